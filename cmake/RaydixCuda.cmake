@@ -1,0 +1,20 @@
+# CUDA is found or left out by itself. RAYDIX_HAVE_CUDA says which.
+set(RAYDIX_HAVE_CUDA OFF)
+if(NOT RAYDIX_CUDA STREQUAL "OFF")
+    include(CheckLanguage)
+    check_language(CUDA)
+    if(CMAKE_CUDA_COMPILER)
+        if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
+            set(CMAKE_CUDA_ARCHITECTURES 90)
+        endif()
+        enable_language(CUDA)
+        set(CMAKE_CUDA_STANDARD 20)
+        # The host's bits: no contraction, no flushed denormals, rounded division and square root.
+        add_library(raydix_cuda_options INTERFACE)
+        target_compile_options(raydix_cuda_options INTERFACE $<$<COMPILE_LANGUAGE:CUDA>:
+            -fmad=false -ftz=false -prec-div=true -prec-sqrt=true -Xcompiler=-ffp-contract=off --expt-relaxed-constexpr>)
+        set(RAYDIX_HAVE_CUDA ON)
+    elseif(RAYDIX_CUDA STREQUAL "ON")
+        message(FATAL_ERROR "RAYDIX_CUDA=ON, but no CUDA compiler was found")
+    endif()
+endif()

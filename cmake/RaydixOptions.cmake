@@ -1,0 +1,19 @@
+# What every target of this project is compiled with.
+# - No contraction: keys, boxes and hits must have the same bits on every path (docs/architecture.md).
+# - x86-64-v2 is the oldest processor that the library promises to run on.
+add_library(raydix_options INTERFACE)
+target_compile_features(raydix_options INTERFACE cxx_std_20)
+target_compile_options(raydix_options INTERFACE
+    $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror
+                              -ffp-contract=off -fno-math-errno -fno-trapping-math>)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    target_compile_options(raydix_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-march=x86-64-v2>)
+endif()
+if(RAYDIX_SANITIZE)
+    target_compile_options(raydix_options INTERFACE
+        $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=${RAYDIX_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all>)
+    target_link_options(raydix_options INTERFACE -fsanitize=${RAYDIX_SANITIZE})
+    target_compile_definitions(raydix_options INTERFACE RAYDIX_CHECKS=1 RAYDIX_SANITIZED=1)
+elseif(CMAKE_BUILD_TYPE STREQUAL "Debug")
+    target_compile_definitions(raydix_options INTERFACE RAYDIX_CHECKS=1)
+endif()

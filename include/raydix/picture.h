@@ -1,0 +1,49 @@
+// Pictures: rendered views, and files to keep them in.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/camera.h>
+#include <raydix/types.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string_view>
+#include <vector>
+
+namespace raydix {
+
+/// Linear RGB, rows from the top. pixels [height * width].
+struct Picture {
+    std::uint32_t width = 0, height = 0;
+    std::vector<Vec3> pixels;
+};
+
+enum class View : std::uint32_t { shaded, normal, depth, primitive, ao, diffuse, steps };
+[[nodiscard]] std::string_view view_name(View view);
+/// Throws InputError that lists the known names.
+[[nodiscard]] View view_from_name(std::string_view name);
+
+struct RenderOptions {
+    View view = View::shaded;
+    std::uint32_t width = 1024, height = 768;  // each 1..16384
+    int samples = 0;         // rays per pixel for ao and diffuse; 0: 64
+    float ao_radius = 0.0f;  // 0: 5 % of the box diagonal
+    std::uint64_t seed = 1;
+    int threads = 0;
+    std::function<void(double)> progress;  // called with the part done, 0..1, from one thread at a time
+};
+
+/// `shaded`: sun with shadow and sky over grey; `normal`: (n + 1) / 2 of the geometric normal turned to the viewer;
+/// `depth`: near white to far black; `primitive`: one colour per triangle; `ao`: open part of the sky within the
+/// radius; `diffuse`: one bounce; `steps`: node visits as a heat map. Deterministic for every thread count.
+[[nodiscard]] Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& options = {});
+
+/// Writes .png (8 bit sRGB, clamped after a filmic curve if `tone_map`) or .exr (linear float), by extension.
+/// Throws InputError that names the file.
+void save_picture(const std::filesystem::path& file, const Picture& picture, bool tone_map);
+
+/// Reads an 8-bit RGB .png back as linear values.
+[[nodiscard]] Picture load_picture(const std::filesystem::path& file);
+
+}  // namespace raydix

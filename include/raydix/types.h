@@ -1,0 +1,49 @@
+// The plain structs that every other header speaks in: points, boxes, rays, hits.
+// They hold float32 data only and may be copied byte for byte.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+
+namespace raydix {
+
+struct Vec3 {
+    float x, y, z;
+};
+
+/// Axis-aligned box, closed on all sides. `lo > hi` on any axis means "empty".
+struct Aabb {
+    Vec3 lo, hi;
+};
+
+/// Three vertex indices.
+using Triangle = std::array<std::uint32_t, 3>;
+
+inline constexpr float infinity = std::numeric_limits<float>::infinity();
+
+/// Stands in `Hit::prim` for "nothing was hit".
+inline constexpr std::uint32_t no_primitive = 0xFFFFFFFFu;
+
+/// Origin + t * direction for t in [tmin, tmax]. The direction need not be unit; t is in its units.
+/// A negative tmin counts as 0. Rays with tmin > tmax, a zero or non-finite direction, a non-finite
+/// origin or a NaN limit are invalid: they miss, and are counted.
+struct Ray {
+    Vec3 origin;
+    float tmin = 0.0f;
+    Vec3 direction;
+    float tmax = infinity;
+};
+static_assert(sizeof(Ray) == 32);
+
+/// The point hit is (1-u-v)*v0 + u*v1 + v*v2 of triangle `prim`, at `t` along the ray.
+struct Hit {
+    float t = infinity;
+    std::uint32_t prim = no_primitive;
+    float u = 0.0f, v = 0.0f;
+
+    [[nodiscard]] bool hit() const { return prim != no_primitive; }
+};
+static_assert(sizeof(Hit) == 16);
+
+}  // namespace raydix

@@ -1,0 +1,46 @@
+// The loops of parallel.h on oneTBB. Every range runs in a plain floating-point environment.
+#include "exec/parallel.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "base/float_env.h"
+
+namespace raydix {
+
+void with_threads(int threads, const std::function<void()>& body) {
+    const FloatEnvironment plain;
+    if (threads <= 0) {
+        body();
+        return;
+    }
+    // More threads than cores are allowed: results must not depend on the number, and tests show it.
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<std::size_t>(std::max(threads, tbb::info::default_concurrency())));
+    tbb::task_arena arena(threads);
+    arena.execute(body);
+}
+
+int thread_count() { return tbb::this_task_arena::max_concurrency(); }
+
+namespace detail {
+
+void parallel_ranges(std::size_t n, std::size_t grain, void (*call)(const void*, std::size_t, std::size_t),
+                     const void* body) {
+    if (n == 0) return;
+    if (n <= grain || thread_count() == 1) {
+        const FloatEnvironment plain;
+        call(body, 0, n);
+        return;
+    }
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, grain), [&](const tbb::blocked_range<std::size_t>& range) {
+        const FloatEnvironment plain;
+        call(body, range.begin(), range.end());
+    });
+}
+
+}  // namespace detail
+}  // namespace raydix

@@ -1,0 +1,41 @@
+#include "support/support.h"
+
+#include <unistd.h>
+
+#include <atomic>
+
+namespace raydix::test {
+
+std::filesystem::path shared_scene(const std::string& name) {
+    return std::filesystem::path(RAYDIX_SHARED_SCENES) / name;
+}
+
+TempFolder::TempFolder() {
+    static std::atomic<int> count{0};
+    path_ = std::filesystem::temp_directory_path() /
+            ("raydix-test-" + std::to_string(getpid()) + "-" + std::to_string(count++));
+    std::filesystem::create_directories(path_);
+}
+
+TempFolder::~TempFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+}
+
+Mesh random_soup(std::size_t count, std::uint64_t seed, float size) {
+    std::mt19937_64 random(seed);
+    const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+    Mesh mesh;
+    mesh.name = "soup";
+    for (std::size_t i = 0; i < count; ++i) {
+        const Vec3 base{unit(), unit(), unit()};
+        for (int k = 0; k < 3; ++k)
+            mesh.vertices.push_back({base.x + size * (unit() - 0.5f), base.y + size * (unit() - 0.5f),
+                                     base.z + size * (unit() - 0.5f)});
+        const auto first = static_cast<std::uint32_t>(3 * i);
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    return mesh;
+}
+
+}  // namespace raydix::test

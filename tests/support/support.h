@@ -1,0 +1,44 @@
+// What several test programs need: shared scenes, seeded random numbers, files in a folder of the test's own.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <raydix/mesh.h>
+
+namespace raydix::test {
+
+/// A file below the shared scenes folder; `skip_without` skips the test if it is not there.
+std::filesystem::path shared_scene(const std::string& name);
+
+#define RAYDIX_SKIP_WITHOUT(path) \
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << "shared scene not present: " << (path).string()
+
+/// A new, empty folder for one test; removed with the object.
+class TempFolder {
+public:
+    TempFolder();
+    ~TempFolder();
+    TempFolder(const TempFolder&) = delete;
+    TempFolder& operator=(const TempFolder&) = delete;
+    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+private:
+    std::filesystem::path path_;
+};
+
+/// Fewer rays under the sanitizers, which slow everything down by an order of magnitude.
+#ifdef RAYDIX_SANITIZED
+inline constexpr std::size_t thorough = 1;
+#else
+inline constexpr std::size_t thorough = 20;
+#endif
+
+/// `count` small triangles at random places in the unit cube.
+Mesh random_soup(std::size_t count, std::uint64_t seed, float size = 0.05f);
+
+}  // namespace raydix::test
