@@ -48,6 +48,14 @@ namespace raydix {
             static_cast<float>(std::sqrt(1.0 - radial))};
 }
 
+/// Unit direction with equal density over the whole sphere, from a point of the unit square.
+[[nodiscard]] inline Vec3 sphere_direction(double height, double angular) {
+    const double z = 1.0 - 2.0 * height, radius = std::sqrt(1.0 - z * z);
+    const double angle = 2.0 * std::numbers::pi * angular;
+    return {static_cast<float>(radius * std::cos(angle)), static_cast<float>(radius * std::sin(angle)),
+            static_cast<float>(z)};
+}
+
 /// Cosine-weighted directions from the Halton points (bases 2 and 3) of indices [first, first +
 /// count).
 [[nodiscard]] inline std::vector<Vec3> halton_directions(std::uint32_t first, std::uint32_t count) {
