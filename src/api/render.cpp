@@ -43,9 +43,7 @@ void check_options(const RenderOptions& options) {
 
 RenderScene make_scene(const Bvh& bvh, const Camera& camera, const RenderOptions& options) {
     const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
-    const int asked = options.samples > 0            ? options.samples
-                      : options.view == View::shaded ? 16
-                                                     : 64;
+    const int asked = options.samples > 0 ? options.samples : options.view == View::ao ? 64 : 32;
     const std::uint32_t samples =
         gathers_light(options.view) ? static_cast<std::uint32_t>(asked) : 0;
     const std::uint32_t per_pixel = samples >= 4 ? 4 : 1;
@@ -54,7 +52,7 @@ RenderScene make_scene(const Bvh& bvh, const Camera& camera, const RenderOptions
             options,
             frame,
             PrimitiveLookup(bvh),
-            make_lights(frame, camera.up),
+            make_lights(bvh, frame, camera.up),
             step_back_distance(box),
             bvh.empty() ? 1.0f : ao_radius_or_default(bvh, options.ao_radius),
             per_pixel,

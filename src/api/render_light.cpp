@@ -1,30 +1,41 @@
 // Every surface is the same grey; what differs between the views is where the light comes from.
 #include "api/render_light.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/double3.h"
 #include "base/math.h"
+#include "rays/sampling.h"
 
 namespace raydix {
 namespace {
 
 constexpr Vec3 surface_grey{0.72f, 0.70f, 0.67f};
 constexpr Vec3 sun_light{0.95f, 0.88f, 0.76f};
-constexpr Vec3 lamp_light{0.22f, 0.22f, 0.21f};
-constexpr Vec3 zenith_light{0.22f, 0.34f, 0.56f};
+/// Lamp in the open, where it only softens shadows, and in a closed room, where it is the only
+/// light.
+constexpr Vec3 lamp_outside{0.15f, 0.15f, 0.14f};
+constexpr Vec3 lamp_inside{0.58f, 0.56f, 0.52f};
+constexpr Vec3 zenith_light{0.26f, 0.37f, 0.55f};
 constexpr Vec3 horizon_light{0.58f, 0.63f, 0.69f};
 /// Stands for all that further bounces would add to a surface, so that closed rooms do not go dark.
-constexpr Vec3 later_light{0.16f, 0.16f, 0.16f};
+constexpr Vec3 later_light{0.20f, 0.20f, 0.20f};
+/// The even light of a closed room, from below and from above.
+constexpr Vec3 room_below{0.20f, 0.19f, 0.18f};
+constexpr Vec3 room_above{0.42f, 0.43f, 0.45f};
 constexpr Vec3 ground_light{0.27f, 0.26f, 0.25f};
 
 Vec3 tinted(Vec3 a, Vec3 b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 Vec3 between(Vec3 a, Vec3 b, float part) { return a + part * (b - a); }
 
-/// Sky and ground as a matt surface with this normal sees them, without anything in between.
+/// Sky and ground as a matt surface with this normal sees them, without anything in between;
+/// indoors an even light.
 Vec3 ambient_light(const Lights& lights, Vec3 normal) {
     const Vec3 sky = 0.5f * (zenith_light + horizon_light);
-    return between(ground_light, sky, 0.5f + 0.5f * dot(normal, lights.up));
+    const float upward = 0.5f + 0.5f * dot(normal, lights.up);
+    const Vec3 outside = between(ground_light, sky, upward);
+    return between(outside, between(room_below, room_above, upward), lights.enclosed);
 }
 
 /// A ray that any-hit tracing answers with "no hit" at once: its interval is empty.
@@ -45,6 +56,7 @@ std::vector<Vec3> direct_light(const RenderScene& scene, std::span<const Surface
     std::vector<std::uint8_t> occluded(rays.size());
     trace_any(scene.bvh, rays, occluded);
 
+    const Vec3 lamp_light = between(lamp_outside, lamp_inside, lights.enclosed);
     std::vector<Vec3> light(points.size());
     for_each_index(points.size(), [&](std::size_t i) {
         const Double3 normal(points[i].normal);
@@ -129,9 +141,24 @@ std::vector<Vec3> fill_samples(const RenderScene& scene, const PrimarySamples& p
     return colours;
 }
 
+/// Looks around from `place` along fixed directions.
+float enclosed_part(const Bvh& bvh, Vec3 place) {
+    constexpr std::uint32_t looks = 512;
+    std::vector<Ray> rays(looks);
+    for (std::uint32_t k = 0; k < looks; ++k) {
+        const Vec3 direction =
+            sphere_direction(radical_inverse(2, k + 1), radical_inverse(3, k + 1));
+        rays[k] = {place, 0.0f, direction, infinity};
+    }
+    std::vector<std::uint8_t> occluded(looks);
+    trace_any(bvh, rays, occluded);
+    return static_cast<float>(std::count(occluded.begin(), occluded.end(), std::uint8_t{1})) /
+           looks;
+}
+
 }  // namespace
 
-Lights make_lights(const CameraFrame& frame, Vec3 camera_up) {
+Lights make_lights(const Bvh& bvh, const CameraFrame& frame, Vec3 camera_up) {
     const float component[3] = {camera_up.x, camera_up.y, camera_up.z};
     int axis = 0;
     for (int k = 1; k < 3; ++k)
@@ -145,7 +172,8 @@ Lights make_lights(const CameraFrame& frame, Vec3 camera_up) {
     const Double3 left = normalized(up * dot(frame.right, up) - frame.right);
     const Double3 backward = cross(up, left);
     const Double3 sun = up * 0.75 + left * 0.62 + backward * 0.38;
-    return {up.rounded(), normalized(sun).rounded(), frame.position};
+    return {up.rounded(), normalized(sun).rounded(), frame.position,
+            enclosed_part(bvh, frame.position)};
 }
 
 Vec3 sky_colour(const Lights& lights, Vec3 direction) {

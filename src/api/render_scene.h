@@ -17,8 +17,8 @@ namespace raydix {
 
 /// Sun and sky light open scenes; a lamp at the camera takes over where walls shut them out.
 struct Lights {
-    Vec3 up;   // the axis of the scene that the camera's `up` leans on most
-    Vec3 sun;  // unit, toward the sun
+    Vec3 up;         // the axis of the scene that the camera's `up` leans on most
+    Vec3 sun;        // unit, toward the sun
     Vec3 lamp;       // position
     float enclosed;  // part of all directions from the camera that hit something
 };

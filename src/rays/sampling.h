@@ -52,8 +52,8 @@ namespace raydix {
 [[nodiscard]] inline Vec3 sphere_direction(double height, double angular) {
     const double z = 1.0 - 2.0 * height, radius = std::sqrt(1.0 - z * z);
     const double angle = 2.0 * std::numbers::pi * angular;
-    return {static_cast<float>(radius * std::cos(angle)), static_cast<float>(radius * std::sin(angle)),
-            static_cast<float>(z)};
+    return {static_cast<float>(radius * std::cos(angle)),
+            static_cast<float>(radius * std::sin(angle)), static_cast<float>(z)};
 }
 
 /// Cosine-weighted directions from the Halton points (bases 2 and 3) of indices [first, first +
