@@ -47,6 +47,7 @@ public:
     [[nodiscard]] const T* data() const { return data_; }
     [[nodiscard]] std::size_t size() const { return size_; }
     [[nodiscard]] bool empty() const { return size_ == 0; }
+    [[nodiscard]] std::size_t capacity_bytes() const { return capacity_ * sizeof(T); }
     [[nodiscard]] std::span<T> span() { return {data_, size_}; }
     [[nodiscard]] std::span<const T> view() const { return {data_, size_}; }
     [[nodiscard]] T& operator[](std::size_t i) { return data_[i]; }

@@ -132,6 +132,7 @@ public:
 
     /// As build_bvh, into `tree`.
     void build(const MeshView& mesh, const BuildOptions& options, Bvh& tree);
+    void build(std::span<const Aabb> boxes, const BuildOptions& options, Bvh& tree);
 
 private:
     struct Scratch;
