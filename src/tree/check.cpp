@@ -6,6 +6,7 @@
 #include <cstring>
 #include <vector>
 
+#include "exec/parallel.h"
 #include "tree/validate.h"
 
 namespace raydix {
@@ -84,10 +85,16 @@ Fault compare(const Bvh& a, const Bvh& b) {
 
 }  // namespace
 
-CheckReport check(const Bvh& bvh) { return report(bvh, validate(bvh)); }
+CheckReport check(const Bvh& bvh) {
+    Fault fault;
+    with_threads(0, [&] { fault = validate(bvh); });
+    return report(bvh, std::move(fault));
+}
 
 CheckReport check(const Bvh& bvh, const MeshView& mesh) {
-    return report(bvh, validate(bvh, &mesh));
+    Fault fault;
+    with_threads(0, [&] { fault = validate(bvh, &mesh); });
+    return report(bvh, std::move(fault));
 }
 
 CheckReport check_same(const Bvh& a, const Bvh& b) { return report(a, compare(a, b)); }

@@ -17,17 +17,6 @@
 namespace raydix {
 namespace {
 
-/// Node -> the first position of the primitive order below it.
-std::vector<std::uint32_t> first_positions(const Bvh& bvh) {
-    std::vector<std::uint32_t> begin(bvh.nodes().size());
-    std::uint32_t position = 0;
-    walk_preorder(bvh.nodes(), bvh.max_depth(), [&](std::uint32_t node_index) {
-        begin[node_index] = position;
-        position += bvh.nodes()[node_index].count;
-    });
-    return begin;
-}
-
 struct Visit {
     std::uint32_t node_index;
     bool at_home;  // the triangle lies below this node: its own surface does not count here

@@ -12,7 +12,7 @@
 namespace raydix {
 namespace {
 
-constexpr std::uint64_t max_primitives = std::uint64_t{1} << 31;
+constexpr std::uint64_t primitive_limit = std::uint64_t{1} << 31;
 constexpr std::uint32_t padding_slot = 1;
 
 Fault validate_options(const BuildOptions& options) {
@@ -181,7 +181,7 @@ Fault validate_counts(const Bvh& bvh) {
     if (Fault fault = validate_options(bvh.options())) return fault;
     if (Fault fault = validate_kind(bvh)) return fault;
     const std::uint64_t n = bvh.order().size();
-    if (bvh.input_count() >= max_primitives)
+    if (bvh.input_count() >= primitive_limit)
         return fmt::format("info: {} primitives, more than a tree can hold", bvh.input_count());
     if (bvh.left_out() > bvh.input_count() || bvh.input_count() - bvh.left_out() != n)
         return fmt::format("info: {} primitives, {} left out, but {} references", bvh.input_count(),
@@ -234,6 +234,7 @@ Fault validate(const Bvh& bvh, const MeshView* mesh) {
     if (Fault fault = validate_order(bvh)) return fault;
     if (Fault fault = validate_primitives(bvh)) return fault;
     if (Fault fault = validate_boxes(bvh)) return fault;
+    if (Fault fault = validate_codes(bvh)) return fault;
     return mesh ? validate_against_mesh(bvh, *mesh) : Fault{};
 }
 

@@ -26,6 +26,10 @@ using Fault = std::optional<std::string>;
 [[nodiscard]] Fault validate_order(const Bvh& bvh);
 [[nodiscard]] Fault validate_primitives(const Bvh& bvh);
 [[nodiscard]] Fault validate_boxes(const Bvh& bvh);
+[[nodiscard]] Fault validate_codes(const Bvh& bvh);
 [[nodiscard]] Fault validate_against_mesh(const Bvh& bvh, const MeshView& mesh);
+
+/// The box of the primitive at a position of the order.
+[[nodiscard]] Aabb primitive_box(const Bvh& bvh, std::size_t position);
 
 }  // namespace raydix

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <bit>
+#include <vector>
 
 #include "base/math.h"
 #include "exec/search.h"
@@ -25,30 +26,20 @@ std::string text_of(const Aabb& b) { return text_of(b.lo) + " to " + text_of(b.h
 /// Finite, within the range of contract.md 1, and without -0.
 bool is_clean(Vec3 p) { return in_range(p) && same_bits(p, without_negative_zero(p)); }
 
-/// The box of the primitive at a position of the order.
-Aabb primitive_box(const Bvh& bvh, std::size_t position) {
-    switch (bvh.kind()) {
-        case PrimitiveKind::triangles: {
-            const LeafTriangle& t = bvh.triangles()[position];
-            return box_of(t.v0, t.v1, t.v2);
-        }
-        case PrimitiveKind::boxes:
-            return bvh.boxes()[position];
-        case PrimitiveKind::points:
-            break;
-    }
-    return {bvh.points()[position], bvh.points()[position]};
+bool is_usable_triangle(Vec3 a, Vec3 b, Vec3 c) {
+    return in_range(a) && in_range(b) && in_range(c) && diagonal_in_range(box_of(a, b, c));
 }
 
 bool is_clean_primitive(const Bvh& bvh, std::size_t position) {
     switch (bvh.kind()) {
         case PrimitiveKind::triangles: {
             const LeafTriangle& t = bvh.triangles()[position];
-            return is_clean(t.v0) && is_clean(t.v1) && is_clean(t.v2);
+            return is_clean(t.v0) && is_clean(t.v1) && is_clean(t.v2) &&
+                   is_usable_triangle(t.v0, t.v1, t.v2);
         }
         case PrimitiveKind::boxes: {
             const Aabb& b = bvh.boxes()[position];
-            return is_clean(b.lo) && is_clean(b.hi) && !is_empty(b);
+            return is_clean(b.lo) && is_clean(b.hi) && !is_empty(b) && diagonal_in_range(b);
         }
         case PrimitiveKind::points:
             break;
@@ -85,7 +76,33 @@ bool matches_mesh(const Bvh& bvh, const MeshView& mesh, std::size_t position) {
            same_bits(t.v2, vertex(corners[2]));
 }
 
+/// The lowest primitive that the tree leaves out for no reason, or the number of primitives.
+std::size_t first_missing(const Bvh& bvh, const MeshView& mesh) {
+    std::vector<bool> held(bvh.input_count());
+    for (const std::uint32_t primitive_id : bvh.order()) held[primitive_id] = true;
+    return first_index_where(held.size(), [&](std::size_t i) {
+        if (held[i]) return false;
+        if (bvh.kind() == PrimitiveKind::points) return in_range(mesh.vertices[i]);
+        const Triangle& t = mesh.triangles[i];
+        return is_usable_triangle(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
+    });
+}
+
 }  // namespace
+
+Aabb primitive_box(const Bvh& bvh, std::size_t position) {
+    switch (bvh.kind()) {
+        case PrimitiveKind::triangles: {
+            const LeafTriangle& t = bvh.triangles()[position];
+            return box_of(t.v0, t.v1, t.v2);
+        }
+        case PrimitiveKind::boxes:
+            return bvh.boxes()[position];
+        case PrimitiveKind::points:
+            break;
+    }
+    return {bvh.points()[position], bvh.points()[position]};
+}
 
 Fault validate_primitives(const Bvh& bvh) {
     const std::size_t n = bvh.order().size();
@@ -93,9 +110,9 @@ Fault validate_primitives(const Bvh& bvh) {
         first_index_where(n, [&](std::size_t i) { return !is_clean_primitive(bvh, i); });
     if (bad == n) return {};
     return fmt::format(
-        "primitives: the one at position {} has a coordinate that is not finite, beyond {} "
-        "or -0, or lo > hi: {}",
-        bad, max_coordinate, text_of(primitive_box(bvh, bad)));
+        "primitives: the one at position {} belongs in no tree (not finite, out of range, -0 or "
+        "inverted): {}",
+        bad, text_of(primitive_box(bvh, bad)));
 }
 
 Fault validate_boxes(const Bvh& bvh) {
@@ -135,9 +152,14 @@ Fault validate_against_mesh(const Bvh& bvh, const MeshView& mesh) {
     const std::size_t n = bvh.order().size();
     const std::size_t bad =
         first_index_where(n, [&](std::size_t i) { return !matches_mesh(bvh, mesh, i); });
-    if (bad == n) return {};
-    return fmt::format("primitives: the one at position {} is not what the mesh holds as number {}",
-                       bad, bvh.order()[bad]);
+    if (bad != n)
+        return fmt::format(
+            "primitives: the one at position {} is not what the mesh holds as number {}", bad,
+            bvh.order()[bad]);
+    if (bvh.left_out() == 0) return {};
+    const std::size_t missing = first_missing(bvh, mesh);
+    if (missing == bvh.input_count()) return {};
+    return fmt::format("order: primitive {} is left out, though nothing is wrong with it", missing);
 }
 
 }  // namespace raydix

@@ -29,4 +29,15 @@ void walk_preorder(std::span<const BvhNode> nodes, std::uint32_t max_depth, cons
     }
 }
 
+/// Node -> the first position of the primitive order below it.
+inline std::vector<std::uint32_t> first_positions(const Bvh& bvh) {
+    std::vector<std::uint32_t> begin(bvh.nodes().size());
+    std::uint32_t position = 0;
+    walk_preorder(bvh.nodes(), bvh.max_depth(), [&](std::uint32_t node_index) {
+        begin[node_index] = position;
+        position += bvh.nodes()[node_index].count;
+    });
+    return begin;
+}
+
 }  // namespace raydix

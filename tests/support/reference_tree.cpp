@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "base/math.h"
@@ -38,8 +39,9 @@ struct Builder {
     std::uint32_t inner_count = 0;
     std::uint32_t max_depth = 0;
 
-    /// The first position of the right half of [begin, end): where the highest bit that differs between
-    /// the first and the last key turns to 1. Equal codes are told apart by their positions.
+    /// The first position of the right half of [begin, end): where the highest bit that differs
+    /// between the first and the last key turns to 1. Equal codes are told apart by their
+    /// positions.
     std::size_t split(std::size_t begin, std::size_t end) const {
         const bool equal = items[begin].code == items[end - 1].code;
         const auto key = [&](std::size_t i) { return equal ? std::uint64_t{i} : items[i].code; };
@@ -113,7 +115,9 @@ std::uint64_t reference_code(const Aabb& box, const Aabb& scene, int bits) {
     const Vec3 c = center_of(box), edges = scene.hi - scene.lo;
     const float longest = std::max({edges.x, edges.y, edges.z});
     if (longest == 0) return 0;
-    const float scale = std::ldexp(1.0f, bits_per_axis) / longest;
+    // The quotient of a scene thinner than 1e-32 is beyond float: the largest one stands in for it.
+    const float scale =
+        std::min(std::ldexp(1.0f, bits_per_axis) / longest, std::numeric_limits<float>::max());
     const std::array<std::uint64_t, 3> cells{cell_of(c.x, scene.lo.x, scale, bits_per_axis),
                                              cell_of(c.y, scene.lo.y, scale, bits_per_axis),
                                              cell_of(c.z, scene.lo.z, scale, bits_per_axis)};

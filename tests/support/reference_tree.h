@@ -1,5 +1,5 @@
-// The Karras tree straight from its definition: recursive, serial, slow and short. What the parallel
-// builders make is compared with it.
+// The Karras tree straight from its definition: recursive, serial, slow and short. What the
+// parallel builders make is compared with it.
 #pragma once
 
 #include <raydix/bvh.h>
