@@ -161,7 +161,7 @@ struct TreeStats {
 };
 
 struct StatsOptions {
-    SahConstants sah;
+    SahConstants sah{};
     bool with_epo = false;
     double epo_sample = 1.0;  // part of the triangles that EPO sums over, evenly spread, in (0, 1]
     bool with_hash = true;

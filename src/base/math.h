@@ -3,6 +3,8 @@
 
 #include <raydix/types.h>
 
+#include <cmath>
+
 #include "base/hd.h"
 
 namespace raydix {
@@ -58,6 +60,14 @@ RAYDIX_HD inline Vec3 without_negative_zero(Vec3 p) { return {p.x + 0.0f, p.y + 
 RAYDIX_HD inline bool in_range(Vec3 p) {
     const auto ok = [](float x) { return x >= -max_coordinate && x <= max_coordinate; };
     return ok(p.x) && ok(p.y) && ok(p.z);
+}
+
+/// contract.md 1: the diagonal is 0 or at least 1e-12.
+RAYDIX_HD inline bool diagonal_in_range(const Aabb& box) {
+    const Vec3 d = box.hi - box.lo;
+    const float longest = max_of(max_of(d.x, d.y), d.z);
+    if (longest >= min_diagonal || longest == 0.0f) return true;
+    return std::sqrt(double(d.x) * d.x + double(d.y) * d.y + double(d.z) * d.z) >= double(min_diagonal);
 }
 
 /// Half the surface area in double: xy + yz + zx.

@@ -4,22 +4,12 @@
 
 #include <raydix/types.h>
 
-#include <cmath>
 #include <cstdint>
 
 #include "base/hd.h"
 #include "base/math.h"
 
 namespace raydix {
-
-/// contract.md 1: the diagonal is 0 or at least 1e-12.
-RAYDIX_HD inline bool diagonal_in_range(const Aabb& box) {
-    const Vec3 d = box.hi - box.lo;
-    const float longest = max_of(max_of(d.x, d.y), d.z);
-    if (longest >= min_diagonal || longest == 0.0f) return true;
-    return std::sqrt(double(d.x) * d.x + double(d.y) * d.y + double(d.z) * d.z) >=
-           double(min_diagonal);
-}
 
 struct TriangleSource {
     const Vec3* vertices;
