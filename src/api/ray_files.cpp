@@ -16,7 +16,8 @@ static_assert(sizeof(Ray) == ray_columns * sizeof(float));
 std::vector<Ray> load_rays(const std::filesystem::path& file) {
     const std::vector<float> values = load_npy(file, ray_columns);
     std::vector<Ray> rays(values.size() / ray_columns);
-    if (!rays.empty()) std::memcpy(rays.data(), values.data(), rays.size() * sizeof(Ray));
+    if (!rays.empty())
+        std::memcpy(static_cast<void*>(rays.data()), values.data(), rays.size() * sizeof(Ray));
     return rays;
 }
 

@@ -17,14 +17,14 @@ constexpr Vec3 sun_light{0.95f, 0.88f, 0.76f};
 /// light.
 constexpr Vec3 lamp_outside{0.15f, 0.15f, 0.14f};
 constexpr Vec3 lamp_inside{0.58f, 0.56f, 0.52f};
-constexpr Vec3 zenith_light{0.26f, 0.37f, 0.55f};
-constexpr Vec3 horizon_light{0.58f, 0.63f, 0.69f};
+constexpr Vec3 zenith_light{0.19f, 0.28f, 0.43f};
+constexpr Vec3 horizon_light{0.48f, 0.53f, 0.59f};
 /// Stands for all that further bounces would add to a surface, so that closed rooms do not go dark.
 constexpr Vec3 later_light{0.20f, 0.20f, 0.20f};
 /// The even light of a closed room, from below and from above.
 constexpr Vec3 room_below{0.20f, 0.19f, 0.18f};
 constexpr Vec3 room_above{0.42f, 0.43f, 0.45f};
-constexpr Vec3 ground_light{0.27f, 0.26f, 0.25f};
+constexpr Vec3 ground_light{0.20f, 0.19f, 0.18f};
 
 Vec3 tinted(Vec3 a, Vec3 b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 Vec3 between(Vec3 a, Vec3 b, float part) { return a + part * (b - a); }

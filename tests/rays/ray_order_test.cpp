@@ -66,7 +66,8 @@ std::vector<float> identities(const std::vector<Ray>& rays) {
 }
 
 TEST(EndPointBox, HoldsBothEndsWhereTheyAreFinite) {
-    const std::vector<Ray> rays{{{0, 0, 0}, 0.0f, {1, 2, 0}, 3.0f}, {{-1, 0, 5}, 0.0f, {0, 0, 1}, infinity}};
+    const std::vector<Ray> rays{{{0, 0, 0}, 0.0f, {1, 2, 0}, 3.0f},
+                                {{-1, 0, 5}, 0.0f, {0, 0, 1}, infinity}};
     const Aabb box = end_point_box(rays);
     EXPECT_EQ(box.lo.x, -1.0f);
     EXPECT_EQ(box.hi.x, 3.0f);
@@ -76,13 +77,20 @@ TEST(EndPointBox, HoldsBothEndsWhereTheyAreFinite) {
 
 TEST(RayKey, BitsByHand) {
     const Aabb box{{0, 0, 0}, {1, 1, 1}};
-    // Origin x in the upper half: the first bit. Direction +z: all its bits, x and y just the middle (bit 20).
+    // Origin x in the upper half: the first bit. Direction +z: all its bits, x and y just the
+    // middle (bit 20).
     const RayKey key = ray_key({{0.5f, 0, 0}, 0.0f, {0, 0, 3}, 1.0f}, box);
-    std::string expected = "100" "000" "000" "000111";
+    std::string expected =
+        "100"
+        "000"
+        "000"
+        "000111";
     for (int level = 19; level >= 0; --level) expected += "000001";
     EXPECT_EQ(text_of(key), expected);
     // The far corner is clamped into the last cell.
-    EXPECT_EQ(text_of(ray_key({{1, 1, 1}, 0.0f, {-1, 0, 0}, 1.0f}, box)).substr(0, 15), "111111111" "111011");
+    EXPECT_EQ(text_of(ray_key({{1, 1, 1}, 0.0f, {-1, 0, 0}, 1.0f}, box)).substr(0, 15),
+              "111111111"
+              "111011");
 }
 
 TEST(RayKey, EqualsItsDefinition) {

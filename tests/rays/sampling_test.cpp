@@ -9,8 +9,10 @@ namespace raydix {
 namespace {
 
 TEST(Halton, FirstValues) {
-    const double base2[] = {0.0, 1 / 2.0, 1 / 4.0, 3 / 4.0, 1 / 8.0, 5 / 8.0, 3 / 8.0, 7 / 8.0, 1 / 16.0};
-    const double base3[] = {0.0, 1 / 3.0, 2 / 3.0, 1 / 9.0, 4 / 9.0, 7 / 9.0, 2 / 9.0, 5 / 9.0, 8 / 9.0};
+    const double base2[] = {0.0,     1 / 2.0, 1 / 4.0, 3 / 4.0, 1 / 8.0,
+                            5 / 8.0, 3 / 8.0, 7 / 8.0, 1 / 16.0};
+    const double base3[] = {0.0,     1 / 3.0, 2 / 3.0, 1 / 9.0, 4 / 9.0,
+                            7 / 9.0, 2 / 9.0, 5 / 9.0, 8 / 9.0};
     for (std::uint32_t i = 0; i < 9; ++i) {
         EXPECT_DOUBLE_EQ(radical_inverse(2, i), base2[i]) << i;
         EXPECT_DOUBLE_EQ(radical_inverse(3, i), base3[i]) << i;

@@ -26,7 +26,8 @@ TEST(ScreenOrder, ThreeByTwoSkipsWhatIsOutside) {
 
 TEST(ScreenOrder, EveryPixelOnceInCodeOrder) {
     const std::pair<std::uint32_t, std::uint32_t> sizes[] = {
-        {1, 1}, {2, 1}, {1, 2}, {7, 5}, {64, 64}, {65, 63}, {1000, 1}, {1, 1000}, {320, 240}, {16384, 2}};
+        {1, 1},   {2, 1},    {1, 2},    {7, 5},     {64, 64},
+        {65, 63}, {1000, 1}, {1, 1000}, {320, 240}, {16384, 2}};
     for (const auto& [width, height] : sizes) {
         SCOPED_TRACE(testing::Message() << width << " x " << height);
         std::vector<std::uint32_t> pixels = pixels_in_morton_order(width, height);
