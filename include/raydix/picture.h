@@ -32,8 +32,8 @@ struct RenderOptions {
     float ao_radius = 0.0f;  // 0: 5 % of the box diagonal
     std::uint64_t seed = 1;
     int threads = 0;
-    std::function<void(double)>
-        progress;  // called with the part done, 0..1, from one thread at a time
+    // Called with the part done, 0..1, from one thread at a time; what it throws ends the render.
+    std::function<void(double)> progress;
 };
 
 /// `shaded`: sun with shadow and sky over grey, a lamp at the camera in closed rooms; `normal`: (n

@@ -13,8 +13,7 @@ namespace {
 
 constexpr Vec3 surface_grey{0.72f, 0.70f, 0.67f};
 constexpr Vec3 sun_light{0.95f, 0.88f, 0.76f};
-/// Lamp in the open, where it only softens shadows, and in a closed room, where it is the only
-/// light.
+/// Lamp in the open, where it only softens shadows, and in a closed room, where it is the light.
 constexpr Vec3 lamp_outside{0.15f, 0.15f, 0.14f};
 constexpr Vec3 lamp_inside{0.58f, 0.56f, 0.52f};
 constexpr Vec3 zenith_light{0.19f, 0.28f, 0.43f};
