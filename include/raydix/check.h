@@ -9,13 +9,15 @@ namespace raydix {
 
 struct CheckReport {
     bool ok = true;
-    std::string broken;   // the first invariant that does not hold, with node and values; empty if ok
+    std::string
+        broken;  // the first invariant that does not hold, with node and values; empty if ok
     std::uint64_t nodes = 0;
     std::uint64_t primitives = 0;
 };
 
-/// Every invariant: slots in range and used once (so no cycle), each primitive in exactly one leaf, leaves within
-/// max_leaf and in order, every box the tight union of what it holds, exact depth, padding zero.
+/// Every invariant: slots in range and used once (so no cycle), each primitive in exactly one leaf,
+/// leaves within max_leaf and in order, every box the tight union of what it holds, exact depth,
+/// padding zero.
 [[nodiscard]] CheckReport check(const Bvh& bvh);
 
 /// The same, and the leaf triangles are bit for bit those of `mesh`, or the leaf points its vertices.

@@ -1,5 +1,5 @@
-// What a builder needs of a primitive: its box, and whether it counts at all. One small struct per kind of input.
-// Boxes hold no -0, so that minima and maxima have one bit pattern.
+// What a builder needs of a primitive: its box, and whether it counts at all. One small struct per
+// kind of input. Boxes hold no -0, so that minima and maxima have one bit pattern.
 #pragma once
 
 #include <raydix/types.h>
