@@ -1,14 +1,12 @@
 // .rdx file -> scene and a tree that views the mapped file.
-#include <raydix/error.h>
 #include <raydix/rdx.h>
-
-#include <fmt/format.h>
 
 #include <system_error>
 
 #include "api/rdx_parse.h"
 #include "exec/mapped_file.h"
 #include "measure/stopwatch.h"
+#include "scene/input_error.h"
 
 namespace raydix {
 
@@ -18,9 +16,9 @@ RdxFile load_rdx(const std::filesystem::path& file) {
     try {
         mapped = map_file(file);
     } catch (const std::system_error& error) {
-        throw InputError(fmt::format("{}: file: {}", file.string(), error.what()));
+        input_error(printable(file), "file", error.what());
     }
-    RdxFile result = rdx::parse(file.string(), mapped.bytes, mapped.owner);
+    RdxFile result = rdx::parse(printable(file), mapped.bytes, mapped.owner);
     result.scene.load_ms = watch.lap();
     return result;
 }

@@ -13,6 +13,7 @@
 #include "api/rdx_faults.h"
 #include "api/rdx_format.h"
 #include "exec/parallel.h"
+#include "scene/input_error.h"
 #include "tree/bvh_access.h"
 
 namespace raydix::rdx {
@@ -38,7 +39,7 @@ public:
 
 private:
     [[noreturn]] void fail(std::string_view section, const std::string& reason) const {
-        throw InputError(fmt::format("{}: {}: {}", file_, section, reason));
+        input_error(file_, section, reason);
     }
 
     void read_header() {

@@ -5,13 +5,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <system_error>
 #include <vector>
 
 #include "api/rdx_faults.h"
 #include "api/rdx_format.h"
+#include "base/replace_file.h"
 #include "exec/parallel.h"
-#include "exec/replaced_file.h"
+#include "scene/input_error.h"
 
 namespace raydix {
 namespace {
@@ -118,15 +118,14 @@ rdx::Header make_header(const Contents& contents) {
 
 void write(const std::filesystem::path& file, const rdx::Header& header, const Contents& contents) {
     constexpr std::array<std::byte, rdx::alignment> zeros{};
-    ReplacedFile out(file);
-    out.write(std::as_bytes(std::span(&header, 1)));
+    std::vector<std::span<const std::byte>> pieces{std::as_bytes(std::span(&header, 1))};
     std::uint64_t position = sizeof(header);
     for (std::size_t id = 0; id < contents.size(); ++id) {
-        out.write(std::span(zeros).first(header.sections[id].offset - position));
-        out.write(contents[id].bytes);
+        pieces.push_back(std::span(zeros).first(header.sections[id].offset - position));
+        pieces.push_back(contents[id].bytes);
         position = header.sections[id].offset + contents[id].bytes.size();
     }
-    out.commit();
+    replace_file(file, pieces);
 }
 
 }  // namespace
@@ -135,14 +134,10 @@ void save_rdx(const std::filesystem::path& file, const Bvh& bvh, const Scene& sc
     if (!rdx::supported) throw BackendUnavailable(std::string(rdx::unsupported_text));
     Fault fault = name_fault(scene);
     if (!fault) fault = rdx::content_fault(bvh, scene.mesh, scene.cameras);
-    if (fault) throw InputError(fmt::format("{}: not written: {}", file.string(), *fault));
-    try {
-        const Packed packed(bvh, scene);
-        const Contents contents = contents_of(packed, bvh, scene.mesh);
-        write(file, make_header(contents), contents);
-    } catch (const std::system_error& error) {
-        throw InputError(fmt::format("{}: file: {}", file.string(), error.what()));
-    }
+    if (fault) input_error(printable(file), "not written", *fault);
+    const Packed packed(bvh, scene);
+    const Contents contents = contents_of(packed, bvh, scene.mesh);
+    write(file, make_header(contents), contents);
 }
 
 }  // namespace raydix
