@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "api/rdx_parse.h"
-#include "support/rdx_seal.h"
+#include "../tests/support/rdx_seal.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace raydix;
