@@ -4,8 +4,10 @@
 #include <raydix/check.h>
 #include <raydix/error.h>
 #include <raydix/rdx.h>
+#include <raydix/trace.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstring>
 #include <fstream>
@@ -111,6 +113,21 @@ TEST_F(Rdx, RoundTripOfTriangles) {
         EXPECT_EQ(loaded.scene.cameras.height, 480u);
         EXPECT_EQ(loaded.scene.cameras.ao_radius, 0.5f);
     }
+}
+
+TEST_F(Rdx, TracesOfALoadedTreeAreTheSame) {
+    const Scene scene = make_scene(3000);
+    const Bvh bvh = build_bvh(scene.mesh);
+    save_rdx(folder_.path() / "a.rdx", bvh, scene);
+    const RdxFile loaded = load_rdx(folder_.path() / "a.rdx");
+    std::mt19937_64 random(41);
+    const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+    std::vector<Ray> rays;
+    for (int i = 0; i < 2000; ++i)
+        rays.push_back({{unit(), unit(), -1}, 0, {unit() - 0.5f, unit() - 0.5f, 1}, infinity});
+    const std::vector<Hit> expected = trace(bvh, rays), hits = trace(loaded.bvh, rays);
+    EXPECT_GT(std::ranges::count_if(expected, &Hit::hit), 100);
+    EXPECT_EQ(std::memcmp(hits.data(), expected.data(), hits.size() * sizeof(Hit)), 0);
 }
 
 TEST_F(Rdx, RoundTripOfPointsAndBoxes) {
