@@ -34,7 +34,7 @@ int write_all(const std::filesystem::path& file,
     int error = 0;
     errno = 0;
     const bool written = std::ranges::all_of(pieces, [&](std::span<const std::byte> bytes) {
-        return std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size();
+        return bytes.empty() || std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size();
     });
     if (!written || std::fflush(out) != 0) error = errno ? errno : EIO;
     if (std::fclose(out) != 0 && error == 0) error = errno ? errno : EIO;
