@@ -5,6 +5,7 @@
 #include <raydix/error.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
@@ -26,12 +27,15 @@ std::filesystem::path unused_name_beside(const std::filesystem::path& file) {
 }
 
 /// 0, or the error number of the step that failed.
-int write_all(const std::filesystem::path& file, std::span<const std::byte> bytes) {
+int write_all(const std::filesystem::path& file,
+              std::span<const std::span<const std::byte>> pieces) {
     std::FILE* out = std::fopen(file.c_str(), "wbx");
     if (!out) return errno;
     int error = 0;
     errno = 0;
-    const bool written = std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size();
+    const bool written = std::ranges::all_of(pieces, [&](std::span<const std::byte> bytes) {
+        return bytes.empty() || std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size();
+    });
     if (!written || std::fflush(out) != 0) error = errno ? errno : EIO;
     if (std::fclose(out) != 0 && error == 0) error = errno ? errno : EIO;
     return error;
@@ -40,8 +44,13 @@ int write_all(const std::filesystem::path& file, std::span<const std::byte> byte
 }  // namespace
 
 void replace_file(const std::filesystem::path& file, std::span<const std::byte> bytes) {
+    replace_file(file, std::span(&bytes, 1));
+}
+
+void replace_file(const std::filesystem::path& file,
+                  std::span<const std::span<const std::byte>> pieces) {
     const std::filesystem::path part = unused_name_beside(file);
-    int error = write_all(part, bytes);
+    int error = write_all(part, pieces);
     if (error == 0 && std::rename(part.c_str(), file.c_str()) != 0) error = errno;
     if (error == 0) return;
     if (error != EEXIST) std::remove(part.c_str());

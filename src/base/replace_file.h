@@ -11,4 +11,8 @@ namespace raydix {
 /// was, nothing is left beside it, and InputError names the file and the system's reason.
 void replace_file(const std::filesystem::path& file, std::span<const std::byte> bytes);
 
+/// The same for bytes that lie in several places.
+void replace_file(const std::filesystem::path& file,
+                  std::span<const std::span<const std::byte>> pieces);
+
 }  // namespace raydix

@@ -16,7 +16,7 @@ constexpr std::uint64_t primitive_limit = std::uint64_t{1} << 31;
 constexpr std::uint32_t padding_slot = 1;
 
 Fault validate_options(const BuildOptions& options) {
-    if (!in_lbvh_family(options.builder))
+    if (builder_name(options.builder) == "unknown")
         return fmt::format("info: builder number {} is unknown",
                            static_cast<std::uint32_t>(options.builder));
     if (options.bits != 30 && options.bits != 63)

@@ -2,6 +2,7 @@
 // threads.
 #include <gtest/gtest.h>
 #include <raydix/check.h>
+#include <raydix/scene.h>
 
 #include <algorithm>
 #include <functional>
@@ -168,6 +169,29 @@ TEST(KarrasReference, LargerSoupIsTheSameForEveryThreadCount) {
     for (const int threads : {1, 2, 7})
         EXPECT_EQ(tree_hash(build_bvh(mesh, {.threads = threads})), expected) << threads;
 }
+
+class KarrasReferenceScene : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(KarrasReferenceScene, IsTheSame) {
+    const auto file = shared_scene(GetParam());
+    RAYDIX_SKIP_WITHOUT(file);
+    const Mesh mesh = load_mesh(file);
+    ASSERT_FALSE(mesh.vertices.empty());
+    for (const int bits : {30, 63}) {
+        const BuildOptions options{.bits = bits};
+        const Bvh built = build_bvh(mesh, options);
+        EXPECT_EQ(check_same(built, reference_tree(MeshView(mesh), options)).broken, "");
+        EXPECT_EQ(check(built, mesh).broken, "");
+        EXPECT_GT(built.order().size(), 1000u);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Shared, KarrasReferenceScene,
+                         ::testing::Values("bunny/bunny.ply.xz", "sibenik/sibenik.ply.xz",
+                                           "conference/conference.ply.xz",
+                                           "kitti_frame/kitti_frame.ply.xz",
+                                           "nasty/pcl_organized_nan_640x480.ply.xz",
+                                           "nasty/isprs_samp12_utm_float32.ply.xz"));
 
 }  // namespace
 }  // namespace raydix::test
