@@ -16,8 +16,10 @@
 #include <ios>
 #include <new>
 #include <system_error>
+#include <type_traits>
 
 #include "scene/input_error.h"
+#include "scene/zstd_frames.h"
 
 namespace raydix {
 namespace {
@@ -77,9 +79,13 @@ struct FilterInput {
     using char_type = char;
     using category = io::source_tag;
     ByteSource::Stream* stream;
+    std::shared_ptr<ZstdFrames> frames =
+        nullptr;  // of zstd only; shared because filters copy their input
 
     std::streamsize read(char* out, std::streamsize n) {
         const std::size_t got = stream->read(out, static_cast<std::size_t>(n));
+        if (frames) frames->feed({out, got});
+        if (frames && got == 0 && !frames->is_whole()) throw std::ios_base::failure("cut off");
         return got == 0 ? -1 : static_cast<std::streamsize>(got);
     }
 };
@@ -88,7 +94,10 @@ template <class Filter>
 class UnpackedStream final : public ByteSource::Stream {
 public:
     UnpackedStream(std::unique_ptr<ByteSource::Stream> packed, Filter filter)
-        : packed_(std::move(packed)), filter_(std::move(filter)), input_{packed_.get()} {}
+        : packed_(std::move(packed)), filter_(std::move(filter)), input_{packed_.get()} {
+        if constexpr (std::is_same_v<Filter, io::zstd_decompressor>)
+            input_.frames = std::make_shared<ZstdFrames>();
+    }
     std::size_t read(char* out, std::size_t n) override {
         const std::streamsize got = io::read(filter_, input_, out, static_cast<std::streamsize>(n));
         return got < 0 ? 0 : static_cast<std::size_t>(got);

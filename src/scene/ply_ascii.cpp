@@ -64,7 +64,10 @@ private:
 
     std::int64_t list_length(Words& words, std::size_t property) {
         std::int64_t length = 0;
-        if (!words.integer(length) || length < 0) fail_word(words, property);
+        if (!words.integer(length)) fail_word(words, property);
+        if (length < 0)
+            in_.fail(fmt::format("{} {}", part_.element->name, number_),
+                     fmt::format("a list of {} items", length));
         return length;
     }
 
