@@ -1,4 +1,5 @@
-// Box centre -> cell of one cubic grid -> Morton code, x highest in each triple (contract.md 2; Karras 2012, section 4).
+// Box centre -> cell of one cubic grid -> Morton code, x highest in each triple (contract.md 2;
+// Karras 2012, section 4).
 #pragma once
 
 #include <raydix/types.h>
@@ -37,8 +38,10 @@ struct Grid {
 
     [[nodiscard]] RAYDIX_HD Cell cell(Vec3 center) const {
         const Vec3 at = (center - lo) * cells_per_unit;
-        // The limit comes before the conversion: what lies beyond the last cell need not fit an integer.
-        return {static_cast<std::uint32_t>(min_of(at.x, last_cell)), static_cast<std::uint32_t>(min_of(at.y, last_cell)),
+        // The limit comes before the conversion: what lies beyond the last cell need not fit an
+        // integer.
+        return {static_cast<std::uint32_t>(min_of(at.x, last_cell)),
+                static_cast<std::uint32_t>(min_of(at.y, last_cell)),
                 static_cast<std::uint32_t>(min_of(at.z, last_cell))};
     }
 };
@@ -51,7 +54,8 @@ inline Grid make_grid(const Aabb& scene, int axis_bits) {
     const auto cells = static_cast<float>(1u << axis_bits);
     Grid grid{scene.lo, 0.0f, cells - 1.0f};
     // A box thinner than 1e-32 would overflow the quotient; any large finite number serves there.
-    if (longest > 0.0f) grid.cells_per_unit = min_of(cells / longest, std::numeric_limits<float>::max());
+    if (longest > 0.0f)
+        grid.cells_per_unit = min_of(cells / longest, std::numeric_limits<float>::max());
     return grid;
 }
 

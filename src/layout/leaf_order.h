@@ -1,4 +1,5 @@
-// Copies primitives into leaf order, so that a leaf is one run of memory. order [n] + primitives -> copies [n].
+// Copies primitives into leaf order, so that a leaf is one run of memory. order [n] + primitives ->
+// copies [n].
 #pragma once
 
 #include <raydix/bvh.h>
@@ -28,9 +29,11 @@ RAYDIX_HD inline Aabb copy_box(const Aabb& box) { return box; }
 RAYDIX_HD inline Aabb copy_box(Vec3 p) { return {p, p}; }
 
 template <class Source, class Copy>
-void copy_to_leaf_order(const Source& source, std::span<const std::uint32_t> order, Buffer<Copy>& copies) {
+void copy_to_leaf_order(const Source& source, std::span<const std::uint32_t> order,
+                        Buffer<Copy>& copies) {
     copies.reset(order.size());
-    for_each_index(order.size(), [&](std::size_t k) { copies[k] = copy_primitive(source, order[k]); });
+    for_each_index(order.size(),
+                   [&](std::size_t k) { copies[k] = copy_primitive(source, order[k]); });
 }
 
 /// Box of the primitives [first, first + count) in leaf order.
@@ -39,7 +42,8 @@ struct LeafBoxOf {
     const Copy* copies;
     RAYDIX_HD Aabb operator()(std::uint32_t first, std::uint32_t count) const {
         Aabb box = copy_box(copies[first]);
-        for (std::uint32_t k = first + 1; k < first + count; ++k) box = unite(box, copy_box(copies[k]));
+        for (std::uint32_t k = first + 1; k < first + count; ++k)
+            box = unite(box, copy_box(copies[k]));
         return box;
     }
 };

@@ -13,7 +13,8 @@ struct Bounds {
     Aabb box = empty_box();
     std::uint64_t left_out = 0;
     std::uint32_t first_left_out = no_primitive;  // the lowest id among them
-    std::uint32_t first_unreadable = no_primitive;  // the lowest id that refers to a vertex that is not there
+    std::uint32_t first_unreadable =
+        no_primitive;  // the lowest id that refers to a vertex that is not there
 
     void merge(const Bounds& other) {
         box = unite(box, other.box);

@@ -1,24 +1,15 @@
-// What a builder needs of a primitive: its box, and whether it counts at all. One small struct per kind of input.
-// Boxes hold no -0, so that minima and maxima have one bit pattern.
+// What a builder needs of a primitive: its box, and whether it counts at all. One small struct per
+// kind of input. Boxes hold no -0, so that minima and maxima have one bit pattern.
 #pragma once
 
 #include <raydix/types.h>
 
-#include <cmath>
 #include <cstdint>
 
 #include "base/hd.h"
 #include "base/math.h"
 
 namespace raydix {
-
-/// contract.md 1: the diagonal is 0 or at least 1e-12.
-RAYDIX_HD inline bool diagonal_in_range(const Aabb& box) {
-    const Vec3 d = box.hi - box.lo;
-    const float longest = max_of(max_of(d.x, d.y), d.z);
-    if (longest >= min_diagonal || longest == 0.0f) return true;
-    return std::sqrt(double(d.x) * d.x + double(d.y) * d.y + double(d.z) * d.z) >= double(min_diagonal);
-}
 
 struct TriangleSource {
     const Vec3* vertices;

@@ -1,4 +1,5 @@
-// The sort of radix_sort.h. Memory: one record per key; a second one only for buckets too large for one core.
+// The sort of radix_sort.h. Memory: one record per key; a second one only for buckets too large for
+// one core.
 #include "sort/radix_sort.h"
 
 #include <algorithm>
@@ -11,9 +12,9 @@
 namespace raydix {
 namespace {
 
-constexpr std::size_t insertion_limit = 24;     // shorter runs: insertion sort beats counting
-constexpr int max_digit_bits = 11;              // 2048 counters, 8 KB: half of a first-level cache is left
-constexpr std::size_t alone_limit = 1u << 18;   // larger buckets are split again by all threads
+constexpr std::size_t insertion_limit = 24;  // shorter runs: insertion sort beats counting
+constexpr int max_digit_bits = 11;  // 2048 counters, 8 KB: half of a first-level cache is left
+constexpr std::size_t alone_limit = 1u << 18;  // larger buckets are split again by all threads
 constexpr std::size_t max_blocks = 64;
 constexpr std::size_t min_block = 1u << 13;
 
@@ -52,7 +53,8 @@ DigitPair choose_digits(std::size_t n, int differing) {
 }
 
 template <class Key>
-void count_digits(const Record<Key>* a, std::size_t n, DigitPair digits, std::uint32_t* low, std::uint32_t* high) {
+void count_digits(const Record<Key>* a, std::size_t n, DigitPair digits, std::uint32_t* low,
+                  std::uint32_t* high) {
     const Key mask = static_cast<Key>(digits.size() - 1);
     std::fill_n(low, digits.size(), 0u);
     std::fill_n(high, digits.size(), 0u);
@@ -72,7 +74,8 @@ void starts_from_counts(std::uint32_t* counts, std::size_t n) {
 }
 
 template <class Key>
-void scatter(const Record<Key>* from, Record<Key>* to, std::size_t n, int shift, Key mask, std::uint32_t* starts) {
+void scatter(const Record<Key>* from, Record<Key>* to, std::size_t n, int shift, Key mask,
+             std::uint32_t* starts) {
     for (std::size_t i = 0; i < n; ++i) to[starts[from[i].key >> shift & mask]++] = from[i];
 }
 
@@ -104,14 +107,17 @@ void sort_alone(Record<Key>* a, Record<Key>* spare, std::size_t n) {
 /// Where the buckets of one distribution start: [buckets + 1].
 using BucketStarts = std::vector<std::size_t>;
 
-/// Stable distribution of n keys by `digit_bits` bits at `shift`, over all threads. `load(i)` gives record i.
+/// Stable distribution of n keys by `digit_bits` bits at `shift`, over all threads. `load(i)` gives
+/// record i.
 template <class Key, class Load>
 BucketStarts distribute(std::size_t n, int shift, int digit_bits, const Load& load, Record<Key>* to,
                         Buffer<std::uint32_t>& histogram) {
     const std::size_t buckets = std::size_t{1} << digit_bits;
     const std::size_t block = std::max(min_block, (n + max_blocks - 1) / max_blocks);
     const std::size_t blocks = (n + block - 1) / block;
-    const auto digit = [shift, mask = static_cast<Key>(buckets - 1)](Key key) { return key >> shift & mask; };
+    const auto digit = [shift, mask = static_cast<Key>(buckets - 1)](Key key) {
+        return key >> shift & mask;
+    };
     histogram.reset(blocks * buckets);
     for_each_block(n, block, [&](std::size_t b, std::size_t begin, std::size_t end) {
         std::uint32_t* counts = histogram.data() + b * buckets;
@@ -140,9 +146,12 @@ BucketStarts distribute(std::size_t n, int shift, int digit_bits, const Load& lo
 }
 
 /// More buckets for more keys, so that one bucket and its spare fit a second-level cache.
-int digit_bits_for(std::size_t n) { return std::clamp(static_cast<int>(std::bit_width(n)) - 9, 6, max_digit_bits); }
+int digit_bits_for(std::size_t n) {
+    return std::clamp(static_cast<int>(std::bit_width(n)) - 9, 6, max_digit_bits);
+}
 
-/// Sorts a bucket that is too large for one thread: splits it at its own highest differing bits, then its buckets.
+/// Sorts a bucket that is too large for one thread: splits it at its own highest differing bits,
+/// then its buckets.
 template <class Key>
 void sort_together(Record<Key>* a, std::size_t n, SortScratch<Key>& scratch) {
     const int differing = differing_bits(a, n);
@@ -150,11 +159,13 @@ void sort_together(Record<Key>* a, std::size_t n, SortScratch<Key>& scratch) {
     const int bits = std::min(digit_bits_for(n), differing);
     if (scratch.spare.size() < n) scratch.spare.reset(n);
     Record<Key>* spare = scratch.spare.data();
-    const BucketStarts starts =
-        distribute<Key>(n, differing - bits, bits, [a](std::size_t i) { return a[i]; }, spare, scratch.histogram);
-    for_each_index(n, [&](std::size_t i) { a[i] = spare[i]; }, 1u << 16);
+    const BucketStarts starts = distribute<Key>(
+        n, differing - bits, bits, [a](std::size_t i) { return a[i]; }, spare, scratch.histogram);
+    for_each_index(
+        n, [&](std::size_t i) { a[i] = spare[i]; }, 1u << 16);
     for (std::size_t b = 0; b + 1 < starts.size(); ++b)
-        if (starts[b + 1] - starts[b] > alone_limit) sort_together(a + starts[b], starts[b + 1] - starts[b], scratch);
+        if (starts[b + 1] - starts[b] > alone_limit)
+            sort_together(a + starts[b], starts[b + 1] - starts[b], scratch);
     for_each_range(starts.size() - 1, 1, [&](std::size_t first, std::size_t last) {
         for (std::size_t b = first; b < last; ++b) {
             const std::size_t size = starts[b + 1] - starts[b];
@@ -166,13 +177,17 @@ void sort_together(Record<Key>* a, std::size_t n, SortScratch<Key>& scratch) {
 }  // namespace
 
 template <class Key>
-void sort_keys(std::span<Key> keys, std::span<std::uint32_t> order, int key_bits, SortScratch<Key>& scratch) {
+void sort_keys(std::span<Key> keys, std::span<std::uint32_t> order, int key_bits,
+               SortScratch<Key>& scratch) {
     const std::size_t n = keys.size();
     scratch.records.reset(n);
     Record<Key>* records = scratch.records.data();
     const int bits = std::min(digit_bits_for(n), key_bits);
-    const auto load = [&](std::size_t i) { return Record<Key>{keys[i], static_cast<std::uint32_t>(i)}; };
-    const BucketStarts starts = distribute<Key>(n, key_bits - bits, bits, load, records, scratch.histogram);
+    const auto load = [&](std::size_t i) {
+        return Record<Key>{keys[i], static_cast<std::uint32_t>(i)};
+    };
+    const BucketStarts starts =
+        distribute<Key>(n, key_bits - bits, bits, load, records, scratch.histogram);
     for (std::size_t b = 0; b + 1 < starts.size(); ++b)
         if (starts[b + 1] - starts[b] > alone_limit)
             sort_together(records + starts[b], starts[b + 1] - starts[b], scratch);
@@ -192,7 +207,9 @@ void sort_keys(std::span<Key> keys, std::span<std::uint32_t> order, int key_bits
     });
 }
 
-template void sort_keys(std::span<std::uint32_t>, std::span<std::uint32_t>, int, SortScratch<std::uint32_t>&);
-template void sort_keys(std::span<std::uint64_t>, std::span<std::uint32_t>, int, SortScratch<std::uint64_t>&);
+template void sort_keys(std::span<std::uint32_t>, std::span<std::uint32_t>, int,
+                        SortScratch<std::uint32_t>&);
+template void sort_keys(std::span<std::uint64_t>, std::span<std::uint32_t>, int,
+                        SortScratch<std::uint64_t>&);
 
 }  // namespace raydix

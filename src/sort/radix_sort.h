@@ -1,4 +1,5 @@
-// Stable parallel sort of keys with their positions. keys [n] -> keys [n] ascending, order [n]: where each came from.
+// Stable parallel sort of keys with their positions. keys [n] -> keys [n] ascending, order [n]:
+// where each came from.
 #pragma once
 
 #include <raydix/buffer.h>
@@ -23,12 +24,16 @@ struct SortScratch {
 };
 
 /// Equal keys keep their order. Only the low `key_bits` bits of a key may be set.
-/// Most significant digit first over all threads, then each bucket by itself in its core's cache: two counting passes
-/// over just enough further bits to tell almost all keys apart, and an insertion sort of the few that are left.
+/// Most significant digit first over all threads, then each bucket by itself in its core's cache:
+/// two counting passes over just enough further bits to tell almost all keys apart, and an
+/// insertion sort of the few that are left.
 template <class Key>
-void sort_keys(std::span<Key> keys, std::span<std::uint32_t> order, int key_bits, SortScratch<Key>& scratch);
+void sort_keys(std::span<Key> keys, std::span<std::uint32_t> order, int key_bits,
+               SortScratch<Key>& scratch);
 
-extern template void sort_keys(std::span<std::uint32_t>, std::span<std::uint32_t>, int, SortScratch<std::uint32_t>&);
-extern template void sort_keys(std::span<std::uint64_t>, std::span<std::uint32_t>, int, SortScratch<std::uint64_t>&);
+extern template void sort_keys(std::span<std::uint32_t>, std::span<std::uint32_t>, int,
+                               SortScratch<std::uint32_t>&);
+extern template void sort_keys(std::span<std::uint64_t>, std::span<std::uint32_t>, int,
+                               SortScratch<std::uint64_t>&);
 
 }  // namespace raydix

@@ -1,4 +1,5 @@
-// Every ray against every triangle with the very test the kernels use. What a tree must agree with, bit for bit.
+// Every ray against every triangle with the very test the kernels use. What a tree must agree with,
+// bit for bit.
 #include <raydix/error.h>
 #include <raydix/trace.h>
 
@@ -33,10 +34,13 @@ std::vector<Hit> trace_brute_force(const MeshView& mesh, std::span<const Ray> ra
     const TriangleSource source{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()};
     const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
     for (std::uint32_t i = 0; i < count; ++i)
-        if (!source.readable(i)) throw InputError("triangle " + std::to_string(i) + ": index past the last vertex");
+        if (!source.readable(i))
+            throw InputError("triangle " + std::to_string(i) + ": index past the last vertex");
     std::vector<Hit> hits(rays.size());
     with_threads(threads, [&] {
-        for_each_index(rays.size(), [&](std::size_t i) { hits[i] = closest_of_all(source, count, rays[i]); }, 16);
+        for_each_index(
+            rays.size(), [&](std::size_t i) { hits[i] = closest_of_all(source, count, rays[i]); },
+            16);
     });
     return hits;
 }

@@ -1,5 +1,5 @@
-// Batches of rays over threads, each ray by walk_tree. Blocks of rays are fixed, so that counts and the order of
-// all-hits results do not depend on the number of threads.
+// Batches of rays over threads, each ray by walk_tree. Blocks of rays are fixed, so that counts and
+// the order of all-hits results do not depend on the number of threads.
 #include "trace/scalar.h"
 
 #include <raydix/error.h>
@@ -30,7 +30,8 @@ TreeView view_of(const Bvh& bvh) {
     if (bvh.kind() != PrimitiveKind::triangles && !bvh.empty())
         throw InputError(std::string("rays need triangles; this tree holds ") +
                          (bvh.kind() == PrimitiveKind::points ? "points" : "boxes"));
-    return {bvh.nodes().data(), bvh.triangles().data(), bvh.order().data(), bvh.max_depth(), bvh.empty()};
+    return {bvh.nodes().data(), bvh.triangles().data(), bvh.order().data(), bvh.max_depth(),
+            bvh.empty()};
 }
 
 template <class Steps>
@@ -53,9 +54,11 @@ Closest find_closest(const TreeView& tree, const RayFrame& ray, WalkStack& stack
         for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
             TriangleHit hit;
             count_test(steps);
-            if (!intersect_triangle<EdgeRule::closed>(ray, tree.triangles[k], best.t, hit)) continue;
+            if (!intersect_triangle<EdgeRule::closed>(ray, tree.triangles[k], best.t, hit))
+                continue;
             // At equal t the lower primitive id wins, whatever order the leaves come in.
-            if (hit.t < best.t || tree.order[k] < best.prim) best = {hit.t, tree.order[k], k, hit.u, hit.v};
+            if (hit.t < best.t || tree.order[k] < best.prim)
+                best = {hit.t, tree.order[k], k, hit.u, hit.v};
         }
         return false;
     };
@@ -79,7 +82,8 @@ bool find_any(const TreeView& tree, const RayFrame& ray, WalkStack& stack, Steps
 }
 
 template <class Steps>
-void find_all(const TreeView& tree, const RayFrame& ray, WalkStack& stack, Steps& steps, std::vector<Hit>& hits) {
+void find_all(const TreeView& tree, const RayFrame& ray, WalkStack& stack, Steps& steps,
+              std::vector<Hit>& hits) {
     const std::size_t before = hits.size();
     const auto leaf = [&](const BvhNode& node) {
         for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
@@ -107,31 +111,34 @@ void add(TraceCounts& sum, const TraceCounts& part) {
     sum.triangle_tests += part.triangle_tests;
 }
 
-/// Calls one(i, frame, stack, steps) -> number of hits for each valid ray and miss(i) for each other one.
+/// Calls one(i, frame, stack, steps) -> number of hits for each valid ray and miss(i) for each
+/// other one.
 template <class Steps, class One, class Miss>
-TraceCounts for_each_ray(const TreeView& tree, std::span<const Ray> rays, const One& one, const Miss& miss) {
+TraceCounts for_each_ray(const TreeView& tree, std::span<const Ray> rays, const One& one,
+                         const Miss& miss) {
     std::vector<TraceCounts> parts((rays.size() + rays_per_block - 1) / rays_per_block);
-    for_each_block(rays.size(), rays_per_block, [&](std::size_t block, std::size_t begin, std::size_t end) {
-        WalkStack stack(tree.max_depth);
-        TraceCounts part;
-        part.rays = end - begin;
-        for (std::size_t i = begin; i < end; ++i) {
-            if (!is_valid(rays[i])) {
-                ++part.invalid_rays;
-                miss(i);
-            } else if (tree.empty) {
-                miss(i);
-            } else {
-                Steps steps;
-                part.hits += one(i, make_frame(rays[i]), stack, steps);
-                if constexpr (std::is_same_v<Steps, RaySteps>) {
-                    part.node_visits += steps.node_visits;
-                    part.triangle_tests += steps.triangle_tests;
-                }
-            }
-        }
-        parts[block] = part;
-    });
+    for_each_block(rays.size(), rays_per_block,
+                   [&](std::size_t block, std::size_t begin, std::size_t end) {
+                       WalkStack stack(tree.max_depth);
+                       TraceCounts part;
+                       part.rays = end - begin;
+                       for (std::size_t i = begin; i < end; ++i) {
+                           if (!is_valid(rays[i])) {
+                               ++part.invalid_rays;
+                               miss(i);
+                           } else if (tree.empty) {
+                               miss(i);
+                           } else {
+                               Steps steps;
+                               part.hits += one(i, make_frame(rays[i]), stack, steps);
+                               if constexpr (std::is_same_v<Steps, RaySteps>) {
+                                   part.node_visits += steps.node_visits;
+                                   part.triangle_tests += steps.triangle_tests;
+                               }
+                           }
+                       }
+                       parts[block] = part;
+                   });
     TraceCounts sum;
     for (const TraceCounts& part : parts) add(sum, part);
     return sum;
@@ -183,7 +190,8 @@ AllHits all_batch(const Bvh& bvh, std::span<const Ray> rays) {
         found.size(),
         [&](std::size_t b) {
             const std::uint64_t at = all.offsets[b * rays_per_block];
-            std::copy(found[b].begin(), found[b].end(), all.hits.begin() + static_cast<std::ptrdiff_t>(at));
+            std::copy(found[b].begin(), found[b].end(),
+                      all.hits.begin() + static_cast<std::ptrdiff_t>(at));
             std::vector<Hit>().swap(found[b]);
         },
         1);
@@ -192,17 +200,19 @@ AllHits all_batch(const Bvh& bvh, std::span<const Ray> rays) {
 
 void check_sizes(std::size_t rays, std::size_t results) {
     if (rays != results)
-        throw InputError("trace: " + std::to_string(rays) + " rays, but room for " + std::to_string(results) +
-                         " results");
+        throw InputError("trace: " + std::to_string(rays) + " rays, but room for " +
+                         std::to_string(results) + " results");
 }
 
 }  // namespace
 
-TraceCounts trace(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits, const TraceOptions& options) {
+TraceCounts trace(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits,
+                  const TraceOptions& options) {
     check_sizes(rays.size(), hits.size());
     TraceCounts counts;
     with_threads(options.threads, [&] {
-        counts = options.counters ? closest_batch<RaySteps>(bvh, rays, hits) : closest_batch<NoSteps>(bvh, rays, hits);
+        counts = options.counters ? closest_batch<RaySteps>(bvh, rays, hits)
+                                  : closest_batch<NoSteps>(bvh, rays, hits);
     });
     return counts;
 }
@@ -218,15 +228,17 @@ TraceCounts trace_any(const Bvh& bvh, std::span<const Ray> rays, std::span<std::
     check_sizes(rays.size(), occluded.size());
     TraceCounts counts;
     with_threads(options.threads, [&] {
-        counts = options.counters ? any_batch<RaySteps>(bvh, rays, occluded) : any_batch<NoSteps>(bvh, rays, occluded);
+        counts = options.counters ? any_batch<RaySteps>(bvh, rays, occluded)
+                                  : any_batch<NoSteps>(bvh, rays, occluded);
     });
     return counts;
 }
 
 AllHits trace_all(const Bvh& bvh, std::span<const Ray> rays, const TraceOptions& options) {
     AllHits all;
-    with_threads(options.threads,
-                 [&] { all = options.counters ? all_batch<RaySteps>(bvh, rays) : all_batch<NoSteps>(bvh, rays); });
+    with_threads(options.threads, [&] {
+        all = options.counters ? all_batch<RaySteps>(bvh, rays) : all_batch<NoSteps>(bvh, rays);
+    });
     return all;
 }
 
@@ -242,8 +254,8 @@ bool any_hit(const Bvh& bvh, const Ray& ray) {
     return occluded != 0;
 }
 
-TraceCounts trace_steps(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits, std::span<RaySteps> steps,
-                        int threads) {
+TraceCounts trace_steps(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits,
+                        std::span<RaySteps> steps, int threads) {
     check_sizes(rays.size(), hits.size());
     check_sizes(rays.size(), steps.size());
     const TreeView tree = view_of(bvh);
@@ -264,7 +276,8 @@ TraceCounts trace_steps(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit
     return counts;
 }
 
-TraceCounts trace_leaf_positions(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits, int threads) {
+TraceCounts trace_leaf_positions(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits,
+                                 int threads) {
     check_sizes(rays.size(), hits.size());
     const TreeView tree = view_of(bvh);
     TraceCounts counts;

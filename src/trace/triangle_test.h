@@ -1,5 +1,6 @@
-// The watertight ray-triangle test (Woop, Benthin, Wald 2013) as a pure function of ray and triangle, with the two
-// edge rules of contract.md 3. Every kernel, builder and brute force calls this one function.
+// The watertight ray-triangle test (Woop, Benthin, Wald 2013) as a pure function of ray and
+// triangle, with the two edge rules of contract.md 3. Every kernel, builder and brute force calls
+// this one function.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -30,20 +31,24 @@ struct ShearedVertex {
 RAYDIX_HD inline ShearedVertex shear(const RayFrame& ray, Vec3 vertex) {
     const Vec3 v = vertex - ray.origin;
     const float z = component(v, ray.kz);
-    return {component(v, ray.kx) - ray.shear_x * z, component(v, ray.ky) - ray.shear_y * z, ray.shear_z * z};
+    return {component(v, ray.kx) - ray.shear_x * z, component(v, ray.ky) - ray.shear_y * z,
+            ray.shear_z * z};
 }
 
-/// Twice the signed area of (ray, a, b): which side of the edge the ray passes. edge(a, b) == -edge(b, a) bit for bit,
-/// and the sign is exact wherever the value is not 0, since rounding is monotone.
-RAYDIX_HD inline float edge_function(const ShearedVertex& a, const ShearedVertex& b) { return a.x * b.y - a.y * b.x; }
+/// Twice the signed area of (ray, a, b): which side of the edge the ray passes. edge(a, b) ==
+/// -edge(b, a) bit for bit, and the sign is exact wherever the value is not 0, since rounding is
+/// monotone.
+RAYDIX_HD inline float edge_function(const ShearedVertex& a, const ShearedVertex& b) {
+    return a.x * b.y - a.y * b.x;
+}
 
 /// Products of two floats are exact in double, so this sign is exact always.
 RAYDIX_HD inline double exact_edge_function(const ShearedVertex& a, const ShearedVertex& b) {
     return double(a.x) * double(b.y) - double(a.y) * double(b.x);
 }
 
-/// Sign of the edge function with the ray moved by an infinitesimal step along x and a smaller one along y, so that
-/// it lies on no edge: the top-left rule. 0 only if a and b coincide in the plane.
+/// Sign of the edge function with the ray moved by an infinitesimal step along x and a smaller one
+/// along y, so that it lies on no edge: the top-left rule. 0 only if a and b coincide in the plane.
 RAYDIX_HD inline int perturbed_edge_sign(const ShearedVertex& a, const ShearedVertex& b) {
     const double e = exact_edge_function(a, b);
     if (e != 0.0) return e > 0.0 ? 1 : -1;
@@ -52,7 +57,8 @@ RAYDIX_HD inline int perturbed_edge_sign(const ShearedVertex& a, const ShearedVe
     return 0;
 }
 
-/// t of the slab planes of the triangle's own box; the same arithmetic as the traversal's, without its pads.
+/// t of the slab planes of the triangle's own box; the same arithmetic as the traversal's, without
+/// its pads.
 struct BoxInterval {
     float entry, exit;
 };
@@ -62,7 +68,8 @@ RAYDIX_HD inline BoxInterval own_box_interval(const RayFrame& ray, const LeafTri
     BoxInterval interval{-infinity, infinity};
     const auto axis = [&](float lo, float hi, float origin, float inverse) {
         const bool negative = std::signbit(inverse);
-        const float near = ((negative ? hi : lo) - origin) * inverse, far = ((negative ? lo : hi) - origin) * inverse;
+        const float near = ((negative ? hi : lo) - origin) * inverse,
+                    far = ((negative ? lo : hi) - origin) * inverse;
         interval.entry = max_of(near, interval.entry);
         interval.exit = min_of(far, interval.exit);
     };
@@ -74,17 +81,22 @@ RAYDIX_HD inline BoxInterval own_box_interval(const RayFrame& ray, const LeafTri
 
 /// Whether the cross product of two edges, in double, is 0: such triangles are never hit.
 RAYDIX_HD inline bool has_zero_area(const LeafTriangle& t) {
-    const double ax = double(t.v1.x) - t.v0.x, ay = double(t.v1.y) - t.v0.y, az = double(t.v1.z) - t.v0.z;
-    const double bx = double(t.v2.x) - t.v0.x, by = double(t.v2.y) - t.v0.y, bz = double(t.v2.z) - t.v0.z;
+    const double ax = double(t.v1.x) - t.v0.x, ay = double(t.v1.y) - t.v0.y,
+                 az = double(t.v1.z) - t.v0.z;
+    const double bx = double(t.v2.x) - t.v0.x, by = double(t.v2.y) - t.v0.y,
+                 bz = double(t.v2.z) - t.v0.z;
     return ay * bz == az * by && az * bx == ax * bz && ax * by == ay * bx;
 }
 
 /// True if the ray hits within [ray.tmin, tmax]. u weighs v1, v weighs v2.
-/// One step beyond the paper: t is held within the triangle's own box. A traversal's entry into any box around the
-/// triangle is then never greater than t (rounding is monotone), so culling cannot change which hit is closest.
+/// One step beyond the paper: t is held within the triangle's own box. A traversal's entry into any
+/// box around the triangle is then never greater than t (rounding is monotone), so culling cannot
+/// change which hit is closest.
 template <EdgeRule rule>
-RAYDIX_HD bool intersect_triangle(const RayFrame& ray, const LeafTriangle& triangle, float tmax, TriangleHit& hit) {
-    const ShearedVertex a = shear(ray, triangle.v0), b = shear(ray, triangle.v1), c = shear(ray, triangle.v2);
+RAYDIX_HD bool intersect_triangle(const RayFrame& ray, const LeafTriangle& triangle, float tmax,
+                                  TriangleHit& hit) {
+    const ShearedVertex a = shear(ray, triangle.v0), b = shear(ray, triangle.v1),
+                        c = shear(ray, triangle.v2);
     float u = edge_function(c, b), v = edge_function(a, c), w = edge_function(b, a);
     if ((u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)) return false;
     if (u == 0.0f || v == 0.0f || w == 0.0f) {
@@ -94,7 +106,8 @@ RAYDIX_HD bool intersect_triangle(const RayFrame& ray, const LeafTriangle& trian
         w = static_cast<float>(exact_edge_function(b, a));
         if ((u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)) return false;
         if constexpr (rule == EdgeRule::half_open) {
-            const int su = perturbed_edge_sign(c, b), sv = perturbed_edge_sign(a, c), sw = perturbed_edge_sign(b, a);
+            const int su = perturbed_edge_sign(c, b), sv = perturbed_edge_sign(a, c),
+                      sw = perturbed_edge_sign(b, a);
             if (su != sv || sv != sw) return false;
         }
     }

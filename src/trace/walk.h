@@ -1,5 +1,5 @@
-// Depth-first walk of one ray through the binary tree, nearer child first. What happens at a leaf, and how far the
-// ray still reaches, is the caller's.
+// Depth-first walk of one ray through the binary tree, nearer child first. What happens at a leaf,
+// and how far the ray still reaches, is the caller's.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -19,8 +19,8 @@ struct PendingNode {
     float entry;
 };
 
-/// Room for one pending sibling per level of the deepest path: taken from the tree's exact depth, so that no walk
-/// can run over. Radix trees fit the array; deeper ones use the heap.
+/// Room for one pending sibling per level of the deepest path: taken from the tree's exact depth,
+/// so that no walk can run over. Radix trees fit the array; deeper ones use the heap.
 class WalkStack {
 public:
     explicit WalkStack(std::uint32_t max_depth) : capacity_(max_depth) {
@@ -38,11 +38,12 @@ private:
 /// Counts nothing; RaySteps counts.
 struct NoSteps {};
 
-/// `leaf(node) -> bool` handles a leaf and says whether to stop; `reach()` is the largest t that still matters: a node
-/// is skipped only if its padded entry is greater. The tree must not be empty.
+/// `leaf(node) -> bool` handles a leaf and says whether to stop; `reach()` is the largest t that
+/// still matters: a node is skipped only if its padded entry is greater. The tree must not be
+/// empty.
 template <class Steps, class Leaf, class Reach>
-void walk_tree(const BvhNode* nodes, const RayFrame& ray, WalkStack& stack, Steps& steps, const Leaf& leaf,
-               const Reach& reach) {
+void walk_tree(const BvhNode* nodes, const RayFrame& ray, WalkStack& stack, Steps& steps,
+               const Leaf& leaf, const Reach& reach) {
     constexpr bool counting = !std::is_same_v<Steps, NoSteps>;
     const SlabFrame slabs = make_slab_frame(ray, {nodes[0].lo, nodes[0].hi});
     const SlabInterval whole = intersect_slabs(slabs, &nodes[0].lo.x, ray.tmin, reach());
@@ -56,8 +57,10 @@ void walk_tree(const BvhNode* nodes, const RayFrame& ray, WalkStack& stack, Step
         if (node.is_leaf()) {
             if (leaf(node)) return;
         } else {
-            const SlabInterval a = intersect_slabs(slabs, &nodes[node.first].lo.x, ray.tmin, reach());
-            const SlabInterval b = intersect_slabs(slabs, &nodes[node.first + 1].lo.x, ray.tmin, reach());
+            const SlabInterval a =
+                intersect_slabs(slabs, &nodes[node.first].lo.x, ray.tmin, reach());
+            const SlabInterval b =
+                intersect_slabs(slabs, &nodes[node.first + 1].lo.x, ray.tmin, reach());
             const bool in_a = a.entry <= a.exit, in_b = b.entry <= b.exit;
             if (in_a && in_b) {
                 const bool b_first = b.entry < a.entry;

@@ -10,7 +10,8 @@
 namespace raydix {
 namespace {
 
-constexpr std::array<std::pair<Builder, std::string_view>, 1> builder_names{{{Builder::karras, "karras"}}};
+constexpr std::array<std::pair<Builder, std::string_view>, 1> builder_names{
+    {{Builder::karras, "karras"}}};
 
 }  // namespace
 
@@ -34,7 +35,8 @@ Aabb Bvh::bounds() const { return empty() ? empty_box() : Aabb{nodes_[0].lo, nod
 
 std::uint64_t Bvh::bytes() const {
     const auto bytes_of = [](const auto& buffer) { return buffer.view().size_bytes(); };
-    return bytes_of(nodes_) + bytes_of(order_) + bytes_of(triangles_) + bytes_of(boxes_) + bytes_of(points_);
+    return bytes_of(nodes_) + bytes_of(order_) + bytes_of(triangles_) + bytes_of(boxes_) +
+           bytes_of(points_);
 }
 
 }  // namespace raydix

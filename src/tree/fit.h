@@ -1,5 +1,6 @@
-// Boxes bottom-up in one parallel pass: leaves climb, and at each inner node the second child to arrive goes on
-// (Karras 2012, section 4). Links + leaf boxes -> boxes of all nodes, and the exact depth.
+// Boxes bottom-up in one parallel pass: leaves climb, and at each inner node the second child to
+// arrive goes on (Karras 2012, section 4). Links + leaf boxes -> boxes of all nodes, and the exact
+// depth.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -19,14 +20,15 @@ RAYDIX_HD inline void set_box(BvhNode& node, const Aabb& box) {
 }
 RAYDIX_HD inline Aabb box_of(const BvhNode& node) { return {node.lo, node.hi}; }
 
-/// One work item per inner node: boxes of those children that are leaves, then up as far as it is the second to come.
+/// One work item per inner node: boxes of those children that are leaves, then up as far as it is
+/// the second to come.
 template <class LeafBox>
 struct FitBoxes {
     LeafBox leaf_box;                  // (first, count) -> box
     BvhNode* nodes;                    // [2 * inner + 2], boxes are written
     const std::uint32_t* parent_slot;  // [inner]
-    std::uint8_t* meeting;             // [inner], zero before; 1 + the height of the child that came first
-    std::uint32_t* max_depth;          // [1], out
+    std::uint8_t* meeting;     // [inner], zero before; 1 + the height of the child that came first
+    std::uint32_t* max_depth;  // [1], out
 
     RAYDIX_HD void operator()(std::uint32_t rank) const {
         BvhNode* pair = nodes + pair_slot(rank);
@@ -37,7 +39,8 @@ struct FitBoxes {
             climb(rank, 1);
         } else if (left || right) {
             const std::uint8_t other = arrive(meeting[rank], 1);
-            if (other != 0) climb(rank, other);  // the other child's height is other - 1 >= 1: it decides
+            if (other != 0)
+                climb(rank, other);  // the other child's height is other - 1 >= 1: it decides
         }
     }
 

@@ -1,5 +1,6 @@
-// The hierarchy of karras.h. The paper compares whole keys; here the common prefixes of neighbours are kept as one
-// byte each, so that the short ranges, which are nearly all, are found by scanning bytes. Long ones use the keys.
+// The hierarchy of karras.h. The paper compares whole keys; here the common prefixes of neighbours
+// are kept as one byte each, so that the short ranges, which are nearly all, are found by scanning
+// bytes. Long ones use the keys.
 #include "tree/karras.h"
 
 #include <algorithm>
@@ -16,10 +17,11 @@ namespace raydix {
 namespace {
 
 constexpr std::size_t word_bits = 64;
-constexpr std::uint32_t scan_limit = 128;         // bytes looked at before galloping, where the paper starts too
+constexpr std::uint32_t scan_limit =
+    128;  // bytes looked at before galloping, where the paper starts too
 
-/// prefixes[i] = 1 + common prefix of keys i and i + 1, so that 0 can mean "outside". At most 1 + 63 + 31.
-/// `padding` zeros stand before and behind: scans may look past the ends.
+/// prefixes[i] = 1 + common prefix of keys i and i + 1, so that 0 can mean "outside". At most 1 +
+/// 63 + 31. `padding` zeros stand before and behind: scans may look past the ends.
 class NeighbourPrefixes {
 public:
     static constexpr std::size_t padding = 256 + 64;
@@ -42,7 +44,8 @@ private:
     std::uint8_t* bytes_ = nullptr;
 };
 
-/// A radix node holds more than max_leaf keys iff the max_leaf prefixes on its inner side all exceed the outer one.
+/// A radix node holds more than max_leaf keys iff the max_leaf prefixes on its inner side all
+/// exceed the outer one.
 std::uint64_t kept_word(const std::uint8_t* prefixes, std::size_t max_leaf) {
     std::array<std::uint8_t, word_bits> to_right, to_left;
     std::memcpy(to_right.data(), prefixes, word_bits);
@@ -73,7 +76,8 @@ std::uint32_t mark_kept(const NeighbourPrefixes& prefixes, std::size_t radix_nod
         [&](std::size_t w) {
             std::uint64_t word = kept_word(prefixes.at(static_cast<std::int64_t>(w * word_bits)),
                                            static_cast<std::size_t>(max_leaf));
-            if ((w + 1) * word_bits > radix_nodes) word &= ~std::uint64_t{0} >> ((w + 1) * word_bits - radix_nodes);
+            if ((w + 1) * word_bits > radix_nodes)
+                word &= ~std::uint64_t{0} >> ((w + 1) * word_bits - radix_nodes);
             scratch.kept_bits[w] = word;
             scratch.kept_before[w] = static_cast<std::uint32_t>(count_ones(word));
         },
@@ -83,7 +87,8 @@ std::uint32_t mark_kept(const NeighbourPrefixes& prefixes, std::size_t radix_nod
 
 /// As find_range, with the bytes first.
 template <class Key>
-RadixRange find_range(const SortedKeys<Key>& keys, const NeighbourPrefixes& prefixes, std::uint32_t node) {
+RadixRange find_range(const SortedKeys<Key>& keys, const NeighbourPrefixes& prefixes,
+                      std::uint32_t node) {
     const std::uint8_t before = *prefixes.at(std::int64_t{node} - 1), behind = *prefixes.at(node);
     std::uint32_t first = node, last = node;
     if (behind > before) {
@@ -105,7 +110,8 @@ RadixRange find_range(const SortedKeys<Key>& keys, const NeighbourPrefixes& pref
 }  // namespace
 
 template <class Key>
-std::uint32_t build_karras(std::span<const Key> keys, int max_leaf, Buffer<BvhNode>& nodes, HierarchyScratch& scratch) {
+std::uint32_t build_karras(std::span<const Key> keys, int max_leaf, Buffer<BvhNode>& nodes,
+                           HierarchyScratch& scratch) {
     const SortedKeys<Key> sorted{keys.data(), static_cast<std::uint32_t>(keys.size())};
     std::uint32_t inner = 0;
     if (keys.size() > static_cast<std::size_t>(max_leaf)) {
@@ -115,13 +121,15 @@ std::uint32_t build_karras(std::span<const Key> keys, int max_leaf, Buffer<BvhNo
         nodes.reset(2 * std::size_t{inner} + 2);
         scratch.parent_slot.reset(inner);
         const KeptNodes kept{scratch.kept_bits.data(), scratch.kept_before.data()};
-        const EmitRadixNode emit{kept, static_cast<std::uint32_t>(max_leaf), nodes.data(), scratch.parent_slot.data()};
+        const EmitRadixNode emit{kept, static_cast<std::uint32_t>(max_leaf), nodes.data(),
+                                 scratch.parent_slot.data()};
         for_each_index(
             scratch.kept_bits.size(),
             [&](std::size_t w) {
                 std::uint32_t rank = kept.before_word[w];
                 for (std::uint64_t left = kept.bits[w]; left != 0; left &= left - 1) {
-                    const auto node = static_cast<std::uint32_t>(w * word_bits + std::countr_zero(left));
+                    const auto node =
+                        static_cast<std::uint32_t>(w * word_bits + std::countr_zero(left));
                     emit(rank++, find_range(sorted, prefixes, node));
                 }
             },
@@ -136,7 +144,9 @@ std::uint32_t build_karras(std::span<const Key> keys, int max_leaf, Buffer<BvhNo
     return inner;
 }
 
-template std::uint32_t build_karras(std::span<const std::uint32_t>, int, Buffer<BvhNode>&, HierarchyScratch&);
-template std::uint32_t build_karras(std::span<const std::uint64_t>, int, Buffer<BvhNode>&, HierarchyScratch&);
+template std::uint32_t build_karras(std::span<const std::uint32_t>, int, Buffer<BvhNode>&,
+                                    HierarchyScratch&);
+template std::uint32_t build_karras(std::span<const std::uint64_t>, int, Buffer<BvhNode>&,
+                                    HierarchyScratch&);
 
 }  // namespace raydix

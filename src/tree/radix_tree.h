@@ -1,5 +1,6 @@
-// Sorted codes -> inner nodes of the binary radix tree, each found without looking at any other (Karras 2012,
-// section 3 and algorithm of figure 4). Inner node i covers a range of keys that begins or ends at key i.
+// Sorted codes -> inner nodes of the binary radix tree, each found without looking at any other
+// (Karras 2012, section 3 and algorithm of figure 4). Inner node i covers a range of keys that
+// begins or ends at key i.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -24,8 +25,10 @@ struct SortedKeys {
         const Key differs = keys[i] ^ keys[j];
         constexpr int unused_bits = static_cast<int>(8 * sizeof(Key)) - CodeFormat<Key>::bits;
         if (differs != 0) return leading_zeros(differs) - unused_bits;
-        // Equal codes: the positions decide, as if they were written behind the code (paper, duplicate keys).
-        return CodeFormat<Key>::bits + leading_zeros(static_cast<std::uint32_t>(i) ^ static_cast<std::uint32_t>(j));
+        // Equal codes: the positions decide, as if they were written behind the code (paper,
+        // duplicate keys).
+        return CodeFormat<Key>::bits +
+               leading_zeros(static_cast<std::uint32_t>(i) ^ static_cast<std::uint32_t>(j));
     }
 };
 
@@ -54,15 +57,17 @@ RAYDIX_HD RadixRange find_range(const SortedKeys<Key>& keys, std::uint32_t node)
         step = (step + 1) / 2;
         if (split + step < last && keys.common_prefix(first, split + step) > shared) split += step;
     } while (step > 1);
-    return {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last), static_cast<std::uint32_t>(split)};
+    return {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
+            static_cast<std::uint32_t>(split)};
 }
 
-/// Node slots: the root in 0, padding in 1, then the pair of children of inner node r (r counts the nodes that are
-/// kept when small subtrees become leaves) in 2r + 2 and 2r + 3.
+/// Node slots: the root in 0, padding in 1, then the pair of children of inner node r (r counts the
+/// nodes that are kept when small subtrees become leaves) in 2r + 2 and 2r + 3.
 RAYDIX_HD inline std::uint32_t pair_slot(std::uint32_t rank) { return 2 * rank + 2; }
 RAYDIX_HD inline std::uint32_t rank_of_slot(std::uint32_t slot) { return (slot - 2) / 2; }
 
-/// Which of the n - 1 radix nodes stay inner nodes, as bits, with the number of kept nodes before each word.
+/// Which of the n - 1 radix nodes stay inner nodes, as bits, with the number of kept nodes before
+/// each word.
 struct KeptNodes {
     const std::uint64_t* bits;
     const std::uint32_t* before_word;
@@ -80,7 +85,8 @@ struct EmitRadixNode {
     BvhNode* nodes;              // [2 * inner + 2], out: links and counts; boxes come later
     std::uint32_t* parent_slot;  // [inner], out
 
-    RAYDIX_HD void child(std::uint32_t slot, std::uint32_t first, std::uint32_t last, std::uint32_t radix_node) const {
+    RAYDIX_HD void child(std::uint32_t slot, std::uint32_t first, std::uint32_t last,
+                         std::uint32_t radix_node) const {
         const std::uint32_t count = last - first + 1;
         if (count <= max_leaf) {
             nodes[slot].first = first;
@@ -92,7 +98,8 @@ struct EmitRadixNode {
             parent_slot[rank] = slot;
         }
     }
-    /// `rank` is the node's own. The left child's radix index is the split, the right one's the split + 1.
+    /// `rank` is the node's own. The left child's radix index is the split, the right one's the
+    /// split + 1.
     RAYDIX_HD void operator()(std::uint32_t rank, const RadixRange& range) const {
         child(pair_slot(rank), range.first, range.split, range.split);
         child(pair_slot(rank) + 1, range.split + 1, range.last, range.split + 1);
