@@ -65,8 +65,10 @@ void run_build(const BuildCommand& options) {
     const Scene scene = load_scene_with_cameras(options.scene, options.tree, options.common);
     document["scene"] = scene_json(scene);
     document["load_ms"] = scene.load_ms;
-    const TimedBuilds timed =
-        build_repeatedly(scene.mesh, options.tree.build_options(options.common), options.repeat);
+    const TimedBuilds timed = about(options.scene, [&] {
+        return build_repeatedly(scene.mesh, options.tree.build_options(options.common),
+                                options.repeat);
+    });
     const TreeStats stats = tree_stats(timed.bvh, stats_options(options.tree, options.common));
     Json build = build_json(timed.bvh, stats, timed.fresh);
     build["kept_ms"] = spread_json(totals(timed.kept));

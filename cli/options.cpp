@@ -1,11 +1,11 @@
 // The shared options, and scenes and trees from what the user named.
 #include "options.h"
 
-#include <raydix/error.h>
 #include <raydix/rdx.h>
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 
 namespace raydix::cli {
 
@@ -18,6 +18,7 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
         ->check(CLI::Range(0, 1024));
     command.add_flag("--quiet", options.quiet, "Print no tables and no progress");
     command.add_option("--seed", options.seed, "Seed of built-in scenes and sampling")
+        ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
 }
 
@@ -56,11 +57,11 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
                   "Invalid primitives are an error instead of being left out")
         ->group(group);
     command.add_option("--sah-node", options.sah.node, "SAH cost of an inner node")
-        ->check(CLI::NonNegativeNumber)
+        ->check(finite_number(true))
         ->capture_default_str()
         ->group(group);
     command.add_option("--sah-primitive", options.sah.primitive, "SAH cost of a primitive")
-        ->check(CLI::NonNegativeNumber)
+        ->check(finite_number(true))
         ->capture_default_str()
         ->group(group);
     command
@@ -113,8 +114,23 @@ SceneTree load_scene_tree(const std::string& name, const TreeOptions& tree,
         return {std::move(file.scene), std::move(file.bvh)};
     }
     SceneTree result{load_scene_with_cameras(name, tree, common), {}};
-    result.bvh = build_bvh(result.scene.mesh, tree.build_options(common));
+    result.bvh =
+        about(name, [&] { return build_bvh(result.scene.mesh, tree.build_options(common)); });
     return result;
+}
+
+CLI::Validator finite_number(bool zero_too) {
+    const auto fault = [zero_too](std::string& text) {
+        double value = 0;
+        const char* end = text.data() + text.size();
+        const auto [rest, error] = std::from_chars(text.data(), end, value);
+        const bool good = error == std::errc() && rest == end && std::isfinite(value) &&
+                          (zero_too ? value >= 0 : value > 0);
+        return good ? std::string()
+                    : "'" + text + "' is not a " +
+                          (zero_too ? "number from 0 on" : "number above 0");
+    };
+    return {fault, zero_too ? "NONNEGATIVE" : "POSITIVE"};
 }
 
 Size parse_size(const std::string& text) {

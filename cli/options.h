@@ -3,6 +3,7 @@
 #pragma once
 
 #include <raydix/bvh.h>
+#include <raydix/error.h>
 #include <raydix/scene.h>
 
 #include <CLI/CLI.hpp>
@@ -47,6 +48,20 @@ struct SceneTree {
                                             const CommonOptions& common);
 [[nodiscard]] SceneTree load_scene_tree(const std::string& scene, const TreeOptions& tree,
                                         const CommonOptions& common);
+
+/// For add_option(...)->check: a finite number above 0, or from 0 on.
+[[nodiscard]] CLI::Validator finite_number(bool zero_too);
+
+/// Runs `work`; puts the scene that the user named before what the library has to say about its
+/// geometry.
+template <class Work>
+auto about(const std::string& scene, const Work& work) {
+    try {
+        return work();
+    } catch (const InputError& error) {
+        throw InputError(scene + ": " + error.what());
+    }
+}
 
 /// "1024x768" -> 1024, 768. Throws CLI::ValidationError.
 struct Size {

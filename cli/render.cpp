@@ -57,7 +57,8 @@ void run_render(const RenderCommand& options) {
     render_options.threads = options.common.threads;
     render_options.progress = [&](double part) { progress.show(part); };
     const auto start = std::chrono::steady_clock::now();
-    const Picture picture = render(input.bvh, camera, render_options);
+    const Picture picture =
+        about(options.scene, [&] { return render(input.bvh, camera, render_options); });
     const double ms =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     const View view = render_options.view;
@@ -93,7 +94,9 @@ void add_render_command(CLI::App& app) {
     command
         ->add_option("--size", options->size_text, "Pixels (default: of cameras.json, or 1024x768)")
         ->type_name("WxH");
-    command->add_option("--camera", options->camera, "Number of a camera")->capture_default_str();
+    command->add_option("--camera", options->camera, "Number of a camera")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
     command->add_option("--eye", options->eye, "Camera position x y z")
         ->expected(3)
         ->delimiter(',');
@@ -113,7 +116,7 @@ void add_render_command(CLI::App& app) {
     command
         ->add_option("--ao-radius", options->ao_radius,
                      "Reach of ao rays (default: of cameras.json, or 5 % of the diagonal)")
-        ->check(CLI::PositiveNumber);
+        ->check(finite_number(false));
     add_tree_options(*command, options->tree);
     add_common_options(*command, options->common);
     command->callback([options] { run_render(*options); });

@@ -221,16 +221,19 @@ void run_trace(const TraceCommand& options) {
     Progress progress("tracing", options.common);
     if (options.rays.ends_with(".npy")) {
         const std::vector<Ray> rays = load_rays(options.rays);
-        if (!rays.empty()) measure(batch, rays, options.repeat, tally);
+        if (!rays.empty())
+            about(options.scene, [&] { measure(batch, rays, options.repeat, tally); });
         keep(options, rays, batch, kept);
     } else {
         const std::vector<Camera> cameras = chosen_cameras(options, input.scene);
         for (std::size_t c = 0; c < cameras.size(); ++c)
-            trace_camera(options, input, cameras[c], ray_kind(options.rays), size, batch, tally,
-                         kept, [&](double part) {
-                             progress.show((static_cast<double>(c) + part) /
-                                           static_cast<double>(cameras.size()));
-                         });
+            about(options.scene, [&] {
+                trace_camera(options, input, cameras[c], ray_kind(options.rays), size, batch, tally,
+                             kept, [&](double part) {
+                                 progress.show((static_cast<double>(c) + part) /
+                                               static_cast<double>(cameras.size()));
+                             });
+            });
     }
     if (!options.rays_file.empty()) save_rays(options.rays_file, kept.rays);
     if (!options.hits_file.empty()) save_hits(options.hits_file, kept.hits);
@@ -285,7 +288,7 @@ void add_trace_command(CLI::App& app) {
     command
         ->add_option("--ao-radius", options->ao_radius,
                      "Reach of ao rays (default: of cameras.json, or 5 % of the diagonal)")
-        ->check(CLI::PositiveNumber);
+        ->check(finite_number(false));
     command->add_option("--repeat", options->repeat, "Times to trace after a warm-up")
         ->check(CLI::Range(1, 10000))
         ->capture_default_str();

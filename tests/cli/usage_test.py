@@ -1,0 +1,193 @@
+"""Help texts, exit codes, one-line errors, --quiet, --json, progress."""
+import os
+import pty
+import subprocess
+import sys
+import time
+
+sys.dont_write_bytecode = True
+from program import COMMANDS, PROGRAM, TIME_LIMIT_S, TRIANGLE, ProgramTest, json_of, main, ply  # noqa: E402
+
+COMMON = ["--json", "--threads", "--quiet", "--seed"]
+TREE = ["--tree", "--builder", "--quality", "--bits", "--max-leaf", "--layout", "--device", "--strict", "--epo",
+        "--cameras", "--sah-node", "--sah-primitive"]
+OPTIONS = {
+    "info": ["SCENE"],
+    "scenes": [],
+    "build": ["SCENE", "--repeat", "--output", *TREE],
+    "check": ["SCENE", "--same", *TREE],
+    "trace": ["SCENE", "--rays", "--mode", "--kernel", "--camera", "--hits", "--save-rays", "--repeat", "--size",
+              "--samples", "--ao-radius", "--explain", *TREE],
+    "render": ["SCENE", "--output", "--view", "--size", "--camera", "--eye", "--target", "--up", "--fov",
+               "--samples", *TREE],
+}
+SMALL = "builtin:soup?triangles=50"
+
+
+class Usage(ProgramTest):
+    def test_help_is_complete(self):
+        top = self.succeed("--help").out
+        for command in COMMANDS:
+            self.assertRegex(top, rf"(?m)^  {command} +\w")
+            text = self.succeed(command, "--help").out
+            for option in OPTIONS[command] + COMMON:
+                self.assertIn(option, text, command)
+            for line in text.splitlines():
+                self.assertFalse(line.strip().startswith("--") and len(line.split()) == 1, f"no words about {line}")
+
+    def test_version(self):
+        self.assertRegex(self.succeed("--version").out, r"\Araydix \d+\.\d+\.\d+\n\Z")
+
+    def test_usage_errors_are_2(self):
+        self.fail_with_usage()
+        self.fail_with_usage("trade", names=["'trade'"])
+        self.fail_with_usage("--nothing")
+        for command in ("info", "build", "trace", "render"):
+            self.fail_with_usage(command, names=["SCENE" if command != "render" else "required"])
+        self.fail_with_usage("check", names=["SCENE"])
+        self.fail_with_usage("check", "--same", SMALL)
+        self.fail_with_usage("check", SMALL, "--same", SMALL, SMALL)
+        self.fail_with_usage("render", SMALL, names=["--output"])
+        for bad in (["--bits", "31"], ["--bits"], ["--max-leaf", "0"], ["--max-leaf", "256"], ["--builder", "other"],
+                    ["--tree", "other"], ["--quality", "best"], ["--device", "abacus"], ["--layout", "x"],
+                    ["--repeat", "0"], ["--threads", "-1"], ["--threads", "two"], ["--seed", "-1"], ["--epo", "0"],
+                    ["--epo", "1.5"], ["--epo", "much"], ["--sah-node", "-1"], ["--sah-node", "nan"],
+                    ["--sah-primitive", "inf"], ["--nothing"], ["--json"], ["extra"],
+                    ["--quality", "fast", "--builder", "karras"]):
+            self.fail_with_usage("build", SMALL, *bad)
+        for bad in (["--rays", "secondary"], ["--mode", "some"], ["--kernel", "x"], ["--camera", "first"],
+                    ["--size", "640"], ["--size", "0x480"], ["--size", "640x480x3"], ["--samples", "0"],
+                    ["--ao-radius", "0"], ["--ao-radius", "nan"], ["--ao-radius", "x"],
+                    ["--mode", "any", "--hits", "h.npy"], ["--rays", "ao", "--hits", "h.npy"]):
+            self.fail_with_usage("trace", SMALL, *bad)
+        for bad in (["--view", "inside"], ["--eye", "1", "2"], ["--fov", "0"], ["--fov", "180"], ["--camera", "-1"],
+                    ["--size", "big"], ["--samples", "-1"]):
+            self.fail_with_usage("render", SMALL, "-o", "x.png", *bad)
+
+    def test_input_errors_are_1_and_one_line(self):
+        file = self.write("triangle.ply", TRIANGLE)
+        self.write("empty.ply", b"")
+        self.write("cut.ply", TRIANGLE[:-8])
+        self.write("text.rdx", b"not a tree\n")
+        self.write("empty.rdx", b"")
+        self.write("what.txt", b"hello\n")
+        self.write("bad_cameras.json", b'{"cameras": [{"position": [0, 0]}]}')
+        os.mkdir(self.folder / "folder.ply")
+        for scene in ("absent.ply", "folder.ply", "empty.ply", "cut.ply", "what.txt", "text.rdx", "empty.rdx",
+                      "absent.rdx", "-", "no/such/folder/x.obj"):
+            for command in ("info", "build", "check", "trace"):
+                self.fail_with_one_line(command, scene, names=[scene])
+            self.fail_with_one_line("render", scene, "-o", "x.png", names=[scene])
+        for scene, names in (("builtin:", ["builtin"]), ("builtin:nothing", ["nothing", "figure"]),
+                             ("builtin:soup?colour=red", ["colour", "triangles"]),
+                             ("builtin:soup?triangles", ["triangles"]), ("builtin:soup?triangles=", ["triangles"]),
+                             ("builtin:soup?triangles=many", ["many"]), ("builtin:soup?triangles=-5", ["-5"]),
+                             ("builtin:soup?triangles=1e300", ["1e300"])):
+            self.fail_with_one_line("info", scene, names=names)
+        self.fail_with_one_line("build", file, "--cameras", "bad_cameras.json", names=["bad_cameras.json"])
+        self.fail_with_one_line("trace", file, "--camera", "7", names=["triangle.ply", "camera 7"])
+        self.fail_with_one_line("render", file, "--camera", "7", "-o", "x.png", names=["triangle.ply", "camera 7"])
+        self.fail_with_one_line("render", file, "-o", "x.bmp", "--size", "4x4", names=["x.bmp"])
+        self.fail_with_one_line("trace", file, "--rays", "absent.npy", names=["absent.npy"])
+        self.fail_with_one_line("trace", file, "--rays", self.write("bad.npy", b"\x93NUMPY"), names=["bad.npy"])
+
+    def test_an_unreadable_file(self):
+        file = self.write("locked.ply", TRIANGLE)
+        os.chmod(file, 0)
+        if os.access(file, os.R_OK):
+            self.skipTest("this user may read every file")
+        self.fail_with_one_line("info", file, names=["locked.ply"])
+
+    def test_unwritable_outputs(self):
+        for arguments in (["build", SMALL, "-o", "no/x.rdx"], ["build", SMALL, "--quiet", "--json", "no/x.json"],
+                          ["trace", SMALL, "--size", "4x4", "--hits", "no/h.npy"],
+                          ["trace", SMALL, "--size", "4x4", "--save-rays", "no/r.npy"],
+                          ["render", SMALL, "--size", "4x4", "-o", "no/x.png"],
+                          ["render", SMALL, "--size", "4x4", "-o", "no/x.exr"]):
+            result = self.run_program(*arguments)
+            self.assertEqual((result.code, result.err.count("\n")), (1, 1), result)
+            self.assertIn("no/", result.err)
+
+    def test_a_full_standard_output(self):
+        if not os.path.exists("/dev/full"):
+            self.skipTest("there is no /dev/full")
+        for arguments in (["scenes"], ["info", SMALL], ["build", SMALL, "--json", "-"]):
+            with open("/dev/full", "w") as full:
+                done = subprocess.run([PROGRAM, *arguments], stdout=full, stderr=subprocess.PIPE, timeout=TIME_LIMIT_S)
+            self.assertEqual((done.returncode, done.stderr.count(b"\n")), (1, 1), done)
+
+    def test_geometry_errors_name_the_file(self):
+        nan = self.write("nan.ply", ply([(0, 0, 0), (1, 0, 0), ("nan", 1, 0), (0, 1, 0)], [(0, 1, 3), (0, 1, 2)]))
+        for command in ("build", "check", "trace"):
+            self.fail_with_one_line(command, nan, "--strict", names=["nan.ply", "triangle 1"])
+        self.assertEqual(self.document("build", nan)["build"]["left_out"], 1)
+        far = self.write("far.ply", ply([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 3)]))
+        self.fail_with_one_line("build", far, names=["far.ply", "3"])
+        points = self.write("points.ply", ply([(0, 0, 0), (1, 0, 0)]))
+        self.fail_with_one_line("trace", points, names=["points.ply", "points"])
+        self.fail_with_one_line("render", points, "-o", "x.png", names=["points.ply", "points"])
+
+    def test_odd_file_names(self):
+        for name in (b"caf\xe9.ply", "gr\u00fcn \u6728.ply".encode(), b"two\nlines.ply", b"-dash.ply", b"\x1b[31m.ply"):
+            path = os.path.join(os.fsencode(self.folder), name)
+            with open(path, "wb") as file:
+                file.write(TRIANGLE.encode())
+            self.assertEqual(json_of(self.succeed("info", path, "--json", "-").out)["scene"]["triangles"], 1)
+            self.succeed("info", path, "--quiet")
+            with open(path, "wb") as file:
+                file.write(TRIANGLE[:40].encode())
+            self.fail_with_one_line("build", path)
+
+    def test_quiet_prints_nothing(self):
+        file = self.write("quiet.ply", TRIANGLE)
+        for arguments in (["info", file], ["scenes"], ["build", file, "-o", "quiet.rdx"], ["check", "quiet.rdx"],
+                          ["check", "--same", "quiet.rdx", file], ["trace", file, "--size", "8x8", "--explain"],
+                          ["render", file, "--size", "8x8", "-o", "quiet.png"]):
+            self.assertEqual(self.succeed(*arguments, "--quiet").out, "")
+            self.assertNotEqual(self.succeed(*arguments).out, "")
+
+    def test_json_to_a_file(self):
+        printed = self.succeed("build", SMALL, "--json", "out.json").out
+        document = json_of((self.folder / "out.json").read_text())
+        self.assertIn(document["build"]["tree_hash"], printed)
+        self.assertEqual(self.succeed("build", SMALL, "--quiet", "--json", "out.json").out, "")
+
+    def test_epo_with_and_without_a_value(self):
+        self.assertIsNone(self.document("build", SMALL)["build"]["epo"])
+        bare = self.document("build", SMALL, "--epo")["build"]["epo"]
+        self.assertGreater(bare, 0)
+        self.assertEqual(self.document("build", SMALL, "--epo", "1")["build"]["epo"], bare)
+        self.assertEqual(self.document("build", "--epo", "--bits", "63", SMALL)["build"]["epo"], bare)
+        self.assertGreater(self.document("build", SMALL, "--epo", "0.5")["build"]["epo"], 0)
+
+    def test_progress_only_on_a_terminal(self):
+        command = ["render", "builtin:figure?triangles=20000", "--view", "ao", "--size", "160x120", "-o", "p.png"]
+        samples = 64
+        for _ in range(8):
+            started = time.monotonic()
+            self.succeed(*command, "--samples", str(samples))  # to a pipe: nothing on standard error
+            if time.monotonic() - started > 2.5:
+                break
+            samples *= 2
+        shown = self.on_terminal(*command, "--samples", str(samples))
+        self.assertRegex(shown, rb"\rrendering \[#*\.*\] +\d+ %")
+        self.assertTrue(shown.rstrip().endswith(b"\r\x1b[K"), "the bar is not wiped at the end")
+        self.assertEqual(self.on_terminal(*command, "--samples", str(samples), "--quiet"), b"")
+
+    def on_terminal(self, *arguments):
+        ours, theirs = pty.openpty()
+        process = subprocess.Popen([PROGRAM, *arguments], stdout=subprocess.DEVNULL, stderr=theirs, cwd=self.folder)
+        os.close(theirs)
+        shown = b""
+        try:
+            while chunk := os.read(ours, 4096):
+                shown += chunk
+        except OSError:  # the other end is closed
+            pass
+        os.close(ours)
+        self.assertEqual(process.wait(TIME_LIMIT_S), 0)
+        return shown
+
+
+if __name__ == "__main__":
+    main()
