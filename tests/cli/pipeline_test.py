@@ -1,0 +1,254 @@
+"""Scene -> tree -> .rdx -> check, trace, render: JSON fields, hashes, rays, hits and pictures of the program."""
+import math
+import os
+import struct
+import sys
+
+sys.dont_write_bytecode = True
+from program import (MISS, TRIANGLE, ProgramTest, main, ply, read_hits, read_npy, read_png, read_rays,  # noqa: E402
+                     write_npy)
+
+NUMBER, COUNT, TEXT = (int, float), int, str
+
+
+def optional(kind):
+    return (*(kind if isinstance(kind, tuple) else (kind,)), type(None))
+
+
+MACHINE = {"cpu": TEXT, "cores": COUNT, "isa": TEXT, "gpu": optional(TEXT)}
+SCENE = {"name": TEXT, "triangles": COUNT, "points": COUNT, "vertices": COUNT}
+STAGES = {stage: NUMBER for stage in ("bounds", "codes", "sort", "hierarchy", "fit", "layout", "total")}
+BUILD = {
+    "tree": TEXT, "builder": TEXT, "bits": COUNT, "device": TEXT, "threads": COUNT, "nodes": COUNT, "leaves": COUNT,
+    "references": COUNT, "layout_nodes": COUNT, "max_depth": COUNT, "depth_bound": optional(COUNT),
+    "sah": optional(NUMBER), "sah_constants": {"node": NUMBER, "primitive": NUMBER}, "epo": optional(NUMBER),
+    "bytes": COUNT, "bytes_referenced": COUNT, "peak_bytes": optional(COUNT), "tree_hash": TEXT,
+}
+BUILT = {**BUILD, "ms": STAGES, "ms_spread": {"min": STAGES, "max": STAGES},
+         "kept_ms": {"median": NUMBER, "min": NUMBER, "max": NUMBER}}
+LOADED = {**BUILD, "ms": type(None)}
+TRACE = {
+    "rays": TEXT, "kernel": TEXT, "device": TEXT, "count": COUNT, "hits": COUNT,
+    "mrays_per_s": {"median": NUMBER, "min": NUMBER, "max": NUMBER},
+    "node_visits_per_ray": NUMBER, "triangle_tests_per_ray": NUMBER,
+}
+DOCUMENT = {"version": TEXT, "machine": MACHINE}
+
+# Two squares facing each other: z = 0 (triangles 0, 1) and z = 1 (triangles 2, 3).
+SQUARES = ply([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)],
+              [(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)])
+SOUP = "builtin:soup?triangles=2000"
+
+
+class Pipeline(ProgramTest):
+    def assert_shape(self, value, shape, where="document"):
+        """Every field of `shape` is there with its type; others may stand beside them."""
+        if isinstance(shape, dict):
+            self.assertIsInstance(value, dict, where)
+            for name, inner in shape.items():
+                self.assertIn(name, value, where)
+                self.assert_shape(value[name], inner, f"{where}.{name}")
+        else:
+            self.assertIsInstance(value, shape, where)
+            self.assertNotIsInstance(value, bool, where)
+
+    def test_fields_of_every_document(self):
+        self.assert_shape(self.document("info", SOUP), {**DOCUMENT, "scene": SCENE, "load_ms": NUMBER})
+        scenes = self.document("scenes")
+        self.assert_shape(scenes, DOCUMENT)
+        self.assertLessEqual({"figure", "soup", "uniform", "clustered"}, {s["name"] for s in scenes["scenes"]})
+        built = self.document("build", SOUP, "--repeat", "3", "-o", "fields.rdx", "--epo", "0.1", "--threads", "2")
+        self.assert_shape(built, {**DOCUMENT, "scene": SCENE, "load_ms": NUMBER, "build": BUILT})
+        build = built["build"]
+        for stage, ms in build["ms"].items():
+            self.assertLessEqual(build["ms_spread"]["min"][stage], ms)
+            self.assertLessEqual(ms, build["ms_spread"]["max"][stage])
+        self.assertEqual((build["tree"], build["builder"], build["bits"], build["device"], build["threads"]),
+                         ("bvh", "karras", 63, "cpu", 2))
+        self.assertEqual(build["nodes"], 2 * build["leaves"] - 1)
+        self.assertEqual(build["references"], 2000)
+        self.assertEqual(build["depth_bound"], 63 + 11)
+        self.assertLessEqual(build["max_depth"], build["depth_bound"])
+        self.assertRegex(build["tree_hash"], r"\A[0-9a-f]{32}\Z")
+        self.assertGreater(build["peak_bytes"], build["bytes"])
+        for command in (["info"], ["trace", "--size", "8x8"]):
+            loaded = self.document(command[0], "fields.rdx", *command[1:])
+            self.assert_shape(loaded, {**DOCUMENT, "scene": SCENE, "load_ms": NUMBER, "build": LOADED})
+            self.assertIsNone(loaded["build"]["peak_bytes"])
+            self.assertEqual(loaded["build"]["tree_hash"], build["tree_hash"])
+        traced = self.document("trace", SOUP, "--size", "16x16")
+        self.assert_shape(traced, {**DOCUMENT, "scene": SCENE, "load_ms": NUMBER, "build": BUILD})
+        self.assert_shape(traced["trace"][0], TRACE)
+        rate = traced["trace"][0]["mrays_per_s"]
+        self.assertTrue(0 < rate["min"] <= rate["median"] <= rate["max"], rate)
+        checked = self.document("check", SOUP)
+        self.assert_shape(checked, {**DOCUMENT, "check": {"nodes": COUNT, "primitives": COUNT, "broken": type(None)}})
+        self.assertIs(checked["check"]["ok"], True)
+        self.assert_shape(self.document("render", SOUP, "--size", "8x8", "-o", "fields.png"),
+                          {**DOCUMENT, "scene": SCENE, "load_ms": NUMBER, "render": {"file": TEXT, "view": TEXT}})
+
+    def test_null_rules(self):
+        self.write("points.ply", ply([(0, 0, 0), (1, 2, 3), (4, 5, 6)]))
+        self.write("flat.ply", ply([(1, 1, 1)] * 3, [(0, 1, 2)]))
+        points = self.document("build", "points.ply")
+        self.assertEqual((points["scene"]["triangles"], points["scene"]["points"]), (0, 3))
+        one_place = self.document("build", "flat.ply")["build"]
+        self.assertEqual((one_place["sah"], one_place["epo"], one_place["nodes"]), (None, None, 1))
+        nothing = self.document("build", "builtin:soup?triangles=0")["build"]
+        self.assertEqual((nothing["nodes"], nothing["leaves"], nothing["sah"], nothing["depth_bound"]),
+                         (0, 0, None, None))
+        # no ray at all: there is no rate
+        write_npy(self.folder / "none.npy", "<f4", (0, 8), b"")
+        trace = self.document("trace", SOUP, "--rays", "none.npy")["trace"][0]
+        self.assertEqual((trace["count"], trace["hits"], trace["mrays_per_s"], trace["node_visits_per_ray"]),
+                         (0, 0, None, None))
+        self.succeed("trace", SOUP, "--rays", "none.npy")
+
+    def test_tiny_scenes(self):
+        self.write("one.ply", TRIANGLE)
+        one = self.document("build", "one.ply")["build"]
+        self.assertEqual((one["nodes"], one["leaves"], one["max_depth"], one["sah"]), (1, 1, 0, 1.0))
+        self.write("no_faces.off", "OFF\n0 0 0\n")
+        for scene in ("one.ply", "builtin:soup?triangles=0", "no_faces.off"):
+            for command in (["info"], ["build", "-o", "tiny.rdx"], ["check"], ["trace", "--size", "8x8"],
+                            ["trace", "--rays", "ao", "--size", "8x8"], ["render", "-o", "tiny.png", "--size", "8x8"]):
+                self.succeed(command[0], scene, *command[1:])
+            self.succeed("check", "tiny.rdx")
+            self.succeed("check", "--same", "tiny.rdx", scene)
+
+    def test_same_hash_for_every_thread_count(self):
+        for scene in ("builtin:soup?triangles=20000", "builtin:clustered?points=20000"):
+            for bits in ("30", "63"):
+                hashes = {self.document("build", scene, "--bits", bits, "--repeat", "1", "--threads", threads)["build"]
+                          ["tree_hash"] for threads in ("1", "2", "7", "7")}
+                self.assertEqual(len(hashes), 1, (scene, bits, hashes))
+        a = self.document("build", "builtin:soup?triangles=20000", "--max-leaf", "1")["build"]
+        b = self.document("build", "builtin:soup?triangles=20000", "--seed", "2")["build"]
+        c = self.document("build", "builtin:soup?triangles=20000")["build"]
+        self.assertEqual(len({x["tree_hash"] for x in (a, b, c)}), 3)
+        self.assertEqual(a["leaves"], 20000)
+
+    def test_rdx_keeps_everything(self):
+        built = self.document("build", SOUP, "-o", "soup.rdx")
+        self.assertEqual(self.document("info", "soup.rdx")["scene"], self.document("info", SOUP)["scene"])
+        self.assertEqual(self.document("build", "soup.rdx")["build"]["tree_hash"], built["build"]["tree_hash"])
+        self.assertIn("every invariant holds", self.succeed("check", "soup.rdx").out)
+        self.assertIn("the same", self.succeed("check", "--same", "soup.rdx", SOUP).out)
+        self.fail_with_one_line("check", "--same", "soup.rdx", "builtin:soup?triangles=2001", names=["soup.rdx"])
+        for scene in ("soup.rdx", SOUP):
+            self.succeed("trace", scene, "--size", "32x24", "--hits", f"{scene == SOUP}.npy", "--repeat", "1")
+            self.succeed("render", scene, "--size", "32x24", "--view", "primitive", "-o", f"{scene == SOUP}.png")
+        for kind in ("npy", "png"):
+            self.assertEqual((self.folder / f"True.{kind}").read_bytes(), (self.folder / f"False.{kind}").read_bytes())
+
+    def test_altered_rdx_files(self):
+        self.succeed("build", "builtin:soup?triangles=20", "-o", "good.rdx", "--repeat", "1")
+        good = (self.folder / "good.rdx").read_bytes()
+        step = max(1, len(good) // 60)
+        changed = [good[:n] for n in range(0, len(good), step)]
+        changed += [good[:n] + bytes([good[n] ^ 0x10]) + good[n + 1:] for n in range(0, len(good), step)]
+        changed.append(good + b"\0")
+        for content in changed:
+            self.write("bad.rdx", content)
+            self.fail_with_one_line("check", "bad.rdx", names=["bad.rdx"])
+
+    def test_saved_rays_give_the_same_hits(self):
+        for kind in ("primary", "ao", "diffuse", "diffuse_shuffled"):
+            arguments = ["--samples", "2", "--repeat", "1", "--mode", "closest"]
+            first = self.document("trace", SOUP, "--rays", kind, "--size", "32x24", "--camera", "0", *arguments,
+                                  "--hits", "a.npy", "--save-rays", "rays.npy")["trace"][0]
+            second = self.document("trace", SOUP, "--rays", "rays.npy", *arguments, "--hits", "b.npy",
+                                   "--threads", "1")["trace"][0]
+            rays, hits = read_rays(self.folder / "rays.npy"), read_hits(self.folder / "a.npy")
+            self.assertEqual(len(rays), len(hits), kind)
+            self.assertEqual((first["count"], first["hits"]), (len(rays), sum(h[1] != MISS for h in hits)), kind)
+            self.assertGreater(first["hits"], 0, kind)
+            self.assertEqual((self.folder / "a.npy").read_bytes(), (self.folder / "b.npy").read_bytes(), kind)
+            for field in ("count", "hits", "node_visits_per_ray", "triangle_tests_per_ray"):
+                self.assertEqual(first[field], second[field], (kind, field))
+            for ray, (t, prim, u, v) in zip(rays, hits):
+                if prim == MISS:
+                    self.assertEqual((t, u, v), (math.inf, 0, 0))
+                else:
+                    self.assertTrue(ray[3] <= t <= ray[7] and prim < 2000 and u >= 0 and v >= 0 and u + v <= 1.0001)
+            if kind == "ao":
+                self.assertTrue(all(math.isfinite(ray[7]) for ray in rays))
+
+    def test_modes(self):
+        self.write("squares.ply", SQUARES)
+        rays = [(0.75, 0.25, 3, 0, 0, 0, -1, math.inf),  # both squares: triangles 2 and 0
+                (0.75, 0.25, 3, 2.5, 0, 0, -1, math.inf),  # only the far one
+                (0.25, 0.75, 0.5, 0, 0, 0, 2, 10),  # triangle 3, t in units of a direction of length 2
+                (5, 5, 3, 0, 0, 0, -1, math.inf),  # beside both
+                (0.25, 0.75, 3, 0, 0, 0, -1, 1.5),  # ends before either
+                (0.25, 0.75, 3, 0, 0, 0, 0, 1)]  # invalid
+        write_npy(self.folder / "rays.npy", "<f4", (len(rays), 8), b"".join(struct.pack("<8f", *r) for r in rays))
+        counts = {}
+        for mode in ("closest", "any", "all"):
+            hits = [] if mode == "any" else ["--hits", f"{mode}.npy"]
+            trace = self.document("trace", "squares.ply", "--rays", "rays.npy", "--mode", mode, *hits)["trace"][0]
+            self.assertEqual((trace["mode"], trace["count"], trace["invalid_rays"]), (mode, 6, 1))
+            counts[mode] = trace["hits"]
+        self.assertEqual(counts, {"closest": 3, "any": 3, "all": 4})
+        miss = (math.inf, MISS)
+        self.assertEqual([h[:2] for h in read_hits(self.folder / "closest.npy")],
+                         [(2.0, 2), (3.0, 0), (0.25, 3), miss, miss, miss])
+        self.assertEqual([h[:2] for h in read_hits(self.folder / "all.npy")], [(2.0, 2), (3.0, 0), (3.0, 0), (0.25, 3)])
+
+    def test_bad_ray_files(self):
+        ray = struct.pack("<8f", 0, 0, 1, 0, 0, 0, -1, 9)
+        for name, descr, shape, data in (("cut", "<f4", (2, 8), ray), ("wide", "<f4", (1, 9), ray + b"1234"),
+                                         ("vast", "<f4", (1 << 60, 8), ray), ("negative", "<f4", (-1, 8), ray),
+                                         ("words", "<U4", (1, 8), ray * 4)):
+            write_npy(self.folder / f"{name}.npy", descr, shape, data)
+            self.fail_with_one_line("trace", SOUP, "--rays", f"{name}.npy", names=[f"{name}.npy"])
+
+    def test_cameras(self):
+        one = '{"position": [0.5, 0.5, %g], "target": [0.5, 0.5, 0], "up": [0, 1, 0], "vfov": 40}'
+        os.mkdir(self.folder / "scene")
+        self.write("scene/squares.ply", SQUARES)
+        self.write("scene/cameras.json", '{"width": 20, "height": 10, "cameras": [%s, %s]}' % (one % 4, one % -4))
+        self.write("other.json", "[%s]" % (one % 100))
+        scene = "scene/squares.ply"
+        self.assertEqual(self.document("trace", scene)["trace"][0]["count"], 2 * 20 * 10)
+        self.assertEqual(self.document("trace", scene, "--camera", "1")["trace"][0]["count"], 20 * 10)
+        near = self.document("trace", scene, "--camera", "0", "--size", "30x30")["trace"][0]
+        far = self.document("trace", scene, "--cameras", "other.json", "--size", "30x30")["trace"][0]
+        self.assertEqual((near["count"], far["count"]), (900, 900))
+        self.assertGreater(near["hits"], 10 * max(1, far["hits"]))
+        self.succeed("render", scene, "-o", "own.png")
+        self.assertEqual(read_png(self.folder / "own.png")[:2], (20, 10))
+        self.fail_with_one_line("render", scene, "--cameras", "other.json", "--camera", "1", "-o", "x.png")
+        for arguments in (["--eye", "0.5", "0.5", "4"], ["--eye=0.5,0.5,4"]):
+            self.succeed("render", scene, "-o", "eye.png", "--camera", "1", "--size", "20x10", *arguments)
+            self.assertEqual((self.folder / "eye.png").read_bytes(), (self.folder / "own.png").read_bytes())
+        self.fail_with_one_line("render", scene, "-o", "x.png", "--eye", "0", "0", "0", "--target", "0", "0", "0")
+
+    def test_pictures_of_every_view(self):
+        scene = "builtin:figure?triangles=5000"
+        self.succeed("build", scene, "-o", "figure.rdx", "--repeat", "1")
+        seen = set()
+        for view in ("shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps"):
+            self.succeed("render", "figure.rdx", "--view", view, "--size", "40x30", "--samples", "4", "-o", "a.png")
+            width, height, values = read_png(self.folder / "a.png")
+            self.assertEqual((width, height), (40, 30), view)
+            self.assertGreater(values, 8, f"{view}: the picture is empty")
+            seen.add((self.folder / "a.png").read_bytes())
+            self.succeed("render", scene, "--view", view, "--size", "40x30", "--samples", "4", "-o", "b.png",
+                         "--threads", "1")
+            self.assertEqual((self.folder / "a.png").read_bytes(), (self.folder / "b.png").read_bytes(), view)
+        self.assertEqual(len(seen), 7)
+        self.succeed("render", "figure.rdx", "--size", "40x30", "--samples", "4", "-o", "a.exr")
+        self.assertEqual((self.folder / "a.exr").read_bytes()[:4], b"\x76\x2f\x31\x01")
+
+    def test_npy_files_are_aligned_version_1(self):
+        self.succeed("trace", SOUP, "--size", "4x4", "--camera", "0", "--hits", "h.npy", "--save-rays", "r.npy")
+        self.assertEqual(read_npy(self.folder / "r.npy")[:2], ("<f4", (16, 8)))
+        for name in ("h.npy", "r.npy"):
+            content = (self.folder / name).read_bytes()
+            self.assertEqual(content[6:8], b"\x01\x00")
+            self.assertEqual((10 + struct.unpack_from("<H", content, 8)[0]) % 64, 0)
+
+
+if __name__ == "__main__":
+    main()
