@@ -8,6 +8,10 @@ if(NOT RAYDIX_CUDA STREQUAL "OFF")
             set(CMAKE_CUDA_ARCHITECTURES 90)
         endif()
         enable_language(CUDA)
+        if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)  # CMake before 3.26 does not know that nvcc has C++20
+            set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
+            set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION -std=c++20)
+        endif()
         set(CMAKE_CUDA_STANDARD 20)
         # The host's bits: no contraction, no flushed denormals, rounded division and square root.
         add_library(raydix_cuda_options INTERFACE)
