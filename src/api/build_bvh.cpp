@@ -7,7 +7,7 @@
 #include "base/check.h"
 #include "exec/memory.h"
 #include "exec/parallel.h"
-#include "keys/morton.h"
+#include "keys/host_encode.h"
 #include "layout/leaf_order.h"
 #include "measure/stopwatch.h"
 #include "primitives/bounds.h"
@@ -109,7 +109,7 @@ struct BuildRun {
         Buffer<Key>& codes = codes_of<Key>(scratch);
         codes.reset(n);
         const Grid grid = make_grid(bounds.box, CodeFormat<Key>::axis_bits);
-        for_each_index(n, EncodeMorton<Source, Key>{source, grid, codes.data()});
+        for_each_index(n, HostEncodeMorton<Source, Key>{source, HostGrid(grid), codes.data()});
         ms.codes = stage.lap();
 
         // Primitives that are left out have the highest key: they sort to the end and are cut off
