@@ -1,5 +1,5 @@
-// An array that either owns its memory or views a mapped file. Move-only; elements are plain data and start
-// uninitialised, because builders write every one of them.
+// An array that either owns its memory or views a mapped file. Move-only; elements are plain data
+// and start uninitialised, because builders write every one of them.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace raydix {
 
-/// 64-byte aligned, backed by huge pages where the system offers them. Counted by `allocated_bytes`.
-/// Throws std::bad_alloc.
+/// 64-byte aligned, backed by huge pages where the system offers them. Counted by
+/// `allocated_bytes`. Throws std::bad_alloc.
 [[nodiscard]] std::shared_ptr<void> allocate_bytes(std::size_t bytes);
 
 template <class T>
@@ -22,9 +22,9 @@ class Buffer {
 public:
     Buffer() = default;
     explicit Buffer(std::size_t size) { reset(size); }
-    /// Views `size` elements at `data`, kept alive by `owner`.
+    /// Views `size` elements at `data`, kept alive by `owner`. `reset` never reuses them: they may be read-only.
     Buffer(std::shared_ptr<void> owner, T* data, std::size_t size)
-        : owner_(std::move(owner)), data_(data), size_(size), capacity_(size) {}
+        : owner_(std::move(owner)), data_(data), size_(size) {}
     Buffer(Buffer&& other) noexcept { swap(other); }
     Buffer& operator=(Buffer&& other) noexcept {
         Buffer moved(std::move(other));
@@ -32,7 +32,8 @@ public:
         return *this;
     }
 
-    /// Makes room for `size` elements; the old ones are lost. Keeps the memory if it is large enough.
+    /// Makes room for `size` elements; the old ones are lost. Keeps the memory if it is large
+    /// enough.
     void reset(std::size_t size) {
         if (size > capacity_) {
             *this = Buffer();  // give the old memory back first: it is not needed beside the new
@@ -47,6 +48,7 @@ public:
     [[nodiscard]] const T* data() const { return data_; }
     [[nodiscard]] std::size_t size() const { return size_; }
     [[nodiscard]] bool empty() const { return size_ == 0; }
+    [[nodiscard]] std::size_t capacity_bytes() const { return capacity_ * sizeof(T); }
     [[nodiscard]] std::span<T> span() { return {data_, size_}; }
     [[nodiscard]] std::span<const T> view() const { return {data_, size_}; }
     [[nodiscard]] T& operator[](std::size_t i) { return data_[i]; }

@@ -27,15 +27,18 @@ struct SahConstants {
 
 struct BuildOptions {
     Builder builder = Builder::karras;
-    int bits = 63;       // Morton code bits, 30 or 63; 30 sorts a little faster, but crowds large scenes into few cells
-    int max_leaf = 4;    // 1..255 primitives in a leaf; more means fewer nodes and more primitive tests
-    bool strict = false; // invalid primitives are an InputError instead of being left out
-    int threads = 0;     // 0: all the machine has. The tree does not depend on it
+    int bits = 63;  // Morton code bits, 30 or 63; 30 sorts a little faster, but crowds large scenes
+                    // into few cells
+    int max_leaf =
+        4;  // 1..255 primitives in a leaf; more means fewer nodes and more primitive tests
+    bool strict = false;  // invalid primitives are an InputError instead of being left out
+    int threads = 0;      // 0: all the machine has. The tree does not depend on it
 };
 
-/// 32 bytes. Inner: count == 0, children are nodes `first` and `first + 1`, left = lower code range.
-/// Leaf: count > 0 primitives, positions [first, first + count) of the primitive order.
-/// Slot 1 is padding, so that each pair of children lies in one 64-byte line; an inner node's `first` is even and >= 2.
+/// 32 bytes. Inner: count == 0, children are nodes `first` and `first + 1`, left = lower code
+/// range. Leaf: count > 0 primitives, positions [first, first + count) of the primitive order. Slot
+/// 1 is padding, so that each pair of children lies in one 64-byte line; an inner node's `first` is
+/// even and >= 2.
 struct BvhNode {
     Vec3 lo;
     std::uint32_t first;
@@ -109,9 +112,10 @@ private:
 };
 
 /// Builds a tree over the mesh's triangles; if it has none, over its vertices as points.
-/// Triangles with a non-finite or out-of-range vertex are left out and counted; `options.strict` throws instead.
-/// The tree refers to triangles by their position in the mesh. Same input, same tree, for every thread count.
-/// Throws InputError: option out of range, a vertex index past the end, 2^31 primitives or more.
+/// Triangles with a non-finite or out-of-range vertex are left out and counted; `options.strict`
+/// throws instead. The tree refers to triangles by their position in the mesh. Same input, same
+/// tree, for every thread count. Throws InputError: option out of range, a vertex index past the
+/// end, 2^31 primitives or more.
 [[nodiscard]] Bvh build_bvh(const MeshView& mesh, const BuildOptions& options = {});
 [[nodiscard]] Bvh build_bvh(const Mesh& mesh, const BuildOptions& options = {});
 
@@ -121,8 +125,8 @@ private:
 /// Builds a tree over points. Non-finite points are left out and counted.
 [[nodiscard]] Bvh build_bvh(std::span<const Vec3> points, const BuildOptions& options = {});
 
-/// Builds again and again into the same memory: scratch space and, if they are large enough, the arrays of
-/// the tree are kept from one call to the next. Not for use by two threads at once.
+/// Builds again and again into the same memory: scratch space and, if they are large enough, the
+/// arrays of the tree are kept from one call to the next. Not for use by two threads at once.
 class BvhBuilder {
 public:
     BvhBuilder();
@@ -132,6 +136,7 @@ public:
 
     /// As build_bvh, into `tree`.
     void build(const MeshView& mesh, const BuildOptions& options, Bvh& tree);
+    void build(std::span<const Aabb> boxes, const BuildOptions& options, Bvh& tree);
 
 private:
     struct Scratch;
@@ -140,34 +145,37 @@ private:
 
 /// Figures of the binary tree (contract.md 2).
 struct TreeStats {
-    std::uint64_t nodes = 0;        // inner + leaves
+    std::uint64_t nodes = 0;  // inner + leaves
     std::uint64_t leaves = 0;
-    std::uint64_t references = 0;   // primitives in leaves
-    std::uint64_t layout_nodes = 0; // 32-byte slots of the node array, padding included
+    std::uint64_t references = 0;    // primitives in leaves
+    std::uint64_t layout_nodes = 0;  // 32-byte slots of the node array, padding included
     std::uint32_t max_depth = 0;
-    std::optional<std::uint32_t> depth_bound;  // code bits + ceil(log2 n): proven for the radix builders
-    std::optional<double> sah;                 // null if the root has no area
+    std::optional<std::uint32_t>
+        depth_bound;            // code bits + ceil(log2 n): proven for the radix builders
+    std::optional<double> sah;  // null if the root has no area
     SahConstants sah_constants;
-    std::optional<double> epo;                 // only if asked for
+    std::optional<double> epo;  // only if asked for
     std::uint64_t bytes = 0;
-    std::uint64_t bytes_referenced = 0;        // caller's buffers that a trace reads: none
-    std::string tree_hash;                     // 32 hex digits
+    std::uint64_t bytes_referenced = 0;  // caller's buffers that a trace reads: none
+    std::string tree_hash;               // 32 hex digits
 };
 
 struct StatsOptions {
-    SahConstants sah;
+    SahConstants sah{};
     bool with_epo = false;
     double epo_sample = 1.0;  // part of the triangles that EPO sums over, evenly spread, in (0, 1]
     bool with_hash = true;
     int threads = 0;
 };
 
-/// Walks the tree once for its statistics. SAH and EPO are sums in double, the same for every thread count.
+/// Walks the tree once for its statistics. SAH and EPO are sums in double, the same for every
+/// thread count.
 [[nodiscard]] TreeStats tree_stats(const Bvh& bvh, const StatsOptions& options = {});
 
 /// 128 bits as hex over the canonical tree: equal exactly when topology, order and boxes are.
-/// XXH3-128 (seed 0) of a little-endian byte stream: tree kind (uint32, 0 = bvh), bits, max_leaf (uint32), then in
-/// preorder, left first, per node its six floats lo.xyz hi.xyz, per leaf also its count and primitive ids (uint32).
+/// XXH3-128 (seed 0) of a little-endian byte stream: tree kind (uint32, 0 = bvh), bits, max_leaf
+/// (uint32), then in preorder, left first, per node its six floats lo.xyz hi.xyz, per leaf also its
+/// count and primitive ids (uint32).
 [[nodiscard]] std::string tree_hash(const Bvh& bvh);
 
 }  // namespace raydix

@@ -6,7 +6,8 @@
 
 namespace raydix {
 
-/// The input is at fault: a file, a mesh, an option value. The message is one line that says where and why.
+/// The input is at fault: a file, a mesh, an option value. The message is one line that says where
+/// and why.
 class InputError : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;

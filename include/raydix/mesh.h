@@ -19,14 +19,16 @@ struct Mesh {
     [[nodiscard]] bool is_point_cloud() const { return triangles.empty() && !vertices.empty(); }
 };
 
-/// The same without owning: [vertices], [triangles]. The caller keeps the arrays alive during the call.
+/// The same without owning: [vertices], [triangles]. The caller keeps the arrays alive during the
+/// call.
 struct MeshView {
     std::span<const Vec3> vertices;
     std::span<const Triangle> triangles;
 
     MeshView() = default;
     MeshView(std::span<const Vec3> v, std::span<const Triangle> t) : vertices(v), triangles(t) {}
-    MeshView(const Mesh& mesh) : vertices(mesh.vertices), triangles(mesh.triangles) {}  // NOLINT: meant to be implicit
+    MeshView(const Mesh& mesh)
+        : vertices(mesh.vertices), triangles(mesh.triangles) {}  // NOLINT: meant to be implicit
 };
 
 /// What `inspect` counts. Coordinates beyond 1e12 and boxes with a diagonal in (0, 1e-12) are
@@ -34,15 +36,17 @@ struct MeshView {
 struct MeshInfo {
     std::uint64_t vertices = 0;
     std::uint64_t triangles = 0;
-    std::uint64_t points = 0;                  // vertices, if there are no triangles
-    Aabb bounds{};                             // of all finite, in-range vertices; lo > hi if there are none
-    std::uint64_t non_finite_vertices = 0;     // NaN or Inf in a coordinate
-    std::uint64_t out_of_range_vertices = 0;   // finite, but |coordinate| > 1e12
-    std::uint64_t unreferenced_vertices = 0;   // in no triangle (0 for point clouds)
-    std::uint64_t zero_area_triangles = 0;     // exact cross product in double is 0 (repeated indices included)
+    std::uint64_t points = 0;  // vertices, if there are no triangles
+    Aabb bounds{};             // of all finite, in-range vertices; lo > hi if there are none
+    std::uint64_t non_finite_vertices = 0;    // NaN or Inf in a coordinate
+    std::uint64_t out_of_range_vertices = 0;  // finite, but |coordinate| > 1e12
+    std::uint64_t unreferenced_vertices = 0;  // in no triangle (0 for point clouds)
+    std::uint64_t zero_area_triangles =
+        0;  // exact cross product in double is 0 (repeated indices included)
     std::uint64_t repeated_index_triangles = 0;
-    std::uint64_t left_out_triangles = 0;      // a vertex is non-finite or out of range, or the box is too small
-    std::uint64_t bytes = 0;                   // of the two arrays
+    std::uint64_t left_out_triangles =
+        0;                    // a vertex is non-finite or out of range, or the box is too small
+    std::uint64_t bytes = 0;  // of the two arrays
 };
 
 /// Counts the elements a user should know about. Throws InputError if an index is out of range.

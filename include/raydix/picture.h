@@ -27,20 +27,28 @@ enum class View : std::uint32_t { shaded, normal, depth, primitive, ao, diffuse,
 struct RenderOptions {
     View view = View::shaded;
     std::uint32_t width = 1024, height = 768;  // each 1..16384
-    int samples = 0;         // rays per pixel for ao and diffuse; 0: 64
+    // Rays per pixel that gather light, 1..4096; 0: 64 for ao, 32 for shaded and diffuse.
+    int samples = 0;
     float ao_radius = 0.0f;  // 0: 5 % of the box diagonal
     std::uint64_t seed = 1;
     int threads = 0;
-    std::function<void(double)> progress;  // called with the part done, 0..1, from one thread at a time
+    // Called with the part done, 0..1, from one thread at a time; what it throws ends the render.
+    std::function<void(double)> progress;
 };
 
-/// `shaded`: sun with shadow and sky over grey; `normal`: (n + 1) / 2 of the geometric normal turned to the viewer;
-/// `depth`: near white to far black; `primitive`: one colour per triangle; `ao`: open part of the sky within the
-/// radius; `diffuse`: one bounce; `steps`: node visits as a heat map. Deterministic for every thread count.
-[[nodiscard]] Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& options = {});
+/// `shaded`: sun with shadow and sky over grey, a lamp at the camera in closed rooms; `normal`: (n
+/// + 1) / 2 of the geometric normal turned to the viewer; `depth`: near white to far black;
+/// `primitive`: one colour per triangle; `ao`: open part of the sky within the radius; `diffuse`:
+/// one bounce; `steps`: node visits as a heat map. Deterministic for every thread count. Where a
+/// ray hits nothing: sky for `shaded` and `diffuse`, white for `ao`, black for `normal`, `depth`
+/// and `primitive`. Four primary rays per pixel in the views that gather light, one through its
+/// centre in the others. Throws InputError: a tree of boxes or points, a camera that shows nothing,
+/// options out of range.
+[[nodiscard]] Picture render(const Bvh& bvh, const Camera& camera,
+                             const RenderOptions& options = {});
 
-/// Writes .png (8 bit sRGB, clamped after a filmic curve if `tone_map`) or .exr (linear float), by extension.
-/// Throws InputError that names the file.
+/// Writes .png (8 bit sRGB, clamped after a filmic curve if `tone_map`) or .exr (linear float), by
+/// extension. Throws InputError that names the file.
 void save_picture(const std::filesystem::path& file, const Picture& picture, bool tone_map);
 
 /// Reads an 8-bit RGB .png back as linear values.

@@ -1,4 +1,5 @@
-// Rays of the measuring protocol: primary, ambient occlusion, diffuse (Aila and Laine 2009 and its release).
+// Rays of the measuring protocol: primary, ambient occlusion, diffuse (Aila and Laine 2009 and its
+// release).
 #pragma once
 
 #include <raydix/bvh.h>
@@ -16,27 +17,38 @@ namespace raydix {
 enum class RayKind : std::uint32_t { primary, ao, diffuse, diffuse_shuffled };
 [[nodiscard]] std::string_view ray_kind_name(RayKind kind);
 
-/// One ray per pixel centre, pixels in 2-D Morton order; `pixels` (if not null) receives y * width + x of each ray.
-[[nodiscard]] std::vector<Ray> make_primary_rays(const Camera& camera, std::uint32_t width, std::uint32_t height,
+/// One ray per pixel centre, pixels in 2-D Morton order (x in the lower bit); `pixels` (if not
+/// null) receives y * width + x of each ray. Directions are unit. Throws InputError that names the
+/// camera if it shows nothing, or a side is not 1..16384.
+[[nodiscard]] std::vector<Ray> make_primary_rays(const Camera& camera, std::uint32_t width,
+                                                 std::uint32_t height,
                                                  std::vector<std::uint32_t>* pixels = nullptr);
 
 struct SecondaryOptions {
     RayKind kind = RayKind::ao;
-    int samples = 32;         // rays per primary hit, 1..1024
-    float ao_radius = 0.0f;   // tmax of ao rays; 0: 5 % of the box diagonal
-    std::uint64_t seed = 1;   // of the per-pixel rotations
-    bool sorted = true;       // by a 6-D Morton key (origin, then direction); shuffled diffuse rays never are
+    int samples = 32;        // rays per primary hit, 1..1024
+    float ao_radius = 0.0f;  // tmax of ao rays; 0: 5 % of the box diagonal
+    std::uint64_t seed = 1;  // of the per-pixel rotations
+    // By a 6-D Morton key: level by level from the highest bit, one bit each of origin x y z and
+    // direction x y z. Origin scaled to 2^24 in the box of all end points (origin, and the far end
+    // where tmax is finite), direction to 2^21. If not, rays follow the hits, `samples` in a row;
+    // diffuse_shuffled rays are permuted at random by `seed` in any case.
+    bool sorted = true;
     int threads = 0;
 };
 
-/// `samples` rays from each of `hits` (missed rays give none): Halton points (bases 2, 3), cosine-weighted about the
-/// geometric normal turned toward the ray, rotated by a hash of (pixel id, seed). Origins move back along the
-/// primary ray by 3e-6 of the box diagonal. rays, hits, pixels [n] -> [hits * samples] rays.
-[[nodiscard]] std::vector<Ray> make_secondary_rays(const Bvh& bvh, std::span<const Ray> rays, std::span<const Hit> hits,
+/// `samples` rays from each of `hits` (missed rays give none): Halton points (bases 2, 3),
+/// cosine-weighted about the geometric normal turned toward the ray, rotated by a hash of (pixel
+/// id, seed). Origins move back along the primary ray by 3e-6 of the box diagonal. rays, hits,
+/// pixels [n] -> [hits * samples] rays. The same for every thread count. Throws InputError: sizes
+/// that differ, an option out of range, a hit on a primitive that the tree does not hold.
+[[nodiscard]] std::vector<Ray> make_secondary_rays(const Bvh& bvh, std::span<const Ray> rays,
+                                                   std::span<const Hit> hits,
                                                    std::span<const std::uint32_t> pixels,
                                                    const SecondaryOptions& options);
 
-/// NumPy files of shape (N, 8) float32: ox oy oz tmin dx dy dz tmax. Throws InputError that names the file.
+/// NumPy files of shape (N, 8) float32: ox oy oz tmin dx dy dz tmax. Throws InputError that names
+/// the file.
 [[nodiscard]] std::vector<Ray> load_rays(const std::filesystem::path& file);
 void save_rays(const std::filesystem::path& file, std::span<const Ray> rays);
 

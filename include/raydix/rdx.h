@@ -9,8 +9,9 @@
 
 namespace raydix {
 
-/// Versioned, little-endian, 64-byte aligned sections, a checksum (XXH3-128) per section and one over the header.
-/// Writes beside the target and renames, so that a reader never sees half a file. Throws InputError.
+/// Versioned, little-endian, 64-byte aligned sections, a checksum (XXH3-128) per section and one
+/// over the header. Writes beside the target and renames, so that a reader never sees half a file.
+/// Throws InputError.
 void save_rdx(const std::filesystem::path& file, const Bvh& bvh, const Scene& scene);
 
 struct RdxFile {
@@ -18,8 +19,9 @@ struct RdxFile {
     Bvh bvh;  // views the mapped file, which stays mapped as long as the tree lives
 };
 
-/// Maps the file, compares lengths and checksums, then validates children, ranges, acyclicity and geometry in O(n)
-/// before anything is used: a right checksum proves nothing. Throws InputError: "FILE: SECTION: reason".
+/// Maps the file, compares lengths and checksums, then validates children, ranges, acyclicity and
+/// geometry in O(n) before anything is used: a right checksum proves nothing. Throws InputError:
+/// "FILE: SECTION: reason".
 [[nodiscard]] RdxFile load_rdx(const std::filesystem::path& file);
 
 }  // namespace raydix

@@ -12,10 +12,11 @@
 
 namespace raydix {
 
-/// Reads .ply (ascii, binary little and big endian), .obj, .stl (ascii, binary), .gltf, .glb, .off, .xyz or .npy,
-/// each also with .gz, .xz or .zst behind it. Polygons are fanned in order; the meshes of a glTF scene follow
-/// each other. -0 becomes +0. Non-finite coordinates are kept (builders leave such triangles out).
-/// Throws InputError: "FILE: ELEMENT: reason". Memory stays in proportion to what the file really holds.
+/// Reads .ply (ascii, binary little and big endian), .obj, .stl (ascii, binary), .gltf, .glb, .off,
+/// .xyz or .npy, each also with .gz, .xz or .zst behind it. Polygons are fanned in order; the
+/// meshes of a glTF scene follow each other. -0 becomes +0. Non-finite coordinates are kept
+/// (builders leave such triangles out). Throws InputError: "FILE: ELEMENT: reason". Memory stays in
+/// proportion to what the file really holds.
 [[nodiscard]] Mesh load_mesh(const std::filesystem::path& file);
 
 /// One `key=value` that a built-in scene understands.
@@ -26,7 +27,8 @@ struct BuiltinParameter {
     std::string_view meaning;
 };
 
-/// A scene that the library makes itself, the same on every machine for the same parameters and seed.
+/// A scene that the library makes itself, the same on every machine for the same parameters and
+/// seed.
 struct BuiltinScene {
     std::string_view name;
     std::string_view what;
@@ -39,7 +41,8 @@ struct BuiltinScene {
 struct Scene {
     std::string name;  // file name without folders, or the built-in's specification
     Mesh mesh;
-    CameraSet cameras;  // from cameras.json beside the file, the built-in's own, or one fitted to the box
+    CameraSet
+        cameras;  // from cameras.json beside the file, the built-in's own, or one fitted to the box
     double load_ms = 0.0;
 };
 

@@ -14,44 +14,51 @@ enum class TraceKernel : std::uint32_t { scalar = 0 };
 
 struct TraceOptions {
     TraceKernel kernel = TraceKernel::scalar;
-    int threads = 0;      // 0: all the machine has. Results do not depend on it
+    int threads = 0;        // 0: all the machine has. Results do not depend on it
     bool counters = false;  // also count node visits and triangle tests; costs a little time
 };
 
 /// What a batch met. Counters are 0 unless asked for.
 struct TraceCounts {
     std::uint64_t rays = 0;
-    std::uint64_t hits = 0;           // rays that hit (all-hits: hits)
+    std::uint64_t hits = 0;  // rays that hit (all-hits: hits)
     std::uint64_t invalid_rays = 0;
-    std::uint64_t node_visits = 0;    // nodes entered, root included: inner ones test both children's boxes
+    std::uint64_t node_visits =
+        0;  // nodes entered, root included: inner ones test both children's boxes
     std::uint64_t triangle_tests = 0;
 };
 
-/// Closest hit of each ray: the least (t, prim) over all triangles that the watertight test accepts (Woop, Benthin,
-/// Wald 2013; edges belong to both triangles). Bit-equal for every builder, kernel and thread count.
-/// rays [n] -> hits [n]; throws InputError if the sizes differ or the tree holds no triangles but boxes or points.
-TraceCounts trace(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits, const TraceOptions& options = {});
-[[nodiscard]] std::vector<Hit> trace(const Bvh& bvh, std::span<const Ray> rays, const TraceOptions& options = {});
+/// Closest hit of each ray: the least (t, prim) over all triangles that the watertight test accepts
+/// (Woop, Benthin, Wald 2013; edges belong to both triangles). Bit-equal for every builder, kernel
+/// and thread count. rays [n] -> hits [n]; throws InputError if the sizes differ or the tree holds
+/// no triangles but boxes or points.
+TraceCounts trace(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits,
+                  const TraceOptions& options = {});
+[[nodiscard]] std::vector<Hit> trace(const Bvh& bvh, std::span<const Ray> rays,
+                                     const TraceOptions& options = {});
 
 /// Whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n].
 TraceCounts trace_any(const Bvh& bvh, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                       const TraceOptions& options = {});
 
-/// All hits of all rays: those of ray i are hits[offsets[i]] .. hits[offsets[i + 1]], sorted by (t, prim).
+/// All hits of all rays: those of ray i are hits[offsets[i]] .. hits[offsets[i + 1]], sorted by (t,
+/// prim).
 struct AllHits {
     std::vector<std::uint64_t> offsets;  // [rays + 1]
     std::vector<Hit> hits;
     TraceCounts counts;
 };
 
-/// Each triangle at most once per ray. Edges are half open (exact sign, then a top-left rule), so that the number of
-/// crossings of a closed mesh is right for rays through edges and vertices too.
-[[nodiscard]] AllHits trace_all(const Bvh& bvh, std::span<const Ray> rays, const TraceOptions& options = {});
+/// Each triangle at most once per ray. Edges are half open (exact sign, then a top-left rule), so
+/// that the number of crossings of a closed mesh is right for rays through edges and vertices too.
+[[nodiscard]] AllHits trace_all(const Bvh& bvh, std::span<const Ray> rays,
+                                const TraceOptions& options = {});
 
 [[nodiscard]] Hit closest_hit(const Bvh& bvh, const Ray& ray);
 [[nodiscard]] bool any_hit(const Bvh& bvh, const Ray& ray);
 
 /// The same answers by testing every triangle: slow, and independent of any tree.
-[[nodiscard]] std::vector<Hit> trace_brute_force(const MeshView& mesh, std::span<const Ray> rays, int threads = 0);
+[[nodiscard]] std::vector<Hit> trace_brute_force(const MeshView& mesh, std::span<const Ray> rays,
+                                                 int threads = 0);
 
 }  // namespace raydix

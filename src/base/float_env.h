@@ -9,7 +9,8 @@
 
 namespace raydix {
 
-/// Clears flush-to-zero and denormals-are-zero and sets rounding to nearest for its lifetime; restores after.
+/// Clears flush-to-zero and denormals-are-zero and sets rounding to nearest for its lifetime;
+/// restores after.
 class FloatEnvironment {
 public:
     FloatEnvironment(const FloatEnvironment&) = delete;
@@ -23,7 +24,8 @@ public:
     }
 
 private:
-    static constexpr unsigned special_bits = 0x8000u | 0x0040u | 0x6000u;  // FTZ, DAZ, rounding mode
+    static constexpr unsigned special_bits =
+        0x8000u | 0x0040u | 0x6000u;  // FTZ, DAZ, rounding mode
     unsigned saved_;
 #elif defined(__aarch64__)
     FloatEnvironment() {

@@ -30,7 +30,8 @@ std::shared_ptr<void> allocate_bytes(std::size_t bytes) {
     void* memory = std::aligned_alloc(alignment, rounded);
     if (!memory) throw std::bad_alloc();
 #ifdef MADV_HUGEPAGE
-    if (huge) madvise(memory, rounded, MADV_HUGEPAGE);  // a hint: if it fails, small pages serve as well
+    if (huge)
+        madvise(memory, rounded, MADV_HUGEPAGE);  // a hint: if it fails, small pages serve as well
 #endif
     try {
         std::shared_ptr<void> owner(memory, [bytes](void* p) {

@@ -17,9 +17,11 @@ void with_threads(int threads, const std::function<void()>& body) {
         body();
         return;
     }
-    // More threads than cores are allowed: results must not depend on the number, and tests show it.
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(std::max(threads, tbb::info::default_concurrency())));
+    // More threads than cores are allowed: results must not depend on the number, and tests show
+    // it.
+    const tbb::global_control limit(
+        tbb::global_control::max_allowed_parallelism,
+        static_cast<std::size_t>(std::max(threads, tbb::info::default_concurrency())));
     tbb::task_arena arena(threads);
     arena.execute(body);
 }
@@ -28,18 +30,19 @@ int thread_count() { return tbb::this_task_arena::max_concurrency(); }
 
 namespace detail {
 
-void parallel_ranges(std::size_t n, std::size_t grain, void (*call)(const void*, std::size_t, std::size_t),
-                     const void* body) {
+void parallel_ranges(std::size_t n, std::size_t grain,
+                     void (*call)(const void*, std::size_t, std::size_t), const void* body) {
     if (n == 0) return;
     if (n <= grain || thread_count() == 1) {
         const FloatEnvironment plain;
         call(body, 0, n);
         return;
     }
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, grain), [&](const tbb::blocked_range<std::size_t>& range) {
-        const FloatEnvironment plain;
-        call(body, range.begin(), range.end());
-    });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, grain),
+                      [&](const tbb::blocked_range<std::size_t>& range) {
+                          const FloatEnvironment plain;
+                          call(body, range.begin(), range.end());
+                      });
 }
 
 }  // namespace detail

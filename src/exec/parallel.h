@@ -1,4 +1,5 @@
-// Parallel loops. The only doors to the thread pool: nothing else in the project knows which one it is.
+// Parallel loops. The only doors to the thread pool: nothing else in the project knows which one it
+// is.
 #pragma once
 
 #include <cstddef>
@@ -9,23 +10,27 @@
 
 namespace raydix {
 
-/// Runs `body` with at most `threads` threads at work in the loops inside it (0: all the machine has).
-/// Exceptions of the loops come out of here.
+/// Runs `body` with at most `threads` threads at work in the loops inside it (0: all the machine
+/// has). Exceptions of the loops come out of here.
 void with_threads(int threads, const std::function<void()>& body);
 
 /// How many threads the loops of the calling context may use.
 [[nodiscard]] int thread_count();
 
 namespace detail {
-void parallel_ranges(std::size_t n, std::size_t grain, void (*call)(const void*, std::size_t, std::size_t),
-                     const void* body);
+void parallel_ranges(std::size_t n, std::size_t grain,
+                     void (*call)(const void*, std::size_t, std::size_t), const void* body);
 }
 
-/// Calls body(begin, end) for ranges that cover [0, n), each at least `grain` long unless n is less.
+/// Calls body(begin, end) for ranges that cover [0, n), each at least `grain` long unless n is
+/// less.
 template <class Body>
 void for_each_range(std::size_t n, std::size_t grain, const Body& body) {
     detail::parallel_ranges(
-        n, grain, [](const void* b, std::size_t begin, std::size_t end) { (*static_cast<const Body*>(b))(begin, end); },
+        n, grain,
+        [](const void* b, std::size_t begin, std::size_t end) {
+            (*static_cast<const Body*>(b))(begin, end);
+        },
         &body);
 }
 
@@ -37,8 +42,9 @@ void for_each_index(std::size_t n, const Body& body, std::size_t grain = 4096) {
     });
 }
 
-/// Splits [0, n) into fixed blocks that depend on n and `block` alone, never on the thread count, and calls
-/// body(block_index, begin, end): what is summed per block and then in order is the same on every machine.
+/// Splits [0, n) into fixed blocks that depend on n and `block` alone, never on the thread count,
+/// and calls body(block_index, begin, end): what is summed per block and then in order is the same
+/// on every machine.
 template <class Body>
 void for_each_block(std::size_t n, std::size_t block, const Body& body) {
     const std::size_t blocks = (n + block - 1) / block;

@@ -30,7 +30,8 @@ Mesh random_soup(std::size_t count, std::uint64_t seed, float size) {
     for (std::size_t i = 0; i < count; ++i) {
         const Vec3 base{unit(), unit(), unit()};
         for (int k = 0; k < 3; ++k)
-            mesh.vertices.push_back({base.x + size * (unit() - 0.5f), base.y + size * (unit() - 0.5f),
+            mesh.vertices.push_back({base.x + size * (unit() - 0.5f),
+                                     base.y + size * (unit() - 0.5f),
                                      base.z + size * (unit() - 0.5f)});
         const auto first = static_cast<std::uint32_t>(3 * i);
         mesh.triangles.push_back({first, first + 1, first + 2});

@@ -1,4 +1,5 @@
-// What several test programs need: shared scenes, seeded random numbers, files in a folder of the test's own.
+// What several test programs need: shared scenes, seeded random numbers, files in a folder of the
+// test's own.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,8 +16,9 @@ namespace raydix::test {
 /// A file below the shared scenes folder; `skip_without` skips the test if it is not there.
 std::filesystem::path shared_scene(const std::string& name);
 
-#define RAYDIX_SKIP_WITHOUT(path) \
-    if (!std::filesystem::exists(path)) GTEST_SKIP() << "shared scene not present: " << (path).string()
+#define RAYDIX_SKIP_WITHOUT(path)       \
+    if (!std::filesystem::exists(path)) \
+    GTEST_SKIP() << "shared scene not present: " << (path).string()
 
 /// A new, empty folder for one test; removed with the object.
 class TempFolder {

@@ -1,0 +1,157 @@
+// raydix build, raydix check.
+#include <fmt/format.h>
+#include <raydix/check.h>
+#include <raydix/error.h>
+#include <raydix/rdx.h>
+
+#include <memory>
+
+#include "output.h"
+
+namespace raydix::cli {
+namespace {
+
+struct BuildCommand {
+    CommonOptions common;
+    TreeOptions tree;
+    std::string scene, out_file;
+    int repeat = 5;
+};
+
+/// One warm-up, then `repeat` builds into new memory, and as many into kept memory.
+struct TimedBuilds {
+    Bvh bvh;
+    std::vector<BuildMs> fresh, kept;
+};
+
+TimedBuilds build_repeatedly(const Mesh& mesh, const BuildOptions& options, int repeat) {
+    TimedBuilds timed;
+    timed.bvh = build_bvh(mesh, options);
+    for (int i = 0; i < repeat; ++i) {
+        timed.bvh = Bvh();
+        timed.bvh = build_bvh(mesh, options);
+        timed.fresh.push_back(timed.bvh.build_ms());
+    }
+    BvhBuilder builder;
+    Bvh again;
+    builder.build(mesh, options, again);
+    for (int i = 0; i < repeat; ++i) {
+        builder.build(mesh, options, again);
+        timed.kept.push_back(again.build_ms());
+    }
+    return timed;
+}
+
+Spread totals(const std::vector<BuildMs>& builds) {
+    std::vector<double> values;
+    for (const BuildMs& b : builds) values.push_back(b.total);
+    return spread_of(values);
+}
+
+void print_build_table(const Json& build, const TimedBuilds& timed) {
+    fmt::print("\n{:<12} {:>9} {:>9} {:>9}   ms, of {} builds into new memory\n", "stage", "median",
+               "min", "max", timed.fresh.size());
+    for (const auto& [stage, ms] : build["ms"].items())
+        fmt::print("{:<12} {:>9.2f} {:>9.2f} {:>9.2f}\n", stage, ms.get<double>(),
+                   build["ms_spread"]["min"][stage].get<double>(),
+                   build["ms_spread"]["max"][stage].get<double>());
+    const Spread kept = totals(timed.kept);
+    fmt::print("{:<12} {:>9.2f} {:>9.2f} {:>9.2f}   total into kept memory\n", "rebuild",
+               kept.median, kept.min, kept.max);
+}
+
+void run_build(const BuildCommand& options) {
+    Json document = new_document("build");
+    const Scene scene = load_scene_with_cameras(options.scene, options.tree, options.common);
+    document["scene"] = scene_json(scene);
+    document["load_ms"] = scene.load_ms;
+    const TimedBuilds timed =
+        build_repeatedly(scene.mesh, options.tree.build_options(options.common), options.repeat);
+    const TreeStats stats = tree_stats(timed.bvh, stats_options(options.tree, options.common));
+    Json build = build_json(timed.bvh, stats, timed.fresh);
+    build["kept_ms"] = spread_json(totals(timed.kept));
+    document["build"] = build;
+    if (options.common.prints_tables()) {
+        fmt::print("{}: {} triangles, {} vertices, loaded in {:.1f} ms\n", scene.name,
+                   grouped(scene.mesh.triangles.size()), grouped(scene.mesh.vertices.size()),
+                   scene.load_ms);
+        print_build_table(build, timed);
+        print_tree_table(timed.bvh, stats);
+    }
+    if (!options.out_file.empty()) {
+        save_rdx(options.out_file, timed.bvh, scene);
+        if (options.common.prints_tables()) fmt::print("written      {}\n", options.out_file);
+    }
+    write_json(document, options.common);
+}
+
+struct CheckCommand {
+    CommonOptions common;
+    TreeOptions tree;
+    std::string scene;
+    std::vector<std::string> same;
+};
+
+void run_check(const CheckCommand& options) {
+    Json document = new_document("check");
+    CheckReport report;
+    std::string what = options.scene;
+    if (!options.same.empty()) {
+        const SceneTree a = load_scene_tree(options.same[0], options.tree, options.common);
+        const SceneTree b = load_scene_tree(options.same[1], options.tree, options.common);
+        report = check_same(a.bvh, b.bvh);
+        what = options.same[0] + " and " + options.same[1];
+    } else {
+        const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
+        report = check(input.bvh, input.scene.mesh);
+    }
+    document["check"] = {{"ok", report.ok},
+                         {"broken", report.ok ? Json(nullptr) : Json(report.broken)},
+                         {"nodes", report.nodes},
+                         {"primitives", report.primitives}};
+    write_json(document, options.common);
+    if (!report.ok) throw InputError(what + ": " + report.broken);
+    if (options.common.prints_tables())
+        fmt::print("{}: {}, {} nodes, {} primitives\n", what,
+                   options.same.empty() ? "every invariant holds" : "the same",
+                   grouped(report.nodes), grouped(report.primitives));
+}
+
+}  // namespace
+
+void add_build_command(CLI::App& app) {
+    auto options = std::make_shared<BuildCommand>();
+    CLI::App* command =
+        app.add_subcommand("build", "Build a tree; print times and statistics; save it");
+    command->add_option("SCENE", options->scene, "A file, or builtin:NAME?key=value&...")
+        ->required();
+    command->add_option("--repeat", options->repeat, "Builds to time after a warm-up")
+        ->check(CLI::Range(1, 10000))
+        ->capture_default_str();
+    command->add_option("-o,--output", options->out_file, "Save the tree with its geometry")
+        ->type_name("FILE.rdx");
+    add_tree_options(*command, options->tree);
+    add_common_options(*command, options->common);
+    command->callback([options] { run_build(*options); });
+}
+
+void add_check_command(CLI::App& app) {
+    auto options = std::make_shared<CheckCommand>();
+    CLI::App* command =
+        app.add_subcommand("check", "Validate every invariant of a tree, or compare two trees");
+    CLI::Option* scene =
+        command->add_option("SCENE", options->scene, "A .rdx file, or a scene to build first");
+    CLI::Option* same =
+        command->add_option("--same", options->same, "Compare the trees of A and B in full")
+            ->expected(2)
+            ->type_name("A B");
+    scene->excludes(same);
+    add_tree_options(*command, options->tree);
+    add_common_options(*command, options->common);
+    command->callback([options, scene, same] {
+        if (scene->count() + same->count() == 0) throw CLI::RequiredError("SCENE or --same A B");
+        run_check(*options);
+    });
+}
+
+}  // namespace raydix::cli

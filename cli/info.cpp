@@ -1,0 +1,100 @@
+// raydix info, raydix scenes.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "output.h"
+
+namespace raydix::cli {
+namespace {
+
+struct InfoOptions {
+    CommonOptions common;
+    TreeOptions tree;
+    std::string scene;
+};
+
+void print_info(const Scene& scene, const MeshInfo& info) {
+    fmt::print("scene        {}\n", scene.name);
+    fmt::print("triangles    {}\n", grouped(info.triangles));
+    fmt::print("vertices     {}\n", grouped(info.vertices));
+    if (info.points) fmt::print("points       {}\n", grouped(info.points));
+    if (info.bounds.lo.x <= info.bounds.hi.x)
+        fmt::print("bounds       ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})\n", info.bounds.lo.x,
+                   info.bounds.lo.y, info.bounds.lo.z, info.bounds.hi.x, info.bounds.hi.y,
+                   info.bounds.hi.z);
+    else
+        fmt::print("bounds       none\n");
+    fmt::print("zero area    {} triangles, {} of them with a repeated index\n",
+               grouped(info.zero_area_triangles), grouped(info.repeated_index_triangles));
+    fmt::print("non-finite   {} vertices\n", grouped(info.non_finite_vertices));
+    fmt::print("out of range {} vertices (beyond 1e12)\n", grouped(info.out_of_range_vertices));
+    fmt::print("unreferenced {} vertices\n", grouped(info.unreferenced_vertices));
+    fmt::print("left out     {} triangles of a tree\n", grouped(info.left_out_triangles));
+    fmt::print("cameras      {}\n", scene.cameras.cameras.size());
+    fmt::print("memory       {:.2f} MB\n", static_cast<double>(info.bytes) / 1e6);
+    fmt::print("loaded in    {:.1f} ms\n", scene.load_ms);
+}
+
+void run_info(const InfoOptions& options) {
+    Json document = new_document("info");
+    SceneTree input;
+    if (is_rdx(options.scene))
+        input = load_scene_tree(options.scene, options.tree, options.common);
+    else
+        input.scene = load_scene_with_cameras(options.scene, options.tree, options.common);
+    const MeshInfo info = inspect(input.scene.mesh);
+    document["scene"] = scene_json(input.scene);
+    document["scene"].update(mesh_info_json(info));
+    document["load_ms"] = input.scene.load_ms;
+    if (options.common.prints_tables()) print_info(input.scene, info);
+    if (is_rdx(options.scene)) {
+        const TreeStats stats = tree_stats(input.bvh, stats_options(options.tree, options.common));
+        document["build"] = build_json(input.bvh, stats, {});
+        if (options.common.prints_tables()) print_tree_table(input.bvh, stats);
+    }
+    write_json(document, options.common);
+}
+
+void run_scenes(const CommonOptions& common) {
+    Json document = new_document("scenes");
+    Json scenes = Json::array();
+    for (const BuiltinScene& scene : builtin_scenes()) {
+        Json parameters = Json::array();
+        if (common.prints_tables()) fmt::print("builtin:{}\n    {}\n", scene.name, scene.what);
+        for (const BuiltinParameter& p : scene.parameters) {
+            parameters.push_back({{"name", p.name},
+                                  {"default", p.default_value},
+                                  {"min", p.min_value},
+                                  {"max", p.max_value},
+                                  {"meaning", p.meaning}});
+            if (common.prints_tables())
+                fmt::print("    {}={:.0f}  ({:.0f} to {:.0f}) {}\n", p.name, p.default_value,
+                           p.min_value, p.max_value, p.meaning);
+        }
+        scenes.push_back({{"name", scene.name}, {"what", scene.what}, {"parameters", parameters}});
+    }
+    document["scenes"] = scenes;
+    write_json(document, common);
+}
+
+}  // namespace
+
+void add_info_command(CLI::App& app) {
+    auto options = std::make_shared<InfoOptions>();
+    CLI::App* command =
+        app.add_subcommand("info", "Counts, bounds, degenerate elements and memory of a scene");
+    command->add_option("SCENE", options->scene, "A file, or builtin:NAME?key=value&...")
+        ->required();
+    add_common_options(*command, options->common);
+    command->callback([options] { run_info(*options); });
+}
+
+void add_scenes_command(CLI::App& app) {
+    auto common = std::make_shared<CommonOptions>();
+    CLI::App* command = app.add_subcommand("scenes", "The built-in scenes and their parameters");
+    add_common_options(*command, *common);
+    command->callback([common] { run_scenes(*common); });
+}
+
+}  // namespace raydix::cli

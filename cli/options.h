@@ -1,0 +1,64 @@
+// Options that several commands share, and the commands themselves: each adds itself to the program
+// and runs later.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/scene.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace raydix::cli {
+
+struct CommonOptions {
+    std::string json_file;  // "-": standard output, and nothing else goes there
+    int threads = 0;
+    bool quiet = false;
+    std::uint64_t seed = 1;
+
+    /// Tables for people go to standard output unless JSON does.
+    [[nodiscard]] bool prints_tables() const { return !quiet && json_file != "-"; }
+};
+void add_common_options(CLI::App& command, CommonOptions& options);
+
+/// How a tree is to be built, in every command that needs one.
+struct TreeOptions {
+    std::string tree = "bvh", builder = "karras", quality, layout = "binary", device = "cpu";
+    int bits = 63, max_leaf = 4;
+    bool strict = false;
+    std::string cameras_file;
+    SahConstants sah;
+    std::optional<double> epo_sample;
+    CLI::Option* builder_option = nullptr;
+
+    [[nodiscard]] BuildOptions build_options(const CommonOptions& common) const;
+};
+void add_tree_options(CLI::App& command, TreeOptions& options);
+
+/// A scene and its tree: built, or both read from a .rdx file.
+struct SceneTree {
+    Scene scene;
+    Bvh bvh;
+};
+[[nodiscard]] bool is_rdx(const std::string& scene);
+[[nodiscard]] Scene load_scene_with_cameras(const std::string& scene, const TreeOptions& tree,
+                                            const CommonOptions& common);
+[[nodiscard]] SceneTree load_scene_tree(const std::string& scene, const TreeOptions& tree,
+                                        const CommonOptions& common);
+
+/// "1024x768" -> 1024, 768. Throws CLI::ValidationError.
+struct Size {
+    std::uint32_t width = 0, height = 0;
+};
+[[nodiscard]] Size parse_size(const std::string& text);
+
+void add_info_command(CLI::App& app);
+void add_scenes_command(CLI::App& app);
+void add_build_command(CLI::App& app);
+void add_check_command(CLI::App& app);
+void add_trace_command(CLI::App& app);
+void add_render_command(CLI::App& app);
+
+}  // namespace raydix::cli

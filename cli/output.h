@@ -1,0 +1,59 @@
+// What commands hand out: JSON documents, tables, progress.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/mesh.h>
+#include <raydix/scene.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "options.h"
+
+namespace raydix::cli {
+
+using Json = nlohmann::ordered_json;
+
+/// {command, version, machine}: the start of every document.
+[[nodiscard]] Json new_document(const std::string& command);
+[[nodiscard]] Json scene_json(const Scene& scene);
+[[nodiscard]] Json mesh_info_json(const MeshInfo& info);
+
+/// Median, least and greatest of some repeats. At least one value.
+struct Spread {
+    double median = 0, min = 0, max = 0;
+};
+[[nodiscard]] Spread spread_of(std::vector<double> values);
+[[nodiscard]] Json spread_json(const Spread& spread);
+
+/// The `build` object of a document; `builds` are the times of each repeat (empty: a tree from a
+/// file).
+[[nodiscard]] Json build_json(const Bvh& bvh, const TreeStats& stats,
+                              const std::vector<BuildMs>& builds);
+[[nodiscard]] StatsOptions stats_options(const TreeOptions& tree, const CommonOptions& common);
+void print_tree_table(const Bvh& bvh, const TreeStats& stats);
+
+/// Writes the document if one was asked for. Throws InputError that names the file.
+void write_json(const Json& document, const CommonOptions& common);
+
+/// A bar on standard error after the first second, on a terminal only.
+class Progress {
+public:
+    Progress(std::string what, const CommonOptions& common);
+    ~Progress();
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+    void show(double part);
+
+private:
+    std::string what_;
+    bool wanted_;
+    bool shown_ = false;
+    double started_, last_ = 0.0;
+};
+
+/// 12345678 -> "12,345,678".
+[[nodiscard]] std::string grouped(std::uint64_t n);
+
+}  // namespace raydix::cli

@@ -1,0 +1,122 @@
+// raydix render: one view of a scene as a picture.
+#include <fmt/format.h>
+#include <raydix/error.h>
+#include <raydix/picture.h>
+
+#include <chrono>
+#include <memory>
+
+#include "output.h"
+
+namespace raydix::cli {
+namespace {
+
+struct RenderCommand {
+    CommonOptions common;
+    TreeOptions tree;
+    std::string scene, out_file, view = "shaded", size_text;
+    std::size_t camera = 0;
+    std::vector<float> eye, target, up;
+    std::optional<float> fov;
+    int samples = 0;
+    float ao_radius = 0.0f;
+};
+
+Vec3 vec_of(const std::vector<float>& v) { return {v[0], v[1], v[2]}; }
+
+Camera chosen_camera(const RenderCommand& options, const Scene& scene) {
+    Camera camera;
+    if (options.camera < scene.cameras.cameras.size())
+        camera = scene.cameras.cameras[options.camera];
+    else
+        throw InputError(scene.name + ": camera " + std::to_string(options.camera) +
+                         " is past the last of " + std::to_string(scene.cameras.cameras.size()) +
+                         " cameras");
+    if (!options.eye.empty()) camera.position = vec_of(options.eye);
+    if (!options.target.empty()) camera.target = vec_of(options.target);
+    if (!options.up.empty()) camera.up = vec_of(options.up);
+    if (options.fov) camera.vfov = *options.fov;
+    return camera;
+}
+
+void run_render(const RenderCommand& options) {
+    const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
+    const Size size = options.size_text.empty()
+                          ? Size{input.scene.cameras.width, input.scene.cameras.height}
+                          : parse_size(options.size_text);
+    const Camera camera = chosen_camera(options, input.scene);
+    Progress progress("rendering", options.common);
+    RenderOptions render_options;
+    render_options.view = view_from_name(options.view);
+    render_options.width = size.width;
+    render_options.height = size.height;
+    render_options.samples = options.samples;
+    render_options.ao_radius =
+        options.ao_radius > 0 ? options.ao_radius : input.scene.cameras.ao_radius;
+    render_options.seed = options.common.seed;
+    render_options.threads = options.common.threads;
+    render_options.progress = [&](double part) { progress.show(part); };
+    const auto start = std::chrono::steady_clock::now();
+    const Picture picture = render(input.bvh, camera, render_options);
+    const double ms =
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    const View view = render_options.view;
+    save_picture(options.out_file, picture, view == View::shaded || view == View::diffuse);
+    if (options.common.prints_tables())
+        fmt::print("{} ({} x {}, {}, {:.0f} ms)\n", options.out_file, size.width, size.height,
+                   options.view, ms);
+    Json document = new_document("render");
+    document["scene"] = scene_json(input.scene);
+    document["load_ms"] = input.scene.load_ms;
+    document["render"] = {{"file", options.out_file}, {"view", options.view},
+                          {"width", size.width},      {"height", size.height},
+                          {"camera", camera.name},    {"ms", ms}};
+    write_json(document, options.common);
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& app) {
+    auto options = std::make_shared<RenderCommand>();
+    CLI::App* command = app.add_subcommand("render", "Render a view of a scene as PNG or EXR");
+    command
+        ->add_option("SCENE", options->scene, "A file, builtin:NAME?key=value&..., or a .rdx file")
+        ->required();
+    command
+        ->add_option("-o,--output", options->out_file,
+                     "Picture to write: .png, or .exr for linear values")
+        ->required()
+        ->type_name("PICTURE");
+    command->add_option("--view", options->view, "What to show")
+        ->check(CLI::IsMember({"shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps"}))
+        ->capture_default_str();
+    command
+        ->add_option("--size", options->size_text, "Pixels (default: of cameras.json, or 1024x768)")
+        ->type_name("WxH");
+    command->add_option("--camera", options->camera, "Number of a camera")->capture_default_str();
+    command->add_option("--eye", options->eye, "Camera position x y z")
+        ->expected(3)
+        ->delimiter(',');
+    command->add_option("--target", options->target, "Point looked at x y z")
+        ->expected(3)
+        ->delimiter(',');
+    command->add_option("--up", options->up, "Direction that is up in the picture x y z")
+        ->expected(3)
+        ->delimiter(',');
+    command->add_option("--fov", options->fov, "Vertical field of view in degrees")
+        ->check(CLI::Range(0.01f, 179.0f));
+    command
+        ->add_option("--samples", options->samples,
+                     "Rays per pixel of views with chance (0: the view's own default)")
+        ->check(CLI::Range(0, 4096))
+        ->capture_default_str();
+    command
+        ->add_option("--ao-radius", options->ao_radius,
+                     "Reach of ao rays (default: of cameras.json, or 5 % of the diagonal)")
+        ->check(CLI::PositiveNumber);
+    add_tree_options(*command, options->tree);
+    add_common_options(*command, options->common);
+    command->callback([options] { run_render(*options); });
+}
+
+}  // namespace raydix::cli

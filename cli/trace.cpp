@@ -1,0 +1,301 @@
+// raydix trace: rays of the protocol, or from a file, through a tree; rates and counts.
+#include <fmt/format.h>
+#include <raydix/error.h>
+#include <raydix/rays.h>
+#include <raydix/trace.h>
+
+#include <charconv>
+#include <chrono>
+#include <functional>
+#include <memory>
+
+#include "output.h"
+
+namespace raydix::cli {
+namespace {
+
+constexpr std::size_t launch_rays = std::size_t{1}
+                                    << 20;  // secondary rays are traced in batches of this size
+
+enum class Mode { closest, any, all };
+
+struct TraceCommand {
+    CommonOptions common;
+    TreeOptions tree;
+    std::string scene, rays = "primary", mode_name, kernel = "scalar", camera = "all", hits_file,
+                       rays_file;
+    std::string size_text;
+    int samples = 32, repeat = 5;
+    float ao_radius = 0.0f;
+    bool explain = false;
+};
+
+/// Figures that grow with each batch.
+struct Tally {
+    TraceCounts counts;
+    std::vector<double> seconds;  // of all batches, for each repeat
+    bool warm = false;
+};
+
+struct Batch {
+    const Bvh& bvh;
+    Mode mode;
+    const CommonOptions& common;
+    std::vector<Hit> hits;  // of the last run, closest and all
+    std::vector<std::uint8_t> occluded;
+
+    TraceCounts run(std::span<const Ray> rays, bool counters) {
+        const TraceOptions options{.threads = common.threads, .counters = counters};
+        if (mode == Mode::any) {
+            occluded.resize(rays.size());
+            return trace_any(bvh, rays, occluded, options);
+        }
+        if (mode == Mode::all) {
+            AllHits all = trace_all(bvh, rays, options);
+            hits = std::move(all.hits);
+            return all.counts;
+        }
+        hits.resize(rays.size());
+        return trace(bvh, rays, hits, options);
+    }
+};
+
+/// Traces one batch: once to count (and warm up), then `repeat` times on the clock.
+void measure(Batch& batch, std::span<const Ray> rays, int repeat, Tally& tally) {
+    const TraceCounts counts = batch.run(rays, true);
+    tally.counts.rays += counts.rays;
+    tally.counts.hits += counts.hits;
+    tally.counts.invalid_rays += counts.invalid_rays;
+    tally.counts.node_visits += counts.node_visits;
+    tally.counts.triangle_tests += counts.triangle_tests;
+    if (!tally.warm) batch.run(rays, false);
+    tally.warm = true;
+    tally.seconds.resize(static_cast<std::size_t>(repeat), 0.0);
+    for (double& seconds : tally.seconds) {
+        const auto start = std::chrono::steady_clock::now();
+        batch.run(rays, false);
+        seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    }
+}
+
+/// What is kept of the rays and hits for files.
+struct Kept {
+    std::vector<Ray> rays;
+    std::vector<Hit> hits;
+};
+
+void keep(const TraceCommand& options, std::span<const Ray> rays, const Batch& batch, Kept& kept) {
+    if (!options.rays_file.empty()) kept.rays.insert(kept.rays.end(), rays.begin(), rays.end());
+    if (!options.hits_file.empty())
+        kept.hits.insert(kept.hits.end(), batch.hits.begin(), batch.hits.end());
+}
+
+std::vector<Camera> chosen_cameras(const TraceCommand& options, const Scene& scene) {
+    const std::vector<Camera>& all = scene.cameras.cameras;
+    if (options.camera == "all") return all;
+    std::size_t index = 0;
+    const char* end = options.camera.data() + options.camera.size();
+    const auto [rest, error] = std::from_chars(options.camera.data(), end, index);
+    if (error != std::errc() || rest != end)
+        throw CLI::ValidationError("--camera",
+                                   "'" + options.camera + "' is neither a number nor 'all'");
+    if (index >= all.size())
+        throw InputError(scene.name + ": camera " + options.camera + " is past the last of " +
+                         std::to_string(all.size()) + " cameras");
+    return {all[index]};
+}
+
+RayKind ray_kind(const std::string& name) {
+    for (const RayKind kind : {RayKind::ao, RayKind::diffuse, RayKind::diffuse_shuffled})
+        if (ray_kind_name(kind) == name) return kind;
+    return RayKind::primary;
+}
+
+/// All batches of one kind of ray from one camera.
+void trace_camera(const TraceCommand& options, const SceneTree& input, const Camera& camera,
+                  RayKind kind, Size size, Batch& batch, Tally& tally, Kept& kept,
+                  const std::function<void(double)>& progress) {
+    std::vector<std::uint32_t> pixels;
+    const std::vector<Ray> primary = make_primary_rays(camera, size.width, size.height, &pixels);
+    if (kind == RayKind::primary) {
+        measure(batch, primary, options.repeat, tally);
+        keep(options, primary, batch, kept);
+        return progress(1.0);
+    }
+    const std::vector<Hit> hits =
+        trace(input.bvh, primary, TraceOptions{.threads = options.common.threads});
+    SecondaryOptions secondary;
+    secondary.kind = kind;
+    secondary.samples = options.samples;
+    secondary.ao_radius = options.ao_radius > 0 ? options.ao_radius : input.scene.cameras.ao_radius;
+    secondary.seed = options.common.seed;
+    secondary.threads = options.common.threads;
+    const std::size_t step =
+        std::max<std::size_t>(1, launch_rays / static_cast<std::size_t>(options.samples));
+    for (std::size_t begin = 0; begin < primary.size();) {
+        // A batch takes primary rays until it has `step` hits.
+        std::size_t end = begin;
+        for (std::size_t found = 0; end < primary.size() && found < step; ++end)
+            found += hits[end].hit();
+        const std::span<const Ray> part = std::span(primary).subspan(begin, end - begin);
+        const std::vector<Ray> rays =
+            make_secondary_rays(input.bvh, part, std::span(hits).subspan(begin, part.size()),
+                                std::span(pixels).subspan(begin, part.size()), secondary);
+        if (!rays.empty()) measure(batch, rays, options.repeat, tally);
+        if (!rays.empty()) keep(options, rays, batch, kept);
+        begin = end;
+        progress(static_cast<double>(begin) / static_cast<double>(primary.size()));
+    }
+}
+
+Json trace_json(const TraceCommand& options, const std::string& mode, const Tally& tally) {
+    std::vector<double> rates;
+    for (const double seconds : tally.seconds)
+        rates.push_back(static_cast<double>(tally.counts.rays) / seconds / 1e6);
+    const auto per_ray = [&](std::uint64_t n) {
+        return tally.counts.rays
+                   ? Json(static_cast<double>(n) / static_cast<double>(tally.counts.rays))
+                   : Json(nullptr);
+    };
+    return {{"rays", options.rays},
+            {"mode", mode},
+            {"kernel", options.kernel},
+            {"device", "cpu"},
+            {"count", tally.counts.rays},
+            {"hits", tally.counts.hits},
+            {"invalid_rays", tally.counts.invalid_rays},
+            {"mrays_per_s", rates.empty() ? Json(nullptr) : spread_json(spread_of(rates))},
+            {"node_visits_per_ray", per_ray(tally.counts.node_visits)},
+            {"triangle_tests_per_ray", per_ray(tally.counts.triangle_tests)}};
+}
+
+void print_trace(const Json& trace) {
+    fmt::print("\n{:<18} {:>12} {:>12} {:>9} {:>9} {:>9} {:>11} {:>14}\n", "rays", "count", "hits",
+               "Mrays/s", "min", "max", "nodes/ray", "triangles/ray");
+    const auto count = trace["count"].get<std::uint64_t>();
+    if (count == 0) return fmt::print("{:<18} {:>12}\n", trace["rays"].get<std::string>(), "none");
+    const Json& rate = trace["mrays_per_s"];
+    fmt::print("{:<18} {:>12} {:>12} {:>9.2f} {:>9.2f} {:>9.2f} {:>11.1f} {:>14.2f}\n",
+               trace["rays"].get<std::string>(), grouped(count),
+               grouped(trace["hits"].get<std::uint64_t>()), rate["median"].get<double>(),
+               rate["min"].get<double>(), rate["max"].get<double>(),
+               trace["node_visits_per_ray"].get<double>(),
+               trace["triangle_tests_per_ray"].get<double>());
+    if (const auto invalid = trace["invalid_rays"].get<std::uint64_t>())
+        fmt::print("{} rays are invalid and count as misses\n", grouped(invalid));
+}
+
+Mode mode_of(const TraceCommand& options) {
+    const std::string name = !options.mode_name.empty() ? options.mode_name
+                             : options.rays == "ao"     ? "any"
+                                                        : "closest";
+    return name == "any" ? Mode::any : name == "all" ? Mode::all : Mode::closest;
+}
+
+const char* mode_text(Mode mode) {
+    return mode == Mode::any ? "any" : mode == Mode::all ? "all" : "closest";
+}
+
+void explain(const TraceCommand& options, const Bvh& bvh) {
+    if (!options.explain || !options.common.prints_tables()) return;
+    fmt::print(
+        "kernel {}: binary layout, width 2, stack of {} entries, x86-64-v2 code without vector "
+        "paths, {} rays a "
+        "block\n",
+        options.kernel, bvh.max_depth(), 1024);
+}
+
+void run_trace(const TraceCommand& options) {
+    const Mode mode = mode_of(options);
+    if (!options.hits_file.empty() && mode == Mode::any)
+        throw CLI::ValidationError("--hits",
+                                   "any-hit rays only answer yes or no; use --mode closest or all");
+    const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
+    const Size size = options.size_text.empty()
+                          ? Size{input.scene.cameras.width, input.scene.cameras.height}
+                          : parse_size(options.size_text);
+    Batch batch{input.bvh, mode, options.common, {}, {}};
+    Tally tally;
+    Kept kept;
+    explain(options, input.bvh);
+    Progress progress("tracing", options.common);
+    if (options.rays.ends_with(".npy")) {
+        const std::vector<Ray> rays = load_rays(options.rays);
+        if (!rays.empty()) measure(batch, rays, options.repeat, tally);
+        keep(options, rays, batch, kept);
+    } else {
+        const std::vector<Camera> cameras = chosen_cameras(options, input.scene);
+        for (std::size_t c = 0; c < cameras.size(); ++c)
+            trace_camera(options, input, cameras[c], ray_kind(options.rays), size, batch, tally,
+                         kept, [&](double part) {
+                             progress.show((static_cast<double>(c) + part) /
+                                           static_cast<double>(cameras.size()));
+                         });
+    }
+    if (!options.rays_file.empty()) save_rays(options.rays_file, kept.rays);
+    if (!options.hits_file.empty()) save_hits(options.hits_file, kept.hits);
+    Json document = new_document("trace");
+    document["scene"] = scene_json(input.scene);
+    document["load_ms"] = input.scene.load_ms;
+    const std::vector<BuildMs> builds =
+        is_rdx(options.scene) ? std::vector<BuildMs>{} : std::vector{input.bvh.build_ms()};
+    document["build"] = build_json(
+        input.bvh, tree_stats(input.bvh, stats_options(options.tree, options.common)), builds);
+    document["trace"] = Json::array({trace_json(options, mode_text(mode), tally)});
+    if (options.common.prints_tables()) print_trace(document["trace"][0]);
+    write_json(document, options.common);
+}
+
+}  // namespace
+
+void add_trace_command(CLI::App& app) {
+    auto options = std::make_shared<TraceCommand>();
+    CLI::App* command =
+        app.add_subcommand("trace", "Trace rays through a tree; print rates and counts");
+    command
+        ->add_option("SCENE", options->scene, "A file, builtin:NAME?key=value&..., or a .rdx file")
+        ->required();
+    command
+        ->add_option("--rays", options->rays,
+                     "primary, ao, diffuse, diffuse_shuffled, or a (N, 8) float32 .npy file")
+        ->check([](const std::string& text) {
+            const bool known = text == "primary" || text == "ao" || text == "diffuse" ||
+                               text == "diffuse_shuffled";
+            return known || text.ends_with(".npy")
+                       ? ""
+                       : "'" + text + "' is neither a kind of ray nor a .npy file";
+        })
+        ->capture_default_str();
+    command
+        ->add_option("--mode", options->mode_name,
+                     "closest, any or all hits (default: any for ao, else closest)")
+        ->check(CLI::IsMember({"closest", "any", "all"}));
+    command->add_option("--kernel", options->kernel, "Traversal kernel")
+        ->check(CLI::IsMember({"scalar"}))
+        ->capture_default_str();
+    command->add_option("--camera", options->camera, "Number of a camera, or all")
+        ->capture_default_str();
+    command
+        ->add_option("--size", options->size_text,
+                     "Pixels of the cameras (default: of cameras.json, or 1024x768)")
+        ->type_name("WxH");
+    command->add_option("--samples", options->samples, "Secondary rays per primary hit")
+        ->check(CLI::Range(1, 1024))
+        ->capture_default_str();
+    command
+        ->add_option("--ao-radius", options->ao_radius,
+                     "Reach of ao rays (default: of cameras.json, or 5 % of the diagonal)")
+        ->check(CLI::PositiveNumber);
+    command->add_option("--repeat", options->repeat, "Times to trace after a warm-up")
+        ->check(CLI::Range(1, 10000))
+        ->capture_default_str();
+    command->add_option("--hits", options->hits_file, "Save the hits as a structured array")
+        ->type_name("FILE.npy");
+    command->add_option("--save-rays", options->rays_file, "Save the rays")->type_name("FILE.npy");
+    command->add_flag("--explain", options->explain, "Say which layout and which code ran");
+    add_tree_options(*command, options->tree);
+    add_common_options(*command, options->common);
+    command->callback([options] { run_trace(*options); });
+}
+
+}  // namespace raydix::cli

@@ -1,0 +1,246 @@
+// build_bvh: bounds -> codes -> sort -> hierarchy -> layout -> fit, one line each in BuildRun::run.
+#include <raydix/bvh.h>
+#include <raydix/error.h>
+
+#include <algorithm>
+
+#include "base/check.h"
+#include "exec/memory.h"
+#include "exec/parallel.h"
+#include "keys/morton.h"
+#include "layout/leaf_order.h"
+#include "measure/stopwatch.h"
+#include "primitives/bounds.h"
+#include "sort/radix_sort.h"
+#include "tree/bvh_access.h"
+#include "tree/fit.h"
+#include "tree/karras.h"
+
+namespace raydix {
+
+struct BvhBuilder::Scratch {
+    Buffer<std::uint32_t> codes30;
+    Buffer<std::uint64_t> codes63;
+    SortScratch<std::uint32_t> sort30;
+    SortScratch<std::uint64_t> sort63;
+    HierarchyScratch hierarchy;
+    Buffer<std::uint8_t> meeting;
+};
+
+namespace {
+
+template <class Key, class Scratch>
+auto& codes_of(Scratch& scratch) {
+    if constexpr (sizeof(Key) == 4)
+        return scratch.codes30;
+    else
+        return scratch.codes63;
+}
+template <class Key, class Scratch>
+auto& sort_scratch_of(Scratch& scratch) {
+    if constexpr (sizeof(Key) == 4)
+        return scratch.sort30;
+    else
+        return scratch.sort63;
+}
+
+template <class Scratch>
+std::uint64_t bytes_held(const Scratch& s, const BvhAccess& tree) {
+    const auto sum = [](const auto&... buffer) {
+        return (buffer.capacity_bytes() + ... + std::size_t{0});
+    };
+    return sum(s.codes30, s.codes63, s.sort30.records, s.sort30.spare, s.sort30.histogram,
+               s.sort63.records, s.sort63.spare, s.sort63.histogram, s.hierarchy.prefixes,
+               s.hierarchy.kept_bits, s.hierarchy.kept_before, s.hierarchy.parent_slot, s.meeting) +
+           sum(tree.nodes(), tree.order(), tree.triangles(), tree.boxes(), tree.points());
+}
+
+void check_options(const BuildOptions& options, std::size_t n) {
+    if (options.bits != 30 && options.bits != 63)
+        throw InputError("build option bits is " + std::to_string(options.bits) +
+                         "; it must be 30 or 63");
+    if (options.max_leaf < 1 || options.max_leaf > 255)
+        throw InputError("build option max_leaf is " + std::to_string(options.max_leaf) +
+                         "; it must be 1 to 255");
+    if (n >= std::size_t{1} << 31)
+        throw InputError(std::to_string(n) + " primitives; a tree takes fewer than 2147483648");
+}
+
+/// Names the primitive that stops a build, if there is one.
+template <class Source>
+void check_bounds(const Bounds& bounds, const Source& source, const char* kind, bool strict) {
+    if constexpr (requires { source.vertex_count; }) {
+        if (bounds.first_unreadable != no_primitive) {
+            const Triangle& t = source.triangles[bounds.first_unreadable];
+            throw InputError(std::string(kind) + " " + std::to_string(bounds.first_unreadable) +
+                             ": index " + std::to_string(std::max({t[0], t[1], t[2]})) +
+                             " is past the last of " + std::to_string(source.vertex_count) +
+                             " vertices");
+        }
+    }
+    if (strict && bounds.left_out != 0)
+        throw InputError(std::string(kind) + " " + std::to_string(bounds.first_left_out) +
+                         ": not finite, out of range or inverted, as are " +
+                         std::to_string(bounds.left_out - 1) + " others");
+}
+
+/// One build: a source of primitives, the kind of copies its leaves hold, and the key type.
+template <class Key, class Source, class Copy, class Scratch>
+struct BuildRun {
+    const Source& source;
+    std::uint32_t n;
+    const char* kind_name;
+    const BuildOptions& options;
+    Scratch& scratch;
+    BvhAccess tree;
+    Buffer<Copy>& copies;
+
+    void run() {
+        Stopwatch total, stage;
+        BuildMs ms;
+        const Bounds bounds = scene_bounds(source, n);
+        check_bounds(bounds, source, kind_name, options.strict);
+        const auto valid = static_cast<std::uint32_t>(n - bounds.left_out);
+        tree.input_count() = n;
+        tree.left_out() = bounds.left_out;
+        ms.bounds = stage.lap();
+        if (valid == 0) return make_empty();
+
+        Buffer<Key>& codes = codes_of<Key>(scratch);
+        codes.reset(n);
+        const Grid grid = make_grid(bounds.box, CodeFormat<Key>::axis_bits);
+        for_each_index(n, EncodeMorton<Source, Key>{source, grid, codes.data()});
+        ms.codes = stage.lap();
+
+        // Primitives that are left out have the highest key: they sort to the end and are cut off
+        // there.
+        const int key_bits = valid == n ? CodeFormat<Key>::bits : static_cast<int>(8 * sizeof(Key));
+        tree.order().reset(n);
+        sort_keys(codes.span(), tree.order().span(), key_bits, sort_scratch_of<Key>(scratch));
+        tree.order().reset(valid);
+        ms.sort = stage.lap();
+
+        const std::span<const Key> keys = codes.view().first(valid);
+        tree.inner_count() = build_karras(keys, options.max_leaf, tree.nodes(), scratch.hierarchy);
+        ms.hierarchy = stage.lap();
+
+        copy_to_leaf_order(source, tree.order().view(), copies);
+        ms.layout = stage.lap();
+
+        fit();
+        ms.fit = stage.lap();
+        ms.total = total.lap();
+        tree.build_ms() = ms;
+    }
+
+private:
+    void make_empty() {
+        tree.nodes().reset(0);
+        tree.order().reset(0);
+        copies.reset(0);
+        tree.inner_count() = 0;
+        tree.max_depth() = 0;
+        tree.build_ms() = {};
+    }
+
+    void fit() {
+        const LeafBoxOf<Copy> leaf_box{copies.data()};
+        const std::uint32_t inner = tree.inner_count();
+        BvhNode* nodes = tree.nodes().data();
+        if (inner == 0) {
+            set_box(nodes[0], leaf_box(nodes[0].first, nodes[0].count));
+            tree.max_depth() = 0;
+            return;
+        }
+        scratch.meeting.reset(inner);
+        std::uint8_t* meeting = scratch.meeting.data();
+        for_each_range(inner, 1u << 16, [&](std::size_t begin, std::size_t end) {
+            std::fill(meeting + begin, meeting + end, std::uint8_t{0});
+        });
+        const FitBoxes<LeafBoxOf<Copy>> fit_boxes{
+            leaf_box, nodes, scratch.hierarchy.parent_slot.data(), meeting, &tree.max_depth()};
+        for_each_index(inner,
+                       [&](std::size_t rank) { fit_boxes(static_cast<std::uint32_t>(rank)); });
+        RAYDIX_CHECK(tree.max_depth(), <=, static_cast<std::uint32_t>(options.bits) + 32);
+    }
+};
+
+template <class Source, class Copy, class Scratch>
+void build(const Source& source, std::size_t n, const char* kind_name, PrimitiveKind kind,
+           const BuildOptions& options, Scratch& scratch, BvhAccess tree, Buffer<Copy>& copies) {
+    check_options(options, n);
+    const std::uint64_t before = memory_count().now() - bytes_held(scratch, tree);
+    memory_count().restart_peak();
+    tree.kind() = kind;
+    tree.options() = options;
+    with_threads(options.threads, [&] {
+        const auto count = static_cast<std::uint32_t>(n);
+        if (options.bits == 30)
+            BuildRun<std::uint32_t, Source, Copy, Scratch>{source,  count, kind_name, options,
+                                                           scratch, tree,  copies}
+                .run();
+        else
+            BuildRun<std::uint64_t, Source, Copy, Scratch>{source,  count, kind_name, options,
+                                                           scratch, tree,  copies}
+                .run();
+    });
+    tree.peak_bytes() = memory_count().peak() - before;
+}
+
+template <class Scratch>
+void build_mesh(const MeshView& mesh, const BuildOptions& options, Scratch& scratch,
+                BvhAccess tree) {
+    if (mesh.triangles.empty()) {
+        build(PointSource{mesh.vertices.data()}, mesh.vertices.size(), "point",
+              PrimitiveKind::points, options, scratch, tree, tree.points());
+    } else {
+        const TriangleSource source{mesh.vertices.data(), mesh.triangles.data(),
+                                    mesh.vertices.size()};
+        build(source, mesh.triangles.size(), "triangle", PrimitiveKind::triangles, options, scratch,
+              tree, tree.triangles());
+    }
+}
+
+}  // namespace
+
+BvhBuilder::BvhBuilder() : scratch_(std::make_unique<Scratch>()) {}
+BvhBuilder::~BvhBuilder() = default;
+BvhBuilder::BvhBuilder(BvhBuilder&&) noexcept = default;
+BvhBuilder& BvhBuilder::operator=(BvhBuilder&&) noexcept = default;
+
+void BvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Bvh& tree) {
+    const bool same_kind =
+        tree.kind() == (mesh.triangles.empty() ? PrimitiveKind::points : PrimitiveKind::triangles);
+    if (!same_kind) tree = Bvh();
+    build_mesh(mesh, options, *scratch_, BvhAccess{tree});
+}
+
+Bvh build_bvh(const MeshView& mesh, const BuildOptions& options) {
+    Bvh tree;
+    BvhBuilder().build(mesh, options, tree);
+    return tree;
+}
+
+Bvh build_bvh(const Mesh& mesh, const BuildOptions& options) {
+    return build_bvh(MeshView(mesh), options);
+}
+
+Bvh build_bvh(std::span<const Aabb> boxes, const BuildOptions& options) {
+    Bvh tree;
+    BvhBuilder builder;
+    builder.build(boxes, options, tree);
+    return tree;
+}
+
+void BvhBuilder::build(std::span<const Aabb> boxes, const BuildOptions& options, Bvh& tree) {
+    if (tree.kind() != PrimitiveKind::boxes) tree = Bvh();
+    const BvhAccess access{tree};
+    raydix::build(BoxSource{boxes.data()}, boxes.size(), "box", PrimitiveKind::boxes, options,
+                  *scratch_, access, access.boxes());
+}
+
+Bvh build_bvh(std::span<const Vec3> points, const BuildOptions& options) {
+    return build_bvh(MeshView(points, {}), options);
+}
+
+}  // namespace raydix

@@ -1,0 +1,52 @@
+// Primitives -> the box around all valid ones and how many are not. primitives [n] -> one Bounds.
+#pragma once
+
+#include <algorithm>
+#include <mutex>
+
+#include "exec/parallel.h"
+#include "primitives/sources.h"
+
+namespace raydix {
+
+struct Bounds {
+    Aabb box = empty_box();
+    std::uint64_t left_out = 0;
+    std::uint32_t first_left_out = no_primitive;  // the lowest id among them
+    std::uint32_t first_unreadable =
+        no_primitive;  // the lowest id that refers to a vertex that is not there
+
+    void merge(const Bounds& other) {
+        box = unite(box, other.box);
+        left_out += other.left_out;
+        first_left_out = std::min(first_left_out, other.first_left_out);
+        first_unreadable = std::min(first_unreadable, other.first_unreadable);
+    }
+};
+
+/// Minima and maxima do not depend on the order, so neither does the result.
+template <class Source>
+Bounds scene_bounds(const Source& source, std::uint32_t n) {
+    Bounds all;
+    std::mutex merging;
+    for_each_range(n, 16384, [&](std::size_t begin, std::size_t end) {
+        Bounds part;
+        for (std::size_t k = begin; k < end; ++k) {
+            const auto i = static_cast<std::uint32_t>(k);
+            Aabb box;
+            if (!source.readable(i)) {
+                part.first_unreadable = std::min(part.first_unreadable, i);
+            } else if (source.box(i, box)) {
+                part.box = unite(part.box, box);
+            } else {
+                ++part.left_out;
+                part.first_left_out = std::min(part.first_left_out, i);
+            }
+        }
+        const std::scoped_lock lock(merging);
+        all.merge(part);
+    });
+    return all;
+}
+
+}  // namespace raydix

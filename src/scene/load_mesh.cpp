@@ -1,0 +1,61 @@
+// File name -> reader by extension -> mesh.
+#include <raydix/error.h>
+#include <raydix/scene.h>
+
+#include <array>
+#include <cctype>
+#include <new>
+#include <stdexcept>
+
+#include "base/float_env.h"
+#include "scene/formats.h"
+#include "scene/input_error.h"
+
+namespace raydix {
+namespace {
+
+std::string lower(std::string text) {
+    for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return text;
+}
+
+Mesh load_gltf_file(ByteSource& in, const std::filesystem::path& file) {
+    return load_gltf(in, [folder = file.parent_path()](const std::filesystem::path& relative) {
+        return ByteSource::from_file(folder / relative, Packing::none);
+    });
+}
+
+Mesh load_by_extension(ByteSource& in, const std::filesystem::path& file,
+                       const std::string& extension) {
+    if (extension == ".ply") return load_ply(in);
+    if (extension == ".obj") return load_obj(in);
+    if (extension == ".stl") return load_stl(in);
+    if (extension == ".off") return load_off(in);
+    if (extension == ".xyz") return load_xyz(in);
+    if (extension == ".npy") return load_npy_points(in);
+    if (extension == ".gltf" || extension == ".glb") return load_gltf_file(in, file);
+    in.fail(
+        "file name",
+        "ends in none of .ply .obj .stl .off .xyz .npy .gltf .glb, with or without .gz .xz .zst");
+}
+
+}  // namespace
+
+Mesh load_mesh(const std::filesystem::path& file) {
+    const FloatEnvironment exact;
+    const Packing packing = packing_of(file);
+    const std::filesystem::path plain = packing == Packing::none ? file : file.stem();
+    ByteSource in = ByteSource::from_file(file, packing);
+    try {
+        Mesh mesh = load_by_extension(in, file, lower(plain.extension().string()));
+        in.finish();
+        mesh.name = printable(file.filename());
+        return mesh;
+    } catch (const std::bad_alloc&) {
+        in.fail("mesh", "needs more memory than there is");
+    } catch (const std::length_error&) {
+        in.fail("mesh", "needs more memory than there is");
+    }
+}
+
+}  // namespace raydix

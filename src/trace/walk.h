@@ -1,0 +1,84 @@
+// Depth-first walk of one ray through the binary tree, nearer child first. What happens at a leaf,
+// and how far the ray still reaches, is the caller's.
+#pragma once
+
+#include <raydix/bvh.h>
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "base/check.h"
+#include "trace/slab.h"
+
+namespace raydix {
+
+struct PendingNode {
+    std::uint32_t slot;
+    float entry;
+};
+
+/// Room for one pending sibling per level of the deepest path: taken from the tree's exact depth,
+/// so that no walk can run over. Radix trees fit the array; deeper ones use the heap.
+class WalkStack {
+public:
+    explicit WalkStack(std::uint32_t max_depth) : capacity_(max_depth) {
+        if (max_depth > inside_.size()) outside_ = std::make_unique<PendingNode[]>(max_depth);
+    }
+    [[nodiscard]] PendingNode* begin() { return outside_ ? outside_.get() : inside_.data(); }
+    [[nodiscard]] std::uint32_t capacity() const { return capacity_; }
+
+private:
+    std::array<PendingNode, 96> inside_;
+    std::unique_ptr<PendingNode[]> outside_;
+    std::uint32_t capacity_;
+};
+
+/// Counts nothing; RaySteps counts.
+struct NoSteps {};
+
+/// `leaf(node) -> bool` handles a leaf and says whether to stop; `reach()` is the largest t that
+/// still matters: a node is skipped only if its padded entry is greater. The tree must not be
+/// empty.
+template <class Steps, class Leaf, class Reach>
+void walk_tree(const BvhNode* nodes, const RayFrame& ray, WalkStack& stack, Steps& steps,
+               const Leaf& leaf, const Reach& reach) {
+    constexpr bool counting = !std::is_same_v<Steps, NoSteps>;
+    const SlabFrame slabs = make_slab_frame(ray, {nodes[0].lo, nodes[0].hi});
+    const SlabInterval whole = intersect_slabs(slabs, &nodes[0].lo.x, ray.tmin, reach());
+    if (!(whole.entry <= whole.exit)) return;
+    PendingNode* const bottom = stack.begin();
+    PendingNode* top = bottom;
+    std::uint32_t slot = 0;
+    for (;;) {
+        const BvhNode& node = nodes[slot];
+        if constexpr (counting) ++steps.node_visits;
+        if (node.is_leaf()) {
+            if (leaf(node)) return;
+        } else {
+            const SlabInterval a =
+                intersect_slabs(slabs, &nodes[node.first].lo.x, ray.tmin, reach());
+            const SlabInterval b =
+                intersect_slabs(slabs, &nodes[node.first + 1].lo.x, ray.tmin, reach());
+            const bool in_a = a.entry <= a.exit, in_b = b.entry <= b.exit;
+            if (in_a && in_b) {
+                const bool b_first = b.entry < a.entry;
+                RAYDIX_CHECK(static_cast<std::uint32_t>(top - bottom), <, stack.capacity());
+                *top++ = {node.first + (b_first ? 0u : 1u), b_first ? a.entry : b.entry};
+                slot = node.first + (b_first ? 1u : 0u);
+                continue;
+            }
+            if (in_a || in_b) {
+                slot = node.first + (in_b ? 1u : 0u);
+                continue;
+            }
+        }
+        do {
+            if (top == bottom) return;
+            slot = (--top)->slot;
+        } while (top->entry > reach());
+    }
+}
+
+}  // namespace raydix

@@ -1,0 +1,77 @@
+// A triangle cut down to a box, in double: Sutherland and Hodgman's algorithm, one plane at a time.
+#pragma once
+
+#include <raydix/types.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+namespace raydix {
+
+struct Polygon {
+    using Point = std::array<double, 3>;
+    // A plane turns each run of outside corners into two at most, so it adds at most half of the
+    // corners there were, rounding or not: 3, 4, 6, 9, 13, 19, 28 after six planes.
+    std::array<Point, 28> corners;
+    std::size_t count = 0;
+
+    void add(const Point& p) { corners[count++] = p; }
+
+    [[nodiscard]] double area() const {
+        Point sum{};
+        for (std::size_t i = 1; i + 1 < count; ++i) {
+            Point a{}, b{};
+            for (std::size_t k = 0; k < 3; ++k) {
+                a[k] = corners[i][k] - corners[0][k];
+                b[k] = corners[i + 1][k] - corners[0][k];
+            }
+            for (std::size_t k = 0; k < 3; ++k)
+                sum[k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+        }
+        return 0.5 * std::sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
+    }
+};
+
+inline Polygon polygon_of(Vec3 a, Vec3 b, Vec3 c) {
+    Polygon polygon;
+    for (const Vec3& p : {a, b, c}) polygon.add({p.x, p.y, p.z});
+    return polygon;
+}
+
+/// What lies on the side of the plane where sign * (coordinate - plane) <= 0. Points on it stay.
+inline Polygon clip(const Polygon& in, std::size_t axis, double plane, double sign) {
+    Polygon out;
+    for (std::size_t i = 0; i < in.count; ++i) {
+        const Polygon::Point& a = in.corners[i];
+        const Polygon::Point& b = in.corners[i + 1 < in.count ? i + 1 : 0];
+        const double from = sign * (a[axis] - plane), to = sign * (b[axis] - plane);
+        if (from <= 0) out.add(a);
+        if ((from < 0 && to > 0) || (from > 0 && to < 0)) {
+            const double t = from / (from - to);
+            Polygon::Point p;
+            for (std::size_t k = 0; k < 3; ++k) p[k] = a[k] + t * (b[k] - a[k]);
+            p[axis] = plane;  // exactly, so that flat boxes keep what lies in them
+            out.add(p);
+        }
+    }
+    return out;
+}
+
+/// The part of `polygon` inside the closed box; no corners if there is none.
+inline Polygon clip(Polygon polygon, const Aabb& box) {
+    const Polygon::Point lo{box.lo.x, box.lo.y, box.lo.z}, hi{box.hi.x, box.hi.y, box.hi.z};
+    for (std::size_t axis = 0; axis < 3 && polygon.count; ++axis) {
+        double least = polygon.corners[0][axis], most = least;
+        for (std::size_t i = 1; i < polygon.count; ++i) {
+            least = std::fmin(least, polygon.corners[i][axis]);
+            most = std::fmax(most, polygon.corners[i][axis]);
+        }
+        if (least > hi[axis] || most < lo[axis]) return {};
+        if (least < lo[axis]) polygon = clip(polygon, axis, lo[axis], -1.0);
+        if (most > hi[axis]) polygon = clip(polygon, axis, hi[axis], 1.0);
+    }
+    return polygon;
+}
+
+}  // namespace raydix

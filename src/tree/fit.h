@@ -1,0 +1,65 @@
+// Boxes bottom-up in one parallel pass: leaves climb, and at each inner node the second child to
+// arrive goes on (Karras 2012, section 4). Links + leaf boxes -> boxes of all nodes, and the exact
+// depth.
+#pragma once
+
+#include <raydix/bvh.h>
+
+#include <cstdint>
+
+#include "base/atomic.h"
+#include "base/hd.h"
+#include "base/math.h"
+#include "tree/radix_tree.h"
+
+namespace raydix {
+
+RAYDIX_HD inline void set_box(BvhNode& node, const Aabb& box) {
+    node.lo = box.lo;
+    node.hi = box.hi;
+}
+RAYDIX_HD inline Aabb box_of(const BvhNode& node) { return {node.lo, node.hi}; }
+
+/// One work item per inner node: boxes of those children that are leaves, then up as far as it is
+/// the second to come.
+template <class LeafBox>
+struct FitBoxes {
+    LeafBox leaf_box;                  // (first, count) -> box
+    BvhNode* nodes;                    // [2 * inner + 2], boxes are written
+    const std::uint32_t* parent_slot;  // [inner]
+    std::uint8_t* meeting;     // [inner], zero before; 1 + the height of the child that came first
+    std::uint32_t* max_depth;  // [1], out
+
+    RAYDIX_HD void operator()(std::uint32_t rank) const {
+        BvhNode* pair = nodes + pair_slot(rank);
+        const bool left = pair[0].is_leaf(), right = pair[1].is_leaf();
+        if (left) set_box(pair[0], leaf_box(pair[0].first, pair[0].count));
+        if (right) set_box(pair[1], leaf_box(pair[1].first, pair[1].count));
+        if (left && right) {
+            climb(rank, 1);
+        } else if (left || right) {
+            const std::uint8_t other = arrive(meeting[rank], 1);
+            if (other != 0)
+                climb(rank, other);  // the other child's height is other - 1 >= 1: it decides
+        }
+    }
+
+    /// Both children of `rank` are done, and the subtree below it is `height` high.
+    RAYDIX_HD void climb(std::uint32_t rank, std::uint32_t height) const {
+        for (;;) {
+            const BvhNode* pair = nodes + pair_slot(rank);
+            const std::uint32_t slot = parent_slot[rank];
+            set_box(nodes[slot], unite(box_of(pair[0]), box_of(pair[1])));
+            if (slot == 0) {
+                *max_depth = height;
+                return;
+            }
+            rank = rank_of_slot(slot);
+            const std::uint8_t other = arrive(meeting[rank], static_cast<std::uint8_t>(height + 1));
+            if (other == 0) return;
+            height = 1 + (height > other - 1u ? height : other - 1u);
+        }
+    }
+};
+
+}  // namespace raydix

@@ -1,0 +1,35 @@
+// The invariants of a tree. Safe on arrays that hold anything at all: the reader of .rdx files
+// hands over what a stranger wrote. Time and memory are linear in the arrays that are there.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/mesh.h>
+
+#include <optional>
+#include <string>
+
+namespace raydix {
+
+/// What is wrong, as "PART: reason" with PART one of info, nodes, order, primitives, triangles.
+/// None: all is well.
+using Fault = std::optional<std::string>;
+
+/// The first invariant that does not hold. With a mesh also: its vertex indices are in range, and
+/// the tree's primitives are bit for bit those of the mesh (a tree of boxes has no counterpart
+/// there).
+[[nodiscard]] Fault validate(const Bvh& bvh, const MeshView* mesh = nullptr);
+
+// The steps of `validate`, in its order; each relies on those before it.
+[[nodiscard]] Fault validate_counts(const Bvh& bvh);
+[[nodiscard]] Fault validate_mesh_counts(const Bvh& bvh, const MeshView& mesh);
+[[nodiscard]] Fault validate_topology(const Bvh& bvh);
+[[nodiscard]] Fault validate_order(const Bvh& bvh);
+[[nodiscard]] Fault validate_primitives(const Bvh& bvh);
+[[nodiscard]] Fault validate_boxes(const Bvh& bvh);
+[[nodiscard]] Fault validate_codes(const Bvh& bvh);
+[[nodiscard]] Fault validate_against_mesh(const Bvh& bvh, const MeshView& mesh);
+
+/// The box of the primitive at a position of the order.
+[[nodiscard]] Aabb primitive_box(const Bvh& bvh, std::size_t position);
+
+}  // namespace raydix
