@@ -18,6 +18,10 @@ using builtin::Arguments;
 
 constexpr double most_triangles = 20e6, most_points = 50e6;
 
+constexpr BuiltinParameter atrium_parameters[] = {
+    {"triangles", 1e6, 10e3, most_triangles, "wanted number of triangles, met within 5 %"}};
+constexpr BuiltinParameter grove_parameters[] = {
+    {"triangles", 1e6, 10e3, most_triangles, "wanted number of triangles, met within 5 %"}};
 constexpr BuiltinParameter figure_parameters[] = {
     {"triangles", 1e6, 5e3, most_triangles, "wanted number of triangles, met within 5 %"}};
 constexpr BuiltinParameter soup_parameters[] = {
@@ -27,18 +31,35 @@ constexpr BuiltinParameter uniform_parameters[] = {
 constexpr BuiltinParameter clustered_parameters[] = {
     {"points", 1e6, 0, most_points, "number of points"},
     {"clusters", 100, 1, 1e6, "number of clusters"}};
+constexpr BuiltinParameter lidar_parameters[] = {
+    {"points", 1e6, 0, most_points, "number of echoes"},
+    {"beams", 64, 1, 128, "lasers, one above the other"},
+    {"triangles", 200e3, 10e3, most_triangles, "of the atrium that is scanned"},
+    {"noise_mm", 10, 0, 1000, "deviation of the measured range in millimetres"},
+    {"dropout_percent", 2, 0, 90, "share of the echoes that are lost"}};
 
 /// Their order is that of makers below.
 constexpr BuiltinScene scenes[] = {
+    {"atrium",
+     "hall with columns, arches, stairs, galleries and furniture; huge and tiny triangles",
+     atrium_parameters},
+    {"grove", "terrain with trees, leaves, grass and rocks; much overlap", grove_parameters},
     {"figure", "closed, dense, scan-like surface of a sitting cat; even triangles",
      figure_parameters},
     {"soup", "random triangles of mixed sizes", soup_parameters},
     {"uniform", "points spread evenly over the unit cube", uniform_parameters},
     {"clustered", "points in dense clusters of mixed sizes", clustered_parameters},
+    {"lidar", "points that a spinning scanner sees inside the atrium", lidar_parameters},
 };
 
 using Maker = BuiltinResult (*)(const Arguments&, std::uint64_t seed, const SceneTracer&);
 constexpr Maker makers[] = {
+    [](const Arguments& a, std::uint64_t seed, const SceneTracer&) {
+        return builtin::make_atrium(a["triangles"], seed);
+    },
+    [](const Arguments& a, std::uint64_t seed, const SceneTracer&) {
+        return builtin::make_grove(a["triangles"], seed);
+    },
     [](const Arguments& a, std::uint64_t seed, const SceneTracer&) {
         return builtin::make_figure(a["triangles"], seed);
     },
@@ -50,6 +71,15 @@ constexpr Maker makers[] = {
     },
     [](const Arguments& a, std::uint64_t seed, const SceneTracer&) {
         return builtin::make_clustered(a["points"], a["clusters"], seed);
+    },
+    [](const Arguments& a, std::uint64_t seed, const SceneTracer& tracer) {
+        const builtin::LidarOptions options{
+            .points = a["points"],
+            .beams = a["beams"],
+            .triangles = a["triangles"],
+            .noise = 1e-3 * static_cast<double>(a["noise_mm"]),
+            .dropout = 1e-2 * static_cast<double>(a["dropout_percent"])};
+        return builtin::make_lidar(options, seed, tracer);
     },
 };
 static_assert(std::size(scenes) == std::size(makers));

@@ -168,7 +168,8 @@ FittedNet fit(const LatticeSurface& surface) {
         fitted.points.push_back(figure_low +
                                 Point{double(c[0]), double(c[1]), double(c[2])} * figure_cell);
     for (std::uint32_t cuts = 1;; cuts *= 2) {
-        for (int round = 0; round < 8; ++round) {
+        // The coarse nets move far and cost little; the fine ones only settle.
+        for (std::uint32_t round = 0; round < 4 + fitted_cuts / cuts; ++round) {
             relax(fitted);
             project(fitted);
         }

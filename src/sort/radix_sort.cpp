@@ -180,7 +180,7 @@ template <class Key>
 void sort_keys(std::span<Key> keys, std::span<std::uint32_t> order, int key_bits,
                SortScratch<Key>& scratch) {
     const std::size_t n = keys.size();
-    scratch.records.reset(n);
+    if (scratch.records.size() < n) scratch.records.reset(n);
     Record<Key>* records = scratch.records.data();
     const int bits = std::min(digit_bits_for(n), key_bits);
     const auto load = [&](std::size_t i) {
