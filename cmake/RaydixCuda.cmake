@@ -16,7 +16,8 @@ if(NOT RAYDIX_CUDA STREQUAL "OFF")
         # The host's bits: no contraction, no flushed denormals, rounded division and square root.
         add_library(raydix_cuda_options INTERFACE)
         target_compile_options(raydix_cuda_options INTERFACE $<$<COMPILE_LANGUAGE:CUDA>:
-            -fmad=false -ftz=false -prec-div=true -prec-sqrt=true -Xcompiler=-ffp-contract=off --expt-relaxed-constexpr>)
+            -fmad=false -ftz=false -prec-div=true -prec-sqrt=true -Xcompiler=-ffp-contract=off --expt-relaxed-constexpr
+            -Werror=all-warnings>)
         set(RAYDIX_HAVE_CUDA ON)
     elseif(RAYDIX_CUDA STREQUAL "ON")
         message(FATAL_ERROR "RAYDIX_CUDA=ON, but no CUDA compiler was found")

@@ -13,7 +13,7 @@ MAY_INCLUDE = {
     "exec": {"base"},
     "scene": {"base", "exec"},
     "primitives": {"base", "exec"},
-    "keys": {"base", "exec"},
+    "keys": {"base", "exec", "primitives"},  # the code of a primitive is made from its box in one go
     "sort": {"base", "exec"},
     "tree": {"base", "exec", "keys"},
     # copies primitives into leaf order, so it must know how a primitive is read

@@ -45,7 +45,7 @@ struct BvhNode {
     Vec3 hi;
     std::uint32_t count;
 
-    [[nodiscard]] bool is_leaf() const { return count != 0; }
+    [[nodiscard]] constexpr bool is_leaf() const { return count != 0; }
 };
 static_assert(sizeof(BvhNode) == 32);
 

@@ -42,7 +42,7 @@ struct Hit {
     std::uint32_t prim = no_primitive;
     float u = 0.0f, v = 0.0f;
 
-    [[nodiscard]] bool hit() const { return prim != no_primitive; }
+    [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
 };
 static_assert(sizeof(Hit) == 16);
 

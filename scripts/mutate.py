@@ -1,0 +1,200 @@
+#!/usr/bin/env python3
+"""scripts/mutate.py [NUMBER...]: plants small faults in the core, one at a time, and lists those that no test notices.
+
+Works on a copy of the tree in build/mutate. A fault is noticed if something no longer builds, or if a test program
+fails, crashes or runs out of time: first those of `tests`, then all others. Exit code 1 if a fault goes unnoticed or
+no longer applies (its old text must stand exactly once in the file).
+"""
+import dataclasses
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+WORK = ROOT / "build" / "mutate"
+SOURCE, BUILD = WORK / "source", WORK / "build"
+LEAST_TIME_LIMIT_S = 60
+JOBS = os.environ.get("RAYDIX_JOBS", str(os.cpu_count() or 1))
+
+
+@dataclasses.dataclass(frozen=True)
+class Fault:
+    file: str
+    old: str
+    new: str
+    breaks: str
+    tests: str  # folders of tests/, those most likely to notice first
+
+
+FAULTS = [
+    Fault("src/keys/morton.h",
+          "return spread_bits(Key{c.x}) << 2 | spread_bits(Key{c.y}) << 1 |",
+          "return spread_bits(Key{c.y}) << 2 | spread_bits(Key{c.x}) << 1 |",
+          "codes: x is not the highest bit of a triple", "keys device tree"),
+    Fault("src/keys/host_encode.h", "return x << 2 | y << 1 |", "return y << 2 | x << 1 |",
+          "63-bit codes of the host: axes exchanged", "keys device tree"),
+    Fault("src/keys/morton.h", "Grid grid{scene.lo, 0.0f, cells - 1.0f};", "Grid grid{scene.lo, 0.0f, cells};",
+          "codes: the upper face of the scene lies in a cell past the last", "keys device tree"),
+    Fault("src/primitives/host_box.h", "!all_at_most(absolute(c), limit))", "!all_at_most(absolute(b), limit))",
+          "a bad third corner does not leave the triangle out", "primitives device api"),
+    Fault("src/sort/radix_sort.cpp", "a[k - 1].key > moving.key", "a[k - 1].key >= moving.key",
+          "sort: equal keys change their order", "sort tree device"),
+    Fault("src/sort/radix_sort.cpp", "if (end - begin > 1) sort_alone(", "if (end - begin > 2) sort_alone(",
+          "sort: pairs that agree in two digits stay as they were", "sort tree device"),
+    Fault("src/tree/radix_tree.h",
+          "leading_zeros(static_cast<std::uint32_t>(i) ^ static_cast<std::uint32_t>(j));",
+          "leading_zeros(static_cast<std::uint32_t>(i) ^ static_cast<std::uint32_t>(j) ^ 1u);",
+          "hierarchy: equal codes are told apart wrongly", "tree device"),
+    Fault("src/tree/radix_tree.h", "range.last, range.split + 1);", "range.last, range.split);",
+          "hierarchy: the right child gets the left one's index", "tree device"),
+    Fault("src/tree/radix_tree.h", "if (count <= max_leaf) {", "if (count < max_leaf) {",
+          "collapse: a subtree of exactly max_leaf keys is no leaf", "tree"),
+    Fault("src/tree/karras.cpp", "if (length == scan_limit) return find_range(keys, node);\n        last",
+          "if (length > scan_limit) return find_range(keys, node);\n        last",
+          "hierarchy: long ranges end where the scan gave up", "tree device"),
+    Fault("src/tree/fit.h", "unite(box_of(pair[0]), box_of(pair[1])));", "unite(box_of(pair[0]), box_of(pair[0])));",
+          "boxes: the right child is left out", "tree device"),
+    Fault("src/tree/fit.h", "(height > other - 1u ? height : other - 1u);", "height;",
+          "depth: only the last child to arrive counts", "tree device"),
+    Fault("src/layout/leaf_order.h", "k < first + count; ++k)", "k + 1 < first + count; ++k)",
+          "boxes: a leaf's last primitive is left out", "layout tree"),
+    Fault("src/trace/host_slabs.h", "_mm_max_ps(plane(_mm_movelh_ps(near_z, far_z), 2), t);",
+          "_mm_max_ps(t, plane(_mm_movelh_ps(near_z, far_z), 2));",
+          "slab test: rays that lie in a slab plane are lost", "device trace"),
+    Fault("src/trace/slab.h", "inline constexpr float slab_pad = 8.0f * 0x1p-24f;",
+          "inline constexpr float slab_pad = 0.0f;",
+          "slab test: boxes are not widened, rays slip between triangles", "trace api device"),
+    Fault("src/trace/triangle_test.h", "if (su != sv || sv != sw) return false;", "if (su != sv) return false;",
+          "all hits: an edge belongs to both or none of its triangles", "trace device"),
+    Fault("src/trace/triangle_test.h", "v = edge_function(a, c), w", "v = edge_function(c, a), w",
+          "triangle test: one edge turned round", "trace api device"),
+    Fault("src/trace/ray_frame.h", "ray.tmin <= ray.tmax && ray.tmax >= 0.0f;",
+          "ray.tmin <= ray.tmax && ray.tmin >= 0.0f;", "rays that start behind their origin are misses",
+          "trace"),
+    Fault("src/trace/scalar.cpp", "tree.order[k] < best.prim)", "tree.order[k] > best.prim)",
+          "closest hit: ties go to the higher id", "trace device"),
+    Fault("src/trace/brute_force.cpp", "if (hit.t < best.t || !best.hit())", "if (hit.t <= best.t || !best.hit())",
+          "brute force: ties go to the higher id", "trace device"),
+    Fault("src/trace/walk.h", "} while (top->entry > reach());", "} while (top->entry >= reach());",
+          "walk: a node that begins at the best t is skipped, so ties are lost", "trace device"),
+    Fault("src/tree/stats.cpp", "cost.primitive * node.count : cost.node;", "cost.primitive : cost.node;",
+          "SAH: a leaf costs as much as one primitive", "tree"),
+    Fault("src/tree/epo.cpp", "(2 * i + 1) * n / (2 * sampled);", "i * n / (2 * sampled);",
+          "EPO: only the first half of the triangles is looked at", "tree"),
+    Fault("src/tree/hash.cpp", "        hash.put(node.hi);\n", "", "tree hash: upper corners do not enter", "tree"),
+    Fault("src/tree/validate.cpp", "        if (used_[first / 2])\n", "        if (false)\n",
+          "check: a subtree may hang below two nodes, or below itself", "tree api"),
+    Fault("src/api/rdx_parse.cpp", "if (section.count > room / section.element_bytes)",
+          "if (section.count * section.element_bytes > room)",
+          ".rdx: a number of elements that wraps around is believed", "api"),
+]
+
+
+def run(arguments, limit=None, **options):
+    """Exit code of a command, None if it ran out of time. Its output is kept in build/mutate/last.log."""
+    with open(WORK / "last.log", "wb") as log:
+        process = subprocess.Popen(arguments, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, **options)
+        try:
+            return process.wait(limit)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, 9)
+            process.wait()
+            return None
+
+
+def last_lines(count=15):
+    return "\n".join((WORK / "last.log").read_text(errors="replace").splitlines()[-count:])
+
+
+def copy_tree():
+    """Brings the copy up to date; files that did not change keep their time, so that little is built again."""
+    listed = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=ROOT, check=True,
+                            stdout=subprocess.PIPE).stdout.decode().split("\0")
+    names = {name for name in listed if name and (ROOT / name).is_file()}
+    for old in [f for f in SOURCE.rglob("*") if f.is_file()]:
+        if old.relative_to(SOURCE).as_posix() not in names:
+            old.unlink()
+    for name in names:
+        source, target = ROOT / name, SOURCE / name
+        if not target.exists() or target.read_bytes() != source.read_bytes():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, target)
+
+
+def test_programs():
+    """Folder of tests/ -> its program."""
+    folders = [f.name for f in sorted((SOURCE / "tests").iterdir()) if list(f.glob("*_test.cpp"))]
+    return {folder: BUILD / "bin" / f"{folder}_test" for folder in folders}
+
+
+def build(targets):
+    return run(["cmake", "--build", str(BUILD), "--parallel", JOBS, "--target", *targets]) == 0
+
+
+def run_program(program, limit):
+    code = run([str(program), "--gtest_brief=1", "--gtest_fail_fast=1"], limit, cwd=WORK)
+    return {0: None, None: "time"}.get(code, "test")
+
+
+def prepare():
+    """Builds everything without a fault; every program must pass, and its time sets its limit."""
+    WORK.mkdir(parents=True, exist_ok=True)
+    SOURCE.mkdir(exist_ok=True)
+    copy_tree()
+    configured = run(["cmake", "-G", "Ninja", "-S", str(SOURCE), "-B", str(BUILD), "-DCMAKE_BUILD_TYPE=Release",
+                      "-DRAYDIX_BENCH=OFF", "-DRAYDIX_CLI=OFF", "-DRAYDIX_CUDA=OFF"]) == 0
+    programs = test_programs()
+    if not configured or not build([p.name for p in programs.values()]):
+        sys.exit(f"without any fault, the tests do not build:\n{last_lines()}")
+    limits = {}
+    for folder, program in programs.items():
+        start = time.monotonic()
+        if run_program(program, None) is not None:
+            sys.exit(f"without any fault, {program.name} fails:\n{last_lines()}")
+        limits[folder] = LEAST_TIME_LIMIT_S + 5 * (time.monotonic() - start)
+    return programs, limits
+
+
+def noticed_by(fault, programs, limits):
+    """What noticed the fault, or None."""
+    first = [folder for folder in fault.tests.split() if folder in programs]
+    for folders in (first, [f for f in programs if f not in first]):
+        if folders and not build([programs[f].name for f in folders]):
+            return "the compiler"
+        for folder in folders:
+            reason = run_program(programs[folder], limits[folder])
+            if reason:
+                return f"{folder}_test" + (" (time)" if reason == "time" else "")
+    return None
+
+
+def main(arguments):
+    chosen = [int(a) for a in arguments] or list(range(1, len(FAULTS) + 1))
+    programs, limits = prepare()
+    bad = []
+    for number in chosen:
+        fault = FAULTS[number - 1]
+        file = SOURCE / fault.file
+        text = file.read_text() if file.is_file() else ""
+        start = time.monotonic()
+        if text.count(fault.old) != 1:
+            outcome = f"DOES NOT APPLY: the old text stands {text.count(fault.old)} times in the file"
+            bad.append(number)
+        else:
+            file.write_text(text.replace(fault.old, fault.new))
+            try:
+                who = noticed_by(fault, programs, limits)
+            finally:
+                file.write_text(text)
+            outcome = f"noticed by {who}" if who else "NOT NOTICED"
+            bad += [] if who else [number]
+        print(f"{number:3}  {fault.file}: {fault.breaks}\n     {outcome} ({time.monotonic() - start:.0f} s)", flush=True)
+    print(f"{len(chosen) - len(bad)} of {len(chosen)} faults noticed" + (f"; not: {bad}" if bad else ""))
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
