@@ -141,7 +141,8 @@ TEST(HostPaths, Slabs) {
         if (!is_valid(ray)) continue;
         alignas(64) BvhNode pair[2];
         for (BvhNode& node : pair) {
-            const Vec3 a{place(random), place(random), place(random)}, b{place(random), a.y, 1.0f};
+            const Vec3 a{place(random), place(random), place(random)},
+                b{place(random), i % 6 ? place(random) : a.y, 1.0f};
             node = {min_of(a, b), 0, max_of(a, b), 1};
         }
         if (i % 3 == 0) pair[i % 2].lo.x = ray.origin.x;  // in the plane: 0 * Inf
@@ -158,13 +159,13 @@ TEST(HostPaths, Slabs) {
         }
         ++pairs;
     }
-    EXPECT_GT(hits, pairs / 4);
+    EXPECT_GT(hits, pairs / 10);
     EXPECT_LT(hits, 2 * pairs);
 }
 
 /// The closest answer of the device's work is the library's, bit for bit.
 TEST(HostPaths, Rays) {
-    const Mesh mesh = test::random_soup(300, 5, 0.4f);
+    const Mesh mesh = test::random_soup(300, 5, 0.8f);
     const Bvh tree = build_bvh(mesh);
     std::vector<LeafTriangle> corners;
     for (const Triangle& t : mesh.triangles)
@@ -183,7 +184,7 @@ TEST(HostPaths, Rays) {
     std::vector<RayAnswer> answers(rays.size());
     std::size_t found = 0;
     for (std::uint32_t i = 0; i < rays.size(); ++i) {
-        AnswerRay{rays.data(), corners.data(), static_cast<std::uint32_t>(corners.size()), root,
+        AnswerRay{rays.data(), corners.data(), static_cast<std::uint32_t>(corners.size()), &root,
                   answers.data()}(i);
         ASSERT_TRUE(same_bits(answers[i].closest, hits[i])) << i;
         ASSERT_EQ(answers[i].crossings, all.offsets[i + 1] - all.offsets[i]) << i;

@@ -192,16 +192,19 @@ bool compare_rays(const Mesh& mesh, const Aabb& bounds, const std::vector<Ray>& 
     std::vector<LeafTriangle> corners;
     for (const Triangle& t : mesh.triangles)
         corners.push_back({mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]});
-    const BvhNode root{bounds.lo, 0, bounds.hi, 0};
+    const std::vector<BvhNode> root{{bounds.lo, 0, bounds.hi, 0}};
+    const DeviceArray<BvhNode> device_root(root);
     const auto n = static_cast<std::uint32_t>(rays.size());
     std::vector<RayAnswer> host(rays.size(), RayAnswer{Hit{}, 0, {0.0f, 0.0f}});
     const DeviceArray<RayAnswer> device(host);
     const DeviceArray<Ray> device_rays(rays);
     const DeviceArray<LeafTriangle> device_corners(corners);
     const auto count = static_cast<std::uint32_t>(corners.size());
-    on_host(AnswerRay{rays.data(), corners.data(), count, root, host.data()}, n);
+    on_host(AnswerRay{rays.data(), corners.data(), count, root.data(), host.data()}, n);
     launch(answer_ray,
-           AnswerRay{device_rays.data(), device_corners.data(), count, root, device.data()}, n);
+           AnswerRay{device_rays.data(), device_corners.data(), count, device_root.data(),
+                     device.data()},
+           n);
     const auto hits =
         std::count_if(host.begin(), host.end(), [](const RayAnswer& a) { return a.closest.hit(); });
     std::printf("%zu rays, %zu of them hit\n", rays.size(), static_cast<std::size_t>(hits));

@@ -28,14 +28,14 @@ struct AnswerRay {
     const Ray* rays;
     const LeafTriangle* triangles;
     std::uint32_t triangle_count;
-    BvhNode root;
+    const BvhNode* root;  // [1], the box around all triangles
     RayAnswer* answers;
 
     RAYDIX_HD void operator()(std::uint32_t i) const {
         RayAnswer answer{Hit{}, 0, {0.0f, 0.0f}};
         if (is_valid(rays[i])) {
             const RayFrame frame = make_frame(rays[i]);
-            answer.box = intersect_slabs(make_slab_frame(frame, {root.lo, root.hi}), &root.lo.x,
+            answer.box = intersect_slabs(make_slab_frame(frame, {root->lo, root->hi}), &root->lo.x,
                                          frame.tmin, frame.tmax);
             float reach = frame.tmax;
             for (std::uint32_t k = 0; k < triangle_count; ++k) {
