@@ -52,9 +52,11 @@ std::vector<Tree> plant_trees(std::uint64_t count, std::uint64_t seed) {
     Random random(seed, 11);
     // Far enough apart to stand, near enough for the crowns to grow into each other; the clearing
     // stays free.
-    const double apart = 1.1 * grove_half / std::sqrt(static_cast<double>(count));
+    const double root = std::sqrt(static_cast<double>(count));
+    const double spread = std::min(0.92 * grove_half, 7.0 + 3.0 * root);
+    const double apart = 1.2 * spread / root;
     for (int attempt = 0; trees.size() < count; ++attempt) {
-        const double x = 0.92 * grove_half * random.sign(), z = 0.92 * grove_half * random.sign();
+        const double x = spread * random.sign(), z = spread * random.sign();
         const double least = attempt < 2000 ? apart : 0.0;
         bool free = x * x + z * z > 36.0;
         for (const Tree& t : trees) {

@@ -130,8 +130,8 @@ struct Pinned {
 constexpr Pinned pinned[] = {
     {"atrium?triangles=10000", "2c898bca6578c9e25498f7b6bb664665"},
     {"atrium?triangles=100000", "1529abaa563a64af27d94b69406298da"},
-    {"grove?triangles=10000", "b453bf669ea15b35f0b80d049060fc4d"},
-    {"grove?triangles=100000", "3b831da621a645aa0ce1b52075a9d2b1"},
+    {"grove?triangles=10000", "26981335c6e73808ca316ddea8091798"},
+    {"grove?triangles=100000", "07a1297fa57571ddb8389267d45d0ce5"},
     {"figure?triangles=10000", "b46af036ac6f064c4879b8d61e431a99"},
     {"figure?triangles=100000", "0d4da986e654c79adce5aead93c9d8bb"},
     {"soup?triangles=1000", "a2ad11ad8af0101e9e6f3a9ddea17af0"},
