@@ -7,7 +7,7 @@
 #include "base/check.h"
 #include "exec/memory.h"
 #include "exec/parallel.h"
-#include "keys/morton.h"
+#include "keys/host_encode.h"
 #include "layout/leaf_order.h"
 #include "measure/stopwatch.h"
 #include "primitives/bounds.h"
@@ -106,21 +106,20 @@ struct BuildRun {
         ms.bounds = stage.lap();
         if (valid == 0) return make_empty();
 
-        Buffer<Key>& codes = codes_of<Key>(scratch);
-        codes.reset(n);
+        const std::span<Key> codes = borrow_sort_memory();
         const Grid grid = make_grid(bounds.box, CodeFormat<Key>::axis_bits);
-        for_each_index(n, EncodeMorton<Source, Key>{source, grid, codes.data()});
+        for_each_index(n, HostEncodeMorton<Source, Key>{source, HostGrid(grid), codes.data()});
         ms.codes = stage.lap();
 
         // Primitives that are left out have the highest key: they sort to the end and are cut off
         // there.
         const int key_bits = valid == n ? CodeFormat<Key>::bits : static_cast<int>(8 * sizeof(Key));
         tree.order().reset(n);
-        sort_keys(codes.span(), tree.order().span(), key_bits, sort_scratch_of<Key>(scratch));
+        sort_keys(codes, tree.order().span(), key_bits, sort_scratch_of<Key>(scratch));
         tree.order().reset(valid);
         ms.sort = stage.lap();
 
-        const std::span<const Key> keys = codes.view().first(valid);
+        const std::span<const Key> keys = codes.first(valid);
         tree.inner_count() = build_karras(keys, options.max_leaf, tree.nodes(), scratch.hierarchy);
         ms.hierarchy = stage.lap();
 
@@ -134,6 +133,25 @@ struct BuildRun {
     }
 
 private:
+    /// Codes and sort records, in the memory of the leaf copies, which are written after the last
+    /// use of both; where the copies are too small for that, in memory of their own.
+    std::span<Key> borrow_sort_memory() {
+        using Record = SortRecord<Key>;
+        Buffer<Record>& records = sort_scratch_of<Key>(scratch).records;
+        copies.reset(n);
+        if constexpr (sizeof(Copy) >= sizeof(Key) + sizeof(Record)) {
+            auto* memory = reinterpret_cast<std::byte*>(copies.data());
+            const std::size_t code_bytes = n * sizeof(Key);
+            records = Buffer<Record>(nullptr, reinterpret_cast<Record*>(memory + code_bytes), n);
+            return {reinterpret_cast<Key*>(memory), n};
+        } else {
+            Buffer<Key>& codes = codes_of<Key>(scratch);
+            codes.reset(n);
+            records.reset(n);
+            return codes.span();
+        }
+    }
+
     void make_empty() {
         tree.nodes().reset(0);
         tree.order().reset(0);
@@ -173,7 +191,7 @@ void build(const Source& source, std::size_t n, const char* kind_name, Primitive
     memory_count().restart_peak();
     tree.kind() = kind;
     tree.options() = options;
-    with_threads(options.threads, [&] {
+    const auto run = [&] {
         const auto count = static_cast<std::uint32_t>(n);
         if (options.bits == 30)
             BuildRun<std::uint32_t, Source, Copy, Scratch>{source,  count, kind_name, options,
@@ -183,7 +201,13 @@ void build(const Source& source, std::size_t n, const char* kind_name, Primitive
             BuildRun<std::uint64_t, Source, Copy, Scratch>{source,  count, kind_name, options,
                                                            scratch, tree,  copies}
                 .run();
-    });
+    };
+    try {
+        with_threads(options.threads, run);
+    } catch (...) {
+        tree.bvh = Bvh();  // nothing half-built gets out
+        throw;
+    }
     tree.peak_bytes() = memory_count().peak() - before;
 }
 

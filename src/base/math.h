@@ -67,7 +67,8 @@ RAYDIX_HD inline bool diagonal_in_range(const Aabb& box) {
     const Vec3 d = box.hi - box.lo;
     const float longest = max_of(max_of(d.x, d.y), d.z);
     if (longest >= min_diagonal || longest == 0.0f) return true;
-    return std::sqrt(double(d.x) * d.x + double(d.y) * d.y + double(d.z) * d.z) >= double(min_diagonal);
+    return std::sqrt(double(d.x) * d.x + double(d.y) * d.y + double(d.z) * d.z) >=
+           double(min_diagonal);
 }
 
 /// Half the surface area in double: xy + yz + zx.

@@ -1,4 +1,6 @@
 // The loops of parallel.h on oneTBB. Every range runs in a plain floating-point environment.
+#if !defined(__SANITIZE_THREAD__)  // parallel_std.cpp serves there
+
 #include "exec/parallel.h"
 
 #include <tbb/blocked_range.h>
@@ -47,3 +49,5 @@ void parallel_ranges(std::size_t n, std::size_t grain,
 
 }  // namespace detail
 }  // namespace raydix
+
+#endif

@@ -7,12 +7,16 @@
 #include <cstdint>
 
 #include "exec/parallel.h"
-#include "primitives/sources.h"
+#include "primitives/host_box.h"
 
 namespace raydix {
 
 inline LeafTriangle copy_primitive(const TriangleSource& source, std::uint32_t i) {
-    return {source.corner(i, 0), source.corner(i, 1), source.corner(i, 2)};
+    LeafTriangle copy;
+    load_corner(source, i, 0).store(copy.v0);
+    load_corner(source, i, 1).store(copy.v1);
+    load_corner(source, i, 2).store(copy.v2);
+    return copy;
 }
 inline Aabb copy_primitive(const BoxSource& source, std::uint32_t i) {
     Aabb box;
@@ -24,27 +28,51 @@ inline Vec3 copy_primitive(const PointSource& source, std::uint32_t i) {
 }
 
 /// The box of a copy.
-RAYDIX_HD inline Aabb copy_box(const LeafTriangle& t) { return box_of(t.v0, t.v1, t.v2); }
-RAYDIX_HD inline Aabb copy_box(const Aabb& box) { return box; }
-RAYDIX_HD inline Aabb copy_box(Vec3 p) { return {p, p}; }
+inline Box3 copy_box(const LeafTriangle& t) {
+    const Float3 a = Float3::load(t.v0), b = Float3::load(t.v1), c = Float3::load(t.v2);
+    return {min_of(min_of(a, b), c), max_of(max_of(a, b), c)};
+}
+inline Box3 copy_box(const Aabb& box) { return Box3::load(box); }
+inline Box3 copy_box(Vec3 p) { return Box3::load(p, p); }
+
+/// Asks for what copying triangle i will read, in two steps: the indices, then the vertices.
+inline void prefetch_indices(const TriangleSource& source, std::uint32_t i) {
+    __builtin_prefetch(&source.triangles[i]);
+}
+inline void prefetch_corners(const TriangleSource& source, std::uint32_t i) {
+    for (const std::uint32_t vertex : source.triangles[i])
+        __builtin_prefetch(&source.vertices[vertex]);
+}
+template <class Source>
+void prefetch_indices(const Source&, std::uint32_t) {}
+template <class Source>
+void prefetch_corners(const Source&, std::uint32_t) {}
 
 template <class Source, class Copy>
 void copy_to_leaf_order(const Source& source, std::span<const std::uint32_t> order,
                         Buffer<Copy>& copies) {
+    constexpr std::size_t indices_ahead = 32, corners_ahead = 16;
     copies.reset(order.size());
-    for_each_index(order.size(),
-                   [&](std::size_t k) { copies[k] = copy_primitive(source, order[k]); });
+    for_each_range(order.size(), 4096, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            if (k + indices_ahead < end) {
+                prefetch_indices(source, order[k + indices_ahead]);
+                prefetch_corners(source, order[k + corners_ahead]);
+            }
+            copies[k] = copy_primitive(source, order[k]);
+        }
+    });
 }
 
 /// Box of the primitives [first, first + count) in leaf order.
 template <class Copy>
 struct LeafBoxOf {
     const Copy* copies;
-    RAYDIX_HD Aabb operator()(std::uint32_t first, std::uint32_t count) const {
-        Aabb box = copy_box(copies[first]);
+    Aabb operator()(std::uint32_t first, std::uint32_t count) const {
+        Box3 box = copy_box(copies[first]);
         for (std::uint32_t k = first + 1; k < first + count; ++k)
             box = unite(box, copy_box(copies[k]));
-        return box;
+        return box.box();
     }
 };
 

@@ -5,7 +5,7 @@
 #include <mutex>
 
 #include "exec/parallel.h"
-#include "primitives/sources.h"
+#include "primitives/host_box.h"
 
 namespace raydix {
 
@@ -31,18 +31,20 @@ Bounds scene_bounds(const Source& source, std::uint32_t n) {
     std::mutex merging;
     for_each_range(n, 16384, [&](std::size_t begin, std::size_t end) {
         Bounds part;
+        Box3 around = Box3::load(part.box);
         for (std::size_t k = begin; k < end; ++k) {
             const auto i = static_cast<std::uint32_t>(k);
-            Aabb box;
+            Box3 box;
             if (!source.readable(i)) {
                 part.first_unreadable = std::min(part.first_unreadable, i);
-            } else if (source.box(i, box)) {
-                part.box = unite(part.box, box);
+            } else if (host_box(source, i, box)) {
+                around = unite(around, box);
             } else {
                 ++part.left_out;
                 part.first_left_out = std::min(part.first_left_out, i);
             }
         }
+        part.box = around.box();
         const std::scoped_lock lock(merging);
         all.merge(part);
     });

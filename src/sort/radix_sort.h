@@ -18,8 +18,8 @@ struct SortRecord {
 /// Kept between calls so that sorting again allocates nothing.
 template <class Key>
 struct SortScratch {
-    Buffer<SortRecord<Key>> records;
-    Buffer<SortRecord<Key>> spare;  // only if one bucket holds most of the input
+    Buffer<SortRecord<Key>> records;  // may view memory of the caller; made larger if too small
+    Buffer<SortRecord<Key>> spare;    // only if one bucket holds most of the input
     Buffer<std::uint32_t> histogram;
 };
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "trace/host_slabs.h"
 #include "trace/slab.h"
 
 namespace raydix {
@@ -48,6 +49,7 @@ void walk_tree(const BvhNode* nodes, const RayFrame& ray, WalkStack& stack, Step
     const SlabFrame slabs = make_slab_frame(ray, {nodes[0].lo, nodes[0].hi});
     const SlabInterval whole = intersect_slabs(slabs, &nodes[0].lo.x, ray.tmin, reach());
     if (!(whole.entry <= whole.exit)) return;
+    const HostSlabs children(slabs, ray.tmin);
     PendingNode* const bottom = stack.begin();
     PendingNode* top = bottom;
     std::uint32_t slot = 0;
@@ -57,20 +59,16 @@ void walk_tree(const BvhNode* nodes, const RayFrame& ray, WalkStack& stack, Step
         if (node.is_leaf()) {
             if (leaf(node)) return;
         } else {
-            const SlabInterval a =
-                intersect_slabs(slabs, &nodes[node.first].lo.x, ray.tmin, reach());
-            const SlabInterval b =
-                intersect_slabs(slabs, &nodes[node.first + 1].lo.x, ray.tmin, reach());
-            const bool in_a = a.entry <= a.exit, in_b = b.entry <= b.exit;
-            if (in_a && in_b) {
-                const bool b_first = b.entry < a.entry;
+            const PairInterval pair = children.intersect(&nodes[node.first], reach());
+            if (pair.hit == 3) {
+                const bool b_first = pair.entry_b < pair.entry_a;
                 RAYDIX_CHECK(static_cast<std::uint32_t>(top - bottom), <, stack.capacity());
-                *top++ = {node.first + (b_first ? 0u : 1u), b_first ? a.entry : b.entry};
+                *top++ = {node.first + (b_first ? 0u : 1u), b_first ? pair.entry_a : pair.entry_b};
                 slot = node.first + (b_first ? 1u : 0u);
                 continue;
             }
-            if (in_a || in_b) {
-                slot = node.first + (in_b ? 1u : 0u);
+            if (pair.hit != 0) {
+                slot = node.first + (pair.hit == 2 ? 1u : 0u);
                 continue;
             }
         }

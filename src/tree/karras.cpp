@@ -45,23 +45,22 @@ private:
 };
 
 /// A radix node holds more than max_leaf keys iff the max_leaf prefixes on its inner side all
-/// exceed the outer one.
-std::uint64_t kept_word(const std::uint8_t* prefixes, std::size_t max_leaf) {
-    std::array<std::uint8_t, word_bits> to_right, to_left;
-    std::memcpy(to_right.data(), prefixes, word_bits);
-    std::memcpy(to_left.data(), prefixes - 1, word_bits);
+/// exceed the outer one. Bit k of the result speaks of the node whose own prefix is prefixes[k].
+std::uint32_t kept_bits(const std::uint8_t* prefixes, std::size_t max_leaf) {
+    Bytes16 to_right = Bytes16::load(prefixes), to_left = Bytes16::load(prefixes - 1);
     for (std::size_t k = 1; k < max_leaf; ++k) {
-        for (std::size_t i = 0; i < word_bits; ++i) {
-            to_right[i] = std::min(to_right[i], prefixes[i + k]);
-            to_left[i] = std::min(to_left[i], *(prefixes + i - 1 - k));
-        }
+        to_right = min_of(to_right, Bytes16::load(prefixes + k));
+        to_left = min_of(to_left, Bytes16::load(prefixes - 1 - k));
     }
+    const std::uint32_t few_right = not_above_mask(to_right, Bytes16::load(prefixes - 1));
+    const std::uint32_t few_left = not_above_mask(to_left, Bytes16::load(prefixes));
+    return ~(few_right & few_left) & 0xFFFFu;
+}
+
+std::uint64_t kept_word(const std::uint8_t* prefixes, std::size_t max_leaf) {
     std::uint64_t word = 0;
-    for (std::size_t i = 0; i < word_bits; ++i) {
-        const bool right = to_right[i] > *(prefixes + i - 1);
-        const bool left = to_left[i] > prefixes[i];
-        word |= std::uint64_t{right || left} << i;
-    }
+    for (std::size_t i = 0; i < word_bits; i += 16)
+        word |= std::uint64_t{kept_bits(prefixes + i, max_leaf)} << i;
     return word;
 }
 
@@ -102,9 +101,7 @@ RadixRange find_range(const SortedKeys<Key>& keys, const NeighbourPrefixes& pref
     }
     // The lowest prefix of a range is unique, and the split stands there.
     const auto lowest = static_cast<std::uint8_t>(1 + keys.common_prefix(first, last));
-    const void* split = std::memchr(prefixes.at(first), lowest, last - first);
-    return {first, last,
-            static_cast<std::uint32_t>(static_cast<const std::uint8_t*>(split) - prefixes.at(0))};
+    return {first, last, first + find_byte(prefixes.at(first), lowest)};
 }
 
 }  // namespace
