@@ -92,13 +92,16 @@ void add_table(PatchModel& model, const Frame& frame, const Furnishing& amount, 
     const int side = amount.chairs / 2;
     for (int i = 0; i < side; ++i) {
         const double x = mix(-1.35, 1.35, (i + 0.5) / side);
-        add_chair(model, inside(frame, {x + 0.05 * random.sign(), 0, -0.75 - 0.15 * random.unit()},
-                                0.02 * random.sign()));
-        add_chair(model, inside(frame, {x + 0.05 * random.sign(), 0, 0.75 + 0.15 * random.unit()},
-                                0.5 + 0.02 * random.sign()));
+        for (const double turn : {0.0, 0.5}) {
+            const Point at{x + 0.05 * random.sign(), 0,
+                           (turn > 0.0 ? 1.0 : -1.0) * random.range(0.75, 0.9)};
+            add_chair(model, inside(frame, at, turn + 0.02 * random.sign()));
+        }
     }
-    add_vase(model, inside(frame, {0.1 * random.sign(), 0.79, 0.1 * random.sign()}, random.unit()),
-             random.range(0.3, 0.45), static_cast<int>(random.below(3)) * 8);
+    const Point vase{0.1 * random.sign(), 0.79, 0.1 * random.sign()};
+    const double height = random.range(0.3, 0.45);
+    const int ribs = static_cast<int>(random.below(3)) * 8;
+    add_vase(model, inside(frame, vase, random.unit()), height, ribs);
     for (const double x : {-0.8, 0.8})
         if (!amount.plain) add_candlestick(model, inside(frame, {x, 0.79, 0.0}, 0.0));
     for (int i = 0; i < side && !amount.plain; ++i) {  // small piles of books
@@ -158,7 +161,8 @@ void add_bookcases(PatchModel& model, const Furnishing& amount, std::uint64_t se
                     x += thick + lean;
                 }
             }
-            add_vase(model, inside(frame, {0.5 * random.sign(), 2.44, 0}, random.unit()), 0.5, 12);
+            const Point top{0.5 * random.sign(), 2.44, 0};
+            add_vase(model, inside(frame, top, random.unit()), 0.5, 12);
         }
     model.set_frame({});
 }

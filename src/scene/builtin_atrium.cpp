@@ -6,7 +6,7 @@
 namespace raydix::builtin {
 
 Furnishing furnishing_for(std::uint64_t triangles) {
-    if (triangles < 60'000) return {true, 2, 2, 0, 4, 0};
+    if (triangles < 75'000) return {true, 2, 2, 0, 4, 0};
     if (triangles < 300'000) return {false, 8, 6, 12, 8, 8'000};
     return {false, 12, 8, 30, 12, triangles / 10};
 }

@@ -96,8 +96,8 @@ BuiltinResult make_grove(std::uint64_t triangles, std::uint64_t seed) {
     // Leaves shrink slower than they multiply: the more there are, the more they overlap.
     const double crowd =
         std::sqrt(std::sqrt(static_cast<double>(leaves) / static_cast<double>(trees)));
-    place_grass(0.42, seed + 2, corners.first(5 * blades), more.first(3 * blades), base);
-    place_leaves(twigs, std::clamp(2.4 / crowd, 0.06, 0.6), seed, corners.subspan(5 * blades),
+    place_grass(0.42, seed, corners.first(5 * blades), more.first(3 * blades), base);
+    place_leaves(twigs, std::clamp(2.4 / crowd, 0.06, 0.7), seed, corners.subspan(5 * blades),
                  more.subspan(3 * blades), base + static_cast<std::uint32_t>(5 * blades));
     return result;
 }

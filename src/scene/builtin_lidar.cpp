@@ -60,7 +60,7 @@ BuiltinResult make_lidar(const LidarOptions& options, std::uint64_t seed,
 
     const Scanner scanner = scanner_for(options);
     const std::uint64_t block =
-        std::max<std::uint64_t>(1, (std::uint64_t{1} << 18) / scanner.beams);
+        std::max<std::uint64_t>(1, (std::uint64_t{1} << 20) / scanner.beams);
     // The hall is closed, so a scan needs few more columns than planned; ten times as many mean
     // that the rays miss.
     const std::uint64_t most = 10 * scanner.columns + 1000;

@@ -74,6 +74,8 @@ inline std::uint64_t scramble(std::uint64_t x) {
 
 /// A stream of random numbers fixed by (seed, index): element i of a scene draws from its own,
 /// whatever the thread.
+/// Never draw twice among the arguments of one call or the operands of one sum: compilers differ in
+/// their order there.
 class Random {
 public:
     explicit Random(std::uint64_t seed, std::uint64_t index = 0)

@@ -17,7 +17,9 @@ CameraSet cube_cameras() {
 
 /// Bell-shaped around 0 with deviation 1, never beyond 3.5.
 double bell(Random& random) {
-    return (((random.unit() + random.unit()) + (random.unit() + random.unit())) - 2.0) * 1.7320508;
+    double sum = -2.0;
+    for (int i = 0; i < 4; ++i) sum += random.unit();
+    return sum * 1.7320508;
 }
 
 }  // namespace

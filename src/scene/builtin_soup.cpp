@@ -16,8 +16,8 @@ BuiltinResult make_soup(std::uint64_t triangles, std::uint64_t seed) {
     for_each_index(triangles, [&](std::size_t i) {
         Random random(seed, i);
         const Point center{random.unit(), random.unit(), random.unit()};
-        const double size =
-            std::ldexp(0.1 * (1.0 + random.unit()), -static_cast<int>(random.below(10)));
+        const double largest = random.range(0.1, 0.2);
+        const double size = std::ldexp(largest, -static_cast<int>(random.below(10)));
         for (std::size_t k = 0; k < 3; ++k) {
             const Point offset{random.sign(), random.sign(), random.sign()};
             mesh.vertices[3 * i + k] = to_vec3(center + offset * size);

@@ -2,6 +2,7 @@
 #include "scene/figure_shape.h"
 
 #include <algorithm>
+#include <array>
 
 namespace raydix::builtin {
 
@@ -55,14 +56,39 @@ SolidSample melt(const SolidSample& s, const SolidSample& t, double width) {
     return {mix(t.distance, s.distance, h) - width * h * (1.0 - h), mix(t.gradient, s.gradient, h)};
 }
 
+/// A ball around a limb.
+struct Reach {
+    Point center;
+    double radius;
+};
+std::array<Reach, std::size(limbs)> limb_reaches() {
+    std::array<Reach, std::size(limbs)> reaches;
+    for (std::size_t i = 0; i < std::size(limbs); ++i)
+        reaches[i] = {
+            mix(limbs[i].a, limbs[i].b, 0.5),
+            0.5 * length(limbs[i].b - limbs[i].a) + std::max(limbs[i].radius_a, limbs[i].radius_b)};
+    return reaches;
+}
+
+/// Too far away to change a solid that is `distance` from p.
+bool out_of_reach(const Reach& reach, const Limb& limb, Point p, double distance) {
+    const double far = distance + limb.blend + reach.radius;
+    const Point away = p - reach.center;
+    return far > 0.0 && dot(away, away) >= far * far;
+}
+
 }  // namespace
 
 SolidSample figure_solid(Point p) {
     SolidSample solid{1e3, {0, 1, 0}};
-    for (const Limb& limb : limbs) {
-        solid = melt(solid, sample_limb(limb, p), limb.blend);
-        if (!limb.mirrored) continue;
-        SolidSample other = sample_limb(limb, {-p.x, p.y, p.z});
+    static const std::array<Reach, std::size(limbs)> reaches = limb_reaches();
+    const Point mirror{-p.x, p.y, p.z};
+    for (std::size_t i = 0; i < std::size(limbs); ++i) {
+        const Limb& limb = limbs[i];
+        if (!out_of_reach(reaches[i], limb, p, solid.distance))
+            solid = melt(solid, sample_limb(limb, p), limb.blend);
+        if (!limb.mirrored || out_of_reach(reaches[i], limb, mirror, solid.distance)) continue;
+        SolidSample other = sample_limb(limb, mirror);
         other.gradient.x = -other.gradient.x;
         solid = melt(solid, other, limb.blend);
     }

@@ -52,9 +52,11 @@ std::vector<Tree> plant_trees(std::uint64_t count, std::uint64_t seed) {
     Random random(seed, 11);
     // Far enough apart to stand, near enough for the crowns to grow into each other; the clearing
     // stays free.
-    const double apart = 1.1 * grove_half / std::sqrt(static_cast<double>(count));
+    const double root = std::sqrt(static_cast<double>(count));
+    const double spread = std::min(0.92 * grove_half, 7.0 + 3.0 * root);
+    const double apart = 1.2 * spread / root;
     for (int attempt = 0; trees.size() < count; ++attempt) {
-        const double x = 0.92 * grove_half * random.sign(), z = 0.92 * grove_half * random.sign();
+        const double x = spread * random.sign(), z = spread * random.sign();
         const double least = attempt < 2000 ? apart : 0.0;
         bool free = x * x + z * z > 36.0;
         for (const Tree& t : trees) {
@@ -81,7 +83,7 @@ std::vector<Twig> grow_tree(PatchModel& model, const Tree& tree, int levels) {
         const Point tip = bough_point(b, bend, 1.0);
         const Point heading = unit(tip - bough_point(b, bend, 0.9));
         if (b.level == levels) {
-            twigs.push_back({bough_point(b, bend, 0.75), heading, 0.4 * b.length + 0.3});
+            twigs.push_back({bough_point(b, bend, 0.75), heading, 0.3 * b.length + 0.22});
             continue;
         }
         const int forks = b.level == 0 ? 5 : 3;
@@ -106,9 +108,13 @@ void place_leaves(std::span<const Twig> twigs, double size, std::uint64_t seed,
     const std::size_t leaves = triangles.size() / 2;
     for_each_index(leaves, [&](std::size_t i) {
         Random random(seed, i);
-        const Twig& twig = twigs[i % twigs.size()];
-        const double far = random.unit();
-        const Point at = twig.at + random.direction() * (twig.reach * far * (2.0 - far));
+        // Eight leaves to a spray: they start close together and grow through each other.
+        const std::size_t spray_index = i / 8;
+        Random spray(seed + 4, spray_index);
+        const Twig& twig = twigs[spray_index % twigs.size()];
+        const double far = spray.unit();
+        const Point stem = twig.at + spray.direction() * (twig.reach * far * (2.0 - far));
+        const Point at = stem + random.direction() * (0.15 * size);
         const Point along = unit(random.direction() + twig.heading * 0.5 + Point{0, -0.4, 0});
         const Point across = sideways(along, random.unit());
         const Point lift = cross(along, across);
@@ -128,14 +134,14 @@ void place_grass(double size, std::uint64_t seed, std::span<Vec3> vertices,
                  std::span<Triangle> triangles, std::uint32_t base) {
     const std::size_t blades = triangles.size() / 3;
     for_each_index(blades, [&](std::size_t i) {
-        Random random(seed, i);
+        Random random(seed + 2, i);
         // Tufts of 16 blades, denser toward the clearing.
-        Random tuft(seed + 1, i / 16);
+        Random tuft(seed + 3, i / 16);
         const Circle c = circle(tuft.unit());
         const double reach = 0.95 * grove_half * tuft.unit();
         const double x = reach * c.cos + 0.25 * random.sign(),
                      z = reach * c.sin + 0.25 * random.sign();
-        const Point foot{x, ground(x, z, seed - 2) - 0.01, z};
+        const Point foot{x, ground(x, z, seed) - 0.01, z};
         const Circle face = circle(random.unit());
         const Point across = Point{face.cos, 0, face.sin} * (0.02 * size);
         const Point lean = Point{-face.sin, 0, face.cos} * (0.3 * size * random.unit());

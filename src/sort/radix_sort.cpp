@@ -46,7 +46,7 @@ struct DigitPair {
 
 /// The two digits that sort almost all of `n` keys which differ below bit `differing`.
 DigitPair choose_digits(std::size_t n, int differing) {
-    const int wanted = std::min(differing, static_cast<int>(std::bit_width(n)) + 6);
+    const int wanted = std::min(differing, static_cast<int>(std::bit_width(n)) + 8);
     const int bits = std::min((wanted + 1) / 2, max_digit_bits);
     const int high_shift = std::max(differing - bits, 0);
     return {std::max(high_shift - bits, 0), high_shift, bits};
@@ -147,7 +147,7 @@ BucketStarts distribute(std::size_t n, int shift, int digit_bits, const Load& lo
 
 /// More buckets for more keys, so that one bucket and its spare fit a second-level cache.
 int digit_bits_for(std::size_t n) {
-    return std::clamp(static_cast<int>(std::bit_width(n)) - 9, 6, max_digit_bits);
+    return std::clamp(static_cast<int>(std::bit_width(n)) - 12, 6, max_digit_bits);
 }
 
 /// Sorts a bucket that is too large for one thread: splits it at its own highest differing bits,

@@ -52,6 +52,25 @@ inline std::uint32_t not_above_mask(Bytes16 a, Bytes16 b) {
 }
 #endif
 
+/// Bit k is set if a[k] == b[k].
+#if defined(__SSE2__)
+inline std::uint32_t equal_mask(Bytes16 a, Bytes16 b) {
+    return static_cast<std::uint32_t>(_mm_movemask_epi8(_mm_cmpeq_epi8(a.v, b.v)));
+}
+#else
+inline std::uint32_t equal_mask(Bytes16 a, Bytes16 b) {
+    return not_above_mask(a, b) & not_above_mask(b, a);
+}
+#endif
+
+/// The first place of `value` in p[0], p[1], ...; it must be there. Reads whole sixteens.
+inline std::uint32_t find_byte(const std::uint8_t* p, std::uint8_t value) {
+    for (std::uint32_t at = 0;; at += 16) {
+        const std::uint32_t mask = equal_mask(Bytes16::load(p + at), Bytes16::all(value));
+        if (mask != 0) return at + static_cast<std::uint32_t>(std::countr_zero(mask));
+    }
+}
+
 /// How many of p[0], p[1], ... are above `threshold` before the first that is not; at most `limit`,
 /// a multiple of 16.
 inline std::uint32_t count_above(const std::uint8_t* p, std::uint32_t limit,

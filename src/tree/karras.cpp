@@ -101,9 +101,7 @@ RadixRange find_range(const SortedKeys<Key>& keys, const NeighbourPrefixes& pref
     }
     // The lowest prefix of a range is unique, and the split stands there.
     const auto lowest = static_cast<std::uint8_t>(1 + keys.common_prefix(first, last));
-    const void* split = std::memchr(prefixes.at(first), lowest, last - first);
-    return {first, last,
-            static_cast<std::uint32_t>(static_cast<const std::uint8_t*>(split) - prefixes.at(0))};
+    return {first, last, first + find_byte(prefixes.at(first), lowest)};
 }
 
 }  // namespace
