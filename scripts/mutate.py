@@ -46,7 +46,7 @@ FAULTS = [
           "sort: pairs that agree in two digits stay as they were", "sort tree device"),
     Fault("src/tree/radix_tree.h",
           "leading_zeros(static_cast<std::uint32_t>(i) ^ static_cast<std::uint32_t>(j));",
-          "leading_zeros(static_cast<std::uint32_t>(i) ^ static_cast<std::uint32_t>(j) ^ 1u);",
+          "leading_zeros(static_cast<std::uint32_t>(i) - static_cast<std::uint32_t>(j));",
           "hierarchy: equal codes are told apart wrongly", "tree device"),
     Fault("src/tree/radix_tree.h", "range.last, range.split + 1);", "range.last, range.split);",
           "hierarchy: the right child gets the left one's index", "tree device"),

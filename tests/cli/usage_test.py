@@ -22,6 +22,7 @@ OPTIONS = {
                "--samples", *TREE],
 }
 SMALL = "builtin:soup?triangles=50"
+MEDIUM = "builtin:soup?triangles=2000"
 
 
 class Usage(ProgramTest):
@@ -153,12 +154,12 @@ class Usage(ProgramTest):
         self.assertEqual(self.succeed("build", SMALL, "--quiet", "--json", "out.json").out, "")
 
     def test_epo_with_and_without_a_value(self):
-        self.assertIsNone(self.document("build", SMALL)["build"]["epo"])
-        bare = self.document("build", SMALL, "--epo")["build"]["epo"]
+        self.assertIsNone(self.document("build", MEDIUM)["build"]["epo"])
+        bare = self.document("build", MEDIUM, "--epo")["build"]["epo"]
         self.assertGreater(bare, 0)
-        self.assertEqual(self.document("build", SMALL, "--epo", "1")["build"]["epo"], bare)
-        self.assertEqual(self.document("build", "--epo", "--bits", "63", SMALL)["build"]["epo"], bare)
-        self.assertGreater(self.document("build", SMALL, "--epo", "0.5")["build"]["epo"], 0)
+        self.assertEqual(self.document("build", MEDIUM, "--epo", "1")["build"]["epo"], bare)
+        self.assertEqual(self.document("build", "--epo", "--bits", "63", MEDIUM)["build"]["epo"], bare)
+        self.assertGreater(self.document("build", MEDIUM, "--epo", "0.5")["build"]["epo"], 0)
 
     def test_progress_only_on_a_terminal(self):
         command = ["render", "builtin:figure?triangles=20000", "--view", "ao", "--size", "160x120", "-o", "p.png"]
