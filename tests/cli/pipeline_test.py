@@ -56,7 +56,8 @@ class Pipeline(ProgramTest):
         self.assert_shape(self.document("info", SOUP), {**DOCUMENT, "scene": SCENE, "load_ms": NUMBER})
         scenes = self.document("scenes")
         self.assert_shape(scenes, DOCUMENT)
-        self.assertLessEqual({"figure", "soup", "uniform", "clustered"}, {s["name"] for s in scenes["scenes"]})
+        self.assertEqual({"atrium", "grove", "figure", "soup", "uniform", "clustered", "lidar"},
+                         {s["name"] for s in scenes["scenes"]})
         built = self.document("build", SOUP, "--repeat", "3", "-o", "fields.rdx", "--epo", "0.1", "--threads", "2")
         self.assert_shape(built, {**DOCUMENT, "scene": SCENE, "load_ms": NUMBER, "build": BUILT})
         build = built["build"]

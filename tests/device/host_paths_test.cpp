@@ -163,6 +163,38 @@ TEST(HostPaths, Slabs) {
     EXPECT_LT(hits, 2 * pairs);
 }
 
+/// Scenes that are flat at the ray's own origin get no padding: their planes are 0 * Inf for a ray
+/// along another axis.
+TEST(HostPaths, SlabsWithoutPadding) {
+    const Vec3 origin{1, 2, 3};
+    int compared = 0;
+    for (int along = 0; along < 3; ++along) {
+        for (int open = 0; open < 3; ++open) {
+            if (open == along) continue;  // the axis in which the scene extends
+            for (const float zero : {0.0f, -0.0f}) {
+                Ray ray{origin, 0.0f, {zero, zero, zero}, infinity};
+                (&ray.direction.x)[along] = 1.0f;
+                Aabb root{origin, origin};
+                (&root.lo.x)[open] -= 1.0f;
+                (&root.hi.x)[open] += 1.0f;
+                alignas(64) BvhNode pair[2] = {{root.lo, 0, origin, 1}, {origin, 0, root.hi, 1}};
+                const RayFrame frame = make_frame(ray);
+                const SlabFrame slabs = make_slab_frame(frame, root);
+                const PairInterval both = HostSlabs(slabs, frame.tmin).intersect(pair, frame.tmax);
+                EXPECT_EQ(both.hit, 3) << "along " << along << ", open " << open;
+                for (int k = 0; k < 2; ++k) {
+                    const SlabInterval one =
+                        intersect_slabs(slabs, &pair[k].lo.x, frame.tmin, frame.tmax);
+                    EXPECT_LE(one.entry, one.exit) << "along " << along << ", open " << open;
+                    EXPECT_EQ(k == 0 ? both.entry_a : both.entry_b, one.entry);
+                    ++compared;
+                }
+            }
+        }
+    }
+    EXPECT_EQ(compared, 24);
+}
+
 /// The closest answer of the device's work is the library's, bit for bit.
 TEST(HostPaths, Rays) {
     const Mesh mesh = test::random_soup(300, 5, 0.8f);
