@@ -6,6 +6,7 @@ fails, crashes or runs out of time: first those of `tests`, then all others. Exi
 no longer applies (its old text must stand exactly once in the file).
 """
 import dataclasses
+import fcntl
 import os
 import pathlib
 import shutil
@@ -142,6 +143,11 @@ def run_program(program, limit):
 def prepare():
     """Builds everything without a fault; every program must pass, and its time sets its limit."""
     WORK.mkdir(parents=True, exist_ok=True)
+    lock = open(WORK / "lock", "w")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        sys.exit("another run is at work in build/mutate")
     SOURCE.mkdir(exist_ok=True)
     copy_tree()
     configured = run(["cmake", "-G", "Ninja", "-S", str(SOURCE), "-B", str(BUILD), "-DCMAKE_BUILD_TYPE=Release",
@@ -155,7 +161,7 @@ def prepare():
         if run_program(program, None) is not None:
             sys.exit(f"without any fault, {program.name} fails:\n{last_lines()}")
         limits[folder] = LEAST_TIME_LIMIT_S + 5 * (time.monotonic() - start)
-    return programs, limits
+    return programs, limits, lock
 
 
 def noticed_by(fault, programs, limits):
@@ -173,7 +179,7 @@ def noticed_by(fault, programs, limits):
 
 def main(arguments):
     chosen = [int(a) for a in arguments] or list(range(1, len(FAULTS) + 1))
-    programs, limits = prepare()
+    programs, limits, _lock = prepare()  # the lock lasts as long as the run
     bad = []
     for number in chosen:
         fault = FAULTS[number - 1]
