@@ -73,6 +73,26 @@ TEST(TraceRules, RaysBeginAtTheirOrigin) {
     EXPECT_TRUE(found[1].hit());
 }
 
+/// Rays through the vertex, the edges and the inside of a square of four triangles cross it once.
+TEST(TraceRules, AllHitsCrossASheetOnce) {
+    Mesh mesh;
+    mesh.vertices = {{0, 0, 0}, {-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}};
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
+    const Bvh tree = build_bvh(mesh, {.max_leaf = 1});
+    std::vector<Ray> rays;
+    for (int y = -7; y <= 7; ++y)
+        for (int x = -7; x <= 7; ++x)
+            for (const Vec3 d : {Vec3{0, 0, -1}, Vec3{1, 0, -1}, Vec3{-1, 2, -1}, Vec3{0, -1, -2}})
+                for (const float turn : {1.0f, -1.0f})
+                    rays.push_back(
+                        {.origin = {0.25f * static_cast<float>(x) - turn * d.x,
+                                    0.25f * static_cast<float>(y) - turn * d.y, -turn * d.z},
+                         .direction = {turn * d.x, turn * d.y, turn * d.z}});
+    const AllHits all = trace_all(tree, rays);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        EXPECT_EQ(all.offsets[i + 1] - all.offsets[i], 1u) << "ray " << i;
+}
+
 /// A flat sheet of squares, and rays at points of its inner edges: boxes end where triangles do.
 TEST(TraceRules, NoRaySlipsBetweenFlatNeighbours) {
     constexpr std::uint32_t side = 32;
