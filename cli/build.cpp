@@ -104,6 +104,7 @@ void run_check(const CheckCommand& options) {
         report = check_same(a.bvh, b.bvh);
         what = options.same[0] + " and " + options.same[1];
     } else {
+        refuse_build_options(options.scene, options.tree);
         const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
         report = check(input.bvh, input.scene.mesh);
     }

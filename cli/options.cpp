@@ -24,26 +24,26 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
 
 void add_tree_options(CLI::App& command, TreeOptions& options) {
     const char* group = "Tree";
+    const auto of_the_build = [&](CLI::Option* option) {
+        options.of_the_build.push_back(option);
+        return option->group(group);
+    };
     command.add_option("--tree", options.tree, "Kind of tree")
         ->check(CLI::IsMember({"bvh"}))
         ->capture_default_str()
         ->group(group);
-    options.builder_option = command.add_option("--builder", options.builder, "Builder")
-                                 ->check(CLI::IsMember({"karras"}))
-                                 ->capture_default_str()
-                                 ->group(group);
-    command.add_option("--quality", options.quality, "Picks a builder: fast")
+    CLI::Option* builder = of_the_build(command.add_option("--builder", options.builder, "Builder"))
+                               ->check(CLI::IsMember({"karras"}))
+                               ->capture_default_str();
+    of_the_build(command.add_option("--quality", options.quality, "Picks a builder: fast"))
         ->check(CLI::IsMember({"fast"}))
-        ->excludes(options.builder_option)
-        ->group(group);
-    command.add_option("--bits", options.bits, "Bits of the Morton codes")
+        ->excludes(builder);
+    of_the_build(command.add_option("--bits", options.bits, "Bits of the Morton codes"))
         ->check(CLI::IsMember({30, 63}))
-        ->capture_default_str()
-        ->group(group);
-    command.add_option("--max-leaf", options.max_leaf, "Most primitives in a leaf")
+        ->capture_default_str();
+    of_the_build(command.add_option("--max-leaf", options.max_leaf, "Most primitives in a leaf"))
         ->check(CLI::Range(1, 255))
-        ->capture_default_str()
-        ->group(group);
+        ->capture_default_str();
     command.add_option("--layout", options.layout, "Memory layout that is traced")
         ->check(CLI::IsMember({"binary"}))
         ->capture_default_str()
@@ -52,10 +52,8 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->check(CLI::IsMember({"cpu"}))
         ->capture_default_str()
         ->group(group);
-    command
-        .add_flag("--strict", options.strict,
-                  "Invalid primitives are an error instead of being left out")
-        ->group(group);
+    of_the_build(command.add_flag("--strict", options.strict,
+                                  "Invalid primitives are an error instead of being left out"));
     command.add_option("--sah-node", options.sah.node, "SAH cost of an inner node")
         ->check(finite_number(true))
         ->capture_default_str()
@@ -104,6 +102,14 @@ Scene load_scene_with_cameras(const std::string& name, const TreeOptions& tree,
     Scene scene = is_rdx(name) ? load_rdx(name).scene : load_scene(name, common.seed);
     override_cameras(scene, tree);
     return scene;
+}
+
+void refuse_build_options(const std::string& scene, const TreeOptions& tree) {
+    if (!is_rdx(scene)) return;
+    for (const CLI::Option* option : tree.of_the_build)
+        if (option->count() != 0)
+            throw CLI::ValidationError(option->get_name(),
+                                       "the tree in " + scene + " is used as it is");
 }
 
 SceneTree load_scene_tree(const std::string& name, const TreeOptions& tree,

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace raydix::cli {
 
@@ -32,7 +33,8 @@ struct TreeOptions {
     std::string cameras_file;
     SahConstants sah;
     std::optional<double> epo_sample;
-    CLI::Option* builder_option = nullptr;
+    std::vector<const CLI::Option*>
+        of_the_build;  // those that a finished tree cannot follow any more
 
     [[nodiscard]] BuildOptions build_options(const CommonOptions& common) const;
 };
@@ -46,6 +48,8 @@ struct SceneTree {
 [[nodiscard]] bool is_rdx(const std::string& scene);
 [[nodiscard]] Scene load_scene_with_cameras(const std::string& scene, const TreeOptions& tree,
                                             const CommonOptions& common);
+/// A .rdx file brings its tree: options that ask for another one are a usage error, never ignored.
+void refuse_build_options(const std::string& scene, const TreeOptions& tree);
 [[nodiscard]] SceneTree load_scene_tree(const std::string& scene, const TreeOptions& tree,
                                         const CommonOptions& common);
 

@@ -6,6 +6,7 @@
 
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <functional>
 #include <memory>
 
@@ -111,6 +112,15 @@ RayKind ray_kind(const std::string& name) {
     return RayKind::primary;
 }
 
+/// Given, of cameras.json, or 5 % of the box diagonal, in this order.
+float ao_radius_of(const TraceCommand& options, const SceneTree& input) {
+    if (options.ao_radius > 0) return options.ao_radius;
+    if (input.scene.cameras.ao_radius > 0) return input.scene.cameras.ao_radius;
+    if (input.bvh.empty()) return 0.0f;
+    const Aabb box = input.bvh.bounds();
+    return 0.05f * std::hypot(box.hi.x - box.lo.x, box.hi.y - box.lo.y, box.hi.z - box.lo.z);
+}
+
 /// All batches of one kind of ray from one camera.
 void trace_camera(const TraceCommand& options, const SceneTree& input, const Camera& camera,
                   RayKind kind, Size size, Batch& batch, Tally& tally, Kept& kept,
@@ -127,7 +137,7 @@ void trace_camera(const TraceCommand& options, const SceneTree& input, const Cam
     SecondaryOptions secondary;
     secondary.kind = kind;
     secondary.samples = options.samples;
-    secondary.ao_radius = options.ao_radius > 0 ? options.ao_radius : input.scene.cameras.ao_radius;
+    secondary.ao_radius = ao_radius_of(options, input);
     secondary.seed = options.common.seed;
     secondary.threads = options.common.threads;
     const std::size_t step =
@@ -210,6 +220,7 @@ void run_trace(const TraceCommand& options) {
     if (!options.hits_file.empty() && mode == Mode::any)
         throw CLI::ValidationError("--hits",
                                    "any-hit rays only answer yes or no; use --mode closest or all");
+    refuse_build_options(options.scene, options.tree);
     const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}
@@ -245,6 +256,11 @@ void run_trace(const TraceCommand& options) {
     document["build"] = build_json(
         input.bvh, tree_stats(input.bvh, stats_options(options.tree, options.common)), builds);
     document["trace"] = Json::array({trace_json(options, mode_text(mode), tally)});
+    if (options.rays == "ao") {
+        const float radius = ao_radius_of(options, input);
+        document["trace"][0]["ao_radius"] = radius;
+        if (options.common.prints_tables()) fmt::print("ao radius {:g}\n", radius);
+    }
     if (options.common.prints_tables()) print_trace(document["trace"][0]);
     write_json(document, options.common);
 }
