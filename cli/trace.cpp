@@ -42,7 +42,8 @@ struct Batch {
     const Bvh& bvh;
     Mode mode;
     const CommonOptions& common;
-    std::vector<Hit> hits;  // of the last run, closest and all
+    std::vector<Hit> hits;               // of the last run, closest and all
+    std::vector<std::uint64_t> offsets;  // of the last run, all
     std::vector<std::uint8_t> occluded;
 
     TraceCounts run(std::span<const Ray> rays, bool counters) {
@@ -54,6 +55,7 @@ struct Batch {
         if (mode == Mode::all) {
             AllHits all = trace_all(bvh, rays, options);
             hits = std::move(all.hits);
+            offsets = std::move(all.offsets);
             return all.counts;
         }
         hits.resize(rays.size());
@@ -83,12 +85,27 @@ void measure(Batch& batch, std::span<const Ray> rays, int repeat, Tally& tally) 
 struct Kept {
     std::vector<Ray> rays;
     std::vector<Hit> hits;
+    std::vector<std::uint64_t> offsets{0};  // all hits: where those of each ray begin
 };
 
 void keep(const TraceCommand& options, std::span<const Ray> rays, const Batch& batch, Kept& kept) {
     if (!options.rays_file.empty()) kept.rays.insert(kept.rays.end(), rays.begin(), rays.end());
-    if (!options.hits_file.empty())
-        kept.hits.insert(kept.hits.end(), batch.hits.begin(), batch.hits.end());
+    if (options.hits_file.empty()) return;
+    const std::uint64_t before = kept.hits.size();
+    kept.hits.insert(kept.hits.end(), batch.hits.begin(), batch.hits.end());
+    if (batch.mode != Mode::all) return;
+    for (std::size_t i = 1; i < batch.offsets.size(); ++i)
+        kept.offsets.push_back(before + batch.offsets[i]);
+}
+
+/// hits.npy; all hits also have hits.offsets.npy beside it.
+void save_kept(const TraceCommand& options, Mode mode, const Kept& kept) {
+    if (!options.rays_file.empty()) save_rays(options.rays_file, kept.rays);
+    if (options.hits_file.empty()) return;
+    save_hits(options.hits_file, kept.hits);
+    if (mode == Mode::all)
+        save_offsets(std::filesystem::path(options.hits_file).replace_extension(".offsets.npy"),
+                     kept.offsets);
 }
 
 std::vector<Camera> chosen_cameras(const TraceCommand& options, const Scene& scene) {
@@ -225,7 +242,7 @@ void run_trace(const TraceCommand& options) {
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}
                           : parse_size(options.size_text);
-    Batch batch{input.bvh, mode, options.common, {}, {}};
+    Batch batch{input.bvh, mode, options.common, {}, {}, {}};
     Tally tally;
     Kept kept;
     explain(options, input.bvh);
@@ -246,8 +263,7 @@ void run_trace(const TraceCommand& options) {
                              });
             });
     }
-    if (!options.rays_file.empty()) save_rays(options.rays_file, kept.rays);
-    if (!options.hits_file.empty()) save_hits(options.hits_file, kept.hits);
+    save_kept(options, mode, kept);
     Json document = new_document("trace");
     document["scene"] = scene_json(input.scene);
     document["load_ms"] = input.scene.load_ms;
@@ -308,7 +324,9 @@ void add_trace_command(CLI::App& app) {
     command->add_option("--repeat", options->repeat, "Times to trace after a warm-up")
         ->check(CLI::Range(1, 10000))
         ->capture_default_str();
-    command->add_option("--hits", options->hits_file, "Save the hits as a structured array")
+    command
+        ->add_option("--hits", options->hits_file,
+                     "Save the hits as a structured array; for all hits also FILE.offsets.npy")
         ->type_name("FILE.npy");
     command->add_option("--save-rays", options->rays_file, "Save the rays")->type_name("FILE.npy");
     command->add_flag("--explain", options->explain, "Say which layout and which code ran");

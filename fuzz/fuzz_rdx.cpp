@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "api/rdx_parse.h"
 #include "../tests/support/rdx_seal.h"
+#include "api/rdx_parse.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace raydix;

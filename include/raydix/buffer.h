@@ -22,7 +22,8 @@ class Buffer {
 public:
     Buffer() = default;
     explicit Buffer(std::size_t size) { reset(size); }
-    /// Views `size` elements at `data`, kept alive by `owner`. `reset` never reuses them: they may be read-only.
+    /// Views `size` elements at `data`, kept alive by `owner`. `reset` never reuses them: they may
+    /// be read-only.
     Buffer(std::shared_ptr<void> owner, T* data, std::size_t size)
         : owner_(std::move(owner)), data_(data), size_(size) {}
     Buffer(Buffer&& other) noexcept { swap(other); }

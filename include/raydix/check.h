@@ -20,11 +20,12 @@ struct CheckReport {
 /// padding zero.
 [[nodiscard]] CheckReport check(const Bvh& bvh);
 
-/// The same, and the leaf triangles are bit for bit those of `mesh`, or the leaf points its vertices.
+/// The same, and the leaf triangles are bit for bit those of `mesh`, or the leaf points its
+/// vertices.
 [[nodiscard]] CheckReport check(const Bvh& bvh, const MeshView& mesh);
 
-/// Compares two valid trees in full: kind, bits, max_leaf, topology, boxes, order, leaf primitives; node numbers
-/// may differ. Names the first difference.
+/// Compares two valid trees in full: kind, bits, max_leaf, topology, boxes, order, leaf primitives;
+/// node numbers may differ. Names the first difference.
 [[nodiscard]] CheckReport check_same(const Bvh& a, const Bvh& b);
 
 }  // namespace raydix

@@ -55,4 +55,7 @@ void save_rays(const std::filesystem::path& file, std::span<const Ray> rays);
 /// NumPy files of shape (N,) with fields t, prim, u, v.
 void save_hits(const std::filesystem::path& file, std::span<const Hit> hits);
 
+/// A NumPy file of shape (N + 1,) uint64: where the hits of each of N rays begin, and the end.
+void save_offsets(const std::filesystem::path& file, std::span<const std::uint64_t> offsets);
+
 }  // namespace raydix

@@ -30,4 +30,8 @@ void save_hits(const std::filesystem::path& file, std::span<const Hit> hits) {
     save_npy(file, hits);
 }
 
+void save_offsets(const std::filesystem::path& file, std::span<const std::uint64_t> offsets) {
+    save_npy(file, offsets);
+}
+
 }  // namespace raydix
