@@ -195,6 +195,9 @@ class Pipeline(ProgramTest):
         self.assertEqual([h[:2] for h in read_hits(self.folder / "closest.npy")],
                          [(2.0, 2), (3.0, 0), (0.25, 3), miss, miss, miss])
         self.assertEqual([h[:2] for h in read_hits(self.folder / "all.npy")], [(2.0, 2), (3.0, 0), (3.0, 0), (0.25, 3)])
+        descr, shape, data = read_npy(self.folder / "all.offsets.npy")
+        self.assertEqual((descr, shape), ("<u8", (7,)))
+        self.assertEqual(struct.unpack("<7Q", data), (0, 2, 3, 4, 4, 4, 4))
 
     def test_bad_ray_files(self):
         ray = struct.pack("<8f", 0, 0, 1, 0, 0, 0, -1, 9)
