@@ -112,7 +112,8 @@ RAYDIX_HD bool intersect_triangle(const RayFrame& ray, const LeafTriangle& trian
         }
     }
     const float determinant = (u + v) + w;
-    if (determinant == 0.0f) return false;
+    // Not finite: the ray starts so far away that the edge functions overflow.
+    if (!(determinant != 0.0f && std::fabs(determinant) < infinity)) return false;
     float t = ((u * a.z + v * b.z) + w * c.z) / determinant;
     const BoxInterval own = own_box_interval(ray, triangle);
     if (own.entry <= own.exit) t = min_of(max_of(t, own.entry), own.exit);

@@ -1,0 +1,176 @@
+#include "support/oracle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ostream>
+#include <sstream>
+
+namespace raydix::test {
+namespace {
+
+struct D3 {
+    double x, y, z;
+};
+D3 to_double(const Vec3& p) { return {p.x, p.y, p.z}; }
+D3 minus(const D3& a, const D3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+double inner(const D3& a, const D3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+D3 outer(const D3& a, const D3& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+double norm(const D3& a) { return std::hypot(a.x, a.y, a.z); }
+double largest(const D3& a) { return std::max({std::abs(a.x), std::abs(a.y), std::abs(a.z)}); }
+
+bool counts(const Vec3& p) {
+    return std::abs(p.x) <= 1e12f && std::abs(p.y) <= 1e12f && std::abs(p.z) <= 1e12f;
+}
+
+struct Corners {
+    Vec3 a, b, c;
+};
+Corners corners(const MeshView& mesh, std::uint32_t prim) {
+    const Triangle& t = mesh.triangles[prim];
+    return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
+}
+
+/// A claimed hit, measured.
+struct Claim {
+    OracleHit exact;
+    OracleSlack slack;
+    [[nodiscard]] double edge_distance() const {
+        return std::min({exact.u, exact.v, 1 - exact.u - exact.v});
+    }
+    [[nodiscard]] bool plausible() const { return exact.valid && !(edge_distance() < -slack.edge); }
+    [[nodiscard]] bool near_edge() const { return !(std::abs(edge_distance()) > slack.edge); }
+    [[nodiscard]] bool near_limit(const Ray& ray) const {
+        const double start = std::max(0.0f, ray.tmin);
+        return !(std::abs(exact.t - start) > slack.t) ||
+               !(std::abs(exact.t - double(ray.tmax)) > slack.t);
+    }
+};
+
+Claim measure(const MeshView& mesh, const Ray& ray, std::uint32_t prim) {
+    const Corners t = corners(mesh, prim);
+    return {oracle_intersect(t.a, t.b, t.c, ray), oracle_slack(t.a, t.b, t.c, ray)};
+}
+
+Verdict judge_same(const Claim& claim, const Hit& ours, const Hit& other) {
+    if (!claim.plausible()) return Verdict::wrong;
+    const double off = std::max(std::abs(double(ours.t) - claim.exact.t),
+                                std::abs(double(ours.t) - double(other.t)));
+    return off > 2 * claim.slack.t ? Verdict::wrong : Verdict::exact;
+}
+
+std::string describe(const Ray& ray, const Hit& ours, const Hit& other) {
+    std::ostringstream out;
+    out.precision(9);
+    out << "  origin " << ray.origin.x << " " << ray.origin.y << " " << ray.origin.z
+        << " direction " << ray.direction.x << " " << ray.direction.y << " " << ray.direction.z
+        << " t in [" << ray.tmin << ", " << ray.tmax << "]: ours " << ours.prim << " at " << ours.t
+        << ", other " << other.prim << " at " << other.t << "\n";
+    return out.str();
+}
+
+}  // namespace
+
+bool has_area(const Vec3& v0, const Vec3& v1, const Vec3& v2) {
+    const D3 normal =
+        outer(minus(to_double(v1), to_double(v0)), minus(to_double(v2), to_double(v0)));
+    return normal.x != 0 || normal.y != 0 || normal.z != 0;
+}
+
+OracleHit oracle_intersect(const Vec3& v0, const Vec3& v1, const Vec3& v2, const Ray& ray) {
+    const D3 origin = to_double(ray.origin), d = to_double(ray.direction);
+    const D3 ab = minus(to_double(v1), to_double(v0)), ac = minus(to_double(v2), to_double(v0));
+    if (!has_area(v0, v1, v2)) return {};
+    const D3 p = outer(d, ac);
+    const double determinant = inner(ab, p);
+    if (determinant == 0) return {};
+    const D3 s = minus(origin, to_double(v0)), q = outer(s, ab);
+    return {inner(ac, q) / determinant, inner(s, p) / determinant, inner(d, q) / determinant, true};
+}
+
+OracleSlack oracle_slack(const Vec3& v0, const Vec3& v1, const Vec3& v2, const Ray& ray) {
+    const D3 origin = to_double(ray.origin), d = to_double(ray.direction);
+    const D3 a = to_double(v0), b = to_double(v1), c = to_double(v2);
+    const double reach =
+        std::max({largest(minus(a, origin)), largest(minus(b, origin)), largest(minus(c, origin))});
+    const double off = 32 * 0x1p-24 * reach;  // lateral error of a vertex as a float test sees it
+    const D3 normal = outer(minus(b, a), minus(c, a));
+    const double across = std::abs(inner(normal, d));  // 0: the ray lies along the plane
+    const double longest = std::max({norm(minus(b, a)), norm(minus(c, b)), norm(minus(a, c))});
+    return {off * norm(normal) / across, off * longest * norm(d) / across};
+}
+
+Hit oracle_closest(const MeshView& mesh, const Ray& ray) {
+    Hit best;
+    double nearest = ray.tmax;
+    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+        const Corners t = corners(mesh, i);
+        if (!counts(t.a) || !counts(t.b) || !counts(t.c)) continue;
+        const OracleHit hit = oracle_intersect(t.a, t.b, t.c, ray);
+        if (!hit.inside() || hit.t < std::max(0.0f, ray.tmin) || hit.t > nearest) continue;
+        if (hit.t == nearest && best.hit()) continue;
+        nearest = hit.t;
+        best = {static_cast<float>(hit.t), i, static_cast<float>(hit.u), static_cast<float>(hit.v)};
+    }
+    return best;
+}
+
+Verdict judge(const MeshView& mesh, const Ray& ray, const Hit& ours, const Hit& other) {
+    if (ours.hit() && other.hit() && ours.prim == other.prim)
+        return judge_same(measure(mesh, ray, ours.prim), ours, other);
+    if (ours.hit() && other.hit()) {
+        const Claim a = measure(mesh, ray, ours.prim), b = measure(mesh, ray, other.prim);
+        if (!a.plausible()) return Verdict::wrong;
+        const bool close = !(std::abs(a.exact.t - b.exact.t) > a.slack.t + b.slack.t);
+        if (close && b.plausible()) return Verdict::tie;
+        // The nearer of the two was missed by the other side: only an edge or a limit excuses it.
+        const Claim& nearer = a.exact.t < b.exact.t ? a : b;
+        return nearer.near_edge() || nearer.near_limit(ray) || !b.plausible() ? Verdict::grazing
+                                                                              : Verdict::wrong;
+    }
+    if (!ours.hit() && !other.hit()) return Verdict::exact;
+    const Claim only = measure(mesh, ray, ours.hit() ? ours.prim : other.prim);
+    if (ours.hit() && !only.plausible()) return Verdict::wrong;
+    return only.near_edge() || only.near_limit(ray) || !only.plausible() ? Verdict::grazing
+                                                                         : Verdict::wrong;
+}
+
+Tally compare(const MeshView& mesh, std::span<const Ray> rays, std::span<const Hit> ours,
+              std::span<const Hit> others) {
+    Tally tally;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        ++tally.rays;
+        if (ours[i].hit()) ++tally.hits;
+        if (!ours[i].hit() && !others[i].hit()) {
+            ++tally.both_miss;
+            continue;
+        }
+        switch (judge(mesh, rays[i], ours[i], others[i])) {
+            case Verdict::exact:
+                ++tally.exact;
+                break;
+            case Verdict::tie:
+                ++tally.ties;
+                break;
+            case Verdict::grazing:
+                ++tally.grazing;
+                break;
+            case Verdict::wrong:
+                if (++tally.wrong <= 5) tally.first_wrong += describe(rays[i], ours[i], others[i]);
+                break;
+        }
+    }
+    return tally;
+}
+
+std::ostream& print_line(std::ostream& out, const std::string& scene, const std::string& peer,
+                         const Tally& tally) {
+    return out << scene << " against " << peer << ": " << tally.rays << " rays, " << tally.hits
+               << " hits, " << tally.exact << " exact, " << tally.ties << " ties, "
+               << tally.both_miss << " both missed, " << tally.grazing << " grazing, "
+               << tally.wrong << " wrong\n"
+               << tally.first_wrong;
+}
+
+}  // namespace raydix::test

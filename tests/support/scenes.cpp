@@ -1,0 +1,60 @@
+#include "support/scenes.h"
+
+#include <algorithm>
+#include <random>
+#include <utility>
+
+#include "base/math.h"
+
+namespace raydix::test {
+
+std::vector<Scene> builtin_triangle_scenes(std::size_t triangles) {
+    std::vector<Scene> scenes;
+    for (const BuiltinScene& builtin : builtin_scenes()) {
+        if (builtin.name == "lidar") continue;  // points; its triangles are those of the atrium
+        for (const BuiltinParameter& parameter : builtin.parameters) {
+            if (parameter.name != "triangles") continue;
+            const auto count = std::max(static_cast<std::size_t>(parameter.min_value), triangles);
+            scenes.push_back(load_scene("builtin:" + std::string(builtin.name) +
+                                        "?triangles=" + std::to_string(count)));
+        }
+    }
+    return scenes;
+}
+
+Scene scene_of(Mesh mesh, std::string name) {
+    Scene scene;
+    scene.name = std::move(name);
+    scene.cameras.cameras.push_back(fit_camera(inspect(mesh).bounds));
+    scene.mesh = std::move(mesh);
+    return scene;
+}
+
+Mesh lattice_mesh(std::size_t triangles, int side, std::uint64_t seed) {
+    std::mt19937_64 random(seed);
+    const auto coordinate = [&] {
+        return static_cast<float>(random() % static_cast<unsigned>(side + 1));
+    };
+    Mesh mesh;
+    for (std::uint32_t i = 0; i < 3 * triangles; ++i)
+        mesh.vertices.push_back({coordinate(), coordinate(), coordinate()});
+    for (std::size_t i = 0; i < triangles; ++i) {
+        const auto corner = [&] {
+            return static_cast<std::uint32_t>(random() % mesh.vertices.size());
+        };
+        mesh.triangles.push_back({corner(), corner(), corner()});
+    }
+    return mesh;
+}
+
+Mesh moved(Mesh mesh, Vec3 by) {
+    for (Vec3& p : mesh.vertices) p = p + by;
+    return mesh;
+}
+
+Mesh scaled(Mesh mesh, float by) {
+    for (Vec3& p : mesh.vertices) p = p * by;
+    return mesh;
+}
+
+}  // namespace raydix::test

@@ -1,0 +1,25 @@
+// Scenes that hits and watertightness are tried on.
+#pragma once
+
+#include <raydix/scene.h>
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace raydix::test {
+
+/// One small version of each built-in scene of triangles.
+std::vector<Scene> builtin_triangle_scenes(std::size_t triangles);
+
+/// A mesh without a file gets its name and one camera that sees it.
+Scene scene_of(Mesh mesh, std::string name);
+
+/// Triangles on a small lattice of integers: ties, shared edges, coplanar ones, zero areas.
+Mesh lattice_mesh(std::size_t triangles, int side, std::uint64_t seed);
+
+/// Every corner moved or scaled, rounded to float.
+Mesh moved(Mesh mesh, Vec3 by);
+Mesh scaled(Mesh mesh, float by);
+
+}  // namespace raydix::test
