@@ -164,8 +164,8 @@ TEST_P(SharedSceneHits, LikeFloatBruteForce) {
 INSTANTIATE_TEST_SUITE_P(Shared, SharedSceneHits,
                          testing::Values("sibenik/sibenik.ply.xz", "conference/conference.ply.xz",
                                          "bunny/bunny.ply.xz", "crown/crown.ply.xz"),
-                         [](const auto& info) {
-                             const std::string name = info.param;
+                         [](const auto& scene) {
+                             const std::string name = scene.param;
                              return name.substr(0, name.find('/'));
                          });
 
