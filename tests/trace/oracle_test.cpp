@@ -21,11 +21,8 @@ namespace {
 
 constexpr std::uint64_t seed = 777;
 
-/// Sets in which rays are not aimed at edges: hardly any may be excused as grazing.
-bool is_ordinary(RaySet set) {
-    return set == RaySet::camera || set == RaySet::through_box || set == RaySet::from_surface ||
-           set == RaySet::any_length;
-}
+/// Rays that are not aimed at edges or limits: hardly any may be excused as grazing.
+bool is_ordinary(RaySet set) { return set == RaySet::camera || set == RaySet::through_box; }
 
 void add(Tally& sum, const Tally& part) {
     sum.rays += part.rays;
@@ -164,8 +161,8 @@ TEST_P(SharedSceneHits, LikeFloatBruteForce) {
 INSTANTIATE_TEST_SUITE_P(Shared, SharedSceneHits,
                          testing::Values("sibenik/sibenik.ply.xz", "conference/conference.ply.xz",
                                          "bunny/bunny.ply.xz", "crown/crown.ply.xz"),
-                         [](const auto& info) {
-                             const std::string name = info.param;
+                         [](const auto& scene) {
+                             const std::string name = scene.param;
                              return name.substr(0, name.find('/'));
                          });
 
