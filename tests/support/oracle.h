@@ -42,7 +42,7 @@ Hit oracle_closest(const MeshView& mesh, const Ray& ray);
 
 /// What comparing two closest hits of one ray came to.
 enum class Verdict {
-    exact,    // the same triangle, t within rounding
+    exact,    // the same triangle, our t within rounding of the exact one
     tie,      // another triangle at the same distance within rounding
     grazing,  // one of the answers passes within rounding of an edge, or along the plane
     wrong
