@@ -26,12 +26,15 @@ struct OracleHit {
 bool has_area(const Vec3& v0, const Vec3& v1, const Vec3& v2);
 OracleHit oracle_intersect(const Vec3& v0, const Vec3& v1, const Vec3& v2, const Ray& ray);
 
-/// How far a hit of this triangle may be off in float32, in units of t, given where the ray starts
-/// and how it lies to the plane; and how far from an edge (in u, v) counts as on it.
+/// How far the lateral position of a vertex may be off in float32, seen from the ray's origin, and
+/// what that makes of t and of u and v. Infinite for a ray along the plane.
 struct OracleSlack {
-    double t = 0, edge = 0;
+    double across = 0, t = 0, edge = 0;
 };
 OracleSlack oracle_slack(const Vec3& v0, const Vec3& v1, const Vec3& v2, const Ray& ray);
+
+/// From the whole line to the nearest edge of the triangle.
+double distance_to_edges(const Vec3& v0, const Vec3& v1, const Vec3& v2, const Ray& ray);
 
 /// Closest hit over all triangles, the least (t, prim). Triangles that a builder leaves out are
 /// left out by their coordinates alone.
@@ -39,7 +42,7 @@ Hit oracle_closest(const MeshView& mesh, const Ray& ray);
 
 /// What comparing two closest hits of one ray came to.
 enum class Verdict {
-    exact,    // the same triangle, t within rounding
+    exact,    // the same triangle, our t within rounding of the exact one
     tie,      // another triangle at the same distance within rounding
     grazing,  // one of the answers passes within rounding of an edge, or along the plane
     wrong

@@ -21,11 +21,8 @@ namespace {
 
 constexpr std::uint64_t seed = 777;
 
-/// Sets in which rays are not aimed at edges: hardly any may be excused as grazing.
-bool is_ordinary(RaySet set) {
-    return set == RaySet::camera || set == RaySet::through_box || set == RaySet::from_surface ||
-           set == RaySet::any_length;
-}
+/// Rays that are not aimed at edges or limits: hardly any may be excused as grazing.
+bool is_ordinary(RaySet set) { return set == RaySet::camera || set == RaySet::through_box; }
 
 void add(Tally& sum, const Tally& part) {
     sum.rays += part.rays;
