@@ -115,7 +115,7 @@ TEST(OracleHits, SoupsLikeDouble) {
 
 TEST(OracleHits, BuiltinScenesLikeDouble) {
     for (const Scene& scene : builtin_triangle_scenes(10'000))
-        expect_like_double(scene, 10 * thorough);
+        expect_like_double(scene, 100 + 5 * thorough);
 }
 
 TEST(OracleHits, BuiltinScenesLikeEmbree) {
