@@ -11,8 +11,7 @@
 
 namespace raydix {
 
-/// 64-byte aligned, backed by huge pages where the system offers them. Counted by
-/// `allocated_bytes`. Throws std::bad_alloc.
+/// 64-byte aligned, uninitialised, counted by the library. Throws std::bad_alloc.
 [[nodiscard]] std::shared_ptr<void> allocate_bytes(std::size_t bytes);
 
 template <class T>

@@ -1,7 +1,6 @@
-// Memory of the library's arrays: aligned, on huge pages where there are any, counted.
+// Memory of the library's arrays: aligned and counted. Huge pages are not asked for: on a virtual
+// machine their first touch cost more than they gave back (docs/performance.md).
 #include <raydix/buffer.h>
-
-#include <sys/mman.h>
 
 #include <cstdlib>
 #include <new>
@@ -12,7 +11,6 @@ namespace raydix {
 namespace {
 
 constexpr std::size_t cache_line = 64;
-constexpr std::size_t huge_page = std::size_t{2} << 20;
 
 }  // namespace
 
@@ -23,16 +21,10 @@ MemoryCount& memory_count() {
 
 std::shared_ptr<void> allocate_bytes(std::size_t bytes) {
     if (bytes == 0) return nullptr;
-    const bool huge = bytes >= huge_page;
-    const std::size_t alignment = huge ? huge_page : cache_line;
-    if (bytes > SIZE_MAX - alignment) throw std::bad_alloc();
-    const std::size_t rounded = (bytes + alignment - 1) / alignment * alignment;
-    void* memory = std::aligned_alloc(alignment, rounded);
+    if (bytes > SIZE_MAX - cache_line) throw std::bad_alloc();
+    const std::size_t rounded = (bytes + cache_line - 1) / cache_line * cache_line;
+    void* memory = std::aligned_alloc(cache_line, rounded);
     if (!memory) throw std::bad_alloc();
-#ifdef MADV_HUGEPAGE
-    if (huge)
-        madvise(memory, rounded, MADV_HUGEPAGE);  // a hint: if it fails, small pages serve as well
-#endif
     try {
         std::shared_ptr<void> owner(memory, [bytes](void* p) {
             memory_count().give_back(bytes);
