@@ -32,11 +32,13 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->check(CLI::IsMember({"bvh"}))
         ->capture_default_str()
         ->group(group);
-    CLI::Option* builder = of_the_build(command.add_option("--builder", options.builder, "Builder"))
-                               ->check(CLI::IsMember({"karras"}))
-                               ->capture_default_str();
-    of_the_build(command.add_option("--quality", options.quality, "Picks a builder: fast"))
-        ->check(CLI::IsMember({"fast"}))
+    CLI::Option* builder =
+        of_the_build(command.add_option("--builder", options.builder, "Builder"))
+            ->check(CLI::IsMember({"karras", "lauterbach", "garanzha", "apetrei", "ploc", "hploc"}))
+            ->capture_default_str();
+    of_the_build(
+        command.add_option("--quality", options.quality, "Picks a builder: fast, balanced"))
+        ->check(CLI::IsMember({"fast", "balanced"}))
         ->excludes(builder);
     of_the_build(command.add_option("--bits", options.bits, "Bits of the Morton codes"))
         ->check(CLI::IsMember({30, 63}))
@@ -52,6 +54,9 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->check(CLI::IsMember({"cpu"}))
         ->capture_default_str()
         ->group(group);
+    of_the_build(
+        command.add_option("--fit", options.fit, "Boxes: level by level, or bottom-up in one pass"))
+        ->check(CLI::IsMember({"levels", "atomic"}));
     of_the_build(command.add_flag("--strict", options.strict,
                                   "Invalid primitives are an error instead of being left out"));
     command.add_option("--sah-node", options.sah.node, "SAH cost of an inner node")
@@ -79,7 +84,8 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
 
 BuildOptions TreeOptions::build_options(const CommonOptions& common) const {
     BuildOptions result;
-    result.builder = builder_from_name(builder);
+    result.builder = builder_from_name(quality == "balanced" ? "ploc" : builder);
+    if (!fit.empty()) result.fit = fit == "levels" ? Fit::levels : Fit::atomic;
     result.bits = bits;
     result.max_leaf = max_leaf;
     result.strict = strict;

@@ -27,7 +27,7 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 
 /// How a tree is to be built, in every command that needs one.
 struct TreeOptions {
-    std::string tree = "bvh", builder = "karras", quality, layout = "binary", device = "cpu";
+    std::string tree = "bvh", builder = "karras", quality, layout = "binary", device = "cpu", fit;
     int bits = 63, max_leaf = 4;
     bool strict = false;
     std::string cameras_file;

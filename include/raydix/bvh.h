@@ -14,10 +14,24 @@
 
 namespace raydix {
 
-enum class Builder : std::uint32_t { karras = 0 };
+/// `karras`, `lauterbach`, `garanzha` and `apetrei` give the same tree, bit for bit; `ploc` and
+/// `hploc` merge clusters by surface area and give better ones for more time.
+enum class Builder : std::uint32_t {
+    karras = 0,
+    lauterbach = 1,
+    garanzha = 2,
+    apetrei = 3,
+    ploc = 4,
+    hploc = 5,
+};
 [[nodiscard]] std::string_view builder_name(Builder builder);
 /// Throws InputError that lists the known names.
 [[nodiscard]] Builder builder_from_name(std::string_view name);
+
+/// How boxes are fitted: one launch per level from the deepest up, or one pass in which the second
+/// child to arrive goes on. `as_published` is what the builder's source does. The boxes are the
+/// same.
+enum class Fit : std::uint32_t { as_published = 0, levels = 1, atomic = 2 };
 
 /// Costs of the surface area heuristic: one inner node, one primitive of a leaf.
 struct SahConstants {
@@ -31,6 +45,7 @@ struct BuildOptions {
                     // into few cells
     int max_leaf =
         4;  // 1..255 primitives in a leaf; more means fewer nodes and more primitive tests
+    Fit fit = Fit::as_published;
     bool strict = false;  // invalid primitives are an InputError instead of being left out
     int threads = 0;      // 0: all the machine has. The tree does not depend on it
 };

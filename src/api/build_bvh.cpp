@@ -14,7 +14,7 @@
 #include "sort/radix_sort.h"
 #include "tree/bvh_access.h"
 #include "tree/fit.h"
-#include "tree/karras.h"
+#include "tree/hierarchy.h"
 
 namespace raydix {
 
@@ -51,7 +51,8 @@ std::uint64_t bytes_held(const Scratch& s, const BvhAccess& tree) {
     };
     return sum(s.codes30, s.codes63, s.sort30.records, s.sort30.spare, s.sort30.histogram,
                s.sort63.records, s.sort63.spare, s.sort63.histogram, s.hierarchy.prefixes,
-               s.hierarchy.kept_bits, s.hierarchy.kept_before, s.hierarchy.parent_slot, s.meeting) +
+               s.hierarchy.kept_bits, s.hierarchy.kept_before, s.hierarchy.parent_slot,
+               s.hierarchy.memory, s.meeting) +
            sum(tree.nodes(), tree.order(), tree.triangles(), tree.boxes(), tree.points());
 }
 
@@ -120,7 +121,8 @@ struct BuildRun {
         ms.sort = stage.lap();
 
         const std::span<const Key> keys = codes.first(valid);
-        tree.inner_count() = build_karras(keys, options.max_leaf, tree.nodes(), scratch.hierarchy);
+        tree.inner_count() = build_hierarchy(options.builder, keys, options.max_leaf, tree.nodes(),
+                                             scratch.hierarchy);
         ms.hierarchy = stage.lap();
 
         copy_to_leaf_order(source, tree.order().view(), copies);

@@ -1,5 +1,5 @@
-// The meeting point of bottom-up passes: two children arrive at their parent, the second one goes
-// on.
+// The meeting point of bottom-up passes, where the second child to arrive goes on, and counters
+// that hand out places.
 #pragma once
 
 #include <cstdint>
@@ -35,6 +35,27 @@ RAYDIX_HD inline std::uint8_t arrive(std::uint8_t& meeting, std::uint8_t value) 
         value, cuda::memory_order_acq_rel);
 #else
     return std::atomic_ref<std::uint8_t>(meeting).exchange(value, std::memory_order_acq_rel);
+#endif
+}
+
+/// The same for a word: returns what lay there before.
+RAYDIX_HD inline std::uint32_t arrive(std::uint32_t& meeting, std::uint32_t value) {
+#if defined(__CUDACC__)
+    return cuda::atomic_ref<std::uint32_t, cuda::thread_scope_device>(meeting).exchange(
+        value, cuda::memory_order_acq_rel);
+#else
+    return std::atomic_ref<std::uint32_t>(meeting).exchange(value, std::memory_order_acq_rel);
+#endif
+}
+
+/// Takes `count` places of a list whose length is `counter`; returns the first. Order is nobody's
+/// promise.
+RAYDIX_HD inline std::uint32_t claim(std::uint32_t& counter, std::uint32_t count) {
+#if defined(__CUDACC__)
+    return cuda::atomic_ref<std::uint32_t, cuda::thread_scope_device>(counter).fetch_add(
+        count, cuda::memory_order_relaxed);
+#else
+    return std::atomic_ref<std::uint32_t>(counter).fetch_add(count, std::memory_order_relaxed);
 #endif
 }
 

@@ -10,8 +10,13 @@
 namespace raydix {
 namespace {
 
-constexpr std::array<std::pair<Builder, std::string_view>, 1> builder_names{
-    {{Builder::karras, "karras"}}};
+constexpr std::array<std::pair<Builder, std::string_view>, 6> builder_names{
+    {{Builder::karras, "karras"},
+     {Builder::lauterbach, "lauterbach"},
+     {Builder::garanzha, "garanzha"},
+     {Builder::apetrei, "apetrei"},
+     {Builder::ploc, "ploc"},
+     {Builder::hploc, "hploc"}}};
 
 }  // namespace
 

@@ -8,15 +8,9 @@
 #include <cstdint>
 #include <span>
 
-namespace raydix {
+#include "tree/hierarchy.h"
 
-/// Memory that a builder keeps from one build to the next.
-struct HierarchyScratch {
-    Buffer<std::uint8_t> prefixes;
-    Buffer<std::uint64_t> kept_bits;
-    Buffer<std::uint32_t> kept_before;
-    Buffer<std::uint32_t> parent_slot;  // [inner]: where the box of each inner node is kept
-};
+namespace raydix {
 
 /// keys: sorted, at least one. Fills nodes [2 * inner + 2] but for the boxes; returns the number of
 /// inner nodes. One work item per radix node; no pass is sequential. Subtrees of up to max_leaf

@@ -9,7 +9,10 @@
 namespace raydix {
 
 /// Builders that split sorted Morton codes at their highest differing bit.
-[[nodiscard]] constexpr bool in_lbvh_family(Builder builder) { return builder == Builder::karras; }
+[[nodiscard]] constexpr bool in_lbvh_family(Builder builder) {
+    return builder == Builder::karras || builder == Builder::lauterbach ||
+           builder == Builder::garanzha || builder == Builder::apetrei;
+}
 
 /// Below each split the common prefix is longer by a bit: at most `bits` times in the code, then
 /// ceil(log2 n) times in the position that tells equal codes apart. n > 0.

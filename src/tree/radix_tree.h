@@ -9,12 +9,13 @@
 
 #include "base/bits.h"
 #include "base/hd.h"
+#include "base/probe.h"
 #include "keys/morton.h"
 
 namespace raydix {
 
 /// Sorted keys, made unique by their position.
-template <class Key>
+template <class Key, class Probe = NoProbe>
 struct SortedKeys {
     const Key* keys;
     std::uint32_t count;
@@ -22,6 +23,8 @@ struct SortedKeys {
     /// Length of the common prefix of keys i and j (delta in the paper); -1 if j is outside.
     [[nodiscard]] RAYDIX_HD int common_prefix(std::int64_t i, std::int64_t j) const {
         if (j < 0 || j >= static_cast<std::int64_t>(count)) return -1;
+        Probe::bytes(2 * sizeof(Key));
+        Probe::step();
         const Key differs = keys[i] ^ keys[j];
         constexpr int unused_bits = static_cast<int>(8 * sizeof(Key)) - CodeFormat<Key>::bits;
         if (differs != 0) return leading_zeros(differs) - unused_bits;
@@ -38,8 +41,8 @@ struct RadixRange {
 };
 
 /// The range of inner node i by galloping and two binary searches.
-template <class Key>
-RAYDIX_HD RadixRange find_range(const SortedKeys<Key>& keys, std::uint32_t node) {
+template <class Key, class Probe>
+RAYDIX_HD RadixRange find_range(const SortedKeys<Key, Probe>& keys, std::uint32_t node) {
     const std::int64_t i = node;
     const int d = keys.common_prefix(i, i + 1) > keys.common_prefix(i, i - 1) ? 1 : -1;
     const int outside = keys.common_prefix(i, i - d);  // delta_min in the paper

@@ -1,0 +1,160 @@
+// Runs a builder's launches on the CPU, one parallel loop each. A builder written against a launcher is one
+// text for all backends:
+//
+//   launch(label, n, work)                   work(i) for i in [0, n), any order
+//   launch_counted(label, count, limit, work)   the same for i in [0, *count), *count <= limit, written by an
+//                                            earlier launch: the host of a GPU does not know it
+//   exclusive_scan(label, values, n, total)  each value becomes the sum of those before it; *total, if not
+//                                            null, the sum of all
+//   sort_pairs(label, arrays, limit, count, key_bits)   the first *count pairs by key, stable
+//   maybe_any(count)                         false if *count is known to be 0; a GPU's host knows nothing
+//   Probe                                    what counted functors report to (base/probe.h)
+//
+// All pointers are to the launcher's memory. Launches see the results of the launches before them.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "base/probe.h"
+#include "exec/parallel.h"
+#include "exec/scan.h"
+
+namespace raydix {
+
+/// One launch as it ran. `longest_chain`: accesses of an item that wait for each other, at most.
+struct LaunchRecord {
+    std::string label;
+    std::uint64_t items = 0, bytes = 0;
+    std::uint32_t longest_chain = 0;
+};
+
+/// Pairs to sort and where they go; `keys` and `values` are lost.
+template <class Key>
+struct SortArrays {
+    Key* keys;
+    std::uint32_t* values;
+    Key* sorted_keys;
+    std::uint32_t* sorted_values;
+};
+
+template <class Probe_ = NoProbe>
+class HostLauncher {
+public:
+    using Probe = Probe_;
+
+    /// `log`: where launches are written down, for CountProbe; may be null.
+    explicit HostLauncher(std::vector<LaunchRecord>* log = nullptr) : log_(log) {}
+
+    template <class Work>
+    void launch(const char* label, std::uint32_t n, const Work& work) {
+        if constexpr (Probe::counts) {
+            run_counted(label, n, work);
+        } else {
+            for_each_index(
+                n, [&](std::size_t i) { work(static_cast<std::uint32_t>(i)); }, grain);
+        }
+    }
+
+    template <class Work>
+    void launch_counted(const char* label, const std::uint32_t* count, std::uint32_t limit,
+                        const Work& work) {
+        launch(label, std::min(*count, limit), work);
+    }
+
+    void exclusive_scan(const char* label, std::uint32_t* values, std::uint32_t n,
+                        std::uint32_t* total) {
+        const std::uint32_t sum = raydix::exclusive_scan({values, n});
+        if (total != nullptr) *total = sum;
+        // One read and one write a value, as a single-pass scan on a GPU has; blocks hand sums on.
+        note({label, n, std::uint64_t{n} * 8, 4});
+    }
+
+    template <class Key>
+    void sort_pairs(const char* label, const SortArrays<Key>& arrays, std::uint32_t limit,
+                    const std::uint32_t* count, int key_bits);
+
+    [[nodiscard]] bool maybe_any(const std::uint32_t* count) const { return *count != 0; }
+
+private:
+    static constexpr std::size_t grain = 1024;
+
+    void note(LaunchRecord record) {
+        if (log_ != nullptr) log_->push_back(std::move(record));
+    }
+
+    template <class Work>
+    void run_counted(const char* label, std::uint32_t n, const Work& work) {
+        std::atomic<std::uint64_t> bytes{0};
+        std::atomic<std::uint32_t> longest{0};
+        for_each_range(n, grain, [&](std::size_t begin, std::size_t end) {
+            WorkCount& mine = Probe::work();
+            mine = {};
+            for (std::size_t i = begin; i < end; ++i) {
+                mine.steps = 0;
+                work(static_cast<std::uint32_t>(i));
+                mine.longest_chain = std::max(mine.longest_chain, mine.steps);
+            }
+            bytes += mine.bytes;
+            std::uint32_t seen = longest.load();
+            while (seen < mine.longest_chain &&
+                   !longest.compare_exchange_weak(seen, mine.longest_chain)) {
+            }
+        });
+        note({label, n, bytes.load(), longest.load()});
+    }
+
+    std::vector<LaunchRecord>* log_;
+};
+
+/// Stable least-significant-digit counting sort, eight bits a pass.
+template <class Probe_>
+template <class Key>
+void HostLauncher<Probe_>::sort_pairs(const char* label, const SortArrays<Key>& a,
+                                      std::uint32_t limit, const std::uint32_t* count,
+                                      int key_bits) {
+    static_assert(std::is_unsigned_v<Key>);
+    constexpr std::size_t digits = 256, block = 1u << 14;
+    const std::uint32_t n = std::min(*count, limit);
+    const std::size_t blocks = (n + block - 1) / block;
+    Key* from_keys = a.keys;
+    Key* to_keys = a.sorted_keys;
+    std::uint32_t* from_values = a.values;
+    std::uint32_t* to_values = a.sorted_values;
+    std::vector<std::uint32_t> starts(digits * blocks);
+    int passes = 0;
+    for (int shift = 0; shift < key_bits; shift += 8, ++passes) {
+        const auto digit = [&](std::size_t i) {
+            return static_cast<std::size_t>(from_keys[i] >> shift & (digits - 1));
+        };
+        std::fill(starts.begin(), starts.end(), 0u);
+        for_each_block(n, block, [&](std::size_t b, std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) ++starts[digit(i) * blocks + b];
+        });
+        raydix::exclusive_scan(starts);
+        for_each_block(n, block, [&](std::size_t b, std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                const std::uint32_t at = starts[digit(i) * blocks + b]++;
+                to_keys[at] = from_keys[i];
+                to_values[at] = from_values[i];
+            }
+        });
+        std::swap(from_keys, to_keys);
+        std::swap(from_values, to_values);
+    }
+    if (from_keys != a.sorted_keys) {
+        for_each_range(n, block, [&](std::size_t begin, std::size_t end) {
+            std::copy(from_keys + begin, from_keys + end, a.sorted_keys + begin);
+            std::copy(from_values + begin, from_values + end, a.sorted_values + begin);
+        });
+    }
+    const std::uint64_t pair_bytes = sizeof(Key) + sizeof(std::uint32_t);
+    for (int p = 0; p < passes; ++p) note({label, n, n * (sizeof(Key) + 2 * pair_bytes), 4});
+}
+
+}  // namespace raydix
