@@ -19,7 +19,7 @@ using raydix::Stopwatch;
 using Json = nlohmann::ordered_json;
 
 struct Options {
-    std::string scene = "builtin:figure?triangles=1000000", peer = "raydix";
+    std::string scene = "builtin:figure?triangles=1000000", peer = "raydix", builder = "apetrei";
     int threads = 2, repeat = 5, bits = 63, max_leaf = 4;
 };
 
@@ -34,6 +34,7 @@ Json run_raydix(const raydix::Mesh& mesh, const Options& options) {
     build.threads = options.threads;
     build.bits = options.bits;
     build.max_leaf = options.max_leaf;
+    build.builder = raydix::builder_from_name(options.builder);
     raydix::BvhBuilder builder;
     raydix::Bvh bvh;
     Json stages = Json::array(), rebuilds = Json::array();
@@ -103,6 +104,7 @@ int main(int argc, char** argv) {
     app.add_option("--scene", options.scene, "Scene")->capture_default_str();
     app.add_option("--peer", options.peer, "raydix or embree")->capture_default_str();
     app.add_option("--threads", options.threads, "Threads")->capture_default_str();
+    app.add_option("--builder", options.builder, "Builder of raydix")->capture_default_str();
     app.add_option("--repeat", options.repeat, "Builds after the first")->capture_default_str();
     app.add_option("--bits", options.bits, "Code bits")->capture_default_str();
     app.add_option("--max-leaf", options.max_leaf, "Most triangles in a leaf")

@@ -12,6 +12,7 @@
 #include "measure/stopwatch.h"
 #include "primitives/bounds.h"
 #include "sort/radix_sort.h"
+#include "tree/apetrei_cpu.h"
 #include "tree/bvh_access.h"
 #include "tree/fit.h"
 #include "tree/hierarchy.h"
@@ -24,6 +25,7 @@ struct BvhBuilder::Scratch {
     SortScratch<std::uint32_t> sort30;
     SortScratch<std::uint64_t> sort63;
     HierarchyScratch hierarchy;
+    ApetreiScratch apetrei;
     Buffer<std::uint8_t> meeting;
 };
 
@@ -52,7 +54,8 @@ std::uint64_t bytes_held(const Scratch& s, const BvhAccess& tree) {
     return sum(s.codes30, s.codes63, s.sort30.records, s.sort30.spare, s.sort30.histogram,
                s.sort63.records, s.sort63.spare, s.sort63.histogram, s.hierarchy.prefixes,
                s.hierarchy.kept_bits, s.hierarchy.kept_before, s.hierarchy.parent_slot,
-               s.hierarchy.memory, s.meeting) +
+               s.hierarchy.memory, s.apetrei.prefixes, s.apetrei.kept_bits, s.apetrei.kept_before,
+               s.apetrei.pieces, s.apetrei.piece_counts, s.meeting) +
            sum(tree.nodes(), tree.order(), tree.triangles(), tree.boxes(), tree.points());
 }
 
@@ -121,6 +124,13 @@ struct BuildRun {
         ms.sort = stage.lap();
 
         const std::span<const Key> keys = codes.first(valid);
+        if (in_one_pass(valid)) {
+            build_in_one_pass(keys);
+            ms.hierarchy = stage.lap();
+            ms.total = total.lap();
+            tree.build_ms() = ms;
+            return;
+        }
         tree.inner_count() = build_hierarchy(options.builder, keys, options.max_leaf, tree.nodes(),
                                              scratch.hierarchy);
         ms.hierarchy = stage.lap();
@@ -152,6 +162,19 @@ private:
             records.reset(n);
             return codes.span();
         }
+    }
+
+    /// apetrei writes leaf copies, links and boxes together.
+    [[nodiscard]] bool in_one_pass(std::uint32_t valid) const {
+        return options.builder == Builder::apetrei && options.fit != Fit::levels &&
+               valid > static_cast<std::uint32_t>(options.max_leaf);
+    }
+    void build_in_one_pass(std::span<const Key> keys) {
+        // The keys lie where the copies go; they are read for the last time before the first copy.
+        copies.reset(keys.size());
+        const CopyToLeafOrder<Source, Copy> leaf_box{source, tree.order().view(), copies.data()};
+        tree.inner_count() = build_apetrei_cpu(keys, options.max_leaf, leaf_box, tree.nodes(),
+                                               tree.max_depth(), scratch.apetrei);
     }
 
     void make_empty() {

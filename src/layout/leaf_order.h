@@ -48,19 +48,32 @@ void prefetch_indices(const Source&, std::uint32_t) {}
 template <class Source>
 void prefetch_corners(const Source&, std::uint32_t) {}
 
+/// Position in leaf order -> its copy, and the copy's box. Positions are asked for in ascending
+/// order: what the next ones read is fetched ahead.
+template <class Source, class Copy>
+struct CopyToLeafOrder {
+    static constexpr std::size_t indices_ahead = 32, corners_ahead = 16;
+    const Source& source;
+    std::span<const std::uint32_t> order;
+    Copy* copies;  // [order]
+
+    Box3 operator()(std::size_t k) const {
+        if (k + indices_ahead < order.size()) {
+            prefetch_indices(source, order[k + indices_ahead]);
+            prefetch_corners(source, order[k + corners_ahead]);
+        }
+        copies[k] = copy_primitive(source, order[k]);
+        return copy_box(copies[k]);
+    }
+};
+
 template <class Source, class Copy>
 void copy_to_leaf_order(const Source& source, std::span<const std::uint32_t> order,
                         Buffer<Copy>& copies) {
-    constexpr std::size_t indices_ahead = 32, corners_ahead = 16;
     copies.reset(order.size());
+    const CopyToLeafOrder<Source, Copy> copy{source, order, copies.data()};
     for_each_range(order.size(), 4096, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) {
-            if (k + indices_ahead < end) {
-                prefetch_indices(source, order[k + indices_ahead]);
-                prefetch_corners(source, order[k + corners_ahead]);
-            }
-            copies[k] = copy_primitive(source, order[k]);
-        }
+        for (std::size_t k = begin; k < end; ++k) copy(k);
     });
 }
 

@@ -6,43 +6,18 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstring>
 
 #include "exec/parallel.h"
 #include "exec/scan.h"
 #include "tree/byte_scan.h"
+#include "tree/neighbour_prefixes.h"
 #include "tree/radix_tree.h"
 
 namespace raydix {
 namespace {
 
-constexpr std::size_t word_bits = 64;
 constexpr std::uint32_t scan_limit =
     128;  // bytes looked at before galloping, where the paper starts too
-
-/// prefixes[i] = 1 + common prefix of keys i and i + 1, so that 0 can mean "outside". At most 1 +
-/// 63 + 31. `padding` zeros stand before and behind: scans may look past the ends.
-class NeighbourPrefixes {
-public:
-    static constexpr std::size_t padding = 256 + 64;
-
-    template <class Key>
-    NeighbourPrefixes(const SortedKeys<Key>& keys, Buffer<std::uint8_t>& memory) {
-        memory.reset(keys.count + 2 * padding);
-        std::memset(memory.data(), 0, padding);
-        bytes_ = memory.data() + padding;
-        std::memset(bytes_ + keys.count - 1, 0, padding + 1);
-        for_each_index(keys.count - 1, [&](std::size_t i) {
-            const auto k = static_cast<std::int64_t>(i);
-            bytes_[i] = static_cast<std::uint8_t>(1 + keys.common_prefix(k, k + 1));
-        });
-    }
-    /// Index -1 is the byte before the first.
-    [[nodiscard]] const std::uint8_t* at(std::int64_t i) const { return bytes_ + i; }
-
-private:
-    std::uint8_t* bytes_ = nullptr;
-};
 
 /// A radix node holds more than max_leaf keys iff the max_leaf prefixes on its inner side all
 /// exceed the outer one. Bit k of the result speaks of the node whose own prefix is prefixes[k].
