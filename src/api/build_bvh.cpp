@@ -112,7 +112,7 @@ struct BuildRun {
 
         const std::span<Key> codes = borrow_sort_memory();
         const Grid grid = make_grid(bounds.box, CodeFormat<Key>::axis_bits);
-        for_each_index(n, HostEncodeMorton<Source, Key>{source, HostGrid(grid), codes.data()});
+        host_encode(source, grid, valid == n, n, codes.data());
         ms.codes = stage.lap();
 
         // Primitives that are left out have the highest key: they sort to the end and are cut off

@@ -9,6 +9,9 @@
 
 #if defined(__SSE2__)
 #include <emmintrin.h>
+#if defined(__SSE4_1__)
+#include <smmintrin.h>
+#endif
 #endif
 
 namespace raydix {
@@ -36,6 +39,16 @@ inline Float3 operator*(Float3 a, Float3 b) { return {_mm_mul_ps(a.v, b.v)}; }
 inline Float3 min_of(Float3 a, Float3 b) { return {_mm_min_ps(a.v, b.v)}; }
 inline Float3 max_of(Float3 a, Float3 b) { return {_mm_max_ps(a.v, b.v)}; }
 
+/// Of signed 32-bit integers.
+inline __m128i max_of_bits(__m128i a, __m128i b) {
+#if defined(__SSE4_1__)
+    return _mm_max_epi32(a, b);
+#else
+    const __m128i greater = _mm_cmpgt_epi32(a, b);
+    return _mm_or_si128(_mm_and_si128(greater, a), _mm_andnot_si128(greater, b));
+#endif
+}
+
 /// Whether a <= b holds in x, y and z; false with NaN.
 inline bool all_at_most(Float3 a, Float3 b) {
     return (_mm_movemask_ps(_mm_cmple_ps(a.v, b.v)) & 7) == 7;
@@ -45,6 +58,12 @@ inline bool any_at_least(Float3 a, Float3 b) {
     return (_mm_movemask_ps(_mm_cmpge_ps(a.v, b.v)) & 7) != 0;
 }
 inline Float3 absolute(Float3 a) { return {_mm_andnot_ps(_mm_set1_ps(-0.0f), a.v)}; }
+/// The largest of |a|, |b|, |c| a component; NaN if one of them is. Without signs, floats are in the order of
+/// their bits, and NaN comes last: an integer maximum does not lose it as a float one may.
+inline Float3 largest_magnitude(Float3 a, Float3 b, Float3 c) {
+    const auto bits = [](Float3 x) { return _mm_castps_si128(absolute(x).v); };
+    return {_mm_castsi128_ps(max_of_bits(max_of_bits(bits(a), bits(b)), bits(c)))};
+}
 
 #else
 
@@ -71,6 +90,14 @@ inline bool any_at_least(Float3 a, Float3 b) {
 }
 inline Float3 absolute(Float3 a) {
     return {{a.v.x < 0 ? -a.v.x : a.v.x, a.v.y < 0 ? -a.v.y : a.v.y, a.v.z < 0 ? -a.v.z : a.v.z}};
+}
+inline float larger_or_nan(float a, float b) { return a >= b || a != a ? a : b; }
+inline Float3 larger_or_nan(Float3 a, Float3 b) {
+    return {{larger_or_nan(a.v.x, b.v.x), larger_or_nan(a.v.y, b.v.y),
+             larger_or_nan(a.v.z, b.v.z)}};
+}
+inline Float3 largest_magnitude(Float3 a, Float3 b, Float3 c) {
+    return larger_or_nan(larger_or_nan(absolute(a), absolute(b)), absolute(c));
 }
 
 #endif

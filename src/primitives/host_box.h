@@ -13,15 +13,24 @@ inline Float3 load_corner(const TriangleSource& source, std::uint32_t i, int k) 
            Float3::all(0.0f);
 }
 
+/// The box of a primitive that is known to be valid.
+inline Box3 valid_box(const TriangleSource& source, std::uint32_t i) {
+    const Float3 a = load_corner(source, i, 0), b = load_corner(source, i, 1),
+                 c = load_corner(source, i, 2);
+    return {min_of(min_of(a, b), c), max_of(max_of(a, b), c)};
+}
+template <class Source>
+Box3 valid_box(const Source& source, std::uint32_t i) {
+    Aabb plain;
+    source.box(i, plain);
+    return Box3::load(plain);
+}
+
 inline bool host_box(const TriangleSource& source, std::uint32_t i, Box3& box) {
     const Float3 a = load_corner(source, i, 0), b = load_corner(source, i, 1),
                  c = load_corner(source, i, 2);
     box = {min_of(min_of(a, b), c), max_of(max_of(a, b), c)};
-    // Minima and maxima may lose a NaN, so the corners are compared one by one.
-    const Float3 limit = Float3::all(max_coordinate);
-    if (!all_at_most(absolute(a), limit) || !all_at_most(absolute(b), limit) ||
-        !all_at_most(absolute(c), limit))
-        return false;
+    if (!all_at_most(largest_magnitude(a, b, c), Float3::all(max_coordinate))) return false;
     return any_at_least(box.hi - box.lo, Float3::all(min_diagonal)) || diagonal_in_range(box.box());
 }
 
