@@ -110,6 +110,12 @@ struct BuildRun {
         ms.bounds = stage.lap();
         if (valid == 0) return make_empty();
 
+        if (in_one_pass(valid)) {
+            build_in_one_pass(valid, bounds.box, ms);
+            ms.total = total.lap();
+            tree.build_ms() = ms;
+            return;
+        }
         const std::span<Key> codes = borrow_sort_memory();
         const Grid grid = make_grid(bounds.box, CodeFormat<Key>::axis_bits);
         host_encode(source, grid, valid == n, n, codes.data());
@@ -124,13 +130,6 @@ struct BuildRun {
         ms.sort = stage.lap();
 
         const std::span<const Key> keys = codes.first(valid);
-        if (in_one_pass(valid)) {
-            build_in_one_pass(keys);
-            ms.hierarchy = stage.lap();
-            ms.total = total.lap();
-            tree.build_ms() = ms;
-            return;
-        }
         tree.inner_count() = build_hierarchy(options.builder, keys, options.max_leaf, tree.nodes(),
                                              scratch.hierarchy);
         ms.hierarchy = stage.lap();
@@ -145,23 +144,25 @@ struct BuildRun {
     }
 
 private:
-    /// Codes and sort records, in the memory of the leaf copies, which are written after the last
-    /// use of both; where the copies are too small for that, in memory of their own.
-    std::span<Key> borrow_sort_memory() {
-        using Record = SortRecord<Key>;
-        Buffer<Record>& records = sort_scratch_of<Key>(scratch).records;
+    /// Sort records behind `offset` bytes of the memory of the leaf copies, which are written after
+    /// the last use of the records; in memory of their own if the copies are too small.
+    bool borrow_records(Buffer<SortRecord<Key>>& records, std::size_t offset) {
         copies.reset(n);
-        if constexpr (sizeof(Copy) >= sizeof(Key) + sizeof(Record)) {
-            auto* memory = reinterpret_cast<std::byte*>(copies.data());
-            const std::size_t code_bytes = n * sizeof(Key);
-            records = Buffer<Record>(nullptr, reinterpret_cast<Record*>(memory + code_bytes), n);
-            return {reinterpret_cast<Key*>(memory), n};
-        } else {
-            Buffer<Key>& codes = codes_of<Key>(scratch);
-            codes.reset(n);
+        if (n * sizeof(Copy) < offset + n * sizeof(SortRecord<Key>)) {
             records.reset(n);
-            return codes.span();
+            return false;
         }
+        auto* memory = reinterpret_cast<std::byte*>(copies.data()) + offset;
+        records = Buffer<SortRecord<Key>>(nullptr, reinterpret_cast<SortRecord<Key>*>(memory), n);
+        return true;
+    }
+    /// Codes, in the same memory before them where there is room.
+    std::span<Key> borrow_sort_memory() {
+        if (borrow_records(sort_scratch_of<Key>(scratch).records, n * sizeof(Key)))
+            return {reinterpret_cast<Key*>(copies.data()), n};
+        Buffer<Key>& codes = codes_of<Key>(scratch);
+        codes.reset(n);
+        return codes.span();
     }
 
     /// apetrei writes leaf copies, links and boxes together.
@@ -169,12 +170,40 @@ private:
         return options.builder == Builder::apetrei && options.fit != Fit::levels &&
                valid > static_cast<std::uint32_t>(options.max_leaf);
     }
-    void build_in_one_pass(std::span<const Key> keys) {
-        // The keys lie where the copies go; they are read for the last time before the first copy.
-        copies.reset(keys.size());
+    /// Codes are made twice rather than stored, and once sorted only their common prefixes are
+    /// kept: what is written, read and written again costs more time than arithmetic.
+    void build_in_one_pass(std::uint32_t valid, const Aabb& scene_box, BuildMs& ms) {
+        Stopwatch stage;
+        SortScratch<Key>& sort_scratch = sort_scratch_of<Key>(scratch);
+        borrow_records(sort_scratch.records, 0);
+        tree.order().reset(n);
+        NeighbourPrefixes prefixes(n, scratch.apetrei.prefixes);
+        const HostGrid grid(make_grid(scene_box, CodeFormat<Key>::axis_bits));
+        const auto load = [&](std::size_t begin, std::size_t end, Key* out) {
+            host_encode_range(source, grid, valid == n, begin, end, out);
+        };
+        const auto take = [&](std::size_t begin, std::span<const SortRecord<Key>> sorted) {
+            std::uint32_t* order = tree.order().data() + begin;
+            for (std::size_t k = 0; k + 1 < sorted.size(); ++k) {
+                order[k] = sorted[k].position;
+                prefixes.set(begin + k, sorted[k].key, sorted[k + 1].key);
+            }
+            order[sorted.size() - 1] = sorted.back().position;
+        };
+        const int key_bits = valid == n ? CodeFormat<Key>::bits : static_cast<int>(8 * sizeof(Key));
+        for (const std::size_t k : sort_on_the_way<Key>(n, key_bits, load, take, sort_scratch))
+            if (k != 0 && k != n)
+                prefixes.set(k - 1, sort_scratch.records[k - 1].key, sort_scratch.records[k].key);
+        prefixes.end_at(valid);
+        tree.order().reset(valid);
+        ms.sort = stage.lap();
+        copies.reset(valid);
         const CopyToLeafOrder<Source, Copy> leaf_box{source, tree.order().view(), copies.data()};
-        tree.inner_count() = build_apetrei_cpu(keys, options.max_leaf, leaf_box, tree.nodes(),
-                                               tree.max_depth(), scratch.apetrei);
+        const ApetreiTree built =
+            build_apetrei_cpu(prefixes, options.max_leaf, leaf_box, tree.nodes(), scratch.apetrei);
+        tree.inner_count() = built.inner;
+        tree.max_depth() = built.max_depth;
+        ms.hierarchy = stage.lap();
     }
 
     void make_empty() {

@@ -58,8 +58,9 @@ inline bool any_at_least(Float3 a, Float3 b) {
     return (_mm_movemask_ps(_mm_cmpge_ps(a.v, b.v)) & 7) != 0;
 }
 inline Float3 absolute(Float3 a) { return {_mm_andnot_ps(_mm_set1_ps(-0.0f), a.v)}; }
-/// The largest of |a|, |b|, |c| a component; NaN if one of them is. Without signs, floats are in the order of
-/// their bits, and NaN comes last: an integer maximum does not lose it as a float one may.
+/// The largest of |a|, |b|, |c| a component; NaN if one of them is. Without signs, floats are in
+/// the order of their bits, and NaN comes last: an integer maximum does not lose it as a float one
+/// may.
 inline Float3 largest_magnitude(Float3 a, Float3 b, Float3 c) {
     const auto bits = [](Float3 x) { return _mm_castps_si128(absolute(x).v); };
     return {_mm_castsi128_ps(max_of_bits(max_of_bits(bits(a), bits(b)), bits(c)))};
@@ -93,8 +94,8 @@ inline Float3 absolute(Float3 a) {
 }
 inline float larger_or_nan(float a, float b) { return a >= b || a != a ? a : b; }
 inline Float3 larger_or_nan(Float3 a, Float3 b) {
-    return {{larger_or_nan(a.v.x, b.v.x), larger_or_nan(a.v.y, b.v.y),
-             larger_or_nan(a.v.z, b.v.z)}};
+    return {
+        {larger_or_nan(a.v.x, b.v.x), larger_or_nan(a.v.y, b.v.y), larger_or_nan(a.v.z, b.v.z)}};
 }
 inline Float3 largest_magnitude(Float3 a, Float3 b, Float3 c) {
     return larger_or_nan(larger_or_nan(absolute(a), absolute(b)), absolute(c));

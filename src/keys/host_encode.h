@@ -78,70 +78,72 @@ struct HostGrid {
 
 #endif
 
-/// encode[i] for i in [begin, end), in the baseline instruction set. `all_valid`: nothing is to be left out, so
-/// nothing is checked.
+/// Codes of primitives [begin, end) to out[0], out[1], ... in the baseline instruction set.
+/// `all_valid`: nothing is to be left out, so nothing is checked.
 template <bool all_valid, class Source, class Key>
-void encode_range(const Source& source, const HostGrid& grid, Key* codes, std::size_t begin,
-                  std::size_t end) {
+void encode_range(const Source& source, const HostGrid& grid, std::size_t begin, std::size_t end,
+                  Key* out) {
     for (std::size_t i = begin; i < end; ++i) {
         const auto k = static_cast<std::uint32_t>(i);
         if constexpr (all_valid) {
-            codes[i] = grid.code<Key>(valid_box(source, k));
+            *out++ = grid.code<Key>(valid_box(source, k));
         } else {
             Box3 box;
             const bool valid = host_box(source, k, box);
-            codes[i] = valid ? grid.code<Key>(box) : left_out_key<Key>;
+            *out++ = valid ? grid.code<Key>(box) : left_out_key<Key>;
         }
     }
 }
 
 #if defined(__x86_64__)
 
-[[gnu::target("avx2")]] inline void spread_step(__m256i& v, int shift, long long mask) {
-    v = _mm256_and_si256(_mm256_or_si256(v, _mm256_slli_epi64(v, shift)),
-                         _mm256_set1_epi64x(mask));
+/// Whether this machine deposits bits in a few cycles: early Zen does it in microcode, at one or
+/// two bits a cycle.
+inline bool deposits_bits_fast() {
+    static const bool fast = __builtin_cpu_supports("bmi2") && !__builtin_cpu_is("znver1") &&
+                             !__builtin_cpu_is("znver2") && !__builtin_cpu_is("bdver4");
+    return fast;
 }
 
-/// 63-bit codes with all three axes spread at once.
-template <class Source>
-[[gnu::target("avx2")]] void encode_valid_range_avx2(const Source& source, const HostGrid& grid,
-                                                     std::uint64_t* codes, std::size_t begin,
-                                                     std::size_t end) {
-    const __m256i axis_shift = _mm256_set_epi64x(64, 0, 1, 2);  // 64: the fourth lane becomes 0
+/// The bits of every third place, from the highest code bit down, by one instruction an axis.
+template <class Source, class Key>
+[[gnu::target("bmi2,sse4.1")]] void encode_valid_range_bmi2(const Source& source,
+                                                            const HostGrid& grid, std::size_t begin,
+                                                            std::size_t end, Key* out) {
+    constexpr auto third = static_cast<std::uint64_t>(0x1249249249249249);  // places of z
     for (std::size_t i = begin; i < end; ++i) {
-        const Box3 box = valid_box(source, static_cast<std::uint32_t>(i));
-        __m256i v = _mm256_cvtepu32_epi64(grid.cell(box));
-        spread_step(v, 32, 0x001F00000000FFFFll);
-        spread_step(v, 16, 0x001F0000FF0000FFll);
-        spread_step(v, 8, 0x100F00F00F00F00Fll);
-        spread_step(v, 4, 0x10C30C30C30C30C3ll);
-        spread_step(v, 2, 0x1249249249249249ll);
-        v = _mm256_sllv_epi64(v, axis_shift);
-        const __m128i pair =
-            _mm_or_si128(_mm256_castsi256_si128(v), _mm256_extracti128_si256(v, 1));
-        codes[i] = static_cast<std::uint64_t>(
-            _mm_cvtsi128_si64(_mm_or_si128(pair, _mm_unpackhi_epi64(pair, pair))));
+        const __m128i cell = grid.cell(valid_box(source, static_cast<std::uint32_t>(i)));
+        const auto xy = static_cast<std::uint64_t>(_mm_cvtsi128_si64(cell));
+        const auto z = static_cast<std::uint32_t>(_mm_extract_epi32(cell, 2));
+        // The 21 lowest places are taken, so the upper half of xy does not get into x.
+        *out++ = static_cast<Key>(_pdep_u64(xy, third << 2) | _pdep_u64(xy >> 32, third << 1) |
+                                  _pdep_u64(z, third));
     }
 }
 
 #endif
 
-/// Primitive -> code, or left_out_key: EncodeMorton in the best instruction set that the machine has. source [n]
-/// -> codes [n].
+/// EncodeMorton for primitives [begin, end) in the best instruction set that the machine has.
+template <class Source, class Key>
+void host_encode_range(const Source& source, const HostGrid& grid, bool all_valid,
+                       std::size_t begin, std::size_t end, Key* out) {
+#if defined(__x86_64__)
+    if (all_valid && deposits_bits_fast())
+        return encode_valid_range_bmi2(source, grid, begin, end, out);
+#endif
+    if (all_valid)
+        encode_range<true>(source, grid, begin, end, out);
+    else
+        encode_range<false>(source, grid, begin, end, out);
+}
+
+/// Primitive -> code, or left_out_key. source [n] -> codes [n].
 template <class Source, class Key>
 void host_encode(const Source& source, const Grid& grid, bool all_valid, std::size_t n,
                  Key* codes) {
     const HostGrid host_grid(grid);
     for_each_range(n, 4096, [&](std::size_t begin, std::size_t end) {
-#if defined(__x86_64__)
-        if constexpr (sizeof(Key) == 8)
-            if (all_valid && __builtin_cpu_supports("avx2"))
-                return encode_valid_range_avx2(source, host_grid, codes, begin, end);
-#endif
-        if (all_valid)
-            encode_range<true>(source, host_grid, codes, begin, end);
-        else
-            encode_range<false>(source, host_grid, codes, begin, end);
+        host_encode_range(source, host_grid, all_valid, begin, end, codes + begin);
     });
 }
 

@@ -107,11 +107,11 @@ void sort_alone(Record<Key>* a, Record<Key>* spare, std::size_t n) {
 /// Where the buckets of one distribution start: [buckets + 1].
 using BucketStarts = std::vector<std::size_t>;
 
-/// Stable distribution of n keys by `digit_bits` bits at `shift`, over all threads. `load(i)` gives
-/// record i.
-template <class Key, class Load>
-BucketStarts distribute(std::size_t n, int shift, int digit_bits, const Load& load, Record<Key>* to,
-                        Buffer<std::uint32_t>& histogram) {
+/// Stable distribution of n keys by `digit_bits` bits at `shift`, over all threads. `visit(begin,
+/// end, f)` calls f(record) for records [begin, end).
+template <class Key, class Visit>
+BucketStarts distribute(std::size_t n, int shift, int digit_bits, const Visit& visit,
+                        Record<Key>* to, Buffer<std::uint32_t>& histogram) {
     const std::size_t buckets = std::size_t{1} << digit_bits;
     const std::size_t block = std::max(min_block, (n + max_blocks - 1) / max_blocks);
     const std::size_t blocks = (n + block - 1) / block;
@@ -122,7 +122,7 @@ BucketStarts distribute(std::size_t n, int shift, int digit_bits, const Load& lo
     for_each_block(n, block, [&](std::size_t b, std::size_t begin, std::size_t end) {
         std::uint32_t* counts = histogram.data() + b * buckets;
         std::fill_n(counts, buckets, 0u);
-        for (std::size_t i = begin; i < end; ++i) ++counts[digit(load(i).key)];
+        visit(begin, end, [&](const Record<Key>& record) { ++counts[digit(record.key)]; });
     });
     BucketStarts starts(buckets + 1);
     std::uint32_t sum = 0;
@@ -137,10 +137,8 @@ BucketStarts distribute(std::size_t n, int shift, int digit_bits, const Load& lo
     starts[buckets] = n;
     for_each_block(n, block, [&](std::size_t b, std::size_t begin, std::size_t end) {
         std::uint32_t* next = histogram.data() + b * buckets;
-        for (std::size_t i = begin; i < end; ++i) {
-            const Record<Key> record = load(i);
-            to[next[digit(record.key)]++] = record;
-        }
+        visit(begin, end,
+              [&](const Record<Key>& record) { to[next[digit(record.key)]++] = record; });
     });
     return starts;
 }
@@ -159,8 +157,11 @@ void sort_together(Record<Key>* a, std::size_t n, SortScratch<Key>& scratch) {
     const int bits = std::min(digit_bits_for(n), differing);
     if (scratch.spare.size() < n) scratch.spare.reset(n);
     Record<Key>* spare = scratch.spare.data();
-    const BucketStarts starts = distribute<Key>(
-        n, differing - bits, bits, [a](std::size_t i) { return a[i]; }, spare, scratch.histogram);
+    const auto visit = [a](std::size_t begin, std::size_t end, const auto& f) {
+        for (std::size_t i = begin; i < end; ++i) f(a[i]);
+    };
+    const BucketStarts starts =
+        distribute<Key>(n, differing - bits, bits, visit, spare, scratch.histogram);
     for_each_index(
         n, [&](std::size_t i) { a[i] = spare[i]; }, 1u << 16);
     for (std::size_t b = 0; b + 1 < starts.size(); ++b)
@@ -177,17 +178,22 @@ void sort_together(Record<Key>* a, std::size_t n, SortScratch<Key>& scratch) {
 }  // namespace
 
 template <class Key>
-void sort_keys(std::span<Key> keys, std::span<std::uint32_t> order, int key_bits,
-               SortScratch<Key>& scratch) {
-    const std::size_t n = keys.size();
+std::vector<std::size_t> sort_on_the_way(std::size_t n, int key_bits, const LoadKeys<Key>& load,
+                                         const TakeSorted<Key>& take, SortScratch<Key>& scratch) {
     if (scratch.records.size() < n) scratch.records.reset(n);
     Record<Key>* records = scratch.records.data();
     const int bits = std::min(digit_bits_for(n), key_bits);
-    const auto load = [&](std::size_t i) {
-        return Record<Key>{keys[i], static_cast<std::uint32_t>(i)};
+    const auto visit = [&](std::size_t begin, std::size_t end, const auto& f) {
+        std::array<Key, 256> batch;
+        for (std::size_t i = begin; i < end; i += batch.size()) {
+            const std::size_t count = std::min(batch.size(), end - i);
+            load(i, i + count, batch.data());
+            for (std::size_t k = 0; k < count; ++k)
+                f(Record<Key>{batch[k], static_cast<std::uint32_t>(i + k)});
+        }
     };
     const BucketStarts starts =
-        distribute<Key>(n, key_bits - bits, bits, load, records, scratch.histogram);
+        distribute<Key>(n, key_bits - bits, bits, visit, records, scratch.histogram);
     for (std::size_t b = 0; b + 1 < starts.size(); ++b)
         if (starts[b + 1] - starts[b] > alone_limit)
             sort_together(records + starts[b], starts[b + 1] - starts[b], scratch);
@@ -199,14 +205,33 @@ void sort_keys(std::span<Key> keys, std::span<std::uint32_t> order, int key_bits
                 if (spare.size() < size) spare.reset(2 * size);
                 sort_alone(records + starts[b], spare.data(), size);
             }
-            for (std::size_t i = starts[b]; i < starts[b + 1]; ++i) {
-                keys[i] = records[i].key;
-                order[i] = records[i].position;
-            }
+            if (size != 0) take(starts[b], {records + starts[b], size});
         }
     });
+    return starts;
 }
 
+template <class Key>
+void sort_keys(std::span<Key> keys, std::span<std::uint32_t> order, int key_bits,
+               SortScratch<Key>& scratch) {
+    const auto load = [&](std::size_t begin, std::size_t end, Key* out) {
+        std::copy(keys.begin() + begin, keys.begin() + end, out);
+    };
+    const auto take = [&](std::size_t begin, std::span<const Record<Key>> sorted) {
+        for (std::size_t k = 0; k < sorted.size(); ++k) {
+            keys[begin + k] = sorted[k].key;
+            order[begin + k] = sorted[k].position;
+        }
+    };
+    sort_on_the_way<Key>(keys.size(), key_bits, load, take, scratch);
+}
+
+template std::vector<std::size_t> sort_on_the_way(std::size_t, int, const LoadKeys<std::uint32_t>&,
+                                                  const TakeSorted<std::uint32_t>&,
+                                                  SortScratch<std::uint32_t>&);
+template std::vector<std::size_t> sort_on_the_way(std::size_t, int, const LoadKeys<std::uint64_t>&,
+                                                  const TakeSorted<std::uint64_t>&,
+                                                  SortScratch<std::uint64_t>&);
 template void sort_keys(std::span<std::uint32_t>, std::span<std::uint32_t>, int,
                         SortScratch<std::uint32_t>&);
 template void sort_keys(std::span<std::uint64_t>, std::span<std::uint32_t>, int,

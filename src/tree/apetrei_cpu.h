@@ -1,11 +1,12 @@
-// Apetrei 2014 on the CPU: hierarchy and boxes in one bottom-up pass. Sorted codes [n] + a box for each leaf
-// position -> nodes with boxes [2 * inner + 2] and the exact depth.
+// Apetrei 2014 on the CPU: hierarchy and boxes in one bottom-up pass. Sorted codes [n] + a box for
+// each leaf position -> nodes with boxes [2 * inner + 2] and the exact depth.
 //
-// The paper's threads climb from each leaf, take as parent the end of their range where the prefix is longer,
-// and meet in atomic counters. Here a task owns a run of neighbouring positions and climbs for all of them, left
-// to right: what waits for its right sibling lies on a stack whose prefixes grow towards the top. Ranges that
-// reach over an end of the run are left over as few pieces; one last pass over the pieces of all runs, in order,
-// does the same with them. Every node is written once, nothing is shared, and no counter is needed.
+// The paper's threads climb from each leaf, take as parent the end of their range where the prefix
+// is longer, and meet in atomic counters. Here a task owns a run of neighbouring positions and
+// climbs for all of them, left to right: what waits for its right sibling lies on a stack whose
+// prefixes grow towards the top. Ranges that reach over an end of the run are left over as few
+// pieces; one last pass over the pieces of all runs, in order, does the same with them. Every node
+// is written once, nothing is shared, and no counter is needed.
 #pragma once
 
 #include <raydix/buffer.h>
@@ -38,22 +39,23 @@ struct Subtree {
     }
 };
 
-/// A subtree, and the inner node that splits right of it: its prefix (1 + common; 0 behind the last key) and rank.
+/// A subtree, and the inner node that splits right of it: its prefix (1 + common; 0 behind the last
+/// key) and rank.
 struct Piece {
     Subtree subtree;
     std::uint32_t prefix, rank;
 };
 
-/// Merges subtrees that come from left to right as soon as both children of a node are there. What waits for
-/// its right sibling is kept in order of prefixes, the longest on top.
+/// Merges subtrees that come from left to right as soon as both children of a node are there. What
+/// waits for its right sibling is kept in order of prefixes, the longest on top.
 class Climb {
 public:
     static constexpr std::size_t most_open = 1 + 63 + 32;  // the prefixes that wait all differ
 
     explicit Climb(BvhNode* nodes) : nodes_(nodes) { open_[0].prefix = 0; }
 
-    /// `right` ends at a split with `prefix`: whatever has a longer one lies below it and is complete now.
-    /// `top` counts what waits; callers keep it in a register.
+    /// `right` ends at a split with `prefix`: whatever has a longer one lies below it and is
+    /// complete now. `top` counts what waits; callers keep it in a register.
     [[nodiscard]] Subtree merge_above(Subtree right, std::uint32_t prefix, std::size_t& top) const {
         for (const Piece* left = &open_[top]; left->prefix > prefix; left = &open_[--top]) {
             BvhNode* pair = nodes_ + pair_slot(left->rank);
@@ -84,8 +86,8 @@ struct ApetreiScratch {
     Buffer<std::uint32_t> piece_counts;
 };
 
-/// The climb inside one run of positions. Splits that are not kept lie inside leaves, so only the kept ones are
-/// looked at, and what lies between two of them is a leaf.
+/// The climb inside one run of positions. Splits that are not kept lie inside leaves, so only the
+/// kept ones are looked at, and what lies between two of them is a leaf.
 template <class LeafBox>
 struct ClimbRun {
     static constexpr std::size_t most_pieces = 2 * Climb::most_open + 1;
@@ -115,11 +117,11 @@ struct ClimbRun {
     [[nodiscard]] Subtree leaf(std::size_t begin, std::size_t last) const {
         Box3 box = leaf_box(begin);
         for (std::size_t k = begin + 1; k <= last; ++k) box = unite(box, leaf_box(k));
-        return {box, static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(last - begin + 1),
-                0};
+        return {box, static_cast<std::uint32_t>(begin),
+                static_cast<std::uint32_t>(last - begin + 1), 0};
     }
-    /// Writes the nodes that lie within the run, and what is left of it as at most most_pieces pieces; returns
-    /// their number.
+    /// Writes the nodes that lie within the run, and what is left of it as at most most_pieces
+    /// pieces; returns their number.
     std::uint32_t operator()(std::size_t nominal_begin, std::size_t nominal_end,
                              Piece* pieces) const {
         const std::size_t end = leaf_border(nominal_end);
@@ -148,16 +150,18 @@ struct ClimbRun {
     }
 };
 
-/// keys: sorted, more than max_leaf. leaf_box(k) is called once for each position k, from left to right within
-/// a task, and gives the Box3 of what lies there. Returns the number of inner nodes.
-template <class Key, class LeafBox>
-std::uint32_t build_apetrei_cpu(std::span<const Key> keys, int max_leaf, const LeafBox& leaf_box,
-                                Buffer<BvhNode>& nodes, std::uint32_t& max_depth,
-                                ApetreiScratch& scratch) {
-    constexpr std::size_t run_length = 1u << 13;
-    const std::size_t n = keys.size();
-    const SortedKeys<Key> sorted{keys.data(), static_cast<std::uint32_t>(n)};
-    const NeighbourPrefixes prefixes(sorted, scratch.prefixes);
+struct ApetreiTree {
+    std::uint32_t inner = 0, max_depth = 0;
+};
+
+/// prefixes: of more than max_leaf keys. leaf_box(k) is called once for each position k, from left
+/// to right within a task, and gives the Box3 of what lies there. The tree does not depend on
+/// run_length.
+template <class LeafBox>
+ApetreiTree build_apetrei_cpu(const NeighbourPrefixes& prefixes, int max_leaf,
+                              const LeafBox& leaf_box, Buffer<BvhNode>& nodes,
+                              ApetreiScratch& scratch, std::size_t run_length = 1u << 13) {
+    const std::size_t n = prefixes.count();
     const std::uint32_t inner =
         mark_kept_splits(prefixes, n - 1, max_leaf, scratch.kept_bits, scratch.kept_before);
     const KeptNodes kept{scratch.kept_bits.data(), scratch.kept_before.data()};
@@ -183,8 +187,7 @@ std::uint32_t build_apetrei_cpu(std::span<const Key> keys, int max_leaf, const L
     }
     root.write(nodes[0]);
     nodes[1] = BvhNode{{0, 0, 0}, 0, {0, 0, 0}, 0};
-    max_depth = root.height;
-    return inner;
+    return {inner, root.height};
 }
 
 }  // namespace raydix

@@ -10,8 +10,8 @@
 namespace raydix {
 namespace {
 
-/// How many prefixes beside split k are longer than its own, without a gap, sixteen splits at a time; no more
-/// than `limit` a side are looked at.
+/// How many prefixes beside split k are longer than its own, without a gap, sixteen splits at a
+/// time; no more than `limit` a side are looked at.
 std::uint32_t kept_sixteen(const std::uint8_t* prefixes, int limit) {
     const Bytes16 own = Bytes16::load(prefixes);
     std::uint32_t left = 0xFFFFu, right = 0xFFFFu;  // the run goes on so far

@@ -25,7 +25,11 @@ struct SortedKeys {
         if (j < 0 || j >= static_cast<std::int64_t>(count)) return -1;
         Probe::bytes(2 * sizeof(Key));
         Probe::step();
-        const Key differs = keys[i] ^ keys[j];
+        return prefix_of(keys[i], keys[j], i, j);
+    }
+    /// The same for two keys at hand.
+    [[nodiscard]] RAYDIX_HD static int prefix_of(Key a, Key b, std::int64_t i, std::int64_t j) {
+        const Key differs = a ^ b;
         constexpr int unused_bits = static_cast<int>(8 * sizeof(Key)) - CodeFormat<Key>::bits;
         if (differs != 0) return leading_zeros(differs) - unused_bits;
         // Equal codes: the positions decide, as if they were written behind the code (paper,
