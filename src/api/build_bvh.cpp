@@ -25,7 +25,7 @@ struct BvhBuilder::Scratch {
     SortScratch<std::uint32_t> sort30;
     SortScratch<std::uint64_t> sort63;
     HierarchyScratch hierarchy;
-    ApetreiScratch apetrei;
+    ClimbScratch apetrei;
     Buffer<std::uint8_t> meeting;
 };
 

@@ -78,7 +78,7 @@ private:
     std::array<Piece, most_open + 1> open_;
 };
 
-struct ApetreiScratch {
+struct ClimbScratch {
     Buffer<std::uint8_t> prefixes;
     Buffer<std::uint64_t> kept_bits;
     Buffer<std::uint32_t> kept_before;
@@ -160,7 +160,7 @@ struct ApetreiTree {
 template <class LeafBox>
 ApetreiTree build_apetrei_cpu(const NeighbourPrefixes& prefixes, int max_leaf,
                               const LeafBox& leaf_box, Buffer<BvhNode>& nodes,
-                              ApetreiScratch& scratch, std::size_t run_length = 1u << 13) {
+                              ClimbScratch& scratch, std::size_t run_length = 1u << 13) {
     const std::size_t n = prefixes.count();
     const std::uint32_t inner =
         mark_kept_splits(prefixes, n - 1, max_leaf, scratch.kept_bits, scratch.kept_before);

@@ -76,7 +76,7 @@ struct Built {
 
 template <class Key>
 Built build(const std::vector<Key>& keys, int max_leaf, std::size_t run_length) {
-    ApetreiScratch scratch;
+    ClimbScratch scratch;
     Built built;
     const NeighbourPrefixes prefixes(
         SortedKeys<Key>{keys.data(), static_cast<std::uint32_t>(keys.size())}, scratch.prefixes);
