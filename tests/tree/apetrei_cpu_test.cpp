@@ -1,4 +1,5 @@
-// The bottom-up pass over runs of positions against the definition of the tree, and against itself with other runs.
+// The bottom-up pass over runs of positions against the definition of the tree, and against itself
+// with other runs.
 #include "tree/apetrei_cpu.h"
 
 #include <gtest/gtest.h>
@@ -22,8 +23,7 @@ using Random = std::mt19937_64;
 template <class Key>
 std::vector<Key> sorted_keys(std::size_t n, std::size_t distinct, int low_bits, Random& random) {
     std::vector<Key> values(distinct);
-    for (Key& v : values)
-        v = static_cast<Key>(random() & ((std::uint64_t{1} << low_bits) - 1));
+    for (Key& v : values) v = static_cast<Key>(random() & ((std::uint64_t{1} << low_bits) - 1));
     std::vector<Key> keys(n);
     for (Key& k : keys) k = values[random() % distinct];
     std::ranges::sort(keys);
@@ -85,8 +85,7 @@ Built build(const std::vector<Key>& keys, int max_leaf, std::size_t run_length) 
         ++asked[k];
         return Box3::load(box_at(k));
     };
-    built.tree =
-        build_apetrei_cpu(prefixes, max_leaf, leaf_box, built.nodes, scratch, run_length);
+    built.tree = build_apetrei_cpu(prefixes, max_leaf, leaf_box, built.nodes, scratch, run_length);
     for (std::size_t k = 0; k < keys.size(); ++k) EXPECT_EQ(asked[k], 1) << k;
     return built;
 }
@@ -98,8 +97,8 @@ void expect_right(const std::vector<Key>& keys) {
         SCOPED_TRACE("n " + std::to_string(keys.size()) + ", max_leaf " + std::to_string(max_leaf));
         const Built whole = build(keys, max_leaf, keys.size());
         const auto n = static_cast<std::uint32_t>(keys.size());
-        Expected<Key> expected{{keys.data(), n}, static_cast<std::uint32_t>(max_leaf),
-                               whole.nodes.view()};
+        Expected<Key> expected{
+            {keys.data(), n}, static_cast<std::uint32_t>(max_leaf), whole.nodes.view()};
         expected.check(0, 0, n - 1, 0);
         EXPECT_EQ(whole.tree.inner, expected.inner);
         EXPECT_EQ(whole.tree.max_depth, expected.max_depth);
@@ -146,9 +145,9 @@ TEST(ApetreiCpu, ThreadsDoNotMatter) {
         Built many;
         with_threads(threads, [&] { many = build(keys, 4, 512); });
         ASSERT_EQ(many.nodes.size(), one.nodes.size());
-        EXPECT_EQ(std::memcmp(many.nodes.data(), one.nodes.data(),
-                              one.nodes.size() * sizeof(BvhNode)),
-                  0);
+        EXPECT_EQ(
+            std::memcmp(many.nodes.data(), one.nodes.data(), one.nodes.size() * sizeof(BvhNode)),
+            0);
     }
 }
 
