@@ -21,6 +21,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -33,11 +34,15 @@
 
 namespace raydix {
 
-/// One launch as it ran. `longest_chain`: accesses of an item that wait for each other, at most.
+/// One launch as it ran. `longest_chain`: accesses of an item that wait for each other, at most;
+/// `steps`: those of all items. Bytes, chain and steps are known to CountProbe, the time is that of
+/// the machine it ran on.
 struct LaunchRecord {
     std::string label;
     std::uint64_t items = 0, bytes = 0;
     std::uint32_t longest_chain = 0;
+    std::uint64_t steps = 0;
+    double ms = 0;
 };
 
 /// Pairs to sort and where they go; `keys` and `values` are lost.
@@ -54,17 +59,20 @@ class HostLauncher {
 public:
     using Probe = Probe_;
 
-    /// `log`: where launches are written down, for CountProbe; may be null.
+    /// `log`: where launches are written down; may be null.
     explicit HostLauncher(std::vector<LaunchRecord>* log = nullptr) : log_(log) {}
 
     template <class Work>
     void launch(const char* label, std::uint32_t n, const Work& work) {
+        const Clock::time_point start = Clock::now();
+        LaunchRecord record{label, n};
         if constexpr (Probe::counts) {
-            run_counted(label, n, work);
+            run_counted(record, n, work);
         } else {
             for_each_index(
                 n, [&](std::size_t i) { work(static_cast<std::uint32_t>(i)); }, grain);
         }
+        note(std::move(record), start);
     }
 
     template <class Work>
@@ -75,10 +83,11 @@ public:
 
     void exclusive_scan(const char* label, std::uint32_t* values, std::uint32_t n,
                         std::uint32_t* total) {
+        const Clock::time_point start = Clock::now();
         const std::uint32_t sum = raydix::exclusive_scan({values, n});
         if (total != nullptr) *total = sum;
         // One read and one write a value, as a single-pass scan on a GPU has; blocks hand sums on.
-        note({label, n, std::uint64_t{n} * 8, 4});
+        note({label, n, std::uint64_t{n} * 8, 4, n}, start);
     }
 
     void exclusive_scan_counted(const char* label, std::uint32_t* values,
@@ -95,30 +104,38 @@ public:
 
 private:
     static constexpr std::size_t grain = 1024;
+    using Clock = std::chrono::steady_clock;
 
-    void note(LaunchRecord record) {
-        if (log_ != nullptr) log_->push_back(std::move(record));
+    void note(LaunchRecord record, Clock::time_point start) {
+        if (log_ == nullptr) return;
+        record.ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        log_->push_back(std::move(record));
     }
 
     template <class Work>
-    void run_counted(const char* label, std::uint32_t n, const Work& work) {
-        std::atomic<std::uint64_t> bytes{0};
+    void run_counted(LaunchRecord& record, std::uint32_t n, const Work& work) {
+        std::atomic<std::uint64_t> bytes{0}, steps{0};
         std::atomic<std::uint32_t> longest{0};
         for_each_range(n, grain, [&](std::size_t begin, std::size_t end) {
             WorkCount& mine = Probe::work();
             mine = {};
+            std::uint64_t all_steps = 0;
             for (std::size_t i = begin; i < end; ++i) {
                 mine.steps = 0;
                 work(static_cast<std::uint32_t>(i));
+                all_steps += mine.steps;
                 mine.longest_chain = std::max(mine.longest_chain, mine.steps);
             }
             bytes += mine.bytes;
+            steps += all_steps;
             std::uint32_t seen = longest.load();
             while (seen < mine.longest_chain &&
                    !longest.compare_exchange_weak(seen, mine.longest_chain)) {
             }
         });
-        note({label, n, bytes.load(), longest.load()});
+        record.bytes = bytes;
+        record.steps = steps;
+        record.longest_chain = longest;
     }
 
     std::vector<LaunchRecord>* log_;
@@ -132,6 +149,7 @@ void HostLauncher<Probe_>::sort_pairs(const char* label, const SortArrays<Key>& 
                                       int key_bits) {
     static_assert(std::is_unsigned_v<Key>);
     constexpr std::size_t digits = 256, block = 1u << 14;
+    const Clock::time_point start = Clock::now();
     const std::uint32_t n = std::min(*count, limit);
     const std::size_t blocks = (n + block - 1) / block;
     Key* from_keys = a.keys;
@@ -166,7 +184,11 @@ void HostLauncher<Probe_>::sort_pairs(const char* label, const SortArrays<Key>& 
         });
     }
     const std::uint64_t pair_bytes = sizeof(Key) + sizeof(std::uint32_t);
-    for (int p = 0; p < passes; ++p) note({label, n, n * (sizeof(Key) + 2 * pair_bytes), 4});
+    // Each pass reads keys to count them, then reads and writes pairs: two launches and a scan that
+    // wait for each other. The time of all passes stands at the first.
+    for (int pass = 0; pass < passes; ++pass)
+        note({label, n, n * (sizeof(Key) + 2 * pair_bytes), 4, 3 * std::uint64_t{n}},
+             pass == 0 ? start : Clock::now());
 }
 
 }  // namespace raydix

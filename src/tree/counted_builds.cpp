@@ -15,19 +15,22 @@
 namespace raydix {
 namespace {
 
-struct CountedLeafBox {
+template <class Probe>
+struct LeafBoxOfBoxes {
     const Aabb* boxes;
     Aabb operator()(std::uint32_t first, std::uint32_t count) const {
         Aabb box = boxes[first];
         for (std::uint32_t k = first + 1; k < first + count; ++k) box = unite(box, boxes[k]);
-        CountProbe::bytes(std::uint64_t{count} * sizeof(Aabb));
-        CountProbe::step();
+        Probe::bytes(std::uint64_t{count} * sizeof(Aabb));
+        Probe::step();
         return box;
     }
 };
 
-template <class Key>
+template <class Key, class Probe>
 class CountedRun {
+    using LeafBox = LeafBoxOfBoxes<Probe>;
+
 public:
     CountedRun(std::span<const Key> keys, std::span<const Aabb> boxes, int max_leaf)
         : in_{keys.data(), static_cast<std::uint32_t>(keys.size()),
@@ -47,9 +50,8 @@ public:
         hierarchy(builder, fused);
         if (fused) return take();
         if (limit_ == 0) {
-            launcher_.launch(
-                "fit.only_leaf", 1,
-                FitOnlyLeaf<CountedLeafBox>{leaf_box_, nodes_.data(), &result_.max_depth});
+            launcher_.launch("fit.only_leaf", 1,
+                             FitOnlyLeaf<LeafBox>{leaf_box_, nodes_.data(), &result_.max_depth});
         } else if (by_levels) {
             fit_by_levels();
         } else {
@@ -61,8 +63,6 @@ public:
     }
 
 private:
-    using Launcher = HostLauncher<CountProbe>;
-
     template <class Scratch, class... Sizes>
     Scratch make_scratch(Sizes... sizes) {
         scratch_.memory.reset(scratch_bytes<Scratch>(sizes...));
@@ -129,8 +129,8 @@ private:
     CountedBuild result_;
     LbvhInput<Key> in_;
     std::uint32_t limit_;
-    CountedLeafBox leaf_box_;
-    Launcher launcher_;
+    LeafBox leaf_box_;
+    HostLauncher<Probe> launcher_;
     Buffer<BvhNode> nodes_;
     HierarchyScratch scratch_;
     TreeLinks out_{};
@@ -141,12 +141,23 @@ private:
 template <class Key>
 CountedBuild count_build(Builder builder, Fit fit, std::span<const Key> keys,
                          std::span<const Aabb> leaf_boxes, int max_leaf) {
-    return CountedRun<Key>(keys, leaf_boxes, max_leaf).run(builder, fit);
+    return CountedRun<Key, CountProbe>(keys, leaf_boxes, max_leaf).run(builder, fit);
+}
+
+template <class Key>
+CountedBuild time_build(Builder builder, Fit fit, std::span<const Key> keys,
+                        std::span<const Aabb> leaf_boxes, int max_leaf) {
+    return CountedRun<Key, NoProbe>(keys, leaf_boxes, max_leaf).run(builder, fit);
 }
 
 template CountedBuild count_build(Builder, Fit, std::span<const std::uint32_t>,
                                   std::span<const Aabb>, int);
 template CountedBuild count_build(Builder, Fit, std::span<const std::uint64_t>,
                                   std::span<const Aabb>, int);
+
+template CountedBuild time_build(Builder, Fit, std::span<const std::uint32_t>,
+                                 std::span<const Aabb>, int);
+template CountedBuild time_build(Builder, Fit, std::span<const std::uint64_t>,
+                                 std::span<const Aabb>, int);
 
 }  // namespace raydix

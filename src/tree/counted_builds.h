@@ -12,7 +12,7 @@
 
 namespace raydix {
 
-/// What a build did, and of its tree the root's box and the depth.
+/// What a build did or how long it took, and of its tree the root's box and the depth.
 struct CountedBuild {
     std::vector<LaunchRecord> launches;
     std::uint32_t inner_count = 0, max_depth = 0;
@@ -27,9 +27,19 @@ template <class Key>
 [[nodiscard]] CountedBuild count_build(Builder builder, Fit fit, std::span<const Key> keys,
                                        std::span<const Aabb> leaf_boxes, int max_leaf);
 
+/// The same launches without counting: each with the milliseconds it took here.
+template <class Key>
+[[nodiscard]] CountedBuild time_build(Builder builder, Fit fit, std::span<const Key> keys,
+                                      std::span<const Aabb> leaf_boxes, int max_leaf);
+
 extern template CountedBuild count_build(Builder, Fit, std::span<const std::uint32_t>,
                                          std::span<const Aabb>, int);
 extern template CountedBuild count_build(Builder, Fit, std::span<const std::uint64_t>,
                                          std::span<const Aabb>, int);
+
+extern template CountedBuild time_build(Builder, Fit, std::span<const std::uint32_t>,
+                                        std::span<const Aabb>, int);
+extern template CountedBuild time_build(Builder, Fit, std::span<const std::uint64_t>,
+                                        std::span<const Aabb>, int);
 
 }  // namespace raydix
