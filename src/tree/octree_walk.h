@@ -1,14 +1,24 @@
 // Walks over octrees that all queries share, and the integer cells of nodes.
 #pragma once
 
+#include <raydix/error.h>
 #include <raydix/octree.h>
 
 #include <array>
 #include <cstdint>
+#include <string>
 
 #include "keys/morton.h"
 
 namespace raydix {
+
+/// Throws InputError if there is no such node.
+[[nodiscard]] inline const OctreeNode& node_at(const Octree& octree, std::uint32_t node_index) {
+    if (node_index >= octree.nodes().size())
+        throw InputError("node " + std::to_string(node_index) + " of an octree of " +
+                         std::to_string(octree.nodes().size()));
+    return octree.nodes()[node_index];
+}
 
 /// The cells per axis are 2^this at the finest level of the codes.
 [[nodiscard]] inline int axis_bits_of(const Octree& octree) { return octree.options().bits / 3; }
