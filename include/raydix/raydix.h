@@ -6,6 +6,7 @@
 #include <raydix/camera.h>   // IWYU pragma: export
 #include <raydix/check.h>    // IWYU pragma: export
 #include <raydix/error.h>    // IWYU pragma: export
+#include <raydix/kdtree.h>   // IWYU pragma: export
 #include <raydix/machine.h>  // IWYU pragma: export
 #include <raydix/mesh.h>     // IWYU pragma: export
 #include <raydix/picture.h>  // IWYU pragma: export
