@@ -77,7 +77,8 @@ private:
         used_[child / 2] = true;
         const auto left = static_cast<std::uint32_t>(child);
         if (nodes[left].is_leaf() && nodes[left + 1].is_leaf()) {
-            const std::uint64_t count = std::uint64_t{nodes[left].count()} + nodes[left + 1].count();
+            const std::uint64_t count =
+                std::uint64_t{nodes[left].count()} + nodes[left + 1].count();
             if (count <= static_cast<std::uint64_t>(max_leaf()))
                 return fmt::format(
                     "nodes: inner node {} holds only {} primitives, a leaf may hold {}",
@@ -123,8 +124,7 @@ bool is_clean_primitive(const KdTree& tree, std::size_t position) {
 bool matches_mesh(const KdTree& tree, const MeshView& mesh, std::size_t position) {
     const auto vertex = [&](std::uint32_t i) { return without_negative_zero(mesh.vertices[i]); };
     const std::uint32_t id = tree.order()[position];
-    if (tree.kind() == PrimitiveKind::points)
-        return same_bits(tree.points()[position], vertex(id));
+    if (tree.kind() == PrimitiveKind::points) return same_bits(tree.points()[position], vertex(id));
     const Triangle& corners = mesh.triangles[id];
     const LeafTriangle& t = tree.triangles()[position];
     return same_bits(t.v0, vertex(corners[0])) && same_bits(t.v1, vertex(corners[1])) &&

@@ -86,13 +86,15 @@ struct SplitCheck {
         const std::uint32_t middle = ranges[node.child() + 1].begin;
         const int prefix = keys.common_prefix(first, last);
         if (keys.common_prefix(first, middle - 1) <= prefix && first != middle - 1)
-            return fmt::format("nodes: the left side of inner node {} ends at {}, not where codes "
-                               "first differ",
-                               slot, middle);
+            return fmt::format(
+                "nodes: the left side of inner node {} ends at {}, not where codes "
+                "first differ",
+                slot, middle);
         if (keys.common_prefix(middle, last) <= prefix && middle != last)
-            return fmt::format("nodes: the right side of inner node {} starts at {}, not where "
-                               "codes first differ",
-                               slot, middle);
+            return fmt::format(
+                "nodes: the right side of inner node {} starts at {}, not where "
+                "codes first differ",
+                slot, middle);
         const KdSplit split = split_of_prefix<Key>(grid, codes[middle], prefix);
         if (node.axis() != split.axis)
             return fmt::format("nodes: inner node {} splits axis {}, but its codes differ on {}",
