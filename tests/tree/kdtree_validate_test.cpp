@@ -32,57 +32,56 @@ std::uint32_t find_slot(const KdTreeAccess& tree, bool leaf) {
     return slot;
 }
 
-#define EXPECT_NAMES(text, damage)                                           \
-    do {                                                                     \
-        const std::string said = broken_after(damage);                       \
-        EXPECT_NE(said.find(text), std::string::npos) << '"' << said << '"'; \
-    } while (false)
+void expect_names(const char* text, const std::function<void(const KdTreeAccess&)>& damage) {
+    const std::string said = broken_after(damage);
+    EXPECT_NE(said.find(text), std::string::npos) << '"' << said << "\" does not say " << text;
+}
 
 using Access = const KdTreeAccess&;
 
 TEST(KdCheck, Counts) {
-    EXPECT_NAMES("31 code bits", [](Access t) { t.options().bits = 31; });
-    EXPECT_NAMES("max_leaf 0", [](Access t) { t.options().max_leaf = 0; });
-    EXPECT_NAMES("goes into no k-d tree", [](Access t) { t.kind() = PrimitiveKind::boxes; });
-    EXPECT_NAMES("400 references to 0 points", [](Access t) { t.kind() = PrimitiveKind::points; });
-    EXPECT_NAMES("left out", [](Access t) { ++t.input_count(); });
-    EXPECT_NAMES("slots", [](Access t) { ++t.inner_count(); });
+    expect_names("31 code bits", [](Access t) { t.options().bits = 31; });
+    expect_names("max_leaf 0", [](Access t) { t.options().max_leaf = 0; });
+    expect_names("goes into no k-d tree", [](Access t) { t.kind() = PrimitiveKind::boxes; });
+    expect_names("400 references to 0 points", [](Access t) { t.kind() = PrimitiveKind::points; });
+    expect_names("left out", [](Access t) { ++t.input_count(); });
+    expect_names("slots", [](Access t) { ++t.inner_count(); });
 }
 
 TEST(KdCheck, Topology) {
-    EXPECT_NAMES("a cycle", [](Access t) {
+    expect_names("a cycle", [](Access t) {
         KdNode& node = t.nodes()[find_slot(t, false)];
         node.link = t.nodes()[0].link;
     });
-    EXPECT_NAMES("children at slot", [](Access t) { t.nodes()[0].link = 0xFFFFFFFCu; });
-    EXPECT_NAMES("starts at position", [](Access t) { ++t.nodes()[find_slot(t, true)].first; });
-    EXPECT_NAMES("holds 0 primitives",
+    expect_names("children at slot", [](Access t) { t.nodes()[0].link = 0xFFFFFFFCu; });
+    expect_names("starts at position", [](Access t) { ++t.nodes()[find_slot(t, true)].first; });
+    expect_names("holds 0 primitives",
                  [](Access t) { t.nodes()[find_slot(t, true)].link = KdNode::leaf_axis; });
-    EXPECT_NAMES("max_leaf is 3", [](Access t) { t.options().max_leaf = 3; });
-    EXPECT_NAMES("a leaf may hold 9", [](Access t) { t.options().max_leaf = 9; });
-    EXPECT_NAMES("deepest leaf", [](Access t) { ++t.max_depth(); });
-    EXPECT_NAMES("padding", [](Access t) { t.nodes()[1].link = 4; });
-    EXPECT_NAMES("the root's interval", [](Access t) { t.nodes()[0].hi = 1; });
+    expect_names("max_leaf is 3", [](Access t) { t.options().max_leaf = 3; });
+    expect_names("a leaf may hold 9", [](Access t) { t.options().max_leaf = 9; });
+    expect_names("deepest leaf", [](Access t) { ++t.max_depth(); });
+    expect_names("padding", [](Access t) { t.nodes()[1].link = 4; });
+    expect_names("the root's interval", [](Access t) { t.nodes()[0].hi = 1; });
 }
 
 TEST(KdCheck, Primitives) {
-    EXPECT_NAMES("names primitive 400 of 400", [](Access t) { t.order()[7] = 400; });
-    EXPECT_NAMES("more than one place", [](Access t) { t.order()[7] = t.order()[8]; });
-    EXPECT_NAMES("belongs in no tree", [](Access t) { t.triangles()[5].v1.y = std::nanf(""); });
-    EXPECT_NAMES("the bounds", [](Access t) { t.bounds().hi.z += 1; });
+    expect_names("names primitive 400 of 400", [](Access t) { t.order()[7] = 400; });
+    expect_names("more than one place", [](Access t) { t.order()[7] = t.order()[8]; });
+    expect_names("belongs in no tree", [](Access t) { t.triangles()[5].v1.y = std::nanf(""); });
+    expect_names("the bounds", [](Access t) { t.bounds().hi.z += 1; });
 }
 
 TEST(KdCheck, Splits) {
-    EXPECT_NAMES("do not ascend", [](Access t) {
+    expect_names("do not ascend", [](Access t) {
         std::swap(t.order()[3], t.order()[300]);
         std::swap(t.triangles()[3], t.triangles()[300]);
     });
-    EXPECT_NAMES("splits axis", [](Access t) { t.nodes()[find_slot(t, false)].link ^= 1; });
-    EXPECT_NAMES("but its codes differ at", [](Access t) {
+    expect_names("splits axis", [](Access t) { t.nodes()[find_slot(t, false)].link ^= 1; });
+    expect_names("but its codes differ at", [](Access t) {
         float& plane = t.nodes()[find_slot(t, false)].plane;
         plane = std::nextafter(plane, infinity);
     });
-    EXPECT_NAMES("not where codes first differ", [](Access t) {
+    expect_names("not where codes first differ", [](Access t) {
         // Moves one primitive from a right leaf to its left sibling.
         for (std::uint32_t slot = 2;; slot += 2) {
             KdNode &left = t.nodes()[slot], &right = t.nodes()[slot + 1];
@@ -97,11 +96,11 @@ TEST(KdCheck, Splits) {
 }
 
 TEST(KdCheck, Intervals) {
-    EXPECT_NAMES("interval", [](Access t) {
+    expect_names("interval", [](Access t) {
         float& hi = t.nodes()[find_slot(t, false)].hi;
         hi = std::nextafter(hi, -infinity);
     });
-    EXPECT_NAMES("interval", [](Access t) {
+    expect_names("interval", [](Access t) {
         float& lo = t.nodes()[find_slot(t, true)].lo;
         lo = std::nextafter(lo, -infinity);
     });
