@@ -55,8 +55,11 @@ TEST(KdCheck, Topology) {
     });
     expect_names("children at slot", [](Access t) { t.nodes()[0].link = 0xFFFFFFFCu; });
     expect_names("starts at position", [](Access t) { ++t.nodes()[find_slot(t, true)].first; });
-    expect_names("holds 0 primitives",
-                 [](Access t) { t.nodes()[find_slot(t, true)].link = KdNode::leaf_axis; });
+    expect_names("holds 0 primitives", [](Access t) {
+        std::uint32_t slot = 2;
+        while (!t.nodes()[slot].is_leaf() || t.nodes()[slot ^ 1].is_leaf()) ++slot;
+        t.nodes()[slot].link = KdNode::leaf_axis;
+    });
     expect_names("max_leaf is 3", [](Access t) { t.options().max_leaf = 3; });
     expect_names("a leaf may hold 9", [](Access t) { t.options().max_leaf = 9; });
     expect_names("deepest leaf", [](Access t) { ++t.max_depth(); });
