@@ -18,8 +18,9 @@
 namespace raydix {
 namespace {
 
-constexpr float scene_light = 0.55f;   // of the shaded picture under the lines
-constexpr double behind = 0.22;        // strength of lines behind a surface
+constexpr float scene_light = 0.40f;   // of the shaded picture under the lines
+constexpr float sky_light = 0.06f;     // of the sky around it
+constexpr double behind = 0.30;        // strength of lines behind a surface
 constexpr double depth_slack = 0.004;  // a line that lies on a surface is in front of it
 constexpr double width_per_pixel = 1.0 / 1024;
 
@@ -56,7 +57,7 @@ std::vector<float> inverse_depths(const Bvh& scene, const CameraFrame& frame,
                               static_cast<double>(i / options.width) + 0.5);
     });
     std::vector<float> result(rays.size(), 0.0f);
-    if (scene.kind() != PrimitiveKind::triangles) return result;
+    if (scene.kind() != PrimitiveKind::triangles || scene.empty()) return result;
     const std::vector<Hit> hits = trace(scene, rays);
     for (std::size_t i = 0; i < hits.size(); ++i)
         if (hits[i].hit())
@@ -107,7 +108,7 @@ void draw_levels(Picture& picture, const CameraFrame& frame, std::span<const Lev
                 mask.add_line(screen.end_at(s), screen.end_at(t), line_width, shade);
             });
         }
-        blend(picture, mask, heat_colour(1.0f - 0.66f * part), 0.95f - 0.35f * part);
+        blend(picture, mask, heat_colour(1.0f - 0.55f * part), 0.95f - 0.2f * part);
     }
 }
 
@@ -118,7 +119,7 @@ Picture dots(const Bvh& scene, const CameraFrame& frame, const RenderOptions& op
     picture.pixels.assign(std::size_t{options.width} * options.height, Vec3{0.012f, 0.014f, 0.02f});
     const Screen screen(frame);
     LineMask mask(options.width, options.height);
-    const double size = std::max(0.6, 1.4 * options.width * width_per_pixel);
+    const double size = std::max(0.6, 1.9 * options.width * width_per_pixel);
     for (const Vec3& p : scene.points()) {
         const Double3 seen = screen.seen(Double3(p));
         if (seen.z < near) continue;
@@ -129,15 +130,18 @@ Picture dots(const Bvh& scene, const CameraFrame& frame, const RenderOptions& op
     return picture;
 }
 
-Picture shaded_below(const Bvh& scene, const Camera& camera, const RenderOptions& options) {
+Picture shaded_below(const Bvh& scene, const Camera& camera, const RenderOptions& options,
+                     const std::vector<float>& surface) {
     RenderOptions shaded = options;
     shaded.view = View::shaded;
     Picture picture = render(scene, camera, shaded);
     // Grey and darker: colours belong to the levels.
-    for (Vec3& p : picture.pixels) {
+    for (std::size_t i = 0; i < surface.size(); ++i) {
+        Vec3& p = picture.pixels[i];
         p = {film_curve(p.x), film_curve(p.y), film_curve(p.z)};
         const float light = 0.2126f * p.x + 0.7152f * p.y + 0.0722f * p.z;
-        p = scene_light * (0.35f * p + 0.65f * Vec3{light, light, light});
+        p = (surface[i] > 0.0f ? scene_light : sky_light) *
+            (0.35f * p + 0.65f * Vec3{light, light, light});
     }
     return picture;
 }
@@ -152,11 +156,11 @@ Picture render_tree(const Bvh& scene, const Camera& camera, std::span<const Leve
     const double near = scene.empty() ? 1e-6 : std::max(1e-4 * length(size), 1e-30);
     Picture picture;
     with_threads(options.threads, [&] {
+        const std::vector<float> surface = inverse_depths(scene, frame, options);
         picture = scene.kind() == PrimitiveKind::points && !scene.empty()
                       ? dots(scene, frame, options, near)
-                      : shaded_below(scene, camera, options);
-        if (!boxes.empty())
-            draw_levels(picture, frame, boxes, inverse_depths(scene, frame, options), near);
+                      : shaded_below(scene, camera, options, surface);
+        if (!boxes.empty()) draw_levels(picture, frame, boxes, surface, near);
     });
     return picture;
 }
