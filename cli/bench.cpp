@@ -1,5 +1,5 @@
-// raydix bench hierarchy: the builders of the LBVH family beside each other, measured here and predicted for larger
-// machines (Karras 2012, section 5).
+// raydix bench hierarchy: the builders of the LBVH family beside each other, measured here and
+// predicted for larger machines (Karras 2012, section 5).
 #include <fmt/format.h>
 #include <raydix/error.h>
 #include <raydix/hierarchy_study.h>
@@ -17,7 +17,8 @@ namespace {
 
 struct HierarchyBench {
     CommonOptions common;
-    std::vector<std::string> scenes{"builtin:figure?triangles=174000", "builtin:figure?triangles=1770000"};
+    std::vector<std::string> scenes{"builtin:figure?triangles=174000",
+                                    "builtin:figure?triangles=1770000"};
     std::vector<std::uint64_t> sizes{1000, 10'000, 100'000, 1'000'000};
     std::vector<int> thread_counts;
     std::vector<std::string> builders{"karras", "apetrei", "garanzha", "lauterbach"};
@@ -38,7 +39,8 @@ struct Variant {
 std::vector<Variant> variants_of(const std::vector<std::string>& builders) {
     std::vector<Variant> all;
     for (const std::string& name : builders)
-        for (const Fit fit : {Fit::atomic, Fit::levels}) all.push_back({builder_from_name(name), fit});
+        for (const Fit fit : {Fit::atomic, Fit::levels})
+            all.push_back({builder_from_name(name), fit});
     return all;
 }
 
@@ -117,20 +119,27 @@ public:
 private:
     void print_machines() const {
         const auto print = [](const std::string& name, const LaunchMachine& m) {
-            fmt::print("{:<20} {:>7.0f} lanes, {:.2f} ns an item, {:.2f} ns a step, {:.0f} GB/s, {:.0f} ns latency, "
-                       "{:.1f} us a launch\n    {}\n",
-                       name, m.lanes, m.item_ns, m.step_ns, m.bytes_per_ns, m.latency_ns, m.launch_us, m.origin);
+            fmt::print(
+                "{:<20} {:>7.0f} lanes, {:.2f} ns an item, {:.2f} ns a step, {:.0f} GB/s, {:.0f} "
+                "ns latency, "
+                "{:.1f} us a launch\n    {}\n",
+                name, m.lanes, m.item_ns, m.step_ns, m.bytes_per_ns, m.latency_ns, m.launch_us,
+                m.origin);
         };
         for (const LaunchMachine& m : machines_) print(m.name + " (simulated)", m);
         for (const auto& [threads, m] : here_) print(fmt::format("here, {} threads", threads), m);
     }
 
     void print_head(const std::string& scene, std::uint32_t keys, int bits) const {
-        fmt::print("\n{}, {} keys, {} bits: hierarchy and boxes\n{:<18} {:>8} {:>7} {:>9} {:>9} {:>7} {:>9}", scene,
-                   grouped(keys), bits, "builder+fit", "launches", "chain", "MB", "items/M", "threads", "here ms");
+        fmt::print(
+            "\n{}, {} keys, {} bits: hierarchy and boxes\n{:<18} {:>8} {:>7} {:>9} {:>9} {:>7} "
+            "{:>9}",
+            scene, grouped(keys), bits, "builder+fit", "launches", "chain", "MB", "items/M",
+            "threads", "here ms");
         fmt::print(" {:>9} {:>7}", "predicted", "error");
         for (const LaunchMachine& m : machines_)
-            fmt::print(" | {:>9} {:>9} {:>6}", m.name, fmt::format("x{:g}", options_.factors.back()), "speed");
+            fmt::print(" | {:>9} {:>9} {:>6}", m.name,
+                       fmt::format("x{:g}", options_.factors.back()), "speed");
         fmt::print("\n");
     }
 
@@ -138,8 +147,9 @@ private:
         std::uint64_t chain = 0;
         for (const LaunchFigures& l : run.launches) chain += l.longest_chain;
         const double predicted = predicted_ms(run, here_.at(threads)), measured = run.measured_ms();
-        fmt::print("{:<18} {:>8} {:>7} {:>9.1f} {:>9.2f} {:>7} {:>9.3f} {:>9.3f} {:>+6.0f}%", variant.name(),
-                   run.launches.size(), chain, double(sum_of(run, &LaunchFigures::bytes)) / 1e6,
+        fmt::print("{:<18} {:>8} {:>7} {:>9.1f} {:>9.2f} {:>7} {:>9.3f} {:>9.3f} {:>+6.0f}%",
+                   variant.name(), run.launches.size(), chain,
+                   double(sum_of(run, &LaunchFigures::bytes)) / 1e6,
                    double(sum_of(run, &LaunchFigures::items)) / 1e6, threads, measured, predicted,
                    100 * (predicted / measured - 1));
         for (const LaunchMachine& m : machines_) {
@@ -159,8 +169,9 @@ private:
                                          .max_leaf = options_.max_leaf,
                                          .fit = variant.fit,
                                          .threads = threads};
-                const HierarchyRun run =
-                    about(scene.name, [&] { return study_hierarchy(scene.mesh, build, options_.repeat); });
+                const HierarchyRun run = about(scene.name, [&] {
+                    return study_hierarchy(scene.mesh, build, options_.repeat);
+                });
                 note(scene, variant, run, threads, size_series);
                 if (!options_.common.prints_tables()) continue;
                 if (!headed) print_head(scene.name, run.keys, bits);
@@ -216,14 +227,17 @@ void add_bench_command(CLI::App& app) {
     bench->require_subcommand(1);
     auto options = std::make_shared<HierarchyBench>();
     CLI::App* command = bench->add_subcommand(
-        "hierarchy", "Builders of the LBVH family: launches, times here, times of simulated larger machines");
+        "hierarchy",
+        "Builders of the LBVH family: launches, times here, times of simulated larger machines");
     command->add_option("SCENE", options->scenes, "Scenes to study")->capture_default_str();
     command->add_option("--sizes", options->sizes, "Triangles of a soup, for times over sizes")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(CLI::Range(1, 100'000'000))
         ->capture_default_str();
-    command->add_option("--thread-counts", options->thread_counts, "Threads to measure with (default: 1, 2, 4, ...)")
+    command
+        ->add_option("--thread-counts", options->thread_counts,
+                     "Threads to measure with (default: 1, 2, 4, ...)")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(CLI::Range(1, 1024));
@@ -232,7 +246,8 @@ void add_bench_command(CLI::App& app) {
         ->allow_extra_args(false)
         ->check(CLI::IsMember({"karras", "apetrei", "garanzha", "lauterbach"}))
         ->capture_default_str();
-    command->add_option("--factors", options->factors, "Sizes of the simulated machines, in multiples")
+    command
+        ->add_option("--factors", options->factors, "Sizes of the simulated machines, in multiples")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(finite_number(false))

@@ -32,7 +32,8 @@ struct CopyItem {
     void operator()(std::uint32_t i) const { to[i] = from[i] + 1; }
 };
 
-/// A binary search: steps that compute an address, load, compare and branch on what nobody can foresee.
+/// A binary search: steps that compute an address, load, compare and branch on what nobody can
+/// foresee.
 struct Search {
     static constexpr std::uint32_t steps = 15;
     const std::uint32_t* sorted;  // [2^steps], ascending
@@ -74,7 +75,11 @@ double memory_latency_ns() {
     const std::vector<std::uint32_t> next = one_cycle(1u << 24);
     std::uint32_t out = 0;
     HostLauncher<> launcher;
-    return least_ms(5, [&] { launcher.launch("hop", 1, Hop{next.data(), hops, &out}); }) * 1e6 / hops;
+    return least_ms(5,
+                    [&] {
+                        launcher.launch("hop", 1, Hop{next.data(), hops, &out});
+                    }) *
+           1e6 / hops;
 }
 
 /// One thread's time for a step of a search in a table that the second-level cache holds.
@@ -86,8 +91,9 @@ double search_step_ns() {
     for (std::uint32_t& v : wanted) v = static_cast<std::uint32_t>(random());
     std::ranges::sort(sorted);
     HostLauncher<> launcher;
-    const double ms = least_ms(
-        5, [&] { launcher.launch("search", items, Search{sorted.data(), wanted.data(), out.data()}); });
+    const double ms = least_ms(5, [&] {
+        launcher.launch("search", items, Search{sorted.data(), wanted.data(), out.data()});
+    });
     return ms * 1e6 * thread_count() / (double(items) * Search::steps);
 }
 
@@ -127,21 +133,28 @@ double HierarchyRun::measured_ms() const {
 }
 
 std::vector<LaunchMachine> study_machines() {
-    // Instruction counts per item and step are estimates: an item computes an index, tests a bound and writes
-    // (some 20 instructions), a step computes an address, loads, compares and branches (some 12).
+    // Instruction counts per item and step are estimates: an item computes an index, tests a bound
+    // and writes (some 20 instructions), a step computes an address, loads, compares and branches
+    // (some 12).
     constexpr double item_instructions = 20, step_instructions = 12;
     const auto machine = [&](const char* name, double cores, double clock_ghz, double gb_per_s,
                              double latency_ns, double launch_us, const char* origin) {
-        return LaunchMachine{name,     cores,      item_instructions / clock_ghz,
+        return LaunchMachine{name,
+                             cores,
+                             item_instructions / clock_ghz,
                              step_instructions / clock_ghz,
-                             gb_per_s, latency_ns, launch_us,
+                             gb_per_s,
+                             latency_ns,
+                             launch_us,
                              origin};
     };
     return {machine("gtx480", 480, 1.401, 177, 430, 5,
-                    "cores, clock and bandwidth: Karras 2012; 600 clocks of memory latency, 5 us a launch, 20 "
+                    "cores, clock and bandwidth: Karras 2012; 600 clocks of memory latency, 5 us a "
+                    "launch, 20 "
                     "instructions an item and 12 a step: estimates"),
             machine("h200", 132 * 128, 1.98, 4800, 350, 2.5,
-                    "cores, clock and bandwidth: data sheet; 700 clocks of memory latency, 2.5 us a launch, 20 "
+                    "cores, clock and bandwidth: data sheet; 700 clocks of memory latency, 2.5 us "
+                    "a launch, 20 "
                     "instructions an item and 12 a step: estimates")};
 }
 
@@ -154,21 +167,26 @@ LaunchMachine measure_this_machine(int threads) {
         std::vector<std::uint32_t> from(std::size_t{1} << 16), to(from.size());
         constexpr int empty_launches = 200;
         const auto small = static_cast<std::uint32_t>(2048 * thread_count());
-        machine.launch_us = 1e3 / empty_launches * least_ms(5, [&] {
-            for (int k = 0; k < empty_launches; ++k)
-                launcher.launch("empty", small, CopyItem{from.data(), to.data()});
-        });
+        machine.launch_us =
+            1e3 / empty_launches * least_ms(5, [&] {
+                for (int k = 0; k < empty_launches; ++k)
+                    launcher.launch("empty", small, CopyItem{from.data(), to.data()});
+            });
         const auto n = static_cast<std::uint32_t>(from.size());
-        const double copy_ms =
-            least_ms(9, [&] { launcher.launch("copy", n, CopyItem{from.data(), to.data()}); });
+        const double copy_ms = least_ms(9, [&] {
+            launcher.launch("copy", n, CopyItem{from.data(), to.data()});
+        });
         machine.item_ns =
             std::max(0.05, (copy_ms * 1e6 - machine.launch_us * 1e3) * machine.lanes / n);
-        machine.launch_us = std::max(0.0, machine.launch_us - small * machine.item_ns * 1e-3 / machine.lanes);
+        machine.launch_us =
+            std::max(0.0, machine.launch_us - small * machine.item_ns * 1e-3 / machine.lanes);
         machine.step_ns = search_step_ns();
         machine.latency_ns = memory_latency_ns();
         machine.bytes_per_ns = triad_bytes_per_ns();
-        machine.origin = "measured: empty launches, a copy of 65,536 words, binary searches in 128 KB, a chain of "
-                         "loads in 64 MB, triad of 192 MB";
+        machine.origin =
+            "measured: empty launches, a copy of 65,536 words, binary searches in 128 KB, a chain "
+            "of "
+            "loads in 64 MB, triad of 192 MB";
     });
     return machine;
 }
