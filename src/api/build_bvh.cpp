@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "api/build_clusters.h"
 #include "base/check.h"
 #include "exec/memory.h"
 #include "exec/parallel.h"
@@ -25,6 +26,7 @@ struct BvhBuilder::Scratch {
     SortScratch<std::uint64_t> sort63;
     HierarchyScratch hierarchy;
     Buffer<std::uint8_t> meeting;
+    ClusterScratch clusters;
 };
 
 namespace {
@@ -53,6 +55,7 @@ std::uint64_t bytes_held(const Scratch& s, const BvhAccess& tree) {
                s.sort63.records, s.sort63.spare, s.sort63.histogram, s.hierarchy.prefixes,
                s.hierarchy.kept_bits, s.hierarchy.kept_before, s.hierarchy.parent_slot,
                s.hierarchy.memory, s.meeting) +
+           s.clusters.capacity_bytes() +
            sum(tree.nodes(), tree.order(), tree.triangles(), tree.boxes(), tree.points());
 }
 
@@ -119,6 +122,13 @@ struct BuildRun {
         sort_keys(codes, tree.order().span(), key_bits, sort_scratch_of<Key>(scratch));
         tree.order().reset(valid);
         ms.sort = stage.lap();
+
+        if (grows_clusters(options.builder)) {
+            build_clusters(source, scratch.clusters, tree, copies, ms);
+            ms.total = total.lap();
+            tree.build_ms() = ms;
+            return;
+        }
 
         const std::span<const Key> keys = codes.first(valid);
         tree.inner_count() = build_hierarchy(options.builder, keys, options.max_leaf, tree.nodes(),

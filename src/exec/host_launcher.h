@@ -1,14 +1,16 @@
-// Runs a builder's launches on the CPU, one parallel loop each. A builder written against a launcher is one
-// text for all backends:
+// Runs a builder's launches on the CPU, one parallel loop each. A builder written against a
+// launcher is one text for all backends:
 //
 //   launch(label, n, work)                   work(i) for i in [0, n), any order
-//   launch_counted(label, count, limit, work)   the same for i in [0, *count), *count <= limit, written by an
+//   launch_counted(label, count, limit, work)   the same for i in [0, *count), *count <= limit,
+//   written by an
 //                                            earlier launch: the host of a GPU does not know it
-//   exclusive_scan(label, values, n, total)  each value becomes the sum of those before it; *total, if not
+//   exclusive_scan(label, values, n, total)  each value becomes the sum of those before it; *total,
+//   if not
 //                                            null, the sum of all
 //   sort_pairs(label, arrays, limit, count, key_bits)   the first *count pairs by key, stable
-//   maybe_any(count)                         false if *count is known to be 0; a GPU's host knows nothing
-//   Probe                                    what counted functors report to (base/probe.h)
+//   maybe_any(count)                         false if *count is known to be 0; a GPU's host knows
+//   nothing Probe                                    what counted functors report to (base/probe.h)
 //
 // All pointers are to the launcher's memory. Launches see the results of the launches before them.
 #pragma once

@@ -12,8 +12,10 @@ template <class Key>
 std::uint32_t build_hierarchy(Builder builder, std::span<const Key> keys, int max_leaf,
                               Buffer<BvhNode>& nodes, HierarchyScratch& scratch) {
     switch (builder) {
-        case Builder::karras: return build_karras(keys, max_leaf, nodes, scratch);
-        default: break;
+        case Builder::karras:
+            return build_karras(keys, max_leaf, nodes, scratch);
+        default:
+            break;
     }
     throw InputError("builder " + std::string(builder_name(builder)) + " does not run here");
 }

@@ -1,5 +1,5 @@
-// Sorted codes [n] -> links of the node array and parent slots, by any builder of the LBVH family. Boxes are
-// fitted after.
+// Sorted codes [n] -> links of the node array and parent slots, by any builder of the LBVH family.
+// Boxes are fitted after.
 #pragma once
 
 #include <raydix/buffer.h>
@@ -19,8 +19,9 @@ struct HierarchyScratch {
     Buffer<std::byte> memory;           // of builders that run as launches (exec/arena.h)
 };
 
-/// keys: sorted, at least one. Fills nodes [2 * inner + 2] but for the boxes, and scratch.parent_slot [inner];
-/// returns the number of inner nodes. Subtrees of up to max_leaf keys become leaves.
+/// keys: sorted, at least one. Fills nodes [2 * inner + 2] but for the boxes, and
+/// scratch.parent_slot [inner]; returns the number of inner nodes. Subtrees of up to max_leaf keys
+/// become leaves.
 template <class Key>
 std::uint32_t build_hierarchy(Builder builder, std::span<const Key> keys, int max_leaf,
                               Buffer<BvhNode>& nodes, HierarchyScratch& scratch);
