@@ -1,11 +1,13 @@
-// What does a better tree cost, and what is it worth? ploc and hploc against Embree's binned SAH builder, in
-// one process, in turn (A B A B ...), every peer with memory of its own that it keeps from build to build:
-//   embree_tree    rtcBuildBVH, quality MEDIUM, two children a node, same leaf limit, costs 1 and 1; filling
+// What does a better tree cost, and what is it worth? ploc and hploc against Embree's binned SAH
+// builder, in one process, in turn (A B A B ...), every peer with memory of its own that it keeps
+// from build to build:
+//   embree_tree    rtcBuildBVH, quality MEDIUM, two children a node, same leaf limit, costs 1 and
+//   1; filling
 //                  its array of boxes is not in its time
 //   embree_scene   commit of a MEDIUM scene whose vertices all moved
-// raydix's times run from vertices and indices to a tree that can be traced. SAH is computed by tree_stats for
-// all trees; rays go through all trees by raydix's scalar kernel. JSON lines on standard output, a table on
-// standard error.
+// raydix's times run from vertices and indices to a tree that can be traced. SAH is computed by
+// tree_stats for all trees; rays go through all trees by raydix's scalar kernel. JSON lines on
+// standard output, a table on standard error.
 #include <fmt/format.h>
 #include <raydix/check.h>
 #include <raydix/machine.h>

@@ -1,5 +1,5 @@
-// Embree's binary tree over our boxes, built through its callbacks, and the same tree as a Bvh, so that one
-// kernel traces both and one function computes SAH for both.
+// Embree's binary tree over our boxes, built through its callbacks, and the same tree as a Bvh, so
+// that one kernel traces both and one function computes SAH for both.
 #pragma once
 
 #include <embree3/rtcore.h>
@@ -24,10 +24,9 @@ public:
           bvh_(rtcNewBVH(device_)) {
         for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
             const Triangle& t = mesh.triangles[i];
-            const Aabb b =
-                box_of(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
-            primitives_.push_back({b.lo.x, b.lo.y, b.lo.z, 0, b.hi.x, b.hi.y, b.hi.z,
-                                   static_cast<unsigned>(i)});
+            const Aabb b = box_of(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
+            primitives_.push_back(
+                {b.lo.x, b.lo.y, b.lo.z, 0, b.hi.x, b.hi.y, b.hi.z, static_cast<unsigned>(i)});
         }
         work_.resize(primitives_.size());
     }
@@ -78,8 +77,8 @@ public:
             const Waiting at = waiting.back();
             waiting.pop_back();
             deepest = std::max(deepest, at.depth);
-            const auto first = static_cast<std::uint32_t>(at.node->count != 0 ? order.size()
-                                                                              : nodes.size());
+            const auto first =
+                static_cast<std::uint32_t>(at.node->count != 0 ? order.size() : nodes.size());
             const Aabb& box = at.node->count != 0 ? at.node->box[0] : at.node->both();
             nodes[at.slot] = {box.lo, first, box.hi, at.node->count};
             if (at.node->count != 0) {
@@ -119,8 +118,8 @@ private:
                                                 {b.upper_x, b.upper_y, b.upper_z}};
         }
     }
-    static void* create_leaf(RTCThreadLocalAllocator allocator,
-                             const RTCBuildPrimitive* primitives, std::size_t count, void*) {
+    static void* create_leaf(RTCThreadLocalAllocator allocator, const RTCBuildPrimitive* primitives,
+                             std::size_t count, void*) {
         auto* node = static_cast<Node*>(rtcThreadLocalAlloc(allocator, sizeof(Node), 16));
         node->count = static_cast<unsigned>(count);
         node->box[0] = empty_box();

@@ -1,5 +1,5 @@
-// The builders that grow a tree from clusters: sorted order -> clusters -> nodes -> leaf copies. Bounds, codes
-// and sort are those of build_bvh.cpp.
+// The builders that grow a tree from clusters: sorted order -> clusters -> nodes -> leaf copies.
+// Bounds, codes and sort are those of build_bvh.cpp.
 #pragma once
 
 #include <utility>
@@ -26,8 +26,8 @@ struct ClusterScratch {
     }
 };
 
-/// tree.order() holds the ids of the valid primitives, at least one, in Morton order; on return all arrays of
-/// the tree are complete, and ms.hierarchy, ms.fit and ms.layout are written.
+/// tree.order() holds the ids of the valid primitives, at least one, in Morton order; on return all
+/// arrays of the tree are complete, and ms.hierarchy, ms.fit and ms.layout are written.
 template <class Source, class Copy>
 void build_clusters(const Source& source, ClusterScratch& scratch, const BvhAccess& tree,
                     Buffer<Copy>& copies, BuildMs& ms) {

@@ -1,5 +1,5 @@
-// Four floats side by side for the host's hot loops over arrays: each lane does the plain operation, so the
-// bits are those of scalar code. Processors without SSE take the loop.
+// Four floats side by side for the host's hot loops over arrays: each lane does the plain
+// operation, so the bits are those of scalar code. Processors without SSE take the loop.
 #pragma once
 
 #include <array>

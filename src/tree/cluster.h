@@ -1,6 +1,7 @@
-// The binary tree that agglomerative builders grow from primitives up: what two clusters become when they
-// merge, and which pair is the better one. Meister and Bittner 2018, "Parallel Locally-Ordered Clustering
-// for BVH Construction"; leaves by SAH are decided here too, because a merge knows all it takes.
+// The binary tree that agglomerative builders grow from primitives up: what two clusters become
+// when they merge, and which pair is the better one. Meister and Bittner 2018, "Parallel
+// Locally-Ordered Clustering for BVH Construction"; leaves by SAH are decided here too, because a
+// merge knows all it takes.
 #pragma once
 
 #include <raydix/types.h>
@@ -12,8 +13,8 @@
 
 namespace raydix {
 
-/// A cluster's name: a merged one by its place among ClusterNodes, a primitive by its place in Morton order,
-/// with the highest bit set.
+/// A cluster's name: a merged one by its place among ClusterNodes, a primitive by its place in
+/// Morton order, with the highest bit set.
 using ClusterRef = std::uint32_t;
 inline constexpr ClusterRef primitive_cluster = 0x80000000u;
 
@@ -21,11 +22,11 @@ RAYDIX_HD inline bool is_primitive(ClusterRef ref) { return (ref & primitive_clu
 
 /// What a subtree is worth to its parent.
 struct ClusterSum {
-    std::uint32_t count;    // primitives
-    std::uint32_t inner;    // inner nodes that the finished tree keeps; 0: one leaf
-    std::uint32_t height;   // edges down to its deepest leaf
-    std::uint32_t least;    // its smallest primitive id
-    float cost;             // SAH times the root's area; written only where count <= max_leaf
+    std::uint32_t count;   // primitives
+    std::uint32_t inner;   // inner nodes that the finished tree keeps; 0: one leaf
+    std::uint32_t height;  // edges down to its deepest leaf
+    std::uint32_t least;   // its smallest primitive id
+    float cost;            // SAH times the root's area; written only where count <= max_leaf
 };
 
 /// A merged cluster, in one cache line. The left child holds the smallest primitive id.
@@ -48,8 +49,8 @@ RAYDIX_HD inline ClusterSum sum_of_primitive(std::uint32_t primitive_id, const A
     return {1, 0, 0, primitive_id, cluster_area(box)};
 }
 
-/// Costs are 1 per inner node and 1 per primitive: a subtree of up to max_leaf primitives becomes a leaf if
-/// that costs no more.
+/// Costs are 1 per inner node and 1 per primitive: a subtree of up to max_leaf primitives becomes a
+/// leaf if that costs no more.
 RAYDIX_HD inline ClusterSum merge_sums(const ClusterSum& a, const ClusterSum& b, float area,
                                        std::uint32_t max_leaf) {
     ClusterSum sum;
@@ -85,9 +86,10 @@ RAYDIX_HD inline ClusterNode merge_clusters(const ClusterPart& a, const ClusterP
             merge_sums(a.sum, b.sum, cluster_area(box), max_leaf)};
 }
 
-/// Of the pairs (i - d, i) and (i, i + d) with equal areas, whether i takes the right one. The choice is the
-/// pair's own, the same from both ends: pairs that tie and share a cluster differ in the lowest set bit of d
-/// at their first position. So some pair always merges, and equal boxes pair up and halve in each round.
+/// Of the pairs (i - d, i) and (i, i + d) with equal areas, whether i takes the right one. The
+/// choice is the pair's own, the same from both ends: pairs that tie and share a cluster differ in
+/// the lowest set bit of d at their first position. So some pair always merges, and equal boxes
+/// pair up and halve in each round.
 RAYDIX_HD inline bool tie_goes_right(std::uint32_t i, std::uint32_t d) {
     return (i & (d & (0u - d))) == 0;
 }

@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::int64_t halo = max_radius + 4;
 
-/// Areas of the unions of i and i + d, and the nearest of each i, over one block and what lies around it.
-/// Places are counted from `origin`, 2 radii before the block.
+/// Areas of the unions of i and i + d, and the nearest of each i, over one block and what lies
+/// around it. Places are counted from `origin`, 2 radii before the block.
 class BlockSearch {
 public:
     BlockSearch(const BoxLanes& boxes, std::int64_t origin, std::uint32_t radius)
@@ -59,7 +59,7 @@ private:
     };
     /// tie_goes_right of four places, by the lowest set bit of d.
     struct TieMasks {
-        std::array<Mask4, 6> by_bit;
+        std::array<Mask4, 5> by_bit;
         explicit TieMasks(std::uint32_t i) {
             for (std::uint32_t b = 0; b < by_bit.size(); ++b) {
                 std::array<std::uint32_t, 4> lanes;

@@ -1,6 +1,7 @@
 #include "tree/place_clusters.h"
 
 #include <algorithm>
+#include <array>
 #include <vector>
 
 #include "exec/parallel.h"
@@ -68,7 +69,8 @@ private:
         }
     }
 
-    /// Writes the two children of an inner node; those that are inner nodes have theirs yet to come.
+    /// Writes the two children of an inner node; those that are inner nodes have theirs yet to
+    /// come.
     void place(const Placed& at, std::vector<Placed>& waiting) {
         const ClusterNode& node = tree_.nodes[at.ref];
         BvhNode* pair = nodes_ + pair_slot(at.rank);
@@ -84,10 +86,17 @@ private:
     }
 
     void child(BvhNode& out, const Placed& at, std::vector<Placed>& waiting) {
-        if (is_primitive(at.ref) || tree_.nodes[at.ref].sum.inner == 0) return leaf(out, at.ref, at.first);
+        if (is_primitive(at.ref) || tree_.nodes[at.ref].sum.inner == 0)
+            return leaf(out, at.ref, at.first);
         const ClusterNode& node = tree_.nodes[at.ref];
         out = {node.lo, pair_slot(at.rank), node.hi, 0};
+        prefetch(node.left);
+        prefetch(node.right);
         waiting.push_back(at);
+    }
+
+    void prefetch(ClusterRef ref) const {
+        if (!is_primitive(ref)) __builtin_prefetch(&tree_.nodes[ref]);
     }
 
     void list_primitives(ClusterRef top, std::uint32_t* out) {

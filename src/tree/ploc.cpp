@@ -34,8 +34,8 @@ std::size_t PlocScratch::capacity_bytes() const {
 
 namespace {
 
-/// A round that merges fewer than one cluster in this many is followed by one that pairs neighbours whatever
-/// their areas: slowly growing boxes would else merge a pair a round.
+/// A round that merges fewer than one cluster in this many is followed by one that pairs neighbours
+/// whatever their areas: slowly growing boxes would else merge a pair a round.
 constexpr std::uint32_t slow_round = 16;
 /// Lists this short may take as many rounds as they like.
 constexpr std::uint32_t short_list = 1024;
@@ -83,22 +83,21 @@ private:
 
     /// Fills partners and the number of merges before each block; returns how many there are.
     std::uint32_t choose_partners(const BoxLanes& boxes, bool pair_neighbours) {
-        const std::uint32_t radius =
-            count_ <= options_.late_count ? options_.late_radius : options_.radius;
         std::int8_t* partners = scratch_.partners.data();
         const std::size_t blocks = (count_ + partner_block - 1) / partner_block;
         scratch_.block_sums.reset(blocks);
-        for_each_block(count_, partner_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
-            if (pair_neighbours) {
-                for (std::size_t i = begin; i < end; ++i)
-                    partners[i] = (i ^ 1) < count_ ? (i % 2 == 0 ? 1 : -1) : 0;
-            } else {
-                find_partners(boxes, static_cast<std::uint32_t>(begin),
-                              static_cast<std::uint32_t>(end), radius, partners);
-            }
-            scratch_.block_sums[b] = static_cast<std::uint32_t>(
-                std::count_if(partners + begin, partners + end, [](auto p) { return p > 0; }));
-        });
+        for_each_block(
+            count_, partner_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
+                if (pair_neighbours) {
+                    for (std::size_t i = begin; i < end; ++i)
+                        partners[i] = (i ^ 1) < count_ ? (i % 2 == 0 ? 1 : -1) : 0;
+                } else {
+                    find_partners(boxes, static_cast<std::uint32_t>(begin),
+                                  static_cast<std::uint32_t>(end), options_.radius, partners);
+                }
+                scratch_.block_sums[b] = static_cast<std::uint32_t>(
+                    std::count_if(partners + begin, partners + end, [](auto p) { return p > 0; }));
+            });
         std::uint32_t before = 0;
         for (std::size_t b = 0; b < blocks; ++b) {
             const std::uint32_t own = scratch_.block_sums[b];
@@ -108,36 +107,38 @@ private:
         return before;
     }
 
-    /// Writes a node per pair that merges, and the list of what is left, in order. A merged cluster takes the
-    /// left place.
+    /// Writes a node per pair that merges, and the list of what is left, in order. A merged cluster
+    /// takes the left place.
     void merge_partners(const From& from, ClusterList& next) {
         const std::int8_t* partners = scratch_.partners.data();
-        for_each_block(count_, partner_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
-            std::uint32_t merge = scratch_.block_sums[b];
-            // A pair vanishes from the list at its right place: one that reaches into this block is still due.
-            std::uint32_t at = static_cast<std::uint32_t>(begin) - merge + crossing(begin);
-            for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
-                if (partners[i] < 0) continue;
-                const ClusterRef ref = ref_at(from, i);
-                const Aabb box = from.boxes.get(i);
-                if (partners[i] == 0) {
-                    next.boxes.set(at, box);
-                    next.refs[at] = ref;
-                } else {
-                    const std::uint32_t j = i + static_cast<std::uint32_t>(partners[i]);
-                    const ClusterRef other = ref_at(from, j);
-                    const Aabb other_box = from.boxes.get(j);
-                    const std::uint32_t node_index = nodes_ + merge++;
-                    const ClusterNode node =
-                        merge_clusters({ref, box, sum_of(ref, box)},
-                                       {other, other_box, sum_of(other, other_box)}, max_leaf_);
-                    scratch_.nodes[node_index] = node;
-                    next.boxes.set(at, {node.lo, node.hi});
-                    next.refs[at] = node_index;
+        for_each_block(
+            count_, partner_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
+                std::uint32_t merge = scratch_.block_sums[b];
+                // A pair vanishes from the list at its right place: one that reaches into this
+                // block is still due.
+                std::uint32_t at = static_cast<std::uint32_t>(begin) - merge + crossing(begin);
+                for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
+                    if (partners[i] < 0) continue;
+                    const ClusterRef ref = ref_at(from, i);
+                    const Aabb box = from.boxes.get(i);
+                    if (partners[i] == 0) {
+                        next.boxes.set(at, box);
+                        next.refs[at] = ref;
+                    } else {
+                        const std::uint32_t j = i + static_cast<std::uint32_t>(partners[i]);
+                        const ClusterRef other = ref_at(from, j);
+                        const Aabb other_box = from.boxes.get(j);
+                        const std::uint32_t node_index = nodes_ + merge++;
+                        const ClusterNode node =
+                            merge_clusters({ref, box, sum_of(ref, box)},
+                                           {other, other_box, sum_of(other, other_box)}, max_leaf_);
+                        scratch_.nodes[node_index] = node;
+                        next.boxes.set(at, {node.lo, node.hi});
+                        next.refs[at] = node_index;
+                    }
+                    ++at;
                 }
-                ++at;
-            }
-        });
+            });
     }
 
     /// How many pairs have their left cluster before `begin` and their right one not.

@@ -1,6 +1,7 @@
-// Parallel locally-ordered clustering: primitives in Morton order are clusters; in each round every cluster
-// looks for its nearest neighbour a few places left and right, and those that chose each other merge (Meister
-// and Bittner 2018; the search that computes each pair once follows Benthin et al. 2022, "PLOC++").
+// Parallel locally-ordered clustering: primitives in Morton order are clusters; in each round every
+// cluster looks for its nearest neighbour a few places left and right, and those that chose each
+// other merge (Meister and Bittner 2018; the search that computes each pair once follows Benthin et
+// al. 2022, "PLOC++").
 #pragma once
 
 #include <raydix/buffer.h>
@@ -13,8 +14,8 @@
 
 namespace raydix {
 
-/// Boxes as six arrays, lo x y z hi x y z, with boxes of infinite area on both sides, so that searches need
-/// not know where the list ends.
+/// Boxes as six arrays, lo x y z hi x y z, with boxes of infinite area on both sides, so that
+/// searches need not know where the list ends.
 class BoxLanes {
 public:
     static constexpr std::uint32_t margin = 128;
@@ -44,9 +45,9 @@ private:
 };
 
 struct PlocOptions {
-    std::uint32_t radius = 16;       // places to search on each side, up to max_radius
-    std::uint32_t late_radius = 32;  // the same once at most `late_count` clusters are left
-    std::uint32_t late_count = 65536;
+    /// Places to search on each side, up to max_radius. More costs time in proportion and hardly
+    /// changes SAH (docs/algorithms/ploc.md).
+    std::uint32_t radius = 8;
 };
 
 /// A list of clusters in Morton order.
@@ -57,17 +58,17 @@ struct ClusterList {
 
 /// Memory kept from one build to the next.
 struct PlocScratch {
-    BoxLanes primitives;                // [n], the caller fills them in Morton order
-    std::array<ClusterList, 2> lists;   // of one round and the next
-    Buffer<ClusterNode> nodes;          // [n - 1] after a build
+    BoxLanes primitives;               // [n], the caller fills them in Morton order
+    std::array<ClusterList, 2> lists;  // of one round and the next
+    Buffer<ClusterNode> nodes;         // [n - 1] after a build
     Buffer<std::int8_t> partners;
     Buffer<std::uint32_t> block_sums;
 
     [[nodiscard]] std::size_t capacity_bytes() const;
 };
 
-/// scratch.primitives [n], n >= 1, and their ids [n] in Morton order -> scratch.nodes [n - 1], children before
-/// parents. Returns the root, which is a primitive if n = 1.
+/// scratch.primitives [n], n >= 1, and their ids [n] in Morton order -> scratch.nodes [n - 1],
+/// children before parents. Returns the root, which is a primitive if n = 1.
 ClusterRef build_ploc(std::span<const std::uint32_t> ids, std::uint32_t max_leaf,
                       PlocScratch& scratch, const PlocOptions& options = {});
 
