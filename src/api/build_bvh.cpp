@@ -123,14 +123,14 @@ struct BuildRun {
         tree.order().reset(valid);
         ms.sort = stage.lap();
 
+        const std::span<const Key> keys = codes.first(valid);
         if (grows_clusters(options.builder)) {
-            build_clusters(source, scratch.clusters, tree, copies, ms);
+            build_clusters(source, keys, scratch.clusters, tree, copies, ms);
             ms.total = total.lap();
             tree.build_ms() = ms;
             return;
         }
 
-        const std::span<const Key> keys = codes.first(valid);
         tree.inner_count() = build_hierarchy(options.builder, keys, options.max_leaf, tree.nodes(),
                                              scratch.hierarchy);
         ms.hierarchy = stage.lap();

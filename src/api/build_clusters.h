@@ -7,6 +7,7 @@
 #include "layout/leaf_order.h"
 #include "measure/stopwatch.h"
 #include "primitives/host_box.h"
+#include "tree/build_hploc.h"
 #include "tree/bvh_access.h"
 #include "tree/place_clusters.h"
 #include "tree/ploc.h"
@@ -20,17 +21,19 @@ namespace raydix {
 struct ClusterScratch {
     Buffer<std::uint32_t> ids;  // [n] in Morton order
     PlocScratch ploc;
+    HplocScratch hploc;
 
     [[nodiscard]] std::size_t capacity_bytes() const {
-        return ids.capacity_bytes() + ploc.capacity_bytes();
+        return ids.capacity_bytes() + ploc.capacity_bytes() + hploc.capacity_bytes();
     }
 };
 
-/// tree.order() holds the ids of the valid primitives, at least one, in Morton order; on return all
-/// arrays of the tree are complete, and ms.hierarchy, ms.fit and ms.layout are written.
-template <class Source, class Copy>
-void build_clusters(const Source& source, ClusterScratch& scratch, const BvhAccess& tree,
-                    Buffer<Copy>& copies, BuildMs& ms) {
+/// `keys`: the sorted codes of the valid primitives, at least one; they may lie in the memory of
+/// `copies`. tree.order() holds their ids, in Morton order; on return all arrays of the tree are
+/// complete, and ms.hierarchy, ms.fit and ms.layout are written.
+template <class Key, class Source, class Copy>
+void build_clusters(const Source& source, std::span<const Key> keys, ClusterScratch& scratch,
+                    const BvhAccess& tree, Buffer<Copy>& copies, BuildMs& ms) {
     Stopwatch stage;
     std::swap(scratch.ids, tree.order());
     const std::span<const std::uint32_t> ids = scratch.ids.view();
@@ -49,7 +52,10 @@ void build_clusters(const Source& source, ClusterScratch& scratch, const BvhAcce
         }
     });
     const auto max_leaf = static_cast<std::uint32_t>(tree.options().max_leaf);
-    const ClusterRef root = build_ploc(ids, max_leaf, scratch.ploc);
+    const ClusterRef root =
+        tree.options().builder == Builder::hploc
+            ? build_hploc(keys, ids, boxes, max_leaf, scratch.ploc.nodes, scratch.hploc)
+            : build_ploc(ids, max_leaf, scratch.ploc);
     ms.hierarchy = stage.lap();
 
     tree.inner_count() = place_clusters({scratch.ploc.nodes.data(), root, boxes, ids}, tree.nodes(),

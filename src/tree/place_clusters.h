@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <span>
 
+#include "tree/box_lanes.h"
 #include "tree/cluster.h"
-#include "tree/ploc.h"
 
 namespace raydix {
 

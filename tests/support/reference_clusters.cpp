@@ -54,11 +54,11 @@ struct Forest {
         return all.size() - 1;
     }
 
-    /// The place that i prefers: least area of the union, then nearest in the list; of two as near as each
-    /// other, the one whose pair begins at an even multiple of the distance's lowest bit.
+    /// The place that i prefers: least area of the union, then nearest in the list; of two as near
+    /// as each other, the one whose pair begins at an even multiple of the distance's lowest bit.
     std::size_t nearest(const List& list, std::size_t i) const {
-        auto best = std::tuple(std::numeric_limits<float>::infinity(), std::size_t{0},
-                               std::size_t{0}, i);
+        auto best =
+            std::tuple(std::numeric_limits<float>::infinity(), std::size_t{0}, std::size_t{0}, i);
         for (std::size_t j = i > radius ? i - radius : 0; j < list.size() && j <= i + radius; ++j) {
             if (j == i) continue;
             const std::size_t first = std::min(i, j), distance = std::max(i, j) - first;
@@ -126,8 +126,7 @@ std::vector<Item> items_in_order(std::span<const Aabb> input, int bits) {
 
 /// Everything around the clustering itself, which gets the forest of primitives in Morton order.
 template <class Clustering>
-Bvh reference(std::span<const Aabb> boxes, const BuildOptions& options,
-              const Clustering& cluster) {
+Bvh reference(std::span<const Aabb> boxes, const BuildOptions& options, const Clustering& cluster) {
     const std::vector<Item> items = items_in_order(boxes, options.bits);
     Bvh bvh;
     const BvhAccess out{bvh};

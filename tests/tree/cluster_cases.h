@@ -40,7 +40,8 @@ inline std::vector<BoxInput> cluster_inputs(std::uint64_t seed) {
                           return Aabb{{1, 2, 3}, {2, 3, 4}};
                       })});
     inputs.push_back({"lattice", boxes(4096, [](std::size_t i) {
-                          const auto x = static_cast<float>(i % 16), y = static_cast<float>(i / 16 % 16),
+                          const auto x = static_cast<float>(i % 16),
+                                     y = static_cast<float>(i / 16 % 16),
                                      z = static_cast<float>(i / 256);
                           return Aabb{{x, y, z}, {x + 1, y + 1, z + 1}};
                       })});

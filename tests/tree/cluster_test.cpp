@@ -127,7 +127,8 @@ TEST_P(Clusters, AMillionEqualPointsGiveAShallowTree) {
     EXPECT_TRUE(check(tree).ok);
 }
 
-/// Gaps that grow by little: each point's nearest neighbour is the one before it, and only the first two agree.
+/// Gaps that grow by little: each point's nearest neighbour is the one before it, and only the
+/// first two agree.
 TEST_P(Clusters, SlowlyGrowingGapsDoNotTakeARoundPerPair) {
     const std::size_t n = 5'000 * thorough;
     std::vector<Vec3> points;
@@ -141,7 +142,7 @@ TEST_P(Clusters, SlowlyGrowingGapsDoNotTakeARoundPerPair) {
     EXPECT_LE(tree.max_depth(), 200u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Builders, Clusters, testing::Values(Builder::ploc),
+INSTANTIATE_TEST_SUITE_P(Builders, Clusters, testing::Values(Builder::ploc, Builder::hploc),
                          [](const auto& p) { return std::string(builder_name(p.param)); });
 
 }  // namespace
