@@ -1,6 +1,7 @@
-// Work that 32 lanes do together: what a lane keeps is a Var, and lanes speak to each other through ballots and
-// shuffles. HostWarp runs the lanes in a loop, CudaWarp is a warp of a GPU; one text serves both. All lanes take
-// part in every call: control flow around calls depends on uniform values only.
+// Work that 32 lanes do together: what a lane keeps is a Var, and lanes speak to each other through
+// ballots and shuffles. HostWarp runs the lanes in a loop, CudaWarp is a warp of a GPU; one text
+// serves both. All lanes take part in every call: control flow around calls depends on uniform
+// values only.
 #pragma once
 
 #include <array>

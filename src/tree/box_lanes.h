@@ -1,4 +1,5 @@
-// Boxes of clusters for searches that look at four places at once. [n] boxes, coordinate by coordinate.
+// Boxes of clusters for searches that look at four places at once. [n] boxes, coordinate by
+// coordinate.
 #pragma once
 
 #include <raydix/buffer.h>
@@ -20,6 +21,7 @@ public:
     void close(std::uint32_t count);
 
     [[nodiscard]] const float* lane(std::size_t k) const { return lanes_[k]; }
+    [[nodiscard]] float* lane(std::size_t k) { return lanes_[k]; }
     void set(std::uint32_t i, const Aabb& box) {
         lanes_[0][i] = box.lo.x;
         lanes_[1][i] = box.lo.y;

@@ -32,7 +32,7 @@ ClusterRef build_hploc(std::span<const Key> keys, std::span<const std::uint32_t>
     std::uint32_t claimed = 0;
     ClusterRef root = 0;
     const HplocArrays<Key, LaneBoxes> arrays{
-        {keys.data(), n}, ids.data(), {&boxes}, max_leaf, scratch.lists.data(),
+        {keys.data(), n},       ids.data(),   {&boxes}, max_leaf, scratch.lists.data(),
         scratch.meeting.data(), nodes.data(), &claimed, &root};
     const std::uint32_t warps = (n + warp_lanes - 1) / warp_lanes;
     for_each_index(

@@ -21,8 +21,8 @@ struct HplocScratch {
     }
 };
 
-/// Sorted keys [n], n >= 1, the ids [n] and boxes [n] of their primitives -> nodes [n - 1], numbered as the
-/// threads come by. Returns the root, which is a primitive if n = 1.
+/// Sorted keys [n], n >= 1, the ids [n] and boxes [n] of their primitives -> nodes [n - 1],
+/// numbered as the threads come by. Returns the root, which is a primitive if n = 1.
 template <class Key>
 ClusterRef build_hploc(std::span<const Key> keys, std::span<const std::uint32_t> ids,
                        const BoxLanes& boxes, std::uint32_t max_leaf, Buffer<ClusterNode>& nodes,

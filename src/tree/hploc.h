@@ -1,7 +1,8 @@
-// Locally-ordered clustering along the radix tree, in one pass (Benthin, Meister, Barczak, Mehalwal, Tsakok and
-// Kensler 2024, "H-PLOC"). Each lane of a warp climbs from a primitive as in Apetrei's builder; where a node with
-// more than half a warp of primitives is complete, the whole warp merges the lists of its children until half a
-// warp of clusters is left. What a node keeps depends on its children's lists alone.
+// Locally-ordered clustering along the radix tree, in one pass (Benthin, Meister, Barczak,
+// Mehalwal, Tsakok and Kensler 2024, "H-PLOC"). Each lane of a warp climbs from a primitive as in
+// Apetrei's builder; where a node with more than half a warp of primitives is complete, the whole
+// warp merges the lists of its children until half a warp of clusters is left. What a node keeps
+// depends on its children's lists alone.
 #pragma once
 
 #include <cstdint>
@@ -24,11 +25,11 @@ struct HplocArrays {
     const std::uint32_t* ids;  // [n] in Morton order
     Boxes boxes;               // [n] in Morton order
     std::uint32_t max_leaf;
-    ClusterRef* lists;        // [n], primitives before; a list begins where its primitives begin
-    std::uint32_t* meeting;   // [n - 1], zero before
-    ClusterNode* nodes;       // [n - 1], out
-    std::uint32_t* claimed;   // [1], zero before: how many nodes are taken
-    ClusterRef* root;         // [1], out
+    ClusterRef* lists;       // [n], primitives before; a list begins where its primitives begin
+    std::uint32_t* meeting;  // [n - 1], zero before
+    ClusterNode* nodes;      // [n - 1], out
+    std::uint32_t* claimed;  // [1], zero before: how many nodes are taken
+    ClusterRef* root;        // [1], out
 };
 
 /// Ends a list of fewer than hploc_list clusters that has room behind it.
@@ -111,7 +112,8 @@ private:
         return first_[lane] == 0 && last_[lane] == a_.keys.count - 1;
     }
 
-    /// To the parent, whose split lies on the side with the longer common prefix. The first child to come stops.
+    /// To the parent, whose split lies on the side with the longer common prefix. The first child
+    /// to come stops.
     RAYDIX_HD void climb(std::uint32_t lane) {
         const std::int64_t first = first_[lane], last = last_[lane];
         const bool left_child =
@@ -167,10 +169,9 @@ private:
         return list;
     }
 
-    /// How many lowest bits are set before the first that is not: what lies behind the end of a list is not its.
-    RAYDIX_HD static std::uint32_t leading_run(std::uint32_t half) {
-        return nth_set_bit(~half, 0);
-    }
+    /// How many lowest bits are set before the first that is not: what lies behind the end of a
+    /// list is not its.
+    RAYDIX_HD static std::uint32_t leading_run(std::uint32_t half) { return nth_set_bit(~half, 0); }
 
     /// One round: each cluster's nearest neighbour, mutual ones merge, the rest moves up.
     RAYDIX_HD Clusters merge_once(const Clusters& list) {
@@ -180,8 +181,8 @@ private:
         const auto mutual = [&](std::uint32_t lane) {
             return lane < list.count && nearest[lane] != lane && back[lane] == lane;
         };
-        const std::uint32_t merges = warp_.ballot(
-            [&](std::uint32_t lane) { return mutual(lane) && lane < nearest[lane]; });
+        const std::uint32_t merges =
+            warp_.ballot([&](std::uint32_t lane) { return mutual(lane) && lane < nearest[lane]; });
         const std::uint32_t rest = warp_.ballot([&](std::uint32_t lane) {
             return lane < list.count && !(mutual(lane) && lane > nearest[lane]);
         });
@@ -203,13 +204,14 @@ private:
             merged.set_box(lane, {node.lo, node.hi});
         });
         warp_.sync();
-        Clusters next = merged.taken_from(
-            warp_, [&](std::uint32_t lane) { return nth_set_bit(rest, lane); });
+        Clusters next =
+            merged.taken_from(warp_, [&](std::uint32_t lane) { return nth_set_bit(rest, lane); });
         next.count = ones(rest);
         return next;
     }
 
-    /// Per lane the lane with the least (area of the union, distance, tie_goes_right); its own if it is alone.
+    /// Per lane the lane with the least (area of the union, distance, tie_goes_right); its own if
+    /// it is alone.
     RAYDIX_HD Var<std::uint32_t> find_nearest(const Clusters& list) {
         Var<float> best;
         Var<std::uint32_t> nearest;

@@ -59,12 +59,12 @@ private:
         return tasks;
     }
 
+    /// Level by level, so that what a node asks for ahead has come when it is its turn.
     void place_subtree(const Placed& top) {
         std::vector<Placed> waiting{top};
-        waiting.reserve(std::size_t{tree_.nodes[top.ref].sum.height} + 1);
-        while (!waiting.empty()) {
-            const Placed at = waiting.back();
-            waiting.pop_back();
+        waiting.reserve(tree_.nodes[top.ref].sum.inner);
+        for (std::size_t next = 0; next < waiting.size(); ++next) {
+            const Placed at = waiting[next];
             place(at, waiting);
         }
     }

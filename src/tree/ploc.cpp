@@ -1,7 +1,7 @@
 #include "tree/ploc.h"
 
 #include <algorithm>
-#include <limits>
+#include <array>
 
 #include "exec/parallel.h"
 #include "tree/nearest_cluster.h"
@@ -94,35 +94,76 @@ private:
     /// Writes a node per pair that merges, and the list of what is left, in order. A merged cluster
     /// takes the left place.
     void merge_partners(const From& from, ClusterList& next) {
+        for_each_block(count_, partner_block,
+                       [&](std::size_t b, std::size_t begin, std::size_t end) {
+                           const Survivors block = find_survivors(static_cast<std::uint32_t>(begin),
+                                                                  static_cast<std::uint32_t>(end));
+                           const std::uint32_t node_base = scratch_.block_sums[b];
+                           // A pair vanishes from the list at its right place: one that reaches
+                           // into this block is still due.
+                           const std::uint32_t at =
+                               static_cast<std::uint32_t>(begin) - node_base + crossing(begin);
+                           copy_survivors(from, block, next, at);
+                           merge_pairs(from, block, next, {nodes_ + node_base, at});
+                       });
+    }
+
+    /// The places of a block that stay, and which of them merge, as positions in that list. Found
+    /// without a branch: nobody can guess which clusters merge.
+    struct Survivors {
+        std::array<std::uint32_t, partner_block + 1> places;
+        std::array<std::uint32_t, partner_block + 1> pairs;
+        std::uint32_t count = 0, pair_count = 0;
+    };
+    [[nodiscard]] Survivors find_survivors(std::uint32_t begin, std::uint32_t end) const {
         const std::int8_t* partners = scratch_.partners.data();
-        for_each_block(
-            count_, partner_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
-                std::uint32_t merge = scratch_.block_sums[b];
-                // A pair vanishes from the list at its right place: one that reaches into this
-                // block is still due.
-                std::uint32_t at = static_cast<std::uint32_t>(begin) - merge + crossing(begin);
-                for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
-                    if (partners[i] < 0) continue;
-                    const ClusterRef ref = ref_at(from, i);
-                    const Aabb box = from.boxes.get(i);
-                    if (partners[i] == 0) {
-                        next.boxes.set(at, box);
-                        next.refs[at] = ref;
-                    } else {
-                        const std::uint32_t j = i + static_cast<std::uint32_t>(partners[i]);
-                        const ClusterRef other = ref_at(from, j);
-                        const Aabb other_box = from.boxes.get(j);
-                        const std::uint32_t node_index = nodes_ + merge++;
-                        const ClusterNode node =
-                            merge_clusters({ref, box, sum_of(ref, box)},
-                                           {other, other_box, sum_of(other, other_box)}, max_leaf_);
-                        scratch_.nodes[node_index] = node;
-                        next.boxes.set(at, {node.lo, node.hi});
-                        next.refs[at] = node_index;
-                    }
-                    ++at;
-                }
-            });
+        Survivors s;
+        for (std::uint32_t i = begin; i < end; ++i) {
+            s.places[s.count] = i;
+            s.pairs[s.pair_count] = s.count;
+            s.pair_count += partners[i] > 0;
+            s.count += partners[i] >= 0;
+        }
+        return s;
+    }
+
+    static void copy_survivors(const From& from, const Survivors& block, ClusterList& next,
+                               std::uint32_t at) {
+        for (std::size_t c = 0; c < 6; ++c) {
+            const float* lane = from.boxes.lane(c);
+            float* out = next.boxes.lane(c) + at;
+            for (std::uint32_t k = 0; k < block.count; ++k) out[k] = lane[block.places[k]];
+        }
+        ClusterRef* out = next.refs.data() + at;
+        for (std::uint32_t k = 0; k < block.count; ++k) out[k] = ref_at(from, block.places[k]);
+    }
+
+    /// Where a block's nodes and its part of the next list begin.
+    struct BlockOutput {
+        std::uint32_t node_index, at;
+    };
+    void merge_pairs(const From& from, const Survivors& block, ClusterList& next,
+                     const BlockOutput& out) {
+        constexpr std::uint32_t ahead = 8;
+        const std::int8_t* partners = scratch_.partners.data();
+        const auto prefetch = [&](std::uint32_t i) {
+            const ClusterRef ref = ref_at(from, i);
+            if (!is_primitive(ref)) __builtin_prefetch(&scratch_.nodes[ref].sum);
+        };
+        for (std::uint32_t m = 0; m < block.pair_count; ++m) {
+            if (m + ahead < block.pair_count) {
+                const std::uint32_t i = block.places[block.pairs[m + ahead]];
+                prefetch(i);
+                prefetch(i + static_cast<std::uint32_t>(partners[i]));
+            }
+            const std::uint32_t i = block.places[block.pairs[m]];
+            const ClusterNode node = merge_clusters(
+                part(from, i), part(from, i + static_cast<std::uint32_t>(partners[i])), max_leaf_);
+            scratch_.nodes[out.node_index + m] = node;
+            const std::uint32_t at = out.at + block.pairs[m];
+            next.boxes.set(at, {node.lo, node.hi});
+            next.refs[at] = out.node_index + m;
+        }
     }
 
     /// How many pairs have their left cluster before `begin` and their right one not.
@@ -138,9 +179,12 @@ private:
     static ClusterRef ref_at(const From& from, std::uint32_t i) {
         return from.refs != nullptr ? from.refs[i] : primitive_cluster | i;
     }
-    [[nodiscard]] ClusterSum sum_of(ClusterRef ref, const Aabb& box) const {
-        return is_primitive(ref) ? sum_of_primitive(ids_[ref & ~primitive_cluster], box)
-                                 : scratch_.nodes[ref].sum;
+    [[nodiscard]] ClusterPart part(const From& from, std::uint32_t i) const {
+        const ClusterRef ref = ref_at(from, i);
+        const Aabb box = from.boxes.get(i);
+        return {ref, box,
+                is_primitive(ref) ? sum_of_primitive(ids_[ref & ~primitive_cluster], box)
+                                  : scratch_.nodes[ref].sum};
     }
 
     std::span<const std::uint32_t> ids_;
