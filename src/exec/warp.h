@@ -76,43 +76,60 @@ struct HostWarp {
 };
 
 #if defined(__CUDACC__)
+/// A warp of the device. Its functions do nothing in the host's pass of the compiler.
 struct CudaWarp {
-    static constexpr unsigned all = 0xFFFFFFFFu;
-
     template <class T>
     class Var {
     public:
-        __device__ T& operator[](std::uint32_t) { return value_; }
-        __device__ const T& operator[](std::uint32_t) const { return value_; }
+        RAYDIX_HD T& operator[](std::uint32_t) { return value_; }
+        RAYDIX_HD const T& operator[](std::uint32_t) const { return value_; }
 
     private:
         T value_{};
     };
 
-    __device__ static std::uint32_t lane() { return threadIdx.x % warp_lanes; }
-
+    RAYDIX_HD static std::uint32_t lane() {
+#if defined(__CUDA_ARCH__)
+        return threadIdx.x % warp_lanes;
+#else
+        return 0;
+#endif
+    }
     template <class Body>
-    __device__ void each(const Body& body) const {
+    RAYDIX_HD void each(const Body& body) const {
         body(lane());
+#if defined(__CUDA_ARCH__)
         __syncwarp();
+#endif
     }
     template <class Vote>
-    [[nodiscard]] __device__ std::uint32_t ballot(const Vote& vote) const {
-        return __ballot_sync(all, vote(lane()));
+    [[nodiscard]] RAYDIX_HD std::uint32_t ballot(const Vote& vote) const {
+        const bool yes = vote(lane());
+#if defined(__CUDA_ARCH__)
+        return __ballot_sync(0xFFFFFFFFu, yes);
+#else
+        return yes;
+#endif
     }
     template <class T, class Source>
-    [[nodiscard]] __device__ Var<T> shuffle(const Var<T>& from, const Source& source) const {
+    [[nodiscard]] RAYDIX_HD Var<T> shuffle(const Var<T>& from, const Source& source) const {
         Var<T> to;
-        to[0] = __shfl_sync(all, from[0], static_cast<int>(source(lane()) & 31));
+        to[0] = broadcast(from, source(lane()) & 31);
         return to;
     }
     template <class T>
-    [[nodiscard]] __device__ T broadcast(const Var<T>& from, std::uint32_t source) const {
-        return __shfl_sync(all, from[0], static_cast<int>(source));
+    [[nodiscard]] RAYDIX_HD T broadcast(const Var<T>& from, std::uint32_t source) const {
+#if defined(__CUDA_ARCH__)
+        return __shfl_sync(0xFFFFFFFFu, from[0], static_cast<int>(source));
+#else
+        return from[source];
+#endif
     }
-    __device__ void sync() const {
+    RAYDIX_HD void sync() const {
+#if defined(__CUDA_ARCH__)
         __threadfence();
         __syncwarp();
+#endif
     }
 };
 #endif
