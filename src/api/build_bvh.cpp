@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "api/build_clusters.h"
 #include "api/input_checks.h"
 #include "base/check.h"
 #include "exec/host_launcher.h"
@@ -31,6 +32,7 @@ struct BvhBuilder::Scratch {
     HierarchyScratch hierarchy;
     ClimbScratch apetrei;
     Buffer<std::uint8_t> meeting;
+    ClusterScratch clusters;
 };
 
 namespace {
@@ -61,6 +63,7 @@ std::uint64_t bytes_held(const Scratch& s, const BvhAccess& tree) {
                s.hierarchy.memory, s.hierarchy.level_memory, s.apetrei.prefixes,
                s.apetrei.kept_bits, s.apetrei.kept_before, s.apetrei.pieces, s.apetrei.piece_counts,
                s.meeting) +
+           s.clusters.capacity_bytes() +
            sum(tree.nodes(), tree.order(), tree.triangles(), tree.boxes(), tree.points());
 }
 
@@ -117,6 +120,13 @@ struct BuildRun {
         ms.sort = stage.lap();
 
         const std::span<const Key> keys = codes.first(valid);
+        if (grows_clusters(options.builder)) {
+            build_clusters(source, keys, scratch.clusters, tree, copies, ms);
+            ms.total = total.lap();
+            tree.build_ms() = ms;
+            return;
+        }
+
         tree.inner_count() = build_hierarchy(options.builder, keys, options.max_leaf, tree.nodes(),
                                              scratch.hierarchy);
         ms.hierarchy = stage.lap();
