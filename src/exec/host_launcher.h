@@ -6,7 +6,8 @@
 //                                            earlier launch: the host of a GPU does not know it
 //   exclusive_scan(label, values, n, total)  each value becomes the sum of those before it; *total, if not
 //                                            null, the sum of all
-//   sort_pairs(label, arrays, limit, count, key_bits)   the first *count pairs by key, stable
+//   sort_pairs(label, arrays, limit, count, key_bits)   the first *count pairs by key, stable; all `limit` if
+//                                            count is null
 //   maybe_any(count)                         false if *count is known to be 0; a GPU's host knows nothing
 //   Probe                                    what counted functors report to (base/probe.h)
 //
@@ -120,7 +121,7 @@ void HostLauncher<Probe_>::sort_pairs(const char* label, const SortArrays<Key>& 
                                       int key_bits) {
     static_assert(std::is_unsigned_v<Key>);
     constexpr std::size_t digits = 256, block = 1u << 14;
-    const std::uint32_t n = std::min(*count, limit);
+    const std::uint32_t n = count == nullptr ? limit : std::min(*count, limit);
     const std::size_t blocks = (n + block - 1) / block;
     Key* from_keys = a.keys;
     Key* to_keys = a.sorted_keys;
