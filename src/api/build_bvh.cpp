@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/check.h"
+#include "exec/host_launcher.h"
 #include "exec/memory.h"
 #include "exec/parallel.h"
 #include "keys/host_encode.h"
@@ -14,7 +15,9 @@
 #include "sort/radix_sort.h"
 #include "tree/bvh_access.h"
 #include "tree/fit.h"
+#include "tree/fit_levels.h"
 #include "tree/hierarchy.h"
+#include "tree/lbvh_family.h"
 
 namespace raydix {
 
@@ -52,7 +55,7 @@ std::uint64_t bytes_held(const Scratch& s, const BvhAccess& tree) {
     return sum(s.codes30, s.codes63, s.sort30.records, s.sort30.spare, s.sort30.histogram,
                s.sort63.records, s.sort63.spare, s.sort63.histogram, s.hierarchy.prefixes,
                s.hierarchy.kept_bits, s.hierarchy.kept_before, s.hierarchy.parent_slot,
-               s.hierarchy.memory, s.meeting) +
+               s.hierarchy.memory, s.hierarchy.level_memory, s.meeting) +
            sum(tree.nodes(), tree.order(), tree.triangles(), tree.boxes(), tree.points());
 }
 
@@ -172,6 +175,7 @@ private:
             tree.max_depth() = 0;
             return;
         }
+        if (fits_by_levels(options)) return fit_by_levels(leaf_box);
         scratch.meeting.reset(inner);
         std::uint8_t* meeting = scratch.meeting.data();
         for_each_range(inner, 1u << 16, [&](std::size_t begin, std::size_t end) {
@@ -182,6 +186,29 @@ private:
         for_each_index(inner,
                        [&](std::size_t rank) { fit_boxes(static_cast<std::uint32_t>(rank)); });
         RAYDIX_CHECK(tree.max_depth(), <=, static_cast<std::uint32_t>(options.bits) + 32);
+    }
+
+    /// The builder's levels if it made some, else those found from the root.
+    void fit_by_levels(const LeafBoxOf<Copy>& leaf_box) {
+        const std::uint32_t inner = tree.inner_count();
+        HierarchyScratch& h = scratch.hierarchy;
+        BvhNode* nodes = tree.nodes().data();
+        HostLauncher<> launcher;
+        Arena query;
+        static_cast<void>(query.take<std::uint32_t>(inner));
+        static_cast<void>(FitLevelsScratch(query, inner));
+        h.memory.reset(query.bytes());
+        Arena arena(h.memory.data(), h.memory.size());
+        auto* ranks = arena.take<std::uint32_t>(inner);
+        const FitLevelsScratch fit_scratch(arena, inner);
+        if (h.levels.limit == 0) {
+            const std::uint32_t limit = in_lbvh_family(options.builder)
+                                            ? lbvh_depth_bound(options.bits, tree.order().size())
+                                            : inner;
+            h.levels = launch_find_levels(launcher, nodes, inner, ranks, make_levels(limit, h));
+        }
+        launch_fit_levels(launcher, leaf_box, nodes, h.parent_slot.data(), inner, h.levels,
+                          fit_scratch, &tree.max_depth());
     }
 };
 

@@ -66,6 +66,14 @@ struct FillUnusedKeys {
     }
 };
 
+struct ClearUnusedValues {
+    std::uint32_t* values;
+    const std::uint32_t* count;
+    RAYDIX_HD void operator()(std::uint32_t i) const {
+        if (i >= *count) values[i] = 0;
+    }
+};
+
 struct SaveLastValue {
     const std::uint32_t* values;
     std::uint32_t n;
@@ -116,6 +124,10 @@ public:
     void launch_counted(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
     void exclusive_scan(const char*, std::uint32_t*, std::uint32_t n, std::uint32_t*) {
         if (n != 0) grow(cub_scan_bytes(n));
+    }
+    void exclusive_scan_counted(const char*, std::uint32_t*, const std::uint32_t*,
+                                std::uint32_t limit) {
+        grow(cub_scan_bytes(limit + 1));
     }
     template <class Key>
     void sort_pairs(const char*, const SortArrays<Key>&, std::uint32_t limit, const std::uint32_t*,
@@ -181,6 +193,14 @@ public:
                 cub::DeviceScan::ExclusiveSum(memory_, bytes, values, values, n, stream_));
         }
         if (total != nullptr) launch(label, 1, AddLastValue{values, n, saved_, total});
+    }
+
+    /// Scans the whole capacity, cleared behind the values that count: then the place behind them
+    /// holds their sum.
+    void exclusive_scan_counted(const char* label, std::uint32_t* values,
+                                const std::uint32_t* count, std::uint32_t limit) {
+        launch(label, limit + 1, ClearUnusedValues{values, count});
+        exclusive_scan(label, values, limit + 1, nullptr);
     }
 
     template <class Key>

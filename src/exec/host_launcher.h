@@ -1,15 +1,21 @@
-// Runs a builder's launches on the CPU, one parallel loop each. A builder written against a launcher is one
-// text for all backends:
+// Runs a builder's launches on the CPU, one parallel loop each. A builder written against a
+// launcher is one text for all backends:
 //
-//   launch(label, n, work)                   work(i) for i in [0, n), any order
-//   launch_counted(label, count, limit, work)   the same for i in [0, *count), *count <= limit, written by an
-//                                            earlier launch: the host of a GPU does not know it
-//   exclusive_scan(label, values, n, total)  each value becomes the sum of those before it; *total, if not
-//                                            null, the sum of all
-//   sort_pairs(label, arrays, limit, count, key_bits)   the first *count pairs by key, stable; all `limit` if
-//                                            count is null
-//   maybe_any(count)                         false if *count is known to be 0; a GPU's host knows nothing
-//   Probe                                    what counted functors report to (base/probe.h)
+//   launch(label, n, work)      work(i) for i in [0, n), any order
+//   launch_counted(label, count, limit, work)
+//                               the same for i in [0, *count), *count <= limit, written by an
+//                               earlier launch: the host of a GPU does not know it
+//   exclusive_scan(label, values, n, total)
+//                               each value becomes the sum of those before it; *total, if not
+//                               null, the sum of all
+//   exclusive_scan_counted(label, values, count, limit)
+//                               the same for the first *count <= limit values; the sum of all
+//                               goes behind them, to values[*count]
+//   sort_pairs(label, arrays, limit, count, key_bits)
+//                               the first *count pairs by key, stable; all `limit` if count is
+//                               null
+//   maybe_any(count)            false if *count is known to be 0; a GPU's host knows nothing
+//   Probe                       what counted functors report to (base/probe.h)
 //
 // All pointers are to the launcher's memory. Launches see the results of the launches before them.
 #pragma once
@@ -74,6 +80,12 @@ public:
         if (total != nullptr) *total = sum;
         // One read and one write a value, as a single-pass scan on a GPU has; blocks hand sums on.
         note({label, n, std::uint64_t{n} * 8, 4});
+    }
+
+    void exclusive_scan_counted(const char* label, std::uint32_t* values,
+                                const std::uint32_t* count, std::uint32_t limit) {
+        const std::uint32_t n = std::min(*count, limit);
+        exclusive_scan(label, values, n, values + n);
     }
 
     template <class Key>

@@ -10,6 +10,7 @@
 #include "base/atomic.h"
 #include "base/hd.h"
 #include "base/math.h"
+#include "base/probe.h"
 #include "tree/radix_tree.h"
 
 namespace raydix {
@@ -22,8 +23,10 @@ RAYDIX_HD inline Aabb box_of(const BvhNode& node) { return {node.lo, node.hi}; }
 
 /// One work item per inner node: boxes of those children that are leaves, then up as far as it is
 /// the second to come.
-template <class LeafBox>
+template <class LeafBox, class Probe = NoProbe>
 struct FitBoxes {
+    static constexpr std::uint32_t accesses_per_level = 2;  // meeting, then the sibling's box
+
     LeafBox leaf_box;                  // (first, count) -> box
     BvhNode* nodes;                    // [2 * inner + 2], boxes are written
     const std::uint32_t* parent_slot;  // [inner]
@@ -33,12 +36,16 @@ struct FitBoxes {
     RAYDIX_HD void operator()(std::uint32_t rank) const {
         BvhNode* pair = nodes + pair_slot(rank);
         const bool left = pair[0].is_leaf(), right = pair[1].is_leaf();
+        Probe::bytes(4 * sizeof(std::uint32_t) + (std::uint64_t{left} + right) * sizeof(Aabb));
+        Probe::step();
         if (left) set_box(pair[0], leaf_box(pair[0].first, pair[0].count));
         if (right) set_box(pair[1], leaf_box(pair[1].first, pair[1].count));
         if (left && right) {
             climb(rank, 1);
         } else if (left || right) {
             const std::uint8_t other = arrive(meeting[rank], 1);
+            Probe::bytes(1);
+            Probe::step();
             if (other != 0)
                 climb(rank, other);  // the other child's height is other - 1 >= 1: it decides
         }
@@ -50,12 +57,18 @@ struct FitBoxes {
             const BvhNode* pair = nodes + pair_slot(rank);
             const std::uint32_t slot = parent_slot[rank];
             set_box(nodes[slot], unite(box_of(pair[0]), box_of(pair[1])));
+            Probe::bytes(sizeof(std::uint32_t) + 3 * sizeof(Aabb));
+            Probe::step();
             if (slot == 0) {
                 *max_depth = height;
+                // Leaf boxes first, then a turn per level, whichever items took them.
+                Probe::chain(2 + height * accesses_per_level);
                 return;
             }
             rank = rank_of_slot(slot);
             const std::uint8_t other = arrive(meeting[rank], static_cast<std::uint8_t>(height + 1));
+            Probe::bytes(1);
+            Probe::step();
             if (other == 0) return;
             height = 1 + (height > other - 1u ? height : other - 1u);
         }

@@ -118,8 +118,8 @@ std::uint32_t build_karras(std::span<const Key> keys, int max_leaf, Buffer<BvhNo
         nodes.reset(2 * std::size_t{inner} + 2);
         scratch.parent_slot.reset(inner);
         const KeptNodes kept{scratch.kept_bits.data(), scratch.kept_before.data()};
-        const EmitRadixNode emit{kept, static_cast<std::uint32_t>(max_leaf), nodes.data(),
-                                 scratch.parent_slot.data()};
+        const EmitRadixNode<> emit{kept, static_cast<std::uint32_t>(max_leaf), nodes.data(),
+                                   scratch.parent_slot.data()};
         for_each_index(
             scratch.kept_bits.size(),
             [&](std::size_t w) {

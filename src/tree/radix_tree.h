@@ -82,8 +82,10 @@ struct KeptNodes {
 };
 
 /// Writes the children of one kept node and tells those that are inner where their own box belongs.
+/// `Ranks` numbers the kept nodes.
+template <class Ranks = KeptNodes, class Probe = NoProbe>
 struct EmitRadixNode {
-    KeptNodes kept;
+    Ranks kept;
     std::uint32_t max_leaf;
     BvhNode* nodes;              // [2 * inner + 2], out: links and counts; boxes come later
     std::uint32_t* parent_slot;  // [inner], out
@@ -91,6 +93,7 @@ struct EmitRadixNode {
     RAYDIX_HD void child(std::uint32_t slot, std::uint32_t first, std::uint32_t last,
                          std::uint32_t radix_node) const {
         const std::uint32_t count = last - first + 1;
+        Probe::bytes(2 * sizeof(std::uint32_t));
         if (count <= max_leaf) {
             nodes[slot].first = first;
             nodes[slot].count = count;
@@ -99,6 +102,8 @@ struct EmitRadixNode {
             nodes[slot].first = pair_slot(rank);
             nodes[slot].count = 0;
             parent_slot[rank] = slot;
+            Probe::bytes(2 * sizeof(std::uint32_t));
+            Probe::step();
         }
     }
     /// `rank` is the node's own. The left child's radix index is the split, the right one's the

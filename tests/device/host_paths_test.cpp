@@ -106,7 +106,7 @@ void expect_same_tree(const Mesh& mesh, int bits) {
     std::vector<std::uint8_t> meeting(inner);
     std::uint32_t depth = 0;
     for (std::uint32_t i = 0; i < inner; ++i) FindRange<Key>{{keys.data(), n}, ranges.data()}(i);
-    const EmitRadixNode emit{{kept.data(), before.data()}, 1, nodes.data(), parent_slot.data()};
+    const EmitRadixNode<> emit{{kept.data(), before.data()}, 1, nodes.data(), parent_slot.data()};
     for (std::uint32_t i = 0; i < inner; ++i) EmitFromRange{emit, ranges.data()}(i);
     const FitTriangles fit{
         {tree.triangles().data()}, nodes.data(), parent_slot.data(), meeting.data(), &depth};

@@ -63,7 +63,7 @@ struct FindRange {
 
 /// Range -> links of a node and its children.
 struct EmitFromRange {
-    EmitRadixNode emit;
+    EmitRadixNode<> emit;
     const RadixRange* ranges;
     RAYDIX_HD void operator()(std::uint32_t i) const { emit(i, ranges[i]); }
 };

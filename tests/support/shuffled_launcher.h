@@ -55,6 +55,11 @@ public:
         host_.exclusive_scan(label, values, n, total);
     }
 
+    void exclusive_scan_counted(const char* label, std::uint32_t* values,
+                                const std::uint32_t* count, std::uint32_t limit) {
+        host_.exclusive_scan_counted(label, values, count, limit);
+    }
+
     /// As on a GPU, the places behind the last pair do not keep what they held.
     template <class Key>
     void sort_pairs(const char* label, const SortArrays<Key>& arrays, std::uint32_t limit,
