@@ -1,5 +1,6 @@
-// Building on an NVIDIA GPU: device pointers in, device pointers out, on the caller's stream. Memory belongs to the
-// caller. Plain C++: in a build without CUDA every call but `device_available` throws BackendUnavailable.
+// Building on an NVIDIA GPU: device pointers in, device pointers out, on the caller's stream.
+// Memory belongs to the caller. Plain C++: in a build without CUDA every call but
+// `device_available` throws BackendUnavailable.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -31,8 +32,8 @@ void copy_to_device(void* device, const void* host, std::size_t bytes, Stream st
 void copy_to_host(void* host, const void* device, std::size_t bytes, Stream stream);
 }  // namespace detail
 
-/// An array in device memory. Move-only; elements are plain data and start uninitialised. The memory
-/// behind it is a whole number of 256-byte lines.
+/// An array in device memory. Move-only; elements are plain data and start uninitialised. The
+/// memory behind it is a whole number of 256-byte lines.
 template <class T>
 class DeviceBuffer {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -51,7 +52,8 @@ public:
     }
     ~DeviceBuffer() { detail::device_free(data_); }
 
-    /// Makes room for `size` elements; the old ones are lost. Keeps the memory if it is large enough.
+    /// Makes room for `size` elements; the old ones are lost. Keeps the memory if it is large
+    /// enough.
     void reset(std::size_t size) {
         if (size > capacity_) {
             *this = DeviceBuffer();
@@ -140,9 +142,9 @@ struct DeviceTree {
 /// hierarchy, leaf copies, boxes, and pairs if asked for. Asynchronous: the launches are put on
 /// `stream` and the call returns; nothing is allocated and nothing waited for. `scratch`: device
 /// memory, aligned to 256 bytes, device_scratch_bytes or more, in use until the stream is past the
-/// build. Calling again with the same arrays rebuilds in place. What is wrong with the data is found
-/// on the device and stands in `counts`; see check_counts. options.strict and options.threads have
-/// no effect here. Throws InputError, BackendUnavailable, DeviceError.
+/// build. Calling again with the same arrays rebuilds in place. What is wrong with the data is
+/// found on the device and stands in `counts`; see check_counts. options.strict and options.threads
+/// have no effect here. Throws InputError, BackendUnavailable, DeviceError.
 void build_bvh_on_device(const DeviceMesh& mesh, const BuildOptions& options,
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 void build_bvh_on_device(const DeviceBoxes& boxes, const BuildOptions& options,

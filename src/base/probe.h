@@ -1,5 +1,6 @@
-// What a launch reports of its own work, for the scaling study of the builders. Functors that the study
-// counts take a probe as a template parameter; in every real build it is NoProbe and costs nothing.
+// What a launch reports of its own work, for the scaling study of the builders. Functors that the
+// study counts take a probe as a template parameter; in every real build it is NoProbe and costs
+// nothing.
 #pragma once
 
 #include <cstdint>

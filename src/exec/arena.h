@@ -1,5 +1,5 @@
-// Carves the arrays of a builder's scratch out of one piece of memory that the caller owns. Without memory it
-// only adds up: the same function is the size query and the layout.
+// Carves the arrays of a builder's scratch out of one piece of memory that the caller owns. Without
+// memory it only adds up: the same function is the size query and the layout.
 #pragma once
 
 #include <cstddef>

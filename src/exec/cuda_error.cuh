@@ -16,9 +16,9 @@ namespace raydix {
 
 }  // namespace raydix
 
-#define RAYDIX_CUDA_TRY(expression)                                                     \
-    do {                                                                                \
-        const cudaError_t raydix_status = (expression);                                 \
-        if (raydix_status != cudaSuccess)                                               \
-            ::raydix::cuda_failed(raydix_status, #expression, __FILE__, __LINE__);      \
+#define RAYDIX_CUDA_TRY(expression)                                                \
+    do {                                                                           \
+        const cudaError_t raydix_status = (expression);                            \
+        if (raydix_status != cudaSuccess)                                          \
+            ::raydix::cuda_failed(raydix_status, #expression, __FILE__, __LINE__); \
     } while (false)

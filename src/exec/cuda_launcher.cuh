@@ -1,6 +1,6 @@
-// Runs a builder's launches (the interface is told in host_launcher.h) as kernels on a CUDA stream. Nothing is
-// allocated here and the host waits for nothing: scans and sorts work in memory that the caller lent, whose size
-// CudaSizer finds by going through the same launches without running any.
+// Runs a builder's launches (the interface is told in host_launcher.h) as kernels on a CUDA stream.
+// Nothing is allocated here and the host waits for nothing: scans and sorts work in memory that the
+// caller lent, whose size CudaSizer finds by going through the same launches without running any.
 #pragma once
 
 #include <cuda_runtime.h>

@@ -1,5 +1,5 @@
-// Primitives [n] -> keys [n] and ids [n] to sort, as one launch for any backend. The scene's box is read where the
-// launch runs: the host need not know it.
+// Primitives [n] -> keys [n] and ids [n] to sort, as one launch for any backend. The scene's box is
+// read where the launch runs: the host need not know it.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
-// Copies of primitives in leaf order and their boxes, for host and device: the bits of leaf_order.h, which is the
-// host's own faster way. order [n] + primitives -> copies [n], as one launch for any backend.
+// Copies of primitives in leaf order and their boxes, for host and device: the bits of
+// leaf_order.h, which is the host's own faster way. order [n] + primitives -> copies [n], as one
+// launch for any backend.
 #pragma once
 
 #include <raydix/bvh.h>

@@ -1,5 +1,6 @@
-// The node of Aila and Laine 2009: 64 bytes that hold the boxes of both children, which are always tested together.
-// Tree of 32-byte nodes -> pairs [max(inner, 1)] and primitive ids with marked ends [references].
+// The node of Aila and Laine 2009: 64 bytes that hold the boxes of both children, which are always
+// tested together. Tree of 32-byte nodes -> pairs [max(inner, 1)] and primitive ids with marked
+// ends [references].
 #pragma once
 
 #include <raydix/bvh.h>
@@ -13,8 +14,9 @@
 namespace raydix {
 
 /// One per inner node; pair r is inner node r, the root is pair 0.
-/// A child >= 0 is the index of its pair, in units of 64 bytes. A child < 0 is a leaf: its complement is the position
-/// of the leaf's first primitive in leaf order, in primitives; the list goes on up to an id with `last_in_leaf`.
+/// A child >= 0 is the index of its pair, in units of 64 bytes. A child < 0 is a leaf: its
+/// complement is the position of the leaf's first primitive in leaf order, in primitives; the list
+/// goes on up to an id with `last_in_leaf`.
 struct alignas(64) NodePair {
     float c0_xlo, c0_xhi, c0_ylo, c0_yhi;
     float c1_xlo, c1_xhi, c1_ylo, c1_yhi;

@@ -1,5 +1,6 @@
-// Primitives -> the box around all valid ones and how many are not, as launches for any backend: what scene_bounds
-// (bounds.h) does in one loop. primitives [n] -> 65536 parts at most -> 256 -> one.
+// Primitives -> the box around all valid ones and how many are not, as launches for any backend:
+// what scene_bounds (bounds.h) does in one loop. primitives [n] -> 65536 parts at most -> 256 ->
+// one.
 #pragma once
 
 #include <raydix/types.h>

@@ -1,6 +1,7 @@
-// Runs launches as a GPU may: elements in blocks, blocks and the elements inside them in an order drawn from a seed,
-// blocks at work at the same time on real threads. What passes here under the thread sanitizer for many seeds does
-// not lean on an order. The interface is that of exec/host_launcher.h.
+// Runs launches as a GPU may: elements in blocks, blocks and the elements inside them in an order
+// drawn from a seed, blocks at work at the same time on real threads. What passes here under the
+// thread sanitizer for many seeds does not lean on an order. The interface is that of
+// exec/host_launcher.h.
 #pragma once
 
 #include <algorithm>
@@ -29,16 +30,14 @@ public:
     void launch(const char*, std::uint32_t n, const Work& work) {
         if (n == 0) return;
         const std::uint64_t launch_seed = random_();
-        const std::vector<std::uint32_t> blocks =
-            shuffled((n - 1) / block_size + 1, launch_seed);
+        const std::vector<std::uint32_t> blocks = shuffled((n - 1) / block_size + 1, launch_seed);
         std::atomic<std::size_t> next{0};
         const auto run_blocks = [&] {
             for (std::size_t k = next++; k < blocks.size(); k = next++)
                 run_block(blocks[k], n, launch_seed, work);
         };
         std::vector<std::thread> crew;
-        const std::size_t helpers =
-            std::min(blocks.size(), static_cast<std::size_t>(threads_)) - 1;
+        const std::size_t helpers = std::min(blocks.size(), static_cast<std::size_t>(threads_)) - 1;
         for (std::size_t t = 0; t < helpers; ++t) crew.emplace_back(run_blocks);
         run_blocks();
         for (std::thread& thread : crew) thread.join();
