@@ -1,4 +1,5 @@
-// The build of build_bvh.cpp as launches for any backend: bounds -> codes -> sort -> leaf copies -> hierarchy -> boxes
+// The build of build_bvh.cpp as launches for any backend: bounds -> codes -> sort -> leaf copies ->
+// hierarchy -> boxes
 // -> node pairs, one line each in run. What the data decides is never asked for by the host.
 #pragma once
 
@@ -31,10 +32,14 @@ struct PublishCounts {
     std::uint32_t input_count;
     DeviceCounts* counts;
     RAYDIX_HD void operator()(std::uint32_t) const {
-        *counts = {bounds->box,        input_count,
-                   bounds->valid,      bounds->left_out,
-                   bounds->first_left_out, bounds->unreadable,
-                   bounds->first_unreadable, 0,
+        *counts = {bounds->box,
+                   input_count,
+                   bounds->valid,
+                   bounds->left_out,
+                   bounds->first_left_out,
+                   bounds->unreadable,
+                   bounds->first_unreadable,
+                   0,
                    0};
     }
 };
@@ -81,9 +86,12 @@ struct DeviceBuild {
 
         const TreeScratch scratch(arena, n, options);
         const BoxOfLeaf<Copy> leaf_box{copies};
-        const TreeRun<Key> tree_run{
-            sorted_keys, n, valid, options,
-            {tree.nodes, scratch.parent_slot, &counts->inner_count}, &counts->max_depth};
+        const TreeRun<Key> tree_run{sorted_keys,
+                                    n,
+                                    valid,
+                                    options,
+                                    {tree.nodes, scratch.parent_slot, &counts->inner_count},
+                                    &counts->max_depth};
         launch_hierarchy(launcher, tree_run, scratch, arena, leaf_box);
         mark("hierarchy");
 
@@ -91,11 +99,11 @@ struct DeviceBuild {
         mark("fit");
 
         if (tree.pairs == nullptr) return;
-        launch_pairs(launcher,
-                     EmitNodePair{tree.nodes, &counts->inner_count, tree.order, tree.pairs,
-                                  tree.pair_ids},
-                     valid, inner_node_limit(n, static_cast<std::uint32_t>(options.max_leaf)),
-                     arena.take<std::uint32_t>(1));
+        launch_pairs(
+            launcher,
+            EmitNodePair{tree.nodes, &counts->inner_count, tree.order, tree.pairs, tree.pair_ids},
+            valid, inner_node_limit(n, static_cast<std::uint32_t>(options.max_leaf)),
+            arena.take<std::uint32_t>(1));
         mark("pairs");
     }
 };

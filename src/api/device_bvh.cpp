@@ -12,9 +12,12 @@ namespace {
 
 const char* name_of(PrimitiveKind kind) {
     switch (kind) {
-        case PrimitiveKind::triangles: return "triangle";
-        case PrimitiveKind::boxes: return "box";
-        default: return "point";
+        case PrimitiveKind::triangles:
+            return "triangle";
+        case PrimitiveKind::boxes:
+            return "box";
+        default:
+            return "point";
     }
 }
 
@@ -54,7 +57,8 @@ std::size_t device_pair_capacity(std::uint32_t n, int max_leaf) {
 
 void check_counts(const DeviceCounts& counts, PrimitiveKind kind, bool strict) {
     if (counts.unreadable != 0)
-        throw InputError(std::string(name_of(kind)) + " " + std::to_string(counts.first_unreadable) +
+        throw InputError(std::string(name_of(kind)) + " " +
+                         std::to_string(counts.first_unreadable) +
                          ": an index is past the last of the vertices");
     if (strict && counts.left_out != 0)
         throw InputError(std::string(name_of(kind)) + " " + std::to_string(counts.first_left_out) +
@@ -81,9 +85,15 @@ Bvh download_bvh(const DeviceTree& tree, PrimitiveKind kind, const BuildOptions&
     fetch(access.nodes(), tree.nodes, 2 * std::size_t{counts.inner_count} + 2, stream);
     fetch(access.order(), tree.order, n, stream);
     switch (kind) {
-        case PrimitiveKind::triangles: fetch(access.triangles(), tree.triangles, n, stream); break;
-        case PrimitiveKind::boxes: fetch(access.boxes(), tree.boxes, n, stream); break;
-        case PrimitiveKind::points: fetch(access.points(), tree.points, n, stream); break;
+        case PrimitiveKind::triangles:
+            fetch(access.triangles(), tree.triangles, n, stream);
+            break;
+        case PrimitiveKind::boxes:
+            fetch(access.boxes(), tree.boxes, n, stream);
+            break;
+        case PrimitiveKind::points:
+            fetch(access.points(), tree.points, n, stream);
+            break;
     }
     synchronize(stream);
     return bvh;
@@ -91,10 +101,7 @@ Bvh download_bvh(const DeviceTree& tree, PrimitiveKind kind, const BuildOptions&
 
 DeviceBvh::DeviceBvh(PrimitiveKind kind, std::uint32_t n, const BuildOptions& options,
                      bool with_pairs)
-    : kind_(kind),
-      capacity_(n),
-      options_(options),
-      scratch_(device_scratch_bytes(n, options)) {
+    : kind_(kind), capacity_(n), options_(options), scratch_(device_scratch_bytes(n, options)) {
     nodes_.reset(device_node_capacity(n, options.max_leaf));
     order_.reset(n);
     counts_.reset(1);

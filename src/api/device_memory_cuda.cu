@@ -18,8 +18,9 @@ std::string device_name() {
     const cudaError_t status = cudaGetDeviceCount(&devices);
     if (status != cudaSuccess || devices == 0) {
         static_cast<void>(cudaGetLastError());
-        throw BackendUnavailable(std::string("no CUDA device: ") +
-                                 (status == cudaSuccess ? "none found" : cudaGetErrorString(status)));
+        throw BackendUnavailable(
+            std::string("no CUDA device: ") +
+            (status == cudaSuccess ? "none found" : cudaGetErrorString(status)));
     }
     int current = 0;
     RAYDIX_CUDA_TRY(cudaGetDevice(&current));
@@ -45,7 +46,8 @@ void* device_allocate(std::size_t bytes) {
 }
 
 void device_free(void* memory) noexcept {
-    // An error of an earlier launch that shows up here has been or will be thrown where it is asked for.
+    // An error of an earlier launch that shows up here has been or will be thrown where it is asked
+    // for.
     if (memory != nullptr) static_cast<void>(cudaFree(memory));
 }
 

@@ -1,6 +1,7 @@
-// Lets a builder that takes the number of keys from the host run where only the device knows it, because primitives
-// that are left out were found on the way. The host gives the capacity; every functor that holds the number of keys
-// gets the exact one when it runs, and launches with an item per key run that many.
+// Lets a builder that takes the number of keys from the host run where only the device knows it,
+// because primitives that are left out were found on the way. The host gives the capacity; every
+// functor that holds the number of keys gets the exact one when it runs, and launches with an item
+// per key run that many.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +12,16 @@
 namespace raydix {
 
 template <class Work>
-inline constexpr bool has_key_count =
-    requires(Work& w) { w.keys.count; } || requires(Work& w) { w.keys.keys.count; } ||
-    requires(Work& w) { w.key_count; };
+inline constexpr bool has_key_count = requires(Work& w) {
+    w.keys.count;
+}
+|| requires(Work& w) { w.keys.keys.count; }
+|| requires(Work& w) { w.key_count; };
 template <class Work>
-inline constexpr bool has_keys =
-    requires(Work& w) { w.keys.count; } || requires(Work& w) { w.keys.keys.count; };
+inline constexpr bool has_keys = requires(Work& w) {
+    w.keys.count;
+}
+|| requires(Work& w) { w.keys.keys.count; };
 
 template <class Work>
 struct WithExactCount {
@@ -24,11 +29,11 @@ struct WithExactCount {
     const std::uint32_t* exact;
     RAYDIX_HD void operator()(std::uint32_t i) const {
         Work mine = work;
-        if constexpr (requires(Work& w) { w.keys.count; })
+        if constexpr (requires(Work & w) { w.keys.count; })
             mine.keys.count = *exact;
-        else if constexpr (requires(Work& w) { w.keys.keys.count; })
+        else if constexpr (requires(Work & w) { w.keys.keys.count; })
             mine.keys.keys.count = *exact;
-        if constexpr (requires(Work& w) { w.key_count; }) mine.key_count = *exact;
+        if constexpr (requires(Work & w) { w.key_count; }) mine.key_count = *exact;
         mine(i);
     }
 };

@@ -1,5 +1,6 @@
-// Sorted keys [n] + leaf boxes -> links and boxes of nodes, by any builder of the LBVH family, as launches for any
-// backend. How many of the n keys count is known where the launches run, not to the host.
+// Sorted keys [n] + leaf boxes -> links and boxes of nodes, by any builder of the LBVH family, as
+// launches for any backend. How many of the n keys count is known where the launches run, not to
+// the host.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -46,8 +47,8 @@ private:
           meeting(arena.take<std::uint8_t>(fit_levels ? 0 : inner)) {}
 };
 
-/// A tree of no more keys than a leaf may hold, which the builders leave to those who know it. Of an
-/// empty one the root is a leaf that nobody may read.
+/// A tree of no more keys than a leaf may hold, which the builders leave to those who know it. Of
+/// an empty one the root is a leaf that nobody may read.
 struct LinkFewKeys {
     const std::uint32_t* key_count;
     std::uint32_t max_leaf;
@@ -106,10 +107,11 @@ void launch_hierarchy(Launcher& plain, const TreeRun<Key>& run, const TreeScratc
             launch_karras(launcher, in, KarrasScratch(arena, n), run.out);
             break;
         case Builder::lauterbach: {
-            const std::uint32_t width = lauterbach_band_width(n, scratch.levels.limit,
-                                                              lauterbach_memory_limit(n));
-            launch_lauterbach(launcher, in, LauterbachScratch(arena, n, scratch.levels.limit, width),
-                              run.out, scratch.levels);
+            const std::uint32_t width =
+                lauterbach_band_width(n, scratch.levels.limit, lauterbach_memory_limit(n));
+            launch_lauterbach(launcher, in,
+                              LauterbachScratch(arena, n, scratch.levels.limit, width), run.out,
+                              scratch.levels);
             break;
         }
         case Builder::garanzha:
@@ -147,14 +149,14 @@ void launch_fit(Launcher& launcher, const TreeRun<Key>& run, const TreeScratch& 
         TreeLevels levels = scratch.levels;
         if (builder != Builder::lauterbach && builder != Builder::garanzha)
             levels = launch_find_levels(launcher, nodes, limit, scratch.ranks, levels);
-        launch_fit_levels(launcher, leaf_box, nodes, run.out.parent_slot, limit, levels, scratch.by_levels,
-                          run.max_depth);
+        launch_fit_levels(launcher, leaf_box, nodes, run.out.parent_slot, limit, levels,
+                          scratch.by_levels, run.max_depth);
         return;
     }
     launcher.launch_counted("fit.clear", run.out.inner_count, limit, ClearMeeting{scratch.meeting});
-    launcher.launch_counted("fit.boxes", run.out.inner_count, limit,
-                            FitBoxes<LeafBox>{leaf_box, nodes, run.out.parent_slot, scratch.meeting,
-                                              run.max_depth});
+    launcher.launch_counted(
+        "fit.boxes", run.out.inner_count, limit,
+        FitBoxes<LeafBox>{leaf_box, nodes, run.out.parent_slot, scratch.meeting, run.max_depth});
 }
 
 }  // namespace raydix
