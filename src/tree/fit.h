@@ -75,4 +75,33 @@ struct FitBoxes {
     }
 };
 
+struct ClearMeeting {
+    std::uint8_t* meeting;
+    RAYDIX_HD void operator()(std::uint32_t rank) const { meeting[rank] = 0; }
+};
+
+/// The tree that has no inner node.
+template <class LeafBox>
+struct FitOnlyLeaf {
+    LeafBox leaf_box;
+    BvhNode* nodes;
+    std::uint32_t* max_depth;
+    RAYDIX_HD void operator()(std::uint32_t) const {
+        set_box(nodes[0], leaf_box(nodes[0].first, nodes[0].count));
+        *max_depth = 0;
+    }
+};
+
+/// Boxes of a tree of *inner_count <= inner_limit inner nodes, at least one. `meeting` has
+/// inner_limit bytes.
+template <class Launcher, class LeafBox>
+void launch_fit_atomic(Launcher& launcher, const LeafBox& leaf_box, BvhNode* nodes,
+                       const std::uint32_t* parent_slot, const std::uint32_t* inner_count,
+                       std::uint32_t inner_limit, std::uint8_t* meeting, std::uint32_t* max_depth) {
+    launcher.launch_counted("fit.clear", inner_count, inner_limit, ClearMeeting{meeting});
+    launcher.launch_counted("fit.climb", inner_count, inner_limit,
+                            FitBoxes<LeafBox, typename Launcher::Probe>{
+                                leaf_box, nodes, parent_slot, meeting, max_depth});
+}
+
 }  // namespace raydix

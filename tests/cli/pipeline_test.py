@@ -129,6 +129,21 @@ class Pipeline(ProgramTest):
         self.assertEqual(len({x["tree_hash"] for x in (a, b, c)}), 3)
         self.assertEqual(a["leaves"], 20000)
 
+    def test_same_tree_from_every_lbvh_builder_and_fit(self):
+        for scene in ("builtin:soup?triangles=20000", "builtin:clustered?points=20000", "builtin:soup?triangles=3"):
+            for bits, max_leaf in (("30", "1"), ("63", "4")):
+                hashes = set()
+                for builder in ("karras", "lauterbach", "garanzha", "apetrei"):
+                    for fit in ([], ["--fit", "levels"], ["--fit", "atomic"]):
+                        arguments = [scene, "--builder", builder, *fit, "--bits", bits, "--max-leaf", max_leaf]
+                        build = self.document("build", *arguments, "--repeat", "1", "-o", "built.rdx")["build"]
+                        self.assertEqual(build["builder"], builder)
+                        hashes.add((build["tree_hash"], build["max_depth"], build["nodes"], build["depth_bound"]))
+                        self.assertIn("every invariant holds", self.succeed("check", *arguments).out)
+                    self.assertIn("every invariant holds", self.succeed("check", "built.rdx").out)
+                    self.assertEqual(self.document("info", "built.rdx")["build"]["builder"], builder)
+                self.assertEqual(len(hashes), 1, (scene, bits, hashes))
+
     def test_rdx_keeps_everything(self):
         built = self.document("build", SOUP, "-o", "soup.rdx")
         self.assertEqual(self.document("info", "soup.rdx")["scene"], self.document("info", SOUP)["scene"])

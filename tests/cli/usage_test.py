@@ -9,8 +9,8 @@ sys.dont_write_bytecode = True
 from program import COMMANDS, PROGRAM, TIME_LIMIT_S, TRIANGLE, ProgramTest, json_of, main, ply  # noqa: E402
 
 COMMON = ["--json", "--threads", "--quiet", "--seed"]
-TREE = ["--tree", "--builder", "--quality", "--bits", "--max-leaf", "--layout", "--device", "--strict", "--epo",
-        "--cameras", "--sah-node", "--sah-primitive"]
+TREE = ["--tree", "--builder", "--quality", "--bits", "--max-leaf", "--fit", "--layout", "--device", "--strict",
+        "--epo", "--cameras", "--sah-node", "--sah-primitive"]
 OPTIONS = {
     "info": ["SCENE"],
     "scenes": [],
@@ -49,7 +49,7 @@ class Usage(ProgramTest):
         self.fail_with_usage("check", "--same", SMALL)
         self.fail_with_usage("check", SMALL, "--same", SMALL, SMALL)
         self.fail_with_usage("render", SMALL, names=["--output"])
-        for bad in (["--bits", "31"], ["--bits"], ["--max-leaf", "0"], ["--max-leaf", "256"], ["--builder", "other"],
+        for bad in (["--bits", "31"], ["--bits"], ["--max-leaf", "0"], ["--max-leaf", "256"], ["--builder", "other"], ["--fit", "tight"],
                     ["--tree", "other"], ["--quality", "best"], ["--device", "abacus"], ["--layout", "x"],
                     ["--repeat", "0"], ["--threads", "-1"], ["--threads", "two"], ["--seed", "-1"], ["--epo", "0"],
                     ["--epo", "1.5"], ["--epo", "much"], ["--sah-node", "-1"], ["--sah-node", "nan"],

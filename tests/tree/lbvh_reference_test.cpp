@@ -1,11 +1,13 @@
-// build_bvh against the recursive reference: every kind of input, both code lengths, leaf sizes,
-// threads.
+// build_bvh with each builder of the LBVH family against the recursive reference: every kind of
+// input, both code lengths, leaf sizes, fits, threads.
 #include <gtest/gtest.h>
 #include <raydix/check.h>
 #include <raydix/scene.h>
 
 #include <algorithm>
 #include <functional>
+#include <string_view>
+#include <tuple>
 
 #include "support/reference_tree.h"
 #include "support/support.h"
@@ -97,18 +99,36 @@ std::vector<Input> point_inputs() {
     return inputs;
 }
 
+class LbvhReference : public ::testing::TestWithParam<Builder> {
+protected:
+    [[nodiscard]] BuildOptions options(int bits, int max_leaf) const {
+        return {.builder = GetParam(), .bits = bits, .max_leaf = max_leaf};
+    }
+};
+
+/// Each fit, and enough threads to meet each other.
+struct Way {
+    int threads;
+    Fit fit;
+};
+constexpr Way ways[] = {
+    {1, Fit::as_published}, {2, Fit::levels}, {7, Fit::atomic}, {7, Fit::levels}};
+
 /// Every option against the reference. `build` and `reference` take options.
 template <class Build, class Reference>
-void compare_all(const std::string& name, const Build& build, const Reference& reference) {
+void compare_all(Builder builder, const std::string& name, const Build& build,
+                 const Reference& reference) {
     for (const int bits : {30, 63}) {
         for (const int max_leaf : {1, 2, 4, 8, 255}) {
-            BuildOptions options{.bits = bits, .max_leaf = max_leaf};
+            BuildOptions options{.builder = builder, .bits = bits, .max_leaf = max_leaf};
             const Bvh expected = reference(options);
             const std::string hash = tree_hash(expected);
-            for (const int threads : {1, 2, 7}) {
+            for (const auto [threads, fit] : ways) {
                 options.threads = threads;
+                options.fit = fit;
                 SCOPED_TRACE(name + ", bits " + std::to_string(bits) + ", max_leaf " +
-                             std::to_string(max_leaf) + ", threads " + std::to_string(threads));
+                             std::to_string(max_leaf) + ", threads " + std::to_string(threads) +
+                             ", fit " + std::to_string(static_cast<int>(fit)));
                 const Bvh built = build(options);
                 EXPECT_EQ(check_same(built, expected).broken, "");
                 EXPECT_EQ(tree_hash(built), hash);
@@ -119,16 +139,16 @@ void compare_all(const std::string& name, const Build& build, const Reference& r
     }
 }
 
-TEST(KarrasReference, Points) {
+TEST_P(LbvhReference, Points) {
     for (const Input& input : point_inputs()) {
         const std::span<const Vec3> points = input.points;
         compare_all(
-            input.name, [&](const BuildOptions& o) { return build_bvh(points, o); },
+            GetParam(), input.name, [&](const BuildOptions& o) { return build_bvh(points, o); },
             [&](const BuildOptions& o) { return reference_tree(points, o); });
     }
 }
 
-TEST(KarrasReference, Boxes) {
+TEST_P(LbvhReference, Boxes) {
     Random random(5);
     std::vector<Aabb> boxes;
     for (int i = 0; i < 2000; ++i) {
@@ -139,11 +159,12 @@ TEST(KarrasReference, Boxes) {
     boxes[18].hi.y = std::numeric_limits<float>::quiet_NaN();
     boxes[19] = {{-0.0f, -0.0f, -0.0f}, {-0.0f, 0.0f, 0.5f}};
     compare_all(
-        "boxes", [&](const BuildOptions& o) { return build_bvh(std::span<const Aabb>(boxes), o); },
+        GetParam(), "boxes",
+        [&](const BuildOptions& o) { return build_bvh(std::span<const Aabb>(boxes), o); },
         [&](const BuildOptions& o) { return reference_tree(std::span<const Aabb>(boxes), o); });
 }
 
-TEST(KarrasReference, Triangles) {
+TEST_P(LbvhReference, Triangles) {
     Mesh mesh = random_soup(2500, 3);
     mesh.triangles[9] = {0, 0, 0};
     mesh.vertices[300].y = std::numeric_limits<float>::quiet_NaN();
@@ -153,7 +174,7 @@ TEST(KarrasReference, Triangles) {
                         mesh.vertices,
                         {mesh.triangles.begin(), mesh.triangles.begin() + std::ptrdiff_t(n)}};
         compare_all(
-            std::to_string(n) + " triangles",
+            GetParam(), std::to_string(n) + " triangles",
             [&](const BuildOptions& o) {
                 Bvh built = build_bvh(part, o);
                 EXPECT_EQ(check(built, part).broken, "");
@@ -163,22 +184,67 @@ TEST(KarrasReference, Triangles) {
     }
 }
 
-TEST(KarrasReference, LargerSoupIsTheSameForEveryThreadCount) {
-    const Mesh mesh = random_soup(10'000 * thorough, 8, 0.01f);
-    const std::string expected = tree_hash(reference_tree(MeshView(mesh)));
-    for (const int threads : {1, 2, 7})
-        EXPECT_EQ(tree_hash(build_bvh(mesh, {.threads = threads})), expected) << threads;
+TEST_P(LbvhReference, LargerInputsAreTheSameForEveryThreadCountAndFit) {
+    Random random(13);
+    const std::size_t n = 5000 * thorough;
+    std::vector<Vec3> line;
+    for (std::size_t i = 0; i < n; ++i) line.push_back({3, static_cast<float>(i), -7});
+    std::ranges::shuffle(line, random);
+    const std::vector<Vec3> equal(10 * n, Vec3{-1, 2, 3});
+    const Mesh soup = random_soup(2 * n, 8, 0.01f);
+    const auto expect = [&](const char* name, const auto& input) {
+        for (const int max_leaf : {1, 4}) {
+            BuildOptions build = options(63, max_leaf);
+            const Bvh expected = reference_tree(input, build);
+            const std::string hash = tree_hash(expected);
+            for (const auto [threads, fit] : ways) {
+                build.threads = threads;
+                build.fit = fit;
+                const Bvh built = build_bvh(input, build);
+                EXPECT_EQ(tree_hash(built), hash) << name << ", threads " << threads;
+                EXPECT_EQ(built.max_depth(), expected.max_depth()) << name;
+            }
+        }
+    };
+    expect("on a line", std::span<const Vec3>(line));
+    expect("equal", std::span<const Vec3>(equal));
+    expect("soup", MeshView(soup));
 }
 
-class KarrasReferenceScene : public ::testing::TestWithParam<const char*> {};
+TEST_P(LbvhReference, RebuildsInPlace) {
+    const Mesh large = random_soup(3000, 1), small = random_soup(40, 2);
+    BvhBuilder builder;
+    Bvh tree;
+    for (const Mesh* mesh : {&large, &small, &large}) {
+        for (const Fit fit : {Fit::levels, Fit::atomic}) {
+            BuildOptions build = options(63, 4);
+            build.fit = fit;
+            builder.build(*mesh, build, tree);
+            EXPECT_EQ(tree_hash(tree), tree_hash(reference_tree(MeshView(*mesh), build)));
+            EXPECT_EQ(check(tree, *mesh).broken, "");
+        }
+    }
+}
 
-TEST_P(KarrasReferenceScene, IsTheSame) {
-    const auto file = shared_scene(GetParam());
+std::string builder_test_name(const ::testing::TestParamInfo<Builder>& info) {
+    return std::string(builder_name(info.param));
+}
+INSTANTIATE_TEST_SUITE_P(All, LbvhReference,
+                         ::testing::Values(Builder::karras, Builder::lauterbach, Builder::garanzha,
+                                           Builder::apetrei),
+                         builder_test_name);
+
+class LbvhReferenceScene : public ::testing::TestWithParam<std::tuple<Builder, std::string_view>> {
+};
+
+TEST_P(LbvhReferenceScene, IsTheSame) {
+    const auto& [builder, scene] = GetParam();
+    const auto file = shared_scene(std::string(scene));
     RAYDIX_SKIP_WITHOUT(file);
     const Mesh mesh = load_mesh(file);
     ASSERT_FALSE(mesh.vertices.empty());
     for (const int bits : {30, 63}) {
-        const BuildOptions options{.bits = bits};
+        const BuildOptions options{.builder = builder, .bits = bits};
         const Bvh built = build_bvh(mesh, options);
         EXPECT_EQ(check_same(built, reference_tree(MeshView(mesh), options)).broken, "");
         EXPECT_EQ(check(built, mesh).broken, "");
@@ -186,12 +252,25 @@ TEST_P(KarrasReferenceScene, IsTheSame) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Shared, KarrasReferenceScene,
-                         ::testing::Values("bunny/bunny.ply.xz", "sibenik/sibenik.ply.xz",
-                                           "conference/conference.ply.xz",
-                                           "kitti_frame/kitti_frame.ply.xz",
-                                           "nasty/pcl_organized_nan_640x480.ply.xz",
-                                           "nasty/isprs_samp12_utm_float32.ply.xz"));
+std::string scene_test_name(
+    const ::testing::TestParamInfo<std::tuple<Builder, std::string_view>>& info) {
+    const auto& [builder, scene] = info.param;
+    std::string name(builder_name(builder));
+    name += '_';
+    name += scene.substr(0, scene.find('.'));
+    std::ranges::replace(name, '/', '_');
+    return name;
+}
+INSTANTIATE_TEST_SUITE_P(
+    Shared, LbvhReferenceScene,
+    ::testing::Combine(::testing::Values(Builder::karras, Builder::lauterbach, Builder::garanzha,
+                                         Builder::apetrei),
+                       ::testing::Values("bunny/bunny.ply.xz", "sibenik/sibenik.ply.xz",
+                                         "conference/conference.ply.xz",
+                                         "kitti_frame/kitti_frame.ply.xz",
+                                         "nasty/pcl_organized_nan_640x480.ply.xz",
+                                         "nasty/isprs_samp12_utm_float32.ply.xz")),
+    scene_test_name);
 
 }  // namespace
 }  // namespace raydix::test
