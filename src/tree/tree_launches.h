@@ -59,23 +59,15 @@ struct LinkFewKeys {
     }
 };
 
-/// The box of a tree that is one leaf.
+/// The box of a tree that is one leaf, if it is.
 template <class LeafBox>
-struct FitOnlyLeaf {
-    LeafBox leaf_box;
+struct FitIfOnlyLeaf {
+    FitOnlyLeaf<LeafBox> fit;
     const std::uint32_t *key_count, *inner_count;
-    BvhNode* nodes;
-    std::uint32_t* max_depth;
     RAYDIX_HD void operator()(std::uint32_t) const {
-        if (*inner_count != 0) return;
-        *max_depth = 0;
-        if (*key_count != 0) set_box(nodes[0], leaf_box(nodes[0].first, nodes[0].count));
+        if (*key_count == 0) *fit.max_depth = 0;
+        if (*key_count != 0 && *inner_count == 0) fit(0);
     }
-};
-
-struct ClearMeeting {
-    std::uint8_t* meeting;
-    RAYDIX_HD void operator()(std::uint32_t i) const { meeting[i] = 0; }
 };
 
 /// What the stages behind the sort read and write.
@@ -140,9 +132,9 @@ void launch_fit(Launcher& launcher, const TreeRun<Key>& run, const TreeScratch& 
     BvhNode* nodes = run.out.nodes;
     const std::uint32_t limit =
         inner_node_limit(run.capacity, static_cast<std::uint32_t>(run.options.max_leaf));
-    launcher.launch(
-        "fit.only_leaf", 1,
-        FitOnlyLeaf<LeafBox>{leaf_box, run.key_count, run.out.inner_count, nodes, run.max_depth});
+    launcher.launch("fit.only_leaf", 1,
+                    FitIfOnlyLeaf<LeafBox>{
+                        {leaf_box, nodes, run.max_depth}, run.key_count, run.out.inner_count});
     if (limit == 0 || fits_while_building(run.options)) return;
     if (fits_by_levels(run.options)) {
         const Builder builder = run.options.builder;
@@ -153,10 +145,8 @@ void launch_fit(Launcher& launcher, const TreeRun<Key>& run, const TreeScratch& 
                           scratch.by_levels, run.max_depth);
         return;
     }
-    launcher.launch_counted("fit.clear", run.out.inner_count, limit, ClearMeeting{scratch.meeting});
-    launcher.launch_counted(
-        "fit.boxes", run.out.inner_count, limit,
-        FitBoxes<LeafBox>{leaf_box, nodes, run.out.parent_slot, scratch.meeting, run.max_depth});
+    launch_fit_atomic(launcher, leaf_box, nodes, run.out.parent_slot, run.out.inner_count, limit,
+                      scratch.meeting, run.max_depth);
 }
 
 }  // namespace raydix

@@ -1,5 +1,6 @@
-// What a GPU runs (api/device_build.h), run on the host: by the host's loops, and in shuffled order on real threads.
-// The tree is that of build_bvh, bit for bit, for every builder and for input that the host does not look at.
+// What a GPU runs (api/device_build.h), run on the host: by the host's loops, and in shuffled order
+// on real threads. The tree is that of build_bvh, bit for bit, for every builder and for input that
+// the host does not look at.
 #include "api/device_build.h"
 
 #include <gtest/gtest.h>
@@ -21,8 +22,9 @@ constexpr Builder builders[] = {Builder::karras, Builder::lauterbach, Builder::g
                                 Builder::apetrei};
 
 std::string told(const BuildOptions& o) {
-    return std::string(builder_name(o.builder)) + ", " + std::to_string(o.bits) + " bits, leaves of " +
-           std::to_string(o.max_leaf) + ", fit " + std::to_string(static_cast<int>(o.fit));
+    return std::string(builder_name(o.builder)) + ", " + std::to_string(o.bits) +
+           " bits, leaves of " + std::to_string(o.max_leaf) + ", fit " +
+           std::to_string(static_cast<int>(o.fit));
 }
 
 template <class Run>
@@ -161,7 +163,8 @@ TEST(DeviceBuild, EachBuiltinScene) {
         for (const Builder builder : builders)
             for (const int bits : {30, 63}) {
                 const BuildOptions options{.builder = builder, .bits = bits};
-                SCOPED_TRACE(scene.name + ": " + told(options) + ", seed " + std::to_string(++seed));
+                SCOPED_TRACE(scene.name + ": " + told(options) + ", seed " +
+                             std::to_string(++seed));
                 ShuffledLauncher shuffled(seed);
                 expect_same_tree(launched_build(shuffled, MeshView(scene.mesh), options),
                                  MeshView(scene.mesh), options);

@@ -1,4 +1,5 @@
-// The build of a GPU (api/device_build.h) on the host, by any launcher, as a Bvh that can be compared.
+// The build of a GPU (api/device_build.h) on the host, by any launcher, as a Bvh that can be
+// compared.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -50,8 +51,8 @@ struct LaunchedBuild {
         resize(triangles, kind == PrimitiveKind::triangles ? n : 0, garbage);
         resize(boxes, kind == PrimitiveKind::boxes ? n : 0, garbage);
         resize(points, kind == PrimitiveKind::points ? n : 0, garbage);
-        const DeviceTree tree{nodes.data(), order.data(), triangles.data(), boxes.data(),
-                              points.data(), &counts, pairs.data(), pair_ids.data()};
+        const DeviceTree tree{nodes.data(),  order.data(), triangles.data(), boxes.data(),
+                              points.data(), &counts,      pairs.data(),     pair_ids.data()};
         with_device_build(input, options, tree, [&](const auto& build) {
             Arena sizing = sizing_arena();
             IdleLauncher idle;
@@ -100,8 +101,7 @@ LaunchedBuild launched_build(Launcher& launcher, const MeshView& mesh,
                              const BuildOptions& options) {
     const auto vertices = static_cast<std::uint32_t>(mesh.vertices.size());
     const auto triangles = static_cast<std::uint32_t>(mesh.triangles.size());
-    return {launcher,
-            DeviceMesh{mesh.vertices.data(), vertices, mesh.triangles.data(), triangles},
+    return {launcher, DeviceMesh{mesh.vertices.data(), vertices, mesh.triangles.data(), triangles},
             triangles != 0 ? triangles : vertices,
             triangles != 0 ? PrimitiveKind::triangles : PrimitiveKind::points, options};
 }
