@@ -41,6 +41,7 @@ Camera chosen_camera(const RenderCommand& options, const Scene& scene) {
 
 void run_render(const RenderCommand& options) {
     refuse_build_options(options.scene, options.tree);
+    refuse_device(options.tree);
     const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}

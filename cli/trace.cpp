@@ -238,6 +238,7 @@ void run_trace(const TraceCommand& options) {
         throw CLI::ValidationError("--hits",
                                    "any-hit rays only answer yes or no; use --mode closest or all");
     refuse_build_options(options.scene, options.tree);
+    refuse_device(options.tree);
     const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}

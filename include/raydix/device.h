@@ -150,6 +150,17 @@ void build_bvh_on_device(const DeviceMesh& mesh, const BuildOptions& options,
 void build_bvh_on_device(const DeviceBoxes& boxes, const BuildOptions& options,
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 
+/// The same, but waits for the end and returns the milliseconds between the stages as the device
+/// saw them (CUDA events; `layout` has the node pairs as well). For measurements.
+BuildMs time_build_on_device(const DeviceMesh& mesh, const BuildOptions& options,
+                             const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
+BuildMs time_build_on_device(const DeviceBoxes& boxes, const BuildOptions& options,
+                             const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
+
+/// Bytes read and written per second when the device copies `bytes` from one place of its memory to
+/// another: the best of `repeat` copies after a first one. Allocates twice `bytes`.
+[[nodiscard]] double measure_device_copy(std::size_t bytes, int repeat);
+
 /// Throws the InputError that build_bvh throws for such an input: an index past the vertices or,
 /// with `strict`, a primitive that was left out.
 void check_counts(const DeviceCounts& counts, PrimitiveKind kind, bool strict);
@@ -171,12 +182,15 @@ public:
     /// As build_bvh_on_device. The input must be of this kind and no larger than promised.
     void build(const DeviceMesh& mesh, Stream stream = nullptr);
     void build(const DeviceBoxes& boxes, Stream stream = nullptr);
+    /// As time_build_on_device.
+    BuildMs build_timed(const DeviceMesh& mesh, Stream stream = nullptr);
     [[nodiscard]] DeviceTree tree() const;
     [[nodiscard]] Bvh download(Stream stream = nullptr) const;
     [[nodiscard]] std::size_t bytes() const;
 
 private:
     void check_input(PrimitiveKind kind, std::uint32_t n) const;
+    void check_input(const DeviceMesh& mesh) const;
 
     PrimitiveKind kind_ = PrimitiveKind::triangles;
     std::uint32_t capacity_ = 0;

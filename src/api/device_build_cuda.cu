@@ -3,6 +3,8 @@
 #include <raydix/error.h>
 
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "api/device_build.h"
 #include "exec/cuda_launcher.cuh"
@@ -24,9 +26,9 @@ std::size_t sized(const Input& input, const BuildOptions& options) {
     return bytes;
 }
 
-template <class Input>
+template <class Input, class Mark = NoMarks>
 void build(const Input& input, const BuildOptions& options, const DeviceTree& tree,
-           std::span<std::byte> scratch, Stream stream) {
+           std::span<std::byte> scratch, Stream stream, const Mark& mark = {}) {
     with_device_build(input, options, tree, [&](const auto& build) {
         Arena layout = sizing_arena();
         CudaSizer sizer;
@@ -42,8 +44,64 @@ void build(const Input& input, const BuildOptions& options, const DeviceTree& tr
         Arena arena(scratch.data(), front);
         CudaLauncher launcher(static_cast<cudaStream_t>(stream), scratch.data() + front,
                               scratch.size() - front);
-        build.run(launcher, arena);
+        build.run(launcher, arena, mark);
     });
+}
+
+/// Events at the ends of the stages.
+class StageTimes {
+public:
+    explicit StageTimes(cudaStream_t stream) : stream_(stream) { (*this)("start"); }
+    StageTimes(const StageTimes&) = delete;
+    StageTimes& operator=(const StageTimes&) = delete;
+    ~StageTimes() {
+        for (const Mark& mark : marks_) static_cast<void>(cudaEventDestroy(mark.event));
+    }
+    void operator()(const char* stage) {
+        Mark mark{stage, nullptr};
+        RAYDIX_CUDA_TRY(cudaEventCreate(&mark.event));
+        marks_.push_back(mark);
+        RAYDIX_CUDA_TRY(cudaEventRecord(mark.event, stream_));
+    }
+    /// Waits for the last stage.
+    [[nodiscard]] BuildMs read() const {
+        RAYDIX_CUDA_TRY(cudaEventSynchronize(marks_.back().event));
+        BuildMs ms;
+        for (std::size_t k = 1; k < marks_.size(); ++k)
+            field(ms, marks_[k].stage) += between(marks_[k - 1], marks_[k]);
+        ms.total = between(marks_.front(), marks_.back());
+        return ms;
+    }
+
+private:
+    struct Mark {
+        std::string_view stage;
+        cudaEvent_t event;
+    };
+    static double between(const Mark& from, const Mark& to) {
+        float ms = 0;
+        RAYDIX_CUDA_TRY(cudaEventElapsedTime(&ms, from.event, to.event));
+        return ms;
+    }
+    static double& field(BuildMs& ms, std::string_view stage) {
+        if (stage == "bounds") return ms.bounds;
+        if (stage == "codes") return ms.codes;
+        if (stage == "sort") return ms.sort;
+        if (stage == "hierarchy") return ms.hierarchy;
+        if (stage == "fit") return ms.fit;
+        return ms.layout;
+    }
+
+    cudaStream_t stream_;
+    std::vector<Mark> marks_;
+};
+
+template <class Input>
+BuildMs time_build(const Input& input, const BuildOptions& options, const DeviceTree& tree,
+                   std::span<std::byte> scratch, Stream stream) {
+    StageTimes times(static_cast<cudaStream_t>(stream));
+    build(input, options, tree, scratch, stream, [&](const char* stage) { times(stage); });
+    return times.read();
 }
 
 }  // namespace
@@ -62,6 +120,16 @@ void build_bvh_on_device(const DeviceMesh& mesh, const BuildOptions& options,
 void build_bvh_on_device(const DeviceBoxes& boxes, const BuildOptions& options,
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream) {
     build(boxes, options, tree, scratch, stream);
+}
+
+BuildMs time_build_on_device(const DeviceMesh& mesh, const BuildOptions& options,
+                             const DeviceTree& tree, std::span<std::byte> scratch, Stream stream) {
+    return time_build(mesh, options, tree, scratch, stream);
+}
+
+BuildMs time_build_on_device(const DeviceBoxes& boxes, const BuildOptions& options,
+                             const DeviceTree& tree, std::span<std::byte> scratch, Stream stream) {
+    return time_build(boxes, options, tree, scratch, stream);
 }
 
 }  // namespace raydix

@@ -134,10 +134,19 @@ void DeviceBvh::check_input(PrimitiveKind kind, std::uint32_t n) const {
                          std::to_string(capacity_));
 }
 
-void DeviceBvh::build(const DeviceMesh& mesh, Stream stream) {
+void DeviceBvh::check_input(const DeviceMesh& mesh) const {
     const bool points = mesh.triangle_count == 0;
     check_input(points ? PrimitiveKind::points : PrimitiveKind::triangles,
                 points ? mesh.vertex_count : mesh.triangle_count);
+}
+
+BuildMs DeviceBvh::build_timed(const DeviceMesh& mesh, Stream stream) {
+    check_input(mesh);
+    return time_build_on_device(mesh, options_, tree(), {scratch_.data(), scratch_.size()}, stream);
+}
+
+void DeviceBvh::build(const DeviceMesh& mesh, Stream stream) {
+    check_input(mesh);
     build_bvh_on_device(mesh, options_, tree(), {scratch_.data(), scratch_.size()}, stream);
 }
 

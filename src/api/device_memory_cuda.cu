@@ -2,6 +2,8 @@
 #include <raydix/device.h>
 #include <raydix/error.h>
 
+#include <algorithm>
+
 #include "exec/cuda_error.cuh"
 
 namespace raydix {
@@ -31,6 +33,26 @@ std::string device_name() {
 
 void synchronize(Stream stream) {
     RAYDIX_CUDA_TRY(cudaStreamSynchronize(static_cast<cudaStream_t>(stream)));
+}
+
+double measure_device_copy(std::size_t bytes, int repeat) {
+    const DeviceBuffer<std::byte> from(bytes), to(bytes);
+    cudaEvent_t start = nullptr, stop = nullptr;
+    RAYDIX_CUDA_TRY(cudaEventCreate(&start));
+    RAYDIX_CUDA_TRY(cudaEventCreate(&stop));
+    double best = 0;
+    for (int turn = 0; turn <= repeat; ++turn) {
+        RAYDIX_CUDA_TRY(cudaEventRecord(start));
+        RAYDIX_CUDA_TRY(cudaMemcpyAsync(to.data(), from.data(), bytes, cudaMemcpyDeviceToDevice));
+        RAYDIX_CUDA_TRY(cudaEventRecord(stop));
+        RAYDIX_CUDA_TRY(cudaEventSynchronize(stop));
+        float ms = 0;
+        RAYDIX_CUDA_TRY(cudaEventElapsedTime(&ms, start, stop));
+        if (turn > 0) best = std::max(best, 2.0 * static_cast<double>(bytes) / (1e-3 * ms));
+    }
+    RAYDIX_CUDA_TRY(cudaEventDestroy(start));
+    RAYDIX_CUDA_TRY(cudaEventDestroy(stop));
+    return best;
 }
 
 namespace detail {

@@ -33,6 +33,15 @@ void build_bvh_on_device(const DeviceBoxes&, const BuildOptions&, const DeviceTr
                          std::span<std::byte>, Stream) {
     unavailable();
 }
+BuildMs time_build_on_device(const DeviceMesh&, const BuildOptions&, const DeviceTree&,
+                             std::span<std::byte>, Stream) {
+    unavailable();
+}
+BuildMs time_build_on_device(const DeviceBoxes&, const BuildOptions&, const DeviceTree&,
+                             std::span<std::byte>, Stream) {
+    unavailable();
+}
+double measure_device_copy(std::size_t, int) { unavailable(); }
 
 }  // namespace raydix
 
