@@ -8,7 +8,8 @@ namespace raydix::cli {
 
 DeviceScene::DeviceScene(const Mesh& mesh, const BuildOptions& options) : options_(options) {
     static_cast<void>(device_name());  // before anything large: says what is missing
-    if (mesh.vertices.size() >= std::size_t{1} << 31 || mesh.triangles.size() >= std::size_t{1} << 31)
+    if (mesh.vertices.size() >= std::size_t{1} << 31 || mesh.triangles.size() >= std::size_t{1}
+                                                                                     << 31)
         throw InputError("a device takes fewer than 2147483648 vertices and triangles");
     vertices_.upload(mesh.vertices);
     triangles_.upload(mesh.triangles);
@@ -20,9 +21,9 @@ BuildMs DeviceScene::build_fresh() {
     tree_.reset();
     const auto start = std::chrono::steady_clock::now();
     const bool points = mesh_.triangle_count == 0;
-    tree_ = std::make_unique<DeviceBvh>(points ? PrimitiveKind::points : PrimitiveKind::triangles,
-                                        points ? mesh_.vertex_count : mesh_.triangle_count,
-                                        options_);
+    tree_ =
+        std::make_unique<DeviceBvh>(points ? PrimitiveKind::points : PrimitiveKind::triangles,
+                                    points ? mesh_.vertex_count : mesh_.triangle_count, options_);
     BuildMs ms = tree_->build_timed(mesh_);
     const std::chrono::duration<double, std::milli> all = std::chrono::steady_clock::now() - start;
     ms.total = all.count();

@@ -173,7 +173,7 @@ TEST(DeviceBuild, EachBuiltinScene) {
 }
 
 TEST(DeviceBuild, AHundredOrdersGiveOneTree) {
-    const Mesh mesh = laced(random_soup(600, 77), 11);
+    const Mesh mesh = laced(random_soup(100 + 25 * thorough, 77), 11);
     for (const Builder builder : builders)
         for (const Fit fit : {Fit::atomic, Fit::levels, Fit::as_published}) {
             const BuildOptions options{.builder = builder, .fit = fit};

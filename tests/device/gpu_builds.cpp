@@ -1,6 +1,7 @@
-// Trees built on a device by the public calls of raydix/device.h against those that the host builds: the same hash for
-// every builder, fit, code length and kind of input; on a stream of the caller's; rebuilt in place; never more memory
-// touched than was lent. Skipped where there is no device.
+// Trees built on a device by the public calls of raydix/device.h against those that the host
+// builds: the same hash for every builder, fit, code length and kind of input; on a stream of the
+// caller's; rebuilt in place; never more memory touched than was lent. Skipped where there is no
+// device.
 #include <gtest/gtest.h>
 #include <raydix/check.h>
 #include <raydix/device.h>
@@ -31,8 +32,9 @@ protected:
 };
 
 std::string told(const BuildOptions& o) {
-    return std::string(builder_name(o.builder)) + ", " + std::to_string(o.bits) + " bits, leaves of " +
-           std::to_string(o.max_leaf) + ", fit " + std::to_string(static_cast<int>(o.fit));
+    return std::string(builder_name(o.builder)) + ", " + std::to_string(o.bits) +
+           " bits, leaves of " + std::to_string(o.max_leaf) + ", fit " +
+           std::to_string(static_cast<int>(o.fit));
 }
 
 /// A mesh on the device.
@@ -41,8 +43,7 @@ struct Uploaded {
     DeviceBuffer<Triangle> triangles;
     DeviceMesh mesh;
 
-    explicit Uploaded(const MeshView& view)
-        : vertices(view.vertices), triangles(view.triangles) {
+    explicit Uploaded(const MeshView& view) : vertices(view.vertices), triangles(view.triangles) {
         mesh = {vertices.data(), static_cast<std::uint32_t>(vertices.size()), triangles.data(),
                 static_cast<std::uint32_t>(triangles.size())};
     }
@@ -162,8 +163,8 @@ TEST_F(GpuBuild, WritesNothingBehindTheScratch) {
             scratch.download(after);
             EXPECT_TRUE(std::equal(after.end() - guard, after.end(), pattern.end() - guard))
                 << told(options);
-            EXPECT_THROW(build_bvh_on_device(input.mesh, options, tree,
-                                             {scratch.data(), bytes / 2}, nullptr),
+            EXPECT_THROW(build_bvh_on_device(input.mesh, options, tree, {scratch.data(), bytes / 2},
+                                             nullptr),
                          InputError);
         }
 }
