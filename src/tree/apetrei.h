@@ -18,7 +18,8 @@ struct NoLeafBox {};
 
 /// Which splits belong to nodes of more than max_leaf keys. All neighbours below node s share more
 /// than keys s and s + 1 do, so its range goes on to either side as long as the key there shares
-/// more with the split's key than that; the search looks no further than a leaf may reach.
+/// more with the split's key than that; the search looks no further than a leaf may reach (max_leaf
+/// <= 255).
 template <class Key, class Probe>
 struct MarkKeptSplit {
     SortedKeys<Key, Probe> keys;
@@ -58,8 +59,8 @@ struct MarkKeptSplit {
 template <class Key, class LeafBox, class Probe>
 struct ClimbFromLeaf {
     static constexpr bool fits = !std::is_same_v<LeafBox, NoLeafBox>;
-    static constexpr std::uint32_t accesses_per_level =
-        5;  // the longest chain of a turn of `climb`
+    // A turn of `climb`: two prefixes, the parent's rank, the meeting, the sibling.
+    static constexpr std::uint32_t accesses_per_level = 5;
 
     SortedKeys<Key, Probe> keys;
     const std::uint32_t* rank_of_split;  // [n]

@@ -18,6 +18,7 @@ struct CountedBuild {
     std::uint32_t inner_count = 0, max_depth = 0;
     Aabb bounds{};
 };
+
 /// Builds a tree over sorted keys [n], n > 0, and boxes [n] in the same order, and returns its
 /// launches: items, bytes read and written, and the longest chain of accesses that wait for each
 /// other. A climb from leaf to root counts as one chain, whichever items took part in it. `fit`

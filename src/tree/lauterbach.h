@@ -50,8 +50,7 @@ struct SplitLists {
     const std::uint32_t* count;     // [1]
     std::uint32_t* level_begin;     // [width]
     std::uint32_t* level_count;     // [width]
-    std::uint32_t*
-        nodes_before;  // [splits + 1]: flags of splits that divide a node, then their sums
+    std::uint32_t* nodes_before;    // [splits + 1]: flags of splits that divide a node, then sums
 };
 
 struct SplitInterval {
@@ -168,8 +167,7 @@ struct LinkLevel {
     std::uint32_t level;  // in the band
     std::uint32_t key_count, max_leaf;
     const std::uint32_t* rank_begin;
-    std::uint32_t*
-        slot_of;  // [n]: the slot of the node that the interval beginning at a key will be
+    std::uint32_t* slot_of;  // [n]: first key of an interval -> the slot that its node will have
     TreeLinks out;
 
     RAYDIX_HD void child(std::uint32_t slot, std::uint32_t first, std::uint32_t last) const {
