@@ -6,6 +6,7 @@
 
 #include <memory>
 
+#include "device_scene.h"
 #include "kdtree_commands.h"
 #include "octree_commands.h"
 #include "output.h"
@@ -24,6 +25,7 @@ struct BuildCommand {
 struct TimedBuilds {
     Bvh bvh;
     std::vector<BuildMs> fresh, kept;
+    std::uint64_t device_bytes = 0;  // held on a device, tree included
 };
 
 TimedBuilds build_repeatedly(const Mesh& mesh, const BuildOptions& options, int repeat) {
@@ -41,6 +43,17 @@ TimedBuilds build_repeatedly(const Mesh& mesh, const BuildOptions& options, int 
         builder.build(mesh, options, again);
         timed.kept.push_back(again.build_ms());
     }
+    return timed;
+}
+
+TimedBuilds build_repeatedly_on_device(const Mesh& mesh, const BuildOptions& options, int repeat) {
+    DeviceScene device(mesh, options);
+    TimedBuilds timed;
+    static_cast<void>(device.build_fresh());
+    for (int i = 0; i < repeat; ++i) timed.fresh.push_back(device.build_fresh());
+    for (int i = 0; i < repeat; ++i) timed.kept.push_back(device.build_again());
+    timed.bvh = device.download();
+    timed.device_bytes = device.tree_bytes();
     return timed;
 }
 
@@ -73,11 +86,14 @@ void run_build(const BuildCommand& options) {
     document["scene"] = scene_json(scene);
     document["load_ms"] = scene.load_ms;
     const TimedBuilds timed = about(options.scene, [&] {
-        return build_repeatedly(scene.mesh, options.tree.build_options(options.common),
-                                options.repeat);
+        const auto build =
+            options.tree.device == "cuda" ? build_repeatedly_on_device : build_repeatedly;
+        return build(scene.mesh, options.tree.build_options(options.common), options.repeat);
     });
     const TreeStats stats = tree_stats(timed.bvh, stats_options(options.tree, options.common));
     Json build = build_json(timed.bvh, stats, timed.fresh);
+    build["device"] = options.tree.device;
+    if (options.tree.device == "cuda") build["peak_bytes"] = timed.device_bytes;
     build["kept_ms"] = spread_json(totals(timed.kept));
     document["build"] = build;
     if (options.common.prints_tables()) {

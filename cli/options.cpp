@@ -7,6 +7,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "device_scene.h"
+
 namespace raydix::cli {
 
 void add_common_options(CLI::App& command, CommonOptions& options) {
@@ -56,7 +58,7 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->capture_default_str()
         ->group(group);
     command.add_option("--device", options.device, "Where to build and trace")
-        ->check(CLI::IsMember({"cpu"}))
+        ->check(CLI::IsMember({"cpu", "cuda"}))
         ->capture_default_str()
         ->group(group);
     of_the_build(
@@ -119,6 +121,13 @@ Scene load_scene_with_cameras(const std::string& name, const TreeOptions& tree,
     return scene;
 }
 
+void refuse_device(const TreeOptions& tree) {
+    if (tree.device != "cpu")
+        throw CLI::ValidationError("--device", tree.device +
+                                                   " builds trees (build, check); rays are traced "
+                                                   "on the cpu only");
+}
+
 void refuse_build_options(const std::string& scene, const TreeOptions& tree) {
     if (!is_rdx(scene)) return;
     for (const CLI::Option* option : tree.of_the_build)
@@ -137,8 +146,11 @@ SceneTree load_scene_tree(const std::string& name, const TreeOptions& tree,
         return {std::move(file.scene), std::move(file.bvh)};
     }
     SceneTree result{load_scene_with_cameras(name, tree, common), {}};
-    result.bvh =
-        about(name, [&] { return build_bvh(result.scene.mesh, tree.build_options(common)); });
+    result.bvh = about(name, [&] {
+        const BuildOptions options = tree.build_options(common);
+        return tree.device == "cuda" ? DeviceScene(result.scene.mesh, options).build().bvh
+                                     : build_bvh(result.scene.mesh, options);
+    });
     return result;
 }
 

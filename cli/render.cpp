@@ -43,6 +43,7 @@ Camera chosen_camera(const RenderCommand& options, const Scene& scene) {
 
 void run_render(const RenderCommand& options) {
     refuse_build_options(options.scene, options.tree);
+    refuse_device(options.tree);
     const bool of_tree = is_tree_view(options.view);
     if (!of_tree) refuse_tree_view_options(options.tree_view);
     const TreeScene tree_scene =

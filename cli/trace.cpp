@@ -242,6 +242,7 @@ void run_trace(const TraceCommand& options) {
         throw CLI::ValidationError("--hits",
                                    "any-hit rays only answer yes or no; use --mode closest or all");
     refuse_build_options(options.scene, options.tree);
+    refuse_device(options.tree);
     const KdTraced traced = load_kdtree_traced(options.scene, options.tree, options.common);
     const bool through_kdtree = traced.kdtree.has_value();
     if (through_kdtree && mode == Mode::all)

@@ -13,6 +13,8 @@ if(NOT RAYDIX_CUDA STREQUAL "OFF")
             set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION -std=c++20)
         endif()
         set(CMAKE_CUDA_STANDARD 20)
+        set(CMAKE_CUDA_STANDARD_REQUIRED ON)
+        find_package(CUDAToolkit REQUIRED)
         # The host's bits: no contraction, no flushed denormals, rounded division and square root.
         add_library(raydix_cuda_options INTERFACE)
         target_compile_options(raydix_cuda_options INTERFACE $<$<COMPILE_LANGUAGE:CUDA>:

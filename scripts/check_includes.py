@@ -32,7 +32,7 @@ PROGRAMS = ("cli", "examples")
 # Headers of one library -> the only files that may include them.
 PRIVATE_LIBRARIES = {
     r"(tbb|oneapi)/.*": r"src/exec/parallel\.cpp",
-    r"(cuda|cub|thrust|nv)/.*|cuda.*\.h": r"(src|tests|bench)/.*\.cuh?|src/base/atomic\.h",
+    r"(cuda|cub|thrust|nv|nvtx3)/.*|cuda.*\.h": r"(src|tests|bench)/.*\.cuh?|src/base/atomic\.h",
     r"(embree\d?|nanoflann).*": r"(tests|bench)/.*",
     r"gtest/.*|gmock/.*": r"tests/.*",
     r"CLI/.*": r"(cli|bench)/.*",

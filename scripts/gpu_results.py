@@ -1,4 +1,5 @@
-"""gpu_results.py JUNIT: the test run of scripts/gpu -> bench/results/GPU-NAME.json. Exit code 1 unless every test ran and passed."""
+"""gpu_results.py JUNIT [BENCH_LINES]: what scripts/gpu ran -> bench/results/GPU-NAME.json: the tests, and the lines that
+bench_gpu printed. Exit code 1 unless every test ran and passed."""
 import json
 import pathlib
 import re
@@ -25,17 +26,26 @@ def tests_of(junit):
             for case in ElementTree.parse(junit).getroot().iter("testcase")]
 
 
-def main(junit):
+def bench_of(file):
+    return [json.loads(line) for line in pathlib.Path(file).read_text(encoding="utf-8").splitlines() if line.strip()]
+
+
+def main(junit, bench=None):
     name, driver = first_line_of("nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader").split(", ")
     tests = tests_of(junit)
-    document = {"gpu": name, "driver": driver, "commit": first_line_of("git", "rev-parse", "HEAD"), "tests": tests}
+    document = {"gpu": name, "driver": driver, "commit": first_line_of("git", "rev-parse", "HEAD"), "tests": tests,
+                "bench": bench_of(bench) if bench else []}
     out = ROOT / "bench" / "results" / (re.sub(r"[^A-Za-z0-9.]+", "-", name) + ".json")
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
     passed = sum(test["status"] == "passed" for test in tests)
+    for line in document["bench"]:
+        print(f"{line['scene']:<40}{line['builder']:<12}{line['bits']:>3} bits, leaves of {line['max_leaf']}: "
+              f"{line['ms']['total']['median']:8.3f} ms, {line['gprims_per_s']:6.2f} Gprims/s, hierarchy and boxes at "
+              f"{100 * line['of_copy_rate']:5.1f} % of the copy rate")
     print(f"{passed} of {len(tests)} GPU tests passed on {name}; written: {out.relative_to(ROOT)}")
     return 0 if tests and passed == len(tests) else 1
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    sys.exit(main(*sys.argv[1:]))

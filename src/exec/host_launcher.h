@@ -12,7 +12,8 @@
 //                               the same for the first *count <= limit values; the sum of all
 //                               goes behind them, to values[*count]
 //   sort_pairs(label, arrays, limit, count, key_bits)
-//                               the first *count pairs by key, stable
+//                               the first *count pairs by key, stable; all `limit` if count is
+//                               null
 //   maybe_any(count)            false if *count is known to be 0; a GPU's host knows nothing
 //   Probe                       what counted functors report to (base/probe.h)
 //
@@ -150,7 +151,7 @@ void HostLauncher<Probe_>::sort_pairs(const char* label, const SortArrays<Key>& 
     static_assert(std::is_unsigned_v<Key>);
     constexpr std::size_t digits = 256, block = 1u << 14;
     const Clock::time_point start = Clock::now();
-    const std::uint32_t n = std::min(*count, limit);
+    const std::uint32_t n = count == nullptr ? limit : std::min(*count, limit);
     const std::size_t blocks = (n + block - 1) / block;
     Key* from_keys = a.keys;
     Key* to_keys = a.sorted_keys;

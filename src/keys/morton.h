@@ -47,7 +47,7 @@ struct Grid {
 };
 
 /// `scene` is the box around all valid primitives; empty gives a grid of one cell.
-inline Grid make_grid(const Aabb& scene, int axis_bits) {
+RAYDIX_HD inline Grid make_grid(const Aabb& scene, int axis_bits) {
     if (is_empty(scene)) return {};
     const Vec3 size = scene.hi - scene.lo;
     const float longest = max_of(max_of(size.x, size.y), size.z);

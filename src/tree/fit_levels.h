@@ -11,15 +11,16 @@
 
 namespace raydix {
 
-/// The root alone is on the first level.
+/// The root alone is on the first level; a tree of one leaf has none.
 struct StartLevels {
     const BvhNode* nodes;
     std::uint32_t* ranks;
     TreeLevels levels;
     RAYDIX_HD void operator()(std::uint32_t level) const {
-        levels.count[level] = level == 0 ? 1 : 0;
+        levels.count[level] = level == 0 && !nodes[0].is_leaf() ? 1 : 0;
         if (level != 0) return;
         levels.begin[0] = 0;
+        if (nodes[0].is_leaf()) return;
         ranks[0] = rank_of_slot(nodes[0].first);
     }
 };

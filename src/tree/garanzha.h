@@ -18,14 +18,15 @@ struct TaskRange {
     std::uint32_t first, last;
 };
 
-/// The first task is the whole range; all other levels are empty.
+/// The first task is the whole range; all other levels are empty. So is the first if all keys fit
+/// into one leaf, which a GPU's host may not know.
 struct StartQueue {
-    std::uint32_t key_count;
+    std::uint32_t key_count, max_leaf;
     TaskRange* queue;
     TreeLinks out;
     TreeLevels levels;
     RAYDIX_HD void operator()(std::uint32_t level) const {
-        levels.count[level] = level == 0 ? 1 : 0;
+        levels.count[level] = level == 0 && key_count > max_leaf ? 1 : 0;
         if (level != 0) return;
         levels.begin[0] = 0;
         queue[0] = {0, key_count - 1};
@@ -116,7 +117,7 @@ void launch_garanzha(Launcher& launcher, const LbvhInput<Key>& in, const Garanzh
     }
     const SortedKeys<Key, Probe> keys{in.keys, in.count};
     launcher.launch("garanzha.start", levels.limit + 1,
-                    StartQueue{in.count, scratch.queue, out, levels});
+                    StartQueue{in.count, in.max_leaf, scratch.queue, out, levels});
     const std::uint32_t limit = inner_node_limit(in.count, in.max_leaf);
     for (std::uint32_t level = 0; level < levels.limit; ++level) {
         if (!launcher.maybe_any(levels.count + level)) break;

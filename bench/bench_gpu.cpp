@@ -1,0 +1,148 @@
+// How fast are builds on a GPU, stage by stage, and what part of the memory's rate do hierarchy and
+// boxes reach? Every tree is first compared with the host's. A JSON line per scene and builder on
+// standard output; scripts/gpu keeps them. Without a device: exit code 1 and the reason.
+#include <fmt/format.h>
+#include <raydix/check.h>
+#include <raydix/device.h>
+#include <raydix/machine.h>
+#include <raydix/scene.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Options {
+    std::vector<std::string> scenes{
+        "builtin:figure?triangles=174000", "builtin:figure?triangles=1000000",
+        "builtin:figure?triangles=1770000", "builtin:figure?triangles=10000000"};
+    std::vector<std::string> builders{"karras", "lauterbach", "garanzha", "apetrei"};
+    std::vector<int> bits{30, 63}, max_leaf{1, 4};
+    int repeat = 20;
+    std::uint64_t seed = 1;
+    std::size_t copy_bytes = std::size_t{1} << 30;
+};
+
+struct Stage {
+    const char* name;
+    double raydix::BuildMs::*ms;
+};
+constexpr Stage stages[] = {
+    {"bounds", &raydix::BuildMs::bounds},       {"codes", &raydix::BuildMs::codes},
+    {"sort", &raydix::BuildMs::sort},           {"layout", &raydix::BuildMs::layout},
+    {"hierarchy", &raydix::BuildMs::hierarchy}, {"fit", &raydix::BuildMs::fit},
+    {"total", &raydix::BuildMs::total}};
+
+Json spread_json(std::vector<double> values) {
+    std::ranges::sort(values);
+    return {{"median", values[values.size() / 2]}, {"min", values.front()}, {"max", values.back()}};
+}
+
+/// The mesh in device memory.
+struct DeviceInput {
+    raydix::DeviceBuffer<raydix::Vec3> vertices;
+    raydix::DeviceBuffer<raydix::Triangle> triangles;
+    raydix::DeviceMesh mesh;
+
+    explicit DeviceInput(const raydix::Mesh& host)
+        : vertices(std::span<const raydix::Vec3>(host.vertices)),
+          triangles(std::span<const raydix::Triangle>(host.triangles)),
+          mesh{vertices.data(), static_cast<std::uint32_t>(vertices.size()), triangles.data(),
+               static_cast<std::uint32_t>(triangles.size())} {
+        if (host.triangles.empty()) throw std::runtime_error("the scene has no triangles");
+    }
+};
+
+Json measure(const DeviceInput& input, const raydix::BuildOptions& options, int repeat,
+             double copy_rate, const raydix::Bvh& expected) {
+    const std::uint32_t n = input.mesh.triangle_count;
+    raydix::DeviceBvh tree(raydix::PrimitiveKind::triangles, n, options);
+    tree.build(input.mesh);
+    if (const auto report = check_same(tree.download(), expected); !report.ok)
+        throw std::runtime_error("the device's tree differs from the host's: " + report.broken);
+    std::vector<raydix::BuildMs> runs;
+    for (int i = 0; i < repeat; ++i) runs.push_back(tree.build_timed(input.mesh));
+
+    Json ms;
+    for (const Stage& stage : stages) {
+        std::vector<double> values;
+        for (const raydix::BuildMs& run : runs) values.push_back(run.*stage.ms);
+        ms[stage.name] = spread_json(values);
+    }
+    // What hierarchy and boxes cannot do without: a key and a box of each primitive read once, the
+    // nodes written once.
+    const std::uint64_t key_bytes = options.bits == 30 ? 4 : 8;
+    const std::uint64_t bytes =
+        expected.order().size() * (key_bytes + 24) + expected.nodes().size_bytes();
+    const double seconds =
+        1e-3 * (ms["hierarchy"]["median"].get<double>() + ms["fit"]["median"].get<double>());
+    const double total = 1e-3 * ms["total"]["median"].get<double>();
+    return {{"builder", builder_name(options.builder)},
+            {"bits", options.bits},
+            {"max_leaf", options.max_leaf},
+            {"same_tree_as_cpu", true},
+            {"repeat", repeat},
+            {"ms", ms},
+            {"gprims_per_s", n / total / 1e9},
+            {"compulsory_bytes", bytes},
+            {"of_copy_rate", static_cast<double>(bytes) / seconds / copy_rate}};
+}
+
+void run(const Options& options) {
+    const std::string device = raydix::device_name();
+    const double copy_rate = raydix::measure_device_copy(options.copy_bytes, options.repeat);
+    for (const std::string& name : options.scenes) {
+        const raydix::Scene scene = raydix::load_scene(name, options.seed);
+        const DeviceInput input(scene.mesh);
+        for (const int bits : options.bits)
+            for (const int max_leaf : options.max_leaf) {
+                raydix::BuildOptions build;
+                build.bits = bits;
+                build.max_leaf = max_leaf;
+                const raydix::Bvh expected = build_bvh(scene.mesh, build);
+                for (const std::string& builder : options.builders) {
+                    build.builder = raydix::builder_from_name(builder);
+                    Json line{{"bench", "gpu_build"},
+                              {"device", device},
+                              {"cpu", raydix::machine_info().cpu},
+                              {"compiler", __VERSION__},
+                              {"copy_bytes_per_s", copy_rate},
+                              {"scene", name},
+                              {"seed", options.seed},
+                              {"triangles", scene.mesh.triangles.size()}};
+                    line.update(measure(input, build, options.repeat, copy_rate, expected));
+                    fmt::print("{}\n", line.dump());
+                }
+            }
+    }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("Builds on a GPU: milliseconds per stage, rate, part of the memory's copy rate");
+    Options options;
+    app.add_option("--scene", options.scenes, "Scenes of triangles")->capture_default_str();
+    app.add_option("--builder", options.builders, "Builders")->capture_default_str();
+    app.add_option("--bits", options.bits, "Bits of the Morton codes")->capture_default_str();
+    app.add_option("--max-leaf", options.max_leaf, "Most primitives in a leaf")
+        ->capture_default_str();
+    app.add_option("--repeat", options.repeat, "Timed builds of each kind")
+        ->check(CLI::Range(1, 10000))
+        ->capture_default_str();
+    app.add_option("--seed", options.seed, "Seed of built-in scenes")->capture_default_str();
+    app.add_option("--copy-bytes", options.copy_bytes, "Size of the copy that measures the memory")
+        ->capture_default_str();
+    CLI11_PARSE(app, argc, argv);
+    try {
+        run(options);
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "bench_gpu: {}\n", error.what());
+        return 1;
+    }
+    return 0;
+}

@@ -1,0 +1,89 @@
+// Device memory and streams of raydix/device.h.
+#include <raydix/device.h>
+#include <raydix/error.h>
+
+#include <algorithm>
+
+#include "exec/cuda_error.cuh"
+
+namespace raydix {
+
+bool device_available() noexcept {
+    int devices = 0;
+    const bool found = cudaGetDeviceCount(&devices) == cudaSuccess && devices > 0;
+    static_cast<void>(cudaGetLastError());  // a missing device is no error of the next call
+    return found;
+}
+
+std::string device_name() {
+    int devices = 0;
+    const cudaError_t status = cudaGetDeviceCount(&devices);
+    if (status != cudaSuccess || devices == 0) {
+        static_cast<void>(cudaGetLastError());
+        throw BackendUnavailable(
+            std::string("no CUDA device: ") +
+            (status == cudaSuccess ? "none found" : cudaGetErrorString(status)));
+    }
+    int current = 0;
+    RAYDIX_CUDA_TRY(cudaGetDevice(&current));
+    cudaDeviceProp properties{};
+    RAYDIX_CUDA_TRY(cudaGetDeviceProperties(&properties, current));
+    return properties.name;
+}
+
+void synchronize(Stream stream) {
+    RAYDIX_CUDA_TRY(cudaStreamSynchronize(static_cast<cudaStream_t>(stream)));
+}
+
+double measure_device_copy(std::size_t bytes, int repeat) {
+    const DeviceBuffer<std::byte> from(bytes), to(bytes);
+    cudaEvent_t start = nullptr, stop = nullptr;
+    RAYDIX_CUDA_TRY(cudaEventCreate(&start));
+    RAYDIX_CUDA_TRY(cudaEventCreate(&stop));
+    double best = 0;
+    for (int turn = 0; turn <= repeat; ++turn) {
+        RAYDIX_CUDA_TRY(cudaEventRecord(start));
+        RAYDIX_CUDA_TRY(cudaMemcpyAsync(to.data(), from.data(), bytes, cudaMemcpyDeviceToDevice));
+        RAYDIX_CUDA_TRY(cudaEventRecord(stop));
+        RAYDIX_CUDA_TRY(cudaEventSynchronize(stop));
+        float ms = 0;
+        RAYDIX_CUDA_TRY(cudaEventElapsedTime(&ms, start, stop));
+        if (turn > 0) best = std::max(best, 2.0 * static_cast<double>(bytes) / (1e-3 * ms));
+    }
+    RAYDIX_CUDA_TRY(cudaEventDestroy(start));
+    RAYDIX_CUDA_TRY(cudaEventDestroy(stop));
+    return best;
+}
+
+namespace detail {
+
+void* device_allocate(std::size_t bytes) {
+    if (bytes == 0) return nullptr;
+    static_cast<void>(device_name());
+    // Whole lines: byte-wide exchanges work on the word around a byte (base/atomic.h).
+    constexpr std::size_t line = 256;
+    void* memory = nullptr;
+    RAYDIX_CUDA_TRY(cudaMalloc(&memory, (bytes + line - 1) / line * line));
+    return memory;
+}
+
+void device_free(void* memory) noexcept {
+    // An error of an earlier launch that shows up here has been or will be thrown where it is asked
+    // for.
+    if (memory != nullptr) static_cast<void>(cudaFree(memory));
+}
+
+void copy_to_device(void* device, const void* host, std::size_t bytes, Stream stream) {
+    if (bytes == 0) return;
+    RAYDIX_CUDA_TRY(cudaMemcpyAsync(device, host, bytes, cudaMemcpyHostToDevice,
+                                    static_cast<cudaStream_t>(stream)));
+}
+
+void copy_to_host(void* host, const void* device, std::size_t bytes, Stream stream) {
+    if (bytes == 0) return;
+    RAYDIX_CUDA_TRY(cudaMemcpyAsync(host, device, bytes, cudaMemcpyDeviceToHost,
+                                    static_cast<cudaStream_t>(stream)));
+}
+
+}  // namespace detail
+}  // namespace raydix

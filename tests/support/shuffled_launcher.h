@@ -1,0 +1,97 @@
+// Runs launches as a GPU may: elements in blocks, blocks and the elements inside them in an order
+// drawn from a seed, blocks at work at the same time on real threads. What passes here under the
+// thread sanitizer for many seeds does not lean on an order. The interface is that of
+// exec/host_launcher.h.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+#include <numeric>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "exec/host_launcher.h"
+
+namespace raydix::test {
+
+class ShuffledLauncher {
+public:
+    using Probe = NoProbe;
+    static constexpr std::uint32_t block_size = 64;
+
+    explicit ShuffledLauncher(std::uint64_t seed, int threads = 3)
+        : random_(seed), threads_(threads) {}
+
+    template <class Work>
+    void launch(const char*, std::uint32_t n, const Work& work) {
+        if (n == 0) return;
+        const std::uint64_t launch_seed = random_();
+        const std::vector<std::uint32_t> blocks = shuffled((n - 1) / block_size + 1, launch_seed);
+        std::atomic<std::size_t> next{0};
+        const auto run_blocks = [&] {
+            for (std::size_t k = next++; k < blocks.size(); k = next++)
+                run_block(blocks[k], n, launch_seed, work);
+        };
+        std::vector<std::thread> crew;
+        const std::size_t helpers = std::min(blocks.size(), static_cast<std::size_t>(threads_)) - 1;
+        for (std::size_t t = 0; t < helpers; ++t) crew.emplace_back(run_blocks);
+        run_blocks();
+        for (std::thread& thread : crew) thread.join();
+    }
+
+    template <class Work>
+    void launch_counted(const char* label, const std::uint32_t* count, std::uint32_t limit,
+                        const Work& work) {
+        launch(label, std::min(*count, limit), work);
+    }
+
+    void exclusive_scan(const char* label, std::uint32_t* values, std::uint32_t n,
+                        std::uint32_t* total) {
+        host_.exclusive_scan(label, values, n, total);
+    }
+
+    void exclusive_scan_counted(const char* label, std::uint32_t* values,
+                                const std::uint32_t* count, std::uint32_t limit) {
+        host_.exclusive_scan_counted(label, values, count, limit);
+    }
+
+    /// As on a GPU, the places behind the last pair do not keep what they held.
+    template <class Key>
+    void sort_pairs(const char* label, const SortArrays<Key>& arrays, std::uint32_t limit,
+                    const std::uint32_t* count, int key_bits) {
+        host_.sort_pairs(label, arrays, limit, count, key_bits);
+        const std::uint32_t n = count == nullptr ? limit : std::min(*count, limit);
+        std::fill(arrays.sorted_keys + n, arrays.sorted_keys + limit, static_cast<Key>(random_()));
+        std::fill(arrays.keys, arrays.keys + limit, static_cast<Key>(random_()));
+    }
+
+    /// A GPU's host knows nothing either.
+    [[nodiscard]] bool maybe_any(const std::uint32_t*) const { return true; }
+
+private:
+    static std::vector<std::uint32_t> shuffled(std::uint32_t n, std::uint64_t seed) {
+        std::vector<std::uint32_t> order(n);
+        std::iota(order.begin(), order.end(), 0u);
+        std::mt19937_64 random(seed);
+        std::ranges::shuffle(order, random);
+        return order;
+    }
+
+    template <class Work>
+    static void run_block(std::uint32_t block, std::uint32_t n, std::uint64_t launch_seed,
+                          const Work& work) {
+        const std::uint32_t begin = block * block_size;
+        const std::uint32_t size = std::min(block_size, n - begin);
+        for (const std::uint32_t k : shuffled(size, launch_seed + block)) work(begin + k);
+    }
+
+    std::mt19937_64 random_;
+    int threads_;
+    HostLauncher<> host_;
+};
+
+}  // namespace raydix::test
