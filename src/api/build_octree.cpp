@@ -56,7 +56,7 @@ struct OctreeRun {
 
         Buffer<Key> codes(n);
         const Grid grid = make_grid(bounds.box, CodeFormat<Key>::axis_bits);
-        for_each_index(n, HostEncodeMorton<Source, Key>{source, HostGrid(grid), codes.data()});
+        host_encode(source, grid, valid == n, n, codes.data());
         ms.codes = stage.lap();
 
         sort(codes.span(), valid);
