@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "device_scene.h"
+#include "octree_commands.h"
 #include "output.h"
 
 namespace raydix::cli {
@@ -62,18 +63,20 @@ Spread totals(const std::vector<BuildMs>& builds) {
 }
 
 void print_build_table(const Json& build, const TimedBuilds& timed) {
-    fmt::print("\n{:<12} {:>9} {:>9} {:>9}   ms, of {} builds into new memory\n", "stage", "median",
-               "min", "max", timed.fresh.size());
-    for (const auto& [stage, ms] : build["ms"].items())
-        fmt::print("{:<12} {:>9.2f} {:>9.2f} {:>9.2f}\n", stage, ms.get<double>(),
-                   build["ms_spread"]["min"][stage].get<double>(),
-                   build["ms_spread"]["max"][stage].get<double>());
+    print_stages(build, timed.fresh.size());
     const Spread kept = totals(timed.kept);
     fmt::print("{:<12} {:>9.2f} {:>9.2f} {:>9.2f}   total into kept memory\n", "rebuild",
                kept.median, kept.min, kept.max);
 }
 
+void run_octree(const BuildCommand& options) {
+    if (!options.out_file.empty())
+        throw CLI::ValidationError("--output", ".rdx files hold a bvh; an octree cannot be saved");
+    run_octree_build(options.scene, options.tree, options.common, options.repeat);
+}
+
 void run_build(const BuildCommand& options) {
+    if (options.tree.tree == "octree") return run_octree(options);
     Json document = new_document("build");
     const Scene scene = load_scene_with_cameras(options.scene, options.tree, options.common);
     document["scene"] = scene_json(scene);
@@ -111,6 +114,8 @@ struct CheckCommand {
 };
 
 void run_check(const CheckCommand& options) {
+    if (options.tree.tree == "octree" && options.same.empty())
+        return run_octree_check(options.scene, options.tree, options.common);
     Json document = new_document("check");
     CheckReport report;
     std::string what = options.scene;

@@ -31,7 +31,7 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         return option->group(group);
     };
     command.add_option("--tree", options.tree, "Kind of tree")
-        ->check(CLI::IsMember({"bvh"}))
+        ->check(CLI::IsMember({"bvh", "octree"}))
         ->capture_default_str()
         ->group(group);
     CLI::Option* builder =
@@ -48,6 +48,11 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
     of_the_build(command.add_option("--max-leaf", options.max_leaf, "Most primitives in a leaf"))
         ->check(CLI::Range(1, 255))
         ->capture_default_str();
+    of_the_build(command.add_option("--max-level", options.max_level,
+                                    "Octree: the level that is not divided any more, 0 to 21 (10 "
+                                    "with 30 bits; default: the highest)"))
+        ->check(CLI::Range(0, 21))
+        ->type_name("LEVEL");
     command.add_option("--layout", options.layout, "Memory layout that is traced")
         ->check(CLI::IsMember({"binary"}))
         ->capture_default_str()
@@ -82,9 +87,13 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
                     "Cameras file instead of cameras.json beside the scene")
         ->type_name("FILE")
         ->group(group);
+    for (const char* name :
+         {"--builder", "--quality", "--fit", "--sah-node", "--sah-primitive", "--epo"})
+        options.of_a_bvh.push_back(command.get_option(name));
 }
 
 BuildOptions TreeOptions::build_options(const CommonOptions& common) const {
+    if (max_level) throw CLI::ValidationError("--max-level", "belongs to --tree octree");
     BuildOptions result;
     result.builder = builder_from_name(quality == "balanced" ? "ploc" : builder);
     if (!fit.empty()) result.fit = fit == "levels" ? Fit::levels : Fit::atomic;
@@ -129,6 +138,10 @@ void refuse_build_options(const std::string& scene, const TreeOptions& tree) {
 
 SceneTree load_scene_tree(const std::string& name, const TreeOptions& tree,
                           const CommonOptions& common) {
+    if (tree.tree == "octree")
+        throw CLI::ValidationError("--tree",
+                                   "an octree is for build and for check of one scene; a bvh "
+                                   "serves everywhere");
     if (is_rdx(name)) {
         RdxFile file = load_rdx(name);
         override_cameras(file.scene, tree);

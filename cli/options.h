@@ -29,12 +29,14 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 struct TreeOptions {
     std::string tree = "bvh", builder = "karras", quality, layout = "binary", device = "cpu", fit;
     int bits = 63, max_leaf = 4;
+    std::optional<int> max_level;  // of an octree
     bool strict = false;
     std::string cameras_file;
     SahConstants sah;
     std::optional<double> epo_sample;
     std::vector<const CLI::Option*>
-        of_the_build;  // those that a finished tree cannot follow any more
+        of_the_build,  // those that a finished tree cannot follow any more
+        of_a_bvh;      // those that mean nothing to other trees
 
     [[nodiscard]] BuildOptions build_options(const CommonOptions& common) const;
 };

@@ -113,9 +113,14 @@ Json build_json(const Bvh& bvh, const TreeStats& stats, const std::vector<BuildM
                {"bytes_referenced", stats.bytes_referenced},
                {"peak_bytes", builds.empty() ? Json(nullptr) : Json(bvh.peak_bytes())},
                {"tree_hash", stats.tree_hash}};
+    add_build_ms(build, builds);
+    return build;
+}
+
+void add_build_ms(Json& build, const std::vector<BuildMs>& builds) {
     if (builds.empty()) {
         build["ms"] = nullptr;
-        return build;
+        return;
     }
     Json ms, least, most;
     for (const auto& [name, member] : stages) {
@@ -126,7 +131,15 @@ Json build_json(const Bvh& bvh, const TreeStats& stats, const std::vector<BuildM
     }
     build["ms"] = ms;
     build["ms_spread"] = {{"min", least}, {"max", most}};
-    return build;
+}
+
+void print_stages(const Json& build, std::size_t builds) {
+    fmt::print("\n{:<12} {:>9} {:>9} {:>9}   ms, of {} builds into new memory\n", "stage", "median",
+               "min", "max", builds);
+    for (const auto& [stage, ms] : build["ms"].items())
+        fmt::print("{:<12} {:>9.2f} {:>9.2f} {:>9.2f}\n", stage, ms.get<double>(),
+                   build["ms_spread"]["min"][stage].get<double>(),
+                   build["ms_spread"]["max"][stage].get<double>());
 }
 
 StatsOptions stats_options(const TreeOptions& tree, const CommonOptions& common) {

@@ -31,6 +31,9 @@ struct Spread {
 /// file).
 [[nodiscard]] Json build_json(const Bvh& bvh, const TreeStats& stats,
                               const std::vector<BuildMs>& builds);
+/// Puts `ms` and `ms_spread` of the repeats into a `build` object.
+void add_build_ms(Json& build, const std::vector<BuildMs>& builds);
+void print_stages(const Json& build, std::size_t builds);
 [[nodiscard]] StatsOptions stats_options(const TreeOptions& tree, const CommonOptions& common);
 void print_tree_table(const Bvh& bvh, const TreeStats& stats);
 

@@ -8,6 +8,7 @@
 #include <raydix/error.h>    // IWYU pragma: export
 #include <raydix/machine.h>  // IWYU pragma: export
 #include <raydix/mesh.h>     // IWYU pragma: export
+#include <raydix/octree.h>   // IWYU pragma: export
 #include <raydix/picture.h>  // IWYU pragma: export
 #include <raydix/rays.h>     // IWYU pragma: export
 #include <raydix/rdx.h>      // IWYU pragma: export

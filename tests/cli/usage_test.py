@@ -9,7 +9,7 @@ sys.dont_write_bytecode = True
 from program import COMMANDS, PROGRAM, TIME_LIMIT_S, TRIANGLE, ProgramTest, json_of, main, ply  # noqa: E402
 
 COMMON = ["--json", "--threads", "--quiet", "--seed"]
-TREE = ["--tree", "--builder", "--quality", "--bits", "--max-leaf", "--fit", "--layout", "--device", "--strict",
+TREE = ["--tree", "--builder", "--quality", "--bits", "--max-leaf", "--max-level", "--fit", "--layout", "--device", "--strict",
         "--epo", "--cameras", "--sah-node", "--sah-primitive"]
 OPTIONS = {
     "info": ["SCENE"],
