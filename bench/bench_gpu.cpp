@@ -1,6 +1,6 @@
-// How fast are builds on a GPU, stage by stage, and what part of the memory's rate do hierarchy and boxes reach? Every
-// tree is first compared with the host's. A JSON line per scene and builder on standard output; scripts/gpu keeps them.
-// Without a device: exit code 1 and the reason.
+// How fast are builds on a GPU, stage by stage, and what part of the memory's rate do hierarchy and
+// boxes reach? Every tree is first compared with the host's. A JSON line per scene and builder on
+// standard output; scripts/gpu keeps them. Without a device: exit code 1 and the reason.
 #include <fmt/format.h>
 #include <raydix/check.h>
 #include <raydix/device.h>

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "device_scene.h"
+#include "kdtree_commands.h"
 #include "octree_commands.h"
 #include "output.h"
 
@@ -77,6 +78,9 @@ void run_octree(const BuildCommand& options) {
 
 void run_build(const BuildCommand& options) {
     if (options.tree.tree == "octree") return run_octree(options);
+    if (options.tree.tree == "kdtree")
+        return run_kdtree_build(options.scene, options.tree, options.common,
+                                {options.repeat, !options.out_file.empty()});
     Json document = new_document("build");
     const Scene scene = load_scene_with_cameras(options.scene, options.tree, options.common);
     document["scene"] = scene_json(scene);
@@ -116,6 +120,8 @@ struct CheckCommand {
 void run_check(const CheckCommand& options) {
     if (options.tree.tree == "octree" && options.same.empty())
         return run_octree_check(options.scene, options.tree, options.common);
+    if (options.tree.tree == "kdtree" && options.same.empty())
+        return run_kdtree_check(options.scene, options.tree, options.common);
     Json document = new_document("check");
     CheckReport report;
     std::string what = options.scene;

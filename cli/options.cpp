@@ -31,7 +31,7 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         return option->group(group);
     };
     command.add_option("--tree", options.tree, "Kind of tree")
-        ->check(CLI::IsMember({"bvh", "octree"}))
+        ->check(CLI::IsMember({"bvh", "octree", "kdtree"}))
         ->capture_default_str()
         ->group(group);
     CLI::Option* builder =
@@ -138,10 +138,8 @@ void refuse_build_options(const std::string& scene, const TreeOptions& tree) {
 
 SceneTree load_scene_tree(const std::string& name, const TreeOptions& tree,
                           const CommonOptions& common) {
-    if (tree.tree == "octree")
-        throw CLI::ValidationError("--tree",
-                                   "an octree is for build and for check of one scene; a bvh "
-                                   "serves everywhere");
+    if (tree.tree != "bvh")
+        throw CLI::ValidationError("--tree", "a " + tree.tree + " does not serve here, only a bvh");
     if (is_rdx(name)) {
         RdxFile file = load_rdx(name);
         override_cameras(file.scene, tree);

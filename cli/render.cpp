@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "output.h"
+#include "tree_view.h"
 
 namespace raydix::cli {
 namespace {
@@ -20,6 +21,7 @@ struct RenderCommand {
     std::optional<float> fov;
     int samples = 0;
     float ao_radius = 0.0f;
+    TreeViewOptions tree_view;
 };
 
 Vec3 vec_of(const std::vector<float>& v) { return {v[0], v[1], v[2]}; }
@@ -42,14 +44,20 @@ Camera chosen_camera(const RenderCommand& options, const Scene& scene) {
 void run_render(const RenderCommand& options) {
     refuse_build_options(options.scene, options.tree);
     refuse_device(options.tree);
-    const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
+    const bool of_tree = is_tree_view(options.view);
+    if (!of_tree) refuse_tree_view_options(options.tree_view);
+    const TreeScene tree_scene =
+        of_tree ? load_tree_scene(options.scene, options.view, options.tree_view, options.tree,
+                                  options.common)
+                : TreeScene{load_scene_tree(options.scene, options.tree, options.common), {}};
+    const SceneTree& input = tree_scene.input;
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}
                           : parse_size(options.size_text);
     const Camera camera = chosen_camera(options, input.scene);
     Progress progress("rendering", options.common);
     RenderOptions render_options;
-    render_options.view = view_from_name(options.view);
+    render_options.view = of_tree ? View::shaded : view_from_name(options.view);
     render_options.width = size.width;
     render_options.height = size.height;
     render_options.samples = options.samples;
@@ -59,12 +67,17 @@ void run_render(const RenderCommand& options) {
     render_options.threads = options.common.threads;
     render_options.progress = [&](double part) { progress.show(part); };
     const auto start = std::chrono::steady_clock::now();
-    const Picture picture =
-        about(options.scene, [&] { return render(input.bvh, camera, render_options); });
+    const Picture picture = about(options.scene, [&] {
+        if (options.view == "slice") return draw_slice(tree_scene, options.tree_view, size);
+        return of_tree ? render_tree(input.bvh, camera, tree_scene.boxes, render_options)
+                       : render(input.bvh, camera, render_options);
+    });
     const double ms =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     const View view = render_options.view;
-    save_picture(options.out_file, picture, view == View::shaded || view == View::diffuse);
+    save_picture(options.out_file, picture,
+                 !of_tree && (view == View::shaded || view == View::diffuse));
+    if (of_tree && options.common.prints_tables()) print_levels(tree_scene);
     if (options.common.prints_tables())
         fmt::print("{} ({} x {}, {}, {:.0f} ms)\n", options.out_file, size.width, size.height,
                    options.view, ms);
@@ -91,7 +104,8 @@ void add_render_command(CLI::App& app) {
         ->required()
         ->type_name("PICTURE");
     command->add_option("--view", options->view, "What to show")
-        ->check(CLI::IsMember({"shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps"}))
+        ->check(CLI::IsMember(
+            {"shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps", "tree", "slice"}))
         ->capture_default_str();
     command
         ->add_option("--size", options->size_text, "Pixels (default: of cameras.json, or 1024x768)")
@@ -119,6 +133,7 @@ void add_render_command(CLI::App& app) {
         ->add_option("--ao-radius", options->ao_radius,
                      "Reach of ao rays (default: of cameras.json, or 5 % of the diagonal)")
         ->check(finite_number(false));
+    add_tree_view_options(*command, options->tree_view);
     add_tree_options(*command, options->tree);
     add_common_options(*command, options->common);
     command->callback([options] { run_render(*options); });

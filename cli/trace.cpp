@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 
+#include "kdtree_commands.h"
 #include "output.h"
 
 namespace raydix::cli {
@@ -42,6 +43,7 @@ struct Batch {
     const Bvh& bvh;
     Mode mode;
     const CommonOptions& common;
+    const KdTree* kdtree;                // traced instead of the bvh if not null
     std::vector<Hit> hits;               // of the last run, closest and all
     std::vector<std::uint64_t> offsets;  // of the last run, all
     std::vector<std::uint8_t> occluded;
@@ -50,6 +52,7 @@ struct Batch {
         const TraceOptions options{.threads = common.threads, .counters = counters};
         if (mode == Mode::any) {
             occluded.resize(rays.size());
+            if (kdtree != nullptr) return kd_trace_any(*kdtree, rays, occluded, options);
             return trace_any(bvh, rays, occluded, options);
         }
         if (mode == Mode::all) {
@@ -59,6 +62,7 @@ struct Batch {
             return all.counts;
         }
         hits.resize(rays.size());
+        if (kdtree != nullptr) return kd_trace(*kdtree, rays, hits, options);
         return trace(bvh, rays, hits, options);
     }
 };
@@ -239,14 +243,21 @@ void run_trace(const TraceCommand& options) {
                                    "any-hit rays only answer yes or no; use --mode closest or all");
     refuse_build_options(options.scene, options.tree);
     refuse_device(options.tree);
-    const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
+    const KdTraced traced = load_kdtree_traced(options.scene, options.tree, options.common);
+    const bool through_kdtree = traced.kdtree.has_value();
+    if (through_kdtree && mode == Mode::all)
+        throw CLI::ValidationError("--mode",
+                                   "all hits go through a bvh; a kdtree gives the closest or any");
+    const SceneTree& input = traced.input;
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}
                           : parse_size(options.size_text);
-    Batch batch{input.bvh, mode, options.common, {}, {}, {}};
+    Batch batch{input.bvh, mode, options.common, through_kdtree ? &*traced.kdtree : nullptr, {},
+                {},        {}};
     Tally tally;
     Kept kept;
-    explain(options, input.bvh);
+    if (!through_kdtree) explain(options, input.bvh);
+    if (through_kdtree && options.explain) explain_kdtree(*traced.kdtree, options.common);
     Progress progress("tracing", options.common);
     if (options.rays.ends_with(".npy")) {
         const std::vector<Ray> rays = load_rays(options.rays);
@@ -270,8 +281,12 @@ void run_trace(const TraceCommand& options) {
     document["load_ms"] = input.scene.load_ms;
     const std::vector<BuildMs> builds =
         is_rdx(options.scene) ? std::vector<BuildMs>{} : std::vector{input.bvh.build_ms()};
-    document["build"] = build_json(
-        input.bvh, tree_stats(input.bvh, stats_options(options.tree, options.common)), builds);
+    document["build"] =
+        through_kdtree
+            ? kdtree_json(*traced.kdtree, {traced.kdtree->build_ms()})
+            : build_json(input.bvh,
+                         tree_stats(input.bvh, stats_options(options.tree, options.common)),
+                         builds);
     document["trace"] = Json::array({trace_json(options, mode_text(mode), tally)});
     if (options.rays == "ao") {
         const float radius = ao_radius_of(options, input);

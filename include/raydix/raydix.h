@@ -1,18 +1,21 @@
 // Everything at once.
 #pragma once
 
-#include <raydix/buffer.h>   // IWYU pragma: export
-#include <raydix/bvh.h>      // IWYU pragma: export
-#include <raydix/camera.h>   // IWYU pragma: export
-#include <raydix/check.h>    // IWYU pragma: export
-#include <raydix/error.h>    // IWYU pragma: export
-#include <raydix/machine.h>  // IWYU pragma: export
-#include <raydix/mesh.h>     // IWYU pragma: export
-#include <raydix/octree.h>   // IWYU pragma: export
-#include <raydix/picture.h>  // IWYU pragma: export
-#include <raydix/rays.h>     // IWYU pragma: export
-#include <raydix/rdx.h>      // IWYU pragma: export
-#include <raydix/scene.h>    // IWYU pragma: export
-#include <raydix/trace.h>    // IWYU pragma: export
-#include <raydix/types.h>    // IWYU pragma: export
-#include <raydix/version.h>  // IWYU pragma: export
+#include <raydix/buffer.h>     // IWYU pragma: export
+#include <raydix/bvh.h>        // IWYU pragma: export
+#include <raydix/camera.h>     // IWYU pragma: export
+#include <raydix/check.h>      // IWYU pragma: export
+#include <raydix/device.h>     // IWYU pragma: export
+#include <raydix/error.h>      // IWYU pragma: export
+#include <raydix/kdtree.h>     // IWYU pragma: export
+#include <raydix/machine.h>    // IWYU pragma: export
+#include <raydix/mesh.h>       // IWYU pragma: export
+#include <raydix/octree.h>     // IWYU pragma: export
+#include <raydix/picture.h>    // IWYU pragma: export
+#include <raydix/rays.h>       // IWYU pragma: export
+#include <raydix/rdx.h>        // IWYU pragma: export
+#include <raydix/scene.h>      // IWYU pragma: export
+#include <raydix/trace.h>      // IWYU pragma: export
+#include <raydix/tree_view.h>  // IWYU pragma: export
+#include <raydix/types.h>      // IWYU pragma: export
+#include <raydix/version.h>    // IWYU pragma: export

@@ -1,0 +1,187 @@
+// build_kdtree: bounds -> codes -> sort -> radix ranges -> layout -> nodes and their intervals, one
+// line each in KdBuildRun::run.
+#include <raydix/error.h>
+#include <raydix/kdtree.h>
+
+#include <algorithm>
+
+#include "base/check.h"
+#include "exec/host_launcher.h"
+#include "exec/memory.h"
+#include "keys/host_encode.h"
+#include "layout/leaf_order.h"
+#include "measure/stopwatch.h"
+#include "primitives/bounds.h"
+#include "sort/radix_sort.h"
+#include "tree/kdtree.h"
+#include "tree/kdtree_access.h"
+
+namespace raydix {
+namespace {
+
+void check_options(const KdTreeOptions& options, std::size_t n) {
+    if (options.bits != 30 && options.bits != 63)
+        throw InputError("k-d tree option bits is " + std::to_string(options.bits) +
+                         "; it must be 30 or 63");
+    if (options.max_leaf < 1 || options.max_leaf > 255)
+        throw InputError("k-d tree option max_leaf is " + std::to_string(options.max_leaf) +
+                         "; it must be 1 to 255");
+    if (n >= std::size_t{1} << 31)
+        throw InputError(std::to_string(n) + " primitives; a tree takes fewer than 2147483648");
+}
+
+/// Names the primitive that stops a build, if there is one.
+template <class Source>
+void check_bounds(const Bounds& bounds, const Source& source, const char* kind, bool strict) {
+    if constexpr (requires { source.vertex_count; }) {
+        if (bounds.first_unreadable != no_primitive) {
+            const Triangle& t = source.triangles[bounds.first_unreadable];
+            throw InputError(std::string(kind) + " " + std::to_string(bounds.first_unreadable) +
+                             ": index " + std::to_string(std::max({t[0], t[1], t[2]})) +
+                             " is past the last of " + std::to_string(source.vertex_count) +
+                             " vertices");
+        }
+    }
+    if (strict && bounds.left_out != 0)
+        throw InputError(std::string(kind) + " " + std::to_string(bounds.first_left_out) +
+                         ": not finite or out of range, as are " +
+                         std::to_string(bounds.left_out - 1) + " others");
+}
+
+/// One build: a source of primitives, the copies that its leaves hold, and the key type.
+template <class Key, class Source, class Copy>
+struct KdBuildRun {
+    const Source& source;
+    std::uint32_t n;
+    const char* kind_name;
+    const KdTreeOptions& options;
+    KdTreeAccess tree;
+    Buffer<Copy>& copies;
+
+    void run() {
+        Stopwatch total, stage;
+        BuildMs& ms = tree.build_ms();
+        const Bounds bounds = scene_bounds(source, n);
+        check_bounds(bounds, source, kind_name, options.strict);
+        const auto valid = static_cast<std::uint32_t>(n - bounds.left_out);
+        tree.input_count() = n;
+        tree.left_out() = bounds.left_out;
+        ms.bounds = stage.lap();
+        if (valid == 0) return;
+        tree.bounds() = bounds.box;
+
+        Buffer<Key> codes(n);
+        const Grid grid = make_grid(bounds.box, CodeFormat<Key>::axis_bits);
+        for_each_index(n, HostEncodeMorton<Source, Key>{source, HostGrid(grid), codes.data()});
+        ms.codes = stage.lap();
+
+        sort(codes.span(), valid);
+        ms.sort = stage.lap();
+
+        const KdKeys<Key> keys{codes.data(), valid, grid,
+                               static_cast<std::uint32_t>(options.max_leaf)};
+        HostLauncher<> launcher;
+        Buffer<std::byte> range_memory;
+        const KdRanges ranges = find_ranges(launcher, keys, range_memory);
+        ms.hierarchy = stage.lap();
+
+        copy_to_leaf_order(source, tree.order().view(), copies);
+        ms.layout = stage.lap();
+
+        emit(launcher, keys, ranges);
+        ms.fit = stage.lap();
+        ms.total = total.lap();
+        RAYDIX_CHECK(tree.max_depth(), <=, static_cast<std::uint32_t>(options.bits) + 32);
+    }
+
+private:
+    /// What is left out has the highest key: it sorts to the end and is cut off there.
+    void sort(std::span<Key> codes, std::uint32_t valid) {
+        SortScratch<Key> scratch;
+        const int key_bits = valid == n ? CodeFormat<Key>::bits : static_cast<int>(8 * sizeof(Key));
+        tree.order().reset(n);
+        sort_keys(codes, tree.order().span(), key_bits, scratch);
+        tree.order().reset(valid);
+    }
+
+    KdRanges find_ranges(HostLauncher<>& launcher, const KdKeys<Key>& keys,
+                         Buffer<std::byte>& memory) {
+        if (keys.n <= keys.max_leaf) return {};
+        Arena size;
+        (void)KdRanges::take(size, keys.n);
+        memory.reset(size.bytes());
+        Arena arena(memory.data(), memory.size());
+        const KdRanges ranges = KdRanges::take(arena, keys.n);
+        find_kd_ranges(launcher, keys, ranges);
+        if (*ranges.inner > max_kd_inner)
+            throw InputError(std::to_string(*ranges.inner) + " inner nodes over " +
+                             std::to_string(keys.n) + " primitives; a k-d tree takes " +
+                             std::to_string(max_kd_inner) + ": raise max_leaf");
+        return ranges;
+    }
+
+    void emit(HostLauncher<>& launcher, const KdKeys<Key>& keys, const KdRanges& ranges) {
+        if (keys.n <= keys.max_leaf) {
+            tree.nodes().reset(2);
+            return launcher.launch("kdtree.leaf", 1,
+                                   EmitKdRootLeaf{tree.nodes().data(), keys.n, &tree.max_depth()});
+        }
+        const std::uint32_t inner = *ranges.inner;
+        tree.inner_count() = inner;
+        tree.nodes().reset(2 * std::size_t{inner} + 2);
+        Arena size;
+        (void)KdFitScratch::take(size, inner);
+        Buffer<std::byte> memory(size.bytes());
+        Arena arena(memory.data(), memory.size());
+        emit_kd_nodes(launcher, keys, ranges, KdFitScratch::take(arena, inner),
+                      LeafBoxOf<Copy>{copies.data()}, tree.nodes().data(), &tree.max_depth());
+    }
+};
+
+template <class Source, class Copy>
+void build(const Source& source, std::size_t n, const char* kind_name, KdTreeAccess tree,
+           Buffer<Copy>& copies) {
+    const KdTreeOptions& options = tree.options();
+    check_options(options, n);
+    const std::uint64_t before = memory_count().now();
+    memory_count().restart_peak();
+    with_threads(options.threads, [&] {
+        const auto count = static_cast<std::uint32_t>(n);
+        if (options.bits == 30)
+            KdBuildRun<std::uint32_t, Source, Copy>{source, count, kind_name, options, tree, copies}
+                .run();
+        else
+            KdBuildRun<std::uint64_t, Source, Copy>{source, count, kind_name, options, tree, copies}
+                .run();
+    });
+    tree.peak_bytes() = memory_count().peak() - before;
+}
+
+}  // namespace
+
+KdTree build_kdtree(const MeshView& mesh, const KdTreeOptions& options) {
+    KdTree tree;
+    const KdTreeAccess access{tree};
+    access.options() = options;
+    if (mesh.triangles.empty()) {
+        access.kind() = PrimitiveKind::points;
+        build(PointSource{mesh.vertices.data()}, mesh.vertices.size(), "point", access,
+              access.points());
+    } else {
+        access.kind() = PrimitiveKind::triangles;
+        const TriangleSource source{mesh.vertices.data(), mesh.triangles.data(),
+                                    mesh.vertices.size()};
+        build(source, mesh.triangles.size(), "triangle", access, access.triangles());
+    }
+    return tree;
+}
+
+KdTree build_kdtree(const Mesh& mesh, const KdTreeOptions& options) {
+    return build_kdtree(MeshView(mesh), options);
+}
+
+KdTree build_kdtree(std::span<const Vec3> points, const KdTreeOptions& options) {
+    return build_kdtree(MeshView(points, {}), options);
+}
+
+}  // namespace raydix
