@@ -1,5 +1,6 @@
-// H-PLOC as one launch on a GPU: the text of hploc.h with a warp of the device. lists, meeting, claimed and root
-// as HplocArrays says; the caller owns all memory, and nothing waits for the device.
+// H-PLOC as one launch on a GPU: the text of hploc.h with a warp of the device. lists, meeting,
+// claimed and root as HplocArrays says; the caller owns all memory, and nothing waits for the
+// device.
 #pragma once
 
 #include "tree/hploc.h"

@@ -1,4 +1,5 @@
-// The H-PLOC kernel against its host twin: same keys and boxes in, same tree out. Skips (77) without a device.
+// The H-PLOC kernel against its host twin: same keys and boxes in, same tree out. Skips (77)
+// without a device.
 #include <raydix/bvh.h>
 
 #include <algorithm>
@@ -26,7 +27,9 @@ bool fine(cudaError_t error, const char* what) {
 template <class T>
 struct Device {
     T* data = nullptr;
-    explicit Device(std::size_t n) { fine(cudaMalloc(&data, std::max<std::size_t>(n, 1) * sizeof(T)), "malloc"); }
+    explicit Device(std::size_t n) {
+        fine(cudaMalloc(&data, std::max<std::size_t>(n, 1) * sizeof(T)), "malloc");
+    }
     Device(const std::vector<T>& v) : Device(v.size()) {
         fine(cudaMemcpy(data, v.data(), v.size() * sizeof(T), cudaMemcpyDefault), "copy");
     }
@@ -75,8 +78,15 @@ Tree on_device(const Input& input, const BoxLanes& lanes) {
     Device<std::uint32_t> ids(input.ids), lists(n), meeting(n), claimed(1), root(1);
     Device<Aabb> boxes(input.boxes);
     Device<ClusterNode> nodes(n);
-    launch_hploc<Key>({{keys.data, n}, ids.data, {boxes.data}, 4, lists.data, meeting.data,
-                       nodes.data, claimed.data, root.data},
+    launch_hploc<Key>({{keys.data, n},
+                       ids.data,
+                       {boxes.data},
+                       4,
+                       lists.data,
+                       meeting.data,
+                       nodes.data,
+                       claimed.data,
+                       root.data},
                       nullptr);
     fine(cudaGetLastError(), "launch");
     std::vector<ClusterNode> host_nodes(n);
@@ -90,8 +100,7 @@ Tree on_device(const Input& input, const BoxLanes& lanes) {
 Tree on_host(const Input& input, const BoxLanes& lanes) {
     Buffer<ClusterNode> nodes;
     HplocScratch scratch;
-    const ClusterRef root =
-        build_hploc<Key>(input.keys, input.ids, lanes, 4, nodes, scratch);
+    const ClusterRef root = build_hploc<Key>(input.keys, input.ids, lanes, 4, nodes, scratch);
     return place(input, lanes, nodes.data(), root);
 }
 
