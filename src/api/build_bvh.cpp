@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "api/build_clusters.h"
 #include "api/input_checks.h"
 #include "base/check.h"
 #include "exec/host_launcher.h"
@@ -29,6 +30,7 @@ struct BvhBuilder::Scratch {
     SortScratch<std::uint64_t> sort63;
     HierarchyScratch hierarchy;
     Buffer<std::uint8_t> meeting;
+    ClusterScratch clusters;
 };
 
 namespace {
@@ -57,6 +59,7 @@ std::uint64_t bytes_held(const Scratch& s, const BvhAccess& tree) {
                s.sort63.records, s.sort63.spare, s.sort63.histogram, s.hierarchy.prefixes,
                s.hierarchy.kept_bits, s.hierarchy.kept_before, s.hierarchy.parent_slot,
                s.hierarchy.memory, s.hierarchy.level_memory, s.meeting) +
+           s.clusters.capacity_bytes() +
            sum(tree.nodes(), tree.order(), tree.triangles(), tree.boxes(), tree.points());
 }
 
@@ -107,6 +110,13 @@ struct BuildRun {
         ms.sort = stage.lap();
 
         const std::span<const Key> keys = codes.first(valid);
+        if (grows_clusters(options.builder)) {
+            build_clusters(source, keys, scratch.clusters, tree, copies, ms);
+            ms.total = total.lap();
+            tree.build_ms() = ms;
+            return;
+        }
+
         tree.inner_count() = build_hierarchy(options.builder, keys, options.max_leaf, tree.nodes(),
                                              scratch.hierarchy);
         ms.hierarchy = stage.lap();

@@ -1,0 +1,68 @@
+// The builders that grow a tree from clusters: sorted order -> clusters -> nodes -> leaf copies.
+// Bounds, codes and sort are those of build_bvh.cpp.
+#pragma once
+
+#include <utility>
+
+#include "layout/leaf_order.h"
+#include "measure/stopwatch.h"
+#include "primitives/host_box.h"
+#include "tree/build_hploc.h"
+#include "tree/bvh_access.h"
+#include "tree/place_clusters.h"
+#include "tree/ploc.h"
+
+namespace raydix {
+
+[[nodiscard]] constexpr bool grows_clusters(Builder builder) {
+    return builder == Builder::ploc || builder == Builder::hploc;
+}
+
+struct ClusterScratch {
+    Buffer<std::uint32_t> ids;  // [n] in Morton order
+    PlocScratch ploc;
+    HplocScratch hploc;
+
+    [[nodiscard]] std::size_t capacity_bytes() const {
+        return ids.capacity_bytes() + ploc.capacity_bytes() + hploc.capacity_bytes();
+    }
+};
+
+/// `keys`: the sorted codes of the valid primitives, at least one; they may lie in the memory of
+/// `copies`. tree.order() holds their ids, in Morton order; on return all arrays of the tree are
+/// complete, and ms.hierarchy, ms.fit and ms.layout are written.
+template <class Key, class Source, class Copy>
+void build_clusters(const Source& source, std::span<const Key> keys, ClusterScratch& scratch,
+                    const BvhAccess& tree, Buffer<Copy>& copies, BuildMs& ms) {
+    Stopwatch stage;
+    std::swap(scratch.ids, tree.order());
+    const std::span<const std::uint32_t> ids = scratch.ids.view();
+    BoxLanes& boxes = scratch.ploc.primitives;
+    boxes.reset(static_cast<std::uint32_t>(ids.size()));
+    for_each_range(ids.size(), 4096, [&](std::size_t begin, std::size_t end) {
+        constexpr std::size_t indices_ahead = 32, corners_ahead = 16;
+        for (std::size_t k = begin; k < end; ++k) {
+            if (k + indices_ahead < end) {
+                prefetch_indices(source, ids[k + indices_ahead]);
+                prefetch_corners(source, ids[k + corners_ahead]);
+            }
+            Box3 box;
+            host_box(source, ids[k], box);
+            boxes.set(static_cast<std::uint32_t>(k), box.box());
+        }
+    });
+    const auto max_leaf = static_cast<std::uint32_t>(tree.options().max_leaf);
+    const ClusterRef root =
+        tree.options().builder == Builder::hploc
+            ? build_hploc(keys, ids, boxes, max_leaf, scratch.ploc.nodes, scratch.hploc)
+            : build_ploc(ids, max_leaf, scratch.ploc);
+    ms.hierarchy = stage.lap();
+
+    tree.inner_count() = place_clusters({scratch.ploc.nodes.data(), root, boxes, ids}, tree.nodes(),
+                                        tree.order(), tree.max_depth());
+    ms.fit = stage.lap();
+    copy_to_leaf_order(source, tree.order().view(), copies);
+    ms.layout = stage.lap();
+}
+
+}  // namespace raydix

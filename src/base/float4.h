@@ -1,0 +1,107 @@
+// Four floats side by side for the host's hot loops over arrays: each lane does the plain
+// operation, so the bits are those of scalar code. Processors without SSE take the loop.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+namespace raydix {
+
+#if defined(__SSE2__)
+
+struct Float4 {
+    __m128 v;
+
+    static Float4 load(const float* p) { return {_mm_loadu_ps(p)}; }
+    static Float4 all(float x) { return {_mm_set1_ps(x)}; }
+    void store(float* p) const { _mm_storeu_ps(p, v); }
+};
+
+inline Float4 operator+(Float4 a, Float4 b) { return {_mm_add_ps(a.v, b.v)}; }
+inline Float4 operator-(Float4 a, Float4 b) { return {_mm_sub_ps(a.v, b.v)}; }
+inline Float4 operator*(Float4 a, Float4 b) { return {_mm_mul_ps(a.v, b.v)}; }
+inline Float4 min_of(Float4 a, Float4 b) { return {_mm_min_ps(a.v, b.v)}; }
+inline Float4 max_of(Float4 a, Float4 b) { return {_mm_max_ps(a.v, b.v)}; }
+
+/// A yes or no per lane: all bits of it or none.
+struct Mask4 {
+    __m128 v;
+
+    static Mask4 load(const std::uint32_t* p) {
+        return {_mm_castsi128_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))};
+    }
+};
+inline Mask4 operator<(Float4 a, Float4 b) { return {_mm_cmplt_ps(a.v, b.v)}; }
+inline Mask4 operator<=(Float4 a, Float4 b) { return {_mm_cmple_ps(a.v, b.v)}; }
+inline Mask4 operator&(Mask4 a, Mask4 b) { return {_mm_and_ps(a.v, b.v)}; }
+inline Mask4 operator|(Mask4 a, Mask4 b) { return {_mm_or_ps(a.v, b.v)}; }
+inline Float4 select(Mask4 mask, Float4 yes, Float4 no) {
+    return {_mm_or_ps(_mm_and_ps(mask.v, yes.v), _mm_andnot_ps(mask.v, no.v))};
+}
+
+#else
+
+struct Float4 {
+    std::array<float, 4> v;
+
+    static Float4 load(const float* p) { return {{p[0], p[1], p[2], p[3]}}; }
+    static Float4 all(float x) { return {{x, x, x, x}}; }
+    void store(float* p) const {
+        for (std::size_t k = 0; k < 4; ++k) p[k] = v[k];
+    }
+};
+struct Mask4 {
+    std::array<std::uint32_t, 4> v;
+
+    static Mask4 load(const std::uint32_t* p) { return {{p[0], p[1], p[2], p[3]}}; }
+};
+
+namespace detail {
+template <class Result, class A, class B, class Op>
+Result lane_by_lane(const A& a, const B& b, const Op& op) {
+    Result r;
+    for (std::size_t k = 0; k < 4; ++k) r.v[k] = op(a.v[k], b.v[k]);
+    return r;
+}
+}  // namespace detail
+
+inline Float4 operator+(Float4 a, Float4 b) {
+    return detail::lane_by_lane<Float4>(a, b, [](float x, float y) { return x + y; });
+}
+inline Float4 operator-(Float4 a, Float4 b) {
+    return detail::lane_by_lane<Float4>(a, b, [](float x, float y) { return x - y; });
+}
+inline Float4 operator*(Float4 a, Float4 b) {
+    return detail::lane_by_lane<Float4>(a, b, [](float x, float y) { return x * y; });
+}
+inline Float4 min_of(Float4 a, Float4 b) {
+    return detail::lane_by_lane<Float4>(a, b, [](float x, float y) { return x < y ? x : y; });
+}
+inline Float4 max_of(Float4 a, Float4 b) {
+    return detail::lane_by_lane<Float4>(a, b, [](float x, float y) { return x > y ? x : y; });
+}
+inline Mask4 operator<(Float4 a, Float4 b) {
+    return detail::lane_by_lane<Mask4>(a, b, [](float x, float y) { return x < y ? ~0u : 0u; });
+}
+inline Mask4 operator<=(Float4 a, Float4 b) {
+    return detail::lane_by_lane<Mask4>(a, b, [](float x, float y) { return x <= y ? ~0u : 0u; });
+}
+inline Mask4 operator&(Mask4 a, Mask4 b) {
+    return detail::lane_by_lane<Mask4>(a, b, [](auto x, auto y) { return x & y; });
+}
+inline Mask4 operator|(Mask4 a, Mask4 b) {
+    return detail::lane_by_lane<Mask4>(a, b, [](auto x, auto y) { return x | y; });
+}
+inline Float4 select(Mask4 mask, Float4 yes, Float4 no) {
+    Float4 r;
+    for (std::size_t k = 0; k < 4; ++k) r.v[k] = mask.v[k] != 0 ? yes.v[k] : no.v[k];
+    return r;
+}
+
+#endif
+
+}  // namespace raydix

@@ -1,0 +1,267 @@
+// Locally-ordered clustering along the radix tree, in one pass (Benthin, Meister, Barczak,
+// Mehalwal, Tsakok and Kensler 2024, "H-PLOC"). Each lane of a warp climbs from a primitive as in
+// Apetrei's builder; where a node with more than half a warp of primitives is complete, the whole
+// warp merges the lists of its children until half a warp of clusters is left. What a node keeps
+// depends on its children's lists alone.
+#pragma once
+
+#include <cstdint>
+
+#include "base/atomic.h"
+#include "exec/warp.h"
+#include "tree/cluster.h"
+#include "tree/radix_tree.h"
+
+namespace raydix {
+
+inline constexpr std::uint32_t hploc_radius = 8;
+/// Clusters that a node of the radix tree hands to its parent, at most.
+inline constexpr std::uint32_t hploc_list = warp_lanes / 2;
+
+/// The arrays of one build. `Boxes` gives the box of a primitive by its place: get(place).
+template <class Key, class Boxes>
+struct HplocArrays {
+    SortedKeys<Key> keys;      // [n]
+    const std::uint32_t* ids;  // [n] in Morton order
+    Boxes boxes;               // [n] in Morton order
+    std::uint32_t max_leaf;
+    ClusterRef* lists;       // [n], primitives before; a list begins where its primitives begin
+    std::uint32_t* meeting;  // [n - 1], zero before
+    ClusterNode* nodes;      // [n - 1], out
+    std::uint32_t* claimed;  // [1], zero before: how many nodes are taken
+    ClusterRef* root;        // [1], out
+};
+
+/// Ends a list of fewer than hploc_list clusters that has room behind it.
+inline constexpr ClusterRef end_of_list = 0xFFFFFFFFu;
+
+/// The clusters that a warp merges, one per lane from lane 0 on.
+template <class Warp>
+struct WarpClusters {
+    template <class T>
+    using Var = typename Warp::template Var<T>;
+
+    std::uint32_t count = 0;
+    Var<ClusterRef> ref;
+    Var<float> lo_x, lo_y, lo_z, hi_x, hi_y, hi_z;
+
+    RAYDIX_HD Aabb box(std::uint32_t lane) const {
+        return {{lo_x[lane], lo_y[lane], lo_z[lane]}, {hi_x[lane], hi_y[lane], hi_z[lane]}};
+    }
+    RAYDIX_HD void set_box(std::uint32_t lane, const Aabb& box) {
+        lo_x[lane] = box.lo.x;
+        lo_y[lane] = box.lo.y;
+        lo_z[lane] = box.lo.z;
+        hi_x[lane] = box.hi.x;
+        hi_y[lane] = box.hi.y;
+        hi_z[lane] = box.hi.z;
+    }
+    /// Lane k gets the cluster of lane source(k).
+    template <class Source>
+    RAYDIX_HD WarpClusters taken_from(const Warp& warp, const Source& source) const {
+        WarpClusters to;
+        to.count = count;
+        to.ref = warp.shuffle(ref, source);
+        to.lo_x = warp.shuffle(lo_x, source);
+        to.lo_y = warp.shuffle(lo_y, source);
+        to.lo_z = warp.shuffle(lo_z, source);
+        to.hi_x = warp.shuffle(hi_x, source);
+        to.hi_y = warp.shuffle(hi_y, source);
+        to.hi_z = warp.shuffle(hi_z, source);
+        return to;
+    }
+};
+
+/// One warp's part of the pass: 32 primitives climb.
+template <class Warp, class Key, class Boxes>
+class HplocWarp {
+public:
+    template <class T>
+    using Var = typename Warp::template Var<T>;
+    using Clusters = WarpClusters<Warp>;
+
+    RAYDIX_HD explicit HplocWarp(const HplocArrays<Key, Boxes>& arrays) : a_(arrays) {}
+
+    RAYDIX_HD void run(std::uint32_t warp_index) {
+        const std::uint32_t n = a_.keys.count;
+        warp_.each([&](std::uint32_t lane) {
+            first_[lane] = last_[lane] = warp_index * warp_lanes + lane;
+            climbing_[lane] = first_[lane] < n && n > 1 ? 1 : 0;
+        });
+        while (warp_.ballot([&](std::uint32_t lane) { return climbing_[lane] != 0; }) != 0) {
+            warp_.each([&](std::uint32_t lane) {
+                if (climbing_[lane] != 0) climb(lane);
+            });
+            std::uint32_t merging = warp_.ballot([&](std::uint32_t lane) {
+                return climbing_[lane] != 0 &&
+                       (last_[lane] - first_[lane] + 1 > hploc_list || is_root(lane));
+            });
+            for (; merging != 0; merging &= merging - 1) {
+                const std::uint32_t lane = nth_set_bit(merging, 0);
+                merge_children(warp_.broadcast(first_, lane), warp_.broadcast(split_, lane),
+                               warp_.broadcast(last_, lane));
+            }
+            warp_.each([&](std::uint32_t lane) {
+                if (climbing_[lane] != 0 && is_root(lane)) climbing_[lane] = 0;
+            });
+        }
+    }
+
+private:
+    RAYDIX_HD bool is_root(std::uint32_t lane) const {
+        return first_[lane] == 0 && last_[lane] == a_.keys.count - 1;
+    }
+
+    /// To the parent, whose split lies on the side with the longer common prefix. The first child
+    /// to come stops.
+    RAYDIX_HD void climb(std::uint32_t lane) {
+        const std::int64_t first = first_[lane], last = last_[lane];
+        const bool left_child =
+            a_.keys.common_prefix(last, last + 1) > a_.keys.common_prefix(first, first - 1);
+        const std::uint32_t parent = left_child ? last_[lane] : first_[lane] - 1;
+        const std::uint32_t own_end = left_child ? first_[lane] : last_[lane];
+        const std::uint32_t other_end = arrive(a_.meeting[parent], own_end + 1);
+        if (other_end == 0) {
+            climbing_[lane] = 0;
+            return;
+        }
+        if (left_child)
+            last_[lane] = other_end - 1;
+        else
+            first_[lane] = other_end - 1;
+        split_[lane] = parent + 1;
+    }
+
+    /// The node over [first, last], whose right child begins at `split`.
+    RAYDIX_HD void merge_children(std::uint32_t first, std::uint32_t split, std::uint32_t last) {
+        const bool root = first == 0 && last == a_.keys.count - 1;
+        Clusters list = load_children(first, split, last);
+        while (list.count > (root ? 1u : hploc_list)) list = merge_once(list);
+        warp_.each([&](std::uint32_t lane) {
+            if (lane < list.count) a_.lists[first + lane] = list.ref[lane];
+            if (lane == list.count && lane < hploc_list && first + lane <= last)
+                a_.lists[first + lane] = end_of_list;
+            if (root && lane == 0) *a_.root = list.ref[lane];
+        });
+        warp_.sync();
+    }
+
+    /// The left child's list, then the right one's.
+    RAYDIX_HD Clusters load_children(std::uint32_t first, std::uint32_t split, std::uint32_t last) {
+        Var<ClusterRef> loaded;
+        const std::uint32_t present = warp_.ballot([&](std::uint32_t lane) {
+            const std::uint32_t k = lane % hploc_list;
+            const std::uint32_t place = (lane < hploc_list ? first : split) + k;
+            const std::uint32_t end = lane < hploc_list ? split : last + 1;
+            loaded[lane] = place < end ? a_.lists[place] : end_of_list;
+            return loaded[lane] != end_of_list;
+        });
+        Clusters list;
+        const std::uint32_t left = leading_run(present & 0xFFFFu);
+        const std::uint32_t right = leading_run(present >> hploc_list);
+        list.count = left + right;
+        list.ref = warp_.shuffle(loaded, [&](std::uint32_t lane) {
+            return lane < left ? lane : lane - left + hploc_list;
+        });
+        warp_.each([&](std::uint32_t lane) {
+            if (lane < list.count) list.set_box(lane, box_of_cluster(list.ref[lane]));
+        });
+        return list;
+    }
+
+    /// How many lowest bits are set before the first that is not: what lies behind the end of a
+    /// list is not its.
+    RAYDIX_HD static std::uint32_t leading_run(std::uint32_t half) { return nth_set_bit(~half, 0); }
+
+    /// One round: each cluster's nearest neighbour, mutual ones merge, the rest moves up.
+    RAYDIX_HD Clusters merge_once(const Clusters& list) {
+        const Var<std::uint32_t> nearest = find_nearest(list);
+        const Var<std::uint32_t> back =
+            warp_.shuffle(nearest, [&](std::uint32_t lane) { return nearest[lane]; });
+        const auto mutual = [&](std::uint32_t lane) {
+            return lane < list.count && nearest[lane] != lane && back[lane] == lane;
+        };
+        const std::uint32_t merges =
+            warp_.ballot([&](std::uint32_t lane) { return mutual(lane) && lane < nearest[lane]; });
+        const std::uint32_t rest = warp_.ballot([&](std::uint32_t lane) {
+            return lane < list.count && !(mutual(lane) && lane > nearest[lane]);
+        });
+        Var<std::uint32_t> base;
+        warp_.each([&](std::uint32_t lane) {
+            if (lane == 0) base[lane] = claim(*a_.claimed, ones(merges));
+        });
+        const std::uint32_t node_base = warp_.broadcast(base, 0);
+        const Clusters other =
+            list.taken_from(warp_, [&](std::uint32_t lane) { return nearest[lane]; });
+        Clusters merged = list;
+        warp_.each([&](std::uint32_t lane) {
+            if ((merges >> lane & 1) == 0) return;
+            const std::uint32_t node_index = node_base + ones(merges & ((1u << lane) - 1));
+            const ClusterNode node =
+                merge_clusters(part(list, lane), part(other, lane), a_.max_leaf);
+            a_.nodes[node_index] = node;
+            merged.ref[lane] = node_index;
+            merged.set_box(lane, {node.lo, node.hi});
+        });
+        warp_.sync();
+        Clusters next =
+            merged.taken_from(warp_, [&](std::uint32_t lane) { return nth_set_bit(rest, lane); });
+        next.count = ones(rest);
+        return next;
+    }
+
+    /// Per lane the lane with the least (area of the union, distance, tie_goes_right); its own if
+    /// it is alone.
+    RAYDIX_HD Var<std::uint32_t> find_nearest(const Clusters& list) {
+        Var<float> best;
+        Var<std::uint32_t> nearest;
+        warp_.each([&](std::uint32_t lane) {
+            best[lane] = infinity;
+            nearest[lane] = lane;
+        });
+        for (std::uint32_t d = 1; d <= hploc_radius; ++d) {
+            const Clusters ahead =
+                list.taken_from(warp_, [&](std::uint32_t lane) { return lane + d; });
+            Var<float> right;
+            warp_.each([&](std::uint32_t lane) {
+                right[lane] = lane + d < list.count
+                                  ? cluster_area(unite(list.box(lane), ahead.box(lane)))
+                                  : infinity;
+            });
+            const Var<float> behind =
+                warp_.shuffle(right, [&](std::uint32_t lane) { return lane - d; });
+            warp_.each([&](std::uint32_t lane) {
+                const float left = lane >= d ? behind[lane] : infinity;
+                const bool goes_right =
+                    right[lane] < left || (right[lane] == left && tie_goes_right(lane, d));
+                const float area = goes_right ? right[lane] : left;
+                if (lane < list.count && area < best[lane]) {
+                    best[lane] = area;
+                    nearest[lane] = goes_right ? lane + d : lane - d;
+                }
+            });
+        }
+        return nearest;
+    }
+
+    RAYDIX_HD Aabb box_of_cluster(ClusterRef ref) const {
+        if (is_primitive(ref)) return a_.boxes.get(ref & ~primitive_cluster);
+        return {a_.nodes[ref].lo, a_.nodes[ref].hi};
+    }
+    RAYDIX_HD ClusterPart part(const Clusters& list, std::uint32_t lane) const {
+        const ClusterRef ref = list.ref[lane];
+        const Aabb box = list.box(lane);
+        return {ref, box,
+                is_primitive(ref) ? sum_of_primitive(a_.ids[ref & ~primitive_cluster], box)
+                                  : a_.nodes[ref].sum};
+    }
+    RAYDIX_HD static std::uint32_t ones(std::uint32_t mask) {
+        return static_cast<std::uint32_t>(count_ones(std::uint64_t{mask}));
+    }
+
+    Warp warp_;
+    HplocArrays<Key, Boxes> a_;
+    Var<std::uint32_t> first_, last_, split_, climbing_;
+};
+
+}  // namespace raydix

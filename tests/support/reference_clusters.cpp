@@ -1,0 +1,200 @@
+#include "support/reference_clusters.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <tuple>
+#include <vector>
+
+#include "base/math.h"
+#include "support/reference_tree.h"
+#include "tree/bvh_access.h"
+
+namespace raydix::test {
+namespace {
+
+constexpr std::size_t radius = 8;
+
+struct Cluster {
+    Aabb box;
+    std::vector<std::uint32_t> ids;  // ascending
+    float cost = 0;
+    bool leaf = true;
+    std::size_t left = 0, right = 0;  // in Forest::all
+};
+
+float area(const Aabb& b) {
+    const float x = b.hi.x - b.lo.x, y = b.hi.y - b.lo.y, z = b.hi.z - b.lo.z;
+    return (x * y + y * z) + z * x;
+}
+
+using List = std::vector<std::size_t>;  // clusters by their place in Forest::all
+
+struct Forest {
+    std::size_t max_leaf;
+    std::vector<Cluster> all;
+
+    std::size_t merge(std::size_t a, std::size_t b) {
+        if (all[b].ids.front() < all[a].ids.front()) std::swap(a, b);
+        Cluster c;
+        c.left = a;
+        c.right = b;
+        c.box = unite(all[a].box, all[b].box);
+        std::ranges::merge(all[a].ids, all[b].ids, std::back_inserter(c.ids));
+        c.leaf = false;
+        if (c.ids.size() <= max_leaf) {
+            const float as_leaf = static_cast<float>(c.ids.size()) * area(c.box);
+            c.cost = area(c.box) + (all[a].cost + all[b].cost);
+            if (as_leaf <= c.cost) {
+                c.cost = as_leaf;
+                c.leaf = true;
+            }
+        }
+        all.push_back(std::move(c));
+        return all.size() - 1;
+    }
+
+    /// The place that i prefers: least area of the union, then nearest in the list; of two as near
+    /// as each other, the one whose pair begins at an even multiple of the distance's lowest bit.
+    std::size_t nearest(const List& list, std::size_t i) const {
+        auto best =
+            std::tuple(std::numeric_limits<float>::infinity(), std::size_t{0}, std::size_t{0}, i);
+        for (std::size_t j = i > radius ? i - radius : 0; j < list.size() && j <= i + radius; ++j) {
+            if (j == i) continue;
+            const std::size_t first = std::min(i, j), distance = std::max(i, j) - first;
+            const std::size_t bit = std::size_t{1} << std::countr_zero(distance);
+            best = std::min(best, std::tuple(area(unite(all[list[i]].box, all[list[j]].box)),
+                                             distance, first / bit % 2, j));
+        }
+        return std::get<3>(best);
+    }
+
+    /// One round; `pair_up`: neighbours merge whatever their areas.
+    List round(const List& list, bool pair_up) {
+        std::vector<std::size_t> choice(list.size());
+        for (std::size_t i = 0; i < list.size(); ++i)
+            choice[i] = pair_up ? std::min(i ^ 1, list.size() - 1) : nearest(list, i);
+        List next;
+        for (std::size_t i = 0; i < list.size(); ++i) {
+            const bool mutual = choice[i] != i && choice[choice[i]] == i;
+            if (!mutual)
+                next.push_back(list[i]);
+            else if (i < choice[i])
+                next.push_back(merge(list[i], list[choice[i]]));
+        }
+        return next;
+    }
+
+    void emit(std::size_t cluster, std::size_t slot, std::uint32_t depth, const BvhAccess& out,
+              std::vector<BvhNode>& nodes, std::vector<std::uint32_t>& order) {
+        const Cluster& c = all[cluster];
+        out.max_depth() = std::max(out.max_depth(), depth);
+        if (c.leaf) {
+            nodes[slot] = {c.box.lo, static_cast<std::uint32_t>(order.size()), c.box.hi,
+                           static_cast<std::uint32_t>(c.ids.size())};
+            order.insert(order.end(), c.ids.begin(), c.ids.end());
+            return;
+        }
+        const std::size_t first = nodes.size();
+        nodes[slot] = {c.box.lo, static_cast<std::uint32_t>(first), c.box.hi, 0};
+        nodes.resize(first + 2);
+        ++out.inner_count();
+        emit(c.left, first, depth + 1, out, nodes, order);
+        emit(c.right, first + 1, depth + 1, out, nodes, order);
+    }
+};
+
+struct Item {
+    std::uint64_t code;
+    std::uint32_t id;
+    Aabb box;
+};
+
+std::vector<Item> items_in_order(std::span<const Aabb> input, int bits) {
+    std::vector<Item> items;
+    Aabb scene = empty_box();
+    for (std::size_t i = 0; i < input.size(); ++i) {
+        const Aabb box{without_negative_zero(input[i].lo), without_negative_zero(input[i].hi)};
+        if (!in_range(box.lo) || !in_range(box.hi) || is_empty(box)) continue;
+        scene = unite(scene, box);
+        items.push_back({0, static_cast<std::uint32_t>(i), box});
+    }
+    for (Item& item : items) item.code = reference_code(item.box, scene, bits);
+    std::ranges::stable_sort(items, {}, &Item::code);
+    return items;
+}
+
+/// Everything around the clustering itself, which gets the forest of primitives in Morton order.
+template <class Clustering>
+Bvh reference(std::span<const Aabb> boxes, const BuildOptions& options, const Clustering& cluster) {
+    const std::vector<Item> items = items_in_order(boxes, options.bits);
+    Bvh bvh;
+    const BvhAccess out{bvh};
+    out.kind() = PrimitiveKind::boxes;
+    out.options() = options;
+    out.input_count() = boxes.size();
+    out.left_out() = boxes.size() - items.size();
+    if (items.empty()) return bvh;
+    Forest forest{static_cast<std::size_t>(options.max_leaf), {}};
+    for (const Item& item : items) forest.all.push_back({item.box, {item.id}, area(item.box)});
+    const std::size_t root = cluster(forest, items);
+
+    std::vector<BvhNode> nodes(2, BvhNode{});
+    std::vector<std::uint32_t> order;
+    forest.emit(root, 0, 0, out, nodes, order);
+    out.nodes().reset(nodes.size());
+    std::ranges::copy(nodes, out.nodes().data());
+    out.order().reset(order.size());
+    std::ranges::copy(order, out.order().data());
+    out.boxes().reset(order.size());
+    for (const Item& item : items)
+        out.boxes()[static_cast<std::size_t>(std::ranges::find(order, item.id) - order.begin())] =
+            item.box;
+    return bvh;
+}
+
+/// How many leading bits two keys share; equal codes go on with their positions.
+int shared_bits(const std::vector<Item>& items, std::size_t i, std::size_t j) {
+    if (items[i].code != items[j].code) return std::countl_zero(items[i].code ^ items[j].code);
+    return 64 + std::countl_zero(i ^ j);
+}
+
+/// What is left of the primitives [begin, end) of a radix node.
+List hierarchical(Forest& forest, const std::vector<Item>& items, std::size_t begin,
+                  std::size_t end) {
+    constexpr std::size_t most = 16;
+    if (end - begin == 1) return {begin};
+    std::size_t split = begin + 1;
+    while (shared_bits(items, split - 1, split) != shared_bits(items, begin, end - 1)) ++split;
+    List list = hierarchical(forest, items, begin, split);
+    const List right = hierarchical(forest, items, split, end);
+    list.insert(list.end(), right.begin(), right.end());
+    const bool root = end - begin == items.size();
+    if (end - begin > most || root)
+        while (list.size() > (root ? 1 : most)) list = forest.round(list, false);
+    return list;
+}
+
+}  // namespace
+
+Bvh reference_ploc(std::span<const Aabb> boxes, const BuildOptions& options) {
+    return reference(boxes, options, [](Forest& forest, const std::vector<Item>& items) {
+        List list(items.size());
+        for (std::size_t i = 0; i < list.size(); ++i) list[i] = i;
+        bool slow = false;
+        while (list.size() > 1) {
+            List next = forest.round(list, slow);
+            slow = list.size() > 1024 && list.size() - next.size() < list.size() / 16;
+            list = std::move(next);
+        }
+        return list[0];
+    });
+}
+
+Bvh reference_hploc(std::span<const Aabb> boxes, const BuildOptions& options) {
+    return reference(boxes, options, [](Forest& forest, const std::vector<Item>& items) {
+        return hierarchical(forest, items, 0, items.size())[0];
+    });
+}
+
+}  // namespace raydix::test
