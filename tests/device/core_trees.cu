@@ -1,5 +1,5 @@
-// Octree and k-d tree on a device against the host's loops: every node. Exit code 77: no device, nothing was compared.
-// Compiling this file shows that their launches are device code.
+// Octree and k-d tree on a device against the host's loops: every node. Exit code 77: no device,
+// nothing was compared. Compiling this file shows that their launches are device code.
 #include "support/core_trees.h"
 
 #include <raydix/device.h>
@@ -14,7 +14,6 @@
 #include "api/device_build.h"
 #include "exec/cuda_launcher.cuh"
 
-
 namespace raydix::test {
 namespace {
 
@@ -26,7 +25,8 @@ std::vector<Vec3> some_points(std::size_t n) {
     std::uniform_real_distribution<float> place(-3.0f, 5.0f);
     std::vector<Vec3> points(n);
     for (std::size_t i = 0; i < n; ++i)
-        points[i] = i % 3 == 1 ? points[i / 100] : Vec3{place(random), place(random), place(random)};
+        points[i] =
+            i % 3 == 1 ? points[i / 100] : Vec3{place(random), place(random), place(random)};
     return points;
 }
 
@@ -91,7 +91,8 @@ bool compare(const char* what, std::size_t n, int bits) {
     const std::vector<KdNode> kd = read(trees.kd_nodes, slots);
     for (std::size_t i = 0; i < slots; ++i)
         different += std::memcmp(&kd[i], &host.trees.kd_nodes[i], sizeof(KdNode)) != 0;
-    std::printf("%s: %u octree nodes, %zu k-d slots, %zu different\n", what, nodes, slots, different);
+    std::printf("%s: %u octree nodes, %zu k-d slots, %zu different\n", what, nodes, slots,
+                different);
     return good && different == 0;
 }
 

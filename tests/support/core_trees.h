@@ -1,5 +1,5 @@
-// Octree and k-d tree over points from sorted codes by any launcher, in memory of that launcher: what the host's loops,
-// shuffled orders and a GPU are compared by.
+// Octree and k-d tree over points from sorted codes by any launcher, in memory of that launcher:
+// what the host's loops, shuffled orders and a GPU are compared by.
 #pragma once
 
 #include <raydix/kdtree.h>

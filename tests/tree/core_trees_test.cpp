@@ -1,5 +1,5 @@
-// The launches of octree and k-d tree in shuffled order on real threads against the trees that build_octree and
-// build_kdtree give.
+// The launches of octree and k-d tree in shuffled order on real threads against the trees that
+// build_octree and build_kdtree give.
 #include "support/core_trees.h"
 
 #include <gtest/gtest.h>
@@ -66,8 +66,8 @@ void compare(std::size_t n, int bits, std::uint64_t seeds) {
             ASSERT_TRUE(same(trees.octree_nodes[i], octree.nodes()[i])) << i;
         ASSERT_EQ(*trees.kd_inner, kdtree.inner_count());
         ASSERT_EQ(*trees.kd_depth, kdtree.max_depth());
-        ASSERT_EQ(
-            std::memcmp(trees.kd_nodes, kdtree.nodes().data(), kdtree.nodes().size_bytes()), 0);
+        ASSERT_EQ(std::memcmp(trees.kd_nodes, kdtree.nodes().data(), kdtree.nodes().size_bytes()),
+                  0);
     }
 }
 
