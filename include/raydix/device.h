@@ -97,7 +97,7 @@ struct DeviceMesh {
     const Triangle* triangles = nullptr;  // [triangle_count]
     std::uint32_t triangle_count = 0;     // below 2^31
 };
-struct DeviceBoxes {
+struct DeviceBoxList {
     const Aabb* boxes = nullptr;  // [count]
     std::uint32_t count = 0;      // below 2^31
 };
@@ -147,14 +147,14 @@ struct DeviceTree {
 /// have no effect here. Throws InputError, BackendUnavailable, DeviceError.
 void build_bvh_on_device(const DeviceMesh& mesh, const BuildOptions& options,
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
-void build_bvh_on_device(const DeviceBoxes& boxes, const BuildOptions& options,
+void build_bvh_on_device(const DeviceBoxList& boxes, const BuildOptions& options,
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 
 /// The same, but waits for the end and returns the milliseconds between the stages as the device
 /// saw them (CUDA events; `layout` has the node pairs as well). For measurements.
 BuildMs time_build_on_device(const DeviceMesh& mesh, const BuildOptions& options,
                              const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
-BuildMs time_build_on_device(const DeviceBoxes& boxes, const BuildOptions& options,
+BuildMs time_build_on_device(const DeviceBoxList& boxes, const BuildOptions& options,
                              const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 
 /// Bytes read and written per second when the device copies `bytes` from one place of its memory to
@@ -181,7 +181,7 @@ public:
 
     /// As build_bvh_on_device. The input must be of this kind and no larger than promised.
     void build(const DeviceMesh& mesh, Stream stream = nullptr);
-    void build(const DeviceBoxes& boxes, Stream stream = nullptr);
+    void build(const DeviceBoxList& boxes, Stream stream = nullptr);
     /// As time_build_on_device.
     BuildMs build_timed(const DeviceMesh& mesh, Stream stream = nullptr);
     [[nodiscard]] DeviceTree tree() const;

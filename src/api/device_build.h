@@ -128,7 +128,7 @@ void with_device_build(const DeviceMesh& mesh, const BuildOptions& options, cons
                      mesh.triangle_count, tree.triangles);
 }
 template <class Visit>
-void with_device_build(const DeviceBoxes& boxes, const BuildOptions& options,
+void with_device_build(const DeviceBoxList& boxes, const BuildOptions& options,
                        const DeviceTree& tree, const Visit& visit) {
     check_device_options(options, boxes.count);
     const BoxSource source{boxes.boxes};

@@ -109,7 +109,7 @@ BuildMs time_build(const Input& input, const BuildOptions& options, const Device
 std::size_t device_scratch_bytes(std::uint32_t n, const BuildOptions& options) {
     static_cast<void>(device_name());  // says what is missing
     // The kinds of primitives differ in their copies, which are the caller's.
-    return sized(DeviceBoxes{nullptr, n}, options);
+    return sized(DeviceBoxList{nullptr, n}, options);
 }
 
 void build_bvh_on_device(const DeviceMesh& mesh, const BuildOptions& options,
@@ -117,7 +117,7 @@ void build_bvh_on_device(const DeviceMesh& mesh, const BuildOptions& options,
     build(mesh, options, tree, scratch, stream);
 }
 
-void build_bvh_on_device(const DeviceBoxes& boxes, const BuildOptions& options,
+void build_bvh_on_device(const DeviceBoxList& boxes, const BuildOptions& options,
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream) {
     build(boxes, options, tree, scratch, stream);
 }
@@ -127,7 +127,7 @@ BuildMs time_build_on_device(const DeviceMesh& mesh, const BuildOptions& options
     return time_build(mesh, options, tree, scratch, stream);
 }
 
-BuildMs time_build_on_device(const DeviceBoxes& boxes, const BuildOptions& options,
+BuildMs time_build_on_device(const DeviceBoxList& boxes, const BuildOptions& options,
                              const DeviceTree& tree, std::span<std::byte> scratch, Stream stream) {
     return time_build(boxes, options, tree, scratch, stream);
 }

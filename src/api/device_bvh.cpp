@@ -150,7 +150,7 @@ void DeviceBvh::build(const DeviceMesh& mesh, Stream stream) {
     build_bvh_on_device(mesh, options_, tree(), {scratch_.data(), scratch_.size()}, stream);
 }
 
-void DeviceBvh::build(const DeviceBoxes& boxes, Stream stream) {
+void DeviceBvh::build(const DeviceBoxList& boxes, Stream stream) {
     check_input(PrimitiveKind::boxes, boxes.count);
     build_bvh_on_device(boxes, options_, tree(), {scratch_.data(), scratch_.size()}, stream);
 }

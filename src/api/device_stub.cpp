@@ -29,7 +29,7 @@ void build_bvh_on_device(const DeviceMesh&, const BuildOptions&, const DeviceTre
                          std::span<std::byte>, Stream) {
     unavailable();
 }
-void build_bvh_on_device(const DeviceBoxes&, const BuildOptions&, const DeviceTree&,
+void build_bvh_on_device(const DeviceBoxList&, const BuildOptions&, const DeviceTree&,
                          std::span<std::byte>, Stream) {
     unavailable();
 }
@@ -37,7 +37,7 @@ BuildMs time_build_on_device(const DeviceMesh&, const BuildOptions&, const Devic
                              std::span<std::byte>, Stream) {
     unavailable();
 }
-BuildMs time_build_on_device(const DeviceBoxes&, const BuildOptions&, const DeviceTree&,
+BuildMs time_build_on_device(const DeviceBoxList&, const BuildOptions&, const DeviceTree&,
                              std::span<std::byte>, Stream) {
     unavailable();
 }

@@ -99,8 +99,10 @@ void launch_hierarchy(Launcher& plain, const TreeRun<Key>& run, const TreeScratc
             launch_karras(launcher, in, KarrasScratch(arena, n), run.out);
             break;
         case Builder::lauterbach: {
-            const std::uint32_t width =
-                lauterbach_band_width(n, scratch.levels.limit, lauterbach_memory_limit(n));
+            // No wider for small n, which would have room for more: scratch for n serves fewer,
+            // too.
+            const std::uint32_t width = std::min(
+                lauterbach_band_width(n, scratch.levels.limit, lauterbach_memory_limit(n)), 5u);
             launch_lauterbach(launcher, in,
                               LauterbachScratch(arena, n, scratch.levels.limit, width), run.out,
                               scratch.levels);

@@ -206,6 +206,21 @@ TEST(DeviceBuild, IndicesPastTheVerticesAreLeftOutAndReported) {
     EXPECT_THROW(check_counts(readable, PrimitiveKind::triangles, true), InputError);
 }
 
+TEST(DeviceBuild, ScratchForManyServesFewer) {
+    for_all_options([&](const BuildOptions& options) {
+        std::size_t before = 0;
+        for (std::uint32_t n = 0; n < 5000; n += 1 + n / 100) {
+            with_device_build(DeviceBoxList{nullptr, n}, options, {}, [&](const auto& build) {
+                Arena sizing = sizing_arena();
+                IdleLauncher idle;
+                build.run(idle, sizing);
+                ASSERT_GE(sizing.bytes(), before) << n << ", " << told(options);
+                before = sizing.bytes();
+            });
+        }
+    });
+}
+
 TEST(DeviceBuild, OptionsOutOfRangeAreNamed) {
     const Mesh mesh = random_soup(3, 1);
     HostLauncher<> host;

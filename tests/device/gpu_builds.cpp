@@ -123,7 +123,7 @@ TEST_F(GpuBuild, Boxes) {
     for (const Builder builder : builders) {
         const BuildOptions options{.builder = builder};
         DeviceBvh tree(PrimitiveKind::boxes, 40'000, options);
-        tree.build(DeviceBoxes{input.data(), static_cast<std::uint32_t>(boxes.size())});
+        tree.build(DeviceBoxList{input.data(), static_cast<std::uint32_t>(boxes.size())});
         expect_same(tree.download(), build_bvh(std::span<const Aabb>(boxes)));
     }
 }

@@ -109,7 +109,7 @@ template <class Launcher>
 LaunchedBuild launched_build(Launcher& launcher, std::span<const Aabb> boxes,
                              const BuildOptions& options) {
     const auto n = static_cast<std::uint32_t>(boxes.size());
-    return {launcher, DeviceBoxes{boxes.data(), n}, n, PrimitiveKind::boxes, options};
+    return {launcher, DeviceBoxList{boxes.data(), n}, n, PrimitiveKind::boxes, options};
 }
 
 }  // namespace raydix::test

@@ -50,6 +50,10 @@ inline std::vector<BoxInput> cluster_inputs(std::uint64_t seed) {
                           const float x = k + 1e-4f * k * k;
                           return Aabb{{x, x, x}, {x, x, x}};
                       })});
+    inputs.push_back({"nested", boxes(3000, [](std::size_t i) {
+                          const float size = 1 + 1e-3f * static_cast<float>(i);
+                          return Aabb{{0, 0, 0}, {size, size, size}};
+                      })});
     inputs.push_back({"collinear", boxes(1000, [&](std::size_t) {
                           const float x = unit();
                           return Aabb{{0, x, 0}, {0, x, 0}};

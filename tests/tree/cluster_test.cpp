@@ -1,11 +1,13 @@
 // Builders ploc and hploc against their definitions, and what holds for every tree of theirs.
 #include <gtest/gtest.h>
 #include <raydix/check.h>
+#include <raydix/rdx.h>
 #include <raydix/scene.h>
 #include <raydix/trace.h>
 
 #include <algorithm>
 
+#include <cmath>
 #include <cstring>
 
 #include "support/ray_sets.h"
@@ -127,19 +129,46 @@ TEST_P(Clusters, AMillionEqualPointsGiveAShallowTree) {
     EXPECT_TRUE(check(tree).ok);
 }
 
-/// Gaps that grow by little: each point's nearest neighbour is the one before it, and only the
-/// first two agree.
-TEST_P(Clusters, SlowlyGrowingGapsDoNotTakeARoundPerPair) {
-    const std::size_t n = 5'000 * thorough;
-    std::vector<Vec3> points;
-    for (std::size_t i = 0; i < n; ++i) {
-        const double k = static_cast<double>(i) / static_cast<double>(n);
-        const auto x = static_cast<float>(k + k * k);
-        points.push_back({x, x, x});
+/// Boxes one inside the other: in each round the two smallest are all that agree, so a million
+/// would take a million rounds over a million clusters.
+TEST_P(Clusters, NestedBoxesDoNotTakeARoundPerPair) {
+    std::vector<Aabb> boxes;
+    for (std::size_t i = 0; i < 10'000 * thorough; ++i) {
+        const float size = 1.0f + 1e-5f * static_cast<float>(i);
+        boxes.push_back({{0, 0, 0}, {size, size, size}});
     }
-    const Bvh tree = build_bvh(points, options());
+    const Bvh tree = build_bvh(boxes, options());
     EXPECT_TRUE(check(tree).ok);
-    EXPECT_LE(tree.max_depth(), 200u);
+    EXPECT_LE(tree.max_depth(), 1100u);  // a list of 1024 may still become a chain
+}
+
+/// Boxes one inside the other: each is nearest to the one before, so the tree is a chain, deeper
+/// than the array that stacks of radix trees fit into.
+TEST_P(Clusters, DeepTreesAreTracedSavedAndLoaded) {
+    Mesh mesh;
+    for (int k = 0; k < 280; ++k) {
+        const float size = 1.0f + 0.01f * static_cast<float>(k);
+        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+        for (const Vec3& corner : {Vec3{0, 0, 0}, Vec3{size, 0, size}, Vec3{0, size, 0.3f * size}})
+            mesh.vertices.push_back(corner);
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    const Scene scene = scene_of(std::move(mesh), "chain");
+    const Bvh tree = build_bvh(scene.mesh, options(1));
+    EXPECT_GT(tree.max_depth(), GetParam() == Builder::ploc ? 96u : 32u);
+    const CheckReport valid = check(tree, scene.mesh);
+    ASSERT_TRUE(valid.ok) << valid.broken;
+    const std::vector<Ray> rays = make_mixed_rays(scene, 2000, 3);
+    const std::vector<Hit> hits = trace(tree, rays), expected = trace_brute_force(scene.mesh, rays);
+    ASSERT_EQ(std::memcmp(hits.data(), expected.data(), hits.size() * sizeof(Hit)), 0);
+
+    const TempFolder folder;
+    save_rdx(folder.path() / "chain.rdx", tree, scene);
+    const RdxFile loaded = load_rdx(folder.path() / "chain.rdx");
+    const CheckReport same = check_same(tree, loaded.bvh);
+    EXPECT_TRUE(same.ok) << same.broken;
+    EXPECT_EQ(loaded.bvh.options().builder, GetParam());
+    EXPECT_EQ(tree_hash(loaded.bvh), tree_hash(tree));
 }
 
 INSTANTIATE_TEST_SUITE_P(Builders, Clusters, testing::Values(Builder::ploc, Builder::hploc),
