@@ -18,11 +18,12 @@ TEST(NthSetBit, CountsFromTheLowest) {
     constexpr unsigned seed = 3;
     std::mt19937 random(seed);
     for (int i = 0; i < 1000; ++i) {
-        const std::uint32_t mask = random();
+        const auto mask = static_cast<std::uint32_t>(random());
         std::uint32_t rank = 0;
-        for (std::uint32_t place = 0; place < 32; ++place)
-            if ((mask >> place & 1) != 0)
-                EXPECT_EQ(nth_set_bit(mask, rank++), place) << mask << ", seed " << seed;
+        for (std::uint32_t place = 0; place < 32; ++place) {
+            if ((mask >> place & 1) == 0) continue;
+            EXPECT_EQ(nth_set_bit(mask, rank++), place) << mask << ", seed " << seed;
+        }
     }
 }
 
