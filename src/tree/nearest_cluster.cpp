@@ -195,8 +195,9 @@ void find_partners(const BoxLanes& boxes, std::uint32_t begin, std::uint32_t end
     for (std::uint32_t i = begin; i < end; ++i) {
         const std::int64_t k = std::int64_t{i} - origin;
         const std::int32_t offset = search.nearest(k);
-        partners[i] = search.nearest(k + offset) == -offset ? static_cast<std::int8_t>(offset)
-                                                            : std::int8_t{0};
+        // A product, not a choice: nobody can guess which clusters agree.
+        const std::int32_t agree = search.nearest(k + offset) == -offset;
+        partners[i] = static_cast<std::int8_t>(offset * agree);
     }
 }
 
