@@ -15,9 +15,10 @@ std::size_t nearest(const std::vector<Aabb>& boxes, std::size_t i, std::size_t r
     for (std::size_t j = i > radius ? i - radius : 0; j < boxes.size() && j <= i + radius; ++j) {
         if (j == i) continue;
         const std::size_t first = std::min(i, j), d = std::max(i, j) - first;
-        const bool goes_right = tie_goes_right(static_cast<std::uint32_t>(first),
-                                               static_cast<std::uint32_t>(d));
-        best = std::min(best, std::tuple(cluster_area(unite(boxes[i], boxes[j])), d, !goes_right, j));
+        const bool goes_right =
+            tie_goes_right(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(d));
+        best =
+            std::min(best, std::tuple(cluster_area(unite(boxes[i], boxes[j])), d, !goes_right, j));
     }
     return std::get<3>(best);
 }
