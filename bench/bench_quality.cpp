@@ -105,13 +105,14 @@ void print_table(const Json& result) {
                result["triangles"].get<std::size_t>(), result["threads"].get<int>());
     fmt::print(stderr, "{:<14}{:>10}{:>10}{:>10}{:>10}{:>12}{:>12}{:>8}\n", "tree", "ms", "min",
                "max", "SAH", "primary", "diffuse", "depth");
-    for (const auto& [name, p] : result["peers"].items()) {
+    for (const auto& entry : result["peers"].items()) {
+        const Json& p = entry.value();
         const auto number = [&](const Json& j) { return j.is_null() ? 0.0 : j.get<double>(); };
         const auto rate = [&](const char* key) {
             return p.contains(key) ? number(p[key]["median"]) : 0.0;
         };
         fmt::print(stderr, "{:<14}{:>10.1f}{:>10.1f}{:>10.1f}{:>10.3f}{:>12.3f}{:>12.3f}{:>8}\n",
-                   name, number(p["build_ms"]["median"]), number(p["build_ms"]["min"]),
+                   entry.key(), number(p["build_ms"]["median"]), number(p["build_ms"]["min"]),
                    number(p["build_ms"]["max"]), p.contains("sah") ? number(p["sah"]) : 0.0,
                    rate("primary_mrays_per_s"), rate("diffuse_mrays_per_s"),
                    p.contains("max_depth") ? p["max_depth"].get<int>() : 0);

@@ -90,7 +90,7 @@ RAYDIX_HD inline ClusterNode merge_clusters(const ClusterPart& a, const ClusterP
 /// choice is the pair's own, the same from both ends: pairs that tie and share a cluster differ in
 /// the lowest set bit of d at their first position. So some pair always merges, and equal boxes
 /// pair up and halve in each round.
-RAYDIX_HD inline bool tie_goes_right(std::uint32_t i, std::uint32_t d) {
+RAYDIX_HD constexpr bool tie_goes_right(std::uint32_t i, std::uint32_t d) {
     return (i & (d & (0u - d))) == 0;
 }
 

@@ -17,4 +17,10 @@ inline constexpr std::uint32_t partner_block = 512;
 void find_partners(const BoxLanes& boxes, std::uint32_t begin, std::uint32_t end,
                    std::uint32_t radius, std::int8_t* partners);
 
+/// The same with eight places at once or four; the answer does not depend on it. `wide` only if
+/// has_wide_search().
+void find_partners(const BoxLanes& boxes, std::uint32_t begin, std::uint32_t end,
+                   std::uint32_t radius, std::int8_t* partners, bool wide);
+[[nodiscard]] bool has_wide_search();
+
 }  // namespace raydix

@@ -129,13 +129,19 @@ private:
 
     static void copy_survivors(const From& from, const Survivors& block, ClusterList& next,
                                std::uint32_t at) {
+        // All lanes at once: each is then one stream through memory, from block to block.
+        std::array<const float*, 6> lanes;
+        std::array<float*, 6> outs;
         for (std::size_t c = 0; c < 6; ++c) {
-            const float* lane = from.boxes.lane(c);
-            float* out = next.boxes.lane(c) + at;
-            for (std::uint32_t k = 0; k < block.count; ++k) out[k] = lane[block.places[k]];
+            lanes[c] = from.boxes.lane(c);
+            outs[c] = next.boxes.lane(c) + at;
         }
-        ClusterRef* out = next.refs.data() + at;
-        for (std::uint32_t k = 0; k < block.count; ++k) out[k] = ref_at(from, block.places[k]);
+        ClusterRef* refs = next.refs.data() + at;
+        for (std::uint32_t k = 0; k < block.count; ++k) {
+            const std::uint32_t i = block.places[k];
+            for (std::size_t c = 0; c < 6; ++c) outs[c][k] = lanes[c][i];
+            refs[k] = ref_at(from, i);
+        }
     }
 
     /// Where a block's nodes and its part of the next list begin.
