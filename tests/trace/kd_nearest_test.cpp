@@ -52,8 +52,8 @@ TEST(KdNearest, ThreadsAndCountersChangeNothing) {
         const KdTree tree = build_kdtree(set.points);
         const auto queries = queries_for(set.points, 100 * thorough, seed);
         const auto wanted = kd_nearest(tree, queries, 8, {.threads = 1});
-        const auto invalid = static_cast<std::uint64_t>(std::ranges::count_if(
-            queries, [](Vec3 q) { return !std::isfinite(q.x + q.y + q.z); }));
+        const auto invalid = static_cast<std::uint64_t>(
+            std::ranges::count_if(queries, [](Vec3 q) { return !std::isfinite(q.x + q.y + q.z); }));
         EXPECT_GE(invalid, 2u);
         KdQueryCounts first;
         for (const int threads : {1, 2, 7}) {
