@@ -23,7 +23,7 @@ using Json = nlohmann::ordered_json;
 struct Options {
     std::string points = "builtin:uniform?points=1000000",
                 scene = "builtin:atrium?triangles=500000";
-    int threads = 2, repeat = 5, max_leaf = 8, bits = 63, samples = 8;
+    int threads = 2, repeat = 5, max_leaf = 0, bits = 63, samples = 8;
     std::uint32_t k = 8, queries = 200'000;
     std::uint64_t seed = 1;
 };
@@ -85,7 +85,7 @@ Json settings(const Options& options, const KdTree& tree, const std::string& sce
             {"seed", options.seed},
             {"repeat", options.repeat},
             {"bits", options.bits},
-            {"max_leaf", options.max_leaf},
+            {"max_leaf", tree.options().max_leaf},
             {"references", tree.order().size()},
             {"nodes", kd_stats(tree).nodes},
             {"bytes", tree.bytes()},
@@ -189,7 +189,8 @@ int main(int argc, char** argv) {
     app.add_option("--repeat", options.repeat, "Timed turns")
         ->check(CLI::Range(1, 10000))
         ->capture_default_str();
-    app.add_option("--max-leaf", options.max_leaf, "Most primitives in a leaf of the k-d tree")
+    app.add_option("--max-leaf", options.max_leaf,
+                   "Most primitives in a leaf of the k-d tree; 0: its default")
         ->capture_default_str();
     app.add_option("--bits", options.bits, "Code bits of both trees")->capture_default_str();
     app.add_option("--samples", options.samples, "Diffuse rays per primary hit")

@@ -18,7 +18,8 @@ namespace raydix {
 
 struct KdTreeOptions {
     int bits = 63;        // Morton code bits, 30 or 63: 10 or 21 halvings of each axis
-    int max_leaf = 8;     // 1..255 primitives in a leaf; more means fewer nodes and more tests
+    int max_leaf = 0;     // 1..255 primitives in a leaf; more means fewer nodes and more tests.
+                          // 0: 8 points or 4 triangles
     bool strict = false;  // invalid primitives are an InputError instead of being left out
     int threads = 0;      // 0: all the machine has. The tree does not depend on it
 };
@@ -71,6 +72,7 @@ public:
 
     /// triangles or points.
     [[nodiscard]] PrimitiveKind kind() const { return kind_; }
+    /// As given; max_leaf is what it stands for.
     [[nodiscard]] const KdTreeOptions& options() const { return options_; }
     [[nodiscard]] std::uint32_t inner_count() const { return inner_count_; }
     [[nodiscard]] std::uint32_t leaf_count() const { return empty() ? 0 : inner_count_ + 1; }

@@ -19,13 +19,17 @@
 namespace raydix {
 namespace {
 
+// Boxes of triangles reach into each other, and a leaf has none of its own: a test saved there is
+// worth a node. Distances to points are cheaper than nodes.
+constexpr int default_leaf_points = 8, default_leaf_triangles = 4;
+
 void check_options(const KdTreeOptions& options, std::size_t n) {
     if (options.bits != 30 && options.bits != 63)
         throw InputError("k-d tree option bits is " + std::to_string(options.bits) +
                          "; it must be 30 or 63");
-    if (options.max_leaf < 1 || options.max_leaf > 255)
+    if (options.max_leaf < 0 || options.max_leaf > 255)
         throw InputError("k-d tree option max_leaf is " + std::to_string(options.max_leaf) +
-                         "; it must be 1 to 255");
+                         "; it must be 1 to 255, or 0");
     if (n >= std::size_t{1} << 31)
         throw InputError(std::to_string(n) + " primitives; a tree takes fewer than 2147483648");
 }
@@ -141,8 +145,11 @@ private:
 template <class Source, class Copy>
 void build(const Source& source, std::size_t n, const char* kind_name, KdTreeAccess tree,
            Buffer<Copy>& copies) {
-    const KdTreeOptions& options = tree.options();
+    KdTreeOptions& options = tree.options();
     check_options(options, n);
+    if (options.max_leaf == 0)
+        options.max_leaf =
+            tree.kind() == PrimitiveKind::points ? default_leaf_points : default_leaf_triangles;
     const std::uint64_t before = memory_count().now();
     memory_count().restart_peak();
     with_threads(options.threads, [&] {

@@ -77,7 +77,7 @@ TEST(KdTree, SharedBunnyLikeTheReference) {
     RAYDIX_SKIP_WITHOUT(file);
     const Mesh mesh = load_mesh(file);
     for (const int bits : {30, 63}) {
-        const KdTreeOptions options{.bits = bits};
+        const KdTreeOptions options{.bits = bits, .max_leaf = 4};
         const KdTree built = build_kdtree(mesh, options);
         EXPECT_EQ(kd_hash(built), kd_hash(reference_kdtree(mesh, options)));
         EXPECT_EQ(kd_check(built, mesh).broken, "");
@@ -145,10 +145,17 @@ TEST(KdTree, StatisticsCountTheTree) {
     EXPECT_FALSE(none.depth_bound.has_value());
 }
 
+TEST(KdTree, LeafSizeUnlessGivenGoesByTheKind) {
+    const Mesh mesh = random_soup(500, 1);
+    EXPECT_EQ(build_kdtree(mesh).options().max_leaf, 4);
+    EXPECT_EQ(kd_hash(build_kdtree(mesh)), kd_hash(build_kdtree(mesh, {.max_leaf = 4})));
+    EXPECT_EQ(build_kdtree(mesh.vertices).options().max_leaf, 8);
+}
+
 TEST(KdTree, RefusesWhatItCannotBuild) {
     const Mesh mesh = random_soup(10, 1);
     EXPECT_THROW((void)build_kdtree(mesh, {.bits = 31}), InputError);
-    EXPECT_THROW((void)build_kdtree(mesh, {.max_leaf = 0}), InputError);
+    EXPECT_THROW((void)build_kdtree(mesh, {.max_leaf = -1}), InputError);
     EXPECT_THROW((void)build_kdtree(mesh, {.max_leaf = 256}), InputError);
     Mesh broken = mesh;
     broken.triangles[3][1] = 30;
