@@ -163,6 +163,17 @@ FAULTS = [
     Fault("src/api/rdx_parse.cpp", "if (section.count > room / section.element_bytes)",
           "if (section.count * section.element_bytes > room)",
           ".rdx: a number of elements that wraps around is believed", "api"),
+    Fault("src/tree/octree.h", "radix.point_count(radix.chain_above(slot))", "radix.point_count(radix.parent_slot(slot))",
+          "octree: a node's parent is taken for its radix parent, chain or not", "tree"),
+    Fault("src/tree/octree.h", ": radix.offsets[radix.chain_above(slot) + 1] - 1;",
+          ": radix.offsets[radix.chain_above(slot)];", "octree: a chain hangs below the first node of the one above",
+          "tree"),
+    Fault("src/tree/octree_query.h", "inside = inside && first > box.lo[axis]", "inside = inside && first >= box.lo[axis]",
+          "octree: points in the box's own border cells are taken without a look", "tree"),
+    Fault("src/tree/octree_neighbour.cpp", "there.level == node.level || there.is_leaf() ? found : no_node;", "found;",
+          "octree: a neighbour without points is the inner node around it", "tree"),
+    Fault("src/tree/octree_query.cpp", "if (cell >> node.level != 0) return hi;\n", "",
+          "octree: cubes at the upper border end beyond the root", "tree"),
 ]
 
 

@@ -150,6 +150,10 @@ struct Direction {
 /// that is zero or has a component beyond 1.
 [[nodiscard]] std::uint32_t neighbour(const Octree& octree, std::uint32_t node_index,
                                       Direction direction);
+/// For many nodes in one direction: [nodes] -> [nodes].
+[[nodiscard]] std::vector<std::uint32_t> neighbour(const Octree& octree,
+                                                   std::span<const std::uint32_t> nodes,
+                                                   Direction direction, int threads = 0);
 /// In all directions, in the order of all_directions().
 [[nodiscard]] std::array<std::uint32_t, 26> neighbours(const Octree& octree,
                                                        std::uint32_t node_index);

@@ -164,8 +164,10 @@ struct CountChain {
         if (levels == 0) return 0;
         if (radix.point_count(slot) > radix.rule.max_leaf)
             return static_cast<std::uint32_t>(levels);
-        return first == 0 || radix.point_count(radix.chain_above(slot)) > radix.rule.max_leaf ? 1
-                                                                                              : 0;
+        const bool is_root = first == 0;
+        const bool has_place =
+            is_root || radix.point_count(radix.chain_above(slot)) > radix.rule.max_leaf;
+        return has_place ? 1 : 0;
     }
     RAYDIX_HD void operator()(std::uint32_t slot) const {
         Probe::bytes(sizeof(std::uint32_t));
@@ -324,8 +326,7 @@ template <class Launcher, class Key>
 void count_octree(Launcher& launcher, const Key* sorted_codes, std::uint32_t n,
                   const RadixChains<Key, typename Launcher::Probe>& radix) {
     using Probe = typename Launcher::Probe;
-    // Two shifts: one by all bits of the key would be undefined. The two unused top bits are 0 in
-    // every code.
+    // Bits below max_level are cut off; at level 0 that is all of them.
     const int cut = 3 * (CodeFormat<Key>::axis_bits - radix.rule.max_level);
     const Key kept_bits = static_cast<Key>(~Key{0} >> cut << cut);
     std::uint32_t* marks = radix.offsets;  // free until the chains are counted

@@ -1,6 +1,8 @@
 // Neighbours of octree nodes: the cell one step away, and the way down to it from the root.
 #include <raydix/error.h>
 
+#include "exec/parallel.h"
+#include "exec/search.h"
 #include "tree/octree_walk.h"
 
 namespace raydix {
@@ -28,6 +30,14 @@ std::uint32_t neighbour_of(const Octree& octree, const OctreeNode& node, Directi
     return there.level == node.level || there.is_leaf() ? found : no_node;
 }
 
+void check_direction(Direction direction) {
+    const auto is_step = [](int d) { return d >= -1 && d <= 1; };
+    const auto [dx, dy, dz] = direction;
+    if (!is_step(dx) || !is_step(dy) || !is_step(dz) || (dx == 0 && dy == 0 && dz == 0))
+        throw InputError("direction (" + std::to_string(dx) + ", " + std::to_string(dy) + ", " +
+                         std::to_string(dz) + ") is not one of the 26");
+}
+
 }  // namespace
 
 std::array<Direction, 26> all_directions() {
@@ -41,13 +51,26 @@ std::array<Direction, 26> all_directions() {
 }
 
 std::uint32_t neighbour(const Octree& octree, std::uint32_t node_index, Direction direction) {
-    const OctreeNode& node = node_at(octree, node_index);
-    const auto is_step = [](int d) { return d >= -1 && d <= 1; };
-    const auto [dx, dy, dz] = direction;
-    if (!is_step(dx) || !is_step(dy) || !is_step(dz) || (dx == 0 && dy == 0 && dz == 0))
-        throw InputError("direction (" + std::to_string(dx) + ", " + std::to_string(dy) + ", " +
-                         std::to_string(dz) + ") is not one of the 26");
-    return neighbour_of(octree, node, direction);
+    check_direction(direction);
+    return neighbour_of(octree, node_at(octree, node_index), direction);
+}
+
+std::vector<std::uint32_t> neighbour(const Octree& octree, std::span<const std::uint32_t> nodes,
+                                     Direction direction, int threads) {
+    check_direction(direction);
+    std::vector<std::uint32_t> found(nodes.size());
+    with_threads(threads, [&] {
+        const auto is_stranger = [&](std::size_t i) { return nodes[i] >= octree.nodes().size(); };
+        const std::size_t stranger = first_index_where(nodes.size(), is_stranger);
+        if (stranger != nodes.size()) (void)node_at(octree, nodes[stranger]);  // throws
+        for_each_index(
+            nodes.size(),
+            [&](std::size_t i) {
+                found[i] = neighbour_of(octree, octree.nodes()[nodes[i]], direction);
+            },
+            256);
+    });
+    return found;
 }
 
 std::array<std::uint32_t, 26> neighbours(const Octree& octree, std::uint32_t node_index) {

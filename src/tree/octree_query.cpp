@@ -114,6 +114,7 @@ PointsInBoxes points_in_boxes(const Octree& octree, std::span<const Aabb> boxes,
     result.offsets.assign(boxes.size() + 1, 0);
     std::vector<std::vector<std::uint32_t>> found((boxes.size() + block - 1) / block);
     with_threads(threads, [&] {
+        for (const Aabb& box : boxes) result.invalid_queries += is_valid_query(box) ? 0 : 1;
         const Grid grid = grid_of(octree);
         for_each_block(boxes.size(), block, [&](std::size_t b, std::size_t begin, std::size_t end) {
             std::vector<std::uint32_t>& ids = found[b];
@@ -124,7 +125,6 @@ PointsInBoxes points_in_boxes(const Octree& octree, std::span<const Aabb> boxes,
             }
         });
     });
-    for (const Aabb& box : boxes) result.invalid_queries += is_valid_query(box) ? 0 : 1;
     for (std::size_t q = 0; q < boxes.size(); ++q) result.offsets[q + 1] += result.offsets[q];
     result.ids.reserve(result.offsets.back());
     for (std::vector<std::uint32_t>& ids : found) {

@@ -111,6 +111,24 @@ TEST(OctreeNeighbour, LeavesByTheirCubesInSpace) {
     EXPECT_GT(found_any, 500u);
 }
 
+TEST(OctreeNeighbour, ManyAtOnceAreTheSameAsOneByOne) {
+    const Octree octree = build_octree(octree_inputs(3000, seed)[5].points);
+    std::vector<std::uint32_t> nodes;
+    for (std::uint32_t i = 0; i < octree.nodes().size(); ++i)
+        nodes.push_back(static_cast<std::uint32_t>(octree.nodes().size()) - 1 - i);
+    for (const Direction d : all_directions()) {
+        std::vector<std::uint32_t> expected;
+        for (const std::uint32_t node : nodes) expected.push_back(neighbour(octree, node, d));
+        for (const int threads : {1, 2, 7})
+            EXPECT_EQ(neighbour(octree, nodes, d, threads), expected);
+    }
+    nodes[7] = no_node;
+    EXPECT_THROW((void)neighbour(octree, nodes, {1, 0, 0}), InputError);
+    nodes.clear();
+    EXPECT_TRUE(neighbour(octree, nodes, {1, 0, 0}).empty());
+    EXPECT_THROW((void)neighbour(octree, nodes, {0, 0, 0}), InputError);
+}
+
 TEST(OctreeNeighbour, BadQuestions) {
     const std::vector<Vec3> points{{0, 0, 0}, {1, 1, 1}};
     const Octree octree = build_octree(points, {.max_leaf = 1});

@@ -4,11 +4,16 @@
 #include <raydix/octree.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
 #include "support/octree_inputs.h"
 #include "support/support.h"
+
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#endif
 
 namespace raydix::test {
 namespace {
@@ -244,6 +249,37 @@ TEST(OctreeQuery, AnEmptyTreeAnswersEverything) {
     EXPECT_EQ(octree.level_count(), 0u);
     EXPECT_EQ(octree.level_nodes(0).size(), 0u);
 }
+
+#if defined(__SSE2__)
+/// A caller's thread that flushes denormals gets the same answers.
+TEST(OctreeQuery, TheCallersFloatingPointStateDoesNotMatter) {
+    std::vector<Vec3> points;
+    for (int i = 0; i < 64; ++i)
+        points.push_back({1e-44f * static_cast<float>(i % 7), 1e-43f * static_cast<float>(i % 5),
+                          1e-42f * static_cast<float>(i)});
+    const std::vector<Aabb> boxes{{{0, 0, 0}, points[40]}, {points[3], {0, 0, 0}}};
+    const auto answers = [&] {
+        const Octree octree = build_octree(points, {.max_leaf = 2});
+        const PointsInBoxes inside = points_in_boxes(octree, boxes);
+        std::vector<std::uint32_t> all{locate(octree, points[9])};
+        for (const std::uint32_t node : locate(octree, points)) all.push_back(node);
+        for (const std::uint32_t id : inside.ids) all.push_back(id);
+        for (const std::uint32_t id : points_in_box(octree, boxes[0])) all.push_back(id);
+        all.push_back(static_cast<std::uint32_t>(inside.invalid_queries));
+        const Aabb box = node_box(octree, all[0]);
+        for (const float x : {box.lo.x, box.lo.y, box.lo.z, box.hi.x, box.hi.y, box.hi.z})
+            all.push_back(std::bit_cast<std::uint32_t>(x));
+        return std::pair(tree_hash(octree), all);
+    };
+    const auto expected = answers();
+    const unsigned saved = _mm_getcsr();
+    _mm_setcsr(saved | 0x8040u);  // flush to zero, denormals are zero
+    const auto flushed = answers();
+    _mm_setcsr(saved);
+    EXPECT_EQ(flushed, expected);
+    EXPECT_EQ(expected.second[expected.second.size() - 7], 1u);  // one inverted box
+}
+#endif
 
 /// The corner of the scene belongs to the last cell, and nothing beyond it to any.
 TEST(OctreeQuery, TheUpperFaceIsClosed) {
