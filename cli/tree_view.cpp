@@ -7,6 +7,7 @@
 #include <charconv>
 
 #include "kdtree_commands.h"
+#include "octree_commands.h"
 
 namespace raydix::cli {
 namespace {
@@ -27,6 +28,21 @@ LevelRange parse_levels(const std::string& text) {
             return levels;
     }
     throw CLI::ValidationError("--levels", "'" + text + "' is neither a level nor FIRST-LAST");
+}
+
+/// An octree, and a BVH of the same scene to show it with.
+TreeScene load_octree_scene(const std::string& name, LevelRange levels, const TreeOptions& tree,
+                            const CommonOptions& common) {
+    if (is_rdx(name)) throw CLI::ValidationError("--tree", "the tree in " + name + " is a bvh");
+    const OctreeOptions options = octree_options(tree, common);
+    TreeOptions shown = tree;
+    shown.tree = "bvh";
+    shown.max_leaf = BuildOptions().max_leaf;
+    TreeScene scene{load_scene_tree(name, shown, common), {}};
+    const Octree octree =
+        about(name, [&] { return build_octree(scene.input.scene.mesh, options); });
+    scene.boxes = level_boxes(octree, levels);
+    return scene;
 }
 
 }  // namespace
@@ -69,6 +85,7 @@ TreeScene load_tree_scene(const std::string& name, const std::string& view,
     const LevelRange levels = !options.levels.empty() ? parse_levels(options.levels)
                               : view == "tree"        ? few_levels
                                                       : LevelRange{};
+    if (tree.tree == "octree") return load_octree_scene(name, levels, tree, common);
     if (tree.tree != "kdtree") {
         TreeScene scene{load_scene_tree(name, tree, common), {}};
         scene.boxes = level_boxes(scene.input.bvh, levels);

@@ -4,6 +4,7 @@
 #include <raydix/bvh.h>
 #include <raydix/camera.h>
 #include <raydix/kdtree.h>
+#include <raydix/octree.h>
 #include <raydix/picture.h>
 #include <raydix/types.h>
 
@@ -34,6 +35,9 @@ struct LevelRange {
 /// The cells of the nodes on these levels, in preorder: the bounds, parted at the planes above.
 /// Nodes that part equal codes share their cell and are left out.
 [[nodiscard]] std::vector<LevelBox> level_boxes(const KdTree& tree, LevelRange levels = {});
+
+/// The cubes of the nodes on these levels, level by level.
+[[nodiscard]] std::vector<LevelBox> level_boxes(const Octree& octree, LevelRange levels = {});
 
 /// The shaded scene, darkened, with the boxes as wire frames: wide and pale yellow on the first of
 /// their levels, over orange, to thin and violet on the last; fainter behind surfaces. `scene` is

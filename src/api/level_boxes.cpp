@@ -57,4 +57,15 @@ std::vector<LevelBox> level_boxes(const KdTree& tree, LevelRange levels) {
     return boxes;
 }
 
+std::vector<LevelBox> level_boxes(const Octree& octree, LevelRange levels) {
+    std::vector<LevelBox> boxes;
+    for (std::uint32_t level = 0; level < octree.level_count(); ++level) {
+        if (!levels.contains(level)) continue;
+        const NodeRange nodes = octree.level_nodes(level);
+        for (std::uint32_t node = nodes.begin; node < nodes.end; ++node)
+            boxes.push_back({node_box(octree, node), level});
+    }
+    return boxes;
+}
+
 }  // namespace raydix
