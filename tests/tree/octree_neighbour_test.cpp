@@ -87,10 +87,12 @@ TEST(OctreeNeighbour, LeavesByTheirCubesInSpace) {
         points.push_back({static_cast<float>(random() % 16), static_cast<float>(random() % 16),
                           static_cast<float>(random() % 8)});
     const Octree octree = build_octree(points, {.max_level = 4, .max_leaf = 2});
+    std::vector<Aabb> boxes;
+    for (std::uint32_t i = 0; i < octree.nodes().size(); ++i) boxes.push_back(node_box(octree, i));
     std::size_t found_any = 0;
     for (std::uint32_t i = 0; i < octree.nodes().size(); ++i) {
         if (!octree.nodes()[i].is_leaf()) continue;
-        const Aabb box = node_box(octree, i);
+        const Aabb box = boxes[i];
         const float edge = box.hi.x - box.lo.x;
         ASSERT_EQ(edge, 16.0f / static_cast<float>(1u << octree.nodes()[i].level));
         for (const Direction d : all_directions()) {
@@ -102,7 +104,7 @@ TEST(OctreeNeighbour, LeavesByTheirCubesInSpace) {
                 const OctreeNode& other = octree.nodes()[j];
                 const bool eligible = other.level == octree.nodes()[i].level ||
                                       (other.level < octree.nodes()[i].level && other.is_leaf());
-                if (eligible && holds(node_box(octree, j), there)) expected = j;
+                if (eligible && holds(boxes[j], there)) expected = j;
             }
             EXPECT_EQ(neighbour(octree, i, d), expected);
             found_any += expected != no_node ? 1 : 0;
