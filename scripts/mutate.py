@@ -90,8 +90,6 @@ FAULTS = [
           "boxes by levels: the shallower child decides the depth", "tree"),
     Fault("src/tree/fit_levels.h", "if (left) ranks[place++] = rank_of_slot(pair[0].first);", "if (left) ranks[place] = rank_of_slot(pair[0].first);",
           "levels from the root: two children in one place", "tree"),
-    Fault("src/tree/counted_keys.h", "n == capacity_ ? exact() : pairs()", "exact()",
-          "builds of a device: launches with an item per pair of keys run one too many", "api"),
     Fault("src/tree/counted_keys.h", "values[*exact + i] = 0;", "static_cast<void>(i);",
           "builds of a device: scans see what lies behind the last key", "api"),
     Fault("src/tree/tree_launches.h", "if (n <= max_leaf) EmitOnlyLeaf", "if (n < max_leaf) EmitOnlyLeaf",
