@@ -4,26 +4,8 @@
 #include <raydix/error.h>
 #include <raydix/machine.h>
 
-#include <array>
-#include <utility>
-
 namespace raydix::cli {
 namespace {
-
-constexpr std::array<std::pair<const char*, double BuildMs::*>, 7> stages{
-    {{"bounds", &BuildMs::bounds},
-     {"codes", &BuildMs::codes},
-     {"sort", &BuildMs::sort},
-     {"hierarchy", &BuildMs::hierarchy},
-     {"fit", &BuildMs::fit},
-     {"layout", &BuildMs::layout},
-     {"total", &BuildMs::total}}};
-
-Spread stage_spread(const std::vector<BuildMs>& builds, double BuildMs::*stage) {
-    std::vector<double> values;
-    for (const BuildMs& build : builds) values.push_back(build.*stage);
-    return spread_of(values);
-}
 
 bool is_given(const TreeOptions& tree, const std::string& name) {
     for (const CLI::Option* option : tree.of_the_build)
@@ -35,13 +17,7 @@ void refuse_rdx(const std::string& scene) {
     if (is_rdx(scene)) throw CLI::ValidationError("--tree", "the tree in " + scene + " is a bvh");
 }
 
-void print_tree(const KdTree& tree, const std::vector<BuildMs>& builds) {
-    fmt::print("\n{:<12} {:>9} {:>9} {:>9}   ms, of {} builds into new memory\n", "stage", "median",
-               "min", "max", builds.size());
-    for (const auto& [name, member] : stages) {
-        const Spread ms = stage_spread(builds, member);
-        fmt::print("{:<12} {:>9.2f} {:>9.2f} {:>9.2f}\n", name, ms.median, ms.min, ms.max);
-    }
+void print_tree(const KdTree& tree) {
     const TreeStats stats = kd_stats(tree);
     fmt::print("\ntree         kdtree over {} {} ({} left out), {} nodes, {} leaves\n",
                grouped(stats.references),
@@ -65,11 +41,11 @@ KdTree build_about(const std::string& scene, const Mesh& mesh, const KdTreeOptio
 }  // namespace
 
 KdTreeOptions kdtree_options(const TreeOptions& tree, const CommonOptions& common) {
-    for (const char* name : {"--builder", "--quality", "--fit"})
-        if (is_given(tree, name))
-            throw CLI::ValidationError(name, "belongs to --tree bvh; a kdtree has one builder");
-    if (tree.epo_sample)
-        throw CLI::ValidationError("--epo", "belongs to --tree bvh; a kdtree has no boxes");
+    for (const CLI::Option* option : tree.of_a_bvh)
+        if (option->count() != 0)
+            throw CLI::ValidationError(option->get_name(),
+                                       "belongs to --tree bvh; a kdtree has nothing like it");
+    if (tree.max_level) throw CLI::ValidationError("--max-level", "belongs to --tree octree");
     KdTreeOptions options;
     options.bits = tree.bits;
     if (is_given(tree, "--max-leaf")) options.max_leaf = tree.max_leaf;
@@ -82,37 +58,30 @@ Json kdtree_json(const KdTree& tree, const std::vector<BuildMs>& builds) {
     const TreeStats stats = kd_stats(tree);
     const KdTreeOptions& options = tree.options();
     const auto or_null = [](const auto& value) { return value ? Json(*value) : Json(nullptr); };
-    Json ms, least, most;
-    for (const auto& [name, member] : stages) {
-        const Spread spread = stage_spread(builds, member);
-        ms[name] = spread.median;
-        least[name] = spread.min;
-        most[name] = spread.max;
-    }
-    return {{"tree", "kdtree"},
-            {"builder", "karras"},
-            {"bits", options.bits},
-            {"max_leaf", options.max_leaf},
-            {"device", "cpu"},
-            {"threads", options.threads > 0 ? options.threads : machine_info().cores},
-            {"primitives", tree.input_count()},
-            {"left_out", tree.left_out()},
-            {"nodes", stats.nodes},
-            {"leaves", stats.leaves},
-            {"references", stats.references},
-            {"layout", "binary"},
-            {"layout_nodes", stats.layout_nodes},
-            {"max_depth", stats.max_depth},
-            {"depth_bound", or_null(stats.depth_bound)},
-            {"sah", or_null(stats.sah)},
-            {"sah_constants", nullptr},
-            {"epo", or_null(stats.epo)},
-            {"bytes", stats.bytes},
-            {"bytes_referenced", stats.bytes_referenced},
-            {"peak_bytes", tree.peak_bytes()},
-            {"tree_hash", stats.tree_hash},
-            {"ms", ms},
-            {"ms_spread", {{"min", least}, {"max", most}}}};
+    Json build{{"tree", "kdtree"},
+               {"builder", "karras"},
+               {"bits", options.bits},
+               {"max_leaf", options.max_leaf},
+               {"device", "cpu"},
+               {"threads", options.threads > 0 ? options.threads : machine_info().cores},
+               {"primitives", tree.input_count()},
+               {"left_out", tree.left_out()},
+               {"nodes", stats.nodes},
+               {"leaves", stats.leaves},
+               {"references", stats.references},
+               {"layout", "binary"},
+               {"layout_nodes", stats.layout_nodes},
+               {"max_depth", stats.max_depth},
+               {"depth_bound", or_null(stats.depth_bound)},
+               {"sah", or_null(stats.sah)},
+               {"sah_constants", nullptr},
+               {"epo", or_null(stats.epo)},
+               {"bytes", stats.bytes},
+               {"bytes_referenced", stats.bytes_referenced},
+               {"peak_bytes", tree.peak_bytes()},
+               {"tree_hash", stats.tree_hash}};
+    add_build_ms(build, builds);
+    return build;
 }
 
 void run_kdtree_build(const std::string& scene_name, const TreeOptions& tree_options,
@@ -137,7 +106,8 @@ void run_kdtree_build(const std::string& scene_name, const TreeOptions& tree_opt
         fmt::print("{}: {} triangles, {} vertices, loaded in {:.1f} ms\n", scene.name,
                    grouped(scene.mesh.triangles.size()), grouped(scene.mesh.vertices.size()),
                    scene.load_ms);
-        print_tree(tree, builds);
+        print_stages(document["build"], builds.size());
+        print_tree(tree);
     }
     write_json(document, common);
 }

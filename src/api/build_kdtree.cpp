@@ -3,15 +3,13 @@
 #include <raydix/error.h>
 #include <raydix/kdtree.h>
 
-#include <algorithm>
-
+#include "api/input_checks.h"
 #include "base/check.h"
 #include "exec/host_launcher.h"
 #include "exec/memory.h"
 #include "keys/host_encode.h"
 #include "layout/leaf_order.h"
 #include "measure/stopwatch.h"
-#include "primitives/bounds.h"
 #include "sort/radix_sort.h"
 #include "tree/kdtree.h"
 #include "tree/kdtree_access.h"
@@ -32,24 +30,6 @@ void check_options(const KdTreeOptions& options, std::size_t n) {
                          "; it must be 1 to 255, or 0");
     if (n >= std::size_t{1} << 31)
         throw InputError(std::to_string(n) + " primitives; a tree takes fewer than 2147483648");
-}
-
-/// Names the primitive that stops a build, if there is one.
-template <class Source>
-void check_bounds(const Bounds& bounds, const Source& source, const char* kind, bool strict) {
-    if constexpr (requires { source.vertex_count; }) {
-        if (bounds.first_unreadable != no_primitive) {
-            const Triangle& t = source.triangles[bounds.first_unreadable];
-            throw InputError(std::string(kind) + " " + std::to_string(bounds.first_unreadable) +
-                             ": index " + std::to_string(std::max({t[0], t[1], t[2]})) +
-                             " is past the last of " + std::to_string(source.vertex_count) +
-                             " vertices");
-        }
-    }
-    if (strict && bounds.left_out != 0)
-        throw InputError(std::string(kind) + " " + std::to_string(bounds.first_left_out) +
-                         ": not finite or out of range, as are " +
-                         std::to_string(bounds.left_out - 1) + " others");
 }
 
 /// One build: a source of primitives, the copies that its leaves hold, and the key type.

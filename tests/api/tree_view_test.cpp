@@ -47,6 +47,22 @@ TEST(LevelBoxes, OfABvhAreItsNodes) {
     EXPECT_TRUE(level_boxes(build_bvh(Mesh{})).empty());
 }
 
+TEST(LevelBoxes, OfAnOctreeAreItsNodesByLevel) {
+    const Octree octree = build_octree(test::random_soup(500, 3));
+    const auto all = level_boxes(octree);
+    ASSERT_EQ(all.size(), octree.nodes().size());
+    for (std::uint32_t node = 0; node < all.size(); ++node) {
+        EXPECT_EQ(all[node].level, octree.nodes()[node].level);
+        EXPECT_EQ(all[node].box.lo, node_box(octree, node).lo);
+        EXPECT_EQ(all[node].box.hi, node_box(octree, node).hi);
+    }
+    const auto part = level_boxes(octree, {1, 2});
+    EXPECT_EQ(part.size(), octree.level_nodes(1).end - octree.level_nodes(1).begin +
+                               octree.level_nodes(2).end - octree.level_nodes(2).begin);
+    EXPECT_TRUE(level_boxes(octree, {90, 99}).empty());
+    EXPECT_TRUE(level_boxes(build_octree(Mesh{})).empty());
+}
+
 TEST(LevelBoxes, CellsOfAKdTreePartitionItsBounds) {
     std::vector<Vec3> points;
     for (const Vec3& p : test::random_soup(300, 4).vertices) points.push_back(p);

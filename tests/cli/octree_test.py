@@ -78,10 +78,18 @@ class Octree(ProgramTest):
                         ["check", scene, "--max-level", "-1"]):
             self.fail_with_usage(*refused, "--tree", "octree")
         for command in (["trace", scene], ["render", scene, "-o", "x.png"]):
-            self.fail_with_usage(*command, "--tree", "octree", names=["--tree", "build", "check", "bvh"])
+            self.fail_with_usage(*command, "--tree", "octree", names=["--tree", "octree", "bvh"])
+        self.fail_with_usage("render", "tree.rdx", "--tree", "octree", "--view", "tree", "-o", "x.png", names=["--tree"])
         self.assertFalse((self.folder / "octree.rdx").exists() or (self.folder / "x.png").exists())
         self.fail_with_usage("build", scene, "--max-level", "3", names=["--max-level", "octree"])
         self.fail_with_usage("trace", "tree.rdx", "--max-level", "3", names=["--max-level"])
+
+    def test_pictures(self):
+        for view in (["--view", "tree", "--levels", "1-3"], ["--view", "slice", "--axis", "x", "--at", "0.3"]):
+            self.succeed("render", SOUP, "--tree", "octree", *view, "--size", "64x48", "-o", "octree.png")
+            self.assertEqual((self.folder / "octree.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertIn("levels 1 to 3", self.succeed("render", SOUP, "--tree", "octree", "--view", "tree", "--levels",
+                                                    "1-3", "--size", "8x8", "-o", "octree.png").out)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,43 @@
+"""raydix bench hierarchy: tables, JSON, refusals."""
+import sys
+
+sys.dont_write_bytecode = True
+from program import ProgramTest, json_of, main  # noqa: E402
+
+SMALL = ("--sizes", "500", "--thread-counts", "1,2", "--repeat", "1")
+
+
+class Bench(ProgramTest):
+    def test_hierarchy(self):
+        document = json_of(self.succeed("bench", "hierarchy", "builtin:soup?triangles=2000", *SMALL, "--bits", "30,63",
+                                        "--factors", "1,64", "--json", "-").out)
+        self.assertEqual(document["factors"], [1, 64])
+        runs = document["runs"]
+        self.assertEqual(len(runs), 2 * 2 * 4 * 2 * 2)  # scenes, bits, builders, fits, threads
+        for run in runs:
+            self.assertGreater(run["measured_ms"], 0)
+            self.assertGreater(run["predicted_ms"], 0)
+            for machine in ("gtx480", "h200"):
+                once, larger = run["simulated_ms"][machine]
+                self.assertGreaterEqual(once, larger)
+            if run["fit"] == "levels":
+                self.assertEqual(sum(run["items_per_level"]), run["inner_nodes"])
+        trees = {(run["scene"], run["bits"]): set() for run in runs}
+        for run in runs:
+            trees[run["scene"], run["bits"]].add((run["inner_nodes"], run["max_depth"]))
+        self.assertTrue(all(len(kinds) == 1 for kinds in trees.values()))
+
+    def test_tables(self):
+        out = self.succeed("bench", "hierarchy", "builtin:soup?triangles=300", *SMALL).out
+        for word in ("karras+atomic", "lauterbach+levels", "gtx480 (simulated)", "us a launch", "error"):
+            self.assertIn(word, out)
+
+    def test_what_is_refused(self):
+        self.fail_with_usage("bench")
+        self.fail_with_usage("bench", "hierarchy", "--builders", "ploc")
+        self.fail_with_usage("bench", "hierarchy", "--factors", "0")
+        self.fail_with_usage("bench", "hierarchy", "--bits", "31")
+
+
+if __name__ == "__main__":
+    main()
