@@ -72,8 +72,8 @@ void compare(std::size_t n, int bits, std::uint64_t seeds) {
 }
 
 TEST(CoreTrees, ShuffledLaunchesGiveTheTreesOfTheHost) {
-    compare<std::uint32_t>(50 * thorough, 30, 100);
-    compare<std::uint64_t>(50 * thorough, 63, 100);
+    compare<std::uint32_t>(300 + 35 * thorough, 30, 100);
+    compare<std::uint64_t>(300 + 35 * thorough, 63, 100);
 }
 
 }  // namespace
