@@ -38,8 +38,8 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         of_the_build(command.add_option("--builder", options.builder, "Builder"))
             ->check(CLI::IsMember({"karras", "lauterbach", "garanzha", "apetrei", "ploc", "hploc"}))
             ->capture_default_str();
-    of_the_build(
-        command.add_option("--quality", options.quality, "Picks a builder: fast, balanced"))
+    of_the_build(command.add_option("--quality", options.quality,
+                                    "Picks a builder: fast is apetrei, balanced is ploc"))
         ->check(CLI::IsMember({"fast", "balanced"}))
         ->excludes(builder);
     of_the_build(command.add_option("--bits", options.bits, "Bits of the Morton codes"))
@@ -95,7 +95,9 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
 BuildOptions TreeOptions::build_options(const CommonOptions& common) const {
     if (max_level) throw CLI::ValidationError("--max-level", "belongs to --tree octree");
     BuildOptions result;
-    result.builder = builder_from_name(quality == "balanced" ? "ploc" : builder);
+    result.builder = quality == "fast"       ? Builder::apetrei
+                     : quality == "balanced" ? Builder::ploc
+                                             : builder_from_name(builder);
     if (!fit.empty()) result.fit = fit == "levels" ? Fit::levels : Fit::atomic;
     result.bits = bits;
     result.max_leaf = max_leaf;

@@ -20,8 +20,14 @@ HierarchyRun study(const Mesh& mesh, Builder builder, Fit fit, int bits = 63) {
 }
 
 LaunchMachine toy() {
-    return {.name = "toy", .lanes = 4, .item_ns = 1, .step_ns = 2, .bytes_per_ns = 8,
-            .latency_ns = 10, .launch_us = 1, .origin = "a test"};
+    return {.name = "toy",
+            .lanes = 4,
+            .item_ns = 1,
+            .step_ns = 2,
+            .bytes_per_ns = 8,
+            .latency_ns = 10,
+            .launch_us = 1,
+            .origin = "a test"};
 }
 
 HierarchyRun one_launch(std::uint64_t items, std::uint64_t bytes, std::uint64_t steps,
@@ -68,7 +74,8 @@ TEST(HierarchyStudy, LevelByLevelTakesALaunchALevel) {
         return predicted_ms(run, machine, 1) / predicted_ms(run, machine, 64);
     };
     const HierarchyRun large = study(random_soup(200'000, 8), Builder::karras, Fit::atomic),
-                       large_levels = study(random_soup(200'000, 8), Builder::garanzha, Fit::levels);
+                       large_levels =
+                           study(random_soup(200'000, 8), Builder::garanzha, Fit::levels);
     EXPECT_GT(speed_up(large), speed_up(large_levels));
 }
 

@@ -1,4 +1,6 @@
 """raydix bench hierarchy: tables, JSON, refusals."""
+import pathlib
+import subprocess
 import sys
 
 sys.dont_write_bytecode = True
@@ -31,6 +33,21 @@ class Bench(ProgramTest):
         out = self.succeed("bench", "hierarchy", "builtin:soup?triangles=300", *SMALL).out
         for word in ("karras+atomic", "lauterbach+levels", "gtx480 (simulated)", "us a launch", "error"):
             self.assertIn(word, out)
+
+    def test_plots(self):
+        self.succeed("bench", "hierarchy", "builtin:soup?triangles=2000", *SMALL, "--json", "result.json", "--quiet")
+        script = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "plot_hierarchy"
+        plot = subprocess.run([script, self.folder / "result.json", "-o", self.folder / "plots"], capture_output=True,
+                              text=True)
+        if "matplotlib is missing" in plot.stderr:
+            self.skipTest(plot.stderr.strip())
+        self.assertEqual(plot.returncode, 0, plot.stderr)
+        for name in ("time", "scaling", "levels"):
+            self.assertIn("<svg", (self.folder / "plots" / f"{name}.svg").read_text(encoding="utf-8"))
+        bad = self.write("bad.json", b"{}")
+        refused = subprocess.run([script, self.folder / bad], capture_output=True, text=True)
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("not a result of bench hierarchy", refused.stderr)
 
     def test_what_is_refused(self):
         self.fail_with_usage("bench")
