@@ -1,11 +1,13 @@
 // raydix bench hierarchy: the builders of the LBVH family beside each other, measured here and
 // predicted for larger machines (Karras 2012, section 5).
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <raydix/error.h>
 #include <raydix/hierarchy_study.h>
 #include <raydix/machine.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -94,6 +96,7 @@ public:
         document_["max_leaf"] = options_.max_leaf;
         document_["factors"] = options_.factors;
         document_["runs"] = Json::array();
+        document_["builds"] = Json::array();
         thread_counts_ = options_.thread_counts;
         if (thread_counts_.empty())
             for (int t = 1; t <= machine_info().cores; t *= 2) thread_counts_.push_back(t);
@@ -108,8 +111,11 @@ public:
         document_["machines"] = machines;
         if (options_.common.prints_tables()) print_machines();
         for (const int bits : options_.bits) {
-            for (const std::string& name : options_.scenes)
-                study(load_scene(name, options_.common.seed), bits, false);
+            for (const std::string& name : options_.scenes) {
+                const Scene scene = load_scene(name, options_.common.seed);
+                study(scene, bits, false);
+                about(scene.name, [&] { time_builds(scene, bits); });
+            }
             for (const std::uint64_t n : options_.sizes)
                 study(load_scene(fmt::format("builtin:soup?triangles={}", n), options_.common.seed),
                       bits, true);
@@ -162,6 +168,7 @@ private:
 
     void study(const Scene& scene, int bits, bool size_series) {
         bool headed = false;
+        std::vector<std::uint64_t> levels;
         for (const Variant& variant : variants_of(options_.builders)) {
             for (const int threads : thread_counts_) {
                 const BuildOptions build{.builder = variant.builder,
@@ -173,6 +180,7 @@ private:
                     return study_hierarchy(scene.mesh, build, options_.repeat);
                 });
                 note(scene, variant, run, threads, size_series);
+                if (variant.builder == Builder::garanzha) levels = run.items_per_level;
                 if (!options_.common.prints_tables()) continue;
                 if (!headed) print_head(scene.name, run.keys, bits);
                 headed = true;
@@ -182,6 +190,69 @@ private:
                     fmt::print("{:<18} refused: {}\n", variant.name(), run.refusal);
             }
         }
+        if (headed && !levels.empty()) fmt::print("nodes a level: {}\n", fmt::join(levels, " "));
+    }
+
+    /// Whole builds into kept memory, stage by stage: what a user of each builder gets here.
+    void time_builds(const Scene& scene, int bits) {
+        constexpr std::array<std::pair<const char*, double BuildMs::*>, 7> stages{
+            {{"bounds", &BuildMs::bounds},
+             {"codes", &BuildMs::codes},
+             {"sort", &BuildMs::sort},
+             {"hierarchy", &BuildMs::hierarchy},
+             {"layout", &BuildMs::layout},
+             {"fit", &BuildMs::fit},
+             {"total", &BuildMs::total}}};
+        bool headed = false;
+        for (const std::string& name : options_.builders) {
+            for (const int threads : thread_counts_) {
+                const BuildOptions build{.builder = builder_from_name(name),
+                                         .bits = bits,
+                                         .max_leaf = options_.max_leaf,
+                                         .threads = threads};
+                const std::vector<BuildMs> times = rebuilds(scene.mesh, build);
+                Json entry{{"scene", scene.name},
+                           {"builder", name},
+                           {"bits", bits},
+                           {"threads", threads},
+                           {"ms", Json::object()}};
+                if (!headed && options_.common.prints_tables()) print_stages_head(scene.name, bits);
+                headed = true;
+                if (options_.common.prints_tables()) fmt::print("{:<18} {:>8}", name, threads);
+                for (const auto& [stage, member] : stages) {
+                    std::vector<double> values;
+                    for (const BuildMs& ms : times) values.push_back(ms.*member);
+                    entry["ms"][stage] =
+                        times.empty() ? Json(nullptr) : spread_json(spread_of(values));
+                    if (options_.common.prints_tables())
+                        fmt::print(" {:>9.2f}", times.empty() ? NAN : spread_of(values).median);
+                }
+                if (options_.common.prints_tables()) fmt::print("\n");
+                document_["builds"].push_back(entry);
+            }
+        }
+    }
+    static void print_stages_head(const std::string& scene, int bits) {
+        fmt::print("\n{}, {} bits: whole builds into kept memory, ms\n{:<18} {:>8}", scene, bits,
+                   "builder", "threads");
+        for (const char* stage : {"bounds", "codes", "sort", "hierarchy", "layout", "fit", "total"})
+            fmt::print(" {:>9}", stage);
+        fmt::print("\n");
+    }
+    /// After one to warm up. Empty if the builder refuses.
+    [[nodiscard]] std::vector<BuildMs> rebuilds(const Mesh& mesh, const BuildOptions& build) const {
+        BvhBuilder builder;
+        Bvh tree;
+        std::vector<BuildMs> times;
+        try {
+            builder.build(mesh, build, tree);
+            for (int k = 0; k < options_.repeat; ++k) {
+                builder.build(mesh, build, tree);
+                times.push_back(tree.build_ms());
+            }
+        } catch (const InputError&) {  // more memory than it may take; the launches say why
+        }
+        return times;
     }
 
     void note(const Scene& scene, const Variant& variant, const HierarchyRun& run, int threads,

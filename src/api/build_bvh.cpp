@@ -195,7 +195,7 @@ private:
         tree.order().reset(valid);
         ms.sort = stage.lap();
         copies.reset(valid);
-        const CopyToLeafOrder<Source, Copy> leaf_box{source, tree.order().view(), copies.data()};
+        const CopyWithBox<Source, Copy> leaf_box{source, tree.order().view(), copies.data()};
         const ApetreiTree built =
             build_apetrei_cpu(prefixes, options.max_leaf, leaf_box, tree.nodes(), scratch.apetrei);
         tree.inner_count() = built.inner;

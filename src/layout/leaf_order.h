@@ -51,7 +51,7 @@ void prefetch_corners(const Source&, std::uint32_t) {}
 /// Position in leaf order -> its copy, and the copy's box. Positions are asked for in ascending
 /// order: what the next ones read is fetched ahead.
 template <class Source, class Copy>
-struct CopyToLeafOrder {
+struct CopyWithBox {
     static constexpr std::size_t indices_ahead = 32, corners_ahead = 16;
     const Source& source;
     std::span<const std::uint32_t> order;
@@ -71,7 +71,7 @@ template <class Source, class Copy>
 void copy_to_leaf_order(const Source& source, std::span<const std::uint32_t> order,
                         Buffer<Copy>& copies) {
     copies.reset(order.size());
-    const CopyToLeafOrder<Source, Copy> copy{source, order, copies.data()};
+    const CopyWithBox<Source, Copy> copy{source, order, copies.data()};
     for_each_range(order.size(), 4096, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) copy(k);
     });

@@ -24,6 +24,10 @@ class Bench(ProgramTest):
                 self.assertGreaterEqual(once, larger)
             if run["fit"] == "levels":
                 self.assertEqual(sum(run["items_per_level"]), run["inner_nodes"])
+        builds = document["builds"]
+        self.assertEqual({build["builder"] for build in builds}, {"karras", "apetrei", "garanzha", "lauterbach"})
+        for build in builds:
+            self.assertGreater(build["ms"]["total"]["median"], 0)
         trees = {(run["scene"], run["bits"]): set() for run in runs}
         for run in runs:
             trees[run["scene"], run["bits"]].add((run["inner_nodes"], run["max_depth"]))
@@ -31,7 +35,8 @@ class Bench(ProgramTest):
 
     def test_tables(self):
         out = self.succeed("bench", "hierarchy", "builtin:soup?triangles=300", *SMALL).out
-        for word in ("karras+atomic", "lauterbach+levels", "gtx480 (simulated)", "us a launch", "error"):
+        for word in ("karras+atomic", "lauterbach+levels", "gtx480 (simulated)", "us a launch", "error", "nodes a level: 1 2",
+                     "whole builds"):
             self.assertIn(word, out)
 
     def test_plots(self):
