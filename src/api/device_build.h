@@ -64,7 +64,8 @@ struct DeviceBuild {
         auto* bounds = arena.take<BoundsPart>(1);
         const BoundsScratch bounds_scratch(arena);
         launch_bounds(launcher, source, n, bounds_scratch, bounds);
-        DeviceCounts* counts = tree.counts;
+        DeviceCounts nowhere;  // a size query has no arrays, but its launches name places in them
+        DeviceCounts* counts = tree.counts != nullptr ? tree.counts : &nowhere;
         launcher.launch("bounds.publish", 1, PublishCounts{bounds, n, counts});
         mark("bounds");
         if (n == 0) return;
