@@ -16,7 +16,7 @@ constexpr std::size_t run_primitives = 16;
 constexpr std::size_t run_block = 1024;
 /// Subtrees of up to this many primitives are built over primitives, each by one thread: two
 /// lists of them stay in a cache.
-constexpr std::uint32_t task_primitives = 8192;
+constexpr std::uint32_t task_primitives = 32768;
 /// Deeper nodes are divided in the middle of their list, so that no stack overflows.
 constexpr std::uint32_t deepest_split = 96;
 
@@ -83,8 +83,8 @@ private:
 struct TopNode {
     std::uint32_t begin, end, base, primitives;  // base: primitives before it
     std::uint32_t depth;
-    bool in_spare;                 // which list
-    std::uint32_t left = 0;        // its children are left and left + 1; 0: a task
+    bool in_spare;           // which list
+    std::uint32_t left = 0;  // its children are left and left + 1; 0: a task
     std::uint32_t left_runs = 0, left_primitives = 0;
     ClusterPart part{};
 };
@@ -94,14 +94,17 @@ class BinnedRun {
 public:
     BinnedRun(std::span<const Key> keys, std::span<const std::uint32_t> ids, const BoxLanes& boxes,
               std::uint32_t max_leaf, Buffer<ClusterNode>& nodes, BinnedScratch& scratch)
-        : keys_(keys), ids_(ids), boxes_(boxes), max_leaf_(max_leaf), nodes_(nodes),
+        : keys_(keys),
+          ids_(ids),
+          boxes_(boxes),
+          max_leaf_(max_leaf),
+          nodes_(nodes),
           scratch_(scratch) {}
 
     ClusterRef run() {
         nodes_.reset(keys_.size() - 1);
         const std::uint32_t runs = make_runs();
-        std::vector<TopNode> top{
-            {0, runs, 0, static_cast<std::uint32_t>(keys_.size()), 0, false}};
+        std::vector<TopNode> top{{0, runs, 0, static_cast<std::uint32_t>(keys_.size()), 0, false}};
         split_top(top);
         build_tasks(top);
         // Children stand behind their parents.
@@ -162,8 +165,8 @@ private:
                 if (at.left_runs == 0) continue;
                 top[first].left = static_cast<std::uint32_t>(top.size());
                 const std::uint32_t middle = at.begin + at.left_runs;
-                top.push_back({at.begin, middle, at.base, at.left_primitives, at.depth + 1,
-                               at.in_spare});
+                top.push_back(
+                    {at.begin, middle, at.base, at.left_primitives, at.depth + 1, at.in_spare});
                 top.push_back({middle, at.end, at.base + at.left_primitives,
                                at.primitives - at.left_primitives, at.depth + 1, at.in_spare});
             }

@@ -109,8 +109,8 @@ private:
         for (std::size_t axis = 0; axis < 3; ++axis)
             for (std::uint32_t b = 0; b + 1 < bins_; ++b) {
                 const Split split = split_at(axis, b);
-                const std::uint32_t right = split_at(axis, bins_ - 1).left_primitives -
-                                            split.left_primitives;
+                const std::uint32_t right =
+                    split_at(axis, bins_ - 1).left_primitives - split.left_primitives;
                 const std::uint32_t larger = std::max(split.left_primitives, right);
                 if (split.left_primitives == 0 || right == 0 || larger >= best_larger) continue;
                 best_larger = larger;

@@ -1,6 +1,6 @@
-// One step of a top-down build by surface area: boxes -> bins over their centroids -> the best plane
-// between two bins -> boxes left and right of it. Wald 2007, "On fast Construction of SAH-based
-// Bounding Volume Hierarchies".
+// One step of a top-down build by surface area: boxes -> bins over their centroids -> the best
+// plane between two bins -> boxes left and right of it. Wald 2007, "On fast Construction of
+// SAH-based Bounding Volume Hierarchies".
 #pragma once
 
 #include <raydix/types.h>
@@ -30,7 +30,7 @@ struct alignas(32) SplitBox {
 };
 static_assert(sizeof(SplitBox) == 32);
 
-inline constexpr std::uint32_t max_bins = 16;
+inline constexpr std::uint32_t max_bins = 32;
 
 /// Few boxes need few bins: most nodes of a tree are small, and theirs is most of the time.
 [[nodiscard]] constexpr std::uint32_t bin_count(std::size_t boxes) {
