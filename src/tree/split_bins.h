@@ -34,7 +34,7 @@ inline constexpr std::uint32_t max_bins = 32;
 
 /// Few boxes need few bins: most nodes of a tree are small, and theirs is most of the time.
 [[nodiscard]] constexpr std::uint32_t bin_count(std::size_t boxes) {
-    return boxes < 20 * (max_bins - 4) ? 4 + static_cast<std::uint32_t>(boxes / 20) : max_bins;
+    return boxes < 20 * (max_bins - 8) ? 8 + static_cast<std::uint32_t>(boxes / 20) : max_bins;
 }
 
 /// Centroid -> bin, per axis.

@@ -192,7 +192,7 @@ Plane best_plane(const Forest& forest, const List& list, int axis, bool by_count
     };
     const auto [low, high] = std::ranges::minmax(list, {}, center2);
     const float origin = center2(low), extent = center2(high) - origin;
-    const std::size_t bins = std::min<std::size_t>(4 + list.size() / 20, 32);
+    const std::size_t bins = std::min<std::size_t>(8 + list.size() / 20, 32);
     Plane best;
     best.larger = list.size();
     if (extent < 1e-30f) return best;
