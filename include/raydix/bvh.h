@@ -15,7 +15,8 @@
 namespace raydix {
 
 /// `karras`, `lauterbach`, `garanzha` and `apetrei` give the same tree, bit for bit; `ploc` and
-/// `hploc` merge clusters by surface area and give better ones for more time.
+/// `hploc` merge clusters by surface area and `binned` splits by it; they give better ones for more
+/// time.
 enum class Builder : std::uint32_t {
     karras = 0,
     lauterbach = 1,
@@ -23,6 +24,7 @@ enum class Builder : std::uint32_t {
     apetrei = 3,
     ploc = 4,
     hploc = 5,
+    binned = 6,
 };
 [[nodiscard]] std::string_view builder_name(Builder builder);
 /// Throws InputError that lists the known names.

@@ -1,5 +1,5 @@
-// The builders that grow a tree from clusters: sorted order -> clusters -> nodes -> leaf copies.
-// Bounds, codes and sort are those of build_bvh.cpp.
+// The builders whose trees are cluster trees at first: sorted order -> clusters -> nodes -> leaf
+// copies. Bounds, codes and sort are those of build_bvh.cpp.
 #pragma once
 
 #include <utility>
@@ -7,6 +7,7 @@
 #include "layout/leaf_order.h"
 #include "measure/stopwatch.h"
 #include "primitives/host_box.h"
+#include "tree/binned.h"
 #include "tree/build_hploc.h"
 #include "tree/bvh_access.h"
 #include "tree/place_clusters.h"
@@ -15,16 +16,18 @@
 namespace raydix {
 
 [[nodiscard]] constexpr bool grows_clusters(Builder builder) {
-    return builder == Builder::ploc || builder == Builder::hploc;
+    return builder == Builder::ploc || builder == Builder::hploc || builder == Builder::binned;
 }
 
 struct ClusterScratch {
     Buffer<std::uint32_t> ids;  // [n] in Morton order
     PlocScratch ploc;
     HplocScratch hploc;
+    BinnedScratch binned;
 
     [[nodiscard]] std::size_t capacity_bytes() const {
-        return ids.capacity_bytes() + ploc.capacity_bytes() + hploc.capacity_bytes();
+        return ids.capacity_bytes() + ploc.capacity_bytes() + hploc.capacity_bytes() +
+               binned.capacity_bytes();
     }
 };
 
@@ -52,10 +55,17 @@ void build_clusters(const Source& source, std::span<const Key> keys, ClusterScra
         }
     });
     const auto max_leaf = static_cast<std::uint32_t>(tree.options().max_leaf);
-    const ClusterRef root =
-        tree.options().builder == Builder::hploc
-            ? build_hploc(keys, ids, boxes, max_leaf, scratch.ploc.nodes, scratch.hploc)
-            : build_ploc(ids, max_leaf, scratch.ploc);
+    Buffer<ClusterNode>& nodes = scratch.ploc.nodes;
+    const ClusterRef root = [&] {
+        switch (tree.options().builder) {
+            case Builder::hploc:
+                return build_hploc(keys, ids, boxes, max_leaf, nodes, scratch.hploc);
+            case Builder::binned:
+                return build_binned(keys, ids, boxes, max_leaf, nodes, scratch.binned);
+            default:
+                return build_ploc(ids, max_leaf, scratch.ploc);
+        }
+    }();
     ms.hierarchy = stage.lap();
 
     tree.inner_count() = place_clusters({scratch.ploc.nodes.data(), root, boxes, ids}, tree.nodes(),

@@ -18,7 +18,19 @@ struct Float4 {
 
     static Float4 load(const float* p) { return {_mm_loadu_ps(p)}; }
     static Float4 all(float x) { return {_mm_set1_ps(x)}; }
+    /// Of whole numbers below 2^31.
+    static Float4 of(const std::uint32_t* p) {
+        return {_mm_cvtepi32_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))};
+    }
     void store(float* p) const { _mm_storeu_ps(p, v); }
+    /// Rounded towards zero, where that fits.
+    void store_whole(std::int32_t* p) const {
+        _mm_storeu_si128(reinterpret_cast<__m128i*>(p), _mm_cvttps_epi32(v));
+    }
+    /// The last lane becomes 0, whatever bits were in it.
+    [[nodiscard]] Float4 xyz() const {
+        return {_mm_and_ps(v, _mm_castsi128_ps(_mm_setr_epi32(-1, -1, -1, 0)))};
+    }
 };
 
 inline Float4 operator+(Float4 a, Float4 b) { return {_mm_add_ps(a.v, b.v)}; }
@@ -43,6 +55,11 @@ inline Float4 select(Mask4 mask, Float4 yes, Float4 no) {
     return {_mm_or_ps(_mm_and_ps(mask.v, yes.v), _mm_andnot_ps(mask.v, no.v))};
 }
 
+/// Rows become columns.
+inline void transpose(Float4& a, Float4& b, Float4& c, Float4& d) {
+    _MM_TRANSPOSE4_PS(a.v, b.v, c.v, d.v);
+}
+
 #else
 
 struct Float4 {
@@ -50,9 +67,17 @@ struct Float4 {
 
     static Float4 load(const float* p) { return {{p[0], p[1], p[2], p[3]}}; }
     static Float4 all(float x) { return {{x, x, x, x}}; }
+    static Float4 of(const std::uint32_t* p) {
+        const auto at = [p](int k) { return static_cast<float>(p[k]); };
+        return {{at(0), at(1), at(2), at(3)}};
+    }
     void store(float* p) const {
         for (std::size_t k = 0; k < 4; ++k) p[k] = v[k];
     }
+    void store_whole(std::int32_t* p) const {
+        for (std::size_t k = 0; k < 4; ++k) p[k] = static_cast<std::int32_t>(v[k]);
+    }
+    [[nodiscard]] Float4 xyz() const { return {{v[0], v[1], v[2], 0}}; }
 };
 struct Mask4 {
     std::array<std::uint32_t, 4> v;
@@ -100,6 +125,17 @@ inline Float4 select(Mask4 mask, Float4 yes, Float4 no) {
     Float4 r;
     for (std::size_t k = 0; k < 4; ++k) r.v[k] = mask.v[k] != 0 ? yes.v[k] : no.v[k];
     return r;
+}
+
+inline void transpose(Float4& a, Float4& b, Float4& c, Float4& d) {
+    const std::array<Float4, 4> m{a, b, c, d};
+    const auto column = [&m](std::size_t k) {
+        return Float4{{m[0].v[k], m[1].v[k], m[2].v[k], m[3].v[k]}};
+    };
+    a = column(0);
+    b = column(1);
+    c = column(2);
+    d = column(3);
 }
 
 #endif

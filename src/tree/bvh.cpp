@@ -10,13 +10,14 @@
 namespace raydix {
 namespace {
 
-constexpr std::array<std::pair<Builder, std::string_view>, 6> builder_names{
+constexpr std::array<std::pair<Builder, std::string_view>, 7> builder_names{
     {{Builder::karras, "karras"},
      {Builder::lauterbach, "lauterbach"},
      {Builder::garanzha, "garanzha"},
      {Builder::apetrei, "apetrei"},
      {Builder::ploc, "ploc"},
-     {Builder::hploc, "hploc"}}};
+     {Builder::hploc, "hploc"},
+     {Builder::binned, "binned"}}};
 
 }  // namespace
 

@@ -1,6 +1,7 @@
 #include "support/reference_clusters.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <limits>
 #include <tuple>
@@ -175,7 +176,78 @@ List hierarchical(Forest& forest, const std::vector<Item>& items, std::size_t be
     return list;
 }
 
+struct Plane {
+    float cost = std::numeric_limits<float>::infinity();
+    std::size_t larger = 0;  // primitives on the fuller side
+    std::vector<bool> goes_left;
+};
+
+float coordinate(Vec3 v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+/// The best plane among the bins of one axis.
+Plane best_plane(const Forest& forest, const List& list, int axis, bool by_count) {
+    const auto center2 = [&](std::size_t i) {
+        const Aabb& box = forest.all[i].box;
+        return coordinate(box.lo, axis) + coordinate(box.hi, axis);
+    };
+    const auto [low, high] = std::ranges::minmax(list, {}, center2);
+    const float origin = center2(low), extent = center2(high) - origin;
+    const std::size_t bins = std::min<std::size_t>(8 + list.size() / 20, 32);
+    Plane best;
+    best.larger = list.size();
+    if (extent < 1e-30f) return best;
+    const float scale = 0.99999f * static_cast<float>(bins) / extent;
+    for (std::size_t last = 0; last + 1 < bins; ++last) {
+        Plane plane;
+        std::array<Aabb, 2> box{empty_box(), empty_box()};
+        std::array<std::size_t, 2> count{};
+        for (const std::size_t i : list) {
+            const bool left = static_cast<std::size_t>((center2(i) - origin) * scale) <= last;
+            plane.goes_left.push_back(left);
+            box[left ? 0 : 1] = unite(box[left ? 0 : 1], forest.all[i].box);
+            ++count[left ? 0 : 1];
+        }
+        if (count[0] == 0 || count[1] == 0) continue;
+        plane.cost = area(box[0]) * static_cast<float>(count[0]) +
+                     area(box[1]) * static_cast<float>(count[1]);
+        plane.larger = std::max(count[0], count[1]);
+        if (by_count ? plane.larger < best.larger : plane.cost < best.cost) best = plane;
+    }
+    return best;
+}
+
+std::size_t binned(Forest& forest, const List& list, int depth) {
+    if (list.size() == 1) return list[0];
+    Plane best;
+    if (list.size() > 2 && depth < 96) {
+        for (int axis = 0; axis < 3; ++axis)
+            if (Plane plane = best_plane(forest, list, axis, false); plane.cost < best.cost)
+                best = std::move(plane);
+        if (best.cost == 0) {
+            best.larger = list.size();
+            for (int axis = 0; axis < 3; ++axis)
+                if (Plane plane = best_plane(forest, list, axis, true); plane.larger < best.larger)
+                    best = std::move(plane);
+        }
+    }
+    std::array<List, 2> sides;
+    for (std::size_t k = 0; k < list.size(); ++k) {
+        const bool left = best.goes_left.empty() ? k < list.size() / 2 : best.goes_left[k];
+        sides[left ? 0 : 1].push_back(list[k]);
+    }
+    const std::size_t left = binned(forest, sides[0], depth + 1);
+    return forest.merge(left, binned(forest, sides[1], depth + 1));
+}
+
 }  // namespace
+
+Bvh reference_binned(std::span<const Aabb> boxes, const BuildOptions& options) {
+    return reference(boxes, options, [](Forest& forest, const std::vector<Item>& items) {
+        List list(items.size());
+        for (std::size_t i = 0; i < list.size(); ++i) list[i] = i;
+        return binned(forest, list, 0);
+    });
+}
 
 Bvh reference_ploc(std::span<const Aabb> boxes, const BuildOptions& options) {
     return reference(boxes, options, [](Forest& forest, const std::vector<Item>& items) {

@@ -16,4 +16,9 @@ Bvh reference_ploc(std::span<const Aabb> boxes, const BuildOptions& options);
 /// its children, until 16 clusters are left (docs/algorithms/hploc.md).
 Bvh reference_hploc(std::span<const Aabb> boxes, const BuildOptions& options);
 
+/// Binned SAH from the top over primitives alone, one bin after the other
+/// (docs/algorithms/binned.md). The builder's tree is the same up to 32768 primitives; above, its
+/// first planes are found over runs of neighbours.
+Bvh reference_binned(std::span<const Aabb> boxes, const BuildOptions& options);
+
 }  // namespace raydix::test
