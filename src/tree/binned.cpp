@@ -52,7 +52,9 @@ public:
         if (list.size() == 1) return primitive(list[0]);
         SplitBox* from = list.data();
         std::size_t left = list.size() / 2;
-        if (list.size() > 2 && depth < deepest_split) {
+        if (list.size() == 3) {
+            left = single_first(list);
+        } else if (list.size() > 3 && depth < deepest_split) {
             const BinGrid grid(list);
             if (const auto split = find_split(list, grid)) {
                 divide_boxes(list, grid, *split, spare);
@@ -69,6 +71,24 @@ public:
     }
 
 private:
+    /// Of three boxes the one that is best left alone comes first: no bins needed.
+    static std::size_t single_first(std::span<SplitBox> list) {
+        float least = infinity;
+        std::size_t single = 0;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const SplitBox &a = list[k == 0 ? 1 : 0], &b = list[k == 2 ? 1 : 2];
+            const float cost = cluster_area({list[k].lo, list[k].hi}) +
+                               2.0f * cluster_area(unite({a.lo, a.hi}, {b.lo, b.hi}));
+            if (cost < least) {
+                least = cost;
+                single = k;
+            }
+        }
+        std::rotate(list.begin(), list.begin() + static_cast<std::ptrdiff_t>(single),
+                    list.begin() + static_cast<std::ptrdiff_t>(single) + 1);
+        return 1;
+    }
+
     [[nodiscard]] ClusterPart primitive(const SplitBox& box) const {
         const Aabb bounds{box.lo, box.hi};
         return {primitive_cluster | box.first, bounds, sum_of_primitive(ids_[box.first], bounds)};

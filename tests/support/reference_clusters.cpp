@@ -219,7 +219,16 @@ Plane best_plane(const Forest& forest, const List& list, int axis, bool by_count
 std::size_t binned(Forest& forest, const List& list, int depth) {
     if (list.size() == 1) return list[0];
     Plane best;
-    if (list.size() > 2 && depth < 96) {
+    if (list.size() == 3) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Aabb pair =
+                unite(forest.all[list[(k + 1) % 3]].box, forest.all[list[(k + 2) % 3]].box);
+            const float cost = area(forest.all[list[k]].box) + 2 * area(pair);
+            if (cost >= best.cost) continue;
+            best.cost = cost;
+            best.goes_left = {k == 0, k == 1, k == 2};
+        }
+    } else if (list.size() > 3 && depth < 96) {
         for (int axis = 0; axis < 3; ++axis)
             if (Plane plane = best_plane(forest, list, axis, false); plane.cost < best.cost)
                 best = std::move(plane);
