@@ -34,10 +34,10 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->check(CLI::IsMember({"bvh", "octree", "kdtree"}))
         ->capture_default_str()
         ->group(group);
-    CLI::Option* builder =
-        of_the_build(command.add_option("--builder", options.builder, "Builder"))
-            ->check(CLI::IsMember({"karras", "lauterbach", "garanzha", "apetrei", "ploc", "hploc"}))
-            ->capture_default_str();
+    CLI::Option* builder = of_the_build(command.add_option("--builder", options.builder, "Builder"))
+                               ->check(CLI::IsMember({"karras", "lauterbach", "garanzha", "apetrei",
+                                                      "ploc", "hploc", "binned"}))
+                               ->capture_default_str();
     of_the_build(command.add_option("--quality", options.quality,
                                     "Picks a builder: fast is apetrei, balanced is ploc"))
         ->check(CLI::IsMember({"fast", "balanced"}))
