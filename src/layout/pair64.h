@@ -24,14 +24,15 @@ struct alignas(64) NodePair {
     std::int32_t child0, child1;
     std::int32_t unused0, unused1;  // 0
 
-    RAYDIX_HD void set_child0(const BvhNode& n, std::int32_t child) {
-        c0_xlo = n.lo.x, c0_xhi = n.hi.x, c0_ylo = n.lo.y, c0_yhi = n.hi.y;
-        c0_zlo = n.lo.z, c0_zhi = n.hi.z;
+    /// The box grows by `pad` on all sides.
+    RAYDIX_HD void set_child0(const BvhNode& n, float pad, std::int32_t child) {
+        c0_xlo = n.lo.x - pad, c0_xhi = n.hi.x + pad, c0_ylo = n.lo.y - pad;
+        c0_yhi = n.hi.y + pad, c0_zlo = n.lo.z - pad, c0_zhi = n.hi.z + pad;
         child0 = child;
     }
-    RAYDIX_HD void set_child1(const BvhNode& n, std::int32_t child) {
-        c1_xlo = n.lo.x, c1_xhi = n.hi.x, c1_ylo = n.lo.y, c1_yhi = n.hi.y;
-        c1_zlo = n.lo.z, c1_zhi = n.hi.z;
+    RAYDIX_HD void set_child1(const BvhNode& n, float pad, std::int32_t child) {
+        c1_xlo = n.lo.x - pad, c1_xhi = n.hi.x + pad, c1_ylo = n.lo.y - pad;
+        c1_yhi = n.hi.y + pad, c1_zlo = n.lo.z - pad, c1_zhi = n.hi.z + pad;
         child1 = child;
     }
 };
@@ -39,6 +40,18 @@ static_assert(sizeof(NodePair) == 64);
 
 /// Bit 31 of an id: primitives are fewer than 2^31.
 inline constexpr std::uint32_t last_in_leaf = 0x80000000u;
+
+/// By how much boxes grow: 2^-20 of the scene's largest coordinate. Plane * inverse - origin *
+/// inverse rounds by up to 2^-23 of the coordinates, and the hit of a Woop triangle may lie as far
+/// outside its box; with the margin every triangle that a ray would accept is reached in any order
+/// of traversal (for origins up to some scene sizes away), so all kernels agree on the closest.
+RAYDIX_HD inline float pair_padding(const BvhNode& root) {
+    const auto largest = [](Vec3 p) {
+        const auto size = [](float x) { return x < 0 ? -x : x; };
+        return max_of(max_of(size(p.x), size(p.y)), size(p.z));
+    };
+    return max_of(largest(root.lo), largest(root.hi)) * 0x1p-20f;
+}
 
 /// Link of a node: its pair, or its first primitive.
 RAYDIX_HD inline std::int32_t pair_link(const BvhNode& node) {
@@ -58,18 +71,19 @@ struct EmitNodePair {
     RAYDIX_HD void operator()(std::uint32_t r) const {
         NodePair pair;
         pair.unused0 = pair.unused1 = 0;
+        const float pad = pair_padding(nodes[0]);
         if (*inner_count == 0) {
             BvhNode nothing = nodes[0];
             const Aabb none = empty_box();
             nothing.lo = none.lo;
             nothing.hi = none.hi;
-            pair.set_child0(nodes[0], pair_link(nodes[0]));
-            pair.set_child1(nothing, pair_link(nodes[0]));
+            pair.set_child0(nodes[0], pad, pair_link(nodes[0]));
+            pair.set_child1(nothing, 0.0f, pair_link(nodes[0]));
             copy_ids(nodes[0]);
         } else {
             const BvhNode &left = nodes[2 * r + 2], &right = nodes[2 * r + 3];
-            pair.set_child0(left, pair_link(left));
-            pair.set_child1(right, pair_link(right));
+            pair.set_child0(left, pad, pair_link(left));
+            pair.set_child1(right, pad, pair_link(right));
             copy_ids(left);
             copy_ids(right);
         }

@@ -71,8 +71,10 @@ void expect_pairs_hold_the_tree(const LaunchedBuild& built) {
         const BvhNode &a = built.nodes[2 * r + 2], &b = built.nodes[2 * r + 3];
         visit_child(pair.child0, a);
         visit_child(pair.child1, b);
-        const float expected[] = {a.lo.x, a.hi.x, a.lo.y, a.hi.y, b.lo.x, b.hi.x,
-                                  b.lo.y, b.hi.y, a.lo.z, a.hi.z, b.lo.z, b.hi.z};
+        const float pad = pair_padding(built.nodes[0]);
+        const float expected[] = {a.lo.x - pad, a.hi.x + pad, a.lo.y - pad, a.hi.y + pad,
+                                  b.lo.x - pad, b.hi.x + pad, b.lo.y - pad, b.hi.y + pad,
+                                  a.lo.z - pad, a.hi.z + pad, b.lo.z - pad, b.hi.z + pad};
         ASSERT_EQ(std::memcmp(&pair.c0_xlo, expected, sizeof(expected)), 0) << r;
         ASSERT_EQ(pair.unused0 | pair.unused1, 0);
     }

@@ -1,0 +1,230 @@
+// Public calls of the warp simulator: trees in the kernels' form, launches, rates.
+#include <raydix/error.h>
+#include <raydix/simulate.h>
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "exec/parallel.h"
+#include "layout/warp_tree.h"
+#include "trace/warp/kernel_list.h"
+#include "trace/warp/prepare_rays.h"
+#include "trace/warp/simulate_launch.h"
+
+namespace raydix {
+namespace {
+
+constexpr std::array kernels{WarpKernel::packet,
+                             WarpKernel::while_while,
+                             WarpKernel::if_if,
+                             WarpKernel::speculative_while_while,
+                             WarpKernel::persistent_packet,
+                             WarpKernel::persistent_while_while,
+                             WarpKernel::persistent_if_if,
+                             WarpKernel::persistent_speculative_while_while,
+                             WarpKernel::ray_replacement,
+                             WarpKernel::work_queue,
+                             WarpKernel::dynamic_fetch};
+constexpr std::array<std::string_view, kernels.size()> kernel_names{
+    "packet",
+    "while_while",
+    "if_if",
+    "speculative_while_while",
+    "persistent_packet",
+    "persistent_while_while",
+    "persistent_if_if",
+    "persistent_speculative_while_while",
+    "ray_replacement",
+    "work_queue",
+    "dynamic_fetch"};
+
+WarpScene scene_of(const WarpTree& tree) {
+    const WarpTree::Arrays& arrays = tree.arrays();
+    return {arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()};
+}
+
+void check_options(const SimulateOptions& options) {
+    const MachineModel& m = options.machine;
+    if (options.width < 1 || options.width > 64 || (options.width & (options.width - 1)) != 0)
+        throw InputError("width is " + std::to_string(options.width) +
+                         "; it must be 1, 2, 4, 8, 16, 32 or 64");
+    const auto positive = [&](const char* field, double value) {
+        if (!(value > 0) || value > 1e15)
+            throw InputError("machine " + m.name + ": " + field + " is " + std::to_string(value) +
+                             "; it must be positive");
+    };
+    positive("multiprocessors", m.multiprocessors);
+    positive("clock_ghz", m.clock_ghz);
+    positive("lanes_per_clock", m.lanes_per_clock);
+    positive("warp_issue_clocks", m.warp_issue_clocks);
+    positive("resident_lanes", m.resident_lanes);
+    positive("block_lanes", m.block_lanes);
+    if (double(m.resident_lanes) * m.multiprocessors > 1 << 24)
+        throw InputError("machine " + m.name + ": more than 2^24 lanes in flight");
+    if (!options.memory) return;
+    positive("l1_transactions_per_clock", m.l1_transactions_per_clock);
+    positive("l2_gb_per_s", m.l2_gb_per_s);
+    positive("dram_gb_per_s", m.dram_gb_per_s);
+    positive("l1_bytes", m.l1_bytes);
+    positive("l2_bytes", m.l2_bytes);
+}
+
+Simulation without_tree(const SimulateOptions& options, std::size_t rays) {
+    Simulation figures;
+    const OpCosts costs = op_costs(options.machine);
+    for (std::size_t k = 0; k < op_count; ++k)
+        figures.operations.push_back({op_names[k], 0, 0, costs[k]});
+    figures.rays = rays;
+    figures.launches = 1;
+    return figures;
+}
+
+}  // namespace
+
+std::span<const WarpKernel> warp_kernels() { return kernels; }
+
+std::string_view warp_kernel_name(WarpKernel kernel) {
+    return kernel_names[static_cast<std::size_t>(kernel)];
+}
+
+WarpKernel warp_kernel_from_name(std::string_view name) {
+    std::string known;
+    for (const WarpKernel kernel : kernels) {
+        if (warp_kernel_name(kernel) == name) return kernel;
+        known += (known.empty() ? "" : ", ") + std::string(warp_kernel_name(kernel));
+    }
+    throw InputError("kernel '" + std::string(name) + "' is not known; there are " + known);
+}
+
+WarpTree::WarpTree(const Bvh& bvh) : arrays_(std::make_unique<Arrays>()) {
+    if (bvh.empty()) return;
+    if (bvh.kind() != PrimitiveKind::triangles)
+        throw InputError(std::string("rays need triangles; this tree holds ") +
+                         (bvh.kind() == PrimitiveKind::points ? "points" : "boxes"));
+    const std::size_t references = bvh.order().size();
+    const std::uint32_t inner = bvh.inner_count();
+    arrays_->max_depth = bvh.max_depth();
+    arrays_->pairs.reset(std::max(inner, 1u));
+    arrays_->triangles.reset(references);
+    arrays_->ids.reset(references);
+    const EmitNodePair emit_pair{bvh.nodes().data(), &inner, bvh.order().data(),
+                                 arrays_->pairs.data(), arrays_->ids.data()};
+    for_each_index(arrays_->pairs.size(),
+                   [&](std::size_t r) { emit_pair(static_cast<std::uint32_t>(r)); });
+    const EmitWoopTriangle emit_triangle{bvh.triangles().data(), arrays_->triangles.data()};
+    for_each_index(references,
+                   [&](std::size_t i) { emit_triangle(static_cast<std::uint32_t>(i)); });
+}
+
+WarpTree::~WarpTree() = default;
+WarpTree::WarpTree(WarpTree&&) noexcept = default;
+WarpTree& WarpTree::operator=(WarpTree&&) noexcept = default;
+
+bool WarpTree::empty() const { return arrays_->ids.empty(); }
+std::uint32_t WarpTree::max_depth() const { return arrays_->max_depth; }
+std::uint64_t WarpTree::bytes() const {
+    return arrays_->pairs.size() * sizeof(NodePair) +
+           arrays_->triangles.size() * sizeof(WoopTriangle) + arrays_->ids.size() * 4;
+}
+
+void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<Hit> hits,
+                     bool any_hit, int threads) {
+    if (rays.size() != hits.size())
+        throw InputError("trace_reference: " + std::to_string(rays.size()) +
+                         " rays, but room for " + std::to_string(hits.size()) + " hits");
+    std::fill(hits.begin(), hits.end(), Hit{});
+    if (tree.empty()) return;
+    const PreparedRays prepared(rays);
+    const WarpJob job{scene_of(tree),
+                      {prepared.rays().data(), hits.data(),
+                       static_cast<std::uint32_t>(rays.size()), nullptr}};
+    with_threads(threads, [&] {
+        for_each_range(rays.size(), 256, [&](std::size_t begin, std::size_t end) {
+            std::vector<std::int32_t> stack(tree.max_depth() + 1);
+            for (std::size_t i = begin; i < end; ++i) {
+                ThreadWarp<Lane> warp;
+                warp.lane.stack = stack.data();
+                OneBatch<WhileWhile> kernel;
+                const auto index = static_cast<std::uint32_t>(i);
+                if (any_hit) kernel.turn<true>(warp, job, index);
+                else kernel.turn<false>(warp, job, index);
+            }
+        });
+    });
+    prepared.rescale(hits);
+}
+
+void Simulation::add(const Simulation& other) {
+    if (operations.empty()) {
+        *this = other;
+        return;
+    }
+    rays += other.rays, launches += other.launches, hits += other.hits;
+    for (std::size_t k = 0; k < operations.size(); ++k) {
+        operations[k].issues += other.operations[k].issues;
+        operations[k].lanes += other.operations[k].lanes;
+    }
+    instructions += other.instructions;
+    lane_instructions += other.lane_instructions;
+    scheduled_clocks += other.scheduled_clocks;
+    idle_issues += other.idle_issues;
+    issue_slots += other.issue_slots;
+    for (std::size_t k = 0; k < warp_times.size(); ++k) warp_times[k] += other.warp_times[k];
+    l1_transactions += other.l1_transactions;
+    l2_bytes += other.l2_bytes;
+    dram_bytes += other.dram_bytes;
+}
+
+SimulatedRates simulated_rates(const Simulation& s, const SimulateOptions& options) {
+    const MachineModel& m = options.machine;
+    SimulatedRates rates;
+    if (s.instructions == 0) return rates;
+    const double clocks_per_us = m.clock_ghz * 1e3;
+    const double rays = static_cast<double>(s.rays);
+    const double issue_clocks = static_cast<double>(s.instructions) * options.width /
+                                (m.lanes_per_clock * m.multiprocessors);
+    rates.bound = rays / (issue_clocks / clocks_per_us);
+    rates.scheduled = rays / (s.scheduled_clocks / clocks_per_us);
+    rates.simd_efficiency = static_cast<double>(s.lane_instructions) /
+                            (static_cast<double>(s.instructions) * options.width);
+    if (!options.memory) return rates;
+    const double l1_us = static_cast<double>(s.l1_transactions) /
+                         (m.l1_transactions_per_clock * m.multiprocessors) / clocks_per_us;
+    const double l2_us = static_cast<double>(s.l2_bytes) / (m.l2_gb_per_s * 1e3);
+    const double dram_us = static_cast<double>(s.dram_bytes) / (m.dram_gb_per_s * 1e3);
+    rates.memory = rays / std::max({issue_clocks / clocks_per_us, l1_us, l2_us, dram_us});
+    return rates;
+}
+
+std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays,
+                                 std::span<const SimulateOptions> runs,
+                                 std::vector<std::vector<Hit>>* hits, int threads) {
+    for (const SimulateOptions& options : runs) {
+        check_options(options);
+        static_cast<void>(op_costs(options.machine));
+    }
+    if (rays.size() >= 0x7FFFFFFFu) throw InputError("simulate: 2^31 rays or more in one launch");
+    std::vector<Simulation> figures(runs.size());
+    std::vector<std::vector<Hit>> own;
+    std::vector<std::vector<Hit>>& found = hits != nullptr ? *hits : own;
+    found.resize(runs.size());
+    const PreparedRays prepared(rays);
+    with_threads(threads, [&] {
+        for_each_index(
+            runs.size(),
+            [&](std::size_t k) {
+                found[k].assign(rays.size(), Hit{});
+                figures[k] = tree.empty()
+                                 ? without_tree(runs[k], rays.size())
+                                 : simulate_launch(scene_of(tree), tree.max_depth() + 1,
+                                                   prepared.rays(), found[k], runs[k]);
+                prepared.rescale(found[k]);
+                if (hits == nullptr) std::vector<Hit>().swap(found[k]);
+            },
+            1);
+    });
+    return figures;
+}
+
+}  // namespace raydix

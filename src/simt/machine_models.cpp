@@ -1,0 +1,116 @@
+// Machines by name. Cores and clocks are the makers' figures; lanes in flight follow from what the
+// kernels of Aila and Laine's release launch or may keep resident; latencies and cache rates are
+// estimates, and say so.
+#include <raydix/error.h>
+#include <raydix/simulate.h>
+
+#include <array>
+#include <string>
+
+#include "simt/cost_model.h"
+
+namespace raydix {
+namespace {
+
+MachineModel gtx285() {
+    MachineModel m;
+    m.name = "gtx285";
+    m.origin =
+        "30 multiprocessors of 8 lanes at 1.476 GHz, 159 GB/s: Aila and Laine 2009; 720 persistent "
+        "warps, blocks of 192: their release; 24 clocks between dependent instructions, caches: "
+        "estimates";
+    m.multiprocessors = 30;
+    m.clock_ghz = 1.476;
+    m.lanes_per_clock = 8;
+    m.warp_issue_clocks = 24;
+    m.resident_lanes = 768;
+    m.block_lanes = 192;
+    m.l1_transactions_per_clock = 0.25;
+    m.l1_bytes = 8 * 1024;
+    m.l2_gb_per_s = 300;
+    m.l2_bytes = 256 * 1024;
+    m.dram_gb_per_s = 159;
+    m.costs = gt200_costs();
+    return m;
+}
+
+MachineModel gtx285_enum_popc() {
+    MachineModel m = gtx285();
+    m.name = "gtx285_enum_popc";
+    m.origin += "; with the ENUM and POPC instructions that the paper wishes for";
+    m.costs = gt200_enum_popc_costs();
+    return m;
+}
+
+MachineModel gtx480() {
+    MachineModel m;
+    m.name = "gtx480";
+    m.origin =
+        "15 multiprocessors of 32 lanes at 1.401 GHz, 177 GB/s: Karras 2012; blocks of 128: Aila "
+        "and Laine's release; 8 blocks in flight: Fermi's limit; 18 clocks between dependent "
+        "instructions, caches: estimates";
+    m.multiprocessors = 15;
+    m.clock_ghz = 1.401;
+    m.lanes_per_clock = 32;
+    m.warp_issue_clocks = 18;
+    m.resident_lanes = 1024;
+    m.block_lanes = 128;
+    m.l1_transactions_per_clock = 0.5;
+    m.l1_bytes = 48 * 1024;
+    m.l2_gb_per_s = 230;
+    m.l2_bytes = 768 * 1024;
+    m.dram_gb_per_s = 177;
+    m.costs = fermi_costs();
+    return m;
+}
+
+MachineModel gtx680() {
+    MachineModel m;
+    m.name = "gtx680";
+    m.origin =
+        "8 multiprocessors of 192 lanes at 1.006 GHz: the maker's figures; all lanes busy, which "
+        "takes dual issue on each clock; 192 GB/s; 2048 lanes in flight: Kepler's limit; 9 clocks "
+        "between dependent instructions, caches: estimates";
+    m.multiprocessors = 8;
+    m.clock_ghz = 1.006;
+    m.lanes_per_clock = 192;
+    m.warp_issue_clocks = 9;
+    m.resident_lanes = 2048;
+    m.block_lanes = 128;
+    m.l1_transactions_per_clock = 1;
+    m.l1_bytes = 48 * 1024;
+    m.l2_gb_per_s = 512;
+    m.l2_bytes = 512 * 1024;
+    m.dram_gb_per_s = 192;
+    m.costs = kepler_costs();
+    return m;
+}
+
+struct Named {
+    std::string_view name;
+    MachineModel (*make)();
+};
+constexpr std::array models{Named{"gtx285", gtx285}, Named{"gtx285_enum_popc", gtx285_enum_popc},
+                            Named{"gtx480", gtx480}, Named{"gtx680", gtx680}};
+
+}  // namespace
+
+std::span<const std::string_view> machine_model_names() {
+    static const auto names = [] {
+        std::array<std::string_view, models.size()> all;
+        for (std::size_t k = 0; k < all.size(); ++k) all[k] = models[k].name;
+        return all;
+    }();
+    return names;
+}
+
+MachineModel machine_model(std::string_view name) {
+    std::string known;
+    for (const Named& model : models) {
+        if (model.name == name) return model.make();
+        known += (known.empty() ? "" : ", ") + std::string(model.name);
+    }
+    throw InputError("machine '" + std::string(name) + "' is not known; there are " + known);
+}
+
+}  // namespace raydix

@@ -1,0 +1,180 @@
+// The warp policy of the simulator: up to 64 lanes on the host. A step runs for the active lanes
+// and is charged once for all of them. Counters rise in charged steps only.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "base/atomic.h"
+#include "simt/op.h"
+#include "simt/thread_warp.h"
+
+namespace raydix {
+
+/// How often an operation was issued, and for how many lanes in sum.
+struct OpCount {
+    std::uint64_t issues = 0;
+    std::uint64_t lanes = 0;
+
+    friend bool operator==(const OpCount&, const OpCount&) = default;
+};
+using OpCounts = std::array<OpCount, op_count>;
+
+/// Sees the addresses that the active lanes read in one go. Of memory models.
+class ReadObserver {
+public:
+    virtual void read(const void* const* addresses, int count, std::uint32_t bytes) = 0;
+
+protected:
+    ~ReadObserver() = default;
+};
+
+/// What warps did: counts of a whole launch, or of a part of it.
+struct WarpTally {
+    OpCounts counts{};
+    std::uint64_t issued = 0;  // native instructions, once for all lanes of a warp
+};
+
+/// `Isa` marks code that was compiled for certain processors, so that no two versions of it share a
+/// name.
+template <class Lane, int Width = 32, class Isa = void>
+class SimulatedWarp {
+    static_assert(Width >= 1 && Width <= 64);
+
+public:
+    std::array<Lane, Width> lanes{};
+    WarpMemory<Lane> memory{};
+    WarpTally* tally = nullptr;      // of this warp, or of several that run one after the other
+    const OpCosts* costs = nullptr;  // null: nothing is issued, only counted
+    ReadObserver* observer = nullptr;
+
+    [[nodiscard]] static constexpr std::uint32_t width() { return Width; }
+    [[nodiscard]] LaneMask active() const { return active_; }
+
+    template <class Cond, class Body>
+    void loop(Op op, Cond cond, Body body) {
+        const LaneMask entered = active_;
+        while ((active_ = votes(cond)) != 0) {
+            charge(op);
+            body();
+        }
+        active_ = entered;
+    }
+    template <class Cond, class Body>
+    void when(Cond cond, Body body) {
+        const LaneMask entered = active_;
+        if ((active_ = votes(cond)) != 0) body();
+        active_ = entered;
+    }
+    template <class Fn>
+    void step(Op op, Fn fn) {
+        charge(op);
+        for (LaneMask left = active_; left != 0; left &= left - 1)
+            fn(lanes[static_cast<std::size_t>(std::countr_zero(left))]);
+    }
+    template <class Fn>
+    void step_indexed(Op op, Fn fn) {
+        charge(op);
+        for (LaneMask left = active_; left != 0; left &= left - 1) {
+            const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
+            fn(lanes[k], k);
+        }
+    }
+    template <class Address>
+    void reads(Address address, std::uint32_t bytes) {
+        if (observer == nullptr) return;
+        std::array<const void*, Width> addresses;
+        int count = 0;
+        for (LaneMask left = active_; left != 0; left &= left - 1)
+            addresses[static_cast<std::size_t>(count++)] =
+                address(lanes[static_cast<std::size_t>(std::countr_zero(left))]);
+        if (count > 0) observer->read(addresses.data(), count, bytes);
+    }
+    template <class Cond, class Body, class Stay>
+    void voting_loop(Op op, Cond cond, Body body, Stay stay) {
+        const LaneMask entered = active_;
+        while ((active_ = votes(cond)) != 0) {
+            charge(op);
+            body();
+            if (!stay()) break;
+        }
+        active_ = entered;
+    }
+    template <class Cond>
+    [[nodiscard]] LaneMask ballot(Op op, Cond cond) {
+        charge(op);
+        return votes(cond);
+    }
+    template <class Cond>
+    [[nodiscard]] LaneMask ballot_indexed(Op op, Cond cond) {
+        charge(op);
+        LaneMask found = 0;
+        for (LaneMask left = active_; left != 0; left &= left - 1) {
+            const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
+            found |= LaneMask{bool(cond(lanes[k], k))} << k;
+        }
+        return found;
+    }
+    template <class Cond>
+    [[nodiscard]] bool any(Op op, Cond cond) {
+        charge(op);
+        for (LaneMask left = active_; left != 0; left &= left - 1)
+            if (cond(lanes[static_cast<std::size_t>(std::countr_zero(left))])) return true;
+        return false;
+    }
+    [[nodiscard]] std::uint32_t take(Op op, std::uint32_t& counter, std::uint32_t count) {
+        charge(op);
+        charge(Op::shuffle);
+        return claim(counter, count);
+    }
+    template <class Fn>
+    auto uniform(Op op, Fn fn) {
+        charge(op);
+        return fn();
+    }
+    template <class Cond, class Body>
+    void uniform_loop(Op op, Cond cond, Body body) {
+        while (cond()) {
+            charge(op);
+            body();
+        }
+    }
+    template <class Body>
+    void among(LaneMask mask, Body body) {
+        const LaneMask entered = active_;
+        active_ &= mask;
+        if (active_ != 0) body();
+        active_ = entered;
+    }
+    template <class Fn>
+    void write_shared(Op op, Fn fn) {
+        charge(op);
+        fn();
+    }
+    void meet() const {}
+
+private:
+    template <class Cond>
+    [[nodiscard]] LaneMask votes(Cond cond) const {
+        LaneMask found = 0;
+        for (LaneMask left = active_; left != 0; left &= left - 1) {
+            const int k = std::countr_zero(left);
+            found |= LaneMask{bool(cond(lanes[static_cast<std::size_t>(k)]))} << k;
+        }
+        return found;
+    }
+    /// Nothing is issued for a warp without active lanes.
+    void charge(Op op) {
+        if (active_ == 0) return;
+        OpCount& count = tally->counts[static_cast<std::size_t>(op)];
+        ++count.issues;
+        count.lanes += static_cast<std::uint64_t>(std::popcount(active_));
+        if (costs != nullptr) tally->issued += (*costs)[static_cast<std::size_t>(op)];
+    }
+
+    LaneMask active_ = ~LaneMask{0} >> (64 - Width);
+};
+
+}  // namespace raydix

@@ -1,0 +1,81 @@
+// Where the rays of a warp come from, for bodies that trace a whole batch: one batch a warp, or
+// persistent warps that fetch batch after batch (Aila and Laine 2009, section 3.3).
+//
+// A kernel is a `turn`, repeated as long as it returns true. It fetches rays at the start of a turn
+// and nowhere else, so that a simulator can put the fetches of many warps in order of time.
+#pragma once
+
+#include <cstdint>
+
+#include "base/hd.h"
+#include "simt/op.h"
+#include "trace/warp/lane.h"
+#include "trace/warp/steps.h"
+
+namespace raydix {
+
+/// Kernels say of themselves:
+/// - persistent: as many warps as fill the machine, which fetch from the pool until it is empty;
+/// - keeps_rays: lanes have rays from one turn to the next;
+/// - one_stack: the warp has a stack, its lanes have none;
+/// - rays_per_lane: 2 if half of the rays wait in shared memory.
+///
+/// What is the same for all warps of a launch.
+struct WarpJob {
+    WarpScene scene;
+    RayLaunch launch;
+};
+
+template <class Warp>
+RAYDIX_HD void start_batch(Warp& warp, const RayLaunch& launch, std::uint32_t first) {
+    warp.reads([&](const Lane&) { return launch.rays + first; }, sizeof(Ray));
+    warp.step_indexed(Op::start_ray, [&](Lane& l, std::uint32_t lane) {
+        start_ray(l, launch, first + lane);
+    });
+}
+
+template <class Warp>
+RAYDIX_HD void store_batch(Warp& warp, const RayLaunch& launch) {
+    warp.step(Op::store_hit, [&](Lane& l) { store_hit(l, launch); });
+}
+
+/// Warp k traces rays [k * width, (k + 1) * width).
+template <class Body>
+struct OneBatch {
+    static constexpr bool persistent = false, keeps_rays = false, one_stack = Body::one_stack;
+    static constexpr int rays_per_lane = 1;
+
+    template <bool any_hit, class Warp>
+    RAYDIX_HD bool turn(Warp& warp, const WarpJob& job, std::uint32_t warp_index) {
+        start_batch(warp, job.launch, warp_index * Warp::width());
+        Body::template trace<any_hit>(warp, job.scene);
+        store_batch(warp, job.launch);
+        return false;
+    }
+};
+
+/// Batches a persistent warp takes from the pool at once: 96 rays at 32 lanes, as in the release.
+inline constexpr std::uint32_t batches_per_fetch = 3;
+
+template <class Body>
+struct Persistent {
+    static constexpr bool persistent = true, keeps_rays = false, one_stack = Body::one_stack;
+    static constexpr int rays_per_lane = 1;
+    std::uint32_t next = 0, end = 0;  // rays taken and not yet started
+
+    template <bool any_hit, class Warp>
+    RAYDIX_HD bool turn(Warp& warp, const WarpJob& job, std::uint32_t) {
+        if (next == end) {
+            next = warp.take(Op::take_rays, *job.launch.next, batches_per_fetch * Warp::width());
+            end = next + batches_per_fetch * Warp::width();
+        }
+        if (next >= job.launch.count) return false;
+        start_batch(warp, job.launch, next);
+        Body::template trace<any_hit>(warp, job.scene);
+        store_batch(warp, job.launch);
+        next += Warp::width();
+        return true;
+    }
+};
+
+}  // namespace raydix

@@ -1,0 +1,23 @@
+// One launch of rays through one kernel on one simulated machine.
+#pragma once
+
+#include <raydix/simulate.h>
+
+#include <cstdint>
+#include <span>
+
+#include "simt/op.h"
+#include "trace/warp/lane.h"
+
+namespace raydix {
+
+/// Of a machine's table; throws InputError if an operation is missing, repeated or unknown.
+[[nodiscard]] OpCosts op_costs(const MachineModel& machine);
+
+/// rays [n], prepared (prepare_rays.h), fewer than 2^31 -> hits [n]. `stack_entries`: at least the
+/// tree's depth.
+[[nodiscard]] Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
+                                         std::span<const Ray> rays, std::span<Hit> hits,
+                                         const SimulateOptions& options);
+
+}  // namespace raydix

@@ -1,0 +1,92 @@
+// Instantiates the kernels for simulated warps of one width and one instruction set.
+// RAYDIX_SIMULATOR_ISA names the latter; all that is compiled here carries it in its name.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <new>
+#include <type_traits>
+
+#include "trace/warp/kernel_list.h"
+#include "trace/warp/simulated_kernels.h"
+
+namespace raydix {
+
+template <class Isa, int Width>
+const SimulatedKernel* simulated_kernel_of_width(WarpKernel kernel, bool any_hit);
+
+namespace simulator_isa {
+struct base;
+struct v3;
+}  // namespace simulator_isa
+
+template <class Kernel, bool any_hit, int Width, class Isa>
+struct SimulatedKernelOf {
+    using Warp = SimulatedWarp<Lane, Width, Isa>;
+    static constexpr std::size_t stacks = Kernel::rays_per_lane * std::size_t{Width};
+    struct Spares {
+        std::array<Lane, Width> lanes;
+        std::array<std::uint32_t, Width> slots;
+    };
+    static_assert(sizeof(Kernel) <= sizeof(KernelState) && alignof(Kernel) <= alignof(KernelState));
+    static_assert(std::is_trivially_destructible_v<Warp> && std::is_trivially_destructible_v<Kernel>);
+
+    static std::size_t rounded(std::size_t bytes) { return (bytes + 63) / 64 * 64; }
+    static std::size_t shared_bytes(std::uint32_t stack_entries) {
+        if (Kernel::one_stack) return rounded(stack_entries * sizeof(PacketEntry));
+        return Kernel::rays_per_lane == 2 ? rounded(sizeof(Spares)) : 0;
+    }
+    static std::size_t warp_bytes(std::uint32_t stack_entries) {
+        return rounded(sizeof(Warp)) + shared_bytes(stack_entries) +
+               (Kernel::one_stack ? 0 : rounded(stacks * stack_entries * sizeof(std::int32_t)));
+    }
+    static void start_warp(std::byte* memory, const WarpSetup& setup) {
+        Warp& warp = *new (memory) Warp{};
+        warp.tally = setup.tally;
+        warp.costs = setup.costs;
+        warp.observer = setup.observer;
+        std::byte* shared = memory + rounded(sizeof(Warp));
+        if (Kernel::one_stack) {
+            warp.memory.packets = reinterpret_cast<PacketEntry*>(shared);
+            return;
+        }
+        auto* stack = reinterpret_cast<std::int32_t*>(shared + shared_bytes(setup.stack_entries));
+        for (Lane& lane : warp.lanes) {
+            lane.stack = stack;
+            stack += setup.stack_entries;
+        }
+        if (Kernel::rays_per_lane == 1) return;
+        Spares& spares = *new (shared) Spares{};
+        warp.memory.spares = spares.lanes.data();
+        warp.memory.slots = spares.slots.data();
+        for (Lane& lane : spares.lanes) {
+            lane.stack = stack;
+            stack += setup.stack_entries;
+        }
+    }
+    static void start_kernel(KernelState& state) { new (&state) Kernel{}; }
+    static bool turn(std::byte* memory, KernelState& state, const WarpJob& job,
+                     std::uint32_t warp_index) {
+        Warp& warp = *std::launder(reinterpret_cast<Warp*>(memory));
+        Kernel& kernel = *std::launder(reinterpret_cast<Kernel*>(&state));
+        return kernel.template turn<any_hit>(warp, job, warp_index);
+    }
+    static constexpr SimulatedKernel table{Kernel::persistent, Kernel::keeps_rays, &warp_bytes,
+                                           &start_warp,        &start_kernel,      &turn};
+};
+
+template <class Isa, int Width>
+const SimulatedKernel* simulated_kernel_of_width(WarpKernel kernel, bool any_hit) {
+    return with_kernel(kernel, [any_hit]<class Kernel>() -> const SimulatedKernel* {
+        if (any_hit) return &SimulatedKernelOf<Kernel, true, Width, Isa>::table;
+        return &SimulatedKernelOf<Kernel, false, Width, Isa>::table;
+    });
+}
+
+#if defined(RAYDIX_SIMULATOR_ISA)
+template const SimulatedKernel*
+simulated_kernel_of_width<simulator_isa::RAYDIX_SIMULATOR_ISA, RAYDIX_SIMULATOR_WIDTH>(WarpKernel,
+                                                                                     bool);
+#endif
+
+}  // namespace raydix
