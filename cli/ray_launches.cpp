@@ -1,0 +1,167 @@
+// Cameras -> primary rays -> launches of each kind -> the ones that a sample takes.
+#include "ray_launches.h"
+
+#include <raydix/error.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace raydix::cli {
+namespace {
+
+constexpr std::size_t runs_per_camera = 4;
+constexpr std::size_t least_run = 2048;  // 64 warps of 32
+
+float chosen_ao_radius(const LaunchOptions& options, const SceneTree& input) {
+    if (options.ao_radius > 0) return options.ao_radius;
+    if (input.scene.cameras.ao_radius > 0) return input.scene.cameras.ao_radius;
+    if (input.bvh.empty()) return 0.0f;
+    const Aabb box = input.bvh.bounds();
+    return 0.05f * std::hypot(box.hi.x - box.lo.x, box.hi.y - box.lo.y, box.hi.z - box.lo.z);
+}
+
+}  // namespace
+
+std::vector<Camera> chosen_cameras(const std::string& which, const Scene& scene) {
+    const std::vector<Camera>& all = scene.cameras.cameras;
+    if (which == "all") return all;
+    std::size_t index = 0;
+    const char* end = which.data() + which.size();
+    const auto [rest, error] = std::from_chars(which.data(), end, index);
+    if (error != std::errc() || rest != end)
+        throw CLI::ValidationError("--camera", "'" + which + "' is neither a number nor 'all'");
+    if (index >= all.size())
+        throw InputError(scene.name + ": camera " + which + " is past the last of " +
+                         std::to_string(all.size()) + " cameras");
+    return {all[index]};
+}
+
+void add_launch_options(CLI::App& command, LaunchOptions& options) {
+    command.add_option("--camera", options.camera, "Number of a camera, or all")
+        ->capture_default_str();
+    command
+        .add_option("--size", options.size_text,
+                    "Pixels of the cameras (default: of cameras.json, or 1024x768)")
+        ->type_name("WxH");
+    command.add_option("--samples", options.samples, "Secondary rays per primary hit")
+        ->check(CLI::Range(1, 1024))
+        ->capture_default_str();
+    command
+        .add_option("--ao-radius", options.ao_radius,
+                    "Reach of ao rays (default: of cameras.json, or 5 % of the diagonal)")
+        ->check(finite_number(false));
+    command
+        .add_option("--sample", options.sample,
+                    "Part of the rays to trace: whole launches, or runs of neighbouring rays")
+        ->check([](const std::string& text) {
+            double value = 0;
+            const char* end = text.data() + text.size();
+            const auto [rest, error] = std::from_chars(text.data(), end, value);
+            return error == std::errc() && rest == end && value > 0 && value <= 1
+                       ? ""
+                       : "'" + text + "' is not a number above 0 and up to 1";
+        })
+        ->capture_default_str();
+    command.add_option("--launch-rays", options.launch_rays, "Secondary rays of one launch")
+        ->check(CLI::Range(1024u, 1u << 26))
+        ->capture_default_str();
+}
+
+RayLaunches::RayLaunches(const LaunchOptions& options, const SceneTree& input,
+                         const CommonOptions& common)
+    : options_(options), input_(input), common_(common),
+      ao_radius_(chosen_ao_radius(options, input)) {
+    const Size size = options.size_text.empty()
+                          ? Size{input.scene.cameras.width, input.scene.cameras.height}
+                          : parse_size(options.size_text);
+    for (const Camera& camera : chosen_cameras(options.camera, input.scene)) {
+        View& view = views_.emplace_back();
+        view.rays = make_primary_rays(camera, size.width, size.height, &view.pixels);
+        view.hits = trace(input.bvh, view.rays, TraceOptions{.threads = common.threads});
+    }
+}
+
+std::vector<RayLaunches::Launch> RayLaunches::launches_of(RayKind kind) const {
+    std::vector<Launch> launches;
+    const auto samples = static_cast<std::size_t>(options_.samples);
+    const std::size_t step = std::max<std::size_t>(1, options_.launch_rays / samples);
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+        const View& view = views_[v];
+        if (kind == RayKind::primary) {
+            launches.push_back({v, 0, view.rays.size(), view.rays.size()});
+            continue;
+        }
+        for (std::size_t begin = 0; begin < view.rays.size();) {
+            // A launch takes primary rays until it has `step` hits.
+            std::size_t end = begin, found = 0;
+            for (; end < view.rays.size() && found < step; ++end) found += view.hits[end].hit();
+            if (found > 0) launches.push_back({v, begin, end, found * samples});
+            begin = end;
+        }
+    }
+    return launches;
+}
+
+std::vector<Ray> RayLaunches::rays_of(RayKind kind, const Launch& launch) const {
+    const View& view = views_[launch.view];
+    if (kind == RayKind::primary) return view.rays;
+    SecondaryOptions secondary;
+    secondary.kind = kind;
+    secondary.samples = options_.samples;
+    secondary.ao_radius = ao_radius_;
+    secondary.seed = common_.seed;
+    secondary.threads = common_.threads;
+    const auto part = [&](const auto& values) {
+        return std::span(values).subspan(launch.begin, launch.end - launch.begin);
+    };
+    return make_secondary_rays(input_.bvh, part(view.rays), part(view.hits), part(view.pixels),
+                               secondary);
+}
+
+void RayLaunches::for_each(RayKind kind,
+                           const std::function<void(const RayUnit&, double)>& visit) const {
+    struct Unit {
+        std::size_t launch, begin, count;  // rays of the launch
+    };
+    const std::vector<Launch> launches = launches_of(kind);
+    std::vector<Unit> units;
+    for (std::size_t first = 0; first < launches.size();) {
+        std::size_t last = first, rays = 0;
+        for (; last < launches.size() && launches[last].view == launches[first].view; ++last)
+            rays += launches[last].rays;
+        const auto here = static_cast<double>(last - first);
+        const auto whole = static_cast<std::size_t>(std::llround(options_.sample * here));
+        if (whole >= 1 && options_.sample * here >= 0.5) {
+            // Evenly spaced, in the middle of equal parts of the view.
+            for (std::size_t k = 0; k < whole; ++k) {
+                const std::size_t at = first + (2 * k + 1) * (last - first) / (2 * whole);
+                units.push_back({at, 0, launches[at].rays});
+            }
+        } else {
+            const double target = options_.sample * static_cast<double>(rays) / runs_per_camera;
+            const std::size_t length =
+                std::max(least_run, (static_cast<std::size_t>(target) + 63) / 64 * 64);
+            for (std::size_t k = 0; k < runs_per_camera; ++k) {
+                std::size_t position = (2 * k + 1) * rays / (2 * runs_per_camera), at = first;
+                while (position >= launches[at].rays) position -= launches[at++].rays;
+                const std::size_t count = std::min(length, launches[at].rays);
+                // Runs begin at a multiple of 64, as warps do.
+                const std::size_t begin =
+                    std::min(position, launches[at].rays - count) / 64 * 64;
+                units.push_back({at, begin, std::min(count, launches[at].rays - begin)});
+            }
+        }
+        first = last;
+    }
+    std::size_t made = launches.size(), done = 0;
+    std::vector<Ray> rays;
+    for (const Unit& unit : units) {
+        if (made != unit.launch) rays = rays_of(kind, launches[unit.launch]);
+        made = unit.launch;
+        visit({std::span(rays).subspan(unit.begin, unit.count), unit.count == rays.size()},
+              static_cast<double>(++done) / static_cast<double>(units.size()));
+    }
+}
+
+}  // namespace raydix::cli

@@ -1,0 +1,68 @@
+// Rays of the protocol as launches: what `simulate` and `bench traversal` send through kernels.
+#pragma once
+
+#include <raydix/rays.h>
+#include <raydix/scene.h>
+#include <raydix/trace.h>
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "options.h"
+
+namespace raydix::cli {
+
+struct LaunchOptions {
+    std::string camera = "all", size_text, rays_file;
+    int samples = 32;         // secondary rays per primary hit
+    float ao_radius = 0.0f;   // 0: of cameras.json, or 5 % of the diagonal
+    double sample = 1.0;      // part of the rays, in (0, 1]
+    std::uint32_t launch_rays = 1u << 20;  // secondary rays of one launch
+};
+void add_launch_options(CLI::App& command, LaunchOptions& options);
+
+/// A launch, or a run of neighbouring rays of one.
+struct RayUnit {
+    std::span<const Ray> rays;
+    bool whole;  // the launch as it is
+};
+
+/// Cameras with their primary rays and hits, made once.
+class RayLaunches {
+public:
+    RayLaunches(const LaunchOptions& options, const SceneTree& input, const CommonOptions& common);
+
+    /// Calls visit(unit, part of the work done) for the launches of one kind, or of those that
+    /// `sample` picks: whole launches spread over all cameras if there are enough, else runs of
+    /// neighbouring rays; never single rays.
+    void for_each(RayKind kind, const std::function<void(const RayUnit&, double)>& visit) const;
+
+    [[nodiscard]] float ao_radius() const { return ao_radius_; }
+    [[nodiscard]] std::size_t cameras() const { return views_.size(); }
+
+private:
+    struct View {
+        std::vector<Ray> rays;
+        std::vector<Hit> hits;
+        std::vector<std::uint32_t> pixels;
+    };
+    /// Primary rays [begin, end) of a view make one launch.
+    struct Launch {
+        std::size_t view, begin, end, rays;
+    };
+    [[nodiscard]] std::vector<Launch> launches_of(RayKind kind) const;
+    [[nodiscard]] std::vector<Ray> rays_of(RayKind kind, const Launch& launch) const;
+
+    const LaunchOptions& options_;
+    const SceneTree& input_;
+    const CommonOptions& common_;
+    float ao_radius_ = 0.0f;
+    std::vector<View> views_;
+};
+
+/// --camera: all of the scene's, or one.
+[[nodiscard]] std::vector<Camera> chosen_cameras(const std::string& which, const Scene& scene);
+
+}  // namespace raydix::cli

@@ -1,0 +1,263 @@
+// Launches -> simulated figures -> tables and JSON.
+#include "simulation.h"
+
+#include <fmt/format.h>
+#include <raydix/error.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace raydix::cli {
+namespace {
+
+/// Pieces between commas; empty ones are usage errors of the caller's option.
+std::vector<std::string> split(const std::string& text) {
+    std::vector<std::string> parts{""};
+    for (const char c : text) {
+        if (c == ',') parts.emplace_back();
+        else parts.back() += c;
+    }
+    return parts;
+}
+
+std::uint64_t count_different(std::span<const Hit> a, std::span<const Hit> b, bool any_hit) {
+    std::uint64_t different = 0;
+    for (std::size_t i = 0; i < a.size(); ++i)
+        different += any_hit ? a[i].hit() != b[i].hit()
+                             : a[i].prim != b[i].prim || a[i].t != b[i].t || a[i].u != b[i].u ||
+                                   a[i].v != b[i].v;
+    return different;
+}
+
+/// One launch, or a run of one, through every row's kernel.
+void add_unit(const WarpTree& tree, const RayUnit& unit, std::span<const SimulateOptions> runs,
+              std::vector<SimulationRow>& rows, const CommonOptions& common) {
+    std::vector<std::vector<Hit>> hits;
+    const std::vector<Simulation> figures =
+        simulate(tree, unit.rays, runs, &hits, common.threads);
+    std::vector<Hit> expected(unit.rays.size());
+    trace_reference(tree, unit.rays, expected, runs.front().any_hit, common.threads);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+        rows[k].sum.add(figures[k]);
+        rows[k].whole_launches &= unit.whole;
+        rows[k].different_hits += count_different(hits[k], expected, runs[k].any_hit);
+        const double bound = simulated_rates(figures[k], runs[k]).bound;
+        if (bound > 0) rows[k].seconds_per_ray.push_back(1.0 / bound);
+    }
+}
+
+Json or_null(bool known, double value) {
+    return known && std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+/// Warp times by octave and half octave, without the empty ends.
+Json histogram_json(const Simulation& sum) {
+    constexpr std::size_t per_bin = 4, per_octave = 8;
+    std::vector<double> edges;
+    std::vector<std::uint64_t> counts;
+    std::size_t first = sum.warp_times.size(), last = 0;
+    for (std::size_t k = 0; k < sum.warp_times.size(); ++k)
+        if (sum.warp_times[k] != 0) first = std::min(first, k), last = k;
+    if (first > last) return {{"unit", "instructions"}, {"edges", edges}, {"counts", counts}};
+    first = first / per_bin * per_bin;
+    for (std::size_t k = first; k <= last; k += per_bin) {
+        edges.push_back(std::exp2(static_cast<double>(k) / per_octave));
+        std::uint64_t count = 0;
+        for (std::size_t j = k; j < std::min(k + per_bin, sum.warp_times.size()); ++j)
+            count += sum.warp_times[j];
+        counts.push_back(count);
+    }
+    edges.push_back(edges.back() * std::exp2(double(per_bin) / per_octave));
+    return {{"unit", "instructions"}, {"edges", edges}, {"counts", counts}};
+}
+
+Json operations_json(const SimulationRow& row) {
+    Json all = Json::array();
+    const auto rays = static_cast<double>(row.sum.rays);
+    for (const OperationFigure& op : row.sum.operations) {
+        if (op.issues == 0) continue;
+        const double issued = static_cast<double>(op.issues) * op.instructions;
+        all.push_back(
+            {{"name", op.operation},
+             {"issues_per_ray", static_cast<double>(op.issues) / rays},
+             {"cost", op.instructions},
+             {"simd_efficiency", static_cast<double>(op.lanes) /
+                                     (static_cast<double>(op.issues) * row.options.width)},
+             {"share", row.sum.instructions ? issued / static_cast<double>(row.sum.instructions)
+                                            : 0.0}});
+    }
+    return all;
+}
+
+}  // namespace
+
+std::optional<double> SimulationRow::sampling_error() const {
+    if (sample >= 1.0) return 0.0;
+    const auto n = static_cast<double>(seconds_per_ray.size());
+    if (n < 2) return std::nullopt;
+    double mean = 0, squares = 0;
+    for (const double s : seconds_per_ray) mean += s / n;
+    for (const double s : seconds_per_ray) squares += (s - mean) * (s - mean);
+    return std::sqrt(squares / (n - 1) / n * (1.0 - sample)) / mean;
+}
+
+std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree& tree,
+                                         const RayLaunches& launches, RayKind kind,
+                                         std::vector<SimulateOptions> runs,
+                                         const LaunchOptions& options,
+                                         const CommonOptions& common) {
+    std::vector<SimulationRow> rows;
+    for (SimulateOptions& run : runs) {
+        run.any_hit = kind == RayKind::ao;
+        rows.push_back({.scene = input.scene.name,
+                        .kind = kind,
+                        .rays = std::string(ray_kind_name(kind)),
+                        .options = run,
+                        .sum = {},
+                        .sample = options.sample,
+                        .seconds_per_ray = {}});
+    }
+    Progress progress(fmt::format("simulating {}", ray_kind_name(kind)), common);
+    launches.for_each(kind, [&](const RayUnit& unit, double part) {
+        add_unit(tree, unit, runs, rows, common);
+        progress.show(part);
+    });
+    return rows;
+}
+
+std::vector<SimulationRow> simulate_rays(const SceneTree& input, const WarpTree& tree,
+                                         std::span<const Ray> rays, const std::string& name,
+                                         std::vector<SimulateOptions> runs,
+                                         const CommonOptions& common) {
+    std::vector<SimulationRow> rows;
+    for (const SimulateOptions& run : runs)
+        rows.push_back({.scene = input.scene.name,
+                        .kind = RayKind::primary,
+                        .rays = name,
+                        .options = run,
+                        .sum = {},
+                        .seconds_per_ray = {}});
+    add_unit(tree, {rays, true}, runs, rows, common);
+    return rows;
+}
+
+Json simulation_json(const SimulationRow& row) {
+    const SimulatedRates rates = row.rates();
+    const bool any = row.sum.instructions > 0;
+    const auto rays = static_cast<double>(row.sum.rays);
+    const std::optional<double> error = row.sampling_error();
+    return {{"scene", row.scene},
+            {"kernel", warp_kernel_name(row.options.kernel)},
+            {"rays", row.rays},
+            {"mode", row.options.any_hit ? "any" : "closest"},
+            {"machine", row.options.machine.name},
+            {"device", "sim"},
+            {"simulated", true},
+            {"width", row.options.width},
+            {"count", row.sum.rays},
+            {"launches", row.sum.launches},
+            {"hits", row.sum.hits},
+            {"different_hits", row.different_hits},
+            {"mrays_per_s_bound", or_null(any, rates.bound)},
+            {"mrays_per_s_scheduled", or_null(any && row.whole_launches, rates.scheduled)},
+            {"mrays_per_s_memory", or_null(any && row.options.memory, rates.memory)},
+            {"simd_efficiency", or_null(any, rates.simd_efficiency)},
+            {"issues_per_ray", or_null(any, static_cast<double>(row.sum.instructions) / rays)},
+            {"instructions_per_ray",
+             or_null(any, static_cast<double>(row.sum.lane_instructions) / rays)},
+            {"idle_share", or_null(any && row.whole_launches && row.sum.issue_slots > 0,
+                                   row.sum.idle_issues / row.sum.issue_slots)},
+            {"sample", row.sample},
+            {"sampling_error", error ? Json(*error) : Json(nullptr)},
+            {"operations", operations_json(row)},
+            {"histogram", histogram_json(row.sum)}};
+}
+
+Json machine_model_json(const MachineModel& m) {
+    Json costs = Json::array();
+    for (const OperationCost& cost : m.costs)
+        costs.push_back({{"operation", cost.operation},
+                         {"instructions", cost.instructions},
+                         {"origin", cost.origin}});
+    return {{"name", m.name},
+            {"origin", m.origin},
+            {"multiprocessors", m.multiprocessors},
+            {"clock_ghz", m.clock_ghz},
+            {"lanes_per_clock", m.lanes_per_clock},
+            {"warp_issue_clocks", m.warp_issue_clocks},
+            {"resident_lanes", m.resident_lanes},
+            {"block_lanes", m.block_lanes},
+            {"l1_transactions_per_clock", m.l1_transactions_per_clock},
+            {"l1_bytes", m.l1_bytes},
+            {"l2_gb_per_s", m.l2_gb_per_s},
+            {"l2_bytes", m.l2_bytes},
+            {"dram_gb_per_s", m.dram_gb_per_s},
+            {"costs", costs}};
+}
+
+void print_simulation(const std::vector<SimulationRow>& rows) {
+    if (rows.empty()) return;
+    fmt::print("\n{} rays of {} on {}, width {}: simulated Mrays/s\n", rows.front().rays,
+               rows.front().scene, rows.front().options.machine.name, rows.front().options.width);
+    fmt::print("{:<36} {:>11} {:>9} {:>9} {:>9} {:>7} {:>8} {:>9} {:>7} {:>7}\n", "kernel", "rays",
+               "bound", "scheduled", "memory", "SIMD", "issues", "instr", "idle", "error");
+    for (const SimulationRow& row : rows) {
+        const SimulatedRates rates = row.rates();
+        const auto number = [](bool known, double value, int digits) {
+            return known ? fmt::format("{:.{}f}", value, digits) : std::string("-");
+        };
+        const auto percent = [&](bool known, double part) {
+            return known ? fmt::format("{:.1f}%", 100 * part) : std::string("-");
+        };
+        const bool any = row.sum.instructions > 0;
+        const auto rays = static_cast<double>(row.sum.rays);
+        const std::optional<double> error = row.sampling_error();
+        fmt::print("{:<36} {:>11} {:>9} {:>9} {:>9} {:>7} {:>8} {:>9} {:>7} {:>7}\n",
+                   warp_kernel_name(row.options.kernel), grouped(row.sum.rays),
+                   number(any, rates.bound, 1), number(any && row.whole_launches, rates.scheduled, 1),
+                   number(any && row.options.memory, rates.memory, 1),
+                   percent(any, rates.simd_efficiency),
+                   number(any, static_cast<double>(row.sum.instructions) / rays, 1),
+                   number(any, static_cast<double>(row.sum.lane_instructions) / rays, 0),
+                   percent(any && row.whole_launches, row.sum.idle_issues / row.sum.issue_slots),
+                   percent(error.has_value(), error.value_or(0)));
+        if (row.different_hits > 0)
+            fmt::print("    {} hits differ from the scalar reference's\n",
+                       grouped(row.different_hits));
+    }
+}
+
+MachineModel machine_from(const std::string& name_or_file) {
+    return name_or_file.ends_with(".json") ? load_machine_model(name_or_file)
+                                           : machine_model(name_or_file);
+}
+
+std::vector<WarpKernel> kernels_from(const std::string& names) {
+    if (names == "all") return {warp_kernels().begin(), warp_kernels().end()};
+    std::vector<WarpKernel> kernels;
+    for (const std::string& name : split(names)) try {
+            kernels.push_back(warp_kernel_from_name(name));
+        } catch (const InputError& error) {
+            throw CLI::ValidationError("--kernel", error.what());
+        }
+    return kernels;
+}
+
+std::vector<RayKind> kinds_from(const std::string& names) {
+    const std::vector<RayKind> all{RayKind::primary, RayKind::ao, RayKind::diffuse,
+                                   RayKind::diffuse_shuffled};
+    if (names == "all") return all;
+    std::vector<RayKind> kinds;
+    for (const std::string& name : split(names)) {
+        const auto kind = std::find_if(all.begin(), all.end(),
+                                       [&](RayKind k) { return ray_kind_name(k) == name; });
+        if (kind == all.end())
+            throw CLI::ValidationError(
+                "--rays", "'" + name +
+                              "' is not primary, ao, diffuse, diffuse_shuffled, all, or a .npy file");
+        kinds.push_back(*kind);
+    }
+    return kinds;
+}
+
+}  // namespace raydix::cli

@@ -1,0 +1,55 @@
+// Kernels x kinds of rays x machines on simulated warps: figures, their table, their JSON.
+#pragma once
+
+#include <raydix/simulate.h>
+
+#include <string>
+#include <vector>
+
+#include "output.h"
+#include "ray_launches.h"
+
+namespace raydix::cli {
+
+/// One kernel, kind and machine over all launches.
+struct SimulationRow {
+    std::string scene;
+    RayKind kind;         // of `rays`
+    std::string rays;     // name of the kind, or a file
+    SimulateOptions options;
+    Simulation sum;
+    double sample = 1.0;
+    bool whole_launches = true;        // else there is no launch to schedule
+    std::uint64_t different_hits = 0;  // from those of the scalar reference
+    std::vector<double> seconds_per_ray;  // of each unit, at the bound
+
+    [[nodiscard]] SimulatedRates rates() const { return simulated_rates(sum, options); }
+    /// Relative standard error of the bound that comes from tracing a part of the rays only; 0 if
+    /// all were traced; nothing if there is only one unit.
+    [[nodiscard]] std::optional<double> sampling_error() const;
+};
+
+/// Runs all `runs` over the launches of one kind; ao rays are any-hit rays.
+[[nodiscard]] std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree& tree,
+                                                       const RayLaunches& launches, RayKind kind,
+                                                       std::vector<SimulateOptions> runs,
+                                                       const LaunchOptions& options,
+                                                       const CommonOptions& common);
+
+/// The same over given rays, as one launch.
+[[nodiscard]] std::vector<SimulationRow> simulate_rays(const SceneTree& input, const WarpTree& tree,
+                                                       std::span<const Ray> rays,
+                                                       const std::string& name,
+                                                       std::vector<SimulateOptions> runs,
+                                                       const CommonOptions& common);
+
+[[nodiscard]] Json simulation_json(const SimulationRow& row);
+[[nodiscard]] Json machine_model_json(const MachineModel& machine);
+void print_simulation(const std::vector<SimulationRow>& rows);
+/// A machine by name, or from a JSON file.
+[[nodiscard]] MachineModel machine_from(const std::string& name_or_file);
+/// Names separated by commas, or "all".
+[[nodiscard]] std::vector<WarpKernel> kernels_from(const std::string& names);
+[[nodiscard]] std::vector<RayKind> kinds_from(const std::string& names);
+
+}  // namespace raydix::cli

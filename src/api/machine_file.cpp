@@ -1,0 +1,129 @@
+// JSON -> a machine of the simulator, with errors that name the file and the field.
+#include <fmt/format.h>
+#include <raydix/simulate.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "scene/byte_source.h"
+#include "scene/json_input.h"
+#include "simt/op.h"
+
+namespace raydix {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::uint64_t largest_file = 1 << 20;
+
+class MachineReader {
+public:
+    MachineReader(const ByteSource& in, const json& document) : in_(in), document_(document) {}
+
+    MachineModel read() {
+        if (!document_.is_object()) in_.fail("machine", "not a JSON object");
+        if (document_.contains("base")) m_ = machine_model(text(document_["base"], "base"));
+        based_ = document_.contains("base");
+        m_.name = document_.contains("name") ? text(document_["name"], "name") : "custom";
+        m_.origin = document_.contains("origin") ? text(document_["origin"], "origin")
+                    : based_ ? fmt::format("{}, changed", m_.origin)
+                             : "a file";
+        known_ = {"base", "name", "origin", "costs"};
+        whole("multiprocessors", m_.multiprocessors);
+        number("clock_ghz", m_.clock_ghz);
+        number("lanes_per_clock", m_.lanes_per_clock);
+        number("warp_issue_clocks", m_.warp_issue_clocks);
+        whole("resident_lanes", m_.resident_lanes);
+        whole("block_lanes", m_.block_lanes);
+        number("l1_transactions_per_clock", m_.l1_transactions_per_clock);
+        whole("l1_bytes", m_.l1_bytes);
+        number("l2_gb_per_s", m_.l2_gb_per_s);
+        whole("l2_bytes", m_.l2_bytes);
+        number("dram_gb_per_s", m_.dram_gb_per_s);
+        for (const auto& [key, value] : document_.items())
+            if (std::find(known_.begin(), known_.end(), key) == known_.end())
+                in_.fail(key, "not a field of a machine");
+        read_costs();
+        return m_;
+    }
+
+private:
+    std::string text(const json& value, const char* key) const {
+        if (!value.is_string()) in_.fail(key, "not a text");
+        return value.get<std::string>();
+    }
+    const json* find(const char* key) {
+        known_.emplace_back(key);
+        const auto found = document_.find(key);
+        if (found != document_.end()) return &*found;
+        if (!based_) in_.fail(key, "missing, and there is no \"base\" to take it from");
+        return nullptr;
+    }
+    void number(const char* key, double& value) {
+        const json* found = find(key);
+        if (found == nullptr) return;
+        const double given = found->is_number() ? found->get<double>() : -1.0;
+        if (!(given > 0 && given <= 1e15)) in_.fail(key, "not a number above 0");
+        value = given;
+    }
+    void whole(const char* key, std::uint32_t& value) {
+        if (find(key) == nullptr) return;
+        const std::uint64_t given = find_whole(in_, document_, key, "machine").value();
+        if (given < 1 || given > std::numeric_limits<std::uint32_t>::max())
+            in_.fail(key, "not from 1 to 2^32 - 1");
+        value = static_cast<std::uint32_t>(given);
+    }
+
+    /// {"visit_node": 50, ...}, or a list of {"operation", "instructions", "origin"}, as documents of
+    /// `raydix simulate` have it.
+    void read_costs() {
+        const json* costs = find("costs");
+        if (costs == nullptr) return;
+        if (costs->is_object()) {
+            for (const auto& [operation, value] : costs->items()) set_cost(operation, value, "a file");
+        } else if (costs->is_array()) {
+            for (const json& entry : *costs) {
+                if (!entry.is_object() || !entry.contains("operation") ||
+                    !entry.contains("instructions"))
+                    in_.fail("costs", "an entry without \"operation\" or \"instructions\"");
+                set_cost(text(entry["operation"], "costs"), entry["instructions"],
+                         entry.contains("origin") ? text(entry["origin"], "origin") : "a file");
+            }
+        } else {
+            in_.fail("costs", "neither an object nor a list");
+        }
+        for (const std::string_view operation : op_names)
+            if (std::none_of(m_.costs.begin(), m_.costs.end(),
+                             [&](const OperationCost& c) { return c.operation == operation; }))
+                in_.fail("costs", fmt::format("{} is missing", operation));
+    }
+    void set_cost(const std::string& operation, const json& value, const std::string& origin) {
+        if (std::find(op_names.begin(), op_names.end(), operation) == op_names.end())
+            in_.fail("costs", fmt::format("there is no operation {}", operation));
+        if (!value.is_number_unsigned() || value.get<std::uint64_t>() > 100'000)
+            in_.fail("costs", fmt::format("{} is not an integer from 0 to 100000", operation));
+        const auto at =
+            std::find_if(m_.costs.begin(), m_.costs.end(),
+                         [&](const OperationCost& c) { return c.operation == operation; });
+        OperationCost& cost = at == m_.costs.end() ? m_.costs.emplace_back() : *at;
+        cost = {operation, value.get<std::uint32_t>(), origin};
+    }
+
+    const ByteSource& in_;
+    const json& document_;
+    MachineModel m_;
+    bool based_ = false;
+    std::vector<std::string> known_;
+};
+
+}  // namespace
+
+MachineModel load_machine_model(const std::filesystem::path& file) {
+    ByteSource in = ByteSource::from_file(file, packing_of(file));
+    const std::string text = read_rest(in, largest_file);
+    const nlohmann::json document = parse_json(in, text);
+    return MachineReader(in, document).read();
+}
+
+}  // namespace raydix
