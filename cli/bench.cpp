@@ -296,6 +296,7 @@ void run_hierarchy(const HierarchyBench& options) {
 void add_bench_command(CLI::App& app) {
     CLI::App* bench = app.add_subcommand("bench", "Measure one question and print its tables");
     bench->require_subcommand(1);
+    add_traversal_suite(*bench);
     auto options = std::make_shared<HierarchyBench>();
     CLI::App* command = bench->add_subcommand(
         "hierarchy",

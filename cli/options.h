@@ -85,5 +85,7 @@ void add_trace_command(CLI::App& app);
 void add_render_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
 void add_bench_command(CLI::App& app);
+/// bench traversal
+void add_traversal_suite(CLI::App& bench);
 
 }  // namespace raydix::cli

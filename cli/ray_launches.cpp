@@ -70,7 +70,9 @@ void add_launch_options(CLI::App& command, LaunchOptions& options) {
 
 RayLaunches::RayLaunches(const LaunchOptions& options, const SceneTree& input,
                          const CommonOptions& common)
-    : options_(options), input_(input), common_(common),
+    : options_(options),
+      input_(input),
+      common_(common),
       ao_radius_(chosen_ao_radius(options, input)) {
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}
@@ -147,8 +149,7 @@ void RayLaunches::for_each(RayKind kind,
                 while (position >= launches[at].rays) position -= launches[at++].rays;
                 const std::size_t count = std::min(length, launches[at].rays);
                 // Runs begin at a multiple of 64, as warps do.
-                const std::size_t begin =
-                    std::min(position, launches[at].rays - count) / 64 * 64;
+                const std::size_t begin = std::min(position, launches[at].rays - count) / 64 * 64;
                 units.push_back({at, begin, std::min(count, launches[at].rays - begin)});
             }
         }

@@ -72,8 +72,8 @@ void run_simulate(const SimulateCommand& options) {
         const RayLaunches launches(options.launches, input, options.common);
         document["ao_radius"] = launches.ao_radius();
         for (const RayKind kind : kinds)
-            hand_out(simulate_kind(input, tree, launches, kind, runs, options.launches,
-                                   options.common));
+            hand_out(
+                simulate_kind(input, tree, launches, kind, runs, options.launches, options.common));
     });
     write_json(document, options.common);
 }
@@ -94,9 +94,10 @@ void add_simulate_command(CLI::App& app) {
     command->add_option("--kernel", options->kernel, "Kernels, separated by commas, or all")
         ->capture_default_str();
     command
-        ->add_option("--rays", options->rays,
-                     "primary, ao, diffuse, diffuse_shuffled, separated by commas, or all, or a (N, "
-                     "8) float32 .npy file")
+        ->add_option(
+            "--rays", options->rays,
+            "primary, ao, diffuse, diffuse_shuffled, separated by commas, or all, or a (N, "
+            "8) float32 .npy file")
         ->capture_default_str();
     command->add_option("--width", options->width, "Lanes of a warp")
         ->check(CLI::IsMember({1, 2, 4, 8, 16, 32, 64}))

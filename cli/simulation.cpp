@@ -14,8 +14,10 @@ namespace {
 std::vector<std::string> split(const std::string& text) {
     std::vector<std::string> parts{""};
     for (const char c : text) {
-        if (c == ',') parts.emplace_back();
-        else parts.back() += c;
+        if (c == ',')
+            parts.emplace_back();
+        else
+            parts.back() += c;
     }
     return parts;
 }
@@ -33,8 +35,7 @@ std::uint64_t count_different(std::span<const Hit> a, std::span<const Hit> b, bo
 void add_unit(const WarpTree& tree, const RayUnit& unit, std::span<const SimulateOptions> runs,
               std::vector<SimulationRow>& rows, const CommonOptions& common) {
     std::vector<std::vector<Hit>> hits;
-    const std::vector<Simulation> figures =
-        simulate(tree, unit.rays, runs, &hits, common.threads);
+    const std::vector<Simulation> figures = simulate(tree, unit.rays, runs, &hits, common.threads);
     std::vector<Hit> expected(unit.rays.size());
     trace_reference(tree, unit.rays, expected, runs.front().any_hit, common.threads);
     for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -81,10 +82,10 @@ Json operations_json(const SimulationRow& row) {
             {{"name", op.operation},
              {"issues_per_ray", static_cast<double>(op.issues) / rays},
              {"cost", op.instructions},
-             {"simd_efficiency", static_cast<double>(op.lanes) /
-                                     (static_cast<double>(op.issues) * row.options.width)},
-             {"share", row.sum.instructions ? issued / static_cast<double>(row.sum.instructions)
-                                            : 0.0}});
+             {"simd_efficiency",
+              static_cast<double>(op.lanes) / (static_cast<double>(op.issues) * row.options.width)},
+             {"share",
+              row.sum.instructions ? issued / static_cast<double>(row.sum.instructions) : 0.0}});
     }
     return all;
 }
@@ -212,15 +213,15 @@ void print_simulation(const std::vector<SimulationRow>& rows) {
         const bool any = row.sum.instructions > 0;
         const auto rays = static_cast<double>(row.sum.rays);
         const std::optional<double> error = row.sampling_error();
-        fmt::print("{:<36} {:>11} {:>9} {:>9} {:>9} {:>7} {:>8} {:>9} {:>7} {:>7}\n",
-                   warp_kernel_name(row.options.kernel), grouped(row.sum.rays),
-                   number(any, rates.bound, 1), number(any && row.whole_launches, rates.scheduled, 1),
-                   number(any && row.options.memory, rates.memory, 1),
-                   percent(any, rates.simd_efficiency),
-                   number(any, static_cast<double>(row.sum.instructions) / rays, 1),
-                   number(any, static_cast<double>(row.sum.lane_instructions) / rays, 0),
-                   percent(any && row.whole_launches, row.sum.idle_issues / row.sum.issue_slots),
-                   percent(error.has_value(), error.value_or(0)));
+        fmt::print(
+            "{:<36} {:>11} {:>9} {:>9} {:>9} {:>7} {:>8} {:>9} {:>7} {:>7}\n",
+            warp_kernel_name(row.options.kernel), grouped(row.sum.rays),
+            number(any, rates.bound, 1), number(any && row.whole_launches, rates.scheduled, 1),
+            number(any && row.options.memory, rates.memory, 1), percent(any, rates.simd_efficiency),
+            number(any, static_cast<double>(row.sum.instructions) / rays, 1),
+            number(any, static_cast<double>(row.sum.lane_instructions) / rays, 0),
+            percent(any && row.whole_launches, row.sum.idle_issues / row.sum.issue_slots),
+            percent(error.has_value(), error.value_or(0)));
         if (row.different_hits > 0)
             fmt::print("    {} hits differ from the scalar reference's\n",
                        grouped(row.different_hits));
@@ -253,8 +254,9 @@ std::vector<RayKind> kinds_from(const std::string& names) {
                                        [&](RayKind k) { return ray_kind_name(k) == name; });
         if (kind == all.end())
             throw CLI::ValidationError(
-                "--rays", "'" + name +
-                              "' is not primary, ao, diffuse, diffuse_shuffled, all, or a .npy file");
+                "--rays",
+                "'" + name +
+                    "' is not primary, ao, diffuse, diffuse_shuffled, all, or a .npy file");
         kinds.push_back(*kind);
     }
     return kinds;

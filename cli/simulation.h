@@ -14,13 +14,13 @@ namespace raydix::cli {
 /// One kernel, kind and machine over all launches.
 struct SimulationRow {
     std::string scene;
-    RayKind kind;         // of `rays`
-    std::string rays;     // name of the kind, or a file
+    RayKind kind;      // of `rays`
+    std::string rays;  // name of the kind, or a file
     SimulateOptions options;
     Simulation sum;
     double sample = 1.0;
-    bool whole_launches = true;        // else there is no launch to schedule
-    std::uint64_t different_hits = 0;  // from those of the scalar reference
+    bool whole_launches = true;           // else there is no launch to schedule
+    std::uint64_t different_hits = 0;     // from those of the scalar reference
     std::vector<double> seconds_per_ray;  // of each unit, at the bound
 
     [[nodiscard]] SimulatedRates rates() const { return simulated_rates(sum, options); }

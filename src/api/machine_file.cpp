@@ -27,8 +27,8 @@ public:
         based_ = document_.contains("base");
         m_.name = document_.contains("name") ? text(document_["name"], "name") : "custom";
         m_.origin = document_.contains("origin") ? text(document_["origin"], "origin")
-                    : based_ ? fmt::format("{}, changed", m_.origin)
-                             : "a file";
+                    : based_                     ? fmt::format("{}, changed", m_.origin)
+                                                 : "a file";
         known_ = {"base", "name", "origin", "costs"};
         whole("multiprocessors", m_.multiprocessors);
         number("clock_ghz", m_.clock_ghz);
@@ -75,13 +75,14 @@ private:
         value = static_cast<std::uint32_t>(given);
     }
 
-    /// {"visit_node": 50, ...}, or a list of {"operation", "instructions", "origin"}, as documents of
-    /// `raydix simulate` have it.
+    /// {"visit_node": 50, ...}, or a list of {"operation", "instructions", "origin"}, as documents
+    /// of `raydix simulate` have it.
     void read_costs() {
         const json* costs = find("costs");
         if (costs == nullptr) return;
         if (costs->is_object()) {
-            for (const auto& [operation, value] : costs->items()) set_cost(operation, value, "a file");
+            for (const auto& [operation, value] : costs->items())
+                set_cost(operation, value, "a file");
         } else if (costs->is_array()) {
             for (const json& entry : *costs) {
                 if (!entry.is_object() || !entry.contains("operation") ||
@@ -103,9 +104,9 @@ private:
             in_.fail("costs", fmt::format("there is no operation {}", operation));
         if (!value.is_number_unsigned() || value.get<std::uint64_t>() > 100'000)
             in_.fail("costs", fmt::format("{} is not an integer from 0 to 100000", operation));
-        const auto at =
-            std::find_if(m_.costs.begin(), m_.costs.end(),
-                         [&](const OperationCost& c) { return c.operation == operation; });
+        const auto at = std::find_if(m_.costs.begin(), m_.costs.end(), [&](const OperationCost& c) {
+            return c.operation == operation;
+        });
         OperationCost& cost = at == m_.costs.end() ? m_.costs.emplace_back() : *at;
         cost = {operation, value.get<std::uint32_t>(), origin};
     }

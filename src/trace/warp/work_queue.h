@@ -1,6 +1,6 @@
 // Local work queues (Aila and Laine 2009, section 4): twice as many rays as lanes, the spare ones
-// in shared memory. Before each operation lanes exchange rays, so that as many lanes as possible
-// want the same.
+// in shared memory. Lanes exchange rays, so that as many of them as possible want the same
+// operation, and again when too few do.
 #pragma once
 
 #include <cstdint>
@@ -48,8 +48,7 @@ public:
             Op::main_loop, [&] { return choose(warp) && wanted_ != Want::fetch; },
             [&] {
                 gather(warp);
-                warp.when([this](const Lane& l) { return wants(l, wanted_); },
-                          [&] { operate<any_hit>(warp, job.scene); });
+                repeat<any_hit>(warp, job.scene);
             });
         if (!none_left_) gather(warp);
         return !none_left_;
@@ -139,15 +138,34 @@ private:
             });
         });
     }
-    RAYDIX_HD static int lesser_count(int a, int b) { return a < b ? a : b; }
-
-    template <bool any_hit, class Warp>
-    RAYDIX_HD void operate(Warp& warp, const WarpScene& scene) {
-        if (wanted_ == Want::node)
-            visit_once(warp, scene);
-        else
-            test_in_place<any_hit>(warp, scene);
+    /// Lanes below which it pays to exchange rays again: three quarters of the warp.
+    template <class Warp>
+    [[nodiscard]] RAYDIX_HD static constexpr int enough_lanes() {
+        return static_cast<int>((3 * Warp::width() + 3) / 4);
     }
+    /// The operation once, and again as long as enough lanes go on wanting it.
+    template <bool any_hit, class Warp>
+    RAYDIX_HD void repeat(Warp& warp, const WarpScene& scene) {
+        const Want wanted = wanted_;
+        const auto same = [wanted](const Lane& l) { return wants(l, wanted); };
+        bool once = false;
+        warp.uniform_loop(
+            wanted == Want::node ? Op::node_loop : Op::leaf_loop,
+            [&] {
+                const bool again = once;
+                once = true;
+                return !again || count_ones(warp.ballot(Op::ballot, same)) >= enough_lanes<Warp>();
+            },
+            [&] {
+                warp.when(same, [&] {
+                    if (wanted == Want::node)
+                        visit_once(warp, scene);
+                    else
+                        test_in_place<any_hit>(warp, scene);
+                });
+            });
+    }
+    RAYDIX_HD static int lesser_count(int a, int b) { return a < b ? a : b; }
 
     Want wanted_ = Want::fetch;
     bool started_ = false, dry_ = false, none_left_ = false;

@@ -1,0 +1,256 @@
+// raydix bench traversal: the tables of Aila and Laine 2009, scene by scene: every kernel and kind
+// of ray on simulated machines, the published figures beside them, the paper's claims, and a sweep
+// of the warp's width.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <raydix/error.h>
+
+#include <algorithm>
+#include <cctype>
+#include <memory>
+
+#include "output.h"
+#include "published.h"
+#include "ray_launches.h"
+#include "simulation.h"
+#include "traversal_claims.h"
+
+namespace raydix::cli {
+namespace {
+
+struct TraversalBench {
+    CommonOptions common;
+    TreeOptions tree;
+    LaunchOptions launches;
+    std::vector<std::string> scenes{"builtin:atrium", "builtin:grove"};
+    std::vector<std::string> machines{"gtx285", "gtx480", "gtx680"};
+    std::string kernel = "all", rays = "all";
+    double sweep_sample = 0.01;  // 0: no sweep
+    bool memory = false;
+};
+
+/// All kernels on each machine; where there is a gtx285, also the two kernels for which the authors
+/// wished for new instructions, on a machine that has them.
+std::vector<SimulateOptions> runs_of(const TraversalBench& options,
+                                     const std::vector<MachineModel>& machines) {
+    std::vector<SimulateOptions> runs;
+    const std::vector<WarpKernel> kernels = kernels_from(options.kernel);
+    const auto has = [&](std::string_view name) {
+        return std::any_of(machines.begin(), machines.end(),
+                           [&](const MachineModel& m) { return m.name == name; });
+    };
+    for (const MachineModel& machine : machines)
+        for (const WarpKernel kernel : kernels)
+            runs.push_back({.kernel = kernel, .machine = machine, .memory = options.memory});
+    if (has("gtx285") && !has("gtx285_enum_popc"))
+        for (const WarpKernel kernel : {WarpKernel::ray_replacement, WarpKernel::work_queue})
+            if (std::find(kernels.begin(), kernels.end(), kernel) != kernels.end())
+                runs.push_back({.kernel = kernel,
+                                .machine = machine_model("gtx285_enum_popc"),
+                                .memory = options.memory});
+    return runs;
+}
+
+std::string lower_case(std::string text) {
+    for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return text;
+}
+
+Json published_json(const std::string& scene) {
+    constexpr std::array kinds{RayKind::primary, RayKind::ao, RayKind::diffuse};
+    Json rows = Json::array();
+    for (const PublishedRates& rates : published_rates) {
+        if (lower_case(scene).find(rates.scene) == std::string::npos) continue;
+        for (std::size_t k = 0; k < kinds.size(); ++k)
+            rows.push_back({{"scene", scene},
+                            {"kernel", rates.kernel},
+                            {"rays", ray_kind_name(kinds[k])},
+                            {"machine", rates.machine},
+                            {"mrays_per_s", rates.mrays_per_s[k]},
+                            {"other_edition", true}});
+    }
+    return rows;
+}
+
+void print_published(const Json& published, const std::vector<SimulationRow>& rows) {
+    if (published.empty()) return;
+    fmt::print(
+        "\npublished Mrays/s of another edition of the scene, measured by the authors, beside our "
+        "simulated bound\n{:<10} {:<36} {:<9} {:>9} {:>9} {:>7}\n",
+        "machine", "kernel", "rays", "published", "bound", "part");
+    for (const Json& p : published) {
+        const auto row = std::find_if(rows.begin(), rows.end(), [&](const SimulationRow& r) {
+            return warp_kernel_name(r.options.kernel) == p["kernel"].get<std::string>() &&
+                   r.rays == p["rays"].get<std::string>() &&
+                   r.scene == p["scene"].get<std::string>() &&
+                   r.options.machine.name == p["machine"].get<std::string>();
+        });
+        const double rate = p["mrays_per_s"].get<double>();
+        fmt::print("{:<10} {:<36} {:<9} {:>9.1f}", p["machine"].get<std::string>(),
+                   p["kernel"].get<std::string>(), p["rays"].get<std::string>(), rate);
+        if (row == rows.end()) fmt::print(" {:>9} {:>7}\n", "-", "-");
+        else fmt::print(" {:>9.1f} {:>6.0f}%\n", row->rates().bound, 100 * rate / row->rates().bound);
+    }
+}
+
+/// Efficiency and bound of every kernel over the width of a warp, with the costs of the first
+/// machine and as many lanes as it has.
+Json sweep_widths(const TraversalBench& options, const SceneTree& input, const WarpTree& tree,
+                  const MachineModel& machine) {
+    Json found = Json::array();
+    LaunchOptions sampled = options.launches;
+    sampled.sample = std::min(sampled.sample, options.sweep_sample);
+    const RayLaunches launches(sampled, input, options.common);
+    std::vector<SimulateOptions> runs;
+    for (const WarpKernel kernel : kernels_from(options.kernel))
+        for (const int width : {1, 2, 4, 8, 16, 32, 64})
+            runs.push_back({.kernel = kernel, .machine = machine, .width = width});
+    for (const RayKind kind : kinds_from(options.rays)) {
+        const std::vector<SimulationRow> rows =
+            simulate_kind(input, tree, launches, kind, runs, sampled, options.common);
+        if (options.common.prints_tables())
+            fmt::print("\n{} rays of {}: SIMD efficiency by width ({} costs, simulated)\n{:<36}",
+                       ray_kind_name(kind), input.scene.name, machine.name, "kernel");
+        for (std::size_t k = 0; k < rows.size(); ++k) {
+            const SimulatedRates rates = rows[k].rates();
+            found.push_back({{"scene", rows[k].scene},
+                             {"kernel", warp_kernel_name(rows[k].options.kernel)},
+                             {"rays", rows[k].rays},
+                             {"machine", machine.name},
+                             {"width", rows[k].options.width},
+                             {"simd_efficiency", rates.simd_efficiency},
+                             {"mrays_per_s_bound", rates.bound},
+                             {"sample", sampled.sample},
+                             {"simulated", true}});
+            if (!options.common.prints_tables()) continue;
+            if (k == 0)
+                for (std::size_t w = 0; w < 7; ++w) fmt::print(" {:>7}", rows[w].options.width);
+            if (rows[k].options.width == 1)
+                fmt::print("\n{:<36}", warp_kernel_name(rows[k].options.kernel));
+            fmt::print(" {:>6.1f}%", 100 * rates.simd_efficiency);
+        }
+        if (options.common.prints_tables()) fmt::print("\n");
+    }
+    return found;
+}
+
+void print_by_machine(const std::vector<SimulationRow>& rows) {
+    std::vector<SimulationRow> group;
+    for (const SimulationRow& row : rows) {
+        if (!group.empty() && group.front().options.machine.name != row.options.machine.name) {
+            print_simulation(group);
+            group.clear();
+        }
+        group.push_back(row);
+    }
+    print_simulation(group);
+}
+
+class TraversalStudy {
+public:
+    explicit TraversalStudy(const TraversalBench& options)
+        : options_(options), document_(new_document("bench traversal")) {
+        for (const char* list :
+             {"scenes", "builds", "machines", "simulate", "measured", "published", "claims",
+              "width_sweep"})
+            document_[list] = Json::array();
+        for (const std::string& name : options.machines) machines_.push_back(machine_from(name));
+        runs_ = runs_of(options, machines_);
+        std::vector<std::string> named;
+        for (const SimulateOptions& run : runs_) {
+            if (std::find(named.begin(), named.end(), run.machine.name) != named.end()) continue;
+            named.push_back(run.machine.name);
+            document_["machines"].push_back(machine_model_json(run.machine));
+        }
+    }
+
+    void run() {
+        for (const std::string& scene : options_.scenes) about(scene, [&] { study(scene); });
+        document_["claims"] = traversal_claims(rows_);
+        if (options_.common.prints_tables()) {
+            print_published(document_["published"], rows_);
+            print_claims(document_["claims"]);
+            fmt::print("\nmeasured: no GPU was used; every rate above is simulated\n");
+        }
+        write_json(document_, options_.common);
+    }
+
+private:
+    void study(const std::string& name) {
+        refuse_build_options(name, options_.tree);
+        const SceneTree input = load_scene_tree(name, options_.tree, options_.common);
+        const std::string& scene = input.scene.name;
+        const std::vector<BuildMs> builds =
+            is_rdx(name) ? std::vector<BuildMs>{} : std::vector{input.bvh.build_ms()};
+        const TreeStats stats =
+            tree_stats(input.bvh, stats_options(options_.tree, options_.common));
+        document_["scenes"].push_back(scene_json(input.scene));
+        document_["builds"].push_back(build_json(input.bvh, stats, builds));
+        const WarpTree tree(input.bvh);
+        if (options_.common.prints_tables())
+            fmt::print("\n{}: {} triangles, {} nodes, SAH {:.1f}, depth {}\n", scene,
+                       grouped(input.scene.mesh.triangles.size()), grouped(stats.nodes),
+                       stats.sah.value_or(0.0), stats.max_depth);
+        const RayLaunches launches(options_.launches, input, options_.common);
+        for (const RayKind kind : kinds_from(options_.rays)) {
+            const std::vector<SimulationRow> rows = simulate_kind(
+                input, tree, launches, kind, runs_, options_.launches, options_.common);
+            for (const SimulationRow& row : rows) {
+                document_["simulate"].push_back(simulation_json(row));
+                rows_.push_back(row);
+            }
+            if (options_.common.prints_tables()) print_by_machine(rows);
+        }
+        for (const Json& row : published_json(scene)) document_["published"].push_back(row);
+        if (options_.sweep_sample <= 0) return;
+        for (const Json& row : sweep_widths(options_, input, tree, machines_.front()))
+            document_["width_sweep"].push_back(row);
+    }
+
+    const TraversalBench& options_;
+    Json document_;
+    std::vector<MachineModel> machines_;
+    std::vector<SimulateOptions> runs_;
+    std::vector<SimulationRow> rows_;
+};
+
+}  // namespace
+
+void add_traversal_suite(CLI::App& bench) {
+    auto options = std::make_shared<TraversalBench>();
+    CLI::App* command = bench.add_subcommand(
+        "traversal",
+        "Kernels of Aila and Laine 2009 on simulated machines, beside what they published");
+    command->add_option("SCENE", options->scenes, "Scenes to study")->capture_default_str();
+    command
+        ->add_option("--machine", options->machines,
+                     fmt::format("Any of {}, or .json files, separated by commas",
+                                 fmt::join(machine_model_names(), ", ")))
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->capture_default_str();
+    command->add_option("--kernel", options->kernel, "Kernels, separated by commas, or all")
+        ->capture_default_str();
+    command
+        ->add_option("--rays", options->rays,
+                     "primary, ao, diffuse, diffuse_shuffled, separated by commas, or all")
+        ->capture_default_str();
+    command
+        ->add_option("--sweep-sample", options->sweep_sample,
+                     "Part of the rays for the sweep of the width from 1 to 64; 0: no sweep")
+        ->check(CLI::Range(0.0, 1.0))
+        ->capture_default_str();
+    command->add_flag("--memory", options->memory,
+                      "Also a first-order memory model, as a column of its own");
+    add_launch_options(*command, options->launches);
+    options->tree.builder = "binned";
+    options->tree.max_leaf = 8;
+    add_tree_options(*command, options->tree);
+    add_common_options(*command, options->common);
+    command->callback([options] {
+        refuse_device(options->tree);
+        TraversalStudy(*options).run();
+    });
+}
+
+}  // namespace raydix::cli
