@@ -1,5 +1,5 @@
-// Rates that the authors measured, Mrays/s: Aila and Laine 2009 (GTX 285) and their addendum of 2012
-// (GTX 480, GTX 680), for primary, ambient occlusion and diffuse rays.
+// Rates that the authors measured, Mrays/s: Aila and Laine 2009 (GTX 285) and their addendum of
+// 2012 (GTX 480, GTX 680), for primary, ambient occlusion and diffuse rays.
 #pragma once
 
 #include <array>

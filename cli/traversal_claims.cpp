@@ -38,12 +38,12 @@ constexpr Claim claims[] = {
      old, Figure::bound, 2.0},
     {per_ray_text, "measured", K::persistent_while_while, K::persistent_packet, R::ao, old, old,
      Figure::bound, 1.3},
-    {"persistent warps gain about twofold for packets", "measured", K::persistent_packet,
-     K::packet, R::primary, old, old, Figure::scheduled, 2.0},
-    {"persistent warps gain about 1.5 times for while-while", "measured",
-     K::persistent_while_while, K::while_while, R::primary, old, old, Figure::scheduled, 1.5},
-    {"persistent warps gain about 1.5 times for while-while", "measured",
-     K::persistent_while_while, K::while_while, R::diffuse, old, old, Figure::scheduled, 1.5},
+    {"persistent warps gain about twofold for packets", "measured", K::persistent_packet, K::packet,
+     R::primary, old, old, Figure::scheduled, 2.0},
+    {"persistent warps gain about 1.5 times for while-while", "measured", K::persistent_while_while,
+     K::while_while, R::primary, old, old, Figure::scheduled, 1.5},
+    {"persistent warps gain about 1.5 times for while-while", "measured", K::persistent_while_while,
+     K::while_while, R::diffuse, old, old, Figure::scheduled, 1.5},
     {"if-if issues more instructions than while-while", "simulated", K::if_if, K::while_while,
      R::primary, old, old, Figure::instructions, 1.2},
     {"the slowest warps of if-if are about 30 % faster", "simulated", K::while_while, K::if_if,
@@ -55,12 +55,12 @@ constexpr Claim claims[] = {
      K::persistent_while_while, R::ao, old, old, Figure::bound, 1.05},
     {replacement_text, predicted, K::ray_replacement, K::persistent_while_while, R::ao, old, old,
      Figure::bound, 1.2},
-    {replacement_text, predicted, K::ray_replacement, K::persistent_while_while, R::ao, wished,
-     old, Figure::bound, 1.2},
+    {replacement_text, predicted, K::ray_replacement, K::persistent_while_while, R::ao, wished, old,
+     Figure::bound, 1.2},
     {replacement_text, predicted, K::ray_replacement, K::persistent_while_while, R::diffuse, old,
      old, Figure::bound, 1.2},
-    {replacement_text, predicted, K::ray_replacement, K::persistent_while_while, R::diffuse,
-     wished, old, Figure::bound, 1.2},
+    {replacement_text, predicted, K::ray_replacement, K::persistent_while_while, R::diffuse, wished,
+     old, Figure::bound, 1.2},
     {queue_text, queue_paper, K::work_queue, K::persistent_while_while, R::ao, old, old,
      Figure::bound, 1.4},
     {queue_text, queue_paper, K::work_queue, K::persistent_while_while, R::ao, wished, old,
@@ -87,12 +87,14 @@ std::optional<double> value_of(const SimulationRow& row, Figure figure) {
     if (row.sum.instructions == 0) return std::nullopt;
     const SimulatedRates rates = row.rates();
     switch (figure) {
-        case Figure::bound: return rates.bound;
+        case Figure::bound:
+            return rates.bound;
         case Figure::scheduled:
             return row.whole_launches ? std::optional(rates.scheduled) : std::nullopt;
         case Figure::instructions:
             return static_cast<double>(row.sum.instructions) / static_cast<double>(row.sum.rays);
-        default: return slowest_warps(row.sum);
+        default:
+            return slowest_warps(row.sum);
     }
 }
 
@@ -107,15 +109,14 @@ const SimulationRow* find_row(const std::vector<SimulationRow>& rows, const std:
 
 std::string found_text(const Claim& claim, double ratio) {
     const bool other = std::string_view(claim.machine) != claim.machine_against;
-    return fmt::format("{:.2f} times ({}{} against {}, {} rays, {}, simulated)", ratio,
-                       warp_kernel_name(claim.kernel),
-                       other ? fmt::format(" on {}", claim.machine) : "",
-                       warp_kernel_name(claim.against), ray_kind_name(claim.kind),
-                       claim.figure == Figure::bound       ? "issue bound"
-                       : claim.figure == Figure::scheduled ? "scheduled"
-                       : claim.figure == Figure::instructions
-                           ? "instructions a ray"
-                           : "time of the slowest 0.1 % of warps");
+    return fmt::format(
+        "{:.2f} times ({}{} against {}, {} rays, {}, simulated)", ratio,
+        warp_kernel_name(claim.kernel), other ? fmt::format(" on {}", claim.machine) : "",
+        warp_kernel_name(claim.against), ray_kind_name(claim.kind),
+        claim.figure == Figure::bound          ? "issue bound"
+        : claim.figure == Figure::scheduled    ? "scheduled"
+        : claim.figure == Figure::instructions ? "instructions a ray"
+                                               : "time of the slowest 0.1 % of warps");
 }
 
 }  // namespace

@@ -212,14 +212,20 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
     std::vector<std::vector<Hit>>& found = hits != nullptr ? *hits : own;
     found.resize(runs.size());
     const PreparedRays prepared(rays);
+    const WarpTree::Arrays& arrays = tree.arrays();
+    const std::array memory{
+        MemoryRange{arrays.pairs.data(), arrays.pairs.view().size_bytes()},
+        MemoryRange{arrays.triangles.data(), arrays.triangles.view().size_bytes()},
+        MemoryRange{arrays.ids.data(), arrays.ids.view().size_bytes()}};
     with_threads(threads, [&] {
         for_each_index(
             runs.size(),
             [&](std::size_t k) {
                 found[k].assign(rays.size(), Hit{});
-                figures[k] = tree.empty() ? without_tree(runs[k], rays.size())
-                                          : simulate_launch(scene_of(tree), tree.max_depth() + 1,
-                                                            prepared.rays(), found[k], runs[k]);
+                figures[k] = tree.empty()
+                                 ? without_tree(runs[k], rays.size())
+                                 : simulate_launch(scene_of(tree), tree.max_depth() + 1,
+                                                   prepared.rays(), found[k], runs[k], memory);
                 prepared.rescale(found[k]);
                 if (hits == nullptr) std::vector<Hit>().swap(found[k]);
             },

@@ -2,6 +2,7 @@
 #include "simt/memory_model.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 namespace raydix {
 namespace {
@@ -27,14 +28,28 @@ bool SectorCache::touch(std::uint64_t number) {
 }
 
 MemoryModel::MemoryModel(std::uint32_t multiprocessors, std::uint64_t l1_bytes,
-                         std::uint64_t l2_bytes)
-    : l1_(multiprocessors, SectorCache(l1_bytes)), l2_(l2_bytes) {}
+                         std::uint64_t l2_bytes, std::span<const MemoryRange> ranges)
+    : l1_(multiprocessors, SectorCache(l1_bytes)), l2_(l2_bytes) {
+    std::uint64_t at = 0;
+    for (const MemoryRange& range : ranges) {
+        const auto begin = reinterpret_cast<std::uintptr_t>(range.begin);
+        ranges_.push_back({begin, begin + range.bytes, at});
+        at += (range.bytes + line_bytes - 1) / line_bytes * line_bytes;
+    }
+}
+
+std::uint64_t MemoryModel::place_of(const void* address) const {
+    const auto place = reinterpret_cast<std::uintptr_t>(address);
+    for (const Range& range : ranges_)
+        if (place >= range.begin && place < range.end) return place - range.begin + range.at;
+    throw std::logic_error("the memory model does not know an address that a kernel reads");
+}
 
 void MemoryModel::read(const void* const* addresses, int count, std::uint32_t bytes) {
     const auto distinct = [&](std::uint64_t unit) {
         numbers_.clear();
         for (int k = 0; k < count; ++k) {
-            const auto first = reinterpret_cast<std::uintptr_t>(addresses[k]);
+            const std::uint64_t first = place_of(addresses[k]);
             for (std::uint64_t n = first / unit; n <= (first + bytes - 1) / unit; ++n)
                 numbers_.push_back(n);
         }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "simt/simulated_warp.h"
@@ -27,9 +28,18 @@ private:
     std::vector<Way> entries_;
 };
 
+/// An array that kernels read.
+struct MemoryRange {
+    const void* begin;
+    std::uint64_t bytes;
+};
+
 class MemoryModel final : public ReadObserver {
 public:
-    MemoryModel(std::uint32_t multiprocessors, std::uint64_t l1_bytes, std::uint64_t l2_bytes);
+    /// `ranges`: all that will be read. They follow each other in the model's own address space, so
+    /// that figures do not depend on where the host put them.
+    MemoryModel(std::uint32_t multiprocessors, std::uint64_t l1_bytes, std::uint64_t l2_bytes,
+                std::span<const MemoryRange> ranges);
 
     void run_on(std::uint32_t multiprocessor) { place_ = multiprocessor; }
     void read(const void* const* addresses, int count, std::uint32_t bytes) override;
@@ -40,6 +50,13 @@ public:
     [[nodiscard]] std::uint64_t dram_bytes() const { return dram_bytes_; }
 
 private:
+    [[nodiscard]] std::uint64_t place_of(const void* address) const;
+
+    struct Range {
+        std::uintptr_t begin, end;
+        std::uint64_t at;  // in the model's address space
+    };
+    std::vector<Range> ranges_;
     std::vector<SectorCache> l1_;
     SectorCache l2_;
     std::uint32_t place_ = 0;

@@ -33,11 +33,12 @@ RAYDIX_HD bool replace_finished(Warp& warp, const RayLaunch& launch, bool& dry) 
     dry = first >= launch.count || launch.count - first <= count;
     if (first >= launch.count) return count < Warp::width();
     warp.when(is_finished, [&] {
-        warp.reads([&](const Lane&) { return launch.rays + first; }, sizeof(Ray));
         warp.step_indexed(Op::rank, [&](Lane& l, std::uint32_t lane) {
             l.ray = first + rank_in(finished, lane);
         });
         warp.step(Op::start_ray, [&](Lane& l) { start_ray(l, launch, l.ray); });
+        warp.reads([&](const Lane& l) { return launch.rays + (has_ray(l) ? l.ray : first); },
+                   sizeof(Ray));
     });
     return true;
 }

@@ -213,7 +213,7 @@ OpCosts op_costs(const MachineModel& machine) {
 
 Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
                            std::span<const Ray> rays, std::span<Hit> hits,
-                           const SimulateOptions& options) {
+                           const SimulateOptions& options, std::span<const MemoryRange> memory) {
     std::uint32_t next = 0;
     LaunchRun run{
         options,
@@ -223,8 +223,12 @@ Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
         op_costs(options.machine),
         nullptr};
     const MachineModel& m = options.machine;
-    if (options.memory)
-        run.memory = std::make_unique<MemoryModel>(m.multiprocessors, m.l1_bytes, m.l2_bytes);
+    if (options.memory) {
+        std::vector<MemoryRange> ranges(memory.begin(), memory.end());
+        ranges.push_back({rays.data(), rays.size_bytes()});
+        run.memory =
+            std::make_unique<MemoryModel>(m.multiprocessors, m.l1_bytes, m.l2_bytes, ranges);
+    }
     Simulation figures = empty_figures(run.costs);
     figures.launches = 1;
     figures.rays = rays.size();

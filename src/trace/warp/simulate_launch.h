@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "simt/memory_model.h"
 #include "simt/op.h"
 #include "trace/warp/lane.h"
 
@@ -15,9 +16,10 @@ namespace raydix {
 [[nodiscard]] OpCosts op_costs(const MachineModel& machine);
 
 /// rays [n], prepared (prepare_rays.h), fewer than 2^31 -> hits [n]. `stack_entries`: at least the
-/// tree's depth.
+/// tree's depth. `memory`: the scene's arrays, for the memory model.
 [[nodiscard]] Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
                                          std::span<const Ray> rays, std::span<Hit> hits,
-                                         const SimulateOptions& options);
+                                         const SimulateOptions& options,
+                                         std::span<const MemoryRange> memory);
 
 }  // namespace raydix

@@ -1,0 +1,143 @@
+"""raydix simulate and bench traversal: figures, machine files, samples, refusals."""
+import json
+import pathlib
+import sys
+
+sys.dont_write_bytecode = True
+from program import ProgramTest, main  # noqa: E402
+
+SCENE = "builtin:grove?triangles=20000"
+SMALL = ("--size", "64x48", "--samples", "4")
+KERNELS = {"packet", "while_while", "if_if", "speculative_while_while", "persistent_packet", "persistent_while_while",
+           "persistent_if_if", "persistent_speculative_while_while", "ray_replacement", "work_queue", "dynamic_fetch"}
+KINDS = {"primary", "ao", "diffuse", "diffuse_shuffled"}
+
+
+class Simulate(ProgramTest):
+    def test_every_kernel_and_kind(self):
+        document = self.document("simulate", SCENE, *SMALL)
+        rows = document["simulate"]
+        self.assertEqual({(r["kernel"], r["rays"]) for r in rows}, {(k, r) for k in KERNELS for r in KINDS})
+        for row in rows:
+            self.assertIs(row["simulated"], True)
+            self.assertEqual(row["different_hits"], 0, row["kernel"])
+            self.assertGreater(row["count"], 0)
+            self.assertEqual(row["mode"], "any" if row["rays"] == "ao" else "closest")
+            self.assertGreater(row["mrays_per_s_bound"], 0)
+            self.assertGreater(row["mrays_per_s_scheduled"], 0)
+            self.assertLessEqual(row["mrays_per_s_scheduled"], row["mrays_per_s_bound"] * 1.000001)
+            self.assertIsNone(row["mrays_per_s_memory"])
+            self.assertEqual(row["sampling_error"], 0)
+            self.assertTrue(0 < row["simd_efficiency"] <= 1)
+            self.assertAlmostEqual(row["instructions_per_ray"] / (row["issues_per_ray"] * 32), row["simd_efficiency"])
+            self.assertTrue(0 <= row["idle_share"] <= 1)
+            self.assertAlmostEqual(sum(op["share"] for op in row["operations"]), 1)
+            self.assertEqual(len(row["histogram"]["edges"]), len(row["histogram"]["counts"]) + 1)
+        by_kind = {kind: {r["hits"] for r in rows if r["rays"] == kind} for kind in KINDS}
+        self.assertTrue(all(len(hits) == 1 for hits in by_kind.values()), by_kind)
+        self.assertEqual(document["machines"][0]["name"], "gtx480")
+
+    def test_same_figures_for_every_thread_count(self):
+        one, two = (self.document("simulate", SCENE, *SMALL, "--rays", "diffuse", "--memory", "--threads", str(n))
+                    for n in (1, 3))
+        for row in one["simulate"] + two["simulate"]:
+            self.assertIsNotNone(row["mrays_per_s_memory"])
+            self.assertLessEqual(row["mrays_per_s_memory"], row["mrays_per_s_bound"] * 1.000001)
+        self.assertEqual(one["simulate"], two["simulate"])
+
+    def test_a_sample_is_near_the_whole(self):
+        arguments = ("simulate", SCENE, "--size", "256x192", "--samples", "8", "--rays", "diffuse", "--kernel",
+                     "while_while,packet", "--launch-rays", "4096")
+        whole, part = self.document(*arguments), self.document(*arguments, "--sample", "0.25")
+        for a, b in zip(whole["simulate"], part["simulate"]):
+            self.assertLess(b["count"], 0.5 * a["count"])
+            self.assertGreater(b["sampling_error"], 0)
+            error = abs(b["mrays_per_s_bound"] / a["mrays_per_s_bound"] - 1)
+            self.assertLess(error, 6 * b["sampling_error"] + 0.02)
+
+    def test_rays_from_a_file(self):
+        self.succeed("trace", SCENE, "--size", "32x24", "--camera", "0", "--repeat", "1", "--save-rays", "rays.npy")
+        document = self.document("simulate", SCENE, "--rays", "rays.npy", "--width", "8")
+        self.assertEqual({row["count"] for row in document["simulate"]}, {32 * 24})
+        self.assertEqual({row["width"] for row in document["simulate"]}, {8})
+
+    def test_machine_files(self):
+        document = self.document("simulate", SCENE, *SMALL, "--rays", "primary", "--kernel", "while_while")
+        before = document["simulate"][0]["mrays_per_s_bound"]
+        file = self.write("twice.json", json.dumps({"base": "gtx480", "name": "twice", "multiprocessors": 30}))
+        twice = self.document("simulate", SCENE, *SMALL, "--rays", "primary", "--kernel", "while_while", "--machine", file)
+        self.assertEqual(twice["machines"][0]["name"], "twice")
+        self.assertAlmostEqual(twice["simulate"][0]["mrays_per_s_bound"], 2 * before)
+        # A machine that a document holds is a machine file.
+        again = self.write("again.json", json.dumps(document["machines"][0]))
+        same = self.document("simulate", SCENE, *SMALL, "--rays", "primary", "--kernel", "while_while", "--machine", again)
+        self.assertEqual(same["simulate"][0]["mrays_per_s_bound"], before)
+
+    def test_bad_machine_files(self):
+        for text, words in (("{", ["JSON"]), ("[]", ["machine", "object"]),
+                            ('{"base": "gtx1"}', ["gtx1", "gtx480"]),
+                            ('{"base": "gtx480", "clock": 2}', ["clock", "not a field"]),
+                            ('{"base": "gtx480", "clock_ghz": -1}', ["clock_ghz"]),
+                            ('{"base": "gtx480", "clock_ghz": "fast"}', ["clock_ghz"]),
+                            ('{"base": "gtx480", "multiprocessors": 0}', ["multiprocessors"]),
+                            ('{"base": "gtx480", "multiprocessors": 1.5}', ["multiprocessors"]),
+                            ('{"base": "gtx480", "multiprocessors": 4000000000}', ["in flight"]),
+                            ('{"base": "gtx480", "costs": {"fly": 1}}', ["fly"]),
+                            ('{"base": "gtx480", "costs": {"push": -1}}', ["push"]),
+                            ('{"base": "gtx480", "costs": [{"operation": "push"}]}', ["instructions"]),
+                            ('{"base": "gtx480", "costs": 3}', ["costs"]),
+                            ('{"name": "bare"}', ["multiprocessors", "missing"])):
+            file = self.write("bad.json", text)
+            self.fail_with_one_line("simulate", SCENE, "--machine", file, names=[*words])
+        self.fail_with_one_line("simulate", SCENE, "--machine", "none.json", names=["none.json"])
+        self.fail_with_one_line("simulate", SCENE, "--machine", "gtx1", names=["gtx1", "gtx285_enum_popc"])
+
+    def test_usage(self):
+        self.fail_with_usage("simulate")
+        self.fail_with_usage("simulate", SCENE, "--kernel", "while", names=["while", "if_if"])
+        self.fail_with_usage("simulate", SCENE, "--rays", "primary,rain", names=["rain"])
+        self.fail_with_usage("simulate", SCENE, "--width", "12")
+        self.fail_with_usage("simulate", SCENE, "--sample", "0")
+        self.fail_with_usage("simulate", SCENE, "--sample", "1.5")
+        self.fail_with_usage("bench", "traversal", SCENE, "--kernel", "x")
+
+    def test_points_are_refused(self):
+        self.fail_with_one_line("simulate", "builtin:uniform?points=100", names=["triangles"])
+
+
+class Traversal(ProgramTest):
+    def test_tables(self):
+        arguments = ("bench", "traversal", SCENE, *SMALL, "--machine", "gtx285,gtx480")
+        document = self.document(*arguments)
+        rows = document["simulate"]
+        self.assertEqual({r["machine"] for r in rows}, {"gtx285", "gtx480", "gtx285_enum_popc"})
+        self.assertEqual(len(rows), 4 * (2 * 11 + 2))
+        self.assertEqual(document["published"], [])
+        self.assertEqual(document["measured"], [])
+        claims = document["claims"]
+        self.assertGreaterEqual(len(claims), 15)
+        bound = {(r["kernel"], r["rays"], r["machine"]): r["mrays_per_s_bound"] for r in rows}
+        queue = [c for c in claims if "work_queue on gtx285_enum_popc" in c["found"] and "ao rays" in c["found"]]
+        self.assertEqual(len(queue), 1)
+        self.assertAlmostEqual(queue[0]["ratio"], bound["work_queue", "ao", "gtx285_enum_popc"] /
+                               bound["persistent_while_while", "ao", "gtx285"])
+        sweep = document["width_sweep"]
+        self.assertEqual(len(sweep), 4 * 11 * 7)
+        for row in sweep:
+            if row["width"] == 1 and row["kernel"] in ("while_while", "if_if"):
+                self.assertAlmostEqual(row["simd_efficiency"], 1)
+        out = self.succeed(*arguments, "--sweep-sample", "0").out
+        for word in ("simulated Mrays/s", "claims", "no GPU was used"):
+            self.assertIn(word, out)
+
+    def test_published_figures_of_the_papers_scenes(self):
+        mesh = pathlib.Path(self.write("conference_copy.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+                                       "property float y\nproperty float z\nelement face 1\n"
+                                       "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"))
+        document = self.document("bench", "traversal", str(mesh), *SMALL, "--sweep-sample", "0", "--rays", "primary")
+        self.assertEqual(len(document["published"]), 15)
+        self.assertTrue(all(row["other_edition"] for row in document["published"]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,309 @@
+// The simulator's figures: counts worked out by hand, costs that move only what uses them, the same
+// figures for every thread count, pools under random delays.
+#include <gtest/gtest.h>
+
+#include <raydix/raydix.h>
+#include <raydix/simulate.h>
+
+#include <atomic>
+#include <cstring>
+#include <thread>
+
+#include "layout/warp_tree.h"
+#include "simt/op.h"
+#include "support/ray_sets.h"
+#include "support/scenes.h"
+#include "support/support.h"
+#include "trace/warp/prepare_rays.h"
+#include "trace/warp/simulated_kernels.h"
+
+namespace raydix::test {
+namespace {
+
+OperationFigure figure(const Simulation& s, Op op) {
+    return s.operations[static_cast<std::size_t>(op)];
+}
+
+void expect_count(const Simulation& s, Op op, std::uint64_t issues, std::uint64_t lanes) {
+    EXPECT_EQ(figure(s, op).issues, issues) << op_name(op);
+    EXPECT_EQ(figure(s, op).lanes, lanes) << op_name(op);
+}
+
+/// Two triangles far apart along x, each a leaf.
+Mesh two_triangles() {
+    Mesh mesh;
+    mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {10, 0, 0}, {11, 0, 0}, {10, 1, 0}};
+    mesh.triangles = {{0, 1, 2}, {3, 4, 5}};
+    return mesh;
+}
+
+Ray down(float x, float y) { return {{x, y, 5}, 0, {0, 0, -1}, infinity}; }
+
+SimulateOptions options_for(WarpKernel kernel) {
+    return {.kernel = kernel, .machine = machine_model("gtx480")};
+}
+
+TEST(Simulate, CountsOfWhileWhileByPencil) {
+    const WarpTree tree(build_bvh(two_triangles(), {.max_leaf = 1}));
+    // 8 rays hit triangle 0, 8 pass beside it within its box, 16 miss everything.
+    std::vector<Ray> rays;
+    for (int k = 0; k < 8; ++k) rays.push_back(down(0.25f, 0.25f));
+    for (int k = 0; k < 8; ++k) rays.push_back(down(0.9f, 0.9f));
+    for (int k = 0; k < 16; ++k) rays.push_back(down(5, 5));
+    const std::vector<SimulateOptions> runs{options_for(WarpKernel::while_while)};
+    std::vector<std::vector<Hit>> hits;
+    const Simulation s = simulate(tree, rays, runs, &hits).front();
+    EXPECT_EQ(s.hits, 8u);
+    expect_count(s, Op::start_ray, 1, 32);
+    expect_count(s, Op::main_loop, 1, 32);
+    expect_count(s, Op::node_loop, 1, 32);
+    expect_count(s, Op::visit_node, 1, 32);
+    expect_count(s, Op::push, 0, 0);
+    expect_count(s, Op::leaf_loop, 1, 16);
+    expect_count(s, Op::test_triangle, 1, 16);
+    expect_count(s, Op::test_edges, 1, 16);
+    expect_count(s, Op::accept_hit, 1, 8);
+    expect_count(s, Op::next_triangle, 1, 16);
+    expect_count(s, Op::pop, 2, 32);  // the misses after the node, the others after the leaf
+    expect_count(s, Op::store_hit, 1, 32);
+    expect_count(s, Op::take_rays, 0, 0);
+    std::uint64_t instructions = 0, lanes = 0;
+    for (const OperationFigure& op : s.operations) {
+        instructions += op.issues * op.instructions;
+        lanes += op.lanes * op.instructions;
+    }
+    EXPECT_EQ(s.instructions, instructions);
+    EXPECT_EQ(s.lane_instructions, lanes);
+    const SimulatedRates rates = simulated_rates(s, runs.front());
+    // 15 multiprocessors issue one instruction a clock at 1.401 GHz.
+    EXPECT_NEAR(rates.bound, 32 / (double(instructions) / (15 * 1401.0)), 1e-9);
+    EXPECT_NEAR(rates.simd_efficiency, double(lanes) / (double(instructions) * 32), 1e-12);
+    // One warp alone issues every 18 clocks.
+    EXPECT_NEAR(s.scheduled_clocks, double(instructions) * 18, 1e-6);
+}
+
+TEST(Simulate, BothChildrenMeanOnePush) {
+    const WarpTree tree(build_bvh(two_triangles(), {.max_leaf = 1}));
+    const std::vector<Ray> rays(5, Ray{{-1, 0.25f, 0.0f}, 0, {1, 0, 0}, infinity});
+    const std::vector<SimulateOptions> runs{options_for(WarpKernel::while_while),
+                                            options_for(WarpKernel::packet)};
+    const auto all = simulate(tree, rays, runs);
+    expect_count(all[0], Op::push, 1, 5);
+    expect_count(all[0], Op::visit_node, 1, 5);
+    expect_count(all[0], Op::test_triangle, 2, 10);
+    expect_count(all[0], Op::pop, 2, 10);
+    expect_count(all[1], Op::visit_node, 1, 5);
+    expect_count(all[1], Op::test_triangle, 2, 10);
+    expect_count(all[1], Op::pop, 1, 32);  // the packet's own stack, by all lanes
+}
+
+TEST(Simulate, ADoubledCostMovesWhatUsesItOnly) {
+    const Scene scene = scene_of(random_soup(500, 3, 0.1f), "soup");
+    const WarpTree tree(build_bvh(scene.mesh));
+    const std::vector<Ray> rays = make_mixed_rays(scene, 640, 3);
+    std::vector<SimulateOptions> runs;
+    for (const WarpKernel kernel : {WarpKernel::while_while, WarpKernel::persistent_packet})
+        runs.push_back(options_for(kernel));
+    const auto before = simulate(tree, rays, runs);
+    for (std::size_t op = 0; op < op_count; ++op) {
+        auto changed = runs;
+        for (SimulateOptions& run : changed)
+            for (OperationCost& cost : run.machine.costs)
+                if (cost.operation == op_names[op]) cost.instructions *= 2;
+        const auto after = simulate(tree, rays, changed);
+        for (std::size_t k = 0; k < runs.size(); ++k) {
+            const std::uint64_t extra =
+                before[k].operations[op].issues * before[k].operations[op].instructions;
+            EXPECT_EQ(after[k].instructions, before[k].instructions + extra) << op_names[op];
+            for (std::size_t other = 0; other < op_count; ++other) {
+                EXPECT_EQ(after[k].operations[other].issues, before[k].operations[other].issues);
+                EXPECT_EQ(after[k].operations[other].lanes, before[k].operations[other].lanes);
+            }
+        }
+    }
+}
+
+TEST(Simulate, OneLaneHasFullEfficiencyAndWidthsAgree) {
+    const Scene scene = scene_of(random_soup(2000, 9, 0.1f), "soup");
+    const WarpTree tree(build_bvh(scene.mesh));
+    const std::vector<Ray> rays = make_mixed_rays(scene, 64 * 20, 3);
+    for (const WarpKernel kernel : {WarpKernel::while_while, WarpKernel::if_if}) {
+        std::vector<SimulateOptions> runs;
+        for (const int width : {1, 2, 4, 8, 16, 32, 64}) {
+            runs.push_back(options_for(kernel));
+            runs.back().width = width;
+        }
+        const auto all = simulate(tree, rays, runs);
+        EXPECT_DOUBLE_EQ(simulated_rates(all.front(), runs.front()).simd_efficiency, 1.0);
+        // What a ray does is its own affair: sums over lanes do not depend on the width.
+        for (std::size_t k = 1; k < all.size(); ++k) {
+            for (const Op op : {Op::visit_node, Op::push, Op::test_triangle, Op::test_edges,
+                                Op::accept_hit, Op::next_triangle, Op::pop})
+                EXPECT_EQ(figure(all[k], op).lanes, figure(all.front(), op).lanes) << op_name(op);
+            EXPECT_LE(all[k].instructions, all[k - 1].instructions);
+            EXPECT_LE(simulated_rates(all[k], runs[k]).simd_efficiency,
+                      simulated_rates(all[k - 1], runs[k - 1]).simd_efficiency);
+        }
+    }
+}
+
+bool same(const Simulation& a, const Simulation& b) {
+    bool equal = a.instructions == b.instructions && a.lane_instructions == b.lane_instructions &&
+                 a.scheduled_clocks == b.scheduled_clocks && a.idle_issues == b.idle_issues &&
+                 a.warp_times == b.warp_times && a.l1_transactions == b.l1_transactions &&
+                 a.l2_bytes == b.l2_bytes && a.dram_bytes == b.dram_bytes && a.hits == b.hits;
+    for (std::size_t k = 0; k < a.operations.size(); ++k)
+        equal = equal && a.operations[k].issues == b.operations[k].issues &&
+                a.operations[k].lanes == b.operations[k].lanes;
+    return equal;
+}
+
+TEST(Simulate, FiguresDoNotDependOnThreads) {
+    const Scene scene = scene_of(random_soup(3000, 4, 0.1f), "soup");
+    const WarpTree tree(build_bvh(scene.mesh));
+    const std::vector<Ray> rays = make_mixed_rays(scene, 1000 * thorough, 8);
+    std::vector<SimulateOptions> runs;
+    for (const WarpKernel kernel : warp_kernels())
+        for (const bool any_hit : {false, true}) {
+            runs.push_back(options_for(kernel));
+            runs.back().any_hit = any_hit;
+        }
+    const auto one = simulate(tree, rays, runs, nullptr, 1);
+    for (const int threads : {2, 7}) {
+        const auto many = simulate(tree, rays, runs, nullptr, threads);
+        for (std::size_t k = 0; k < runs.size(); ++k)
+            EXPECT_TRUE(same(one[k], many[k])) << warp_kernel_name(runs[k].kernel);
+    }
+}
+
+TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
+    if (simulated_kernel(WarpKernel::packet, false, 32, SimulatorIsa::v3) == nullptr)
+        GTEST_SKIP() << "no AVX2 and FMA here";
+    const Scene scene = scene_of(random_soup(1000, 4, 0.1f), "soup");
+    const WarpTree tree(build_bvh(scene.mesh));
+    const PreparedRays rays(make_mixed_rays(scene, 640, 8));
+    const auto& arrays = tree.arrays();
+    OpCosts costs;
+    costs.fill(1);
+    for (const WarpKernel name : warp_kernels()) {
+        std::vector<std::vector<Hit>> hits;
+        std::vector<std::uint64_t> issued;
+        for (const SimulatorIsa isa : {SimulatorIsa::base, SimulatorIsa::v3}) {
+            const SimulatedKernel& kernel = *simulated_kernel(name, false, 32, isa);
+            WarpTally tally;
+            Buffer<std::byte> memory(kernel.warp_bytes(tree.max_depth() + 1));
+            std::uint32_t next = 0;
+            hits.emplace_back(640);
+            const WarpJob job{{arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
+                              {rays.rays().data(), hits.back().data(), 640, &next}};
+            kernel.start_warp(memory.data(), {&costs, &tally, nullptr, tree.max_depth() + 1});
+            for (std::uint32_t warp = 0; warp < 20; ++warp) {
+                KernelState state;
+                kernel.start_kernel(state);
+                while (kernel.turn(memory.data(), state, job, warp)) {
+                }
+            }
+            issued.push_back(tally.issued);
+        }
+        EXPECT_EQ(issued[0], issued[1]) << warp_kernel_name(name);
+        EXPECT_EQ(std::memcmp(hits[0].data(), hits[1].data(), 640 * sizeof(Hit)), 0)
+            << warp_kernel_name(name);
+    }
+}
+
+/// Warps on real threads that wait at random between turns, on one pool.
+TEST(Simulate, PoolsLoseAndRepeatNoRayWhateverTheDelays) {
+    const Scene scene = scene_of(random_soup(1000, 4, 0.1f), "soup");
+    const WarpTree tree(build_bvh(scene.mesh));
+    std::vector<Ray> some = make_mixed_rays(scene, 977, 8);
+    for (std::size_t i = 0; i < some.size(); i += 3) some[i].tmax = 0.0f;  // very short lives
+    const PreparedRays rays(some);
+    const auto count = static_cast<std::uint32_t>(some.size());
+    std::vector<Hit> expected(count);
+    trace_reference(tree, some, expected);
+    const std::vector<SimulateOptions> reference_run{options_for(WarpKernel::while_while)};
+    const std::uint64_t visits =
+        figure(simulate(tree, some, reference_run).front(), Op::visit_node).lanes;
+    const auto& arrays = tree.arrays();
+    OpCosts costs;
+    costs.fill(1);
+    for (const WarpKernel name :
+         {WarpKernel::persistent_while_while, WarpKernel::ray_replacement, WarpKernel::work_queue,
+          WarpKernel::dynamic_fetch, WarpKernel::persistent_packet}) {
+        SCOPED_TRACE(warp_kernel_name(name));
+        const SimulatedKernel& kernel = *simulated_kernel(name, false, 8);
+        constexpr int warps = 6;
+        std::vector<WarpTally> tallies(warps);
+        std::vector<Hit> hits(count, Hit{-5.0f, 7u, 0, 0});
+        std::uint32_t next = 0;
+        const WarpJob job{{arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
+                          {rays.rays().data(), hits.data(), count, &next}};
+        std::vector<std::thread> threads;
+        for (int w = 0; w < warps; ++w)
+            threads.emplace_back([&, w] {
+                std::mt19937 random(static_cast<unsigned>(w) + 100u);
+                Buffer<std::byte> memory(kernel.warp_bytes(tree.max_depth() + 1));
+                kernel.start_warp(memory.data(),
+                                  {&costs, &tallies[w], nullptr, tree.max_depth() + 1});
+                KernelState state;
+                kernel.start_kernel(state);
+                while (kernel.turn(memory.data(), state, job, static_cast<std::uint32_t>(w)))
+                    if (random() % 4 == 0)
+                        std::this_thread::sleep_for(std::chrono::microseconds(random() % 200));
+            });
+        for (std::thread& thread : threads) thread.join();
+        rays.rescale(hits);
+        std::uint64_t visited = 0;
+        for (const WarpTally& tally : tallies)
+            visited += tally.counts[static_cast<std::size_t>(Op::visit_node)].lanes;
+        if (name != WarpKernel::dynamic_fetch && name != WarpKernel::persistent_packet) {
+            EXPECT_EQ(visited, visits) << "a ray was lost or traced twice";
+        }
+        for (std::uint32_t i = 0; i < count; ++i)
+            ASSERT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(Hit)), 0) << i;
+    }
+}
+
+TEST(Simulate, EmptyTreesAndNoRays) {
+    const WarpTree nothing(build_bvh(Mesh{}));
+    std::vector<SimulateOptions> runs;
+    for (const WarpKernel kernel : warp_kernels()) runs.push_back(options_for(kernel));
+    const std::vector<Ray> rays(3, down(0, 0));
+    std::vector<std::vector<Hit>> hits;
+    for (const Simulation& s : simulate(nothing, rays, runs, &hits)) {
+        EXPECT_EQ(s.rays, 3u);
+        EXPECT_EQ(s.hits, 0u);
+    }
+    for (const auto& row : hits)
+        for (const Hit& hit : row) EXPECT_FALSE(hit.hit());
+    const WarpTree tree(build_bvh(two_triangles()));
+    for (const Simulation& s : simulate(tree, {}, runs)) EXPECT_EQ(s.rays, 0u);
+}
+
+TEST(Simulate, RefusesWhatItCannotRun) {
+    const WarpTree tree(build_bvh(two_triangles()));
+    const auto refuse = [&](const char* word, auto change) {
+        SimulateOptions options = options_for(WarpKernel::packet);
+        change(options);
+        try {
+            static_cast<void>(simulate(tree, {}, std::span(&options, 1)));
+            FAIL() << word;
+        } catch (const InputError& error) {
+            EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
+        }
+    };
+    refuse("width", [](SimulateOptions& o) { o.width = 3; });
+    refuse("width", [](SimulateOptions& o) { o.width = 128; });
+    refuse("clock_ghz", [](SimulateOptions& o) { o.machine.clock_ghz = 0; });
+    refuse("multiprocessors", [](SimulateOptions& o) { o.machine.multiprocessors = 0; });
+    refuse("in flight", [](SimulateOptions& o) { o.machine.resident_lanes = 1u << 30; });
+    refuse("has no cost", [](SimulateOptions& o) { o.machine.costs.pop_back(); });
+    refuse("two costs", [](SimulateOptions& o) { o.machine.costs.push_back(o.machine.costs[0]); });
+    refuse("no operation", [](SimulateOptions& o) { o.machine.costs[0].operation = "jump"; });
+    EXPECT_THROW(static_cast<void>(machine_model("gtx1")), InputError);
+    EXPECT_THROW(static_cast<void>(warp_kernel_from_name("while")), InputError);
+    EXPECT_THROW(WarpTree(build_bvh(std::vector<Vec3>{{0, 0, 0}})), InputError);
+}
+
+}  // namespace
+}  // namespace raydix::test
