@@ -29,8 +29,9 @@ struct Fixture {
 TEST(SimulatedWarp, LoopRunsForTheLanesThatWantIt) {
     Fixture<8> f;
     for (int k = 0; k < 8; ++k) f.warp.lanes[k].left = k;
-    f.warp.loop(Op::main_loop, [](const Counter& l) { return l.left > 0; },
-                [&] { f.warp.step(Op::visit_node, [](Counter& l) { --l.left, ++l.done; }); });
+    f.warp.loop(
+        Op::main_loop, [](const Counter& l) { return l.left > 0; },
+        [&] { f.warp.step(Op::visit_node, [](Counter& l) { --l.left, ++l.done; }); });
     for (int k = 0; k < 8; ++k) EXPECT_EQ(f.warp.lanes[k].done, k);
     // The longest lane makes 7 turns; 0 + 1 + ... + 7 lanes work in them.
     EXPECT_EQ(f.of(Op::visit_node), (OpCount{7, 28}));
@@ -42,13 +43,16 @@ TEST(SimulatedWarp, LoopRunsForTheLanesThatWantIt) {
 TEST(SimulatedWarp, NestedLoopsRestoreTheMask) {
     Fixture<4> f;
     for (int k = 0; k < 4; ++k) f.warp.lanes[k].left = k + 1;
-    f.warp.loop(Op::main_loop, [](const Counter& l) { return l.left > 0; }, [&] {
-        const LaneMask outside = f.warp.active();
-        f.warp.step(Op::visit_node, [](Counter& l) { l.inner = l.left--; });
-        f.warp.loop(Op::leaf_loop, [](const Counter& l) { return l.inner > 0; },
-                    [&] { f.warp.step(Op::test_triangle, [](Counter& l) { --l.inner, ++l.done; }); });
-        EXPECT_EQ(f.warp.active(), outside);
-    });
+    f.warp.loop(
+        Op::main_loop, [](const Counter& l) { return l.left > 0; },
+        [&] {
+            const LaneMask outside = f.warp.active();
+            f.warp.step(Op::visit_node, [](Counter& l) { l.inner = l.left--; });
+            f.warp.loop(
+                Op::leaf_loop, [](const Counter& l) { return l.inner > 0; },
+                [&] { f.warp.step(Op::test_triangle, [](Counter& l) { --l.inner, ++l.done; }); });
+            EXPECT_EQ(f.warp.active(), outside);
+        });
     for (int k = 0; k < 4; ++k) EXPECT_EQ(f.warp.lanes[k].done, (k + 1) * (k + 2) / 2);
     EXPECT_EQ(f.of(Op::visit_node), (OpCount{4, 10}));
     // Turn 1 has lanes of 1, 2, 3, 4; turn 2 of 1, 2, 3; turn 3 of 1, 2; turn 4 of 1.
@@ -63,7 +67,8 @@ TEST(SimulatedWarp, NothingIsChargedWithoutLanes) {
     bool ran = false;
     f.warp.when(never, [&] { ran = true; });
     f.warp.loop(Op::main_loop, never, [&] { ran = true; });
-    f.warp.voting_loop(Op::main_loop, never, [&] { ran = true; }, [] { return true; });
+    f.warp.voting_loop(
+        Op::main_loop, never, [&] { ran = true; }, [] { return true; });
     f.warp.among(0, [&] { ran = true; });
     EXPECT_FALSE(ran);
     EXPECT_EQ(f.tally.issued, 0u);
@@ -81,9 +86,9 @@ TEST(SimulatedWarp, VotesCountTheMembersOnly) {
         EXPECT_EQ(f.warp.ballot(Op::ballot, odd), 0b00001010u);
         EXPECT_FALSE(f.warp.any(Op::vote, [](const Counter& l) { return l.left > 3; }));
         f.warp.when(odd, [&] {
-            EXPECT_EQ(f.warp.ballot_indexed(Op::rank, [](const Counter&, std::uint32_t lane) {
-                return lane < 2;
-            }), 0b00000010u);
+            EXPECT_EQ(f.warp.ballot_indexed(
+                          Op::rank, [](const Counter&, std::uint32_t lane) { return lane < 2; }),
+                      0b00000010u);
         });
     });
     EXPECT_EQ(f.of(Op::ballot), (OpCount{2, 12}));
@@ -127,8 +132,9 @@ std::uint64_t lane_steps() {
     for (int first = 0; first < 64; first += Width) {
         Fixture<Width> f;
         for (int k = 0; k < Width; ++k) f.warp.lanes[k].left = (first + k) * 7 % 13;
-        f.warp.loop(Op::main_loop, [](const Counter& l) { return l.left > 0; },
-                    [&] { f.warp.step(Op::visit_node, [](Counter& l) { --l.left; }); });
+        f.warp.loop(
+            Op::main_loop, [](const Counter& l) { return l.left > 0; },
+            [&] { f.warp.step(Op::visit_node, [](Counter& l) { --l.left; }); });
         sum += f.of(Op::visit_node).lanes;
         if (Width == 1) {
             EXPECT_EQ(f.of(Op::visit_node).lanes, f.of(Op::visit_node).issues);

@@ -42,16 +42,17 @@ struct Lane {
     std::int32_t* stack;                // [max_depth + 1]
 };
 
-RAYDIX_HD inline bool is_finished(const Lane& l) { return l.node == finished_node; }
-RAYDIX_HD inline bool is_unfinished(const Lane& l) { return l.node != finished_node; }
-RAYDIX_HD inline bool at_inner_node(const Lane& l) {
+// Static: this is compiled for several instruction sets, and no version may stand in for another.
+RAYDIX_HD static inline bool is_finished(const Lane& l) { return l.node == finished_node; }
+RAYDIX_HD static inline bool is_unfinished(const Lane& l) { return l.node != finished_node; }
+RAYDIX_HD static inline bool at_inner_node(const Lane& l) {
     return static_cast<std::uint32_t>(l.node) < static_cast<std::uint32_t>(popped_node);
 }
-RAYDIX_HD inline bool at_leaf(const Lane& l) { return l.node < 0; }
-RAYDIX_HD inline bool must_pop(const Lane& l) { return l.node == popped_node; }
-RAYDIX_HD inline bool must_push(const Lane& l) { return l.aside != finished_node; }
-RAYDIX_HD inline bool has_leaf_aside(const Lane& l) { return l.leaf != 0; }
-RAYDIX_HD inline bool has_ray(const Lane& l) { return l.ray != no_ray; }
+RAYDIX_HD static inline bool at_leaf(const Lane& l) { return l.node < 0; }
+RAYDIX_HD static inline bool must_pop(const Lane& l) { return l.node == popped_node; }
+RAYDIX_HD static inline bool must_push(const Lane& l) { return l.aside != finished_node; }
+RAYDIX_HD static inline bool has_leaf_aside(const Lane& l) { return l.leaf != 0; }
+RAYDIX_HD static inline bool has_ray(const Lane& l) { return l.ray != no_ray; }
 
 /// The rays of one launch and where their hits go.
 struct RayLaunch {

@@ -15,7 +15,7 @@
 namespace raydix {
 
 /// Bits of `mask` below lane `lane`.
-RAYDIX_HD inline std::uint32_t rank_in(LaneMask mask, std::uint32_t lane) {
+RAYDIX_HD static inline std::uint32_t rank_in(LaneMask mask, std::uint32_t lane) {
     return static_cast<std::uint32_t>(count_ones(mask & ((LaneMask{1} << lane) - 1)));
 }
 

@@ -16,7 +16,7 @@
 namespace raydix {
 
 /// a * b + c, rounded once.
-RAYDIX_HD inline float multiply_add(float a, float b, float c) {
+RAYDIX_HD static inline float multiply_add(float a, float b, float c) {
 #if defined(__CUDA_ARCH__)
     return __fmaf_rn(a, b, c);
 #elif defined(__FMA__)
@@ -27,14 +27,14 @@ RAYDIX_HD inline float multiply_add(float a, float b, float c) {
 }
 
 // One instruction each on a GPU; nothing here is NaN.
-RAYDIX_HD inline float lesser(float a, float b) {
+RAYDIX_HD static inline float lesser(float a, float b) {
 #if defined(__CUDA_ARCH__)
     return fminf(a, b);
 #else
     return min_of(a, b);
 #endif
 }
-RAYDIX_HD inline float greater(float a, float b) {
+RAYDIX_HD static inline float greater(float a, float b) {
 #if defined(__CUDA_ARCH__)
     return fmaxf(a, b);
 #else
@@ -43,14 +43,14 @@ RAYDIX_HD inline float greater(float a, float b) {
 }
 
 /// 1 / d, where components closer to 0 than 2^-80 become that (Aila and Laine's release).
-RAYDIX_HD inline float inverse_of(float d) {
+RAYDIX_HD static inline float inverse_of(float d) {
     constexpr float least = 0x1p-80f;
     const bool tiny = (d < 0 ? -d : d) < least;
     return 1.0f / (tiny ? (std::signbit(d) ? -least : least) : d);
 }
 
 /// Lane and ray `index` of the launch; past its end, and for invalid rays, the lane is finished.
-RAYDIX_HD inline void start_ray(Lane& l, const RayLaunch& launch, std::uint32_t index) {
+RAYDIX_HD static inline void start_ray(Lane& l, const RayLaunch& launch, std::uint32_t index) {
     const bool there = index < launch.count;
     l.ray = there ? index : no_ray;
     l.node = finished_node;
@@ -71,15 +71,15 @@ RAYDIX_HD inline void start_ray(Lane& l, const RayLaunch& launch, std::uint32_t 
     l.node = ray.tmin <= ray.tmax ? 0 : finished_node;
 }
 
-RAYDIX_HD inline void store_hit(Lane& l, const RayLaunch& launch) {
+RAYDIX_HD static inline void store_hit(Lane& l, const RayLaunch& launch) {
     if (l.ray != no_ray)
         launch.hits[l.ray] = Hit{l.prim == no_primitive ? infinity : l.t, l.prim, l.u, l.v};
     l.ray = no_ray;
 }
 
 /// Interval of the ray inside a box: planes in the order lo, hi of x, y, z.
-RAYDIX_HD inline void clip_to_box(const Lane& l, const float (&planes)[6], float& near,
-                                  float& far) {
+RAYDIX_HD static inline void clip_to_box(const Lane& l, const float (&planes)[6], float& near,
+                                         float& far) {
     const float x0 = multiply_add(planes[0], l.inverse.x, -l.scaled.x),
                 x1 = multiply_add(planes[1], l.inverse.x, -l.scaled.x),
                 y0 = multiply_add(planes[2], l.inverse.y, -l.scaled.y),
@@ -94,7 +94,7 @@ RAYDIX_HD inline void clip_to_box(const Lane& l, const float (&planes)[6], float
 struct PairVisit {
     bool first, second, second_is_closer;
 };
-RAYDIX_HD inline PairVisit meet_pair(const Lane& l, const NodePair& n) {
+RAYDIX_HD static inline PairVisit meet_pair(const Lane& l, const NodePair& n) {
     float near0, far0, near1, far1;
     clip_to_box(l, {n.c0_xlo, n.c0_xhi, n.c0_ylo, n.c0_yhi, n.c0_zlo, n.c0_zhi}, near0, far0);
     clip_to_box(l, {n.c1_xlo, n.c1_xhi, n.c1_ylo, n.c1_yhi, n.c1_zlo, n.c1_zhi}, near1, far1);
@@ -102,7 +102,7 @@ RAYDIX_HD inline PairVisit meet_pair(const Lane& l, const NodePair& n) {
 }
 
 /// Both children are tested; the lane goes to the closer, and the other is set aside.
-RAYDIX_HD inline void visit_node(Lane& l, const WarpScene& scene) {
+RAYDIX_HD static inline void visit_node(Lane& l, const WarpScene& scene) {
     const NodePair n = scene.pairs[l.node];
     const PairVisit visit = meet_pair(l, n);
     const bool both = visit.first & visit.second;
@@ -113,19 +113,19 @@ RAYDIX_HD inline void visit_node(Lane& l, const WarpScene& scene) {
     l.node = (visit.first | visit.second) ? closer : popped_node;
 }
 
-RAYDIX_HD inline void push(Lane& l) {
+RAYDIX_HD static inline void push(Lane& l) {
     l.stack[l.top++] = l.aside;
     l.aside = finished_node;
 }
 
-RAYDIX_HD inline void pop(Lane& l) {
+RAYDIX_HD static inline void pop(Lane& l) {
     const bool empty = l.top == 0;
     l.top -= empty ? 0 : 1;
     l.node = empty ? finished_node : l.stack[l.top];
 }
 
 /// The plane of triangle `position`: t along the ray.
-RAYDIX_HD inline void test_plane(Lane& l, const WarpScene& scene, std::uint32_t position) {
+RAYDIX_HD static inline void test_plane(Lane& l, const WarpScene& scene, std::uint32_t position) {
     const float* z = scene.triangles[position].z;
     const float height = multiply_add(
         -z[0], l.origin.x, multiply_add(-z[1], l.origin.y, multiply_add(-z[2], l.origin.z, z[3])));
@@ -134,12 +134,12 @@ RAYDIX_HD inline void test_plane(Lane& l, const WarpScene& scene, std::uint32_t 
     l.test_t = height / slope;
 }
 /// False for NaN, which is what triangles without area give.
-RAYDIX_HD inline bool plane_in_range(const Lane& l) {
+RAYDIX_HD static inline bool plane_in_range(const Lane& l) {
     return l.test_t >= l.tmin && l.test_t <= l.t;
 }
 
 /// Where the ray pierces the plane, in the triangle's own axes.
-RAYDIX_HD inline void test_edges(Lane& l, const WarpScene& scene, std::uint32_t position) {
+RAYDIX_HD static inline void test_edges(Lane& l, const WarpScene& scene, std::uint32_t position) {
     const WoopTriangle& triangle = scene.triangles[position];
     const auto along = [&](const float* row) {
         const float start = multiply_add(
@@ -152,12 +152,12 @@ RAYDIX_HD inline void test_edges(Lane& l, const WarpScene& scene, std::uint32_t 
     l.test_u = along(triangle.x);
     l.test_v = along(triangle.y);
 }
-RAYDIX_HD inline bool inside_edges(const Lane& l) {
+RAYDIX_HD static inline bool inside_edges(const Lane& l) {
     return l.test_u >= 0.0f && l.test_v >= 0.0f && l.test_u + l.test_v <= 1.0f;
 }
 
 /// At equal t the lower primitive wins, whatever order leaves come in.
-RAYDIX_HD inline void accept_hit(Lane& l, const WarpScene& scene, std::uint32_t position) {
+RAYDIX_HD static inline void accept_hit(Lane& l, const WarpScene& scene, std::uint32_t position) {
     const std::uint32_t id = scene.ids[position] & ~last_in_leaf;
     const bool better = l.test_t < l.t || id < l.prim;
     l.t = better ? l.test_t : l.t;
@@ -167,8 +167,8 @@ RAYDIX_HD inline void accept_hit(Lane& l, const WarpScene& scene, std::uint32_t 
 }
 
 /// A leaf link one triangle further; `done` if that was the last of its leaf.
-RAYDIX_HD inline std::int32_t after_triangle(std::int32_t link, const WarpScene& scene,
-                                             std::int32_t done) {
+RAYDIX_HD static inline std::int32_t after_triangle(std::int32_t link, const WarpScene& scene,
+                                                    std::int32_t done) {
     return (scene.ids[~link] & last_in_leaf) != 0 ? done : link - 1;
 }
 

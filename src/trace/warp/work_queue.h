@@ -20,7 +20,7 @@ namespace raydix {
 /// What a ray needs next. Rays are few enough that the three are counted, and the most wanted wins.
 enum class Want : std::uint32_t { node, triangle, fetch };
 
-RAYDIX_HD inline bool wants(const Lane& l, Want want) {
+RAYDIX_HD static inline bool wants(const Lane& l, Want want) {
     return want == Want::node       ? at_inner_node(l)
            : want == Want::triangle ? at_leaf(l)
                                     : is_finished(l);
