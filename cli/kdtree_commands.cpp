@@ -41,6 +41,7 @@ KdTree build_about(const std::string& scene, const Mesh& mesh, const KdTreeOptio
 }  // namespace
 
 KdTreeOptions kdtree_options(const TreeOptions& tree, const CommonOptions& common) {
+    refuse_device_of_tree(tree);
     for (const CLI::Option* option : tree.of_a_bvh)
         if (option->count() != 0)
             throw CLI::ValidationError(option->get_name(),

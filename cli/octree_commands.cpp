@@ -36,6 +36,7 @@ Octree build_about(const std::string& scene, const Mesh& mesh, const OctreeOptio
 }  // namespace
 
 OctreeOptions octree_options(const TreeOptions& tree, const CommonOptions& common) {
+    refuse_device_of_tree(tree);
     for (const CLI::Option* option : tree.of_a_bvh)
         if (option->count() != 0)
             throw CLI::ValidationError(option->get_name(),

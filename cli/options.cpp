@@ -130,6 +130,12 @@ void refuse_device(const TreeOptions& tree) {
                                                    "on the cpu only");
 }
 
+void refuse_device_of_tree(const TreeOptions& tree) {
+    if (tree.device != "cpu")
+        throw CLI::ValidationError(
+            "--device", "a " + tree.device + " device builds a bvh only; " + tree.tree + " on cpu");
+}
+
 void refuse_build_options(const std::string& scene, const TreeOptions& tree) {
     if (!is_rdx(scene)) return;
     for (const CLI::Option* option : tree.of_the_build)
@@ -141,7 +147,7 @@ void refuse_build_options(const std::string& scene, const TreeOptions& tree) {
 SceneTree load_scene_tree(const std::string& name, const TreeOptions& tree,
                           const CommonOptions& common) {
     if (tree.tree != "bvh")
-        throw CLI::ValidationError("--tree", "a " + tree.tree + " does not serve here, only a bvh");
+        throw CLI::ValidationError("--tree", tree.tree + " does not serve here, only bvh");
     if (is_rdx(name)) {
         RdxFile file = load_rdx(name);
         override_cameras(file.scene, tree);

@@ -38,6 +38,7 @@ TreeScene load_octree_scene(const std::string& name, LevelRange levels, const Tr
     TreeOptions shown = tree;
     shown.tree = "bvh";
     shown.max_leaf = BuildOptions().max_leaf;
+    shown.max_level.reset();
     TreeScene scene{load_scene_tree(name, shown, common), {}};
     const Octree octree =
         about(name, [&] { return build_octree(scene.input.scene.mesh, options); });

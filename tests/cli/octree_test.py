@@ -75,7 +75,8 @@ class Octree(ProgramTest):
                         ["build", scene, "--quality", "fast"], ["build", scene, "--fit", "levels"],
                         ["build", scene, "--epo"], ["build", scene, "--sah-node", "2"],
                         ["build", scene, "--max-level", "22"], ["build", scene, "--max-level", "11", "--bits", "30"],
-                        ["check", scene, "--max-level", "-1"]):
+                        ["check", scene, "--max-level", "-1"], ["build", scene, "--device", "cuda"],
+                        ["check", scene, "--device", "cuda"]):
             self.fail_with_usage(*refused, "--tree", "octree")
         for command in (["trace", scene], ["render", scene, "-o", "x.png"]):
             self.fail_with_usage(*command, "--tree", "octree", names=["--tree", "octree", "bvh"])
@@ -85,7 +86,8 @@ class Octree(ProgramTest):
         self.fail_with_usage("trace", "tree.rdx", "--max-level", "3", names=["--max-level"])
 
     def test_pictures(self):
-        for view in (["--view", "tree", "--levels", "1-3"], ["--view", "slice", "--axis", "x", "--at", "0.3"]):
+        for view in (["--view", "tree", "--levels", "1-3"], ["--view", "slice", "--axis", "x", "--at", "0.3"],
+                     ["--view", "tree", "--max-level", "2"]):
             self.succeed("render", SOUP, "--tree", "octree", *view, "--size", "64x48", "-o", "octree.png")
             self.assertEqual((self.folder / "octree.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         self.assertIn("levels 1 to 3", self.succeed("render", SOUP, "--tree", "octree", "--view", "tree", "--levels",
