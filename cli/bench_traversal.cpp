@@ -241,6 +241,7 @@ void add_traversal_suite(CLI::App& bench) {
     command
         ->add_option("--sweep-sample", options->sweep_sample,
                      "Part of the rays for the sweep of the width from 1 to 64; 0: no sweep")
+        ->check(finite_number(true))
         ->check(CLI::Range(0.0, 1.0))
         ->capture_default_str();
     command->add_flag("--memory", options->memory,

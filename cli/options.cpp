@@ -79,6 +79,7 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
                     "Also compute end-point overlap, over this part of the triangles")
         ->expected(0, 1)
         ->default_str("1")
+        ->check(finite_number(false))
         ->check(CLI::Range(1e-9, 1.0))
         ->type_name("SAMPLE")
         ->group(group);

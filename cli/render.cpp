@@ -123,6 +123,7 @@ void add_render_command(CLI::App& app) {
         ->expected(3)
         ->delimiter(',');
     command->add_option("--fov", options->fov, "Vertical field of view in degrees")
+        ->check(finite_number(false))
         ->check(CLI::Range(0.01f, 179.0f));
     command
         ->add_option("--samples", options->samples,

@@ -46,6 +46,9 @@ class Usage(ProgramTest):
         for command in ("info", "build", "trace", "render"):
             self.fail_with_usage(command, names=["SCENE" if command != "render" else "required"])
         self.fail_with_usage("check", names=["SCENE"])
+        self.fail_with_usage("render", SMALL, "-o", "x.png", "--view", "slice", "--at", "nan")
+        self.fail_with_usage("render", SMALL, "-o", "x.png", "--eye", "0", "0", "0", "--fov", "nan")
+        self.fail_with_usage("build", SMALL, "--epo", "nan")
         self.fail_with_usage("check", "--same", SMALL)
         self.fail_with_usage("check", SMALL, "--same", SMALL, SMALL)
         self.fail_with_usage("render", SMALL, names=["--output"])
