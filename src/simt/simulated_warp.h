@@ -165,9 +165,8 @@ private:
         }
         return found;
     }
-    /// Nothing is issued for a warp without active lanes.
+    /// Policies run bodies for at least one lane, so a charged step always has one.
     void charge(Op op) {
-        if (active_ == 0) return;
         OpCount& count = tally->counts[static_cast<std::size_t>(op)];
         ++count.issues;
         count.lanes += static_cast<std::uint64_t>(std::popcount(active_));
