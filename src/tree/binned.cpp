@@ -1,11 +1,13 @@
 #include "tree/binned.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <vector>
 
 #include "base/math.h"
 #include "exec/parallel.h"
+#include "tree/small_splits.h"
 
 namespace raydix {
 namespace {
@@ -49,12 +51,10 @@ public:
     /// whose left side ends there at m is node m - 1.
     ClusterPart run(std::span<SplitBox> list, SplitBox* spare, std::uint32_t node_base,
                     std::uint32_t depth) {
-        if (list.size() == 1) return primitive(list[0]);
+        if (list.size() <= small_boxes) return run_small(list, node_base);
         SplitBox* from = list.data();
         std::size_t left = list.size() / 2;
-        if (list.size() == 3) {
-            left = single_first(list);
-        } else if (list.size() > 3 && depth < deepest_split) {
+        if (depth < deepest_split) {
             const BinGrid grid(list);
             if (const auto split = find_split(list, grid)) {
                 divide_boxes(list, grid, *split, spare);
@@ -71,32 +71,39 @@ public:
     }
 
 private:
-    /// Of three boxes the one that is best left alone comes first: no bins needed.
-    static std::size_t single_first(std::span<SplitBox> list) {
-        float least = infinity;
-        std::size_t single = 0;
-        for (std::size_t k = 0; k < 3; ++k) {
-            const SplitBox &a = list[k == 0 ? 1 : 0], &b = list[k == 2 ? 1 : 2];
-            const float cost = cluster_area({list[k].lo, list[k].hi}) +
-                               2.0f * cluster_area(unite({a.lo, a.hi}, {b.lo, b.hi}));
-            if (cost < least) {
-                least = cost;
-                single = k;
-            }
+    ClusterPart run_small(std::span<const SplitBox> list, std::uint32_t node_base) {
+        for (std::size_t k = 0; k < list.size(); ++k) {
+            small_.set(k, list[k]);
+            firsts_[k] = list[k].first;
         }
-        std::rotate(list.begin(), list.begin() + static_cast<std::ptrdiff_t>(single),
-                    list.begin() + static_cast<std::ptrdiff_t>(single) + 1);
-        return 1;
+        return small_node((1u << list.size()) - 1, node_base);
     }
 
-    [[nodiscard]] ClusterPart primitive(const SplitBox& box) const {
-        const Aabb bounds{box.lo, box.hi};
-        return {primitive_cluster | box.first, bounds, sum_of_primitive(ids_[box.first], bounds)};
+    ClusterPart small_node(LaneSet set, std::uint32_t node_base) {
+        const int count = std::popcount(set);
+        if (count == 1) return small_primitive(static_cast<std::size_t>(std::countr_zero(set)));
+        const LaneSet left = count == 2 ? set & (0u - set) : split_small(small_, set, width_);
+        const auto middle = node_base + static_cast<std::uint32_t>(std::popcount(left));
+        const ClusterPart a = small_node(left, node_base);
+        const ClusterPart b = small_node(set & ~left, middle);
+        const ClusterNode& node = nodes_[middle - 1] = merge_clusters(a, b, max_leaf_);
+        return {middle - 1, {node.lo, node.hi}, node.sum};
+    }
+
+    [[nodiscard]] ClusterPart small_primitive(std::size_t lane) const {
+        const auto& at = small_.at;
+        const Aabb bounds{{at[0][lane], at[1][lane], at[2][lane]},
+                          {-at[3][lane], -at[4][lane], -at[5][lane]}};
+        const std::uint32_t first = firsts_[lane];
+        return {primitive_cluster | first, bounds, sum_of_primitive(ids_[first], bounds)};
     }
 
     std::span<const std::uint32_t> ids_;
     std::uint32_t max_leaf_;
     ClusterNode* nodes_;
+    int width_ = small_split_width();
+    SmallBoxes small_{};
+    std::array<std::uint32_t, small_boxes> firsts_{};
 };
 
 /// A node above the tasks, or a task, over runs [begin, end) of a list.
@@ -163,8 +170,8 @@ private:
                 Aabb box = empty_box();
                 for (std::size_t k = first; k < last; ++k)
                     box = unite(box, boxes_.get(static_cast<std::uint32_t>(k)));
-                *out++ = {box.lo, static_cast<std::uint32_t>(first), box.hi,
-                          static_cast<std::uint32_t>(last - first)};
+                *out++ = SplitBox::of(box, static_cast<std::uint32_t>(first),
+                                      static_cast<std::uint32_t>(last - first));
             });
         });
         return before;
@@ -231,7 +238,7 @@ private:
             for (std::uint32_t k = 0; k < runs[r].count; ++k) {
                 const std::uint32_t place = runs[r].first + k;
                 const Aabb box = boxes_.get(place);
-                *out++ = {box.lo, place, box.hi, 1};
+                *out++ = SplitBox::of(box, place, 1);
             }
     }
 

@@ -28,12 +28,12 @@ public:
         for (const SplitBox& box : boxes) {
             std::array<std::int32_t, 4> bin;
             ((box.center2() - origin) * scale).store_whole(bin.data());
-            const Float4 lo = Float4::load(&box.lo.x), hi = Float4::load(&box.hi.x);
+            const Float4 lo = Float4::load(&box.lo.x), hi = Float4::load(&box.minus_hi.x);
             for (std::size_t axis = 0; axis < 3; ++axis) {
                 const auto b = static_cast<std::size_t>(bin[axis]);
                 Corners& corners = at_[b][axis];
                 corners.lo = min_of(corners.lo, lo);
-                corners.hi = max_of(corners.hi, hi);
+                corners.hi = min_of(corners.hi, hi);
                 ++boxes_[b][axis];
                 primitives_[b][axis] += box.count;
             }
@@ -52,11 +52,11 @@ public:
 
 private:
     struct Corners {
-        Float4 lo = Float4::all(infinity), hi = Float4::all(-infinity);
+        Float4 lo = Float4::all(infinity), hi = Float4::all(infinity);
 
         void add(const Corners& other) {
             lo = min_of(lo, other.lo);
-            hi = max_of(hi, other.hi);
+            hi = min_of(hi, other.hi);
         }
     };
     using PerAxis = std::array<std::uint32_t, 4>;
@@ -75,8 +75,8 @@ private:
         }
         /// Area times count in the lane of each axis; NaN if nothing is on this side.
         [[nodiscard]] Float4 cost() const {
-            Float4 x = corners[0].hi - corners[0].lo, y = corners[1].hi - corners[1].lo,
-                   z = corners[2].hi - corners[2].lo, none = Float4::all(0);
+            Float4 x = corners[0].hi + corners[0].lo, y = corners[1].hi + corners[1].lo,
+                   z = corners[2].hi + corners[2].lo, none = Float4::all(0);
             transpose(x, y, z, none);
             return ((x * y + y * z) + z * x) * Float4::of(primitives.data());
         }
