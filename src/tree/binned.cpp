@@ -56,7 +56,7 @@ public:
         std::size_t left = list.size() / 2;
         if (depth < deepest_split) {
             const BinGrid grid(list);
-            if (const auto split = find_split(list, grid)) {
+            if (const auto split = find_split(list, grid, small_split_width() >= 8)) {
                 divide_boxes(list, grid, *split, spare);
                 std::swap(from, spare);
                 left = split->left_boxes;
@@ -204,7 +204,7 @@ private:
         if (at.primitives <= task_primitives) return;
         const std::span<const SplitBox> list(list_of(at), at.end - at.begin);
         const BinGrid grid(list);
-        const auto split = at.depth < deepest_split ? find_split(list, grid) : std::nullopt;
+        const auto split = at.depth < deepest_split ? find_split(list, grid, small_split_width() >= 8) : std::nullopt;
         if (split) {
             at.in_spare = !at.in_spare;
             divide_boxes(list, grid, *split, list_of(at));

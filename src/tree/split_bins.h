@@ -31,7 +31,7 @@ struct alignas(32) SplitBox {
     }
     /// Twice the centroid.
     [[nodiscard]] Float4 center2() const {
-        return (Float4::load(&lo.x) - Float4::load(&minus_hi.x)).xyz();
+        return Float4::load(&lo.x).xyz() - Float4::load(&minus_hi.x).xyz();
     }
 };
 static_assert(sizeof(SplitBox) == 32);
@@ -67,7 +67,7 @@ struct Split {
 /// The plane with the least area(left) * count(left) + area(right) * count(right), counts of
 /// primitives; of equals the lowest in (axis, bin). If that is 0, as for boxes on a line, the plane
 /// that divides the primitives most evenly. None if all centroids fall into one bin.
-[[nodiscard]] std::optional<Split> find_split(std::span<const SplitBox> boxes, const BinGrid& grid);
+[[nodiscard]] std::optional<Split> find_split(std::span<const SplitBox> boxes, const BinGrid& grid, bool wide);
 
 /// from [n] -> to [n], left ones first, otherwise in the old order.
 void divide_boxes(std::span<const SplitBox> from, const BinGrid& grid, const Split& split,
