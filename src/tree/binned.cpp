@@ -44,8 +44,9 @@ void cut_runs(const Key* keys, std::size_t begin, std::size_t end, const Take& t
 /// A subtree that is built by one thread, over lists that fit into a cache.
 class SubtreeBuild {
 public:
-    SubtreeBuild(std::span<const std::uint32_t> ids, std::uint32_t max_leaf, ClusterNode* nodes)
-        : ids_(ids), max_leaf_(max_leaf), nodes_(nodes) {}
+    SubtreeBuild(std::span<const std::uint32_t> ids, std::uint32_t max_leaf, ClusterNode* nodes,
+                 int width)
+        : ids_(ids), max_leaf_(max_leaf), nodes_(nodes), width_(width) {}
 
     /// `node_base` is the subtree's first place in the list of all primitives of the tree: a node
     /// whose left side ends there at m is node m - 1.
@@ -56,8 +57,9 @@ public:
         std::size_t left = list.size() / 2;
         if (depth < deepest_split) {
             const BinGrid grid(list);
-            if (const auto split = find_split(list, grid, small_split_width() >= 8)) {
-                divide_boxes(list, grid, *split, spare);
+            const bool wide = width_ >= 8;
+            if (const auto split = find_split(list, grid, wide)) {
+                divide_boxes(list, grid, *split, spare, wide);
                 std::swap(from, spare);
                 left = split->left_boxes;
             }
@@ -101,7 +103,7 @@ private:
     std::span<const std::uint32_t> ids_;
     std::uint32_t max_leaf_;
     ClusterNode* nodes_;
-    int width_ = small_split_width();
+    int width_;
     SmallBoxes small_{};
     std::array<std::uint32_t, small_boxes> firsts_{};
 };
@@ -120,13 +122,14 @@ template <class Key>
 class BinnedRun {
 public:
     BinnedRun(std::span<const Key> keys, std::span<const std::uint32_t> ids, const BoxLanes& boxes,
-              std::uint32_t max_leaf, Buffer<ClusterNode>& nodes, BinnedScratch& scratch)
+              std::uint32_t max_leaf, Buffer<ClusterNode>& nodes, BinnedScratch& scratch, int width)
         : keys_(keys),
           ids_(ids),
           boxes_(boxes),
           max_leaf_(max_leaf),
           nodes_(nodes),
-          scratch_(scratch) {}
+          scratch_(scratch),
+          width_(width) {}
 
     ClusterRef run() {
         nodes_.reset(keys_.size() - 1);
@@ -204,10 +207,12 @@ private:
         if (at.primitives <= task_primitives) return;
         const std::span<const SplitBox> list(list_of(at), at.end - at.begin);
         const BinGrid grid(list);
-        const auto split = at.depth < deepest_split ? find_split(list, grid, small_split_width() >= 8) : std::nullopt;
+        const bool wide = width_ >= 8;
+        const auto split =
+            at.depth < deepest_split ? find_split(list, grid, wide) : std::nullopt;
         if (split) {
             at.in_spare = !at.in_spare;
-            divide_boxes(list, grid, *split, list_of(at));
+            divide_boxes(list, grid, *split, list_of(at), wide);
             at.left_runs = split->left_boxes;
             at.left_primitives = split->left_primitives;
         } else {
@@ -223,7 +228,7 @@ private:
         for_each_range(tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
             Buffer<SplitBox> lists(2 * std::size_t{task_primitives});
             SplitBox *list = lists.data(), *spare = list + task_primitives;
-            SubtreeBuild build(ids_, max_leaf_, nodes_.data());
+            SubtreeBuild build(ids_, max_leaf_, nodes_.data(), width_);
             for (std::size_t t = begin; t < end; ++t) {
                 TopNode& task = top[tasks[t]];
                 list_primitives(task, list);
@@ -248,6 +253,7 @@ private:
     std::uint32_t max_leaf_;
     Buffer<ClusterNode>& nodes_;
     BinnedScratch& scratch_;
+    int width_;
 };
 
 }  // namespace
@@ -255,15 +261,15 @@ private:
 template <class Key>
 ClusterRef build_binned(std::span<const Key> keys, std::span<const std::uint32_t> ids,
                         const BoxLanes& boxes, std::uint32_t max_leaf, Buffer<ClusterNode>& nodes,
-                        BinnedScratch& scratch) {
-    return BinnedRun<Key>(keys, ids, boxes, max_leaf, nodes, scratch).run();
+                        BinnedScratch& scratch, int width) {
+    return BinnedRun<Key>(keys, ids, boxes, max_leaf, nodes, scratch, width).run();
 }
 
 template ClusterRef build_binned(std::span<const std::uint32_t>, std::span<const std::uint32_t>,
                                  const BoxLanes&, std::uint32_t, Buffer<ClusterNode>&,
-                                 BinnedScratch&);
+                                 BinnedScratch&, int);
 template ClusterRef build_binned(std::span<const std::uint64_t>, std::span<const std::uint32_t>,
                                  const BoxLanes&, std::uint32_t, Buffer<ClusterNode>&,
-                                 BinnedScratch&);
+                                 BinnedScratch&, int);
 
 }  // namespace raydix

@@ -9,6 +9,7 @@
 
 #include "tree/box_lanes.h"
 #include "tree/cluster.h"
+#include "tree/small_splits.h"
 #include "tree/split_bins.h"
 
 namespace raydix {
@@ -24,17 +25,19 @@ struct BinnedScratch {
 };
 
 /// Sorted keys [n], n >= 1, the ids [n] and boxes [n] of their primitives -> nodes [n - 1]. Returns
-/// the root, which is a primitive if n = 1.
+/// the root, which is a primitive if n = 1. `width`:
+/// how many floats at a time, 4, 8 or 16 where the processor has them; the tree does not depend on
+/// it.
 template <class Key>
 ClusterRef build_binned(std::span<const Key> keys, std::span<const std::uint32_t> ids,
                         const BoxLanes& boxes, std::uint32_t max_leaf, Buffer<ClusterNode>& nodes,
-                        BinnedScratch& scratch);
+                        BinnedScratch& scratch, int width = split_width());
 
 extern template ClusterRef build_binned(std::span<const std::uint32_t>,
                                         std::span<const std::uint32_t>, const BoxLanes&,
-                                        std::uint32_t, Buffer<ClusterNode>&, BinnedScratch&);
+                                        std::uint32_t, Buffer<ClusterNode>&, BinnedScratch&, int);
 extern template ClusterRef build_binned(std::span<const std::uint64_t>,
                                         std::span<const std::uint32_t>, const BoxLanes&,
-                                        std::uint32_t, Buffer<ClusterNode>&, BinnedScratch&);
+                                        std::uint32_t, Buffer<ClusterNode>&, BinnedScratch&, int);
 
 }  // namespace raydix

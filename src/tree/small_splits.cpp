@@ -14,6 +14,7 @@
 #define RAYDIX_WITH_WIDE_LANES
 #define RAYDIX_AVX2 __attribute__((target("avx2")))
 #define RAYDIX_AVX512 __attribute__((target("avx512f")))
+#define RAYDIX_INLINE inline __attribute__((always_inline))
 #endif
 
 namespace raydix {
@@ -84,11 +85,11 @@ struct Sides4 {
     }
 };
 
-/// Takes the lowest of four lanes that is below what was found before.
-void take_4(Found& found, Float4 cost, std::size_t axis, LaneSet first, LaneSet valid) {
-    std::array<float, 4> costs;
-    cost.store(costs.data());
-    for (LaneSet k = 0; k < 4; ++k)
+/// Takes the lowest lane that is below what was found before.
+template <std::size_t lanes>
+void take(Found& found, const std::array<float, lanes>& costs, std::size_t axis, LaneSet first,
+          LaneSet valid) {
+    for (LaneSet k = 0; k < lanes; ++k)
         if ((valid >> (first + k) & 1) != 0 && costs[k] < found.cost)
             found = {costs[k], axis, first + k};
 }
@@ -106,7 +107,9 @@ Found best_of_few_4(const SmallBoxes& boxes, LaneSet set, LaneSet valid) {
             sides.add(boxes, static_cast<std::size_t>(std::countr_zero(rest)),
                       Mask4::load(mask.data()));
         }
-        take_4(found, sides.cost(), 0, first, valid);
+        std::array<float, 4> costs;
+        sides.cost().store(costs.data());
+        take(found, costs, 0, first, valid);
     }
     return found;
 }
@@ -122,21 +125,95 @@ Found best_plane_4(const SmallBoxes& boxes, LaneSet set) {
                 const auto box = static_cast<std::size_t>(std::countr_zero(rest));
                 sides.add(boxes, box, Float4::all(boxes.at[6 + axis][box]) <= plane);
             }
-            take_4(found, sides.cost(), axis, first, set);
+            std::array<float, 4> costs;
+            sides.cost().store(costs.data());
+            take(found, costs, axis, first, set);
         }
     return found;
 }
 
 #if defined(RAYDIX_WITH_WIDE_LANES)
 
+struct Sides8 {
+    __m256 left[6], right[6], left_count;
+};
+RAYDIX_AVX2 RAYDIX_INLINE void begin_8(Sides8& s) {
+    for (int c = 0; c < 6; ++c) s.left[c] = s.right[c] = _mm256_set1_ps(infinity);
+    s.left_count = _mm256_setzero_ps();
+}
+RAYDIX_AVX2 RAYDIX_INLINE void add_8(Sides8& s, const SmallBoxes& boxes, std::size_t box,
+                                     __m256 goes_left) {
+    const __m256 none = _mm256_set1_ps(infinity);
+    for (std::size_t c = 0; c < 6; ++c) {
+        const __m256 value = _mm256_set1_ps(boxes.at.data()[c].data()[box]);
+        s.left[c] = _mm256_min_ps(s.left[c], _mm256_blendv_ps(none, value, goes_left));
+        s.right[c] = _mm256_min_ps(s.right[c], _mm256_blendv_ps(value, none, goes_left));
+    }
+    s.left_count =
+        _mm256_add_ps(s.left_count, _mm256_and_ps(_mm256_set1_ps(1.0f), goes_left));
+}
+RAYDIX_AVX2 RAYDIX_INLINE __m256 area_8(const __m256* box) {
+    const __m256 x = _mm256_add_ps(box[0], box[3]), y = _mm256_add_ps(box[1], box[4]),
+                 z = _mm256_add_ps(box[2], box[5]);
+    return _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(x, y), _mm256_mul_ps(y, z)),
+                         _mm256_mul_ps(z, x));
+}
+RAYDIX_AVX2 RAYDIX_INLINE std::array<float, 8> cost_8(const Sides8& s, int count) {
+    const __m256 right_count =
+        _mm256_sub_ps(_mm256_set1_ps(static_cast<float>(count)), s.left_count);
+    std::array<float, 8> cost;
+    _mm256_storeu_ps(cost.data(), _mm256_add_ps(_mm256_mul_ps(area_8(s.left), s.left_count),
+                                                _mm256_mul_ps(area_8(s.right), right_count)));
+    return cost;
+}
+
+RAYDIX_AVX2 Found best_of_few_8(const SmallBoxes& boxes, LaneSet set, LaneSet valid) {
+    const __m256i bit_of_lane = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    Found found;
+    for (LaneSet first = 0; first < small_boxes && valid >> first != 0; first += 8) {
+        Sides8 sides;
+        begin_8(sides);
+        std::size_t k = 0;
+        for (LaneSet rest = set; rest != 0; rest &= rest - 1, ++k) {
+            const bool last = (rest & (rest - 1)) == 0;
+            const LaneSet bits = last ? 0 : lanes_with_bit.data()[k] >> first;
+            const __m256i mine =
+                _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(bits)), bit_of_lane);
+            add_8(sides, boxes, static_cast<std::size_t>(std::countr_zero(rest)),
+                  _mm256_castsi256_ps(_mm256_cmpeq_epi32(mine, bit_of_lane)));
+        }
+        take(found, cost_8(sides, std::popcount(set)), 0, first, valid);
+    }
+    return found;
+}
+
+RAYDIX_AVX2 Found best_plane_8(const SmallBoxes& boxes, LaneSet set) {
+    Found found;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+        for (LaneSet first = 0; first < small_boxes; first += 8) {
+            if ((set >> first & 255) == 0) continue;
+            const float* centers = boxes.at.data()[6 + axis].data();
+            const __m256 plane = _mm256_load_ps(centers + first);
+            Sides8 sides;
+            begin_8(sides);
+            for (LaneSet rest = set; rest != 0; rest &= rest - 1) {
+                const auto box = static_cast<std::size_t>(std::countr_zero(rest));
+                add_8(sides, boxes, box,
+                      _mm256_cmp_ps(_mm256_set1_ps(centers[box]), plane, _CMP_LE_OQ));
+            }
+            take(found, cost_8(sides, std::popcount(set)), axis, first, set);
+        }
+    return found;
+}
+
 struct Sides16 {
     __m512 left[6], right[6], left_count;
 };
-RAYDIX_AVX512 inline __attribute__((always_inline)) void begin_16(Sides16& s) {
+RAYDIX_AVX512 RAYDIX_INLINE void begin_16(Sides16& s) {
     for (int c = 0; c < 6; ++c) s.left[c] = s.right[c] = _mm512_set1_ps(infinity);
     s.left_count = _mm512_setzero_ps();
 }
-RAYDIX_AVX512 inline __attribute__((always_inline)) void add_16(Sides16& s,
+RAYDIX_AVX512 RAYDIX_INLINE void add_16(Sides16& s,
                                                                 const SmallBoxes& boxes,
                                                                 std::size_t box,
                                                                 __mmask16 goes_left) {
@@ -149,20 +226,20 @@ RAYDIX_AVX512 inline __attribute__((always_inline)) void add_16(Sides16& s,
     s.left_count =
         _mm512_mask_add_ps(s.left_count, goes_left, s.left_count, _mm512_set1_ps(1.0f));
 }
-RAYDIX_AVX512 inline __attribute__((always_inline)) __m512 area_16(const __m512* box) {
+RAYDIX_AVX512 RAYDIX_INLINE __m512 area_16(const __m512* box) {
     const __m512 x = _mm512_add_ps(box[0], box[3]), y = _mm512_add_ps(box[1], box[4]),
                  z = _mm512_add_ps(box[2], box[5]);
     return _mm512_add_ps(_mm512_add_ps(_mm512_mul_ps(x, y), _mm512_mul_ps(y, z)),
                          _mm512_mul_ps(z, x));
 }
-RAYDIX_AVX512 inline __attribute__((always_inline)) __m512 cost_16(const Sides16& s, int count) {
+RAYDIX_AVX512 RAYDIX_INLINE __m512 cost_16(const Sides16& s, int count) {
     const __m512 right_count =
         _mm512_sub_ps(_mm512_set1_ps(static_cast<float>(count)), s.left_count);
     return _mm512_add_ps(_mm512_mul_ps(area_16(s.left), s.left_count),
                          _mm512_mul_ps(area_16(s.right), right_count));
 }
 /// Lanes that are not valid, or NaN, become infinite.
-RAYDIX_AVX512 inline __attribute__((always_inline)) __m512 only_16(__m512 cost, LaneSet valid) {
+RAYDIX_AVX512 RAYDIX_INLINE __m512 only_16(__m512 cost, LaneSet valid) {
     const __m512 none = _mm512_set1_ps(infinity);
     return _mm512_min_ps(_mm512_mask_mov_ps(none, static_cast<__mmask16>(valid), cost), none);
 }
@@ -212,6 +289,7 @@ Found best_of_few(const SmallBoxes& boxes, LaneSet set, int count, [[maybe_unuse
     const LaneSet valid = (1u << (1u << (count - 1))) - 2;  // not the empty set
 #if defined(RAYDIX_WITH_WIDE_LANES)
     if (width == 16) return best_of_few_16(boxes, set, valid);
+    if (width == 8) return best_of_few_8(boxes, set, valid);
 #endif
     return best_of_few_4(boxes, set, valid);
 }
@@ -219,6 +297,7 @@ Found best_of_few(const SmallBoxes& boxes, LaneSet set, int count, [[maybe_unuse
 Found best_plane(const SmallBoxes& boxes, LaneSet set, [[maybe_unused]] int width) {
 #if defined(RAYDIX_WITH_WIDE_LANES)
     if (width == 16) return best_plane_16(boxes, set);
+    if (width == 8) return best_plane_8(boxes, set);
 #endif
     return best_plane_4(boxes, set);
 }
@@ -233,9 +312,11 @@ LaneSet split_small(const SmallBoxes& boxes, LaneSet set, int width) {
     return few ? spread_over(found.lane, set) : up_to(boxes.at[6 + found.axis], set, found.lane);
 }
 
-int small_split_width() {
+int split_width() {
 #if defined(RAYDIX_WITH_WIDE_LANES)
-    static const int width = __builtin_cpu_supports("avx512f") ? 16 : 4;
+    static const int width = __builtin_cpu_supports("avx512f") ? 16
+                             : __builtin_cpu_supports("avx2")  ? 8
+                                                               : 4;
     return width;
 #else
     return 4;

@@ -41,6 +41,6 @@ using LaneSet = std::uint32_t;
 [[nodiscard]] LaneSet split_small(const SmallBoxes& boxes, LaneSet set, int width);
 
 /// 4, 8 or 16: what the processor has.
-[[nodiscard]] int small_split_width();
+[[nodiscard]] int split_width();
 
 }  // namespace raydix

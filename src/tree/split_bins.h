@@ -71,6 +71,6 @@ struct Split {
 
 /// from [n] -> to [n], left ones first, otherwise in the old order.
 void divide_boxes(std::span<const SplitBox> from, const BinGrid& grid, const Split& split,
-                  SplitBox* to);
+                  SplitBox* to, bool wide);
 
 }  // namespace raydix
