@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <vector>
 
@@ -16,6 +17,7 @@ namespace {
 constexpr std::size_t run_primitives = 16;
 /// Runs do not cross multiples of this many places, so that blocks are cut at once.
 constexpr std::size_t run_block = 1024;
+static_assert(run_primitives <= 255, "lengths are bytes");
 /// Subtrees of up to this many primitives are built over primitives, each by one thread: two
 /// lists of them stay in a cache.
 constexpr std::uint32_t task_primitives = 32768;
@@ -154,10 +156,14 @@ private:
         const std::size_t n = keys_.size(), blocks = (n + run_block - 1) / run_block;
         Buffer<std::uint32_t>& counts = scratch_.run_counts;
         counts.reset(blocks);
+        scratch_.run_lengths.reset(n);
+        std::uint8_t* lengths = scratch_.run_lengths.data();  // a block's runs at its first places
         for_each_block(n, run_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
-            std::uint32_t count = 0;
-            cut_runs(keys_.data(), begin, end, [&](std::size_t, std::size_t) { ++count; });
-            counts[b] = count;
+            std::uint8_t* out = lengths + begin;
+            cut_runs(keys_.data(), begin, end, [&](std::size_t first, std::size_t last) {
+                *out++ = static_cast<std::uint8_t>(last - first);
+            });
+            counts[b] = static_cast<std::uint32_t>(out - (lengths + begin));
         });
         std::uint32_t before = 0;
         for (std::size_t b = 0; b < blocks; ++b) {
@@ -169,13 +175,13 @@ private:
         scratch_.spare.reset(before);
         for_each_block(n, run_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
             SplitBox* out = scratch_.runs.data() + counts[b];
-            cut_runs(keys_.data(), begin, end, [&](std::size_t first, std::size_t last) {
+            const std::uint8_t* length = lengths + begin;
+            for (std::size_t first = begin; first < end; first += *length++) {
                 Aabb box = empty_box();
-                for (std::size_t k = first; k < last; ++k)
+                for (std::size_t k = first; k < first + *length; ++k)
                     box = unite(box, boxes_.get(static_cast<std::uint32_t>(k)));
-                *out++ = SplitBox::of(box, static_cast<std::uint32_t>(first),
-                                      static_cast<std::uint32_t>(last - first));
-            });
+                *out++ = SplitBox::of(box, static_cast<std::uint32_t>(first), *length);
+            }
         });
         return before;
     }
@@ -221,20 +227,30 @@ private:
         }
     }
 
+    /// The longest tasks first, each by whichever worker comes next.
     void build_tasks(std::vector<TopNode>& top) {
         std::vector<std::uint32_t> tasks;
         for (std::uint32_t i = 0; i < top.size(); ++i)
             if (top[i].left == 0) tasks.push_back(i);
-        for_each_range(tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
-            Buffer<SplitBox> lists(2 * std::size_t{task_primitives});
-            SplitBox *list = lists.data(), *spare = list + task_primitives;
+        std::sort(tasks.begin(), tasks.end(), [&](std::uint32_t a, std::uint32_t b) {
+            return top[a].primitives > top[b].primitives;
+        });
+        const std::size_t longest = top[tasks.front()].primitives;
+        const std::size_t workers =
+            std::min(tasks.size(), static_cast<std::size_t>(std::max(thread_count(), 1)));
+        scratch_.lists.reset(2 * longest * workers);
+        std::atomic<std::size_t> next = 0;
+        const auto work = [&](std::size_t worker) {
+            SplitBox* list = scratch_.lists.data() + 2 * longest * worker;
+            SplitBox* spare = list + longest;
             SubtreeBuild build(ids_, max_leaf_, nodes_.data(), width_);
-            for (std::size_t t = begin; t < end; ++t) {
+            for (std::size_t t = next++; t < tasks.size(); t = next++) {
                 TopNode& task = top[tasks[t]];
                 list_primitives(task, list);
                 task.part = build.run({list, task.primitives}, spare, task.base, task.depth);
             }
-        });
+        };
+        for_each_index(workers, work, 1);
     }
 
     void list_primitives(const TopNode& task, SplitBox* out) {

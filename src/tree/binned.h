@@ -17,10 +17,13 @@ namespace raydix {
 /// Memory kept from one build to the next.
 struct BinnedScratch {
     Buffer<SplitBox> runs, spare;
+    Buffer<SplitBox> lists;  // two for each worker
     Buffer<std::uint32_t> run_counts;
+    Buffer<std::uint8_t> run_lengths;
 
     [[nodiscard]] std::size_t capacity_bytes() const {
-        return runs.capacity_bytes() + spare.capacity_bytes() + run_counts.capacity_bytes();
+        return runs.capacity_bytes() + spare.capacity_bytes() + lists.capacity_bytes() +
+               run_counts.capacity_bytes() + run_lengths.capacity_bytes();
     }
 };
 

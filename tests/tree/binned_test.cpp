@@ -39,7 +39,7 @@ TEST(BinnedWidths, GiveTheSameTree) {
         boxes.reset(static_cast<std::uint32_t>(input.boxes.size()));
         std::vector<std::uint32_t> ids;
         for (const Aabb& box : input.boxes)
-            if (box.lo.y <= box.hi.y && box.hi.x < infinity) {
+            if (box.lo.x <= box.hi.x && box.lo.y <= box.hi.y && box.hi.x < infinity) {
                 boxes.set(static_cast<std::uint32_t>(ids.size()), box);
                 ids.push_back(static_cast<std::uint32_t>(ids.size()));
             }
