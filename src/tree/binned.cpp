@@ -214,8 +214,7 @@ private:
         const std::span<const SplitBox> list(list_of(at), at.end - at.begin);
         const BinGrid grid(list);
         const bool wide = width_ >= 8;
-        const auto split =
-            at.depth < deepest_split ? find_split(list, grid, wide) : std::nullopt;
+        const auto split = at.depth < deepest_split ? find_split(list, grid, wide) : std::nullopt;
         if (split) {
             at.in_spare = !at.in_spare;
             divide_boxes(list, grid, *split, list_of(at), wide);

@@ -8,7 +8,10 @@
 #if defined(__x86_64__) && defined(__GNUC__)
 // GCC 12 takes the undefined operands of its own intrinsics for mistakes.
 #pragma GCC diagnostic push
+#if !defined(__clang__)
 #pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#endif
 #include <immintrin.h>
 #pragma GCC diagnostic pop
 #define RAYDIX_WITH_WIDE_LANES
@@ -149,8 +152,7 @@ RAYDIX_AVX2 RAYDIX_INLINE void add_8(Sides8& s, const SmallBoxes& boxes, std::si
         s.left[c] = _mm256_min_ps(s.left[c], _mm256_blendv_ps(none, value, goes_left));
         s.right[c] = _mm256_min_ps(s.right[c], _mm256_blendv_ps(value, none, goes_left));
     }
-    s.left_count =
-        _mm256_add_ps(s.left_count, _mm256_and_ps(_mm256_set1_ps(1.0f), goes_left));
+    s.left_count = _mm256_add_ps(s.left_count, _mm256_and_ps(_mm256_set1_ps(1.0f), goes_left));
 }
 RAYDIX_AVX2 RAYDIX_INLINE __m256 area_8(const __m256* box) {
     const __m256 x = _mm256_add_ps(box[0], box[3]), y = _mm256_add_ps(box[1], box[4]),
@@ -213,18 +215,15 @@ RAYDIX_AVX512 RAYDIX_INLINE void begin_16(Sides16& s) {
     for (int c = 0; c < 6; ++c) s.left[c] = s.right[c] = _mm512_set1_ps(infinity);
     s.left_count = _mm512_setzero_ps();
 }
-RAYDIX_AVX512 RAYDIX_INLINE void add_16(Sides16& s,
-                                                                const SmallBoxes& boxes,
-                                                                std::size_t box,
-                                                                __mmask16 goes_left) {
+RAYDIX_AVX512 RAYDIX_INLINE void add_16(Sides16& s, const SmallBoxes& boxes, std::size_t box,
+                                        __mmask16 goes_left) {
     const auto goes_right = static_cast<__mmask16>(~goes_left);
     for (std::size_t c = 0; c < 6; ++c) {
         const __m512 value = _mm512_set1_ps(boxes.at.data()[c].data()[box]);
         s.left[c] = _mm512_mask_min_ps(s.left[c], goes_left, s.left[c], value);
         s.right[c] = _mm512_mask_min_ps(s.right[c], goes_right, s.right[c], value);
     }
-    s.left_count =
-        _mm512_mask_add_ps(s.left_count, goes_left, s.left_count, _mm512_set1_ps(1.0f));
+    s.left_count = _mm512_mask_add_ps(s.left_count, goes_left, s.left_count, _mm512_set1_ps(1.0f));
 }
 RAYDIX_AVX512 RAYDIX_INLINE __m512 area_16(const __m512* box) {
     const __m512 x = _mm512_add_ps(box[0], box[3]), y = _mm512_add_ps(box[1], box[4]),
@@ -274,7 +273,8 @@ RAYDIX_AVX512 Found best_plane_16(const SmallBoxes& boxes, LaneSet set) {
         }
         costs[axis] = only_16(cost_16(sides, std::popcount(set)), set);
     }
-    const float least = _mm512_reduce_min_ps(_mm512_min_ps(_mm512_min_ps(costs[0], costs[1]), costs[2]));
+    const float least =
+        _mm512_reduce_min_ps(_mm512_min_ps(_mm512_min_ps(costs[0], costs[1]), costs[2]));
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto lanes = static_cast<LaneSet>(
             _mm512_cmp_ps_mask(costs[axis], _mm512_set1_ps(least), _CMP_EQ_OQ));

@@ -219,10 +219,9 @@ private:
         _MM_TRANSPOSE4_PS(x, y, z, none);
         const __m128 area =
             _mm_add_ps(_mm_add_ps(_mm_mul_ps(x, y), _mm_mul_ps(y, z)), _mm_mul_ps(z, x));
-        const __m128i primitives = _mm_castps_si128(
-            _mm_shuffle_ps(_mm_castsi128_ps(_mm256_castsi256_si128(side.counts)),
-                           _mm_castsi128_ps(_mm256_extracti128_si256(side.counts, 1)),
-                           _MM_SHUFFLE(3, 1, 3, 1)));
+        const __m128i primitives = _mm_castps_si128(_mm_shuffle_ps(
+            _mm_castsi128_ps(_mm256_castsi256_si128(side.counts)),
+            _mm_castsi128_ps(_mm256_extracti128_si256(side.counts, 1)), _MM_SHUFFLE(3, 1, 3, 1)));
         return _mm_mul_ps(area, _mm_cvtepi32_ps(primitives));
     }
 

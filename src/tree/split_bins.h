@@ -26,9 +26,7 @@ struct alignas(32) SplitBox {
     [[nodiscard]] static SplitBox of(const Aabb& box, std::uint32_t first, std::uint32_t count) {
         return {box.lo, first, {-box.hi.x, -box.hi.y, -box.hi.z}, count};
     }
-    [[nodiscard]] Aabb box() const {
-        return {lo, {-minus_hi.x, -minus_hi.y, -minus_hi.z}};
-    }
+    [[nodiscard]] Aabb box() const { return {lo, {-minus_hi.x, -minus_hi.y, -minus_hi.z}}; }
     /// Twice the centroid.
     [[nodiscard]] Float4 center2() const {
         return Float4::load(&lo.x).xyz() - Float4::load(&minus_hi.x).xyz();
@@ -67,7 +65,8 @@ struct Split {
 /// The plane with the least area(left) * count(left) + area(right) * count(right), counts of
 /// primitives; of equals the lowest in (axis, bin). If that is 0, as for boxes on a line, the plane
 /// that divides the primitives most evenly. None if all centroids fall into one bin.
-[[nodiscard]] std::optional<Split> find_split(std::span<const SplitBox> boxes, const BinGrid& grid, bool wide);
+[[nodiscard]] std::optional<Split> find_split(std::span<const SplitBox> boxes, const BinGrid& grid,
+                                              bool wide);
 
 /// from [n] -> to [n], left ones first, otherwise in the old order.
 void divide_boxes(std::span<const SplitBox> from, const BinGrid& grid, const Split& split,

@@ -46,8 +46,8 @@ TEST(BinnedWidths, GiveTheSameTree) {
         if (ids.empty()) continue;
         Buffer<ClusterNode> expected, nodes;
         BinnedScratch scratch;
-        const ClusterRef root = build_binned(std::span<const std::uint32_t>(ids), ids, boxes, 4,
-                                             expected, scratch, 4);
+        const ClusterRef root =
+            build_binned(std::span<const std::uint32_t>(ids), ids, boxes, 4, expected, scratch, 4);
         for (const int width : widths()) {
             ASSERT_EQ(build_binned(std::span<const std::uint32_t>(ids), ids, boxes, 4, nodes,
                                    scratch, width),
