@@ -243,6 +243,13 @@ RAYDIX_AVX512 RAYDIX_INLINE __m512 only_16(__m512 cost, LaneSet valid) {
     return _mm512_min_ps(_mm512_mask_mov_ps(none, static_cast<__mmask16>(valid), cost), none);
 }
 
+RAYDIX_AVX512 LaneSet up_to_16(const std::array<float, small_boxes>& center2, LaneSet set,
+                               LaneSet lane) {
+    return set & static_cast<LaneSet>(_mm512_cmp_ps_mask(_mm512_load_ps(center2.data()),
+                                                         _mm512_set1_ps(center2.data()[lane]),
+                                                         _CMP_LE_OQ));
+}
+
 RAYDIX_AVX512 Found best_of_few_16(const SmallBoxes& boxes, LaneSet set, LaneSet valid) {
     Sides16 sides;
     begin_16(sides);
@@ -309,7 +316,11 @@ LaneSet split_small(const SmallBoxes& boxes, LaneSet set, int width) {
     const bool few = count <= few_boxes;
     const Found found = few ? best_of_few(boxes, set, count, width) : best_plane(boxes, set, width);
     if (found.cost == 0 || found.cost == infinity) return lower_half(set);
-    return few ? spread_over(found.lane, set) : up_to(boxes.at[6 + found.axis], set, found.lane);
+    if (few) return spread_over(found.lane, set);
+#if defined(RAYDIX_WITH_WIDE_LANES)
+    if (width == 16) return up_to_16(boxes.at[6 + found.axis], set, found.lane);
+#endif
+    return up_to(boxes.at[6 + found.axis], set, found.lane);
 }
 
 int split_width() {

@@ -285,15 +285,26 @@ private:
 }  // namespace
 
 BinGrid::BinGrid(std::span<const SplitBox> boxes) : bins(bin_count(boxes.size())) {
-    Float4 lo = Float4::all(infinity), hi = Float4::all(-infinity);
-    for (const SplitBox& box : boxes) {
+    // Two by two: each minimum waits for the one before.
+    std::array<Float4, 2> lo, hi;
+    lo.fill(Float4::all(infinity));
+    hi.fill(Float4::all(-infinity));
+    const auto take = [&](std::size_t k, const SplitBox& box) {
         const Float4 center2 = box.center2();
-        lo = min_of(lo, center2);
-        hi = max_of(hi, center2);
+        lo[k] = min_of(lo[k], center2);
+        hi[k] = max_of(hi[k], center2);
+    };
+    std::size_t i = 0;
+    for (; i + 1 < boxes.size(); i += 2) {
+        take(0, boxes[i]);
+        take(1, boxes[i + 1]);
     }
+    if (i < boxes.size()) take(0, boxes[i]);
+    lo[0] = min_of(lo[0], lo[1]);
+    hi[0] = max_of(hi[0], hi[1]);
     std::array<float, 4> extent;
-    lo.store(origin.data());
-    (hi - lo).store(extent.data());
+    lo[0].store(origin.data());
+    (hi[0] - lo[0]).store(extent.data());
     for (std::size_t axis = 0; axis < 4; ++axis)
         scale[axis] = extent[axis] >= least_extent
                           ? below_one * static_cast<float>(bins) / extent[axis]
