@@ -245,9 +245,9 @@ RAYDIX_AVX512 RAYDIX_INLINE __m512 only_16(__m512 cost, LaneSet valid) {
 
 RAYDIX_AVX512 LaneSet up_to_16(const std::array<float, small_boxes>& center2, LaneSet set,
                                LaneSet lane) {
-    return set & static_cast<LaneSet>(_mm512_cmp_ps_mask(_mm512_load_ps(center2.data()),
-                                                         _mm512_set1_ps(center2.data()[lane]),
-                                                         _CMP_LE_OQ));
+    return set &
+           static_cast<LaneSet>(_mm512_cmp_ps_mask(
+               _mm512_load_ps(center2.data()), _mm512_set1_ps(center2.data()[lane]), _CMP_LE_OQ));
 }
 
 RAYDIX_AVX512 Found best_of_few_16(const SmallBoxes& boxes, LaneSet set, LaneSet valid) {
