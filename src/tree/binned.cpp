@@ -1,11 +1,14 @@
 #include "tree/binned.h"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <bit>
 #include <vector>
 
 #include "base/math.h"
 #include "exec/parallel.h"
+#include "tree/small_splits.h"
 
 namespace raydix {
 namespace {
@@ -14,6 +17,7 @@ namespace {
 constexpr std::size_t run_primitives = 16;
 /// Runs do not cross multiples of this many places, so that blocks are cut at once.
 constexpr std::size_t run_block = 1024;
+static_assert(run_primitives <= 255, "lengths are bytes");
 /// Subtrees of up to this many primitives are built over primitives, each by one thread: two
 /// lists of them stay in a cache.
 constexpr std::uint32_t task_primitives = 32768;
@@ -42,22 +46,22 @@ void cut_runs(const Key* keys, std::size_t begin, std::size_t end, const Take& t
 /// A subtree that is built by one thread, over lists that fit into a cache.
 class SubtreeBuild {
 public:
-    SubtreeBuild(std::span<const std::uint32_t> ids, std::uint32_t max_leaf, ClusterNode* nodes)
-        : ids_(ids), max_leaf_(max_leaf), nodes_(nodes) {}
+    SubtreeBuild(std::span<const std::uint32_t> ids, std::uint32_t max_leaf, ClusterNode* nodes,
+                 int width)
+        : ids_(ids), max_leaf_(max_leaf), nodes_(nodes), width_(width) {}
 
     /// `node_base` is the subtree's first place in the list of all primitives of the tree: a node
     /// whose left side ends there at m is node m - 1.
     ClusterPart run(std::span<SplitBox> list, SplitBox* spare, std::uint32_t node_base,
                     std::uint32_t depth) {
-        if (list.size() == 1) return primitive(list[0]);
+        if (list.size() <= small_boxes) return run_small(list, node_base);
         SplitBox* from = list.data();
         std::size_t left = list.size() / 2;
-        if (list.size() == 3) {
-            left = single_first(list);
-        } else if (list.size() > 3 && depth < deepest_split) {
+        if (depth < deepest_split) {
             const BinGrid grid(list);
-            if (const auto split = find_split(list, grid)) {
-                divide_boxes(list, grid, *split, spare);
+            const bool wide = width_ >= 8;
+            if (const auto split = find_split(list, grid, wide)) {
+                divide_boxes(list, grid, *split, spare, wide);
                 std::swap(from, spare);
                 left = split->left_boxes;
             }
@@ -71,32 +75,39 @@ public:
     }
 
 private:
-    /// Of three boxes the one that is best left alone comes first: no bins needed.
-    static std::size_t single_first(std::span<SplitBox> list) {
-        float least = infinity;
-        std::size_t single = 0;
-        for (std::size_t k = 0; k < 3; ++k) {
-            const SplitBox &a = list[k == 0 ? 1 : 0], &b = list[k == 2 ? 1 : 2];
-            const float cost = cluster_area({list[k].lo, list[k].hi}) +
-                               2.0f * cluster_area(unite({a.lo, a.hi}, {b.lo, b.hi}));
-            if (cost < least) {
-                least = cost;
-                single = k;
-            }
+    ClusterPart run_small(std::span<const SplitBox> list, std::uint32_t node_base) {
+        for (std::size_t k = 0; k < list.size(); ++k) {
+            small_.set(k, list[k]);
+            firsts_[k] = list[k].first;
         }
-        std::rotate(list.begin(), list.begin() + static_cast<std::ptrdiff_t>(single),
-                    list.begin() + static_cast<std::ptrdiff_t>(single) + 1);
-        return 1;
+        return small_node((1u << list.size()) - 1, node_base);
     }
 
-    [[nodiscard]] ClusterPart primitive(const SplitBox& box) const {
-        const Aabb bounds{box.lo, box.hi};
-        return {primitive_cluster | box.first, bounds, sum_of_primitive(ids_[box.first], bounds)};
+    ClusterPart small_node(LaneSet set, std::uint32_t node_base) {
+        const int count = std::popcount(set);
+        if (count == 1) return small_primitive(static_cast<std::size_t>(std::countr_zero(set)));
+        const LaneSet left = count == 2 ? set & (0u - set) : split_small(small_, set, width_);
+        const auto middle = node_base + static_cast<std::uint32_t>(std::popcount(left));
+        const ClusterPart a = small_node(left, node_base);
+        const ClusterPart b = small_node(set & ~left, middle);
+        const ClusterNode& node = nodes_[middle - 1] = merge_clusters(a, b, max_leaf_);
+        return {middle - 1, {node.lo, node.hi}, node.sum};
+    }
+
+    [[nodiscard]] ClusterPart small_primitive(std::size_t lane) const {
+        const auto& at = small_.at;
+        const Aabb bounds{{at[0][lane], at[1][lane], at[2][lane]},
+                          {-at[3][lane], -at[4][lane], -at[5][lane]}};
+        const std::uint32_t first = firsts_[lane];
+        return {primitive_cluster | first, bounds, sum_of_primitive(ids_[first], bounds)};
     }
 
     std::span<const std::uint32_t> ids_;
     std::uint32_t max_leaf_;
     ClusterNode* nodes_;
+    int width_;
+    SmallBoxes small_{};
+    std::array<std::uint32_t, small_boxes> firsts_{};
 };
 
 /// A node above the tasks, or a task, over runs [begin, end) of a list.
@@ -113,13 +124,14 @@ template <class Key>
 class BinnedRun {
 public:
     BinnedRun(std::span<const Key> keys, std::span<const std::uint32_t> ids, const BoxLanes& boxes,
-              std::uint32_t max_leaf, Buffer<ClusterNode>& nodes, BinnedScratch& scratch)
+              std::uint32_t max_leaf, Buffer<ClusterNode>& nodes, BinnedScratch& scratch, int width)
         : keys_(keys),
           ids_(ids),
           boxes_(boxes),
           max_leaf_(max_leaf),
           nodes_(nodes),
-          scratch_(scratch) {}
+          scratch_(scratch),
+          width_(width) {}
 
     ClusterRef run() {
         nodes_.reset(keys_.size() - 1);
@@ -144,10 +156,14 @@ private:
         const std::size_t n = keys_.size(), blocks = (n + run_block - 1) / run_block;
         Buffer<std::uint32_t>& counts = scratch_.run_counts;
         counts.reset(blocks);
+        scratch_.run_lengths.reset(n);
+        std::uint8_t* lengths = scratch_.run_lengths.data();  // a block's runs at its first places
         for_each_block(n, run_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
-            std::uint32_t count = 0;
-            cut_runs(keys_.data(), begin, end, [&](std::size_t, std::size_t) { ++count; });
-            counts[b] = count;
+            std::uint8_t* out = lengths + begin;
+            cut_runs(keys_.data(), begin, end, [&](std::size_t first, std::size_t last) {
+                *out++ = static_cast<std::uint8_t>(last - first);
+            });
+            counts[b] = static_cast<std::uint32_t>(out - (lengths + begin));
         });
         std::uint32_t before = 0;
         for (std::size_t b = 0; b < blocks; ++b) {
@@ -159,13 +175,13 @@ private:
         scratch_.spare.reset(before);
         for_each_block(n, run_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
             SplitBox* out = scratch_.runs.data() + counts[b];
-            cut_runs(keys_.data(), begin, end, [&](std::size_t first, std::size_t last) {
+            const std::uint8_t* length = lengths + begin;
+            for (std::size_t first = begin; first < end; first += *length++) {
                 Aabb box = empty_box();
-                for (std::size_t k = first; k < last; ++k)
+                for (std::size_t k = first; k < first + *length; ++k)
                     box = unite(box, boxes_.get(static_cast<std::uint32_t>(k)));
-                *out++ = {box.lo, static_cast<std::uint32_t>(first), box.hi,
-                          static_cast<std::uint32_t>(last - first)};
-            });
+                *out++ = SplitBox::of(box, static_cast<std::uint32_t>(first), *length);
+            }
         });
         return before;
     }
@@ -197,10 +213,11 @@ private:
         if (at.primitives <= task_primitives) return;
         const std::span<const SplitBox> list(list_of(at), at.end - at.begin);
         const BinGrid grid(list);
-        const auto split = at.depth < deepest_split ? find_split(list, grid) : std::nullopt;
+        const bool wide = width_ >= 8;
+        const auto split = at.depth < deepest_split ? find_split(list, grid, wide) : std::nullopt;
         if (split) {
             at.in_spare = !at.in_spare;
-            divide_boxes(list, grid, *split, list_of(at));
+            divide_boxes(list, grid, *split, list_of(at), wide);
             at.left_runs = split->left_boxes;
             at.left_primitives = split->left_primitives;
         } else {
@@ -209,20 +226,30 @@ private:
         }
     }
 
+    /// The longest tasks first, each by whichever worker comes next.
     void build_tasks(std::vector<TopNode>& top) {
         std::vector<std::uint32_t> tasks;
         for (std::uint32_t i = 0; i < top.size(); ++i)
             if (top[i].left == 0) tasks.push_back(i);
-        for_each_range(tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
-            Buffer<SplitBox> lists(2 * std::size_t{task_primitives});
-            SplitBox *list = lists.data(), *spare = list + task_primitives;
-            SubtreeBuild build(ids_, max_leaf_, nodes_.data());
-            for (std::size_t t = begin; t < end; ++t) {
+        std::sort(tasks.begin(), tasks.end(), [&](std::uint32_t a, std::uint32_t b) {
+            return top[a].primitives > top[b].primitives;
+        });
+        const std::size_t longest = top[tasks.front()].primitives;
+        const std::size_t workers =
+            std::min(tasks.size(), static_cast<std::size_t>(std::max(thread_count(), 1)));
+        scratch_.lists.reset(2 * longest * workers);
+        std::atomic<std::size_t> next = 0;
+        const auto work = [&](std::size_t worker) {
+            SplitBox* list = scratch_.lists.data() + 2 * longest * worker;
+            SplitBox* spare = list + longest;
+            SubtreeBuild build(ids_, max_leaf_, nodes_.data(), width_);
+            for (std::size_t t = next++; t < tasks.size(); t = next++) {
                 TopNode& task = top[tasks[t]];
                 list_primitives(task, list);
                 task.part = build.run({list, task.primitives}, spare, task.base, task.depth);
             }
-        });
+        };
+        for_each_index(workers, work, 1);
     }
 
     void list_primitives(const TopNode& task, SplitBox* out) {
@@ -231,7 +258,7 @@ private:
             for (std::uint32_t k = 0; k < runs[r].count; ++k) {
                 const std::uint32_t place = runs[r].first + k;
                 const Aabb box = boxes_.get(place);
-                *out++ = {box.lo, place, box.hi, 1};
+                *out++ = SplitBox::of(box, place, 1);
             }
     }
 
@@ -241,6 +268,7 @@ private:
     std::uint32_t max_leaf_;
     Buffer<ClusterNode>& nodes_;
     BinnedScratch& scratch_;
+    int width_;
 };
 
 }  // namespace
@@ -248,15 +276,15 @@ private:
 template <class Key>
 ClusterRef build_binned(std::span<const Key> keys, std::span<const std::uint32_t> ids,
                         const BoxLanes& boxes, std::uint32_t max_leaf, Buffer<ClusterNode>& nodes,
-                        BinnedScratch& scratch) {
-    return BinnedRun<Key>(keys, ids, boxes, max_leaf, nodes, scratch).run();
+                        BinnedScratch& scratch, int width) {
+    return BinnedRun<Key>(keys, ids, boxes, max_leaf, nodes, scratch, width).run();
 }
 
 template ClusterRef build_binned(std::span<const std::uint32_t>, std::span<const std::uint32_t>,
                                  const BoxLanes&, std::uint32_t, Buffer<ClusterNode>&,
-                                 BinnedScratch&);
+                                 BinnedScratch&, int);
 template ClusterRef build_binned(std::span<const std::uint64_t>, std::span<const std::uint32_t>,
                                  const BoxLanes&, std::uint32_t, Buffer<ClusterNode>&,
-                                 BinnedScratch&);
+                                 BinnedScratch&, int);
 
 }  // namespace raydix

@@ -113,7 +113,18 @@ private:
                 waiting[waiting_count++] = tree_.nodes[ref].left;
             }
         }
-        std::sort(out, out + listed);
+        sort_ids(out, listed);
+    }
+
+    /// Most leaves hold a few ids that are nearly in order.
+    static void sort_ids(std::uint32_t* ids, std::size_t count) {
+        if (count > 16) return std::sort(ids, ids + count);
+        for (std::size_t k = 1; k < count; ++k) {
+            const std::uint32_t id = ids[k];
+            std::size_t at = k;
+            for (; at > 0 && ids[at - 1] > id; --at) ids[at] = ids[at - 1];
+            ids[at] = id;
+        }
     }
 
     const ClusterTree& tree_;

@@ -20,12 +20,16 @@ namespace raydix {
 struct alignas(32) SplitBox {
     Vec3 lo;
     std::uint32_t first;  // place in Morton order
-    Vec3 hi;
+    Vec3 minus_hi;        // the union takes the least of both corners
     std::uint32_t count;
 
+    [[nodiscard]] static SplitBox of(const Aabb& box, std::uint32_t first, std::uint32_t count) {
+        return {box.lo, first, {-box.hi.x, -box.hi.y, -box.hi.z}, count};
+    }
+    [[nodiscard]] Aabb box() const { return {lo, {-minus_hi.x, -minus_hi.y, -minus_hi.z}}; }
     /// Twice the centroid.
     [[nodiscard]] Float4 center2() const {
-        return (Float4::load(&lo.x) + Float4::load(&hi.x)).xyz();
+        return Float4::load(&lo.x).xyz() - Float4::load(&minus_hi.x).xyz();
     }
 };
 static_assert(sizeof(SplitBox) == 32);
@@ -46,7 +50,7 @@ struct BinGrid {
 
     [[nodiscard]] bool flat() const { return scale[0] == 0 && scale[1] == 0 && scale[2] == 0; }
     [[nodiscard]] std::int32_t bin(const SplitBox& box, std::size_t axis) const {
-        const float center2 = (&box.lo.x)[axis] + (&box.hi.x)[axis];
+        const float center2 = (&box.lo.x)[axis] - (&box.minus_hi.x)[axis];
         return static_cast<std::int32_t>((center2 - origin[axis]) * scale[axis]);
     }
 };
@@ -61,10 +65,11 @@ struct Split {
 /// The plane with the least area(left) * count(left) + area(right) * count(right), counts of
 /// primitives; of equals the lowest in (axis, bin). If that is 0, as for boxes on a line, the plane
 /// that divides the primitives most evenly. None if all centroids fall into one bin.
-[[nodiscard]] std::optional<Split> find_split(std::span<const SplitBox> boxes, const BinGrid& grid);
+[[nodiscard]] std::optional<Split> find_split(std::span<const SplitBox> boxes, const BinGrid& grid,
+                                              bool wide);
 
 /// from [n] -> to [n], left ones first, otherwise in the old order.
 void divide_boxes(std::span<const SplitBox> from, const BinGrid& grid, const Split& split,
-                  SplitBox* to);
+                  SplitBox* to, bool wide);
 
 }  // namespace raydix

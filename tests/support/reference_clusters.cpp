@@ -216,19 +216,55 @@ Plane best_plane(const Forest& forest, const List& list, int axis, bool by_count
     return best;
 }
 
+float cost_of(const Forest& forest, const List& list, const std::vector<bool>& goes_left) {
+    std::array<Aabb, 2> box{empty_box(), empty_box()};
+    std::array<std::size_t, 2> count{};
+    for (std::size_t k = 0; k < list.size(); ++k) {
+        const std::size_t side = goes_left[k] ? 0 : 1;
+        box[side] = unite(box[side], forest.all[list[k]].box);
+        ++count[side];
+    }
+    if (count[0] == 0 || count[1] == 0) return std::numeric_limits<float>::infinity();
+    return area(box[0]) * static_cast<float>(count[0]) +
+           area(box[1]) * static_cast<float>(count[1]);
+}
+
+/// Up to 5: every division; up to 16: every plane through a centroid. None that costs 0.
+Plane best_of_small(const Forest& forest, const List& list) {
+    Plane best;
+    const std::size_t n = list.size();
+    if (n < 3) return best;
+    const auto offer = [&](const auto& is_left) {
+        std::vector<bool> goes_left;
+        for (std::size_t k = 0; k < n; ++k) goes_left.push_back(is_left(k));
+        if (const float cost = cost_of(forest, list, goes_left); cost < best.cost) {
+            best.cost = cost;
+            best.goes_left = goes_left;
+        }
+    };
+    if (n <= 5) {
+        for (std::size_t left = 1; left < std::size_t{1} << (n - 1); ++left)
+            offer([&](std::size_t k) { return (left >> k & 1) != 0; });
+    } else {
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto center2 = [&](std::size_t k) {
+                const Aabb& box = forest.all[list[k]].box;
+                return coordinate(box.lo, axis) + coordinate(box.hi, axis);
+            };
+            for (std::size_t plane = 0; plane < n; ++plane)
+                offer([&](std::size_t k) { return center2(k) <= center2(plane); });
+        }
+    }
+    if (best.cost == 0) best.goes_left.clear();
+    return best;
+}
+
 std::size_t binned(Forest& forest, const List& list, int depth) {
     if (list.size() == 1) return list[0];
     Plane best;
-    if (list.size() == 3) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            const Aabb pair =
-                unite(forest.all[list[(k + 1) % 3]].box, forest.all[list[(k + 2) % 3]].box);
-            const float cost = area(forest.all[list[k]].box) + 2 * area(pair);
-            if (cost >= best.cost) continue;
-            best.cost = cost;
-            best.goes_left = {k == 0, k == 1, k == 2};
-        }
-    } else if (list.size() > 3 && depth < 96) {
+    if (list.size() <= 16) {
+        best = best_of_small(forest, list);
+    } else if (depth < 96) {
         for (int axis = 0; axis < 3; ++axis)
             if (Plane plane = best_plane(forest, list, axis, false); plane.cost < best.cost)
                 best = std::move(plane);
