@@ -62,7 +62,7 @@ struct KdBuildRun {
         sort(codes.span(), valid);
         ms.sort = stage.lap();
 
-        const KdKeys<Key> keys{codes.data(), valid, grid,
+        const KdKeys<Key> keys{codes.data(), valid, &valid, &grid,
                                static_cast<std::uint32_t>(options.max_leaf)};
         HostLauncher<> launcher;
         Buffer<std::byte> range_memory;
@@ -90,26 +90,20 @@ private:
 
     KdRanges find_ranges(HostLauncher<>& launcher, const KdKeys<Key>& keys,
                          Buffer<std::byte>& memory) {
-        if (keys.n <= keys.max_leaf) return {};
         Arena size;
-        (void)KdRanges::take(size, keys.n);
+        (void)KdRanges::take(size, keys.limit);
         memory.reset(size.bytes());
         Arena arena(memory.data(), memory.size());
-        const KdRanges ranges = KdRanges::take(arena, keys.n);
+        const KdRanges ranges = KdRanges::take(arena, keys.limit);
         find_kd_ranges(launcher, keys, ranges);
         if (*ranges.inner > max_kd_inner)
             throw InputError(std::to_string(*ranges.inner) + " inner nodes over " +
-                             std::to_string(keys.n) + " primitives; a k-d tree takes " +
+                             std::to_string(keys.limit) + " primitives; a k-d tree takes " +
                              std::to_string(max_kd_inner) + ": raise max_leaf");
         return ranges;
     }
 
     void emit(HostLauncher<>& launcher, const KdKeys<Key>& keys, const KdRanges& ranges) {
-        if (keys.n <= keys.max_leaf) {
-            tree.nodes().reset(2);
-            return launcher.launch("kdtree.leaf", 1,
-                                   EmitKdRootLeaf{tree.nodes().data(), keys.n, &tree.max_depth()});
-        }
         const std::uint32_t inner = *ranges.inner;
         tree.inner_count() = inner;
         tree.nodes().reset(2 * std::size_t{inner} + 2);

@@ -90,7 +90,7 @@ private:
         Buffer<std::byte> radix_memory(radix_size.bytes());
         Arena radix_arena(radix_memory.data(), radix_memory.size());
         const auto radix = take_radix_chains<Key>(radix_arena, valid, rule);
-        count_octree(launcher, codes, valid, radix);
+        count_octree(launcher, codes, &valid, valid, radix);
 
         const std::uint32_t node_count = *radix.node_count;
         tree.nodes().reset(node_count);

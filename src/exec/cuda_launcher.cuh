@@ -20,6 +20,7 @@
 #include "base/probe.h"
 #include "exec/cuda_error.cuh"
 #include "exec/host_launcher.h"
+#include "exec/warp.h"
 
 namespace raydix {
 
@@ -52,6 +53,16 @@ __global__ void for_each_counted(Work work, const std::uint32_t* count, std::uin
     // 64 bits: the last step may go past 2^32.
     for (std::uint64_t i = blockIdx.x * blockDim.x + threadIdx.x; i < n; i += stride)
         work(static_cast<std::uint32_t>(i));
+}
+
+/// Whole warps: the block size is a multiple of 32, and a warp has one w.
+template <class Work>
+__global__ void for_each_warp(Work work, const std::uint32_t* count, std::uint32_t limit) {
+    const std::uint32_t warps = warps_for(*count < limit ? *count : limit);
+    const std::uint32_t stride = gridDim.x * (blockDim.x / warp_lanes);
+    for (std::uint32_t w = (blockIdx.x * blockDim.x + threadIdx.x) / warp_lanes; w < warps;
+         w += stride)
+        work(CudaWarp(), w);
 }
 
 }  // namespace kernels
@@ -122,6 +133,8 @@ public:
     void launch(const char*, std::uint32_t, const Work&) {}
     template <class Work>
     void launch_counted(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
+    template <class Work>
+    void launch_warps(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
     void exclusive_scan(const char*, std::uint32_t*, std::uint32_t n, std::uint32_t*) {
         if (n != 0) grow(cub_scan_bytes(n));
     }
@@ -149,6 +162,7 @@ public:
     static constexpr unsigned block_threads = 128;
     /// Blocks of a counted launch: some for each multiprocessor of the largest machine there is.
     static constexpr unsigned counted_blocks = 132 * 16;
+    static constexpr unsigned counted_warp_blocks = 132 * 32;
     /// Kept at the front of the lent memory for the last value of a scan.
     static constexpr std::size_t reserved_bytes = 256;
 
@@ -176,6 +190,19 @@ public:
         const ProfilerRange range(label);
         const unsigned blocks = std::min((limit - 1) / block_threads + 1, counted_blocks);
         kernels::for_each_counted<<<blocks, block_threads, 0, stream_>>>(work, count, limit);
+        RAYDIX_CUDA_TRY(cudaGetLastError());
+    }
+
+    template <class Work>
+    void launch_warps(const char* label, const std::uint32_t* count, std::uint32_t limit,
+                      const Work& work) {
+        if (limit == 0) return;
+        const ProfilerRange range(label);
+        constexpr unsigned warps_per_block =
+            2;  // a warp that waits keeps only one other from going
+        const unsigned blocks = (warps_for(limit) - 1) / warps_per_block + 1;
+        kernels::for_each_warp<<<std::min(blocks, counted_warp_blocks),
+                                 warps_per_block * warp_lanes, 0, stream_>>>(work, count, limit);
         RAYDIX_CUDA_TRY(cudaGetLastError());
     }
 

@@ -147,7 +147,7 @@ TEST_F(GpuBuild, WritesNothingBehindTheScratch) {
             const std::size_t bytes = device_scratch_bytes(10'000, options), guard = 4096;
             const std::vector<std::byte> pattern(bytes + guard, std::byte{0x5A});
             DeviceBuffer<std::byte> scratch{std::span<const std::byte>(pattern)};
-            DeviceBuffer<BvhNode> nodes(device_node_capacity(10'000, options.max_leaf));
+            DeviceBuffer<BvhNode> nodes(device_node_capacity(10'000, options));
             DeviceBuffer<std::uint32_t> order(10'000);
             DeviceBuffer<LeafTriangle> copies(10'000);
             DeviceBuffer<DeviceCounts> counts(1);
