@@ -28,9 +28,13 @@ struct PublishCounts {
     Counts* counts;
     RAYDIX_HD void operator()(std::uint32_t) const {
         *counts = Counts{};
-        static_cast<DeviceInputCounts&>(*counts) = {
-            bounds->box,      input_count,        bounds->valid,           bounds->left_out,
-            bounds->first_left_out, bounds->unreadable, bounds->first_unreadable};
+        static_cast<DeviceInputCounts&>(*counts) = {bounds->box,
+                                                    input_count,
+                                                    bounds->valid,
+                                                    bounds->left_out,
+                                                    bounds->first_left_out,
+                                                    bounds->unreadable,
+                                                    bounds->first_unreadable};
     }
 };
 

@@ -1,5 +1,5 @@
-// hploc as launches for any backend: sorted keys [n], ids [n] and boxes [n] -> cluster nodes and the
-// root. The pass itself is hploc.h.
+// hploc as launches for any backend: sorted keys [n], ids [n] and boxes [n] -> cluster nodes and
+// the root. The pass itself is hploc.h.
 #pragma once
 
 #include <cstdint>

@@ -38,10 +38,10 @@ struct ClusterPlacing {
     const std::uint32_t* ids;    // [n] in Morton order
     Boxes boxes;                 // [n] in Morton order
     std::uint32_t max_leaf;
-    PlacedLink *even, *odd;  // [greatest id + 1], of the rounds in turn
-    std::uint32_t* rounds;   // [most_rounds]: nodes at work in each
-    BvhNode* nodes;          // [2 * inner + 2], out
-    std::uint32_t* order;    // [n], out
+    PlacedLink *even, *odd;                  // [greatest id + 1], of the rounds in turn
+    std::uint32_t* rounds;                   // [most_rounds]: nodes at work in each
+    BvhNode* nodes;                          // [2 * inner + 2], out
+    std::uint32_t* order;                    // [n], out
     std::uint32_t *inner_count, *max_depth;  // [1], out
 
     /// True if there is a node at ids[place].

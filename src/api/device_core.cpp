@@ -1,0 +1,164 @@
+// What raydix/device_trees.h does on the host: sizes, and trees that come back.
+#include "api/device_core.h"
+
+#include <raydix/error.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+
+#include "api/device_fetch.h"
+#include "tree/kdtree_access.h"
+#include "tree/octree_access.h"
+
+namespace raydix {
+
+std::size_t device_node_capacity(std::uint32_t n, PrimitiveKind kind,
+                                 const KdTreeOptions& options) {
+    const std::uint32_t inner = inner_limit(n, resolved(options, kind, n));
+    check_kd_inner(inner, n);
+    return 2 * std::size_t{inner} + 2;
+}
+
+std::uint64_t device_node_bound(std::uint32_t n, const OctreeOptions& options) {
+    const OctreeOptions full = resolved(options, n);
+    // Each level has no more nodes than points, than cells, and than children of nodes that hold
+    // more than a leaf may.
+    const std::uint64_t divided = n / (static_cast<std::uint64_t>(full.max_leaf) + 1);
+    std::uint64_t nodes = std::min(n, 1u), cells = 1;
+    for (int level = 1; level <= full.max_level; ++level) {
+        cells = std::min<std::uint64_t>(8 * cells, n);
+        nodes += std::min(cells, 8 * divided);
+    }
+    return nodes;
+}
+
+KdTree download_kdtree(const DeviceKdArrays& tree, PrimitiveKind kind,
+                       const KdTreeOptions& options, Stream stream) {
+    const DeviceCounts counts = fetch_counts(tree.counts, stream);
+    check_counts(counts, kind, options.strict);
+    KdTree result;
+    const KdTreeAccess access{result};
+    access.kind() = kind;
+    access.options() = resolved(options, kind, counts.input_count);
+    access.input_count() = counts.input_count;
+    access.left_out() = counts.left_out;
+    access.inner_count() = counts.inner_count;
+    access.max_depth() = counts.max_depth;
+    const std::size_t n = counts.references;
+    if (n == 0) return result;
+    access.bounds() = counts.bounds;
+    fetch(access.nodes(), tree.nodes, 2 * std::size_t{counts.inner_count} + 2, stream);
+    fetch(access.order(), tree.order, n, stream);
+    if (kind == PrimitiveKind::triangles)
+        fetch(access.triangles(), tree.triangles, n, stream);
+    else
+        fetch(access.points(), tree.points, n, stream);
+    synchronize(stream);
+    return result;
+}
+
+Octree download_octree(const DeviceOctreeArrays& tree, PrimitiveKind kind,
+                       const OctreeOptions& options, Stream stream) {
+    const DeviceOctreeCounts counts = fetch_counts(tree.counts, stream);
+    check_counts(counts, kind, options.strict);
+    if (counts.node_count > tree.node_capacity)
+        throw InputError("the octree has " + std::to_string(counts.node_count) +
+                         " nodes; there is room for " + std::to_string(tree.node_capacity));
+    Octree result;
+    const OctreeAccess access{result};
+    access.kind() = kind;
+    access.options() = resolved(options, counts.input_count);
+    access.input_count() = counts.input_count;
+    access.left_out() = counts.left_out;
+    const std::size_t n = counts.references;
+    if (n == 0) return result;
+    access.bounds() = counts.bounds;
+    // Behind max_level there are no nodes.
+    const auto used = static_cast<std::size_t>(access.options().max_level) + 2;
+    for (std::size_t k = 0; k < access.level_begin().size(); ++k)
+        access.level_begin()[k] = k < used ? counts.level_begin[k] : counts.node_count;
+    fetch(access.nodes(), tree.nodes, counts.node_count, stream);
+    fetch(access.order(), tree.order, n, stream);
+    fetch(access.points(), tree.points, n, stream);
+    synchronize(stream);
+    return result;
+}
+
+DeviceKdTree::DeviceKdTree(PrimitiveKind kind, std::uint32_t n, const KdTreeOptions& options)
+    : kind_(kind),
+      capacity_(n),
+      options_(options),
+      scratch_(device_scratch_bytes(n, kind, options)) {
+    nodes_.reset(device_node_capacity(n, kind, options));
+    order_.reset(n);
+    counts_.reset(1);
+    if (kind == PrimitiveKind::triangles) triangles_.reset(n);
+    if (kind == PrimitiveKind::points) points_.reset(n);
+}
+
+void DeviceKdTree::build(const DeviceMesh& mesh, Stream stream) {
+    check_device_input(kind_of(mesh), count_of(mesh), kind_, capacity_);
+    build_kdtree_on_device(mesh, options_, tree(), {scratch_.data(), scratch_.size()}, stream);
+}
+
+BuildMs DeviceKdTree::build_timed(const DeviceMesh& mesh, Stream stream) {
+    check_device_input(kind_of(mesh), count_of(mesh), kind_, capacity_);
+    return time_kdtree_on_device(mesh, options_, tree(), {scratch_.data(), scratch_.size()},
+                                 stream);
+}
+
+DeviceKdArrays DeviceKdTree::tree() const {
+    return {nodes_.data(), order_.data(), triangles_.data(), points_.data(), counts_.data()};
+}
+
+KdTree DeviceKdTree::download(Stream stream) const {
+    return download_kdtree(tree(), kind_, options_, stream);
+}
+
+std::size_t DeviceKdTree::bytes() const {
+    return nodes_.bytes() + order_.bytes() + triangles_.bytes() + points_.bytes() +
+           counts_.bytes() + scratch_.bytes();
+}
+
+DeviceOctree::DeviceOctree(PrimitiveKind kind, std::uint32_t n, const OctreeOptions& options,
+                           std::uint32_t node_capacity)
+    : kind_(kind), capacity_(n), node_capacity_(node_capacity), options_(options) {
+    if (node_capacity_ == 0)
+        node_capacity_ = static_cast<std::uint32_t>(
+            std::min(device_node_bound(n, options), 2 * std::uint64_t{n} + 64));
+    scratch_.reset(device_scratch_bytes(n, node_capacity_, options));
+    nodes_.reset(node_capacity_);
+    order_.reset(n);
+    points_.reset(n);
+    counts_.reset(1);
+}
+
+void DeviceOctree::build(const DeviceMesh& mesh, Stream stream) {
+    check_device_input(kind_of(mesh), count_of(mesh), kind_, capacity_);
+    build_octree_on_device(mesh, options_, tree(), {scratch_.data(), scratch_.size()}, stream);
+}
+
+BuildMs DeviceOctree::build_timed(const DeviceMesh& mesh, Stream stream) {
+    check_device_input(kind_of(mesh), count_of(mesh), kind_, capacity_);
+    return time_octree_on_device(mesh, options_, tree(), {scratch_.data(), scratch_.size()},
+                                 stream);
+}
+
+DeviceOctreeArrays DeviceOctree::tree() const {
+    return {nodes_.data(), node_capacity_, order_.data(), points_.data(), counts_.data()};
+}
+
+std::uint32_t DeviceOctree::node_count(Stream stream) const {
+    return fetch_counts(counts_.data(), stream).node_count;
+}
+
+Octree DeviceOctree::download(Stream stream) const {
+    return download_octree(tree(), kind_, options_, stream);
+}
+
+std::size_t DeviceOctree::bytes() const {
+    return nodes_.bytes() + order_.bytes() + points_.bytes() + counts_.bytes() + scratch_.bytes();
+}
+
+}  // namespace raydix
