@@ -1,6 +1,6 @@
-// k-d trees and octrees built on an NVIDIA GPU, by the rules of raydix/device.h: device pointers in,
-// device pointers out, on the caller's stream, memory of the caller's. In a build without CUDA every
-// call but the capacities throws BackendUnavailable.
+// k-d trees and octrees built on an NVIDIA GPU, by the rules of raydix/device.h: device pointers
+// in, device pointers out, on the caller's stream, memory of the caller's. In a build without CUDA
+// every call but the capacities throws BackendUnavailable.
 #pragma once
 
 #include <raydix/device.h>
@@ -63,8 +63,8 @@ struct DeviceOctreeArrays {
 /// The most nodes an octree over n points can have. Common trees have fewer than 2n: the bound is
 /// for codes that stay together down to the last level. Throws InputError as build_octree.
 [[nodiscard]] std::uint64_t device_node_bound(std::uint32_t n, const OctreeOptions& options);
-/// Bytes of scratch for n primitives and `node_capacity` nodes at most. Throws BackendUnavailable as
-/// well.
+/// Bytes of scratch for n primitives and `node_capacity` nodes at most. Throws BackendUnavailable
+/// as well.
 [[nodiscard]] std::size_t device_scratch_bytes(std::uint32_t n, std::uint32_t node_capacity,
                                                const OctreeOptions& options);
 
@@ -80,7 +80,8 @@ BuildMs time_octree_on_device(const DeviceMesh& mesh, const OctreeOptions& optio
 [[nodiscard]] Octree download_octree(const DeviceOctreeArrays& tree, PrimitiveKind kind,
                                      const OctreeOptions& options, Stream stream);
 
-/// Device memory for k-d trees over up to n primitives of one kind, kept from one build to the next.
+/// Device memory for k-d trees over up to n primitives of one kind, kept from one build to the
+/// next.
 class DeviceKdTree {
 public:
     DeviceKdTree() = default;

@@ -56,9 +56,9 @@ OctreeOptions resolved(OctreeOptions options, std::uint64_t n) {
 
 void check_kd_inner(std::uint64_t inner, std::uint64_t primitives) {
     if (inner > max_kd_inner)
-        throw InputError(std::to_string(inner) + " inner nodes over " +
-                         std::to_string(primitives) + " primitives; a k-d tree takes " +
-                         std::to_string(max_kd_inner) + ": raise max_leaf");
+        throw InputError(std::to_string(inner) + " inner nodes over " + std::to_string(primitives) +
+                         " primitives; a k-d tree takes " + std::to_string(max_kd_inner) +
+                         ": raise max_leaf");
 }
 
 }  // namespace raydix

@@ -1,17 +1,22 @@
 // What raydix/device_trees.h does on the host: sizes, and trees that come back.
 #include "api/device_core.h"
 
-#include <raydix/error.h>
-
 #include <algorithm>
-#include <limits>
-#include <string>
 
+#include "api/device_assemble.h"
 #include "api/device_fetch.h"
-#include "tree/kdtree_access.h"
-#include "tree/octree_access.h"
 
 namespace raydix {
+namespace {
+
+/// Complete once the stream has been waited for.
+auto fetch_on(Stream stream) {
+    return [stream](auto& out, const auto* device, std::size_t size) {
+        fetch(out, device, size, stream);
+    };
+}
+
+}  // namespace
 
 std::size_t device_node_capacity(std::uint32_t n, PrimitiveKind kind,
                                  const KdTreeOptions& options) {
@@ -33,54 +38,18 @@ std::uint64_t device_node_bound(std::uint32_t n, const OctreeOptions& options) {
     return nodes;
 }
 
-KdTree download_kdtree(const DeviceKdArrays& tree, PrimitiveKind kind,
-                       const KdTreeOptions& options, Stream stream) {
-    const DeviceCounts counts = fetch_counts(tree.counts, stream);
-    check_counts(counts, kind, options.strict);
-    KdTree result;
-    const KdTreeAccess access{result};
-    access.kind() = kind;
-    access.options() = resolved(options, kind, counts.input_count);
-    access.input_count() = counts.input_count;
-    access.left_out() = counts.left_out;
-    access.inner_count() = counts.inner_count;
-    access.max_depth() = counts.max_depth;
-    const std::size_t n = counts.references;
-    if (n == 0) return result;
-    access.bounds() = counts.bounds;
-    fetch(access.nodes(), tree.nodes, 2 * std::size_t{counts.inner_count} + 2, stream);
-    fetch(access.order(), tree.order, n, stream);
-    if (kind == PrimitiveKind::triangles)
-        fetch(access.triangles(), tree.triangles, n, stream);
-    else
-        fetch(access.points(), tree.points, n, stream);
+KdTree download_kdtree(const DeviceKdArrays& tree, PrimitiveKind kind, const KdTreeOptions& options,
+                       Stream stream) {
+    KdTree result =
+        assemble_kdtree(tree, fetch_counts(tree.counts, stream), kind, options, fetch_on(stream));
     synchronize(stream);
     return result;
 }
 
 Octree download_octree(const DeviceOctreeArrays& tree, PrimitiveKind kind,
                        const OctreeOptions& options, Stream stream) {
-    const DeviceOctreeCounts counts = fetch_counts(tree.counts, stream);
-    check_counts(counts, kind, options.strict);
-    if (counts.node_count > tree.node_capacity)
-        throw InputError("the octree has " + std::to_string(counts.node_count) +
-                         " nodes; there is room for " + std::to_string(tree.node_capacity));
-    Octree result;
-    const OctreeAccess access{result};
-    access.kind() = kind;
-    access.options() = resolved(options, counts.input_count);
-    access.input_count() = counts.input_count;
-    access.left_out() = counts.left_out;
-    const std::size_t n = counts.references;
-    if (n == 0) return result;
-    access.bounds() = counts.bounds;
-    // Behind max_level there are no nodes.
-    const auto used = static_cast<std::size_t>(access.options().max_level) + 2;
-    for (std::size_t k = 0; k < access.level_begin().size(); ++k)
-        access.level_begin()[k] = k < used ? counts.level_begin[k] : counts.node_count;
-    fetch(access.nodes(), tree.nodes, counts.node_count, stream);
-    fetch(access.order(), tree.order, n, stream);
-    fetch(access.points(), tree.points, n, stream);
+    Octree result =
+        assemble_octree(tree, fetch_counts(tree.counts, stream), kind, options, fetch_on(stream));
     synchronize(stream);
     return result;
 }

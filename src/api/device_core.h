@@ -1,6 +1,6 @@
-// k-d tree and octree as launches for any backend, from primitives on: the builds of build_kdtree.cpp
-// and build_octree.cpp, where neither the number of valid primitives nor that of nodes is known to
-// the host.
+// k-d tree and octree as launches for any backend, from primitives on: the builds of
+// build_kdtree.cpp and build_octree.cpp, where neither the number of valid primitives nor that of
+// nodes is known to the host.
 #pragma once
 
 #include <raydix/device_trees.h>
@@ -100,8 +100,8 @@ void with_device_kdtree(const DeviceMesh& mesh, const KdTreeOptions& options,
         using Source = std::decay_t<decltype(source)>;
         using Copy = std::remove_pointer_t<decltype(copies)>;
         const KdTreeOptions full = resolved(
-            options,
-            mesh.triangle_count == 0 ? PrimitiveKind::points : PrimitiveKind::triangles, n);
+            options, mesh.triangle_count == 0 ? PrimitiveKind::points : PrimitiveKind::triangles,
+            n);
         check_kd_inner(inner_limit(n, full), n);
         if (full.bits == 30)
             visit(DeviceKdBuild<std::uint32_t, Source, Copy>{source, n, full, tree, copies});

@@ -1,5 +1,5 @@
-// A build of src/api as launches on a CUDA stream: its scratch, its launches, its times. `with` calls
-// its argument with the build, whose run(launcher, arena, mark) is the pipeline.
+// A build of src/api as launches on a CUDA stream: its scratch, its launches, its times. `with`
+// calls its argument with the build, whose run(launcher, arena, mark) is the pipeline.
 #pragma once
 
 #include <raydix/device.h>

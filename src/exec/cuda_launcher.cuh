@@ -55,14 +55,14 @@ __global__ void for_each_counted(Work work, const std::uint32_t* count, std::uin
         work(static_cast<std::uint32_t>(i));
 }
 
-/// Whole warps: the block size is a multiple of 32, and a warp has one w.
+inline constexpr unsigned warp_block_threads = 64;  // a slow warp holds up only one other
+/// One warp for each w; blocks are whole warps. Room is asked for 24 blocks a multiprocessor: such
+/// work waits for memory most of the time.
 template <class Work>
-__global__ void for_each_warp(Work work, const std::uint32_t* count, std::uint32_t limit) {
-    const std::uint32_t warps = warps_for(*count < limit ? *count : limit);
-    const std::uint32_t stride = gridDim.x * (blockDim.x / warp_lanes);
-    for (std::uint32_t w = (blockIdx.x * blockDim.x + threadIdx.x) / warp_lanes; w < warps;
-         w += stride)
-        work(CudaWarp(), w);
+__global__ void __launch_bounds__(warp_block_threads, 24)
+    for_each_warp(Work work, const std::uint32_t* count) {
+    const std::uint32_t w = (blockIdx.x * warp_block_threads + threadIdx.x) / warp_lanes;
+    if (w < warps_for(*count)) work(CudaWarp(), w);
 }
 
 }  // namespace kernels
@@ -162,7 +162,6 @@ public:
     static constexpr unsigned block_threads = 128;
     /// Blocks of a counted launch: some for each multiprocessor of the largest machine there is.
     static constexpr unsigned counted_blocks = 132 * 16;
-    static constexpr unsigned counted_warp_blocks = 132 * 32;
     /// Kept at the front of the lent memory for the last value of a scan.
     static constexpr std::size_t reserved_bytes = 256;
 
@@ -198,11 +197,8 @@ public:
                       const Work& work) {
         if (limit == 0) return;
         const ProfilerRange range(label);
-        constexpr unsigned warps_per_block =
-            2;  // a warp that waits keeps only one other from going
-        const unsigned blocks = (warps_for(limit) - 1) / warps_per_block + 1;
-        kernels::for_each_warp<<<std::min(blocks, counted_warp_blocks),
-                                 warps_per_block * warp_lanes, 0, stream_>>>(work, count, limit);
+        const unsigned blocks = (limit - 1) / kernels::warp_block_threads + 1;
+        kernels::for_each_warp<<<blocks, kernels::warp_block_threads, 0, stream_>>>(work, count);
         RAYDIX_CUDA_TRY(cudaGetLastError());
     }
 
