@@ -1,5 +1,5 @@
-// k-d tree and octree as a GPU builds them (api/device_core.h), run on the host: by its loops, and in
-// shuffled order on real threads. Every node is that of build_kdtree and build_octree, for input
+// k-d tree and octree as a GPU builds them (api/device_core.h), run on the host: by its loops, and
+// in shuffled order on real threads. Every node is that of build_kdtree and build_octree, for input
 // that the host does not look at.
 #include "api/device_core.h"
 
@@ -43,8 +43,8 @@ std::vector<Case> cases() {
         points.vertices.resize(n);
         all.push_back({std::to_string(n) + " points", std::move(points)});
         if (n != 0)
-            all.push_back({std::to_string(n) + " triangles, some left out",
-                           laced(random_soup(n, n + 1), 4)});
+            all.push_back(
+                {std::to_string(n) + " triangles, some left out", laced(random_soup(n, n + 1), 4)});
     }
     all.push_back({"soup", random_soup(40 * thorough + 60, 3)});
     all.push_back({"soup with NaN", laced(random_soup(40 * thorough + 60, 3), 5)});
@@ -118,8 +118,8 @@ TEST(DeviceCore, OctreeIsThatOfTheHost) {
                     const OctreeOptions options{
                         .bits = bits, .max_level = max_level, .max_leaf = max_leaf};
                     SCOPED_TRACE(c.name + ", " + std::to_string(bits) + " bits, leaves of " +
-                                 std::to_string(max_leaf) + ", level " +
-                                 std::to_string(max_level) + ", seed " + std::to_string(++seed));
+                                 std::to_string(max_leaf) + ", level " + std::to_string(max_level) +
+                                 ", seed " + std::to_string(++seed));
                     const Octree expected = build_octree(c.mesh, options);
                     HostLauncher<> host;
                     expect_same(launched_octree(host, c.mesh, options), expected);
@@ -135,8 +135,8 @@ TEST(DeviceCore, AHundredOrdersGiveOneTree) {
     const Octree octree = build_octree(mesh, {.max_leaf = 2});
     for (std::uint64_t seed = 0; seed < 100; ++seed) {
         ShuffledLauncher shuffled(seed);
-        const KdTree kd = launched_kdtree(shuffled, mesh, {.max_leaf = 2},
-                                          static_cast<unsigned char>(seed));
+        const KdTree kd =
+            launched_kdtree(shuffled, mesh, {.max_leaf = 2}, static_cast<unsigned char>(seed));
         ASSERT_TRUE(same_bytes(kd.nodes(), kdtree.nodes())) << "seed " << seed;
         const Octree oct = launched_octree(shuffled, mesh, {.max_leaf = 2});
         ASSERT_TRUE(same_bytes(oct.nodes(), octree.nodes())) << "seed " << seed;
@@ -202,8 +202,8 @@ TEST(DeviceCore, OptionsOutOfRangeAreNamed) {
     EXPECT_THROW(
         static_cast<void>(device_node_capacity(3, PrimitiveKind::points, {.max_leaf = 256})),
         InputError);
-    EXPECT_THROW(static_cast<void>(device_node_capacity(0x7FFFFFFFu, PrimitiveKind::points,
-                                                        {.max_leaf = 1})),
+    EXPECT_THROW(static_cast<void>(
+                     device_node_capacity(0x7FFFFFFFu, PrimitiveKind::points, {.max_leaf = 1})),
                  InputError);  // more inner nodes than a link can name
     EXPECT_THROW(static_cast<void>(device_node_bound(3, {.max_leaf = 0})), InputError);
     EXPECT_THROW(static_cast<void>(device_node_bound(1u << 28, {})), InputError);

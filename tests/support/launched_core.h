@@ -59,8 +59,7 @@ KdTree launched_kdtree(Launcher& launcher, const MeshView& mesh, const KdTreeOpt
     auto triangles = garbage_array<LeafTriangle>(n, garbage);
     auto points = garbage_array<Vec3>(n, garbage);
     DeviceCounts counts;
-    const DeviceKdArrays tree{nodes.data(), order.data(), triangles.data(), points.data(),
-                              &counts};
+    const DeviceKdArrays tree{nodes.data(), order.data(), triangles.data(), points.data(), &counts};
     with_device_kdtree(device_mesh(mesh), options, tree, [&](const auto& build) {
         run_with_exact_scratch(build, launcher, garbage);
     });
