@@ -51,8 +51,8 @@ void refuse_rdx(const std::string& scene) {
 void refuse_bvh_options(const TreeOptions& tree) {
     for (const CLI::Option* option : tree.of_a_bvh)
         if (option->count() != 0)
-            throw CLI::ValidationError(
-                option->get_name(), "belongs to --tree bvh; --tree " + tree.tree + " has none");
+            throw CLI::ValidationError(option->get_name(),
+                                       "belongs to --tree bvh; --tree " + tree.tree + " has none");
 }
 
 }  // namespace raydix::cli

@@ -117,8 +117,8 @@ void run_core_check(const std::string& scene_name, const TreeOptions& tree_optio
     Json document = new_document("check");
     const Scene scene = load_scene_with_cameras(scene_name, tree_options, common);
     const CheckReport report = about(scene_name, [&] {
-        return Kind::check(
-            build_core<Kind>(scene.mesh, options, tree_options.device, 0).tree, scene.mesh);
+        return Kind::check(build_core<Kind>(scene.mesh, options, tree_options.device, 0).tree,
+                           scene.mesh);
     });
     document["check"] = {{"ok", report.ok},
                          {"broken", report.ok ? Json(nullptr) : Json(report.broken)},

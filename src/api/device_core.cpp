@@ -27,13 +27,13 @@ std::size_t device_node_capacity(std::uint32_t n, PrimitiveKind kind,
 
 std::uint64_t device_node_bound(std::uint32_t n, const OctreeOptions& options) {
     const OctreeOptions full = resolved(options, n);
-    // Each level has no more nodes than points, than cells, and than children of nodes that hold
-    // more than a leaf may.
-    const std::uint64_t divided = n / (static_cast<std::uint64_t>(full.max_leaf) + 1);
-    std::uint64_t nodes = std::min(n, 1u), cells = 1;
-    for (int level = 1; level <= full.max_level; ++level) {
+    // No more leaves than points, and on each level above the last no more divided nodes than cells
+    // and than nodes that hold more than a leaf may.
+    const std::uint64_t most_divided = n / (static_cast<std::uint64_t>(full.max_leaf) + 1);
+    std::uint64_t nodes = n, cells = 1;
+    for (int level = 0; level < full.max_level; ++level) {
+        nodes += std::min(cells, most_divided);
         cells = std::min<std::uint64_t>(8 * cells, n);
-        nodes += std::min(cells, 8 * divided);
     }
     return nodes;
 }
