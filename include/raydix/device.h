@@ -144,13 +144,12 @@ struct DeviceTree {
 
 /// Builds the tree that build_bvh builds, bit for bit, for the same input: bounds, codes, sort,
 /// hierarchy, leaf copies, boxes, and pairs if asked for. raydix/device_trees.h has k-d trees and
-/// octrees. Asynchronous: the launches are put on
-/// `stream` and the call returns; nothing is allocated and nothing waited for. `scratch`: device
-/// memory, aligned to 256 bytes, device_scratch_bytes or more, in use until the stream is past the
-/// build. Calling again with the same arrays rebuilds in place. What is wrong with the data is
-/// found on the device and stands in `counts`; see check_counts. options.strict and options.threads
-/// have no effect here, nor has options.fit on hploc. Throws InputError, BackendUnavailable,
-/// DeviceError.
+/// octrees. Asynchronous: the launches are put on `stream` and the call returns; nothing is
+/// allocated and nothing waited for. `scratch`: device memory, aligned to 256 bytes,
+/// device_scratch_bytes or more, in use until the stream is past the build. Calling again with the
+/// same arrays rebuilds in place. What is wrong with the data is found on the device and stands in
+/// `counts`; see check_counts. options.strict and options.threads have no effect here, nor has
+/// options.fit on hploc. Throws InputError, BackendUnavailable, DeviceError.
 void build_bvh_on_device(const DeviceMesh& mesh, const BuildOptions& options,
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 void build_bvh_on_device(const DeviceBoxList& boxes, const BuildOptions& options,
