@@ -70,17 +70,19 @@ void print_build_table(const Json& build, const TimedBuilds& timed) {
                kept.median, kept.min, kept.max);
 }
 
-void run_octree(const BuildCommand& options) {
+/// --tree octree or kdtree.
+void run_core_tree(const BuildCommand& options) {
+    const bool octree = options.tree.tree == "octree";
     if (!options.out_file.empty())
-        throw CLI::ValidationError("--output", ".rdx files hold a bvh; an octree cannot be saved");
-    run_octree_build(options.scene, options.tree, options.common, options.repeat);
+        throw CLI::ValidationError("--output", std::string(".rdx files hold a bvh; ") +
+                                                   (octree ? "an octree" : "a kdtree") +
+                                                   " cannot be saved");
+    const auto run = octree ? run_octree_build : run_kdtree_build;
+    run(options.scene, options.tree, options.common, options.repeat);
 }
 
 void run_build(const BuildCommand& options) {
-    if (options.tree.tree == "octree") return run_octree(options);
-    if (options.tree.tree == "kdtree")
-        return run_kdtree_build(options.scene, options.tree, options.common,
-                                {options.repeat, !options.out_file.empty()});
+    if (options.tree.tree != "bvh") return run_core_tree(options);
     Json document = new_document("build");
     const Scene scene = load_scene_with_cameras(options.scene, options.tree, options.common);
     document["scene"] = scene_json(scene);

@@ -1,11 +1,34 @@
 // A mesh in the memory of a GPU, and trees built from it there.
 #pragma once
 
-#include <raydix/device.h>
+#include <raydix/device_trees.h>
 
 #include <memory>
 
 namespace raydix::cli {
+
+/// The mesh alone.
+class DeviceInput {
+public:
+    /// Copies the mesh to the device. Throws BackendUnavailable if there is none.
+    explicit DeviceInput(const Mesh& mesh);
+    [[nodiscard]] const DeviceMesh& mesh() const { return mesh_; }
+    [[nodiscard]] PrimitiveKind kind() const;
+    [[nodiscard]] std::uint32_t count() const;
+
+private:
+    DeviceBuffer<Vec3> vertices_;
+    DeviceBuffer<Triangle> triangles_;
+    DeviceMesh mesh_;
+};
+
+/// A tree in new device memory. `ms`, if asked for: stages as the device saw them; `total` is the
+/// host's time with the allocation in it.
+[[nodiscard]] DeviceKdTree build_on_device(const DeviceInput& input, const KdTreeOptions& options,
+                                           BuildMs* ms);
+/// Where the usual room for nodes is too small, built again in as much as it takes.
+[[nodiscard]] DeviceOctree build_on_device(const DeviceInput& input, const OctreeOptions& options,
+                                           BuildMs* ms);
 
 class DeviceScene {
 public:
@@ -14,8 +37,8 @@ public:
         BuildMs ms;
     };
 
-    /// Copies the mesh to the device. Throws BackendUnavailable if there is none.
-    DeviceScene(const Mesh& mesh, const BuildOptions& options);
+    /// Throws as DeviceInput does.
+    DeviceScene(const Mesh& mesh, const BuildOptions& options) : options_(options), input_(mesh) {}
 
     /// Into new device memory. `ms.total` has the allocation in it and is the host's time; the
     /// stages are the device's.
@@ -29,9 +52,7 @@ public:
 
 private:
     BuildOptions options_;
-    DeviceBuffer<Vec3> vertices_;
-    DeviceBuffer<Triangle> triangles_;
-    DeviceMesh mesh_;
+    DeviceInput input_;
     std::unique_ptr<DeviceBvh> tree_;
 };
 

@@ -14,12 +14,9 @@ namespace raydix::cli {
 /// given. Options that belong to a BVH are a usage error, never ignored.
 [[nodiscard]] KdTreeOptions kdtree_options(const TreeOptions& tree, const CommonOptions& common);
 
-struct KdBuildCommand {
-    int repeat;
-    bool wants_file;  // -o: .rdx files hold a bvh
-};
+/// k-d trees are built and checked; .rdx files are for a BVH.
 void run_kdtree_build(const std::string& scene, const TreeOptions& tree,
-                      const CommonOptions& common, const KdBuildCommand& command);
+                      const CommonOptions& common, int repeat);
 void run_kdtree_check(const std::string& scene, const TreeOptions& tree,
                       const CommonOptions& common);
 

@@ -19,8 +19,4 @@ void run_octree_build(const std::string& scene, const TreeOptions& tree,
 void run_octree_check(const std::string& scene, const TreeOptions& tree,
                       const CommonOptions& common);
 
-/// The `build` object of a document; `builds` are the times of each repeat, at least one.
-[[nodiscard]] Json octree_json(const Octree& octree, const OctreeStats& stats,
-                               const std::vector<BuildMs>& builds);
-
 }  // namespace raydix::cli

@@ -131,12 +131,6 @@ void refuse_device(const TreeOptions& tree) {
                                                    "on the cpu only");
 }
 
-void refuse_device_of_tree(const TreeOptions& tree) {
-    if (tree.device != "cpu")
-        throw CLI::ValidationError(
-            "--device", "a " + tree.device + " device builds a bvh only; " + tree.tree + " on cpu");
-}
-
 void refuse_build_options(const std::string& scene, const TreeOptions& tree) {
     if (!is_rdx(scene)) return;
     for (const CLI::Option* option : tree.of_the_build)

@@ -50,8 +50,6 @@ struct SceneTree {
 [[nodiscard]] bool is_rdx(const std::string& scene);
 [[nodiscard]] Scene load_scene_with_cameras(const std::string& scene, const TreeOptions& tree,
                                             const CommonOptions& common);
-/// Octrees and k-d trees are built on the cpu: another --device is a usage error.
-void refuse_device_of_tree(const TreeOptions& tree);
 /// A .rdx file brings its tree: options that ask for another one are a usage error, never ignored.
 void refuse_build_options(const std::string& scene, const TreeOptions& tree);
 /// For commands that run on the CPU only: another device is a usage error, never ignored.

@@ -40,9 +40,9 @@ def main(junit, bench=None):
     out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
     passed = sum(test["status"] == "passed" for test in tests)
     for line in document["bench"]:
-        print(f"{line['scene']:<40}{line['builder']:<12}{line['bits']:>3} bits, leaves of {line['max_leaf']}: "
-              f"{line['ms']['total']['median']:8.3f} ms, {line['gprims_per_s']:6.2f} Gprims/s, hierarchy and boxes at "
-              f"{100 * line['of_copy_rate']:5.1f} % of the copy rate")
+        share = f", hierarchy and boxes at {100 * line['of_copy_rate']:5.1f} % of the copy rate" if "of_copy_rate" in line else ""
+        print(f"{line['scene']:<40}{line.get('builder', line['tree']):<12}{line['bits']:>3} bits, leaves of "
+              f"{line['max_leaf']}: {line['ms']['total']['median']:8.3f} ms, {line['gprims_per_s']:6.2f} Gprims/s{share}")
     print(f"{passed} of {len(tests)} GPU tests passed on {name}; written: {out.relative_to(ROOT)}")
     return 0 if tests and passed == len(tests) else 1
 

@@ -102,8 +102,8 @@ struct DeviceBoxList {
     std::uint32_t count = 0;      // below 2^31
 };
 
-/// What a build found out; lies on the device until it is asked for.
-struct DeviceCounts {
+/// What a build found out about its input; lies on the device until it is asked for.
+struct DeviceInputCounts {
     Aabb bounds;                     // around all valid primitives
     std::uint32_t input_count;       // primitives given
     std::uint32_t references;        // of them valid, and so in the tree
@@ -111,8 +111,11 @@ struct DeviceCounts {
     std::uint32_t first_left_out;    // the lowest id among them, or no_primitive
     std::uint32_t unreadable;        // triangles with an index past the vertices; left out as well
     std::uint32_t first_unreadable;  // the lowest id among them, or no_primitive
-    std::uint32_t inner_count;       // inner nodes; leaves are one more, unless references is 0
-    std::uint32_t max_depth;         // edges from the root to the deepest leaf
+};
+/// And about a binary tree.
+struct DeviceCounts : DeviceInputCounts {
+    std::uint32_t inner_count;  // inner nodes; leaves are one more, unless references is 0
+    std::uint32_t max_depth;    // edges from the root to the deepest leaf
 };
 
 /// AL09's node of 64 bytes, both children's boxes in one; src/layout/pair64.h tells the fields.
@@ -121,30 +124,32 @@ struct NodePair;
 /// Where a build writes; every pointer is the caller's device memory, aligned to 64 bytes. After
 /// the build the arrays are as in Bvh, the first `references` and `2 * inner_count + 2` elements.
 struct DeviceTree {
-    BvhNode* nodes = nullptr;           // [device_node_capacity(n, max_leaf)]
+    BvhNode* nodes = nullptr;           // [device_node_capacity(n, options)]
     std::uint32_t* order = nullptr;     // [n]
     LeafTriangle* triangles = nullptr;  // [n], of a mesh with triangles
     Aabb* boxes = nullptr;              // [n], of boxes
     Vec3* points = nullptr;             // [n], of points
     DeviceCounts* counts = nullptr;     // [1]
-    NodePair* pairs = nullptr;          // null, or [device_pair_capacity(n, max_leaf)]
+    NodePair* pairs = nullptr;          // null, or [device_pair_capacity(n, options)]
     std::uint32_t* pair_ids = nullptr;  // with pairs: [n], primitive ids, bit 31 ends a leaf's list
 };
-/// n primitives at most; `max_leaf` as in BuildOptions.
-[[nodiscard]] std::size_t device_node_capacity(std::uint32_t n, int max_leaf);
-[[nodiscard]] std::size_t device_pair_capacity(std::uint32_t n, int max_leaf);
+/// For n primitives at most. Throws InputError as device_scratch_bytes.
+[[nodiscard]] std::size_t device_node_capacity(std::uint32_t n, const BuildOptions& options);
+[[nodiscard]] std::size_t device_pair_capacity(std::uint32_t n, const BuildOptions& options);
 
 /// Bytes of scratch that a build of up to `n` primitives wants with these options. Throws
-/// InputError (as build_bvh, and for builders that do not run on a device), BackendUnavailable.
+/// InputError (as build_bvh, and for builders that do not run on a device: those that do are
+/// karras, lauterbach, garanzha, apetrei and hploc), BackendUnavailable.
 [[nodiscard]] std::size_t device_scratch_bytes(std::uint32_t n, const BuildOptions& options);
 
 /// Builds the tree that build_bvh builds, bit for bit, for the same input: bounds, codes, sort,
-/// hierarchy, leaf copies, boxes, and pairs if asked for. Asynchronous: the launches are put on
-/// `stream` and the call returns; nothing is allocated and nothing waited for. `scratch`: device
-/// memory, aligned to 256 bytes, device_scratch_bytes or more, in use until the stream is past the
-/// build. Calling again with the same arrays rebuilds in place. What is wrong with the data is
-/// found on the device and stands in `counts`; see check_counts. options.strict and options.threads
-/// have no effect here. Throws InputError, BackendUnavailable, DeviceError.
+/// hierarchy, leaf copies, boxes, and pairs if asked for. raydix/device_trees.h has k-d trees and
+/// octrees. Asynchronous: the launches are put on `stream` and the call returns; nothing is
+/// allocated and nothing waited for. `scratch`: device memory, aligned to 256 bytes,
+/// device_scratch_bytes or more, in use until the stream is past the build. Calling again with the
+/// same arrays rebuilds in place. What is wrong with the data is found on the device and stands in
+/// `counts`; see check_counts. options.strict and options.threads have no effect here, nor has
+/// options.fit on hploc. Throws InputError, BackendUnavailable, DeviceError.
 void build_bvh_on_device(const DeviceMesh& mesh, const BuildOptions& options,
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 void build_bvh_on_device(const DeviceBoxList& boxes, const BuildOptions& options,
@@ -163,7 +168,7 @@ BuildMs time_build_on_device(const DeviceBoxList& boxes, const BuildOptions& opt
 
 /// Throws the InputError that build_bvh throws for such an input: an index past the vertices or,
 /// with `strict`, a primitive that was left out.
-void check_counts(const DeviceCounts& counts, PrimitiveKind kind, bool strict);
+void check_counts(const DeviceInputCounts& counts, PrimitiveKind kind, bool strict);
 
 /// Copies a finished tree to the host, as the Bvh that build_bvh returns (without times). Waits for
 /// `stream`; throws as check_counts does.

@@ -6,6 +6,7 @@
 #include <raydix/camera.h>           // IWYU pragma: export
 #include <raydix/check.h>            // IWYU pragma: export
 #include <raydix/device.h>           // IWYU pragma: export
+#include <raydix/device_trees.h>     // IWYU pragma: export
 #include <raydix/error.h>            // IWYU pragma: export
 #include <raydix/hierarchy_study.h>  // IWYU pragma: export
 #include <raydix/kdtree.h>           // IWYU pragma: export

@@ -22,7 +22,7 @@ namespace raydix {
 struct ClusterScratch {
     Buffer<std::uint32_t> ids;  // [n] in Morton order
     PlocScratch ploc;
-    HplocScratch hploc;
+    Buffer<std::byte> hploc;
     BinnedScratch binned;
 
     [[nodiscard]] std::size_t capacity_bytes() const {
@@ -59,7 +59,8 @@ void build_clusters(const Source& source, std::span<const Key> keys, ClusterScra
     const ClusterRef root = [&] {
         switch (tree.options().builder) {
             case Builder::hploc:
-                return build_hploc(keys, ids, boxes, max_leaf, nodes, scratch.hploc);
+                return build_hploc(keys, ids, static_cast<std::uint32_t>(tree.input_count()), boxes,
+                                   max_leaf, nodes, scratch.hploc);
             case Builder::binned:
                 return build_binned(keys, ids, boxes, max_leaf, nodes, scratch.binned);
             default:

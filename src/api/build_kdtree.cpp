@@ -3,6 +3,7 @@
 #include <raydix/error.h>
 #include <raydix/kdtree.h>
 
+#include "api/core_options.h"
 #include "api/input_checks.h"
 #include "base/check.h"
 #include "exec/host_launcher.h"
@@ -16,21 +17,6 @@
 
 namespace raydix {
 namespace {
-
-// Boxes of triangles reach into each other, and a leaf has none of its own: a test saved there is
-// worth a node. Distances to points are cheaper than nodes.
-constexpr int default_leaf_points = 8, default_leaf_triangles = 4;
-
-void check_options(const KdTreeOptions& options, std::size_t n) {
-    if (options.bits != 30 && options.bits != 63)
-        throw InputError("k-d tree option bits is " + std::to_string(options.bits) +
-                         "; it must be 30 or 63");
-    if (options.max_leaf < 0 || options.max_leaf > 255)
-        throw InputError("k-d tree option max_leaf is " + std::to_string(options.max_leaf) +
-                         "; it must be 1 to 255, or 0");
-    if (n >= std::size_t{1} << 31)
-        throw InputError(std::to_string(n) + " primitives; a tree takes fewer than 2147483648");
-}
 
 /// One build: a source of primitives, the copies that its leaves hold, and the key type.
 template <class Key, class Source, class Copy>
@@ -62,7 +48,7 @@ struct KdBuildRun {
         sort(codes.span(), valid);
         ms.sort = stage.lap();
 
-        const KdKeys<Key> keys{codes.data(), valid, grid,
+        const KdKeys<Key> keys{codes.data(), valid, &valid, &grid,
                                static_cast<std::uint32_t>(options.max_leaf)};
         HostLauncher<> launcher;
         Buffer<std::byte> range_memory;
@@ -90,26 +76,17 @@ private:
 
     KdRanges find_ranges(HostLauncher<>& launcher, const KdKeys<Key>& keys,
                          Buffer<std::byte>& memory) {
-        if (keys.n <= keys.max_leaf) return {};
         Arena size;
-        (void)KdRanges::take(size, keys.n);
+        (void)KdRanges::take(size, keys.limit);
         memory.reset(size.bytes());
         Arena arena(memory.data(), memory.size());
-        const KdRanges ranges = KdRanges::take(arena, keys.n);
+        const KdRanges ranges = KdRanges::take(arena, keys.limit);
         find_kd_ranges(launcher, keys, ranges);
-        if (*ranges.inner > max_kd_inner)
-            throw InputError(std::to_string(*ranges.inner) + " inner nodes over " +
-                             std::to_string(keys.n) + " primitives; a k-d tree takes " +
-                             std::to_string(max_kd_inner) + ": raise max_leaf");
+        check_kd_inner(*ranges.inner, keys.limit);
         return ranges;
     }
 
     void emit(HostLauncher<>& launcher, const KdKeys<Key>& keys, const KdRanges& ranges) {
-        if (keys.n <= keys.max_leaf) {
-            tree.nodes().reset(2);
-            return launcher.launch("kdtree.leaf", 1,
-                                   EmitKdRootLeaf{tree.nodes().data(), keys.n, &tree.max_depth()});
-        }
         const std::uint32_t inner = *ranges.inner;
         tree.inner_count() = inner;
         tree.nodes().reset(2 * std::size_t{inner} + 2);
@@ -126,10 +103,7 @@ template <class Source, class Copy>
 void build(const Source& source, std::size_t n, const char* kind_name, KdTreeAccess tree,
            Buffer<Copy>& copies) {
     KdTreeOptions& options = tree.options();
-    check_options(options, n);
-    if (options.max_leaf == 0)
-        options.max_leaf =
-            tree.kind() == PrimitiveKind::points ? default_leaf_points : default_leaf_triangles;
+    options = resolved(options, tree.kind(), n);
     const std::uint64_t before = memory_count().now();
     memory_count().restart_peak();
     with_threads(options.threads, [&] {

@@ -2,6 +2,7 @@
 #include <raydix/error.h>
 #include <raydix/octree.h>
 
+#include "api/core_options.h"
 #include "api/input_checks.h"
 #include "exec/host_launcher.h"
 #include "exec/memory.h"
@@ -13,26 +14,6 @@
 
 namespace raydix {
 namespace {
-
-constexpr std::size_t most_points = (std::size_t{1} << 28) - 1;
-
-int finest_level(int bits) { return bits / 3; }
-
-void check_options(const OctreeOptions& options, std::size_t n) {
-    if (options.bits != 30 && options.bits != 63)
-        throw InputError("octree option bits is " + std::to_string(options.bits) +
-                         "; it must be 30 or 63");
-    if (options.max_level < -1 || options.max_level > finest_level(options.bits))
-        throw InputError("octree option max_level is " + std::to_string(options.max_level) +
-                         "; with " + std::to_string(options.bits) + " bits it must be 0 to " +
-                         std::to_string(finest_level(options.bits)) + ", or -1 for that");
-    if (options.max_leaf < 1)
-        throw InputError("octree option max_leaf is " + std::to_string(options.max_leaf) +
-                         "; it must be at least 1");
-    if (n > most_points)
-        throw InputError(std::to_string(n) + " points; an octree takes at most " +
-                         std::to_string(most_points));
-}
 
 /// One build: a source of primitives, whose centres are the points, and the key type.
 template <class Key, class Source>
@@ -90,7 +71,7 @@ private:
         Buffer<std::byte> radix_memory(radix_size.bytes());
         Arena radix_arena(radix_memory.data(), radix_memory.size());
         const auto radix = take_radix_chains<Key>(radix_arena, valid, rule);
-        count_octree(launcher, codes, valid, radix);
+        count_octree(launcher, codes, &valid, valid, radix);
 
         const std::uint32_t node_count = *radix.node_count;
         tree.nodes().reset(node_count);
@@ -120,9 +101,8 @@ private:
 
 template <class Source>
 Octree build(const Source& source, std::size_t n, PrimitiveKind kind, const char* kind_name,
-             OctreeOptions options) {
-    check_options(options, n);
-    if (options.max_level < 0) options.max_level = finest_level(options.bits);
+             const OctreeOptions& given) {
+    const OctreeOptions options = resolved(given, n);
     Octree octree;
     const OctreeAccess tree{octree};
     tree.kind() = kind;

@@ -5,33 +5,10 @@
 #include <algorithm>
 
 #include "api/device_build.h"
+#include "api/device_fetch.h"
 #include "tree/bvh_access.h"
 
 namespace raydix {
-namespace {
-
-const char* name_of(PrimitiveKind kind) {
-    switch (kind) {
-        case PrimitiveKind::triangles:
-            return "triangle";
-        case PrimitiveKind::boxes:
-            return "box";
-        default:
-            return "point";
-    }
-}
-
-std::uint32_t inner_limit(std::uint32_t n, int max_leaf) {
-    return inner_node_limit(n, static_cast<std::uint32_t>(max_leaf));
-}
-
-template <class T>
-void fetch(Buffer<T>& out, const T* device, std::size_t size, Stream stream) {
-    out.reset(size);
-    detail::copy_to_host(out.data(), device, size * sizeof(T), stream);
-}
-
-}  // namespace
 
 void check_device_options(const BuildOptions& options, std::uint64_t n) {
     if (options.bits != 30 && options.bits != 63)
@@ -40,37 +17,26 @@ void check_device_options(const BuildOptions& options, std::uint64_t n) {
     if (options.max_leaf < 1 || options.max_leaf > 255)
         throw InputError("build option max_leaf is " + std::to_string(options.max_leaf) +
                          "; it must be 1 to 255");
-    if (!in_lbvh_family(options.builder))
+    if (!in_lbvh_family(options.builder) && options.builder != Builder::hploc)
         throw InputError("builder " + std::string(builder_name(options.builder)) +
                          " does not run on a device");
     if (n >= std::uint64_t{1} << 31)
         throw InputError(std::to_string(n) + " primitives; a tree takes fewer than 2147483648");
 }
 
-std::size_t device_node_capacity(std::uint32_t n, int max_leaf) {
-    return 2 * std::size_t{inner_limit(n, max_leaf)} + 2;
+std::size_t device_node_capacity(std::uint32_t n, const BuildOptions& options) {
+    check_device_options(options, n);
+    return 2 * std::size_t{inner_limit(n, options)} + 2;
 }
 
-std::size_t device_pair_capacity(std::uint32_t n, int max_leaf) {
-    return std::max<std::size_t>(inner_limit(n, max_leaf), 1);
-}
-
-void check_counts(const DeviceCounts& counts, PrimitiveKind kind, bool strict) {
-    if (counts.unreadable != 0)
-        throw InputError(std::string(name_of(kind)) + " " +
-                         std::to_string(counts.first_unreadable) +
-                         ": an index is past the last of the vertices");
-    if (strict && counts.left_out != 0)
-        throw InputError(std::string(name_of(kind)) + " " + std::to_string(counts.first_left_out) +
-                         ": not finite, out of range or inverted, as are " +
-                         std::to_string(counts.left_out - 1) + " others");
+std::size_t device_pair_capacity(std::uint32_t n, const BuildOptions& options) {
+    check_device_options(options, n);
+    return std::max<std::size_t>(inner_limit(n, options), 1);
 }
 
 Bvh download_bvh(const DeviceTree& tree, PrimitiveKind kind, const BuildOptions& options,
                  Stream stream) {
-    DeviceCounts counts{};
-    detail::copy_to_host(&counts, tree.counts, sizeof(counts), stream);
-    synchronize(stream);
+    const DeviceCounts counts = fetch_counts(tree.counts, stream);
     check_counts(counts, kind, options.strict);
     Bvh bvh;
     const BvhAccess access{bvh};
@@ -102,14 +68,14 @@ Bvh download_bvh(const DeviceTree& tree, PrimitiveKind kind, const BuildOptions&
 DeviceBvh::DeviceBvh(PrimitiveKind kind, std::uint32_t n, const BuildOptions& options,
                      bool with_pairs)
     : kind_(kind), capacity_(n), options_(options), scratch_(device_scratch_bytes(n, options)) {
-    nodes_.reset(device_node_capacity(n, options.max_leaf));
+    nodes_.reset(device_node_capacity(n, options));
     order_.reset(n);
     counts_.reset(1);
     if (kind == PrimitiveKind::triangles) triangles_.reset(n);
     if (kind == PrimitiveKind::boxes) boxes_.reset(n);
     if (kind == PrimitiveKind::points) points_.reset(n);
     if (with_pairs) {
-        pairs_.reset(device_pair_capacity(n, options.max_leaf) * sizeof(NodePair));
+        pairs_.reset(device_pair_capacity(n, options) * sizeof(NodePair));
         pair_ids_.reset(n);
     }
 }
@@ -126,18 +92,11 @@ DeviceTree DeviceBvh::tree() const {
 }
 
 void DeviceBvh::check_input(PrimitiveKind kind, std::uint32_t n) const {
-    if (kind != kind_)
-        throw InputError(std::string("this memory is for a tree of another kind than a ") +
-                         name_of(kind));
-    if (n > capacity_)
-        throw InputError(std::to_string(n) + " primitives; this memory is for " +
-                         std::to_string(capacity_));
+    check_device_input(kind, n, kind_, capacity_);
 }
 
 void DeviceBvh::check_input(const DeviceMesh& mesh) const {
-    const bool points = mesh.triangle_count == 0;
-    check_input(points ? PrimitiveKind::points : PrimitiveKind::triangles,
-                points ? mesh.vertex_count : mesh.triangle_count);
+    check_input(kind_of(mesh), count_of(mesh));
 }
 
 BuildMs DeviceBvh::build_timed(const DeviceMesh& mesh, Stream stream) {

@@ -1,5 +1,6 @@
-// raydix/device.h in a build without CUDA: every call that would need it says so.
-#include <raydix/device.h>
+// raydix/device.h and device_trees.h in a build without CUDA: every call that would need it says
+// so.
+#include <raydix/device_trees.h>
 #include <raydix/error.h>
 
 #if !defined(RAYDIX_HAVE_CUDA)
@@ -42,6 +43,29 @@ BuildMs time_build_on_device(const DeviceBoxList&, const BuildOptions&, const De
     unavailable();
 }
 double measure_device_copy(std::size_t, int) { unavailable(); }
+
+std::size_t device_scratch_bytes(std::uint32_t, PrimitiveKind, const KdTreeOptions&) {
+    unavailable();
+}
+void build_kdtree_on_device(const DeviceMesh&, const KdTreeOptions&, const DeviceKdArrays&,
+                            std::span<std::byte>, Stream) {
+    unavailable();
+}
+BuildMs time_kdtree_on_device(const DeviceMesh&, const KdTreeOptions&, const DeviceKdArrays&,
+                              std::span<std::byte>, Stream) {
+    unavailable();
+}
+std::size_t device_scratch_bytes(std::uint32_t, std::uint32_t, const OctreeOptions&) {
+    unavailable();
+}
+void build_octree_on_device(const DeviceMesh&, const OctreeOptions&, const DeviceOctreeArrays&,
+                            std::span<std::byte>, Stream) {
+    unavailable();
+}
+BuildMs time_octree_on_device(const DeviceMesh&, const OctreeOptions&, const DeviceOctreeArrays&,
+                              std::span<std::byte>, Stream) {
+    unavailable();
+}
 
 }  // namespace raydix
 

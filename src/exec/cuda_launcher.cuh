@@ -20,6 +20,7 @@
 #include "base/probe.h"
 #include "exec/cuda_error.cuh"
 #include "exec/host_launcher.h"
+#include "exec/warp.h"
 
 namespace raydix {
 
@@ -52,6 +53,16 @@ __global__ void for_each_counted(Work work, const std::uint32_t* count, std::uin
     // 64 bits: the last step may go past 2^32.
     for (std::uint64_t i = blockIdx.x * blockDim.x + threadIdx.x; i < n; i += stride)
         work(static_cast<std::uint32_t>(i));
+}
+
+inline constexpr unsigned warp_block_threads = 64;  // a slow warp holds up only one other
+/// One warp for each w; blocks are whole warps. Room is asked for 24 blocks a multiprocessor: such
+/// work waits for memory most of the time.
+template <class Work>
+__global__ void __launch_bounds__(warp_block_threads, 24)
+    for_each_warp(Work work, const std::uint32_t* count) {
+    const std::uint32_t w = (blockIdx.x * warp_block_threads + threadIdx.x) / warp_lanes;
+    if (w < warps_for(*count)) work(CudaWarp(), w);
 }
 
 }  // namespace kernels
@@ -122,6 +133,8 @@ public:
     void launch(const char*, std::uint32_t, const Work&) {}
     template <class Work>
     void launch_counted(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
+    template <class Work>
+    void launch_warps(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
     void exclusive_scan(const char*, std::uint32_t*, std::uint32_t n, std::uint32_t*) {
         if (n != 0) grow(cub_scan_bytes(n));
     }
@@ -176,6 +189,16 @@ public:
         const ProfilerRange range(label);
         const unsigned blocks = std::min((limit - 1) / block_threads + 1, counted_blocks);
         kernels::for_each_counted<<<blocks, block_threads, 0, stream_>>>(work, count, limit);
+        RAYDIX_CUDA_TRY(cudaGetLastError());
+    }
+
+    template <class Work>
+    void launch_warps(const char* label, const std::uint32_t* count, std::uint32_t limit,
+                      const Work& work) {
+        if (limit == 0) return;
+        const ProfilerRange range(label);
+        const unsigned blocks = (limit - 1) / kernels::warp_block_threads + 1;
+        kernels::for_each_warp<<<blocks, kernels::warp_block_threads, 0, stream_>>>(work, count);
         RAYDIX_CUDA_TRY(cudaGetLastError());
     }
 

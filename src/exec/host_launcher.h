@@ -5,6 +5,9 @@
 //   launch_counted(label, count, limit, work)
 //                               the same for i in [0, *count), *count <= limit, written by an
 //                               earlier launch: the host of a GPU does not know it
+//   launch_warps(label, count, limit, work)
+//                               work(warp, w) for w in [0, *count / 32), rounded up: 32 lanes that
+//                               work together (exec/warp.h); *count <= limit
 //   exclusive_scan(label, values, n, total)
 //                               each value becomes the sum of those before it; *total, if not
 //                               null, the sum of all
@@ -32,6 +35,7 @@
 #include "base/probe.h"
 #include "exec/parallel.h"
 #include "exec/scan.h"
+#include "exec/warp.h"
 
 namespace raydix {
 
@@ -80,6 +84,17 @@ public:
     void launch_counted(const char* label, const std::uint32_t* count, std::uint32_t limit,
                         const Work& work) {
         launch(label, std::min(*count, limit), work);
+    }
+
+    template <class Work>
+    void launch_warps(const char* label, const std::uint32_t* count, std::uint32_t limit,
+                      const Work& work) {
+        const Clock::time_point start = Clock::now();
+        const std::uint32_t warps = warps_for(std::min(*count, limit));
+        for_each_index(
+            warps, [&](std::size_t w) { work(HostWarp(), static_cast<std::uint32_t>(w)); },
+            grain / 16);
+        note({label, std::uint64_t{warps} * warp_lanes}, start);
     }
 
     void exclusive_scan(const char* label, std::uint32_t* values, std::uint32_t n,

@@ -13,6 +13,10 @@
 namespace raydix {
 
 inline constexpr std::uint32_t warp_lanes = 32;
+/// Warps that have a lane for each of so many items.
+[[nodiscard]] RAYDIX_HD constexpr std::uint32_t warps_for(std::uint32_t items) {
+    return items / warp_lanes + (items % warp_lanes != 0 ? 1 : 0);
+}
 
 /// The place of the `rank`-th set bit of `mask`, counted from 0; 31 if there is none.
 RAYDIX_HD inline std::uint32_t nth_set_bit(std::uint32_t mask, std::uint32_t rank) {

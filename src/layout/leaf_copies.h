@@ -49,6 +49,28 @@ struct CopyToLeafOrder {
     RAYDIX_HD void operator()(std::uint32_t k) const { copies[k] = leaf_copy(source, order[k]); }
 };
 
+/// Boxes of primitives in an order.
+template <class Source>
+struct BoxInOrder {
+    Source source;
+    const std::uint32_t* order;
+    Aabb* boxes;
+    RAYDIX_HD void operator()(std::uint32_t k) const { source.box(order[k], boxes[k]); }
+};
+
+/// Centres of their boxes in an order.
+template <class Source>
+struct CenterInOrder {
+    Source source;
+    const std::uint32_t* order;
+    Vec3* centers;
+    RAYDIX_HD void operator()(std::uint32_t k) const {
+        Aabb box;
+        source.box(order[k], box);
+        centers[k] = center_of(box);
+    }
+};
+
 /// The first *count of `limit` places; what is left out stands behind them.
 template <class Launcher, class Source, class Copy>
 void launch_copies(Launcher& launcher, const Source& source, const std::uint32_t* count,

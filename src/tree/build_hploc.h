@@ -11,28 +11,21 @@
 
 namespace raydix {
 
-/// Memory kept from one build to the next.
-struct HplocScratch {
-    Buffer<ClusterRef> lists;
-    Buffer<std::uint32_t> meeting;
-
-    [[nodiscard]] std::size_t capacity_bytes() const {
-        return lists.capacity_bytes() + meeting.capacity_bytes();
-    }
-};
-
-/// Sorted keys [n], n >= 1, the ids [n] and boxes [n] of their primitives -> nodes [n - 1],
-/// numbered as the threads come by. Returns the root, which is a primitive if n = 1.
+/// Sorted keys [n], n >= 1, the ids [n] and boxes [n] of their primitives -> nodes [id_limit],
+/// which is more than any id. Returns the root, which is a primitive if n = 1. `memory` is kept
+/// from one build to the next.
 template <class Key>
 ClusterRef build_hploc(std::span<const Key> keys, std::span<const std::uint32_t> ids,
-                       const BoxLanes& boxes, std::uint32_t max_leaf, Buffer<ClusterNode>& nodes,
-                       HplocScratch& scratch);
+                       std::uint32_t id_limit, const BoxLanes& boxes, std::uint32_t max_leaf,
+                       Buffer<ClusterNode>& nodes, Buffer<std::byte>& memory);
 
 extern template ClusterRef build_hploc(std::span<const std::uint32_t>,
-                                       std::span<const std::uint32_t>, const BoxLanes&,
-                                       std::uint32_t, Buffer<ClusterNode>&, HplocScratch&);
+                                       std::span<const std::uint32_t>, std::uint32_t,
+                                       const BoxLanes&, std::uint32_t, Buffer<ClusterNode>&,
+                                       Buffer<std::byte>&);
 extern template ClusterRef build_hploc(std::span<const std::uint64_t>,
-                                       std::span<const std::uint32_t>, const BoxLanes&,
-                                       std::uint32_t, Buffer<ClusterNode>&, HplocScratch&);
+                                       std::span<const std::uint32_t>, std::uint32_t,
+                                       const BoxLanes&, std::uint32_t, Buffer<ClusterNode>&,
+                                       Buffer<std::byte>&);
 
 }  // namespace raydix

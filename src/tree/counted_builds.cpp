@@ -93,9 +93,9 @@ private:
             }
             case Builder::garanzha:
                 scratch_.levels = make_levels(level_limit(), scratch_);
-                return launch_garanzha(launcher_, in_,
-                                       make_scratch<GaranzhaScratch>(n, in_.max_leaf), out_,
-                                       scratch_.levels);
+                return launch_garanzha(
+                    launcher_, in_, make_scratch<GaranzhaScratch>(n, in_.max_leaf, level_limit()),
+                    out_, scratch_.levels);
             case Builder::apetrei: {
                 const auto scratch = make_scratch<ApetreiScratch>(n, in_.max_leaf);
                 std::uint32_t* depth = &result_.max_depth;

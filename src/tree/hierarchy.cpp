@@ -50,9 +50,10 @@ struct LaunchRun {
     }
     void garanzha() {
         scratch.levels = make_levels(level_limit(), scratch);
-        launch_garanzha(launcher, in,
-                        make_scratch<GaranzhaScratch>(scratch.memory, in.count, in.max_leaf), out,
-                        scratch.levels);
+        launch_garanzha(
+            launcher, in,
+            make_scratch<GaranzhaScratch>(scratch.memory, in.count, in.max_leaf, level_limit()),
+            out, scratch.levels);
     }
     void apetrei() {
         std::uint32_t depth = 0;  // the fit says it again

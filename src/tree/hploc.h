@@ -2,7 +2,7 @@
 // Mehalwal, Tsakok and Kensler 2024, "H-PLOC"). Each lane of a warp climbs from a primitive as in
 // Apetrei's builder; where a node with more than half a warp of primitives is complete, the whole
 // warp merges the lists of its children until half a warp of clusters is left. What a node keeps
-// depends on its children's lists alone.
+// depends on its children's lists alone, and where it lies on its children: no counter is asked.
 #pragma once
 
 #include <cstdint>
@@ -27,9 +27,10 @@ struct HplocArrays {
     std::uint32_t max_leaf;
     ClusterRef* lists;       // [n], primitives before; a list begins where its primitives begin
     std::uint32_t* meeting;  // [n - 1], zero before
-    ClusterNode* nodes;      // [n - 1], out
-    std::uint32_t* claimed;  // [1], zero before: how many nodes are taken
-    ClusterRef* root;        // [1], out
+    /// [greatest id + 1], out. Each merge ends the career of one smallest id, that of the child
+    /// with the greater one: this id is the node's place. The smallest id of all has no node.
+    ClusterNode* nodes;
+    ClusterRef* root;  // [1], out
 };
 
 /// Ends a list of fewer than hploc_list clusters that has room behind it.
@@ -186,19 +187,15 @@ private:
         const std::uint32_t rest = warp_.ballot([&](std::uint32_t lane) {
             return lane < list.count && !(mutual(lane) && lane > nearest[lane]);
         });
-        Var<std::uint32_t> base;
-        warp_.each([&](std::uint32_t lane) {
-            if (lane == 0) base[lane] = claim(*a_.claimed, ones(merges));
-        });
-        const std::uint32_t node_base = warp_.broadcast(base, 0);
         const Clusters other =
             list.taken_from(warp_, [&](std::uint32_t lane) { return nearest[lane]; });
         Clusters merged = list;
         warp_.each([&](std::uint32_t lane) {
             if ((merges >> lane & 1) == 0) return;
-            const std::uint32_t node_index = node_base + ones(merges & ((1u << lane) - 1));
-            const ClusterNode node =
-                merge_clusters(part(list, lane), part(other, lane), a_.max_leaf);
+            const ClusterPart mine = part(list, lane), its = part(other, lane);
+            const std::uint32_t node_index =
+                mine.sum.least > its.sum.least ? mine.sum.least : its.sum.least;
+            const ClusterNode node = merge_clusters(mine, its, a_.max_leaf);
             a_.nodes[node_index] = node;
             merged.ref[lane] = node_index;
             merged.set_box(lane, {node.lo, node.hi});

@@ -1,6 +1,7 @@
 // Sorted codes [n] -> nodes of a k-d tree: which radix nodes stay, their splits, then how far the
 // primitives below each reach (Karras 2012, section 5). One text for every launcher
-// (exec/host_launcher.h); slots are numbered by radix index, so the array is the same on all.
+// (exec/host_launcher.h); slots are numbered by radix index, so the array is the same on all. How
+// many keys count, and the grid, are read where the launches run.
 #pragma once
 
 #include <raydix/kdtree.h>
@@ -23,6 +24,21 @@ inline constexpr std::uint32_t max_kd_inner = 1u << 30;
 RAYDIX_HD inline float component_of(Vec3 v, std::uint32_t axis) {
     return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
 }
+
+/// What the launches of one build share. `keys` are sorted.
+template <class Key>
+struct KdKeys {
+    const Key* keys;             // [limit]
+    std::uint32_t limit;         // at least 1
+    const std::uint32_t* count;  // [1]: the first so many count
+    const Grid* grid;            // [1]
+    std::uint32_t max_leaf;
+
+    template <class Probe>
+    [[nodiscard]] RAYDIX_HD SortedKeys<Key, Probe> sorted() const {
+        return {keys, *count};
+    }
+};
 
 /// Scratch of the first launches; `inner` is what they find out.
 struct KdRanges {
@@ -52,14 +68,18 @@ struct KdFitScratch {
 /// Radix node -> its range, and whether it stays an inner node.
 template <class Key, class Probe>
 struct FindKdRange {
-    SortedKeys<Key, Probe> keys;
-    std::uint32_t max_leaf;
+    KdKeys<Key> in;
     KdRanges out;
 
     RAYDIX_HD void operator()(std::uint32_t node) const {
+        const auto keys = in.template sorted<Probe>();
+        if (node + 1 >= keys.count) {
+            out.rank[node] = 0;
+            return;
+        }
         const RadixRange range = find_range(keys, node);
         out.ranges[node] = range;
-        out.rank[node] = range.last - range.first >= max_leaf ? 1u : 0u;
+        out.rank[node] = range.last - range.first >= in.max_leaf ? 1u : 0u;
         Probe::bytes(sizeof(RadixRange) + sizeof(std::uint32_t));
     }
 };
@@ -67,17 +87,16 @@ struct FindKdRange {
 /// Writes the children of one radix node that stays, but for their intervals.
 template <class Key, class Probe>
 struct EmitKdNode {
-    SortedKeys<Key, Probe> keys;
-    Grid grid;
-    std::uint32_t max_leaf;
+    KdKeys<Key> in;
     KdRanges found;
     KdFitScratch scratch;
     KdNode* nodes;  // [2 * inner + 2], out
 
     RAYDIX_HD void operator()(std::uint32_t node) const {
+        if (node + 1 >= *in.count) return;
         const RadixRange range = found.ranges[node];
         Probe::bytes(sizeof(RadixRange));
-        if (range.last - range.first < max_leaf) return;
+        if (range.last - range.first < in.max_leaf) return;
         const std::uint32_t rank = found.rank[node], slot = pair_slot(rank);
         scratch.meeting[rank] = 0;
         child(slot, range.first, range.split, range.split);
@@ -92,15 +111,15 @@ private:
     RAYDIX_HD void child(std::uint32_t slot, std::uint32_t first, std::uint32_t last,
                          std::uint32_t node) const {
         const std::uint32_t count = last - first + 1;
-        if (count > max_leaf) return inner_node(slot, node);
+        if (count > in.max_leaf) return inner_node(slot, node);
         nodes[slot] = {0.0f, 0.0f, {.first = first}, count << 2 | KdNode::leaf_axis};
         Probe::bytes(sizeof(KdNode));
     }
     RAYDIX_HD void inner_node(std::uint32_t slot, std::uint32_t node) const {
         const RadixRange range = found.ranges[node];
         const std::uint32_t rank = found.rank[node];
-        const int prefix = keys.common_prefix(range.first, range.last);
-        const KdSplit split = split_of_prefix<Key>(grid, keys.keys[range.split + 1], prefix);
+        const int prefix = in.template sorted<Probe>().common_prefix(range.first, range.last);
+        const KdSplit split = split_of_prefix<Key>(*in.grid, in.keys[range.split + 1], prefix);
         nodes[slot] = {0.0f, 0.0f, {.plane = split.plane}, rank << 2 | split.axis};
         scratch.parent_slot[rank] = slot;
         Probe::bytes(sizeof(RadixRange) + sizeof(Key) + sizeof(KdNode) + 2 * sizeof(rank));
@@ -164,48 +183,44 @@ private:
     }
 };
 
-/// Up to max_leaf primitives: the root is a leaf.
+/// Up to max_leaf primitives: the root is a leaf. Of none there is a leaf that nobody may read.
+template <class Probe>
 struct EmitKdRootLeaf {
-    KdNode* nodes;  // [2], out
-    std::uint32_t count;
+    const std::uint32_t* primitives;  // [1]
+    std::uint32_t max_leaf;
+    KdNode* nodes;             // [2], out
     std::uint32_t* max_depth;  // [1], out
 
     RAYDIX_HD void operator()(std::uint32_t) const {
+        const std::uint32_t count = *primitives;
+        Probe::bytes(sizeof(count));
+        if (count > max_leaf) return;
         nodes[0] = {0.0f, 0.0f, {.first = 0}, count << 2 | KdNode::leaf_axis};
         nodes[1] = {0.0f, 0.0f, {.first = 0}, 0};
         *max_depth = 0;
+        Probe::bytes(2 * sizeof(KdNode) + sizeof(std::uint32_t));
     }
 };
 
-/// What the launches of one build share. `keys` are sorted.
-template <class Key>
-struct KdKeys {
-    const Key* keys;  // [n]
-    std::uint32_t n;
-    Grid grid;
-    std::uint32_t max_leaf;
-};
-
-/// For n > max_leaf: finds ranges, and how many nodes stay inner ones (in `out.inner`).
+/// Finds ranges, and how many nodes stay inner ones (in `out.inner`).
 template <class Launcher, class Key>
 void find_kd_ranges(Launcher& launcher, const KdKeys<Key>& in, const KdRanges& out) {
     using Probe = typename Launcher::Probe;
-    const SortedKeys<Key, Probe> sorted{in.keys, in.n};
-    launcher.launch("kdtree.ranges", in.n - 1, FindKdRange<Key, Probe>{sorted, in.max_leaf, out});
-    launcher.exclusive_scan("kdtree.ranks", out.rank, in.n - 1, out.inner);
+    launcher.launch("kdtree.ranges", in.limit - 1, FindKdRange<Key, Probe>{in, out});
+    launcher.exclusive_scan("kdtree.ranks", out.rank, in.limit - 1, out.inner);
 }
 
-/// For n > max_leaf: writes all nodes and the exact depth. The copies that `leaf_box` reads are in
-/// leaf order. nodes [2 * inner + 2]
+/// Writes all nodes and the exact depth. The copies that `leaf_box` reads are in leaf order.
+/// nodes [2 * inner + 2]
 template <class Launcher, class Key, class LeafBox>
 void emit_kd_nodes(Launcher& launcher, const KdKeys<Key>& in, const KdRanges& found,
                    const KdFitScratch& scratch, const LeafBox& leaf_box, KdNode* nodes,
                    std::uint32_t* max_depth) {
     using Probe = typename Launcher::Probe;
-    const SortedKeys<Key, Probe> sorted{in.keys, in.n};
-    launcher.launch("kdtree.emit", in.n - 1,
-                    EmitKdNode<Key, Probe>{sorted, in.grid, in.max_leaf, found, scratch, nodes});
-    launcher.launch_counted("kdtree.fit", found.inner, in.n - 1,
+    launcher.launch("kdtree.leaf", 1,
+                    EmitKdRootLeaf<Probe>{in.count, in.max_leaf, nodes, max_depth});
+    launcher.launch("kdtree.emit", in.limit - 1, EmitKdNode<Key, Probe>{in, found, scratch, nodes});
+    launcher.launch_counted("kdtree.fit", found.inner, in.limit - 1,
                             FitKdIntervals<LeafBox, Probe>{leaf_box, nodes, scratch, max_depth});
 }
 

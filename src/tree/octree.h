@@ -9,8 +9,8 @@
 //   scan              where each chain is written
 //   chains, by_level  a stable sort by level gives the final numbers
 //   fill, parents, children   the nodes
-// Counts stay in the launcher's memory. `count_octree` ends with the number of nodes, so that the
-// caller can make room; `emit_octree` writes them.
+// Counts stay in the launcher's memory, that of the points as well. `count_octree` ends with the
+// number of nodes, so that the caller can make room; `emit_octree` writes them.
 #pragma once
 
 #include <raydix/octree.h>
@@ -46,7 +46,7 @@ struct RadixChains {
     static constexpr int key_levels = CodeFormat<Key>::axis_bits;
 
     Key* codes;              // [n], unique ones first; bits below max_level are 0
-    std::uint32_t* starts;   // [n + 1] the first point of each unique code, then n
+    std::uint32_t* starts;   // [n + 1] the first point of each unique code, then their number
     std::uint32_t* parents;  // [2n] slot -> inner radix node, no_node for the root
     CodeRange* ranges;       // [n] inner node -> its codes
     std::uint8_t* levels;    // [n] inner node -> floor(delta / 3)
@@ -112,10 +112,10 @@ struct MarkUniqueCodes {
 
 template <class Key, class Probe>
 struct CompactCodes {
-    const Key* sorted_codes;  // [n]
-    std::uint32_t n;
+    const Key* sorted_codes;           // [n]
+    const std::uint32_t* point_count;  // [1]
     Key kept_bits;
-    const std::uint32_t* ranks;  // [n], the marks after their scan
+    const std::uint32_t* ranks;  // [n + 1], the marks after their scan
     RadixChains<Key, Probe> radix;
 
     RAYDIX_HD void operator()(std::uint32_t i) const {
@@ -127,7 +127,19 @@ struct CompactCodes {
             radix.codes[ranks[i]] = code;
             radix.starts[ranks[i]] = i;
         }
-        if (i + 1 == n) radix.starts[*radix.unique_count] = n;
+        if (i + 1 != *point_count) return;
+        *radix.unique_count = ranks[i + 1];
+        radix.starts[ranks[i + 1]] = i + 1;
+    }
+};
+
+/// No unique codes, should there be no points.
+template <class Probe>
+struct StartOctree {
+    std::uint32_t* unique_count;
+    RAYDIX_HD void operator()(std::uint32_t) const {
+        Probe::bytes(sizeof(std::uint32_t));
+        *unique_count = 0;
     }
 };
 
@@ -302,7 +314,7 @@ RadixChains<Key, Probe> take_radix_chains(Arena& arena, std::uint32_t n, OctreeR
     radix.parents = arena.take<std::uint32_t>(2 * std::size_t{n});
     radix.ranges = arena.take<CodeRange>(n);
     radix.levels = arena.take<std::uint8_t>(n);
-    radix.offsets = arena.take<std::uint32_t>(2 * std::size_t{n});
+    radix.offsets = arena.take<std::uint32_t>(2 * std::size_t{n});  // the marks: n + 1 <= 2 n
     radix.unique_count = arena.take<std::uint32_t>(1);
     radix.node_count = arena.take<std::uint32_t>(1);
     radix.rule = rule;
@@ -321,19 +333,22 @@ inline ChainOrder take_chain_order(Arena& arena, std::uint32_t capacity) {
     return order;
 }
 
-/// sorted_codes [n], n > 0 -> chains and *radix.node_count.
+/// sorted_codes [n], n > 0, of which the first *point_count count -> chains and *radix.node_count.
 template <class Launcher, class Key>
-void count_octree(Launcher& launcher, const Key* sorted_codes, std::uint32_t n,
-                  const RadixChains<Key, typename Launcher::Probe>& radix) {
+void count_octree(Launcher& launcher, const Key* sorted_codes, const std::uint32_t* point_count,
+                  std::uint32_t n, const RadixChains<Key, typename Launcher::Probe>& radix) {
     using Probe = typename Launcher::Probe;
     // Bits below max_level are cut off; at level 0 that is all of them.
     const int cut = 3 * (CodeFormat<Key>::axis_bits - radix.rule.max_level);
     const Key kept_bits = static_cast<Key>(~Key{0} >> cut << cut);
     std::uint32_t* marks = radix.offsets;  // free until the chains are counted
-    launcher.launch("octree.mark", n, MarkUniqueCodes<Key, Probe>{sorted_codes, kept_bits, marks});
-    launcher.exclusive_scan("octree.mark.scan", marks, n, radix.unique_count);
-    launcher.launch("octree.compact", n,
-                    CompactCodes<Key, Probe>{sorted_codes, n, kept_bits, marks, radix});
+    launcher.launch("octree.start", 1, StartOctree<Probe>{radix.unique_count});
+    launcher.launch_counted("octree.mark", point_count, n,
+                            MarkUniqueCodes<Key, Probe>{sorted_codes, kept_bits, marks});
+    launcher.exclusive_scan_counted("octree.mark.scan", marks, point_count, n);
+    launcher.launch_counted(
+        "octree.compact", point_count, n,
+        CompactCodes<Key, Probe>{sorted_codes, point_count, kept_bits, marks, radix});
     launcher.launch_counted("octree.radix", radix.unique_count, n,
                             LinkRadixNode<Key, Probe>{radix});
     launcher.launch("octree.count", 2 * n, CountChain<Key, Probe>{radix});

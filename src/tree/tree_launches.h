@@ -109,8 +109,8 @@ void launch_hierarchy(Launcher& plain, const TreeRun<Key>& run, const TreeScratc
             break;
         }
         case Builder::garanzha:
-            launch_garanzha(launcher, in, GaranzhaScratch(arena, n, max_leaf), run.out,
-                            scratch.levels);
+            launch_garanzha(launcher, in, GaranzhaScratch(arena, n, max_leaf, scratch.levels.limit),
+                            run.out, scratch.levels);
             break;
         case Builder::apetrei: {
             const ApetreiScratch mine(arena, n, max_leaf);

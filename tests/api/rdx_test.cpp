@@ -78,6 +78,22 @@ protected:
     TempFolder folder_;
 };
 
+TEST_F(Rdx, BytesDoNotDependOnTheThreads) {
+    const Scene scene = make_scene(3000 * thorough);
+    for (const Builder builder :
+         {Builder::karras, Builder::lauterbach, Builder::garanzha, Builder::apetrei, Builder::ploc,
+          Builder::hploc, Builder::binned}) {
+        const auto bytes_with = [&](int threads) {
+            return saved(folder_, build_bvh(scene.mesh, {.builder = builder, .threads = threads}),
+                         scene);
+        };
+        const Bytes one = bytes_with(1);
+        for (const int threads : {2, 5})
+            EXPECT_TRUE(bytes_with(threads) == one)
+                << builder_name(builder) << ", " << threads << " threads";
+    }
+}
+
 TEST_F(Rdx, RoundTripOfTriangles) {
     for (const std::size_t n : {0u, 1u, 2u, 3u, 5u, 4000u}) {
         Scene scene = make_scene(n);

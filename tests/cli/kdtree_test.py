@@ -62,8 +62,6 @@ class KdTree(ProgramTest):
         self.fail_with_usage("build", SOUP, "--tree", "kdtree", "--quality", "fast", names=["--quality"])
         self.fail_with_usage("build", SOUP, "--tree", "kdtree", "--fit", "levels", names=["--fit"])
         self.fail_with_usage("build", SOUP, "--tree", "kdtree", "--epo", names=["--epo"])
-        for command in ("build", "check"):
-            self.fail_with_usage(command, SOUP, "--tree", "kdtree", "--device", "cuda", names=["--device", "cuda"])
         self.fail_with_usage("trace", SOUP, "--tree", "kdtree", "--mode", "all", names=["--mode"])
         self.fail_with_usage("check", "--same", SOUP, SOUP, "--tree", "kdtree", names=["--tree"])
         self.fail_with_usage("render", SOUP, "--tree", "kdtree", "-o", "x.png", names=["--tree"])

@@ -75,8 +75,7 @@ class Octree(ProgramTest):
                         ["build", scene, "--quality", "fast"], ["build", scene, "--fit", "levels"],
                         ["build", scene, "--epo"], ["build", scene, "--sah-node", "2"],
                         ["build", scene, "--max-level", "22"], ["build", scene, "--max-level", "11", "--bits", "30"],
-                        ["check", scene, "--max-level", "-1"], ["build", scene, "--device", "cuda"],
-                        ["check", scene, "--device", "cuda"]):
+                        ["check", scene, "--max-level", "-1"]):
             self.fail_with_usage(*refused, "--tree", "octree")
         for command in (["trace", scene], ["render", scene, "-o", "x.png"]):
             self.fail_with_usage(*command, "--tree", "octree", names=["--tree", "octree", "bvh"])

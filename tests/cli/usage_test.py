@@ -96,10 +96,14 @@ class Usage(ProgramTest):
         self.fail_with_one_line("trace", file, "--rays", self.write("bad.npy", b"\x93NUMPY"), names=["bad.npy"])
 
     def test_a_device_that_is_not_there(self):
-        done = self.run_program("build", "builtin:soup?triangles=100", "--device", "cuda", "--quiet", "--repeat", "1")
-        if done.code != 0:  # where a GPU is, the build has nothing to complain about
-            self.assert_one_line(done)
-            self.assertRegex(done.err, "CUDA")
+        soup = "builtin:soup?triangles=100"
+        for tree in ((), ("--builder", "hploc"), ("--tree", "kdtree"), ("--tree", "octree")):
+            for command in (("build", soup, "--repeat", "1"), ("check", soup)):
+                done = self.run_program(*command, "--device", "cuda", "--quiet", *tree)
+                if done.code != 0:  # where a GPU is, the build has nothing to complain about
+                    self.assertEqual(done.code, 1)
+                    self.assert_one_line(done)
+                    self.assertRegex(done.err, "CUDA")
         self.fail_with_usage("trace", SMALL, "--device", "cuda", names=["--device"])
         self.fail_with_usage("render", SMALL, "-o", "x.png", "--device", "cuda", names=["--device"])
 

@@ -1,13 +1,14 @@
 // Trees built on a device by the public calls of raydix/device.h against those that the host
-// builds: the same hash for every builder, fit, code length and kind of input; on a stream of the
-// caller's; rebuilt in place; never more memory touched than was lent. Skipped where there is no
-// device.
+// builds: the same hash for every kind of tree, builder, fit, code length and kind of input; on a
+// stream of the caller's; rebuilt in place; never more memory touched than was lent. Skipped where
+// there is no device.
 #include <gtest/gtest.h>
 #include <raydix/check.h>
-#include <raydix/device.h>
+#include <raydix/device_trees.h>
 #include <raydix/error.h>
 #include <raydix/scene.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -18,7 +19,14 @@ namespace raydix::test {
 namespace {
 
 constexpr Builder builders[] = {Builder::karras, Builder::lauterbach, Builder::garanzha,
-                                Builder::apetrei};
+                                Builder::apetrei, Builder::hploc};
+
+/// What the host builds: one tree for the LBVH family, which karras gives the soonest.
+BuildOptions host_options(BuildOptions options) {
+    if (options.builder != Builder::hploc) options.builder = Builder::karras;
+    options.fit = Fit::as_published;
+    return options;
+}
 
 class GpuBuild : public ::testing::Test {
 protected:
@@ -63,15 +71,14 @@ void expect_same(const Bvh& built, const Bvh& expected) {
     EXPECT_EQ(built.max_depth(), expected.max_depth());
 }
 
-void compare(const std::string& what, const MeshView& mesh) {
-    const Uploaded input(mesh);
+void compare_bvh(const std::string& what, const MeshView& mesh, const Uploaded& input) {
     for (const int bits : {30, 63})
-        for (const int max_leaf : {1, 4}) {
-            const Bvh expected = build_bvh(mesh, {.bits = bits, .max_leaf = max_leaf});
-            for (const Builder builder : builders)
+        for (const int max_leaf : {1, 4})
+            for (const Builder builder : builders) {
+                BuildOptions options{.builder = builder, .bits = bits, .max_leaf = max_leaf};
+                const Bvh expected = build_bvh(mesh, host_options(options));
                 for (const Fit fit : {Fit::as_published, Fit::levels, Fit::atomic}) {
-                    const BuildOptions options{
-                        .builder = builder, .bits = bits, .max_leaf = max_leaf, .fit = fit};
+                    options.fit = fit;
                     SCOPED_TRACE(what + ": " + told(options));
                     DeviceBvh tree(input.kind(), input.count(), options, true);
                     for (int turn = 0; turn < 3; ++turn) {  // again into the same memory
@@ -79,7 +86,59 @@ void compare(const std::string& what, const MeshView& mesh) {
                         expect_same(tree.download(), expected);
                     }
                 }
+            }
+}
+
+template <class T>
+bool same_bytes(std::span<const T> a, std::span<const T> b) {
+    return a.size() == b.size() &&
+           (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
+}
+
+void compare_kdtree(const std::string& what, const MeshView& mesh, const Uploaded& input) {
+    for (const int bits : {30, 63})
+        for (const int max_leaf : {0, 1}) {
+            SCOPED_TRACE(what + ": k-d tree, " + std::to_string(bits) + " bits");
+            const KdTreeOptions options{.bits = bits, .max_leaf = max_leaf};
+            const KdTree expected = build_kdtree(mesh, options);
+            DeviceKdTree tree(input.kind(), input.count(), options);
+            for (int turn = 0; turn < 3; ++turn) {
+                tree.build(input.mesh);
+                const KdTree built = tree.download();
+                EXPECT_EQ(kd_hash(built), kd_hash(expected));
+                EXPECT_TRUE(same_bytes(built.nodes(), expected.nodes()));
+                EXPECT_EQ(kd_check(built).broken, "");
+                EXPECT_EQ(built.left_out(), expected.left_out());
+            }
         }
+}
+
+void compare_octree(const std::string& what, const MeshView& mesh, const Uploaded& input) {
+    for (const int bits : {30, 63})
+        for (const int max_leaf : {1, 4}) {
+            SCOPED_TRACE(what + ": octree, " + std::to_string(bits) + " bits");
+            const OctreeOptions options{.bits = bits, .max_leaf = max_leaf};
+            const Octree expected = build_octree(mesh, options);
+            const auto nodes = static_cast<std::uint32_t>(expected.nodes().size());
+            DeviceOctree tree(input.kind(), input.count(), options, std::max(nodes, 1u));
+            for (int turn = 0; turn < 3; ++turn) {
+                tree.build(input.mesh);
+                EXPECT_EQ(tree.node_count(), nodes);
+                const Octree built = tree.download();
+                EXPECT_EQ(tree_hash(built), tree_hash(expected));
+                EXPECT_TRUE(same_bytes(built.nodes(), expected.nodes()));
+                EXPECT_EQ(check(built).broken, "");
+                EXPECT_EQ(built.left_out(), expected.left_out());
+            }
+        }
+}
+
+/// All trees of a mesh.
+void compare(const std::string& what, const MeshView& mesh) {
+    const Uploaded input(mesh);
+    compare_bvh(what, mesh, input);
+    compare_kdtree(what, mesh, input);
+    compare_octree(what, mesh, input);
 }
 
 /// Every k-th vertex is NaN.
@@ -124,7 +183,8 @@ TEST_F(GpuBuild, Boxes) {
         const BuildOptions options{.builder = builder};
         DeviceBvh tree(PrimitiveKind::boxes, 40'000, options);
         tree.build(DeviceBoxList{input.data(), static_cast<std::uint32_t>(boxes.size())});
-        expect_same(tree.download(), build_bvh(std::span<const Aabb>(boxes)));
+        expect_same(tree.download(),
+                    build_bvh(std::span<const Aabb>(boxes), host_options(options)));
     }
 }
 
@@ -138,6 +198,59 @@ TEST_F(GpuBuild, ASmallerMeshIntoTheMemoryOfALargerOne) {
     }
 }
 
+bool guard_is_whole(const DeviceBuffer<std::byte>& scratch, const std::vector<std::byte>& pattern,
+                    std::size_t guard) {
+    std::vector<std::byte> after(pattern.size());
+    scratch.download(after);
+    const auto behind = static_cast<std::ptrdiff_t>(guard);
+    return std::equal(after.end() - behind, after.end(), pattern.end() - behind);
+}
+
+TEST_F(GpuBuild, WritesNothingBehindTheScratchOfCoreTrees) {
+    const Mesh mesh = laced(random_soup(10'000, 3), 9);
+    const Uploaded input(mesh);
+    constexpr std::size_t guard = 4096;
+    constexpr std::uint32_t n = 10'000, room = 50'000;
+    DeviceBuffer<std::uint32_t> order(n);
+    DeviceBuffer<LeafTriangle> copies(n);
+    DeviceBuffer<Vec3> points(n);
+    for (const int bits : {30, 63}) {
+        const KdTreeOptions kd{.bits = bits};
+        const std::size_t kd_bytes = device_scratch_bytes(n, PrimitiveKind::triangles, kd);
+        const std::vector<std::byte> pattern(kd_bytes + guard, std::byte{0x5A});
+        DeviceBuffer<std::byte> scratch{std::span<const std::byte>(pattern)};
+        DeviceBuffer<KdNode> nodes(device_node_capacity(n, PrimitiveKind::triangles, kd));
+        DeviceBuffer<DeviceCounts> counts(1);
+        const DeviceKdArrays kd_tree{nodes.data(), order.data(), copies.data(), nullptr,
+                                     counts.data()};
+        build_kdtree_on_device(input.mesh, kd, kd_tree, {scratch.data(), kd_bytes}, nullptr);
+        EXPECT_EQ(kd_hash(download_kdtree(kd_tree, PrimitiveKind::triangles, kd, nullptr)),
+                  kd_hash(build_kdtree(mesh, kd)));
+        EXPECT_TRUE(guard_is_whole(scratch, pattern, guard));
+        EXPECT_THROW(build_kdtree_on_device(input.mesh, kd, kd_tree, {scratch.data(), kd_bytes / 2},
+                                            nullptr),
+                     InputError);
+
+        const OctreeOptions oct{.bits = bits};
+        const std::size_t oct_bytes = device_scratch_bytes(n, room, oct);
+        const std::vector<std::byte> oct_pattern(oct_bytes + guard, std::byte{0x5A});
+        DeviceBuffer<std::byte> oct_scratch{std::span<const std::byte>(oct_pattern)};
+        DeviceBuffer<OctreeNode> oct_nodes(room);
+        DeviceBuffer<DeviceOctreeCounts> oct_counts(1);
+        DeviceOctreeArrays oct_tree{oct_nodes.data(), room, order.data(), points.data(),
+                                    oct_counts.data()};
+        build_octree_on_device(input.mesh, oct, oct_tree, {oct_scratch.data(), oct_bytes}, nullptr);
+        EXPECT_EQ(tree_hash(download_octree(oct_tree, PrimitiveKind::triangles, oct, nullptr)),
+                  tree_hash(build_octree(mesh, oct)));
+        EXPECT_TRUE(guard_is_whole(oct_scratch, oct_pattern, guard));
+        oct_tree.node_capacity = 10;  // too little room: a clear error, nothing written beyond it
+        build_octree_on_device(input.mesh, oct, oct_tree, {oct_scratch.data(), oct_bytes}, nullptr);
+        EXPECT_THROW(
+            static_cast<void>(download_octree(oct_tree, PrimitiveKind::triangles, oct, nullptr)),
+            InputError);
+    }
+}
+
 TEST_F(GpuBuild, WritesNothingBehindTheScratch) {
     const Mesh mesh = random_soup(10'000, 3);
     const Uploaded input(mesh);
@@ -147,7 +260,7 @@ TEST_F(GpuBuild, WritesNothingBehindTheScratch) {
             const std::size_t bytes = device_scratch_bytes(10'000, options), guard = 4096;
             const std::vector<std::byte> pattern(bytes + guard, std::byte{0x5A});
             DeviceBuffer<std::byte> scratch{std::span<const std::byte>(pattern)};
-            DeviceBuffer<BvhNode> nodes(device_node_capacity(10'000, options.max_leaf));
+            DeviceBuffer<BvhNode> nodes(device_node_capacity(10'000, options));
             DeviceBuffer<std::uint32_t> order(10'000);
             DeviceBuffer<LeafTriangle> copies(10'000);
             DeviceBuffer<DeviceCounts> counts(1);
@@ -158,11 +271,8 @@ TEST_F(GpuBuild, WritesNothingBehindTheScratch) {
             tree.counts = counts.data();
             build_bvh_on_device(input.mesh, options, tree, {scratch.data(), bytes}, nullptr);
             expect_same(download_bvh(tree, PrimitiveKind::triangles, options, nullptr),
-                        build_bvh(mesh, {.bits = bits}));
-            std::vector<std::byte> after(bytes + guard);
-            scratch.download(after);
-            EXPECT_TRUE(std::equal(after.end() - guard, after.end(), pattern.end() - guard))
-                << told(options);
+                        build_bvh(mesh, host_options(options)));
+            EXPECT_TRUE(guard_is_whole(scratch, pattern, guard)) << told(options);
             EXPECT_THROW(build_bvh_on_device(input.mesh, options, tree, {scratch.data(), bytes / 2},
                                              nullptr),
                          InputError);

@@ -11,22 +11,23 @@ PLAIN = ("encode_triangles_30", "encode_triangles_63", "encode_boxes_63", "encod
          "find_range_63", "emit_radix_node", "fit_boxes", "answer_ray")
 # Functors of a build that must have been compiled -> the most registers. 32 lets an sm_90 multiprocessor hold all of
 # its 2048 threads: what waits for memory (the climbs, the searches) must not exceed it.
-BUILD = {
+EVERY = {
     "BoundPrimitives": 40, "MergeParts": 40, "PublishCounts": 40, "EncodeInScene": 32, "CopyToLeafOrder": 32,
+    "FillUnusedKeys": 32, "ClearUnusedValues": 32, "SaveLastValue": 32, "AddLastValue": 32, "SetWord": 32}
+BUILD = EVERY | {
     "MarkKeptNode": 32, "EmitKeptNode": 32, "CountSplits": 32, "EmitSplits": 32, "FindSplitLevels": 32,
     "KeepTwoChildren": 32, "NoteLevelNodes": 32, "LinkLevel": 32, "StartQueue": 32, "SplitTask": 32,
     "StartSplitLists": 32, "EmitOnlyLeaf": 32,
     "MarkKeptSplit": 32, "ClimbFromLeaf": 32, "LinkFewKeys": 32, "FitIfOnlyLeaf": 40, "FitBoxes": 32, "FitLevel": 40,
     "StartLevels": 32, "ExpandLevel": 32, "ClearMeeting": 32, "EmitNodePair": 40, "CountPairs": 32, "SetKeyCounts": 32,
-    "ClearBehind": 32, "FillUnusedKeys": 32, "ClearUnusedValues": 32, "SaveLastValue": 32, "AddLastValue": 32,
-    "SetWord": 32}
-# Octree and k-d tree (core_trees.cu).
-CORE = dict.fromkeys((
-    "MarkUniqueCodes", "CompactCodes", "LinkRadixNode", "CountChain", "WriteChain", "FillNode", "LinkToParent",
-    "LinkToChildren", "MarkLevels", "FindKdRange", "EmitKdNode", "FitKdIntervals", "FillUnusedKeys", "ClearWords",
-    "ClearUnusedValues", "SaveLastValue", "AddLastValue", "SetWord"), 32)
-EXPECTED = {"kernels.cu": dict.fromkeys(PLAIN, 255), "device_build_cuda.cu": BUILD, "core_trees.cu": CORE,
-            "hploc_same_tree.cu": {"prepare_hploc": 32, "run_hploc": 40}}
+    "ClearBehind": 32, "BoxInOrder": 32, "StartHploc": 32, "MergeClusters": 40, "StartPlacing": 40, "LinkPlaced": 32,
+    "JumpPlaced": 32, "EmitPlaced": 40}
+# Octree and k-d tree.
+CORE = EVERY | dict.fromkeys((
+    "StartOctree", "MarkUniqueCodes", "CompactCodes", "LinkRadixNode", "CountChain", "WriteChain", "FillNode",
+    "LinkToParent", "LinkToChildren", "MarkLevels", "CenterInOrder", "MakeGrid", "FindKdRange", "EmitKdRootLeaf",
+    "EmitKdNode", "FitKdIntervals"), 32)
+EXPECTED = {"kernels.cu": dict.fromkeys(PLAIN, 255), "device_build_cuda.cu": BUILD, "device_core_cuda.cu": CORE}
 ENTRY = re.compile(r"Compiling entry function '(\w+)'.*?(\d+) bytes stack frame, (\d+) bytes spill stores, "
                    r"(\d+) bytes spill loads.*?Used (\d+) registers", re.DOTALL)
 

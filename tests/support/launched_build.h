@@ -2,10 +2,13 @@
 // compared.
 #pragma once
 
+#include <gtest/gtest.h>
 #include <raydix/bvh.h>
 #include <raydix/device.h>
 
+#include <algorithm>
 #include <cstring>
+#include <memory>
 #include <vector>
 
 #include "api/device_build.h"
@@ -21,12 +24,44 @@ struct IdleLauncher {
     void launch(const char*, std::uint32_t, const Work&) {}
     template <class Work>
     void launch_counted(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
+    template <class Work>
+    void launch_warps(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
     void exclusive_scan(const char*, std::uint32_t*, std::uint32_t, std::uint32_t*) {}
     void exclusive_scan_counted(const char*, std::uint32_t*, const std::uint32_t*, std::uint32_t) {}
     template <class Key>
     void sort_pairs(const char*, const SortArrays<Key>&, std::uint32_t, const std::uint32_t*, int) {
     }
     [[nodiscard]] bool maybe_any(const std::uint32_t*) const { return true; }
+};
+
+/// Scratch of exactly this size, filled with `garbage`, which also stands behind it.
+struct LentMemory {
+    static constexpr std::size_t guard = 1024;
+    std::size_t bytes;
+    unsigned char garbage;
+    std::vector<std::byte> memory;
+    Arena arena;
+
+    LentMemory(std::size_t size, unsigned char fill)
+        : bytes(size),
+          garbage(fill),
+          memory(size + Arena::alignment + guard, std::byte{fill}),
+          arena(start(), size) {}
+
+    /// All of it was given out, and nothing behind it was written.
+    void expect_exact_use() {
+        EXPECT_EQ(arena.bytes(), bytes);
+        const std::byte* behind = static_cast<std::byte*>(start()) + bytes;
+        EXPECT_TRUE(std::all_of(behind, behind + guard,
+                                [&](std::byte b) { return b == std::byte{garbage}; }));
+    }
+
+private:
+    void* start() {
+        void* at = memory.data();
+        std::size_t space = memory.size();
+        return std::align(Arena::alignment, bytes, at, space);
+    }
 };
 
 /// All that a build leaves behind. Memory is filled with `garbage` before, as a rebuild in place
@@ -44,8 +79,8 @@ struct LaunchedBuild {
     template <class Launcher, class Input>
     LaunchedBuild(Launcher& launcher, const Input& input, std::uint32_t n, PrimitiveKind kind,
                   const BuildOptions& options, unsigned char garbage = 0xA5) {
-        resize(nodes, device_node_capacity(n, options.max_leaf), garbage);
-        resize(pairs, device_pair_capacity(n, options.max_leaf), garbage);
+        resize(nodes, device_node_capacity(n, options), garbage);
+        resize(pairs, device_pair_capacity(n, options), garbage);
         resize(order, n, garbage);
         resize(pair_ids, n, garbage);
         resize(triangles, kind == PrimitiveKind::triangles ? n : 0, garbage);
@@ -57,12 +92,9 @@ struct LaunchedBuild {
             Arena sizing = sizing_arena();
             IdleLauncher idle;
             build.run(idle, sizing);
-            std::vector<std::byte> memory(sizing.bytes() + Arena::alignment, std::byte{garbage});
-            void* start = memory.data();
-            std::size_t space = memory.size();
-            start = std::align(Arena::alignment, sizing.bytes(), start, space);
-            Arena arena(start, sizing.bytes());
-            build.run(launcher, arena);
+            LentMemory memory(sizing.bytes(), garbage);
+            build.run(launcher, memory.arena);
+            memory.expect_exact_use();
         });
         make_bvh(kind, options);
     }

@@ -49,6 +49,14 @@ public:
         launch(label, std::min(*count, limit), work);
     }
 
+    /// A warp of the host is one element: its lanes are in step, warps are not.
+    template <class Work>
+    void launch_warps(const char* label, const std::uint32_t* count, std::uint32_t limit,
+                      const Work& work) {
+        launch(label, warps_for(std::min(*count, limit)),
+               [&](std::uint32_t w) { work(HostWarp(), w); });
+    }
+
     void exclusive_scan(const char* label, std::uint32_t* values, std::uint32_t n,
                         std::uint32_t* total) {
         host_.exclusive_scan(label, values, n, total);

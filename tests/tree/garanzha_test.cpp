@@ -4,18 +4,25 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <numeric>
 
 #include "support/launched_tree.h"
+#include "support/shuffled_launcher.h"
+#include "support/support.h"
 
 namespace raydix::test {
 namespace {
 
+const auto run_by = [](auto& launcher, auto& tree) {
+    launch_garanzha(
+        launcher, tree.in,
+        tree.template scratch<GaranzhaScratch>(tree.in.count, tree.in.max_leaf, tree.level_limit),
+        tree.links(), tree.levels());
+};
 const auto run = [](auto& tree) {
     HostLauncher<> launcher;
-    launch_garanzha(launcher, tree.in,
-                    tree.template scratch<GaranzhaScratch>(tree.in.count, tree.in.max_leaf),
-                    tree.links(), tree.levels());
+    run_by(launcher, tree);
 };
 
 /// Ranks [begin, begin + count) of level l belong to nodes l edges below the root, and there are no
@@ -67,6 +74,39 @@ TEST(Garanzha, RanksOfALevelFollowOneAnother) {
         LaunchedTree<std::uint64_t> tree(keys, max_leaf);
         run(tree);
         expect_ranks_by_level(tree);
+    }
+}
+
+TEST(Garanzha, NumbersFollowTheKeysInEveryOrderOfThreads) {
+    std::mt19937_64 random(9);
+    for (const std::uint32_t max_leaf : {1u, 4u}) {
+        const auto keys = random_keys<std::uint32_t>(random, 1000 * thorough, 1u << 12);
+        LaunchedTree<std::uint32_t> expected(keys, max_leaf);
+        run(expected);
+        std::vector<std::uint32_t> first(expected.nodes.size(), 0);  // key of a slot's range
+        for (std::uint32_t rank = expected.inner_count; rank-- > 0;) {
+            const std::uint32_t pair = pair_slot(rank);
+            for (const std::uint32_t slot : {pair, pair + 1})
+                if (expected.nodes[slot].is_leaf()) first[slot] = expected.nodes[slot].first;
+            first[expected.parent_slot[rank]] = first[pair];
+        }
+        for (std::uint32_t level = 0; expected.level_count[level] != 0; ++level) {
+            const std::uint32_t begin = expected.level_begin[level];
+            for (std::uint32_t rank = begin + 1; rank < begin + expected.level_count[level]; ++rank)
+                ASSERT_LT(first[expected.parent_slot[rank - 1]], first[expected.parent_slot[rank]]);
+        }
+        for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+            ShuffledLauncher shuffled(seed);
+            LaunchedTree<std::uint32_t> tree(keys, max_leaf);
+            run_by(shuffled, tree);
+            EXPECT_EQ(tree.parent_slot, expected.parent_slot) << "seed " << seed;
+            EXPECT_EQ(tree.level_begin, expected.level_begin) << "seed " << seed;
+            EXPECT_EQ(tree.level_count, expected.level_count) << "seed " << seed;
+            EXPECT_EQ(std::memcmp(tree.nodes.data(), expected.nodes.data(),
+                                  tree.nodes.size() * sizeof(BvhNode)),
+                      0)
+                << "seed " << seed;
+        }
     }
 }
 

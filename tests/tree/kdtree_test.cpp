@@ -198,22 +198,26 @@ struct BackwardLauncher {
 struct Prepared {
     KdTree tree;
     std::vector<std::uint64_t> codes;
+    Grid grid{};
+    std::uint32_t count = 0;
     KdKeys<std::uint64_t> keys{};
 
     explicit Prepared(const std::vector<Vec3>& points, int max_leaf)
         : tree(build_kdtree(points, {.max_leaf = max_leaf})) {
-        const Grid grid = make_grid(tree.bounds(), 21);
+        grid = make_grid(tree.bounds(), 21);
         for (const Vec3& p : tree.points())
             codes.push_back(interleave<std::uint64_t>(grid.cell(p)));
-        keys = {codes.data(), static_cast<std::uint32_t>(codes.size()), grid,
-                static_cast<std::uint32_t>(max_leaf)};
+        count = static_cast<std::uint32_t>(codes.size());
+        keys = {codes.data(), count, &count, &grid, static_cast<std::uint32_t>(max_leaf)};
     }
+    Prepared(const Prepared&) = delete;
+    Prepared& operator=(const Prepared&) = delete;
 };
 
 template <class Launcher>
 std::vector<KdNode> nodes_by(Launcher& launcher, const Prepared& in, std::uint32_t inner,
                              std::uint32_t* depth) {
-    const auto n = in.keys.n;
+    const auto n = in.keys.limit;
     std::vector<RadixRange> ranges(n - 1);
     std::vector<std::uint32_t> rank(n - 1), parent(inner);
     std::vector<std::uint8_t> meeting(inner);
@@ -239,15 +243,16 @@ TEST(KdTreePipeline, OrderOfWorkDoesNotMatterAndCountsAreTaken) {
         const auto nodes = nodes_by(backward, in, in.tree.inner_count(), &depth);
         EXPECT_TRUE(same_nodes(nodes, in.tree.nodes()));
         EXPECT_EQ(depth, in.tree.max_depth());
-        EXPECT_EQ(backward.labels, (std::vector<std::string>{"kdtree.ranges", "kdtree.ranks",
-                                                             "kdtree.emit", "kdtree.fit"}));
+        EXPECT_EQ(backward.labels,
+                  (std::vector<std::string>{"kdtree.ranges", "kdtree.ranks", "kdtree.leaf",
+                                            "kdtree.emit", "kdtree.fit"}));
         std::vector<LaunchRecord> log;
         HostLauncher<CountProbe> counting(&log);
         const auto again = nodes_by(counting, in, in.tree.inner_count(), &depth);
         EXPECT_TRUE(same_nodes(again, in.tree.nodes()));
-        ASSERT_EQ(log.size(), 4u);
+        ASSERT_EQ(log.size(), 5u);
         EXPECT_EQ(log[0].items, in.codes.size() - 1);
-        EXPECT_EQ(log[3].items, in.tree.inner_count());
+        EXPECT_EQ(log[4].items, in.tree.inner_count());
         for (const LaunchRecord& record : log) EXPECT_GT(record.bytes, record.items);
     }
 }
