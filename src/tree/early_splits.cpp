@@ -43,8 +43,10 @@ private:
         return polygon_of(mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]);
     }
 
+    /// What the box has beyond a parallelogram: of a triangle half of which fills its flat box,
+    /// nothing. Cutting walls only made trees worse (docs/algorithms/split.md).
     [[nodiscard]] static double waste(const Polygon& polygon, const Aabb& box) {
-        return std::max(0.0, half_area(box) - polygon.projected_area());
+        return std::max(0.0, half_area(box) - 2 * polygon.projected_area());
     }
 
     /// Each cut halves a cell of the grid, so this ends after 24 levels an axis.
@@ -80,8 +82,7 @@ private:
         const double cell = ((&scene_.hi.x)[axis] - origin) / grid_cells;
         if (!(cell > 0)) return false;
         const auto at = [&](float x) {
-            return static_cast<std::uint32_t>(
-                std::clamp((x - origin) / cell, 0.0, grid_cells - 1));
+            return static_cast<std::uint32_t>(std::clamp((x - origin) / cell, 0.0, grid_cells - 1));
         };
         const std::uint32_t first = at(lo), last = at(hi);
         if (first == last) return false;
@@ -104,8 +105,7 @@ private:
 double cuts_per_weight(const std::vector<float>& weights, double least_weight,
                        std::uint64_t budget) {
     const auto cuts_with = [&](double factor) {
-        std::vector<std::uint64_t> sums((weights.size() + block_references - 1) /
-                                        block_references);
+        std::vector<std::uint64_t> sums((weights.size() + block_references - 1) / block_references);
         for_each_block(weights.size(), block_references,
                        [&](std::size_t b, std::size_t begin, std::size_t end) {
                            std::uint64_t sum = 0;

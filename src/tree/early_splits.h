@@ -15,9 +15,9 @@ namespace raydix {
 
 /// More parts: better boxes, more memory and time.
 struct EarlySplits {
-    double budget = 0.5;     // references beyond one a triangle, at most, over triangles
-    double least_waste = 4;  // triangles with a smaller waste than this many even shares of the
-                             // scene's half surface stay whole
+    double budget = 0.5;      // references beyond one a triangle, at most, over triangles
+    double least_waste = 64;  // triangles with a smaller waste than this many even shares of the
+                              // scene's half surface stay whole
 };
 
 /// references [n]: one for each triangle that is not left out, n >= 1, inside `scene`. On return

@@ -56,10 +56,10 @@ public:
 private:
     [[nodiscard]] SweepLists lists_of(const TopNode& at) {
         auto& orders = at.in_spare ? s_.spare_orders : s_.orders;
-        return {s_.references.data(),
-                {orders[0].data() + at.begin, orders[1].data() + at.begin,
-                 orders[2].data() + at.begin},
-                at.count()};
+        return {
+            s_.references.data(),
+            {orders[0].data() + at.begin, orders[1].data() + at.begin, orders[2].data() + at.begin},
+            at.count()};
     }
 
     /// Level by level; all nodes of a level at once.
@@ -112,7 +112,8 @@ private:
                        });
         std::array<std::uint32_t, 2> all{UINT32_MAX, UINT32_MAX};
         for (const auto& part : least)
-            for (std::size_t side = 0; side < 2; ++side) all[side] = std::min(all[side], part[side]);
+            for (std::size_t side = 0; side < 2; ++side)
+                all[side] = std::min(all[side], part[side]);
         at.upper_is_left = all[1] < all[0];
     }
 
@@ -145,8 +146,8 @@ private:
             SubtreeBuild build(max_leaf_);
             for (std::size_t t = begin; t < end; ++t) {
                 TopNode& task = top_[tasks[t]];
-                task.sum = build.run(lists_of(task), task.depth, s_.local.data(), out_of(task),
-                                     task.node);
+                task.sum =
+                    build.run(lists_of(task), task.depth, s_.local.data(), out_of(task), task.node);
             }
         });
     }

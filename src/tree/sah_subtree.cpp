@@ -40,8 +40,7 @@ SubtreeBuild::Below SubtreeBuild::build(const Range& range, BvhNode& node) {
     const std::uint32_t pair = pairs_++, first = listed_;
     BvhNode* children = out_.nodes + 2 * std::size_t{pair};
     const Below a = build(left, children[0]), b = build(right, children[1]);
-    const Aabb box =
-        unite({children[0].lo, children[0].hi}, {children[1].lo, children[1].hi});
+    const Aabb box = unite({children[0].lo, children[0].hi}, {children[1].lo, children[1].hi});
     const float area = sah_area(box);
     node = {box.lo, 2 * pair, box.hi, 0};
     Below below{area + (a.cost + b.cost), 1 + std::max(a.height, b.height)};
