@@ -2,6 +2,7 @@
 // whole -> three orders -> tree -> leaf copies.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <numeric>
 #include <type_traits>
@@ -35,9 +36,10 @@ struct SweepScratch {
 };
 
 /// One reference for each primitive that is not left out, ascending by id.
+/// `references` gets room for `spare` more.
 template <class Source>
 void make_references(const Source& source, std::uint32_t n, std::uint32_t valid,
-                     Buffer<SahReference>& references) {
+                     std::uint32_t spare, Buffer<SahReference>& references) {
     constexpr std::size_t block = 4096;
     std::vector<std::uint32_t> before((n + block - 1) / block);
     if (valid != n) {
@@ -51,7 +53,7 @@ void make_references(const Source& source, std::uint32_t n, std::uint32_t valid,
         for (std::size_t b = 0; b < before.size(); ++b)
             before[b] = static_cast<std::uint32_t>(b * block);
     }
-    references.reset(valid);
+    references.reset(std::size_t{valid} + spare);
     for_each_block(n, block, [&](std::size_t b, std::size_t begin, std::size_t end) {
         SahReference* out = references.data() + before[b];
         Box3 box;
@@ -68,17 +70,33 @@ inline std::uint32_t ascending_bits(float x) {
 }
 
 /// By the centroid's coordinate, of equals by place.
-inline void sort_references(SweepScratch& scratch) {
-    const std::span<const SahReference> references = scratch.sah.references.view();
+inline void sort_references(std::uint32_t n, SweepScratch& scratch) {
+    const SahReference* references = scratch.sah.references.data();
+    scratch.keys.reset(n);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-        scratch.keys.reset(references.size());
-        for_each_index(references.size(), [&](std::size_t k) {
+        for_each_index(n, [&](std::size_t k) {
             const SahReference& r = references[k];
             scratch.keys[k] = ascending_bits((&r.lo.x)[axis] + (&r.hi.x)[axis]);
         });
-        scratch.sah.orders[axis].reset(references.size());
-        sort_keys(scratch.keys.span(), scratch.sah.orders[axis].span(), 32, scratch.sort);
+        scratch.sah.orders[axis].reset(scratch.sah.references.size());
+        sort_keys(scratch.keys.span(), scratch.sah.orders[axis].span().first(n), 32, scratch.sort);
     }
+}
+
+/// References that spatial splits may add: with them at most twice as many as primitives, and fewer
+/// than 2^31.
+[[nodiscard]] constexpr std::uint32_t spatial_spare(std::uint32_t valid) {
+    return std::min(valid, 0x7fffffffu - valid);
+}
+
+inline void sort_and_build(const SahInput& input, SweepScratch& scratch, const BvhAccess& tree,
+                           BuildMs& ms, Stopwatch& stage) {
+    ms.codes = stage.lap();
+    sort_references(input.references, scratch);
+    ms.sort = stage.lap();
+    tree.inner_count() =
+        build_sah(input, scratch.sah, tree.nodes(), tree.order(), tree.max_depth());
+    ms.hierarchy = stage.lap();
 }
 
 /// Of `n` primitives `valid` > 0 are not left out. On return all arrays of the tree are complete.
@@ -87,19 +105,25 @@ void build_by_sweeps(const Source& source, std::uint32_t n, std::uint32_t valid,
                      SweepScratch& scratch, const BvhAccess& tree, Buffer<Copy>& copies,
                      BuildMs& ms) {
     Stopwatch stage;
-    make_references(source, n, valid, scratch.sah.references);
+    const Builder builder = tree.options().builder;
+    SahInput input{valid, static_cast<std::uint32_t>(tree.options().max_leaf)};
     if constexpr (std::is_same_v<Source, TriangleSource>) {
-        if (tree.options().builder == Builder::split)
-            split_early({{source.vertices, source.vertex_count}, {source.triangles, n}}, scene, {},
-                        scratch.sah.references, scratch.spare);
+        const MeshView mesh{{source.vertices, source.vertex_count}, {source.triangles, n}};
+        const ReferenceCutter cutter(mesh);
+        if (builder == Builder::sbvh) {
+            input.spare = spatial_spare(valid);
+            input.cutter = &cutter;
+        }
+        make_references(source, n, valid, input.spare, scratch.sah.references);
+        if (builder == Builder::split) {
+            split_early(mesh, scene, {}, scratch.sah.references, scratch.spare);
+            input.references = static_cast<std::uint32_t>(scratch.sah.references.size());
+        }
+        sort_and_build(input, scratch, tree, ms, stage);
+    } else {
+        make_references(source, n, valid, 0, scratch.sah.references);
+        sort_and_build(input, scratch, tree, ms, stage);
     }
-    ms.codes = stage.lap();
-    sort_references(scratch);
-    ms.sort = stage.lap();
-    const auto max_leaf = static_cast<std::uint32_t>(tree.options().max_leaf);
-    tree.inner_count() =
-        build_sah(scratch.sah, max_leaf, tree.nodes(), tree.order(), tree.max_depth());
-    ms.hierarchy = stage.lap();
     copy_to_leaf_order(source, tree.order().view(), copies);
     ms.layout = stage.lap();
 }

@@ -17,35 +17,42 @@ constexpr std::uint32_t task_references = 8192;
 static_assert(task_references > 255);
 constexpr std::uint32_t block_references = 4096;
 
-/// A node above the tasks, or a task, over places [begin, end) of the orders.
-struct TopNode {
-    std::uint32_t begin, end, depth;
-    bool in_spare;
-    std::uint32_t left = 0;    // its children are left and left + 1; 0: a task
-    std::uint32_t middle = 0;  // of the lower side
+/// References [begin, begin + count) of the orders, with room for `spare` more behind them, which
+/// are to be made from the places [free_places, free_places + spare).
+struct Side {
+    std::uint32_t begin = 0, count = 0, spare = 0, free_places = 0;
+};
+
+/// A node above the tasks, or a task.
+struct TopNode : Side {
+    std::uint32_t depth = 0;
+    bool in_spare = false;        // which orders
+    std::uint32_t left = 0;       // its children are left and left + 1; 0: a task
+    std::array<Side, 2> sides{};  // lower, upper; none: a task
     bool upper_is_left = false;
     SubtreeSum sum{};
     BvhNode node{};
     std::uint32_t rank = 0, first = 0;  // in the finished tree: of its own pair, of its references
-
-    [[nodiscard]] std::uint32_t count() const { return end - begin; }
 };
 
 class SahRun {
 public:
-    SahRun(SahScratch& scratch, std::uint32_t max_leaf) : s_(scratch), max_leaf_(max_leaf) {}
+    SahRun(const SahInput& input, SahScratch& scratch) : in_(input), s_(scratch) {}
 
     std::uint32_t run(Buffer<BvhNode>& nodes, Buffer<std::uint32_t>& order,
                       std::uint32_t& max_depth) {
-        const auto n = static_cast<std::uint32_t>(s_.references.size());
-        s_.sides.reset(n);
-        if (n > task_references)
-            for (auto& spare : s_.spare_orders) spare.reset(n);
-        top_.push_back({0, n, 0, false});
+        const std::size_t room = std::size_t{in_.references} + in_.spare;
+        s_.sides.reset(room);
+        if (in_.references > task_references)
+            for (auto& spare : s_.spare_orders) spare.reset(room);
+        if (in_.cutter != nullptr) rules_ = {in_.cutter, least_overlap * root_area()};
+        TopNode root;
+        static_cast<Side&>(root) = {0, in_.references, in_.spare, in_.references};
+        top_.push_back(root);
         split_top();
-        s_.local.reset(n);
-        s_.order.reset(n);
-        s_.nodes.reset(2 * std::size_t{n});
+        s_.local.reset(room);
+        s_.order.reset(room);
+        s_.nodes.reset(2 * room);
         build_tasks();
         sum_up();
         place(nodes, order);
@@ -59,7 +66,13 @@ private:
         return {
             s_.references.data(),
             {orders[0].data() + at.begin, orders[1].data() + at.begin, orders[2].data() + at.begin},
-            at.count()};
+            at.count};
+    }
+
+    [[nodiscard]] float root_area() const {
+        GrowingBox box;
+        for (std::uint32_t k = 0; k < in_.references; ++k) box.add(s_.references[k]);
+        return box.area();
     }
 
     /// Level by level; all nodes of a level at once.
@@ -70,30 +83,62 @@ private:
                 last - first, [&](std::size_t i) { split(top_[first + i]); }, 1);
             for (; first < last; ++first) {
                 const TopNode at = top_[first];
-                if (at.middle == 0) continue;
+                if (at.sides[0].count == 0) continue;
                 top_[first].left = static_cast<std::uint32_t>(top_.size());
-                TopNode left{at.begin, at.middle, at.depth + 1, at.in_spare};
-                TopNode right{at.middle, at.end, at.depth + 1, at.in_spare};
-                if (at.upper_is_left) std::swap(left, right);
-                top_.push_back(left);
-                top_.push_back(right);
+                for (const std::size_t side : {0, 1}) {
+                    TopNode child;
+                    static_cast<Side&>(child) = at.sides[at.upper_is_left ? 1 - side : side];
+                    child.depth = at.depth + 1;
+                    child.in_spare = at.in_spare;
+                    top_.push_back(child);
+                }
             }
         }
     }
 
     void split(TopNode& at) {
-        if (at.count() <= task_references) return;
+        if (at.count <= task_references) return;
         const SweepLists lists = lists_of(at);
         SweepSplit split;
-        split.left = at.count() / 2;
-        if (at.depth < deepest_sah_split) split = find_sweep_split_parallel(lists);
-        at.middle = at.begin + split.left;
+        split.left = at.count / 2;
+        if (at.depth < deepest_sah_split) {
+            split = find_sweep_split_parallel(lists);
+            SpatialSides sides;
+            if (choose_spatial_split(rules_, lists.references, {lists.orders[split.axis], at.count},
+                                     split, at.spare, sides))
+                return split_by_plane(at, lists, split.axis, sides);
+        }
         mark_sides(at, lists, split);
+        make_sides(at, split.left, at.count - split.left);
         at.in_spare = !at.in_spare;
-        const SweepLists divided = lists_of(at);
         for (std::size_t axis = 0; axis < 3; ++axis)
-            divide(lists.orders[axis], at.count(), split.left,
-                   const_cast<std::uint32_t*>(divided.orders[axis]));
+            divide(lists.orders[axis], at.count, orders_to(at, axis, 0), orders_to(at, axis, 1));
+    }
+
+    /// Room for what each side holds and may add, one behind the other.
+    static void make_sides(TopNode& at, std::uint32_t lower, std::uint32_t upper) {
+        const std::uint32_t used = lower + upper - at.count, spare = at.spare - used;
+        const std::uint32_t spare_lower = share_of(spare, lower, lower + upper);
+        at.sides[0] = {at.begin, lower, spare_lower, at.free_places + used};
+        at.sides[1] = {at.begin + lower + spare_lower, upper, spare - spare_lower,
+                       at.free_places + used + spare_lower};
+    }
+    [[nodiscard]] std::uint32_t* orders_to(const TopNode& at, std::size_t axis, std::size_t side) {
+        return (at.in_spare ? s_.spare_orders : s_.orders)[axis].data() + at.sides[side].begin;
+    }
+
+    void split_by_plane(TopNode& at, const SweepLists& lists, std::uint32_t axis_of_sides,
+                        const SpatialSides& sides) {
+        SideLists side_lists;
+        side_lists.cut(s_.references.data(), {lists.orders[axis_of_sides], at.count}, sides,
+                       at.free_places, s_.sides.data());
+        at.upper_is_left = side_lists.right_is_least();
+        make_sides(at, sides.left_count, sides.right_count);
+        at.in_spare = !at.in_spare;
+        for (std::uint32_t axis = 0; axis < 3; ++axis)
+            for (const auto side : {SpatialSides::left, SpatialSides::right})
+                side_lists.list(lists.references, {lists.orders[axis], at.count}, s_.sides.data(),
+                                side, axis, orders_to(at, axis, side));
     }
 
     /// Side of each reference, and which side holds the smallest id; both: the lower one.
@@ -118,7 +163,8 @@ private:
     }
 
     /// Stable, by sides.
-    void divide(const std::uint32_t* from, std::uint32_t n, std::uint32_t left, std::uint32_t* to) {
+    void divide(const std::uint32_t* from, std::uint32_t n, std::uint32_t* to_lower,
+                std::uint32_t* to_upper) {
         std::vector<std::uint32_t> lower((n + block_references - 1) / block_references);
         for_each_block(n, block_references, [&](std::size_t b, std::size_t begin, std::size_t end) {
             std::uint32_t uppers = 0;
@@ -132,9 +178,9 @@ private:
             before += own;
         }
         for_each_block(n, block_references, [&](std::size_t b, std::size_t begin, std::size_t end) {
-            std::array<std::uint32_t, 2> at{lower[b],
-                                            left + static_cast<std::uint32_t>(begin) - lower[b]};
-            for (std::size_t k = begin; k < end; ++k) to[at[s_.sides[from[k]]]++] = from[k];
+            const std::size_t uppers = begin - lower[b];
+            std::array<std::uint32_t*, 2> to{to_lower + lower[b], to_upper + uppers};
+            for (std::size_t k = begin; k < end; ++k) *to[s_.sides[from[k]]]++ = from[k];
         });
     }
 
@@ -143,11 +189,11 @@ private:
         for (std::uint32_t i = 0; i < top_.size(); ++i)
             if (top_[i].left == 0) tasks.push_back(i);
         for_each_range(tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
-            SubtreeBuild build(max_leaf_);
+            SubtreeBuild build(in_.max_leaf, rules_);
             for (std::size_t t = begin; t < end; ++t) {
                 TopNode& task = top_[tasks[t]];
-                task.sum =
-                    build.run(lists_of(task), task.depth, s_.local.data(), out_of(task), task.node);
+                task.sum = build.run(lists_of(task), task.spare, task.depth, s_.local.data(),
+                                     out_of(task), task.node);
             }
         });
     }
@@ -210,8 +256,9 @@ private:
         std::copy(out.order, out.order + task.sum.references, order.data() + task.first);
     }
 
+    const SahInput& in_;
     SahScratch& s_;
-    std::uint32_t max_leaf_;
+    SpatialRules rules_;
     std::vector<TopNode> top_;
 };
 
@@ -225,9 +272,9 @@ std::size_t SahScratch::capacity_bytes() const {
     return sum;
 }
 
-std::uint32_t build_sah(SahScratch& scratch, std::uint32_t max_leaf, Buffer<BvhNode>& nodes,
+std::uint32_t build_sah(const SahInput& input, SahScratch& scratch, Buffer<BvhNode>& nodes,
                         Buffer<std::uint32_t>& order, std::uint32_t& max_depth) {
-    return SahRun(scratch, max_leaf).run(nodes, order, max_depth);
+    return SahRun(input, scratch).run(nodes, order, max_depth);
 }
 
 }  // namespace raydix

@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "tree/sah_reference.h"
+#include "tree/spatial_split.h"
 
 namespace raydix {
 
@@ -25,10 +26,17 @@ struct SahScratch {
     [[nodiscard]] std::size_t capacity_bytes() const;
 };
 
-/// scratch.references [n], n >= 1, and scratch.orders [n]: places in it, ascending by centroid.
-/// Fills nodes [2 * inner + 2] and order, ids within a leaf ascending and each at most once.
-/// Returns the number of inner nodes.
-std::uint32_t build_sah(SahScratch& scratch, std::uint32_t max_leaf, Buffer<BvhNode>& nodes,
+struct SahInput {
+    std::uint32_t references;  // n >= 1
+    std::uint32_t max_leaf;
+    std::uint32_t spare = 0;                  // references that spatial splits may add
+    const ReferenceCutter* cutter = nullptr;  // of spatial splits; null: none
+};
+
+/// scratch.references [n + spare], of which n are there, and scratch.orders [n + spare]: the places
+/// of those n, ascending by centroid. Fills nodes [2 * inner + 2] and order, ids within a leaf
+/// ascending and each at most once. Returns the number of inner nodes.
+std::uint32_t build_sah(const SahInput& input, SahScratch& scratch, Buffer<BvhNode>& nodes,
                         Buffer<std::uint32_t>& order, std::uint32_t& max_depth);
 
 }  // namespace raydix
