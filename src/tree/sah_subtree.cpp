@@ -59,9 +59,11 @@ SubtreeBuild::Below SubtreeBuild::build(const Range& range, BvhNode& node) {
     node = {box.lo, 2 * pair, box.hi, 0};
     Below below{area + (a.cost + b.cost), 1 + std::max(a.height, b.height)};
     if (range.count() > max_leaf_) return below;
-    const std::uint32_t held = distinct_ids(first);
+    std::array<std::uint32_t, 255> ids;
+    const std::uint32_t held = distinct_ids(first, ids.data());
     const float as_leaf = static_cast<float>(held) * area;
     if (as_leaf <= below.cost) {
+        std::copy(ids.data(), ids.data() + held, out_.order + first);
         pairs_ = pair;
         listed_ = first + held;
         node.first = first;
@@ -156,10 +158,10 @@ SubtreeBuild::Children SubtreeBuild::divide_by_plane(const Range& range,
     return children_of(range, left_count, right_count);
 }
 
-std::uint32_t SubtreeBuild::distinct_ids(std::uint32_t begin) {
-    std::uint32_t *first = out_.order + begin, *last = out_.order + listed_;
-    std::sort(first, last);
-    return static_cast<std::uint32_t>(std::unique(first, last) - first);
+std::uint32_t SubtreeBuild::distinct_ids(std::uint32_t begin, std::uint32_t* ids) const {
+    std::uint32_t* end = std::copy(out_.order + begin, out_.order + listed_, ids);
+    std::sort(ids, end);
+    return static_cast<std::uint32_t>(std::unique(ids, end) - ids);
 }
 
 }  // namespace raydix

@@ -92,8 +92,9 @@ private:
                                                           std::uint32_t axis) const {
         return {orders_[axis].data() + range.begin, range.count()};
     }
-    /// Ids at [begin, end) of the order, sorted, each once; returns how many.
-    std::uint32_t distinct_ids(std::uint32_t begin);
+    /// What the order lists from `begin` on, at most 255, ascending and each once; returns how
+    /// many.
+    std::uint32_t distinct_ids(std::uint32_t begin, std::uint32_t* ids) const;
 
     std::uint32_t max_leaf_;
     SpatialRules rules_;

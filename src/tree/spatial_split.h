@@ -57,8 +57,8 @@ private:
 /// What becomes of each reference of a node.
 struct SpatialSides {
     enum Side : std::uint8_t { left, right, both };
-    std::vector<Side> sides;                // [places]
-    std::vector<CutReference> cut;          // of those on both sides, in the order of the places
+    std::vector<Side> sides;        // [places]
+    std::vector<CutReference> cut;  // of those on both sides, in the order of the places
     std::uint32_t left_count = 0, right_count = 0;
 };
 
