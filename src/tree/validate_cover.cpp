@@ -105,8 +105,7 @@ private:
 
 bool boxes_cover(const LeafTriangle& triangle, std::span<const Aabb> boxes) {
     return CoverSearch(triangle, boxes.size())
-        .covered(polygon_of(triangle.v0, triangle.v1, triangle.v2),
-                 {boxes.begin(), boxes.end()});
+        .covered(polygon_of(triangle.v0, triangle.v1, triangle.v2), {boxes.begin(), boxes.end()});
 }
 
 Fault validate_cover(const Bvh& bvh) {
