@@ -34,13 +34,15 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->check(CLI::IsMember({"bvh", "octree", "kdtree"}))
         ->capture_default_str()
         ->group(group);
-    CLI::Option* builder = of_the_build(command.add_option("--builder", options.builder, "Builder"))
-                               ->check(CLI::IsMember({"karras", "lauterbach", "garanzha", "apetrei",
-                                                      "ploc", "hploc", "binned"}))
-                               ->capture_default_str();
-    of_the_build(command.add_option("--quality", options.quality,
-                                    "Picks a builder: fast is apetrei, balanced is ploc"))
-        ->check(CLI::IsMember({"fast", "balanced"}))
+    CLI::Option* builder =
+        of_the_build(command.add_option("--builder", options.builder, "Builder"))
+            ->check(CLI::IsMember({"karras", "lauterbach", "garanzha", "apetrei", "ploc", "hploc",
+                                   "binned", "sweep", "split", "sbvh"}))
+            ->capture_default_str();
+    of_the_build(
+        command.add_option("--quality", options.quality,
+                           "Picks a builder: fast is apetrei, balanced is ploc, high is sbvh"))
+        ->check(CLI::IsMember({"fast", "balanced", "high"}))
         ->excludes(builder);
     of_the_build(command.add_option("--bits", options.bits, "Bits of the Morton codes"))
         ->check(CLI::IsMember({30, 63}))
@@ -98,6 +100,7 @@ BuildOptions TreeOptions::build_options(const CommonOptions& common) const {
     BuildOptions result;
     result.builder = quality == "fast"       ? Builder::apetrei
                      : quality == "balanced" ? Builder::ploc
+                     : quality == "high"     ? Builder::sbvh
                                              : builder_from_name(builder);
     if (!fit.empty()) result.fit = fit == "levels" ? Fit::levels : Fit::atomic;
     result.bits = bits;

@@ -16,7 +16,9 @@ namespace raydix {
 
 /// `karras`, `lauterbach`, `garanzha` and `apetrei` give the same tree, bit for bit; `ploc` and
 /// `hploc` merge clusters by surface area and `binned` splits by it; they give better ones for more
-/// time.
+/// time. `sweep` looks at every split there is; `split` cuts large triangles into parts before, and
+/// `sbvh` on the way, so that one triangle may be in several leaves. Over boxes and points both are
+/// `sweep`.
 enum class Builder : std::uint32_t {
     karras = 0,
     lauterbach = 1,
@@ -25,6 +27,9 @@ enum class Builder : std::uint32_t {
     ploc = 4,
     hploc = 5,
     binned = 6,
+    sweep = 7,
+    split = 8,
+    sbvh = 9,
 };
 [[nodiscard]] std::string_view builder_name(Builder builder);
 /// Throws InputError that lists the known names.
@@ -103,6 +108,11 @@ public:
     /// Primitives the caller gave, and how many of them were invalid and left out.
     [[nodiscard]] std::uint64_t input_count() const { return input_count_; }
     [[nodiscard]] std::uint64_t left_out() const { return left_out_; }
+    /// Whether a primitive may stand in more than one leaf, with a box around each part of it. Such
+    /// a tree cannot be refitted: the parts are not kept.
+    [[nodiscard]] bool has_split_primitives() const {
+        return order_.size() != input_count_ - left_out_;
+    }
     [[nodiscard]] Aabb bounds() const;
 
     [[nodiscard]] const BuildMs& build_ms() const { return build_ms_; }

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "api/build_clusters.h"
+#include "api/build_sah.h"
 #include "api/input_checks.h"
 #include "base/check.h"
 #include "exec/host_launcher.h"
@@ -33,6 +34,7 @@ struct BvhBuilder::Scratch {
     ClimbScratch apetrei;
     Buffer<std::uint8_t> meeting;
     ClusterScratch clusters;
+    SweepScratch sweeps;
 };
 
 namespace {
@@ -63,7 +65,7 @@ std::uint64_t bytes_held(const Scratch& s, const BvhAccess& tree) {
                s.hierarchy.memory, s.hierarchy.level_memory, s.apetrei.prefixes,
                s.apetrei.kept_bits, s.apetrei.kept_before, s.apetrei.pieces, s.apetrei.piece_counts,
                s.meeting) +
-           s.clusters.capacity_bytes() +
+           s.clusters.capacity_bytes() + s.sweeps.capacity_bytes() +
            sum(tree.nodes(), tree.order(), tree.triangles(), tree.boxes(), tree.points());
 }
 
@@ -102,6 +104,12 @@ struct BuildRun {
 
         if (in_one_pass(valid)) {
             build_in_one_pass(valid, bounds.box, ms);
+            ms.total = total.lap();
+            tree.build_ms() = ms;
+            return;
+        }
+        if (sweeps(options.builder)) {
+            build_by_sweeps(source, n, valid, bounds.box, scratch.sweeps, tree, copies, ms);
             ms.total = total.lap();
             tree.build_ms() = ms;
             return;

@@ -97,6 +97,10 @@ void find_all(const TreeView& tree, const RayFrame& ray, WalkStack& stack, Steps
     walk_tree(tree.nodes, ray, stack, steps, leaf, [&] { return ray.tmax; });
     std::sort(hits.begin() + static_cast<std::ptrdiff_t>(before), hits.end(),
               [](const Hit& a, const Hit& b) { return a.t != b.t ? a.t < b.t : a.prim < b.prim; });
+    // A triangle that is in several leaves was found more than once, with the same t.
+    const auto last = std::unique(hits.begin() + static_cast<std::ptrdiff_t>(before), hits.end(),
+                                  [](const Hit& a, const Hit& b) { return a.prim == b.prim; });
+    hits.erase(last, hits.end());
 }
 
 Hit public_hit(const Closest& best, const RayFrame& ray) {

@@ -10,14 +10,17 @@
 namespace raydix {
 namespace {
 
-constexpr std::array<std::pair<Builder, std::string_view>, 7> builder_names{
+constexpr std::array<std::pair<Builder, std::string_view>, 10> builder_names{
     {{Builder::karras, "karras"},
      {Builder::lauterbach, "lauterbach"},
      {Builder::garanzha, "garanzha"},
      {Builder::apetrei, "apetrei"},
      {Builder::ploc, "ploc"},
      {Builder::hploc, "hploc"},
-     {Builder::binned, "binned"}}};
+     {Builder::binned, "binned"},
+     {Builder::sweep, "sweep"},
+     {Builder::split, "split"},
+     {Builder::sbvh, "sbvh"}}};
 
 }  // namespace
 

@@ -19,6 +19,19 @@ struct Polygon {
     void add(const Point& p) { corners[count++] = p; }
 
     [[nodiscard]] double area() const {
+        const Point n = twice_normal();
+        return 0.5 * std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    }
+    /// Sum of the areas of its shadows on the three coordinate planes: half the surface of the
+    /// boxes around very many small parts of it, together.
+    [[nodiscard]] double projected_area() const {
+        const Point n = twice_normal();
+        return 0.5 * (std::fabs(n[0]) + std::fabs(n[1]) + std::fabs(n[2]));
+    }
+
+private:
+    /// Along the normal, twice as long as the area is large.
+    [[nodiscard]] Point twice_normal() const {
         Point sum{};
         for (std::size_t i = 1; i + 1 < count; ++i) {
             Point a{}, b{};
@@ -29,7 +42,7 @@ struct Polygon {
             for (std::size_t k = 0; k < 3; ++k)
                 sum[k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
         }
-        return 0.5 * std::sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
+        return sum;
     }
 };
 

@@ -156,21 +156,48 @@ bool all_bits_zero(const BvhNode& node) {
     return node.first == 0 && node.count == 0;
 }
 
-/// The primitive that the order names twice, for few references to a long list of primitives.
-std::optional<std::uint32_t> repeated_by_sorting(std::span<const std::uint32_t> order) {
+/// How many primitives the order names, and one that it names twice.
+struct Named {
+    std::uint64_t distinct = 0;
+    std::optional<std::uint32_t> repeated;
+};
+
+/// For few references to a long list of primitives.
+Named named_by_sorting(std::span<const std::uint32_t> order) {
     std::vector<std::uint32_t> sorted(order.begin(), order.end());
     std::sort(sorted.begin(), sorted.end());
-    const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
-    if (twice == sorted.end()) return {};
-    return *twice;
+    Named named;
+    for (std::size_t i = 0; i < sorted.size(); ++i) {
+        if (i == 0 || sorted[i] != sorted[i - 1])
+            ++named.distinct;
+        else if (!named.repeated)
+            named.repeated = sorted[i];
+    }
+    return named;
 }
 
-std::optional<std::uint32_t> repeated_by_marking(std::span<const std::uint32_t> order,
-                                                 std::uint64_t input_count) {
+Named named_by_marking(std::span<const std::uint32_t> order, std::uint64_t input_count) {
     std::vector<bool> seen(input_count);
+    Named named;
     for (const std::uint32_t primitive_id : order) {
-        if (seen[primitive_id]) return primitive_id;
+        if (!seen[primitive_id])
+            ++named.distinct;
+        else if (!named.repeated)
+            named.repeated = primitive_id;
         seen[primitive_id] = true;
+    }
+    return named;
+}
+
+/// Ids within a leaf ascend, so that none stands there twice.
+Fault validate_leaf_ids(const Bvh& bvh) {
+    const std::span<const std::uint32_t> order = bvh.order();
+    for (std::size_t i = 0; i < bvh.nodes().size(); ++i) {
+        const BvhNode& node = bvh.nodes()[i];
+        for (std::uint32_t k = 1; k < node.count; ++k)
+            if (order[node.first + k - 1] >= order[node.first + k])
+                return fmt::format("order: leaf {} holds primitive {} behind {}", i,
+                                   order[node.first + k], order[node.first + k - 1]);
     }
     return {};
 }
@@ -183,7 +210,11 @@ Fault validate_counts(const Bvh& bvh) {
     const std::uint64_t n = bvh.order().size();
     if (bvh.input_count() >= primitive_limit)
         return fmt::format("info: {} primitives, more than a tree can hold", bvh.input_count());
-    if (bvh.left_out() > bvh.input_count() || bvh.input_count() - bvh.left_out() != n)
+    const std::uint64_t valid = bvh.input_count() - bvh.left_out();
+    const bool fits = may_split_primitives(bvh)
+                          ? n < primitive_limit && n >= valid && (n == 0) == (valid == 0)
+                          : n == valid;
+    if (bvh.left_out() > bvh.input_count() || !fits)
         return fmt::format("info: {} primitives, {} left out, but {} references", bvh.input_count(),
                            bvh.left_out(), n);
     const std::uint64_t slots = n == 0 ? 0 : 2 * std::uint64_t{bvh.inner_count()} + 2;
@@ -218,11 +249,17 @@ Fault validate_order(const Bvh& bvh) {
                                bvh.input_count());
     // A mark costs a bit, a sorted copy four bytes: either way memory follows the arrays that are
     // there.
-    const auto repeated = bvh.input_count() / 32 > order.size()
-                              ? repeated_by_sorting(order)
-                              : repeated_by_marking(order, bvh.input_count());
-    if (repeated)
-        return fmt::format("order: primitive {} stands in more than one place", *repeated);
+    const Named named = bvh.input_count() / 32 > order.size()
+                            ? named_by_sorting(order)
+                            : named_by_marking(order, bvh.input_count());
+    if (may_split_primitives(bvh)) {
+        if (named.distinct != bvh.input_count() - bvh.left_out())
+            return fmt::format("order: {} primitives, {} left out, but the leaves hold {}",
+                               bvh.input_count(), bvh.left_out(), named.distinct);
+        return validate_leaf_ids(bvh);
+    }
+    if (named.repeated)
+        return fmt::format("order: primitive {} stands in more than one place", *named.repeated);
     return {};
 }
 
@@ -234,6 +271,7 @@ Fault validate(const Bvh& bvh, const MeshView* mesh) {
     if (Fault fault = validate_order(bvh)) return fault;
     if (Fault fault = validate_primitives(bvh)) return fault;
     if (Fault fault = validate_boxes(bvh)) return fault;
+    if (Fault fault = validate_cover(bvh)) return fault;
     if (Fault fault = validate_codes(bvh)) return fault;
     return mesh ? validate_against_mesh(bvh, *mesh) : Fault{};
 }

@@ -14,6 +14,12 @@ namespace raydix {
 /// None: all is well.
 using Fault = std::optional<std::string>;
 
+/// Whether leaves may hold parts of primitives: trees of `split` and `sbvh` over triangles.
+[[nodiscard]] inline bool may_split_primitives(const Bvh& bvh) {
+    return bvh.kind() == PrimitiveKind::triangles &&
+           (bvh.options().builder == Builder::split || bvh.options().builder == Builder::sbvh);
+}
+
 /// The first invariant that does not hold. With a mesh also: its vertex indices are in range, and
 /// the tree's primitives are bit for bit those of the mesh (a tree of boxes has no counterpart
 /// there).
@@ -26,6 +32,8 @@ using Fault = std::optional<std::string>;
 [[nodiscard]] Fault validate_order(const Bvh& bvh);
 [[nodiscard]] Fault validate_primitives(const Bvh& bvh);
 [[nodiscard]] Fault validate_boxes(const Bvh& bvh);
+/// Of trees with parts of triangles: the leaves' boxes cover each triangle.
+[[nodiscard]] Fault validate_cover(const Bvh& bvh);
 [[nodiscard]] Fault validate_codes(const Bvh& bvh);
 [[nodiscard]] Fault validate_against_mesh(const Bvh& bvh, const MeshView& mesh);
 

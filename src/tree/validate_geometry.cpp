@@ -60,8 +60,16 @@ Aabb union_below(const Bvh& bvh, const BvhNode& node) {
     return box;
 }
 
+/// A box of parts: not empty, without -0, and around no more than the whole primitives.
+bool is_box_of_parts(const Aabb& box, const Aabb& whole) {
+    return is_clean(box.lo) && is_clean(box.hi) && !is_empty(box) &&
+           min_of(box.lo, whole.lo) == whole.lo && max_of(box.hi, whole.hi) == whole.hi;
+}
+
 bool is_tight(const Bvh& bvh, const BvhNode& node) {
     const Aabb box = union_below(bvh, node);
+    if (node.is_leaf() && may_split_primitives(bvh))
+        return is_box_of_parts({node.lo, node.hi}, box);
     return same_bits(node.lo, box.lo) && same_bits(node.hi, box.hi);
 }
 
