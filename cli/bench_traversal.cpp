@@ -247,7 +247,7 @@ void add_traversal_suite(CLI::App& bench) {
     command->add_flag("--memory", options->memory,
                       "Also a first-order memory model, as a column of its own");
     add_launch_options(*command, options->launches);
-    options->tree.builder = "binned";
+    options->tree.builder = "split";
     options->tree.max_leaf = 8;
     add_tree_options(*command, options->tree);
     add_common_options(*command, options->common);

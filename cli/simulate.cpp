@@ -109,7 +109,7 @@ void add_simulate_command(CLI::App& app) {
     command->add_flag("--any", options->any_hit,
                       "Rays of a file end at their first hit (ao rays always do)");
     add_launch_options(*command, options->launches);
-    options->tree.builder = "binned";
+    options->tree.builder = "split";
     options->tree.max_leaf = 8;
     add_tree_options(*command, options->tree);
     add_common_options(*command, options->common);
