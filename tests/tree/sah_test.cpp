@@ -237,8 +237,7 @@ TEST_P(SahTrees, HitsAreThoseOfBruteForce) {
             ASSERT_EQ(occluded[i] != 0, expected[i].hit()) << scene.name << ", ray " << i;
         }
         // A triangle that a ray meets in several leaves is one hit.
-        const AllHits all = trace_all(tree, rays),
-                      wanted = trace_all(build_bvh(scene.mesh), rays);
+        const AllHits all = trace_all(tree, rays), wanted = trace_all(build_bvh(scene.mesh), rays);
         EXPECT_EQ(all.offsets, wanted.offsets) << scene.name;
         ASSERT_EQ(all.hits.size(), wanted.hits.size());
         EXPECT_EQ(std::memcmp(all.hits.data(), wanted.hits.data(), all.hits.size() * sizeof(Hit)),
@@ -288,9 +287,7 @@ TEST_P(SahTrees, EachPointOfATriangleIsInALeafThatHoldsIt) {
         double u = unit(), v = unit();
         if (u + v > 1) u = 1 - u, v = 1 - v;
         const auto at = [&](std::size_t k) {
-            const auto c = [&](std::size_t j) {
-                return double((&scene.mesh.vertices[t[j]].x)[k]);
-            };
+            const auto c = [&](std::size_t j) { return double((&scene.mesh.vertices[t[j]].x)[k]); };
             return (1 - u - v) * c(0) + u * c(1) + v * c(2);
         };
         outside += std::ranges::none_of(boxes[id], [&](const Aabb& b) {
@@ -327,16 +324,15 @@ TEST_P(SahTrees, HalfAMillionEqualPointsGiveAShallowTree) {
 
 TEST_P(SahTrees, TriangleEdgeCases) {
     const float nan = std::numeric_limits<float>::quiet_NaN();
-    const std::vector<Vec3> corners{{0, 0, 0},    {1, 0, 0},    {0, 1, 0},      {nan, 0, 0},
+    const std::vector<Vec3> corners{{0, 0, 0},     {1, 0, 0},     {0, 1, 0},      {nan, 0, 0},
                                     {1e12f, 0, 0}, {0, 1e12f, 1}, {3e-39f, 0, 0}, {5, 5, 5}};
-    const std::vector<std::vector<Triangle>> lists{
-        {{0, 1, 2}},
-        {{0, 1, 2}, {0, 1, 2}},
-        {{3, 1, 2}, {0, 1, 2}, {0, 0, 0}},
-        {{3, 3, 3}},
-        {{0, 4, 5}, {0, 1, 2}, {7, 7, 7}, {4, 5, 7}},
-        std::vector<Triangle>(300, Triangle{0, 1, 7}),
-        std::vector<Triangle>(9000, Triangle{0, 4, 5})};
+    const std::vector<std::vector<Triangle>> lists{{{0, 1, 2}},
+                                                   {{0, 1, 2}, {0, 1, 2}},
+                                                   {{3, 1, 2}, {0, 1, 2}, {0, 0, 0}},
+                                                   {{3, 3, 3}},
+                                                   {{0, 4, 5}, {0, 1, 2}, {7, 7, 7}, {4, 5, 7}},
+                                                   std::vector<Triangle>(300, Triangle{0, 1, 7}),
+                                                   std::vector<Triangle>(9000, Triangle{0, 4, 5})};
     for (const auto& triangles : lists)
         for (const int max_leaf : {1, 4, 255}) {
             const MeshView mesh{corners, triangles};
