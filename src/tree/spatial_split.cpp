@@ -29,7 +29,7 @@ float& coordinate(Vec3& p, std::uint32_t axis) { return (&p.x)[axis]; }
 float coordinate(const Vec3& p, std::uint32_t axis) { return (&p.x)[axis]; }
 
 struct Bin {
-    Aabb box = empty_box();
+    GrowingBox box;
     std::uint32_t begins = 0, ends = 0;
 };
 using Bins = std::array<Bin, spatial_bins>;
@@ -56,43 +56,110 @@ private:
     float origin_, width_, inverse_;
 };
 
+Float4 load_point(const Vec3& p) {
+    const std::array<float, 4> xyz{p.x, p.y, p.z, 0};
+    return Float4::load(xyz.data());
+}
+
+/// A triangle with its corners in the order of one axis, cut across it. In float, without care for
+/// rounding: it is only asked what a plane would cost.
+class SlicedTriangle {
+public:
+    SlicedTriangle(std::array<Vec3, 3> v, std::uint32_t axis) {
+        const auto order = [&](std::size_t i, std::size_t j) {
+            if (coordinate(v[j], axis) < coordinate(v[i], axis)) std::swap(v[i], v[j]);
+        };
+        order(0, 1);
+        order(1, 2);
+        order(0, 1);
+        for (std::size_t k = 0; k < 3; ++k) {
+            x_[k] = coordinate(v[k], axis);
+            v_[k] = load_point(v[k]);
+        }
+    }
+
+    /// Where the plane meets the triangle, as a box. x lies between the first and last corner.
+    [[nodiscard]] GrowingBox section(float x) const {
+        const Float4 a = edge(0, 2, x), b = x < x_[1] ? edge(0, 1, x) : edge(1, 2, x);
+        GrowingBox box;
+        box.lo = min_of(a, b);
+        box.hi = max_of(a, b);
+        return box;
+    }
+    /// Adds the middle corner if it lies in [begin, end].
+    void add_middle(float begin, float end, GrowingBox& box) const {
+        if (!(x_[1] >= begin && x_[1] <= end)) return;
+        box.lo = min_of(box.lo, v_[1]);
+        box.hi = max_of(box.hi, v_[1]);
+    }
+
+private:
+    [[nodiscard]] Float4 edge(std::size_t i, std::size_t j, float x) const {
+        const float length = x_[j] - x_[i];
+        const float t = length > 0 ? (x - x_[i]) / length : 0.0f;
+        return v_[i] + (v_[j] - v_[i]) * Float4::all(t);
+    }
+
+    std::array<float, 3> x_;
+    std::array<Float4, 3> v_;
+};
+
+/// Adds what each bin of [first, last] holds of a reference.
+void add_slices(const SlicedTriangle& triangle, const SahReference& reference, const BinAxis& grid,
+                std::uint32_t axis, std::uint32_t first, std::uint32_t last, Bins& bins) {
+    const float lo = coordinate(reference.lo, axis), hi = coordinate(reference.hi, axis);
+    const Float4 box_lo = Float4::load(&reference.lo.x).xyz(),
+                 box_hi = Float4::load(&reference.hi.x).xyz();
+    float begin = lo;
+    GrowingBox before = triangle.section(begin);
+    for (std::uint32_t b = first; b <= last; ++b) {
+        const float end = b == last ? hi : std::clamp(grid.plane(b + 1), begin, hi);
+        const GrowingBox behind = triangle.section(end);
+        GrowingBox slice = before;
+        slice.add(behind);
+        triangle.add_middle(begin, end, slice);
+        bins[b].box.lo = min_of(bins[b].box.lo, min_of(max_of(slice.lo, box_lo), box_hi));
+        bins[b].box.hi = max_of(bins[b].box.hi, max_of(min_of(slice.hi, box_hi), box_lo));
+        before = behind;
+        begin = end;
+    }
+}
+
 void fill_bins(const ReferenceCutter& cutter, const SahReference* references,
                std::span<const std::uint32_t> places, const BinAxis& grid, std::uint32_t axis,
                Bins& bins) {
     for (const std::uint32_t place : places) {
-        SahReference rest = references[place];
-        const std::uint32_t first = grid.bin(coordinate(rest.lo, axis));
-        const std::uint32_t last = std::max(first, grid.bin(coordinate(rest.hi, axis)));
-        for (std::uint32_t b = first; b < last; ++b) {
-            const float plane = grid.plane(b + 1);
-            if (!(plane > coordinate(rest.lo, axis) && plane < coordinate(rest.hi, axis))) continue;
-            const CutReference parts = cutter.cut(rest, axis, plane);
-            if (!is_empty(parts.left)) bins[b].box = unite(bins[b].box, parts.left);
-            if (is_empty(parts.right)) break;
-            rest.lo = parts.right.lo;
-            rest.hi = parts.right.hi;
-        }
-        bins[last].box = unite(bins[last].box, rest.box());
+        const SahReference& reference = references[place];
+        const std::uint32_t first = grid.bin(coordinate(reference.lo, axis));
+        const std::uint32_t last = std::max(first, grid.bin(coordinate(reference.hi, axis)));
         ++bins[first].begins;
         ++bins[last].ends;
+        if (first == last)
+            bins[first].box.add(reference);
+        else
+            add_slices({cutter.corners(reference), axis}, reference, grid, axis, first, last, bins);
     }
 }
 
 void find_in_bins(const Bins& bins, const BinAxis& grid, std::uint32_t axis, std::uint32_t n,
                   SpatialSplit& best) {
-    std::array<Aabb, spatial_bins> behind;
-    Aabb box = empty_box();
-    for (std::uint32_t b = spatial_bins; b-- > 1;) behind[b] = box = unite(box, bins[b].box);
-    box = empty_box();
+    std::array<GrowingBox, spatial_bins> behind;
+    GrowingBox box;
+    for (std::uint32_t b = spatial_bins; b-- > 1;) {
+        box.add(bins[b].box);
+        behind[b] = box;
+    }
+    box = {};
     std::uint32_t left = 0, right = n;
     for (std::uint32_t b = 1; b < spatial_bins; ++b) {
-        box = unite(box, bins[b - 1].box);
+        box.add(bins[b - 1].box);
         left += bins[b - 1].begins;
         right -= bins[b - 1].ends;
-        if (left == 0 || right == 0 || is_empty(box) || is_empty(behind[b])) continue;
-        const float cost = sah_area(box) * static_cast<float>(left) +
-                           sah_area(behind[b]) * static_cast<float>(right);
-        if (cost < best.cost) best = {cost, axis, grid.plane(b), left, right, box, behind[b]};
+        if (left == 0 || right == 0) continue;
+        const float cost =
+            box.area() * static_cast<float>(left) + behind[b].area() * static_cast<float>(right);
+        if (cost < best.cost)
+            best = {cost, axis, grid.plane(b), left, right, box.box(), behind[b].box()};
     }
 }
 
@@ -100,12 +167,9 @@ void find_in_bins(const Bins& bins, const BinAxis& grid, std::uint32_t axis, std
 
 CutReference ReferenceCutter::cut(const SahReference& reference, std::uint32_t axis,
                                   float plane) const {
-    const Triangle& corners = mesh_.triangles[reference.primitive_id];
     std::array<Polygon::Point, 3> v;
-    for (std::size_t k = 0; k < 3; ++k) {
-        const Vec3& p = mesh_.vertices[corners[k]];
-        v[k] = {p.x, p.y, p.z};
-    }
+    const std::array<Vec3, 3> exact = corners(reference);
+    for (std::size_t k = 0; k < 3; ++k) v[k] = {exact[k].x, exact[k].y, exact[k].z};
     DoubleBox left, right;
     for (std::size_t k = 0; k < 3; ++k) {
         const Polygon::Point &a = v[k], &b = v[k < 2 ? k + 1 : 0];

@@ -5,6 +5,7 @@
 
 #include <raydix/mesh.h>
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -42,6 +43,10 @@ public:
     /// The boxes cover what the reference's box holds of its triangle. At least one is not empty.
     [[nodiscard]] CutReference cut(const SahReference& reference, std::uint32_t axis,
                                    float plane) const;
+    [[nodiscard]] std::array<Vec3, 3> corners(const SahReference& reference) const {
+        const Triangle& t = mesh_.triangles[reference.primitive_id];
+        return {mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]};
+    }
 
 private:
     MeshView mesh_;
