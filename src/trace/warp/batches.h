@@ -29,9 +29,8 @@ struct WarpJob {
 template <class Warp>
 RAYDIX_HD void start_batch(Warp& warp, const RayLaunch& launch, std::uint32_t first) {
     warp.reads([&](const Lane&) { return launch.rays + first; }, sizeof(Ray));
-    warp.step_indexed(Op::start_ray, [&](Lane& l, std::uint32_t lane) {
-        start_ray(l, launch, first + lane);
-    });
+    warp.step_indexed(Op::start_ray,
+                      [&](Lane& l, std::uint32_t lane) { start_ray(l, launch, first + lane); });
 }
 
 template <class Warp>
@@ -73,6 +72,7 @@ struct Persistent {
         start_batch(warp, job.launch, next);
         Body::template trace<any_hit>(warp, job.scene);
         store_batch(warp, job.launch);
+        warp.meet();  // else a lane that is done early could start the next batch alone
         next += Warp::width();
         return true;
     }

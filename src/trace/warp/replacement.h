@@ -16,7 +16,7 @@ namespace raydix {
 
 /// Bits of `mask` below lane `lane`.
 RAYDIX_HD inline std::uint32_t rank_in(LaneMask mask, std::uint32_t lane) {
-    return static_cast<std::uint32_t>(count_ones(mask & ((LaneMask{1} << lane) - 1)));
+    return static_cast<std::uint32_t>(count_ones(mask & lanes_below(lane)));
 }
 
 /// Stores the hits of finished lanes and gives them new rays: one atomic addition for the warp,
@@ -25,9 +25,8 @@ template <class Warp>
 RAYDIX_HD bool replace_finished(Warp& warp, const RayLaunch& launch, bool& dry) {
     const LaneMask finished = warp.ballot(Op::ballot, is_finished);
     if (finished == 0) return true;
-    warp.when([](const Lane& l) { return is_finished(l) && has_ray(l); }, [&] {
-        warp.step(Op::store_hit, [&](Lane& l) { store_hit(l, launch); });
-    });
+    warp.when([](const Lane& l) { return is_finished(l) && has_ray(l); },
+              [&] { warp.step(Op::store_hit, [&](Lane& l) { store_hit(l, launch); }); });
     const auto count = static_cast<std::uint32_t>(count_ones(finished));
     if (dry) return count < Warp::width();
     const std::uint32_t first = warp.take(Op::take_rays, *launch.next, count);
