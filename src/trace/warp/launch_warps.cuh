@@ -14,6 +14,10 @@ namespace kernels {
 
 inline constexpr std::uint32_t warps_per_block = warp_block_threads / device_warp_width;
 
+/// Blocks of packets that a multiprocessor must be able to hold: a bound on their registers, within
+/// which the compiler of CUDA 13.0 spills none; left alone it stops at 40 and spills one.
+inline constexpr std::uint32_t packet_blocks = 10;
+
 /// What a warp of work_queue has in shared memory.
 struct SpareRays {
     Lane lanes[device_warp_width];
@@ -43,7 +47,7 @@ __global__ void __launch_bounds__(warp_block_threads) trace_rays(const WarpJob j
 
 /// One stack a warp.
 template <class Kernel, bool any_hit>
-__global__ void __launch_bounds__(warp_block_threads)
+__global__ void __launch_bounds__(warp_block_threads, packet_blocks)
     trace_packets(const WarpJob job, std::uint32_t stack_entries) {
     ThreadWarp<Lane> warp;
     warp.memory.packets = reinterpret_cast<PacketEntry*>(shared_words) +
@@ -56,8 +60,7 @@ template <class Kernel, bool any_hit>
 __global__ void __launch_bounds__(warp_block_threads)
     trace_queues(const WarpJob job, std::uint32_t stack_entries, std::int32_t* stacks) {
     ThreadWarp<Lane> warp;
-    SpareRays& spares =
-        reinterpret_cast<SpareRays*>(shared_words)[threadIdx.x / device_warp_width];
+    SpareRays& spares = reinterpret_cast<SpareRays*>(shared_words)[threadIdx.x / device_warp_width];
     warp.memory.spares = spares.lanes;
     warp.memory.slots = spares.slots;
     const std::size_t thread = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x;
@@ -74,8 +77,7 @@ void with_global_function(const WarpLaunch& launch, std::int32_t* stacks, const 
     with_kernel(launch.kernel, [&]<class Kernel>() {
         using kernels::warps_per_block;
         if constexpr (Kernel::one_stack) {
-            const std::size_t bytes =
-                warps_per_block * launch.stack_entries * sizeof(PacketEntry);
+            const std::size_t bytes = warps_per_block * launch.stack_entries * sizeof(PacketEntry);
             visit(kernels::trace_packets<Kernel, any_hit>, bytes, launch.stack_entries);
         } else if constexpr (Kernel::rays_per_lane == 2) {
             visit(kernels::trace_queues<Kernel, any_hit>,
@@ -94,31 +96,23 @@ std::uint32_t resident_blocks_of(const WarpLaunch& launch) {
     RAYDIX_CUDA_TRY(cudaGetDevice(&device));
     RAYDIX_CUDA_TRY(
         cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
-    with_global_function<any_hit>(
-        launch, nullptr, [&](auto function, std::size_t shared_bytes, auto...) {
-            RAYDIX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(
-                &blocks, function, warp_block_threads, shared_bytes));
-        });
+    with_global_function<any_hit>(launch, nullptr,
+                                  [&](auto function, std::size_t shared_bytes, auto...) {
+                                      RAYDIX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(
+                                          &blocks, function, warp_block_threads, shared_bytes));
+                                  });
     return static_cast<std::uint32_t>(std::max(1, blocks) * multiprocessors);
 }
 
 template <bool any_hit>
 void launch_warps_of(const WarpLaunch& launch, const WarpJob& job, std::int32_t* stacks,
                      std::uint32_t blocks, void* stream) {
-    with_global_function<any_hit>(
-        launch, stacks, [&](auto function, std::size_t shared_bytes, auto... arguments) {
-            function<<<blocks, warp_block_threads, shared_bytes,
-                       static_cast<cudaStream_t>(stream)>>>(job, arguments...);
-            RAYDIX_CUDA_TRY(cudaGetLastError());
-        });
+    with_global_function<
+        any_hit>(launch, stacks, [&](auto function, std::size_t shared_bytes, auto... arguments) {
+        function<<<blocks, warp_block_threads, shared_bytes, static_cast<cudaStream_t>(stream)>>>(
+            job, arguments...);
+        RAYDIX_CUDA_TRY(cudaGetLastError());
+    });
 }
-
-// In launch_warps_closest.cu and launch_warps_any.cu.
-extern template std::uint32_t resident_blocks_of<false>(const WarpLaunch&);
-extern template std::uint32_t resident_blocks_of<true>(const WarpLaunch&);
-extern template void launch_warps_of<false>(const WarpLaunch&, const WarpJob&, std::int32_t*,
-                                            std::uint32_t, void*);
-extern template void launch_warps_of<true>(const WarpLaunch&, const WarpJob&, std::int32_t*,
-                                           std::uint32_t, void*);
 
 }  // namespace raydix

@@ -23,8 +23,8 @@ struct WarpLaunch {
     std::uint32_t stack_entries;  // [1, large_stack_entries], the tree's depth + 1
 };
 
-/// Rays per lane of work_queue's launches lie in stacks of global memory: a lane may hand its ray,
-/// and with it the stack, to another.
+/// Stacks in global memory, of kernels whose lanes hand rays, and with them the stacks, to others;
+/// in entries.
 inline std::size_t global_stack_entries(const WarpLaunch& launch, std::uint32_t blocks) {
     return with_kernel(launch.kernel, [&]<class Kernel>() -> std::size_t {
         if (Kernel::rays_per_lane == 1) return 0;
@@ -34,15 +34,28 @@ inline std::size_t global_stack_entries(const WarpLaunch& launch, std::uint32_t 
 }
 
 inline bool is_persistent(WarpKernel kernel) {
-    return with_kernel(kernel, []<class Kernel>() { return Kernel::persistent; });
+    bool persistent = false;
+    with_kernel(kernel, [&]<class Kernel>() { persistent = Kernel::persistent; });
+    return persistent;
 }
 
 /// Blocks that fill the current device. Asks the runtime: not for each launch.
-[[nodiscard]] std::uint32_t resident_blocks(const WarpLaunch& launch);
+[[nodiscard]] std::uint32_t resident_blocks_closest(const WarpLaunch& launch);
+[[nodiscard]] std::uint32_t resident_blocks_any(const WarpLaunch& launch);
+[[nodiscard]] inline std::uint32_t resident_blocks(const WarpLaunch& launch) {
+    return launch.any_hit ? resident_blocks_any(launch) : resident_blocks_closest(launch);
+}
 
-/// Puts the kernel on `stream` (a cudaStream_t). job.launch.next must be 0 by then, `global_stacks`
-/// [global_stack_entries] long. Throws DeviceError.
-void launch_warps(const WarpLaunch& launch, const WarpJob& job, std::int32_t* global_stacks,
-                  std::uint32_t blocks, void* stream);
+void launch_warps_closest(const WarpLaunch& launch, const WarpJob& job, std::int32_t* global_stacks,
+                          std::uint32_t blocks, void* stream);
+void launch_warps_any(const WarpLaunch& launch, const WarpJob& job, std::int32_t* global_stacks,
+                      std::uint32_t blocks, void* stream);
+/// Puts the kernel on `stream` (a cudaStream_t). *job.launch.next must be 0 by then;
+/// `global_stacks` [global_stack_entries]. Throws DeviceError.
+inline void launch_warps(const WarpLaunch& launch, const WarpJob& job, std::int32_t* global_stacks,
+                         std::uint32_t blocks, void* stream) {
+    const auto start = launch.any_hit ? launch_warps_any : launch_warps_closest;
+    start(launch, job, global_stacks, blocks, stream);
+}
 
 }  // namespace raydix

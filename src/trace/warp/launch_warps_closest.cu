@@ -3,8 +3,13 @@
 
 namespace raydix {
 
-template std::uint32_t resident_blocks_of<false>(const WarpLaunch&);
-template void launch_warps_of<false>(const WarpLaunch&, const WarpJob&, std::int32_t*, std::uint32_t,
-                                      void*);
+std::uint32_t resident_blocks_closest(const WarpLaunch& launch) {
+    return resident_blocks_of<false>(launch);
+}
+
+void launch_warps_closest(const WarpLaunch& launch, const WarpJob& job, std::int32_t* global_stacks,
+                          std::uint32_t blocks, void* stream) {
+    launch_warps_of<false>(launch, job, global_stacks, blocks, stream);
+}
 
 }  // namespace raydix
