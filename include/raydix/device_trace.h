@@ -21,10 +21,10 @@ public:
     /// Copies a tree from the host and waits for that. Throws InputError for a tree so deep that no
     /// kernel has a stack for it, naming both depths; BackendUnavailable; DeviceError.
     explicit DeviceWarpTree(const WarpTree& tree, Stream stream = nullptr);
-    /// Of a tree of triangles that was built on the device with pairs. Reads the pairs and ids where
-    /// they lie: they must outlive this object, and a rebuild there calls for a new one. Waits for
-    /// `stream` to learn the tree's counts. Throws as above and as check_counts does; InputError if
-    /// the tree has no pairs or no triangles.
+    /// Of a tree of triangles that was built on the device with pairs. Reads the pairs and ids
+    /// where they lie: they must outlive this object, and a rebuild there calls for a new one.
+    /// Waits for `stream` to learn the tree's counts. Throws as above and as check_counts does;
+    /// InputError if the tree has no pairs or no triangles.
     explicit DeviceWarpTree(const DeviceTree& tree, Stream stream = nullptr);
     ~DeviceWarpTree();
     DeviceWarpTree(DeviceWarpTree&&) noexcept;

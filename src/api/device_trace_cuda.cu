@@ -1,5 +1,5 @@
-// raydix/device_trace.h on a CUDA device: trees in the kernels' form, then rays prepared, traced and
-// scaled back, launch after launch on one stream.
+// raydix/device_trace.h on a CUDA device: trees in the kernels' form, then rays prepared, traced
+// and scaled back, launch after launch on one stream.
 #include <raydix/device_trace.h>
 #include <raydix/error.h>
 
@@ -19,7 +19,9 @@ namespace {
 /// A tree without triangles.
 struct MissAll {
     Hit* hits;  // [n], out
-    RAYDIX_HD void operator()(std::uint32_t i) const { hits[i] = Hit{infinity, no_primitive, 0, 0}; }
+    RAYDIX_HD void operator()(std::uint32_t i) const {
+        hits[i] = Hit{infinity, no_primitive, 0, 0};
+    }
 };
 
 void find_resident_blocks(DeviceWarpTree::Arrays& tree) {
@@ -84,7 +86,8 @@ void trace_launches(const DeviceWarpTree& tree, std::span<const Ray> rays, std::
         launch_warps(launch, job, work.stacks, blocks, stream);
     }
     mark(1);
-    if (!tree.empty()) launcher.launch("trace.rescale", count, RescaleHit{rays.data(), hits.data()});
+    if (!tree.empty())
+        launcher.launch("trace.rescale", count, RescaleHit{rays.data(), hits.data()});
 }
 
 class Event {
@@ -140,7 +143,8 @@ DeviceWarpTree::DeviceWarpTree(const DeviceTree& tree, Stream stream)
     if (n == 0) return;
     arrays_->own_triangles.reset(n * sizeof(WoopTriangle));
     auto* maps = reinterpret_cast<WoopTriangle*>(arrays_->own_triangles.data());
-    plain_launcher(stream, nullptr).launch("layout.woop", n, EmitWoopTriangle{tree.triangles, maps});
+    plain_launcher(stream, nullptr)
+        .launch("layout.woop", n, EmitWoopTriangle{tree.triangles, maps});
     arrays_->scene = {tree.pairs, maps, tree.pair_ids};
     find_resident_blocks(*arrays_);
 }
