@@ -114,20 +114,24 @@ TEST(ThreadWarp, AVoteThatNotAllMembersComeToIsSeen) {
     EXPECT_NE(end.find("ended"), std::string::npos) << end;
     // Some wait with one set of members, some with another.
     const std::string other = fault_of([](Counter& warp) {
-        if (warp.lane_id() < 16) warp.hardware.meet(all_lanes);
-        else warp.hardware.meet(0xFFFF8000u);
+        if (warp.lane_id() < 16)
+            warp.hardware.meet(all_lanes);
+        else
+            warp.hardware.meet(0xFFFF8000u);
         warp.hardware.meet(all_lanes);
     });
     EXPECT_NE(other.find("no lane has come on"), std::string::npos) << other;
 }
 
 TEST(ThreadWarp, WrongMembersAreSeen) {
-    const std::string stranger = fault_of(
-        [](Counter& warp) { static_cast<void>(warp.hardware.ballot(0x7FFFFFFFu, true)); });
+    const std::string stranger =
+        fault_of([](Counter& warp) { static_cast<void>(warp.hardware.ballot(0x7FFFFFFFu, true)); });
     EXPECT_NE(stranger.find("no member of its own"), std::string::npos) << stranger;
     const std::string mixed = fault_of([](Counter& warp) {
-        if (warp.lane_id() == 7) warp.hardware.meet(all_lanes);
-        else static_cast<void>(warp.hardware.ballot(all_lanes, true));
+        if (warp.lane_id() == 7)
+            warp.hardware.meet(all_lanes);
+        else
+            static_cast<void>(warp.hardware.ballot(all_lanes, true));
     });
     EXPECT_NE(mixed.find("lane 7"), std::string::npos) << mixed;
     const std::string asked = fault_of(
@@ -185,17 +189,21 @@ void compare_with_reference(const WarpTree& tree, std::span<const Ray> rays, War
     const PreparedRays prepared(rays);
     std::uint32_t next = 0;
     const WarpTree::Arrays& arrays = tree.arrays();
-    const WarpJob job{{arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
-                      {prepared.rays().data(), hits.data(),
-                       static_cast<std::uint32_t>(rays.size()), &next}};
+    const WarpJob job{
+        {arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
+        {prepared.rays().data(), hits.data(), static_cast<std::uint32_t>(rays.size()), &next}};
     with_kernel(kernel, [&]<class Kernel>() {
-        if (any_hit) run_launch<Kernel, true>(job, tree.max_depth() + 1);
-        else run_launch<Kernel, false>(job, tree.max_depth() + 1);
+        if (any_hit)
+            run_launch<Kernel, true>(job, tree.max_depth() + 1);
+        else
+            run_launch<Kernel, false>(job, tree.max_depth() + 1);
     });
     prepared.rescale(hits);
     for (std::size_t i = 0; i < rays.size(); ++i) {
-        if (any_hit) ASSERT_EQ(hits[i].hit(), expected[i].hit()) << "ray " << i;
-        else ASSERT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(Hit)), 0) << "ray " << i;
+        if (any_hit)
+            ASSERT_EQ(hits[i].hit(), expected[i].hit()) << "ray " << i;
+        else
+            ASSERT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(Hit)), 0) << "ray " << i;
     }
 }
 

@@ -93,8 +93,8 @@ ThreadLane::Values ThreadLane::call_with(LaneBoard::Call call, LaneMask members,
     State::Place& place = state->places[mask];
     const LaneBoard::Entry mine{call, mask, place.turns++, value};
     if (members >> 32 != 0 || (mask >> state->lane & 1) == 0)
-        board.fail(fmt::format("lane {} is no member of its own {}", state->lane,
-                               LaneBoard::told(mine)));
+        board.fail(
+            fmt::format("lane {} is no member of its own {}", state->lane, LaneBoard::told(mine)));
     LaneBoard::Log& log = board.logs_[state->lane];
     const std::uint32_t length = log.length.load(std::memory_order_relaxed);
     if (length == LaneBoard::capacity) board.fail("a lane makes too many calls");

@@ -1,7 +1,7 @@
-// The lanes of a warp as threads of the host: what WarpHardware is on a GPU, so that ThreadWarp runs
-// as it does there, with lanes that part wherever they like and meet only where the code makes them.
-// A call is answered when all of its members have made it, and every mistake that would hang or be
-// undefined on a GPU is an exception in every lane.
+// The lanes of a warp as threads of the host: what WarpHardware is on a GPU, so that ThreadWarp
+// runs as it does there, with lanes that part wherever they like and meet only where the code makes
+// them. A call is answered when all of its members have made it, and every mistake that would hang
+// or be undefined on a GPU is an exception in every lane.
 //
 // Lanes learn of each other through what they published alone, so the thread sanitizer sees exactly
 // the order that the members of a call are promised, and no other.
