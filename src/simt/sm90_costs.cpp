@@ -22,10 +22,10 @@ std::vector<OperationCost> sm90_costs() {
     std::vector<OperationCost> costs;
     for (const KernelCosts& row : table)
         for (std::size_t k = 0; k < op_count; ++k)
-            costs.push_back({std::string(op_names[k]), row.costs[k],
-                             "SASS of sm_90, " RAYDIX_SM90_COMPILER ", kernel " +
-                                 std::string(row.kernel),
-                             std::string(row.kernel)});
+            costs.push_back(
+                {std::string(op_names[k]), row.costs[k],
+                 "SASS of sm_90, " RAYDIX_SM90_COMPILER ", kernel " + std::string(row.kernel),
+                 std::string(row.kernel)});
     return costs;
 }
 
