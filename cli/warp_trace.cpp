@@ -41,8 +41,7 @@ void check_kernel(const std::string& kernel, const std::string& device) {
                                                joined(warp_kernel_names()));
 }
 
-WarpTracer::WarpTracer(const Bvh& bvh, const Settings& settings)
-    : settings_(settings), tree_(bvh) {
+WarpTracer::WarpTracer(const Bvh& bvh, const Settings& settings) : settings_(settings), tree_(bvh) {
     const WarpKernel kernel = warp_kernel_from_name(settings.kernel);
     simulate_ = {.kernel = kernel, .any_hit = settings.any_hit};
     if (is_simulated()) {
@@ -53,8 +52,7 @@ WarpTracer::WarpTracer(const Bvh& bvh, const Settings& settings)
     device_invalid_.reset(1);
 }
 
-WarpTracer::Times WarpTracer::run(std::span<const Ray> rays, std::vector<Hit>& hits,
-                                  bool counted) {
+WarpTracer::Times WarpTracer::run(std::span<const Ray> rays, std::vector<Hit>& hits, bool counted) {
     hits.resize(rays.size());
     if (!is_simulated()) return run_on_device(rays, hits, counted);
     run_simulated(rays, hits);
@@ -76,9 +74,9 @@ WarpTracer::Times WarpTracer::run_on_device(std::span<const Ray> rays, std::vect
     rays_.reset(rays.size());
     const auto start = std::chrono::steady_clock::now();
     rays_.upload(rays);
-    const DeviceTraceMs ms =
-        time_trace_on_device(*device_tree_, {rays_.data(), rays.size()}, {hits_.data(), hits.size()},
-                             options, {scratch_.data(), scratch_.size()}, nullptr);
+    const DeviceTraceMs ms = time_trace_on_device(*device_tree_, {rays_.data(), rays.size()},
+                                                  {hits_.data(), hits.size()}, options,
+                                                  {scratch_.data(), scratch_.size()}, nullptr);
     hits_.download(hits);
     const std::chrono::duration<double> all = std::chrono::steady_clock::now() - start;
     if (counted) {

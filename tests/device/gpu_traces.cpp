@@ -1,6 +1,7 @@
-// Every warp kernel on a device against the scalar reference: the same hits, bit for bit, from trees
-// copied there and trees built there; trees of no and few triangles, invalid and scaled rays, on a
-// stream of the caller's, never more memory touched than was lent. Skipped where there is no device.
+// Every warp kernel on a device against the scalar reference: the same hits, bit for bit, from
+// trees copied there and trees built there; trees of no and few triangles, invalid and scaled rays,
+// on a stream of the caller's, never more memory touched than was lent. Skipped where there is no
+// device.
 #include <gtest/gtest.h>
 #include <raydix/device_trace.h>
 #include <raydix/error.h>
@@ -69,9 +70,8 @@ void compare(const std::string& what, const WarpTree& host, const DeviceWarpTree
             const Traced traced = trace_there(tree, rays, kernel, any_hit);
             std::size_t different = 0;
             for (std::size_t i = 0; i < rays.size(); ++i)
-                different += any_hit
-                                 ? traced.hits[i].hit() != expected[i].hit()
-                                 : std::memcmp(&traced.hits[i], &expected[i], sizeof(Hit)) != 0;
+                different += any_hit ? traced.hits[i].hit() != expected[i].hit()
+                                     : std::memcmp(&traced.hits[i], &expected[i], sizeof(Hit)) != 0;
             EXPECT_EQ(different, 0u) << "of " << rays.size();
         }
     }
@@ -132,7 +132,8 @@ TEST_F(GpuTrace, WhatDoesNotFitIsRefused) {
     const DeviceTraceOptions options;
     const std::size_t bytes = device_trace_scratch_bytes(tree, 64, options);
     const DeviceBuffer<std::byte> scratch(bytes);
-    const auto launch = [&](std::size_t ray_count, std::size_t hit_count, std::size_t scratch_bytes) {
+    const auto launch = [&](std::size_t ray_count, std::size_t hit_count,
+                            std::size_t scratch_bytes) {
         trace_warps_on_device(tree, {rays.data(), ray_count}, {hits.data(), hit_count}, options,
                               {scratch.data(), scratch_bytes}, nullptr);
     };
