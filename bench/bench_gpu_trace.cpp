@@ -1,7 +1,7 @@
-// How many rays does each warp kernel trace on a GPU? Mrays/s of the kernel alone, as Aila and Laine
-// report, per scene, kind of ray and kernel. Every hit is first compared with the scalar reference.
-// A JSON line each on standard output; scripts/gpu keeps them. Without a device: exit code 1 and
-// the reason.
+// How many rays does each warp kernel trace on a GPU? Mrays/s of the kernel alone, as Aila and
+// Laine report, per scene, kind of ray and kernel. Every hit is first compared with the scalar
+// reference. A JSON line each on standard output; scripts/gpu keeps them. Without a device: exit
+// code 1 and the reason.
 #include <fmt/format.h>
 #include <raydix/device_trace.h>
 #include <raydix/machine.h>
@@ -69,9 +69,9 @@ void check_hits(const Launch& launch, raydix::WarpKernel kernel) {
     std::vector<raydix::Hit> hits(launch.rays.size());
     launch.device_hits.download(hits);
     for (std::size_t i = 0; i < hits.size(); ++i) {
-        const bool same =
-            launch.any_hit ? hits[i].hit() == launch.expected[i].hit()
-                           : std::memcmp(&hits[i], &launch.expected[i], sizeof(hits[i])) == 0;
+        const bool same = launch.any_hit
+                              ? hits[i].hit() == launch.expected[i].hit()
+                              : std::memcmp(&hits[i], &launch.expected[i], sizeof(hits[i])) == 0;
         if (!same)
             throw std::runtime_error(fmt::format("{}: the hit of ray {} is not the reference's",
                                                  warp_kernel_name(kernel), i));
@@ -82,8 +82,7 @@ Json measure(const raydix::DeviceWarpTree& tree, const Launch& launch, raydix::W
              int repeat) {
     const raydix::DeviceTraceOptions options{.kernel = kernel, .any_hit = launch.any_hit};
     const auto count = static_cast<std::uint32_t>(launch.rays.size());
-    const raydix::DeviceBuffer<std::byte> scratch(
-        device_trace_scratch_bytes(tree, count, options));
+    const raydix::DeviceBuffer<std::byte> scratch(device_trace_scratch_bytes(tree, count, options));
     std::vector<double> kernel_rates, rates;
     for (int turn = 0; turn <= repeat; ++turn) {
         const raydix::DeviceTraceMs ms = time_trace_on_device(
