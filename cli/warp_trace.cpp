@@ -42,8 +42,8 @@ void check_kernel(const std::string& kernel, const std::string& device) {
 }
 
 WarpTracer::WarpTracer(const Bvh& bvh, const Settings& settings) : settings_(settings), tree_(bvh) {
-    const WarpKernel kernel = warp_kernel_from_name(settings.kernel);
-    simulate_ = {.kernel = kernel, .any_hit = settings.any_hit};
+    simulate_.kernel = warp_kernel_from_name(settings.kernel);
+    simulate_.any_hit = settings.any_hit;
     if (is_simulated()) {
         simulate_.machine = machine_model(settings.machine);
         return;
