@@ -59,8 +59,10 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->check(CLI::IsMember({"binary"}))
         ->capture_default_str()
         ->group(group);
-    command.add_option("--device", options.device, "Where to build and trace")
-        ->check(CLI::IsMember({"cpu", "cuda"}))
+    command
+        .add_option("--device", options.device,
+                    "Where to build (cpu, cuda) and trace (cpu, cuda, sim)")
+        ->check(CLI::IsMember({"cpu", "cuda", "sim"}))
         ->capture_default_str()
         ->group(group);
     of_the_build(
@@ -96,6 +98,7 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
 }
 
 BuildOptions TreeOptions::build_options(const CommonOptions& common) const {
+    refuse_simulator(*this);
     if (max_level) throw CLI::ValidationError("--max-level", "belongs to --tree octree");
     BuildOptions result;
     result.builder = quality == "fast"       ? Builder::apetrei
@@ -127,11 +130,16 @@ Scene load_scene_with_cameras(const std::string& name, const TreeOptions& tree,
     return scene;
 }
 
+void refuse_simulator(const TreeOptions& tree) {
+    if (tree.device == "sim")
+        throw CLI::ValidationError("--device",
+                                   "sim traces rays (trace); trees are built on the "
+                                   "cpu, or on cuda");
+}
+
 void refuse_device(const TreeOptions& tree) {
     if (tree.device != "cpu")
-        throw CLI::ValidationError("--device", tree.device +
-                                                   " builds trees (build, check); rays are traced "
-                                                   "on the cpu only");
+        throw CLI::ValidationError("--device", tree.device + " does not serve here, only cpu");
 }
 
 void refuse_build_options(const std::string& scene, const TreeOptions& tree) {
@@ -144,6 +152,7 @@ void refuse_build_options(const std::string& scene, const TreeOptions& tree) {
 
 SceneTree load_scene_tree(const std::string& name, const TreeOptions& tree,
                           const CommonOptions& common) {
+    refuse_simulator(tree);
     if (tree.tree != "bvh")
         throw CLI::ValidationError("--tree", tree.tree + " does not serve here, only bvh");
     if (is_rdx(name)) {

@@ -52,6 +52,8 @@ struct SceneTree {
                                             const CommonOptions& common);
 /// A .rdx file brings its tree: options that ask for another one are a usage error, never ignored.
 void refuse_build_options(const std::string& scene, const TreeOptions& tree);
+/// The simulator builds no trees: a usage error.
+void refuse_simulator(const TreeOptions& tree);
 /// For commands that run on the CPU only: another device is a usage error, never ignored.
 void refuse_device(const TreeOptions& tree);
 [[nodiscard]] SceneTree load_scene_tree(const std::string& scene, const TreeOptions& tree,

@@ -9,9 +9,11 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "kdtree_commands.h"
 #include "output.h"
+#include "warp_trace.h"
 
 namespace raydix::cli {
 namespace {
@@ -24,8 +26,8 @@ enum class Mode { closest, any, all };
 struct TraceCommand {
     CommonOptions common;
     TreeOptions tree;
-    std::string scene, rays = "primary", mode_name, kernel = "scalar", camera = "all", hits_file,
-                       rays_file;
+    std::string scene, rays = "primary", mode_name, kernel, machine = "gtx480", camera = "all",
+                       hits_file, rays_file;
     std::string size_text;
     int samples = 32, repeat = 5;
     float ao_radius = 0.0f;
@@ -35,7 +37,8 @@ struct TraceCommand {
 /// Figures that grow with each batch.
 struct Tally {
     TraceCounts counts;
-    std::vector<double> seconds;  // of all batches, for each repeat
+    std::vector<double> seconds;     // of all batches, for each repeat
+    std::vector<double> end_to_end;  // the same on a GPU, with the copies to it and from it
     bool warm = false;
 };
 
@@ -44,6 +47,7 @@ struct Batch {
     Mode mode;
     const CommonOptions& common;
     const KdTree* kdtree;                // traced instead of the bvh if not null
+    WarpTracer* warps;                   // traces instead of the CPU if not null
     std::vector<Hit> hits;               // of the last run, closest and all
     std::vector<std::uint64_t> offsets;  // of the last run, all
     std::vector<std::uint8_t> occluded;
@@ -67,8 +71,28 @@ struct Batch {
     }
 };
 
+/// The same on a GPU, where the kernel's own time counts, or once in the simulator.
+void measure_warps(Batch& batch, std::span<const Ray> rays, int repeat, Tally& tally) {
+    WarpTracer& warps = *batch.warps;
+    warps.run(rays, batch.hits, true);
+    tally.counts.rays += rays.size();
+    tally.counts.invalid_rays = warps.invalid_rays();
+    for (const Hit& hit : batch.hits) tally.counts.hits += hit.hit();
+    if (warps.is_simulated()) return;
+    if (!tally.warm) warps.run(rays, batch.hits, false);
+    tally.warm = true;
+    tally.seconds.resize(static_cast<std::size_t>(repeat), 0.0);
+    tally.end_to_end.resize(static_cast<std::size_t>(repeat), 0.0);
+    for (std::size_t k = 0; k < tally.seconds.size(); ++k) {
+        const WarpTracer::Times times = warps.run(rays, batch.hits, false);
+        tally.seconds[k] += times.kernel_s;
+        tally.end_to_end[k] += times.end_to_end_s;
+    }
+}
+
 /// Traces one batch: once to count (and warm up), then `repeat` times on the clock.
 void measure(Batch& batch, std::span<const Ray> rays, int repeat, Tally& tally) {
+    if (batch.warps != nullptr) return measure_warps(batch, rays, repeat, tally);
     const TraceCounts counts = batch.run(rays, true);
     tally.counts.rays += counts.rays;
     tally.counts.hits += counts.hits;
@@ -179,25 +203,60 @@ void trace_camera(const TraceCommand& options, const SceneTree& input, const Cam
     }
 }
 
-Json trace_json(const TraceCommand& options, const std::string& mode, const Tally& tally) {
+/// Mrays/s of each repeat; null if nothing was timed.
+Json rates_json(const Tally& tally, const std::vector<double>& all_seconds) {
     std::vector<double> rates;
-    for (const double seconds : tally.seconds)
+    for (const double seconds : all_seconds)
         rates.push_back(static_cast<double>(tally.counts.rays) / seconds / 1e6);
+    return rates.empty() ? Json(nullptr) : spread_json(spread_of(rates));
+}
+
+Json trace_json(const TraceCommand& options, const std::string& mode, const Tally& tally,
+                const WarpTracer* warps) {
     const auto per_ray = [&](std::uint64_t n) {
-        return tally.counts.rays
+        return tally.counts.rays && warps == nullptr
                    ? Json(static_cast<double>(n) / static_cast<double>(tally.counts.rays))
                    : Json(nullptr);
     };
-    return {{"rays", options.rays},
-            {"mode", mode},
-            {"kernel", options.kernel},
-            {"device", "cpu"},
-            {"count", tally.counts.rays},
-            {"hits", tally.counts.hits},
-            {"invalid_rays", tally.counts.invalid_rays},
-            {"mrays_per_s", rates.empty() ? Json(nullptr) : spread_json(spread_of(rates))},
-            {"node_visits_per_ray", per_ray(tally.counts.node_visits)},
-            {"triangle_tests_per_ray", per_ray(tally.counts.triangle_tests)}};
+    Json json{{"rays", options.rays},
+              {"mode", mode},
+              {"kernel", options.kernel},
+              {"device", options.tree.device},
+              {"count", tally.counts.rays},
+              {"hits", tally.counts.hits},
+              {"invalid_rays", tally.counts.invalid_rays},
+              {"mrays_per_s", rates_json(tally, tally.seconds)},
+              {"node_visits_per_ray", per_ray(tally.counts.node_visits)},
+              {"triangle_tests_per_ray", per_ray(tally.counts.triangle_tests)}};
+    if (warps == nullptr) return json;
+    if (warps->is_simulated())
+        json["simulated"] = warps->simulated_json();
+    else
+        json["mrays_per_s_end_to_end"] = rates_json(tally, tally.end_to_end);
+    return json;
+}
+
+/// Kernels of a GPU count no visits; simulated ones have simulated rates.
+void print_warps(const Json& trace) {
+    const auto count = trace["count"].get<std::uint64_t>();
+    const auto hits = trace["hits"].get<std::uint64_t>();
+    fmt::print("\n{} rays, {} hits by {} on device {}\n", grouped(count), grouped(hits),
+               trace["kernel"].get<std::string>(), trace["device"].get<std::string>());
+    if (trace.contains("simulated")) {
+        const Json& s = trace["simulated"];
+        fmt::print(
+            "the hits come from the simulator; *simulated* on {}: at most {:.1f} Mrays/s, {:.1f} "
+            "with the distribution of work\n",
+            s["machine"].get<std::string>(), s["mrays_per_s_bound"].get<double>(),
+            s["mrays_per_s_scheduled"].get<double>());
+    } else if (count != 0) {
+        const Json &kernel = trace["mrays_per_s"], &all = trace["mrays_per_s_end_to_end"];
+        fmt::print("{:.1f} Mrays/s in the kernel ({:.1f} to {:.1f}), {:.1f} from rays to hits\n",
+                   kernel["median"].get<double>(), kernel["min"].get<double>(),
+                   kernel["max"].get<double>(), all["median"].get<double>());
+    }
+    if (const auto invalid = trace["invalid_rays"].get<std::uint64_t>())
+        fmt::print("{} rays are invalid and count as misses\n", grouped(invalid));
 }
 
 void print_trace(const Json& trace) {
@@ -236,14 +295,42 @@ void explain(const TraceCommand& options, const Bvh& bvh) {
         options.kernel, bvh.max_depth(), 1024);
 }
 
-void run_trace(const TraceCommand& options) {
-    const Mode mode = mode_of(options);
+void explain_warps(const TraceCommand& options, const Bvh& bvh) {
+    if (!options.explain || !options.common.prints_tables()) return;
+    fmt::print(
+        "kernel {}: pair64 nodes and woop48 triangles, width 2, warps of 32, stacks of {} "
+        "entries, tree built on the cpu\n",
+        options.kernel, bvh.max_depth() + 1);
+}
+
+/// What the options say about the device, before any work. The tree is built on the cpu.
+TraceCommand with_device(TraceCommand options, Mode mode) {
+    const std::string device = options.tree.device;
+    if (options.kernel.empty()) options.kernel = default_kernel(device);
+    check_kernel(options.kernel, device);
+    if (device == "cpu") return options;
+    if (options.tree.tree != "bvh")
+        throw CLI::ValidationError(
+            "--tree", "device " + device + " traces a bvh, not a " + options.tree.tree);
+    if (mode == Mode::all)
+        throw CLI::ValidationError("--mode", "all hits are found on the cpu only");
+    if (device == "sim")
+        static_cast<void>(machine_model(options.machine));
+    else
+        static_cast<void>(device_name());
+    return options;
+}
+
+void run_trace(const TraceCommand& given) {
+    const Mode mode = mode_of(given);
+    const TraceCommand options = with_device(given, mode);
     if (!options.hits_file.empty() && mode == Mode::any)
         throw CLI::ValidationError("--hits",
                                    "any-hit rays only answer yes or no; use --mode closest or all");
     refuse_build_options(options.scene, options.tree);
-    refuse_device(options.tree);
-    const KdTraced traced = load_kdtree_traced(options.scene, options.tree, options.common);
+    TreeOptions on_cpu = options.tree;
+    on_cpu.device = "cpu";
+    const KdTraced traced = load_kdtree_traced(options.scene, on_cpu, options.common);
     const bool through_kdtree = traced.kdtree.has_value();
     if (through_kdtree && mode == Mode::all)
         throw CLI::ValidationError("--mode",
@@ -252,11 +339,25 @@ void run_trace(const TraceCommand& options) {
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}
                           : parse_size(options.size_text);
-    Batch batch{input.bvh, mode, options.common, through_kdtree ? &*traced.kdtree : nullptr, {},
-                {},        {}};
+    std::optional<WarpTracer> warps;
+    if (options.tree.device != "cpu")
+        about(options.scene, [&] {
+            warps.emplace(input.bvh,
+                          WarpTracer::Settings{options.tree.device, options.kernel, options.machine,
+                                               mode == Mode::any, options.common.threads});
+        });
+    Batch batch{input.bvh,
+                mode,
+                options.common,
+                through_kdtree ? &*traced.kdtree : nullptr,
+                warps ? &*warps : nullptr,
+                {},
+                {},
+                {}};
     Tally tally;
     Kept kept;
-    if (!through_kdtree) explain(options, input.bvh);
+    if (!through_kdtree && !warps) explain(options, input.bvh);
+    if (warps) explain_warps(options, input.bvh);
     if (through_kdtree && options.explain) explain_kdtree(*traced.kdtree, options.common);
     Progress progress("tracing", options.common);
     if (options.rays.ends_with(".npy")) {
@@ -287,13 +388,14 @@ void run_trace(const TraceCommand& options) {
             : build_json(input.bvh,
                          tree_stats(input.bvh, stats_options(options.tree, options.common)),
                          builds);
-    document["trace"] = Json::array({trace_json(options, mode_text(mode), tally)});
+    document["trace"] = Json::array({trace_json(options, mode_text(mode), tally, batch.warps)});
     if (options.rays == "ao") {
         const float radius = ao_radius_of(options, input);
         document["trace"][0]["ao_radius"] = radius;
         if (options.common.prints_tables()) fmt::print("ao radius {:g}\n", radius);
     }
-    if (options.common.prints_tables()) print_trace(document["trace"][0]);
+    if (options.common.prints_tables())
+        warps ? print_warps(document["trace"][0]) : print_trace(document["trace"][0]);
     write_json(document, options.common);
 }
 
@@ -321,8 +423,13 @@ void add_trace_command(CLI::App& app) {
         ->add_option("--mode", options->mode_name,
                      "closest, any or all hits (default: any for ao, else closest)")
         ->check(CLI::IsMember({"closest", "any", "all"}));
-    command->add_option("--kernel", options->kernel, "Traversal kernel")
-        ->check(CLI::IsMember({"scalar"}))
+    command
+        ->add_option(
+            "--kernel", options->kernel,
+            "Traversal kernel (default: scalar on the cpu, speculative_while_while on cuda "
+            "and sim)")
+        ->check(CLI::IsMember(trace_kernel_names()));
+    command->add_option("--machine", options->machine, "Simulated machine of --device sim")
         ->capture_default_str();
     command->add_option("--camera", options->camera, "Number of a camera, or all")
         ->capture_default_str();

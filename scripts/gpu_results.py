@@ -40,6 +40,9 @@ def main(junit, bench=None):
     out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
     passed = sum(test["status"] == "passed" for test in tests)
     for line in document["bench"]:
+        if line["bench"] == "gpu_trace":
+            print(f"{line['scene']:<40}{line['rays']:<18}{line['kernel']:<36}{line['mrays_per_s']['median']:8.1f} Mrays/s")
+            continue
         share = f", hierarchy and boxes at {100 * line['of_copy_rate']:5.1f} % of the copy rate" if "of_copy_rate" in line else ""
         print(f"{line['scene']:<40}{line.get('builder', line['tree']):<12}{line['bits']:>3} bits, leaves of "
               f"{line['max_leaf']}: {line['ms']['total']['median']:8.3f} ms, {line['gprims_per_s']:6.2f} Gprims/s{share}")

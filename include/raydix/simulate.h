@@ -66,7 +66,8 @@ void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<
 struct OperationCost {
     std::string operation;
     std::uint32_t instructions = 0;
-    std::string origin;  // where the number comes from
+    std::string origin;       // where the number comes from
+    std::string kernel = {};  // empty: in all kernels that have no count of their own
 };
 
 /// A SIMT machine. Rates are per clock and multiprocessor.
@@ -84,7 +85,7 @@ struct MachineModel {
     double l2_gb_per_s = 100, dram_gb_per_s = 100;
     std::uint32_t l1_bytes = 16384;  // of each multiprocessor
     std::uint32_t l2_bytes = 1u << 20;
-    std::vector<OperationCost> costs;  // every operation once
+    std::vector<OperationCost> costs;  // every operation once, or once for each kernel
 };
 
 /// `gtx285`, `gtx285_enum_popc`, `gtx480`, `gtx680`, `h200`. Throws InputError that lists them.

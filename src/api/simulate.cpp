@@ -72,7 +72,7 @@ void check_options(const SimulateOptions& options) {
 
 Simulation without_tree(const SimulateOptions& options, std::size_t rays) {
     Simulation figures;
-    const OpCosts costs = op_costs(options.machine);
+    const OpCosts costs = op_costs(options.machine, options.kernel);
     for (std::size_t k = 0; k < op_count; ++k)
         figures.operations.push_back({op_names[k], 0, 0, costs[k]});
     figures.rays = rays;
@@ -204,7 +204,7 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
                                  std::vector<std::vector<Hit>>* hits, int threads) {
     for (const SimulateOptions& options : runs) {
         check_options(options);
-        static_cast<void>(op_costs(options.machine));
+        static_cast<void>(op_costs(options.machine, options.kernel));
     }
     if (rays.size() >= 0x7FFFFFFFu) throw InputError("simulate: 2^31 rays or more in one launch");
     std::vector<Simulation> figures(runs.size());

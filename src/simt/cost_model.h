@@ -24,5 +24,9 @@ namespace raydix {
 [[nodiscard]] std::vector<OperationCost> fermi_costs();
 /// Kepler: shuffles, and minimum-maximum pairs that take three operands.
 [[nodiscard]] std::vector<OperationCost> kepler_costs();
+/// sm_90: counted in the compiled kernels by scripts/sass_costs, for each kernel (closest hit)
+/// apart. A count of 0: the kernel does not have the operation, or the compiler has put it into
+/// others.
+[[nodiscard]] std::vector<OperationCost> sm90_costs();
 
 }  // namespace raydix

@@ -86,12 +86,35 @@ MachineModel gtx680() {
     return m;
 }
 
+MachineModel h200() {
+    MachineModel m;
+    m.name = "h200";
+    m.origin =
+        "132 multiprocessors of 128 lanes at 1.98 GHz, 4.8 TB/s, 50 MB of L2, up to 256 KB of L1: "
+        "the maker's figures; 1536 lanes in flight: 40 registers a thread, blocks of 128; integer "
+        "instructions, which run at half the rate, count as full ones; 4 clocks between dependent "
+        "instructions, cache rates: estimates";
+    m.multiprocessors = 132;
+    m.clock_ghz = 1.98;
+    m.lanes_per_clock = 128;
+    m.warp_issue_clocks = 4;
+    m.resident_lanes = 1536;
+    m.block_lanes = 128;
+    m.l1_transactions_per_clock = 1;
+    m.l1_bytes = 256 * 1024;
+    m.l2_gb_per_s = 5500;
+    m.l2_bytes = 50u << 20;
+    m.dram_gb_per_s = 4800;
+    m.costs = sm90_costs();
+    return m;
+}
+
 struct Named {
     std::string_view name;
     MachineModel (*make)();
 };
 constexpr std::array models{Named{"gtx285", gtx285}, Named{"gtx285_enum_popc", gtx285_enum_popc},
-                            Named{"gtx480", gtx480}, Named{"gtx680", gtx680}};
+                            Named{"gtx480", gtx480}, Named{"gtx680", gtx680}, Named{"h200", h200}};
 
 }  // namespace
 

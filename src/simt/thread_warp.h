@@ -1,14 +1,18 @@
 // The warp policy in which one thread is one lane: on a GPU, where the hardware lets threads part
 // and meet, and on the CPU at width 1, where it is the scalar reference.
 //
-// All lanes of a warp are alive to the end: those without a ray are finished ones. Votes count the
-// members alone: all lanes, or within voting_loop those that are in it.
+// Since Volta the threads of a warp part at any branch and need not meet behind it. So what lanes
+// do together names its members, exactly the lanes that come to it:
+// - all lanes of a warp are alive to the end: those without a ray are finished ones;
+// - members are all lanes; within voting_loop those that are in it, within among those of its mask;
+// - a member leaves those two only through meet(), where the members of before wait for each other;
+// - there is no vote within loop and when, whose lanes nobody counts.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
 #include "base/atomic.h"
-#include "base/bits.h"
 #include "base/hd.h"
 #include "simt/op.h"
 
@@ -18,8 +22,59 @@ namespace raydix {
 using LaneMask = std::uint64_t;
 
 #if defined(__CUDACC__)
-inline constexpr int device_warp_width = 32;
+inline constexpr std::uint32_t device_warp_width = 32;
 #endif
+
+/// The bits below `lane`.
+RAYDIX_HD static inline LaneMask lanes_below(std::uint32_t lane) {
+#if defined(__CUDA_ARCH__)
+    return (1u << lane) - 1;  // a device's masks have 32 bits; half the instructions
+#else
+    return (LaneMask{1} << lane) - 1;
+#endif
+}
+
+/// What the hardware offers to the threads of a warp. `members`: the lanes that make this very
+/// call.
+struct WarpHardware {
+    [[nodiscard]] RAYDIX_HD static constexpr std::uint32_t width() {
+#if defined(__CUDACC__)
+        return device_warp_width;
+#else
+        return 1;
+#endif
+    }
+    [[nodiscard]] RAYDIX_HD static std::uint32_t lane_id() {
+#if defined(__CUDA_ARCH__)
+        return threadIdx.x % device_warp_width;
+#else
+        return 0;
+#endif
+    }
+    [[nodiscard]] RAYDIX_HD static LaneMask ballot([[maybe_unused]] LaneMask members, bool vote) {
+#if defined(__CUDA_ARCH__)
+        return __ballot_sync(static_cast<unsigned>(members), vote);
+#else
+        return vote ? 1 : 0;
+#endif
+    }
+    /// The value of lane `from`, a member.
+    [[nodiscard]] RAYDIX_HD static std::uint32_t broadcast([[maybe_unused]] LaneMask members,
+                                                           std::uint32_t value,
+                                                           [[maybe_unused]] std::uint32_t from) {
+#if defined(__CUDA_ARCH__)
+        return __shfl_sync(static_cast<unsigned>(members), value, static_cast<int>(from));
+#else
+        return value;
+#endif
+    }
+    /// Members wait for each other and see what each of them wrote before.
+    RAYDIX_HD static void meet([[maybe_unused]] LaneMask members) {
+#if defined(__CUDA_ARCH__)
+        __syncwarp(static_cast<unsigned>(members));
+#endif
+    }
+};
 
 /// A node and the lanes that met its box: what packets put on their stack.
 struct PacketEntry {
@@ -35,26 +90,15 @@ struct WarpMemory {
     PacketEntry* packets = nullptr;  // [max_depth + 1]
 };
 
-template <class Lane>
+template <class Lane, class Hardware = WarpHardware>
 class ThreadWarp {
 public:
     Lane lane{};
     WarpMemory<Lane> memory{};
+    Hardware hardware{};
 
-    [[nodiscard]] RAYDIX_HD static constexpr std::uint32_t width() {
-#if defined(__CUDACC__)
-        return device_warp_width;
-#else
-        return 1;
-#endif
-    }
-    [[nodiscard]] RAYDIX_HD static std::uint32_t lane_id() {
-#if defined(__CUDA_ARCH__)
-        return threadIdx.x % device_warp_width;
-#else
-        return 0;
-#endif
-    }
+    [[nodiscard]] RAYDIX_HD static constexpr std::uint32_t width() { return Hardware::width(); }
+    [[nodiscard]] RAYDIX_HD std::uint32_t lane_id() const { return hardware.lane_id(); }
 
     template <class Cond, class Body>
     RAYDIX_HD void loop(Op, Cond cond, Body body) {
@@ -84,7 +128,7 @@ public:
         const LaneMask entered = members_;
         while (true) {
             const bool in = cond(lane);
-            const LaneMask left = ballot_of(members_, in);
+            const LaneMask left = hardware.ballot(members_, in);
             if (!in) break;
             members_ = left;
             body();
@@ -97,26 +141,22 @@ public:
     /// Members for whom cond(lane) holds.
     template <class Cond>
     [[nodiscard]] RAYDIX_HD LaneMask ballot(Op, Cond cond) {
-        return ballot_of(members_, cond(lane));
+        return hardware.ballot(members_, cond(lane));
     }
     /// The same with cond(lane, lane_id).
     template <class Cond>
     [[nodiscard]] RAYDIX_HD LaneMask ballot_indexed(Op, Cond cond) {
-        return ballot_of(members_, cond(lane, lane_id()));
+        return hardware.ballot(members_, cond(lane, lane_id()));
     }
     template <class Cond>
     [[nodiscard]] RAYDIX_HD bool any(Op op, Cond cond) {
         return ballot(op, cond) != 0;
     }
-    /// Takes `count` from a pool's counter for the whole warp; all lanes get the first.
+    /// Takes `count` from a pool's counter once for all members; all members get the first.
     [[nodiscard]] RAYDIX_HD std::uint32_t take(Op, std::uint32_t& counter, std::uint32_t count) {
-#if defined(__CUDA_ARCH__)
-        std::uint32_t first = 0;
-        if (lane_id() == 0) first = claim(counter, count);
-        return __shfl_sync(0xFFFFFFFFu, first, 0);
-#else
-        return claim(counter, count);
-#endif
+        const std::uint32_t taker = first_member();
+        const std::uint32_t first = lane_id() == taker ? claim(counter, count) : 0;
+        return hardware.broadcast(members_, first, taker);
     }
     /// Computes a value that is the same in all lanes.
     template <class Fn>
@@ -128,12 +168,12 @@ public:
     RAYDIX_HD void uniform_loop(Op, Cond cond, Body body) {
         while (cond()) body();
     }
-    /// The lanes of `mask` run body; the others wait.
+    /// The members in `mask` run body; the others wait.
     template <class Body>
     RAYDIX_HD void among(LaneMask mask, Body body) {
         const LaneMask entered = members_;
         if ((mask >> lane_id() & 1) != 0) {
-            members_ = mask;
+            members_ = entered & mask;
             body();
         }
         members_ = entered;
@@ -143,25 +183,21 @@ public:
     template <class Fn>
     RAYDIX_HD void write_shared(Op, Fn fn) {
         meet();  // nobody still reads the old value
-        if (lane_id() == 0) fn();
+        if (lane_id() == first_member()) fn();
         meet();
     }
     /// Members see what each of them wrote to shared memory.
-    RAYDIX_HD void meet() const {
-#if defined(__CUDA_ARCH__)
-        __syncwarp(static_cast<unsigned>(members_));
-#endif
-    }
+    RAYDIX_HD void meet() const { hardware.meet(members_); }
 
 private:
-    RAYDIX_HD static LaneMask ballot_of([[maybe_unused]] LaneMask members, bool vote) {
+    RAYDIX_HD std::uint32_t first_member() const {
 #if defined(__CUDA_ARCH__)
-        return __ballot_sync(static_cast<unsigned>(members), vote);
+        return static_cast<std::uint32_t>(__ffs(static_cast<int>(members_)) - 1);
 #else
-        return vote ? 1 : 0;
+        return static_cast<std::uint32_t>(std::countr_zero(members_));
 #endif
     }
-    LaneMask members_ = width() == 1 ? 1 : 0xFFFFFFFFu;
+    LaneMask members_ = ~LaneMask{0} >> (64 - width());
 };
 
 }  // namespace raydix

@@ -104,7 +104,7 @@ class Usage(ProgramTest):
                     self.assertEqual(done.code, 1)
                     self.assert_one_line(done)
                     self.assertRegex(done.err, "CUDA")
-        self.fail_with_usage("trace", SMALL, "--device", "cuda", names=["--device"])
+        self.fail_with_usage("trace", SMALL, "--device", "cuda", "--kernel", "scalar", names=["--kernel"])
         self.fail_with_usage("render", SMALL, "-o", "x.png", "--device", "cuda", names=["--device"])
 
     def test_an_unreadable_file(self):

@@ -1,5 +1,6 @@
 """resources_test.py NVCC SOURCE OUT FLAG...: compiles the kernels of SOURCE for sm_90 and prints what the assembler says
-of each: registers, stack, spilled bytes. None may use a stack, and those of the project have a limit on registers.
+of each: registers, stack, spilled bytes. None may spill, or use a stack other than that of
+a traversal, and those of the project have a limit on registers.
 Needs no device."""
 import pathlib
 import re
@@ -28,6 +29,13 @@ CORE = EVERY | dict.fromkeys((
     "LinkToParent", "LinkToChildren", "MarkLevels", "CenterInOrder", "MakeGrid", "FindKdRange", "EmitKdRootLeaf",
     "EmitKdNode", "FitKdIntervals"), 32)
 EXPECTED = {"kernels.cu": dict.fromkeys(PLAIN, 255), "device_build_cuda.cu": BUILD, "device_core_cuda.cu": CORE}
+# Traversal: 40 registers leave room for 1536 threads, which the h200 of src/simt/machine_models.cpp has in flight.
+KERNELS = {"trace_rays": 40, "trace_packets": 48, "trace_queues": 72}
+EXPECTED |= {"launch_warps_closest.cu": KERNELS, "launch_warps_any.cu": KERNELS,
+             "device_trace_cuda.cu": {"PrepareRay": 32, "RescaleHit": 32, "MissAll": 32, "EmitWoopTriangle": 48, "ClearUnusedValues": 32,
+                                   "SaveLastValue": 32, "AddLastValue": 32, "SetWord": 32}}
+# The traversal stack itself, of the larger size: an array that the kernel indexes.
+STACK_BYTES = {"trace_rays": 4 * 128}
 ENTRY = re.compile(r"Compiling entry function '(\w+)'.*?(\d+) bytes stack frame, (\d+) bytes spill stores, "
                    r"(\d+) bytes spill loads.*?Used (\d+) registers", re.DOTALL)
 
@@ -55,14 +63,14 @@ def main(nvcc, source, out, *flags):
     for kernel, (variants, registers, stack, spilled) in sorted(most.items()):
         limit = known.get(kernel, 255)
         print(f"{kernel:<24}{variants:>9}{registers:>10}{limit:>7}{stack:>7}{spilled:>9}")
-        if stack or spilled:
-            faults.append(f"{kernel} uses {stack} bytes of stack")
+        if stack > STACK_BYTES.get(kernel, 0) or spilled:
+            faults.append(f"{kernel} uses {stack} bytes of stack and spills {spilled}")
         if registers > limit:
             faults.append(f"{kernel} uses {registers} registers; the limit is {limit}")
     faults += [f"{kernel} was not compiled" for kernel in sorted(known.keys() - most.keys())]
     if done.returncode:
         faults.append(f"nvcc: exit code {done.returncode}\n{done.stdout}")
-    print("\n".join(faults) or f"{len(usage)} kernels, none uses a stack")
+    print("\n".join(faults) or f"{len(usage)} kernels, none spills or uses a stack it was not given")
     return 1 if faults else 0
 
 

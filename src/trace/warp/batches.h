@@ -73,6 +73,7 @@ struct Persistent {
         start_batch(warp, job.launch, next);
         Body::template trace<any_hit>(warp, job.scene);
         store_batch(warp, job.launch);
+        warp.meet();  // else a lane that is done early could start the next batch alone
         next += Warp::width();
         return true;
     }

@@ -16,7 +16,7 @@ namespace raydix {
 
 /// Bits of `mask` below lane `lane`.
 RAYDIX_HD static inline std::uint32_t rank_in(LaneMask mask, std::uint32_t lane) {
-    return static_cast<std::uint32_t>(count_ones(mask & ((LaneMask{1} << lane) - 1)));
+    return static_cast<std::uint32_t>(count_ones(mask & lanes_below(lane)));
 }
 
 /// Stores the hits of finished lanes and gives them new rays: one atomic addition for the warp,

@@ -9,7 +9,10 @@
 #include <bit>
 #include <cmath>
 #include <memory>
+#include <set>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "exec/memory.h"
@@ -189,25 +192,29 @@ Simulation empty_figures(const OpCosts& costs) {
 
 }  // namespace
 
-OpCosts op_costs(const MachineModel& machine) {
+OpCosts op_costs(const MachineModel& machine, WarpKernel kernel) {
     OpCosts costs{};
-    std::vector<bool> seen(op_count);
+    std::vector<const OperationCost*> found(op_count);
+    std::set<std::pair<std::string_view, std::string_view>> seen;
+    const std::string told = "machine " + machine.name + ": operation '";
     for (const OperationCost& cost : machine.costs) {
-        const auto found = std::find(op_names.begin(), op_names.end(), cost.operation);
-        if (found == op_names.end())
+        const auto name = std::find(op_names.begin(), op_names.end(), cost.operation);
+        if (name == op_names.end())
             throw InputError("machine " + machine.name + ": there is no operation '" +
                              cost.operation + "'");
-        const auto k = static_cast<std::size_t>(found - op_names.begin());
-        if (seen[k])
-            throw InputError("machine " + machine.name + ": operation '" + cost.operation +
-                             "' has two costs");
-        seen[k] = true;
-        costs[k] = cost.instructions;
+        if (!seen.insert({cost.operation, cost.kernel}).second)
+            throw InputError(told + cost.operation + "' has two costs" +
+                             (cost.kernel.empty() ? "" : " in kernel " + cost.kernel));
+        const bool own = !cost.kernel.empty();
+        if (own && warp_kernel_from_name(cost.kernel) != kernel) continue;
+        const auto k = static_cast<std::size_t>(name - op_names.begin());
+        if (own || found[k] == nullptr) found[k] = &cost;
     }
-    for (std::size_t k = 0; k < op_count; ++k)
-        if (!seen[k])
-            throw InputError("machine " + machine.name + ": operation '" +
-                             std::string(op_names[k]) + "' has no cost");
+    for (std::size_t k = 0; k < op_count; ++k) {
+        if (found[k] == nullptr)
+            throw InputError(told + std::string(op_names[k]) + "' has no cost");
+        costs[k] = found[k]->instructions;
+    }
     return costs;
 }
 
@@ -220,7 +227,7 @@ Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
         *simulated_kernel(options.kernel, options.any_hit, options.width),
         {scene, {rays.data(), hits.data(), static_cast<std::uint32_t>(rays.size()), &next}},
         stack_entries,
-        op_costs(options.machine),
+        op_costs(options.machine, options.kernel),
         nullptr};
     const MachineModel& m = options.machine;
     if (options.memory) {

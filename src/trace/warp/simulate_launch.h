@@ -12,8 +12,9 @@
 
 namespace raydix {
 
-/// Of a machine's table; throws InputError if an operation is missing, repeated or unknown.
-[[nodiscard]] OpCosts op_costs(const MachineModel& machine);
+/// Of a machine's table: the kernel's own counts, and for the rest those of all kernels. Throws
+/// InputError if an operation is missing, repeated or unknown, or a kernel is unknown.
+[[nodiscard]] OpCosts op_costs(const MachineModel& machine, WarpKernel kernel);
 
 /// rays [n], prepared (prepare_rays.h), fewer than 2^31 -> hits [n]. `stack_entries`: at least the
 /// tree's depth. `memory`: the scene's arrays, for the memory model.

@@ -49,6 +49,36 @@ RAYDIX_HD static inline float inverse_of(float d) {
     return 1.0f / (tiny ? (std::signbit(d) ? -least : least) : d);
 }
 
+// Loads and stores of 16 bytes at once, which a compiler makes out of the structs only if it knows
+// their alignment.
+
+struct FourFloats {
+    float x, y, z, w;
+};
+RAYDIX_HD static inline FourFloats load_four(const float* at) {
+#if defined(__CUDA_ARCH__)
+    const float4 four = *reinterpret_cast<const float4*>(at);
+    return {four.x, four.y, four.z, four.w};
+#else
+    return {at[0], at[1], at[2], at[3]};
+#endif
+}
+RAYDIX_HD static inline Ray load_ray(const Ray* ray) {
+#if defined(__CUDA_ARCH__)
+    const FourFloats from = load_four(&ray->origin.x), to = load_four(&ray->direction.x);
+    return {{from.x, from.y, from.z}, from.w, {to.x, to.y, to.z}, to.w};
+#else
+    return *ray;
+#endif
+}
+RAYDIX_HD static inline void write_hit(Hit* to, const Hit& hit) {
+#if defined(__CUDA_ARCH__)
+    *reinterpret_cast<float4*>(to) = make_float4(hit.t, __uint_as_float(hit.prim), hit.u, hit.v);
+#else
+    *to = hit;
+#endif
+}
+
 /// Lane and ray `index` of the launch; past its end, and for invalid rays, the lane is finished.
 RAYDIX_HD static inline void start_ray(Lane& l, const RayLaunch& launch, std::uint32_t index) {
     const bool there = index < launch.count;
@@ -60,7 +90,7 @@ RAYDIX_HD static inline void start_ray(Lane& l, const RayLaunch& launch, std::ui
     l.prim = no_primitive;
     l.u = l.v = 0.0f;
     if (!there) return;
-    const Ray ray = launch.rays[index];
+    const Ray ray = load_ray(launch.rays + index);
     l.origin = ray.origin;
     l.direction = ray.direction;
     l.inverse = {inverse_of(ray.direction.x), inverse_of(ray.direction.y),
@@ -126,11 +156,11 @@ RAYDIX_HD static inline void pop(Lane& l) {
 
 /// The plane of triangle `position`: t along the ray.
 RAYDIX_HD static inline void test_plane(Lane& l, const WarpScene& scene, std::uint32_t position) {
-    const float* z = scene.triangles[position].z;
+    const FourFloats z = load_four(scene.triangles[position].z);
     const float height = multiply_add(
-        -z[0], l.origin.x, multiply_add(-z[1], l.origin.y, multiply_add(-z[2], l.origin.z, z[3])));
+        -z.x, l.origin.x, multiply_add(-z.y, l.origin.y, multiply_add(-z.z, l.origin.z, z.w)));
     const float slope =
-        multiply_add(z[0], l.direction.x, multiply_add(z[1], l.direction.y, z[2] * l.direction.z));
+        multiply_add(z.x, l.direction.x, multiply_add(z.y, l.direction.y, z.z * l.direction.z));
     l.test_t = height / slope;
 }
 /// False for NaN, which is what triangles without area give.
@@ -141,16 +171,16 @@ RAYDIX_HD static inline bool plane_in_range(const Lane& l) {
 /// Where the ray pierces the plane, in the triangle's own axes.
 RAYDIX_HD static inline void test_edges(Lane& l, const WarpScene& scene, std::uint32_t position) {
     const WoopTriangle& triangle = scene.triangles[position];
-    const auto along = [&](const float* row) {
-        const float start = multiply_add(
-            row[0], l.origin.x,
-            multiply_add(row[1], l.origin.y, multiply_add(row[2], l.origin.z, row[3])));
-        const float slope = multiply_add(
-            row[0], l.direction.x, multiply_add(row[1], l.direction.y, row[2] * l.direction.z));
+    const auto along = [&](const FourFloats& row) {
+        const float start =
+            multiply_add(row.x, l.origin.x,
+                         multiply_add(row.y, l.origin.y, multiply_add(row.z, l.origin.z, row.w)));
+        const float slope = multiply_add(row.x, l.direction.x,
+                                         multiply_add(row.y, l.direction.y, row.z * l.direction.z));
         return multiply_add(l.test_t, slope, start);
     };
-    l.test_u = along(triangle.x);
-    l.test_v = along(triangle.y);
+    l.test_u = along(load_four(triangle.x));
+    l.test_v = along(load_four(triangle.y));
 }
 RAYDIX_HD static inline bool inside_edges(const Lane& l) {
     return l.test_u >= 0.0f && l.test_v >= 0.0f && l.test_u + l.test_v <= 1.0f;
