@@ -160,7 +160,8 @@ void RayLaunches::for_each(RayKind kind,
     for (const Unit& unit : units) {
         if (made != unit.launch) rays = rays_of(kind, launches[unit.launch]);
         made = unit.launch;
-        visit({std::span(rays).subspan(unit.begin, unit.count), unit.count == rays.size()},
+        visit({std::span(rays).subspan(unit.begin, unit.count),
+               static_cast<double>(unit.count) / static_cast<double>(rays.size())},
               static_cast<double>(++done) / static_cast<double>(units.size()));
     }
 }

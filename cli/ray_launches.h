@@ -26,7 +26,8 @@ void add_launch_options(CLI::App& command, LaunchOptions& options);
 /// A launch, or a run of neighbouring rays of one.
 struct RayUnit {
     std::span<const Ray> rays;
-    bool whole;  // the launch as it is
+    double part;  // of the launch; 1: the launch as it is
+    [[nodiscard]] bool whole() const { return part == 1.0; }
 };
 
 /// Cameras with their primary rays and hits, made once.

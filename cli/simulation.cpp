@@ -32,15 +32,16 @@ std::uint64_t count_different(std::span<const Hit> a, std::span<const Hit> b, bo
 }
 
 /// One launch, or a run of one, through every row's kernel.
-void add_unit(const WarpTree& tree, const RayUnit& unit, std::span<const SimulateOptions> runs,
+void add_unit(const WarpTree& tree, const RayUnit& unit, std::vector<SimulateOptions> runs,
               std::vector<SimulationRow>& rows, const CommonOptions& common) {
+    for (SimulateOptions& run : runs) run.part_of_launch = unit.part;
     std::vector<std::vector<Hit>> hits;
     const std::vector<Simulation> figures = simulate(tree, unit.rays, runs, &hits, common.threads);
     std::vector<Hit> expected(unit.rays.size());
     trace_reference(tree, unit.rays, expected, runs.front().any_hit, common.threads);
     for (std::size_t k = 0; k < rows.size(); ++k) {
         rows[k].sum.add(figures[k]);
-        rows[k].whole_launches &= unit.whole;
+        rows[k].whole_launches &= unit.whole();
         rows[k].different_hits += count_different(hits[k], expected, runs[k].any_hit);
         const double bound = simulated_rates(figures[k], runs[k]).bound;
         if (bound > 0) rows[k].seconds_per_ray.push_back(1.0 / bound);
@@ -138,7 +139,7 @@ std::vector<SimulationRow> simulate_rays(const SceneTree& input, const WarpTree&
                         .options = run,
                         .sum = {},
                         .seconds_per_ray = {}});
-    add_unit(tree, {rays, true}, runs, rows, common);
+    add_unit(tree, {rays, 1.0}, runs, rows, common);
     return rows;
 }
 

@@ -101,6 +101,9 @@ struct SimulateOptions {
     int width = 32;        // lanes of a warp: 1, 2, 4, 8, 16, 32 or 64
     bool any_hit = false;  // rays end at their first hit
     bool memory = false;   // also run the memory model
+    // The rays are this part of a launch: as many of the persistent warps trace them. Matters to
+    // the bound only; times of a part say nothing.
+    double part_of_launch = 1.0;
 };
 
 /// How often an operation was issued, for how many lanes in sum, and at what cost.

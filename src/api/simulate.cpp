@@ -60,6 +60,9 @@ void check_options(const SimulateOptions& options) {
     positive("warp_issue_clocks", m.warp_issue_clocks);
     positive("resident_lanes", m.resident_lanes);
     positive("block_lanes", m.block_lanes);
+    if (!(options.part_of_launch > 0 && options.part_of_launch <= 1))
+        throw InputError("part_of_launch is " + std::to_string(options.part_of_launch) +
+                         "; it must be above 0 and at most 1");
     if (double(m.resident_lanes) * m.multiprocessors > 1 << 24)
         throw InputError("machine " + m.name + ": more than 2^24 lanes in flight");
     if (!options.memory) return;

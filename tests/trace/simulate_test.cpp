@@ -202,6 +202,27 @@ TEST(Simulate, FiguresDoNotDependOnThreads) {
     }
 }
 
+TEST(Simulate, PersistentFormsDifferByTheirFetchesOnly) {
+    const Scene scene = scene_of(random_soup(2000, 4, 0.1f), "soup");
+    const WarpTree tree(build_bvh(scene.mesh));
+    const std::vector<Ray> rays = make_mixed_rays(scene, 64 * 32, 8);
+    std::vector<SimulateOptions> runs{options_for(WarpKernel::while_while),
+                                      options_for(WarpKernel::persistent_while_while)};
+    // On a machine with room for far more warps than there are batches, too.
+    runs[1].machine.resident_lanes = 1u << 15;
+    for (const double part : {1.0, 0.001}) {
+        runs[1].part_of_launch = part;
+        const auto all = simulate(tree, rays, runs);
+        for (std::size_t op = 0; op < op_count; ++op) {
+            if (Op(op) == Op::take_rays || Op(op) == Op::shuffle) continue;
+            EXPECT_EQ(all[0].operations[op].issues, all[1].operations[op].issues) << op_names[op];
+            EXPECT_EQ(all[0].operations[op].lanes, all[1].operations[op].lanes) << op_names[op];
+        }
+        // 64 batches, and each warp comes once in vain.
+        EXPECT_LE(figure(all[1], Op::take_rays).issues, 64u + 64);
+    }
+}
+
 TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
     if (simulated_kernel(WarpKernel::packet, false, 32, SimulatorIsa::v3) == nullptr)
         GTEST_SKIP() << "no AVX2 and FMA here";
@@ -320,6 +341,8 @@ TEST(Simulate, RefusesWhatItCannotRun) {
     };
     refuse("width", [](SimulateOptions& o) { o.width = 3; });
     refuse("width", [](SimulateOptions& o) { o.width = 128; });
+    refuse("part_of_launch", [](SimulateOptions& o) { o.part_of_launch = 0; });
+    refuse("part_of_launch", [](SimulateOptions& o) { o.part_of_launch = 1.5; });
     refuse("clock_ghz", [](SimulateOptions& o) { o.machine.clock_ghz = 0; });
     refuse("multiprocessors", [](SimulateOptions& o) { o.machine.multiprocessors = 0; });
     refuse("in flight", [](SimulateOptions& o) { o.machine.resident_lanes = 1u << 30; });

@@ -145,7 +145,11 @@ void schedule_blocks(const LaunchRun& run, const std::vector<std::uint64_t>& tim
 /// Persistent warps, each turn at its time.
 void run_persistent(const LaunchRun& run, Simulation& figures) {
     const MachineModel& m = run.options.machine;
-    const std::uint32_t warps = std::max(1u, m.resident_lanes / run.width()) * m.multiprocessors;
+    const std::uint32_t filling = std::max(1u, m.resident_lanes / run.width()) * m.multiprocessors;
+    // No more warps than batches: those would only find the pool empty.
+    const std::uint32_t batches = (run.job.launch.count - 1) / run.width() + 1;
+    const std::uint32_t warps = std::clamp(
+        static_cast<std::uint32_t>(std::ceil(filling * run.options.part_of_launch)), 1u, batches);
     WarpTally tally;
     WarpMemoryPool memory(run.kernel, run.kernel.keeps_rays ? warps : 1, run.setup(tally));
     std::vector<KernelState> states(warps);
