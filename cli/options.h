@@ -84,5 +84,6 @@ void add_check_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
 void add_render_command(CLI::App& app);
 void add_bench_command(CLI::App& app);
+void add_report_command(CLI::App& app);
 
 }  // namespace raydix::cli
