@@ -28,6 +28,11 @@ bool has_values(const Bar& bar) {
            std::isfinite(bar.limit) || std::isfinite(bar.mark);
 }
 
+/// Simulated bars are outlines, lightly filled; parts of a whole would not be told apart that way.
+bool is_outlined(const BarPlot& plot) {
+    return plot.origin == Origin::simulated && plot.parts.size() == 1;
+}
+
 double total_of(const Bar& bar) {
     if (std::isfinite(bar.total)) return bar.total;
     const bool any = std::ranges::any_of(bar.parts, [](double v) { return std::isfinite(v); });
@@ -88,10 +93,9 @@ private:
                       (plot_.parts[k].name.empty() ? "" : plot_.parts[k].name + ": ") +
                       significant(bar.parts[k]) + " " + plot_.unit + share_text(bar, k) +
                       origin_suffix(plot_.origin));
-            svg_.rect(begin, from, std::max(x(sum) - begin, 0.8), bar_height,
-                      (plot_.origin == Origin::simulated && plot_.parts.size() == 1 ? "outline "
-                                                                                    : "fill ") +
-                          colour_class(plot_.parts[k].colour));
+            svg_.rect(
+                begin, from, std::max(x(sum) - begin, 0.8), bar_height,
+                (is_outlined(plot_) ? "outline " : "fill ") + colour_class(plot_.parts[k].colour));
             svg_.close();
             end = std::max(x(sum), begin + 0.8);
         }
@@ -143,20 +147,25 @@ private:
 
 }  // namespace
 
-std::string bar_plot(const BarPlot& plot) {
-    Figure figure{.title = plot.title,
-                  .subtitle = plot.subtitle,
-                  .origin = plot.origin,
-                  .svg = Bars(plot).draw(),
-                  .note = plot.note};
+std::vector<LegendItem> legend_of(const BarPlot& plot) {
+    std::vector<LegendItem> legend;
     if (plot.parts.size() > 1 || !plot.limit_name.empty() || !plot.mark_name.empty())
         for (const BarPart& part : plot.parts)
-            if (!part.name.empty()) figure.legend.push_back({part.name, part.colour});
-    if (!plot.limit_name.empty())
-        figure.legend.push_back({plot.limit_name, 0, LegendItem::Kind::limit});
-    if (!plot.mark_name.empty())
-        figure.legend.push_back({plot.mark_name, 0, LegendItem::Kind::mark});
-    return figure_html(figure);
+            legend.push_back(
+                {part.name, part.colour,
+                 is_outlined(plot) ? LegendItem::Kind::outline : LegendItem::Kind::box});
+    if (!plot.limit_name.empty()) legend.push_back({plot.limit_name, 0, LegendItem::Kind::limit});
+    if (!plot.mark_name.empty()) legend.push_back({plot.mark_name, 0, LegendItem::Kind::mark});
+    return legend;
+}
+
+std::string bar_plot(const BarPlot& plot) {
+    return figure_html({.title = plot.title,
+                        .subtitle = plot.subtitle,
+                        .origin = plot.origin,
+                        .legend = plot.with_legend ? legend_of(plot) : std::vector<LegendItem>(),
+                        .svg = Bars(plot).draw(),
+                        .note = plot.note});
 }
 
 }  // namespace raydix::report

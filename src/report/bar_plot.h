@@ -32,10 +32,12 @@ struct BarPlot {
     std::string unit = {};   // of the values behind the bars
     Origin origin = Origin::none;
     std::vector<BarPart> parts = {};  // a legend if there are several
+    bool with_legend = true;          // false: it stands elsewhere, see legend_of
     std::string limit_name = {}, mark_name = {};
     std::vector<Bar> bars = {};
 };
 
+[[nodiscard]] std::vector<LegendItem> legend_of(const BarPlot& plot);
 [[nodiscard]] std::string bar_plot(const BarPlot& plot);
 
 }  // namespace raydix::report

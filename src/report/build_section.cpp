@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "report/bar_plot.h"
 #include "report/html.h"
@@ -21,23 +22,44 @@ using Format = Column::Format;
 struct BuildRow {
     const Document* document;
     const Json* build;
-    std::string scene, name;  // name: tree, builder and what else tells it from the others
+    std::string scene, name;     // name: the builder, and what tells it from others of the scene
+    std::string device, shared;  // shared: settings of all of the scene
     std::optional<double> total, low, high, primitives, sah;
 };
 
-std::string build_name(const Json& build) {
-    const std::string tree = text_at(build, "tree");
-    std::string name = text_at(build, "builder");
-    if (name.empty()) name = "a builder without a name";
-    if (!tree.empty() && tree != "bvh") name = tree + ", " + name;
-    if (const auto bits = number_at(build, "bits")) name += fmt::format(", {:.0f} bits", *bits);
+std::string device_of(const Json& build) {
+    const std::string device = text_at(build, "device");
+    const auto threads = number_at(build, "threads");
+    return device == "cpu" && threads ? counted(*threads, "thread") : device;
+}
+
+/// Tree, builder and settings, as texts to put beside each other.
+std::vector<std::string> parts_of(const Json& build) {
+    std::vector<std::string> parts{text_at(build, "tree"), text_at(build, "builder"), "", "", ""};
+    if (parts[0] == "bvh") parts[0].clear();
+    if (const auto bits = number_at(build, "bits")) parts[2] = fmt::format("{:.0f} bits", *bits);
     if (const auto leaf = number_at(build, "max_leaf"))
-        name += fmt::format(", leaves of {:.0f}", *leaf);
-    if (const std::string device = text_at(build, "device"); !device.empty() && device != "cpu")
-        name += ", " + device;
-    else if (const auto threads = number_at(build, "threads"))
-        name += fmt::format(", {:.0f} {}", *threads, *threads == 1 ? "thread" : "threads");
-    return name;
+        parts[3] = fmt::format("leaves of {:.0f}", *leaf);
+    parts[4] = device_of(build);
+    return parts;
+}
+
+void name_rows(std::vector<BuildRow>& rows) {
+    for (BuildRow& row : rows) {
+        if (!row.name.empty()) continue;
+        std::vector<BuildRow*> group;
+        std::vector<std::vector<std::string>> parts;
+        for (BuildRow& other : rows)
+            if (other.scene == row.scene) {
+                group.push_back(&other);
+                parts.push_back(parts_of(*other.build));
+            }
+        const Names names = distinct_names(parts, 1);
+        for (std::size_t i = 0; i < group.size(); ++i) {
+            group[i]->name = names.each[i];
+            group[i]->shared = names.common;
+        }
+    }
 }
 
 std::vector<BuildRow> rows_of(const Documents& documents) {
@@ -45,10 +67,17 @@ std::vector<BuildRow> rows_of(const Documents& documents) {
     for (const Document& document : documents) {
         const Json& build = at(document.root, "build");
         if (!build.is_object()) continue;
-        rows.push_back({&document, &build, scene_name(document.root), build_name(build),
-                        number_at(build, "ms.total"), number_at(build, "ms_spread.min.total"),
-                        number_at(build, "ms_spread.max.total"), number_at(build, "primitives"),
-                        number_at(build, "sah")});
+        rows.push_back({.document = &document,
+                        .build = &build,
+                        .scene = scene_name(document.root),
+                        .name = {},
+                        .device = device_of(build),
+                        .shared = {},
+                        .total = number_at(build, "ms.total"),
+                        .low = number_at(build, "ms_spread.min.total"),
+                        .high = number_at(build, "ms_spread.max.total"),
+                        .primitives = number_at(build, "primitives"),
+                        .sah = number_at(build, "sah")});
     }
     return rows;
 }
@@ -85,14 +114,18 @@ std::vector<std::string> stages_of(const std::vector<BuildRow>& rows) {
     return stages;
 }
 
-std::string stage_plot(const std::string& scene, std::vector<BuildRow> rows, PageColours& colours) {
+std::string with_settings(const BuildRow& row) {
+    return row.shared.empty() ? row.scene : row.scene + ", " + row.shared;
+}
+
+std::string stage_plot(std::vector<BuildRow> rows, PageColours& colours) {
     std::erase_if(rows, [](const BuildRow& row) { return !at(*row.build, "ms").is_object(); });
     if (rows.empty()) return {};
     std::ranges::stable_sort(rows, {}, [](const BuildRow& row) {
         return row.total.value_or(std::numeric_limits<double>::infinity());
     });
     BarPlot plot{.title = "Build time by stage",
-                 .subtitle = scene,
+                 .subtitle = with_settings(rows.front()),
                  .note = "Medians of the stages; the thin line spans the totals of all repeats.",
                  .label = "time, ms",
                  .unit = "ms",
@@ -112,11 +145,10 @@ std::string stage_plot(const std::string& scene, std::vector<BuildRow> rows, Pag
 }
 
 /// A point for each build: how long it took, how good the tree is.
-std::string quality_plot(const std::string& scene, const std::vector<BuildRow>& rows,
-                         PageColours& colours) {
+std::string quality_plot(const std::vector<BuildRow>& rows, PageColours& colours) {
     LinePlot plot;
     plot.title = "Quality against build time";
-    plot.subtitle = scene;
+    plot.subtitle = with_settings(rows.front());
     plot.note = "Down is a cheaper tree, left is a faster build.";
     plot.x_label = "build time, ms (log scale)";
     plot.y_label = "SAH cost, nodes and triangles of an average ray";
@@ -161,8 +193,12 @@ std::string level_plot(const std::vector<BuildRow>& rows) {
 std::string time_table(const std::vector<BuildRow>& rows) {
     Table table{.title = "Build times",
                 .origin = Origin::measured,
-                .columns = {{"scene"},
-                            {"build"},
+                .columns = {{"builder"},
+                            {"scene"},
+                            {"tree"},
+                            {"bits", Format::integer},
+                            {"leaves of", Format::integer},
+                            {"device"},
                             {"total", Format::number, "ms, median"},
                             {"least", Format::number, "ms"},
                             {"most", Format::number, "ms"},
@@ -179,8 +215,10 @@ std::string time_table(const std::vector<BuildRow>& rows) {
         std::optional<double> ratio, rate;
         if (fastest > 0) ratio = *row.total / fastest;
         if (row.primitives && *row.total > 0) rate = *row.primitives / *row.total / 1e3;
-        table.rows.push_back({row.scene, row.name, row.total, row.low, row.high, ratio,
-                              spread_at(*row.build, "kept_ms").median, rate,
+        table.rows.push_back({text_at(*row.build, "builder"), row.scene,
+                              text_at(*row.build, "tree"), number_at(*row.build, "bits"),
+                              number_at(*row.build, "max_leaf"), row.device, row.total, row.low,
+                              row.high, ratio, spread_at(*row.build, "kept_ms").median, rate,
                               number_at(row.document->root, "load_ms"), row.document->name});
     }
     table.drop_empty_columns();
@@ -192,8 +230,12 @@ std::string tree_table(const std::vector<BuildRow>& rows) {
                 .note =
                     "SAH and EPO are costs that a model gives, counted over the real tree. A tree "
                     "hash stands for every node, box and leaf: equal hashes, equal trees.",
-                .columns = {{"scene"},
-                            {"build"},
+                .columns = {{"builder"},
+                            {"scene"},
+                            {"tree"},
+                            {"bits", Format::integer},
+                            {"leaves of", Format::integer},
+                            {"device"},
                             {"primitives", Format::integer},
                             {"left out", Format::integer},
                             {"nodes", Format::integer},
@@ -207,6 +249,7 @@ std::string tree_table(const std::vector<BuildRow>& rows) {
                             {"each primitive", Format::number, "bytes"},
                             {"peak of the build", Format::number, "MB"},
                             {"tree hash"}}};
+    std::set<std::string> seen;
     for (const BuildRow& row : rows) {
         const Json& b = *row.build;
         const auto mega = [&](const char* field) -> std::optional<double> {
@@ -218,11 +261,16 @@ std::string tree_table(const std::vector<BuildRow>& rows) {
             each = *bytes / *row.primitives;
         Cell hash(shortened(text_at(b, "tree_hash"), 11));
         hash.tip = text_at(b, "tree_hash");
-        table.rows.push_back({row.scene, row.name, row.primitives, number_at(b, "left_out"),
-                              number_at(b, "nodes"), number_at(b, "leaves"),
-                              number_at(b, "references"), number_at(b, "max_depth"),
-                              number_at(b, "depth_bound"), row.sah, number_at(b, "epo"),
-                              mega("bytes"), each, mega("peak_bytes"), hash});
+        // Every trace of a scene brings the same tree again.
+        const std::string identity = row.scene + text_at(b, "tree") + text_at(b, "builder") +
+                                     row.device + text_at(b, "tree_hash");
+        if (!seen.insert(identity).second) continue;
+        table.rows.push_back({text_at(b, "builder"), row.scene, text_at(b, "tree"),
+                              number_at(b, "bits"), number_at(b, "max_leaf"), row.device,
+                              row.primitives, number_at(b, "left_out"), number_at(b, "nodes"),
+                              number_at(b, "leaves"), number_at(b, "references"),
+                              number_at(b, "max_depth"), number_at(b, "depth_bound"), row.sah,
+                              number_at(b, "epo"), mega("bytes"), each, mega("peak_bytes"), hash});
     }
     table.drop_empty_columns();
     return table_html(table);
@@ -235,17 +283,17 @@ void say_times(const std::string& scene, const std::vector<BuildRow>& rows, Sect
     if (timed.empty()) return;
     const auto [fast, slow] =
         std::ranges::minmax(timed, {}, [](const BuildRow& r) { return *r.total; });
-    const auto ms = [](const BuildRow& row) { return strong(significant(*row.total) + " ms"); };
-    std::string said = fmt::format("Measured on {}: ", escaped(machine_text(*fast.document)));
+    const auto ms = [](const BuildRow& row) { return strong(significant(*row.total), "ms"); };
+    std::string said = "Measured on " + escaped(machine_text(*fast.document)) + ": ";
+    const std::string what = breakable(with_settings(fast));
     if (timed.size() == 1)
-        said += fmt::format("{} builds the tree of {} in {}", strong(fast.name), breakable(scene),
-                            ms(fast));
+        said += fmt::format("{} builds the tree of {} in {}", strong(fast.name), what, ms(fast));
     else
         said += fmt::format(
-            "of {} builds of {}, the fastest is {} with {}, the slowest {} with {}, "
-            "{} times as long",
-            timed.size(), breakable(scene), strong(fast.name), ms(fast), strong(slow.name),
-            ms(slow), significant(*slow.total / *fast.total));
+            "of {} builds of {}, the fastest is {} with {}, the slowest {} with {}, {} times as "
+            "long",
+            timed.size(), what, strong(fast.name), ms(fast), strong(slow.name), ms(slow),
+            significant(*slow.total / *fast.total));
     if (fast.primitives && *fast.total > 0)
         said += fmt::format(" ({} million primitives a second{})",
                             significant(*fast.primitives / *fast.total / 1e3),
@@ -289,10 +337,11 @@ Section build_section(const Documents& documents, PageColours& colours) {
     const std::vector<BuildRow> all = rows_of(documents);
     std::vector<BuildRow> built = all;
     std::erase_if(built, [](const BuildRow& row) { return row.document->command != "build"; });
+    name_rows(built);
     std::string plots;
     for (const std::string& scene : scenes_of(built)) {
         const std::vector<BuildRow> rows = rows_of_scene(built, scene);
-        plots += stage_plot(scene, rows, colours) + quality_plot(scene, rows, colours);
+        plots += stage_plot(rows, colours) + quality_plot(rows, colours);
         say_times(scene, rows, section);
         say_quality(scene, rows, section);
     }

@@ -22,6 +22,9 @@ std::string swatch(const LegendItem& item) {
         case LegendItem::Kind::box:
             svg.rect(6, 0, 14, 12, "fill " + colour);
             break;
+        case LegendItem::Kind::outline:
+            svg.rect(6.5, 0.5, 13, 11, "outline " + colour);
+            break;
         case LegendItem::Kind::limit:
             svg.rect(4.5, 1, 17, 10, "limit");
             break;
@@ -61,19 +64,21 @@ std::string origin_suffix(Origin origin) {
     return "";
 }
 
+std::string legend_html(const std::vector<LegendItem>& legend) {
+    if (legend.empty()) return {};
+    std::string out = "<ul class=\"legend\">";
+    for (const LegendItem& item : legend)
+        out += "<li>" + swatch(item) + "<span>" + breakable(item.name) + "</span></li>";
+    return out + "</ul>\n";
+}
+
 std::string figure_html(const Figure& figure) {
     std::string out = "<figure class=\"plot\"><figcaption><span class=\"title\">" +
                       escaped(figure.title) + "</span> " + badge(figure.origin);
     if (!figure.subtitle.empty())
         out += "<span class=\"subtitle\">" + breakable(figure.subtitle) + "</span>";
     out += "</figcaption>";
-    if (!figure.legend.empty()) {
-        out += "<ul class=\"legend\">";
-        for (const LegendItem& item : figure.legend)
-            out += "<li>" + swatch(item) + "<span>" + breakable(item.name) + "</span></li>";
-        out += "</ul>";
-    }
-    out += figure.svg;
+    out += legend_html(figure.legend) + figure.svg;
     if (!figure.note.empty()) out += "<p class=\"note\">" + escaped(figure.note) + "</p>";
     return out + "</figure>\n";
 }

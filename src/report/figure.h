@@ -16,7 +16,7 @@ enum class Origin { none, measured, simulated, published };
 [[nodiscard]] std::string origin_suffix(Origin origin);
 
 struct LegendItem {
-    enum class Kind { line, markers, box, limit, mark };
+    enum class Kind { line, markers, box, outline, limit, mark };
     std::string name;
     int colour = 0;
     Kind kind = Kind::box;
@@ -31,6 +31,9 @@ struct Figure {
     std::string svg = {};
     std::string note = {};  // below the drawing
 };
+
+/// One legend for several figures, or for one.
+[[nodiscard]] std::string legend_html(const std::vector<LegendItem>& legend);
 
 /// `<figure>`; all texts are plain. The legend is text beside the drawing, so it cannot overlap it.
 [[nodiscard]] std::string figure_html(const Figure& figure);

@@ -33,7 +33,7 @@ std::string size_plots(const Study& study, PageColours& colours) {
     for (const StudyRun& run : study.runs)
         if (run.size_series && run.measured)
             panels[{run.bits.value_or(0), run.threads.value_or(0)}].push_back(&run);
-    std::string plots;
+    std::string plots, legend;
     for (const auto& [key, runs] : panels) {
         LinePlot plot;
         plot.title = "Hierarchy and boxes over the size of the scene";
@@ -62,9 +62,18 @@ std::string size_plots(const Study& study, PageColours& colours) {
             }
             plot.series.push_back(series);
         }
+        if (legend.empty()) legend = legend_html(legend_of(plot));
+        plot.with_legend = false;
         plots += line_plot(plot);
     }
-    return plots;
+    return plots.empty() ? "" : legend + "<div class=\"plots\">" + plots + "</div>\n";
+}
+
+const StudyScene* largest_of(const std::vector<StudyScene>& scenes) {
+    const StudyScene* largest = nullptr;
+    for (const StudyScene& scene : scenes)
+        if (!largest || scene.keys.value_or(0) > largest->keys.value_or(0)) largest = &scene;
+    return largest;
 }
 
 enum class Scaling { time, speed_up, ratio };
@@ -73,16 +82,16 @@ LinePlot scaling_frame(const Study& study, const std::string& machine, const std
                        Scaling kind) {
     LinePlot plot;
     plot.subtitle = subtitle;
-    plot.x_label = "size of the machine, times " + machine + " (log scale)";
+    plot.x_label = "N, size of the machine (log scale)";
     plot.x_unit = "x " + machine;
     plot.x_scale = LinePlot::Scale::log_at_points;
     plot.y_scale = LinePlot::Scale::log;
     plot.origin = Origin::simulated;
-    plot.title = "Time on larger machines";
+    plot.title = "Time on N times " + machine;
     plot.y_label = "time, ms (log scale)";
     plot.y_unit = "ms";
     if (kind == Scaling::speed_up) {
-        plot.title = "Speed-up on larger machines";
+        plot.title = "Speed-up on N times " + machine;
         plot.y_label = fmt::format("speed-up over N = {:g} (log scale)",
                                    study.factors.empty() ? 1.0 : study.factors.front());
         plot.y_unit = "times";
@@ -90,7 +99,7 @@ LinePlot scaling_frame(const Study& study, const std::string& machine, const std
         plot.diagonal = true;
     }
     if (kind == Scaling::ratio) {
-        plot.title = "Builder against builder";
+        plot.title = "Builder against builder on N times " + machine;
         plot.y_label = "time over the best's at this N (log scale)";
         plot.y_unit = "times the best";
         plot.reference = 1;
@@ -98,34 +107,63 @@ LinePlot scaling_frame(const Study& study, const std::string& machine, const std
     return plot;
 }
 
-/// Time, speed-up, and time over the best builder's, over the size of one simulated machine.
-std::string scaling_plots(const Study& study, const std::vector<const StudyRun*>& runs,
-                          const std::string& machine, const std::string& subtitle,
-                          PageColours& colours) {
+/// Milliseconds of the best builder for each size of the machine.
+std::vector<double> best_times(const Study& study, const StudyScene& scene,
+                               const std::string& machine) {
     std::vector<double> best(study.factors.size(), std::numeric_limits<double>::infinity());
-    for (const StudyRun* run : runs)
+    for (const StudyRun* run : scene.one_each)
         if (const auto found = run->simulated.find(machine); found != run->simulated.end())
             for (std::size_t i = 0; i < best.size() && i < found->second.size(); ++i)
                 best[i] = std::fmin(best[i], found->second[i]);
-    std::string plots;
-    for (const Scaling kind : {Scaling::time, Scaling::speed_up, Scaling::ratio}) {
-        LinePlot plot = scaling_frame(study, machine, subtitle, kind);
-        for (const StudyRun* run : runs) {
-            const auto found = run->simulated.find(machine);
-            if (found == run->simulated.end() || found->second.empty()) continue;
-            const std::vector<double>& ms = found->second;
-            Series series = series_of(*run, colours);
-            for (std::size_t i = 0; i < ms.size() && i < study.factors.size(); ++i) {
-                series.x.push_back(study.factors[i]);
-                series.y.push_back(kind == Scaling::time       ? ms[i]
-                                   : kind == Scaling::speed_up ? ms.front() / ms[i]
-                                                               : ms[i] / best[i]);
-            }
-            plot.series.push_back(series);
+    return best;
+}
+
+LinePlot scaling_plot(const Study& study, const StudyScene& scene, const std::string& machine,
+                      Scaling kind, PageColours& colours) {
+    LinePlot plot = scaling_frame(study, machine, scene.title(), kind);
+    const std::vector<double> best = best_times(study, scene, machine);
+    for (const StudyRun* run : scene.one_each) {
+        const auto found = run->simulated.find(machine);
+        if (found == run->simulated.end() || found->second.empty()) continue;
+        const std::vector<double>& ms = found->second;
+        Series series = series_of(*run, colours);
+        for (std::size_t i = 0; i < ms.size() && i < study.factors.size(); ++i) {
+            series.x.push_back(study.factors[i]);
+            series.y.push_back(kind == Scaling::time       ? ms[i]
+                               : kind == Scaling::speed_up ? ms.front() / ms[i]
+                                                           : ms[i] / best[i]);
         }
-        if (!plot.series.empty()) plots += line_plot(plot);
+        plot.series.push_back(series);
     }
-    return plots;
+    return plot;
+}
+
+/// Time, speed-up, and time over the best builder's: a row each, a column for each machine.
+std::string scaling_plots(const Study& study, const StudyScene& scene, PageColours& colours) {
+    std::string plots, legend;
+    for (const Scaling kind : {Scaling::time, Scaling::speed_up, Scaling::ratio})
+        for (const std::string& machine : scene.machines()) {
+            LinePlot plot = scaling_plot(study, scene, machine, kind, colours);
+            if (plot.series.empty()) continue;
+            if (legend.empty()) legend = legend_html(legend_of(plot));
+            plot.with_legend = false;
+            plots += line_plot(plot);
+        }
+    return plots.empty() ? "" : legend + "<div class=\"plots\">" + plots + "</div>\n";
+}
+
+/// Scenes in their order; all but the largest are folded away.
+std::string scene_parts(const Study& study, PageColours& colours) {
+    const std::vector<StudyScene> scenes = study.scenes();
+    const StudyScene* largest = largest_of(scenes);
+    std::string parts;
+    for (const StudyScene& scene : scenes)
+        if (const std::string plots = scaling_plots(study, scene, colours); !plots.empty())
+            parts += fmt::format(
+                "<details{}><summary>{} on larger machines {}</summary>\n{}</details>\n",
+                &scene == largest ? " open" : "", breakable(scene.title()),
+                badge(Origin::simulated), plots);
+    return parts;
 }
 
 std::string level_plot(const Study& study) {
@@ -203,8 +241,8 @@ void say_measured(const Study& study, const StudyScene& scene, Section& section)
         "Measured on {}: hierarchy and boxes of {} take {} with {}, the fastest of {} ways, and {} "
         "with {}, the slowest.",
         escaped(machine_text(*study.document)), breakable(scene.title()),
-        strong(significant(*fast->measured) + " ms"), strong(with_threads(*fast)), timed.size(),
-        strong(significant(*slow->measured) + " ms"), escaped(with_threads(*slow))));
+        strong(significant(*fast->measured), "ms"), strong(with_threads(*fast)), timed.size(),
+        strong(significant(*slow->measured), "ms"), escaped(with_threads(*slow))));
 }
 
 void say_simulated(const Study& study, const StudyScene& scene, Section& section) {
@@ -218,12 +256,13 @@ void say_simulated(const Study& study, const StudyScene& scene, Section& section
         }
         if (!best || best == least) continue;
         section.summary.push_back(fmt::format(
-            "{} On a machine {} times the size of {}, {} of {} runs {} times as fast as on one of "
-            "size {}; {} only {} times.",
-            badge(Origin::simulated), significant(study.factors.back()), escaped(machine),
+            "{} On a machine {} times the size of {}, {} gains most on {}, {} over {} times that "
+            "machine; {} gains least, {}.",
+            badge(Origin::simulated), short_number(study.factors.back()), escaped(machine),
             strong(best->name()), breakable(scene.title()),
-            strong(significant(*best->speed_up(machine))), significant(study.factors.front()),
-            strong(least->name()), strong(significant(*least->speed_up(machine)))));
+            strong(significant(*best->speed_up(machine)), "times"),
+            short_number(study.factors.front()), strong(least->name()),
+            strong(significant(*least->speed_up(machine)), "times")));
     }
 }
 
@@ -250,27 +289,22 @@ void say_model_error(const Study& study, Section& section) {
 
 Section hierarchy_section(const Documents& documents, PageColours& colours) {
     Section section{.id = "construction", .title = "Construction study"};
+    const auto of_study = [](const Document& d) { return d.command == "bench hierarchy"; };
+    const bool several = std::ranges::count_if(documents, of_study) > 1;
     for (const Document& document : documents) {
-        if (document.command != "bench hierarchy") continue;
+        if (!of_study(document)) continue;
         const Study study(document);
-        if (documents.size() > 1) section.html += "<h3>" + breakable(document.name) + "</h3>\n";
-        std::string plots = size_plots(study, colours) + level_plot(study);
-        if (!plots.empty()) section.html += "<div class=\"plots\">" + plots + "</div>\n";
-        for (const StudyScene& scene : study.scenes()) {
-            plots.clear();
-            for (const std::string& machine : scene.machines())
-                plots += scaling_plots(study, scene.one_each, machine, scene.title(), colours);
-            if (!plots.empty())
-                section.html += "<h3>" + breakable(scene.title()) + " on larger machines " +
-                                badge(Origin::simulated) + "</h3><div class=\"plots\">" + plots +
-                                "</div>\n";
-            say_measured(study, scene, section);
-            say_simulated(study, scene, section);
+        if (several) section.html += "<h3>" + breakable(document.name) + "</h3>\n";
+        section.html += size_plots(study, colours) + scene_parts(study, colours);
+        const std::vector<StudyScene> scenes = study.scenes();
+        if (const StudyScene* scene = largest_of(scenes)) {
+            say_measured(study, *scene, section);
+            say_simulated(study, *scene, section);
         }
-        plots = build_plots(study, colours);
+        const std::string plots = build_plots(study, colours) + level_plot(study);
         if (!plots.empty())
-            section.html += "<h3>Whole builds " + badge(Origin::measured) +
-                            "</h3><div class=\"plots\">" + plots + "</div>\n";
+            section.html +=
+                "<h3>Whole builds, and their levels</h3><div class=\"plots\">" + plots + "</div>\n";
         section.html += study_tables(study);
         say_model_error(study, section);
     }

@@ -225,11 +225,17 @@ std::vector<StudyScene> Study::scenes() const {
 }
 
 std::string study_tables(const Study& study) {
-    std::string launches = launch_table(study);
-    if (!launches.empty())
-        launches =
-            "<details><summary>Launches, added up by name</summary>" + launches + "</details>\n";
-    return run_table(study) + build_table(study) + launches + machine_table(study);
+    const auto folded = [](const char* title, const std::string& table) {
+        return table.empty()
+                   ? ""
+                   : fmt::format("<details><summary>{}</summary>{}</details>\n", title, table);
+    };
+    constexpr std::size_t long_table = 24;
+    const std::string runs = run_table(study);
+    return (study.runs.size() > long_table ? folded("Every run", runs) : runs) +
+           folded("Launches, added up by name", launch_table(study)) +
+           folded("Whole builds, every stage", build_table(study)) +
+           folded("Machines of the model and where their numbers are from", machine_table(study));
 }
 
 }  // namespace raydix::report

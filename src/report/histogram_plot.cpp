@@ -130,13 +130,12 @@ double histogram_median(const Histogram& h) {
 }
 
 std::string histogram_plot(const HistogramPlot& plot) {
-    Figure figure{.title = plot.title,
-                  .subtitle = plot.subtitle,
-                  .origin = plot.origin,
-                  .legend = {{"half lie below", 0, LegendItem::Kind::mark}},
-                  .svg = Rows(plot).draw(),
-                  .note = plot.note};
-    return figure_html(figure);
+    return figure_html({.title = plot.title,
+                        .subtitle = plot.subtitle,
+                        .origin = plot.origin,
+                        .legend = {{"half lie below", 0, LegendItem::Kind::mark}},
+                        .svg = Rows(plot).draw(),
+                        .note = plot.note});
 }
 
 }  // namespace raydix::report

@@ -12,6 +12,7 @@ namespace raydix::report {
 namespace {
 
 constexpr double width = 440, height = 290;
+constexpr std::size_t most_markers = 16;
 
 Axis axis_of(LinePlot::Scale scale, const std::vector<double>& values) {
     switch (scale) {
@@ -107,6 +108,7 @@ private:
     }
 
     void markers(const Series& s) {
+        const std::size_t every = points_of(s) / most_markers + 1;  // more would hide the line
         for (std::size_t i = 0; i < points_of(s); ++i) {
             if (!shows(s, i)) continue;
             const auto with_unit = [](double v, const std::string& unit) {
@@ -115,7 +117,8 @@ private:
             svg_.open(s.name + "\n" + with_unit(s.x[i], plot_.x_unit) + ": " +
                       with_unit(s.y[i], plot_.y_unit) + origin_suffix(plot_.origin));
             svg_.rect(px(s.x[i]) - 8, py(s.y[i]) - 8, 16, 16, "hit");
-            svg_.marker(s.shape, px(s.x[i]), py(s.y[i]), colour_class(s.colour));
+            if (i % every == 0)
+                svg_.marker(s.shape, px(s.x[i]), py(s.y[i]), colour_class(s.colour));
             svg_.close();
         }
     }
@@ -130,17 +133,22 @@ private:
 
 }  // namespace
 
-std::string line_plot(const LinePlot& plot) {
-    Figure figure{.title = plot.title,
-                  .subtitle = plot.subtitle,
-                  .origin = plot.origin,
-                  .svg = Drawing(plot).draw(),
-                  .note = plot.note};
+std::vector<LegendItem> legend_of(const LinePlot& plot) {
+    std::vector<LegendItem> legend;
     for (const Series& s : plot.series)
-        figure.legend.push_back(
-            {s.name, s.colour, s.markers_only ? LegendItem::Kind::markers : LegendItem::Kind::line,
-             s.dash, s.shape});
-    return figure_html(figure);
+        legend.push_back({s.name, s.colour,
+                          s.markers_only ? LegendItem::Kind::markers : LegendItem::Kind::line,
+                          s.dash, s.shape});
+    return legend;
+}
+
+std::string line_plot(const LinePlot& plot) {
+    return figure_html({.title = plot.title,
+                        .subtitle = plot.subtitle,
+                        .origin = plot.origin,
+                        .legend = plot.with_legend ? legend_of(plot) : std::vector<LegendItem>(),
+                        .svg = Drawing(plot).draw(),
+                        .note = plot.note});
 }
 
 }  // namespace raydix::report

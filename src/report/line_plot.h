@@ -24,12 +24,14 @@ struct LinePlot {
     Scale x_scale = Scale::linear, y_scale = Scale::linear;
     Origin origin = Origin::none;
     std::vector<Series> series = {};
+    bool with_legend = true;  // false: it stands elsewhere, see legend_of
     /// A thin line from corner to corner of equal x and y: the ideal speed-up. Log axes only.
     bool diagonal = false;
     /// A thin horizontal line here, if finite.
     double reference = std::numeric_limits<double>::quiet_NaN();
 };
 
+[[nodiscard]] std::vector<LegendItem> legend_of(const LinePlot& plot);
 [[nodiscard]] std::string line_plot(const LinePlot& plot);
 
 }  // namespace raydix::report

@@ -78,11 +78,8 @@ std::string scene_name(const Json& holder) {
 
 std::string strong(const std::string& text) { return "<strong>" + breakable(text) + "</strong>"; }
 
-std::string listed(const std::vector<std::string>& names) {
-    std::string text;
-    for (std::size_t i = 0; i < names.size(); ++i)
-        text += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + names[i];
-    return text;
+std::string strong(const std::string& number, const std::string& unit) {
+    return "<strong>" + escaped(number) + "&nbsp;" + escaped(unit) + "</strong>";
 }
 
 }  // namespace raydix::report

@@ -35,12 +35,14 @@ std::string summary_html(const Page& page) {
     std::string tiles, said;
     for (const Section& section : page.sections) {
         for (const Tile& tile : section.tiles) tiles += tile_html(tile);
+        if (section.summary.empty()) continue;
+        said += "<h3>" + escaped(section.title) + "</h3>\n<ul class=\"said\">\n";
         for (const std::string& sentence : section.summary) said += "<li>" + sentence + "</li>\n";
+        said += "</ul>\n";
     }
     std::string out = "<section id=\"summary\"><h2>Summary</h2>\n";
     if (!tiles.empty()) out += "<ul class=\"tiles\">" + tiles + "</ul>\n";
-    if (!said.empty()) out += "<ul class=\"said\">\n" + said + "</ul>\n";
-    return out + "</section>\n";
+    return out + said + "</section>\n";
 }
 
 }  // namespace

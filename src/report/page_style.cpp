@@ -26,6 +26,7 @@ header,main,footer{max-width:72rem;margin:0 auto;padding:0 1.25rem}
 header{padding-top:2.2rem}
 h1{font-size:1.9rem;line-height:1.2;margin:0 0 .35rem;letter-spacing:-.015em;overflow-wrap:anywhere}
 h2{font-size:1.35rem;line-height:1.3;margin:0 0 .9rem;letter-spacing:-.01em}
+h4{font-size:.98rem;margin:1.6rem 0 .3rem}
 h3{font-size:1.05rem;line-height:1.35;margin:2rem 0 .6rem;overflow-wrap:anywhere}
 p{margin:.5rem 0;max-width:46rem}
 .lead,.note,.subtitle,.unit,small,footer{color:var(--soft)}
@@ -41,6 +42,7 @@ section:last-child{border-bottom:0}
 .tiles b{display:block;font-size:1.55rem;line-height:1.25;font-weight:650;letter-spacing:-.01em}
 .tiles b small{font-size:.9rem;font-weight:400}
 .tiles span.what{display:block;font-size:.86rem;line-height:1.4;color:var(--soft);margin-bottom:.35rem}
+#summary h3{margin:1.3rem 0 .2rem;font-size:.95rem;color:var(--soft)}
 .said{padding-left:1.15rem;margin:.4rem 0;max-width:52rem}
 .said li{margin:.45rem 0;overflow-wrap:anywhere}
 .badge{display:inline-block;font-size:.7rem;line-height:1.5;font-weight:600;padding:0 .45em;border-radius:.6em;
@@ -80,13 +82,15 @@ g:hover>.fill,g:hover>.outline{filter:brightness(1.15)}
 table{border-collapse:collapse;width:100%;font-size:.88rem;line-height:1.4}
 caption{caption-side:top;text-align:left;font-weight:600;font-size:.95rem;padding:.6rem .75rem .5rem}
 th,td{padding:.36rem .75rem;border-top:1px solid var(--line);vertical-align:baseline;background:var(--bg)}
-thead th{background:var(--panel);font-weight:600;vertical-align:bottom;white-space:nowrap}
+thead th{background:var(--panel);font-weight:600;vertical-align:bottom;white-space:normal;min-width:4.2rem}
+thead .name{text-wrap:balance}
 thead .unit{display:block;font-weight:400;font-size:.8rem}
 thead .badge{display:block;width:max-content;margin-top:.15rem}
 .num{text-align:right;white-space:nowrap}
 thead .num .badge{margin-left:auto}
-.txt{text-align:left}
-tbody th{font-weight:500;min-width:9rem}
+.txt{text-align:left;white-space:nowrap}
+.txt.long{white-space:normal;min-width:14rem}
+tbody th{font-weight:500}
 tbody tr:hover>*{background-image:linear-gradient(rgb(128 128 128/.09),rgb(128 128 128/.09))}
 th button{all:unset;cursor:pointer;display:block;width:100%;box-sizing:border-box}
 th button:focus-visible,.table:focus-visible{outline:2px solid var(--link);outline-offset:2px}
@@ -109,7 +113,7 @@ summary{cursor:pointer;font-weight:600}
 footer{padding-top:1.2rem;padding-bottom:2.5rem;font-size:.85rem}
 @media (max-width:40rem){header,main,footer{padding-left:1rem;padding-right:1rem}
 nav ul{padding-left:1rem;padding-right:1rem}h1{font-size:1.5rem}
-th,td{padding:.34rem .55rem}tbody th{position:sticky;left:0;max-width:46vw;min-width:7.5rem}
+th,td{padding:.34rem .55rem}tbody th{position:sticky;left:0;max-width:42vw;white-space:normal}tbody th.txt.long{min-width:8rem}
 .tiles{grid-template-columns:repeat(auto-fit,minmax(9.2rem,1fr));gap:.6rem}.tiles b{font-size:1.3rem}}
 @media print{body{font-size:10pt}nav{display:none}header,main,footer{max-width:none;padding-left:0;padding-right:0}
 section{padding:1rem 0 .6rem;break-inside:auto}h2,h3,caption,figcaption{break-after:avoid}

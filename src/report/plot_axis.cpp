@@ -10,6 +10,9 @@ namespace raydix::report {
 namespace {
 
 constexpr int most_labels = 7;
+// Up to this ratio of ends a log axis has evenly spaced values as ticks: it holds too few round
+// ones.
+constexpr double widest_even = 4;
 
 std::vector<double> sorted_values(std::span<const double> values, bool positive) {
     std::vector<double> kept;
@@ -37,6 +40,15 @@ std::vector<double> decade_ticks(double lo, double hi, std::span<const double> m
             const double v = m * std::pow(10.0, e);
             if (v >= lo * 0.9999 && v <= hi * 1.0001) ticks.push_back(v);
         }
+    return ticks;
+}
+
+/// Multiples of a round step within [lo, hi].
+std::vector<double> even_ticks(double lo, double hi) {
+    std::vector<double> ticks;
+    const double step = round_step(hi - lo);
+    for (double k = std::ceil(lo / step - 1e-9); k * step <= hi * (1 + 1e-9); ++k)
+        ticks.push_back(k * step);
     return ticks;
 }
 
@@ -82,20 +94,17 @@ Axis log_axis(std::span<const double> values) {
     static constexpr std::array<double, 9> all{1, 2, 3, 4, 5, 6, 7, 8, 9};
     static constexpr std::array<double, 3> few{1, 2, 5};
     static constexpr std::array<double, 1> one{1};
-    std::vector<double> labelled;
+    std::vector<double> labelled = even_ticks(axis.lo, axis.hi);
+    const bool narrow = axis.hi / axis.lo < widest_even;
     for (const std::span<const double> set :
          {std::span<const double>(all), std::span<const double>(few),
           std::span<const double>(one)}) {
+        if (narrow) break;
         labelled = decade_ticks(axis.lo, axis.hi, set);
         if (labelled.size() <= most_labels) break;
     }
     // Twelve decades have too many powers of ten, too.
     const std::size_t stride = labelled.size() / (most_labels + 1) + 1;
-    if (labelled.size() < 2) {  // all within a digit: the range itself
-        labelled = {axis.lo, axis.hi};
-        if (!kept.empty()) labelled = {kept.front(), kept.back()};
-        if (labelled[0] == labelled[1]) labelled.pop_back();
-    }
     for (std::size_t i = 0; i < labelled.size(); i += stride)
         axis.ticks.push_back({labelled[i], short_number(labelled[i])});
     return axis;

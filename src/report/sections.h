@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "report/fields.h"
+#include "report/names.h"
 #include "report/page.h"
 
 namespace raydix::report {
@@ -52,7 +53,7 @@ struct PageColours {
 
 /// `<strong>` around escaped text, for sentences.
 [[nodiscard]] std::string strong(const std::string& text);
-/// "a", "a and b", "a, b and c".
-[[nodiscard]] std::string listed(const std::vector<std::string>& names);
+/// The same with a number: "3.02 ms", never broken between the two.
+[[nodiscard]] std::string strong(const std::string& number, const std::string& unit);
 
 }  // namespace raydix::report

@@ -13,6 +13,9 @@ namespace {
 
 using Format = Column::Format;
 
+// Longer texts may be broken into lines.
+constexpr std::size_t short_text = 30;
+
 bool has_number(const Cell& cell) { return cell.value && std::isfinite(*cell.value); }
 
 /// Decides the digits of one column.
@@ -56,8 +59,9 @@ std::string cell_html(const Column& column, const Cell& cell, int decimals, bool
         inner +=
             cell.text.empty() ? "<span class=\"none\">\xE2\x80\x93</span>" : breakable(cell.text);
     }
-    std::string attributes = fmt::format("class=\"{}{}{}\"", numeric ? "num" : "txt",
-                                         mark_class(cell.mark), cell.shade ? " shade" : "");
+    const char* kind = numeric ? "num" : cell.text.size() > short_text ? "txt long" : "txt";
+    std::string attributes =
+        fmt::format("class=\"{}{}{}\"", kind, mark_class(cell.mark), cell.shade ? " shade" : "");
     if (has_number(cell)) attributes += fmt::format(" data-v=\"{:.17g}\"", *cell.value);
     if (!cell.tip.empty()) attributes += " title=\"" + escaped(cell.tip) + "\"";
     if (cell.shade && std::isfinite(*cell.shade))

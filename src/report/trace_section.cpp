@@ -24,22 +24,31 @@ struct TraceRow {
 std::vector<TraceRow> rows_of(const Documents& documents) {
     std::vector<TraceRow> rows;
     for (const Document& document : documents)
-        for (const Json* trace : objects_at(document.root, "trace")) {
-            const std::string rays = text_at(*trace, "rays"), mode = text_at(*trace, "mode");
-            std::string name = rays + (mode.empty() ? "" : ", " + mode + " hit") + ", " +
-                               text_at(*trace, "kernel");
-            if (const std::string builder = text_at(document.root, "build.builder");
-                !builder.empty())
-                name += ", tree of " + builder;
-            rows.push_back({&document, trace, scene_name(document.root), name, rays,
-                            spread_at(*trace, "mrays_per_s")});
-        }
+        for (const Json* trace : objects_at(document.root, "trace"))
+            rows.push_back({&document, trace, scene_name(document.root), "",
+                            text_at(*trace, "rays"), spread_at(*trace, "mrays_per_s")});
     return rows;
 }
 
-std::string plots_of(const std::string& scene, const std::vector<TraceRow>& rows) {
+/// Names the rows of one scene; returns what they share.
+std::string name_rows(std::vector<TraceRow>& rows) {
+    std::vector<std::vector<std::string>> parts;
+    for (const TraceRow& row : rows) {
+        const std::string mode = text_at(*row.trace, "mode"),
+                          kernel = text_at(*row.trace, "kernel"),
+                          builder = text_at(row.document->root, "build.builder");
+        parts.push_back(
+            {row.rays, mode.empty() ? "" : mode + " hit", kernel.empty() ? "" : "kernel " + kernel,
+             builder.empty() ? "" : "tree of " + builder, text_at(*row.trace, "device")});
+    }
+    const Names names = distinct_names(parts, 0);
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i].name = names.each[i];
+    return names.common;
+}
+
+std::string plots_of(const std::string& subtitle, const std::vector<TraceRow>& rows) {
     BarPlot rates{.title = "Rays traced",
-                  .subtitle = scene,
+                  .subtitle = subtitle,
                   .note = "The bar is the median, the thin line spans all repeats.",
                   .label = "rate, Mrays/s",
                   .unit = "Mrays/s",
@@ -108,11 +117,10 @@ void say(const std::string& scene, const std::vector<TraceRow>& rows, Section& s
     std::string said =
         fmt::format("Measured on {}: through the tree of {} go {} for {}",
                     escaped(machine_text(*fast.document)), breakable(scene),
-                    strong(significant(*fast.rate.median) + " Mrays/s"), escaped(fast.name));
+                    strong(significant(*fast.rate.median), "Mrays/s"), escaped(fast.name));
     if (timed.size() > 1)
-        said +=
-            fmt::format(", the best of {}; the least is {} for {}", timed.size(),
-                        strong(significant(*slow.rate.median) + " Mrays/s"), escaped(slow.name));
+        said += fmt::format(", the best of {}; the least is {} for {}", timed.size(),
+                            strong(significant(*slow.rate.median), "Mrays/s"), escaped(slow.name));
     section.summary.push_back(said + ".");
     section.tiles.push_back({significant(*fast.rate.median), "Mrays/s",
                              "best rate through " + scene + ": " + fast.rays,
@@ -131,7 +139,8 @@ Section trace_section(const Documents& documents) {
     for (const std::string& scene : scenes) {
         std::vector<TraceRow> some = rows;
         std::erase_if(some, [&](const TraceRow& row) { return row.scene != scene; });
-        plots += plots_of(scene, some);
+        const std::string shared = name_rows(some);
+        plots += plots_of(shared.empty() ? scene : scene + ", " + shared, some);
         say(scene, some, section);
     }
     if (!plots.empty()) section.html = "<div class=\"plots\">" + plots + "</div>\n";
