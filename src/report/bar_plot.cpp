@@ -124,7 +124,7 @@ private:
         }
         if (drawn(bar.mark)) {
             svg_.open(bar.label + "\n" + plot_.mark_name + ": " + significant(bar.mark) + " " +
-                      plot_.unit);
+                      plot_.unit + origin_suffix(plot_.origin));
             svg_.rect(x(bar.mark) - 5, from - 4, 10, bar_height + 8, "hit");
             svg_.line(x(bar.mark), from - 4, x(bar.mark), from + bar_height + 4, "mark-line");
             svg_.close();

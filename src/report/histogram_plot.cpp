@@ -133,7 +133,6 @@ std::string histogram_plot(const HistogramPlot& plot) {
     return figure_html({.title = plot.title,
                         .subtitle = plot.subtitle,
                         .origin = plot.origin,
-                        .legend = {{"half lie below", 0, LegendItem::Kind::mark}},
                         .svg = Rows(plot).draw(),
                         .note = plot.note});
 }

@@ -82,8 +82,8 @@ g:hover>.fill,g:hover>.outline{filter:brightness(1.15)}
 table{border-collapse:collapse;width:100%;font-size:.88rem;line-height:1.4}
 caption{caption-side:top;text-align:left;font-weight:600;font-size:.95rem;padding:.6rem .75rem .5rem}
 th,td{padding:.36rem .75rem;border-top:1px solid var(--line);vertical-align:baseline;background:var(--bg)}
-thead th{background:var(--panel);font-weight:600;vertical-align:bottom;white-space:normal;min-width:4.2rem}
-thead .name{text-wrap:balance}
+thead th{background:var(--panel);font-weight:600;vertical-align:bottom;white-space:nowrap}
+thead th.long{white-space:normal;min-width:7rem}
 thead .unit{display:block;font-weight:400;font-size:.8rem}
 thead .badge{display:block;width:max-content;margin-top:.15rem}
 .num{text-align:right;white-space:nowrap}

@@ -16,6 +16,8 @@ namespace raydix::report {
 namespace {
 
 using Format = Column::Format;
+const char* const bound_name = "bound: the issue limit alone, infinitely fast memory";
+const char* const scheduled_name = "with work distribution and the tail of a launch";
 using Rows = std::vector<const SimulatedRow*>;
 
 std::vector<std::string> operations_of(const Rows& rows) {
@@ -34,16 +36,17 @@ const SimulatedOperation* find(const SimulatedRow& row, const std::string& opera
 std::string bound_plot(const std::string& rays, Rows rows) {
     std::ranges::stable_sort(rows, std::greater<>(),
                              [](const SimulatedRow* row) { return row->bound.value_or(-1); });
-    BarPlot plot{.title = "Bound, " + rays + " rays",
+    BarPlot plot{.title = rays + " rays",
                  .label = "upper bound, Mrays/s",
                  .unit = "Mrays/s",
                  .origin = Origin::simulated,
-                 .parts = {{"bound: issue limit alone, infinitely fast memory", 0}}};
+                 .parts = {{bound_name, 0}}};
+    plot.with_legend = false;
     for (const SimulatedRow* row : rows) {
         Bar bar{.label = row->kernel, .parts = {or_nan(row->bound)}};
         if (row->scheduled) {
             bar.mark = *row->scheduled;
-            plot.mark_name = "with work distribution and the tail of a launch (simulated)";
+            plot.mark_name = scheduled_name;
         }
         plot.bars.push_back(bar);
     }
@@ -51,13 +54,11 @@ std::string bound_plot(const std::string& rays, Rows rows) {
 }
 
 std::string instruction_plot(const std::string& rays, const Rows& rows, PageColours& colours) {
-    BarPlot plot{.title = "Instructions by operation, " + rays + " rays",
-                 .note =
-                     "Issues of an operation times its cost: what a warp pays, however many of "
-                     "its lanes work.",
+    BarPlot plot{.title = rays + " rays",
                  .label = "warp instructions per ray",
                  .unit = "per ray",
                  .origin = Origin::simulated};
+    plot.with_legend = false;
     const std::vector<std::string> operations = operations_of(rows);
     if (operations.empty()) return {};
     for (const std::string& name : operations)
@@ -74,11 +75,8 @@ std::string instruction_plot(const std::string& rays, const Rows& rows, PageColo
     return bar_plot(plot);
 }
 
-std::string time_plot(const std::string& rays, const Rows& rows, PageColours& colours) {
-    HistogramPlot plot{.title = "Warp times, " + rays + " rays",
-                       .note =
-                           "Each row is as high as its fullest bin. A long tail means warps that "
-                           "keep a launch waiting.",
+std::string time_plot(const std::string& rays, const Rows& rows) {
+    HistogramPlot plot{.title = rays + " rays",
                        .label = "time of a warp, issues",
                        .items = "warps",
                        .origin = Origin::simulated};
@@ -86,7 +84,6 @@ std::string time_plot(const std::string& rays, const Rows& rows, PageColours& co
         if (row->times.counts.empty()) continue;
         if (!row->unit.empty()) plot.label = "time of a warp, " + row->unit;
         plot.rows.push_back(row->times);
-        plot.rows.back().colour = colours.kernels.of(row->kernel);
     }
     return plot.rows.empty() ? "" : histogram_plot(plot);
 }
@@ -141,9 +138,9 @@ std::string row_table(const SimulatedGroup& group) {
                             {"SIMD efficiency", Format::percent},
                             {"issues", Format::number, "per ray"},
                             {"instructions", Format::number, "per ray"},
-                            {"half of the warps below", Format::number, "issues"},
-                            {"idle at the end", Format::percent, "of the launch"},
-                            {"rays simulated", Format::integer},
+                            {"median warp", Format::number, "issues"},
+                            {"idle", Format::percent, "of the launch"},
+                            {"count", Format::integer, "rays"},
                             {"hits", Format::integer},
                             {"sample", Format::percent, "of the rays"},
                             {"sampling error", Format::percent}}};
@@ -156,20 +153,63 @@ std::string row_table(const SimulatedGroup& group) {
     return table_html(table);
 }
 
+std::string plots_block(const std::string& title, const std::string& legend,
+                        const std::string& plots) {
+    if (plots.empty()) return {};
+    return "<h4>" + title + " " + badge(Origin::simulated) + "</h4>\n" + legend +
+           "<div class=\"plots\">" + plots + "</div>\n";
+}
+
 std::string group_html(const SimulatedGroup& group, PageColours& colours) {
-    std::string plots;
+    std::string bounds, instructions, times;
+    std::vector<LegendItem> operations;
+    Rows all;
+    for (const SimulatedRow& row : group.rows) all.push_back(&row);
+    for (const std::string& name : operations_of(all))
+        operations.push_back({name, colours.operations.of(name)});
     for (const std::string& rays : group.ray_kinds()) {
         const Rows rows = group.of_kind(rays);
-        plots += bound_plot(rays, rows) + instruction_plot(rays, rows, colours) +
-                 time_plot(rays, rows, colours);
+        bounds += bound_plot(rays, rows);
+        instructions += instruction_plot(rays, rows, colours);
+        times += time_plot(rays, rows);
     }
-    return "<div class=\"plots\">" + plots + "</div>\n" + efficiency_table(group) +
-           row_table(group);
+    return plots_block("Upper bounds",
+                       legend_html({{bound_name, 0, LegendItem::Kind::outline},
+                                    {scheduled_name, 0, LegendItem::Kind::mark}}),
+                       bounds) +
+           row_table(group) +
+           plots_block("Where the instructions go",
+                       "<p class=\"note\">Issues of an operation times its cost: what a warp pays, "
+                       "however many of its lanes work.</p>" +
+                           legend_html(operations),
+                       instructions) +
+           efficiency_table(group) +
+           plots_block(
+               "How long warps run",
+               "<p class=\"note\">Each row is as high as its fullest bin; the black line has "
+               "half of the warps on either side. A long tail means warps that keep a launch "
+               "waiting.</p>",
+               times);
+}
+
+/// The best bound of each machine.
+void add_tiles(const std::vector<SimulatedGroup>& groups, Section& section) {
+    std::map<std::string, const SimulatedRow*> best;
+    for (const SimulatedGroup& group : groups)
+        for (const SimulatedRow& row : group.rows) {
+            const SimulatedRow*& top = best[row.machine];
+            if (row.bound && (top == nullptr || *row.bound > *top->bound)) top = &row;
+        }
+    for (const auto& [machine, row] : best)
+        if (row != nullptr)
+            section.tiles.push_back(
+                {significant(*row->bound), "Mrays/s",
+                 fmt::format("highest bound on {}: {}, {}", machine, row->kernel, row->rays),
+                 badge(Origin::simulated)});
 }
 
 void say(const SimulatedGroup& group, Section& section) {
     std::vector<std::string> parts;
-    const SimulatedRow* top = nullptr;
     for (const std::string& rays : group.ray_kinds()) {
         Rows bounded = group.of_kind(rays);
         std::erase_if(bounded, [](const SimulatedRow* row) { return !row->bound; });
@@ -178,21 +218,16 @@ void say(const SimulatedGroup& group, Section& section) {
             std::ranges::minmax(bounded, {}, [](const SimulatedRow* row) { return *row->bound; });
         std::string part =
             fmt::format("{} rays {} with {}", escaped(rays),
-                        strong(significant(*high->bound) + " Mrays/s"), breakable(high->kernel));
+                        strong(significant(*high->bound), "Mrays/s"), breakable(high->kernel));
         if (bounded.size() > 1)
             part += fmt::format(" (least: {} with {})", significant(*low->bound),
                                 breakable(low->kernel));
         parts.push_back(part);
-        if (top == nullptr || *high->bound > *top->bound) top = high;
     }
     if (parts.empty()) return;
     section.summary.push_back(fmt::format("{} On {}, tracing {}, the best upper bounds are: {}.",
                                           badge(Origin::simulated), escaped(group.machine),
                                           breakable(group.scene), listed(parts)));
-    section.tiles.push_back(
-        {significant(*top->bound), "Mrays/s",
-         fmt::format("highest bound on {}: {}, {}", group.machine, top->kernel, top->rays),
-         badge(Origin::simulated)});
 }
 
 }  // namespace
@@ -215,6 +250,7 @@ Section simulate_section(const Documents& documents, PageColours& colours) {
                         group_html(group, colours));
         say(group, section);
     }
+    add_tiles(groups, section);
     return section;
 }
 

@@ -13,8 +13,10 @@ namespace {
 
 using Format = Column::Format;
 
+// Longer heads of columns may be broken into lines.
+constexpr std::size_t short_title = 16;
 // Longer texts may be broken into lines.
-constexpr std::size_t short_text = 30;
+constexpr std::size_t short_text = 40;
 
 bool has_number(const Cell& cell) { return cell.value && std::isfinite(*cell.value); }
 
@@ -54,10 +56,12 @@ std::string cell_html(const Column& column, const Cell& cell, int decimals, bool
     if (!cell.swatch.empty()) inner = "<i class=\"swatch " + escaped(cell.swatch) + "\"></i>";
     if (has_number(cell)) {
         inner += escaped(number_text(column, *cell.value, decimals));
-        if (!cell.text.empty()) inner += " <small>" + breakable(cell.text) + "</small>";
+        if (!cell.text.empty()) inner += " <small>" + escaped(cell.text) + "</small>";
     } else {
-        inner +=
-            cell.text.empty() ? "<span class=\"none\">\xE2\x80\x93</span>" : breakable(cell.text);
+        const bool is_short = cell.text.size() <= short_text;
+        inner += cell.text.empty() ? "<span class=\"none\">\xE2\x80\x93</span>"
+                 : is_short        ? escaped(cell.text)
+                                   : breakable(cell.text);
     }
     const char* kind = numeric ? "num" : cell.text.size() > short_text ? "txt long" : "txt";
     std::string attributes =
@@ -75,8 +79,9 @@ std::string head_html(const Column& column) {
     std::string inner = "<span class=\"name\">" + breakable(column.title) + "</span>";
     if (!column.unit.empty()) inner += " <span class=\"unit\">" + escaped(column.unit) + "</span>";
     inner += badge(column.origin);
-    return fmt::format("<th scope=\"col\" class=\"{}\"{}>{}</th>",
+    return fmt::format("<th scope=\"col\" class=\"{}{}\"{}>{}</th>",
                        column.format == Format::text ? "txt" : "num",
+                       column.title.size() > short_title ? " long" : "",
                        column.help.empty() ? "" : " title=\"" + escaped(column.help) + "\"", inner);
 }
 

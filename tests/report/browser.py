@@ -76,11 +76,12 @@ class Browser:
     def logs(self, kind):
         return self._in_session("POST", "/se/log", {"type": kind})
 
-    def requests(self):
-        """Addresses of all that the page asked for, itself and data URIs left out."""
+    def requests(self, page):
+        """Addresses of all that the page asked for, itself and data URIs left out; and how many there were with these."""
         sent = (json.loads(entry["message"])["message"] for entry in self.logs("performance"))
         urls = [message["params"]["request"]["url"] for message in sent if message["method"] == "Network.requestWillBeSent"]
-        return [url for url in urls if not url.startswith(("data:", "file:"))], len(urls)
+        own = page.resolve().as_uri()
+        return [url for url in urls if not url.startswith("data:") and url.split("#")[0] != own], len(urls)
 
     def screenshot(self, selector):
         """PNG bytes of the whole element, however far it reaches beyond the window."""
