@@ -41,9 +41,9 @@ std::string scene_spec(const std::string& name, const std::string& folder) {
 }
 
 /// Two views of a scene, or a line why there are none.
-void render_views(const std::string& name, const ReportCommand& options, ReportInput& input) {
+void render_views(const std::string& name, const ReportCommand& options, Size size,
+                  ReportInput& input) {
     const std::string spec = scene_spec(name, options.scene_folder);
-    const Size size = parse_size(options.size_text);
     try {
         const Scene scene = load_scene(spec, options.common.seed);
         BuildOptions build;
@@ -84,6 +84,7 @@ void add_named_picture(const std::string& name, const std::string& document, Rep
 }
 
 void run_report(const ReportCommand& options) {
+    const Size size = parse_size(options.size_text);
     ReportInput input;
     if (!options.title.empty()) input.title = options.title;
     std::vector<std::string> scenes;
@@ -99,7 +100,7 @@ void run_report(const ReportCommand& options) {
     for (const std::string& file : options.pictures)
         input.pictures.push_back(load_report_picture(file));
     if (options.render)
-        for (const std::string& scene : scenes) render_views(scene, options, input);
+        for (const std::string& scene : scenes) render_views(scene, options, size, input);
     const std::string html = make_report(input);
     save_report(options.out_file, html);
     if (options.common.prints_tables())

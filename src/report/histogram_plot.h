@@ -11,7 +11,7 @@ namespace raydix::report {
 /// counts [n], edges [n + 1] ascending. Anything else is shown as a row without a figure.
 struct Histogram {
     std::string label;
-    std::vector<double> edges, counts;
+    std::vector<double> edges = {}, counts = {};
     int colour = 0;
 };
 
