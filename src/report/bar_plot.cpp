@@ -13,6 +13,9 @@ namespace raydix::report {
 namespace {
 
 constexpr double width = 440, row_height = 41, bar_height = 15, top = 4;
+// One slow repeat must not shrink all bars: spreads are cut off beyond this part of the longest
+// bar.
+constexpr double widest_spread = 1.3;
 
 bool drawn(double v) { return std::isfinite(v) && v > 0; }
 
@@ -47,11 +50,15 @@ public:
                   row_height * static_cast<double>(std::max<std::size_t>(plot.bars.size(), 1))),
           svg_(width, bottom_ + 40, plot.title) {
         std::vector<double> all{0.0};
-        double widest = 0;
+        double widest = 0, longest = 0;
         for (const Bar& bar : plot.bars) {
-            for (const double v : {sum_of(bar), bar.high, bar.limit, bar.mark}) all.push_back(v);
+            for (const double v : {sum_of(bar), bar.limit, bar.mark}) all.push_back(v);
             widest = std::max(widest, text_width(value_text(bar), 12));
+            longest = std::max(longest, sum_of(bar));
         }
+        for (const Bar& bar : plot.bars)
+            if (std::isfinite(bar.high))
+                all.push_back(std::fmin(bar.high, widest_spread * longest));
         axis_ = linear_axis(all);
         right_ = std::max(width - 10 - widest, 200.0);
     }
@@ -118,7 +125,8 @@ private:
                       " " + plot_.unit + " over the repeats");
             svg_.line(x(bar.low), middle, x(bar.high), middle, "whisker");
             svg_.line(x(bar.low), middle - 3, x(bar.low), middle + 3, "whisker");
-            svg_.line(x(bar.high), middle - 3, x(bar.high), middle + 3, "whisker");
+            if (bar.high <= axis_.hi)
+                svg_.line(x(bar.high), middle - 3, x(bar.high), middle + 3, "whisker");
             svg_.close();
             end = std::max(end, x(bar.high));
         }

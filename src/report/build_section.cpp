@@ -247,7 +247,7 @@ std::string tree_table(const std::vector<BuildRow>& rows) {
                             {"EPO", Format::number},
                             {"size", Format::number, "MB"},
                             {"each primitive", Format::number, "bytes"},
-                            {"peak of the build", Format::number, "MB"},
+                            {"peak", Format::number, "MB, building"},
                             {"tree hash"}}};
     std::set<std::string> seen;
     for (const BuildRow& row : rows) {

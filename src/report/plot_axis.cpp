@@ -57,7 +57,9 @@ std::vector<double> even_ticks(double lo, double hi) {
 bool Axis::shows(double value) const { return std::isfinite(value) && (!log || value > 0); }
 
 double Axis::place(double value) const {
-    const double part = log ? std::log(value / lo) / std::log(hi / lo) : (value - lo) / (hi - lo);
+    // Not log(value / lo): the ratio of numbers that a document may hold can overflow.
+    const double part = log ? (std::log(value) - std::log(lo)) / (std::log(hi) - std::log(lo))
+                            : (value - lo) / (hi - lo);
     return std::clamp(part, 0.0, 1.0);
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "report/bar_plot.h"
+#include "report/dot_plot.h"
 #include "report/html.h"
 #include "report/number_text.h"
 #include "report/sections.h"
@@ -88,6 +89,24 @@ std::string time_plot(const std::string& rays, const Rows& rows) {
     return plot.rows.empty() ? "" : histogram_plot(plot);
 }
 
+DotPlot efficiency_plot(const std::string& rays, const Rows& rows, PageColours& colours) {
+    DotPlot plot{.title = rays + " rays",
+                 .label = "SIMD efficiency, %",
+                 .origin = Origin::simulated,
+                 .rows = operations_of(rows)};
+    plot.rows.insert(plot.rows.begin(), "all operations");
+    for (const SimulatedRow* row : rows) {
+        const int colour = colours.kernels.of(row->kernel);
+        DotSeries series{row->kernel, {or_nan(row->efficiency)}, colour, colour};
+        for (std::size_t i = 1; i < plot.rows.size(); ++i) {
+            const SimulatedOperation* op = find(*row, plot.rows[i]);
+            series.parts.push_back(op ? or_nan(op->efficiency) : Bar::none);
+        }
+        plot.series.push_back(series);
+    }
+    return plot;
+}
+
 /// Kernels down, operations across, one table for all kinds of rays.
 std::string efficiency_table(const SimulatedGroup& group) {
     Rows all;
@@ -161,7 +180,7 @@ std::string plots_block(const std::string& title, const std::string& legend,
 }
 
 std::string group_html(const SimulatedGroup& group, PageColours& colours) {
-    std::string bounds, instructions, times;
+    std::string bounds, instructions, times, fullness, kernels;
     std::vector<LegendItem> operations;
     Rows all;
     for (const SimulatedRow& row : group.rows) all.push_back(&row);
@@ -172,6 +191,9 @@ std::string group_html(const SimulatedGroup& group, PageColours& colours) {
         bounds += bound_plot(rays, rows);
         instructions += instruction_plot(rays, rows, colours);
         times += time_plot(rays, rows);
+        const DotPlot efficiency = efficiency_plot(rays, rows, colours);
+        if (kernels.empty()) kernels = legend_html(legend_of(efficiency));
+        fullness += dot_plot(efficiency);
     }
     return plots_block("Upper bounds",
                        legend_html({{bound_name, 0, LegendItem::Kind::outline},
@@ -183,6 +205,7 @@ std::string group_html(const SimulatedGroup& group, PageColours& colours) {
                        "however many of its lanes work.</p>" +
                            legend_html(operations),
                        instructions) +
+           plots_block("How full warps are, by operation", kernels, fullness) +
            efficiency_table(group) +
            plots_block(
                "How long warps run",

@@ -38,7 +38,7 @@ std::string number_text(const Column& column, double value, int decimals) {
             return with_decimals(value, 0);
         case Format::mixed:
         case Format::text:
-            return significant(value, 4);
+            return value == std::floor(value) ? with_decimals(value, 0) : significant(value, 4);
         case Format::number:
             break;
     }
