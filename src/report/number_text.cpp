@@ -13,7 +13,11 @@ namespace {
 const char* const dash = "\xE2\x80\x93";
 const char* const minus = "\xE2\x88\x92";
 
-int exponent_of(double value) { return static_cast<int>(std::floor(std::log10(std::fabs(value)))); }
+/// Of the first digit, after rounding to `digits`: 0.9999 with three is 1.00.
+int exponent_of(double value, int digits) {
+    const std::string text = fmt::format("{:.{}e}", value, digits - 1);
+    return std::stoi(text.substr(text.find('e') + 1));
+}
 
 /// "-12345.6" -> "−12,345.6"
 std::string group_digits(std::string digits) {
@@ -49,7 +53,7 @@ std::string significant(double value, int digits) {
     const double size = std::fabs(value);
     if (size >= 1e15 || size < 1e-6) return fmt::format("{:.{}e}", value, digits - 1);
     return group_digits(
-        fmt::format("{:.{}f}", value, std::max(0, digits - 1 - exponent_of(value))));
+        fmt::format("{:.{}f}", value, std::max(0, digits - 1 - exponent_of(value, digits))));
 }
 
 std::string short_number(double value) {
@@ -69,22 +73,11 @@ std::string percent(double part) {
     return std::isfinite(part) ? with_decimals(100 * part, 1) + " %" : dash;
 }
 
-std::string byte_text(double bytes) {
-    if (!std::isfinite(bytes)) return dash;
-    constexpr std::array<const char*, 5> units{"bytes", "kB", "MB", "GB", "TB"};
-    std::size_t unit = 0;
-    while (std::fabs(bytes) >= 999.5 && unit + 1 < units.size()) {
-        bytes /= 1000;
-        ++unit;
-    }
-    return (unit == 0 ? with_decimals(bytes, 0) : significant(bytes)) + " " + units[unit];
-}
-
 int decimals_for(const std::vector<double>& values) {
     int decimals = 0;
     for (const double v : values)
         if (std::isfinite(v) && v != std::floor(v))
-            decimals = std::max(decimals, std::clamp(1 - exponent_of(v), 1, 4));
+            decimals = std::max(decimals, std::clamp(1 - exponent_of(v, 2), 1, 4));
     return decimals;
 }
 

@@ -24,9 +24,6 @@ namespace raydix::report {
 /// 0.423 -> "42.3 %".
 [[nodiscard]] std::string percent(double part);
 
-/// 3007536 -> "3.01 MB", in powers of 1000.
-[[nodiscard]] std::string byte_text(double bytes);
-
 /// How many digits behind the point a column of such values needs, so that the smallest still has
 /// two that count; 0 to 4, and none where all are whole.
 [[nodiscard]] int decimals_for(const std::vector<double>& values);

@@ -26,11 +26,12 @@ Cell plain_cell(const Json& value) {
     if (value.is_number()) return value.get<double>();
     if (value.is_string()) return shortened(value.get<std::string>(), 400);
     if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
-    if (value.is_object()) return "(" + counted(static_cast<double>(value.size()), "field") + ")";
+    if (value.is_object())
+        return fmt::format("({})", counted(static_cast<double>(value.size()), "field"));
     if (!value.is_array()) return "";
     const bool plain = std::ranges::none_of(value, &Json::is_structured);
     if (!plain || value.size() > most_listed)
-        return "(" + counted(static_cast<double>(value.size()), "value") + ")";
+        return fmt::format("({})", counted(static_cast<double>(value.size()), "value"));
     std::string text;
     for (const Json& element : value) {
         const Cell cell = plain_cell(element);

@@ -89,7 +89,8 @@ ReportReferences report_references(const ReportDocument& document) {
     add_once(references.scenes, text_at(parsed.root, "scene.name"));
     for (const char* list : {"simulate", "measured", "runs", "builds"})
         for (const Json* row : objects_at(parsed.root, list))
-            add_once(references.scenes, text_at(*row, "scene"));
+            if (text_at(*row, "series") != "size")  // a series over sizes is not worth pictures
+                add_once(references.scenes, text_at(*row, "scene"));
     add_once(references.pictures, text_at(parsed.root, "render.file"));
     return references;
 }

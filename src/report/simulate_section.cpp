@@ -9,6 +9,7 @@
 #include "report/dot_plot.h"
 #include "report/html.h"
 #include "report/number_text.h"
+#include "report/plain_tables.h"
 #include "report/sections.h"
 #include "report/simulate_rows.h"
 #include "report/table.h"
@@ -253,6 +254,18 @@ void say(const SimulatedGroup& group, Section& section) {
                                           breakable(group.scene), listed(parts)));
 }
 
+std::string machine_tables(const Documents& documents) {
+    std::string tables;
+    for (const Document& document : documents)
+        if (const Json& machines = at(document.root, "machines");
+            machines.is_array() && !objects_at(document.root, "simulate").empty())
+            tables += plain_tables("Constants of the machines of " + document.name, machines,
+                                   Origin::simulated);
+    return tables.empty() ? ""
+                          : "<details><summary>What the simulated machines are</summary>" + tables +
+                                "</details>\n";
+}
+
 }  // namespace
 
 Section simulate_section(const Documents& documents, PageColours& colours) {
@@ -273,6 +286,7 @@ Section simulate_section(const Documents& documents, PageColours& colours) {
                         group_html(group, colours));
         say(group, section);
     }
+    section.html += machine_tables(documents);
     add_tiles(groups, section);
     return section;
 }

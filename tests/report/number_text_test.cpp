@@ -35,6 +35,8 @@ TEST(Significant, KeepsTheDigitsThatCount) {
     EXPECT_EQ(significant(-3.14159, 4), minus + "3.142");
     EXPECT_EQ(significant(1e-9), "1.00e-09");
     EXPECT_EQ(significant(1e20), "1.00e+20");
+    EXPECT_EQ(significant(0.99999), "1.00");
+    EXPECT_EQ(significant(9.996), "10.0");
     EXPECT_EQ(significant(nan), dash);
 }
 
@@ -52,14 +54,6 @@ TEST(Percent, OfAPart) {
     EXPECT_EQ(percent(0.4231), "42.3 %");
     EXPECT_EQ(percent(6.129), "612.9 %");
     EXPECT_EQ(percent(nan), dash);
-}
-
-TEST(ByteText, InPowersOfThousand) {
-    EXPECT_EQ(byte_text(0), "0 bytes");
-    EXPECT_EQ(byte_text(999), "999 bytes");
-    EXPECT_EQ(byte_text(1000), "1.00 kB");
-    EXPECT_EQ(byte_text(3007536), "3.01 MB");
-    EXPECT_EQ(byte_text(999999), "1.00 MB");
 }
 
 TEST(DecimalsFor, OneColumnHasOneNumberOfDigits) {

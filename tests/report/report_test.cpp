@@ -262,7 +262,8 @@ TEST(MakeReport, DamagedDocumentsStillGiveAPage) {
 
 TEST(ReportReferences, NameScenesAndPicturesOnce) {
     const ReportReferences references = report_references(
-        {"d", R"({"scene": {"name": "a"}, "runs": [{"scene": "b"}, {"scene": "a"}, {"scene": 3}],
+        {"d",
+         R"({"scene": {"name": "a"}, "runs": [{"scene": "b"}, {"scene": "a"}, {"scene": 3}, {"scene": "c", "series": "size"}],
                  "render": {"file": "p.png"}})"});
     EXPECT_EQ(references.scenes, (std::vector<std::string>{"a", "b", "3"}));
     EXPECT_EQ(references.pictures, (std::vector<std::string>{"p.png"}));
