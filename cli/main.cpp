@@ -52,6 +52,7 @@ int main(int argc, char** argv) {
     raydix::cli::add_render_command(app);
     raydix::cli::add_simulate_command(app);
     raydix::cli::add_bench_command(app);
+    raydix::cli::add_report_command(app);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -16,6 +16,7 @@
 #include <raydix/picture.h>          // IWYU pragma: export
 #include <raydix/rays.h>             // IWYU pragma: export
 #include <raydix/rdx.h>              // IWYU pragma: export
+#include <raydix/report.h>           // IWYU pragma: export
 #include <raydix/scene.h>            // IWYU pragma: export
 #include <raydix/trace.h>            // IWYU pragma: export
 #include <raydix/tree_view.h>        // IWYU pragma: export

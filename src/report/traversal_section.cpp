@@ -1,0 +1,298 @@
+// Documents of `bench traversal` -> measured beside simulated and published figures, the paper's
+// claims, and what the width of a warp changes.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "report/bar_plot.h"
+#include "report/html.h"
+#include "report/line_plot.h"
+#include "report/number_text.h"
+#include "report/sections.h"
+#include "report/simulate_rows.h"
+#include "report/svg.h"
+#include "report/table.h"
+
+namespace raydix::report {
+namespace {
+
+using Format = Column::Format;
+
+std::string claim_table(const std::vector<const Json*>& claims) {
+    Table table{.title = "The paper's claims",
+                .columns = {{"claim"}, {"here"}, {"the paper"}, {"found"}, {"scene"}}};
+    for (const Json* claim : claims) {
+        const Json& holds = at(*claim, "holds");
+        Cell verdict("open");
+        verdict.mark = Cell::Mark::even;
+        if (holds.is_boolean()) {
+            verdict.text = holds.get<bool>() ? "\xE2\x9C\x93 holds" : "\xE2\x9C\x97 does not hold";
+            verdict.mark = holds.get<bool>() ? Cell::Mark::better : Cell::Mark::worse;
+        }
+        table.rows.push_back({text_at(*claim, "claim"), verdict, text_at(*claim, "paper"),
+                              text_at(*claim, "found"), text_at(*claim, "scene")});
+    }
+    return table_html(table);
+}
+
+struct MeasuredRow {
+    std::string scene, kernel, rays, device;
+    SpreadFields rate;
+    std::optional<double> part;  // of the simulated bound, 0..1
+};
+
+std::vector<MeasuredRow> measured_rows(const Documents& documents) {
+    std::vector<MeasuredRow> rows;
+    for (const Document& document : documents)
+        for (const Json* m : objects_at(document.root, "measured")) {
+            auto part = number_at(*m, "percent_of_simulated");
+            if (part) *part /= 100;
+            rows.push_back({text_at(*m, "scene"), text_at(*m, "kernel"), text_at(*m, "rays"),
+                            text_at(*m, "device"), spread_at(*m, "mrays_per_s"), part});
+        }
+    return rows;
+}
+
+/// The bound that the measured figure was compared with: rate / part.
+double bound_of(const MeasuredRow& row) {
+    return row.rate.median && row.part && *row.part > 0 ? *row.rate.median / *row.part : Bar::none;
+}
+
+std::string measured_table(const std::vector<MeasuredRow>& rows) {
+    Table table{
+        .title = "Measured beside simulated",
+        .note = "A measured rate above the simulated bound would mean that the model is wrong.",
+        .columns = {{"kernel"},
+                    {"scene"},
+                    {"rays"},
+                    {"device"},
+                    {"rate", Format::number, "Mrays/s, median", Origin::measured},
+                    {"least", Format::number, "Mrays/s", Origin::measured},
+                    {"most", Format::number, "Mrays/s", Origin::measured},
+                    {"bound", Format::number, "Mrays/s", Origin::simulated},
+                    {"measured of simulated", Format::percent}}};
+    for (const MeasuredRow& row : rows) {
+        Cell part(row.part);
+        if (row.part && *row.part > 1) {
+            part.mark = Cell::Mark::alert;
+            part.text = "above the bound";
+        }
+        table.rows.push_back({row.kernel, row.scene, row.rays, row.device, row.rate.median,
+                              row.rate.min, row.rate.max, bound_of(row), part});
+    }
+    table.drop_empty_columns();
+    return table_html(table);
+}
+
+std::string measured_plots(const std::vector<MeasuredRow>& rows) {
+    std::vector<std::pair<std::string, std::string>> groups;  // scene, rays
+    for (const MeasuredRow& row : rows)
+        if (std::ranges::find(groups, std::pair(row.scene, row.rays)) == groups.end())
+            groups.emplace_back(row.scene, row.rays);
+    std::string plots;
+    for (const auto& [scene, rays] : groups) {
+        BarPlot plot{.title = "Measured, " + rays + " rays",
+                     .subtitle = scene,
+                     .label = "rate, Mrays/s",
+                     .unit = "Mrays/s",
+                     .origin = Origin::measured,
+                     .parts = {{"measured", 0}},
+                     .limit_name = "upper bound (simulated)"};
+        for (const MeasuredRow& row : rows)
+            if (row.scene == scene && row.rays == rays)
+                plot.bars.push_back({.label = row.kernel,
+                                     .parts = {or_nan(row.rate.median)},
+                                     .low = or_nan(row.rate.min),
+                                     .high = or_nan(row.rate.max),
+                                     .limit = bound_of(row),
+                                     .note = row.part ? percent(*row.part) : ""});
+        plots += bar_plot(plot);
+    }
+    return plots;
+}
+
+struct PublishedRow {
+    std::string scene, kernel, rays, machine;
+    std::optional<double> rate, simulated;
+    bool other_edition = false;
+};
+
+std::vector<PublishedRow> published_rows(const Documents& documents) {
+    const std::vector<SimulatedRow> simulated = simulated_rows(documents);
+    std::vector<PublishedRow> rows;
+    for (const Document& document : documents)
+        for (const Json* p : objects_at(document.root, "published")) {
+            PublishedRow row{text_at(*p, "scene"),
+                             text_at(*p, "kernel"),
+                             text_at(*p, "rays"),
+                             text_at(*p, "machine"),
+                             spread_at(*p, "mrays_per_s").median,
+                             {},
+                             text_at(*p, "other_edition") == "yes"};
+            for (const SimulatedRow& s : simulated)
+                if (std::tie(s.scene, s.kernel, s.rays, s.machine) ==
+                    std::tie(row.scene, row.kernel, row.rays, row.machine))
+                    row.simulated = s.bound;
+            rows.push_back(row);
+        }
+    return rows;
+}
+
+/// A figure over the largest of its scene, rays and machine among kernels that have both.
+std::optional<double> of_best(const std::vector<PublishedRow>& rows, const PublishedRow& row,
+                              std::optional<double> PublishedRow::*field) {
+    double best = 0;
+    for (const PublishedRow& other : rows)
+        if (other.rate && other.simulated &&
+            std::tie(other.scene, other.rays, other.machine) ==
+                std::tie(row.scene, row.rays, row.machine))
+            best = std::max(best, *(other.*field));
+    if (!row.rate || !row.simulated || best <= 0) return std::nullopt;
+    return *(row.*field) / best;
+}
+
+std::string published_table(const std::vector<PublishedRow>& rows) {
+    const bool other = std::ranges::any_of(rows, &PublishedRow::other_edition);
+    Table table{.title = "Published beside simulated",
+                .note = other ? "Scenes marked \xE2\x80\x9Cother edition\xE2\x80\x9D are not the "
+                                "paper's files: compare what a kernel has of the best kernel, not "
+                                "the rates themselves."
+                              : "",
+                .columns = {{"kernel"},
+                            {"scene"},
+                            {"rays"},
+                            {"machine"},
+                            {"published", Format::number, "Mrays/s", Origin::published},
+                            {"bound", Format::number, "Mrays/s", Origin::simulated},
+                            {"of the best kernel", Format::percent, "", Origin::published},
+                            {"of the best kernel", Format::percent, "", Origin::simulated},
+                            {"scene's edition"}}};
+    for (const PublishedRow& row : rows)
+        table.rows.push_back({row.kernel, row.scene, row.rays, row.machine, row.rate, row.simulated,
+                              of_best(rows, row, &PublishedRow::rate),
+                              of_best(rows, row, &PublishedRow::simulated),
+                              row.other_edition ? "other edition" : "the paper's"});
+    table.drop_empty_columns();
+    return table_html(table);
+}
+
+/// Panels of scene, rays and machine; a line for each kernel.
+std::string width_plots(const Documents& documents, PageColours& colours) {
+    std::map<std::tuple<std::string, std::string, std::string>, std::vector<const Json*>> panels;
+    for (const Document& document : documents)
+        for (const Json* row : objects_at(document.root, "width_sweep"))
+            panels[{text_at(*row, "machine"), text_at(*row, "scene"), text_at(*row, "rays")}]
+                .push_back(row);
+    std::string plots;
+    for (const auto& [key, rows] : panels) {
+        const auto& [machine, scene, rays] = key;
+        LinePlot efficiency;
+        efficiency.title = "Width of a warp, " + rays + " rays";
+        efficiency.subtitle = scene + " on " + machine;
+        efficiency.x_label = "lanes of a warp (log scale)";
+        efficiency.y_label = "SIMD efficiency, %";
+        efficiency.x_unit = "lanes";
+        efficiency.y_unit = "%";
+        efficiency.x_scale = LinePlot::Scale::log_at_points;
+        efficiency.origin = Origin::simulated;
+        LinePlot bound = efficiency;
+        bound.y_label = "upper bound, Mrays/s (log scale)";
+        bound.y_unit = "Mrays/s";
+        bound.y_scale = LinePlot::Scale::log;
+        std::map<std::string, std::vector<const Json*>> lines;
+        for (const Json* row : rows) lines[text_at(*row, "kernel")].push_back(row);
+        for (auto& [kernel, points] : lines) {
+            std::ranges::stable_sort(
+                points, {}, [](const Json* p) { return number_at(*p, "width").value_or(0); });
+            const int colour = colours.kernels.of(kernel);
+            Series series{.name = kernel,
+                          .x = {},
+                          .y = {},
+                          .colour = colour,
+                          .dash = colour / palette_size,
+                          .shape = colour};
+            for (const Json* p : points) {
+                series.x.push_back(or_nan(number_at(*p, "width")));
+                series.y.push_back(100 * or_nan(number_at(*p, "simd_efficiency")));
+            }
+            efficiency.series.push_back(series);
+            series.y.clear();
+            for (const Json* p : points)
+                series.y.push_back(or_nan(spread_at(*p, "mrays_per_s_bound").median));
+            bound.series.push_back(series);
+        }
+        plots += line_plot(efficiency) + line_plot(bound);
+    }
+    return plots;
+}
+
+void say_claims(const std::vector<const Json*>& claims, Section& section) {
+    if (claims.empty()) return;
+    std::size_t hold = 0, fail = 0;
+    for (const Json* claim : claims) {
+        const Json& holds = at(*claim, "holds");
+        if (holds.is_boolean()) ++(holds.get<bool>() ? hold : fail);
+    }
+    const std::size_t open = claims.size() - hold - fail;
+    section.summary.push_back(
+        fmt::format("Of {} claims of the paper, {} here, {}{}.", claims.size(),
+                    strong(fmt::format("{} {}", hold, hold == 1 ? "holds" : "hold")),
+                    strong(fmt::format("{} {} not", fail, fail == 1 ? "does" : "do")),
+                    open ? fmt::format(" and {} stay{} open", open, open == 1 ? "s" : "") : ""));
+    section.tiles.push_back(
+        {fmt::format("{} of {}", hold, claims.size()), "", "claims of the paper hold here", ""});
+}
+
+void say_measured(const std::vector<MeasuredRow>& rows, Section& section) {
+    std::vector<MeasuredRow> rated;
+    for (const MeasuredRow& row : rows)
+        if (row.part) rated.push_back(row);
+    if (rated.empty()) {
+        section.summary.push_back(
+            rows.empty() ? "No kernel of this bench was run on a real GPU: all its rates are "
+                           "simulated or published."
+                         : "Measured rates are there, but none has a simulated bound beside it.");
+        return;
+    }
+    const auto [low, high] =
+        std::ranges::minmax(rated, {}, [](const MeasuredRow& row) { return *row.part; });
+    section.summary.push_back(
+        fmt::format("Measured rates reach {} to {} of their simulated bounds; the nearest is {} "
+                    "with {} rays on "
+                    "{}.",
+                    strong(percent(*low.part)), strong(percent(*high.part)), breakable(high.kernel),
+                    escaped(high.rays), escaped(high.device)));
+    if (*high.part > 1)
+        section.summary.push_back(
+            "<span class=\"warning\">A measured rate lies above its simulated bound, so the model "
+            "is wrong there.</span>");
+}
+
+}  // namespace
+
+Section traversal_section(const Documents& documents, PageColours& colours) {
+    Section section{.id = "traversal", .title = "Measured, simulated, published"};
+    std::vector<const Json*> claims;
+    bool benched = false;
+    for (const Document& document : documents) {
+        benched = benched || document.command == "bench traversal";
+        for (const Json* claim : objects_at(document.root, "claims")) claims.push_back(claim);
+    }
+    const std::vector<MeasuredRow> measured = measured_rows(documents);
+    section.html = claim_table(claims);
+    std::string plots = measured_plots(measured);
+    if (!plots.empty())
+        section.html += "<h3>Measured and the bound</h3><div class=\"plots\">" + plots + "</div>\n";
+    section.html += measured_table(measured) + published_table(published_rows(documents));
+    plots = width_plots(documents, colours);
+    if (!plots.empty())
+        section.html += "<h3>Width of a warp " + badge(Origin::simulated) +
+                        "</h3><div class=\"plots\">" + plots + "</div>\n";
+    say_claims(claims, section);
+    if (benched || !measured.empty()) say_measured(measured, section);
+    return section;
+}
+
+}  // namespace raydix::report

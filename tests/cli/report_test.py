@@ -1,0 +1,97 @@
+"""raydix report: pages from real documents; what is refused. tests/report/page_test.py opens them in a browser."""
+import json
+import os
+import re
+import sys
+
+sys.dont_write_bytecode = True
+from program import ProgramTest, main  # noqa: E402
+
+FIGURE = "builtin:figure?triangles=5000"
+
+
+class Report(ProgramTest):
+    def make(self, name, *arguments):
+        self.succeed(*arguments, "--quiet", "--json", name)
+        return name
+
+    def page(self, *arguments):
+        self.succeed("report", *arguments, "-o", "page.html", "--quiet")
+        return (self.folder / "page.html").read_text(encoding="utf-8")
+
+    def test_documents_of_every_command(self):
+        results = [self.make("build.json", "build", FIGURE), self.make("trace.json", "trace", FIGURE, "--size", "16x12"),
+                   self.make("check.json", "check", FIGURE), self.make("info.json", "info", FIGURE),
+                   self.make("scenes.json", "scenes"),
+                   self.make("study.json", "bench", "hierarchy", "builtin:soup?triangles=2000", "--sizes", "200,2000",
+                             "--repeat", "1", "--thread-counts", "1")]
+        html = self.page(*results)
+        for section in ("summary", "builds", "traces", "construction", "scenes", "other", "sources"):
+            self.assertIn(f'<section id="{section}">', html)
+        total = json.loads((self.folder / "build.json").read_text(encoding="utf-8"))["build"]["ms"]["total"]
+        self.assertIn(f'data-v="{total:.17g}"', html)  # the number of the document, all digits
+        self.assertIn("every invariant holds", html)
+        for name in results:
+            self.assertIn(name, html)
+        self.assertEqual(html, self.page(*results))
+
+    def test_two_runs_are_compared(self):
+        first = self.make("a.json", "build", FIGURE, "--max-leaf", "4")
+        second = self.make("b.json", "build", FIGURE, "--max-leaf", "8")
+        a, b = (json.loads((self.folder / n).read_text(encoding="utf-8"))["build"] for n in (first, second))
+        html = self.page(first, second)
+        row = re.search(r"<tr><th[^>]*>[^<]*bvh</th><td[^>]*>size</td>.*?</tr>", html, re.DOTALL).group(0)
+        values = [float(v) for v in re.findall(r'data-v="([^"]*)"', row)]
+        self.assertEqual(values[:2], [a["bytes"], b["bytes"]])
+        self.assertAlmostEqual(values[2], b["bytes"] / a["bytes"])
+        self.assertIn("better" if b["bytes"] < a["bytes"] else "worse", row)
+        self.assertIn("max_leaf", html)  # a setting that differs
+        self.assertNotIn('<section id="comparison">', self.page(first))
+
+    def test_pictures(self):
+        self.succeed("render", FIGURE, "--size", "32x24", "--samples", "1", "-o", "p.png", "--json", "render.json", "--quiet")
+        self.assertEqual(self.page("render.json").count("data:image/png;base64,"), 1)  # named in the document
+        self.assertEqual(self.page("render.json", "--picture", "p.png", "--picture", "p.png").count("data:image/png"), 3)
+        html = self.page(self.make("info.json", "info", FIGURE), "--render", "--size", "24x16")
+        self.assertEqual(html.count('width="24" height="16"'), 2)
+        self.assertIn("shaded", html)
+        self.assertIn("steps", html)
+
+    def test_a_scene_that_is_not_there_is_said_and_left_out(self):
+        name = self.write("gone.json", json.dumps({"command": "info", "scene": {"name": "gone.ply"}}))
+        result = self.run_program("report", name, "--render", "-o", "page.html")
+        self.assertEqual(result.code, 0, result)
+        self.assertIn("no picture: gone.ply", result.err)
+        self.assertEqual(result.err.count("\n"), 1, result)
+
+    def test_what_is_refused(self):
+        good = self.make("good.json", "scenes")
+        bad = self.write("bad.json", '{"a": ')
+        listed = self.write("list.json", "[]")
+        binary = self.write("binary.json", bytes(range(256)))
+        (self.folder / "folder").mkdir(exist_ok=True)
+        out = ("-o", "refused.html")
+        for arguments, names in (((bad, *out), ("bad.json", "JSON")), ((listed, *out), ("list.json", "not an object")),
+                                 ((binary, *out), ("binary.json",)), (("absent.json", *out), ("absent.json", "No such file")),
+                                 (("folder", *out), ("folder", "is a folder")),
+                                 ((good, bad, *out), ("bad.json",)),
+                                 ((good, "-o", "absent/page.html"), ("absent/page.html", "cannot write")),
+                                 ((good, "-o", "folder"), ("folder", "cannot write")),
+                                 ((good, "--picture", "good.json", *out), ("good.json",)),
+                                 ((good, "--picture", "absent.png", *out), ("absent.png",))):
+            self.fail_with_one_line("report", *arguments, names=names)
+        self.assertFalse((self.folder / "refused.html").exists())
+        self.assertEqual([n for n in os.listdir(self.folder) if n.endswith(".part")], [])
+        self.fail_with_usage("report", good)
+        self.fail_with_usage("report", "-o", "page.html")
+        self.fail_with_usage("report", good, *out, "--render", "--size", "huge")
+
+    def test_a_failure_keeps_the_old_page(self):
+        good = self.make("good.json", "scenes")
+        before = self.page(good)
+        self.fail_with_one_line("report", good, self.write("bad.json", "{"), "-o", "page.html")
+        self.assertEqual((self.folder / "page.html").read_text(encoding="utf-8"), before)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,285 @@
+// Whole pages from documents: sound, odd, broken and hostile ones.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <raydix/error.h>
+#include <raydix/report.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
+#include <string>
+
+#include "support/support.h"
+
+namespace raydix {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json build_document(double total) {
+    Json document = Json::parse(R"({"command": "build", "version": "0",
+        "machine": {"cpu": "made up", "cores": 2}, "scene": {"name": "hall.obj", "triangles": 100},
+        "build": {"tree": "bvh", "builder": "karras", "bits": 63, "max_leaf": 4, "device": "cpu",
+                  "threads": 2, "primitives": 100, "nodes": 7, "sah": 12.5, "bytes": 1000,
+                  "tree_hash": "00ff", "ms": {"sort": 1.0, "fit": 2.0}}})");
+    document["build"]["ms"]["total"] = total;
+    return document;
+}
+
+std::string page_of(const std::vector<Json>& documents) {
+    ReportInput input;
+    for (std::size_t i = 0; i < documents.size(); ++i)
+        input.documents.push_back({fmt::format("d{}.json", i), documents[i].dump()});
+    return make_report(input);
+}
+
+bool holds(const std::string& html, const std::string& part) {
+    return html.find(part) != std::string::npos;
+}
+
+std::string shared_document(const std::string& name) {
+    std::ifstream in(std::string(RAYDIX_SOURCE_DIR) + "/tests/report/documents/" + name);
+    std::ostringstream text;
+    text << in.rdbuf();
+    return text.str();
+}
+
+void expect_whole(const std::string& html) {
+    EXPECT_TRUE(html.starts_with("<!DOCTYPE html>"));
+    EXPECT_TRUE(html.ends_with("</body></html>\n"));
+    for (const char* tag : {"section", "table", "details", "figure", "svg", "div", "ul"}) {
+        const auto count = [&](const std::string& part) {
+            std::size_t n = 0;
+            for (std::size_t at = 0; (at = html.find(part, at)) != std::string::npos; ++at) ++n;
+            return n;
+        };
+        EXPECT_EQ(count(fmt::format("<{}>", tag)) + count(fmt::format("<{} ", tag)),
+                  count(fmt::format("</{}>", tag)))
+            << tag;
+    }
+}
+
+TEST(MakeReport, ABuildHasItsTimesAndItsTree) {
+    const std::string html = page_of({build_document(4)});
+    expect_whole(html);
+    EXPECT_TRUE(holds(html, "<section id=\"builds\">"));
+    EXPECT_FALSE(holds(html, "<section id=\"comparison\">"));
+    EXPECT_FALSE(holds(html, "<section id=\"simulated\">"));
+    EXPECT_TRUE(holds(html, "hall.obj"));
+    EXPECT_TRUE(holds(html, "4.00&nbsp;ms"));
+    EXPECT_TRUE(holds(html, "Measured on made up, 2 cores"));
+}
+
+TEST(MakeReport, TheSameDocumentsGiveTheSamePage) {
+    EXPECT_EQ(page_of({build_document(4), build_document(5)}),
+              page_of({build_document(4), build_document(5)}));
+}
+
+TEST(MakeReport, TwoOfACommandAreCompared) {
+    const std::string faster = page_of({build_document(4), build_document(2)});
+    EXPECT_TRUE(holds(faster, "<section id=\"comparison\">"));
+    EXPECT_TRUE(holds(faster, "\xE2\x96\xB2 better"));
+    EXPECT_FALSE(holds(faster, "\xE2\x96\xBC worse"));
+    EXPECT_TRUE(holds(faster, "0.50 \xC3\x97"));
+    const std::string slower = page_of({build_document(2), build_document(4)});
+    EXPECT_TRUE(holds(slower, "\xE2\x96\xBC worse"));
+    EXPECT_TRUE(holds(slower, "2.00 \xC3\x97"));
+    const std::string close = page_of({build_document(4), build_document(4.01)});
+    EXPECT_FALSE(holds(close, "\xE2\x96\xBC worse"));
+    EXPECT_TRUE(holds(close, "within 2 %"));
+}
+
+TEST(MakeReport, OverlappingSpreadsAreNoChange) {
+    Json a = build_document(4), b = build_document(5);
+    a["build"]["ms_spread"] = {{"min", {{"total", 3.0}}}, {"max", {{"total", 5.5}}}};
+    b["build"]["ms_spread"] = {{"min", {{"total", 4.5}}}, {"max", {{"total", 6.0}}}};
+    const std::string html = page_of({a, b});
+    EXPECT_TRUE(holds(html, "within the spread"));
+    EXPECT_FALSE(holds(html, "\xE2\x96\xBC worse"));
+}
+
+TEST(MakeReport, OnlyRowsThatMatchAreCompared) {
+    Json other = build_document(2);
+    other["scene"]["name"] = "church.obj";
+    const std::string html = page_of({build_document(4), other});
+    EXPECT_TRUE(holds(html, "have no row in common"));
+    EXPECT_FALSE(holds(html, "\xE2\x96\xB2 better"));
+    // Three of one scene are a series, not a pair.
+    EXPECT_FALSE(holds(page_of({build_document(4), build_document(3), build_document(2)}),
+                       "<section id=\"comparison\">"));
+}
+
+TEST(MakeReport, MadeUpSimulationsAreShownAndLabelled) {
+    for (const char* name : {"simulate.json", "traversal.json"}) {
+        ReportInput input;
+        input.documents = {{name, shared_document(name)}};
+        ASSERT_FALSE(input.documents[0].json.empty());
+        const std::string html = make_report(input);
+        expect_whole(html);
+        EXPECT_TRUE(holds(html, "<section id=\"simulated\">"));
+        EXPECT_TRUE(holds(html, "persistent_speculative_while_while"));
+        EXPECT_TRUE(holds(html, "upper bound, Mrays/s (simulated)"));
+        EXPECT_TRUE(holds(html, "SIMD efficiency by operation"));
+        EXPECT_EQ(holds(html, "does not hold"), std::string(name) == "traversal.json");
+        EXPECT_EQ(holds(html, "other edition"), std::string(name) == "traversal.json");
+    }
+}
+
+TEST(MakeReport, AMeasuredRateAboveItsBoundIsAnAlarm) {
+    Json document = Json::parse(shared_document("traversal.json"));
+    EXPECT_FALSE(holds(page_of({document}), "the model is wrong there"));
+    document["measured"][0]["percent_of_simulated"] = 120.0;
+    EXPECT_TRUE(holds(page_of({document}), "the model is wrong there"));
+}
+
+TEST(MakeReport, UnknownDocumentsAreTables) {
+    const std::string html = page_of({Json::parse(R"({"command": "bench unheard-of", "answer": 42,
+        "deep": {"a": {"b": {"c": {"d": {"e": {"f": 1}}}}}}, "rows": [{"x": 1, "y": {"z": "text"}}, {"x": null}],
+        "mixed": [1, "two", {"three": 3}], "none": [], "nothing": {}})"),
+                                      Json::parse("{}")});
+    expect_whole(html);
+    for (const char* part :
+         {"bench unheard-of", "answer", ">42<", "y.<wbr>z", "(3 values)", "of no command"})
+        EXPECT_TRUE(holds(html, part) || holds(html, "y.z")) << part;
+    EXPECT_TRUE(holds(html, "this page has no part for"));
+}
+
+TEST(MakeReport, UnknownFieldsOfKnownDocumentsAreTables) {
+    Json document = build_document(4);
+    document["surprise"] = {{"depth", 5}};
+    EXPECT_TRUE(holds(page_of({document}), "surprise.depth"));
+}
+
+TEST(MakeReport, BrokenTextNamesTheDocument) {
+    const auto fault = [](const std::string& json) -> std::string {
+        ReportInput input;
+        input.documents = {{"bad.json", json}};
+        try {
+            static_cast<void>(make_report(input));
+        } catch (const InputError& error) {
+            return error.what();
+        }
+        return "none";
+    };
+    EXPECT_EQ(fault("{\"a\": }"), "bad.json: JSON: not valid at byte 7");
+    EXPECT_EQ(fault(""), "bad.json: JSON: not valid at byte 1");
+    EXPECT_EQ(fault("[1, 2]"),
+              "bad.json: JSON: not an object, so not a result of a raydix command");
+    EXPECT_EQ(fault("{\"a\": 1e999}"), "bad.json: JSON: a number is out of range");
+    EXPECT_EQ(fault(fmt::format("{{\"a\": {}", std::string(100000, '['))),
+              "bad.json: JSON: nested deeper than 64 levels");
+    EXPECT_EQ(fault("{\"a\": \"\xFF\"}").substr(0, 30), "bad.json: JSON: not valid at b");
+}
+
+TEST(MakeReport, PicturesAreInThePage) {
+    Picture grey{.width = 2, .height = 1, .pixels = {{0.5f, 0.5f, 0.5f}, {0, 0, 0}}};
+    ReportInput input;
+    input.pictures = {make_report_picture("<b>name", "what it shows", grey, false)};
+    const std::string html = make_report(input);
+    EXPECT_TRUE(holds(html, "src=\"data:image/png;base64,iVBORw0KGgo"));
+    EXPECT_TRUE(holds(html, "width=\"2\" height=\"1\""));
+    EXPECT_FALSE(holds(html, "<b>name"));
+    expect_whole(html);
+    test::TempFolder folder;
+    save_picture(folder.path() / "p.png", grey, false);
+    EXPECT_EQ(load_report_picture(folder.path() / "p.png").width, 2u);
+    std::ofstream(folder.path() / "no.png") << "no picture";
+    EXPECT_THROW(static_cast<void>(load_report_picture(folder.path() / "no.png")), InputError);
+    EXPECT_THROW(static_cast<void>(load_report_picture(folder.path() / "absent.png")), InputError);
+}
+
+/// Values that no field expects.
+Json odd_value(std::mt19937& random) {
+    static const std::vector<Json> odd{nullptr,
+                                       true,
+                                       -1,
+                                       1e300,
+                                       -1e-300,
+                                       0,
+                                       "",
+                                       "<script>",
+                                       Json::array(),
+                                       Json::object(),
+                                       {1, nullptr},
+                                       {{"median", nullptr}},
+                                       "\xE2\x82\xAC",
+                                       Json::array({Json::object()})};
+    return odd[random() % odd.size()];
+}
+
+/// Replaces or removes one value somewhere below.
+void damage(Json& value, std::mt19937& random) {
+    if (!value.is_structured() || value.empty() || random() % 12 == 0) {
+        value = odd_value(random);
+        return;
+    }
+    auto it = value.begin();
+    std::advance(it, static_cast<std::ptrdiff_t>(random() % value.size()));
+    if (random() % 10 == 0)
+        value.erase(it);
+    else
+        damage(*it, random);
+}
+
+TEST(MakeReport, DamagedDocumentsStillGiveAPage) {
+    const std::uint32_t seed = std::random_device{}();
+    SCOPED_TRACE(fmt::format("seed {}", seed));
+    std::mt19937 random(seed);
+    std::ifstream study(std::string(RAYDIX_SOURCE_DIR) +
+                        "/bench/results/hierarchy-AMD-EPYC-2-cores.json");
+    Json hierarchy = Json::parse(study);
+    Json& runs = hierarchy["runs"];
+    while (runs.size() > 12) runs.erase(runs.size() / 2);  // enough of each kind, and quick
+    Json simulate = Json::parse(shared_document("simulate.json")),
+         traversal = Json::parse(shared_document("traversal.json"));
+    for (Json* document : {&simulate, &traversal})
+        while ((*document)["simulate"].size() > 6) (*document)["simulate"].erase(5);
+    Json trace = build_document(3);
+    trace["command"] = "trace";
+    trace["trace"] =
+        Json::parse(R"([{"rays": "ao", "mode": "any", "kernel": "scalar", "device": "cpu",
+        "count": 10, "hits": 5, "mrays_per_s": {"median": 2, "min": 1, "max": 3},
+        "node_visits_per_ray": 7.5, "triangle_tests_per_ray": 2.5}])");
+    const Json check =
+                   Json::parse(R"({"command": "check", "check": {"ok": false, "broken": "x"}})"),
+               info = Json::parse(R"({"command": "info", "scene": {"name": "s", "triangles": 3,
+                                      "bounds": [[0, 0, 0], [1, 1, 1]]}})");
+    for (std::size_t round = 0; round < 5 * test::thorough; ++round)
+        for (const Json& whole :
+             {build_document(4), trace, simulate, traversal, hierarchy, check, info}) {
+            Json damaged = whole;
+            for (std::size_t k = 0; k <= round % 20; ++k)
+                for (auto& [key, value] : damaged.items())
+                    if (key != "command" && random() % 2) damage(value, random);
+            const std::string html = page_of({whole, damaged});
+            EXPECT_TRUE(html.ends_with("</body></html>\n"));
+            EXPECT_EQ(html.find("<script>", html.find("<script>") + 1), std::string::npos)
+                << "an element of the document's own";
+            if (HasFailure()) return;
+        }
+}
+
+TEST(ReportReferences, NameScenesAndPicturesOnce) {
+    const ReportReferences references = report_references(
+        {"d",
+         R"({"scene": {"name": "a"}, "runs": [{"scene": "b"}, {"scene": "a"}, {"scene": 3}, {"scene": "c", "series": "size"}],
+                 "render": {"file": "p.png"}})"});
+    EXPECT_EQ(references.scenes, (std::vector<std::string>{"a", "b", "3"}));
+    EXPECT_EQ(references.pictures, (std::vector<std::string>{"p.png"}));
+}
+
+TEST(SaveReport, WholeOrNotAtAll) {
+    test::TempFolder folder;
+    const auto file = folder.path() / "page.html";
+    save_report(file, "old");
+    save_report(file, "new");
+    std::ifstream in(file);
+    std::string text;
+    in >> text;
+    EXPECT_EQ(text, "new");
+    EXPECT_THROW(save_report(folder.path() / "absent" / "page.html", "x"), InputError);
+}
+
+}  // namespace
+}  // namespace raydix
