@@ -75,10 +75,10 @@ struct MachineModel {
     std::string origin;  // where the figures come from
     std::uint32_t multiprocessors = 1;
     double clock_ghz = 1.0;
-    double lanes_per_clock = 32;     // lane instructions issued; a warp of 32 takes 32 of them
-    double warp_issue_clocks = 1;    // least clocks between two instructions of one warp
-    std::uint32_t resident_lanes = 1024;    // in flight
-    std::uint32_t block_lanes = 128;        // of one block; a block's place is free when all are done
+    double lanes_per_clock = 32;          // lane instructions issued; a warp of 32 takes 32 of them
+    double warp_issue_clocks = 1;         // least clocks between two instructions of one warp
+    std::uint32_t resident_lanes = 1024;  // in flight
+    std::uint32_t block_lanes = 128;      // of one block; a block's place is free when all are done
     // The memory model: a transaction brings up to 16 bytes a lane from one 128-byte line.
     double l1_transactions_per_clock = 1;
     double l2_gb_per_s = 100, dram_gb_per_s = 100;
@@ -97,9 +97,9 @@ struct MachineModel {
 struct SimulateOptions {
     WarpKernel kernel = WarpKernel::while_while;
     MachineModel machine;
-    int width = 32;         // lanes of a warp: 1, 2, 4, 8, 16, 32 or 64
-    bool any_hit = false;   // rays end at their first hit
-    bool memory = false;    // also run the memory model
+    int width = 32;        // lanes of a warp: 1, 2, 4, 8, 16, 32 or 64
+    bool any_hit = false;  // rays end at their first hit
+    bool memory = false;   // also run the memory model
 };
 
 /// How often an operation was issued, for how many lanes in sum, and at what cost.
@@ -118,8 +118,8 @@ struct Simulation {
     double scheduled_clocks = 0;          // launches one after the other, with their tails
     double idle_issues = 0;               // lost after the last ray or block was handed out
     double issue_slots = 0;               // of all clocks of all launches
-    // Warp execution times in instructions: of a batch, or of a warp's life where rays are replaced.
-    // Bin k of 8 an octave: [2^(k / 8), 2^((k + 1) / 8)).
+    // Warp execution times in instructions: of a batch, or of a warp's life where rays are
+    // replaced. Bin k of 8 an octave: [2^(k / 8), 2^((k + 1) / 8)).
     std::array<std::uint64_t, 256> warp_times{};
     std::uint64_t l1_transactions = 0, l2_bytes = 0, dram_bytes = 0;  // of the memory model
 

@@ -136,9 +136,9 @@ void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<
     std::fill(hits.begin(), hits.end(), Hit{});
     if (tree.empty()) return;
     const PreparedRays prepared(rays);
-    const WarpJob job{scene_of(tree),
-                      {prepared.rays().data(), hits.data(),
-                       static_cast<std::uint32_t>(rays.size()), nullptr}};
+    const WarpJob job{
+        scene_of(tree),
+        {prepared.rays().data(), hits.data(), static_cast<std::uint32_t>(rays.size()), nullptr}};
     with_threads(threads, [&] {
         for_each_range(rays.size(), 256, [&](std::size_t begin, std::size_t end) {
             std::vector<std::int32_t> stack(tree.max_depth() + 1);
@@ -147,8 +147,10 @@ void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<
                 warp.lane.stack = stack.data();
                 OneBatch<WhileWhile> kernel;
                 const auto index = static_cast<std::uint32_t>(i);
-                if (any_hit) kernel.turn<true>(warp, job, index);
-                else kernel.turn<false>(warp, job, index);
+                if (any_hit)
+                    kernel.turn<true>(warp, job, index);
+                else
+                    kernel.turn<false>(warp, job, index);
             }
         });
     });
@@ -215,10 +217,9 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
             runs.size(),
             [&](std::size_t k) {
                 found[k].assign(rays.size(), Hit{});
-                figures[k] = tree.empty()
-                                 ? without_tree(runs[k], rays.size())
-                                 : simulate_launch(scene_of(tree), tree.max_depth() + 1,
-                                                   prepared.rays(), found[k], runs[k]);
+                figures[k] = tree.empty() ? without_tree(runs[k], rays.size())
+                                          : simulate_launch(scene_of(tree), tree.max_depth() + 1,
+                                                            prepared.rays(), found[k], runs[k]);
                 prepared.rescale(found[k]);
                 if (hits == nullptr) std::vector<Hit>().swap(found[k]);
             },

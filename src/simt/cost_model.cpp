@@ -13,8 +13,10 @@ std::vector<OperationCost> changed(std::vector<OperationCost> table,
         const auto at = std::find_if(table.begin(), table.end(), [&](const OperationCost& c) {
             return c.operation == change.operation;
         });
-        if (at == table.end()) table.push_back(change);
-        else *at = change;
+        if (at == table.end())
+            table.push_back(change);
+        else
+            *at = change;
     }
     return table;
 }

@@ -37,11 +37,10 @@ enum class Op : std::uint8_t {
 inline constexpr std::size_t op_count = static_cast<std::size_t>(Op::count);
 
 inline constexpr std::array<std::string_view, op_count> op_names{
-    "main_loop",  "node_loop",     "leaf_loop",  "visit_node", "push",
-    "pop",        "test_triangle", "test_edges", "accept_hit", "next_triangle",
-    "postpone_leaf", "next_leaf",  "vote",       "ballot",     "rank",
-    "shuffle",    "choose",        "take_rays",  "start_ray",  "store_hit",
-    "exchange_ray"};
+    "main_loop",     "node_loop",  "leaf_loop",   "visit_node",    "push",          "pop",
+    "test_triangle", "test_edges", "accept_hit",  "next_triangle", "postpone_leaf", "next_leaf",
+    "vote",          "ballot",     "rank",        "shuffle",       "choose",        "take_rays",
+    "start_ray",     "store_hit",  "exchange_ray"};
 
 [[nodiscard]] constexpr std::string_view op_name(Op op) {
     return op_names[static_cast<std::size_t>(op)];

@@ -29,9 +29,8 @@ struct WarpJob {
 template <class Warp>
 RAYDIX_HD void start_batch(Warp& warp, const RayLaunch& launch, std::uint32_t first) {
     warp.reads([&](const Lane&) { return launch.rays + first; }, sizeof(Ray));
-    warp.step_indexed(Op::start_ray, [&](Lane& l, std::uint32_t lane) {
-        start_ray(l, launch, first + lane);
-    });
+    warp.step_indexed(Op::start_ray,
+                      [&](Lane& l, std::uint32_t lane) { start_ray(l, launch, first + lane); });
 }
 
 template <class Warp>

@@ -15,20 +15,28 @@ namespace raydix {
 template <class Fn>
 auto with_kernel(WarpKernel kernel, const Fn& fn) {
     switch (kernel) {
-        case WarpKernel::packet: return fn.template operator()<OneBatch<Packet>>();
-        case WarpKernel::while_while: return fn.template operator()<OneBatch<WhileWhile>>();
-        case WarpKernel::if_if: return fn.template operator()<OneBatch<IfIf>>();
+        case WarpKernel::packet:
+            return fn.template operator()<OneBatch<Packet>>();
+        case WarpKernel::while_while:
+            return fn.template operator()<OneBatch<WhileWhile>>();
+        case WarpKernel::if_if:
+            return fn.template operator()<OneBatch<IfIf>>();
         case WarpKernel::speculative_while_while:
             return fn.template operator()<OneBatch<SpeculativeWhileWhile>>();
-        case WarpKernel::persistent_packet: return fn.template operator()<Persistent<Packet>>();
+        case WarpKernel::persistent_packet:
+            return fn.template operator()<Persistent<Packet>>();
         case WarpKernel::persistent_while_while:
             return fn.template operator()<Persistent<WhileWhile>>();
-        case WarpKernel::persistent_if_if: return fn.template operator()<Persistent<IfIf>>();
+        case WarpKernel::persistent_if_if:
+            return fn.template operator()<Persistent<IfIf>>();
         case WarpKernel::persistent_speculative_while_while:
             return fn.template operator()<Persistent<SpeculativeWhileWhile>>();
-        case WarpKernel::ray_replacement: return fn.template operator()<RayReplacement>();
-        case WarpKernel::work_queue: return fn.template operator()<WorkQueue>();
-        default: return fn.template operator()<DynamicFetch>();
+        case WarpKernel::ray_replacement:
+            return fn.template operator()<RayReplacement>();
+        case WarpKernel::work_queue:
+            return fn.template operator()<WorkQueue>();
+        default:
+            return fn.template operator()<DynamicFetch>();
     }
 }
 

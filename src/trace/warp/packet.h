@@ -53,8 +53,8 @@ private:
             warp.step(Op::visit_node, [&](Lane& l) {
                 const PairVisit met = meet_pair(l, pair);
                 const bool rather_second = met.second && (met.second_is_closer || !met.first);
-                l.meets = (met.first ? 1u : 0u) | (met.second ? 2u : 0u) |
-                          (rather_second ? 4u : 0u);
+                l.meets =
+                    (met.first ? 1u : 0u) | (met.second ? 2u : 0u) | (rather_second ? 4u : 0u);
             });
         });
         const auto votes = [&](std::uint32_t flag, Op op = Op::vote) {
@@ -67,8 +67,7 @@ private:
         const bool to_second = warp.uniform(Op::choose, [&] {
             return 2 * count_ones(rather_second) > count_ones(first.lanes | second.lanes);
         });
-        warp.write_shared(Op::push,
-                          [&] { warp.memory.packets[top] = to_second ? first : second; });
+        warp.write_shared(Op::push, [&] { warp.memory.packets[top] = to_second ? first : second; });
         ++top;
         return to_second ? second : first;
     }
@@ -84,12 +83,11 @@ private:
                 warp.among(at.lanes, [&] {
                     test_triangle(warp, scene, [link](const Lane&) { return link; });
                 });
-                link = warp.uniform(Op::next_triangle,
-                                    [&] { return after_triangle(link, scene, 0); });
+                link =
+                    warp.uniform(Op::next_triangle, [&] { return after_triangle(link, scene, 0); });
             });
         if (!any_hit) return alive;
-        return alive &
-               warp.ballot(Op::vote, [](const Lane& l) { return l.prim == no_primitive; });
+        return alive & warp.ballot(Op::vote, [](const Lane& l) { return l.prim == no_primitive; });
     }
 };
 

@@ -28,13 +28,16 @@ RAYDIX_HD void test_triangle(Warp& warp, const WarpScene& scene, Link link) {
     const auto position = [link](const Lane& l) { return static_cast<std::uint32_t>(~link(l)); };
     warp.reads([&](const Lane& l) { return scene.triangles[position(l)].z; }, 16);
     warp.step(Op::test_triangle, [&](Lane& l) { test_plane(l, scene, position(l)); });
-    warp.when([](const Lane& l) { return plane_in_range(l); }, [&] {
-        warp.reads([&](const Lane& l) { return scene.triangles[position(l)].x; }, 32);
-        warp.step(Op::test_edges, [&](Lane& l) { test_edges(l, scene, position(l)); });
-        warp.when([](const Lane& l) { return inside_edges(l); }, [&] {
-            warp.step(Op::accept_hit, [&](Lane& l) { accept_hit(l, scene, position(l)); });
-        });
-    });
+    warp.when([](const Lane& l) { return plane_in_range(l); },
+              [&] {
+                  warp.reads([&](const Lane& l) { return scene.triangles[position(l)].x; }, 32);
+                  warp.step(Op::test_edges, [&](Lane& l) { test_edges(l, scene, position(l)); });
+                  warp.when([](const Lane& l) { return inside_edges(l); },
+                            [&] {
+                                warp.step(Op::accept_hit,
+                                          [&](Lane& l) { accept_hit(l, scene, position(l)); });
+                            });
+              });
 }
 
 /// The triangle that `node` stands at, and on to the next or out of the leaf.
@@ -87,8 +90,7 @@ struct SpeculativeWhileWhile {
     template <bool any_hit, class Warp>
     RAYDIX_HD static void trace(Warp& warp, const WarpScene& scene) {
         warp.voting_loop(
-            Op::main_loop, is_unfinished, [&] { turn<any_hit>(warp, scene); },
-            [] { return true; });
+            Op::main_loop, is_unfinished, [&] { turn<any_hit>(warp, scene); }, [] { return true; });
     }
     template <bool any_hit, class Warp>
     RAYDIX_HD static void turn(Warp& warp, const WarpScene& scene) {
@@ -104,9 +106,7 @@ struct SpeculativeWhileWhile {
 
 private:
     RAYDIX_HD static bool found_first_leaf(const Lane& l) { return at_leaf(l) && l.leaf == 0; }
-    RAYDIX_HD static bool still_searching(const Lane& l) {
-        return at_inner_node(l) && l.leaf == 0;
-    }
+    RAYDIX_HD static bool still_searching(const Lane& l) { return at_inner_node(l) && l.leaf == 0; }
     template <class Warp>
     RAYDIX_HD static void put_leaf_aside(Warp& warp) {
         warp.step(Op::postpone_leaf, [](Lane& l) { l.leaf = l.node; });
@@ -122,10 +122,11 @@ private:
             l.node = end ? finished_node : l.node;
         });
         // The walk may have stopped at a second leaf.
-        warp.when([](const Lane& l) { return l.leaf == 0 && at_leaf(l); }, [&] {
-            warp.step(Op::next_leaf, [](Lane& l) { l.leaf = l.node; });
-            warp.step(Op::pop, [](Lane& l) { pop(l); });
-        });
+        warp.when([](const Lane& l) { return l.leaf == 0 && at_leaf(l); },
+                  [&] {
+                      warp.step(Op::next_leaf, [](Lane& l) { l.leaf = l.node; });
+                      warp.step(Op::pop, [](Lane& l) { pop(l); });
+                  });
     }
 };
 

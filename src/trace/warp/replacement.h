@@ -25,9 +25,8 @@ template <class Warp>
 RAYDIX_HD bool replace_finished(Warp& warp, const RayLaunch& launch, bool& dry) {
     const LaneMask finished = warp.ballot(Op::ballot, is_finished);
     if (finished == 0) return true;
-    warp.when([](const Lane& l) { return is_finished(l) && has_ray(l); }, [&] {
-        warp.step(Op::store_hit, [&](Lane& l) { store_hit(l, launch); });
-    });
+    warp.when([](const Lane& l) { return is_finished(l) && has_ray(l); },
+              [&] { warp.step(Op::store_hit, [&](Lane& l) { store_hit(l, launch); }); });
     const auto count = static_cast<std::uint32_t>(count_ones(finished));
     if (dry) return count < Warp::width();
     const std::uint32_t first = warp.take(Op::take_rays, *launch.next, count);

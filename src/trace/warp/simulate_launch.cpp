@@ -76,8 +76,7 @@ void add_times(Simulation& figures, const LaunchRun& run, double clocks, double 
     const double slots_per_clock = run.rates().shared * run.options.machine.multiprocessors;
     figures.scheduled_clocks += clocks;
     figures.issue_slots += clocks * slots_per_clock;
-    figures.idle_issues +=
-        std::max(0.0, (clocks - last_handed_out) * slots_per_clock - work_after);
+    figures.idle_issues += std::max(0.0, (clocks - last_handed_out) * slots_per_clock - work_after);
 }
 
 /// Instructions of each warp, in the order of the launch.
@@ -93,9 +92,9 @@ std::vector<std::uint64_t> run_batches(const LaunchRun& run, Simulation& figures
         for (std::size_t w = begin; w < end; ++w) {
             const std::uint64_t before = tally.issued;
             if (run.memory)
-                run.memory->run_on(static_cast<std::uint32_t>(
-                    w * run.width() / run.options.machine.block_lanes %
-                    run.options.machine.multiprocessors));
+                run.memory->run_on(
+                    static_cast<std::uint32_t>(w * run.width() / run.options.machine.block_lanes %
+                                               run.options.machine.multiprocessors));
             run.kernel.start_kernel(state);
             run.kernel.turn(memory.at(0), state, run.job, static_cast<std::uint32_t>(w));
             times[w] = tally.issued - before;
@@ -119,7 +118,8 @@ void schedule_blocks(const LaunchRun& run, const std::vector<std::uint64_t>& tim
     const MachineModel& m = run.options.machine;
     const std::size_t block_warps = std::max(1u, m.block_lanes / run.width());
     const std::size_t blocks = (times.size() + block_warps - 1) / block_warps;
-    const std::size_t places = std::max(1u, m.resident_lanes / std::max(m.block_lanes, run.width()));
+    const std::size_t places =
+        std::max(1u, m.resident_lanes / std::max(m.block_lanes, run.width()));
     Multiprocessors machine(m.multiprocessors, run.rates());
     std::vector<std::uint32_t> left(blocks);
     std::size_t next = 0;
@@ -215,12 +215,13 @@ Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
                            std::span<const Ray> rays, std::span<Hit> hits,
                            const SimulateOptions& options) {
     std::uint32_t next = 0;
-    LaunchRun run{options,
-                  *simulated_kernel(options.kernel, options.any_hit, options.width),
-                  {scene, {rays.data(), hits.data(), static_cast<std::uint32_t>(rays.size()), &next}},
-                  stack_entries,
-                  op_costs(options.machine),
-                  nullptr};
+    LaunchRun run{
+        options,
+        *simulated_kernel(options.kernel, options.any_hit, options.width),
+        {scene, {rays.data(), hits.data(), static_cast<std::uint32_t>(rays.size()), &next}},
+        stack_entries,
+        op_costs(options.machine),
+        nullptr};
     const MachineModel& m = options.machine;
     if (options.memory)
         run.memory = std::make_unique<MemoryModel>(m.multiprocessors, m.l1_bytes, m.l2_bytes);

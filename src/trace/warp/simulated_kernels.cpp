@@ -16,14 +16,22 @@ namespace {
 template <class Isa>
 const SimulatedKernel* kernel_of(WarpKernel kernel, bool any_hit, int width) {
     switch (width) {
-        case 1: return simulated_kernel_of_width<Isa, 1>(kernel, any_hit);
-        case 2: return simulated_kernel_of_width<Isa, 2>(kernel, any_hit);
-        case 4: return simulated_kernel_of_width<Isa, 4>(kernel, any_hit);
-        case 8: return simulated_kernel_of_width<Isa, 8>(kernel, any_hit);
-        case 16: return simulated_kernel_of_width<Isa, 16>(kernel, any_hit);
-        case 32: return simulated_kernel_of_width<Isa, 32>(kernel, any_hit);
-        case 64: return simulated_kernel_of_width<Isa, 64>(kernel, any_hit);
-        default: return nullptr;
+        case 1:
+            return simulated_kernel_of_width<Isa, 1>(kernel, any_hit);
+        case 2:
+            return simulated_kernel_of_width<Isa, 2>(kernel, any_hit);
+        case 4:
+            return simulated_kernel_of_width<Isa, 4>(kernel, any_hit);
+        case 8:
+            return simulated_kernel_of_width<Isa, 8>(kernel, any_hit);
+        case 16:
+            return simulated_kernel_of_width<Isa, 16>(kernel, any_hit);
+        case 32:
+            return simulated_kernel_of_width<Isa, 32>(kernel, any_hit);
+        case 64:
+            return simulated_kernel_of_width<Isa, 64>(kernel, any_hit);
+        default:
+            return nullptr;
     }
 }
 
@@ -41,8 +49,7 @@ bool has_v3() {
 
 const SimulatedKernel* simulated_kernel(WarpKernel kernel, bool any_hit, int width,
                                         SimulatorIsa isa) {
-    if (isa == SimulatorIsa::base)
-        return kernel_of<simulator_isa::base>(kernel, any_hit, width);
+    if (isa == SimulatorIsa::base) return kernel_of<simulator_isa::base>(kernel, any_hit, width);
 #if defined(RAYDIX_SIMULATOR_V3)
     if (has_v3()) return kernel_of<simulator_isa::v3>(kernel, any_hit, width);
 #endif

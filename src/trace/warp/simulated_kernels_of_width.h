@@ -29,7 +29,8 @@ struct SimulatedKernelOf {
         std::array<std::uint32_t, Width> slots;
     };
     static_assert(sizeof(Kernel) <= sizeof(KernelState) && alignof(Kernel) <= alignof(KernelState));
-    static_assert(std::is_trivially_destructible_v<Warp> && std::is_trivially_destructible_v<Kernel>);
+    static_assert(std::is_trivially_destructible_v<Warp> &&
+                  std::is_trivially_destructible_v<Kernel>);
 
     static std::size_t rounded(std::size_t bytes) { return (bytes + 63) / 64 * 64; }
     static std::size_t shared_bytes(std::uint32_t stack_entries) {
@@ -84,9 +85,8 @@ const SimulatedKernel* simulated_kernel_of_width(WarpKernel kernel, bool any_hit
 }
 
 #if defined(RAYDIX_SIMULATOR_ISA)
-template const SimulatedKernel*
-simulated_kernel_of_width<simulator_isa::RAYDIX_SIMULATOR_ISA, RAYDIX_SIMULATOR_WIDTH>(WarpKernel,
-                                                                                     bool);
+template const SimulatedKernel* simulated_kernel_of_width<simulator_isa::RAYDIX_SIMULATOR_ISA,
+                                                          RAYDIX_SIMULATOR_WIDTH>(WarpKernel, bool);
 #endif
 
 }  // namespace raydix

@@ -65,8 +65,7 @@ RAYDIX_HD inline void start_ray(Lane& l, const RayLaunch& launch, std::uint32_t 
     l.direction = ray.direction;
     l.inverse = {inverse_of(ray.direction.x), inverse_of(ray.direction.y),
                  inverse_of(ray.direction.z)};
-    l.scaled = {ray.origin.x * l.inverse.x, ray.origin.y * l.inverse.y,
-                ray.origin.z * l.inverse.z};
+    l.scaled = {ray.origin.x * l.inverse.x, ray.origin.y * l.inverse.y, ray.origin.z * l.inverse.z};
     l.tmin = ray.tmin;
     l.t = ray.tmax;
     l.node = ray.tmin <= ray.tmax ? 0 : finished_node;
@@ -74,8 +73,7 @@ RAYDIX_HD inline void start_ray(Lane& l, const RayLaunch& launch, std::uint32_t 
 
 RAYDIX_HD inline void store_hit(Lane& l, const RayLaunch& launch) {
     if (l.ray != no_ray)
-        launch.hits[l.ray] =
-            Hit{l.prim == no_primitive ? infinity : l.t, l.prim, l.u, l.v};
+        launch.hits[l.ray] = Hit{l.prim == no_primitive ? infinity : l.t, l.prim, l.u, l.v};
     l.ray = no_ray;
 }
 
@@ -131,8 +129,8 @@ RAYDIX_HD inline void test_plane(Lane& l, const WarpScene& scene, std::uint32_t 
     const float* z = scene.triangles[position].z;
     const float height = multiply_add(
         -z[0], l.origin.x, multiply_add(-z[1], l.origin.y, multiply_add(-z[2], l.origin.z, z[3])));
-    const float slope = multiply_add(
-        z[0], l.direction.x, multiply_add(z[1], l.direction.y, z[2] * l.direction.z));
+    const float slope =
+        multiply_add(z[0], l.direction.x, multiply_add(z[1], l.direction.y, z[2] * l.direction.z));
     l.test_t = height / slope;
 }
 /// False for NaN, which is what triangles without area give.

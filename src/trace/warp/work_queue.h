@@ -21,8 +21,9 @@ namespace raydix {
 enum class Want : std::uint32_t { node, triangle, fetch };
 
 RAYDIX_HD inline bool wants(const Lane& l, Want want) {
-    return want == Want::node ? at_inner_node(l) : want == Want::triangle ? at_leaf(l)
-                                                                          : is_finished(l);
+    return want == Want::node       ? at_inner_node(l)
+           : want == Want::triangle ? at_leaf(l)
+                                    : is_finished(l);
 }
 
 class WorkQueue {
@@ -59,9 +60,8 @@ private:
     template <class Warp>
     RAYDIX_HD void fetch(Warp& warp, const RayLaunch& launch) {
         const LaneMask finished = warp.ballot(Op::ballot, is_finished);
-        warp.when([](const Lane& l) { return is_finished(l) && has_ray(l); }, [&] {
-            warp.step(Op::store_hit, [&](Lane& l) { store_hit(l, launch); });
-        });
+        warp.when([](const Lane& l) { return is_finished(l) && has_ray(l); },
+                  [&] { warp.step(Op::store_hit, [&](Lane& l) { store_hit(l, launch); }); });
         if (dry_) return;
         const auto count = static_cast<std::uint32_t>(count_ones(finished));
         const std::uint32_t first = warp.take(Op::take_rays, *launch.next, count);
@@ -90,18 +90,17 @@ private:
             const bool idle = nodes + triangles == 0;
             none_left_ = idle && done == 0;
             wanted_ = (idle && done > 0) || done >= static_cast<int>(Warp::width()) ? Want::fetch
-                      : triangles > nodes                                          ? Want::triangle
-                                                                                   : Want::node;
+                      : triangles > nodes                                           ? Want::triangle
+                                                                                    : Want::node;
             return !none_left_;
         });
     }
     template <class Warp, class Cond>
     RAYDIX_HD static int count(Warp& warp, Cond cond) {
         const LaneMask own = warp.ballot(Op::ballot, cond);
-        const LaneMask spare =
-            warp.ballot_indexed(Op::ballot, [&](const Lane&, std::uint32_t lane) {
-                return cond(warp.memory.spares[lane]);
-            });
+        const LaneMask spare = warp.ballot_indexed(
+            Op::ballot,
+            [&](const Lane&, std::uint32_t lane) { return cond(warp.memory.spares[lane]); });
         return count_ones(own) + count_ones(spare);
     }
 
@@ -115,15 +114,13 @@ private:
         const auto fits = [wanted, dry](const Lane& l) {
             return wants(l, wanted) && (wanted != Want::fetch || !dry || has_ray(l));
         };
-        const LaneMask without =
-            warp.ballot(Op::ballot, [&](const Lane& l) { return !fits(l); });
-        const LaneMask offered =
-            warp.ballot_indexed(Op::ballot, [&](const Lane&, std::uint32_t lane) {
-                return fits(warp.memory.spares[lane]);
-            });
+        const LaneMask without = warp.ballot(Op::ballot, [&](const Lane& l) { return !fits(l); });
+        const LaneMask offered = warp.ballot_indexed(
+            Op::ballot,
+            [&](const Lane&, std::uint32_t lane) { return fits(warp.memory.spares[lane]); });
         if (without == 0 || offered == 0) return;
-        const auto pairs = static_cast<std::uint32_t>(
-            lesser_count(count_ones(without), count_ones(offered)));
+        const auto pairs =
+            static_cast<std::uint32_t>(lesser_count(count_ones(without), count_ones(offered)));
         warp.among(offered, [&] {
             warp.step_indexed(Op::rank, [&](const Lane&, std::uint32_t lane) {
                 warp.memory.slots[rank_in(offered, lane)] = lane;
@@ -146,8 +143,10 @@ private:
 
     template <bool any_hit, class Warp>
     RAYDIX_HD void operate(Warp& warp, const WarpScene& scene) {
-        if (wanted_ == Want::node) visit_once(warp, scene);
-        else test_in_place<any_hit>(warp, scene);
+        if (wanted_ == Want::node)
+            visit_once(warp, scene);
+        else
+            test_in_place<any_hit>(warp, scene);
     }
 
     Want wanted_ = Want::fetch;
