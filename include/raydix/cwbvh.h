@@ -1,5 +1,5 @@
-// The compressed wide BVH (Ylitie, Karras, Laine 2017): eight children a node of 80 bytes, made from
-// any binary tree of triangles; its rays on the CPU. raydix/device_cwbvh.h traces it on a GPU.
+// The compressed wide BVH (Ylitie, Karras, Laine 2017): eight children a node of 80 bytes, made
+// from any binary tree of triangles; its rays on the CPU. raydix/device_cwbvh.h traces it on a GPU.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -18,15 +18,15 @@ struct CwbvhStats {
     std::uint64_t inner_children = 0;  // children that are nodes: nodes - 1
     std::uint64_t leaf_children = 0;   // children of 1 to 3 triangles
     std::uint64_t references = 0;      // triangles in leaves
-    std::uint64_t triangles = 0;       // different ones; less than references if a builder splits them
-    std::uint32_t max_depth = 0;       // edges from the root to the deepest leaf child
+    std::uint64_t triangles = 0;  // different ones; less than references if a builder splits them
+    std::uint32_t max_depth = 0;  // edges from the root to the deepest leaf child
     double children_per_node = 0;
-    double sah = 0;  // cost of the wide tree, 1 a node and 1 a triangle, by the boxes before they are
-                     // quantised; 0 if the root has no area
-    double widening = 0;  // surface of all quantised child boxes / that of the exact ones; 1 without
-                          // surface
+    double sah = 0;  // cost of the wide tree, 1 a node and 1 a triangle, by the boxes before they
+                     // are quantised; 0 if the root has no area
+    double widening = 0;  // surface of all quantised child boxes / that of the exact ones; 1
+                          // without surface
     std::uint64_t node_bytes = 0, triangle_bytes = 0;
-    std::uint64_t bytes = 0;  // every byte a trace touches
+    std::uint64_t bytes = 0;        // every byte a trace touches
     double bytes_per_triangle = 0;  // bytes / triangles
 };
 

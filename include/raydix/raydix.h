@@ -7,6 +7,7 @@
 #include <raydix/check.h>            // IWYU pragma: export
 #include <raydix/cwbvh.h>            // IWYU pragma: export
 #include <raydix/device.h>           // IWYU pragma: export
+#include <raydix/device_cwbvh.h>     // IWYU pragma: export
 #include <raydix/error.h>            // IWYU pragma: export
 #include <raydix/hierarchy_study.h>  // IWYU pragma: export
 #include <raydix/kdtree.h>           // IWYU pragma: export

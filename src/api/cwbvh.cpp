@@ -50,9 +50,8 @@ CwbvhStats stats_of(const WideTree& wide, const WideOptions& options, const Bvh&
     stats.triangle_bytes = arrays.triangles.size() * sizeof(CwbvhTriangle);
     stats.bytes = stats.node_bytes + stats.triangle_bytes;
     if (stats.nodes > 0)
-        stats.children_per_node =
-            static_cast<double>(stats.inner_children + stats.leaf_children) /
-            static_cast<double>(stats.nodes);
+        stats.children_per_node = static_cast<double>(stats.inner_children + stats.leaf_children) /
+                                  static_cast<double>(stats.nodes);
     if (stats.triangles > 0)
         stats.bytes_per_triangle =
             static_cast<double>(stats.bytes) / static_cast<double>(stats.triangles);

@@ -20,8 +20,8 @@ float coordinate(Vec3 v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : 
 
 double step_of(int exponent) { return std::ldexp(1.0, exponent - 127); }
 
-/// b - a without rounding: `value` is the nearest double, `rest` what it lacks (Knuth's two-sum; two
-/// floats can be 2^149 apart in size).
+/// b - a without rounding: `value` is the nearest double, `rest` what it lacks (Knuth's two-sum;
+/// two floats can be 2^149 apart in size).
 struct ExactDifference {
     double value, rest;
     ExactDifference(double a, double b) : value(b - a) {
@@ -30,9 +30,7 @@ struct ExactDifference {
     }
     /// Whether the difference is at least / at most x. x and `value` are doubles, hence the rest
     /// matters only if they are equal.
-    [[nodiscard]] bool at_least(double x) const {
-        return value > x || (value == x && rest >= 0);
-    }
+    [[nodiscard]] bool at_least(double x) const { return value > x || (value == x && rest >= 0); }
     [[nodiscard]] bool at_most(double x) const { return value < x || (value == x && rest <= 0); }
 };
 
@@ -151,8 +149,8 @@ void set_frame(const Slots& slots, CwbvhNode& node) {
         if (child != nullptr) box = unite(box, box_of(*child));
     for (int axis = 0; axis < 3; ++axis) {
         node.origin[axis] = coordinate(box.lo, axis);
-        node.exponent[axis] = static_cast<std::uint8_t>(
-            step_exponent(node.origin[axis], coordinate(box.hi, axis)));
+        node.exponent[axis] =
+            static_cast<std::uint8_t>(step_exponent(node.origin[axis], coordinate(box.hi, axis)));
     }
 }
 
@@ -201,8 +199,10 @@ public:
         place_.resize(n);
         if (n > 0) place_[0] = 0;
         order_.resize(n);
-        for_each_index(n, [&](std::size_t w) { place_children(w); }, 256);
-        for_each_index(n, [&](std::size_t w) { write_node(w); }, 256);
+        for_each_index(
+            n, [&](std::size_t w) { place_children(w); }, 256);
+        for_each_index(
+            n, [&](std::size_t w) { write_node(w); }, 256);
     }
 
 private:

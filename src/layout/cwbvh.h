@@ -21,17 +21,17 @@ inline constexpr std::uint32_t cwbvh_first_child_bit = 24;
 
 /// A child in slot s has the box origin + lo[.][s] * step to origin + hi[.][s] * step, where the
 /// step of an axis is 2^(exponent - 127). Bit a of s is set for children that lie toward the upper
-/// end of axis a, as far as the places go: a ray meets the slots from near to far in ascending order
-/// of s ^ (its octant).
+/// end of axis a, as far as the places go: a ray meets the slots from near to far in ascending
+/// order of s ^ (its octant).
 struct alignas(16) CwbvhNode {
     float origin[3];
     std::uint8_t exponent[3];
     std::uint8_t inner_mask;      // bit s: the child in slot s is a node
     std::uint32_t child_base;     // nodes of the children follow each other, in order of slots
     std::uint32_t triangle_base;  // and so do their triangles
-    /// 0: no child. Node: 001 in the upper three bits, 24 + s in the lower five. Leaf: as many ones in
-    /// the upper three bits as it has triangles; the lower five are the first one's position behind
-    /// triangle_base.
+    /// 0: no child. Node: 001 in the upper three bits, 24 + s in the lower five. Leaf: as many ones
+    /// in the upper three bits as it has triangles; the lower five are the first one's position
+    /// behind triangle_base.
     std::uint8_t meta[cwbvh_width];
     std::uint8_t lo[3][cwbvh_width];
     std::uint8_t hi[3][cwbvh_width];
@@ -60,8 +60,8 @@ struct Cwbvh::Arrays {
 void compress_wide_tree(const WideTree& wide, const Bvh& bvh, Cwbvh::Arrays& out);
 
 /// Places up to 8 children in slots 0 to 7 so that the sum over children of
-/// dot(centre of child - centre of node, diagonal of slot) is largest: the assignment of section 3.2,
-/// solved exactly. slots [count], out.
+/// dot(centre of child - centre of node, diagonal of slot) is largest: the assignment of
+/// section 3.2, solved exactly. slots [count], out.
 void assign_octant_slots(std::span<const Aabb> children, int* slots);
 
 /// step_exponent: the biased exponent of the least power of two of which 255 reach from lo to hi.

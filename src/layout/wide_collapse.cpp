@@ -73,14 +73,12 @@ struct Plan {
     std::uint32_t choices;  // four bits per i: see choice()
     std::uint32_t first, last;  // its primitives [first, last); first > last: not in one run
 
-    /// i = 1: 1 for a leaf, 0 for a wide node. i > 1: so many of the i subtrees go to the left child;
-    /// 0: as for i - 1.
+    /// i = 1: 1 for a leaf, 0 for a wide node. i > 1: so many of the i subtrees go to the left
+    /// child; 0: as for i - 1.
     [[nodiscard]] int choice(int i) const {
         return static_cast<int>(choices >> (4 * (i - 1)) & 15u);
     }
-    void choose(int i, int what) {
-        choices |= static_cast<std::uint32_t>(what) << (4 * (i - 1));
-    }
+    void choose(int i, int what) { choices |= static_cast<std::uint32_t>(what) << (4 * (i - 1)); }
     [[nodiscard]] bool is_leaf() const { return choice(1) == 1; }
 };
 
@@ -180,7 +178,9 @@ private:
         }
         const float area = relative_area(node);
         plan.choose(width, part[width]);
-        plan.cost[0] = shared[width] + area * static_cast<float>(options_.node_cost);
+        // The root is a node in any case: nothing is saved by making it a leaf, its only child.
+        const double node_cost = &node == &nodes_[0] ? 0.0 : options_.node_cost;
+        plan.cost[0] = shared[width] + area * static_cast<float>(node_cost);
         if (plan.first <= plan.last && plan.last - plan.first <= options_.max_leaf) {
             const float as_leaf = area * static_cast<float>(plan.last - plan.first) *
                                   static_cast<float>(options_.primitive_cost);
@@ -199,8 +199,10 @@ private:
     static void join_runs(const ChildPlan& a, const ChildPlan& b, Plan<width>& plan) {
         plan.first = 1, plan.last = 0;
         if (a.first > a.last || b.first > b.last) return;
-        if (a.last == b.first) plan.first = a.first, plan.last = b.last;
-        else if (b.last == a.first) plan.first = b.first, plan.last = a.last;
+        if (a.last == b.first)
+            plan.first = a.first, plan.last = b.last;
+        else if (b.last == a.first)
+            plan.first = b.first, plan.last = a.last;
     }
 
     [[nodiscard]] bool ends_here(const BvhNode& node) const {
@@ -231,8 +233,10 @@ private:
             int trees = next.trees;
             if (!node.is_leaf())
                 while (trees > 1 && plans_[rank_of(node)].choice(trees) == 0) --trees;
-            if (node.is_leaf() || trees == 1) chosen[count++] = next.slot;
-            else divide(node, trees);
+            if (node.is_leaf() || trees == 1)
+                chosen[count++] = next.slot;
+            else
+                divide(node, trees);
         }
         return count;
     }
@@ -271,9 +275,9 @@ private:
     std::span<const BvhNode> nodes_;
     WideOptions options_;
     double per_area_ = 0;
-    std::vector<Plan<width>> plans_;          // [inner nodes], by rank
-    std::vector<std::uint32_t> by_level_;     // [inner nodes]
-    std::vector<std::size_t> level_begin_;    // [levels + 1]
+    std::vector<Plan<width>> plans_;           // [inner nodes], by rank
+    std::vector<std::uint32_t> by_level_;      // [inner nodes]
+    std::vector<std::size_t> level_begin_;     // [levels + 1]
     std::vector<std::uint32_t> roots_, base_;  // [wide nodes]: slot; first inner child
 };
 

@@ -1,6 +1,6 @@
 // One ray through a compressed wide tree (Ylitie, Karras, Laine 2017, section 3.3), for host and
-// device. What a ray still has to visit are groups: children of one node that it met, as bits in the
-// order of its octant, and triangles of one node.
+// device. What a ray still has to visit are groups: children of one node that it met, as bits in
+// the order of its octant, and triangles of one node.
 #pragma once
 
 #include <cstdint>
@@ -35,10 +35,10 @@ struct CwbvhTriangles {
 };
 
 /// A ray's constants. Boxes are widened by twice the pad of slab.h, which leaves room for the
-/// roundings of plane_at: it stays within 8 u * (distance to the farthest plane) of the exact plane,
-/// u = 2^-24, the pad adds as much on every side (docs/algorithms/cwbvh.md). A component of the
-/// direction below 2^-80 counts as that: nothing then is infinite or NaN, a plane before the origin
-/// stays before it, and the one behind stays farther away than any hit.
+/// roundings of plane_at: it stays within 8 u * (distance to the farthest plane) of the exact
+/// plane, u = 2^-24, the pad adds as much on every side (docs/algorithms/cwbvh.md). A component of
+/// the direction below 2^-80 counts as that: nothing then is infinite or NaN, a plane before the
+/// origin stays before it, and the one behind stays farther away than any hit.
 struct CwbvhRay {
     RayFrame frame;
     Vec3 inverse, pad;  // pad: with the sign that moves near planes toward the ray's start
@@ -66,8 +66,8 @@ RAYDIX_HD inline CwbvhRay make_cwbvh_ray(const RayFrame& frame, const Aabb& boun
     return ray;
 }
 
-/// A node as 32-bit words: 0-2 origin, 3 exponents and inner_mask, 4 and 5 bases, 6 and 7 meta, then
-/// pairs of lo x, y, z and hi x, y, z.
+/// A node as 32-bit words: 0-2 origin, 3 exponents and inner_mask, 4 and 5 bases, 6 and 7 meta,
+/// then pairs of lo x, y, z and hi x, y, z.
 struct CwbvhWords {
     std::uint32_t word[20];
 };
@@ -189,7 +189,8 @@ RAYDIX_HD inline std::uint32_t meet_children(const CwbvhRay& ray, const CwbvhWor
 RAYDIX_HD inline std::uint32_t take_first_child(const CwbvhRay& ray, CwbvhGroup& group) {
     const int bit = highest_bit(group.hits);
     group.hits ^= 1u << bit;
-    const std::uint32_t slot = (static_cast<std::uint32_t>(bit) - cwbvh_first_child_bit) ^ ray.octant;
+    const std::uint32_t slot =
+        (static_cast<std::uint32_t>(bit) - cwbvh_first_child_bit) ^ ray.octant;
     const std::uint32_t before = group.hits & ((1u << slot) - 1u);
     return group.base + static_cast<std::uint32_t>(count_ones(std::uint64_t{before}));
 }
@@ -222,8 +223,8 @@ struct NoCwbvhSteps {
 /// What a ray has before it: the root, as the only child of nothing.
 RAYDIX_HD inline CwbvhGroup root_group() { return {0, 1u << 31}; }
 
-/// Enters the first child of `nodes`, whose siblings go to the stack. One entry a level at most: the
-/// stack needs room for `max_depth` of them.
+/// Enters the first child of `nodes`, whose siblings go to the stack. One entry a level at most:
+/// the stack needs room for `max_depth` of them.
 template <class Steps>
 RAYDIX_HD void visit_first_child(const CwbvhView& tree, const CwbvhRay& ray, float tmax,
                                  CwbvhGroup& nodes, CwbvhTriangles& triangles, CwbvhGroup*& top,

@@ -33,7 +33,8 @@ TEST(Cwbvh, StepsAreTheNearestOutward) {
     for (int turn = 0; turn < 200'000; ++turn) {
         const auto number = [&] {
             const int size = static_cast<int>(random() % 56) - 16;  // 2^-16 to 2^39
-            return std::ldexp(static_cast<float>(static_cast<std::int64_t>(random()) >> 40), size - 23);
+            return std::ldexp(static_cast<float>(static_cast<std::int64_t>(random()) >> 40),
+                              size - 23);
         };
         float v[3] = {number(), number(), number()};
         if (turn % 5 == 0) v[2] = std::nextafter(v[1], infinity);
@@ -75,8 +76,8 @@ double gain_of(std::span<const Aabb> boxes, std::span<const int> slots) {
     double sum = 0;
     for (std::size_t k = 0; k < boxes.size(); ++k) {
         const Vec3 d = center_of(boxes[k]) - center_of(all);
-        sum += (slots[k] & 1 ? d.x : -d.x) + (slots[k] & 2 ? d.y : -d.y) +
-               (slots[k] & 4 ? d.z : -d.z);
+        sum +=
+            (slots[k] & 1 ? d.x : -d.x) + (slots[k] & 2 ? d.y : -d.y) + (slots[k] & 4 ? d.z : -d.z);
     }
     return sum;
 }

@@ -42,9 +42,9 @@ private:
         return n.is_leaf() ? n.count : count(n.first) + count(n.first + 1);
     }
     double as_leaf(std::uint32_t slot) const {
-        return count(slot) <= options_.max_leaf ? count(slot) * half_area(box_of(nodes_[slot])) *
-                                                      options_.primitive_cost
-                                                : INFINITY;
+        return count(slot) <= options_.max_leaf
+                   ? count(slot) * half_area(box_of(nodes_[slot])) * options_.primitive_cost
+                   : INFINITY;
     }
     double as_node(std::uint32_t slot) const {
         double best = as_leaf(slot);  // the only child of a node
@@ -121,7 +121,7 @@ void expect_valid(const Bvh& bvh, const WideOptions& options) {
     EXPECT_TRUE(std::ranges::all_of(seen, [](int times) { return times == 1; }));
 }
 
-constexpr WideOptions kinds[] = {{4, 1, 1, 1}, {4, 3, 1, 1}, {4, 8, 1, 1}, {8, 1, 1, 1},
+constexpr WideOptions kinds[] = {{4, 1, 1, 1}, {4, 3, 1, 1}, {4, 8, 1, 1},  {8, 1, 1, 1},
                                  {8, 3, 1, 1}, {8, 3, 2, 1}, {8, 255, 1, 1}};
 
 TEST(WideCollapse, CostsTheLeastOfAllCuts) {
@@ -134,8 +134,7 @@ TEST(WideCollapse, CostsTheLeastOfAllCuts) {
                     options.max_leaf = std::max(options.max_leaf, 2u);
                     const WideTree tree = collapse_to_wide(bvh, options);
                     const double wanted = CutSearch(bvh.nodes(), options).root();
-                    EXPECT_NEAR(wide_cost(tree, options) * options.node_cost, wanted,
-                                1e-5 * wanted)
+                    EXPECT_NEAR(wide_cost(tree, options) * options.node_cost, wanted, 1e-5 * wanted)
                         << n << " triangles, seed " << seed << ", width " << options.width
                         << ", leaves of " << options.max_leaf;
                 }
@@ -149,9 +148,9 @@ TEST(WideCollapse, HoldsEveryPrimitiveOnce) {
             expect_valid(build_bvh(random_soup(n, n + 1), {.max_leaf = 4}), options);
         for (const Builder builder : {Builder::karras, Builder::ploc, Builder::binned})
             for (const int leaf : {1, 4, 255})
-                expect_valid(build_bvh(random_soup(3000, 5),
-                                       {.builder = builder, .max_leaf = leaf}),
-                             options);
+                expect_valid(
+                    build_bvh(random_soup(3000, 5), {.builder = builder, .max_leaf = leaf}),
+                    options);
         expect_valid(build_bvh(lattice_mesh(2000, 6, 3)), options);
     }
 }

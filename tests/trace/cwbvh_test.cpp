@@ -132,7 +132,8 @@ TEST(CwbvhTrace, NastyMeshes) {
     Mesh twice = soup;  // ties
     twice.triangles.insert(twice.triangles.end(), soup.triangles.rbegin(), soup.triangles.rend());
     Mesh piled = soup;
-    for (std::size_t k = 0; k < piled.triangles.size(); ++k) piled.triangles[k] = soup.triangles[k % 2];
+    for (std::size_t k = 0; k < piled.triangles.size(); ++k)
+        piled.triangles[k] = soup.triangles[k % 2];
     Mesh flat = soup;
     for (Vec3& v : flat.vertices) v.z = -0.25f;
     for (const Mesh& mesh : {laced, with_points, twice, piled, flat}) {
@@ -157,7 +158,8 @@ TEST(CwbvhTrace, DuplicatedReferences) {
     EXPECT_EQ(tree.stats().references, 2 * n);
     EXPECT_EQ(tree.stats().triangles, n);
     const auto rays = make_mixed_rays(scene, 20'000, seed);
-    EXPECT_TRUE(std::ranges::equal(trace(tree, rays), trace(build_bvh(scene.mesh), rays), same_bits));
+    EXPECT_TRUE(
+        std::ranges::equal(trace(tree, rays), trace(build_bvh(scene.mesh), rays), same_bits));
 }
 
 TEST(CwbvhTrace, SameCountsForEveryThreadCount) {
@@ -184,8 +186,8 @@ TEST(CwbvhTrace, NoRayLeavesAClosedSurface) {
                 const float a = 3.14159265f * float(i) / rows, b = 6.2831853f * float(j) / rows;
                 const bool pole = i == 0 || i == rows;
                 const float r = pole ? 0.0f : std::sin(a);
-                mesh.vertices.push_back(100.0f * Vec3{r * std::cos(b), r * std::sin(b), std::cos(a)} +
-                                        move);
+                mesh.vertices.push_back(
+                    100.0f * Vec3{r * std::cos(b), r * std::sin(b), std::cos(a)} + move);
             }
         for (std::uint32_t i = 0; i < rows; ++i)
             for (std::uint32_t j = 0; j < rows; ++j) {
@@ -218,8 +220,11 @@ TEST(CwbvhTrace, PlanesStayWithinTheirPad) {
         Aabb root{{coordinate(), coordinate(), coordinate()}, {}};
         root.hi = root.lo + Vec3{size * unit(), size * unit(), size * unit()};
         const float away = std::ldexp(1.0f, static_cast<int>(random() % 20) - 4);
-        const Vec3 direction{unit() - 0.5f, std::ldexp(unit() - 0.5f, -int(random() % 100)), unit() - 0.5f};
-        const Ray ray{{away * coordinate(), away * coordinate(), away * coordinate()}, 0, direction,
+        const Vec3 direction{unit() - 0.5f, std::ldexp(unit() - 0.5f, -int(random() % 100)),
+                             unit() - 0.5f};
+        const Ray ray{{away * coordinate(), away * coordinate(), away * coordinate()},
+                      0,
+                      direction,
                       infinity};
         if (!is_valid(ray)) continue;
         const RayFrame frame = make_frame(ray);
@@ -230,7 +235,8 @@ TEST(CwbvhTrace, PlanesStayWithinTheirPad) {
         const float at = root.lo.x + unit() * (root.hi.x - root.lo.x);
         if (!(at >= root.lo.x && at <= root.hi.x)) continue;
         const float t = (at - frame.origin.x) * frame.inverse.x;
-        const int below = steps_below(root.lo.x, exponent, at), above = steps_above(root.lo.x, exponent, at);
+        const int below = steps_below(root.lo.x, exponent, at),
+                  above = steps_above(root.lo.x, exponent, at);
         const int near = own.negative_x ? above : below, far = own.negative_x ? below : above;
         ASSERT_LE(plane_at(float(near), axis.rate, axis.near), t) << "turn " << turn;
         ASSERT_GE(plane_at(float(far), axis.rate, axis.far), t) << "turn " << turn;
