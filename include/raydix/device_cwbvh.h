@@ -1,6 +1,6 @@
-// Rays through a compressed wide tree on an NVIDIA GPU (Ylitie, Karras, Laine 2017): device pointers
-// in, device pointers out, on the caller's stream. Memory belongs to the caller. Plain C++: in a
-// build without CUDA every call throws BackendUnavailable.
+// Rays through a compressed wide tree on an NVIDIA GPU (Ylitie, Karras, Laine 2017): device
+// pointers in, device pointers out, on the caller's stream. Memory belongs to the caller. Plain
+// C++: in a build without CUDA every call throws BackendUnavailable.
 #pragma once
 
 #include <raydix/cwbvh.h>
@@ -31,15 +31,16 @@ inline constexpr std::uint32_t device_cwbvh_max_depth = 128;
 
 /// How threads come by their rays.
 enum class CwbvhKernel : std::uint32_t {
-    cwbvh = 0,            // one thread a ray
-    persistent_cwbvh = 1  // as many threads as fit; a warp takes new rays when few of its own are left
+    cwbvh = 0,  // one thread a ray
+    persistent_cwbvh =
+        1  // as many threads as fit; a warp takes new rays when few of its own are left
 };
 
 /// Bytes of device memory that a launch of this kernel wants beside rays and results: 0 or 256.
 [[nodiscard]] std::size_t device_cwbvh_scratch_bytes(CwbvhKernel kernel);
 
-/// As trace() and trace_any() of a Cwbvh, bit for bit. rays, hits, occluded: device memory, [count],
-/// aligned to 16 bytes (occluded: any). `scratch`: aligned to 256 bytes, at least
+/// As trace() and trace_any() of a Cwbvh, bit for bit. rays, hits, occluded: device memory,
+/// [count], aligned to 16 bytes (occluded: any). `scratch`: aligned to 256 bytes, at least
 /// device_cwbvh_scratch_bytes, in use until the stream is past the call. Asynchronous: nothing is
 /// allocated and nothing waited for. Invalid rays are misses and not counted. Throws InputError,
 /// BackendUnavailable, DeviceError.
@@ -49,8 +50,8 @@ void trace_any_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint
                          std::uint8_t* occluded, CwbvhKernel kernel, std::span<std::byte> scratch,
                          Stream stream);
 
-/// The same, but waits for the end and returns the milliseconds of the kernel as the device saw them
-/// (CUDA events). For measurements.
+/// The same, but waits for the end and returns the milliseconds of the kernel as the device saw
+/// them (CUDA events). For measurements.
 [[nodiscard]] double time_trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays,
                                           std::uint32_t count, Hit* hits, CwbvhKernel kernel,
                                           std::span<std::byte> scratch, Stream stream);

@@ -28,8 +28,7 @@ template <class Kernel>
 unsigned resident_blocks(Kernel kernel, unsigned needed) {
     int device = 0, processors = 0, blocks = 0;
     RAYDIX_CUDA_TRY(cudaGetDevice(&device));
-    RAYDIX_CUDA_TRY(
-        cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device));
+    RAYDIX_CUDA_TRY(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device));
     RAYDIX_CUDA_TRY(
         cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, block_threads, 0));
     const unsigned most = static_cast<unsigned>(processors) * static_cast<unsigned>(blocks);
@@ -74,10 +73,12 @@ void launch_rays(const Launch& launch, const Store& store) {
     static_cast<void>(device_name());  // says what is missing
     check_cwbvh_launch(launch.tree, launch.count, launch.kernel, launch.scratch);
     if (launch.count == 0) return;
-    if (launch.tree.node_count == 0) store_misses(launch, store);
+    if (launch.tree.node_count == 0)
+        store_misses(launch, store);
     else if (launch.tree.max_depth <= usual_depth)
         launch_with_stack<any, usual_depth>(launch, store);
-    else launch_with_stack<any, device_cwbvh_max_depth>(launch, store);
+    else
+        launch_with_stack<any, device_cwbvh_max_depth>(launch, store);
 }
 
 class Event {
@@ -114,8 +115,7 @@ cudaStream_t cuda(Stream stream) { return static_cast<cudaStream_t>(stream); }
 
 void trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count, Hit* hits,
                      CwbvhKernel kernel, std::span<std::byte> scratch, Stream stream) {
-    launch_rays<false>({tree, rays, count, kernel, scratch, cuda(stream)},
-                       kernels::StoreHit{hits});
+    launch_rays<false>({tree, rays, count, kernel, scratch, cuda(stream)}, kernels::StoreHit{hits});
 }
 
 void trace_any_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count,

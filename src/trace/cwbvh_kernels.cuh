@@ -57,12 +57,12 @@ __device__ inline std::uint32_t replace_ended(bool ended, std::uint32_t current,
     return ended ? first + rank : current;
 }
 
-/// *next counts the rays handed out; 0 at the start. It ends at most 32 a warp past `count`, which is
-/// less than 2^31: it cannot wrap.
+/// *next counts the rays handed out; 0 at the start. It ends at most 32 a warp past `count`, which
+/// is less than 2^31: it cannot wrap.
 template <bool any, int stack_entries, class Store>
-__global__ void __launch_bounds__(128) persistent_cwbvh_rays(CwbvhView tree, const Ray* rays,
-                                                             std::uint32_t count, Store store,
-                                                             std::uint32_t* next) {
+__global__ void __launch_bounds__(128)
+    persistent_cwbvh_rays(CwbvhView tree, const Ray* rays, std::uint32_t count, Store store,
+                          std::uint32_t* next) {
     CwbvhGroup stack[stack_entries];
     CwbvhGroup* top = stack;
     CwbvhGroup nodes{0, 0};

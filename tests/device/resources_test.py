@@ -1,5 +1,6 @@
 """resources_test.py NVCC SOURCE OUT FLAG...: compiles the kernels of SOURCE for sm_90 and prints what the assembler says
-of each: registers, stack, spilled bytes. None may use a stack, and those of the project have a limit on registers.
+of each: registers, stack, spilled bytes. None may use a stack but for the
+entries of a traversal, none may spill, and those of the project have a limit on registers.
 Needs no device."""
 import pathlib
 import re
@@ -26,7 +27,11 @@ CORE = dict.fromkeys((
     "LinkToChildren", "MarkLevels", "FindKdRange", "EmitKdNode", "FitKdIntervals", "FillUnusedKeys", "ClearWords",
     "ClearUnusedValues", "SaveLastValue", "AddLastValue", "SetWord"), 32)
 EXPECTED = {"kernels.cu": dict.fromkeys(PLAIN, 255), "device_build_cuda.cu": BUILD, "core_trees.cu": CORE,
-            "hploc_same_tree.cu": {"prepare_hploc": 32, "run_hploc": 40}}
+            "hploc_same_tree.cu": {"prepare_hploc": 32, "run_hploc": 40},
+            # 64: half of an sm_90 multiprocessor's threads at once; 72: 28 of its 64 warps
+            "device_cwbvh_cuda.cu": {"cwbvh_rays": 64, "persistent_cwbvh_rays": 72, "fill_misses": 16}}
+# Kernels that keep a traversal stack: the bytes of the largest variant, 8 an entry, and nothing beside it.
+STACK = {"cwbvh_rays": 8 * 128, "persistent_cwbvh_rays": 8 * 128}
 ENTRY = re.compile(r"Compiling entry function '(\w+)'.*?(\d+) bytes stack frame, (\d+) bytes spill stores, "
                    r"(\d+) bytes spill loads.*?Used (\d+) registers", re.DOTALL)
 
@@ -54,14 +59,14 @@ def main(nvcc, source, out, *flags):
     for kernel, (variants, registers, stack, spilled) in sorted(most.items()):
         limit = known.get(kernel, 255)
         print(f"{kernel:<24}{variants:>9}{registers:>10}{limit:>7}{stack:>7}{spilled:>9}")
-        if stack or spilled:
-            faults.append(f"{kernel} uses {stack} bytes of stack")
+        if stack != STACK.get(kernel, 0) or spilled:
+            faults.append(f"{kernel} uses {stack} bytes of stack, {spilled} of spills; wanted {STACK.get(kernel, 0)} and 0")
         if registers > limit:
             faults.append(f"{kernel} uses {registers} registers; the limit is {limit}")
     faults += [f"{kernel} was not compiled" for kernel in sorted(known.keys() - most.keys())]
     if done.returncode:
         faults.append(f"nvcc: exit code {done.returncode}\n{done.stdout}")
-    print("\n".join(faults) or f"{len(usage)} kernels, none uses a stack")
+    print("\n".join(faults) or f"{len(usage)} kernels, none uses a stack beyond its traversal's")
     return 1 if faults else 0
 
 

@@ -62,7 +62,7 @@ TEST(CwbvhTrace, SoupsLikeScalar) {
     expect_like_scalar(scene_of(moved(random_soup(2000, 4), {1e5f, -2e5f, 5e6f}), "soup far off"),
                        million / 4);
     expect_like_scalar(scene_of(scaled(random_soup(2000, 4), 1e-6f), "small soup"), million / 4);
-    expect_like_scalar(scene_of(scaled(random_soup(2000, 4), 1e-11f), "tiny soup"), million / 4);
+    expect_like_scalar(scene_of(scaled(random_soup(2000, 4), 1e-9f), "tiny soup"), million / 4);
     expect_like_scalar(scene_of(scaled(random_soup(2000, 4), 1e12f), "huge soup"), million / 4);
 }
 
