@@ -1,7 +1,7 @@
 // How much work do rays have in wide trees? Nodes entered and triangles tested per ray by `scalar`,
-// in 4- and 8-wide trees with float32 boxes, and by `cwbvh`; sizes; milliseconds of the collapse and
-// of the compression. Every hit is compared with scalar's. A JSON line per scene, tree and kind of
-// rays on standard output. The counts do not depend on the machine.
+// in 4- and 8-wide trees with float32 boxes, and by `cwbvh`; sizes; milliseconds of the collapse
+// and of the compression. Every hit is compared with scalar's. A JSON line per scene, tree and kind
+// of rays on standard output. The counts do not depend on the machine.
 #include <fmt/format.h>
 #include <raydix/cwbvh.h>
 #include <raydix/machine.h>
@@ -38,8 +38,8 @@ double ms_of(int repeat, const auto& work) {
     for (int i = 0; i < repeat; ++i) {
         const auto start = std::chrono::steady_clock::now();
         work();
-        ms.push_back(1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
-                               .count());
+        ms.push_back(
+            1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     }
     std::ranges::sort(ms);
     return ms[ms.size() / 2];
@@ -131,18 +131,18 @@ void run(const Options& options) {
     for (const std::string& name : options.scenes) {
         const raydix::Scene scene = raydix::load_scene(name, options.seed);
         for (const std::string& builder : options.builders) {
-            const raydix::Bvh bvh =
-                build_bvh(scene.mesh, {.builder = raydix::builder_from_name(builder),
-                                       .max_leaf = options.max_leaf});
+            const raydix::Bvh bvh = build_bvh(
+                scene.mesh,
+                {.builder = raydix::builder_from_name(builder), .max_leaf = options.max_leaf});
             const raydix::Cwbvh cwbvh(bvh);
             std::vector<std::uint32_t> pixels;
             const auto primary = make_primary_rays(scene.cameras.cameras.at(0), options.width,
                                                    options.height, &pixels);
             const auto hits = trace(bvh, primary);
-            const auto diffuse =
-                make_secondary_rays(bvh, primary, hits, pixels,
-                                    {.kind = raydix::RayKind::diffuse, .samples = options.samples,
-                                     .seed = options.seed});
+            const auto diffuse = make_secondary_rays(bvh, primary, hits, pixels,
+                                                     {.kind = raydix::RayKind::diffuse,
+                                                      .samples = options.samples,
+                                                      .seed = options.seed});
             Json line{{"bench", "wide"},
                       {"cpu", raydix::machine_info().cpu},
                       {"threads", raydix::thread_count()},

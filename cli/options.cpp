@@ -53,8 +53,9 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
                                     "with 30 bits; default: the highest)"))
         ->check(CLI::Range(0, 21))
         ->type_name("LEVEL");
-    command.add_option("--layout", options.layout, "Memory layout that is traced")
-        ->check(CLI::IsMember({"binary"}))
+    command
+        .add_option("--layout", options.layout, "Memory layout that is traced; cwbvh: build only")
+        ->check(CLI::IsMember({"binary", "cwbvh"}))
         ->capture_default_str()
         ->group(group);
     command.add_option("--device", options.device, "Where to build and trace")
@@ -123,7 +124,14 @@ Scene load_scene_with_cameras(const std::string& name, const TreeOptions& tree,
     return scene;
 }
 
+void refuse_layout(const TreeOptions& tree) {
+    if (tree.layout != "binary")
+        throw CLI::ValidationError(
+            "--layout", tree.layout + " is made by build --tree bvh and by nothing else");
+}
+
 void refuse_device(const TreeOptions& tree) {
+    refuse_layout(tree);
     if (tree.device != "cpu")
         throw CLI::ValidationError("--device", tree.device +
                                                    " builds trees (build, check); rays are traced "

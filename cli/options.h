@@ -52,7 +52,9 @@ struct SceneTree {
                                             const CommonOptions& common);
 /// A .rdx file brings its tree: options that ask for another one are a usage error, never ignored.
 void refuse_build_options(const std::string& scene, const TreeOptions& tree);
-/// For commands that run on the CPU only: another device is a usage error, never ignored.
+/// For what knows no layout but its own: another one is a usage error, never ignored.
+void refuse_layout(const TreeOptions& tree);
+/// For commands that run on the CPU only: another device or layout is a usage error, never ignored.
 void refuse_device(const TreeOptions& tree);
 [[nodiscard]] SceneTree load_scene_tree(const std::string& scene, const TreeOptions& tree,
                                         const CommonOptions& common);

@@ -56,8 +56,10 @@ void walk_wide(const WideTree& tree, const Aabb& bounds, const RayFrame& ray, Wi
     while (top > bottom) {
         const PendingChild next = *--top;
         if (next.entry > reach()) continue;
-        if (WideTree::is_inner(*next.child)) enter(next.child->first);
-        else if (leaf(*next.child)) return;
+        if (WideTree::is_inner(*next.child))
+            enter(next.child->first);
+        else if (leaf(*next.child))
+            return;
     }
 }
 

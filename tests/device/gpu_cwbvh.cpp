@@ -1,6 +1,6 @@
-// Rays through compressed wide trees on a device against `scalar`, bit for bit: closest and any hit,
-// both kernels, any number of rays; results beyond the last ray stay untouched. Skipped where there
-// is no device.
+// Rays through compressed wide trees on a device against `scalar`, bit for bit: closest and any
+// hit, both kernels, any number of rays; results beyond the last ray stay untouched. Skipped where
+// there is no device.
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
 
@@ -110,9 +110,9 @@ TEST_F(GpuCwbvh, InvalidRaysMiss) {
 TEST_F(GpuCwbvh, RefusesWhatItCannotDo) {
     const DeviceCwbvh device{Cwbvh(build_bvh(random_soup(100, 1)))};
     DeviceCwbvhTree tree = device.tree();
-    EXPECT_THROW(trace_on_device(tree, nullptr, 1, nullptr, CwbvhKernel::persistent_cwbvh, {},
-                                 nullptr),
-                 InputError);
+    EXPECT_THROW(
+        trace_on_device(tree, nullptr, 1, nullptr, CwbvhKernel::persistent_cwbvh, {}, nullptr),
+        InputError);
     tree.max_depth = device_cwbvh_max_depth + 1;
     EXPECT_THROW(trace_on_device(tree, nullptr, 1, nullptr, CwbvhKernel::cwbvh, {}, nullptr),
                  InputError);

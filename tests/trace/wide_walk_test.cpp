@@ -1,5 +1,5 @@
-// Walks through 4- and 8-wide trees find what `scalar` finds, bit for bit, within the stack that the
-// depth allows.
+// Walks through 4- and 8-wide trees find what `scalar` finds, bit for bit, within the stack that
+// the depth allows.
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
 
