@@ -191,6 +191,22 @@ FAULTS = [
           "octree: a neighbour without points is the inner node around it", "tree"),
     Fault("src/tree/octree_query.cpp", "if (cell >> node.level != 0) return hi;\n", "",
           "octree: cubes at the upper border end beyond the root", "tree"),
+    Fault("src/layout/wide_collapse.cpp", "if (as_leaf <= plan.cost[0]) {", "if (as_leaf <= 2 * plan.cost[0]) {",
+          "wide collapse: leaves that cost more than nodes", "layout"),
+    Fault("src/layout/wide_collapse.cpp", "const bool divided = shared[i] <= plan.cost[i - 2];", "const bool divided = true;",
+          "wide collapse: a subtree is divided although it is cheaper whole", "layout"),
+    Fault("src/layout/cwbvh.cpp", "return value < x || (value == x && rest <= 0);", "return value <= x;",
+          "cwbvh: what a double cannot hold of a difference is forgotten", "layout"),
+    Fault("src/layout/cwbvh.cpp", "if (sum > best[set] || best[set]", "if (sum < best[set] || best[set]",
+          "cwbvh: the worst slots are taken", "layout"),
+    Fault("src/layout/cwbvh.cpp", "place_[child->first] = next++;", "place_[child->first] = child->first, ++next;",
+          "cwbvh: child nodes do not follow the order of their slots", "layout trace"),
+    Fault("src/trace/cwbvh_walk.h", "ray.pad = 2.0f * slabs.near_pad;", "ray.pad = 0.0f * slabs.near_pad;",
+          "cwbvh: boxes are not widened", "trace"),
+    Fault("src/trace/cwbvh_walk.h", "if (entry <= min_of(leave, tmax))", "if (entry < min_of(leave, tmax))",
+          "cwbvh: a box that begins at the best t is skipped, so ties are lost", "trace"),
+    Fault("src/trace/cwbvh_walk.h", "triangle.prim < best.prim)", "triangle.prim > best.prim)",
+          "cwbvh: ties go to the higher id", "trace"),
 ]
 
 
