@@ -40,6 +40,11 @@ def main(junit, bench=None):
     out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
     passed = sum(test["status"] == "passed" for test in tests)
     for line in document["bench"]:
+        if line["bench"] == "gpu_cwbvh":
+            rates = [f"{rays} {kernel} {line[rays][kernel]['mrays_per_s']['median']:.0f}"
+                     for rays in ("primary", "diffuse") for kernel in ("cwbvh", "persistent_cwbvh")]
+            print(f"{line['scene']:<40}Mrays/s: {', '.join(rates)}")
+            continue
         print(f"{line['scene']:<40}{line['builder']:<12}{line['bits']:>3} bits, leaves of {line['max_leaf']}: "
               f"{line['ms']['total']['median']:8.3f} ms, {line['gprims_per_s']:6.2f} Gprims/s, hierarchy and boxes at "
               f"{100 * line['of_copy_rate']:5.1f} % of the copy rate")
