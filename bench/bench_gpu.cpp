@@ -1,14 +1,18 @@
 // How fast are builds on a GPU, stage by stage, and what part of the memory's rate do hierarchy and
-// boxes reach? Every tree is first compared with the host's. A JSON line per scene and tree on
-// standard output; scripts/gpu keeps them. Without a device: exit code 1 and the reason.
+// boxes reach? How fast are rays through a compressed wide tree? Every tree is first compared with
+// the host's. A JSON line per scene and tree on standard output; scripts/gpu keeps them. Without a
+// device: exit code 1 and the reason.
 #include <fmt/format.h>
 #include <raydix/check.h>
+#include <raydix/device_cwbvh.h>
 #include <raydix/device_trees.h>
 #include <raydix/machine.h>
+#include <raydix/rays.h>
 #include <raydix/scene.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstring>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -151,6 +155,51 @@ void run_builders(const Options& options, const DeviceInput& input, const raydix
     }
 }
 
+/// Rays through the compressed wide tree, by both kernels; hits are first compared with the CPU's.
+Json measure_rays(const raydix::DeviceCwbvhTree& tree, const std::vector<raydix::Ray>& rays,
+                  const std::vector<raydix::Hit>& wanted, int repeat) {
+    const auto n = static_cast<std::uint32_t>(rays.size());
+    const raydix::DeviceBuffer<raydix::Ray> input{std::span(rays)};
+    raydix::DeviceBuffer<raydix::Hit> output(n);
+    raydix::DeviceBuffer<std::byte> scratch(256);
+    const std::span<std::byte> lent(scratch.data(), scratch.size());
+    Json rates{{"count", n}};
+    for (const auto& [name, kernel] :
+         {std::pair("cwbvh", raydix::CwbvhKernel::cwbvh),
+          std::pair("persistent_cwbvh", raydix::CwbvhKernel::persistent_cwbvh)}) {
+        std::vector<raydix::Hit> hits(n);
+        trace_on_device(tree, input.data(), n, output.data(), kernel, lent, nullptr);
+        output.download(hits);
+        if (std::memcmp(hits.data(), wanted.data(), n * sizeof(raydix::Hit)) != 0)
+            throw std::runtime_error(std::string(name) + " finds other hits than the CPU");
+        std::vector<double> mrays;
+        for (int i = 0; i < repeat; ++i)
+            mrays.push_back(
+                1e-3 * n /
+                time_trace_on_device(tree, input.data(), n, output.data(), kernel, lent, nullptr));
+        rates[name] = {{"mrays_per_s", spread_json(mrays)}};
+    }
+    return rates;
+}
+
+Json measure_cwbvh(const raydix::Scene& scene, int repeat) {
+    const raydix::Bvh bvh =
+        build_bvh(scene.mesh, {.builder = raydix::Builder::ploc, .max_leaf = 1});
+    const raydix::Cwbvh tree(bvh);
+    const raydix::DeviceCwbvh device(tree);
+    std::vector<std::uint32_t> pixels;
+    const auto primary = make_primary_rays(scene.cameras.cameras.at(0), 1024, 768, &pixels);
+    const auto hits = trace(bvh, primary);
+    raydix::SecondaryOptions secondary{.kind = raydix::RayKind::diffuse, .samples = 8};
+    const auto diffuse = make_secondary_rays(bvh, primary, hits, pixels, secondary);
+    return {{"builder", "ploc"},
+            {"bytes_per_triangle", tree.stats().bytes_per_triangle},
+            {"same_hits_as_cpu", true},
+            {"repeat", repeat},
+            {"primary", measure_rays(device.tree(), primary, hits, repeat)},
+            {"diffuse", measure_rays(device.tree(), diffuse, trace(bvh, diffuse), repeat)}};
+}
+
 void run(const Options& options) {
     const std::string device = raydix::device_name();
     const double copy_rate = raydix::measure_device_copy(options.copy_bytes, options.repeat);
@@ -169,6 +218,13 @@ void run(const Options& options) {
             line.update(row);
             fmt::print("{}\n", line.dump());
         };
+        Json rays{{"bench", "gpu_cwbvh"},
+                  {"device", device},
+                  {"scene", name},
+                  {"seed", options.seed},
+                  {"triangles", scene.mesh.triangles.size()}};
+        rays.update(measure_cwbvh(scene, options.repeat));
+        fmt::print("{}\n", rays.dump());
         for (const int bits : options.bits)
             for (const int max_leaf : options.max_leaf)
                 for (const std::string& tree : options.trees) {

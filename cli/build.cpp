@@ -1,9 +1,11 @@
 // raydix build, raydix check.
 #include <fmt/format.h>
 #include <raydix/check.h>
+#include <raydix/cwbvh.h>
 #include <raydix/error.h>
 #include <raydix/rdx.h>
 
+#include <chrono>
 #include <memory>
 
 #include "device_scene.h"
@@ -70,6 +72,40 @@ void print_build_table(const Json& build, const TimedBuilds& timed) {
                kept.median, kept.min, kept.max);
 }
 
+/// The compressed wide tree that follows from the binary one; what a trace touches is then its.
+void add_cwbvh(Json& build, const Bvh& bvh, const CommonOptions& common) {
+    const auto start = std::chrono::steady_clock::now();
+    const Cwbvh tree(bvh, common.threads);
+    const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
+    const CwbvhStats& s = tree.stats();
+    build["layout"] = "cwbvh";
+    build["layout_nodes"] = s.nodes;
+    build["bytes"] = s.bytes;
+    build["cwbvh"] = {{"nodes", s.nodes},
+                      {"leaves", s.leaf_children},
+                      {"references", s.references},
+                      {"max_depth", s.max_depth},
+                      {"children_per_node", s.children_per_node},
+                      {"sah", s.sah},
+                      {"widening", s.widening},
+                      {"node_bytes", s.node_bytes},
+                      {"triangle_bytes", s.triangle_bytes},
+                      {"bytes_per_triangle", s.bytes_per_triangle},
+                      {"ms", ms.count()}};
+}
+
+void print_cwbvh_table(const Json& cwbvh) {
+    fmt::print("\ncwbvh        {} nodes of {:.2f} children, {} leaves, depth {}, in {:.2f} ms\n",
+               grouped(cwbvh["nodes"].get<std::uint64_t>()),
+               cwbvh["children_per_node"].get<double>(),
+               grouped(cwbvh["leaves"].get<std::uint64_t>()),
+               cwbvh["max_depth"].get<std::uint32_t>(), cwbvh["ms"].get<double>());
+    fmt::print(
+        "SAH          {:.3f}   (node 1, primitive 1), boxes widened to {:.3f} x their area\n",
+        cwbvh["sah"].get<double>(), cwbvh["widening"].get<double>());
+    fmt::print("memory       {:.1f} bytes a triangle\n", cwbvh["bytes_per_triangle"].get<double>());
+}
+
 /// --tree octree or kdtree.
 void run_core_tree(const BuildCommand& options) {
     const bool octree = options.tree.tree == "octree";
@@ -82,6 +118,9 @@ void run_core_tree(const BuildCommand& options) {
 }
 
 void run_build(const BuildCommand& options) {
+    if (options.tree.tree != "bvh") refuse_layout(options.tree);
+    if (options.tree.layout != "binary" && !options.out_file.empty())
+        throw CLI::ValidationError("--output", ".rdx files hold the binary layout");
     if (options.tree.tree != "bvh") return run_core_tree(options);
     Json document = new_document("build");
     const Scene scene = load_scene_with_cameras(options.scene, options.tree, options.common);
@@ -97,6 +136,7 @@ void run_build(const BuildCommand& options) {
     build["device"] = options.tree.device;
     if (options.tree.device == "cuda") build["peak_bytes"] = timed.device_bytes;
     build["kept_ms"] = spread_json(totals(timed.kept));
+    if (options.tree.layout == "cwbvh") add_cwbvh(build, timed.bvh, options.common);
     document["build"] = build;
     if (options.common.prints_tables()) {
         fmt::print("{}: {} triangles, {} vertices, loaded in {:.1f} ms\n", scene.name,
@@ -104,6 +144,7 @@ void run_build(const BuildCommand& options) {
                    scene.load_ms);
         print_build_table(build, timed);
         print_tree_table(timed.bvh, stats);
+        if (build.contains("cwbvh")) print_cwbvh_table(build["cwbvh"]);
     }
     if (!options.out_file.empty()) {
         save_rdx(options.out_file, timed.bvh, scene);
@@ -120,6 +161,7 @@ struct CheckCommand {
 };
 
 void run_check(const CheckCommand& options) {
+    refuse_layout(options.tree);
     if (options.tree.tree == "octree" && options.same.empty())
         return run_octree_check(options.scene, options.tree, options.common);
     if (options.tree.tree == "kdtree" && options.same.empty())

@@ -55,8 +55,9 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
                                     "with 30 bits; default: the highest)"))
         ->check(CLI::Range(0, 21))
         ->type_name("LEVEL");
-    command.add_option("--layout", options.layout, "Memory layout that is traced")
-        ->check(CLI::IsMember({"binary"}))
+    command
+        .add_option("--layout", options.layout, "Memory layout that is traced; cwbvh: build only")
+        ->check(CLI::IsMember({"binary", "cwbvh"}))
         ->capture_default_str()
         ->group(group);
     command
@@ -137,7 +138,14 @@ void refuse_simulator(const TreeOptions& tree) {
                                    "cpu, or on cuda");
 }
 
+void refuse_layout(const TreeOptions& tree) {
+    if (tree.layout != "binary")
+        throw CLI::ValidationError(
+            "--layout", tree.layout + " is made by build --tree bvh and by nothing else");
+}
+
 void refuse_device(const TreeOptions& tree) {
+    refuse_layout(tree);
     if (tree.device != "cpu")
         throw CLI::ValidationError("--device", tree.device + " does not serve here, only cpu");
 }

@@ -54,7 +54,9 @@ struct SceneTree {
 void refuse_build_options(const std::string& scene, const TreeOptions& tree);
 /// The simulator builds no trees: a usage error.
 void refuse_simulator(const TreeOptions& tree);
-/// For commands that run on the CPU only: another device is a usage error, never ignored.
+/// For what knows no layout but its own: another one is a usage error, never ignored.
+void refuse_layout(const TreeOptions& tree);
+/// For commands that run on the CPU only: another device or layout is a usage error, never ignored.
 void refuse_device(const TreeOptions& tree);
 [[nodiscard]] SceneTree load_scene_tree(const std::string& scene, const TreeOptions& tree,
                                         const CommonOptions& common);

@@ -40,6 +40,10 @@ def main(junit, bench=None):
     out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
     passed = sum(test["status"] == "passed" for test in tests)
     for line in document["bench"]:
+        if line["bench"] == "gpu_cwbvh":
+            rates = [f"{rays} {kernel} {line[rays][kernel]['mrays_per_s']['median']:.0f}"
+                     for rays in ("primary", "diffuse") for kernel in ("cwbvh", "persistent_cwbvh")]
+            print(f"{line['scene']:<40}Mrays/s: {', '.join(rates)}")
         if line["bench"] == "gpu_trace":
             print(f"{line['scene']:<40}{line['rays']:<18}{line['kernel']:<36}{line['mrays_per_s']['median']:8.1f} Mrays/s")
             continue

@@ -5,7 +5,10 @@
 #include <raydix/bvh.h>              // IWYU pragma: export
 #include <raydix/camera.h>           // IWYU pragma: export
 #include <raydix/check.h>            // IWYU pragma: export
+#include <raydix/cwbvh.h>            // IWYU pragma: export
 #include <raydix/device.h>           // IWYU pragma: export
+#include <raydix/device_cwbvh.h>     // IWYU pragma: export
+#include <raydix/device_trace.h>     // IWYU pragma: export
 #include <raydix/device_trees.h>     // IWYU pragma: export
 #include <raydix/error.h>            // IWYU pragma: export
 #include <raydix/hierarchy_study.h>  // IWYU pragma: export
@@ -18,6 +21,7 @@
 #include <raydix/rdx.h>              // IWYU pragma: export
 #include <raydix/report.h>           // IWYU pragma: export
 #include <raydix/scene.h>            // IWYU pragma: export
+#include <raydix/simulate.h>         // IWYU pragma: export
 #include <raydix/trace.h>            // IWYU pragma: export
 #include <raydix/tree_view.h>        // IWYU pragma: export
 #include <raydix/types.h>            // IWYU pragma: export

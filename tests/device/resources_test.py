@@ -35,7 +35,9 @@ EXPECTED |= {"launch_warps_closest.cu": KERNELS, "launch_warps_any.cu": KERNELS,
              "device_trace_cuda.cu": {"PrepareRay": 32, "RescaleHit": 32, "MissAll": 32, "EmitWoopTriangle": 48, "ClearUnusedValues": 32,
                                    "SaveLastValue": 32, "AddLastValue": 32, "SetWord": 32}}
 # The traversal stack itself, of the larger size: an array that the kernel indexes.
-STACK_BYTES = {"trace_rays": 4 * 128}
+STACK_BYTES = {"trace_rays": 4 * 128, "cwbvh_rays": 8 * 128, "persistent_cwbvh_rays": 8 * 128}
+# 64: half of an sm_90 multiprocessor's threads at once; 72: 28 of its 64 warps.
+EXPECTED["device_cwbvh_cuda.cu"] = {"cwbvh_rays": 64, "persistent_cwbvh_rays": 72, "fill_misses": 16}
 ENTRY = re.compile(r"Compiling entry function '(\w+)'.*?(\d+) bytes stack frame, (\d+) bytes spill stores, "
                    r"(\d+) bytes spill loads.*?Used (\d+) registers", re.DOTALL)
 

@@ -1,0 +1,63 @@
+// The compressed wide BVH (Ylitie, Karras, Laine 2017): eight children a node of 80 bytes, made
+// from any binary tree of triangles; its rays on the CPU. raydix/device_cwbvh.h traces it on a GPU.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/trace.h>
+#include <raydix/types.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace raydix {
+
+struct CwbvhStats {
+    std::uint64_t nodes = 0;           // of 80 bytes
+    std::uint64_t inner_children = 0;  // children that are nodes: nodes - 1
+    std::uint64_t leaf_children = 0;   // children of 1 to 3 triangles
+    std::uint64_t references = 0;      // triangles in leaves
+    std::uint64_t triangles = 0;  // different ones; less than references if a builder splits them
+    std::uint32_t max_depth = 0;  // edges from the root to the deepest leaf child
+    double children_per_node = 0;
+    double sah = 0;  // cost of the wide tree, 1 a node and 1 a triangle, by the boxes before they
+                     // are quantised; 0 if the root has no area
+    double widening = 0;  // surface of all quantised child boxes / that of the exact ones; 1
+                          // without surface
+    std::uint64_t node_bytes = 0, triangle_bytes = 0;
+    std::uint64_t bytes = 0;        // every byte a trace touches
+    double bytes_per_triangle = 0;  // bytes / triangles
+};
+
+/// Holds all that a trace reads. Children are chosen by dynamic programming over the surface area
+/// heuristic; child boxes are quantised to 8 bits an axis outward, and every quantised box was
+/// compared with its box. The same bits for every thread count.
+class Cwbvh {
+public:
+    /// Throws InputError if the tree holds boxes or points. `threads` as in BuildOptions.
+    explicit Cwbvh(const Bvh& bvh, int threads = 0);
+    ~Cwbvh();
+    Cwbvh(Cwbvh&&) noexcept;
+    Cwbvh& operator=(Cwbvh&&) noexcept;
+
+    [[nodiscard]] bool empty() const;
+    [[nodiscard]] const CwbvhStats& stats() const;
+
+    struct Arrays;
+    [[nodiscard]] const Arrays& arrays() const { return *arrays_; }
+
+private:
+    std::unique_ptr<Arrays> arrays_;
+};
+
+/// As trace() and trace_any() of a Bvh, bit for bit, by the kernel `cwbvh`; options.kernel has no
+/// effect. rays [n] -> hits, occluded [n]. Throws InputError if the sizes differ.
+TraceCounts trace(const Cwbvh& tree, std::span<const Ray> rays, std::span<Hit> hits,
+                  const TraceOptions& options = {});
+[[nodiscard]] std::vector<Hit> trace(const Cwbvh& tree, std::span<const Ray> rays,
+                                     const TraceOptions& options = {});
+TraceCounts trace_any(const Cwbvh& tree, std::span<const Ray> rays,
+                      std::span<std::uint8_t> occluded, const TraceOptions& options = {});
+
+}  // namespace raydix

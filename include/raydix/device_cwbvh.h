@@ -1,0 +1,78 @@
+// Rays through a compressed wide tree on an NVIDIA GPU (Ylitie, Karras, Laine 2017): device
+// pointers in, device pointers out, on the caller's stream. Memory belongs to the caller. Plain
+// C++: in a build without CUDA every call throws BackendUnavailable.
+#pragma once
+
+#include <raydix/cwbvh.h>
+#include <raydix/device.h>
+#include <raydix/types.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace raydix {
+
+/// The node of 80 bytes and the triangle of 48; src/layout/cwbvh.h tells the fields.
+struct CwbvhNode;
+struct CwbvhTriangle;
+
+/// A tree in device memory; pointers are aligned to 16 bytes.
+struct DeviceCwbvhTree {
+    const CwbvhNode* nodes = nullptr;          // [node_count]
+    const CwbvhTriangle* triangles = nullptr;  // [references]
+    std::uint32_t node_count = 0;              // 0: nothing to hit
+    std::uint32_t max_depth = 0;               // as in CwbvhStats; stacks are chosen by it
+    Aabb bounds{};                             // of the root; rays widen boxes by its size
+};
+
+/// Trees deeper than this are refused with an InputError: a thread's stack has as many entries.
+inline constexpr std::uint32_t device_cwbvh_max_depth = 128;
+
+/// How threads come by their rays.
+enum class CwbvhKernel : std::uint32_t {
+    cwbvh = 0,  // one thread a ray
+    persistent_cwbvh =
+        1  // as many threads as fit; a warp takes new rays when few of its own are left
+};
+
+/// Bytes of device memory that a launch of this kernel wants beside rays and results: 0 or 256.
+[[nodiscard]] std::size_t device_cwbvh_scratch_bytes(CwbvhKernel kernel);
+
+/// As trace() and trace_any() of a Cwbvh, bit for bit. rays, hits, occluded: device memory,
+/// [count], aligned to 16 bytes (occluded: any). `scratch`: aligned to 256 bytes, at least
+/// device_cwbvh_scratch_bytes, in use until the stream is past the call. Asynchronous: nothing is
+/// allocated and nothing waited for. Invalid rays are misses and not counted. Throws InputError,
+/// BackendUnavailable, DeviceError.
+void trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count, Hit* hits,
+                     CwbvhKernel kernel, std::span<std::byte> scratch, Stream stream);
+void trace_any_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count,
+                         std::uint8_t* occluded, CwbvhKernel kernel, std::span<std::byte> scratch,
+                         Stream stream);
+
+/// The same, but waits for the end and returns the milliseconds of the kernel as the device saw
+/// them (CUDA events). For measurements.
+[[nodiscard]] double time_trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays,
+                                          std::uint32_t count, Hit* hits, CwbvhKernel kernel,
+                                          std::span<std::byte> scratch, Stream stream);
+[[nodiscard]] double time_trace_any_on_device(const DeviceCwbvhTree& tree, const Ray* rays,
+                                              std::uint32_t count, std::uint8_t* occluded,
+                                              CwbvhKernel kernel, std::span<std::byte> scratch,
+                                              Stream stream);
+
+/// A copy of a tree in device memory: the convenient way to DeviceCwbvhTree.
+class DeviceCwbvh {
+public:
+    DeviceCwbvh() = default;
+    /// Waits for the copy. Throws BackendUnavailable, DeviceError.
+    explicit DeviceCwbvh(const Cwbvh& tree, Stream stream = nullptr);
+
+    [[nodiscard]] DeviceCwbvhTree tree() const;
+    [[nodiscard]] std::size_t bytes() const { return memory_.bytes(); }
+
+private:
+    DeviceBuffer<std::byte> memory_;  // nodes, then triangles
+    DeviceCwbvhTree tree_;
+};
+
+}  // namespace raydix
