@@ -13,15 +13,15 @@ namespace {
 constexpr std::size_t runs_per_camera = 4;
 constexpr std::size_t least_run = 2048;  // 64 warps of 32
 
-float chosen_ao_radius(const LaunchOptions& options, const SceneTree& input) {
-    if (options.ao_radius > 0) return options.ao_radius;
+}  // namespace
+
+float chosen_ao_radius(float given, const SceneTree& input) {
+    if (given > 0) return given;
     if (input.scene.cameras.ao_radius > 0) return input.scene.cameras.ao_radius;
     if (input.bvh.empty()) return 0.0f;
     const Aabb box = input.bvh.bounds();
     return 0.05f * std::hypot(box.hi.x - box.lo.x, box.hi.y - box.lo.y, box.hi.z - box.lo.z);
 }
-
-}  // namespace
 
 std::vector<Camera> chosen_cameras(const std::string& which, const Scene& scene) {
     const std::vector<Camera>& all = scene.cameras.cameras;
@@ -73,7 +73,7 @@ RayLaunches::RayLaunches(const LaunchOptions& options, const SceneTree& input,
     : options_(options),
       input_(input),
       common_(common),
-      ao_radius_(chosen_ao_radius(options, input)) {
+      ao_radius_(chosen_ao_radius(options.ao_radius, input)) {
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}
                           : parse_size(options.size_text);

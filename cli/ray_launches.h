@@ -65,5 +65,7 @@ private:
 
 /// --camera: all of the scene's, or one.
 [[nodiscard]] std::vector<Camera> chosen_cameras(const std::string& which, const Scene& scene);
+/// Given, of cameras.json, or 5 % of the box diagonal, in this order.
+[[nodiscard]] float chosen_ao_radius(float given, const SceneTree& input);
 
 }  // namespace raydix::cli

@@ -4,15 +4,15 @@
 #include <raydix/rays.h>
 #include <raydix/trace.h>
 
-#include <charconv>
 #include <chrono>
-#include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
 
 #include "kdtree_commands.h"
 #include "output.h"
+#include "ray_launches.h"
+#include "simulation.h"
 #include "warp_trace.h"
 
 namespace raydix::cli {
@@ -136,34 +136,10 @@ void save_kept(const TraceCommand& options, Mode mode, const Kept& kept) {
                      kept.offsets);
 }
 
-std::vector<Camera> chosen_cameras(const TraceCommand& options, const Scene& scene) {
-    const std::vector<Camera>& all = scene.cameras.cameras;
-    if (options.camera == "all") return all;
-    std::size_t index = 0;
-    const char* end = options.camera.data() + options.camera.size();
-    const auto [rest, error] = std::from_chars(options.camera.data(), end, index);
-    if (error != std::errc() || rest != end)
-        throw CLI::ValidationError("--camera",
-                                   "'" + options.camera + "' is neither a number nor 'all'");
-    if (index >= all.size())
-        throw InputError(scene.name + ": camera " + options.camera + " is past the last of " +
-                         std::to_string(all.size()) + " cameras");
-    return {all[index]};
-}
-
 RayKind ray_kind(const std::string& name) {
     for (const RayKind kind : {RayKind::ao, RayKind::diffuse, RayKind::diffuse_shuffled})
         if (ray_kind_name(kind) == name) return kind;
     return RayKind::primary;
-}
-
-/// Given, of cameras.json, or 5 % of the box diagonal, in this order.
-float ao_radius_of(const TraceCommand& options, const SceneTree& input) {
-    if (options.ao_radius > 0) return options.ao_radius;
-    if (input.scene.cameras.ao_radius > 0) return input.scene.cameras.ao_radius;
-    if (input.bvh.empty()) return 0.0f;
-    const Aabb box = input.bvh.bounds();
-    return 0.05f * std::hypot(box.hi.x - box.lo.x, box.hi.y - box.lo.y, box.hi.z - box.lo.z);
 }
 
 /// All batches of one kind of ray from one camera.
@@ -182,7 +158,7 @@ void trace_camera(const TraceCommand& options, const SceneTree& input, const Cam
     SecondaryOptions secondary;
     secondary.kind = kind;
     secondary.samples = options.samples;
-    secondary.ao_radius = ao_radius_of(options, input);
+    secondary.ao_radius = chosen_ao_radius(options.ao_radius, input);
     secondary.seed = options.common.seed;
     secondary.threads = options.common.threads;
     const std::size_t step =
@@ -305,6 +281,7 @@ void explain_warps(const TraceCommand& options, const Bvh& bvh) {
 
 /// What the options say about the device, before any work. The tree is built on the cpu.
 TraceCommand with_device(TraceCommand options, Mode mode) {
+    refuse_layout(options.tree);
     const std::string device = options.tree.device;
     if (options.kernel.empty()) options.kernel = default_kernel(device);
     check_kernel(options.kernel, device);
@@ -315,7 +292,7 @@ TraceCommand with_device(TraceCommand options, Mode mode) {
     if (mode == Mode::all)
         throw CLI::ValidationError("--mode", "all hits are found on the cpu only");
     if (device == "sim")
-        static_cast<void>(machine_model(options.machine));
+        static_cast<void>(machine_from(options.machine));
     else
         static_cast<void>(device_name());
     return options;
@@ -366,7 +343,7 @@ void run_trace(const TraceCommand& given) {
             about(options.scene, [&] { measure(batch, rays, options.repeat, tally); });
         keep(options, rays, batch, kept);
     } else {
-        const std::vector<Camera> cameras = chosen_cameras(options, input.scene);
+        const std::vector<Camera> cameras = chosen_cameras(options.camera, input.scene);
         for (std::size_t c = 0; c < cameras.size(); ++c)
             about(options.scene, [&] {
                 trace_camera(options, input, cameras[c], ray_kind(options.rays), size, batch, tally,
@@ -390,7 +367,7 @@ void run_trace(const TraceCommand& given) {
                          builds);
     document["trace"] = Json::array({trace_json(options, mode_text(mode), tally, batch.warps)});
     if (options.rays == "ao") {
-        const float radius = ao_radius_of(options, input);
+        const float radius = chosen_ao_radius(options.ao_radius, input);
         document["trace"][0]["ao_radius"] = radius;
         if (options.common.prints_tables()) fmt::print("ao radius {:g}\n", radius);
     }

@@ -6,6 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 
+#include "simulation.h"
+
 namespace raydix::cli {
 namespace {
 
@@ -45,7 +47,7 @@ WarpTracer::WarpTracer(const Bvh& bvh, const Settings& settings) : settings_(set
     simulate_.kernel = warp_kernel_from_name(settings.kernel);
     simulate_.any_hit = settings.any_hit;
     if (is_simulated()) {
-        simulate_.machine = machine_model(settings.machine);
+        simulate_.machine = machine_from(settings.machine);
         return;
     }
     device_tree_.emplace(tree_);
