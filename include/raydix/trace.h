@@ -6,16 +6,27 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace raydix {
 
-enum class TraceKernel : std::uint32_t { scalar = 0 };
+enum class TraceKernel : std::uint32_t { scalar = 0, simd = 1 };
+
+/// How `simd` takes a batch through a wide tree. The hits do not depend on it.
+enum class SimdPath : std::uint32_t {
+    automatic = 0,  // packets for batches whose neighbours go the same way, else sorted single rays
+    single = 1,     // one ray at a time, in the caller's order
+    packet = 2,     // neighbours in the batch together
+    sorted = 3,     // grouped by direction and place first
+};
 
 struct TraceOptions {
     TraceKernel kernel = TraceKernel::scalar;
     int threads = 0;        // 0: all the machine has. Results do not depend on it
     bool counters = false;  // also count node visits and triangle tests; costs a little time
+    SimdPath path = SimdPath::automatic;  // wide trees only
+    std::string isa;  // wide trees only: one of simd_instruction_sets(); empty: the best
 };
 
 /// What a batch met. Counters are 0 unless asked for.

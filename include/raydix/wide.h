@@ -1,0 +1,75 @@
+// Wide trees for the CPU: up to eight children a node, boxes of 8 bits an axis, triangles in blocks
+// that one vector instruction reads. Made from any binary tree of triangles; traced by the kernel
+// `simd`, whose code is chosen at run time for the processor.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/trace.h>
+#include <raydix/types.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace raydix {
+
+struct WideBvhOptions {
+    int width = 8;      // children a node at most: 4 or 8
+    int threads = 0;    // as in BuildOptions; the layout does not depend on it
+};
+
+struct WideBvhStats {
+    int width = 0;
+    std::uint64_t nodes = 0;
+    std::uint64_t leaves = 0;
+    std::uint64_t references = 0;  // triangles in leaves; those without area are left out
+    std::uint32_t max_depth = 0;   // edges from the root to the deepest leaf
+    double children_per_node = 0;
+    double sah = 0;       // 1 a node and 1 a triangle, by the boxes before they are quantised; 0 if the root
+                          // has no area
+    double widening = 0;  // surface of all quantised child boxes / that of the exact ones; 1 without surface
+    std::uint64_t node_bytes = 0, triangle_bytes = 0;
+    std::uint64_t bytes = 0;  // every byte a trace touches
+    double ms = 0;            // of making it
+};
+
+/// Holds all that a trace reads: the binary tree and the mesh may go. The same bits for every
+/// thread count and instruction set.
+class WideBvh {
+public:
+    /// Throws InputError for another width, or if the tree holds boxes or points.
+    explicit WideBvh(const Bvh& bvh, const WideBvhOptions& options = {});
+    ~WideBvh();
+    WideBvh(WideBvh&&) noexcept;
+    WideBvh& operator=(WideBvh&&) noexcept;
+
+    [[nodiscard]] bool empty() const;
+    [[nodiscard]] const WideBvhStats& stats() const;
+
+    struct Arrays;
+    [[nodiscard]] const Arrays& arrays() const { return *arrays_; }
+
+private:
+    std::unique_ptr<Arrays> arrays_;
+};
+
+/// As trace(), trace_any() and trace_all() of a Bvh, bit for bit, by the kernel `simd`.
+/// options.path says how rays go through the tree; options.kernel has no effect.
+TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit> hits,
+                  const TraceOptions& options = {});
+[[nodiscard]] std::vector<Hit> trace(const WideBvh& tree, std::span<const Ray> rays,
+                                     const TraceOptions& options = {});
+TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
+                      std::span<std::uint8_t> occluded, const TraceOptions& options = {});
+
+/// One ray, on the caller's thread, without any set-up.
+[[nodiscard]] Hit closest_hit(const WideBvh& tree, const Ray& ray);
+[[nodiscard]] bool any_hit(const WideBvh& tree, const Ray& ray);
+
+/// Instruction sets that `simd` has code for and this processor can run, best first: for example
+/// {"avx512", "avx2", "sse4"}.
+[[nodiscard]] std::vector<std::string> simd_instruction_sets();
+
+}  // namespace raydix
