@@ -62,6 +62,7 @@ WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
                                .node_cost = 1.0,
                                .primitive_cost = wide_primitive_cost,
                                .block = wide_block};
+    if (getenv("WB")) { const_cast<WideOptions&>(collapse).block = atoi(getenv("WB")); const_cast<WideOptions&>(collapse).primitive_cost = atof(getenv("WP")); const_cast<WideOptions&>(collapse).max_leaf = atoi(getenv("WL")); }
     check_wide_options(collapse);
     arrays_->stats.width = options.width;
     arrays_->stats.widening = 1.0;

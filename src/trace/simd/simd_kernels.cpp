@@ -2,8 +2,11 @@
 // this processor can run.
 #include "trace/simd/simd_kernels.h"
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #undef HWY_TARGET_INCLUDE
@@ -11,12 +14,14 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "trace/simd/packet.h"
+#include "trace/simd/packets.h"
 #include "trace/simd/single.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-SimdKernels kernels(std::string_view isa) { return {isa, single}; }
+SimdKernels kernels(std::string_view isa) { return {isa, single, packets}; }
 
 }  // namespace raydix::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -9,26 +9,28 @@
 
 namespace raydix {
 
+inline constexpr std::size_t max_job_rays = 4096;
+
 struct SimdCounts {
     std::uint64_t hits = 0, invalid = 0, visits = 0, tests = 0;
 };
 
-/// Rays rays[index[k]] (or rays[k] without an index), k < n; results go to the same places: hits,
-/// or occluded if hits is null.
+/// At most max_job_rays rays; their hits, or occluded if hits is null, [n].
 struct SimdJob {
     WideView tree;
     const Ray* rays;
-    const std::uint32_t* index;
     std::size_t n;
     Hit* hits;
     std::uint8_t* occluded;
     WideStackView stack;
+    PacketStackView packet_stack;
     bool counting;
 };
 
 struct SimdKernels {
     std::string_view isa;
     void (*single)(const SimdJob& job, SimdCounts& counts);
+    void (*packets)(const SimdJob& job, SimdCounts& counts);
 };
 
 /// Best first; those this processor can run.

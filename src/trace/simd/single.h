@@ -10,29 +10,13 @@
 #include <hwy/highway.h>
 
 #include "base/check.h"
+#include "trace/simd/lanes.h"
 #include "trace/simd/wide_ray.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
-using F8 = hn::CappedTag<float, 8>;
-using I8 = hn::RebindToSigned<F8>;
-using U8 = hn::RebindToUnsigned<F8>;
-using B8 = hn::Rebind<std::uint8_t, F8>;
-constexpr F8 f8;
-constexpr std::size_t lanes8 = hn::MaxLanes(f8);
 constexpr std::size_t parts8 = 8 / lanes8;
-
-template <class D, class Mask>
-HWY_INLINE std::uint32_t bits_of(D d, Mask mask) {
-    std::uint8_t bytes[8] = {};
-    hn::StoreMaskBits(d, mask, bytes);
-    std::uint32_t bits;
-    std::memcpy(&bits, bytes, sizeof(bits));
-    return bits & static_cast<std::uint32_t>((std::uint64_t{1} << hn::MaxLanes(d)) - 1);
-}
 
 template <bool any, bool counting>
 class SingleRay {
@@ -259,23 +243,25 @@ private:
 };
 
 template <bool any, bool counting>
-void trace_single(const SimdJob& job, SimdCounts& counts) {
-    for (std::size_t k = 0; k < job.n; ++k) {
-        const std::size_t i = job.index == nullptr ? k : job.index[k];
-        Hit hit;
-        if (!is_valid(job.rays[i])) {
-            ++counts.invalid;
-        } else {
-            const RayFrame frame = make_frame(job.rays[i]);
-            const WideBest best = SingleRay<any, counting>(job.tree, frame, job.stack, counts).trace();
-            if (best.found()) hit = {best.t * frame.t_scale, best.prim, best.u, best.v};
-        }
-        counts.hits += hit.hit();
-        if constexpr (any)
-            job.occluded[i] = hit.hit() ? 1 : 0;
-        else
-            job.hits[i] = hit;
+void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
+    Hit hit;
+    if (!is_valid(job.rays[i])) {
+        ++counts.invalid;
+    } else {
+        const RayFrame frame = make_frame(job.rays[i]);
+        const WideBest best = SingleRay<any, counting>(job.tree, frame, job.stack, counts).trace();
+        if (best.found()) hit = {best.t * frame.t_scale, best.prim, best.u, best.v};
     }
+    counts.hits += hit.hit();
+    if constexpr (any)
+        job.occluded[i] = hit.hit() ? 1 : 0;
+    else
+        job.hits[i] = hit;
+}
+
+template <bool any, bool counting>
+void trace_single(const SimdJob& job, SimdCounts& counts) {
+    for (std::size_t i = 0; i < job.n; ++i) trace_one<any, counting>(job, i, counts);
 }
 
 inline void single(const SimdJob& job, SimdCounts& counts) {

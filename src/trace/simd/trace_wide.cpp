@@ -33,12 +33,16 @@ const SimdKernels& kernels_for(const std::string& isa) {
 class StackMemory {
 public:
     explicit StackMemory(std::uint32_t max_depth)
-        : words_(wide_stack_capacity(max_depth)), entries_(words_.size()) {}
+        : words_(wide_stack_capacity(max_depth)), entries_(words_.size()), active_(words_.size()) {}
     [[nodiscard]] WideStackView view() { return {words_.data(), entries_.data()}; }
+    [[nodiscard]] PacketStackView packet_view() {
+        return {words_.data(), entries_.data(), active_.data()};
+    }
 
 private:
     std::vector<std::uint32_t> words_;
     std::vector<float> entries_;
+    std::vector<std::uint64_t> active_;
 };
 
 WideView view_of(const WideBvh& tree) {
@@ -56,11 +60,11 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hit
             [&](std::size_t block, std::size_t begin, std::size_t end) {
                 StackMemory stack(tree.stats().max_depth);
                 SimdJob job{view_of(tree),  rays.data() + begin,
-                            nullptr,        end - begin,
+                            end - begin,
                             hits == nullptr ? nullptr : hits + begin,
                             hits == nullptr ? occluded + begin : nullptr,
-                            stack.view(),   options.counters};
-                kernels.single(job, parts[block]);
+                            stack.view(), stack.packet_view(),  options.counters};
+                (options.path == SimdPath::single ? kernels.single : kernels.packets)(job, parts[block]);
             });
     });
     TraceCounts sum;
@@ -122,7 +126,7 @@ Result one_ray(const WideBvh& tree, const Ray& ray, bool closest) {
     }
     Result result{};
     SimdCounts counts;
-    SimdJob job{view_of(tree), &ray, nullptr, 1, nullptr, nullptr, stack, false};
+    SimdJob job{view_of(tree), &ray, 1, nullptr, nullptr, stack, {}, false};
     if constexpr (std::is_same_v<Result, Hit>)
         job.hits = &result;
     else

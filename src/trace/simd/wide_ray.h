@@ -26,6 +26,13 @@ struct WideStackView {
     float* entries;
 };
 
+/// As above, for packets: entries are those of the nearest ray, bit k of `active` is ray k.
+struct PacketStackView {
+    std::uint32_t* words;
+    float* entries;
+    std::uint64_t* active;
+};
+
 /// Siblings of the deepest path (contract.md 2), and room for a whole vector behind the last.
 inline std::size_t wide_stack_capacity(std::uint32_t max_depth) {
     return std::size_t{quantised_width - 1} * (max_depth + 1) + 1 + 2 * quantised_width;
@@ -38,6 +45,8 @@ inline constexpr float wide_longest_inverse = 0x1p80f;
 
 /// Boxes widen by twice the pad of slab.h: it covers the roundings of origin + steps, fused or not.
 inline constexpr float wide_pad_factor = 2.0f;
+/// The bounds of a packet round once more (docs/algorithms/wide.md).
+inline constexpr float packet_pad_factor = 3.0f;
 
 struct WideRay {
     Vec3 inverse;    // limited

@@ -1,0 +1,215 @@
+// Batches -> packets: rays are sorted by class within a block, and a packet's rays become arrays.
+// Included once per instruction set by simd_kernels.cpp.
+#if defined(RAYDIX_SIMD_PACKETS_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef RAYDIX_SIMD_PACKETS_H
+#undef RAYDIX_SIMD_PACKETS_H
+#else
+#define RAYDIX_SIMD_PACKETS_H
+#endif
+
+#include <hwy/cache_control.h>
+
+#include "trace/simd/packet.h"
+#include "trace/simd/single.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace raydix::HWY_NAMESPACE {
+
+/// Components of rays, index by index, in vectors: 8 floats a ray.
+struct RayReader {
+    const float* base;
+    hn::Vec<I16> place;  // of the first float of each ray
+
+    HWY_INLINE hn::Vec<F16> operator()(int component) const {
+        return hn::GatherIndex(f16, base + component, place);
+    }
+};
+
+inline constexpr int ray_tmin = 3, ray_direction = 4, ray_tmax = 7;
+
+HWY_INLINE RayReader read_rays(const Ray* rays, const std::int32_t* index) {
+    return {&rays->origin.x, hn::ShiftLeft<3>(hn::Load(I16(), index))};
+}
+
+/// The class codes of rays index[0] to index[lanes16 - 1].
+HWY_INLINE hn::Vec<I16> classify(const RayReader& ray) {
+    using V = hn::Vec<F16>;
+    const V x = ray(ray_direction), y = ray(ray_direction + 1), z = ray(ray_direction + 2);
+    const V ax = hn::Abs(x), ay = hn::Abs(y), az = hn::Abs(z);
+    const V longest = hn::Max(hn::Max(ax, ay), az);
+    const I16 d;
+    const auto bit = [&](V component, int value) {
+        return hn::IfThenElseZero(hn::Lt(hn::BitCast(d, component), hn::Zero(d)), hn::Set(d, value));
+    };
+    const auto axis = hn::IfThenElse(
+        hn::RebindMask(d, hn::Eq(az, longest)), hn::Set(d, 16),
+        hn::IfThenElseZero(hn::RebindMask(d, hn::Eq(ay, longest)), hn::Set(d, 8)));
+    const auto code = hn::Add(hn::Add(bit(x, 1), bit(y, 2)), hn::Add(bit(z, 4), axis));
+    const V tmin = ray(ray_tmin), tmax = ray(ray_tmax);
+    const V far = hn::Set(f16, std::numeric_limits<float>::max());
+    const auto origin_ok = hn::And(hn::And(hn::Le(hn::Abs(ray(0)), far), hn::Le(hn::Abs(ray(1)), far)),
+                                   hn::Le(hn::Abs(ray(2)), far));
+    // Each against the longest, since a NaN may have been dropped.
+    const auto direction_ok = hn::And(
+        hn::And(hn::And(hn::Le(ax, longest), hn::Le(ay, longest)), hn::Le(az, longest)),
+        hn::And(hn::Gt(longest, hn::Set(f16, 0x1p-3f)), hn::Lt(longest, hn::Set(f16, 0x1p3f))));
+    const auto limits_ok = hn::And(hn::Le(tmin, tmax), hn::Ge(tmax, hn::Zero(f16)));
+    const auto ok = hn::And(hn::And(origin_ok, direction_ok), limits_ok);
+    return hn::IfThenElse(hn::RebindMask(d, ok), code, hn::Set(d, int{odd_ray_class}));
+}
+
+/// slab_pad and make_slab_frame for all rays: the largest pad.
+HWY_INLINE void set_pads(const Aabb& bounds, Packet& p) {
+    float far[3];
+    const float lo[3] = {bounds.lo.x, bounds.lo.y, bounds.lo.z},
+                hi[3] = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
+    for (int a = 0; a < 3; ++a)
+        far[a] = max_of(max_of(std::fabs(lo[a] - p.origin_lo[a]), std::fabs(lo[a] - p.origin_hi[a])),
+                        max_of(std::fabs(hi[a] - p.origin_lo[a]), std::fabs(hi[a] - p.origin_hi[a])));
+    for (int a = 0; a < 3; ++a)
+        p.pad[a] = packet_pad_factor * slab_pad * (far[a] + far[p.kind.kz]);
+}
+
+/// Rays index[0, count) of one class; `index` may be read up to the next multiple of lanes16.
+HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::int32_t* index,
+                            std::uint32_t count, std::uint32_t code, Packet& p) {
+    using V = hn::Vec<F16>;
+    p.count = count;
+    p.kind = ray_class_of(code);
+    V origin_lo[3], origin_hi[3], least[3], largest[3];
+    for (int a = 0; a < 3; ++a) {
+        origin_lo[a] = least[a] = hn::Set(f16, infinity);
+        origin_hi[a] = hn::Set(f16, -infinity);
+        largest[a] = hn::Zero(f16);
+    }
+    V least_tmin = hn::Set(f16, infinity);
+    for (std::size_t i = 0; i < packet_size; i += lanes16) {
+        if (i >= count) {
+            hn::Store(hn::Set(f16, -infinity), f16, p.t + i);
+            continue;
+        }
+        const RayReader ray = read_rays(rays, index + i);
+        V inverse[3];
+        for (int a = 0; a < 3; ++a) {
+            const V o = hn::Add(ray(a), hn::Zero(f16));  // -0 becomes +0
+            hn::Store(o, f16, p.origin[a] + i);
+            origin_lo[a] = hn::Min(origin_lo[a], o);
+            origin_hi[a] = hn::Max(origin_hi[a], o);
+            inverse[a] = hn::Div(hn::Set(f16, 1.0f), ray(ray_direction + a));
+            hn::Store(inverse[a], f16, p.true_inverse[a] + i);
+            const V limit = hn::Set(f16, wide_longest_inverse);
+            const V limited = hn::Max(hn::Min(inverse[a], limit), hn::Neg(limit));
+            hn::Store(limited, f16, p.inverse[a] + i);
+            least[a] = hn::Min(least[a], hn::Abs(limited));
+            largest[a] = hn::Max(largest[a], hn::Abs(limited));
+        }
+        const V depth = ray(ray_direction + static_cast<int>(p.kind.kz));
+        hn::Store(hn::Div(ray(ray_direction + static_cast<int>(p.kind.kx)), depth), f16, p.shear_x + i);
+        hn::Store(hn::Div(ray(ray_direction + static_cast<int>(p.kind.ky)), depth), f16, p.shear_y + i);
+        hn::Store(hn::Div(hn::Set(f16, 1.0f), depth), f16, p.shear_z + i);
+        const V tmin = ray(ray_tmin);
+        const V start = hn::IfThenElseZero(hn::Gt(tmin, hn::Zero(f16)), tmin);
+        hn::Store(start, f16, p.tmin + i);
+        least_tmin = hn::Min(least_tmin, start);
+        hn::Store(hn::Min(ray(ray_tmax), hn::Set(f16, std::numeric_limits<float>::max())), f16, p.t + i);
+        hn::Store(hn::Set(U16(), no_primitive), U16(), p.prim + i);
+    }
+    for (int a = 0; a < 3; ++a) {
+        p.origin_lo[a] = hn::GetLane(hn::MinOfLanes(f16, origin_lo[a]));
+        p.origin_hi[a] = hn::GetLane(hn::MaxOfLanes(f16, origin_hi[a]));
+        p.least_inverse[a] = hn::GetLane(hn::MinOfLanes(f16, least[a]));
+        p.largest_inverse[a] = hn::GetLane(hn::MaxOfLanes(f16, largest[a]));
+    }
+    p.least_tmin = hn::GetLane(hn::MinOfLanes(f16, least_tmin));
+    set_pads(tree.bounds, p);
+}
+
+/// Rays of a job by class: order[begin[c]] to order[begin[c + 1]], each class in the caller's
+/// order and followed by room for a vector.
+class RaySorter {
+public:
+    static constexpr std::size_t max_rays = 4096;
+
+    void sort(const SimdJob& job) {
+        HWY_ALIGN std::int32_t index[16], codes[16];
+        std::uint32_t counts[ray_class_count] = {};
+        for (std::size_t k = 0; k < job.n; k += lanes16) {
+            for (std::size_t l = 0; l < lanes16; ++l)
+                index[l] = static_cast<std::int32_t>(std::min(k + l, job.n - 1));
+            hn::Store(classify(read_rays(job.rays, index)), I16(), codes);
+            for (std::size_t l = 0; l < lanes16 && k + l < job.n; ++l) {
+                code_[k + l] = static_cast<std::uint8_t>(codes[l]);
+                ++counts[codes[l]];
+            }
+        }
+        std::uint32_t at = 0, next[ray_class_count];
+        for (std::uint32_t c = 0; c < ray_class_count; ++c) {
+            begin_[c] = next[c] = at;
+            count_[c] = counts[c];
+            at += (counts[c] + 15u) & ~15u;
+        }
+        for (std::size_t k = 0; k < job.n; ++k)
+            order_[next[code_[k]]++] = static_cast<std::int32_t>(k);
+        for (std::uint32_t c = 0; c < ray_class_count; ++c)  // the last ray again, to fill vectors
+            for (; counts[c] > 0 && next[c] % 16 != 0; ++next[c]) order_[next[c]] = order_[next[c] - 1];
+    }
+    [[nodiscard]] const std::int32_t* rays(std::uint32_t code) const { return order_ + begin_[code]; }
+    [[nodiscard]] std::uint32_t count(std::uint32_t code) const { return count_[code]; }
+
+private:
+    std::uint32_t begin_[ray_class_count], count_[ray_class_count];
+    std::uint8_t code_[max_rays];
+    HWY_ALIGN std::int32_t order_[max_rays + 16 * ray_class_count];
+};
+
+template <bool any>
+void store_packet(const SimdJob& job, const std::int32_t* index, const Packet& p,
+                  std::uint64_t found, SimdCounts& counts) {
+    for (std::uint32_t k = 0; k < p.count; ++k) {
+        const auto i = static_cast<std::size_t>(index[k]);
+        if constexpr (any) {
+            job.occluded[i] = found >> k & 1;
+            counts.hits += found >> k & 1;
+        } else {
+            const bool hit = p.prim[k] != no_primitive;
+            counts.hits += hit;
+            job.hits[i] = hit ? Hit{p.t[k], p.prim[k], p.u[k], p.v[k]} : Hit{};
+        }
+    }
+}
+
+template <bool any, bool counting>
+void trace_packets(const SimdJob& job, SimdCounts& counts) {
+    RaySorter sorter;
+    sorter.sort(job);
+    Packet packet;
+    const Ray* ahead = job.rays + job.n;
+    for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
+        const std::int32_t* const rays = sorter.rays(code);
+        for (std::uint32_t at = 0; at < sorter.count(code); at += packet_size) {
+            const auto count = std::min<std::uint32_t>(packet_size, sorter.count(code) - at);
+            // What the next job will read first, while there is something to do.
+            for (std::uint32_t k = 0; k < count; k += 2) hwy::Prefetch(ahead + k);
+            ahead += count;
+            fill_packet(job.tree, job.rays, rays + at, count, code, packet);
+            PacketWalk<any, counting> walk(job.tree, packet, job.packet_stack, counts);
+            walk.trace();
+            store_packet<any>(job, rays + at, packet, walk.found(), counts);
+        }
+    }
+    const std::int32_t* const odd = sorter.rays(odd_ray_class);
+    for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k)
+        trace_one<any, counting>(job, static_cast<std::size_t>(odd[k]), counts);
+}
+
+inline void packets(const SimdJob& job, SimdCounts& counts) {
+    if (job.hits == nullptr)
+        job.counting ? trace_packets<true, true>(job, counts) : trace_packets<true, false>(job, counts);
+    else
+        job.counting ? trace_packets<false, true>(job, counts)
+                     : trace_packets<false, false>(job, counts);
+}
+
+}  // namespace raydix::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

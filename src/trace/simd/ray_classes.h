@@ -1,0 +1,32 @@
+// Rays whose directions agree in sign and in the longest axis form a class: boxes and triangles
+// read the same planes and corners for all of them.
+#pragma once
+
+#include <cstdint>
+
+namespace raydix {
+
+/// Codes 0 to 23 are negative + 8 * kz; code 24 holds rays that packets do not take: invalid ones,
+/// and those with directions so long or short that they are scaled.
+inline constexpr std::uint32_t ray_class_count = 25, odd_ray_class = 24;
+
+struct RayClass {
+    std::uint32_t negatives;  // bit a: component a of the direction is negative (or -0)
+    std::uint32_t kx, ky, kz;  // as in RayFrame
+
+    [[nodiscard]] bool negative(int axis) const { return (negatives >> axis & 1) != 0; }
+};
+
+inline RayClass ray_class_of(std::uint32_t code) {
+    RayClass out{code & 7, 0, 0, code >> 3};
+    out.kx = out.kz == 2 ? 0 : out.kz + 1;
+    out.ky = out.kx == 2 ? 0 : out.kx + 1;
+    if (out.negative(static_cast<int>(out.kz))) {
+        const std::uint32_t swapped = out.kx;
+        out.kx = out.ky;
+        out.ky = swapped;
+    }
+    return out;
+}
+
+}  // namespace raydix
