@@ -11,6 +11,7 @@
 
 #include "trace/simd/packet.h"
 #include "trace/simd/single.h"
+#include "trace/simd/stream.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
@@ -200,6 +201,90 @@ void trace_packets(const SimdJob& job, SimdCounts& counts) {
     const std::int32_t* const odd = sorter.rays(odd_ray_class);
     for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k)
         trace_one<any, counting>(job, static_cast<std::size_t>(odd[k]), counts);
+}
+
+using F4 = hn::FixedTag<float, 4>;
+
+/// Rays index[0, count) of one class as a stream.
+HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index,
+                                   std::uint32_t count, std::uint32_t code,
+                                   std::vector<StreamRay>& rays) {
+    const F4 f4;
+    StreamFrame frame;
+    frame.kind = ray_class_of(code);
+    rays.resize(count);
+    auto lo = hn::Set(f4, infinity), hi = hn::Set(f4, -infinity);
+    const auto limit = hn::Set(f4, wide_longest_inverse);
+    for (std::uint32_t k = 0; k < count; ++k) {
+        StreamRay& ray = rays[k];
+        const float* const from = &job.rays[index[k]].origin.x;
+        const auto origin = hn::Add(hn::LoadU(f4, from), hn::Zero(f4));  // -0 becomes +0
+        const auto direction = hn::LoadU(f4, from + ray_direction);
+        const auto inverse = hn::Div(hn::Set(f4, 1.0f), direction);
+        HWY_ALIGN const float three[4] = {from[ray_direction + static_cast<int>(frame.kind.kx)],
+                                          from[ray_direction + static_cast<int>(frame.kind.ky)], 1.0f, 1.0f};
+        const auto shear = hn::Div(hn::Load(f4, three),
+                                   hn::Set(f4, from[ray_direction + static_cast<int>(frame.kind.kz)]));
+        lo = hn::Min(lo, origin), hi = hn::Max(hi, origin);
+        hn::Store(origin, f4, ray.quad[0]);
+        hn::Store(hn::Max(hn::Min(inverse, limit), hn::Neg(limit)), f4, ray.quad[1]);
+        hn::Store(shear, f4, ray.quad[2]);
+        hn::Store(inverse, f4, ray.quad[3]);
+        ray.t() = min_of(from[ray_tmax], std::numeric_limits<float>::max());
+        ray.quad[1][3] = from[ray_tmin] > 0.0f ? from[ray_tmin] : 0.0f;
+        ray.prim = no_primitive, ray.u = 0.0f, ray.v = 0.0f;
+        ray.index = static_cast<std::uint32_t>(index[k]);
+    }
+    HWY_ALIGN float least[4], largest[4];
+    hn::Store(lo, f4, least);
+    hn::Store(hi, f4, largest);
+    const Aabb& bounds = job.tree.bounds;
+    float far[3];
+    for (int a = 0; a < 3; ++a) {
+        const float box_lo = coordinate(bounds.lo, a), box_hi = coordinate(bounds.hi, a);
+        far[a] = max_of(max_of(std::fabs(box_lo - least[a]), std::fabs(box_lo - largest[a])),
+                        max_of(std::fabs(box_hi - least[a]), std::fabs(box_hi - largest[a])));
+    }
+    for (int a = 0; a < 3; ++a) {
+        const float pad = wide_pad_factor * slab_pad * (far[a] + far[frame.kind.kz]);
+        frame.near_pad[a] = frame.kind.negative(a) ? pad : -pad;
+    }
+    return frame;
+}
+
+template <bool any, bool counting>
+void trace_streams(const SimdJob& job, SimdCounts& counts) {
+    RaySorter sorter;
+    sorter.sort(job);
+    const Ray* ahead = job.rays + job.n;
+    std::vector<StreamRay>& rays = job.memory->rays();
+    for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
+        const std::uint32_t count = sorter.count(code);
+        if (count == 0) continue;
+        for (std::uint32_t k = 0; k < count; k += 2) hwy::Prefetch(ahead + k);
+        ahead += count;
+        const StreamFrame frame = fill_stream(job, sorter.rays(code), count, code, rays);
+        StreamWalk<any, counting>(job.tree, frame, rays, *job.memory, job.stack, counts).trace();
+        for (const StreamRay& ray : rays) {
+            const bool hit = ray.prim != no_primitive;
+            counts.hits += hit;
+            if constexpr (any)
+                job.occluded[ray.index] = hit;
+            else
+                job.hits[ray.index] = hit ? Hit{ray.t(), ray.prim, ray.u, ray.v} : Hit{};
+        }
+    }
+    const std::int32_t* const odd = sorter.rays(odd_ray_class);
+    for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k)
+        trace_one<any, counting>(job, static_cast<std::size_t>(odd[k]), counts);
+}
+
+inline void streams(const SimdJob& job, SimdCounts& counts) {
+    if (job.hits == nullptr)
+        job.counting ? trace_streams<true, true>(job, counts) : trace_streams<true, false>(job, counts);
+    else
+        job.counting ? trace_streams<false, true>(job, counts)
+                     : trace_streams<false, false>(job, counts);
 }
 
 inline void packets(const SimdJob& job, SimdCounts& counts) {

@@ -5,6 +5,7 @@
 #include <span>
 #include <string_view>
 
+#include "trace/simd/stream_rays.h"
 #include "trace/simd/wide_ray.h"
 
 namespace raydix {
@@ -24,6 +25,7 @@ struct SimdJob {
     std::uint8_t* occluded;
     WideStackView stack;
     PacketStackView packet_stack;
+    StreamMemory* memory;
     bool counting;
 };
 
@@ -31,6 +33,7 @@ struct SimdKernels {
     std::string_view isa;
     void (*single)(const SimdJob& job, SimdCounts& counts);
     void (*packets)(const SimdJob& job, SimdCounts& counts);
+    void (*streams)(const SimdJob& job, SimdCounts& counts);
 };
 
 /// Best first; those this processor can run.

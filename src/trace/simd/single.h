@@ -21,18 +21,18 @@ constexpr std::size_t parts8 = 8 / lanes8;
 template <bool any, bool counting>
 class SingleRay {
 public:
-    SingleRay(const WideView& tree, const RayFrame& frame, const WideStackView& stack,
-              SimdCounts& counts)
-        : tree_(tree), frame_(frame), ray_(make_wide_ray(frame, tree.bounds)), stack_(stack),
-          counts_(counts) {
+    SingleRay(const WideView& tree, const RayFrame& frame, const WideRay& ray,
+              const WideStackView& stack, SimdCounts& counts)
+        : tree_(tree), frame_(frame), ray_(ray), stack_(stack), counts_(counts) {
         origin_[0] = frame.origin.x, origin_[1] = frame.origin.y, origin_[2] = frame.origin.z;
         inverse_[0] = frame.inverse.x, inverse_[1] = frame.inverse.y, inverse_[2] = frame.inverse.z;
         for (std::size_t l = 0; l < 8; ++l) slot_[l] = static_cast<std::int32_t>(l ^ ray_.negative ^ 7u);
     }
 
-    WideBest trace() {
-        best_.t = frame_.tmax;
-        stack_.words[0] = 0;
+    /// From a node or leaf on; `best` is what was found before.
+    WideBest trace(std::uint32_t root, const WideBest& best) {
+        best_ = best;
+        stack_.words[0] = root;
         stack_.entries[0] = frame_.tmin;
         std::size_t top = 1;
         while (top > 0) {
@@ -249,7 +249,9 @@ void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
         ++counts.invalid;
     } else {
         const RayFrame frame = make_frame(job.rays[i]);
-        const WideBest best = SingleRay<any, counting>(job.tree, frame, job.stack, counts).trace();
+        const WideBest best = SingleRay<any, counting>(job.tree, frame, make_wide_ray(frame, job.tree.bounds),
+                                                               job.stack, counts)
+                                  .trace(0, {frame.tmax});
         if (best.found()) hit = {best.t * frame.t_scale, best.prim, best.u, best.v};
     }
     counts.hits += hit.hit();

@@ -59,12 +59,13 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hit
             rays.size(), rays_per_block,
             [&](std::size_t block, std::size_t begin, std::size_t end) {
                 StackMemory stack(tree.stats().max_depth);
+                static thread_local StreamMemory memory;
                 SimdJob job{view_of(tree),  rays.data() + begin,
                             end - begin,
                             hits == nullptr ? nullptr : hits + begin,
                             hits == nullptr ? occluded + begin : nullptr,
-                            stack.view(), stack.packet_view(),  options.counters};
-                (options.path == SimdPath::single ? kernels.single : kernels.packets)(job, parts[block]);
+                            stack.view(), stack.packet_view(), &memory, options.counters};
+                (options.path == SimdPath::single ? kernels.single : options.path == SimdPath::sorted ? kernels.streams : kernels.packets)(job, parts[block]);
             });
     });
     TraceCounts sum;
@@ -126,7 +127,7 @@ Result one_ray(const WideBvh& tree, const Ray& ray, bool closest) {
     }
     Result result{};
     SimdCounts counts;
-    SimdJob job{view_of(tree), &ray, 1, nullptr, nullptr, stack, {}, false};
+    SimdJob job{view_of(tree), &ray, 1, nullptr, nullptr, stack, {}, nullptr, false};
     if constexpr (std::is_same_v<Result, Hit>)
         job.hits = &result;
     else

@@ -1,0 +1,313 @@
+// Many rays of one class through a wide tree together, each node with all rays that reach it: lists
+// of rays are filtered from a node to its children (Tsakok 2009; Barringer, Akenine-Moeller 2014),
+// so that vectors are full wherever enough rays go, whatever the order they came in. Included once
+// per instruction set by simd_kernels.cpp.
+#if defined(RAYDIX_SIMD_STREAM_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef RAYDIX_SIMD_STREAM_H
+#undef RAYDIX_SIMD_STREAM_H
+#else
+#define RAYDIX_SIMD_STREAM_H
+#endif
+
+#include "trace/simd/quads.h"
+#include "trace/simd/single.h"
+#include "trace/simd/stream_rays.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace raydix::HWY_NAMESPACE {
+
+/// Lists of fewer rays go on one by one.
+constexpr std::uint32_t few_rays = 3;
+
+template <bool any, bool counting>
+class StreamWalk {
+public:
+    StreamWalk(const WideView& tree, const StreamFrame& frame, std::span<StreamRay> rays,
+               StreamMemory& memory, const WideStackView& single_stack, SimdCounts& counts)
+        : tree_(tree), frame_(frame), rays_(rays.data()), memory_(memory),
+          single_stack_(single_stack), counts_(counts) {
+        for (int axis = 0; axis < 3; ++axis) negative_[axis] = frame.kind.negative(axis);
+        for (std::uint32_t l = 0; l < 8; ++l) slot_[l] = l ^ frame.kind.negatives ^ 7u;
+        count_ = static_cast<std::uint32_t>(rays.size());
+    }
+
+    void trace() {
+        memory_.reserve(0, count_);
+        std::uint32_t* const all = memory_.lists();
+        for (std::uint32_t k = 0; k < count_; ++k) all[k] = k;
+        auto& stack = memory_.stack();
+        stack.clear();
+        stack.push_back({0, 0, count_});
+        while (!stack.empty()) {
+            const StreamEntry next = stack.back();
+            stack.pop_back();
+            if ((next.word & wide_leaf_bit) != 0) {
+                test_leaf(next);
+            } else if (next.count <= few_rays) {
+                for (std::uint32_t k = 0; k < next.count; ++k)
+                    go_alone(memory_.lists()[next.begin + k], next.word);
+            } else {
+                visit(next);
+            }
+        }
+    }
+
+private:
+    static constexpr std::uint32_t ray_bits = 0xFFFFu;
+
+    /// A ray's number in the lower half, where it enters in the upper: the upper half of a float,
+    /// which is never more than the float.
+    static HWY_INLINE float entry_of(std::uint32_t item) {
+        const std::uint32_t bits = item & ~ray_bits;
+        float entry;
+        std::memcpy(&entry, &bits, sizeof(entry));
+        return entry;
+    }
+
+    struct RowsOf {
+        const StreamRay* rays;
+        const std::uint32_t* list;
+        std::size_t quad;
+        HWY_INLINE const float* operator()(std::size_t l) const {
+            return rays[list[l] & ray_bits].quad[quad];
+        }
+    };
+
+    /// Ends a list so that whole vectors can be read.
+    HWY_INLINE void pad_list(std::uint32_t* list, std::uint32_t count) const {
+        hn::StoreU(hn::Set(U16(), list[count - 1]), U16(), list + count);
+    }
+
+    HWY_INLINE void visit(const StreamEntry& entry) {
+        if constexpr (counting) counts_.visits += entry.count;
+        const std::uint32_t stride = entry.count + StreamMemory::slack;
+        const std::uint32_t out_begin = entry.begin + stride;
+        memory_.reserve(out_begin, 8 * stride);
+        std::uint32_t* const lists = memory_.lists();
+        std::uint32_t* const list = lists + entry.begin;
+        pad_list(list, entry.count);
+        const WideNode& node = tree_.nodes[entry.word];
+        HWY_ALIGN float near_steps[3][8], far_steps[3][8];
+        float step[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::uint32_t bits = std::uint32_t{node.exponent[axis]} << 23;
+            std::memcpy(&step[axis], &bits, sizeof(float));
+            const std::uint8_t* const near = negative_[axis] ? node.hi[axis] : node.lo[axis];
+            const std::uint8_t* const far = negative_[axis] ? node.lo[axis] : node.hi[axis];
+            for (std::size_t l = 0; l < 8; l += lanes8) {
+                const auto read = [&](const std::uint8_t* from) {
+                    return hn::ConvertTo(f8, hn::PromoteTo(I8(), hn::LoadU(B8(), from + l)));
+                };
+                hn::Store(read(near), f8, near_steps[axis] + l);
+                hn::Store(read(far), f8, far_steps[axis] + l);
+            }
+        }
+        std::uint32_t children[8], child_count = 0;  // slots, farthest first
+        std::uint32_t* ends[8];
+        for (const std::uint32_t s : slot_)
+            if ((node.used >> s & 1) != 0) {
+                ends[child_count] = lists + out_begin + child_count * stride;
+                children[child_count++] = s;
+            }
+        const auto high = hn::Set(U16(), ~ray_bits), low = hn::Set(U16(), ray_bits);
+        for (std::uint32_t k = 0; k < entry.count; k += lanes16) {
+            V16 place[4], way[4];
+            load_quads(RowsOf{rays_, list + k, 0}, place);
+            load_quads(RowsOf{rays_, list + k, 1}, way);
+            const auto items = hn::LoadU(U16(), list + k);
+            const V16 reach = place[3], tmin = way[3];
+            V16 rate[3], near[3], far[3];
+            for (int axis = 0; axis < 3; ++axis) {
+                const V16 from = hn::Sub(hn::Set(f16, node.origin[axis]), place[axis]);
+                const V16 pad = hn::Set(f16, frame_.near_pad[axis]);
+                rate[axis] = hn::Mul(hn::Set(f16, step[axis]), way[axis]);
+                near[axis] = hn::Mul(hn::Add(from, pad), way[axis]);
+                far[axis] = hn::Mul(hn::Sub(from, pad), way[axis]);
+            }
+            auto active = hn::Le(hn::BitCast(f16, hn::And(items, high)), reach);
+            if (entry.count - k < lanes16)
+                active = hn::And(active, hn::FirstN(f16, entry.count - k));
+            const auto numbers = hn::And(items, low);
+            for (std::uint32_t c = 0; c < child_count; ++c) {
+                const std::uint32_t s = children[c];
+                V16 in = tmin;
+                V16 leave = hn::MulAdd(hn::Set(f16, far_steps[0][s]), rate[0], far[0]);
+                in = hn::Max(in, hn::MulAdd(hn::Set(f16, near_steps[0][s]), rate[0], near[0]));
+                for (int axis = 1; axis < 3; ++axis) {
+                    in = hn::Max(in, hn::MulAdd(hn::Set(f16, near_steps[axis][s]), rate[axis], near[axis]));
+                    leave = hn::Min(leave, hn::MulAdd(hn::Set(f16, far_steps[axis][s]), rate[axis], far[axis]));
+                }
+                const V16 exit = hn::Min(hn::Mul(leave, hn::Set(f16, slab_exit_factor)), reach);
+                const auto met = hn::And(hn::Le(in, exit), active);
+                const auto item = hn::Or(hn::And(hn::BitCast(U16(), in), high), numbers);
+                hn::StoreU(hn::Compress(item, hn::RebindMask(U16(), met)), U16(), ends[c]);
+                ends[c] += hn::CountTrue(f16, met);
+            }
+        }
+        auto& stack = memory_.stack();
+        for (std::uint32_t c = 0; c < child_count; ++c) {
+            const std::uint32_t begin = out_begin + c * stride;
+            const auto count = static_cast<std::uint32_t>(ends[c] - (lists + begin));
+            if (count > 0) stack.push_back({node.child[children[c]], begin, count});
+        }
+    }
+
+    void go_alone(std::uint32_t item, std::uint32_t word) {
+        StreamRay& ray = rays_[item & ray_bits];
+        if (!(entry_of(item) <= ray.t())) return;
+        const RayFrame frame = frame_.frame_of(ray);
+        SingleRay<any, counting> single(tree_, frame, frame_.wide_ray_of(ray), single_stack_, counts_);
+        const WideBest best = single.trace(word, {ray.t(), ray.prim, ray.u, ray.v});
+        if (any && best.found()) {
+            ray.settle();
+        } else {
+            ray.t() = best.t, ray.prim = best.prim, ray.u = best.u, ray.v = best.v;
+        }
+    }
+
+    struct Sheared {
+        V16 x, y, z;  // z before shear_z
+    };
+    static HWY_INLINE V16 edge(const Sheared& a, const Sheared& b) {
+        return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
+    }
+
+    /// Rays of a chunk of a list, for triangles.
+    struct Chunk {
+        const std::uint32_t* list;
+        V16 origin[3], shear[3], reach;
+    };
+
+    HWY_INLINE void load_chunk(Chunk& chunk) const {
+        V16 place[4], way[4];
+        load_quads(RowsOf{rays_, chunk.list, 0}, place);
+        load_quads(RowsOf{rays_, chunk.list, 2}, way);
+        for (int axis = 0; axis < 3; ++axis) chunk.origin[axis] = place[axis], chunk.shear[axis] = way[axis];
+        chunk.reach = place[3];
+    }
+
+    void test_leaf(const StreamEntry& entry) {
+        const std::uint32_t place = (entry.word & ~wide_leaf_bit) >> 3, count = (entry.word & 7) + 1;
+        const TriangleBlock& block = tree_.blocks[place / 8];
+        std::uint32_t* const list = memory_.lists() + entry.begin;
+        if constexpr (counting) counts_.tests += std::uint64_t{count} * entry.count;
+        pad_list(list, entry.count);
+        for (std::uint32_t k = 0; k < entry.count; k += lanes16) {
+            Chunk chunk;
+            chunk.list = list + k;
+            load_chunk(chunk);
+            const auto items = hn::LoadU(U16(), list + k);
+            auto active = hn::Le(
+                hn::BitCast(f16, hn::And(items, hn::Set(U16(), ~ray_bits))), chunk.reach);
+            if (entry.count - k < lanes16)
+                active = hn::And(active, hn::FirstN(f16, entry.count - k));
+            const std::uint32_t wanted = bits_of(f16, active);
+            if (wanted == 0) continue;
+            for (std::uint32_t tri = 0; tri < count; ++tri)
+                test_triangle(block, place % 8 + tri, chunk, wanted);
+        }
+    }
+
+    HWY_INLINE Sheared shear(const TriangleBlock& block, int vertex, std::uint32_t lane,
+                             const Chunk& chunk) const {
+        const auto at = [&](std::uint32_t axis) {
+            return hn::Sub(hn::Set(f16, block.corner[3 * vertex + static_cast<int>(axis)][lane]),
+                           chunk.origin[axis]);
+        };
+        const V16 z = at(frame_.kind.kz);
+        return {hn::Sub(at(frame_.kind.kx), hn::Mul(chunk.shear[0], z)),
+                hn::Sub(at(frame_.kind.ky), hn::Mul(chunk.shear[1], z)), z};
+    }
+
+    /// intersect_triangle for the rays of the chunk in `wanted`: the same bits.
+    HWY_INLINE void test_triangle(const TriangleBlock& block, std::uint32_t lane, Chunk& chunk,
+                                  std::uint32_t wanted) {
+        const Sheared a = shear(block, 0, lane, chunk), b = shear(block, 1, lane, chunk),
+                      c = shear(block, 2, lane, chunk);
+        const V16 u = edge(c, b), v = edge(a, c), w = edge(b, a);
+        const V16 zero = hn::Zero(f16);
+        const V16 least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
+        const auto outside = hn::And(hn::Lt(least, zero), hn::Gt(largest, zero));
+        std::uint32_t candidates = wanted & ~bits_of(f16, outside);
+        if (candidates == 0) return;
+        const auto on_edge = hn::Or(hn::Or(hn::Eq(u, zero), hn::Eq(v, zero)), hn::Eq(w, zero));
+        const std::uint32_t near_edge = candidates & bits_of(f16, on_edge);
+        candidates &= ~near_edge;
+        if (candidates != 0) accept(block, lane, chunk, candidates, a, b, c, u, v, w);
+        if (near_edge != 0) {
+            test_exactly(block, lane, chunk, near_edge);
+            load_chunk(chunk);
+        }
+    }
+
+    HWY_NOINLINE void test_exactly(const TriangleBlock& block, std::uint32_t lane,
+                                   const Chunk& chunk, std::uint32_t rays) {
+        for (; rays != 0; rays &= rays - 1) {
+            StreamRay& ray = rays_[chunk.list[std::countr_zero(rays)] & ray_bits];
+            TriangleHit hit;
+            if (!intersect_triangle<EdgeRule::closed>(frame_.frame_of(ray), triangle_of(block, lane),
+                                                      ray.t(), hit))
+                continue;
+            ray.take(any, hit.t, block.prim[lane], hit.u, hit.v);
+        }
+    }
+
+    HWY_INLINE void accept(const TriangleBlock& block, std::uint32_t lane, Chunk& chunk,
+                           std::uint32_t candidates, const Sheared& a, const Sheared& b,
+                           const Sheared& c, V16 u, V16 v, V16 w) {
+        V16 way[4], true_way[4];
+        load_quads(RowsOf{rays_, chunk.list, 1}, way);
+        load_quads(RowsOf{rays_, chunk.list, 3}, true_way);
+        const V16 determinant = hn::Add(hn::Add(u, v), w);
+        const V16 shear_z = chunk.shear[2];
+        const V16 depth = hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)),
+                                          hn::Mul(v, hn::Mul(shear_z, b.z))),
+                                  hn::Mul(w, hn::Mul(shear_z, c.z)));
+        V16 t = hn::Div(depth, determinant);
+        V16 entry = hn::Set(f16, -infinity), exit = hn::Set(f16, infinity);
+        for (int axis = 0; axis < 3; ++axis) {
+            const float p = block.corner[axis][lane], q = block.corner[3 + axis][lane],
+                        r = block.corner[6 + axis][lane];
+            const float lo = min_of(min_of(p, q), r), hi = max_of(max_of(p, q), r);
+            const V16 inverse = true_way[axis];
+            const V16 near = hn::Mul(
+                hn::Sub(hn::Set(f16, negative_[axis] ? hi : lo), chunk.origin[axis]), inverse);
+            const V16 far = hn::Mul(
+                hn::Sub(hn::Set(f16, negative_[axis] ? lo : hi), chunk.origin[axis]), inverse);
+            // A NaN plane is dropped.
+            entry = hn::IfThenElse(hn::Gt(near, entry), near, entry);
+            exit = hn::IfThenElse(hn::Lt(far, exit), far, exit);
+        }
+        V16 held = hn::IfThenElse(hn::Gt(t, entry), t, entry);
+        held = hn::IfThenElse(hn::Lt(held, exit), held, exit);
+        t = hn::IfThenElse(hn::Le(entry, exit), held, t);
+        const auto sound = hn::And(hn::Ne(determinant, hn::Zero(f16)),
+                                   hn::Lt(hn::Abs(determinant), hn::Set(f16, infinity)));
+        const auto in_reach = hn::And(hn::Ge(t, way[3]), hn::Le(t, chunk.reach));
+        candidates &= bits_of(f16, hn::And(sound, in_reach));
+        if (candidates == 0) return;
+        HWY_ALIGN float ts[lanes16], us[lanes16], vs[lanes16];
+        hn::Store(t, f16, ts);
+        hn::Store(hn::Div(v, determinant), f16, us);
+        hn::Store(hn::Div(w, determinant), f16, vs);
+        chunk.reach = hn::IfThenElse(mask_of(f16, candidates), any ? hn::Set(f16, -1.0f) : t, chunk.reach);
+        for (; candidates != 0; candidates &= candidates - 1) {
+            const auto l = static_cast<std::size_t>(std::countr_zero(candidates));
+            rays_[chunk.list[l] & ray_bits].take(any, ts[l], block.prim[lane], us[l], vs[l]);
+        }
+    }
+
+    const WideView& tree_;
+    const StreamFrame& frame_;
+    StreamRay* const rays_;
+    StreamMemory& memory_;
+    const WideStackView single_stack_;
+    SimdCounts& counts_;
+    std::uint32_t count_;
+    bool negative_[3];
+    std::uint32_t slot_[8];
+};
+
+}  // namespace raydix::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
