@@ -18,11 +18,11 @@ namespace raydix {
 /// goes over the end of a block.
 inline constexpr std::uint32_t wide_leaf_bit = 0x80000000u;
 inline constexpr std::uint32_t wide_no_child = 0xFFFFFFFFu;
-inline constexpr std::uint32_t wide_max_leaf = 8;
+inline constexpr std::uint32_t wide_max_leaf = 4;
 /// What the collapse takes for the cost of testing up to `wide_block` triangles against that of a
 /// node.
-inline constexpr std::uint32_t wide_block = 4;
-inline constexpr double wide_primitive_cost = 1.0;
+inline constexpr std::uint32_t wide_block = 1;
+inline constexpr double wide_primitive_cost = 0.4;
 
 /// Frame and boxes fill the first 64 bytes. A child in slot s has the box origin + lo[.][s] * step
 /// to origin + hi[.][s] * step, where the step of an axis is 2^(exponent - 127); slots are those of

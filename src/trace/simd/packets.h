@@ -16,40 +16,38 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-/// Components of rays, index by index, in vectors: 8 floats a ray.
-struct RayReader {
-    const float* base;
-    hn::Vec<I16> place;  // of the first float of each ray
+inline constexpr int ray_tmin = 3, ray_direction = 4, ray_tmax = 7;  // floats of a Ray
 
-    HWY_INLINE hn::Vec<F16> operator()(int component) const {
-        return hn::GatherIndex(f16, base + component, place);
-    }
+/// Rays index[0] to index[lanes16 - 1], a vector a component: origin, tmin; direction, tmax.
+struct RayVectors {
+    V16 place[4], way[4];
 };
 
-inline constexpr int ray_tmin = 3, ray_direction = 4, ray_tmax = 7;
-
-HWY_INLINE RayReader read_rays(const Ray* rays, const std::int32_t* index) {
-    return {&rays->origin.x, hn::ShiftLeft<3>(hn::Load(I16(), index))};
+HWY_INLINE RayVectors read_rays(const Ray* rays, const std::int32_t* index) {
+    RayVectors out;
+    load_quads([&](std::size_t l) { return &rays[index[l]].origin.x; }, out.place);
+    load_quads([&](std::size_t l) { return &rays[index[l]].direction.x; }, out.way);
+    return out;
 }
 
-/// The class codes of rays index[0] to index[lanes16 - 1].
-HWY_INLINE hn::Vec<I16> classify(const RayReader& ray) {
-    using V = hn::Vec<F16>;
-    const V x = ray(ray_direction), y = ray(ray_direction + 1), z = ray(ray_direction + 2);
-    const V ax = hn::Abs(x), ay = hn::Abs(y), az = hn::Abs(z);
-    const V longest = hn::Max(hn::Max(ax, ay), az);
+/// The class codes of rays.
+HWY_INLINE hn::Vec<I16> classify(const RayVectors& ray) {
+    const V16 x = ray.way[0], y = ray.way[1], z = ray.way[2];
+    const V16 ax = hn::Abs(x), ay = hn::Abs(y), az = hn::Abs(z);
+    const V16 longest = hn::Max(hn::Max(ax, ay), az);
     const I16 d;
-    const auto bit = [&](V component, int value) {
-        return hn::IfThenElseZero(hn::Lt(hn::BitCast(d, component), hn::Zero(d)), hn::Set(d, value));
+    const auto sign = [&](V16 component, int place) {
+        return hn::And(hn::ShiftRight<31>(hn::BitCast(d, component)), hn::Set(d, place));
     };
     const auto axis = hn::IfThenElse(
         hn::RebindMask(d, hn::Eq(az, longest)), hn::Set(d, 16),
         hn::IfThenElseZero(hn::RebindMask(d, hn::Eq(ay, longest)), hn::Set(d, 8)));
-    const auto code = hn::Add(hn::Add(bit(x, 1), bit(y, 2)), hn::Add(bit(z, 4), axis));
-    const V tmin = ray(ray_tmin), tmax = ray(ray_tmax);
-    const V far = hn::Set(f16, std::numeric_limits<float>::max());
-    const auto origin_ok = hn::And(hn::And(hn::Le(hn::Abs(ray(0)), far), hn::Le(hn::Abs(ray(1)), far)),
-                                   hn::Le(hn::Abs(ray(2)), far));
+    const auto code = hn::Or(hn::Or(sign(x, 1), sign(y, 2)), hn::Or(sign(z, 4), axis));
+    const V16 tmin = ray.place[3], tmax = ray.way[3];
+    const V16 far = hn::Set(f16, std::numeric_limits<float>::max());
+    const auto origin_ok =
+        hn::And(hn::And(hn::Le(hn::Abs(ray.place[0]), far), hn::Le(hn::Abs(ray.place[1]), far)),
+                hn::Le(hn::Abs(ray.place[2]), far));
     // Each against the longest, since a NaN may have been dropped.
     const auto direction_ok = hn::And(
         hn::And(hn::And(hn::Le(ax, longest), hn::Le(ay, longest)), hn::Le(az, longest)),
@@ -74,7 +72,7 @@ HWY_INLINE void set_pads(const Aabb& bounds, Packet& p) {
 /// Rays index[0, count) of one class; `index` may be read up to the next multiple of lanes16.
 HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::int32_t* index,
                             std::uint32_t count, std::uint32_t code, Packet& p) {
-    using V = hn::Vec<F16>;
+    using V = V16;
     p.count = count;
     p.kind = ray_class_of(code);
     V origin_lo[3], origin_hi[3], least[3], largest[3];
@@ -89,14 +87,14 @@ HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::in
             hn::Store(hn::Set(f16, -infinity), f16, p.t + i);
             continue;
         }
-        const RayReader ray = read_rays(rays, index + i);
+        const RayVectors ray = read_rays(rays, index + i);
         V inverse[3];
         for (int a = 0; a < 3; ++a) {
-            const V o = hn::Add(ray(a), hn::Zero(f16));  // -0 becomes +0
+            const V o = hn::Add(ray.place[a], hn::Zero(f16));  // -0 becomes +0
             hn::Store(o, f16, p.origin[a] + i);
             origin_lo[a] = hn::Min(origin_lo[a], o);
             origin_hi[a] = hn::Max(origin_hi[a], o);
-            inverse[a] = hn::Div(hn::Set(f16, 1.0f), ray(ray_direction + a));
+            inverse[a] = hn::Div(hn::Set(f16, 1.0f), ray.way[a]);
             hn::Store(inverse[a], f16, p.true_inverse[a] + i);
             const V limit = hn::Set(f16, wide_longest_inverse);
             const V limited = hn::Max(hn::Min(inverse[a], limit), hn::Neg(limit));
@@ -104,15 +102,15 @@ HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::in
             least[a] = hn::Min(least[a], hn::Abs(limited));
             largest[a] = hn::Max(largest[a], hn::Abs(limited));
         }
-        const V depth = ray(ray_direction + static_cast<int>(p.kind.kz));
-        hn::Store(hn::Div(ray(ray_direction + static_cast<int>(p.kind.kx)), depth), f16, p.shear_x + i);
-        hn::Store(hn::Div(ray(ray_direction + static_cast<int>(p.kind.ky)), depth), f16, p.shear_y + i);
+        const V depth = ray.way[p.kind.kz];
+        hn::Store(hn::Div(ray.way[p.kind.kx], depth), f16, p.shear_x + i);
+        hn::Store(hn::Div(ray.way[p.kind.ky], depth), f16, p.shear_y + i);
         hn::Store(hn::Div(hn::Set(f16, 1.0f), depth), f16, p.shear_z + i);
-        const V tmin = ray(ray_tmin);
+        const V tmin = ray.place[3];
         const V start = hn::IfThenElseZero(hn::Gt(tmin, hn::Zero(f16)), tmin);
         hn::Store(start, f16, p.tmin + i);
         least_tmin = hn::Min(least_tmin, start);
-        hn::Store(hn::Min(ray(ray_tmax), hn::Set(f16, std::numeric_limits<float>::max())), f16, p.t + i);
+        hn::Store(hn::Min(ray.way[3], hn::Set(f16, std::numeric_limits<float>::max())), f16, p.t + i);
         hn::Store(hn::Set(U16(), no_primitive), U16(), p.prim + i);
     }
     for (int a = 0; a < 3; ++a) {
@@ -129,7 +127,7 @@ HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::in
 /// order and followed by room for a vector.
 class RaySorter {
 public:
-    static constexpr std::size_t max_rays = 4096;
+    static constexpr std::size_t max_rays = 65536;
 
     void sort(const SimdJob& job) {
         HWY_ALIGN std::int32_t index[16], codes[16];
@@ -137,6 +135,7 @@ public:
         for (std::size_t k = 0; k < job.n; k += lanes16) {
             for (std::size_t l = 0; l < lanes16; ++l)
                 index[l] = static_cast<std::int32_t>(std::min(k + l, job.n - 1));
+            for (std::size_t l = 0; l < lanes16; l += 2) hwy::Prefetch(job.rays + k + 128 + l);
             hn::Store(classify(read_rays(job.rays, index)), I16(), codes);
             for (std::size_t l = 0; l < lanes16 && k + l < job.n; ++l) {
                 code_[k + l] = static_cast<std::uint8_t>(codes[l]);
@@ -213,6 +212,11 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
     StreamFrame frame;
     frame.kind = ray_class_of(code);
     rays.resize(count);
+    const hn::FixedTag<std::uint8_t, 16> b16;
+    HWY_ALIGN std::uint8_t bytes[16];
+    for (std::uint32_t b = 0; b < 16; ++b)
+        bytes[b] = static_cast<std::uint8_t>(4 * (b < 4 ? frame.kind.kx : frame.kind.ky) + b % 4);
+    const auto order = hn::Load(b16, bytes);
     auto lo = hn::Set(f4, infinity), hi = hn::Set(f4, -infinity);
     const auto limit = hn::Set(f4, wide_longest_inverse);
     for (std::uint32_t k = 0; k < count; ++k) {
@@ -221,10 +225,10 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
         const auto origin = hn::Add(hn::LoadU(f4, from), hn::Zero(f4));  // -0 becomes +0
         const auto direction = hn::LoadU(f4, from + ray_direction);
         const auto inverse = hn::Div(hn::Set(f4, 1.0f), direction);
-        HWY_ALIGN const float three[4] = {from[ray_direction + static_cast<int>(frame.kind.kx)],
-                                          from[ray_direction + static_cast<int>(frame.kind.ky)], 1.0f, 1.0f};
-        const auto shear = hn::Div(hn::Load(f4, three),
-                                   hn::Set(f4, from[ray_direction + static_cast<int>(frame.kind.kz)]));
+        const auto sheared = hn::BitCast(f4, hn::TableLookupBytes(hn::BitCast(b16, direction), order));
+        const auto shear =
+            hn::Div(sheared, hn::Set(f4, from[ray_direction + static_cast<int>(frame.kind.kz)]));
+        if (k + 16 < count) hwy::Prefetch(job.rays + index[k + 16]);
         lo = hn::Min(lo, origin), hi = hn::Max(hi, origin);
         hn::Store(origin, f4, ray.quad[0]);
         hn::Store(hn::Max(hn::Min(inverse, limit), hn::Neg(limit)), f4, ray.quad[1]);
@@ -256,13 +260,10 @@ template <bool any, bool counting>
 void trace_streams(const SimdJob& job, SimdCounts& counts) {
     RaySorter sorter;
     sorter.sort(job);
-    const Ray* ahead = job.rays + job.n;
     std::vector<StreamRay>& rays = job.memory->rays();
     for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
         const std::uint32_t count = sorter.count(code);
         if (count == 0) continue;
-        for (std::uint32_t k = 0; k < count; k += 2) hwy::Prefetch(ahead + k);
-        ahead += count;
         const StreamFrame frame = fill_stream(job, sorter.rays(code), count, code, rays);
         StreamWalk<any, counting>(job.tree, frame, rays, *job.memory, job.stack, counts).trace();
         for (const StreamRay& ray : rays) {

@@ -175,14 +175,15 @@ private:
     /// Rays of a chunk of a list, for triangles.
     struct Chunk {
         const std::uint32_t* list;
-        V16 origin[3], shear[3], reach;
+        V16 origin[3], shear[2], reach;
     };
 
     HWY_INLINE void load_chunk(Chunk& chunk) const {
         V16 place[4], way[4];
         load_quads(RowsOf{rays_, chunk.list, 0}, place);
         load_quads(RowsOf{rays_, chunk.list, 2}, way);
-        for (int axis = 0; axis < 3; ++axis) chunk.origin[axis] = place[axis], chunk.shear[axis] = way[axis];
+        for (int axis = 0; axis < 3; ++axis) chunk.origin[axis] = place[axis];
+        chunk.shear[0] = way[0], chunk.shear[1] = way[1];
         chunk.reach = place[3];
     }
 
@@ -259,7 +260,7 @@ private:
         load_quads(RowsOf{rays_, chunk.list, 1}, way);
         load_quads(RowsOf{rays_, chunk.list, 3}, true_way);
         const V16 determinant = hn::Add(hn::Add(u, v), w);
-        const V16 shear_z = chunk.shear[2];
+        const V16 shear_z = true_way[frame_.kind.kz];
         const V16 depth = hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)),
                                           hn::Mul(v, hn::Mul(shear_z, b.z))),
                                   hn::Mul(w, hn::Mul(shear_z, c.z)));

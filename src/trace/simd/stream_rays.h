@@ -11,7 +11,7 @@ namespace raydix {
 
 /// 64 bytes of constants in fours, as load_quads reads them, and what was found.
 struct alignas(32) StreamRay {
-    float quad[4][4];  // origin, t | limited inverse, tmin | shear x, y, z, unused | inverse, unused
+    float quad[4][4];  // origin, t | limited inverse, tmin | shear x, y, unused | inverse, unused
     std::uint32_t prim;
     float u, v;
     std::uint32_t index;  // of the ray in its job
@@ -42,8 +42,8 @@ struct StreamFrame {
         frame.inverse = {ray.quad[3][0], ray.quad[3][1], ray.quad[3][2]};
         frame.kx = static_cast<int>(kind.kx), frame.ky = static_cast<int>(kind.ky),
         frame.kz = static_cast<int>(kind.kz);
-        frame.shear_x = ray.quad[2][0], frame.shear_y = ray.quad[2][1],
-        frame.shear_z = ray.quad[2][2];
+        frame.shear_x = ray.quad[2][0], frame.shear_y = ray.quad[2][1];
+        frame.shear_z = ray.quad[3][kind.kz];
         frame.tmin = ray.quad[1][3], frame.tmax = ray.t();
         frame.t_scale = 1.0f;
         return frame;

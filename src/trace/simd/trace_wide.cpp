@@ -11,7 +11,7 @@
 namespace raydix {
 namespace {
 
-constexpr std::size_t rays_per_block = 1024;
+constexpr std::size_t rays_per_block = 16384;
 
 void check_sizes(std::size_t rays, std::size_t results) {
     if (rays != results)
