@@ -206,12 +206,13 @@ using F4 = hn::FixedTag<float, 4>;
 
 /// Rays index[0, count) of one class as a stream.
 HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index,
-                                   std::uint32_t count, std::uint32_t code,
-                                   std::vector<StreamRay>& rays) {
+                                   std::uint32_t count, std::uint32_t code) {
+    std::vector<StreamRay>& rays = job.memory->rays();
     const F4 f4;
     StreamFrame frame;
     frame.kind = ray_class_of(code);
     rays.resize(count);
+    job.memory->hits().resize(count);
     const hn::FixedTag<std::uint8_t, 16> b16;
     HWY_ALIGN std::uint8_t bytes[16];
     for (std::uint32_t b = 0; b < 16; ++b)
@@ -230,13 +231,13 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
             hn::Div(sheared, hn::Set(f4, from[ray_direction + static_cast<int>(frame.kind.kz)]));
         if (k + 16 < count) hwy::Prefetch(job.rays + index[k + 16]);
         lo = hn::Min(lo, origin), hi = hn::Max(hi, origin);
-        hn::Store(origin, f4, ray.quad[0]);
-        hn::Store(hn::Max(hn::Min(inverse, limit), hn::Neg(limit)), f4, ray.quad[1]);
-        hn::Store(shear, f4, ray.quad[2]);
-        hn::Store(inverse, f4, ray.quad[3]);
-        ray.t() = min_of(from[ray_tmax], std::numeric_limits<float>::max());
-        ray.quad[1][3] = from[ray_tmin] > 0.0f ? from[ray_tmin] : 0.0f;
-        ray.prim = no_primitive, ray.u = 0.0f, ray.v = 0.0f;
+        hn::Store(origin, f4, ray.origin);
+        hn::Store(hn::Max(hn::Min(inverse, limit), hn::Neg(limit)), f4, ray.inverse);
+        hn::Store(shear, f4, ray.shear);
+        hn::Store(inverse, f4, ray.true_inverse);
+        ray.t = min_of(from[ray_tmax], std::numeric_limits<float>::max());
+        ray.tmin = from[ray_tmin] > 0.0f ? from[ray_tmin] : 0.0f;
+        ray.prim = no_primitive;
         ray.index = static_cast<std::uint32_t>(index[k]);
     }
     HWY_ALIGN float least[4], largest[4];
@@ -260,19 +261,20 @@ template <bool any, bool counting>
 void trace_streams(const SimdJob& job, SimdCounts& counts) {
     RaySorter sorter;
     sorter.sort(job);
-    std::vector<StreamRay>& rays = job.memory->rays();
     for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
         const std::uint32_t count = sorter.count(code);
         if (count == 0) continue;
-        const StreamFrame frame = fill_stream(job, sorter.rays(code), count, code, rays);
-        StreamWalk<any, counting>(job.tree, frame, rays, *job.memory, job.stack, counts).trace();
-        for (const StreamRay& ray : rays) {
+        const StreamFrame frame = fill_stream(job, sorter.rays(code), count, code);
+        StreamWalk<any, counting>(job.tree, frame, *job.memory, job.stack, counts).trace();
+        const StreamHit* found = job.memory->hits().data();
+        for (const StreamRay& ray : job.memory->rays()) {
             const bool hit = ray.prim != no_primitive;
             counts.hits += hit;
             if constexpr (any)
                 job.occluded[ray.index] = hit;
             else
-                job.hits[ray.index] = hit ? Hit{ray.t(), ray.prim, ray.u, ray.v} : Hit{};
+                job.hits[ray.index] = hit ? Hit{ray.t, ray.prim, found->u, found->v} : Hit{};
+            ++found;
         }
     }
     const std::int32_t* const odd = sorter.rays(odd_ray_class);

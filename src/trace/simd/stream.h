@@ -22,13 +22,12 @@ constexpr std::uint32_t few_rays = 3;
 template <bool any, bool counting>
 class StreamWalk {
 public:
-    StreamWalk(const WideView& tree, const StreamFrame& frame, std::span<StreamRay> rays,
-               StreamMemory& memory, const WideStackView& single_stack, SimdCounts& counts)
-        : tree_(tree), frame_(frame), rays_(rays.data()), memory_(memory),
-          single_stack_(single_stack), counts_(counts) {
+    StreamWalk(const WideView& tree, const StreamFrame& frame, StreamMemory& memory, const WideStackView& single_stack, SimdCounts& counts)
+        : tree_(tree), frame_(frame), rays_(memory.rays().data()), hits_(memory.hits().data()),
+          memory_(memory), single_stack_(single_stack), counts_(counts) {
         for (int axis = 0; axis < 3; ++axis) negative_[axis] = frame.kind.negative(axis);
         for (std::uint32_t l = 0; l < 8; ++l) slot_[l] = l ^ frame.kind.negatives ^ 7u;
-        count_ = static_cast<std::uint32_t>(rays.size());
+        count_ = static_cast<std::uint32_t>(memory.rays().size());
     }
 
     void trace() {
@@ -69,7 +68,7 @@ private:
         const std::uint32_t* list;
         std::size_t quad;
         HWY_INLINE const float* operator()(std::size_t l) const {
-            return rays[list[l] & ray_bits].quad[quad];
+            return reinterpret_cast<const float*>(rays + (list[l] & ray_bits)) + 4 * quad;
         }
     };
 
@@ -153,16 +152,26 @@ private:
     }
 
     void go_alone(std::uint32_t item, std::uint32_t word) {
-        StreamRay& ray = rays_[item & ray_bits];
-        if (!(entry_of(item) <= ray.t())) return;
+        const std::uint32_t k = item & ray_bits;
+        StreamRay& ray = rays_[k];
+        if (!(entry_of(item) <= ray.t)) return;
         const RayFrame frame = frame_.frame_of(ray);
         SingleRay<any, counting> single(tree_, frame, frame_.wide_ray_of(ray), single_stack_, counts_);
-        const WideBest best = single.trace(word, {ray.t(), ray.prim, ray.u, ray.v});
-        if (any && best.found()) {
-            ray.settle();
+        const WideBest best = single.trace(word, {ray.t, ray.prim, hits_[k].u, hits_[k].v});
+        if (any) {
+            if (best.found()) ray.settle();
         } else {
-            ray.t() = best.t, ray.prim = best.prim, ray.u = best.u, ray.v = best.v;
+            ray.t = best.t, ray.prim = best.prim, hits_[k] = {best.u, best.v};
         }
+    }
+
+    /// t is at most that of the best hit; at equal t the lower primitive wins.
+    HWY_INLINE void take(std::uint32_t k, float t, std::uint32_t prim, float u, float v) {
+        StreamRay& ray = rays_[k];
+        if constexpr (any)
+            ray.settle();
+        else if (t < ray.t || prim < ray.prim)
+            ray.t = t, ray.prim = prim, hits_[k] = {u, v};
     }
 
     struct Sheared {
@@ -172,18 +181,21 @@ private:
         return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
     }
 
-    /// Rays of a chunk of a list, for triangles.
+    /// Rays of a chunk of a list, for triangles; axes in the order kx, ky, kz.
     struct Chunk {
         const std::uint32_t* list;
-        V16 origin[3], shear[2], reach;
+        V16 away[3];  // - origin: adding it is the same as subtracting the origin
+        V16 shear_x, shear_y, reach;
     };
 
     HWY_INLINE void load_chunk(Chunk& chunk) const {
         V16 place[4], way[4];
         load_quads(RowsOf{rays_, chunk.list, 0}, place);
         load_quads(RowsOf{rays_, chunk.list, 2}, way);
-        for (int axis = 0; axis < 3; ++axis) chunk.origin[axis] = place[axis];
-        chunk.shear[0] = way[0], chunk.shear[1] = way[1];
+        chunk.away[0] = hn::Neg(place[frame_.kind.kx]);
+        chunk.away[1] = hn::Neg(place[frame_.kind.ky]);
+        chunk.away[2] = hn::Neg(place[frame_.kind.kz]);
+        chunk.shear_x = way[0], chunk.shear_y = way[1];
         chunk.reach = place[3];
     }
 
@@ -204,33 +216,39 @@ private:
                 active = hn::And(active, hn::FirstN(f16, entry.count - k));
             const std::uint32_t wanted = bits_of(f16, active);
             if (wanted == 0) continue;
-            for (std::uint32_t tri = 0; tri < count; ++tri)
-                test_triangle(block, place % 8 + tri, chunk, wanted);
+            for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane)
+                test_triangle(block, lane, chunk, wanted);
         }
     }
 
-    HWY_INLINE Sheared shear(const TriangleBlock& block, int vertex, std::uint32_t lane,
-                             const Chunk& chunk) const {
-        const auto at = [&](std::uint32_t axis) {
-            return hn::Sub(hn::Set(f16, block.corner[3 * vertex + static_cast<int>(axis)][lane]),
-                           chunk.origin[axis]);
-        };
-        const V16 z = at(frame_.kind.kz);
-        return {hn::Sub(at(frame_.kind.kx), hn::Mul(chunk.shear[0], z)),
-                hn::Sub(at(frame_.kind.ky), hn::Mul(chunk.shear[1], z)), z};
+    HWY_INLINE Sheared shear(const float* x, const float* y, const float* z, const Chunk& chunk) const {
+        const V16 depth = hn::Add(hn::Set(f16, *z), chunk.away[2]);
+        return {hn::Sub(hn::Add(hn::Set(f16, *x), chunk.away[0]), hn::Mul(chunk.shear_x, depth)),
+                hn::Sub(hn::Add(hn::Set(f16, *y), chunk.away[1]), hn::Mul(chunk.shear_y, depth)),
+                depth};
     }
 
     /// intersect_triangle for the rays of the chunk in `wanted`: the same bits.
     HWY_INLINE void test_triangle(const TriangleBlock& block, std::uint32_t lane, Chunk& chunk,
                                   std::uint32_t wanted) {
-        const Sheared a = shear(block, 0, lane, chunk), b = shear(block, 1, lane, chunk),
-                      c = shear(block, 2, lane, chunk);
+        const float* const x = block.corner[frame_.kind.kx] + lane;
+        const float* const y = block.corner[frame_.kind.ky] + lane;
+        const float* const z = block.corner[frame_.kind.kz] + lane;
+        const Sheared a = shear(x, y, z, chunk), b = shear(x + 24, y + 24, z + 24, chunk),
+                      c = shear(x + 48, y + 48, z + 48, chunk);
         const V16 u = edge(c, b), v = edge(a, c), w = edge(b, a);
         const V16 zero = hn::Zero(f16);
         const V16 least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
         const auto outside = hn::And(hn::Lt(least, zero), hn::Gt(largest, zero));
-        std::uint32_t candidates = wanted & ~bits_of(f16, outside);
-        if (candidates == 0) return;
+        const std::uint32_t candidates = wanted & ~bits_of(f16, outside);
+        if (candidates != 0) settle_candidates(block, lane, chunk, candidates, a, b, c, u, v, w);
+    }
+
+    HWY_NOINLINE void settle_candidates(const TriangleBlock& block, std::uint32_t lane, Chunk& chunk,
+                                        std::uint32_t candidates, const Sheared& a,
+                                        const Sheared& b, const Sheared& c, const V16& u,
+                                        const V16& v, const V16& w) {
+        const V16 zero = hn::Zero(f16);
         const auto on_edge = hn::Or(hn::Or(hn::Eq(u, zero), hn::Eq(v, zero)), hn::Eq(w, zero));
         const std::uint32_t near_edge = candidates & bits_of(f16, on_edge);
         candidates &= ~near_edge;
@@ -241,22 +259,22 @@ private:
         }
     }
 
-    HWY_NOINLINE void test_exactly(const TriangleBlock& block, std::uint32_t lane,
-                                   const Chunk& chunk, std::uint32_t rays) {
-        for (; rays != 0; rays &= rays - 1) {
-            StreamRay& ray = rays_[chunk.list[std::countr_zero(rays)] & ray_bits];
+    void test_exactly(const TriangleBlock& block, std::uint32_t lane, const Chunk& chunk,
+                      std::uint32_t lanes) {
+        for (; lanes != 0; lanes &= lanes - 1) {
+            const std::uint32_t k = chunk.list[std::countr_zero(lanes)] & ray_bits;
             TriangleHit hit;
-            if (!intersect_triangle<EdgeRule::closed>(frame_.frame_of(ray), triangle_of(block, lane),
-                                                      ray.t(), hit))
-                continue;
-            ray.take(any, hit.t, block.prim[lane], hit.u, hit.v);
+            if (intersect_triangle<EdgeRule::closed>(frame_.frame_of(rays_[k]),
+                                                     triangle_of(block, lane), rays_[k].t, hit))
+                take(k, hit.t, block.prim[lane], hit.u, hit.v);
         }
     }
 
     HWY_INLINE void accept(const TriangleBlock& block, std::uint32_t lane, Chunk& chunk,
                            std::uint32_t candidates, const Sheared& a, const Sheared& b,
                            const Sheared& c, V16 u, V16 v, V16 w) {
-        V16 way[4], true_way[4];
+        V16 place[4], way[4], true_way[4];
+        load_quads(RowsOf{rays_, chunk.list, 0}, place);
         load_quads(RowsOf{rays_, chunk.list, 1}, way);
         load_quads(RowsOf{rays_, chunk.list, 3}, true_way);
         const V16 determinant = hn::Add(hn::Add(u, v), w);
@@ -271,10 +289,10 @@ private:
                         r = block.corner[6 + axis][lane];
             const float lo = min_of(min_of(p, q), r), hi = max_of(max_of(p, q), r);
             const V16 inverse = true_way[axis];
-            const V16 near = hn::Mul(
-                hn::Sub(hn::Set(f16, negative_[axis] ? hi : lo), chunk.origin[axis]), inverse);
-            const V16 far = hn::Mul(
-                hn::Sub(hn::Set(f16, negative_[axis] ? lo : hi), chunk.origin[axis]), inverse);
+            const V16 near =
+                hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? hi : lo), place[axis]), inverse);
+            const V16 far =
+                hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? lo : hi), place[axis]), inverse);
             // A NaN plane is dropped.
             entry = hn::IfThenElse(hn::Gt(near, entry), near, entry);
             exit = hn::IfThenElse(hn::Lt(far, exit), far, exit);
@@ -287,20 +305,27 @@ private:
         const auto in_reach = hn::And(hn::Ge(t, way[3]), hn::Le(t, chunk.reach));
         candidates &= bits_of(f16, hn::And(sound, in_reach));
         if (candidates == 0) return;
+        chunk.reach =
+            hn::IfThenElse(mask_of(f16, candidates), any ? hn::Set(f16, -1.0f) : t, chunk.reach);
         HWY_ALIGN float ts[lanes16], us[lanes16], vs[lanes16];
-        hn::Store(t, f16, ts);
-        hn::Store(hn::Div(v, determinant), f16, us);
-        hn::Store(hn::Div(w, determinant), f16, vs);
-        chunk.reach = hn::IfThenElse(mask_of(f16, candidates), any ? hn::Set(f16, -1.0f) : t, chunk.reach);
+        if constexpr (!any) {
+            hn::Store(t, f16, ts);
+            hn::Store(hn::Div(v, determinant), f16, us);
+            hn::Store(hn::Div(w, determinant), f16, vs);
+        }
         for (; candidates != 0; candidates &= candidates - 1) {
             const auto l = static_cast<std::size_t>(std::countr_zero(candidates));
-            rays_[chunk.list[l] & ray_bits].take(any, ts[l], block.prim[lane], us[l], vs[l]);
+            if constexpr (any)
+                rays_[chunk.list[l] & ray_bits].settle();
+            else
+                take(chunk.list[l] & ray_bits, ts[l], block.prim[lane], us[l], vs[l]);
         }
     }
 
     const WideView& tree_;
     const StreamFrame& frame_;
     StreamRay* const rays_;
+    StreamHit* const hits_;
     StreamMemory& memory_;
     const WideStackView single_stack_;
     SimdCounts& counts_;

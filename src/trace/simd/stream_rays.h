@@ -9,27 +9,22 @@
 
 namespace raydix {
 
-/// 64 bytes of constants in fours, as load_quads reads them, and what was found.
-struct alignas(32) StreamRay {
-    float quad[4][4];  // origin, t | limited inverse, tmin | shear x, y, unused | inverse, unused
-    std::uint32_t prim;
-    float u, v;
-    std::uint32_t index;  // of the ray in its job
+/// A cache line: what load_quads reads in fours.
+struct alignas(64) StreamRay {
+    float origin[3], t;
+    float inverse[3], tmin;  // limited
+    float shear[2];          // of x and y
+    std::uint32_t prim, index;  // index: of the ray in its job
+    float true_inverse[3], unused;
 
-    [[nodiscard]] float& t() { return quad[0][3]; }
-    [[nodiscard]] float t() const { return quad[0][3]; }
     /// Any hit will do, and there is one: no box is near enough any more.
-    void settle() { prim = 0, t() = -1.0f; }
-    /// t is at most t(); at equal t the lower primitive wins.
-    void take(bool any, float new_t, std::uint32_t new_prim, float new_u, float new_v) {
-        if (any) {
-            settle();
-        } else if (new_t < t() || new_prim < prim) {
-            t() = new_t, prim = new_prim, u = new_u, v = new_v;
-        }
-    }
+    void settle() { prim = 0, t = -1.0f; }
 };
-static_assert(sizeof(StreamRay) == 96);
+static_assert(sizeof(StreamRay) == 64);
+
+struct StreamHit {
+    float u, v;
+};
 
 /// What all rays of a stream share.
 struct StreamFrame {
@@ -38,18 +33,18 @@ struct StreamFrame {
 
     [[nodiscard]] RayFrame frame_of(const StreamRay& ray) const {
         RayFrame frame;
-        frame.origin = {ray.quad[0][0], ray.quad[0][1], ray.quad[0][2]};
-        frame.inverse = {ray.quad[3][0], ray.quad[3][1], ray.quad[3][2]};
+        frame.origin = {ray.origin[0], ray.origin[1], ray.origin[2]};
+        frame.inverse = {ray.true_inverse[0], ray.true_inverse[1], ray.true_inverse[2]};
         frame.kx = static_cast<int>(kind.kx), frame.ky = static_cast<int>(kind.ky),
         frame.kz = static_cast<int>(kind.kz);
-        frame.shear_x = ray.quad[2][0], frame.shear_y = ray.quad[2][1];
-        frame.shear_z = ray.quad[3][kind.kz];
-        frame.tmin = ray.quad[1][3], frame.tmax = ray.t();
+        frame.shear_x = ray.shear[0], frame.shear_y = ray.shear[1];
+        frame.shear_z = ray.true_inverse[kind.kz];
+        frame.tmin = ray.tmin, frame.tmax = ray.t;
         frame.t_scale = 1.0f;
         return frame;
     }
     [[nodiscard]] WideRay wide_ray_of(const StreamRay& ray) const {
-        return {{ray.quad[1][0], ray.quad[1][1], ray.quad[1][2]},
+        return {{ray.inverse[0], ray.inverse[1], ray.inverse[2]},
                 {near_pad[0], near_pad[1], near_pad[2]},
                 kind.negatives};
     }
@@ -68,6 +63,7 @@ public:
     [[nodiscard]] std::uint32_t* lists() { return lists_.data(); }
     [[nodiscard]] std::vector<StreamEntry>& stack() { return stack_; }
     [[nodiscard]] std::vector<StreamRay>& rays() { return rays_; }
+    [[nodiscard]] std::vector<StreamHit>& hits() { return hits_; }
     /// Room for `count` items from `begin` on, with slack.
     void reserve(std::uint32_t begin, std::uint32_t count) {
         const std::size_t wanted = std::size_t{begin} + count + slack;
@@ -78,6 +74,7 @@ private:
     std::vector<std::uint32_t> lists_;
     std::vector<StreamEntry> stack_;
     std::vector<StreamRay> rays_;
+    std::vector<StreamHit> hits_;
 };
 
 }  // namespace raydix
