@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace raydix {
@@ -15,11 +16,14 @@ enum class TraceKernel : std::uint32_t { scalar = 0, simd = 1 };
 
 /// How `simd` takes a batch through a wide tree. The hits do not depend on it.
 enum class SimdPath : std::uint32_t {
-    automatic = 0,  // packets for batches whose neighbours go the same way, else sorted single rays
-    single = 1,     // one ray at a time, in the caller's order
-    packet = 2,     // neighbours in the batch together
-    sorted = 3,     // grouped by direction and place first
+    automatic = 0,  // packets if neighbours in the batch go the same way, else streams
+    single = 1,     // one ray at a time
+    packet = 2,     // 64 neighbours together, with bounds around all of them
+    stream = 3,     // thousands together: each node is tested with all rays that reach it
 };
+[[nodiscard]] std::string_view simd_path_name(SimdPath path);
+/// Throws InputError that lists the known names.
+[[nodiscard]] SimdPath simd_path_from_name(std::string_view name);
 
 struct TraceOptions {
     TraceKernel kernel = TraceKernel::scalar;

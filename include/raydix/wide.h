@@ -56,13 +56,22 @@ private:
 };
 
 /// As trace(), trace_any() and trace_all() of a Bvh, bit for bit, by the kernel `simd`.
-/// options.path says how rays go through the tree; options.kernel has no effect.
+/// options.path says how rays go through the tree, options.isa with which instructions;
+/// options.kernel has no effect. rays [n] -> hits, occluded [n]. Throws InputError if the sizes
+/// differ or this processor does not have the instruction set.
 TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit> hits,
                   const TraceOptions& options = {});
 [[nodiscard]] std::vector<Hit> trace(const WideBvh& tree, std::span<const Ray> rays,
                                      const TraceOptions& options = {});
 TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const TraceOptions& options = {});
+
+[[nodiscard]] AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays,
+                                const TraceOptions& options = {});
+
+/// The path that `automatic` takes: packets if in most of a few windows of 64 rays, evenly spread,
+/// directions and origins lie close together.
+[[nodiscard]] SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays);
 
 /// One ray, on the caller's thread, without any set-up.
 [[nodiscard]] Hit closest_hit(const WideBvh& tree, const Ray& ray);

@@ -127,8 +127,7 @@ private:
                 entry = hn::Max(entry, hn::Min(hn::Mul(from, least), hn::Mul(from, largest)));
                 leave = hn::Min(leave, hn::Max(hn::Mul(to, least), hn::Mul(to, largest)));
             }
-            const auto exit = hn::Min(hn::Mul(leave, hn::Set(f8, slab_exit_factor)),
-                                      hn::Set(f8, reach_));
+            const auto exit = hn::Min(leave, hn::Set(f8, reach_));
             hn::Store(entry, f8, entries + l);
             met |= bits_of(f8, hn::Le(entry, exit)) << l;
         }
@@ -162,8 +161,7 @@ private:
             leave = hn::Min(leave, hn::MulAdd(hn::Set(f16, steps.far[axis][child]), ray.rate[axis],
                                               ray.far[axis]));
         }
-        const V exit = hn::Min(hn::Mul(leave, hn::Set(f16, slab_exit_factor)),
-                               hn::Load(f16, p_.t + i));
+        const V exit = hn::Min(leave, hn::Load(f16, p_.t + i));
         return bits_of(f16, hn::Le(entry, exit));
     }
 

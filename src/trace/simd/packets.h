@@ -127,7 +127,7 @@ HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::in
 /// order and followed by room for a vector.
 class RaySorter {
 public:
-    static constexpr std::size_t max_rays = 65536;
+    static constexpr std::size_t max_rays = max_job_rays;
 
     void sort(const SimdJob& job) {
         HWY_ALIGN std::int32_t index[16], codes[16];

@@ -10,7 +10,7 @@
 
 namespace raydix {
 
-inline constexpr std::size_t max_job_rays = 4096;
+inline constexpr std::size_t max_job_rays = 16384;
 
 struct SimdCounts {
     std::uint64_t hits = 0, invalid = 0, visits = 0, tests = 0;

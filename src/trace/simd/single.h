@@ -87,8 +87,7 @@ private:
             const auto leave = hn::Min(hn::Min(hn::MulAdd(steps(far_plane[0]), rate_x, far_x),
                                                hn::MulAdd(steps(far_plane[1]), rate_y, far_y)),
                                        hn::MulAdd(steps(far_plane[2]), rate_z, far_z));
-            const auto exit = hn::Min(hn::Mul(leave, hn::Set(f8, slab_exit_factor)),
-                                      hn::Set(f8, best_.t));
+            const auto exit = hn::Min(leave, hn::Set(f8, best_.t));
             const auto slot = hn::IndicesFromVec(f8, hn::Load(I8(), slot_));
             const auto words = hn::TableLookupLanes(
                 hn::BitCast(f8, hn::Load(U8(), node.child)), slot);
@@ -114,8 +113,7 @@ private:
                     hn::Min(hn::Min(hn::MulAdd(steps(far_plane[0] + l), rate_x, far_x),
                                     hn::MulAdd(steps(far_plane[1] + l), rate_y, far_y)),
                             hn::MulAdd(steps(far_plane[2] + l), rate_z, far_z));
-                const auto exit = hn::Min(hn::Mul(leave, hn::Set(f8, slab_exit_factor)),
-                                          hn::Set(f8, best_.t));
+                const auto exit = hn::Min(leave, hn::Set(f8, best_.t));
                 hn::Store(entry, f8, entries + l);
                 met |= bits_of(f8, hn::Le(entry, exit)) << l;
             }

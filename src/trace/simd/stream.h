@@ -17,7 +17,7 @@ HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
 /// Lists of fewer rays go on one by one.
-constexpr std::uint32_t few_rays = 3;
+constexpr std::uint32_t few_rays = 4;
 
 template <bool any, bool counting>
 class StreamWalk {
@@ -136,8 +136,7 @@ private:
                     in = hn::Max(in, hn::MulAdd(hn::Set(f16, near_steps[axis][s]), rate[axis], near[axis]));
                     leave = hn::Min(leave, hn::MulAdd(hn::Set(f16, far_steps[axis][s]), rate[axis], far[axis]));
                 }
-                const V16 exit = hn::Min(hn::Mul(leave, hn::Set(f16, slab_exit_factor)), reach);
-                const auto met = hn::And(hn::Le(in, exit), active);
+                const auto met = hn::And(hn::Le(in, hn::Min(leave, reach)), active);
                 const auto item = hn::Or(hn::And(hn::BitCast(U16(), in), high), numbers);
                 hn::StoreU(hn::Compress(item, hn::RebindMask(U16(), met)), U16(), ends[c]);
                 ends[c] += hn::CountTrue(f16, met);

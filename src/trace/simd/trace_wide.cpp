@@ -2,6 +2,8 @@
 #include <raydix/error.h>
 #include <raydix/wide.h>
 
+#include <algorithm>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,8 +12,6 @@
 
 namespace raydix {
 namespace {
-
-constexpr std::size_t rays_per_block = 16384;
 
 void check_sizes(std::size_t rays, std::size_t results) {
     if (rays != results)
@@ -30,6 +30,12 @@ const SimdKernels& kernels_for(const std::string& isa) {
     throw InputError("instruction set " + isa + ": this processor and build have " + known);
 }
 
+WideView view_of(const WideBvh& tree) {
+    const WideBvh::Arrays& arrays = tree.arrays();
+    return {arrays.nodes.data(), arrays.blocks.data(), arrays.bounds};
+}
+
+/// Stacks for the deepest path of a tree.
 class StackMemory {
 public:
     explicit StackMemory(std::uint32_t max_depth)
@@ -45,27 +51,41 @@ private:
     std::vector<std::uint64_t> active_;
 };
 
-WideView view_of(const WideBvh& tree) {
-    const WideBvh::Arrays& arrays = tree.arrays();
-    return {arrays.nodes.data(), arrays.blocks.data(), arrays.bounds};
+/// Rays of a job: as many as give full vectors deep in the tree and still lie in the second-level
+/// cache; fewer where the batch would not keep many threads busy. Depends on the batch alone, so
+/// that counts do not depend on the threads.
+std::size_t rays_per_job(std::size_t n, SimdPath path) {
+    constexpr std::size_t smallest = 1024, jobs = 32;
+    if (path != SimdPath::stream) return smallest;
+    return std::clamp(n / jobs / smallest * smallest, smallest, max_job_rays);
+}
+
+void (*job_of(const SimdKernels& kernels, SimdPath path))(const SimdJob&, SimdCounts&) {
+    if (path == SimdPath::single) return kernels.single;
+    return path == SimdPath::packet ? kernels.packets : kernels.streams;
 }
 
 TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hits,
                         std::uint8_t* occluded, const TraceOptions& options) {
     const SimdKernels& kernels = kernels_for(options.isa);
-    std::vector<SimdCounts> parts((rays.size() + rays_per_block - 1) / rays_per_block);
+    const SimdPath path = options.path == SimdPath::automatic ? choose_simd_path(tree, rays) : options.path;
+    const std::size_t block_size = rays_per_job(rays.size(), path);
+    std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
     with_threads(options.threads, [&] {
         for_each_block(
-            rays.size(), rays_per_block,
-            [&](std::size_t block, std::size_t begin, std::size_t end) {
+            rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
                 StackMemory stack(tree.stats().max_depth);
-                static thread_local StreamMemory memory;
-                SimdJob job{view_of(tree),  rays.data() + begin,
-                            end - begin,
-                            hits == nullptr ? nullptr : hits + begin,
-                            hits == nullptr ? occluded + begin : nullptr,
-                            stack.view(), stack.packet_view(), &memory, options.counters};
-                (options.path == SimdPath::single ? kernels.single : options.path == SimdPath::sorted ? kernels.streams : kernels.packets)(job, parts[block]);
+                StreamMemory memory;
+                const SimdJob job{view_of(tree),
+                                  rays.data() + begin,
+                                  end - begin,
+                                  hits == nullptr ? nullptr : hits + begin,
+                                  hits == nullptr ? occluded + begin : nullptr,
+                                  stack.view(),
+                                  stack.packet_view(),
+                                  &memory,
+                                  options.counters};
+                job_of(kernels, path)(job, parts[block]);
             });
     });
     TraceCounts sum;
@@ -93,7 +113,7 @@ TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit>
                   const TraceOptions& options) {
     check_sizes(rays.size(), hits.size());
     if (!tree.empty()) return trace_batch(tree, rays, hits.data(), nullptr, options);
-    for (Hit& hit : hits) hit = Hit{};
+    std::ranges::fill(hits, Hit{});
     return miss_all(rays);
 }
 
@@ -107,21 +127,47 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size());
     if (!tree.empty()) return trace_batch(tree, rays, nullptr, occluded.data(), options);
-    for (std::uint8_t& o : occluded) o = 0;
+    std::ranges::fill(occluded, std::uint8_t{0});
     return miss_all(rays);
+}
+
+SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays) {
+    constexpr std::size_t window = 64, windows = 32;
+    constexpr float small_angle = 0.25f, small_part = 0.05f;
+    const Aabb& bounds = tree.arrays().bounds;
+    const Vec3 size = bounds.hi - bounds.lo;
+    const float near = small_part * max_of(max_of(size.x, size.y), size.z);
+    std::size_t looked_at = 0, together = 0;
+    for (std::size_t w = 0; w < windows; ++w) {
+        const std::size_t begin = rays.size() / windows * w;
+        if (begin + window > rays.size()) break;
+        Aabb origins = empty_box(), directions = empty_box();
+        for (const Ray& ray : rays.subspan(begin, window)) {
+            if (!is_valid(ray)) continue;
+            const Vec3 d = ray.direction;
+            const float longest =
+                max_of(max_of(std::fabs(d.x), std::fabs(d.y)), std::fabs(d.z));
+            const Vec3 scaled{d.x / longest, d.y / longest, d.z / longest};
+            origins = unite(origins, {ray.origin, ray.origin});
+            directions = unite(directions, {scaled, scaled});
+        }
+        ++looked_at;
+        const Vec3 o = origins.hi - origins.lo, d = directions.hi - directions.lo;
+        together += max_of(max_of(o.x, o.y), o.z) <= near && max_of(max_of(d.x, d.y), d.z) <= small_angle;
+    }
+    return looked_at > 0 && 4 * together < 3 * looked_at ? SimdPath::stream : SimdPath::packet;
 }
 
 namespace {
 
 template <class Result>
-Result one_ray(const WideBvh& tree, const Ray& ray, bool closest) {
+Result one_ray(const WideBvh& tree, const Ray& ray) {
     constexpr std::size_t inside = 512;
-    const std::size_t capacity = wide_stack_capacity(tree.stats().max_depth);
     std::uint32_t words[inside];
     float entries[inside];
     std::unique_ptr<StackMemory> outside;
     WideStackView stack{words, entries};
-    if (capacity > inside) {
+    if (wide_stack_capacity(tree.stats().max_depth) > inside) {
         outside = std::make_unique<StackMemory>(tree.stats().max_depth);
         stack = outside->view();
     }
@@ -132,7 +178,6 @@ Result one_ray(const WideBvh& tree, const Ray& ray, bool closest) {
         job.hits = &result;
     else
         job.occluded = &result;
-    static_cast<void>(closest);
     static const SimdKernels& kernels = simd_kernels().front();
     kernels.single(job, counts);
     return result;
@@ -141,11 +186,11 @@ Result one_ray(const WideBvh& tree, const Ray& ray, bool closest) {
 }  // namespace
 
 Hit closest_hit(const WideBvh& tree, const Ray& ray) {
-    return tree.empty() ? Hit{} : one_ray<Hit>(tree, ray, true);
+    return tree.empty() ? Hit{} : one_ray<Hit>(tree, ray);
 }
 
 bool any_hit(const WideBvh& tree, const Ray& ray) {
-    return !tree.empty() && one_ray<std::uint8_t>(tree, ray, false) != 0;
+    return !tree.empty() && one_ray<std::uint8_t>(tree, ray) != 0;
 }
 
 std::vector<std::string> simd_instruction_sets() {
