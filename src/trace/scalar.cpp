@@ -5,10 +5,10 @@
 #include <raydix/error.h>
 #include <raydix/trace.h>
 
-#include <algorithm>
 #include <string>
 
 #include "exec/parallel.h"
+#include "trace/all_hits.h"
 #include "trace/triangle_test.h"
 #include "trace/walk.h"
 
@@ -95,12 +95,7 @@ void find_all(const TreeView& tree, const RayFrame& ray, WalkStack& stack, Steps
         return false;
     };
     walk_tree(tree.nodes, ray, stack, steps, leaf, [&] { return ray.tmax; });
-    std::sort(hits.begin() + static_cast<std::ptrdiff_t>(before), hits.end(),
-              [](const Hit& a, const Hit& b) { return a.t != b.t ? a.t < b.t : a.prim < b.prim; });
-    // A triangle that is in several leaves was found more than once, with the same t.
-    const auto last = std::unique(hits.begin() + static_cast<std::ptrdiff_t>(before), hits.end(),
-                                  [](const Hit& a, const Hit& b) { return a.prim == b.prim; });
-    hits.erase(last, hits.end());
+    finish_ray(hits, before);
 }
 
 Hit public_hit(const Closest& best, const RayFrame& ray) {
@@ -188,17 +183,7 @@ AllHits all_batch(const Bvh& bvh, std::span<const Ray> rays) {
             return all.offsets[i + 1];
         },
         [](std::size_t) {});
-    for (std::size_t i = 0; i < rays.size(); ++i) all.offsets[i + 1] += all.offsets[i];
-    all.hits.resize(all.offsets.back());
-    for_each_index(
-        found.size(),
-        [&](std::size_t b) {
-            const std::uint64_t at = all.offsets[b * rays_per_block];
-            std::copy(found[b].begin(), found[b].end(),
-                      all.hits.begin() + static_cast<std::ptrdiff_t>(at));
-            std::vector<Hit>().swap(found[b]);
-        },
-        1);
+    join_blocks(found, rays_per_block, all);
     return all;
 }
 

@@ -21,7 +21,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-SimdKernels kernels(std::string_view isa) { return {isa, single, packets, streams}; }
+SimdKernels kernels(std::string_view isa) { return {isa, single, packets, streams, all_hits}; }
 
 }  // namespace raydix::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

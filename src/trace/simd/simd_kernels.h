@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "trace/simd/stream_rays.h"
 #include "trace/simd/wide_ray.h"
@@ -34,6 +35,9 @@ struct SimdKernels {
     void (*single)(const SimdJob& job, SimdCounts& counts);
     void (*packets)(const SimdJob& job, SimdCounts& counts);
     void (*streams)(const SimdJob& job, SimdCounts& counts);
+    /// Hits of each ray behind those of the one before, sorted; how many to hit_counts [n].
+    void (*all_hits)(const SimdJob& job, std::vector<Hit>& found, std::uint64_t* hit_counts,
+                     SimdCounts& counts);
 };
 
 /// Best first; those this processor can run.

@@ -10,6 +10,7 @@
 #include <hwy/highway.h>
 
 #include "base/check.h"
+#include "trace/all_hits.h"
 #include "trace/simd/lanes.h"
 #include "trace/simd/wide_ray.h"
 
@@ -18,7 +19,9 @@ namespace raydix::HWY_NAMESPACE {
 
 constexpr std::size_t parts8 = 8 / lanes8;
 
-template <bool any, bool counting>
+enum class Wanted { closest, any, all };
+
+template <Wanted wanted, bool counting>
 class SingleRay {
 public:
     SingleRay(const WideView& tree, const RayFrame& frame, const WideRay& ray,
@@ -27,6 +30,12 @@ public:
         origin_[0] = frame.origin.x, origin_[1] = frame.origin.y, origin_[2] = frame.origin.z;
         inverse_[0] = frame.inverse.x, inverse_[1] = frame.inverse.y, inverse_[2] = frame.inverse.z;
         for (std::size_t l = 0; l < 8; ++l) slot_[l] = static_cast<std::int32_t>(l ^ ray_.negative ^ 7u);
+    }
+
+    /// All hits, in no order, behind those in `hits`.
+    void trace_all(std::vector<Hit>& hits) {
+        all_ = &hits;
+        trace(0, {frame_.tmax});
     }
 
     /// From a node or leaf on; `best` is what was found before.
@@ -132,10 +141,18 @@ private:
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
         const TriangleBlock& block = tree_.blocks[place / 8];
         if constexpr (counting) counts_.tests += count;
+        if constexpr (wanted == Wanted::all) {
+            for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane) {
+                TriangleHit hit;
+                if (intersect_triangle<EdgeRule::half_open>(frame_, triangle_of(block, lane), best_.t, hit))
+                    all_->push_back({hit.t * frame_.t_scale, block.prim[lane], hit.u, hit.v});
+            }
+            return false;
+        }
         const std::uint32_t lanes = ((1u << count) - 1) << place % 8;
         for (std::size_t part = 0; part < parts8; ++part) {
-            const std::uint32_t wanted = lanes >> (part * lanes8) & ((1u << lanes8) - 1);
-            if (wanted != 0 && test_lanes(block, part * lanes8, wanted)) return true;
+            const std::uint32_t tested = lanes >> (part * lanes8) & ((1u << lanes8) - 1);
+            if (tested != 0 && test_lanes(block, part * lanes8, tested)) return true;
         }
         return false;
     }
@@ -157,14 +174,14 @@ private:
         return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
     }
 
-    /// intersect_triangle for the lanes l + (bits of `wanted`): the same bits. True: stop.
-    HWY_INLINE bool test_lanes(const TriangleBlock& block, std::size_t l, std::uint32_t wanted) {
+    /// intersect_triangle for the lanes l + (bits of `tested`): the same bits. True: stop.
+    HWY_INLINE bool test_lanes(const TriangleBlock& block, std::size_t l, std::uint32_t tested) {
         const Sheared a = shear(block, 0, l), b = shear(block, 1, l), c = shear(block, 2, l);
         const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
         const V zero = hn::Zero(f8);
         const V least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
         const auto outside = hn::And(hn::Lt(least, zero), hn::Gt(largest, zero));
-        std::uint32_t candidates = wanted & ~bits_of(f8, outside);
+        std::uint32_t candidates = tested & ~bits_of(f8, outside);
         if (candidates == 0) return false;
         const auto on_edge = hn::Or(hn::Or(hn::Eq(u, zero), hn::Eq(v, zero)), hn::Eq(w, zero));
         const std::uint32_t near_edge = candidates & bits_of(f8, on_edge);
@@ -181,7 +198,7 @@ private:
             if (!intersect_triangle<EdgeRule::closed>(frame_, triangle_of(block, lane), best_.t, hit))
                 continue;
             best_.take(hit.t, block.prim[lane], hit.u, hit.v);
-            if constexpr (any) return true;
+            if constexpr (wanted == Wanted::any) return true;
         }
         return false;
     }
@@ -215,7 +232,7 @@ private:
         const auto in_reach = hn::And(hn::Ge(t, hn::Set(f8, frame_.tmin)), hn::Le(t, hn::Set(f8, best_.t)));
         candidates &= bits_of(f8, hn::And(sound, in_reach));
         if (candidates == 0) return false;
-        if constexpr (any) {
+        if constexpr (wanted == Wanted::any) {
             best_.prim = 0;
             return true;
         }
@@ -236,6 +253,7 @@ private:
     const WideStackView stack_;
     SimdCounts& counts_;
     WideBest best_{};
+    std::vector<Hit>* all_ = nullptr;
     float origin_[3], inverse_[3];
     HWY_ALIGN std::int32_t slot_[8];
 };
@@ -247,7 +265,7 @@ void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
         ++counts.invalid;
     } else {
         const RayFrame frame = make_frame(job.rays[i]);
-        const WideBest best = SingleRay<any, counting>(job.tree, frame, make_wide_ray(frame, job.tree.bounds),
+        const WideBest best = SingleRay<any ? Wanted::any : Wanted::closest, counting>(job.tree, frame, make_wide_ray(frame, job.tree.bounds),
                                                                job.stack, counts)
                                   .trace(0, {frame.tmax});
         if (best.found()) hit = {best.t * frame.t_scale, best.prim, best.u, best.v};
@@ -262,6 +280,32 @@ void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
 template <bool any, bool counting>
 void trace_single(const SimdJob& job, SimdCounts& counts) {
     for (std::size_t i = 0; i < job.n; ++i) trace_one<any, counting>(job, i, counts);
+}
+
+/// All hits of each ray behind those of the one before; counts.hits of each in hit_counts.
+template <bool counting>
+void trace_all_of(const SimdJob& job, std::vector<Hit>& found, std::uint64_t* hit_counts,
+                  SimdCounts& counts) {
+    for (std::size_t i = 0; i < job.n; ++i) {
+        const std::size_t before = found.size();
+        if (!is_valid(job.rays[i])) {
+            ++counts.invalid;
+        } else {
+            const RayFrame frame = make_frame(job.rays[i]);
+            SingleRay<Wanted::all, counting>(job.tree, frame, make_wide_ray(frame, job.tree.bounds),
+                                             job.stack, counts)
+                .trace_all(found);
+            finish_ray(found, before);
+        }
+        hit_counts[i] = found.size() - before;
+        counts.hits += hit_counts[i];
+    }
+}
+
+inline void all_hits(const SimdJob& job, std::vector<Hit>& found, std::uint64_t* hit_counts,
+                     SimdCounts& counts) {
+    job.counting ? trace_all_of<true>(job, found, hit_counts, counts)
+                 : trace_all_of<false>(job, found, hit_counts, counts);
 }
 
 inline void single(const SimdJob& job, SimdCounts& counts) {

@@ -155,7 +155,7 @@ private:
         StreamRay& ray = rays_[k];
         if (!(entry_of(item) <= ray.t)) return;
         const RayFrame frame = frame_.frame_of(ray);
-        SingleRay<any, counting> single(tree_, frame, frame_.wide_ray_of(ray), single_stack_, counts_);
+        SingleRay<any ? Wanted::any : Wanted::closest, counting> single(tree_, frame, frame_.wide_ray_of(ray), single_stack_, counts_);
         const WideBest best = single.trace(word, {ray.t, ray.prim, hits_[k].u, hits_[k].v});
         if (any) {
             if (best.found()) ray.settle();

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "exec/parallel.h"
+#include "trace/all_hits.h"
 #include "trace/simd/simd_kernels.h"
 
 namespace raydix {
@@ -65,6 +66,18 @@ void (*job_of(const SimdKernels& kernels, SimdPath path))(const SimdJob&, SimdCo
     return path == SimdPath::packet ? kernels.packets : kernels.streams;
 }
 
+TraceCounts sum_of(const std::vector<SimdCounts>& parts, std::size_t rays) {
+    TraceCounts sum;
+    sum.rays = rays;
+    for (const SimdCounts& part : parts) {
+        sum.hits += part.hits;
+        sum.invalid_rays += part.invalid;
+        sum.node_visits += part.visits;
+        sum.triangle_tests += part.tests;
+    }
+    return sum;
+}
+
 TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hits,
                         std::uint8_t* occluded, const TraceOptions& options) {
     const SimdKernels& kernels = kernels_for(options.isa);
@@ -88,15 +101,7 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hit
                 job_of(kernels, path)(job, parts[block]);
             });
     });
-    TraceCounts sum;
-    sum.rays = rays.size();
-    for (const SimdCounts& part : parts) {
-        sum.hits += part.hits;
-        sum.invalid_rays += part.invalid;
-        sum.node_visits += part.visits;
-        sum.triangle_tests += part.tests;
-    }
-    return sum;
+    return sum_of(parts, rays.size());
 }
 
 /// Nothing to hit: all rays miss, but invalid ones still count.
@@ -129,6 +134,32 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
     if (!tree.empty()) return trace_batch(tree, rays, nullptr, occluded.data(), options);
     std::ranges::fill(occluded, std::uint8_t{0});
     return miss_all(rays);
+}
+
+AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOptions& options) {
+    AllHits all;
+    all.offsets.resize(rays.size() + 1, 0);
+    if (tree.empty()) {
+        all.counts = miss_all(rays);
+        return all;
+    }
+    constexpr std::size_t block_size = 1024;
+    const SimdKernels& kernels = kernels_for(options.isa);
+    std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
+    std::vector<std::vector<Hit>> found(parts.size());
+    with_threads(options.threads, [&] {
+        for_each_block(rays.size(), block_size,
+                       [&](std::size_t block, std::size_t begin, std::size_t end) {
+                           StackMemory stack(tree.stats().max_depth);
+                           const SimdJob job{view_of(tree), rays.data() + begin, end - begin,
+                                             nullptr,       nullptr,             stack.view(),
+                                             {},            nullptr,             options.counters};
+                           kernels.all_hits(job, found[block], &all.offsets[begin + 1], parts[block]);
+                       });
+        join_blocks(found, block_size, all);
+    });
+    all.counts = sum_of(parts, rays.size());
+    return all;
 }
 
 SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays) {
