@@ -121,29 +121,34 @@ std::vector<Ray> RayLaunches::rays_of(RayKind kind, const Launch& launch) const 
                                secondary);
 }
 
-void RayLaunches::for_each(RayKind kind,
-                           const std::function<void(const RayUnit&, double)>& visit) const {
+double RayLaunches::for_each(RayKind kind,
+                             const std::function<void(const RayUnit&, double)>& visit) const {
     struct Unit {
         std::size_t launch, begin, count;  // rays of the launch
     };
     const std::vector<Launch> launches = launches_of(kind);
     std::vector<Unit> units;
+    std::size_t taken = 0, there = 0;  // rays
     for (std::size_t first = 0; first < launches.size();) {
         std::size_t last = first, rays = 0;
         for (; last < launches.size() && launches[last].view == launches[first].view; ++last)
             rays += launches[last].rays;
         const auto here = static_cast<double>(last - first);
         const auto whole = static_cast<std::size_t>(std::llround(options_.sample * here));
-        if (whole >= 1 && options_.sample * here >= 0.5) {
+        const double target = options_.sample * static_cast<double>(rays) / runs_per_camera;
+        const std::size_t length =
+            std::max(least_run, (static_cast<std::size_t>(target) + 63) / 64 * 64);
+        there += rays;
+        if (runs_per_camera * length >= rays) {  // runs would overlap: all there is
+            for (std::size_t at = first; at < last; ++at)
+                units.push_back({at, 0, launches[at].rays});
+        } else if (whole >= 1 && options_.sample * here >= 0.5) {
             // Evenly spaced, in the middle of equal parts of the view.
             for (std::size_t k = 0; k < whole; ++k) {
                 const std::size_t at = first + (2 * k + 1) * (last - first) / (2 * whole);
                 units.push_back({at, 0, launches[at].rays});
             }
         } else {
-            const double target = options_.sample * static_cast<double>(rays) / runs_per_camera;
-            const std::size_t length =
-                std::max(least_run, (static_cast<std::size_t>(target) + 63) / 64 * 64);
             for (std::size_t k = 0; k < runs_per_camera; ++k) {
                 std::size_t position = (2 * k + 1) * rays / (2 * runs_per_camera), at = first;
                 while (position >= launches[at].rays) position -= launches[at++].rays;
@@ -155,6 +160,7 @@ void RayLaunches::for_each(RayKind kind,
         }
         first = last;
     }
+    for (const Unit& unit : units) taken += unit.count;
     std::size_t made = launches.size(), done = 0;
     std::vector<Ray> rays;
     for (const Unit& unit : units) {
@@ -164,6 +170,7 @@ void RayLaunches::for_each(RayKind kind,
                static_cast<double>(unit.count) / static_cast<double>(rays.size())},
               static_cast<double>(++done) / static_cast<double>(units.size()));
     }
+    return there > 0 ? static_cast<double>(taken) / static_cast<double>(there) : 1.0;
 }
 
 }  // namespace raydix::cli

@@ -37,8 +37,9 @@ public:
 
     /// Calls visit(unit, part of the work done) for the launches of one kind, or of those that
     /// `sample` picks: whole launches spread over all cameras if there are enough, else runs of
-    /// neighbouring rays; never single rays.
-    void for_each(RayKind kind, const std::function<void(const RayUnit&, double)>& visit) const;
+    /// neighbouring rays, or everything where those would overlap; never single rays. Returns the
+    /// part of all rays that was visited.
+    double for_each(RayKind kind, const std::function<void(const RayUnit&, double)>& visit) const;
 
     [[nodiscard]] float ao_radius() const { return ao_radius_; }
     [[nodiscard]] std::size_t cameras() const { return views_.size(); }

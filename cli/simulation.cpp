@@ -94,13 +94,13 @@ Json operations_json(const SimulationRow& row) {
 }  // namespace
 
 std::optional<double> SimulationRow::sampling_error() const {
-    if (sample >= 1.0) return 0.0;
+    if (part_taken >= 1.0) return 0.0;
     const auto n = static_cast<double>(seconds_per_ray.size());
     if (n < 2) return std::nullopt;
     double mean = 0, squares = 0;
     for (const double s : seconds_per_ray) mean += s / n;
     for (const double s : seconds_per_ray) squares += (s - mean) * (s - mean);
-    return std::sqrt(squares / (n - 1) / n * (1.0 - sample)) / mean;
+    return std::sqrt(squares / (n - 1) / n * (1.0 - part_taken)) / mean;
 }
 
 std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree& tree,
@@ -120,10 +120,11 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
                         .seconds_per_ray = {}});
     }
     Progress progress(fmt::format("simulating {}", ray_kind_name(kind)), common);
-    launches.for_each(kind, [&](const RayUnit& unit, double part) {
+    const double taken = launches.for_each(kind, [&](const RayUnit& unit, double part) {
         add_unit(tree, unit, runs, rows, common);
         progress.show(part);
     });
+    for (SimulationRow& row : rows) row.part_taken = taken;
     return rows;
 }
 
@@ -170,6 +171,7 @@ Json simulation_json(const SimulationRow& row) {
             {"idle_share", or_null(any && row.whole_launches && row.sum.issue_slots > 0,
                                    row.sum.idle_issues / row.sum.issue_slots)},
             {"sample", row.sample},
+            {"part_taken", row.part_taken},
             {"sampling_error", error ? Json(*error) : Json(nullptr)},
             {"operations", operations_json(row)},
             {"histogram", histogram_json(row.sum)}};
@@ -177,10 +179,12 @@ Json simulation_json(const SimulationRow& row) {
 
 Json machine_model_json(const MachineModel& m) {
     Json costs = Json::array();
-    for (const OperationCost& cost : m.costs)
+    for (const OperationCost& cost : m.costs) {
         costs.push_back({{"operation", cost.operation},
                          {"instructions", cost.instructions},
                          {"origin", cost.origin}});
+        if (!cost.kernel.empty()) costs.back()["kernel"] = cost.kernel;
+    }
     return {{"name", m.name},
             {"origin", m.origin},
             {"multiprocessors", m.multiprocessors},

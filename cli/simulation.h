@@ -18,7 +18,8 @@ struct SimulationRow {
     std::string rays;  // name of the kind, or a file
     SimulateOptions options;
     Simulation sum;
-    double sample = 1.0;
+    double sample = 1.0;                  // as asked for
+    double part_taken = 1.0;              // of all rays
     bool whole_launches = true;           // else there is no launch to schedule
     std::uint64_t different_hits = 0;     // from those of the scalar reference
     std::vector<double> seconds_per_ray;  // of each unit, at the bound

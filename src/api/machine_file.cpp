@@ -75,40 +75,68 @@ private:
         value = static_cast<std::uint32_t>(given);
     }
 
-    /// {"visit_node": 50, ...}, or a list of {"operation", "instructions", "origin"}, as documents
-    /// of `raydix simulate` have it.
+    /// {"visit_node": 50, ...}, or a list of {"operation", "instructions", "origin", "kernel"}, as
+    /// documents of `raydix simulate` have it. Without "kernel" a cost holds for all kernels, also
+    /// for those that the base counts apart.
     void read_costs() {
         const json* costs = find("costs");
         if (costs == nullptr) return;
+        std::vector<OperationCost> given;
         if (costs->is_object()) {
             for (const auto& [operation, value] : costs->items())
-                set_cost(operation, value, "a file");
+                given.push_back(cost_of(operation, value));
         } else if (costs->is_array()) {
-            for (const json& entry : *costs) {
-                if (!entry.is_object() || !entry.contains("operation") ||
-                    !entry.contains("instructions"))
-                    in_.fail("costs", "an entry without \"operation\" or \"instructions\"");
-                set_cost(text(entry["operation"], "costs"), entry["instructions"],
-                         entry.contains("origin") ? text(entry["origin"], "origin") : "a file");
-            }
+            for (const json& entry : *costs) given.push_back(cost_of(entry));
         } else {
             in_.fail("costs", "neither an object nor a list");
         }
+        replace_costs(given);
         for (const std::string_view operation : op_names)
-            if (std::none_of(m_.costs.begin(), m_.costs.end(),
-                             [&](const OperationCost& c) { return c.operation == operation; }))
-                in_.fail("costs", fmt::format("{} is missing", operation));
+            for (const WarpKernel kernel : warp_kernels()) require_cost(operation, kernel);
     }
-    void set_cost(const std::string& operation, const json& value, const std::string& origin) {
+    OperationCost cost_of(const json& entry) const {
+        if (!entry.is_object() || !entry.contains("operation") || !entry.contains("instructions"))
+            in_.fail("costs", "an entry without \"operation\" or \"instructions\"");
+        for (const auto& [key, value] : entry.items())
+            if (key != "operation" && key != "instructions" && key != "origin" && key != "kernel")
+                in_.fail("costs", fmt::format("{} is not a field of an entry", key));
+        OperationCost cost = cost_of(text(entry["operation"], "costs"), entry["instructions"]);
+        if (entry.contains("origin")) cost.origin = text(entry["origin"], "origin");
+        if (!entry.contains("kernel")) return cost;
+        cost.kernel = text(entry["kernel"], "kernel");
+        const auto kernels = warp_kernels();
+        if (std::none_of(kernels.begin(), kernels.end(),
+                         [&](WarpKernel k) { return warp_kernel_name(k) == cost.kernel; }))
+            in_.fail("costs", fmt::format("there is no kernel {}", cost.kernel));
+        return cost;
+    }
+    OperationCost cost_of(const std::string& operation, const json& value) const {
         if (std::find(op_names.begin(), op_names.end(), operation) == op_names.end())
             in_.fail("costs", fmt::format("there is no operation {}", operation));
         if (!value.is_number_unsigned() || value.get<std::uint64_t>() > 100'000)
             in_.fail("costs", fmt::format("{} is not an integer from 0 to 100000", operation));
-        const auto at = std::find_if(m_.costs.begin(), m_.costs.end(), [&](const OperationCost& c) {
-            return c.operation == operation;
-        });
-        OperationCost& cost = at == m_.costs.end() ? m_.costs.emplace_back() : *at;
-        cost = {operation, value.get<std::uint32_t>(), origin};
+        return {operation, value.get<std::uint32_t>(), "a file"};
+    }
+    void replace_costs(const std::vector<OperationCost>& given) {
+        for (const OperationCost& cost : given) {
+            const auto same = [&](const OperationCost& c) {
+                return c.operation == cost.operation && c.kernel == cost.kernel;
+            };
+            if (std::count_if(given.begin(), given.end(), same) > 1)
+                in_.fail("costs", fmt::format("{} has two costs", cost.operation));
+            std::erase_if(m_.costs, [&](const OperationCost& c) {
+                return c.operation == cost.operation && (cost.kernel.empty() || same(c));
+            });
+        }
+        m_.costs.insert(m_.costs.end(), given.begin(), given.end());
+    }
+    void require_cost(std::string_view operation, WarpKernel kernel) const {
+        if (std::none_of(m_.costs.begin(), m_.costs.end(), [&](const OperationCost& c) {
+                return c.operation == operation &&
+                       (c.kernel.empty() || c.kernel == warp_kernel_name(kernel));
+            }))
+            in_.fail("costs",
+                     fmt::format("{} is missing for {}", operation, warp_kernel_name(kernel)));
     }
 
     const ByteSource& in_;

@@ -71,6 +71,10 @@ void check_options(const SimulateOptions& options) {
     positive("dram_gb_per_s", m.dram_gb_per_s);
     positive("l1_bytes", m.l1_bytes);
     positive("l2_bytes", m.l2_bytes);
+    // The model keeps a record for each 32 bytes of cache.
+    if (double(m.l1_bytes) * m.multiprocessors + m.l2_bytes > 1 << 30)
+        throw InputError("machine " + m.name +
+                         ": l1_bytes of all multiprocessors and l2_bytes are more than 2^30");
 }
 
 Simulation without_tree(const SimulateOptions& options, std::size_t rays) {

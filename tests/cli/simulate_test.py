@@ -55,6 +55,16 @@ class Simulate(ProgramTest):
             error = abs(b["mrays_per_s_bound"] / a["mrays_per_s_bound"] - 1)
             self.assertLess(error, 6 * b["sampling_error"] + 0.02)
 
+    def test_a_sample_of_few_rays_is_all_of_them_once(self):
+        arguments = ("simulate", SCENE, *SMALL, "--kernel", "while_while")
+        whole, part = self.document(*arguments), self.document(*arguments, "--sample", "0.1")
+        for a, b in zip(whole["simulate"], part["simulate"]):
+            if b["part_taken"] == 1:  # runs of the least length would overlap
+                self.assertEqual({**a, "sample": 0.1}, b)
+            self.assertLessEqual(b["count"], a["count"])
+            self.assertAlmostEqual(b["count"] / a["count"], b["part_taken"])
+        self.assertEqual(part["simulate"][0]["part_taken"], 1)
+
     def test_rays_from_a_file(self):
         self.succeed("trace", SCENE, "--size", "32x24", "--camera", "0", "--repeat", "1", "--save-rays", "rays.npy")
         document = self.document("simulate", SCENE, "--rays", "rays.npy", "--width", "8")
@@ -73,6 +83,23 @@ class Simulate(ProgramTest):
         same = self.document("simulate", SCENE, *SMALL, "--rays", "primary", "--kernel", "while_while", "--machine", again)
         self.assertEqual(same["simulate"][0]["mrays_per_s_bound"], before)
 
+    def test_costs_of_single_kernels_are_kept_in_machine_files(self):
+        arguments = ("simulate", SCENE, "--size", "32x24", "--rays", "primary")
+        first = self.document(*arguments, "--machine", "h200")
+        again = self.document(*arguments, "--machine", self.write("h200.json", json.dumps(first["machines"][0])))
+        self.assertEqual(first["simulate"], again["simulate"])
+        # A cost without a kernel holds for all kernels.
+        dear = self.document(*arguments, "--machine",
+                             self.write("dear.json", '{"base": "h200", "costs": {"visit_node": 5000}}'))
+        for before, after in zip(first["simulate"], dear["simulate"]):
+            self.assertLess(after["mrays_per_s_bound"], 0.5 * before["mrays_per_s_bound"], after["kernel"])
+        one = self.document(*arguments, "--machine", self.write("one.json", json.dumps(
+            {"base": "h200", "name": "h200",
+             "costs": [{"operation": "visit_node", "instructions": 5000, "kernel": "if_if"}]})))
+        for before, after in zip(first["simulate"], one["simulate"]):
+            changed = before["mrays_per_s_bound"] != after["mrays_per_s_bound"]
+            self.assertEqual(changed, before["kernel"] == "if_if", before["kernel"])
+
     def test_bad_machine_files(self):
         for text, words in (("{", ["JSON"]), ("[]", ["machine", "object"]),
                             ('{"base": "gtx1"}', ["gtx1", "gtx480"]),
@@ -86,9 +113,18 @@ class Simulate(ProgramTest):
                             ('{"base": "gtx480", "costs": {"push": -1}}', ["push"]),
                             ('{"base": "gtx480", "costs": [{"operation": "push"}]}', ["instructions"]),
                             ('{"base": "gtx480", "costs": 3}', ["costs"]),
+                            ('{"base": "gtx480", "costs": [{"operation": "push", "instructions": 3, "kernel": "x"}]}',
+                             ["there is no kernel x"]),
+                            ('{"base": "gtx480", "costs": [{"operation": "push", "instructions": 3, "cost": 1}]}',
+                             ["cost is not a field"]),
+                            ('{"base": "gtx480", "costs": [{"operation": "push", "instructions": 3}, '
+                             '{"operation": "push", "instructions": 4}]}', ["push has two costs"]),
                             ('{"name": "bare"}', ["multiprocessors", "missing"])):
             file = self.write("bad.json", text)
             self.fail_with_one_line("simulate", SCENE, "--machine", file, names=[*words])
+        # 15 first-level caches of 4 GB would be 32 GB of records.
+        file = self.write("caches.json", '{"base": "gtx480", "l1_bytes": 4000000000}')
+        self.fail_with_one_line("simulate", SCENE, "--memory", "--machine", file, names=["l1_bytes", "2^30"])
         self.fail_with_one_line("simulate", SCENE, "--machine", "none.json", names=["none.json"])
         self.fail_with_one_line("simulate", SCENE, "--machine", "gtx1", names=["gtx1", "gtx285_enum_popc"])
 
