@@ -42,12 +42,12 @@ public:
         document["options"] = options_json();
         document["scenes"] = Json::array();
         std::vector<SceneFigures> scenes;
-        if (tables)
-            fmt::print("Embree {}, {}; builds in processes of their own, {} rounds\n",
-                       embree_version(), machine_info().cpu, options_.rounds);
         for (const std::string& name : options_.scenes) {
             scenes.push_back(study(name));
             document["scenes"].push_back(figures_json(scenes.back()));
+            if (tables && scenes.size() == 1)
+                fmt::print("Embree {}, {}; builds in processes of their own, {} rounds\n",
+                           embree_version(), machine_info().cpu, options_.rounds);
             if (tables) print_figures(scenes.back());
             std::fflush(stdout);
         }

@@ -140,7 +140,6 @@ public:
 private:
     Mode batch_mode(const std::string& name, SimdPath path, const std::string& isa) const {
         TraceOptions options;
-        options.kernel = TraceKernel::simd;
         options.path = path;
         options.isa = isa;
         const WideBvh* tree = &*wide_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <tuple>
 
@@ -191,14 +192,48 @@ void print_differences(const SceneFigures& figures) {
         }
 }
 
-void print_ratio_head(const std::vector<std::string>& names) {
-    fmt::print("{:<18} {:<22}", "raydix", "over Embree");
-    for (const std::string& name : names) {
-        std::string head = name;
-        if (head.starts_with("diffuse_shuffled")) head = "shuffled" + head.substr(16);
-        fmt::print(" {:>15}", head);
+/// A row for each name of `rows`, in the order of `order`; a column for each figure.
+void print_grid(const std::vector<std::string>& columns,
+                const std::vector<std::string>& order,
+                std::map<std::string, std::map<std::string, double>>& rows) {
+    fmt::print("{:<36}", "");
+    for (const std::string& name : columns) {
+        const bool shuffled = name.starts_with("diffuse_shuffled");
+        fmt::print(" {:>15}", shuffled ? name.substr(8) : name);
     }
     fmt::print("\n");
+    for (const std::string& row : order) {
+        fmt::print("{:<36}", row);
+        for (const std::string& name : columns)
+            fmt::print(" {:>15}",
+                       rows[row].contains(name) ? fmt::format("{:.2f}", rows[row][name]) : "-");
+        fmt::print("\n");
+    }
+}
+
+void print_ratios(const SceneFigures& figures) {
+    std::map<std::string, std::map<std::string, double>> rows;
+    std::vector<std::string> order;
+    for (const Ratio& r : ratios_of(figures)) {
+        const std::string row = r.ours + " / Embree " + r.embree;
+        if (!rows.contains(row)) order.push_back(row);
+        rows[row][r.figure] = r.value;
+    }
+    fmt::print("\nours / Embree's: rates (more is better), times and bytes (less is better)\n");
+    print_grid(figure_names(figures), order, rows);
+}
+
+void print_speed_ups(const SceneFigures& figures) {
+    std::map<std::string, std::map<std::string, double>> rows;
+    std::vector<std::string> order;
+    for (const Json& s : speed_ups_json(figures)) {
+        const std::string row = s["peer"].get<std::string>();
+        if (!rows.contains(row)) order.push_back(row);
+        rows[row][s["figure"].get<std::string>()] = s["speed_up"].get<double>();
+    }
+    if (order.empty()) return;
+    fmt::print("\nspeed-up from 1 to {} threads\n", figures.threads);
+    print_grid(figure_names(figures), order, rows);
 }
 
 }  // namespace
@@ -253,28 +288,8 @@ void print_figures(const SceneFigures& figures) {
         print_rates(figures);
         print_differences(figures);
     }
-    const std::vector<std::string> names = figure_names(figures);
-    std::map<std::pair<std::string, std::string>, std::map<std::string, double>> rows;
-    std::vector<std::pair<std::string, std::string>> order;
-    for (const Ratio& r : ratios_of(figures)) {
-        if (!rows.contains({r.ours, r.embree})) order.emplace_back(r.ours, r.embree);
-        rows[{r.ours, r.embree}][r.figure] = r.value;
-    }
-    fmt::print("\nratios: of rates (more is better), of times and bytes (less is better)\n");
-    print_ratio_head(names);
-    for (const auto& row : order) {
-        fmt::print("{:<18} {:<22}", row.first, row.second);
-        for (const std::string& name : names)
-            fmt::print(" {:>15}",
-                       rows[row].contains(name) ? fmt::format("{:.2f}", rows[row][name]) : "-");
-        fmt::print("\n");
-    }
-    const Json speed_ups = speed_ups_json(figures);
-    if (!speed_ups.empty())
-        fmt::print("\nspeed-up from 1 to {} threads\n", figures.threads);
-    for (const Json& s : speed_ups)
-        fmt::print("{:<24} {:<24} {:>6.2f}\n", s["peer"].get<std::string>(),
-                   s["figure"].get<std::string>(), s["speed_up"].get<double>());
+    print_ratios(figures);
+    print_speed_ups(figures);
 }
 
 Json summary_json(const std::vector<SceneFigures>& scenes) {
