@@ -26,7 +26,7 @@ struct TraceOptions {
     int threads = 0;        // 0: all the machine has. Results do not depend on it
     bool counters = false;  // also count node visits and triangle tests; costs a little time
     SimdPath path = SimdPath::automatic;  // wide trees only
-    std::string isa;  // wide trees only: one of simd_instruction_sets(); empty: the best
+    std::string isa = {};  // wide trees only: one of simd_instruction_sets(); empty: the best
 };
 
 /// What a batch met. Counters are 0 unless asked for.

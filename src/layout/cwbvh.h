@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "base/hd.h"
+#include "layout/quantise.h"
 #include "layout/wide_collapse.h"
 
 namespace raydix {
@@ -58,19 +59,5 @@ struct Cwbvh::Arrays {
 
 /// Fills nodes, triangles and bounds. `wide` has 8 children a node, at most 3 primitives a leaf.
 void compress_wide_tree(const WideTree& wide, const Bvh& bvh, Cwbvh::Arrays& out);
-
-/// Places up to 8 children in slots 0 to 7 so that the sum over children of
-/// dot(centre of child - centre of node, diagonal of slot) is largest: the assignment of
-/// section 3.2, solved exactly. slots [count], out.
-void assign_octant_slots(std::span<const Aabb> children, int* slots);
-
-/// step_exponent: the biased exponent of the least power of two of which 255 reach from lo to hi.
-[[nodiscard]] int step_exponent(float lo, float hi);
-/// The largest q with origin + q * step <= at, and the least with origin + q * step >= at, held
-/// within 0 to 255: exact, whatever the sizes are. origin <= at.
-[[nodiscard]] int steps_below(float origin, int exponent, float at);
-[[nodiscard]] int steps_above(float origin, int exponent, float at);
-/// Whether the child in `slot` as it will be decoded contains `box`, in exact arithmetic.
-[[nodiscard]] bool contains_exactly(const CwbvhNode& node, int slot, const Aabb& box);
 
 }  // namespace raydix

@@ -86,6 +86,10 @@ struct Plan {
 /// costs (flat scenes have no others) the tree stays shallow.
 constexpr int left_part(int i, int j) { return j % 2 == 1 ? i / 2 + (j + 1) / 2 : i / 2 - j / 2; }
 
+std::uint32_t blocks_of(std::uint32_t count, const WideOptions& options) {
+    return (count + options.block - 1) / options.block;
+}
+
 std::uint32_t rank_of(const BvhNode& inner) { return (inner.first - 2) / 2; }
 
 template <int width>
@@ -120,6 +124,11 @@ private:
         return static_cast<float>(std::max(half_area(box_of(node)), 0.0) * per_area_);
     }
 
+    [[nodiscard]] float leaf_cost(float area, std::uint32_t count) const {
+        return area * static_cast<float>(blocks_of(count, options_)) *
+               static_cast<float>(options_.primitive_cost);
+    }
+
     /// Slots of the inner nodes, parents before children: a rank says nothing about depth.
     void order_by_levels() {
         by_level_.reserve(plans_.size());
@@ -143,8 +152,7 @@ private:
     [[nodiscard]] ChildPlan child_plan(const BvhNode& child) const {
         ChildPlan plan;
         if (child.is_leaf()) {
-            const float cost = relative_area(child) * static_cast<float>(child.count) *
-                               static_cast<float>(options_.primitive_cost);
+            const float cost = leaf_cost(relative_area(child), child.count);
             std::fill_n(plan.cost, width - 1, cost);
             plan.first = child.first;
             plan.last = child.first + child.count;
@@ -182,8 +190,7 @@ private:
         const double node_cost = &node == &nodes_[0] ? 0.0 : options_.node_cost;
         plan.cost[0] = shared[width] + area * static_cast<float>(node_cost);
         if (plan.first <= plan.last && plan.last - plan.first <= options_.max_leaf) {
-            const float as_leaf = area * static_cast<float>(plan.last - plan.first) *
-                                  static_cast<float>(options_.primitive_cost);
+            const float as_leaf = leaf_cost(area, plan.last - plan.first);
             if (as_leaf <= plan.cost[0]) {
                 plan.cost[0] = as_leaf;
                 plan.choose(1, 1);
@@ -283,11 +290,16 @@ private:
 
 }  // namespace
 
-WideTree collapse_to_wide(const Bvh& bvh, const WideOptions& options) {
+void check_wide_options(const WideOptions& options) {
     if (options.width != 4 && options.width != 8)
         throw InputError("wide trees have 4 or 8 children a node, not " +
                          std::to_string(options.width));
+    if (options.block == 0) throw InputError("a block must hold one primitive at least");
     if (options.max_leaf == 0) throw InputError("a leaf must hold one primitive at least");
+}
+
+WideTree collapse_to_wide(const Bvh& bvh, const WideOptions& options) {
+    check_wide_options(options);
     WideTree none;
     none.width = options.width;
     if (bvh.empty()) return none;
@@ -303,7 +315,8 @@ double wide_cost(const WideTree& tree, const WideOptions& options) {
         for (const BvhNode& child : tree.node(w)) {
             if (WideTree::is_unused(child)) continue;
             box = unite(box, box_of(child));
-            sum += child.count * options.primitive_cost * half_area(box_of(child));
+            sum += blocks_of(child.count, options) * options.primitive_cost *
+                   half_area(box_of(child));
         }
         if (w == 0) root_area = half_area(box);
         sum += options.node_cost * half_area(box);

@@ -16,6 +16,7 @@ struct WideOptions {
     std::uint32_t max_leaf = 3;   // primitives of a leaf at most; larger leaves are divided
     double node_cost = 1.0;       // of visiting a wide node, against ...
     double primitive_cost = 1.0;  // ... testing one primitive
+    std::uint32_t block = 1;      // so many primitives are tested at the cost of one
 };
 
 /// Node w has the children [w * width, (w + 1) * width), used ones first. A child is a BvhNode: an
@@ -50,6 +51,9 @@ struct WideTree {
 /// O(references * width) time, the same tree for every thread count. References may be more than
 /// primitives. Throws InputError for another width, or max_leaf 0.
 [[nodiscard]] WideTree collapse_to_wide(const Bvh& bvh, const WideOptions& options = {});
+
+/// Throws InputError for another width, or a limit of 0.
+void check_wide_options(const WideOptions& options);
 
 /// Cost of the tree in units of node_cost * the root's area: what the collapse makes least. 0 if
 /// the root has no area.

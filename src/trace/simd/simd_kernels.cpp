@@ -1,0 +1,48 @@
+// Compiles the kernels once per instruction set (Highway's foreach_target) and lists those that
+// this processor can run.
+#include "trace/simd/simd_kernels.h"
+
+#include <bit>
+#include <cstring>
+#include <vector>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "trace/simd/simd_kernels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "trace/simd/single.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace raydix::HWY_NAMESPACE {
+
+SimdKernels kernels(std::string_view isa) { return {isa, single}; }
+
+}  // namespace raydix::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace raydix {
+
+std::span<const SimdKernels> simd_kernels() {
+    static const std::vector<SimdKernels> all = [] {
+        std::vector<SimdKernels> found;
+        [[maybe_unused]] const std::int64_t here = hwy::SupportedTargets();
+#if HWY_TARGETS & HWY_AVX3
+        if (here & HWY_AVX3) found.push_back(N_AVX3::kernels("avx512"));
+#endif
+#if HWY_TARGETS & HWY_AVX2
+        if (here & HWY_AVX2) found.push_back(N_AVX2::kernels("avx2"));
+#endif
+        found.push_back(HWY_STATIC_DISPATCH(kernels)(
+            HWY_STATIC_TARGET == HWY_SSE4    ? "sse4"
+            : HWY_STATIC_TARGET == HWY_SSSE3 ? "ssse3"
+            : HWY_STATIC_TARGET == HWY_NEON  ? "neon"
+                                             : "scalar"));
+        return found;
+    }();
+    return all;
+}
+
+}  // namespace raydix
+#endif

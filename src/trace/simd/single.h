@@ -1,0 +1,291 @@
+// One ray through a wide tree: eight children at a time, eight triangles at a time. Included once
+// per instruction set by simd_kernels.cpp.
+#if defined(RAYDIX_SIMD_SINGLE_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef RAYDIX_SIMD_SINGLE_H
+#undef RAYDIX_SIMD_SINGLE_H
+#else
+#define RAYDIX_SIMD_SINGLE_H
+#endif
+
+#include <hwy/highway.h>
+
+#include "base/check.h"
+#include "trace/simd/wide_ray.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace raydix::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using F8 = hn::CappedTag<float, 8>;
+using I8 = hn::RebindToSigned<F8>;
+using U8 = hn::RebindToUnsigned<F8>;
+using B8 = hn::Rebind<std::uint8_t, F8>;
+constexpr F8 f8;
+constexpr std::size_t lanes8 = hn::MaxLanes(f8);
+constexpr std::size_t parts8 = 8 / lanes8;
+
+template <class D, class Mask>
+HWY_INLINE std::uint32_t bits_of(D d, Mask mask) {
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, mask, bytes);
+    std::uint32_t bits;
+    std::memcpy(&bits, bytes, sizeof(bits));
+    return bits & static_cast<std::uint32_t>((std::uint64_t{1} << hn::MaxLanes(d)) - 1);
+}
+
+template <bool any, bool counting>
+class SingleRay {
+public:
+    SingleRay(const WideView& tree, const RayFrame& frame, const WideStackView& stack,
+              SimdCounts& counts)
+        : tree_(tree), frame_(frame), ray_(make_wide_ray(frame, tree.bounds)), stack_(stack),
+          counts_(counts) {
+        origin_[0] = frame.origin.x, origin_[1] = frame.origin.y, origin_[2] = frame.origin.z;
+        inverse_[0] = frame.inverse.x, inverse_[1] = frame.inverse.y, inverse_[2] = frame.inverse.z;
+        for (std::size_t l = 0; l < 8; ++l) slot_[l] = static_cast<std::int32_t>(l ^ ray_.negative ^ 7u);
+    }
+
+    WideBest trace() {
+        best_.t = frame_.tmax;
+        stack_.words[0] = 0;
+        stack_.entries[0] = frame_.tmin;
+        std::size_t top = 1;
+        while (top > 0) {
+            --top;
+            if (!(stack_.entries[top] <= best_.t)) continue;
+            const std::uint32_t word = stack_.words[top];
+            if ((word & wide_leaf_bit) != 0) {
+                if (test_leaf(word)) break;
+            } else {
+                top = visit(tree_.nodes[word], top);
+            }
+        }
+        return best_;
+    }
+
+private:
+    /// Children that the ray meets go onto the stack, the nearest last.
+    HWY_INLINE std::size_t visit(const WideNode& node, std::size_t top) {
+        if constexpr (counting) ++counts_.visits;
+        const auto rate_of = [&](int axis, float inverse) {
+            const std::uint32_t bits = std::uint32_t{node.exponent[axis]} << 23;
+            float step;
+            std::memcpy(&step, &bits, sizeof(step));
+            return hn::Set(f8, step * inverse);
+        };
+        const Vec3 from{node.origin[0] - frame_.origin.x, node.origin[1] - frame_.origin.y,
+                        node.origin[2] - frame_.origin.z};
+        const Vec3& pad = ray_.near_pad;
+        const Vec3& inverse = ray_.inverse;
+        const auto rate_x = rate_of(0, inverse.x), rate_y = rate_of(1, inverse.y),
+                   rate_z = rate_of(2, inverse.z);
+        const auto near_x = hn::Set(f8, (from.x + pad.x) * inverse.x),
+                   near_y = hn::Set(f8, (from.y + pad.y) * inverse.y),
+                   near_z = hn::Set(f8, (from.z + pad.z) * inverse.z);
+        const auto far_x = hn::Set(f8, (from.x - pad.x) * inverse.x),
+                   far_y = hn::Set(f8, (from.y - pad.y) * inverse.y),
+                   far_z = hn::Set(f8, (from.z - pad.z) * inverse.z);
+        const std::uint8_t* const near_plane[3] = {
+            ray_.negative & 1 ? node.hi[0] : node.lo[0], ray_.negative & 2 ? node.hi[1] : node.lo[1],
+            ray_.negative & 4 ? node.hi[2] : node.lo[2]};
+        const std::uint8_t* const far_plane[3] = {
+            ray_.negative & 1 ? node.lo[0] : node.hi[0], ray_.negative & 2 ? node.lo[1] : node.hi[1],
+            ray_.negative & 4 ? node.lo[2] : node.hi[2]};
+        const auto steps = [](const std::uint8_t* from8) {
+            return hn::ConvertTo(f8, hn::PromoteTo(I8(), hn::LoadU(B8(), from8)));
+        };
+        if constexpr (parts8 == 1) {
+            const auto entry = hn::Max(
+                hn::Max(hn::MulAdd(steps(near_plane[0]), rate_x, near_x),
+                        hn::MulAdd(steps(near_plane[1]), rate_y, near_y)),
+                hn::Max(hn::MulAdd(steps(near_plane[2]), rate_z, near_z), hn::Set(f8, frame_.tmin)));
+            const auto leave = hn::Min(hn::Min(hn::MulAdd(steps(far_plane[0]), rate_x, far_x),
+                                               hn::MulAdd(steps(far_plane[1]), rate_y, far_y)),
+                                       hn::MulAdd(steps(far_plane[2]), rate_z, far_z));
+            const auto exit = hn::Min(hn::Mul(leave, hn::Set(f8, slab_exit_factor)),
+                                      hn::Set(f8, best_.t));
+            const auto slot = hn::IndicesFromVec(f8, hn::Load(I8(), slot_));
+            const auto words = hn::TableLookupLanes(
+                hn::BitCast(f8, hn::Load(U8(), node.child)), slot);
+            const auto entry_in_order = hn::TableLookupLanes(entry, slot);
+            const auto exit_in_order = hn::TableLookupLanes(exit, slot);
+            // A missing child is a word of all ones: NaN, and nothing equals NaN.
+            const auto met = hn::And(hn::Le(entry_in_order, exit_in_order), hn::Eq(words, words));
+            hn::StoreU(hn::Compress(entry_in_order, met), f8, stack_.entries + top);
+            hn::StoreU(hn::Compress(words, met), f8,
+                       reinterpret_cast<float*>(stack_.words + top));
+            return top + hn::CountTrue(f8, met);
+        } else {
+            HWY_ALIGN float entries[8];
+            std::uint32_t met = 0;
+            for (std::size_t part = 0; part < parts8; ++part) {
+                const std::size_t l = part * lanes8;
+                const auto entry = hn::Max(
+                    hn::Max(hn::MulAdd(steps(near_plane[0] + l), rate_x, near_x),
+                            hn::MulAdd(steps(near_plane[1] + l), rate_y, near_y)),
+                    hn::Max(hn::MulAdd(steps(near_plane[2] + l), rate_z, near_z),
+                            hn::Set(f8, frame_.tmin)));
+                const auto leave =
+                    hn::Min(hn::Min(hn::MulAdd(steps(far_plane[0] + l), rate_x, far_x),
+                                    hn::MulAdd(steps(far_plane[1] + l), rate_y, far_y)),
+                            hn::MulAdd(steps(far_plane[2] + l), rate_z, far_z));
+                const auto exit = hn::Min(hn::Mul(leave, hn::Set(f8, slab_exit_factor)),
+                                          hn::Set(f8, best_.t));
+                hn::Store(entry, f8, entries + l);
+                met |= bits_of(f8, hn::Le(entry, exit)) << l;
+            }
+            met &= node.used;
+            for (std::size_t k = 0; met != 0 && k < 8; ++k) {
+                const auto s = static_cast<std::size_t>(slot_[k]);
+                if ((met >> s & 1) == 0) continue;
+                stack_.words[top] = node.child[s];
+                stack_.entries[top++] = entries[s];
+            }
+            return top;
+        }
+    }
+
+    HWY_INLINE bool test_leaf(std::uint32_t word) {
+        const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
+        const TriangleBlock& block = tree_.blocks[place / 8];
+        if constexpr (counting) counts_.tests += count;
+        const std::uint32_t lanes = ((1u << count) - 1) << place % 8;
+        for (std::size_t part = 0; part < parts8; ++part) {
+            const std::uint32_t wanted = lanes >> (part * lanes8) & ((1u << lanes8) - 1);
+            if (wanted != 0 && test_lanes(block, part * lanes8, wanted)) return true;
+        }
+        return false;
+    }
+
+    using V = hn::Vec<F8>;
+    struct Sheared {
+        V x, y, z;  // z before shear_z
+    };
+    HWY_INLINE Sheared shear(const TriangleBlock& block, int vertex, std::size_t l) const {
+        const auto at = [&](int axis) {
+            return hn::Sub(hn::Load(f8, block.corner[3 * vertex + axis] + l),
+                           hn::Set(f8, origin_[axis]));
+        };
+        const V z = at(frame_.kz);
+        return {hn::Sub(at(frame_.kx), hn::Mul(hn::Set(f8, frame_.shear_x), z)),
+                hn::Sub(at(frame_.ky), hn::Mul(hn::Set(f8, frame_.shear_y), z)), z};
+    }
+    static HWY_INLINE V edge(const Sheared& a, const Sheared& b) {
+        return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
+    }
+
+    /// intersect_triangle for the lanes l + (bits of `wanted`): the same bits. True: stop.
+    HWY_INLINE bool test_lanes(const TriangleBlock& block, std::size_t l, std::uint32_t wanted) {
+        const Sheared a = shear(block, 0, l), b = shear(block, 1, l), c = shear(block, 2, l);
+        const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
+        const V zero = hn::Zero(f8);
+        const V least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
+        const auto outside = hn::And(hn::Lt(least, zero), hn::Gt(largest, zero));
+        std::uint32_t candidates = wanted & ~bits_of(f8, outside);
+        if (candidates == 0) return false;
+        const auto on_edge = hn::Or(hn::Or(hn::Eq(u, zero), hn::Eq(v, zero)), hn::Eq(w, zero));
+        const std::uint32_t near_edge = candidates & bits_of(f8, on_edge);
+        if (near_edge != 0 && test_exactly(block, l, near_edge)) return true;
+        candidates &= ~near_edge;
+        if (candidates == 0) return false;
+        return accept(block, l, candidates, a, b, c, u, v, w);
+    }
+
+    HWY_NOINLINE bool test_exactly(const TriangleBlock& block, std::size_t l, std::uint32_t lanes) {
+        for (; lanes != 0; lanes &= lanes - 1) {
+            const auto lane = static_cast<std::uint32_t>(l) + static_cast<std::uint32_t>(std::countr_zero(lanes));
+            TriangleHit hit;
+            if (!intersect_triangle<EdgeRule::closed>(frame_, triangle_of(block, lane), best_.t, hit))
+                continue;
+            best_.take(hit.t, block.prim[lane], hit.u, hit.v);
+            if constexpr (any) return true;
+        }
+        return false;
+    }
+
+    HWY_INLINE bool accept(const TriangleBlock& block, std::size_t l, std::uint32_t candidates,
+                           const Sheared& a, const Sheared& b, const Sheared& c, V u, V v, V w) {
+        const V determinant = hn::Add(hn::Add(u, v), w);
+        const V shear_z = hn::Set(f8, frame_.shear_z);
+        const V depth = hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)),
+                                        hn::Mul(v, hn::Mul(shear_z, b.z))),
+                                hn::Mul(w, hn::Mul(shear_z, c.z)));
+        V t = hn::Div(depth, determinant);
+        V entry = hn::Set(f8, -infinity), exit = hn::Set(f8, infinity);
+        for (int axis = 0; axis < 3; ++axis) {
+            const V p = hn::Load(f8, block.corner[axis] + l), q = hn::Load(f8, block.corner[3 + axis] + l),
+                    r = hn::Load(f8, block.corner[6 + axis] + l);
+            const V lo = hn::Min(hn::Min(p, q), r), hi = hn::Max(hn::Max(p, q), r);
+            const bool negative = (ray_.negative >> axis & 1) != 0;
+            const V origin = hn::Set(f8, origin_[axis]), inverse = hn::Set(f8, inverse_[axis]);
+            const V near = hn::Mul(hn::Sub(negative ? hi : lo, origin), inverse);
+            const V far = hn::Mul(hn::Sub(negative ? lo : hi, origin), inverse);
+            // A NaN plane is dropped.
+            entry = hn::IfThenElse(hn::Gt(near, entry), near, entry);
+            exit = hn::IfThenElse(hn::Lt(far, exit), far, exit);
+        }
+        V held = hn::IfThenElse(hn::Gt(t, entry), t, entry);
+        held = hn::IfThenElse(hn::Lt(held, exit), held, exit);
+        t = hn::IfThenElse(hn::Le(entry, exit), held, t);
+        const auto sound = hn::And(hn::Ne(determinant, hn::Zero(f8)),
+                                   hn::Lt(hn::Abs(determinant), hn::Set(f8, infinity)));
+        const auto in_reach = hn::And(hn::Ge(t, hn::Set(f8, frame_.tmin)), hn::Le(t, hn::Set(f8, best_.t)));
+        candidates &= bits_of(f8, hn::And(sound, in_reach));
+        if (candidates == 0) return false;
+        if constexpr (any) {
+            best_.prim = 0;
+            return true;
+        }
+        HWY_ALIGN float ts[lanes8], us[lanes8], vs[lanes8];
+        hn::Store(t, f8, ts);
+        hn::Store(hn::Div(v, determinant), f8, us);
+        hn::Store(hn::Div(w, determinant), f8, vs);
+        for (; candidates != 0; candidates &= candidates - 1) {
+            const auto k = static_cast<std::size_t>(std::countr_zero(candidates));
+            best_.take(ts[k], block.prim[l + k], us[k], vs[k]);
+        }
+        return false;
+    }
+
+    const WideView& tree_;
+    const RayFrame& frame_;
+    const WideRay ray_;
+    const WideStackView stack_;
+    SimdCounts& counts_;
+    WideBest best_{};
+    float origin_[3], inverse_[3];
+    HWY_ALIGN std::int32_t slot_[8];
+};
+
+template <bool any, bool counting>
+void trace_single(const SimdJob& job, SimdCounts& counts) {
+    for (std::size_t k = 0; k < job.n; ++k) {
+        const std::size_t i = job.index == nullptr ? k : job.index[k];
+        Hit hit;
+        if (!is_valid(job.rays[i])) {
+            ++counts.invalid;
+        } else {
+            const RayFrame frame = make_frame(job.rays[i]);
+            const WideBest best = SingleRay<any, counting>(job.tree, frame, job.stack, counts).trace();
+            if (best.found()) hit = {best.t * frame.t_scale, best.prim, best.u, best.v};
+        }
+        counts.hits += hit.hit();
+        if constexpr (any)
+            job.occluded[i] = hit.hit() ? 1 : 0;
+        else
+            job.hits[i] = hit;
+    }
+}
+
+inline void single(const SimdJob& job, SimdCounts& counts) {
+    if (job.hits == nullptr)
+        job.counting ? trace_single<true, true>(job, counts) : trace_single<true, false>(job, counts);
+    else
+        job.counting ? trace_single<false, true>(job, counts)
+                     : trace_single<false, false>(job, counts);
+}
+
+}  // namespace raydix::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
