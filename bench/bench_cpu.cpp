@@ -30,9 +30,8 @@ public:
         const std::vector<std::string> known = simd_instruction_sets();
         for (const std::string& isa : options.isas)
             if (isa != "all" && std::find(known.begin(), known.end(), isa) == known.end())
-                throw CLI::ValidationError("--isa",
-                                           fmt::format("'{}' is not all or one of {}", isa,
-                                                       fmt::join(known, ", ")));
+                throw CLI::ValidationError("--isa", fmt::format("'{}' is not all or one of {}", isa,
+                                                                fmt::join(known, ", ")));
     }
 
     void run() {
@@ -168,9 +167,11 @@ int main(int argc, char** argv) {
     raydix::bench::add_measuring_options(app, options);
     options.launches.sample = 0.05;
     raydix::cli::add_launch_options(app, options.launches);
-    app.get_option("--sample")->description(
-        "Part of the ao and diffuse rays: whole launches, or runs of neighbouring rays. Pictures "
-        "of primary rays are always whole");
+    app.get_option("--sample")
+        ->description(
+            "Part of the ao and diffuse rays: whole launches, or runs of neighbouring rays. "
+            "Pictures "
+            "of primary rays are always whole");
     raydix::cli::add_common_options(app, options.common);
     app.callback([&options] {
         if (options.build_of.empty())

@@ -52,8 +52,8 @@ std::vector<PeerBuilds> measure_builds(const std::string& scene, const CpuBench&
     cli::Progress progress("builds of " + scene, options.common);
     for (int round = 0; round < options.rounds; ++round)
         for (std::size_t k = 0; k < all.size(); ++k) {
-            add_process(all[k], Json::parse(output_of_this_program(arguments_of(
-                                    all[k].peer, scene, options, all[k].threads))));
+            add_process(all[k], Json::parse(output_of_this_program(
+                                    arguments_of(all[k].peer, scene, options, all[k].threads))));
             progress.show((round + double(k + 1) / double(all.size())) / options.rounds);
         }
     return all;
@@ -62,8 +62,7 @@ std::vector<PeerBuilds> measure_builds(const std::string& scene, const CpuBench&
 void print_builds_of_one_peer(const CpuBench& options) {
     Scene scene = load_scene(options.scenes.front(), options.common.seed);
     scene.mesh.vertices.reserve(scene.mesh.vertices.size() + 1);
-    const auto peer =
-        make_peer({options.build_of}, scene.mesh, options, options.common.threads);
+    const auto peer = make_peer({options.build_of}, scene.mesh, options, options.common.threads);
     Json result{{"fresh_ms", nullptr}, {"kept_ms", Json::array()}};
     for (int k = 0; k < builds_of_a_process; ++k) {
         peer->prepare();

@@ -143,20 +143,19 @@ private:
         options.path = path;
         options.isa = isa;
         const WideBvh* tree = &*wide_;
-        return {
-            .name = "batch " + name + (isa.empty() ? "" : " " + isa),
-            .closest =
-                [=](std::span<const Ray> rays, std::span<Hit> hits, int threads) {
-                    TraceOptions here = options;
-                    here.threads = threads;
-                    trace(*tree, rays, hits, here);
-                },
-            .any =
-                [=](std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) {
-                    TraceOptions here = options;
-                    here.threads = threads;
-                    trace_any(*tree, rays, found, here);
-                }};
+        return {.name = "batch " + name + (isa.empty() ? "" : " " + isa),
+                .closest =
+                    [=](std::span<const Ray> rays, std::span<Hit> hits, int threads) {
+                        TraceOptions here = options;
+                        here.threads = threads;
+                        trace(*tree, rays, hits, here);
+                    },
+                .any =
+                    [=](std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) {
+                        TraceOptions here = options;
+                        here.threads = threads;
+                        trace_any(*tree, rays, found, here);
+                    }};
     }
 
     /// The loop is the one that Embree's rays go through.

@@ -20,9 +20,7 @@ Spread rate_of(const KindRates& kind, const ModeRates& mode) {
 }
 
 /// Else a time or a number of bytes.
-bool is_rate(const std::string& figure) {
-    return !figure.ends_with("_ms") && figure != "bytes";
-}
+bool is_rate(const std::string& figure) { return !figure.ends_with("_ms") && figure != "bytes"; }
 
 enum class Call { batch, single };
 constexpr std::array calls{Call::batch, Call::single};
@@ -151,15 +149,15 @@ void print_builds(const SceneFigures& figures) {
 }
 
 void print_rates(const SceneFigures& figures) {
-    fmt::print("\nMrays/s, medians; in brackets the spread, (max - min) / median\n{:<24} {:<18} "
-               "{:>7}",
-               "tree", "mode", "threads");
-    for (const KindRates& kind : figures.kinds)
-        fmt::print(" {:>16}", ray_kind_name(kind.kind));
+    fmt::print(
+        "\nMrays/s, medians; in brackets the spread, (max - min) / median\n{:<24} {:<24} "
+        "{:>7}",
+        "tree", "mode", "threads");
+    for (const KindRates& kind : figures.kinds) fmt::print(" {:>16}", ray_kind_name(kind.kind));
     fmt::print(" {:>13}\n", "other hits");
     for (std::size_t m = 0; m < figures.kinds.front().modes.size(); ++m) {
         const ModeRates& first = figures.kinds.front().modes[m];
-        fmt::print("{:<24} {:<18} {:>7}", figures.peers[first.peer].text, first.mode.name,
+        fmt::print("{:<24} {:<24} {:>7}", figures.peers[first.peer].text, first.mode.name,
                    first.threads);
         std::uint64_t other = 0;
         for (const KindRates& kind : figures.kinds) {
@@ -184,26 +182,25 @@ void print_differences(const SceneFigures& figures) {
             for (const ModeRates& m : kind.modes)
                 if (m.peer == p && m.differences.sum() > most.sum()) most = m.differences;
             if (most.sum() != 0)
-                fmt::print("{}, {} rays: of {} answers {} are hit instead of miss or the reverse, "
-                           "{} at another distance\n",
-                           figures.peers[p].text, ray_kind_name(kind.kind),
-                           cli::grouped(kind.rays), cli::grouped(most.hit_or_miss),
-                           cli::grouped(most.distance));
+                fmt::print(
+                    "{}, {} rays: of {} answers {} are hit instead of miss or the reverse, "
+                    "{} at another distance\n",
+                    figures.peers[p].text, ray_kind_name(kind.kind), cli::grouped(kind.rays),
+                    cli::grouped(most.hit_or_miss), cli::grouped(most.distance));
         }
 }
 
 /// A row for each name of `rows`, in the order of `order`; a column for each figure.
-void print_grid(const std::vector<std::string>& columns,
-                const std::vector<std::string>& order,
+void print_grid(const std::vector<std::string>& columns, const std::vector<std::string>& order,
                 std::map<std::string, std::map<std::string, double>>& rows) {
-    fmt::print("{:<36}", "");
+    fmt::print("{:<32}", "");
     for (const std::string& name : columns) {
         const bool shuffled = name.starts_with("diffuse_shuffled");
         fmt::print(" {:>15}", shuffled ? name.substr(8) : name);
     }
     fmt::print("\n");
     for (const std::string& row : order) {
-        fmt::print("{:<36}", row);
+        fmt::print("{:<32}", row);
         for (const std::string& name : columns)
             fmt::print(" {:>15}",
                        rows[row].contains(name) ? fmt::format("{:.2f}", rows[row][name]) : "-");
@@ -281,8 +278,8 @@ Json figures_json(const SceneFigures& figures) {
 }
 
 void print_figures(const SceneFigures& figures) {
-    fmt::print("\n{}: {} triangles, {} threads\n", figures.scene,
-               cli::grouped(figures.triangles), figures.threads);
+    fmt::print("\n{}: {} triangles, {} threads\n", figures.scene, cli::grouped(figures.triangles),
+               figures.threads);
     if (!figures.builds.empty()) print_builds(figures);
     if (!figures.kinds.empty()) {
         print_rates(figures);
@@ -325,14 +322,15 @@ Json summary_json(const std::vector<SceneFigures>& scenes) {
 }
 
 void print_summary(const Json& summary) {
-    fmt::print("\nover all scenes: ratio of ours to Embree's\n{:<18} {:<22} {:<24} {:>8} {:>8}  "
-               "{}\n",
-               "raydix", "over Embree", "figure", "median", "worst", "worst scene");
+    fmt::print(
+        "\nover all scenes: ratio of ours to Embree's\n{:<18} {:<22} {:<24} {:>8} {:>8}  "
+        "{}\n",
+        "raydix", "over Embree", "figure", "median", "worst", "worst scene");
     for (const Json& row : summary)
-        fmt::print("{:<18} {:<22} {:<24} {:>8.2f} {:>8.2f}  {}\n",
-                   row["raydix"].get<std::string>(), row["embree"].get<std::string>(),
-                   row["figure"].get<std::string>(), row["median"].get<double>(),
-                   row["worst"].get<double>(), row["worst_scene"].get<std::string>());
+        fmt::print("{:<18} {:<22} {:<24} {:>8.2f} {:>8.2f}  {}\n", row["raydix"].get<std::string>(),
+                   row["embree"].get<std::string>(), row["figure"].get<std::string>(),
+                   row["median"].get<double>(), row["worst"].get<double>(),
+                   row["worst_scene"].get<std::string>());
 }
 
 }  // namespace raydix::bench

@@ -50,8 +50,8 @@ struct EmbreeQuery {
 
     explicit EmbreeQuery(bool coherent) {
         rtcInitIntersectContext(&context);
-        context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
-                                 : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+        context.flags =
+            coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
     }
 };
 

@@ -59,9 +59,7 @@ public:
     }
     [[nodiscard]] RTCScene scene() const { return scene_; }
     /// What Embree has taken and not given back, by its own count. 0 unless asked for.
-    [[nodiscard]] std::uint64_t bytes() const {
-        return static_cast<std::uint64_t>(bytes_.load());
-    }
+    [[nodiscard]] std::uint64_t bytes() const { return static_cast<std::uint64_t>(bytes_.load()); }
 
 private:
     static bool note_bytes(void* sum, ssize_t bytes, bool) {
