@@ -51,19 +51,17 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hit
     const SimdKernels& kernels = kernels_for(options.isa);
     std::vector<SimdCounts> parts((rays.size() + rays_per_block - 1) / rays_per_block);
     with_threads(options.threads, [&] {
-        for_each_block(rays.size(), rays_per_block,
-                       [&](std::size_t block, std::size_t begin, std::size_t end) {
-                           StackMemory stack(tree.stats().max_depth);
-                           SimdJob job{view_of(tree),
-                                       rays.data() + begin,
-                                       nullptr,
-                                       end - begin,
-                                       hits == nullptr ? nullptr : hits + begin,
-                                       hits == nullptr ? occluded + begin : nullptr,
-                                       stack.view(),
-                                       options.counters};
-                           kernels.single(job, parts[block]);
-                       });
+        for_each_block(
+            rays.size(), rays_per_block,
+            [&](std::size_t block, std::size_t begin, std::size_t end) {
+                StackMemory stack(tree.stats().max_depth);
+                SimdJob job{view_of(tree),  rays.data() + begin,
+                            nullptr,        end - begin,
+                            hits == nullptr ? nullptr : hits + begin,
+                            hits == nullptr ? occluded + begin : nullptr,
+                            stack.view(),   options.counters};
+                kernels.single(job, parts[block]);
+            });
     });
     TraceCounts sum;
     sum.rays = rays.size();
@@ -94,8 +92,7 @@ TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit>
     return miss_all(rays);
 }
 
-std::vector<Hit> trace(const WideBvh& tree, std::span<const Ray> rays,
-                       const TraceOptions& options) {
+std::vector<Hit> trace(const WideBvh& tree, std::span<const Ray> rays, const TraceOptions& options) {
     std::vector<Hit> hits(rays.size());
     trace(tree, rays, hits, options);
     return hits;
