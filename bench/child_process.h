@@ -13,6 +13,12 @@
 
 namespace raydix::bench {
 
+inline std::string text_of(const std::vector<std::string>& arguments) {
+    std::string text;
+    for (const std::string& argument : arguments) text += " " + argument;
+    return text;
+}
+
 /// Throws if it cannot be started or does not end with exit code 0.
 inline std::string output_of_this_program(std::vector<std::string> arguments) {
     std::string self = "/proc/self/exe";
@@ -37,7 +43,7 @@ inline std::string output_of_this_program(std::vector<std::string> arguments) {
     close(ends[0]);
     int status = -1;
     if (fault != 0 || waitpid(child, &status, 0) != child || status != 0)
-        throw std::runtime_error("a process of this program failed: " + arguments.front());
+        throw std::runtime_error("a process of this program failed:" + text_of(arguments));
     return text;
 }
 

@@ -49,11 +49,12 @@ struct PeerName {
     [[nodiscard]] bool ours() const { return text.starts_with("raydix "); }
     [[nodiscard]] std::string kind() const { return text.substr(7); }
 };
-/// Embree's first, then ours, so that a round goes from one side to the other.
+/// Embree's first, then ours, so that a round goes from one side to the other. Throws
+/// CLI::ValidationError for a kind that does not exist.
 [[nodiscard]] std::vector<PeerName> peers_of(const CpuBench& options);
 
 /// The mesh must outlive the peer. Its vertex array must have room for one more element (Embree
-/// reads 16 bytes a vertex). Throws CLI::ValidationError for a kind that does not exist.
+/// reads 16 bytes a vertex).
 [[nodiscard]] std::unique_ptr<Peer> make_peer(const PeerName& name, const Mesh& mesh,
                                               const CpuBench& options, int threads);
 
