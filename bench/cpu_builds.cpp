@@ -33,6 +33,7 @@ std::vector<std::string> arguments_of(const PeerName& peer, const std::string& s
 void add_process(PeerBuilds& builds, const Json& printed) {
     builds.fresh_ms.push_back(printed["fresh_ms"].get<double>());
     for (const Json& ms : printed["kept_ms"]) builds.kept_ms.push_back(ms.get<double>());
+    for (const Json& ms : printed["layout_ms"]) builds.layout_ms.push_back(ms.get<double>());
     builds.bytes = {printed["bytes"].get<std::uint64_t>(),
                     printed["bytes_referenced"].get<std::uint64_t>()};
     if (!printed["sah"].is_null()) builds.sah = printed["sah"].get<double>();
@@ -63,16 +64,18 @@ void print_builds_of_one_peer(const CpuBench& options) {
     Scene scene = load_scene(options.scenes.front(), options.common.seed);
     scene.mesh.vertices.reserve(scene.mesh.vertices.size() + 1);
     const auto peer = make_peer({options.build_of}, scene.mesh, options, options.common.threads);
-    Json result{{"fresh_ms", nullptr}, {"kept_ms", Json::array()}};
+    Json result{{"fresh_ms", nullptr}, {"kept_ms", Json::array()}, {"layout_ms", Json::array()}};
     for (int k = 0; k < builds_of_a_process; ++k) {
         peer->prepare();
         Stopwatch watch;
         peer->build();
         const double ms = watch.lap();
-        if (k == 0)
+        if (k == 0) {
             result["fresh_ms"] = ms;
-        else
-            result["kept_ms"].push_back(ms);
+            continue;
+        }
+        result["kept_ms"].push_back(ms);
+        if (const auto layout = peer->layout_ms()) result["layout_ms"].push_back(*layout);
     }
     const PeerBytes bytes = peer->bytes();
     const std::optional<double> sah = options.sah ? peer->sah() : std::nullopt;

@@ -14,8 +14,9 @@ namespace raydix::bench {
 struct PeerBuilds {
     PeerName peer;
     int threads = 0;
-    std::vector<double> fresh_ms;  // the first build of each process
-    std::vector<double> kept_ms;   // those behind it, into memory that is kept
+    std::vector<double> fresh_ms;   // the first build of each process
+    std::vector<double> kept_ms;    // those behind it, into memory that is kept
+    std::vector<double> layout_ms;  // the part of kept_ms that went to the wide layout; ours only
     PeerBytes bytes;
     std::optional<double> sah;
 };

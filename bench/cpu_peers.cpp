@@ -117,6 +117,7 @@ public:
         wide_.emplace(bvh_, wide_options_);
     }
 
+    std::optional<double> layout_ms() const override { return wide_->stats().ms; }
     PeerBytes bytes() override { return {wide_->stats().bytes, 0}; }
     std::optional<double> sah() override { return tree_stats(bvh_, {.with_hash = false}).sah; }
 

@@ -37,6 +37,8 @@ public:
     virtual void prepare() {}
     /// From vertices and indices to what can be traced. Again: into the memory that is kept.
     virtual void build() = 0;
+    /// How much of the last build went to the layout that is traced, if that is a step of its own.
+    [[nodiscard]] virtual std::optional<double> layout_ms() const { return std::nullopt; }
     [[nodiscard]] virtual PeerBytes bytes() = 0;
     /// Of the binary tree, node 1 and triangle 1; nothing if the peer has no binary tree to show.
     [[nodiscard]] virtual std::optional<double> sah() { return std::nullopt; }

@@ -77,6 +77,8 @@ Json build_json(const PeerBuilds& b, std::uint64_t triangles) {
             {"threads", b.threads},
             {"fresh_ms", spread_json(cli::spread_of(b.fresh_ms))},
             {"kept_ms", spread_json(cli::spread_of(b.kept_ms))},
+            {"layout_ms",
+             b.layout_ms.empty() ? Json(nullptr) : spread_json(cli::spread_of(b.layout_ms))},
             {"bytes", b.bytes.own},
             {"bytes_referenced", b.bytes.referenced},
             {"bytes_per_triangle", double(b.bytes.own) / double(triangles)},
@@ -134,14 +136,17 @@ Json speed_ups_json(const SceneFigures& figures) {
 }
 
 void print_builds(const SceneFigures& figures) {
-    fmt::print("\n{:<24} {:>7} {:>9} {:>19} {:>9} {:>9} {:>9} {:>8}\n", "tree", "threads",
-               "fresh ms", "(min to max)", "kept ms", "SAH", "MB", "B/tri");
+    fmt::print("\n{:<24} {:>7} {:>9} {:>19} {:>9} {:>9} {:>9} {:>9} {:>8}\n", "tree", "threads",
+               "fresh ms", "(min to max)", "kept ms", "layout", "SAH", "MB", "B/tri");
     for (const PeerBuilds& b : figures.builds) {
         const Spread fresh = cli::spread_of(b.fresh_ms);
-        fmt::print("{:<24} {:>7} {:>9.2f} {:>19} {:>9.2f} {:>9} {:>9.2f} {:>8.1f}\n", b.peer.text,
-                   b.threads, fresh.median, fmt::format("({:.2f} to {:.2f})", fresh.min, fresh.max),
-                   cli::spread_of(b.kept_ms).median, b.sah ? fmt::format("{:.3f}", *b.sah) : "-",
-                   double(b.bytes.own) / 1e6, double(b.bytes.own) / double(figures.triangles));
+        const std::string layout =
+            b.layout_ms.empty() ? "-" : fmt::format("{:.2f}", cli::spread_of(b.layout_ms).median);
+        fmt::print(
+            "{:<24} {:>7} {:>9.2f} {:>19} {:>9.2f} {:>9} {:>9} {:>9.2f} {:>8.1f}\n", b.peer.text,
+            b.threads, fresh.median, fmt::format("({:.2f} to {:.2f})", fresh.min, fresh.max),
+            cli::spread_of(b.kept_ms).median, layout, b.sah ? fmt::format("{:.3f}", *b.sah) : "-",
+            double(b.bytes.own) / 1e6, double(b.bytes.own) / double(figures.triangles));
         if (b.bytes.referenced != 0)
             fmt::print("{:>33} reads another {:.2f} MB of the caller's vertices\n", "",
                        double(b.bytes.referenced) / 1e6);

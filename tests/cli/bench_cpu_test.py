@@ -54,6 +54,10 @@ class BenchCpu(ProgramTest):
             self.assertAlmostEqual(build["bytes_per_triangle"], build["bytes"] / scene["triangles"])
             self.assertTrue(10 < build["bytes_per_triangle"] < 400, build)
             self.assertTrue(5 < build["sah"] < 500, build)
+            if build["peer"].startswith("raydix"):
+                self.assertLess(build["layout_ms"]["min"], build["kept_ms"]["max"])
+            else:
+                self.assertIsNone(build["layout_ms"])
         self.assertEqual(builds["embree medium"]["bytes_referenced"], 0)
         self.assertGreater(builds["embree medium+compact"]["bytes_referenced"], 0)
         self.assertLess(builds["embree medium+compact"]["bytes"], builds["embree medium"]["bytes"])
