@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "measure/stopwatch.h"
-#ifdef RAYDIX_HAVE_EMBREE
+#ifdef RAYDIX_EMBREE_MAJOR
 #include "embree_scene.h"
 #endif
 
@@ -68,7 +68,7 @@ Json run_raydix(const raydix::Mesh& mesh, const Options& options) {
             {"tree_hash", tree_hash(bvh)}};
 }
 
-#ifdef RAYDIX_HAVE_EMBREE
+#ifdef RAYDIX_EMBREE_MAJOR
 /// Scene and geometry quality LOW with the dynamic flag: Embree's Morton builder.
 Json run_embree(const raydix::Mesh& mesh, const Options& options) {
     raydix::bench::EmbreeScene scene(
@@ -94,7 +94,7 @@ Json run(const Options& options) {
     Json result;
     if (options.peer == "raydix") {
         result = run_raydix(scene.mesh, options);
-#ifdef RAYDIX_HAVE_EMBREE
+#ifdef RAYDIX_EMBREE_MAJOR
     } else if (options.peer == "embree") {
         result = run_embree(scene.mesh, options);
 #endif

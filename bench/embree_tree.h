@@ -2,7 +2,6 @@
 // that one kernel traces both and one function computes SAH for both.
 #pragma once
 
-#include <embree3/rtcore.h>
 #include <raydix/bvh.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "base/math.h"
+#include "embree_api.h"
 #include "tree/bvh_access.h"
 
 namespace raydix::bench {

@@ -297,6 +297,7 @@ void add_bench_command(CLI::App& app) {
     CLI::App* bench = app.add_subcommand("bench", "Measure one question and print its tables");
     bench->require_subcommand(1);
     add_traversal_suite(*bench);
+    add_cpu_suite(*bench);
     auto options = std::make_shared<HierarchyBench>();
     CLI::App* command = bench->add_subcommand(
         "hierarchy",
