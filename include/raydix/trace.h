@@ -16,10 +16,11 @@ enum class TraceKernel : std::uint32_t { scalar = 0, simd = 1 };
 
 /// How `simd` takes a batch through a wide tree. The hits do not depend on it.
 enum class SimdPath : std::uint32_t {
-    automatic = 0,  // packets if neighbours in the batch go the same way, else streams
+    automatic = 0,  // what the order of the batch suggests
     single = 1,     // one ray at a time
     packet = 2,     // 64 neighbours together, with bounds around all of them
     stream = 3,     // thousands together: each node is tested with all rays that reach it
+    sorted = 4,     // streams of rays that are neighbours in space, whatever their order
 };
 [[nodiscard]] std::string_view simd_path_name(SimdPath path);
 /// Throws InputError that lists the known names.

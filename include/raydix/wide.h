@@ -69,8 +69,8 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
 [[nodiscard]] AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays,
                                 const TraceOptions& options = {});
 
-/// The path that `automatic` takes: packets if in most of a few windows of 64 rays, evenly spread,
-/// directions and origins lie close together.
+/// The path that `automatic` takes. Judged by a few windows of 64 rays, evenly spread: packets if in
+/// most of them origins and directions lie close together, streams if origins do, else sorted.
 [[nodiscard]] SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays);
 
 /// One ray, on the caller's thread, without any set-up.

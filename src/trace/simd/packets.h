@@ -134,8 +134,9 @@ public:
         std::uint32_t counts[ray_class_count] = {};
         for (std::size_t k = 0; k < job.n; k += lanes16) {
             for (std::size_t l = 0; l < lanes16; ++l)
-                index[l] = static_cast<std::int32_t>(std::min(k + l, job.n - 1));
-            for (std::size_t l = 0; l < lanes16; l += 2) hwy::Prefetch(job.rays + k + 128 + l);
+                index[l] = place_of(job, std::min(k + l, job.n - 1));
+            for (std::size_t l = 0; l < lanes16; ++l)
+                hwy::Prefetch(job.rays + place_of(job, std::min(k + l + 128, job.n - 1)));
             hn::Store(classify(read_rays(job.rays, index)), I16(), codes);
             for (std::size_t l = 0; l < lanes16 && k + l < job.n; ++l) {
                 code_[k + l] = static_cast<std::uint8_t>(codes[l]);
@@ -149,9 +150,12 @@ public:
             at += (counts[c] + 15u) & ~15u;
         }
         for (std::size_t k = 0; k < job.n; ++k)
-            order_[next[code_[k]]++] = static_cast<std::int32_t>(k);
+            order_[next[code_[k]]++] = place_of(job, k);
         for (std::uint32_t c = 0; c < ray_class_count; ++c)  // the last ray again, to fill vectors
             for (; counts[c] > 0 && next[c] % 16 != 0; ++next[c]) order_[next[c]] = order_[next[c] - 1];
+    }
+    [[nodiscard]] static std::int32_t place_of(const SimdJob& job, std::size_t k) {
+        return static_cast<std::int32_t>(job.order == nullptr ? k : job.order[k]);
     }
     [[nodiscard]] const std::int32_t* rays(std::uint32_t code) const { return order_ + begin_[code]; }
     [[nodiscard]] std::uint32_t count(std::uint32_t code) const { return count_[code]; }

@@ -17,10 +17,12 @@ struct SimdCounts {
     std::uint64_t hits = 0, invalid = 0, visits = 0, tests = 0;
 };
 
-/// At most max_job_rays rays; their hits, or occluded if hits is null, [n].
+/// At most max_job_rays rays, rays[order[k]], or rays[k] without an order; hits, or occluded if hits
+/// is null, go to the same places.
 struct SimdJob {
     WideView tree;
     const Ray* rays;
+    const std::uint32_t* order;
     std::size_t n;
     Hit* hits;
     std::uint8_t* occluded;

@@ -279,7 +279,8 @@ void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
 
 template <bool any, bool counting>
 void trace_single(const SimdJob& job, SimdCounts& counts) {
-    for (std::size_t i = 0; i < job.n; ++i) trace_one<any, counting>(job, i, counts);
+    for (std::size_t k = 0; k < job.n; ++k)
+        trace_one<any, counting>(job, job.order == nullptr ? k : job.order[k], counts);
 }
 
 /// All hits of each ray behind those of the one before; counts.hits of each in hit_counts.

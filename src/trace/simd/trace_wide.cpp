@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "exec/parallel.h"
+#include "keys/morton.h"
+#include "sort/radix_sort.h"
 #include "trace/all_hits.h"
 #include "trace/simd/simd_kernels.h"
 
@@ -52,12 +54,33 @@ private:
     std::vector<std::uint64_t> active_;
 };
 
+/// Rays in the order of a Morton curve through their origins.
+std::vector<std::uint32_t> order_by_place(const Aabb& bounds, std::span<const Ray> rays) {
+    constexpr int axis_bits = 7;
+    constexpr float last = (1 << axis_bits) - 1;
+    const Vec3 size = bounds.hi - bounds.lo;
+    const float longest = max_of(max_of(size.x, size.y), size.z);
+    const float scale = longest > 0.0f ? min_of((last + 1) / longest, std::numeric_limits<float>::max()) : 0.0f;
+    const auto cell = [&](float at, float lo) {  // NaN is in cell 0
+        return static_cast<std::uint32_t>(min_of(max_of((at - lo) * scale, 0.0f), last));
+    };
+    std::vector<std::uint32_t> keys(rays.size()), order(rays.size());
+    for_each_index(rays.size(), [&](std::size_t i) {
+        const Vec3 o = rays[i].origin;
+        keys[i] = spread_bits(cell(o.x, bounds.lo.x)) << 2 | spread_bits(cell(o.y, bounds.lo.y)) << 1 |
+                  spread_bits(cell(o.z, bounds.lo.z));
+    });
+    SortScratch<std::uint32_t> scratch;
+    sort_keys<std::uint32_t>(keys, order, 3 * axis_bits, scratch);
+    return order;
+}
+
 /// Rays of a job: as many as give full vectors deep in the tree and still lie in the second-level
 /// cache; fewer where the batch would not keep many threads busy. Depends on the batch alone, so
 /// that counts do not depend on the threads.
 std::size_t rays_per_job(std::size_t n, SimdPath path) {
     constexpr std::size_t smallest = 1024, jobs = 32;
-    if (path != SimdPath::stream) return smallest;
+    if (path != SimdPath::stream && path != SimdPath::sorted) return smallest;
     return std::clamp(n / jobs / smallest * smallest, smallest, max_job_rays);
 }
 
@@ -85,15 +108,19 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hit
     const std::size_t block_size = rays_per_job(rays.size(), path);
     std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
     with_threads(options.threads, [&] {
+        std::vector<std::uint32_t> order;
+        if (path == SimdPath::sorted) order = order_by_place(tree.arrays().bounds, rays);
         for_each_block(
             rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
                 StackMemory stack(tree.stats().max_depth);
                 StreamMemory memory;
+                const std::size_t from = order.empty() ? begin : 0;
                 const SimdJob job{view_of(tree),
-                                  rays.data() + begin,
+                                  rays.data() + from,
+                                  order.empty() ? nullptr : order.data() + begin,
                                   end - begin,
-                                  hits == nullptr ? nullptr : hits + begin,
-                                  hits == nullptr ? occluded + begin : nullptr,
+                                  hits == nullptr ? nullptr : hits + from,
+                                  hits == nullptr ? occluded + from : nullptr,
                                   stack.view(),
                                   stack.packet_view(),
                                   &memory,
@@ -151,9 +178,7 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
         for_each_block(rays.size(), block_size,
                        [&](std::size_t block, std::size_t begin, std::size_t end) {
                            StackMemory stack(tree.stats().max_depth);
-                           const SimdJob job{view_of(tree), rays.data() + begin, end - begin,
-                                             nullptr,       nullptr,             stack.view(),
-                                             {},            nullptr,             options.counters};
+                           const SimdJob job{view_of(tree), rays.data() + begin, nullptr, end - begin, nullptr, nullptr, stack.view(), {}, nullptr, options.counters};
                            kernels.all_hits(job, found[block], &all.offsets[begin + 1], parts[block]);
                        });
         join_blocks(found, block_size, all);
@@ -168,7 +193,7 @@ SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays) {
     const Aabb& bounds = tree.arrays().bounds;
     const Vec3 size = bounds.hi - bounds.lo;
     const float near = small_part * max_of(max_of(size.x, size.y), size.z);
-    std::size_t looked_at = 0, together = 0;
+    std::size_t looked_at = 0, coherent = 0, close = 0;
     for (std::size_t w = 0; w < windows; ++w) {
         const std::size_t begin = rays.size() / windows * w;
         if (begin + window > rays.size()) break;
@@ -184,9 +209,12 @@ SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays) {
         }
         ++looked_at;
         const Vec3 o = origins.hi - origins.lo, d = directions.hi - directions.lo;
-        together += max_of(max_of(o.x, o.y), o.z) <= near && max_of(max_of(d.x, d.y), d.z) <= small_angle;
+        const bool here = max_of(max_of(o.x, o.y), o.z) <= near;
+        close += here;
+        coherent += here && max_of(max_of(d.x, d.y), d.z) <= small_angle;
     }
-    return looked_at > 0 && 4 * together < 3 * looked_at ? SimdPath::stream : SimdPath::packet;
+    if (4 * coherent >= 3 * looked_at) return SimdPath::packet;
+    return 2 * close >= looked_at ? SimdPath::stream : SimdPath::sorted;
 }
 
 namespace {
@@ -204,7 +232,7 @@ Result one_ray(const WideBvh& tree, const Ray& ray) {
     }
     Result result{};
     SimdCounts counts;
-    SimdJob job{view_of(tree), &ray, 1, nullptr, nullptr, stack, {}, nullptr, false};
+    SimdJob job{view_of(tree), &ray, nullptr, 1, nullptr, nullptr, stack, {}, nullptr, false};
     if constexpr (std::is_same_v<Result, Hit>)
         job.hits = &result;
     else
