@@ -12,6 +12,7 @@
 #include "kdtree_commands.h"
 #include "octree_commands.h"
 #include "output.h"
+#include "wide_trace.h"
 
 namespace raydix::cli {
 namespace {
@@ -137,6 +138,8 @@ void run_build(const BuildCommand& options) {
     if (options.tree.device == "cuda") build["peak_bytes"] = timed.device_bytes;
     build["kept_ms"] = spread_json(totals(timed.kept));
     if (options.tree.layout == "cwbvh") add_cwbvh(build, timed.bvh, options.common);
+    if (options.tree.layout == "wide8")
+        add_wide(build, WideBvh(timed.bvh, {.threads = options.common.threads}));
     document["build"] = build;
     if (options.common.prints_tables()) {
         fmt::print("{}: {} triangles, {} vertices, loaded in {:.1f} ms\n", scene.name,
@@ -145,6 +148,7 @@ void run_build(const BuildCommand& options) {
         print_build_table(build, timed);
         print_tree_table(timed.bvh, stats);
         if (build.contains("cwbvh")) print_cwbvh_table(build["cwbvh"]);
+        if (build.contains("wide")) print_wide_table(build["wide"]);
     }
     if (!options.out_file.empty()) {
         save_rdx(options.out_file, timed.bvh, scene);

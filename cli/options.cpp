@@ -57,7 +57,7 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->type_name("LEVEL");
     command
         .add_option("--layout", options.layout, "Memory layout that is traced; cwbvh: build only")
-        ->check(CLI::IsMember({"binary", "cwbvh"}))
+        ->check(CLI::IsMember({"binary", "wide8", "cwbvh"}))
         ->capture_default_str()
         ->group(group);
     command

@@ -14,6 +14,7 @@
 #include "ray_launches.h"
 #include "simulation.h"
 #include "warp_trace.h"
+#include "wide_trace.h"
 
 namespace raydix::cli {
 namespace {
@@ -32,6 +33,7 @@ struct TraceCommand {
     int samples = 32, repeat = 5;
     float ao_radius = 0.0f;
     bool explain = false;
+    WideTraceOptions wide;
 };
 
 /// Figures that grow with each batch.
@@ -48,6 +50,7 @@ struct Batch {
     const CommonOptions& common;
     const KdTree* kdtree;                // traced instead of the bvh if not null
     WarpTracer* warps;                   // traces instead of the CPU if not null
+    WideTracer* wide;                    // traces instead of the bvh if not null
     std::vector<Hit> hits;               // of the last run, closest and all
     std::vector<std::uint64_t> offsets;  // of the last run, all
     std::vector<std::uint8_t> occluded;
@@ -57,16 +60,19 @@ struct Batch {
         if (mode == Mode::any) {
             occluded.resize(rays.size());
             if (kdtree != nullptr) return kd_trace_any(*kdtree, rays, occluded, options);
+            if (wide != nullptr) return wide->any(rays, occluded, options);
             return trace_any(bvh, rays, occluded, options);
         }
         if (mode == Mode::all) {
-            AllHits all = trace_all(bvh, rays, options);
+            AllHits all =
+                wide != nullptr ? wide->all(rays, options) : trace_all(bvh, rays, options);
             hits = std::move(all.hits);
             offsets = std::move(all.offsets);
             return all.counts;
         }
         hits.resize(rays.size());
         if (kdtree != nullptr) return kd_trace(*kdtree, rays, hits, options);
+        if (wide != nullptr) return wide->closest(rays, hits, options);
         return trace(bvh, rays, hits, options);
     }
 };
@@ -281,7 +287,8 @@ void explain_warps(const TraceCommand& options, const Bvh& bvh) {
 
 /// What the options say about the device, before any work. The tree is built on the cpu.
 TraceCommand with_device(TraceCommand options, Mode mode) {
-    refuse_layout(options.tree);
+    options.kernel = chosen_cpu_kernel(options.kernel, options.tree, options.wide);
+    if (options.kernel != "simd") refuse_layout(options.tree);
     const std::string device = options.tree.device;
     if (options.kernel.empty()) options.kernel = default_kernel(device);
     check_kernel(options.kernel, device);
@@ -323,17 +330,22 @@ void run_trace(const TraceCommand& given) {
                           WarpTracer::Settings{options.tree.device, options.kernel, options.machine,
                                                mode == Mode::any, options.common.threads});
         });
+    std::optional<WideTracer> wide;
+    if (options.kernel == "simd")
+        about(options.scene, [&] { wide.emplace(input.bvh, options.wide, options.common); });
     Batch batch{input.bvh,
                 mode,
                 options.common,
                 through_kdtree ? &*traced.kdtree : nullptr,
                 warps ? &*warps : nullptr,
+                wide ? &*wide : nullptr,
                 {},
                 {},
                 {}};
     Tally tally;
     Kept kept;
-    if (!through_kdtree && !warps) explain(options, input.bvh);
+    if (!through_kdtree && !warps && !wide) explain(options, input.bvh);
+    if (wide && options.explain) wide->explain_tree(options.common);
     if (warps) explain_warps(options, input.bvh);
     if (through_kdtree && options.explain) explain_kdtree(*traced.kdtree, options.common);
     Progress progress("tracing", options.common);
@@ -365,7 +377,13 @@ void run_trace(const TraceCommand& given) {
             : build_json(input.bvh,
                          tree_stats(input.bvh, stats_options(options.tree, options.common)),
                          builds);
+    if (wide) add_wide(document["build"], wide->tree());
     document["trace"] = Json::array({trace_json(options, mode_text(mode), tally, batch.warps)});
+    if (wide) {
+        document["trace"][0]["isa"] = wide->isa();
+        document["trace"][0]["paths"] = wide->paths_json();
+        if (options.explain) wide->explain_paths(options.common);
+    }
     if (options.rays == "ao") {
         const float radius = chosen_ao_radius(options.ao_radius, input);
         document["trace"][0]["ao_radius"] = radius;
@@ -430,6 +448,7 @@ void add_trace_command(CLI::App& app) {
         ->type_name("FILE.npy");
     command->add_option("--save-rays", options->rays_file, "Save the rays")->type_name("FILE.npy");
     command->add_flag("--explain", options->explain, "Say which layout and which code ran");
+    add_wide_trace_options(*command, options->wide);
     add_tree_options(*command, options->tree);
     add_common_options(*command, options->common);
     command->callback([options] { run_trace(*options); });

@@ -26,7 +26,7 @@ std::vector<std::string> warp_kernel_names() {
 }  // namespace
 
 std::vector<std::string> trace_kernel_names() {
-    std::vector<std::string> names{"scalar"};
+    std::vector<std::string> names{"scalar", "simd"};
     for (std::string& name : warp_kernel_names()) names.push_back(std::move(name));
     return names;
 }
@@ -36,11 +36,12 @@ std::string default_kernel(const std::string& device) {
 }
 
 void check_kernel(const std::string& kernel, const std::string& device) {
-    const bool of_cpu = kernel == "scalar";
+    const bool of_cpu = kernel == "scalar" || kernel == "simd";
     if (of_cpu == (device == "cpu")) return;
-    throw CLI::ValidationError("--kernel", kernel + " does not run on device " + device +
-                                               "; cpu goes with scalar, cuda and sim go with " +
-                                               joined(warp_kernel_names()));
+    throw CLI::ValidationError("--kernel",
+                               kernel + " does not run on device " + device +
+                                   "; cpu goes with scalar and simd, cuda and sim go with " +
+                                   joined(warp_kernel_names()));
 }
 
 WarpTracer::WarpTracer(const Bvh& bvh, const Settings& settings) : settings_(settings), tree_(bvh) {

@@ -18,7 +18,7 @@ MAY_INCLUDE = {
     "tree": {"base", "exec", "keys"},
     # copies primitives into leaf order, so it must know how a primitive is read
     "layout": {"base", "exec", "tree", "primitives"},
-    "rays": {"base", "exec"},
+    "rays": {"base", "exec", "keys", "sort"},
     "simt": {"base"},
     "trace": {"base", "exec", "primitives", "layout", "rays", "simt"},
     "measure": {"base", "exec"},  # exec: the number of threads is a property of the machine

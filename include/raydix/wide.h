@@ -16,8 +16,8 @@
 namespace raydix {
 
 struct WideBvhOptions {
-    int width = 8;      // children a node at most: 4 or 8
-    int threads = 0;    // as in BuildOptions; the layout does not depend on it
+    int width = 8;    // children a node at most: 4 or 8
+    int threads = 0;  // as in BuildOptions; the layout does not depend on it
 };
 
 struct WideBvhStats {
@@ -27,9 +27,10 @@ struct WideBvhStats {
     std::uint64_t references = 0;  // triangles in leaves; those without area are left out
     std::uint32_t max_depth = 0;   // edges from the root to the deepest leaf
     double children_per_node = 0;
-    double sah = 0;       // 1 a node and 1 a triangle, by the boxes before they are quantised; 0 if the root
-                          // has no area
-    double widening = 0;  // surface of all quantised child boxes / that of the exact ones; 1 without surface
+    double sah = 0;  // 1 a node and 1 a triangle, by the boxes before they are quantised; 0 if the
+                     // root has no area
+    double widening =
+        0;  // surface of all quantised child boxes / that of the exact ones; 1 without surface
     std::uint64_t node_bytes = 0, triangle_bytes = 0;
     std::uint64_t bytes = 0;  // every byte a trace touches
     double ms = 0;            // of making it
@@ -69,8 +70,8 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
 [[nodiscard]] AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays,
                                 const TraceOptions& options = {});
 
-/// The path that `automatic` takes. Judged by a few windows of 64 rays, evenly spread: packets if in
-/// most of them origins and directions lie close together, streams if origins do, else sorted.
+/// The path that `automatic` takes. Judged by a few windows of 64 rays, evenly spread: packets if
+/// in most of them origins and directions lie close together, streams if origins do, else sorted.
 [[nodiscard]] SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays);
 
 /// One ray, on the caller's thread, without any set-up.

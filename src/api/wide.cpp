@@ -24,10 +24,8 @@ double decoded_half_area(const WideNode& node, int slot) {
     return size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
 }
 
-void add_widening(const WideTree& wide, WideBvh::Arrays& arrays) {
-    double exact = 0, quantised = 0;
-    for (const BvhNode& child : wide.children.view())
-        if (!WideTree::is_unused(child)) exact += half_area({child.lo, child.hi});
+void add_widening(double exact, WideBvh::Arrays& arrays) {
+    double quantised = 0;
     for (const WideNode& node : arrays.nodes.view())
         for (int slot = 0; slot < quantised_width; ++slot)
             if ((node.used >> slot & 1) != 0) quantised += decoded_half_area(node, slot);
@@ -62,7 +60,6 @@ WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
                                .node_cost = 1.0,
                                .primitive_cost = wide_primitive_cost,
                                .block = wide_block};
-    if (getenv("WB")) { const_cast<WideOptions&>(collapse).block = atoi(getenv("WB")); const_cast<WideOptions&>(collapse).primitive_cost = atof(getenv("WP")); const_cast<WideOptions&>(collapse).max_leaf = atoi(getenv("WL")); }
     check_wide_options(collapse);
     arrays_->stats.width = options.width;
     arrays_->stats.widening = 1.0;
@@ -74,11 +71,11 @@ WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
     with_threads(options.threads, [&] {
         Stopwatch watch;
         const WideTree wide = collapse_to_wide(bvh, collapse);
-        make_wide_layout(wide, bvh, *arrays_);
+        const double area = make_wide_layout(wide, bvh, *arrays_);
         arrays_->stats.ms = watch.lap();
         arrays_->stats.max_depth = wide.max_depth;
         arrays_->stats.sah = wide_cost(wide, collapse);
-        add_widening(wide, *arrays_);
+        add_widening(area, *arrays_);
         add_counts(arrays_->stats, *arrays_);
     });
 }

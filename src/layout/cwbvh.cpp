@@ -107,7 +107,7 @@ private:
     Cwbvh::Arrays& out_;
     std::vector<Bases> bases_;          // [wide nodes]
     std::vector<std::uint32_t> place_;  // wide node -> its place
-    std::vector<ChildSlots> order_;          // [wide nodes]
+    std::vector<ChildSlots> order_;     // [wide nodes]
 };
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "exec/parallel.h"
-#include "trace/triangle_test.h"
+#include "primitives/zero_area.h"
 
 namespace raydix {
 namespace {
@@ -54,7 +54,7 @@ public:
     Layout(const WideTree& wide, const Bvh& bvh, WideBvh::Arrays& out)
         : wide_(wide), bvh_(bvh), out_(out) {}
 
-    void run() {
+    double run() {
         find_flat();
         words_.resize(wide_.children.size());
         place_leaves();
@@ -64,6 +64,11 @@ public:
         std::fill_n(out_.blocks.data(), filler_.blocks(), TriangleBlock{});
         for_each_index(
             wide_.node_count(), [&](std::size_t w) { write_node(w); }, 128);
+        double area = 0;
+        for (std::size_t c = 0; c < words_.size(); ++c)
+            if (words_[c] != wide_no_child)
+                area += half_area({wide_.children[c].lo, wide_.children[c].hi});
+        return area;
     }
 
 private:
@@ -140,8 +145,8 @@ private:
 
 }  // namespace
 
-void make_wide_layout(const WideTree& wide, const Bvh& bvh, WideBvh::Arrays& out) {
-    Layout(wide, bvh, out).run();
+double make_wide_layout(const WideTree& wide, const Bvh& bvh, WideBvh::Arrays& out) {
+    return Layout(wide, bvh, out).run();
 }
 
 }  // namespace raydix

@@ -52,7 +52,8 @@ struct WideBvh::Arrays {
 };
 
 /// Fills nodes, blocks and bounds. At most wide_max_leaf primitives a leaf in `wide`; triangles
-/// without area are left out, and leaves that hold nothing else.
-void make_wide_layout(const WideTree& wide, const Bvh& bvh, WideBvh::Arrays& out);
+/// without area are left out, and leaves that hold nothing else. Returns the sum of the half areas
+/// of all child boxes before they are quantised.
+double make_wide_layout(const WideTree& wide, const Bvh& bvh, WideBvh::Arrays& out);
 
 }  // namespace raydix

@@ -315,8 +315,8 @@ double wide_cost(const WideTree& tree, const WideOptions& options) {
         for (const BvhNode& child : tree.node(w)) {
             if (WideTree::is_unused(child)) continue;
             box = unite(box, box_of(child));
-            sum += blocks_of(child.count, options) * options.primitive_cost *
-                   half_area(box_of(child));
+            sum +=
+                blocks_of(child.count, options) * options.primitive_cost * half_area(box_of(child));
         }
         if (w == 0) root_area = half_area(box);
         sum += options.node_cost * half_area(box);

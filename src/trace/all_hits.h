@@ -17,9 +17,9 @@ inline void finish_ray(std::vector<Hit>& hits, std::size_t before) {
     const auto first = hits.begin() + static_cast<std::ptrdiff_t>(before);
     std::sort(first, hits.end(),
               [](const Hit& a, const Hit& b) { return a.t != b.t ? a.t < b.t : a.prim < b.prim; });
-    hits.erase(std::unique(first, hits.end(),
-                           [](const Hit& a, const Hit& b) { return a.prim == b.prim; }),
-               hits.end());
+    hits.erase(
+        std::unique(first, hits.end(), [](const Hit& a, const Hit& b) { return a.prim == b.prim; }),
+        hits.end());
 }
 
 /// found[b]: hits of the rays b * rays_per_block on; all.offsets[i + 1]: how many ray i has.

@@ -10,6 +10,7 @@
 
 #include "base/hd.h"
 #include "base/math.h"
+#include "primitives/zero_area.h"
 #include "trace/ray_frame.h"
 
 namespace raydix {
@@ -77,15 +78,6 @@ RAYDIX_HD inline BoxInterval own_box_interval(const RayFrame& ray, const LeafTri
     axis(box.lo.y, box.hi.y, ray.origin.y, ray.inverse.y);
     axis(box.lo.z, box.hi.z, ray.origin.z, ray.inverse.z);
     return interval;
-}
-
-/// Whether the cross product of two edges, in double, is 0: such triangles are never hit.
-RAYDIX_HD inline bool has_zero_area(const LeafTriangle& t) {
-    const double ax = double(t.v1.x) - t.v0.x, ay = double(t.v1.y) - t.v0.y,
-                 az = double(t.v1.z) - t.v0.z;
-    const double bx = double(t.v2.x) - t.v0.x, by = double(t.v2.y) - t.v0.y,
-                 bz = double(t.v2.z) - t.v0.z;
-    return ay * bz == az * by && az * bx == ax * bz && ax * by == ay * bx;
 }
 
 /// True if the ray hits within [ray.tmin, tmax]. u weighs v1, v weighs v2.

@@ -23,7 +23,7 @@ constexpr std::size_t packet_size = 64;
 /// are never active.
 struct Packet {
     HWY_ALIGN float origin[3][packet_size];
-    HWY_ALIGN float inverse[3][packet_size];       // limited
+    HWY_ALIGN float inverse[3][packet_size];  // limited
     HWY_ALIGN float true_inverse[3][packet_size];
     HWY_ALIGN float shear_x[packet_size], shear_y[packet_size], shear_z[packet_size];
     HWY_ALIGN float tmin[packet_size];
@@ -31,9 +31,9 @@ struct Packet {
     HWY_ALIGN std::uint32_t prim[packet_size];
     std::uint32_t count;
     RayClass kind;
-    float pad[3];                               // of boxes, the largest of all rays; positive
+    float pad[3];  // of boxes, the largest of all rays; positive
     float origin_lo[3], origin_hi[3];
-    float least_inverse[3], largest_inverse[3]; // magnitudes
+    float least_inverse[3], largest_inverse[3];  // magnitudes
     float least_tmin;
 };
 
@@ -120,7 +120,8 @@ private:
                                              : node.origin[axis] - p_.origin_hi[axis];
                 const float end = negative ? p_.origin_hi[axis] - node.origin[axis]
                                            : node.origin[axis] - p_.origin_lo[axis];
-                const auto from = hn::MulAdd(near, hn::Set(f8, rate), hn::Set(f8, start - p_.pad[axis]));
+                const auto from =
+                    hn::MulAdd(near, hn::Set(f8, rate), hn::Set(f8, start - p_.pad[axis]));
                 const auto to = hn::MulAdd(far, hn::Set(f8, rate), hn::Set(f8, end + p_.pad[axis]));
                 const auto least = hn::Set(f8, p_.least_inverse[axis]),
                            largest = hn::Set(f8, p_.largest_inverse[axis]);
@@ -142,7 +143,8 @@ private:
         RayNode out;
         for (int axis = 0; axis < 3; ++axis) {
             const V inverse = hn::Load(f16, p_.inverse[axis] + i);
-            const V from = hn::Sub(hn::Set(f16, node.origin[axis]), hn::Load(f16, p_.origin[axis] + i));
+            const V from =
+                hn::Sub(hn::Set(f16, node.origin[axis]), hn::Load(f16, p_.origin[axis] + i));
             const V pad = hn::Set(f16, negative_[axis] ? p_.pad[axis] : -p_.pad[axis]);
             out.rate[axis] = hn::Mul(hn::Set(f16, steps.step[axis]), inverse);
             out.near[axis] = hn::Mul(hn::Add(from, pad), inverse);
@@ -151,8 +153,8 @@ private:
         return out;
     }
 
-    HWY_INLINE std::uint32_t test_rays(const RayNode& ray, const NodeSteps& steps, std::size_t child,
-                                       std::size_t i) const {
+    HWY_INLINE std::uint32_t test_rays(const RayNode& ray, const NodeSteps& steps,
+                                       std::size_t child, std::size_t i) const {
         V entry = hn::Load(f16, p_.tmin + i);
         V leave = hn::Set(f16, infinity);
         for (int axis = 0; axis < 3; ++axis) {
@@ -199,7 +201,8 @@ private:
             counts_.tests += count * static_cast<std::uint64_t>(std::popcount(active));
         bool changed = false;
         for (std::size_t vector = 0; vector < packet_size / lanes16; ++vector) {
-            const auto wanted = static_cast<std::uint32_t>(active >> (vector * lanes16) & vector_bits);
+            const auto wanted =
+                static_cast<std::uint32_t>(active >> (vector * lanes16) & vector_bits);
             if (wanted == 0) continue;
             for (std::uint32_t k = 0; k < count; ++k)
                 changed |= test_triangle(block, place % 8 + k, vector * lanes16, wanted);
@@ -263,7 +266,8 @@ private:
         for (; rays != 0; rays &= rays - 1) {
             const std::size_t k = i + static_cast<std::size_t>(std::countr_zero(rays));
             TriangleHit hit;
-            if (!intersect_triangle<EdgeRule::closed>(frame_of(k), triangle_of(block, lane), p_.t[k], hit))
+            if (!intersect_triangle<EdgeRule::closed>(frame_of(k), triangle_of(block, lane),
+                                                      p_.t[k], hit))
                 continue;
             done_ |= std::uint64_t{1} << k;
             if (hit.t < p_.t[k] || block.prim[lane] < p_.prim[k]) {
@@ -279,9 +283,9 @@ private:
                            const Sheared& c, V u, V v, V w) {
         const V determinant = hn::Add(hn::Add(u, v), w);
         const V shear_z = hn::Load(f16, p_.shear_z + i);
-        const V depth = hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)),
-                                        hn::Mul(v, hn::Mul(shear_z, b.z))),
-                                hn::Mul(w, hn::Mul(shear_z, c.z)));
+        const V depth =
+            hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)), hn::Mul(v, hn::Mul(shear_z, b.z))),
+                    hn::Mul(w, hn::Mul(shear_z, c.z)));
         V t = hn::Div(depth, determinant);
         V entry = hn::Set(f16, -infinity), exit = hn::Set(f16, infinity);
         for (int axis = 0; axis < 3; ++axis) {
@@ -290,8 +294,10 @@ private:
             const float lo = min_of(min_of(p, q), r), hi = max_of(max_of(p, q), r);
             const V origin = hn::Load(f16, p_.origin[axis] + i);
             const V inverse = hn::Load(f16, p_.true_inverse[axis] + i);
-            const V near = hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? hi : lo), origin), inverse);
-            const V far = hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? lo : hi), origin), inverse);
+            const V near =
+                hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? hi : lo), origin), inverse);
+            const V far =
+                hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? lo : hi), origin), inverse);
             entry = hn::IfThenElse(hn::Gt(near, entry), near, entry);
             exit = hn::IfThenElse(hn::Lt(far, exit), far, exit);
         }
@@ -310,13 +316,14 @@ private:
         const U16 u16;
         const auto prim = hn::Set(u16, block.prim[lane]);
         const auto old_prim = hn::Load(u16, p_.prim + i);
-        const auto better = hn::Or(
-            hn::Lt(t, reach),
-            hn::RebindMask(f16, hn::Eq(hn::Min(prim, old_prim), prim)));
+        const auto better =
+            hn::Or(hn::Lt(t, reach), hn::RebindMask(f16, hn::Eq(hn::Min(prim, old_prim), prim)));
         const auto take = hn::And(better, mask_of(f16, candidates));
         hn::Store(hn::IfThenElse(take, t, reach), f16, p_.t + i);
-        hn::Store(hn::IfThenElse(take, hn::Div(v, determinant), hn::Load(f16, p_.u + i)), f16, p_.u + i);
-        hn::Store(hn::IfThenElse(take, hn::Div(w, determinant), hn::Load(f16, p_.v + i)), f16, p_.v + i);
+        hn::Store(hn::IfThenElse(take, hn::Div(v, determinant), hn::Load(f16, p_.u + i)), f16,
+                  p_.u + i);
+        hn::Store(hn::IfThenElse(take, hn::Div(w, determinant), hn::Load(f16, p_.v + i)), f16,
+                  p_.v + i);
         hn::Store(hn::IfThenElse(hn::RebindMask(u16, take), prim, old_prim), u16, p_.prim + i);
         return true;
     }

@@ -39,9 +39,9 @@ HWY_INLINE hn::Vec<I16> classify(const RayVectors& ray) {
     const auto sign = [&](V16 component, int place) {
         return hn::And(hn::ShiftRight<31>(hn::BitCast(d, component)), hn::Set(d, place));
     };
-    const auto axis = hn::IfThenElse(
-        hn::RebindMask(d, hn::Eq(az, longest)), hn::Set(d, 16),
-        hn::IfThenElseZero(hn::RebindMask(d, hn::Eq(ay, longest)), hn::Set(d, 8)));
+    const auto axis =
+        hn::IfThenElse(hn::RebindMask(d, hn::Eq(az, longest)), hn::Set(d, 16),
+                       hn::IfThenElseZero(hn::RebindMask(d, hn::Eq(ay, longest)), hn::Set(d, 8)));
     const auto code = hn::Or(hn::Or(sign(x, 1), sign(y, 2)), hn::Or(sign(z, 4), axis));
     const V16 tmin = ray.place[3], tmax = ray.way[3];
     const V16 far = hn::Set(f16, std::numeric_limits<float>::max());
@@ -63,10 +63,10 @@ HWY_INLINE void set_pads(const Aabb& bounds, Packet& p) {
     const float lo[3] = {bounds.lo.x, bounds.lo.y, bounds.lo.z},
                 hi[3] = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
     for (int a = 0; a < 3; ++a)
-        far[a] = max_of(max_of(std::fabs(lo[a] - p.origin_lo[a]), std::fabs(lo[a] - p.origin_hi[a])),
-                        max_of(std::fabs(hi[a] - p.origin_lo[a]), std::fabs(hi[a] - p.origin_hi[a])));
-    for (int a = 0; a < 3; ++a)
-        p.pad[a] = packet_pad_factor * slab_pad * (far[a] + far[p.kind.kz]);
+        far[a] =
+            max_of(max_of(std::fabs(lo[a] - p.origin_lo[a]), std::fabs(lo[a] - p.origin_hi[a])),
+                   max_of(std::fabs(hi[a] - p.origin_lo[a]), std::fabs(hi[a] - p.origin_hi[a])));
+    for (int a = 0; a < 3; ++a) p.pad[a] = packet_pad_factor * slab_pad * (far[a] + far[p.kind.kz]);
 }
 
 /// Rays index[0, count) of one class; `index` may be read up to the next multiple of lanes16.
@@ -110,7 +110,8 @@ HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::in
         const V start = hn::IfThenElseZero(hn::Gt(tmin, hn::Zero(f16)), tmin);
         hn::Store(start, f16, p.tmin + i);
         least_tmin = hn::Min(least_tmin, start);
-        hn::Store(hn::Min(ray.way[3], hn::Set(f16, std::numeric_limits<float>::max())), f16, p.t + i);
+        hn::Store(hn::Min(ray.way[3], hn::Set(f16, std::numeric_limits<float>::max())), f16,
+                  p.t + i);
         hn::Store(hn::Set(U16(), no_primitive), U16(), p.prim + i);
     }
     for (int a = 0; a < 3; ++a) {
@@ -149,15 +150,17 @@ public:
             count_[c] = counts[c];
             at += (counts[c] + 15u) & ~15u;
         }
-        for (std::size_t k = 0; k < job.n; ++k)
-            order_[next[code_[k]]++] = place_of(job, k);
+        for (std::size_t k = 0; k < job.n; ++k) order_[next[code_[k]]++] = place_of(job, k);
         for (std::uint32_t c = 0; c < ray_class_count; ++c)  // the last ray again, to fill vectors
-            for (; counts[c] > 0 && next[c] % 16 != 0; ++next[c]) order_[next[c]] = order_[next[c] - 1];
+            for (; counts[c] > 0 && next[c] % 16 != 0; ++next[c])
+                order_[next[c]] = order_[next[c] - 1];
     }
     [[nodiscard]] static std::int32_t place_of(const SimdJob& job, std::size_t k) {
         return static_cast<std::int32_t>(job.order == nullptr ? k : job.order[k]);
     }
-    [[nodiscard]] const std::int32_t* rays(std::uint32_t code) const { return order_ + begin_[code]; }
+    [[nodiscard]] const std::int32_t* rays(std::uint32_t code) const {
+        return order_ + begin_[code];
+    }
     [[nodiscard]] std::uint32_t count(std::uint32_t code) const { return count_[code]; }
 
 private:
@@ -230,7 +233,8 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
         const auto origin = hn::Add(hn::LoadU(f4, from), hn::Zero(f4));  // -0 becomes +0
         const auto direction = hn::LoadU(f4, from + ray_direction);
         const auto inverse = hn::Div(hn::Set(f4, 1.0f), direction);
-        const auto sheared = hn::BitCast(f4, hn::TableLookupBytes(hn::BitCast(b16, direction), order));
+        const auto sheared =
+            hn::BitCast(f4, hn::TableLookupBytes(hn::BitCast(b16, direction), order));
         const auto shear =
             hn::Div(sheared, hn::Set(f4, from[ray_direction + static_cast<int>(frame.kind.kz)]));
         if (k + 16 < count) hwy::Prefetch(job.rays + index[k + 16]);
@@ -288,7 +292,8 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
 
 inline void streams(const SimdJob& job, SimdCounts& counts) {
     if (job.hits == nullptr)
-        job.counting ? trace_streams<true, true>(job, counts) : trace_streams<true, false>(job, counts);
+        job.counting ? trace_streams<true, true>(job, counts)
+                     : trace_streams<true, false>(job, counts);
     else
         job.counting ? trace_streams<false, true>(job, counts)
                      : trace_streams<false, false>(job, counts);
@@ -296,7 +301,8 @@ inline void streams(const SimdJob& job, SimdCounts& counts) {
 
 inline void packets(const SimdJob& job, SimdCounts& counts) {
     if (job.hits == nullptr)
-        job.counting ? trace_packets<true, true>(job, counts) : trace_packets<true, false>(job, counts);
+        job.counting ? trace_packets<true, true>(job, counts)
+                     : trace_packets<true, false>(job, counts);
     else
         job.counting ? trace_packets<false, true>(job, counts)
                      : trace_packets<false, false>(job, counts);

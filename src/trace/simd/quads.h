@@ -34,7 +34,8 @@ HWY_INLINE V16 load_row(const At& at, std::size_t first) {
 template <class At>
 HWY_INLINE void load_quads(const At& at, V16 (&out)[4]) {
     const hn::Repartition<double, F16> d64;
-    const V16 r0 = load_row(at, 0), r1 = load_row(at, 1), r2 = load_row(at, 2), r3 = load_row(at, 3);
+    const V16 r0 = load_row(at, 0), r1 = load_row(at, 1), r2 = load_row(at, 2),
+              r3 = load_row(at, 3);
     const auto low01 = hn::BitCast(d64, hn::InterleaveLower(f16, r0, r1));
     const auto low23 = hn::BitCast(d64, hn::InterleaveLower(f16, r2, r3));
     const auto high01 = hn::BitCast(d64, hn::InterleaveUpper(f16, r0, r1));

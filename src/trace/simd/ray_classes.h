@@ -11,7 +11,7 @@ namespace raydix {
 inline constexpr std::uint32_t ray_class_count = 25, odd_ray_class = 24;
 
 struct RayClass {
-    std::uint32_t negatives;  // bit a: component a of the direction is negative (or -0)
+    std::uint32_t negatives;   // bit a: component a of the direction is negative (or -0)
     std::uint32_t kx, ky, kz;  // as in RayFrame
 
     [[nodiscard]] bool negative(int axis) const { return (negatives >> axis & 1) != 0; }

@@ -39,11 +39,10 @@ std::span<const SimdKernels> simd_kernels() {
 #if HWY_TARGETS & HWY_AVX2
         if (here & HWY_AVX2) found.push_back(N_AVX2::kernels("avx2"));
 #endif
-        found.push_back(HWY_STATIC_DISPATCH(kernels)(
-            HWY_STATIC_TARGET == HWY_SSE4    ? "sse4"
-            : HWY_STATIC_TARGET == HWY_SSSE3 ? "ssse3"
-            : HWY_STATIC_TARGET == HWY_NEON  ? "neon"
-                                             : "scalar"));
+        found.push_back(HWY_STATIC_DISPATCH(kernels)(HWY_STATIC_TARGET == HWY_SSE4    ? "sse4"
+                                                     : HWY_STATIC_TARGET == HWY_SSSE3 ? "ssse3"
+                                                     : HWY_STATIC_TARGET == HWY_NEON  ? "neon"
+                                                                                      : "scalar"));
         return found;
     }();
     return all;

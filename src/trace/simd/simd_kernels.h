@@ -17,8 +17,8 @@ struct SimdCounts {
     std::uint64_t hits = 0, invalid = 0, visits = 0, tests = 0;
 };
 
-/// At most max_job_rays rays, rays[order[k]], or rays[k] without an order; hits, or occluded if hits
-/// is null, go to the same places.
+/// At most max_job_rays rays, rays[order[k]], or rays[k] without an order; hits, or occluded if
+/// hits is null, go to the same places.
 struct SimdJob {
     WideView tree;
     const Ray* rays;

@@ -29,7 +29,8 @@ public:
         : tree_(tree), frame_(frame), ray_(ray), stack_(stack), counts_(counts) {
         origin_[0] = frame.origin.x, origin_[1] = frame.origin.y, origin_[2] = frame.origin.z;
         inverse_[0] = frame.inverse.x, inverse_[1] = frame.inverse.y, inverse_[2] = frame.inverse.z;
-        for (std::size_t l = 0; l < 8; ++l) slot_[l] = static_cast<std::int32_t>(l ^ ray_.negative ^ 7u);
+        for (std::size_t l = 0; l < 8; ++l)
+            slot_[l] = static_cast<std::int32_t>(l ^ ray_.negative ^ 7u);
     }
 
     /// All hits, in no order, behind those in `hits`.
@@ -79,45 +80,44 @@ private:
         const auto far_x = hn::Set(f8, (from.x - pad.x) * inverse.x),
                    far_y = hn::Set(f8, (from.y - pad.y) * inverse.y),
                    far_z = hn::Set(f8, (from.z - pad.z) * inverse.z);
-        const std::uint8_t* const near_plane[3] = {
-            ray_.negative & 1 ? node.hi[0] : node.lo[0], ray_.negative & 2 ? node.hi[1] : node.lo[1],
-            ray_.negative & 4 ? node.hi[2] : node.lo[2]};
-        const std::uint8_t* const far_plane[3] = {
-            ray_.negative & 1 ? node.lo[0] : node.hi[0], ray_.negative & 2 ? node.lo[1] : node.hi[1],
-            ray_.negative & 4 ? node.lo[2] : node.hi[2]};
+        const std::uint8_t* const near_plane[3] = {ray_.negative & 1 ? node.hi[0] : node.lo[0],
+                                                   ray_.negative & 2 ? node.hi[1] : node.lo[1],
+                                                   ray_.negative & 4 ? node.hi[2] : node.lo[2]};
+        const std::uint8_t* const far_plane[3] = {ray_.negative & 1 ? node.lo[0] : node.hi[0],
+                                                  ray_.negative & 2 ? node.lo[1] : node.hi[1],
+                                                  ray_.negative & 4 ? node.lo[2] : node.hi[2]};
         const auto steps = [](const std::uint8_t* from8) {
             return hn::ConvertTo(f8, hn::PromoteTo(I8(), hn::LoadU(B8(), from8)));
         };
         if constexpr (parts8 == 1) {
-            const auto entry = hn::Max(
-                hn::Max(hn::MulAdd(steps(near_plane[0]), rate_x, near_x),
-                        hn::MulAdd(steps(near_plane[1]), rate_y, near_y)),
-                hn::Max(hn::MulAdd(steps(near_plane[2]), rate_z, near_z), hn::Set(f8, frame_.tmin)));
+            const auto entry = hn::Max(hn::Max(hn::MulAdd(steps(near_plane[0]), rate_x, near_x),
+                                               hn::MulAdd(steps(near_plane[1]), rate_y, near_y)),
+                                       hn::Max(hn::MulAdd(steps(near_plane[2]), rate_z, near_z),
+                                               hn::Set(f8, frame_.tmin)));
             const auto leave = hn::Min(hn::Min(hn::MulAdd(steps(far_plane[0]), rate_x, far_x),
                                                hn::MulAdd(steps(far_plane[1]), rate_y, far_y)),
                                        hn::MulAdd(steps(far_plane[2]), rate_z, far_z));
             const auto exit = hn::Min(leave, hn::Set(f8, best_.t));
             const auto slot = hn::IndicesFromVec(f8, hn::Load(I8(), slot_));
-            const auto words = hn::TableLookupLanes(
-                hn::BitCast(f8, hn::Load(U8(), node.child)), slot);
+            const auto words =
+                hn::TableLookupLanes(hn::BitCast(f8, hn::Load(U8(), node.child)), slot);
             const auto entry_in_order = hn::TableLookupLanes(entry, slot);
             const auto exit_in_order = hn::TableLookupLanes(exit, slot);
             // A missing child is a word of all ones: NaN, and nothing equals NaN.
             const auto met = hn::And(hn::Le(entry_in_order, exit_in_order), hn::Eq(words, words));
             hn::StoreU(hn::Compress(entry_in_order, met), f8, stack_.entries + top);
-            hn::StoreU(hn::Compress(words, met), f8,
-                       reinterpret_cast<float*>(stack_.words + top));
+            hn::StoreU(hn::Compress(words, met), f8, reinterpret_cast<float*>(stack_.words + top));
             return top + hn::CountTrue(f8, met);
         } else {
             HWY_ALIGN float entries[8];
             std::uint32_t met = 0;
             for (std::size_t part = 0; part < parts8; ++part) {
                 const std::size_t l = part * lanes8;
-                const auto entry = hn::Max(
-                    hn::Max(hn::MulAdd(steps(near_plane[0] + l), rate_x, near_x),
-                            hn::MulAdd(steps(near_plane[1] + l), rate_y, near_y)),
-                    hn::Max(hn::MulAdd(steps(near_plane[2] + l), rate_z, near_z),
-                            hn::Set(f8, frame_.tmin)));
+                const auto entry =
+                    hn::Max(hn::Max(hn::MulAdd(steps(near_plane[0] + l), rate_x, near_x),
+                                    hn::MulAdd(steps(near_plane[1] + l), rate_y, near_y)),
+                            hn::Max(hn::MulAdd(steps(near_plane[2] + l), rate_z, near_z),
+                                    hn::Set(f8, frame_.tmin)));
                 const auto leave =
                     hn::Min(hn::Min(hn::MulAdd(steps(far_plane[0] + l), rate_x, far_x),
                                     hn::MulAdd(steps(far_plane[1] + l), rate_y, far_y)),
@@ -144,7 +144,8 @@ private:
         if constexpr (wanted == Wanted::all) {
             for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane) {
                 TriangleHit hit;
-                if (intersect_triangle<EdgeRule::half_open>(frame_, triangle_of(block, lane), best_.t, hit))
+                if (intersect_triangle<EdgeRule::half_open>(frame_, triangle_of(block, lane),
+                                                            best_.t, hit))
                     all_->push_back({hit.t * frame_.t_scale, block.prim[lane], hit.u, hit.v});
             }
             return false;
@@ -193,9 +194,11 @@ private:
 
     HWY_NOINLINE bool test_exactly(const TriangleBlock& block, std::size_t l, std::uint32_t lanes) {
         for (; lanes != 0; lanes &= lanes - 1) {
-            const auto lane = static_cast<std::uint32_t>(l) + static_cast<std::uint32_t>(std::countr_zero(lanes));
+            const auto lane =
+                static_cast<std::uint32_t>(l) + static_cast<std::uint32_t>(std::countr_zero(lanes));
             TriangleHit hit;
-            if (!intersect_triangle<EdgeRule::closed>(frame_, triangle_of(block, lane), best_.t, hit))
+            if (!intersect_triangle<EdgeRule::closed>(frame_, triangle_of(block, lane), best_.t,
+                                                      hit))
                 continue;
             best_.take(hit.t, block.prim[lane], hit.u, hit.v);
             if constexpr (wanted == Wanted::any) return true;
@@ -207,13 +210,14 @@ private:
                            const Sheared& a, const Sheared& b, const Sheared& c, V u, V v, V w) {
         const V determinant = hn::Add(hn::Add(u, v), w);
         const V shear_z = hn::Set(f8, frame_.shear_z);
-        const V depth = hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)),
-                                        hn::Mul(v, hn::Mul(shear_z, b.z))),
-                                hn::Mul(w, hn::Mul(shear_z, c.z)));
+        const V depth =
+            hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)), hn::Mul(v, hn::Mul(shear_z, b.z))),
+                    hn::Mul(w, hn::Mul(shear_z, c.z)));
         V t = hn::Div(depth, determinant);
         V entry = hn::Set(f8, -infinity), exit = hn::Set(f8, infinity);
         for (int axis = 0; axis < 3; ++axis) {
-            const V p = hn::Load(f8, block.corner[axis] + l), q = hn::Load(f8, block.corner[3 + axis] + l),
+            const V p = hn::Load(f8, block.corner[axis] + l),
+                    q = hn::Load(f8, block.corner[3 + axis] + l),
                     r = hn::Load(f8, block.corner[6 + axis] + l);
             const V lo = hn::Min(hn::Min(p, q), r), hi = hn::Max(hn::Max(p, q), r);
             const bool negative = (ray_.negative >> axis & 1) != 0;
@@ -229,7 +233,8 @@ private:
         t = hn::IfThenElse(hn::Le(entry, exit), held, t);
         const auto sound = hn::And(hn::Ne(determinant, hn::Zero(f8)),
                                    hn::Lt(hn::Abs(determinant), hn::Set(f8, infinity)));
-        const auto in_reach = hn::And(hn::Ge(t, hn::Set(f8, frame_.tmin)), hn::Le(t, hn::Set(f8, best_.t)));
+        const auto in_reach =
+            hn::And(hn::Ge(t, hn::Set(f8, frame_.tmin)), hn::Le(t, hn::Set(f8, best_.t)));
         candidates &= bits_of(f8, hn::And(sound, in_reach));
         if (candidates == 0) return false;
         if constexpr (wanted == Wanted::any) {
@@ -265,9 +270,10 @@ void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
         ++counts.invalid;
     } else {
         const RayFrame frame = make_frame(job.rays[i]);
-        const WideBest best = SingleRay<any ? Wanted::any : Wanted::closest, counting>(job.tree, frame, make_wide_ray(frame, job.tree.bounds),
-                                                               job.stack, counts)
-                                  .trace(0, {frame.tmax});
+        const WideBest best = SingleRay < any ? Wanted::any : Wanted::closest,
+                       counting > (job.tree, frame, make_wide_ray(frame, job.tree.bounds),
+                                   job.stack, counts)
+                                      .trace(0, {frame.tmax});
         if (best.found()) hit = {best.t * frame.t_scale, best.prim, best.u, best.v};
     }
     counts.hits += hit.hit();
@@ -311,7 +317,8 @@ inline void all_hits(const SimdJob& job, std::vector<Hit>& found, std::uint64_t*
 
 inline void single(const SimdJob& job, SimdCounts& counts) {
     if (job.hits == nullptr)
-        job.counting ? trace_single<true, true>(job, counts) : trace_single<true, false>(job, counts);
+        job.counting ? trace_single<true, true>(job, counts)
+                     : trace_single<true, false>(job, counts);
     else
         job.counting ? trace_single<false, true>(job, counts)
                      : trace_single<false, false>(job, counts);

@@ -22,9 +22,15 @@ constexpr std::uint32_t few_rays = 4;
 template <bool any, bool counting>
 class StreamWalk {
 public:
-    StreamWalk(const WideView& tree, const StreamFrame& frame, StreamMemory& memory, const WideStackView& single_stack, SimdCounts& counts)
-        : tree_(tree), frame_(frame), rays_(memory.rays().data()), hits_(memory.hits().data()),
-          memory_(memory), single_stack_(single_stack), counts_(counts) {
+    StreamWalk(const WideView& tree, const StreamFrame& frame, StreamMemory& memory,
+               const WideStackView& single_stack, SimdCounts& counts)
+        : tree_(tree),
+          frame_(frame),
+          rays_(memory.rays().data()),
+          hits_(memory.hits().data()),
+          memory_(memory),
+          single_stack_(single_stack),
+          counts_(counts) {
         for (int axis = 0; axis < 3; ++axis) negative_[axis] = frame.kind.negative(axis);
         for (std::uint32_t l = 0; l < 8; ++l) slot_[l] = l ^ frame.kind.negatives ^ 7u;
         count_ = static_cast<std::uint32_t>(memory.rays().size());
@@ -133,8 +139,10 @@ private:
                 V16 leave = hn::MulAdd(hn::Set(f16, far_steps[0][s]), rate[0], far[0]);
                 in = hn::Max(in, hn::MulAdd(hn::Set(f16, near_steps[0][s]), rate[0], near[0]));
                 for (int axis = 1; axis < 3; ++axis) {
-                    in = hn::Max(in, hn::MulAdd(hn::Set(f16, near_steps[axis][s]), rate[axis], near[axis]));
-                    leave = hn::Min(leave, hn::MulAdd(hn::Set(f16, far_steps[axis][s]), rate[axis], far[axis]));
+                    in = hn::Max(
+                        in, hn::MulAdd(hn::Set(f16, near_steps[axis][s]), rate[axis], near[axis]));
+                    leave = hn::Min(
+                        leave, hn::MulAdd(hn::Set(f16, far_steps[axis][s]), rate[axis], far[axis]));
                 }
                 const auto met = hn::And(hn::Le(in, hn::Min(leave, reach)), active);
                 const auto item = hn::Or(hn::And(hn::BitCast(U16(), in), high), numbers);
@@ -155,7 +163,8 @@ private:
         StreamRay& ray = rays_[k];
         if (!(entry_of(item) <= ray.t)) return;
         const RayFrame frame = frame_.frame_of(ray);
-        SingleRay<any ? Wanted::any : Wanted::closest, counting> single(tree_, frame, frame_.wide_ray_of(ray), single_stack_, counts_);
+        SingleRay<any ? Wanted::any : Wanted::closest, counting> single(
+            tree_, frame, frame_.wide_ray_of(ray), single_stack_, counts_);
         const WideBest best = single.trace(word, {ray.t, ray.prim, hits_[k].u, hits_[k].v});
         if (any) {
             if (best.found()) ray.settle();
@@ -199,7 +208,8 @@ private:
     }
 
     void test_leaf(const StreamEntry& entry) {
-        const std::uint32_t place = (entry.word & ~wide_leaf_bit) >> 3, count = (entry.word & 7) + 1;
+        const std::uint32_t place = (entry.word & ~wide_leaf_bit) >> 3,
+                            count = (entry.word & 7) + 1;
         const TriangleBlock& block = tree_.blocks[place / 8];
         std::uint32_t* const list = memory_.lists() + entry.begin;
         if constexpr (counting) counts_.tests += std::uint64_t{count} * entry.count;
@@ -209,8 +219,8 @@ private:
             chunk.list = list + k;
             load_chunk(chunk);
             const auto items = hn::LoadU(U16(), list + k);
-            auto active = hn::Le(
-                hn::BitCast(f16, hn::And(items, hn::Set(U16(), ~ray_bits))), chunk.reach);
+            auto active =
+                hn::Le(hn::BitCast(f16, hn::And(items, hn::Set(U16(), ~ray_bits))), chunk.reach);
             if (entry.count - k < lanes16)
                 active = hn::And(active, hn::FirstN(f16, entry.count - k));
             const std::uint32_t wanted = bits_of(f16, active);
@@ -220,7 +230,8 @@ private:
         }
     }
 
-    HWY_INLINE Sheared shear(const float* x, const float* y, const float* z, const Chunk& chunk) const {
+    HWY_INLINE Sheared shear(const float* x, const float* y, const float* z,
+                             const Chunk& chunk) const {
         const V16 depth = hn::Add(hn::Set(f16, *z), chunk.away[2]);
         return {hn::Sub(hn::Add(hn::Set(f16, *x), chunk.away[0]), hn::Mul(chunk.shear_x, depth)),
                 hn::Sub(hn::Add(hn::Set(f16, *y), chunk.away[1]), hn::Mul(chunk.shear_y, depth)),
@@ -243,8 +254,8 @@ private:
         if (candidates != 0) settle_candidates(block, lane, chunk, candidates, a, b, c, u, v, w);
     }
 
-    HWY_NOINLINE void settle_candidates(const TriangleBlock& block, std::uint32_t lane, Chunk& chunk,
-                                        std::uint32_t candidates, const Sheared& a,
+    HWY_NOINLINE void settle_candidates(const TriangleBlock& block, std::uint32_t lane,
+                                        Chunk& chunk, std::uint32_t candidates, const Sheared& a,
                                         const Sheared& b, const Sheared& c, const V16& u,
                                         const V16& v, const V16& w) {
         const V16 zero = hn::Zero(f16);
@@ -278,9 +289,9 @@ private:
         load_quads(RowsOf{rays_, chunk.list, 3}, true_way);
         const V16 determinant = hn::Add(hn::Add(u, v), w);
         const V16 shear_z = true_way[frame_.kind.kz];
-        const V16 depth = hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)),
-                                          hn::Mul(v, hn::Mul(shear_z, b.z))),
-                                  hn::Mul(w, hn::Mul(shear_z, c.z)));
+        const V16 depth =
+            hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)), hn::Mul(v, hn::Mul(shear_z, b.z))),
+                    hn::Mul(w, hn::Mul(shear_z, c.z)));
         V16 t = hn::Div(depth, determinant);
         V16 entry = hn::Set(f16, -infinity), exit = hn::Set(f16, infinity);
         for (int axis = 0; axis < 3; ++axis) {

@@ -12,8 +12,8 @@ namespace raydix {
 /// A cache line: what load_quads reads in fours.
 struct alignas(64) StreamRay {
     float origin[3], t;
-    float inverse[3], tmin;  // limited
-    float shear[2];          // of x and y
+    float inverse[3], tmin;     // limited
+    float shear[2];             // of x and y
     std::uint32_t prim, index;  // index: of the ray in its job
     float true_inverse[3], unused;
 

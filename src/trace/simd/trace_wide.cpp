@@ -3,13 +3,13 @@
 #include <raydix/wide.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "exec/parallel.h"
-#include "keys/morton.h"
-#include "sort/radix_sort.h"
+#include "rays/place_order.h"
 #include "trace/all_hits.h"
 #include "trace/simd/simd_kernels.h"
 
@@ -54,27 +54,6 @@ private:
     std::vector<std::uint64_t> active_;
 };
 
-/// Rays in the order of a Morton curve through their origins.
-std::vector<std::uint32_t> order_by_place(const Aabb& bounds, std::span<const Ray> rays) {
-    constexpr int axis_bits = 7;
-    constexpr float last = (1 << axis_bits) - 1;
-    const Vec3 size = bounds.hi - bounds.lo;
-    const float longest = max_of(max_of(size.x, size.y), size.z);
-    const float scale = longest > 0.0f ? min_of((last + 1) / longest, std::numeric_limits<float>::max()) : 0.0f;
-    const auto cell = [&](float at, float lo) {  // NaN is in cell 0
-        return static_cast<std::uint32_t>(min_of(max_of((at - lo) * scale, 0.0f), last));
-    };
-    std::vector<std::uint32_t> keys(rays.size()), order(rays.size());
-    for_each_index(rays.size(), [&](std::size_t i) {
-        const Vec3 o = rays[i].origin;
-        keys[i] = spread_bits(cell(o.x, bounds.lo.x)) << 2 | spread_bits(cell(o.y, bounds.lo.y)) << 1 |
-                  spread_bits(cell(o.z, bounds.lo.z));
-    });
-    SortScratch<std::uint32_t> scratch;
-    sort_keys<std::uint32_t>(keys, order, 3 * axis_bits, scratch);
-    return order;
-}
-
 /// Rays of a job: as many as give full vectors deep in the tree and still lie in the second-level
 /// cache; fewer where the batch would not keep many threads busy. Depends on the batch alone, so
 /// that counts do not depend on the threads.
@@ -104,29 +83,30 @@ TraceCounts sum_of(const std::vector<SimdCounts>& parts, std::size_t rays) {
 TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hits,
                         std::uint8_t* occluded, const TraceOptions& options) {
     const SimdKernels& kernels = kernels_for(options.isa);
-    const SimdPath path = options.path == SimdPath::automatic ? choose_simd_path(tree, rays) : options.path;
+    const SimdPath path =
+        options.path == SimdPath::automatic ? choose_simd_path(tree, rays) : options.path;
     const std::size_t block_size = rays_per_job(rays.size(), path);
     std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
     with_threads(options.threads, [&] {
         std::vector<std::uint32_t> order;
         if (path == SimdPath::sorted) order = order_by_place(tree.arrays().bounds, rays);
-        for_each_block(
-            rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
-                StackMemory stack(tree.stats().max_depth);
-                StreamMemory memory;
-                const std::size_t from = order.empty() ? begin : 0;
-                const SimdJob job{view_of(tree),
-                                  rays.data() + from,
-                                  order.empty() ? nullptr : order.data() + begin,
-                                  end - begin,
-                                  hits == nullptr ? nullptr : hits + from,
-                                  hits == nullptr ? occluded + from : nullptr,
-                                  stack.view(),
-                                  stack.packet_view(),
-                                  &memory,
-                                  options.counters};
-                job_of(kernels, path)(job, parts[block]);
-            });
+        for_each_block(rays.size(), block_size,
+                       [&](std::size_t block, std::size_t begin, std::size_t end) {
+                           StackMemory stack(tree.stats().max_depth);
+                           StreamMemory memory;
+                           const std::size_t from = order.empty() ? begin : 0;
+                           const SimdJob job{view_of(tree),
+                                             rays.data() + from,
+                                             order.empty() ? nullptr : order.data() + begin,
+                                             end - begin,
+                                             hits == nullptr ? nullptr : hits + from,
+                                             hits == nullptr ? occluded + from : nullptr,
+                                             stack.view(),
+                                             stack.packet_view(),
+                                             &memory,
+                                             options.counters};
+                           job_of(kernels, path)(job, parts[block]);
+                       });
     });
     return sum_of(parts, rays.size());
 }
@@ -149,7 +129,8 @@ TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit>
     return miss_all(rays);
 }
 
-std::vector<Hit> trace(const WideBvh& tree, std::span<const Ray> rays, const TraceOptions& options) {
+std::vector<Hit> trace(const WideBvh& tree, std::span<const Ray> rays,
+                       const TraceOptions& options) {
     std::vector<Hit> hits(rays.size());
     trace(tree, rays, hits, options);
     return hits;
@@ -175,12 +156,14 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
     std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
     std::vector<std::vector<Hit>> found(parts.size());
     with_threads(options.threads, [&] {
-        for_each_block(rays.size(), block_size,
-                       [&](std::size_t block, std::size_t begin, std::size_t end) {
-                           StackMemory stack(tree.stats().max_depth);
-                           const SimdJob job{view_of(tree), rays.data() + begin, nullptr, end - begin, nullptr, nullptr, stack.view(), {}, nullptr, options.counters};
-                           kernels.all_hits(job, found[block], &all.offsets[begin + 1], parts[block]);
-                       });
+        for_each_block(
+            rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
+                StackMemory stack(tree.stats().max_depth);
+                const SimdJob job{
+                    view_of(tree), rays.data() + begin, nullptr, end - begin, nullptr,
+                    nullptr,       stack.view(),        {},      nullptr,     options.counters};
+                kernels.all_hits(job, found[block], &all.offsets[begin + 1], parts[block]);
+            });
         join_blocks(found, block_size, all);
     });
     all.counts = sum_of(parts, rays.size());
@@ -201,8 +184,7 @@ SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays) {
         for (const Ray& ray : rays.subspan(begin, window)) {
             if (!is_valid(ray)) continue;
             const Vec3 d = ray.direction;
-            const float longest =
-                max_of(max_of(std::fabs(d.x), std::fabs(d.y)), std::fabs(d.z));
+            const float longest = max_of(max_of(std::fabs(d.x), std::fabs(d.y)), std::fabs(d.z));
             const Vec3 scaled{d.x / longest, d.y / longest, d.z / longest};
             origins = unite(origins, {ray.origin, ray.origin});
             directions = unite(directions, {scaled, scaled});
@@ -250,6 +232,26 @@ Hit closest_hit(const WideBvh& tree, const Ray& ray) {
 
 bool any_hit(const WideBvh& tree, const Ray& ray) {
     return !tree.empty() && one_ray<std::uint8_t>(tree, ray) != 0;
+}
+
+namespace {
+
+constexpr std::array<std::string_view, 5> path_names{"automatic", "single", "packet", "stream",
+                                                     "sorted"};
+
+}  // namespace
+
+std::string_view simd_path_name(SimdPath path) {
+    return path_names[static_cast<std::size_t>(path)];
+}
+
+SimdPath simd_path_from_name(std::string_view name) {
+    std::string known;
+    for (std::size_t k = 0; k < path_names.size(); ++k) {
+        if (path_names[k] == name) return static_cast<SimdPath>(k);
+        known += (known.empty() ? "" : ", ") + std::string(path_names[k]);
+    }
+    throw InputError("unknown path " + std::string(name) + "; known are " + known);
 }
 
 std::vector<std::string> simd_instruction_sets() {

@@ -49,8 +49,8 @@ inline constexpr float wide_pad_factor = 2.0f;
 inline constexpr float packet_pad_factor = 3.0f;
 
 struct WideRay {
-    Vec3 inverse;    // limited
-    Vec3 near_pad;   // with the sign that moves near planes toward the ray's start
+    Vec3 inverse;            // limited
+    Vec3 near_pad;           // with the sign that moves near planes toward the ray's start
     std::uint32_t negative;  // bit a: the direction's component a is negative (or -0)
 };
 

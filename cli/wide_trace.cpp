@@ -1,0 +1,121 @@
+#include "wide_trace.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+
+namespace raydix::cli {
+
+void add_wide_trace_options(CLI::App& command, WideTraceOptions& options) {
+    options.path_option =
+        command.add_option("--path", options.path, "How simd takes a batch through the tree")
+            ->check(CLI::IsMember({"automatic", "single", "packet", "stream", "sorted"}))
+            ->capture_default_str();
+    options.isa_option = command
+                             .add_option("--isa", options.isa,
+                                         "Instruction set of simd (default: the best of the "
+                                         "processor)")
+                             ->check(CLI::IsMember(simd_instruction_sets()));
+}
+
+std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
+                              const WideTraceOptions& options) {
+    const bool wide = tree.layout == "wide8";
+    const bool simd = kernel == "simd" || (kernel.empty() && wide && tree.device == "cpu");
+    if (!simd) {
+        if (wide && !kernel.empty())
+            throw CLI::ValidationError("--layout", "wide8 goes with --kernel simd, not with " + kernel);
+        for (const CLI::Option* option : {options.path_option, options.isa_option})
+            if (option->count() != 0)
+                throw CLI::ValidationError(option->get_name(), "belongs to --kernel simd");
+        return kernel;
+    }
+    if (tree.tree != "bvh")
+        throw CLI::ValidationError("--kernel", "simd traces a bvh, not a " + tree.tree);
+    if (tree.layout == "cwbvh")
+        throw CLI::ValidationError("--layout", "cwbvh does not go with --kernel simd, wide8 does");
+    tree.layout = "wide8";
+    return "simd";
+}
+
+WideTracer::WideTracer(const Bvh& bvh, const WideTraceOptions& options, const CommonOptions& common)
+    : tree_(bvh, {.threads = common.threads}),
+      path_(simd_path_from_name(options.path)),
+      isa_(options.isa.empty() ? simd_instruction_sets().front() : options.isa) {}
+
+TraceOptions WideTracer::with_path(std::span<const Ray> rays, TraceOptions options) {
+    options.path = path_ == SimdPath::automatic ? choose_simd_path(tree_, rays) : path_;
+    options.isa = isa_;
+    if (options.counters) ++batches_[std::string(simd_path_name(options.path))];
+    return options;
+}
+
+TraceCounts WideTracer::closest(std::span<const Ray> rays, std::span<Hit> hits,
+                                TraceOptions options) {
+    return trace(tree_, rays, hits, with_path(rays, options));
+}
+
+TraceCounts WideTracer::any(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+                            TraceOptions options) {
+    return trace_any(tree_, rays, occluded, with_path(rays, options));
+}
+
+AllHits WideTracer::all(std::span<const Ray> rays, TraceOptions options) {
+    options.isa = isa_;
+    if (options.counters) ++batches_["single"];
+    return trace_all(tree_, rays, options);
+}
+
+Json WideTracer::paths_json() const {
+    Json json = Json::object();
+    for (const auto& [path, batches] : batches_) json[path] = batches;
+    return json;
+}
+
+void WideTracer::explain_tree(const CommonOptions& common) const {
+    if (!common.prints_tables()) return;
+    const WideBvhStats& s = tree_.stats();
+    fmt::print(
+        "kernel simd: wide8 layout, nodes of up to 8 children with boxes of 8 bits an axis, blocks "
+        "of 8 triangles, {} code, paths chosen by batch ({})\n",
+        isa_, simd_path_name(path_));
+    fmt::print("             {} nodes, {} leaves, {:.1f} MB\n", s.nodes, s.leaves,
+               static_cast<double>(s.bytes) * 1e-6);
+}
+
+void WideTracer::explain_paths(const CommonOptions& common) const {
+    if (!common.prints_tables()) return;
+    for (const auto& [path, batches] : batches_)
+        fmt::print("path {}: {} {}\n", path, batches, batches == 1 ? "batch" : "batches");
+}
+
+void add_wide(Json& build, const WideBvh& tree) {
+    const WideBvhStats& s = tree.stats();
+    build["layout"] = "wide8";
+    build["layout_nodes"] = s.nodes;
+    build["bytes"] = s.bytes;
+    build["wide"] = {{"nodes", s.nodes},
+                     {"leaves", s.leaves},
+                     {"references", s.references},
+                     {"max_depth", s.max_depth},
+                     {"children_per_node", s.children_per_node},
+                     {"sah", s.sah},
+                     {"widening", s.widening},
+                     {"node_bytes", s.node_bytes},
+                     {"triangle_bytes", s.triangle_bytes},
+                     {"ms", s.ms}};
+}
+
+void print_wide_table(const Json& wide) {
+    fmt::print("\nwide8        {} nodes of {:.2f} children, {} leaves, depth {}, in {:.2f} ms\n",
+               grouped(wide["nodes"].get<std::uint64_t>()),
+               wide["children_per_node"].get<double>(),
+               grouped(wide["leaves"].get<std::uint64_t>()), wide["max_depth"].get<std::uint32_t>(),
+               wide["ms"].get<double>());
+    fmt::print("SAH          {:.3f}   (node 1, primitive 0.4), boxes widened to {:.3f} x their area\n",
+               wide["sah"].get<double>(), wide["widening"].get<double>());
+    fmt::print("memory       {:.1f} MB\n", (wide["node_bytes"].get<double>() +
+                                            wide["triangle_bytes"].get<double>()) * 1e-6);
+}
+
+}  // namespace raydix::cli

@@ -1,0 +1,55 @@
+// The kernel simd: what trace and build say about wide trees.
+#pragma once
+
+#include <raydix/wide.h>
+
+#include <map>
+#include <string>
+
+#include "options.h"
+#include "output.h"
+
+namespace raydix::cli {
+
+struct WideTraceOptions {
+    std::string path = "automatic", isa;
+    CLI::Option* path_option = nullptr;
+    CLI::Option* isa_option = nullptr;
+};
+
+void add_wide_trace_options(CLI::App& command, WideTraceOptions& options);
+
+/// --kernel simd goes with --layout wide8 and either of them is enough. Usage errors: one without
+/// the other, options of simd for another kernel.
+std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
+                              const WideTraceOptions& options);
+
+/// A wide tree, and which paths its batches took.
+class WideTracer {
+public:
+    WideTracer(const Bvh& bvh, const WideTraceOptions& options, const CommonOptions& common);
+    TraceCounts closest(std::span<const Ray> rays, std::span<Hit> hits, TraceOptions options);
+    TraceCounts any(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+                    TraceOptions options);
+    AllHits all(std::span<const Ray> rays, TraceOptions options);
+    [[nodiscard]] const WideBvh& tree() const { return tree_; }
+    [[nodiscard]] const std::string& isa() const { return isa_; }
+    /// Path -> batches.
+    [[nodiscard]] Json paths_json() const;
+    void explain_tree(const CommonOptions& common) const;
+    void explain_paths(const CommonOptions& common) const;
+
+private:
+    TraceOptions with_path(std::span<const Ray> rays, TraceOptions options);
+
+    WideBvh tree_;
+    SimdPath path_;
+    std::string isa_;
+    std::map<std::string, std::uint64_t> batches_;
+};
+
+/// The wide tree that follows from the binary one; what a trace touches is then its.
+void add_wide(Json& build, const WideBvh& tree);
+void print_wide_table(const Json& wide);
+
+}  // namespace raydix::cli

@@ -1,0 +1,370 @@
+// The kernel `simd` against `scalar`, bit for bit: every instruction set that the machine has, every
+// path, scenes of every size, all kinds of rays, nasty meshes, any thread count.
+#include <gtest/gtest.h>
+#include <raydix/raydix.h>
+#include <raydix/wide.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <iostream>
+#include <random>
+
+#include "layout/wide_bvh.h"
+#include "support/ray_sets.h"
+#include "support/scenes.h"
+#include "support/support.h"
+#include "tree/bvh_access.h"
+
+namespace raydix::test {
+namespace {
+
+constexpr std::uint64_t seed = 2021;
+constexpr SimdPath paths[] = {SimdPath::automatic, SimdPath::single, SimdPath::packet,
+                              SimdPath::stream, SimdPath::sorted};
+
+bool same_bits(const Hit& a, const Hit& b) { return std::memcmp(&a, &b, sizeof(Hit)) == 0; }
+
+/// Everything that `simd` can do with a batch, by one path and instruction set.
+void expect_like(const std::string& what, const WideBvh& tree, std::span<const Ray> rays,
+                 std::span<const Hit> wanted, const TraceCounts& counts,
+                 const TraceOptions& options) {
+    SCOPED_TRACE(what + ", path " + std::string(simd_path_name(options.path)) + ", " + options.isa +
+                 ", seed " + std::to_string(seed));
+    std::vector<Hit> hits(rays.size());
+    const TraceCounts own = trace(tree, rays, hits, options);
+    std::uint64_t different = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) different += !same_bits(hits[i], wanted[i]);
+    EXPECT_EQ(different, 0u);
+    EXPECT_EQ(own.rays, rays.size());
+    EXPECT_EQ(own.hits, counts.hits);
+    EXPECT_EQ(own.invalid_rays, counts.invalid_rays);
+    if (options.counters && counts.hits > 0) {
+        EXPECT_GE(own.triangle_tests, own.hits);
+    }
+    std::vector<std::uint8_t> occluded(rays.size(), 2);
+    const TraceCounts any = trace_any(tree, rays, occluded, options);
+    EXPECT_EQ(any.hits, counts.hits);
+    EXPECT_EQ(any.invalid_rays, counts.invalid_rays);
+    different = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        different += occluded[i] != (wanted[i].hit() ? 1 : 0);
+    EXPECT_EQ(different, 0u) << "any hit";
+}
+
+void expect_like_scalar(const std::string& what, const Bvh& bvh, std::span<const Ray> rays,
+                        bool some_hit = true) {
+    std::vector<Hit> wanted(rays.size());
+    const TraceCounts counts = trace(bvh, rays, wanted);
+    std::cout << what << ": " << rays.size() << " rays, " << counts.hits << " hits (seed " << seed
+              << ")\n";
+    if (some_hit) {
+        EXPECT_GT(counts.hits, 0u);
+    }
+    for (const int width : {8, 4}) {
+        const WideBvh tree(bvh, {.width = width});
+        for (const std::string& isa : simd_instruction_sets())
+            for (const SimdPath path : paths) {
+                if (width == 4 && path != SimdPath::automatic) continue;
+                expect_like(what, tree, rays, wanted, counts,
+                            {.counters = path == SimdPath::stream, .path = path, .isa = isa});
+            }
+    }
+}
+
+void expect_like_scalar(const Scene& scene, std::size_t rays, const BuildOptions& options = {}) {
+    expect_like_scalar(scene.name, build_bvh(scene.mesh, options),
+                       make_mixed_rays(scene, rays, seed));
+}
+
+constexpr std::size_t many = 4'000 * thorough;
+
+TEST(Simd, HasCodeForThisProcessor) {
+    const auto sets = simd_instruction_sets();
+    ASSERT_FALSE(sets.empty());
+    for (const std::string& isa : sets) std::cout << isa << "\n";
+#if defined(__x86_64__)
+    EXPECT_EQ(sets.back(), "sse4");
+    EXPECT_EQ(std::ranges::count(sets, "avx2"), __builtin_cpu_supports("avx2") ? 1 : 0);
+    if (__builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl")) {
+        EXPECT_EQ(sets.front(), "avx512");
+    }
+#endif
+}
+
+TEST(Simd, SoupsLikeScalar) {
+    expect_like_scalar(scene_of(random_soup(2000, 1), "soup"), many);
+    expect_like_scalar(scene_of(random_soup(2000, 2, 1.0f), "soup of large ones"), many / 4);
+    expect_like_scalar(scene_of(lattice_mesh(2000, 20, 5), "lattice"), many);
+    expect_like_scalar(scene_of(moved(random_soup(2000, 4), {1e5f, -2e5f, 5e6f}), "soup far off"),
+                       many);
+    expect_like_scalar(scene_of(scaled(random_soup(2000, 4), 1e-6f), "small soup"), many);
+    expect_like_scalar(scene_of(scaled(random_soup(2000, 4), 1e-9f), "tiny soup"), many);
+    expect_like_scalar(scene_of(scaled(random_soup(2000, 4), 1e12f), "huge soup"), many);
+}
+
+TEST(Simd, BuiltinScenesLikeScalar) {
+    const auto scenes = builtin_triangle_scenes(20'000);
+    EXPECT_GE(scenes.size(), 4u);
+    for (const Scene& scene : scenes) expect_like_scalar(scene, many);
+}
+
+TEST(Simd, EveryBuilderAndLeafSize) {
+    const Scene scene = scene_of(random_soup(3000, 8, 0.2f), "soup");
+    for (const Builder builder : {Builder::karras, Builder::ploc, Builder::binned, Builder::sweep,
+                                  Builder::split, Builder::sbvh})
+        for (const int max_leaf : {1, 4, 255})
+            expect_like_scalar(scene, 500 * thorough, {.builder = builder, .max_leaf = max_leaf});
+}
+
+TEST(Simd, FewTriangles) {
+    const Mesh all = random_soup(30, seed, 1.0f);
+    for (std::size_t n = 0; n <= 30; ++n) {
+        Mesh mesh = all;
+        mesh.triangles.resize(n);
+        if (n == 0) mesh.vertices.clear();
+        expect_like_scalar(std::to_string(n) + " triangles", build_bvh(mesh),
+                           make_mixed_rays(scene_of(all, "few"), 1000, seed), n > 0);
+    }
+}
+
+/// Around the sizes of vectors, packets and jobs.
+TEST(Simd, BatchesOfEverySize) {
+    const Scene scene = scene_of(random_soup(2000, 9, 0.2f), "soup");
+    const Bvh bvh = build_bvh(scene.mesh);
+    const auto rays = make_mixed_rays(scene, 40'000, seed);
+    for (const std::size_t n :
+         {0u, 1u, 2u, 3u, 4u, 5u, 15u, 16u, 17u, 63u, 64u, 65u, 1023u, 1024u, 1025u, 40'000u})
+        expect_like_scalar(std::to_string(n) + " rays", bvh, std::span(rays).first(n), n > 60);
+}
+
+TEST(Simd, NastyRays) {
+    const Scene scene = scene_of(random_soup(500, 3, 0.5f), "soup");
+    const float nan = std::nanf(""), most = std::numeric_limits<float>::max();
+    std::vector<Ray> rays{{{0, 0, 0}, 0, {0, 0, 0}, infinity},
+                          {{nan, 0, 0}, 0, {1, 0, 0}, infinity},
+                          {{0, infinity, 0}, 0, {1, 0, 0}, infinity},
+                          {{0, 0, 0}, nan, {1, 0, 0}, infinity},
+                          {{0, 0, 0}, 0, {1, nan, 0}, infinity},
+                          {{0, 0, 0}, 0, {nan, 1, 0}, infinity},
+                          {{0, 0, 0}, 0, {1, 0, infinity}, infinity},
+                          {{0, 0, 0}, 0, {1, 0, 0}, nan},
+                          {{0, 0, 0}, 2, {1, 0, 0}, 1},
+                          {{0, 0, 0}, -2, {1, 0, 0}, -1},
+                          {{0, 0, 0}, -5, {1, 1, 1}, infinity},
+                          {{most, most, most}, 0, {-1, -1, -1}, infinity},
+                          {{-most, 0.5f, 0.5f}, 0, {1, 0, -0.0f}, infinity},
+                          {{0.5f, 0.5f, -1e30f}, 0, {0, -0.0f, 1}, infinity},
+                          {{0.5f, 0.5f, -1}, 0, {1e-40f, -1e-44f, 1}, infinity},
+                          {{0.5f, 0.5f, -1}, 0, {1e-30f, 1e-25f, 1e-20f}, infinity},
+                          {{0.5f, 0.5f, -1}, 0, {1e-45f, 0, 1e-44f}, infinity},
+                          {{0.5f, 0.5f, 2}, 0, {0, 0, -most}, infinity}};
+    std::mt19937_64 random(seed);
+    const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+    for (int k = 0; k < 20'000; ++k) {  // along axes, from within and from far off
+        Ray ray{{unit(), unit(), unit()}, 0, {0, -0.0f, 0}, infinity};
+        const std::size_t axis = k % 3;
+        (&ray.direction.x)[axis] = k % 2 == 0 ? 1.0f : -1.0f;
+        if (k % 4 < 2) (&ray.origin.x)[axis] -= 1000.0f * (&ray.direction.x)[axis];
+        if (k % 5 == 0) (&ray.direction.x)[(axis + 1) % 3] = std::ldexp(unit() - 0.5f, -k % 149);
+        if (k % 7 == 0) ray.direction = std::ldexp(1.0f, k % 200 - 100) * ray.direction;
+        if (k % 11 == 0) ray.tmax = unit();
+        rays.push_back(ray);
+    }
+    expect_like_scalar("nasty rays", build_bvh(scene.mesh), rays);
+}
+
+TEST(Simd, NastyMeshes) {
+    const Mesh soup = random_soup(500, 6, 0.3f);
+    Mesh laced = soup;
+    for (std::size_t i = 0; i < laced.vertices.size(); i += 7) laced.vertices[i].y = std::nanf("");
+    Mesh with_points = soup;  // zero areas
+    for (std::size_t k = 0; k < with_points.triangles.size(); k += 3)
+        with_points.triangles[k][1] = with_points.triangles[k][0];
+    Mesh twice = soup;  // ties
+    twice.triangles.insert(twice.triangles.end(), soup.triangles.rbegin(), soup.triangles.rend());
+    Mesh piled = soup;
+    for (std::size_t k = 0; k < piled.triangles.size(); ++k)
+        piled.triangles[k] = soup.triangles[k % 2];
+    Mesh flat = soup;
+    for (Vec3& v : flat.vertices) v.z = -0.25f;
+    for (const Mesh& mesh : {laced, with_points, twice, piled, flat}) {
+        Scene whole = scene_of(soup, "soup");
+        whole.mesh.triangles = {soup.triangles.begin(), soup.triangles.begin() + 400};
+        expect_like_scalar("nasty mesh", build_bvh(mesh), make_mixed_rays(whole, 10'000, seed));
+    }
+    Mesh none = soup;  // all without area: a tree without leaves
+    for (Triangle& t : none.triangles) t[2] = t[1];
+    const Bvh bvh = build_bvh(none);
+    const WideBvh tree(bvh);
+    EXPECT_TRUE(tree.empty());
+    expect_like_scalar("flat triangles", bvh, make_mixed_rays(scene_of(soup, "soup"), 3000, seed),
+                       false);
+}
+
+/// As a builder that splits triangles leaves it: several references to one triangle.
+TEST(Simd, DuplicatedReferences) {
+    const Scene scene = scene_of(random_soup(1000, 5, 0.3f), "soup");
+    const auto n = static_cast<std::uint32_t>(scene.mesh.triangles.size());
+    Mesh doubled = scene.mesh;
+    doubled.triangles.insert(doubled.triangles.end(), scene.mesh.triangles.begin(),
+                             scene.mesh.triangles.end());
+    Bvh bvh = build_bvh(doubled);
+    for (std::uint32_t& prim : BvhAccess{bvh}.order().span()) prim %= n;
+    BvhAccess{bvh}.input_count() = n;
+    const WideBvh tree(bvh);
+    EXPECT_EQ(tree.stats().references, 2 * n);
+    const auto rays = make_mixed_rays(scene, 20'000, seed);
+    const Bvh plain = build_bvh(scene.mesh);
+    for (const SimdPath path : paths)
+        EXPECT_TRUE(std::ranges::equal(trace(tree, rays, {.path = path}), trace(plain, rays),
+                                       same_bits));
+    const AllHits all = trace_all(tree, rays), wanted = trace_all(plain, rays);
+    EXPECT_EQ(all.offsets, wanted.offsets);
+    EXPECT_TRUE(std::ranges::equal(all.hits, wanted.hits, same_bits));
+}
+
+TEST(Simd, AllHitsLikeScalar) {
+    for (const Scene& scene : builtin_triangle_scenes(5'000)) {
+        const Bvh bvh = build_bvh(scene.mesh);
+        const WideBvh tree(bvh);
+        const auto rays = make_mixed_rays(scene, 1000 * thorough, seed);
+        const AllHits wanted = trace_all(bvh, rays);
+        EXPECT_GT(wanted.hits.size(), 0u);
+        for (const std::string& isa : simd_instruction_sets()) {
+            const AllHits all = trace_all(tree, rays, {.counters = true, .isa = isa});
+            EXPECT_EQ(all.offsets, wanted.offsets) << isa;
+            EXPECT_TRUE(std::ranges::equal(all.hits, wanted.hits, same_bits)) << isa;
+            EXPECT_EQ(all.counts.hits, wanted.counts.hits);
+            EXPECT_EQ(all.counts.invalid_rays, wanted.counts.invalid_rays);
+            EXPECT_GT(all.counts.node_visits, 0u);
+        }
+    }
+}
+
+TEST(Simd, OneRayLikeBatches) {
+    const Scene scene = load_scene("builtin:atrium?triangles=10000");
+    const Bvh bvh = build_bvh(scene.mesh);
+    const WideBvh tree(bvh);
+    const auto rays = make_mixed_rays(scene, 2000, seed);
+    const auto wanted = trace(bvh, rays);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        ASSERT_TRUE(same_bits(closest_hit(tree, rays[i]), wanted[i])) << i;
+        ASSERT_EQ(any_hit(tree, rays[i]), wanted[i].hit()) << i;
+    }
+    const WideBvh empty(build_bvh(Mesh{}));
+    EXPECT_FALSE(closest_hit(empty, rays[0]).hit());
+    EXPECT_FALSE(any_hit(empty, rays[0]));
+}
+
+TEST(Simd, SameCountsForEveryThreadCount) {
+    const Scene scene = load_scene("builtin:atrium?triangles=10000");
+    const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
+    const WideBvh tree(build_bvh(scene.mesh));
+    for (const SimdPath path : paths) {
+        std::vector<Hit> wanted(rays.size()), hits(rays.size());
+        const TraceCounts one =
+            trace(tree, rays, wanted, {.threads = 1, .counters = true, .path = path});
+        for (const int threads : {2, 7, 0}) {
+            const TraceCounts counts =
+                trace(tree, rays, hits, {.threads = threads, .counters = true, .path = path});
+            EXPECT_TRUE(std::ranges::equal(hits, wanted, same_bits));
+            EXPECT_EQ(counts.node_visits, one.node_visits) << simd_path_name(path);
+            EXPECT_EQ(counts.triangle_tests, one.triangle_tests) << simd_path_name(path);
+        }
+    }
+}
+
+TEST(Simd, EachPathWhereItBelongs) {
+    const Scene scene = load_scene("builtin:atrium?triangles=20000");
+    const Bvh bvh = build_bvh(scene.mesh);
+    const WideBvh tree(bvh);
+    std::vector<std::uint32_t> pixels;
+    const auto primary = make_primary_rays(scene.cameras.cameras.at(0), 256, 192, &pixels);
+    EXPECT_EQ(choose_simd_path(tree, primary), SimdPath::packet);
+    SecondaryOptions secondary;
+    secondary.kind = RayKind::diffuse;
+    secondary.samples = 8;
+    const auto hits = trace(bvh, primary);
+    EXPECT_EQ(choose_simd_path(tree, make_secondary_rays(bvh, primary, hits, pixels, secondary)),
+              SimdPath::stream);
+    secondary.kind = RayKind::diffuse_shuffled;
+    EXPECT_EQ(choose_simd_path(tree, make_secondary_rays(bvh, primary, hits, pixels, secondary)),
+              SimdPath::sorted);
+    EXPECT_EQ(choose_simd_path(tree, {}), SimdPath::packet);
+}
+
+/// Fewer nodes than `scalar` enters, since each has up to eight children.
+TEST(Simd, EntersFewerNodesThanScalar) {
+    const Scene scene = load_scene("builtin:atrium?triangles=20000");
+    const Bvh bvh = build_bvh(scene.mesh);
+    const auto rays = make_mixed_rays(scene, 10'000, seed);
+    std::vector<Hit> hits(rays.size());
+    const TraceCounts binary = trace(bvh, rays, hits, {.counters = true});
+    const WideBvh tree(bvh);
+    for (const SimdPath path : paths) {
+        const TraceCounts wide = trace(tree, rays, hits, {.counters = true, .path = path});
+        EXPECT_LT(2 * wide.node_visits, binary.node_visits) << simd_path_name(path);
+    }
+}
+
+TEST(Simd, RefusesWhatItCannotDo) {
+    const std::vector<Aabb> boxes(4, Aabb{{0, 0, 0}, {1, 1, 1}});
+    EXPECT_THROW(WideBvh{build_bvh(boxes)}, InputError);
+    const Bvh bvh = build_bvh(random_soup(100, 1));
+    EXPECT_THROW((WideBvh{bvh, {.width = 5}}), InputError);
+    const WideBvh tree(bvh);
+    const std::vector<Ray> rays(3, Ray{{0, 0, 0}, 0, {0, 0, 1}, 1});
+    std::vector<Hit> two(2);
+    std::vector<std::uint8_t> four(4);
+    EXPECT_THROW(trace(tree, rays, two), InputError);
+    EXPECT_THROW(trace_any(tree, rays, four), InputError);
+    try {
+        static_cast<void>(trace(tree, rays, {.isa = "mmx"}));
+        ADD_FAILURE();
+    } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find(simd_instruction_sets().back()), std::string::npos)
+            << error.what();
+    }
+    EXPECT_THROW(static_cast<void>(simd_path_from_name("fast")), InputError);
+    EXPECT_EQ(simd_path_from_name("sorted"), SimdPath::sorted);
+}
+
+/// Rays from the middle of a closed surface, at vertices and edges, wherever it lies.
+TEST(Simd, NoRayLeavesAClosedSurface) {
+    for (const Vec3 move : {Vec3{0, 0, 0}, Vec3{1e5f, 1e5f, -1e5f}}) {
+        Mesh mesh;
+        constexpr int rows = 24;
+        for (int i = 0; i <= rows; ++i)
+            for (int j = 0; j < rows; ++j) {
+                const float a = 3.14159265f * float(i) / rows, b = 6.2831853f * float(j) / rows;
+                const bool pole = i == 0 || i == rows;
+                const float r = pole ? 0.0f : std::sin(a);
+                mesh.vertices.push_back(
+                    100.0f * Vec3{r * std::cos(b), r * std::sin(b), std::cos(a)} + move);
+            }
+        for (std::uint32_t i = 0; i < rows; ++i)
+            for (std::uint32_t j = 0; j < rows; ++j) {
+                const std::uint32_t k = (j + 1) % rows, p = i * rows, q = p + rows;
+                mesh.triangles.push_back({p + j, q + j, q + k});
+                mesh.triangles.push_back({p + j, q + k, p + k});
+            }
+        const WideBvh tree(build_bvh(mesh, {.max_leaf = 1}));
+        std::mt19937_64 random(seed);
+        std::vector<Ray> rays;
+        for (std::size_t k = 0; k < 10'000 * thorough; ++k) {
+            const Triangle& t = mesh.triangles[random() % mesh.triangles.size()];
+            const Vec3 a = mesh.vertices[t[0]], b = mesh.vertices[t[1]];
+            rays.push_back({move, 0, (k % 2 == 0 ? a : 0.5f * (a + b)) - move, infinity});
+        }
+        for (const std::string& isa : simd_instruction_sets())
+            for (const SimdPath path : paths) {
+                const auto hits = trace(tree, rays, {.path = path, .isa = isa});
+                EXPECT_EQ(std::ranges::count_if(hits, [](const Hit& h) { return !h.hit(); }), 0)
+                    << isa << ", " << simd_path_name(path);
+            }
+    }
+}
+
+}  // namespace
+}  // namespace raydix::test
