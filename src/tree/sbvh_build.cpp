@@ -127,8 +127,7 @@ public:
 private:
     [[nodiscard]] float root_area() const {
         Aabb box = empty_box();
-        for (std::uint32_t k = 0; k < in_.references; ++k)
-            box = unite(box, s_.references[k].box());
+        for (std::uint32_t k = 0; k < in_.references; ++k) box = unite(box, s_.references[k].box());
         return sah_area(box);
     }
 

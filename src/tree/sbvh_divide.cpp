@@ -95,9 +95,8 @@ bool SbvhDivider::choose_spatial(const SbvhList& list, const SplitSides& object)
     const float overlap = sah_area(shared);
     if (!(overlap > least_overlap_) || !(overlap > options_.least_own_overlap * sah_area(box)))
         return false;
-    const SpatialSplit split =
-        find_spatial_split(cutter_, list.references(), box,
-                           spatial_bin_count(list.count, options_.spatial_bins));
+    const SpatialSplit split = find_spatial_split(
+        cutter_, list.references(), box, spatial_bin_count(list.count, options_.spatial_bins));
     if (!(split.cost < object.cost)) return false;
     sides_.choose(cutter_, list.references(), split);
     return sides_.left() != 0 && sides_.right() != 0 && sides_.cuts() <= list.spare;

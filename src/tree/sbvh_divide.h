@@ -19,9 +19,9 @@ struct SpatialOptions {
     double budget = 0.5;
     /// Spatial splits are tried where the boxes of the object split's children share more than this
     /// part of the root's surface (alpha in the paper) ...
-    float least_overlap = 1e-5f;
+    float least_overlap = 1e-4f;
     /// ... and more than this part of the node's own.
-    float least_own_overlap = 0.05f;
+    float least_own_overlap = 0.2f;
     std::uint32_t object_bins = 32, spatial_bins = max_spatial_bins;  // an axis, at most
 };
 
@@ -51,7 +51,7 @@ public:
 
     /// count >= 2.
     [[nodiscard]] SbvhChildren divide(const SbvhList& list);
-    /// Whether no node in a box of this half surface can have a spatial split.
+    /// Whether neither the list nor any below it can have a spatial split.
     [[nodiscard]] bool is_object_only(const SbvhList& list) const;
 
 private:

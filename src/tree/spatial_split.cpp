@@ -106,33 +106,36 @@ Float4 load_point(const Vec3& p) {
     return Float4::load(xyz.data());
 }
 
+/// Corners of a triangle in ascending order on one axis, by which of them are below others: bit 0
+/// the second below the first, bit 1 the third below the second, bit 2 the third below the first.
+constexpr std::array<std::array<std::uint8_t, 3>, 8> ascending{
+    {{0, 1, 2}, {1, 0, 2}, {0, 2, 1}, {2, 1, 0}, {0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
+
 /// A triangle with its corners in the order of one axis, cut across it. In float, without care for
-/// rounding: it is only asked what a plane would cost.
+/// rounding: it is only asked what a plane would cost. No branches: nobody can guess the order.
 class SlicedTriangle {
 public:
-    SlicedTriangle(const std::array<Float4, 3>& corners, const std::array<Vec3, 3>& exact,
-                   std::size_t axis) {
-        std::array<std::size_t, 3> order{0, 1, 2};
-        const auto x = [&](std::size_t k) { return coordinate(exact[order[k]], axis); };
-        if (x(1) < x(0)) std::swap(order[0], order[1]);
-        if (x(2) < x(1)) std::swap(order[1], order[2]);
-        if (x(1) < x(0)) std::swap(order[0], order[1]);
-        middle_x_ = x(1);
+    SlicedTriangle(const std::array<Float4, 3>& corners, float x0, float x1, float x2) {
+        const std::array<float, 3> x{x0, x1, x2};
+        const auto code = static_cast<std::size_t>(x1 < x0) |
+                          static_cast<std::size_t>(x2 < x1) << 1 |
+                          static_cast<std::size_t>(x2 < x0) << 2;
+        const auto& order = ascending[code];
+        const Float4 low = corners[order[0]], high = corners[order[2]];
         middle_ = corners[order[1]];
-        long_ = Edge(corners[order[0]], corners[order[2]], x(0), x(2));
-        low_ = Edge(corners[order[0]], middle_, x(0), middle_x_);
-        high_ = Edge(middle_, corners[order[2]], middle_x_, x(2));
+        middle_x_ = x[order[1]];
+        long_ = Edge(low, high, x[order[0]], x[order[2]]);
+        short_[0] = Edge(low, middle_, x[order[0]], middle_x_);
+        short_[1] = Edge(middle_, high, middle_x_, x[order[2]]);
     }
 
     /// Where the plane meets the triangle, as a box. x lies between the first and last corner.
     [[nodiscard]] LowCorners section(float x) const {
-        const Float4 a = long_.at(x), b = x < middle_x_ ? low_.at(x) : high_.at(x);
+        const Float4 a = long_.at(x), b = short_[x < middle_x_ ? 0 : 1].at(x);
         return {min_of(a, b), Float4::all(0) - max_of(a, b)};
     }
-    /// Adds the middle corner if it lies in [begin, end].
-    void add_middle(float begin, float end, LowCorners& box) const {
-        if (middle_x_ >= begin && middle_x_ <= end) box.add({middle_, Float4::all(0) - middle_});
-    }
+    [[nodiscard]] float middle_x() const { return middle_x_; }
+    [[nodiscard]] LowCorners middle() const { return {middle_, Float4::all(0) - middle_}; }
 
 private:
     struct Edge {
@@ -149,7 +152,8 @@ private:
 
     float middle_x_;
     Float4 middle_;
-    Edge long_, low_, high_;
+    Edge long_;
+    std::array<Edge, 2> short_;
 };
 
 class SpatialBins {
@@ -217,27 +221,33 @@ private:
         box.minus_hi.store(minus_hi.data());
         for (std::size_t axis = 0; axis < 3; ++axis)
             if (from[axis] != to[axis])
-                slice({corners, exact, axis}, box, axis, lo[axis], -minus_hi[axis],
-                      static_cast<std::uint32_t>(from[axis]), static_cast<std::uint32_t>(to[axis]));
+                slice({corners, coordinate(exact[0], axis), coordinate(exact[1], axis),
+                       coordinate(exact[2], axis)},
+                      box, axis, lo[axis], -minus_hi[axis], static_cast<std::uint32_t>(from[axis]),
+                      static_cast<std::uint32_t>(to[axis]));
     }
     /// Adds what each bin of [first, last] holds of a reference that reaches from lo to hi.
     void slice(const SlicedTriangle& triangle, const LowCorners& box, std::size_t axis, float lo,
                float hi, std::uint32_t first, std::uint32_t last) {
         const Float4 most = Float4::all(0) - box.minus_hi, minus_least = Float4::all(0) - box.lo;
-        float begin = lo;
-        LowCorners before = triangle.section(begin);
-        for (std::uint32_t b = first; b <= last; ++b) {
-            const float end = b == last ? hi : std::clamp(grid_.plane(axis, b + 1), begin, hi);
-            const LowCorners behind = triangle.section(end);
-            LowCorners part = before;
-            part.add(behind);
-            triangle.add_middle(begin, end, part);
-            part.lo = min_of(max_of(part.lo, box.lo), most);
-            part.minus_hi = min_of(max_of(part.minus_hi, box.minus_hi), minus_least);
-            rows_[b].corners[axis].add(part);
+        const auto inside = [&](const LowCorners& part) -> LowCorners {
+            return {min_of(max_of(part.lo, box.lo), most),
+                    min_of(max_of(part.minus_hi, box.minus_hi), minus_least)};
+        };
+        LowCorners before = inside(triangle.section(lo));
+        for (std::uint32_t b = first; b < last; ++b) {
+            const float plane = max_of(min_of(grid_.plane(axis, b + 1), hi), lo);
+            const LowCorners behind = inside(triangle.section(plane));
+            before.add(behind);
+            rows_[b].corners[axis].add(before);
             before = behind;
-            begin = end;
         }
+        before.add(inside(triangle.section(hi)));
+        rows_[last].corners[axis].add(before);
+        const float x = triangle.middle_x();
+        if (x < lo || x > hi) return;
+        const auto bin = static_cast<std::uint32_t>((x - grid_.origin[axis]) * grid_.inverse[axis]);
+        rows_[std::min(std::max(bin, first), last)].corners[axis].add(inside(triangle.middle()));
     }
 
     [[nodiscard]] SpatialSplit split_at(std::uint32_t axis, std::uint32_t b, float cost,

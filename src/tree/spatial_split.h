@@ -19,7 +19,10 @@ inline constexpr std::uint32_t max_spatial_bins = 128;
 /// Most nodes are small: few references need few planes.
 [[nodiscard]] constexpr std::uint32_t spatial_bin_count(std::size_t references,
                                                         std::uint32_t most) {
-    const std::uint32_t bins = references < 1024 ? 16 : references < 16384 ? 32 : max_spatial_bins;
+    const std::uint32_t bins = references < 64      ? 8
+                               : references < 1024  ? 16
+                               : references < 16384 ? 32
+                                                    : max_spatial_bins;
     return bins < most ? bins : most;
 }
 
