@@ -6,7 +6,6 @@
 #include <raydix/bvh.h>
 
 #include <algorithm>
-#include <array>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -14,6 +13,7 @@
 
 #include "base/math.h"
 #include "tree/bvh_access.h"
+#include "tree/spatial_split.h"
 
 namespace raydix::bench {
 
@@ -140,33 +140,19 @@ private:
         return node;
     }
 
-    /// Boxes of the parts of a triangle on both sides of a plane, each inside the box it has: in
-    /// float and not rounded outward, so the trees may be a little too good, never too bad.
+    /// Boxes of the parts of a triangle on both sides of a plane, cut as our own builder does.
     static void split(const RTCBuildPrimitive* primitive, unsigned axis, float plane,
                       RTCBounds* left, RTCBounds* right, void* self) {
-        const MeshView& mesh = static_cast<const EmbreeTree*>(self)->mesh_;
-        const Triangle& t = mesh.triangles[primitive->primID];
-        std::array<Aabb, 2> sides{empty_box(), empty_box()};
-        const auto add = [](Aabb& box, Vec3 p) { box = unite(box, {p, p}); };
-        for (std::size_t k = 0; k < 3; ++k) {
-            const Vec3 a = mesh.vertices[t[k]], b = mesh.vertices[t[k < 2 ? k + 1 : 0]];
-            const float from = (&a.x)[axis], to = (&b.x)[axis];
-            if (from <= plane) add(sides[0], a);
-            if (from >= plane) add(sides[1], a);
-            if ((from < plane && to > plane) || (from > plane && to < plane)) {
-                Vec3 p = a + (b - a) * ((plane - from) / (to - from));
-                (&p.x)[axis] = plane;
-                for (Aabb& side : sides) add(side, p);
-            }
-        }
         const Aabb whole{{primitive->lower_x, primitive->lower_y, primitive->lower_z},
                          {primitive->upper_x, primitive->upper_y, primitive->upper_z}};
-        const auto store = [&](const Aabb& side, RTCBounds* out) {
-            const Vec3 lo = max_of(side.lo, whole.lo), hi = min_of(side.hi, whole.hi);
-            *out = {lo.x, lo.y, lo.z, 0, hi.x, hi.y, hi.z, 0};
+        const ReferenceCutter cutter(static_cast<const EmbreeTree*>(self)->mesh_);
+        const CutReference parts =
+            cutter.cut(SplitBox::of(whole, primitive->primID, 1), axis, plane);
+        const auto store = [](const Aabb& b, RTCBounds* out) {
+            *out = {b.lo.x, b.lo.y, b.lo.z, 0, b.hi.x, b.hi.y, b.hi.z, 0};
         };
-        store(sides[0], left);
-        store(sides[1], right);
+        store(parts.left, left);
+        store(parts.right, right);
     }
 
     [[nodiscard]] Bvh assemble(const MeshView& mesh, const std::vector<BvhNode>& nodes,
