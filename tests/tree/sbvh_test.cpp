@@ -166,6 +166,18 @@ TEST(SbvhBudget, IsKept) {
     }
 }
 
+TEST(Sbvh, TakesALeafThatCostsAsMuchAsItsSubtree) {
+    Mesh mesh;  // on a line: nothing has a surface, so nothing costs anything
+    for (std::uint32_t i = 0; i < 4; ++i) {
+        const auto x = static_cast<float>(i);
+        for (const float step : {0.0f, 0.5f, 0.7f}) mesh.vertices.push_back({x + step, 0, 0});
+        mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    const PlainTree tree = build(mesh, split_width(), {});
+    EXPECT_EQ(tree.order, (std::vector<std::uint32_t>{0, 1, 2, 3}));
+    EXPECT_EQ(tree.nodes[0].count, 4u);
+}
+
 TEST(Sbvh, LargeNodesGiveTheSameTreeOnEachNumberOfThreads) {
     const Mesh mesh = random_soup(2 * parallel_boxes + 999, seed, 0.02f);
     BuildOptions options;
