@@ -5,6 +5,8 @@
 //   1; filling
 //                  its array of boxes is not in its time
 //   embree_scene   commit of a MEDIUM scene whose vertices all moved
+// and with --high also embree_tree_high and embree_scene_high: the same with quality HIGH, which
+// splits triangles. Ratios of sbvh are then to these, of time and of SAH.
 // raydix's times run from vertices and indices to a tree that can be traced. SAH is computed by
 // tree_stats for all trees; rays go through all trees by raydix's scalar kernel. JSON lines on
 // standard output, a table on standard error.
@@ -31,7 +33,7 @@ struct Options {
     std::vector<std::string> builders = {"ploc"};
     int threads = 2, rounds = 5, max_leaf = 4, samples = 4;
     std::uint32_t width = 640, height = 480;
-    bool trace = true;
+    bool trace = true, high = false;
 };
 
 double median(std::vector<double> v) {
@@ -103,7 +105,7 @@ void trace_all(std::map<std::string, Peer>& peers, const RayBatch& rays, const O
 void print_table(const Json& result) {
     fmt::print(stderr, "{} ({} triangles, {} threads)\n", result["scene"].get<std::string>(),
                result["triangles"].get<std::size_t>(), result["threads"].get<int>());
-    fmt::print(stderr, "{:<14}{:>10}{:>10}{:>10}{:>10}{:>12}{:>12}{:>8}\n", "tree", "ms", "min",
+    fmt::print(stderr, "{:<18}{:>10}{:>10}{:>10}{:>10}{:>12}{:>12}{:>8}\n", "tree", "ms", "min",
                "max", "SAH", "primary", "diffuse", "depth");
     for (const auto& entry : result["peers"].items()) {
         const Json& p = entry.value();
@@ -111,7 +113,7 @@ void print_table(const Json& result) {
         const auto rate = [&](const char* key) {
             return p.contains(key) ? number(p[key]["median"]) : 0.0;
         };
-        fmt::print(stderr, "{:<14}{:>10.1f}{:>10.1f}{:>10.1f}{:>10.3f}{:>12.3f}{:>12.3f}{:>8}\n",
+        fmt::print(stderr, "{:<18}{:>10.1f}{:>10.1f}{:>10.1f}{:>10.3f}{:>12.3f}{:>12.3f}{:>8}\n",
                    entry.key(), number(p["build_ms"]["median"]), number(p["build_ms"]["min"]),
                    number(p["build_ms"]["max"]), p.contains("sah") ? number(p["sah"]) : 0.0,
                    rate("primary_mrays_per_s"), rate("diffuse_mrays_per_s"),
@@ -129,7 +131,14 @@ Json run(const std::string& scene_name, const Options& options) {
     std::map<std::string, raydix::BvhBuilder> builders;
     raydix::bench::EmbreeTree tree(scene.mesh, options.threads, options.max_leaf);
     raydix::bench::EmbreeScene embree(scene.mesh, {options.threads, RTC_BUILD_QUALITY_MEDIUM});
-    Times scene_ms;
+    std::optional<raydix::bench::EmbreeTree> high_tree;
+    std::optional<raydix::bench::EmbreeScene> high_scene;
+    if (options.high) {
+        high_tree.emplace(scene.mesh, options.threads, options.max_leaf, RTC_BUILD_QUALITY_HIGH);
+        high_scene.emplace(scene.mesh,
+                           raydix::bench::EmbreeOptions{options.threads, RTC_BUILD_QUALITY_HIGH});
+    }
+    Times scene_ms, high_scene_ms;
     for (int round = -1; round < options.rounds; ++round) {  // the first one warms up
         Stopwatch watch;
         const auto note = [&](Times& times) {
@@ -153,7 +162,17 @@ Json run(const std::string& scene_name, const Options& options) {
         watch.lap();
         embree.commit();
         note(scene_ms);
+        if (!options.high) continue;
+        high_tree->refill();
+        watch.lap();
+        high_tree->build();
+        note(peers["embree_tree_high"].build_ms);
+        high_scene->touch();
+        watch.lap();
+        high_scene->commit();
+        note(high_scene_ms);
     }
+    if (options.high) peers["embree_tree_high"].bvh = high_tree->as_bvh(scene.mesh);
     peers["embree_tree"].bvh = tree.as_bvh(scene.mesh);
     if (options.trace && !scene.cameras.cameras.empty())
         trace_all(peers, make_rays(scene, peers["embree_tree"].bvh, options), options);
@@ -175,6 +194,7 @@ Json run(const std::string& scene_name, const Options& options) {
         p = {{"build_ms", peer.build_ms.json()},
              {"sah", stats.sah ? Json(*stats.sah) : Json()},
              {"nodes", stats.nodes},
+             {"references", stats.references},
              {"max_depth", stats.max_depth}};
         if (!peer.primary_mrays.values.empty()) {
             p["primary_mrays_per_s"] = peer.primary_mrays.json();
@@ -182,12 +202,15 @@ Json run(const std::string& scene_name, const Options& options) {
         }
     }
     result["peers"]["embree_scene"] = {{"build_ms", scene_ms.json()}};
-    const double embree_ms =
-        std::min(median(scene_ms.values), median(peers["embree_tree"].build_ms.values));
-    for (const std::string& name : options.builders)
-        result["ratios"][name] = {
-            {"time", median(peers[name].build_ms.values) / embree_ms},
-            {"sah", peers[name].sah.value_or(0) / peers["embree_tree"].sah.value_or(1)}};
+    if (options.high) result["peers"]["embree_scene_high"] = {{"build_ms", high_scene_ms.json()}};
+    for (const std::string& name : options.builders) {
+        const bool high = options.high && name == "sbvh";
+        const Peer& peer = peers[high ? "embree_tree_high" : "embree_tree"];
+        const double embree_ms = std::min(median((high ? high_scene_ms : scene_ms).values),
+                                          median(peer.build_ms.values));
+        result["ratios"][name] = {{"time", median(peers[name].build_ms.values) / embree_ms},
+                                  {"sah", peers[name].sah.value_or(0) / peer.sah.value_or(1)}};
+    }
     return result;
 }
 
@@ -209,6 +232,7 @@ int main(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--width", options.width, "Pixels per row")->capture_default_str();
     app.add_option("--height", options.height, "Rows of pixels")->capture_default_str();
+    app.add_flag("--high", options.high, "Embree's trees of quality HIGH too, for sbvh");
     app.add_flag("!--no-trace", options.trace, "Trace no rays");
     CLI11_PARSE(app, argc, argv);
     try {

@@ -13,13 +13,17 @@
 #include "base/math.h"
 #include "embree_api.h"
 #include "tree/bvh_access.h"
+#include "tree/spatial_split.h"
 
 namespace raydix::bench {
 
 class EmbreeTree {
 public:
-    EmbreeTree(const MeshView& mesh, int threads, int max_leaf)
-        : max_leaf_(max_leaf),
+    EmbreeTree(const MeshView& mesh, int threads, int max_leaf,
+               RTCBuildQuality quality = RTC_BUILD_QUALITY_MEDIUM)
+        : mesh_(mesh),
+          max_leaf_(max_leaf),
+          quality_(quality),
           device_(rtcNewDevice(("threads=" + std::to_string(threads)).c_str())),
           bvh_(rtcNewBVH(device_)) {
         for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
@@ -28,7 +32,8 @@ public:
             primitives_.push_back(
                 {b.lo.x, b.lo.y, b.lo.z, 0, b.hi.x, b.hi.y, b.hi.z, static_cast<unsigned>(i)});
         }
-        work_.resize(primitives_.size());
+        work_.resize(quality == RTC_BUILD_QUALITY_HIGH ? 2 * primitives_.size()
+                                                       : primitives_.size());
     }
     ~EmbreeTree() {
         rtcReleaseBVH(bvh_);
@@ -40,10 +45,10 @@ public:
     /// The builder reorders its input: to be called before each build, outside of the time.
     void refill() { std::copy(primitives_.begin(), primitives_.end(), work_.begin()); }
 
-    /// Quality MEDIUM: binned SAH. Costs 1 and 1, two children a node.
+    /// Quality MEDIUM: binned SAH; HIGH: with spatial splits. Costs 1 and 1, two children a node.
     void build() {
         RTCBuildArguments a = rtcDefaultBuildArguments();
-        a.buildQuality = RTC_BUILD_QUALITY_MEDIUM;
+        a.buildQuality = quality_;
         a.maxBranchingFactor = 2;
         a.maxDepth = 64;
         a.sahBlockSize = 1;
@@ -53,7 +58,10 @@ public:
         a.intersectionCost = 1.0f;
         a.bvh = bvh_;
         a.primitives = work_.data();
-        a.primitiveCount = a.primitiveArrayCapacity = work_.size();
+        a.primitiveCount = primitives_.size();
+        a.primitiveArrayCapacity = work_.size();
+        a.splitPrimitive = split;
+        a.userPtr = this;
         a.createNode = create_inner;
         a.setNodeChildren = set_children;
         a.setNodeBounds = set_bounds;
@@ -132,6 +140,21 @@ private:
         return node;
     }
 
+    /// Boxes of the parts of a triangle on both sides of a plane, cut as our own builder does.
+    static void split(const RTCBuildPrimitive* primitive, unsigned axis, float plane,
+                      RTCBounds* left, RTCBounds* right, void* self) {
+        const Aabb whole{{primitive->lower_x, primitive->lower_y, primitive->lower_z},
+                         {primitive->upper_x, primitive->upper_y, primitive->upper_z}};
+        const ReferenceCutter cutter(static_cast<const EmbreeTree*>(self)->mesh_);
+        const CutReference parts =
+            cutter.cut(SplitBox::of(whole, primitive->primID, 1), axis, plane);
+        const auto store = [](const Aabb& b, RTCBounds* out) {
+            *out = {b.lo.x, b.lo.y, b.lo.z, 0, b.hi.x, b.hi.y, b.hi.z, 0};
+        };
+        store(parts.left, left);
+        store(parts.right, right);
+    }
+
     [[nodiscard]] Bvh assemble(const MeshView& mesh, const std::vector<BvhNode>& nodes,
                                const std::vector<std::uint32_t>& order, std::uint32_t depth) const {
         Bvh bvh;
@@ -147,15 +170,19 @@ private:
                                      without_negative_zero(mesh.vertices[t[1]]),
                                      without_negative_zero(mesh.vertices[t[2]])};
         }
-        access.options().builder = Builder::ploc;  // no radix tree
+        // No radix tree; primitives may be in several leaves.
+        access.options().builder =
+            quality_ == RTC_BUILD_QUALITY_HIGH ? Builder::sbvh : Builder::ploc;
         access.options().max_leaf = max_leaf_;
         access.inner_count() = static_cast<std::uint32_t>(nodes.size() / 2 - 1);
         access.max_depth() = depth;
-        access.input_count() = order.size();
+        access.input_count() = mesh.triangles.size();
         return bvh;
     }
 
+    MeshView mesh_;
     int max_leaf_;
+    RTCBuildQuality quality_;
     RTCDevice device_;
     RTCBVH bvh_;
     std::vector<RTCBuildPrimitive> primitives_, work_;

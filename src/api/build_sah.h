@@ -15,6 +15,7 @@
 #include "tree/bvh_access.h"
 #include "tree/early_splits.h"
 #include "tree/sah_build.h"
+#include "tree/sbvh_build.h"
 
 namespace raydix {
 
@@ -24,22 +25,30 @@ namespace raydix {
 
 struct SweepScratch {
     SahScratch sah;
+    SbvhScratch sbvh;
     Buffer<SahReference> spare;
     Buffer<std::uint32_t> keys;
     SortScratch<std::uint32_t> sort;
 
     [[nodiscard]] std::size_t capacity_bytes() const {
-        return sah.capacity_bytes() + spare.capacity_bytes() + keys.capacity_bytes() +
-               sort.records.capacity_bytes() + sort.spare.capacity_bytes() +
+        return sah.capacity_bytes() + sbvh.capacity_bytes() + spare.capacity_bytes() +
+               keys.capacity_bytes() + sort.records.capacity_bytes() + sort.spare.capacity_bytes() +
                sort.histogram.capacity_bytes();
     }
 };
 
+inline void set_reference(SahReference& reference, const Aabb& box, std::uint32_t id) {
+    reference = make_reference(box, id);
+}
+inline void set_reference(SplitBox& reference, const Aabb& box, std::uint32_t id) {
+    reference = SplitBox::of(box, id, 1);
+}
+
 /// One reference for each primitive that is not left out, ascending by id.
 /// `references` gets room for `spare` more.
-template <class Source>
+template <class Source, class Reference>
 void make_references(const Source& source, std::uint32_t n, std::uint32_t valid,
-                     std::uint32_t spare, Buffer<SahReference>& references) {
+                     std::uint32_t spare, Buffer<Reference>& references) {
     constexpr std::size_t block = 4096;
     std::vector<std::uint32_t> before((n + block - 1) / block);
     if (valid != n) {
@@ -55,11 +64,11 @@ void make_references(const Source& source, std::uint32_t n, std::uint32_t valid,
     }
     references.reset(std::size_t{valid} + spare);
     for_each_block(n, block, [&](std::size_t b, std::size_t begin, std::size_t end) {
-        SahReference* out = references.data() + before[b];
+        Reference* out = references.data() + before[b];
         Box3 box;
         for (std::size_t i = begin; i < end; ++i)
             if (const auto id = static_cast<std::uint32_t>(i); host_box(source, id, box))
-                *out++ = make_reference(box.box(), id);
+                set_reference(*out++, box.box(), id);
     });
 }
 
@@ -83,12 +92,6 @@ inline void sort_references(std::uint32_t n, SweepScratch& scratch) {
     }
 }
 
-/// References that spatial splits may add: with them at most twice as many as primitives, and fewer
-/// than 2^31.
-[[nodiscard]] constexpr std::uint32_t spatial_spare(std::uint32_t valid) {
-    return std::min(valid, 0x7fffffffu - valid);
-}
-
 inline void sort_and_build(const SahInput& input, SweepScratch& scratch, const BvhAccess& tree,
                            BuildMs& ms, Stopwatch& stage) {
     ms.codes = stage.lap();
@@ -106,20 +109,27 @@ void build_by_sweeps(const Source& source, std::uint32_t n, std::uint32_t valid,
                      BuildMs& ms) {
     Stopwatch stage;
     const Builder builder = tree.options().builder;
-    SahInput input{valid, static_cast<std::uint32_t>(tree.options().max_leaf)};
+    const auto max_leaf = static_cast<std::uint32_t>(tree.options().max_leaf);
+    SahInput input{valid, max_leaf};
     if constexpr (std::is_same_v<Source, TriangleSource>) {
         const MeshView mesh{{source.vertices, source.vertex_count}, {source.triangles, n}};
-        const ReferenceCutter cutter(mesh);
         if (builder == Builder::sbvh) {
-            input.spare = spatial_spare(valid);
-            input.cutter = &cutter;
+            const ReferenceCutter cutter(mesh);
+            const SbvhInput cut_input{cutter, valid, max_leaf};
+            make_references(source, n, valid, spatial_spare(valid, cut_input.options),
+                            scratch.sbvh.references);
+            ms.codes = stage.lap();
+            tree.inner_count() =
+                build_sbvh(cut_input, scratch.sbvh, tree.nodes(), tree.order(), tree.max_depth());
+            ms.hierarchy = stage.lap();
+        } else {
+            make_references(source, n, valid, 0, scratch.sah.references);
+            if (builder == Builder::split) {
+                split_early(mesh, scene, {}, scratch.sah.references, scratch.spare);
+                input.references = static_cast<std::uint32_t>(scratch.sah.references.size());
+            }
+            sort_and_build(input, scratch, tree, ms, stage);
         }
-        make_references(source, n, valid, input.spare, scratch.sah.references);
-        if (builder == Builder::split) {
-            split_early(mesh, scene, {}, scratch.sah.references, scratch.spare);
-            input.references = static_cast<std::uint32_t>(scratch.sah.references.size());
-        }
-        sort_and_build(input, scratch, tree, ms, stage);
     } else {
         make_references(source, n, valid, 0, scratch.sah.references);
         sort_and_build(input, scratch, tree, ms, stage);

@@ -61,7 +61,7 @@ public:
             const BinGrid grid(list);
             const bool wide = width_ >= 8;
             if (const auto split = find_split(list, grid, wide)) {
-                divide_boxes(list, grid, *split, spare, wide);
+                divide_boxes(list, grid, *split, spare, split->left_boxes, wide);
                 std::swap(from, spare);
                 left = split->left_boxes;
             }
@@ -217,7 +217,7 @@ private:
         const auto split = at.depth < deepest_split ? find_split(list, grid, wide) : std::nullopt;
         if (split) {
             at.in_spare = !at.in_spare;
-            divide_boxes(list, grid, *split, list_of(at), wide);
+            divide_boxes(list, grid, *split, list_of(at), split->left_boxes, wide);
             at.left_runs = split->left_boxes;
             at.left_primitives = split->left_primitives;
         } else {

@@ -10,7 +10,7 @@
 #include <cstdint>
 
 #include "tree/sah_reference.h"
-#include "tree/spatial_split.h"
+#include "tree/sah_top.h"
 
 namespace raydix {
 
@@ -20,8 +20,7 @@ struct SahScratch {
     std::array<Buffer<std::uint32_t>, 3> orders, spare_orders;
     Buffer<std::uint8_t> sides;
     Buffer<std::uint32_t> local;  // place of a reference in its task
-    Buffer<std::uint32_t> order;
-    Buffer<BvhNode> nodes;
+    SubtreeStore subtrees;
 
     [[nodiscard]] std::size_t capacity_bytes() const;
 };
@@ -29,13 +28,11 @@ struct SahScratch {
 struct SahInput {
     std::uint32_t references;  // n >= 1
     std::uint32_t max_leaf;
-    std::uint32_t spare = 0;                  // references that spatial splits may add
-    const ReferenceCutter* cutter = nullptr;  // of spatial splits; null: none
 };
 
-/// scratch.references [n + spare], of which n are there, and scratch.orders [n + spare]: the places
-/// of those n, ascending by centroid. Fills nodes [2 * inner + 2] and order, ids within a leaf
-/// ascending and each at most once. Returns the number of inner nodes.
+/// scratch.references [n] and scratch.orders [n]: their places, ascending by centroid. Fills nodes
+/// [2 * inner + 2] and order, ids within a leaf ascending and each at most once. Returns the number
+/// of inner nodes.
 std::uint32_t build_sah(const SahInput& input, SahScratch& scratch, Buffer<BvhNode>& nodes,
                         Buffer<std::uint32_t>& order, std::uint32_t& max_depth);
 

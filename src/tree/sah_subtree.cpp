@@ -4,40 +4,22 @@
 
 namespace raydix {
 
-bool choose_spatial_split(const SpatialRules& rules, const SahReference* references,
-                          std::span<const std::uint32_t> order, const SweepSplit& object,
-                          std::uint32_t spare, SpatialSides& sides) {
-    if (rules.cutter == nullptr || spare == 0) return false;
-    GrowingBox lower, upper;
-    for (std::size_t k = 0; k < order.size(); ++k)
-        (k < object.left ? lower : upper).add(references[order[k]]);
-    const Aabb a = lower.box(), b = upper.box();
-    const Aabb shared{max_of(a.lo, b.lo), min_of(a.hi, b.hi)};
-    if (is_empty(shared) || !(sah_area(shared) > rules.least_overlap)) return false;
-    const SpatialSplit split = find_spatial_split(*rules.cutter, references, order, unite(a, b));
-    if (!(split.cost < object.cost)) return false;
-    choose_sides(*rules.cutter, references, order, split, sides);
-    return sides.left_count != 0 && sides.right_count != 0 && sides.cut.size() <= spare;
-}
-
-SubtreeSum SubtreeBuild::run(const SweepLists& lists, std::uint32_t spare, std::uint32_t depth,
-                             std::uint32_t* local, const SubtreeOut& out, BvhNode& root) {
-    copy_in(lists, spare, local);
+SubtreeSum SubtreeBuild::run(const SweepLists& lists, std::uint32_t depth, std::uint32_t* local,
+                             const SubtreeOut& out, BvhNode& root) {
+    copy_in(lists, local);
     out_ = out;
     pairs_ = listed_ = 0;
-    const Below below = build({0, lists.n, depth, spare}, root);
+    const Below below = build({0, lists.n, depth}, root);
     return {pairs_, listed_, below.height, below.cost};
 }
 
-void SubtreeBuild::copy_in(const SweepLists& lists, std::uint32_t spare, std::uint32_t* local) {
+void SubtreeBuild::copy_in(const SweepLists& lists, std::uint32_t* local) {
     const std::uint32_t n = lists.n;
-    const std::size_t room = std::size_t{n} + spare;
-    places_ = n;
-    references_.resize(room);
-    spare_.resize(room);
-    areas_.resize(room);
-    sides_.resize(room);
-    for (auto& order : orders_) order.resize(room);
+    references_.resize(n);
+    spare_.resize(n);
+    areas_.resize(n);
+    sides_.resize(n);
+    for (auto& order : orders_) order.resize(n);
     for (std::uint32_t k = 0; k < n; ++k) {
         const std::uint32_t place = lists.orders[0][k];
         references_[k] = lists.references[place];
@@ -88,20 +70,8 @@ SubtreeBuild::Children SubtreeBuild::divide(const Range& range) {
         for (std::uint32_t axis = 0; axis < 3; ++axis)
             lists.orders[axis] = order_of(range, axis).data();
         split = find_sweep_split(lists, areas_.data());
-        if (choose_spatial_split(rules_, references_.data(), order_of(range, split.axis), split,
-                                 range.spare, spatial_))
-            return divide_by_plane(range, split.axis);
     }
     return divide_by_order(range, split);
-}
-
-SubtreeBuild::Children SubtreeBuild::children_of(const Range& range, std::uint32_t left,
-                                                 std::uint32_t right) {
-    const std::uint32_t spare = range.spare - (left + right - range.count());
-    const std::uint32_t spare_left = share_of(spare, left, left + right);
-    const std::uint32_t middle = range.begin + right, depth = range.depth + 1;
-    return {{middle, middle + left, depth, spare_left},
-            {range.begin, middle, depth, spare - spare_left}};
 }
 
 bool SubtreeBuild::mark_left(const Range& range, const SweepSplit& split) {
@@ -134,28 +104,8 @@ SubtreeBuild::Children SubtreeBuild::divide_by_order(const Range& range, const S
         std::copy(spare, spare + left, order + right);
     }
     const std::uint32_t left = upper_is_left ? range.count() - split.left : split.left;
-    return children_of(range, left, range.count() - left);
-}
-
-SubtreeBuild::Children SubtreeBuild::divide_by_plane(const Range& range,
-                                                     std::uint32_t axis_of_sides) {
-    side_lists_.cut(references_.data(), order_of(range, axis_of_sides), spatial_, places_,
-                    sides_.data());
-    places_ += static_cast<std::uint32_t>(spatial_.cut.size());
-    SpatialSides::Side left = SpatialSides::left, right = SpatialSides::right;
-    std::uint32_t left_count = spatial_.left_count, right_count = spatial_.right_count;
-    if (side_lists_.right_is_least()) {
-        std::swap(left, right);
-        std::swap(left_count, right_count);
-    }
-    for (std::uint32_t axis = 0; axis < 3; ++axis) {
-        std::uint32_t* out = spare_.data();
-        for (const SpatialSides::Side side : {right, left})
-            out = side_lists_.list(references_.data(), order_of(range, axis), sides_.data(), side,
-                                   axis, out);
-        std::copy(spare_.data(), out, orders_[axis].data() + range.begin);
-    }
-    return children_of(range, left_count, right_count);
+    const std::uint32_t middle = range.end - left, depth = range.depth + 1;
+    return {{middle, range.end, depth}, {range.begin, middle, depth}};
 }
 
 std::uint32_t SubtreeBuild::distinct_ids(std::uint32_t begin, std::uint32_t* ids) const {

@@ -1,12 +1,15 @@
 #include "tree/spatial_split.h"
 
 #include <algorithm>
-#include <array>
 
+#include "exec/parallel.h"
 #include "tree/outward_box.h"
 
 namespace raydix {
 namespace {
+
+/// Shorter extents are not divided: the scale would overflow.
+constexpr float least_extent = 1e-30f;
 
 struct DoubleBox {
     Polygon::Point lo{infinity, infinity, infinity}, hi{-infinity, -infinity, -infinity};
@@ -25,35 +28,77 @@ struct DoubleBox {
     }
 };
 
-float& coordinate(Vec3& p, std::uint32_t axis) { return (&p.x)[axis]; }
-float coordinate(const Vec3& p, std::uint32_t axis) { return (&p.x)[axis]; }
+float& coordinate(Vec3& p, std::size_t axis) { return (&p.x)[axis]; }
+float coordinate(const Vec3& p, std::size_t axis) { return (&p.x)[axis]; }
 
-struct Bin {
-    GrowingBox box;
-    std::uint32_t begins = 0, ends = 0;
+float half_surface(const Aabb& box) {
+    const Vec3 d = box.hi - box.lo;
+    return (d.x * d.y + d.y * d.z) + d.z * d.x;
+}
+
+/// The union of boxes as (lo, -hi): the lesser of both, lane by lane.
+struct LowCorners {
+    Float4 lo = Float4::all(infinity), minus_hi = Float4::all(infinity);
+
+    void add(const LowCorners& other) {
+        lo = min_of(lo, other.lo);
+        minus_hi = min_of(minus_hi, other.minus_hi);
+    }
+    [[nodiscard]] Aabb box() const {
+        std::array<float, 4> l, h;
+        lo.store(l.data());
+        minus_hi.store(h.data());
+        return {{l[0], l[1], l[2]}, {-h[0], -h[1], -h[2]}};
+    }
 };
-using Bins = std::array<Bin, spatial_bins>;
 
-/// The planes of one axis: plane b lies between bins b - 1 and b.
-class BinAxis {
-public:
-    BinAxis(const Aabb& box, std::uint32_t axis)
-        : origin_(coordinate(box.lo, axis)),
-          width_((coordinate(box.hi, axis) - origin_) / static_cast<float>(spatial_bins)),
-          inverse_(1 / width_) {}
+/// Half the surfaces of three boxes, NaN of empty ones.
+Float4 areas(const std::array<LowCorners, 3>& boxes) {
+    Float4 x = boxes[0].lo + boxes[0].minus_hi, y = boxes[1].lo + boxes[1].minus_hi,
+           z = boxes[2].lo + boxes[2].minus_hi, none = Float4::all(0);
+    transpose(x, y, z, none);
+    return (x * y + y * z) + z * x;
+}
 
-    [[nodiscard]] bool usable() const { return width_ > 0 && inverse_ < infinity; }
-    [[nodiscard]] float plane(std::uint32_t b) const {
-        return origin_ + width_ * static_cast<float>(b) + 0.0f;
+/// What the bins with one number hold on the three axes.
+struct SpatialRow {
+    std::array<LowCorners, 3> corners;
+    std::array<std::uint32_t, 4> begins{}, ends{};
+
+    void add(const SpatialRow& other) {
+        for (std::size_t axis = 0; axis < 3; ++axis) corners[axis].add(other.corners[axis]);
+        add_counts(other);
     }
-    [[nodiscard]] std::uint32_t bin(float x) const {
-        const float at = (x - origin_) * inverse_;
-        return at < static_cast<float>(spatial_bins) ? static_cast<std::uint32_t>(at)
-                                                     : spatial_bins - 1;
+    void add_counts(const SpatialRow& other) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            begins[axis] += other.begins[axis];
+            ends[axis] += other.ends[axis];
+        }
     }
+};
 
-private:
-    float origin_, width_, inverse_;
+/// Plane b of an axis lies between its bins b - 1 and b.
+struct SpatialGrid {
+    std::array<float, 4> origin{}, width{}, inverse{};
+    std::uint32_t bins;
+
+    SpatialGrid(const Aabb& box, std::uint32_t bin_count) : bins(bin_count) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            origin[axis] = coordinate(box.lo, axis);
+            const float extent = coordinate(box.hi, axis) - origin[axis];
+            if (!(extent >= least_extent)) continue;
+            width[axis] = extent / static_cast<float>(bins);
+            inverse[axis] = static_cast<float>(bins) / extent;
+        }
+    }
+    [[nodiscard]] float plane(std::size_t axis, std::uint32_t b) const {
+        return origin[axis] + width[axis] * static_cast<float>(b) + 0.0f;
+    }
+    /// Of a point inside the box.
+    void bins_of(Float4 p, std::array<std::int32_t, 4>& bin) const {
+        const Float4 at = (p - Float4::load(origin.data())) * Float4::load(inverse.data());
+        min_of(at, Float4::all(static_cast<float>(bins - 1))).store_whole(bin.data());
+    }
 };
 
 Float4 load_point(const Vec3& p) {
@@ -61,111 +106,172 @@ Float4 load_point(const Vec3& p) {
     return Float4::load(xyz.data());
 }
 
+/// Corners of a triangle in ascending order on one axis, by which of them are below others: bit 0
+/// the second below the first, bit 1 the third below the second, bit 2 the third below the first.
+constexpr std::array<std::array<std::uint8_t, 3>, 8> ascending{
+    {{0, 1, 2}, {1, 0, 2}, {0, 2, 1}, {2, 1, 0}, {0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
+
 /// A triangle with its corners in the order of one axis, cut across it. In float, without care for
-/// rounding: it is only asked what a plane would cost.
+/// rounding: it is only asked what a plane would cost. No branches: nobody can guess the order.
 class SlicedTriangle {
 public:
-    SlicedTriangle(std::array<Vec3, 3> v, std::uint32_t axis) {
-        const auto order = [&](std::size_t i, std::size_t j) {
-            if (coordinate(v[j], axis) < coordinate(v[i], axis)) std::swap(v[i], v[j]);
-        };
-        order(0, 1);
-        order(1, 2);
-        order(0, 1);
-        for (std::size_t k = 0; k < 3; ++k) {
-            x_[k] = coordinate(v[k], axis);
-            v_[k] = load_point(v[k]);
-        }
+    SlicedTriangle(const std::array<Float4, 3>& corners, float x0, float x1, float x2) {
+        const std::array<float, 3> x{x0, x1, x2};
+        const auto code = static_cast<std::size_t>(x1 < x0) |
+                          static_cast<std::size_t>(x2 < x1) << 1 |
+                          static_cast<std::size_t>(x2 < x0) << 2;
+        const auto& order = ascending[code];
+        const Float4 low = corners[order[0]], high = corners[order[2]];
+        middle_ = corners[order[1]];
+        middle_x_ = x[order[1]];
+        long_ = Edge(low, high, x[order[0]], x[order[2]]);
+        short_[0] = Edge(low, middle_, x[order[0]], middle_x_);
+        short_[1] = Edge(middle_, high, middle_x_, x[order[2]]);
     }
 
     /// Where the plane meets the triangle, as a box. x lies between the first and last corner.
-    [[nodiscard]] GrowingBox section(float x) const {
-        const Float4 a = edge(0, 2, x), b = x < x_[1] ? edge(0, 1, x) : edge(1, 2, x);
-        GrowingBox box;
-        box.lo = min_of(a, b);
-        box.hi = max_of(a, b);
-        return box;
+    [[nodiscard]] LowCorners section(float x) const {
+        const Float4 a = long_.at(x), b = short_[x < middle_x_ ? 0 : 1].at(x);
+        return {min_of(a, b), Float4::all(0) - max_of(a, b)};
     }
-    /// Adds the middle corner if it lies in [begin, end].
-    void add_middle(float begin, float end, GrowingBox& box) const {
-        if (!(x_[1] >= begin && x_[1] <= end)) return;
-        box.lo = min_of(box.lo, v_[1]);
-        box.hi = max_of(box.hi, v_[1]);
+    [[nodiscard]] float middle_x() const { return middle_x_; }
+    [[nodiscard]] LowCorners middle() const { return {middle_, Float4::all(0) - middle_}; }
+
+private:
+    struct Edge {
+        Float4 from, step;
+        float x = 0, inverse = 0;
+
+        Edge() = default;
+        Edge(Float4 a, Float4 b, float begin, float end)
+            : from(a), step(b - a), x(begin), inverse(end > begin ? 1 / (end - begin) : 0) {}
+        [[nodiscard]] Float4 at(float plane) const {
+            return from + step * Float4::all((plane - x) * inverse);
+        }
+    };
+
+    float middle_x_;
+    Float4 middle_;
+    Edge long_;
+    std::array<Edge, 2> short_;
+};
+
+class SpatialBins {
+public:
+    explicit SpatialBins(const SpatialGrid& grid) : grid_(grid), rows_(grid.bins) {}
+
+    void take(const ReferenceCutter& cutter, std::span<const SplitBox> references) {
+        for (const SplitBox& reference : references) {
+            const LowCorners box{Float4::load(&reference.lo.x).xyz(),
+                                 Float4::load(&reference.minus_hi.x).xyz()};
+            std::array<std::int32_t, 4> from, to;
+            grid_.bins_of(box.lo, from);
+            grid_.bins_of(Float4::all(0) - box.minus_hi, to);
+            bool across = false;
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                SpatialRow& first = rows_[static_cast<std::size_t>(from[axis])];
+                ++first.begins[axis];
+                ++rows_[static_cast<std::size_t>(to[axis])].ends[axis];
+                if (from[axis] == to[axis])
+                    first.corners[axis].add(box);
+                else
+                    across = true;
+            }
+            if (across) slice(cutter.corners(reference), box, from, to);
+        }
+    }
+    void add(const SpatialBins& other) {
+        for (std::size_t b = 0; b < rows_.size(); ++b) rows_[b].add(other.rows_[b]);
+    }
+
+    [[nodiscard]] SpatialSplit best(std::uint32_t n) const {
+        std::array<Float4, max_spatial_bins> right_cost;
+        SpatialRow side;
+        for (std::uint32_t b = grid_.bins - 1; b > 0; --b) {
+            side.add(rows_[b]);
+            right_cost[b] = areas(side.corners) * Float4::of(side.ends.data());
+        }
+        side = {};
+        Float4 cost = Float4::all(infinity), plane = Float4::all(0);
+        for (std::uint32_t b = 1; b < grid_.bins; ++b) {
+            side.add(rows_[b - 1]);
+            const Float4 here =
+                areas(side.corners) * Float4::of(side.begins.data()) + right_cost[b];
+            const Mask4 better = here < cost;  // no for NaN
+            cost = select(better, here, cost);
+            plane = select(better, Float4::all(static_cast<float>(b)), plane);
+        }
+        std::array<float, 4> costs, planes;
+        cost.store(costs.data());
+        plane.store(planes.data());
+        std::uint32_t axis = 0;
+        for (std::uint32_t a = 1; a < 3; ++a)
+            if (costs[a] < costs[axis]) axis = a;
+        if (!(costs[axis] < infinity)) return {};
+        return split_at(axis, static_cast<std::uint32_t>(planes[axis]), costs[axis], n);
     }
 
 private:
-    [[nodiscard]] Float4 edge(std::size_t i, std::size_t j, float x) const {
-        const float length = x_[j] - x_[i];
-        const float t = length > 0 ? (x - x_[i]) / length : 0.0f;
-        return v_[i] + (v_[j] - v_[i]) * Float4::all(t);
+    void slice(const std::array<Vec3, 3>& exact, const LowCorners& box,
+               const std::array<std::int32_t, 4>& from, const std::array<std::int32_t, 4>& to) {
+        const std::array<Float4, 3> corners{load_point(exact[0]), load_point(exact[1]),
+                                            load_point(exact[2])};
+        std::array<float, 4> lo, minus_hi;
+        box.lo.store(lo.data());
+        box.minus_hi.store(minus_hi.data());
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            if (from[axis] != to[axis])
+                slice({corners, coordinate(exact[0], axis), coordinate(exact[1], axis),
+                       coordinate(exact[2], axis)},
+                      box, axis, lo[axis], -minus_hi[axis], static_cast<std::uint32_t>(from[axis]),
+                      static_cast<std::uint32_t>(to[axis]));
+    }
+    /// Adds what each bin of [first, last] holds of a reference that reaches from lo to hi.
+    void slice(const SlicedTriangle& triangle, const LowCorners& box, std::size_t axis, float lo,
+               float hi, std::uint32_t first, std::uint32_t last) {
+        const Float4 most = Float4::all(0) - box.minus_hi, minus_least = Float4::all(0) - box.lo;
+        const auto inside = [&](const LowCorners& part) -> LowCorners {
+            return {min_of(max_of(part.lo, box.lo), most),
+                    min_of(max_of(part.minus_hi, box.minus_hi), minus_least)};
+        };
+        LowCorners before = inside(triangle.section(lo));
+        for (std::uint32_t b = first; b < last; ++b) {
+            const float plane = max_of(min_of(grid_.plane(axis, b + 1), hi), lo);
+            const LowCorners behind = inside(triangle.section(plane));
+            before.add(behind);
+            rows_[b].corners[axis].add(before);
+            before = behind;
+        }
+        before.add(inside(triangle.section(hi)));
+        rows_[last].corners[axis].add(before);
+        const float x = triangle.middle_x();
+        if (x < lo || x > hi) return;
+        const auto bin = static_cast<std::uint32_t>((x - grid_.origin[axis]) * grid_.inverse[axis]);
+        rows_[std::min(std::max(bin, first), last)].corners[axis].add(inside(triangle.middle()));
     }
 
-    std::array<float, 3> x_;
-    std::array<Float4, 3> v_;
+    [[nodiscard]] SpatialSplit split_at(std::uint32_t axis, std::uint32_t b, float cost,
+                                        std::uint32_t n) const {
+        SpatialSplit split{cost, axis, grid_.plane(axis, b), 0, n, {}, {}};
+        LowCorners left, right;
+        for (std::uint32_t k = 0; k < grid_.bins; ++k) {
+            (k < b ? left : right).add(rows_[k].corners[axis]);
+            if (k >= b) continue;
+            split.left += rows_[k].begins[axis];
+            split.right -= rows_[k].ends[axis];
+        }
+        split.left_box = left.box();
+        split.right_box = right.box();
+        return split;
+    }
+
+    const SpatialGrid& grid_;
+    std::vector<SpatialRow> rows_;
 };
-
-/// Adds what each bin of [first, last] holds of a reference.
-void add_slices(const SlicedTriangle& triangle, const SahReference& reference, const BinAxis& grid,
-                std::uint32_t axis, std::uint32_t first, std::uint32_t last, Bins& bins) {
-    const float lo = coordinate(reference.lo, axis), hi = coordinate(reference.hi, axis);
-    const Float4 box_lo = Float4::load(&reference.lo.x).xyz(),
-                 box_hi = Float4::load(&reference.hi.x).xyz();
-    float begin = lo;
-    GrowingBox before = triangle.section(begin);
-    for (std::uint32_t b = first; b <= last; ++b) {
-        const float end = b == last ? hi : std::clamp(grid.plane(b + 1), begin, hi);
-        const GrowingBox behind = triangle.section(end);
-        GrowingBox slice = before;
-        slice.add(behind);
-        triangle.add_middle(begin, end, slice);
-        bins[b].box.lo = min_of(bins[b].box.lo, min_of(max_of(slice.lo, box_lo), box_hi));
-        bins[b].box.hi = max_of(bins[b].box.hi, max_of(min_of(slice.hi, box_hi), box_lo));
-        before = behind;
-        begin = end;
-    }
-}
-
-void fill_bins(const ReferenceCutter& cutter, const SahReference* references,
-               std::span<const std::uint32_t> places, const BinAxis& grid, std::uint32_t axis,
-               Bins& bins) {
-    for (const std::uint32_t place : places) {
-        const SahReference& reference = references[place];
-        const std::uint32_t first = grid.bin(coordinate(reference.lo, axis));
-        const std::uint32_t last = std::max(first, grid.bin(coordinate(reference.hi, axis)));
-        ++bins[first].begins;
-        ++bins[last].ends;
-        if (first == last)
-            bins[first].box.add(reference);
-        else
-            add_slices({cutter.corners(reference), axis}, reference, grid, axis, first, last, bins);
-    }
-}
-
-void find_in_bins(const Bins& bins, const BinAxis& grid, std::uint32_t axis, std::uint32_t n,
-                  SpatialSplit& best) {
-    std::array<GrowingBox, spatial_bins> behind;
-    GrowingBox box;
-    for (std::uint32_t b = spatial_bins; b-- > 1;) {
-        box.add(bins[b].box);
-        behind[b] = box;
-    }
-    box = {};
-    std::uint32_t left = 0, right = n;
-    for (std::uint32_t b = 1; b < spatial_bins; ++b) {
-        box.add(bins[b - 1].box);
-        left += bins[b - 1].begins;
-        right -= bins[b - 1].ends;
-        if (left == 0 || right == 0) continue;
-        const float cost =
-            box.area() * static_cast<float>(left) + behind[b].area() * static_cast<float>(right);
-        if (cost < best.cost)
-            best = {cost, axis, grid.plane(b), left, right, box.box(), behind[b].box()};
-    }
-}
 
 }  // namespace
 
-CutReference ReferenceCutter::cut(const SahReference& reference, std::uint32_t axis,
+CutReference ReferenceCutter::cut(const SplitBox& reference, std::uint32_t axis,
                                   float plane) const {
     std::array<Polygon::Point, 3> v;
     const std::array<Vec3, 3> exact = corners(reference);
@@ -193,98 +299,86 @@ CutReference ReferenceCutter::cut(const SahReference& reference, std::uint32_t a
     return parts;
 }
 
-SpatialSplit find_spatial_split(const ReferenceCutter& cutter, const SahReference* references,
-                                std::span<const std::uint32_t> places, const Aabb& box) {
-    SpatialSplit best;
-    for (std::uint32_t axis = 0; axis < 3; ++axis) {
-        const BinAxis grid(box, axis);
-        if (!grid.usable()) continue;
-        Bins bins;
-        fill_bins(cutter, references, places, grid, axis, bins);
-        find_in_bins(bins, grid, axis, static_cast<std::uint32_t>(places.size()), best);
+SpatialSplit find_spatial_split(const ReferenceCutter& cutter, std::span<const SplitBox> references,
+                                const Aabb& box, std::uint32_t bins) {
+    const SpatialGrid grid(box, bins);
+    const auto n = static_cast<std::uint32_t>(references.size());
+    if (references.size() < 2 * parallel_boxes) {
+        SpatialBins all(grid);
+        all.take(cutter, references);
+        return all.best(n);
     }
-    return best;
+    // Minima and whole numbers: as exact in parts as at once.
+    std::vector<SpatialBins> parts((n + parallel_boxes - 1) / parallel_boxes, SpatialBins(grid));
+    for_each_block(n, parallel_boxes, [&](std::size_t b, std::size_t begin, std::size_t end) {
+        parts[b].take(cutter, references.subspan(begin, end - begin));
+    });
+    for (std::size_t b = 1; b < parts.size(); ++b) parts[0].add(parts[b]);
+    return parts[0].best(n);
 }
 
-void choose_sides(const ReferenceCutter& cutter, const SahReference* references,
-                  std::span<const std::uint32_t> places, const SpatialSplit& split,
-                  SpatialSides& out) {
+void SpatialSides::choose(const ReferenceCutter& cutter, std::span<const SplitBox> references,
+                          const SpatialSplit& split) {
     Aabb left_box = split.left_box, right_box = split.right_box;
     std::uint32_t left = split.left, right = split.right;
-    out.sides.resize(places.size());
-    out.cut.clear();
-    out.left_count = out.right_count = 0;
-    for (std::size_t k = 0; k < places.size(); ++k) {
-        const SahReference& reference = references[places[k]];
-        SpatialSides::Side& side = out.sides[k];
-        if (coordinate(reference.hi, split.axis) <= split.plane) {
-            side = SpatialSides::left;
+    sides_.resize(references.size());
+    cuts_.clear();
+    left_count_ = right_count_ = 0;
+    for (std::size_t k = 0; k < references.size(); ++k) {
+        const SplitBox& reference = references[k];
+        Side& side = sides_[k];
+        if (-coordinate(reference.minus_hi, split.axis) <= split.plane) {
+            side = left_side;
         } else if (coordinate(reference.lo, split.axis) >= split.plane) {
-            side = SpatialSides::right;
+            side = right_side;
         } else {
-            const CutReference parts = cutter.cut(reference, split.axis, split.plane);
             const Aabb with_left = unite(left_box, reference.box());
             const Aabb with_right = unite(right_box, reference.box());
             const auto l = static_cast<float>(left), r = static_cast<float>(right);
-            const float divided = sah_area(left_box) * l + sah_area(right_box) * r;
-            const float all_left = sah_area(with_left) * l + sah_area(right_box) * (r - 1);
-            const float all_right = sah_area(left_box) * (l - 1) + sah_area(with_right) * r;
-            if (is_empty(parts.right) || (all_left <= divided && all_left <= all_right)) {
-                side = SpatialSides::left;
+            const float area_left = half_surface(left_box), area_right = half_surface(right_box);
+            const float divided = area_left * l + area_right * r;
+            const float all_left = half_surface(with_left) * l + area_right * (r - 1);
+            const float all_right = area_left * (l - 1) + half_surface(with_right) * r;
+            side = all_left <= divided && all_left <= all_right ? left_side
+                   : all_right <= divided                       ? right_side
+                                                                : both_sides;
+            if (side == both_sides) {
+                const CutReference parts = cutter.cut(reference, split.axis, split.plane);
+                if (is_empty(parts.right))
+                    side = left_side;
+                else if (is_empty(parts.left))
+                    side = right_side;
+                else
+                    cuts_.push_back(parts);
+            }
+            if (side == left_side) {
                 left_box = with_left;
                 --right;
-            } else if (is_empty(parts.left) || all_right <= divided) {
-                side = SpatialSides::right;
+            } else if (side == right_side) {
                 right_box = with_right;
                 --left;
-            } else {
-                side = SpatialSides::both;
-                out.cut.push_back(parts);
             }
         }
-        out.left_count += side != SpatialSides::right ? 1 : 0;
-        out.right_count += side != SpatialSides::left ? 1 : 0;
+        left_count_ += side != right_side ? 1 : 0;
+        right_count_ += side != left_side ? 1 : 0;
     }
 }
 
-void SideLists::cut(SahReference* references, std::span<const std::uint32_t> order,
-                    const SpatialSides& sides, std::uint32_t free_places, std::uint8_t* side_of) {
-    for (auto& parts : parts_) parts.clear();
-    least_[0] = least_[1] = UINT32_MAX;
-    std::size_t next_cut = 0;
-    for (std::size_t k = 0; k < order.size(); ++k) {
-        const std::uint32_t place = order[k];
-        const SpatialSides::Side side = sides.sides[k];
-        side_of[place] = side;
-        const std::uint32_t id = references[place].primitive_id;
-        if (side != SpatialSides::right) least_[0] = std::min(least_[0], id);
-        if (side != SpatialSides::left) least_[1] = std::min(least_[1], id);
-        if (side != SpatialSides::both) continue;
-        const CutReference& parts = sides.cut[next_cut++];
-        references[place] = make_reference(parts.left, id);
-        references[free_places] = make_reference(parts.right, id);
-        parts_[0].push_back(place);
-        parts_[1].push_back(free_places++);
-    }
-}
-
-std::uint32_t* SideLists::list(const SahReference* references, std::span<const std::uint32_t> order,
-                               const std::uint8_t* side_of, SpatialSides::Side side,
-                               std::uint32_t axis, std::uint32_t* out) {
-    sorted_.clear();
-    for (const std::uint32_t place : parts_[side]) sorted_.emplace_back(references, place, axis);
-    std::sort(sorted_.begin(), sorted_.end());
-    auto part = sorted_.begin();
-    for (const std::uint32_t place : order) {
-        if (side_of[place] != side) continue;
-        if (part != sorted_.end()) {
-            const KeyedPlace whole(references, place, axis);
-            for (; part != sorted_.end() && *part < whole; ++part) *out++ = part->place;
+void SpatialSides::divide(std::span<const SplitBox> references, SplitBox* to_left,
+                          SplitBox* to_right) const {
+    auto cut = cuts_.begin();
+    for (std::size_t k = 0; k < references.size(); ++k) {
+        const SplitBox& reference = references[k];
+        if (sides_[k] == left_side) {
+            *to_left++ = reference;
+        } else if (sides_[k] == right_side) {
+            *to_right++ = reference;
+        } else {
+            *to_left++ = SplitBox::of(cut->left, reference.first, 1);
+            *to_right++ = SplitBox::of(cut->right, reference.first, 1);
+            ++cut;
         }
-        *out++ = place;
     }
-    for (; part != sorted_.end(); ++part) *out++ = part->place;
-    return out;
 }
 
 }  // namespace raydix

@@ -1,8 +1,11 @@
 #include "tree/split_bins.h"
 
 #include <algorithm>
+#include <numeric>
+#include <vector>
 
 #include "base/math.h"
+#include "exec/parallel.h"
 
 // A box in one register where the processor has such registers, found out at run time.
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -30,6 +33,13 @@ struct alignas(32) Corners {
     void add(const float* other_lo, const float* other_minus_hi) {
         min_of(Float4::load(lo.data()), Float4::load(other_lo)).store(lo.data());
         min_of(Float4::load(minus_hi.data()), Float4::load(other_minus_hi)).store(minus_hi.data());
+    }
+    [[nodiscard]] Aabb box() const {
+        return {{lo[0], lo[1], lo[2]}, {-minus_hi[0], -minus_hi[1], -minus_hi[2]}};
+    }
+    [[nodiscard]] float area() const {
+        const float x = lo[0] + minus_hi[0], y = lo[1] + minus_hi[1], z = lo[2] + minus_hi[2];
+        return (x * y + y * z) + z * x;
     }
 };
 
@@ -78,8 +88,18 @@ class Bins {
 public:
     explicit Bins(const BinGrid& grid) : grid_(grid), bins_(grid.bins) {}
 
-    [[nodiscard]] std::optional<Split> best(std::span<const SplitBox> boxes, bool wide) {
-        const PlanePerAxis found = fill_and_sweep(boxes, wide);
+    void take(std::span<const SplitBox> boxes, [[maybe_unused]] bool wide) {
+#if defined(RAYDIX_WITH_AVX2)
+        if (wide) return fill_8(boxes);
+#endif
+        fill(boxes);
+    }
+    void add(const Bins& other) {
+        for (std::uint32_t b = 0; b < bins_; ++b) rows_[b].add(other.rows_[b]);
+    }
+
+    [[nodiscard]] std::optional<Split> best(bool wide) const {
+        const PlanePerAxis found = sweep_planes(wide);
         std::size_t axis = 0;
         for (std::size_t a = 1; a < 3; ++a)
             if (found.cost[a] < found.cost[axis]) axis = a;
@@ -88,15 +108,28 @@ public:
         return split_at(axis, static_cast<std::uint32_t>(found.bin[axis]));
     }
 
-private:
-    PlanePerAxis fill_and_sweep(std::span<const SplitBox> boxes, [[maybe_unused]] bool wide) {
-#if defined(RAYDIX_WITH_AVX2)
-        if (wide) {
-            fill_8(boxes);
-            return sweep_8();
+    [[nodiscard]] SplitSides sides_of(const Split& split) const {
+        Corners left, right;
+        left.clear();
+        right.clear();
+        std::uint32_t left_count = 0, right_count = 0;
+        for (std::uint32_t b = 0; b < bins_; ++b) {
+            const bool is_left = static_cast<std::int32_t>(b) <= split.last_left;
+            const Corners& own = rows_[b].corners[split.axis];
+            (is_left ? left : right).add(own.lo.data(), own.minus_hi.data());
+            (is_left ? left_count : right_count) += rows_[b].primitives(split.axis);
         }
+        SplitSides sides{0, left.box(), right.box()};
+        sides.cost = left.area() * static_cast<float>(left_count) +
+                     right.area() * static_cast<float>(right_count);
+        return sides;
+    }
+
+private:
+    [[nodiscard]] PlanePerAxis sweep_planes([[maybe_unused]] bool wide) const {
+#if defined(RAYDIX_WITH_AVX2)
+        if (wide) return sweep_8();
 #endif
-        fill(boxes);
         return sweep();
     }
 
@@ -284,7 +317,19 @@ private:
 
 }  // namespace
 
-BinGrid::BinGrid(std::span<const SplitBox> boxes) : bins(bin_count(boxes.size())) {
+namespace {
+
+/// Around doubled centroids.
+struct CenterBounds {
+    Float4 lo = Float4::all(infinity), hi = Float4::all(-infinity);
+
+    void add(const CenterBounds& other) {
+        lo = min_of(lo, other.lo);
+        hi = max_of(hi, other.hi);
+    }
+};
+
+CenterBounds center_bounds(std::span<const SplitBox> boxes) {
     // Two by two: each minimum waits for the one before.
     std::array<Float4, 2> lo, hi;
     lo.fill(Float4::all(infinity));
@@ -300,20 +345,59 @@ BinGrid::BinGrid(std::span<const SplitBox> boxes) : bins(bin_count(boxes.size())
         take(1, boxes[i + 1]);
     }
     if (i < boxes.size()) take(0, boxes[i]);
-    lo[0] = min_of(lo[0], lo[1]);
-    hi[0] = max_of(hi[0], hi[1]);
+    return {min_of(lo[0], lo[1]), max_of(hi[0], hi[1])};
+}
+
+bool in_blocks(std::size_t boxes) { return boxes >= 2 * parallel_boxes; }
+std::size_t block_count(std::size_t boxes) { return (boxes + parallel_boxes - 1) / parallel_boxes; }
+
+}  // namespace
+
+BinGrid::BinGrid(std::span<const SplitBox> boxes, std::uint32_t most)
+    : bins(bin_count(boxes.size(), most)) {
+    CenterBounds all;
+    if (in_blocks(boxes.size())) {
+        std::vector<CenterBounds> parts(block_count(boxes.size()));
+        for_each_block(boxes.size(), parallel_boxes,
+                       [&](std::size_t b, std::size_t begin, std::size_t end) {
+                           parts[b] = center_bounds(boxes.subspan(begin, end - begin));
+                       });
+        for (const CenterBounds& part : parts) all.add(part);
+    } else {
+        all = center_bounds(boxes);
+    }
     std::array<float, 4> extent;
-    lo[0].store(origin.data());
-    (hi[0] - lo[0]).store(extent.data());
+    all.lo.store(origin.data());
+    (all.hi - all.lo).store(extent.data());
     for (std::size_t axis = 0; axis < 4; ++axis)
         scale[axis] = extent[axis] >= least_extent
                           ? below_one * static_cast<float>(bins) / extent[axis]
                           : 0.0f;
 }
 
-std::optional<Split> find_split(std::span<const SplitBox> boxes, const BinGrid& grid, bool wide) {
+std::optional<Split> find_split(std::span<const SplitBox> boxes, const BinGrid& grid, bool wide,
+                                SplitSides* sides) {
     if (grid.flat()) return std::nullopt;
-    return Bins(grid).best(boxes, wide);
+    const auto answer = [&](const Bins& bins) {
+        const std::optional<Split> split = bins.best(wide);
+        if (split && sides != nullptr) *sides = bins.sides_of(*split);
+        return split;
+    };
+    if (!in_blocks(boxes.size())) {
+        Bins bins(grid);
+        bins.take(boxes, wide);
+        return answer(bins);
+    }
+    // Minima and whole numbers: as exact in parts as at once.
+    std::vector<Bins> parts;
+    parts.reserve(block_count(boxes.size()));
+    while (parts.size() < block_count(boxes.size())) parts.emplace_back(grid);
+    for_each_block(boxes.size(), parallel_boxes,
+                   [&](std::size_t b, std::size_t begin, std::size_t end) {
+                       parts[b].take(boxes.subspan(begin, end - begin), wide);
+                   });
+    for (std::size_t b = 1; b < parts.size(); ++b) parts[0].add(parts[b]);
+    return answer(parts[0]);
 }
 
 namespace {
@@ -333,8 +417,7 @@ struct Cursors {
 #if defined(RAYDIX_WITH_AVX2)
 /// Whole boxes, so that who loads them next need not wait for two halves.
 RAYDIX_AVX2 void divide_boxes_8(std::span<const SplitBox> from, const BinGrid& grid,
-                                const Split& split, SplitBox* to) {
-    Cursors cursors{0, split.left_boxes};
+                                const Split& split, SplitBox* to, Cursors cursors) {
     const float origin = grid.origin.data()[split.axis], scale = grid.scale.data()[split.axis];
     const auto end_of_left = static_cast<float>(split.last_left + 1);
     const SplitBox *box = from.data(), *end = box + from.size();
@@ -347,16 +430,32 @@ RAYDIX_AVX2 void divide_boxes_8(std::span<const SplitBox> from, const BinGrid& g
 }
 #endif
 
+void divide_part(std::span<const SplitBox> from, const BinGrid& grid, const Split& split,
+                 SplitBox* to, Cursors cursors, [[maybe_unused]] bool wide) {
+#if defined(RAYDIX_WITH_AVX2)
+    if (wide) return divide_boxes_8(from, grid, split, to, cursors);
+#endif
+    for (const SplitBox& box : from)
+        to[cursors.place(grid.bin(box, split.axis) <= split.last_left)] = box;
+}
+
 }  // namespace
 
 void divide_boxes(std::span<const SplitBox> from, const BinGrid& grid, const Split& split,
-                  SplitBox* to, [[maybe_unused]] bool wide) {
-#if defined(RAYDIX_WITH_AVX2)
-    if (wide) return divide_boxes_8(from, grid, split, to);
-#endif
-    Cursors cursors{0, split.left_boxes};
-    for (const SplitBox& box : from)
-        to[cursors.place(grid.bin(box, split.axis) <= split.last_left)] = box;
+                  SplitBox* to, std::size_t right_begin, bool wide) {
+    if (!in_blocks(from.size())) return divide_part(from, grid, split, to, {0, right_begin}, wide);
+    std::vector<std::size_t> lefts(block_count(from.size()));
+    for_each_block(from.size(), parallel_boxes,
+                   [&](std::size_t b, std::size_t begin, std::size_t end) {
+                       for (std::size_t k = begin; k < end; ++k)
+                           lefts[b] += grid.bin(from[k], split.axis) <= split.last_left ? 1 : 0;
+                   });
+    std::exclusive_scan(lefts.begin(), lefts.end(), lefts.begin(), std::size_t{0});
+    for_each_block(
+        from.size(), parallel_boxes, [&](std::size_t b, std::size_t begin, std::size_t end) {
+            const std::size_t right = right_begin + begin - lefts[b];
+            divide_part(from.subspan(begin, end - begin), grid, split, to, {lefts[b], right}, wide);
+        });
 }
 
 }  // namespace raydix
