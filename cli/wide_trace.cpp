@@ -24,7 +24,8 @@ std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
     const bool simd = kernel == "simd" || (kernel.empty() && wide && tree.device == "cpu");
     if (!simd) {
         if (wide && !kernel.empty())
-            throw CLI::ValidationError("--layout", "wide8 goes with --kernel simd, not with " + kernel);
+            throw CLI::ValidationError("--layout",
+                                       "wide8 goes with --kernel simd, not with " + kernel);
         for (const CLI::Option* option : {options.path_option, options.isa_option})
             if (option->count() != 0)
                 throw CLI::ValidationError(option->get_name(), "belongs to --kernel simd");
@@ -108,14 +109,14 @@ void add_wide(Json& build, const WideBvh& tree) {
 
 void print_wide_table(const Json& wide) {
     fmt::print("\nwide8        {} nodes of {:.2f} children, {} leaves, depth {}, in {:.2f} ms\n",
-               grouped(wide["nodes"].get<std::uint64_t>()),
-               wide["children_per_node"].get<double>(),
+               grouped(wide["nodes"].get<std::uint64_t>()), wide["children_per_node"].get<double>(),
                grouped(wide["leaves"].get<std::uint64_t>()), wide["max_depth"].get<std::uint32_t>(),
                wide["ms"].get<double>());
-    fmt::print("SAH          {:.3f}   (node 1, primitive 0.4), boxes widened to {:.3f} x their area\n",
-               wide["sah"].get<double>(), wide["widening"].get<double>());
-    fmt::print("memory       {:.1f} MB\n", (wide["node_bytes"].get<double>() +
-                                            wide["triangle_bytes"].get<double>()) * 1e-6);
+    fmt::print(
+        "SAH          {:.3f}   (node 1, primitive 0.4), boxes widened to {:.3f} x their area\n",
+        wide["sah"].get<double>(), wide["widening"].get<double>());
+    fmt::print("memory       {:.1f} MB\n",
+               (wide["node_bytes"].get<double>() + wide["triangle_bytes"].get<double>()) * 1e-6);
 }
 
 }  // namespace raydix::cli

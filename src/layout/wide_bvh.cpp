@@ -56,6 +56,7 @@ public:
 
     double run() {
         find_flat();
+        place_nodes();
         words_.resize(wide_.children.size());
         place_leaves();
         out_.bounds = bvh_.bounds();
@@ -78,20 +79,41 @@ private:
                        [&](std::size_t k) { flat_[k] = has_zero_area(bvh_.triangles()[k]); });
     }
 
-    void place_leaves() {
-        for (std::size_t c = 0; c < words_.size(); ++c) {
-            const BvhNode& child = wide_.children[c];
-            words_[c] = WideTree::is_inner(child) ? child.first : wide_no_child;
-            if (child.count == 0) continue;
-            std::uint32_t kept = 0;
-            for (std::uint32_t k = 0; k < child.count; ++k) kept += flat_[child.first + k] == 0;
-            if (kept == 0) continue;
-            const std::uint32_t place = filler_.place(kept);
-            if (place >= max_places)
-                throw InputError("a wide tree holds " + std::to_string(max_places) +
-                                 " triangle references at most");
-            words_[c] = wide_leaf_bit | place << 3 | (kept - 1);
+    /// Depth first: what rays visit together lies together, at every size of page and cache.
+    void place_nodes() {
+        std::vector<std::uint32_t> waiting{0};
+        place_.resize(wide_.node_count());
+        by_place_.reserve(wide_.node_count());
+        while (!waiting.empty() && wide_.node_count() > 0) {
+            const std::uint32_t w = waiting.back();
+            waiting.pop_back();
+            place_[w] = static_cast<std::uint32_t>(by_place_.size());
+            by_place_.push_back(w);
+            const auto children = wide_.node(w);
+            for (std::size_t k = children.size(); k-- > 0;)
+                if (WideTree::is_inner(children[k])) waiting.push_back(children[k].first);
         }
+    }
+
+    void place_leaves() {
+        for (const std::uint32_t w : by_place_) {
+            const std::size_t base = w * static_cast<std::size_t>(wide_.width);
+            for (std::size_t c = base; c < base + static_cast<std::size_t>(wide_.width); ++c)
+                words_[c] = word_of(wide_.children[c]);
+        }
+    }
+
+    std::uint32_t word_of(const BvhNode& child) {
+        if (WideTree::is_unused(child)) return wide_no_child;
+        if (WideTree::is_inner(child)) return place_[child.first];
+        std::uint32_t kept = 0;
+        for (std::uint32_t k = 0; k < child.count; ++k) kept += flat_[child.first + k] == 0;
+        if (kept == 0) return wide_no_child;
+        const std::uint32_t place = filler_.place(kept);
+        if (place >= max_places)
+            throw InputError("a wide tree holds " + std::to_string(max_places) +
+                             " triangle references at most");
+        return wide_leaf_bit | place << 3 | (kept - 1);
     }
 
     void write_node(std::size_t w) {
@@ -106,7 +128,7 @@ private:
             from[count++] = k;
         }
         assign_octant_slots(std::span(boxes).first(count), slots.data());
-        WideNode& node = out_.nodes[w];
+        WideNode& node = out_.nodes[place_[w]];
         node = {};
         std::fill_n(node.child, quantised_width, wide_no_child);
         ChildSlots children{};
@@ -139,8 +161,9 @@ private:
     const Bvh& bvh_;
     WideBvh::Arrays& out_;
     BlockFiller filler_;
-    std::vector<std::uint8_t> flat_;    // [references] 1: no area
-    std::vector<std::uint32_t> words_;  // [children]
+    std::vector<std::uint8_t> flat_;               // [references] 1: no area
+    std::vector<std::uint32_t> words_;             // [children]
+    std::vector<std::uint32_t> place_, by_place_;  // [nodes] and its inverse
 };
 
 }  // namespace

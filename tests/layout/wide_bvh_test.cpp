@@ -1,4 +1,5 @@
-// Wide trees as they lie in memory: every node and triangle once, every box around what is below it.
+// Wide trees as they lie in memory: every node and triangle once, every box around what is below
+// it.
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
 #include <raydix/wide.h>

@@ -1,5 +1,5 @@
-// The kernel `simd` against `scalar`, bit for bit: every instruction set that the machine has, every
-// path, scenes of every size, all kinds of rays, nasty meshes, any thread count.
+// The kernel `simd` against `scalar`, bit for bit: every instruction set that the machine has,
+// every path, scenes of every size, all kinds of rays, nasty meshes, any thread count.
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
 #include <raydix/wide.h>
@@ -217,8 +217,8 @@ TEST(Simd, DuplicatedReferences) {
     const auto rays = make_mixed_rays(scene, 20'000, seed);
     const Bvh plain = build_bvh(scene.mesh);
     for (const SimdPath path : paths)
-        EXPECT_TRUE(std::ranges::equal(trace(tree, rays, {.path = path}), trace(plain, rays),
-                                       same_bits));
+        EXPECT_TRUE(
+            std::ranges::equal(trace(tree, rays, {.path = path}), trace(plain, rays), same_bits));
     const AllHits all = trace_all(tree, rays), wanted = trace_all(plain, rays);
     EXPECT_EQ(all.offsets, wanted.offsets);
     EXPECT_TRUE(std::ranges::equal(all.hits, wanted.hits, same_bits));

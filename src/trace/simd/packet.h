@@ -44,7 +44,7 @@ public:
                SimdCounts& counts)
         : tree_(tree), p_(packet), stack_(stack), counts_(counts) {
         for (int axis = 0; axis < 3; ++axis) negative_[axis] = packet.kind.negative(axis);
-        for (std::uint32_t l = 0; l < 8; ++l) slot_[l] = l ^ packet.kind.negatives ^ 7u;
+        flip_ = packet.kind.negatives ^ 7u;
     }
 
     void trace() {
@@ -173,25 +173,36 @@ private:
         HWY_ALIGN float entries[8];
         const std::uint32_t met = test_intervals(node, steps, entries);
         if (met == 0) return top;
-        std::uint64_t rays[8] = {};
-        for (std::size_t vector = 0; vector < packet_size / lanes16; ++vector) {
-            const std::uint64_t wanted = active >> (vector * lanes16) & vector_bits;
-            if (wanted == 0) continue;
-            const RayNode ray = ray_node(node, steps, vector * lanes16);
-            for (std::uint32_t left = met; left != 0; left &= left - 1) {
-                const auto child = static_cast<std::size_t>(std::countr_zero(left));
-                rays[child] |= (test_rays(ray, steps, child, vector * lanes16) & wanted)
-                               << (vector * lanes16);
-            }
+        RayNode rays[packet_size / lanes16];
+        std::uint32_t vectors[packet_size / lanes16], vector_count = 0;
+        for (std::uint32_t v = 0; v < packet_size / lanes16; ++v) {
+            if ((active >> (v * lanes16) & vector_bits) == 0) continue;
+            rays[vector_count] = ray_node(node, steps, v * lanes16);
+            vectors[vector_count++] = v;
         }
-        for (std::size_t k = 0; k < 8; ++k) {
-            const std::size_t s = slot_[k];
-            if (rays[s] == 0) continue;
+        // Bit l: the child that comes l-th from the far end.
+        for (std::uint32_t left = in_order(met); left != 0; left &= left - 1) {
+            const std::size_t s = static_cast<std::size_t>(std::countr_zero(left)) ^ flip_;
+            std::uint64_t hit = 0;
+            for (std::uint32_t k = 0; k < vector_count; ++k) {
+                const std::size_t shift = vectors[k] * lanes16;
+                hit |= std::uint64_t{test_rays(rays[k], steps, s, shift)} << shift;
+            }
+            hit &= active;
+            if (hit == 0) continue;
             stack_.words[top] = node.child[s];
             stack_.entries[top] = entries[s];
-            stack_.active[top++] = rays[s];
+            stack_.active[top++] = hit;
         }
         return top;
+    }
+
+    /// Moves bit s to bit s ^ flip_.
+    [[nodiscard]] std::uint32_t in_order(std::uint32_t bits) const {
+        if ((flip_ & 1) != 0) bits = (bits & 0x55) << 1 | (bits & 0xAA) >> 1;
+        if ((flip_ & 2) != 0) bits = (bits & 0x33) << 2 | (bits & 0xCC) >> 2;
+        if ((flip_ & 4) != 0) bits = (bits & 0x0F) << 4 | (bits & 0xF0) >> 4;
+        return bits;
     }
 
     void test_leaf(std::uint32_t word, std::uint64_t active) {
@@ -333,7 +344,7 @@ private:
     const PacketStackView stack_;
     SimdCounts& counts_;
     bool negative_[3];
-    std::uint32_t slot_[8];
+    std::uint32_t flip_;
     std::uint64_t done_ = 0;  // closest: rays that have hit; any: rays that need nothing more
     float reach_ = 0;
 };
