@@ -26,3 +26,4 @@
 #include <raydix/tree_view.h>        // IWYU pragma: export
 #include <raydix/types.h>            // IWYU pragma: export
 #include <raydix/version.h>          // IWYU pragma: export
+#include <raydix/wide.h>             // IWYU pragma: export

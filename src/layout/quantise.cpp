@@ -102,4 +102,36 @@ void assign_octant_slots(std::span<const Aabb> children, int* slots) {
     }
 }
 
+void assign_octant_slots_greedily(std::span<const Aabb> children, int* slots) {
+    const std::size_t count = children.size();
+    Aabb all = empty_box();
+    for (const Aabb& box : children) all = unite(all, box);
+    const Vec3 middle = center_of(all);
+    std::array<Vec3, quantised_width> away;
+    std::array<float, quantised_width> most;  // what the best slot would give
+    for (std::size_t k = 0; k < count; ++k) {
+        const Vec3 d = center_of(children[k]) - middle;
+        away[k] = d;
+        most[k] = (std::fabs(d.x) + std::fabs(d.y)) + std::fabs(d.z);
+    }
+    unsigned open = (1u << quantised_width) - 1;
+    for (std::size_t turn = 0; turn < count; ++turn) {
+        std::size_t next = 0;
+        for (std::size_t k = 1; k < count; ++k)
+            if (most[k] > most[next]) next = k;
+        most[next] = -1.0f;
+        const Vec3 d = away[next];
+        float best = -infinity;
+        for (unsigned left = open; left != 0; left &= left - 1) {
+            const int s = std::countr_zero(left);
+            const float gain = ((s & 1 ? d.x : -d.x) + (s & 2 ? d.y : -d.y)) + (s & 4 ? d.z : -d.z);
+            if (gain > best || best == -infinity) {
+                best = gain;
+                slots[next] = s;
+            }
+        }
+        open &= ~(1u << slots[next]);
+    }
+}
+
 }  // namespace raydix

@@ -33,6 +33,10 @@ inline constexpr int max_steps = 255;
 /// section 3.2, solved exactly. slots [count], out.
 void assign_octant_slots(std::span<const Aabb> children, int* slots);
 
+/// The same by rule of thumb, in a tenth of the time: children far from the middle choose first,
+/// each the best slot that is left.
+void assign_octant_slots_greedily(std::span<const Aabb> children, int* slots);
+
 /// The children of a wide node by slot; null where there is none.
 using ChildSlots = std::array<const BvhNode*, quantised_width>;
 

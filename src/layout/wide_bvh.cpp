@@ -127,7 +127,7 @@ private:
             boxes[count] = {wide_.children[k].lo, wide_.children[k].hi};
             from[count++] = k;
         }
-        assign_octant_slots(std::span(boxes).first(count), slots.data());
+        assign_octant_slots_greedily(std::span(boxes).first(count), slots.data());
         WideNode& node = out_.nodes[place_[w]];
         node = {};
         std::fill_n(node.child, quantised_width, wide_no_child);
