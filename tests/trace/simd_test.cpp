@@ -202,6 +202,33 @@ TEST(Simd, NastyMeshes) {
                        false);
 }
 
+/// All rays go through all of a deep tree: the lists of a stream grow beyond what they may waste.
+TEST(Simd, DeepTreesWithAllRaysEverywhere) {
+    Mesh mesh;  // one behind the other, each in a cell of its own, ever closer together
+    for (int k = 0; k < 120; ++k) {
+        const float z = std::ldexp(1.0f, -k / 2) * (k % 2 == 0 ? 1.0f : 1.4f);
+        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+        for (const Vec3 v : {Vec3{-9, -9, z}, Vec3{9, -9, z}, Vec3{0, 9, z}})
+            mesh.vertices.push_back(v);
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    const Bvh bvh = build_bvh(mesh, {.max_leaf = 1});
+    const WideBvh tree(bvh);
+    std::mt19937_64 random(seed);
+    const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+    std::vector<Ray> rays;
+    for (int k = 0; k < 300'000; ++k)  // one class, few of them blocked early
+        rays.push_back({{unit(), unit(), 3.0f},
+                        k % 10 == 0 ? 0.0f : 2.9f + 0.1f * unit(),
+                        {0.01f * unit(), 0.01f * unit(), -1},
+                        infinity});
+    std::vector<Hit> hits(rays.size());
+    const TraceCounts wanted = trace(bvh, rays, hits, {.threads = 2});
+    EXPECT_GT(wanted.hits, 0u);
+    for (const std::string& isa : simd_instruction_sets())
+        expect_like("deep tree", tree, rays, hits, wanted, {.path = SimdPath::stream, .isa = isa});
+}
+
 /// As a builder that splits triangles leaves it: several references to one triangle.
 TEST(Simd, DuplicatedReferences) {
     const Scene scene = scene_of(random_soup(1000, 5, 0.3f), "soup");

@@ -150,11 +150,26 @@ private:
                 ends[c] += hn::CountTrue(f16, met);
             }
         }
-        auto& stack = memory_.stack();
+        push_children(node, children, ends, child_count, out_begin, stride);
+    }
+
+    /// Lists that hold a ray go onto the stack. In a tree so deep that the room behind short lists
+    /// would add up, they move together first.
+    HWY_INLINE void push_children(const WideNode& node, const std::uint32_t* children,
+                                  std::uint32_t* const* ends, std::uint32_t child_count,
+                                  std::uint32_t out_begin, std::uint32_t stride) {
+        std::uint32_t* const lists = memory_.lists();
+        std::uint32_t free = out_begin;
         for (std::uint32_t c = 0; c < child_count; ++c) {
-            const std::uint32_t begin = out_begin + c * stride;
+            std::uint32_t begin = out_begin + c * stride;
             const auto count = static_cast<std::uint32_t>(ends[c] - (lists + begin));
-            if (count > 0) stack.push_back({node.child[children[c]], begin, count});
+            if (count == 0) continue;
+            if (out_begin > StreamMemory::dense_from) {
+                std::memmove(lists + free, lists + begin, count * sizeof(*lists));
+                begin = free;
+                free += count + StreamMemory::slack;
+            }
+            memory_.stack().push_back({node.child[children[c]], begin, count});
         }
     }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -80,11 +81,16 @@ TraceCounts sum_of(const std::vector<SimdCounts>& parts, std::size_t rays) {
     return sum;
 }
 
+SimdPath path_for(const WideBvh& tree, std::span<const Ray> rays, SimdPath wanted) {
+    const SimdPath path = wanted == SimdPath::automatic ? choose_simd_path(tree, rays) : wanted;
+    const bool can_sort = rays.size() <= std::size_t{std::numeric_limits<std::int32_t>::max()};
+    return path == SimdPath::sorted && !can_sort ? SimdPath::stream : path;
+}
+
 TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hits,
                         std::uint8_t* occluded, const TraceOptions& options) {
     const SimdKernels& kernels = kernels_for(options.isa);
-    const SimdPath path =
-        options.path == SimdPath::automatic ? choose_simd_path(tree, rays) : options.path;
+    const SimdPath path = path_for(tree, rays, options.path);
     const std::size_t block_size = rays_per_job(rays.size(), path);
     std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
     with_threads(options.threads, [&] {
