@@ -153,23 +153,19 @@ private:
         push_children(node, children, ends, child_count, out_begin, stride);
     }
 
-    /// Lists that hold a ray go onto the stack. In a tree so deep that the room behind short lists
-    /// would add up, they move together first.
+    /// Lists that hold a ray go onto the stack, moved together: gaps would add up in deep trees.
     HWY_INLINE void push_children(const WideNode& node, const std::uint32_t* children,
                                   std::uint32_t* const* ends, std::uint32_t child_count,
                                   std::uint32_t out_begin, std::uint32_t stride) {
         std::uint32_t* const lists = memory_.lists();
         std::uint32_t free = out_begin;
         for (std::uint32_t c = 0; c < child_count; ++c) {
-            std::uint32_t begin = out_begin + c * stride;
-            const auto count = static_cast<std::uint32_t>(ends[c] - (lists + begin));
+            const std::uint32_t* const list = lists + out_begin + c * stride;
+            const auto count = static_cast<std::uint32_t>(ends[c] - list);
             if (count == 0) continue;
-            if (out_begin > StreamMemory::dense_from) {
-                std::memmove(lists + free, lists + begin, count * sizeof(*lists));
-                begin = free;
-                free += count + StreamMemory::slack;
-            }
-            memory_.stack().push_back({node.child[children[c]], begin, count});
+            std::memmove(lists + free, list, count * sizeof(*lists));
+            memory_.stack().push_back({node.child[children[c]], free, count});
+            free += count + StreamMemory::slack;
         }
     }
 

@@ -59,8 +59,6 @@ struct StreamEntry {
 class StreamMemory {
 public:
     static constexpr std::uint32_t slack = 16;  // behind a list: whole vectors are read and written
-    static constexpr std::uint32_t dense_from =
-        1u << 20;  // lists that begin behind this leave no gaps
 
     [[nodiscard]] std::uint32_t* lists() { return lists_.data(); }
     [[nodiscard]] std::vector<StreamEntry>& stack() { return stack_; }
