@@ -10,6 +10,10 @@
 #include <iostream>
 #include <random>
 
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#endif
+
 #include "layout/wide_bvh.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"
@@ -283,6 +287,28 @@ TEST(Simd, OneRayLikeBatches) {
     EXPECT_FALSE(closest_hit(empty, rays[0]).hit());
     EXPECT_FALSE(any_hit(empty, rays[0]));
 }
+
+#if defined(__SSE2__)
+/// Callers may have told their thread to flush denormals; the hits are the same, and so is the
+/// setting afterwards.
+TEST(Simd, OneRayOfACallerThatFlushesDenormals) {
+    const Mesh mesh = scaled(random_soup(300, 4, 0.3f), 1e-11f);
+    const WideBvh tree(build_bvh(mesh));
+    auto rays = make_mixed_rays(scene_of(mesh, "tiny"), 3000, seed);
+    for (Ray& ray : rays) ray.direction = 1e-30f * ray.direction;  // t beyond the usual too
+    std::vector<Hit> wanted(rays.size()), hits(rays.size());
+    for (std::size_t i = 0; i < rays.size(); ++i) wanted[i] = closest_hit(tree, rays[i]);
+    const unsigned before = _mm_getcsr();
+    constexpr unsigned flush_both = 0x8040u;
+    _mm_setcsr(before | flush_both);
+    for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = closest_hit(tree, rays[i]);
+    const unsigned after = _mm_getcsr();
+    _mm_setcsr(before);
+    EXPECT_EQ(after & flush_both, flush_both);
+    EXPECT_TRUE(std::ranges::equal(hits, wanted, same_bits));
+    EXPECT_GT(std::ranges::count_if(wanted, [](const Hit& h) { return h.hit(); }), 0);
+}
+#endif
 
 TEST(Simd, SameCountsForEveryThreadCount) {
     const Scene scene = load_scene("builtin:atrium?triangles=10000");

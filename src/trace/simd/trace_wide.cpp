@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/float_env.h"
 #include "exec/parallel.h"
 #include "rays/place_order.h"
 #include "trace/all_hits.h"
@@ -209,6 +210,7 @@ namespace {
 
 template <class Result>
 Result one_ray(const WideBvh& tree, const Ray& ray) {
+    const FloatEnvironment plain;
     constexpr std::size_t inside = 512;
     std::uint32_t words[inside];
     float entries[inside];
