@@ -14,7 +14,8 @@ namespace raydix {
 namespace {
 
 constexpr std::uint32_t lanes = 8;
-constexpr std::uint32_t max_places = 1u << 28;
+/// Beyond, a leaf's word would be a NaN as a float: kernels take that for a missing child.
+constexpr std::uint32_t max_places = (1u << 28) - (1u << 20);
 
 /// Where leaves go: into the block that they fill best of a few that are not full.
 class BlockFiller {

@@ -93,10 +93,13 @@ RAYDIX_HD bool intersect_triangle(const RayFrame& ray, const LeafTriangle& trian
     if ((u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)) return false;
     if (u == 0.0f || v == 0.0f || w == 0.0f) {
         // A zero may be lost precision: the ray passes near an edge. Once more, exactly.
-        u = static_cast<float>(exact_edge_function(c, b));
-        v = static_cast<float>(exact_edge_function(a, c));
-        w = static_cast<float>(exact_edge_function(b, a));
-        if ((u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)) return false;
+        // Signs before the conversion: what is too small for a float would lose its own.
+        const double du = exact_edge_function(c, b), dv = exact_edge_function(a, c),
+                     dw = exact_edge_function(b, a);
+        if ((du < 0 || dv < 0 || dw < 0) && (du > 0 || dv > 0 || dw > 0)) return false;
+        u = static_cast<float>(du);
+        v = static_cast<float>(dv);
+        w = static_cast<float>(dw);
         if constexpr (rule == EdgeRule::half_open) {
             const int su = perturbed_edge_sign(c, b), sv = perturbed_edge_sign(a, c),
                       sw = perturbed_edge_sign(b, a);

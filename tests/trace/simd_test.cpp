@@ -379,6 +379,9 @@ TEST(Simd, RefusesWhatItCannotDo) {
         EXPECT_NE(std::string(error.what()).find(simd_instruction_sets().back()), std::string::npos)
             << error.what();
     }
+    const WideBvh empty(build_bvh(Mesh{}));
+    EXPECT_THROW(static_cast<void>(trace(empty, rays, {.isa = "mmx"})), InputError);
+    EXPECT_THROW(static_cast<void>(trace_all(empty, rays, {.isa = "mmx"})), InputError);
     EXPECT_THROW(static_cast<void>(simd_path_from_name("fast")), InputError);
     EXPECT_EQ(simd_path_from_name("sorted"), SimdPath::sorted);
 }

@@ -171,6 +171,25 @@ TEST(TriangleTest, FanWithRoundedCoordinatesCountsOnce) {
     }
 }
 
+/// The edge beside the ray has an edge function of 2e-50: 0 as a float, but the ray is outside.
+TEST(TriangleTest, EdgeFunctionsThatUnderflowKeepTheirSigns) {
+    for (int axis = 0; axis < 3; ++axis)
+        for (const float side : {1.0f, -1.0f}) {
+            const LeafTriangle beside{
+                {side * 1e-30f, -1e-20f, 5}, {side * 1e-30f, 1e-20f, 5}, {side, 0, 5}};
+            const LeafTriangle around{
+                {-side * 1e-30f, -1e-20f, 5}, {-side * 1e-30f, 1e-20f, 5}, {side, 0, 5}};
+            const Ray ray{{0, 0, 0}, 0, turned(Vec3{0, 0, 1}, axis), infinity};
+            for (const bool flip : {false, true}) {
+                const auto faced = [&](const LeafTriangle& t) {
+                    return turned(flip ? flipped(t) : t, axis);
+                };
+                EXPECT_FALSE(shoot(ray, faced(beside))) << axis << " " << side << " " << flip;
+                EXPECT_TRUE(shoot(ray, faced(around))) << axis << " " << side << " " << flip;
+            }
+        }
+}
+
 TEST(TriangleTest, EdgeFunctionTurnsItsSignExactly) {
     Random random(23);
     const auto wild = [&] {

@@ -110,7 +110,8 @@ HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::in
         const V start = hn::IfThenElseZero(hn::Gt(tmin, hn::Zero(f16)), tmin);
         hn::Store(start, f16, p.tmin + i);
         least_tmin = hn::Min(least_tmin, start);
-        hn::Store(hn::Min(ray.way[3], hn::Set(f16, std::numeric_limits<float>::max())), f16,
+        const V reach = hn::Min(ray.way[3], hn::Set(f16, std::numeric_limits<float>::max()));
+        hn::Store(hn::IfThenElse(hn::FirstN(f16, count - i), reach, hn::Set(f16, -infinity)), f16,
                   p.t + i);
         hn::Store(hn::Set(U16(), no_primitive), U16(), p.prim + i);
     }

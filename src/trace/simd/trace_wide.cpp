@@ -131,6 +131,7 @@ TraceCounts miss_all(std::span<const Ray> rays) {
 TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit> hits,
                   const TraceOptions& options) {
     check_sizes(rays.size(), hits.size());
+    static_cast<void>(kernels_for(options.isa));
     if (!tree.empty()) return trace_batch(tree, rays, hits.data(), nullptr, options);
     std::ranges::fill(hits, Hit{});
     return miss_all(rays);
@@ -146,12 +147,14 @@ std::vector<Hit> trace(const WideBvh& tree, std::span<const Ray> rays,
 TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size());
+    static_cast<void>(kernels_for(options.isa));
     if (!tree.empty()) return trace_batch(tree, rays, nullptr, occluded.data(), options);
     std::ranges::fill(occluded, std::uint8_t{0});
     return miss_all(rays);
 }
 
 AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOptions& options) {
+    const SimdKernels& kernels = kernels_for(options.isa);
     AllHits all;
     all.offsets.resize(rays.size() + 1, 0);
     if (tree.empty()) {
@@ -159,7 +162,6 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
         return all;
     }
     constexpr std::size_t block_size = 1024;
-    const SimdKernels& kernels = kernels_for(options.isa);
     std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
     std::vector<std::vector<Hit>> found(parts.size());
     with_threads(options.threads, [&] {
@@ -178,6 +180,7 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
 }
 
 SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays) {
+    const FloatEnvironment plain;
     constexpr std::size_t window = 64, windows = 32;
     constexpr float small_angle = 0.25f, small_part = 0.05f;
     const Aabb& bounds = tree.arrays().bounds;
