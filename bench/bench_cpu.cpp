@@ -126,7 +126,7 @@ void add_peer_options(CLI::App& app, CpuBench& options) {
     list("--isa", options.isas,
          "Instruction sets of our batch calls, or all (default: the best that the processor has)");
     app.add_flag("--all-paths", options.all_paths,
-                 "Our batch calls also one by one, in packets, sorted");
+                 "Our batch calls also one by one, in packets, as streams, sorted");
     app.add_option("--max-leaf", options.max_leaf, "Most triangles in a leaf of our binary trees")
         ->check(CLI::Range(1, 255))
         ->capture_default_str();

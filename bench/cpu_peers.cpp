@@ -131,6 +131,7 @@ public:
             if (!bench_.all_paths) continue;
             modes.push_back(batch_mode("one by one", SimdPath::single, isa));
             modes.push_back(batch_mode("packets", SimdPath::packet, isa));
+            modes.push_back(batch_mode("streams", SimdPath::stream, isa));
             modes.push_back(batch_mode("sorted", SimdPath::sorted, isa));
         }
         modes.front().automatic = true;
