@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "exec/parallel.h"
+#include "trace/batch.h"
 #include "trace/cwbvh_walk.h"
 
 namespace raydix {
@@ -18,20 +19,6 @@ struct CountedSteps {
     void visit() { ++visits; }
     void test() { ++tests; }
 };
-
-void check_sizes(std::size_t rays, std::size_t results) {
-    if (rays != results)
-        throw InputError("trace: " + std::to_string(rays) + " rays, but room for " +
-                         std::to_string(results) + " results");
-}
-
-void add(TraceCounts& sum, const TraceCounts& part) {
-    sum.rays += part.rays;
-    sum.hits += part.hits;
-    sum.invalid_rays += part.invalid_rays;
-    sum.node_visits += part.node_visits;
-    sum.triangle_tests += part.triangle_tests;
-}
 
 void count_steps(TraceCounts&, const NoCwbvhSteps&) {}
 void count_steps(TraceCounts& counts, const CountedSteps& steps) {

@@ -9,6 +9,7 @@
 
 #include "exec/parallel.h"
 #include "trace/all_hits.h"
+#include "trace/batch.h"
 #include "trace/triangle_test.h"
 #include "trace/walk.h"
 
@@ -102,14 +103,6 @@ Hit public_hit(const Closest& best, const RayFrame& ray) {
     return best.prim == no_primitive ? Hit{} : Hit{best.t * ray.t_scale, best.prim, best.u, best.v};
 }
 
-void add(TraceCounts& sum, const TraceCounts& part) {
-    sum.rays += part.rays;
-    sum.hits += part.hits;
-    sum.invalid_rays += part.invalid_rays;
-    sum.node_visits += part.node_visits;
-    sum.triangle_tests += part.triangle_tests;
-}
-
 /// Calls one(i, frame, stack, steps) -> number of hits for each valid ray and miss(i) for each
 /// other one.
 template <class Steps, class One, class Miss>
@@ -185,12 +178,6 @@ AllHits all_batch(const Bvh& bvh, std::span<const Ray> rays) {
         [](std::size_t) {});
     join_blocks(found, rays_per_block, all);
     return all;
-}
-
-void check_sizes(std::size_t rays, std::size_t results) {
-    if (rays != results)
-        throw InputError("trace: " + std::to_string(rays) + " rays, but room for " +
-                         std::to_string(results) + " results");
 }
 
 }  // namespace

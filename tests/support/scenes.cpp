@@ -1,6 +1,7 @@
 #include "support/scenes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 #include <utility>
 
@@ -44,6 +45,26 @@ Mesh lattice_mesh(std::size_t triangles, int side, std::uint64_t seed) {
         };
         mesh.triangles.push_back({corner(), corner(), corner()});
     }
+    return mesh;
+}
+
+Mesh ball_mesh(Vec3 middle) {
+    Mesh mesh;
+    constexpr int rows = 24;
+    for (int i = 0; i <= rows; ++i)
+        for (int j = 0; j < rows; ++j) {
+            const float a = 3.14159265f * float(i) / rows, b = 6.2831853f * float(j) / rows;
+            const bool pole = i == 0 || i == rows;
+            const float r = pole ? 0.0f : std::sin(a);
+            mesh.vertices.push_back(100.0f * Vec3{r * std::cos(b), r * std::sin(b), std::cos(a)} +
+                                    middle);
+        }
+    for (std::uint32_t i = 0; i < rows; ++i)
+        for (std::uint32_t j = 0; j < rows; ++j) {
+            const std::uint32_t k = (j + 1) % rows, p = i * rows, q = p + rows;
+            mesh.triangles.push_back({p + j, q + j, q + k});
+            mesh.triangles.push_back({p + j, q + k, p + k});
+        }
     return mesh;
 }
 

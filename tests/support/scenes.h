@@ -18,6 +18,9 @@ Scene scene_of(Mesh mesh, std::string name);
 /// Triangles on a small lattice of integers: ties, shared edges, coplanar ones, zero areas.
 Mesh lattice_mesh(std::size_t triangles, int side, std::uint64_t seed);
 
+/// A closed surface around `middle`, 100 from it, with many edges and two poles.
+Mesh ball_mesh(Vec3 middle);
+
 /// Every corner moved or scaled, rounded to float.
 Mesh moved(Mesh mesh, Vec3 by);
 Mesh scaled(Mesh mesh, float by);

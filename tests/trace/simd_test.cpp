@@ -389,22 +389,7 @@ TEST(Simd, RefusesWhatItCannotDo) {
 /// Rays from the middle of a closed surface, at vertices and edges, wherever it lies.
 TEST(Simd, NoRayLeavesAClosedSurface) {
     for (const Vec3 move : {Vec3{0, 0, 0}, Vec3{1e5f, 1e5f, -1e5f}}) {
-        Mesh mesh;
-        constexpr int rows = 24;
-        for (int i = 0; i <= rows; ++i)
-            for (int j = 0; j < rows; ++j) {
-                const float a = 3.14159265f * float(i) / rows, b = 6.2831853f * float(j) / rows;
-                const bool pole = i == 0 || i == rows;
-                const float r = pole ? 0.0f : std::sin(a);
-                mesh.vertices.push_back(
-                    100.0f * Vec3{r * std::cos(b), r * std::sin(b), std::cos(a)} + move);
-            }
-        for (std::uint32_t i = 0; i < rows; ++i)
-            for (std::uint32_t j = 0; j < rows; ++j) {
-                const std::uint32_t k = (j + 1) % rows, p = i * rows, q = p + rows;
-                mesh.triangles.push_back({p + j, q + j, q + k});
-                mesh.triangles.push_back({p + j, q + k, p + k});
-            }
+        const Mesh mesh = ball_mesh(move);
         const WideBvh tree(build_bvh(mesh, {.max_leaf = 1}));
         std::mt19937_64 random(seed);
         std::vector<Ray> rays;

@@ -57,16 +57,17 @@ HWY_INLINE hn::Vec<I16> classify(const RayVectors& ray) {
     return hn::IfThenElse(hn::RebindMask(d, ok), code, hn::Set(d, int{odd_ray_class}));
 }
 
-/// slab_pad and make_slab_frame for all rays: the largest pad.
-HWY_INLINE void set_pads(const Aabb& bounds, Packet& p) {
+/// The largest pad of make_slab_frame over rays whose origins lie between `least` and `largest`,
+/// times `factor`; positive.
+inline void largest_pad(const Aabb& bounds, const float* least, const float* largest,
+                        std::uint32_t kz, float factor, float* pad) {
     float far[3];
-    const float lo[3] = {bounds.lo.x, bounds.lo.y, bounds.lo.z},
-                hi[3] = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
-    for (int a = 0; a < 3; ++a)
-        far[a] =
-            max_of(max_of(std::fabs(lo[a] - p.origin_lo[a]), std::fabs(lo[a] - p.origin_hi[a])),
-                   max_of(std::fabs(hi[a] - p.origin_lo[a]), std::fabs(hi[a] - p.origin_hi[a])));
-    for (int a = 0; a < 3; ++a) p.pad[a] = packet_pad_factor * slab_pad * (far[a] + far[p.kind.kz]);
+    for (int a = 0; a < 3; ++a) {
+        const float lo = coordinate(bounds.lo, a), hi = coordinate(bounds.hi, a);
+        far[a] = max_of(max_of(std::fabs(lo - least[a]), std::fabs(lo - largest[a])),
+                        max_of(std::fabs(hi - least[a]), std::fabs(hi - largest[a])));
+    }
+    for (int a = 0; a < 3; ++a) pad[a] = factor * slab_pad * (far[a] + far[kz]);
 }
 
 /// Rays index[0, count) of one class; `index` may be read up to the next multiple of lanes16.
@@ -122,7 +123,7 @@ HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::in
         p.largest_inverse[a] = hn::GetLane(hn::MaxOfLanes(f16, largest[a]));
     }
     p.least_tmin = hn::GetLane(hn::MinOfLanes(f16, least_tmin));
-    set_pads(tree.bounds, p);
+    largest_pad(tree.bounds, p.origin_lo, p.origin_hi, p.kind.kz, packet_pad_factor, p.pad);
 }
 
 /// Rays of a job by class: order[begin[c]] to order[begin[c + 1]], each class in the caller's
@@ -252,17 +253,9 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
     HWY_ALIGN float least[4], largest[4];
     hn::Store(lo, f4, least);
     hn::Store(hi, f4, largest);
-    const Aabb& bounds = job.tree.bounds;
-    float far[3];
-    for (int a = 0; a < 3; ++a) {
-        const float box_lo = coordinate(bounds.lo, a), box_hi = coordinate(bounds.hi, a);
-        far[a] = max_of(max_of(std::fabs(box_lo - least[a]), std::fabs(box_lo - largest[a])),
-                        max_of(std::fabs(box_hi - least[a]), std::fabs(box_hi - largest[a])));
-    }
-    for (int a = 0; a < 3; ++a) {
-        const float pad = wide_pad_factor * slab_pad * (far[a] + far[frame.kind.kz]);
-        frame.near_pad[a] = frame.kind.negative(a) ? pad : -pad;
-    }
+    largest_pad(job.tree.bounds, least, largest, frame.kind.kz, wide_pad_factor, frame.near_pad);
+    for (int a = 0; a < 3; ++a)
+        if (!frame.kind.negative(a)) frame.near_pad[a] = -frame.near_pad[a];
     return frame;
 }
 

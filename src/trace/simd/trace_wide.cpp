@@ -13,16 +13,11 @@
 #include "exec/parallel.h"
 #include "rays/place_order.h"
 #include "trace/all_hits.h"
+#include "trace/batch.h"
 #include "trace/simd/simd_kernels.h"
 
 namespace raydix {
 namespace {
-
-void check_sizes(std::size_t rays, std::size_t results) {
-    if (rays != results)
-        throw InputError("trace: " + std::to_string(rays) + " rays, but room for " +
-                         std::to_string(results) + " results");
-}
 
 const SimdKernels& kernels_for(const std::string& isa) {
     const auto all = simd_kernels();

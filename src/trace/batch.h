@@ -1,0 +1,27 @@
+// What all kernels do with a batch: its size is checked, counts of its blocks are added up.
+#pragma once
+
+#include <raydix/error.h>
+#include <raydix/trace.h>
+
+#include <cstddef>
+#include <string>
+
+namespace raydix {
+
+/// Throws InputError if they differ.
+inline void check_sizes(std::size_t rays, std::size_t results) {
+    if (rays != results)
+        throw InputError("trace: " + std::to_string(rays) + " rays, but room for " +
+                         std::to_string(results) + " results");
+}
+
+inline void add(TraceCounts& sum, const TraceCounts& part) {
+    sum.rays += part.rays;
+    sum.hits += part.hits;
+    sum.invalid_rays += part.invalid_rays;
+    sum.node_visits += part.node_visits;
+    sum.triangle_tests += part.triangle_tests;
+}
+
+}  // namespace raydix
