@@ -106,7 +106,7 @@ class BenchCpu(ProgramTest):
         document = json_of((self.folder / "r.json").read_text(encoding="utf-8"))
         for scene in document["scenes"]:
             self.assertEqual(scene["builds"], [])
-            self.assertEqual(len(scene["rays"][0]["modes"]), 2 * (6 + 5))
+            self.assertEqual(len(scene["rays"][0]["modes"]), 2 * (6 + 6))
             self.assertEqual({s["peer"] for s in scene["speed_ups"]}, {"embree medium", "raydix balanced"})
             self.assertEqual({s["figure"] for s in scene["speed_ups"]},
                              {f"{kind}_{call}" for kind in KINDS[:2] for call in ("batch", "single")})
