@@ -98,11 +98,11 @@ private:
     EmbreeScene scene_;
 };
 
-/// A binary tree by the builder that the word of quality stands for, and the wide one from it.
+/// A wide tree by the builder that the word of quality stands for.
 class RaydixPeer : public Peer {
 public:
     RaydixPeer(const std::string& quality, const Mesh& mesh, const CpuBench& bench, int threads)
-        : mesh_(mesh), bench_(bench), wide_options_{.width = bench.width, .threads = threads} {
+        : mesh_(mesh), bench_(bench) {
         cli::CommonOptions common = bench.common;
         common.threads = threads;
         cli::TreeOptions tree;
@@ -111,15 +111,13 @@ public:
         build_options_ = tree.build_options(common);
     }
 
-    void build() override {
-        builder_.build(mesh_, build_options_, bvh_);
-        wide_.reset();
-        wide_.emplace(bvh_, wide_options_);
-    }
+    void build() override { builder_.build(mesh_, build_options_, wide_, bench_.width); }
 
-    std::optional<double> layout_ms() const override { return wide_->stats().ms; }
-    PeerBytes bytes() override { return {wide_->stats().bytes, 0}; }
-    std::optional<double> sah() override { return tree_stats(bvh_, {.with_hash = false}).sah; }
+    std::optional<double> layout_ms() const override { return wide_.stats().layout_ms; }
+    PeerBytes bytes() override { return {wide_.stats().bytes, 0}; }
+    std::optional<double> sah() override {
+        return tree_stats(build_bvh(mesh_, build_options_), {.with_hash = false}).sah;
+    }
 
     std::vector<Mode> modes() const override {
         std::vector<std::string> isas = bench_.isas;
@@ -144,7 +142,7 @@ private:
         TraceOptions options;
         options.path = path;
         options.isa = isa;
-        const WideBvh* tree = &*wide_;
+        const WideBvh* tree = &wide_;
         return {.name = "batch " + name + (isa.empty() ? "" : " " + isa),
                 .closest =
                     [=](std::span<const Ray> rays, std::span<Hit> hits, int threads) {
@@ -162,7 +160,7 @@ private:
 
     /// The loop is the one that Embree's rays go through.
     Mode single_mode() const {
-        const WideBvh* tree = &*wide_;
+        const WideBvh* tree = &wide_;
         const auto loop = [](std::size_t rays, int threads, const auto& one) {
             with_threads(threads, [&] {
                 for_each_block(rays, rays_of_a_block,
@@ -188,10 +186,8 @@ private:
     const Mesh& mesh_;
     const CpuBench& bench_;
     BuildOptions build_options_;
-    WideBvhOptions wide_options_;
-    BvhBuilder builder_;
-    Bvh bvh_;
-    std::optional<WideBvh> wide_;
+    WideBvhBuilder builder_;
+    WideBvh wide_;
 };
 
 }  // namespace

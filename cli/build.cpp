@@ -139,7 +139,8 @@ void run_build(const BuildCommand& options) {
     build["kept_ms"] = spread_json(totals(timed.kept));
     if (options.tree.layout == "cwbvh") add_cwbvh(build, timed.bvh, options.common);
     if (options.tree.layout == "wide8")
-        add_wide(build, WideBvh(timed.bvh, {.threads = options.common.threads}));
+        add_wide_builds(build, scene.mesh, options.tree.build_options(options.common),
+                        options.repeat);
     document["build"] = build;
     if (options.common.prints_tables()) {
         fmt::print("{}: {} triangles, {} vertices, loaded in {:.1f} ms\n", scene.name,

@@ -102,8 +102,8 @@ BuildOptions TreeOptions::build_options(const CommonOptions& common) const {
     refuse_simulator(*this);
     if (max_level) throw CLI::ValidationError("--max-level", "belongs to --tree octree");
     BuildOptions result;
-    result.builder = quality == "fast"       ? Builder::apetrei
-                     : quality == "balanced" ? Builder::ploc
+    result.builder = quality == "fast"       ? build_options_for(Quality::fast).builder
+                     : quality == "balanced" ? build_options_for(Quality::balanced).builder
                      : quality == "high"     ? Builder::sbvh
                                              : builder_from_name(builder);
     if (!fit.empty()) result.fit = fit == "levels" ? Fit::levels : Fit::atomic;

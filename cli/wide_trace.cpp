@@ -104,14 +104,43 @@ void add_wide(Json& build, const WideBvh& tree) {
                      {"widening", s.widening},
                      {"node_bytes", s.node_bytes},
                      {"triangle_bytes", s.triangle_bytes},
-                     {"ms", s.ms}};
+                     {"ms", s.ms},
+                     {"layout_ms", s.layout_ms},
+                     {"build_ms", nullptr},
+                     {"kept_ms", nullptr}};
+}
+
+void add_wide_builds(Json& build, const Mesh& mesh, const BuildOptions& options, int repeat) {
+    std::vector<double> fresh, kept;
+    WideBvh tree = build_wide_bvh(mesh, options);
+    for (int i = 0; i < repeat; ++i) {
+        tree = WideBvh();
+        tree = build_wide_bvh(mesh, options);
+        fresh.push_back(tree.stats().ms);
+    }
+    WideBvhBuilder builder;
+    builder.build(mesh, options, tree);
+    for (int i = 0; i < repeat; ++i) {
+        builder.build(mesh, options, tree);
+        kept.push_back(tree.stats().ms);
+    }
+    add_wide(build, tree);
+    build["wide"]["build_ms"] = spread_json(spread_of(fresh));
+    build["wide"]["kept_ms"] = spread_json(spread_of(kept));
 }
 
 void print_wide_table(const Json& wide) {
-    fmt::print("\nwide8        {} nodes of {:.2f} children, {} leaves, depth {}, in {:.2f} ms\n",
+    fmt::print("\nwide8        {} nodes of {:.2f} children, {} leaves, depth {}\n",
                grouped(wide["nodes"].get<std::uint64_t>()), wide["children_per_node"].get<double>(),
-               grouped(wide["leaves"].get<std::uint64_t>()), wide["max_depth"].get<std::uint32_t>(),
-               wide["ms"].get<double>());
+               grouped(wide["leaves"].get<std::uint64_t>()),
+               wide["max_depth"].get<std::uint32_t>());
+    for (const auto& [label, field] :
+         {std::pair{"from the mesh", "build_ms"}, {"rebuild", "kept_ms"}})
+        if (const Json& ms = wide[field]; ms.is_object())
+            fmt::print(
+                "{:<13} {:>8.2f} {:>9.2f} {:>9.2f}   ms: median, min, max; all that rays need\n",
+                label, ms["median"].get<double>(), ms["min"].get<double>(),
+                ms["max"].get<double>());
     fmt::print(
         "SAH          {:.3f}   (node 1, primitive 0.4), boxes widened to {:.3f} x their area\n",
         wide["sah"].get<double>(), wide["widening"].get<double>());

@@ -48,8 +48,11 @@ private:
     std::map<std::string, std::uint64_t> batches_;
 };
 
-/// The wide tree that follows from the binary one; what a trace touches is then its.
+/// The wide tree; what a trace touches is then its.
 void add_wide(Json& build, const WideBvh& tree);
+/// Times builds of it, into new memory and into kept memory, without the binary tree where that is
+/// possible; then as add_wide.
+void add_wide_builds(Json& build, const Mesh& mesh, const BuildOptions& options, int repeat);
 void print_wide_table(const Json& wide);
 
 }  // namespace raydix::cli

@@ -57,6 +57,16 @@ struct BuildOptions {
     int threads = 0;      // 0: all the machine has. The tree does not depend on it
 };
 
+/// What a tree is for: built each frame, built once for some million rays, built once for many.
+enum class Quality { fast, balanced, high };
+
+/// The builder that the word stands for (apetrei, ploc, sbvh), with its other options as they are.
+[[nodiscard]] constexpr BuildOptions build_options_for(Quality quality) {
+    return {.builder = quality == Quality::fast       ? Builder::apetrei
+                       : quality == Quality::balanced ? Builder::ploc
+                                                      : Builder::sbvh};
+}
+
 /// 32 bytes. Inner: count == 0, children are nodes `first` and `first + 1`, left = lower code
 /// range. Leaf: count > 0 primitives, positions [first, first + count) of the primitive order. Slot
 /// 1 is padding, so that each pair of children lies in one 64-byte line; an inner node's `first` is
@@ -166,6 +176,7 @@ public:
     void build(std::span<const Aabb> boxes, const BuildOptions& options, Bvh& tree);
 
 private:
+    friend struct BvhBuilderAccess;  // for builders that go on where this one would end
     struct Scratch;
     std::unique_ptr<Scratch> scratch_;
 };

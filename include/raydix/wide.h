@@ -33,13 +33,17 @@ struct WideBvhStats {
         0;  // surface of all quantised child boxes / that of the exact ones; 1 without surface
     std::uint64_t node_bytes = 0, triangle_bytes = 0;
     std::uint64_t bytes = 0;  // every byte a trace touches
-    double ms = 0;            // of making it
+    double ms = 0;            // of making it: from a binary tree, or from a mesh
+    double layout_ms = 0;     // the part of it after the binary tree or its clusters
+    std::uint64_t input_count = 0, left_out = 0;  // triangles given; invalid ones among them
 };
 
 /// Holds all that a trace reads: the binary tree and the mesh may go. The same bits for every
 /// thread count and instruction set.
 class WideBvh {
 public:
+    /// Empty: nothing is hit.
+    WideBvh();
     /// Throws InputError for another width, if the tree holds boxes or points, or for more than
     /// 267,386,880 references.
     explicit WideBvh(const Bvh& bvh, const WideBvhOptions& options = {});
@@ -54,8 +58,35 @@ public:
     [[nodiscard]] const Arrays& arrays() const { return *arrays_; }
 
 private:
+    friend class WideBvhBuilder;
     std::unique_ptr<Arrays> arrays_;
 };
+
+/// Builds wide trees from meshes, again and again into the same memory. Not for use by two threads
+/// at once.
+class WideBvhBuilder {
+public:
+    WideBvhBuilder();
+    ~WideBvhBuilder();
+    WideBvhBuilder(WideBvhBuilder&&) noexcept;
+    WideBvhBuilder& operator=(WideBvhBuilder&&) noexcept;
+
+    /// The same bits as WideBvh(build_bvh(mesh, options)), without the binary tree in between where
+    /// the builder is ploc, hploc or binned and max_leaf is at most 4. The mesh may go afterwards.
+    /// Throws InputError as both of them do, and if the mesh has vertices but no triangles.
+    void build(const MeshView& mesh, const BuildOptions& options, WideBvh& tree,
+               int width = WideBvhOptions{}.width);
+
+private:
+    struct Scratch;
+    std::unique_ptr<Scratch> scratch_;
+};
+
+/// As WideBvhBuilder makes it.
+[[nodiscard]] WideBvh build_wide_bvh(
+    const MeshView& mesh, const BuildOptions& options = build_options_for(Quality::balanced));
+[[nodiscard]] WideBvh build_wide_bvh(
+    const Mesh& mesh, const BuildOptions& options = build_options_for(Quality::balanced));
 
 /// As trace(), trace_any() and trace_all() of a Bvh, bit for bit, by the kernel `simd`.
 /// options.path says how rays go through the tree, options.isa with which instructions;

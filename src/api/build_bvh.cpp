@@ -6,6 +6,7 @@
 
 #include "api/build_clusters.h"
 #include "api/build_sah.h"
+#include "api/bvh_builder_access.h"
 #include "api/input_checks.h"
 #include "base/check.h"
 #include "exec/host_launcher.h"
@@ -35,6 +36,7 @@ struct BvhBuilder::Scratch {
     Buffer<std::uint8_t> meeting;
     ClusterScratch clusters;
     SweepScratch sweeps;
+    const TakeClusters* take_clusters = nullptr;  // if clusters are wanted, not a tree
 };
 
 namespace {
@@ -129,7 +131,7 @@ struct BuildRun {
 
         const std::span<const Key> keys = codes.first(valid);
         if (grows_clusters(options.builder)) {
-            build_clusters(source, keys, scratch.clusters, tree, copies, ms);
+            build_clusters(source, keys, scratch.clusters, scratch.take_clusters, tree, copies, ms);
             ms.total = total.lap();
             tree.build_ms() = ms;
             return;
@@ -212,11 +214,7 @@ private:
     }
 
     void make_empty() {
-        tree.nodes().reset(0);
-        tree.order().reset(0);
-        copies.reset(0);
-        tree.inner_count() = 0;
-        tree.max_depth() = 0;
+        tree.make_empty();
         tree.build_ms() = {};
     }
 
@@ -314,6 +312,15 @@ BvhBuilder::BvhBuilder() : scratch_(std::make_unique<Scratch>()) {}
 BvhBuilder::~BvhBuilder() = default;
 BvhBuilder::BvhBuilder(BvhBuilder&&) noexcept = default;
 BvhBuilder& BvhBuilder::operator=(BvhBuilder&&) noexcept = default;
+
+void BvhBuilderAccess::build_clusters(BvhBuilder& builder, const MeshView& mesh,
+                                      const BuildOptions& options, Bvh& tree,
+                                      const TakeClusters& take) {
+    builder.scratch_->take_clusters = &take;
+    const auto forget = [&](void*) { builder.scratch_->take_clusters = nullptr; };
+    const std::unique_ptr<void, decltype(forget)> guard(&builder, forget);
+    builder.build(mesh, options, tree);
+}
 
 void BvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Bvh& tree) {
     const bool same_kind =

@@ -2,11 +2,14 @@
 // copies. Bounds, codes and sort are those of build_bvh.cpp.
 #pragma once
 
+#include <type_traits>
 #include <utility>
 
+#include "api/bvh_builder_access.h"
 #include "layout/leaf_order.h"
 #include "measure/stopwatch.h"
 #include "primitives/host_box.h"
+#include "primitives/zero_area.h"
 #include "tree/binned.h"
 #include "tree/build_hploc.h"
 #include "tree/bvh_access.h"
@@ -15,33 +18,35 @@
 
 namespace raydix {
 
-[[nodiscard]] constexpr bool grows_clusters(Builder builder) {
-    return builder == Builder::ploc || builder == Builder::hploc || builder == Builder::binned;
-}
-
 struct ClusterScratch {
     Buffer<std::uint32_t> ids;  // [n] in Morton order
     PlocScratch ploc;
     Buffer<std::byte> hploc;
     BinnedScratch binned;
+    Buffer<std::uint8_t> flat;  // [n] in Morton order: triangles without area
 
     [[nodiscard]] std::size_t capacity_bytes() const {
-        return ids.capacity_bytes() + ploc.capacity_bytes() + hploc.capacity_bytes() +
-               binned.capacity_bytes();
+        return ids.capacity_bytes() + flat.capacity_bytes() + ploc.capacity_bytes() +
+               hploc.capacity_bytes() + binned.capacity_bytes();
     }
 };
 
 /// `keys`: the sorted codes of the valid primitives, at least one; they may lie in the memory of
 /// `copies`. tree.order() holds their ids, in Morton order; on return all arrays of the tree are
-/// complete, and ms.hierarchy, ms.fit and ms.layout are written.
+/// complete, and ms.hierarchy, ms.fit and ms.layout are written. With `take` (triangles only), it
+/// gets the clusters, and the arrays of the tree stay empty.
 template <class Key, class Source, class Copy>
 void build_clusters(const Source& source, std::span<const Key> keys, ClusterScratch& scratch,
-                    const BvhAccess& tree, Buffer<Copy>& copies, BuildMs& ms) {
+                    const TakeClusters* take, const BvhAccess& tree, Buffer<Copy>& copies,
+                    BuildMs& ms) {
     Stopwatch stage;
     std::swap(scratch.ids, tree.order());
     const std::span<const std::uint32_t> ids = scratch.ids.view();
     BoxLanes& boxes = scratch.ploc.primitives;
     boxes.reset(static_cast<std::uint32_t>(ids.size()));
+    constexpr bool triangles = std::is_same_v<Source, TriangleSource>;
+    const bool mark_flat = triangles && take != nullptr;
+    if (mark_flat) scratch.flat.reset(ids.size());
     for_each_range(ids.size(), 4096, [&](std::size_t begin, std::size_t end) {
         constexpr std::size_t indices_ahead = 32, corners_ahead = 16;
         for (std::size_t k = begin; k < end; ++k) {
@@ -52,6 +57,9 @@ void build_clusters(const Source& source, std::span<const Key> keys, ClusterScra
             Box3 box;
             host_box(source, ids[k], box);
             boxes.set(static_cast<std::uint32_t>(k), box.box());
+            if constexpr (triangles)
+                if (mark_flat)
+                    scratch.flat[k] = has_zero_area(copy_primitive(source, ids[k])) ? 1 : 0;
         }
     });
     const auto max_leaf = static_cast<std::uint32_t>(tree.options().max_leaf);
@@ -69,8 +77,15 @@ void build_clusters(const Source& source, std::span<const Key> keys, ClusterScra
     }();
     ms.hierarchy = stage.lap();
 
-    tree.inner_count() = place_clusters({scratch.ploc.nodes.data(), root, boxes, ids}, tree.nodes(),
-                                        tree.order(), tree.max_depth());
+    const ClusterTree clusters{scratch.ploc.nodes.data(), root, boxes, ids};
+    if constexpr (triangles)
+        if (take != nullptr) {
+            (*take)(clusters, source, scratch.flat.data());
+            ms.fit = stage.lap();
+            tree.make_empty();
+            return;
+        }
+    tree.inner_count() = place_clusters(clusters, tree.nodes(), tree.order(), tree.max_depth());
     ms.fit = stage.lap();
     copy_to_leaf_order(source, tree.order().view(), copies);
     ms.layout = stage.lap();

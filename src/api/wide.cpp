@@ -2,67 +2,38 @@
 #include <raydix/error.h>
 #include <raydix/wide.h>
 
-#include <cmath>
 #include <string>
 
+#include "api/bvh_builder_access.h"
 #include "base/float_env.h"
-#include "base/math.h"
 #include "exec/parallel.h"
+#include "layout/cluster_view.h"
 #include "layout/wide_bvh.h"
 #include "layout/wide_collapse.h"
 #include "measure/stopwatch.h"
+#include "tree/cluster.h"
 
 namespace raydix {
 namespace {
 
-/// As decoded; in double, to within a rounding.
-double decoded_half_area(const WideNode& node, int slot) {
-    double size[3];
-    for (int axis = 0; axis < 3; ++axis)
-        size[axis] = (node.hi[axis][slot] - node.lo[axis][slot]) *
-                     std::ldexp(1.0, node.exponent[axis] - 127);
-    return size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
-}
-
-void add_widening(double exact, WideBvh::Arrays& arrays) {
-    double quantised = 0;
-    for (const WideNode& node : arrays.nodes.view())
-        for (int slot = 0; slot < quantised_width; ++slot)
-            if ((node.used >> slot & 1) != 0) quantised += decoded_half_area(node, slot);
-    arrays.stats.widening = exact > 0 ? quantised / exact : 1.0;
-}
-
-void add_counts(WideBvhStats& stats, const WideBvh::Arrays& arrays) {
-    std::uint64_t children = 0;
-    for (const WideNode& node : arrays.nodes.view())
-        for (int slot = 0; slot < quantised_width; ++slot) {
-            const std::uint32_t word = node.child[slot];
-            if (word == wide_no_child) continue;
-            ++children;
-            if ((word & wide_leaf_bit) == 0) continue;
-            ++stats.leaves;
-            stats.references += (word & 7) + 1;
-        }
-    stats.nodes = arrays.nodes.size();
-    if (stats.nodes > 0)
-        stats.children_per_node = static_cast<double>(children) / static_cast<double>(stats.nodes);
-    stats.node_bytes = arrays.nodes.size() * sizeof(WideNode);
-    stats.triangle_bytes = arrays.blocks.size() * sizeof(TriangleBlock);
-    stats.bytes = stats.node_bytes + stats.triangle_bytes;
-}
-
-}  // namespace
-
-WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
-    : arrays_(std::make_unique<Arrays>()) {
+WideOptions collapse_options(const WideBvhOptions& options) {
     const WideOptions collapse{.width = options.width,
                                .max_leaf = wide_max_leaf,
                                .node_cost = 1.0,
                                .primitive_cost = wide_primitive_cost,
                                .block = wide_block};
     check_wide_options(collapse);
-    arrays_->stats.width = options.width;
-    arrays_->stats.widening = 1.0;
+    return collapse;
+}
+
+}  // namespace
+
+WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
+    : arrays_(std::make_unique<Arrays>()) {
+    const WideOptions collapse = collapse_options(options);
+    arrays_->clear(options.width);
+    arrays_->stats.input_count = bvh.input_count();
+    arrays_->stats.left_out = bvh.left_out();
     if (bvh.empty()) return;
     if (bvh.kind() != PrimitiveKind::triangles)
         throw InputError(std::string("rays need triangles; this tree holds ") +
@@ -70,19 +41,80 @@ WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
     const FloatEnvironment environment;
     with_threads(options.threads, [&] {
         Stopwatch watch;
-        const WideTree wide = collapse_to_wide(bvh, collapse);
-        const double area = make_wide_layout(wide, bvh, *arrays_);
-        arrays_->stats.ms = watch.lap();
-        arrays_->stats.max_depth = wide.max_depth;
-        arrays_->stats.sah = wide_cost(wide, collapse);
-        add_widening(area, *arrays_);
-        add_counts(arrays_->stats, *arrays_);
+        WideScratch scratch;
+        make_wide_layout(bvh, collapse, *arrays_, scratch);
+        arrays_->stats.ms = arrays_->stats.layout_ms = watch.lap();
     });
 }
 
+WideBvh::WideBvh() : arrays_(std::make_unique<Arrays>()) { arrays_->clear(WideBvhOptions{}.width); }
 WideBvh::~WideBvh() = default;
 WideBvh::WideBvh(WideBvh&&) noexcept = default;
 WideBvh& WideBvh::operator=(WideBvh&&) noexcept = default;
+
+struct WideBvhBuilder::Scratch {
+    BvhBuilder builder;
+    Bvh tree;
+    WideScratch wide;
+};
+
+WideBvhBuilder::WideBvhBuilder() : scratch_(std::make_unique<Scratch>()) {}
+WideBvhBuilder::~WideBvhBuilder() = default;
+WideBvhBuilder::WideBvhBuilder(WideBvhBuilder&&) noexcept = default;
+WideBvhBuilder& WideBvhBuilder::operator=(WideBvhBuilder&&) noexcept = default;
+
+void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, WideBvh& tree,
+                           int width) {
+    const FloatEnvironment environment;
+    Stopwatch watch;
+    const WideOptions collapse = collapse_options({.width = width});
+    if (mesh.triangles.empty() && !mesh.vertices.empty())
+        throw InputError("rays need triangles; this mesh has vertices alone");
+    WideBvh::Arrays& arrays = *tree.arrays_;
+    Bvh& bvh = scratch_->tree;
+    double layout_ms = 0;
+    const auto lay_out = [&](const auto& make) {
+        Stopwatch stage;
+        make();
+        layout_ms = stage.lap();
+    };
+    try {
+        arrays.clear(width);
+        if (grows_clusters(options.builder) &&
+            options.max_leaf <= static_cast<int>(wide_max_leaf)) {
+            BvhBuilderAccess::build_clusters(
+                scratch_->builder, mesh, options, bvh,
+                [&](const ClusterTree& clusters, const TriangleSource& source,
+                    const std::uint8_t* flat) {
+                    const ClusterView view(clusters, source, flat);
+                    lay_out([&] { make_wide_layout(view, collapse, arrays, scratch_->wide); });
+                });
+        } else {
+            scratch_->builder.build(mesh, options, bvh);
+            if (!bvh.empty())
+                with_threads(options.threads, [&] {
+                    lay_out([&] { make_wide_layout(bvh, collapse, arrays, scratch_->wide); });
+                });
+        }
+    } catch (...) {
+        arrays.clear(width);  // nothing half-built gets out
+        throw;
+    }
+    arrays.stats.input_count = bvh.input_count();
+    arrays.stats.left_out = bvh.left_out();
+    arrays.stats.layout_ms = layout_ms;
+    arrays.stats.ms = watch.lap();
+}
+
+WideBvh build_wide_bvh(const MeshView& mesh, const BuildOptions& options) {
+    WideBvh tree;
+    WideBvhBuilder().build(mesh, options, tree);
+    return tree;
+}
+
+WideBvh build_wide_bvh(const Mesh& mesh, const BuildOptions& options) {
+    return build_wide_bvh(MeshView(mesh), options);
+}
 
 bool WideBvh::empty() const { return arrays_->blocks.empty(); }
 const WideBvhStats& WideBvh::stats() const { return arrays_->stats; }

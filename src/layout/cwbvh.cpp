@@ -18,6 +18,8 @@ std::size_t used_children(std::span<const BvhNode> children) {
     return count;
 }
 
+using ChildSlots = std::array<const BvhNode*, cwbvh_width>;
+
 ChildSlots children_by_slot(std::span<const BvhNode> children) {
     std::array<Aabb, cwbvh_width> boxes;
     std::array<int, cwbvh_width> places{};
@@ -74,7 +76,14 @@ private:
 
     void write_node(std::size_t w) {
         CwbvhNode node{};
-        quantise_children(order_[w], node);
+        SlotBoxes boxes;
+        Aabb all = empty_box();
+        for (std::size_t s = 0; s < cwbvh_width; ++s)
+            if (const BvhNode* child = order_[w][s]; child != nullptr) {
+                boxes.set(static_cast<int>(s), box_of(*child));
+                all = unite(all, box_of(*child));
+            }
+        set_boxes(node, quantise(boxes, all));
         node.child_base = bases_[w].node;
         node.triangle_base = bases_[w].triangle;
         std::uint32_t position = 0;

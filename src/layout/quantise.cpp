@@ -4,11 +4,15 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
+
+#define RAYDIX_INLINE __attribute__((always_inline)) inline
+#if defined(__x86_64__)
+#define RAYDIX_WITH_AVX2
+#endif
 
 namespace raydix {
 namespace {
-
-double step_of(int exponent) { return std::ldexp(1.0, exponent - 127); }
 
 /// b - a without rounding: `value` is the nearest double, `rest` what it lacks (Knuth's two-sum;
 /// two floats can be 2^149 apart in size).
@@ -24,21 +28,124 @@ struct ExactDifference {
     [[nodiscard]] bool at_most(double x) const { return value < x || (value == x && rest <= 0); }
 };
 
+struct QuantisedAxis {
+    bool contained;
+    std::uint8_t lo[quantised_width], hi[quantised_width];
+};
+
+/// Four at a time, by the compilers' own vectors: the loop below is a fifth of what making a layout
+/// costs, and no compiler makes vectors of it by itself.
+constexpr int lanes = 4;
+using Floats = float __attribute__((vector_size(lanes * sizeof(float))));
+using Ints = std::int32_t __attribute__((vector_size(lanes * sizeof(std::int32_t))));
+using Doubles = double __attribute__((vector_size(lanes * sizeof(double))));
+using Bytes = std::uint8_t __attribute__((vector_size(lanes)));
+using Masks = std::int64_t __attribute__((vector_size(lanes * sizeof(std::int64_t))));
+
+RAYDIX_INLINE void store_bytes(Doubles values, std::uint8_t* out) {
+    const Ints whole = __builtin_convertvector(values, Ints);
+    const Bytes bytes = __builtin_convertvector(whole, Bytes);
+    std::memcpy(out, &bytes, sizeof(bytes));
+}
+
+/// Distances from an origin, in steps; `rest` is what they lack (see ExactDifference).
+struct Steps {
+    Doubles x, rest, whole;
+
+    RAYDIX_INLINE Steps(float origin, const float* at, double per_step) {
+        Floats loaded;
+        std::memcpy(&loaded, at, sizeof(loaded));
+        const Doubles b = __builtin_convertvector(loaded, Doubles), a = Doubles{} + double(origin);
+        const Doubles value = b - a, b_part = value + a, a_part = b_part - value;
+        rest = (b - b_part) - (a - a_part);
+        x = value * per_step;
+        whole = __builtin_convertvector(__builtin_convertvector(x, Ints), Doubles);
+    }
+};
+
+/// As steps_below() and steps_above() of eight children at once.
+RAYDIX_INLINE QuantisedAxis quantise_axis(float origin, int exponent, const float* lo,
+                                          const float* hi) {
+    const double per_step = quantised_step(254 - exponent);  // exact, as is multiplying by it
+    const Doubles zero{}, one = zero + 1.0, most = zero + double(max_steps);
+    QuantisedAxis out;
+    Masks contained = zero == zero;
+    for (int s = 0; s < quantised_width; s += lanes) {
+        const Steps below(origin, lo + s, per_step), above(origin, hi + s, per_step);
+        Doubles a = below.whole;
+        a -= ((a == below.x) & (below.rest < zero)) ? one : zero;
+        a = a < zero ? zero : a;
+        Doubles b = above.whole;
+        b += ((b < above.x) | ((b == above.x) & (above.rest > zero))) ? one : zero;
+        b = b > most ? most : b;
+        contained &= ((a < below.x) | ((a == below.x) & (below.rest >= zero))) &
+                     ((b > above.x) | ((b == above.x) & (above.rest <= zero)));
+        store_bytes(a, out.lo + s);
+        store_bytes(b, out.hi + s);
+    }
+    out.contained = (contained[0] & contained[1] & contained[2] & contained[3]) != 0;
+    return out;
+}
+
+RAYDIX_INLINE QuantisedBoxes quantise_here(const SlotBoxes& boxes, const Aabb& all) {
+    QuantisedBoxes out;
+    for (int axis = 0; axis < 3; ++axis) {
+        const float origin = coordinate(all.lo, axis);
+        float lo[quantised_width], hi[quantised_width];
+        for (int s = 0; s < quantised_width; ++s) {
+            const bool used = (boxes.used >> s & 1) != 0;
+            lo[s] = used ? boxes.lo[axis][s] : origin;
+            hi[s] = used ? boxes.hi[axis][s] : origin;
+        }
+        int exponent = step_exponent(origin, coordinate(all.hi, axis));
+        QuantisedAxis q = quantise_axis(origin, exponent, lo, hi);
+        while (!q.contained && exponent < max_step_exponent)
+            q = quantise_axis(origin, ++exponent, lo, hi);
+        out.origin[axis] = origin;
+        out.exponent[axis] = static_cast<std::uint8_t>(exponent);
+        for (int s = 0; s < quantised_width; ++s) {
+            const bool used = (boxes.used >> s & 1) != 0;
+            out.lo[axis][s] = used ? q.lo[s] : static_cast<std::uint8_t>(max_steps);
+            out.hi[axis][s] = used ? q.hi[s] : std::uint8_t{0};
+        }
+    }
+    return out;
+}
+
+#if defined(RAYDIX_WITH_AVX2)
+__attribute__((target("avx2"))) QuantisedBoxes quantise_avx2(const SlotBoxes& boxes,
+                                                             const Aabb& all) {
+    return quantise_here(boxes, all);
+}
+#endif
+
 }  // namespace
+
+double quantised_step(int exponent) {
+    return std::bit_cast<double>(static_cast<std::uint64_t>(exponent - 127 + 1023) << 52);
+}
+
+QuantisedBoxes quantise(const SlotBoxes& boxes, const Aabb& all) {
+#if defined(RAYDIX_WITH_AVX2)
+    static const bool avx2 = __builtin_cpu_supports("avx2") != 0;
+    if (avx2) return quantise_avx2(boxes, all);
+#endif
+    return quantise_here(boxes, all);
+}
 
 int step_exponent(float lo, float hi) {
     const ExactDifference extent(lo, hi);
     if (extent.at_most(0.0)) return min_step_exponent;
-    int exponent;
-    std::frexp(extent.value / max_steps, &exponent);  // at most 2^exponent
-    int biased = std::clamp(exponent - 2 + 127, min_step_exponent, max_step_exponent);
-    while (!extent.at_most(max_steps * step_of(biased))) ++biased;
+    const auto bits = std::bit_cast<std::uint64_t>(extent.value / max_steps);
+    const int exponent = static_cast<int>(bits >> 52) - 1023;  // 2^exponent is at most that
+    int biased = std::clamp(exponent - 1 + 127, min_step_exponent, max_step_exponent);
+    while (!extent.at_most(max_steps * quantised_step(biased))) ++biased;
     return biased;
 }
 
 int steps_below(float origin, int exponent, float at) {
     const ExactDifference distance(origin, at);
-    const double step = step_of(exponent);
+    const double step = quantised_step(exponent);
     int q = static_cast<int>(std::clamp(distance.value / step, 0.0, double(max_steps)));
     while (q < max_steps && distance.at_least((q + 1) * step)) ++q;
     while (q > 0 && !distance.at_least(q * step)) --q;
@@ -47,7 +154,7 @@ int steps_below(float origin, int exponent, float at) {
 
 int steps_above(float origin, int exponent, float at) {
     const ExactDifference distance(origin, at);
-    const double step = step_of(exponent);
+    const double step = quantised_step(exponent);
     int q = static_cast<int>(std::clamp(distance.value / step, 0.0, double(max_steps)));
     while (q > 0 && distance.at_most((q - 1) * step)) --q;
     while (q < max_steps && !distance.at_most(q * step)) ++q;
@@ -55,11 +162,11 @@ int steps_above(float origin, int exponent, float at) {
 }
 
 bool is_at_most(float origin, int exponent, int q, float at) {
-    return ExactDifference(origin, at).at_least(q * step_of(exponent));
+    return ExactDifference(origin, at).at_least(q * quantised_step(exponent));
 }
 
 bool is_at_least(float origin, int exponent, int q, float at) {
-    return ExactDifference(origin, at).at_most(q * step_of(exponent));
+    return ExactDifference(origin, at).at_most(q * quantised_step(exponent));
 }
 
 void assign_octant_slots(std::span<const Aabb> children, int* slots) {
@@ -103,35 +210,42 @@ void assign_octant_slots(std::span<const Aabb> children, int* slots) {
 }
 
 void assign_octant_slots_greedily(std::span<const Aabb> children, int* slots) {
-    const std::size_t count = children.size();
+    const auto count = static_cast<int>(children.size());
     Aabb all = empty_box();
     for (const Aabb& box : children) all = unite(all, box);
     const Vec3 middle = center_of(all);
     std::array<Vec3, quantised_width> away;
     std::array<float, quantised_width> most;  // what the best slot would give
-    for (std::size_t k = 0; k < count; ++k) {
-        const Vec3 d = center_of(children[k]) - middle;
-        away[k] = d;
-        most[k] = (std::fabs(d.x) + std::fabs(d.y)) + std::fabs(d.z);
+    std::array<int, quantised_width> owner, waiting;
+    owner.fill(-1);
+    int waiting_count = 0;
+    for (int k = 0; k < count; ++k) {
+        const auto at = static_cast<std::size_t>(k);
+        const Vec3 d = away[at] = center_of(children[at]) - middle;
+        most[at] = (std::fabs(d.x) + std::fabs(d.y)) + std::fabs(d.z);
+        int& other = owner[(d.x > 0 ? 1u : 0u) | (d.y > 0 ? 2u : 0u) | (d.z > 0 ? 4u : 0u)];
+        int loser = other;
+        if (other < 0 || most[at] > most[static_cast<std::size_t>(other)])
+            other = k;
+        else
+            loser = k;
+        if (loser >= 0) waiting[static_cast<std::size_t>(waiting_count++)] = loser;
     }
-    unsigned open = (1u << quantised_width) - 1;
-    for (std::size_t turn = 0; turn < count; ++turn) {
-        std::size_t next = 0;
-        for (std::size_t k = 1; k < count; ++k)
-            if (most[k] > most[next]) next = k;
-        most[next] = -1.0f;
-        const Vec3 d = away[next];
+    for (int w = 0; w < waiting_count; ++w) {
+        const int k = waiting[static_cast<std::size_t>(w)];
+        const Vec3 d = away[static_cast<std::size_t>(k)];
         float best = -infinity;
-        for (unsigned left = open; left != 0; left &= left - 1) {
-            const int s = std::countr_zero(left);
+        int* slot = nullptr;
+        for (unsigned s = 0; s < quantised_width; ++s) {
             const float gain = ((s & 1 ? d.x : -d.x) + (s & 2 ? d.y : -d.y)) + (s & 4 ? d.z : -d.z);
-            if (gain > best || best == -infinity) {
-                best = gain;
-                slots[next] = s;
-            }
+            if (owner[s] >= 0 || (gain <= best && slot != nullptr)) continue;
+            best = gain;
+            slot = &owner[s];
         }
-        open &= ~(1u << slots[next]);
+        *slot = k;
     }
+    for (int s = 0; s < quantised_width; ++s)
+        if (const int k = owner[static_cast<std::size_t>(s)]; k >= 0) slots[k] = s;
 }
 
 }  // namespace raydix

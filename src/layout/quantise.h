@@ -33,14 +33,51 @@ inline constexpr int max_steps = 255;
 /// section 3.2, solved exactly. slots [count], out.
 void assign_octant_slots(std::span<const Aabb> children, int* slots);
 
-/// The same by rule of thumb, in a tenth of the time: children far from the middle choose first,
-/// each the best slot that is left.
+/// The same by rule of thumb, in a small part of the time: each gets the slot of its octant, of
+/// several in one octant the one farthest from the middle; the others the best slots that are left.
 void assign_octant_slots_greedily(std::span<const Aabb> children, int* slots);
 
-/// The children of a wide node by slot; null where there is none.
-using ChildSlots = std::array<const BvhNode*, quantised_width>;
-
 inline float coordinate(Vec3 v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+/// Boxes of the children of a wide node, by slot.
+struct SlotBoxes {
+    float lo[3][quantised_width], hi[3][quantised_width];
+    unsigned used = 0;  // bit s: there is a child in slot s; others hold anything
+    void set(int slot, const Aabb& box) {
+        for (int axis = 0; axis < 3; ++axis) {
+            lo[axis][slot] = coordinate(box.lo, axis);
+            hi[axis][slot] = coordinate(box.hi, axis);
+        }
+        used |= 1u << slot;
+    }
+};
+
+/// The frame of a node and the boxes of its children in it. An unused slot has an inverted box.
+struct QuantisedBoxes {
+    float origin[3];
+    std::uint8_t exponent[3];
+    std::uint8_t lo[3][quantised_width], hi[3][quantised_width];
+};
+
+/// `all` is the box around all of them. What a ray can never miss by rounding is what was compared
+/// in exact arithmetic: coarser steps until every decoded box contains its child.
+[[nodiscard]] QuantisedBoxes quantise(const SlotBoxes& boxes, const Aabb& all);
+
+/// The step of an axis, 2^(exponent - 127).
+[[nodiscard]] double quantised_step(int exponent);
+
+/// Copies frame and boxes into a node, which has the same arrays.
+template <class Node>
+void set_boxes(Node& node, const QuantisedBoxes& q) {
+    for (int axis = 0; axis < 3; ++axis) {
+        node.origin[axis] = q.origin[axis];
+        node.exponent[axis] = q.exponent[axis];
+        for (int s = 0; s < quantised_width; ++s) {
+            node.lo[axis][s] = q.lo[axis][s];
+            node.hi[axis][s] = q.hi[axis][s];
+        }
+    }
+}
 
 /// Whether the child in `slot` as it will be decoded contains `box`, in exact arithmetic. A node
 /// has origin[3], exponent[3], lo[3][8] and hi[3][8].
@@ -54,42 +91,6 @@ template <class Node>
                  is_at_least(node.origin[axis], node.exponent[axis], node.hi[axis][slot],
                              coordinate(box.hi, axis));
     return inside;
-}
-
-/// Fills the frame and the boxes of a node. What a ray can never miss by rounding is what
-/// contains_exactly said yes to: coarser steps until it does. Empty slots get an inverted box.
-template <class Node>
-void quantise_children(const ChildSlots& slots, Node& node) {
-    Aabb all = empty_box();
-    for (const BvhNode* child : slots)
-        if (child != nullptr) all = unite(all, {child->lo, child->hi});
-    for (int axis = 0; axis < 3; ++axis) {
-        node.origin[axis] = coordinate(all.lo, axis);
-        node.exponent[axis] =
-            static_cast<std::uint8_t>(step_exponent(node.origin[axis], coordinate(all.hi, axis)));
-    }
-    for (;;) {
-        bool contained = true;
-        for (int s = 0; s < quantised_width; ++s) {
-            const BvhNode* child = slots[static_cast<std::size_t>(s)];
-            for (int axis = 0; axis < 3; ++axis) {
-                const float origin = node.origin[axis];
-                const int exponent = node.exponent[axis];
-                node.lo[axis][s] = static_cast<std::uint8_t>(
-                    child == nullptr ? max_steps
-                                     : steps_below(origin, exponent, coordinate(child->lo, axis)));
-                node.hi[axis][s] = static_cast<std::uint8_t>(
-                    child == nullptr ? 0
-                                     : steps_above(origin, exponent, coordinate(child->hi, axis)));
-            }
-            contained = contained &&
-                        (child == nullptr || contains_exactly(node, s, {child->lo, child->hi}));
-        }
-        if (contained) return;
-        for (std::uint8_t& exponent : node.exponent)
-            exponent = static_cast<std::uint8_t>(exponent < max_step_exponent ? exponent + 1
-                                                                              : max_step_exponent);
-    }
 }
 
 }  // namespace raydix

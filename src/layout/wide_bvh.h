@@ -1,5 +1,5 @@
-// What a wide tree of the CPU consists of (raydix/wide.h). Wide tree + triangles in leaf order ->
-// nodes [wide nodes], blocks [references / 8, a little more].
+// What a wide tree of the CPU consists of (raydix/wide.h). A finished binary tree, or the clusters
+// that it would be made of -> nodes [wide nodes], blocks [references / 8, a little more].
 #pragma once
 
 #include <raydix/buffer.h>
@@ -7,11 +7,14 @@
 #include <raydix/wide.h>
 
 #include <cstdint>
+#include <memory>
 
 #include "layout/quantise.h"
 #include "layout/wide_collapse.h"
 
 namespace raydix {
+
+class ClusterView;
 
 /// A word of WideNode::child: the node's index, or with the highest bit set, a leaf's place among
 /// the triangles times 8 plus its count less one. Place p is lane p % 8 of block p / 8; no leaf
@@ -41,6 +44,16 @@ static_assert(sizeof(WideNode) == 96);
 struct alignas(32) TriangleBlock {
     float corner[9][8];
     std::uint32_t prim[8];
+
+    void set(std::uint32_t lane, const LeafTriangle& t, std::uint32_t id) {
+        const Vec3 corners[3] = {t.v0, t.v1, t.v2};
+        for (int v = 0; v < 3; ++v) {
+            corner[3 * v][lane] = corners[v].x;
+            corner[3 * v + 1][lane] = corners[v].y;
+            corner[3 * v + 2][lane] = corners[v].z;
+        }
+        prim[lane] = id;
+    }
 };
 static_assert(sizeof(TriangleBlock) == 320);
 
@@ -49,11 +62,33 @@ struct WideBvh::Arrays {
     Buffer<TriangleBlock> blocks;
     Aabb bounds{};  // the root's exact box: rays widen boxes by its size
     WideBvhStats stats;
+
+    /// Nothing to hit; the memory stays.
+    void clear(int width) {
+        nodes.reset(0);
+        blocks.reset(0);
+        bounds = {};
+        stats = {};
+        stats.width = width;
+        stats.widening = 1.0;
+    }
 };
 
-/// Fills nodes, blocks and bounds. At most wide_max_leaf primitives a leaf in `wide`; triangles
-/// without area are left out, and leaves that hold nothing else. Returns the sum of the half areas
-/// of all child boxes before they are quantised.
-double make_wide_layout(const WideTree& wide, const Bvh& bvh, WideBvh::Arrays& out);
+/// Memory that making a layout takes, kept from one to the next.
+struct WideScratch {
+    WideScratch();
+    ~WideScratch();
+    struct Memory;
+    std::unique_ptr<Memory> memory;
+};
+
+/// Fills the arrays and their figures but for time and width; the tree holds triangles and is not
+/// empty. Triangles without area are left out, and leaves that hold nothing else.
+/// The same from a Bvh of the builders ploc, hploc and binned and from the clusters that it was
+/// made of.
+void make_wide_layout(const Bvh& bvh, const WideOptions& options, WideBvh::Arrays& out,
+                      WideScratch& scratch);
+void make_wide_layout(const ClusterView& clusters, const WideOptions& options, WideBvh::Arrays& out,
+                      WideScratch& scratch);
 
 }  // namespace raydix

@@ -21,6 +21,17 @@ struct BvhAccess {
     [[nodiscard]] std::uint64_t& left_out() const { return bvh.left_out_; }
     [[nodiscard]] BuildMs& build_ms() const { return bvh.build_ms_; }
     [[nodiscard]] std::uint64_t& peak_bytes() const { return bvh.peak_bytes_; }
+
+    /// No nodes, no primitives; the memory stays.
+    void make_empty() const {
+        nodes().reset(0);
+        order().reset(0);
+        triangles().reset(0);
+        boxes().reset(0);
+        points().reset(0);
+        inner_count() = 0;
+        max_depth() = 0;
+    }
 };
 
 }  // namespace raydix

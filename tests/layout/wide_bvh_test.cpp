@@ -1,6 +1,7 @@
 // Wide trees as they lie in memory: every node and triangle once, every box around what is below
 // it.
 #include <gtest/gtest.h>
+#include <raydix/error.h>
 #include <raydix/raydix.h>
 #include <raydix/wide.h>
 
@@ -112,13 +113,91 @@ TEST(WideLayout, WastesLittleOnBlocks) {
     EXPECT_LT(places, 1.1 * static_cast<double>(tree.stats().references));
 }
 
+bool same_bits(const WideBvh& a, const WideBvh& b) {
+    const auto equal = [](const auto& x, const auto& y) {
+        return std::ranges::equal(std::as_bytes(x.view()), std::as_bytes(y.view()));
+    };
+    return equal(a.arrays().nodes, b.arrays().nodes) && equal(a.arrays().blocks, b.arrays().blocks);
+}
+
 TEST(WideLayout, IsTheSameForEveryThreadCount) {
-    const Bvh bvh = build_bvh(random_soup(5000, 2));
-    const WideBvh one(bvh, {.threads = 1}), many(bvh, {.threads = 5});
-    EXPECT_TRUE(std::ranges::equal(std::as_bytes(one.arrays().nodes.view()),
-                                   std::as_bytes(many.arrays().nodes.view())));
-    EXPECT_TRUE(std::ranges::equal(std::as_bytes(one.arrays().blocks.view()),
-                                   std::as_bytes(many.arrays().blocks.view())));
+    for (const std::size_t n : {5000u, 60'000u}) {
+        const Bvh bvh = build_bvh(random_soup(n, 2));
+        const WideBvh one(bvh, {.threads = 1}), many(bvh, {.threads = 5});
+        EXPECT_TRUE(same_bits(one, many));
+    }
+}
+
+/// Many triangles in each of a few places, so that there are parts of all sizes.
+Mesh crowded_mesh() {
+    Mesh mesh = random_soup(30'000, 4);
+    const auto add = [&](const Mesh& other) {
+        const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
+        mesh.vertices.insert(mesh.vertices.end(), other.vertices.begin(), other.vertices.end());
+        for (const Triangle& t : other.triangles)
+            mesh.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
+    };
+    add(scaled(random_soup(20'000, 5), 1e-3f));
+    add(moved(scaled(random_soup(40, 6), 0.1f), {3, 0, 0}));
+    return mesh;
+}
+
+TEST(WideBuild, GivesTheTreeThatTheBinaryOneGives) {
+    WideBvhBuilder builder;
+    WideBvh tree;
+    for (const Mesh& mesh : {crowded_mesh(), random_soup(700, 1), random_soup(1, 1), Mesh{},
+                             lattice_mesh(20'000, 7, 3), random_soup(3, 9)})
+        for (const Builder name : {Builder::ploc, Builder::hploc, Builder::binned, Builder::karras,
+                                   Builder::apetrei, Builder::sbvh})
+            for (const int max_leaf : {1, 4, 5})
+                for (const int width : {4, 8}) {
+                    const BuildOptions options{.builder = name, .max_leaf = max_leaf, .threads = 3};
+                    builder.build(mesh, options, tree, width);
+                    const WideBvh other(build_bvh(mesh, options), {.width = width});
+                    EXPECT_TRUE(same_bits(tree, other))
+                        << builder_name(name) << ", " << mesh.triangles.size() << " triangles";
+                    EXPECT_EQ(tree.stats().max_depth, other.stats().max_depth);
+                    EXPECT_EQ(tree.stats().sah, other.stats().sah);
+                    EXPECT_EQ(tree.stats().input_count, mesh.triangles.size());
+                }
+}
+
+TEST(WideBuild, OfManyPartsHoldsEveryTriangleInItsBoxes) {
+    const Mesh mesh = crowded_mesh();
+    const WideBvh tree = build_wide_bvh(mesh);
+    Walk walk(tree);
+    walk.below(0);
+    EXPECT_TRUE(walk.every_node_once());
+    EXPECT_EQ(walk.seen.size(), mesh.triangles.size());
+    EXPECT_EQ(walk.deepest, tree.stats().max_depth);
+}
+
+TEST(WideBuild, LeavesOutWhatIsInvalidOrFlat) {
+    Mesh mesh = random_soup(20'000, 8);
+    for (std::size_t k = 0; k < 20'000; k += 7) mesh.vertices[mesh.triangles[k][0]].x = NAN;
+    for (std::size_t k = 1; k < 20'000; k += 5) mesh.triangles[k][1] = mesh.triangles[k][0];
+    const BuildOptions options = build_options_for(Quality::balanced);
+    const WideBvh tree = build_wide_bvh(mesh, options);
+    EXPECT_EQ(tree.stats().left_out, 2858u);
+    EXPECT_TRUE(same_bits(tree, WideBvh(build_bvh(mesh, options))));
+    BuildOptions strict = options;
+    strict.strict = true;
+    WideBvhBuilder builder;
+    WideBvh kept = build_wide_bvh(mesh, options);
+    EXPECT_THROW(builder.build(mesh, strict, kept), InputError);
+    EXPECT_TRUE(kept.empty());
+    builder.build(mesh, options, kept);  // and it goes on working
+    EXPECT_TRUE(same_bits(tree, kept));
+}
+
+TEST(WideBuild, RefusesPointsAndOtherWidths) {
+    const std::vector<Vec3> points{{0, 0, 0}, {1, 1, 1}};
+    EXPECT_THROW(static_cast<void>(build_wide_bvh(MeshView(points, {}))), InputError);
+    WideBvhBuilder builder;
+    WideBvh tree;
+    EXPECT_THROW(builder.build(random_soup(10, 1), {}, tree, 5), InputError);
+    EXPECT_TRUE(closest_hit(WideBvh(), Ray{{0, 0, 0}, 0, {0, 0, 1}, infinity}).prim ==
+                no_primitive);
 }
 
 }  // namespace

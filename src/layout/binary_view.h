@@ -1,0 +1,78 @@
+// A binary tree as the collapse to wide nodes sees it: a finished Bvh, by the slots of its nodes.
+// cluster_view.h is the other view, of a tree that is not finished yet.
+#pragma once
+
+#include <raydix/bvh.h>
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/math.h"
+#include "primitives/zero_area.h"
+
+namespace raydix {
+
+/// Primitives below a node. In one run of the tree's order, as in all trees that builders make, or
+/// in several: then there is no first one.
+struct PrimitiveRun {
+    static constexpr std::uint32_t several = ~std::uint32_t{0};
+    std::uint32_t first, count;
+};
+
+/// Leaves of more than `max_leaf` primitives are divided in halves of their order until none is
+/// left. The tree must not be empty.
+class BinaryView {
+public:
+    using Ref = std::uint32_t;  // slot
+
+    BinaryView(const Bvh& bvh, std::uint32_t max_leaf);
+
+    [[nodiscard]] Ref root() const { return 0; }
+    [[nodiscard]] bool is_leaf(Ref ref) const { return nodes_[ref].is_leaf(); }
+    [[nodiscard]] Aabb box(Ref ref) const { return {nodes_[ref].lo, nodes_[ref].hi}; }
+    [[nodiscard]] std::array<Ref, 2> children(Ref inner) const {
+        const std::uint32_t pair = nodes_[inner].first;
+        return {pair, pair + 1};
+    }
+    void prefetch(Ref) const {}
+    /// About how many primitives are below: what lies between its first leaf and its last in the
+    /// tree's order.
+    [[nodiscard]] std::uint32_t size(Ref ref) const;
+    [[nodiscard]] PrimitiveRun run(Ref leaf) const { return {nodes_[leaf].first, nodes_[leaf].count}; }
+    [[nodiscard]] static PrimitiveRun join(PrimitiveRun a, PrimitiveRun b) {
+        const std::uint32_t count = a.count + b.count;
+        if (a.first != PrimitiveRun::several && b.first != PrimitiveRun::several) {
+            if (a.first + a.count == b.first) return {a.first, count};
+            if (b.first + b.count == a.first) return {b.first, count};
+        }
+        return {PrimitiveRun::several, count};
+    }
+
+    /// Appends the positions of a leaf's primitives in the tree's order.
+    void list_primitives(Ref leaf, std::vector<std::uint32_t>& positions) const {
+        const auto [first, count] = run(leaf);
+        for (std::uint32_t k = first; k < first + count; ++k) positions.push_back(k);
+    }
+    [[nodiscard]] bool is_flat(std::uint32_t position) const {
+        return has_zero_area(bvh_.triangles()[position]);
+    }
+    [[nodiscard]] std::uint32_t id(std::uint32_t position) const { return bvh_.order()[position]; }
+    [[nodiscard]] LeafTriangle triangle(std::uint32_t position) const {
+        return bvh_.triangles()[position];
+    }
+    void prefetch_indices(std::uint32_t) const {}
+    void prefetch_corners(std::uint32_t position) const {
+        __builtin_prefetch(&bvh_.triangles()[position]);
+    }
+
+private:
+    void divide(std::size_t slot);
+
+    const Bvh& bvh_;
+    std::span<const BvhNode> nodes_;
+    std::vector<BvhNode> own_;  // new pairs of children stand behind the old nodes
+};
+
+}  // namespace raydix

@@ -1,0 +1,210 @@
+// Which nodes of a binary tree become children of which wide node: the least cost that the surface
+// area heuristic can give (Ylitie, Karras, Laine 2017, section 3.1), by dynamic programming from
+// the leaves up. A subtree of a binary tree -> its entries, with a plan for each.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "base/math.h"
+#include "layout/binary_view.h"
+#include "layout/wide_collapse.h"
+
+namespace raydix {
+
+/// A node of the subtree. Pairs of children are neighbours and come after their parents.
+template <class Ref>
+struct CollapseEntry {
+    Aabb box;
+    Ref ref;
+    std::uint32_t children;  // the first one; of a leaf, leaf_bit and where its primitives are listed
+    PrimitiveRun run;
+
+    static constexpr std::uint32_t leaf_bit = 0x80000000u;
+    [[nodiscard]] bool is_leaf() const { return (children & leaf_bit) != 0; }
+};
+
+/// What is best for the subtree of an entry.
+template <int width>
+struct CollapsePlan {
+    std::array<float, width - 1> cost;  // [i - 1]: as at most i wide subtrees; areas are parts of
+                                        // the tree's
+    std::uint32_t choices;              // four bits per i: see choice()
+
+    /// i = 1: 1 for a leaf, 0 for a wide node. i > 1: so many of the i subtrees go to the left
+    /// child; 0: as for i - 1.
+    [[nodiscard]] int choice(int i) const {
+        return static_cast<int>(choices >> (4 * (i - 1)) & 15u);
+    }
+    void choose(int i, int what) { choices |= static_cast<std::uint32_t>(what) << (4 * (i - 1)); }
+    [[nodiscard]] bool is_leaf() const { return choice(1) == 1; }
+};
+
+/// Entry 0 is the root of the subtree. Used for one after the other, to keep the memory.
+template <int width, class View>
+class Collapse {
+public:
+    using Ref = typename View::Ref;
+    using Entry = CollapseEntry<Ref>;
+    using Plan = CollapsePlan<width>;
+
+    Collapse(const View& view, const WideOptions& options) : view_(view), options_(options) {
+        const double root = half_area(view.box(view.root()));
+        per_area_ = root > 0 ? 1.0 / root : 0.0;
+    }
+
+    /// Enters and plans the subtree of `root`.
+    void plan(Ref root) {
+        entries_.clear();
+        positions_.clear();
+        enter(root);
+        for (std::size_t k = 0; k < entries_.size(); ++k) {
+            if (entries_[k].is_leaf()) continue;
+            entries_[k].children = static_cast<std::uint32_t>(entries_.size());
+            const auto [a, b] = view_.children(entries_[k].ref);
+            enter(a);
+            enter(b);
+        }
+        plans_.resize(entries_.size());
+        for (std::size_t k = entries_.size(); k-- > 0;)
+            if (entries_[k].is_leaf())
+                plan_leaf(k);
+            else
+                make_plan(k);
+    }
+
+    [[nodiscard]] const Entry& entry(std::uint32_t k) const { return entries_[k]; }
+    [[nodiscard]] std::size_t size() const { return entries_.size(); }
+    /// Whether a subtree is a leaf of the wide tree, as a child of some node.
+    [[nodiscard]] bool is_leaf(std::uint32_t k) const { return plans_[k].is_leaf(); }
+    /// Calls take(position) for the primitives of a leaf of the wide tree, in the tree's order.
+    template <class Take>
+    void for_each_primitive(std::uint32_t k, const Take& take) const {
+        const Entry& e = entries_[k];
+        if (e.is_leaf()) {
+            const std::uint32_t* first = &positions_[e.children & ~Entry::leaf_bit];
+            std::for_each_n(first, e.run.count, take);
+        } else {
+            for_each_primitive(e.children, take);
+            for_each_primitive(e.children + 1, take);
+        }
+    }
+
+    /// The children of the wide node whose root is entry k; returns how many.
+    int children(std::uint32_t k, std::array<std::uint32_t, width>& chosen) const {
+        if (is_leaf(k)) {  // the whole tree is one leaf
+            chosen[0] = k;
+            return 1;
+        }
+        struct Forest {
+            std::uint32_t entry;
+            int trees;
+        };
+        std::array<Forest, width> open;
+        std::size_t waiting = 0;
+        int count = 0;
+        const auto divide = [&](std::uint32_t inner, int trees) {
+            const int left = plans_[inner].choice(trees);
+            open[waiting++] = {entries_[inner].children + 1, trees - left};
+            open[waiting++] = {entries_[inner].children, left};
+        };
+        divide(k, width);
+        while (waiting > 0) {
+            Forest next = open[--waiting];
+            const Plan& plan = plans_[next.entry];
+            if (entries_[next.entry].is_leaf()) next.trees = 1;
+            while (next.trees > 1 && plan.choice(next.trees) == 0) --next.trees;
+            if (next.trees == 1)
+                chosen[static_cast<std::size_t>(count++)] = next.entry;
+            else
+                divide(next.entry, next.trees);
+        }
+        return count;
+    }
+
+private:
+    /// What its children will be read from is asked for ahead.
+    void enter(Ref ref) {
+        if (view_.is_leaf(ref)) {
+            const auto listed = static_cast<std::uint32_t>(positions_.size());
+            view_.list_primitives(ref, positions_);
+            entries_.push_back({view_.box(ref), ref, Entry::leaf_bit | listed, view_.run(ref)});
+        } else {
+            view_.prefetch(ref);
+            entries_.push_back({view_.box(ref), ref, 0, {0, 0}});
+        }
+    }
+
+    void plan_leaf(std::size_t k) {
+        plans_[k].cost.fill(leaf_cost(relative_area(entries_[k].box), entries_[k].run.count));
+        plans_[k].choices = 1;
+    }
+
+    [[nodiscard]] float relative_area(const Aabb& box) const {
+        return static_cast<float>(std::max(half_area(box), 0.0) * per_area_);
+    }
+    [[nodiscard]] float leaf_cost(float area, std::uint32_t count) const {
+        const std::uint32_t blocks = (count + options_.block - 1) / options_.block;
+        return area * static_cast<float>(blocks) * static_cast<float>(options_.primitive_cost);
+    }
+
+    /// The j-th division of i subtrees among two children, from even ones to uneven ones: among
+    /// equal costs (flat scenes have no others) the tree stays shallow.
+    static constexpr int left_part(int i, int j) {
+        return j % 2 == 1 ? i / 2 + (j + 1) / 2 : i / 2 - j / 2;
+    }
+
+    void make_plan(std::size_t k) {
+        Entry& entry = entries_[k];
+        const Plan& a = plans_[entry.children];
+        const Plan& b = plans_[entry.children + 1];
+        std::array<float, width + 1> shared;
+        std::array<int, width + 1> part;
+#pragma GCC unroll 8
+        for (int i = 2; i <= width; ++i) {
+            const int even = left_part(i, 0);
+            float best = a.cost[even - 1] + b.cost[i - even - 1];
+            int best_part = even;
+#pragma GCC unroll 8
+            for (int j = 1; j < i - 1; ++j) {
+                const int left = left_part(i, j);
+                const float cost = a.cost[left - 1] + b.cost[i - left - 1];
+                best_part = cost < best ? left : best_part;
+                best = std::min(best, cost);
+            }
+            shared[static_cast<std::size_t>(i)] = best;
+            part[static_cast<std::size_t>(i)] = best_part;
+        }
+        Plan& plan = plans_[k];
+        plan.choices = 0;
+        entry.run = view_.join(entries_[entry.children].run, entries_[entry.children + 1].run);
+        const float area = relative_area(entry.box);
+        plan.choose(width, part[width]);
+        // The root is a node in any case: nothing is saved by making it a leaf, its only child.
+        const double node_cost = entry.ref == view_.root() ? 0.0 : options_.node_cost;
+        plan.cost[0] = shared[width] + area * static_cast<float>(node_cost);
+        if (entry.run.first != PrimitiveRun::several && entry.run.count <= options_.max_leaf) {
+            const float as_leaf = leaf_cost(area, entry.run.count);
+            if (as_leaf <= plan.cost[0]) {
+                plan.cost[0] = as_leaf;
+                plan.choose(1, 1);
+            }
+        }
+        for (std::size_t i = 2; i < width; ++i) {
+            const bool divided = shared[i] <= plan.cost[i - 2];
+            plan.cost[i - 1] = divided ? shared[i] : plan.cost[i - 2];
+            if (divided) plan.choose(static_cast<int>(i), part[i]);
+        }
+    }
+
+    const View& view_;
+    WideOptions options_;
+    double per_area_ = 0;
+    std::vector<Entry> entries_;
+    std::vector<Plan> plans_;
+    std::vector<std::uint32_t> positions_;  // of the primitives of all leaves
+};
+
+}  // namespace raydix

@@ -1,0 +1,132 @@
+// A view of a binary tree -> the nodes and triangle blocks of a WideBvh. Subtrees of some thousand
+// primitives are collapsed and written by themselves, each while it is in a cache, into memory of
+// their own, and then put behind each other: the arrays do not depend on the number of threads.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "base/math.h"
+#include "exec/parallel.h"
+#include "layout/wide_part_writer.h"
+
+namespace raydix {
+
+/// A tree of few primitives is one part. In larger ones the top is a part of its own: there nodes
+/// take their largest children apart until they are full, which needs no plan of what is below.
+template <int width, class View>
+class WideEmitter {
+public:
+    using Ref = typename View::Ref;
+
+    WideEmitter(const View& view, const WideOptions& options, std::vector<WidePart>& parts)
+        : view_(view), options_(options), parts_(parts) {}
+
+    void run(WideBvh::Arrays& out) {
+        WidePart top;
+        if (view_.size(view_.root()) > most) {
+            write_top(top);
+        } else {
+            roots_.push_back({view_.root(), 0});
+        }
+        if (parts_.size() < roots_.size() + 1) parts_.resize(roots_.size() + 1);
+        std::swap(parts_[0], top);
+        for_each_range(roots_.size(), 1, [&](std::size_t begin, std::size_t end) {
+            Collapse<width, View> collapse(view_, options_);
+            for (; begin < end; ++begin) {
+                WidePart& part = parts_[begin + 1];
+                part.clear();
+                collapse.plan(roots_[begin].ref);
+                Writer writer(view_, part);
+                writer.write(collapse, roots_[begin].depth);
+                writer.copy_triangles();
+            }
+        });
+        const WideSums sums = join_parts(std::span(parts_).first(roots_.size() + 1), out);
+        out.bounds = view_.box(view_.root());
+        const double root = half_area(out.bounds);
+        out.stats.sah =
+            root > 0 ? (sums.node_area + wide_primitive_cost * sums.triangle_area) / root : 0;
+    }
+
+private:
+    using Writer = WidePartWriter<width, View>;
+    /// A part has at most so many primitives; subtrees of fewer than `least` stay in the top.
+    static constexpr std::uint32_t most = 8192, least = 64;
+    struct Root {
+        Ref ref;
+        std::uint32_t depth;
+    };
+    struct Waiting {
+        Ref ref;
+        std::uint32_t parent, slot, depth;
+    };
+
+    void write_top(WidePart& top) {
+        constexpr std::uint32_t no_parent = ~std::uint32_t{0};
+        Writer writer(view_, top);
+        Collapse<width, View> small(view_, options_);
+        std::vector<Waiting> waiting{{view_.root(), no_parent, 0, 0}};
+        std::array<Ref, width> chosen;
+        std::array<WideChild, width> children;
+        while (!waiting.empty()) {
+            const Waiting at = waiting.back();
+            waiting.pop_back();
+            const std::uint32_t w = writer.add_node();
+            if (at.parent != no_parent) top.nodes[at.parent].child[at.slot] = w;
+            const std::size_t all = take_apart(at.ref, chosen);
+            std::size_t count = 0;
+            for (std::uint32_t k = 0; k < all; ++k) {
+                const std::uint32_t word = word_of(chosen[k], at.depth + 1, writer, small);
+                if (word != wide_no_child) children[count++] = {view_.box(chosen[k]), word, k};
+            }
+            writer.fill_node(w, std::span(children).first(count), at.depth,
+                             [&](std::uint32_t k, std::uint32_t slot) {
+                                 waiting.push_back({chosen[k], w, slot, at.depth + 1});
+                             });
+        }
+        writer.copy_triangles();
+    }
+
+    /// The children of a node of the top: the largest one is replaced by its own two while there is
+    /// room.
+    std::size_t take_apart(Ref ref, std::array<Ref, width>& chosen) const {
+        std::array<double, width> area;
+        std::size_t count = 0;
+        const auto set = [&](std::size_t k, Ref child) {
+            chosen[k] = child;
+            const bool open = !view_.is_leaf(child) && view_.size(child) >= least;
+            area[k] = open ? half_area(view_.box(child)) : -1.0;
+        };
+        for (const Ref child : view_.children(ref)) set(count++, child);
+        while (count < width) {
+            const auto largest = static_cast<std::size_t>(
+                std::max_element(area.begin(), area.begin() + count) - area.begin());
+            if (area[largest] < 0) break;
+            const auto [a, b] = view_.children(chosen[largest]);
+            set(largest, a);
+            set(count++, b);
+        }
+        return count;
+    }
+
+    std::uint32_t word_of(Ref ref, std::uint32_t depth, Writer& writer,
+                          Collapse<width, View>& small) {
+        const std::uint32_t size = view_.is_leaf(ref) ? 1 : view_.size(ref);
+        if (size > most) return WideChild::inner_word;
+        if (size >= least) {
+            roots_.push_back({ref, depth});
+            return wide_part_bit | static_cast<std::uint32_t>(roots_.size() - 1);
+        }
+        small.plan(ref);
+        return small.is_leaf(0) ? writer.leaf_word(small, 0) : writer.write(small, depth);
+    }
+
+    const View& view_;
+    WideOptions options_;
+    std::vector<WidePart>& parts_;
+    std::vector<Root> roots_;
+};
+
+}  // namespace raydix

@@ -1,0 +1,98 @@
+#include "layout/wide_part.h"
+
+#include <raydix/error.h>
+
+#include <algorithm>
+#include <string>
+
+#include "exec/parallel.h"
+
+namespace raydix {
+namespace {
+
+constexpr std::uint32_t lanes = BlockFiller::lanes;
+/// Beyond, a leaf's word would be a NaN as a float: kernels take that for a missing child.
+constexpr std::uint32_t max_places = (1u << 28) - (1u << 20);
+
+/// Where a part's arrays begin in those of the whole tree.
+struct Bases {
+    std::uint32_t node, block;
+};
+
+WideNode placed(WideNode node, const Bases& own, std::span<const Bases> parts) {
+    for (std::uint32_t& word : node.child) {
+        if (word == wide_no_child) continue;
+        if ((word & wide_leaf_bit) != 0)
+            word += own.block * lanes << 3;
+        else if ((word & wide_part_bit) != 0)
+            word = parts[1 + (word & ~wide_part_bit)].node;
+        else
+            word += own.node;
+    }
+    return node;
+}
+
+void set_figures(const WideSums& sums, WideBvh::Arrays& out) {
+    WideBvhStats& stats = out.stats;
+    stats.nodes = out.nodes.size();
+    stats.leaves = sums.leaves;
+    stats.references = sums.references;
+    stats.max_depth = sums.levels;
+    stats.children_per_node =
+        static_cast<double>(sums.children) / static_cast<double>(out.nodes.size());
+    stats.widening = sums.child_area > 0 ? sums.decoded_area / sums.child_area : 1.0;
+    stats.node_bytes = out.nodes.size() * sizeof(WideNode);
+    stats.triangle_bytes = out.blocks.size() * sizeof(TriangleBlock);
+    stats.bytes = stats.node_bytes + stats.triangle_bytes;
+}
+
+}  // namespace
+
+void WideSums::add(const WideSums& other) {
+    node_area += other.node_area;
+    child_area += other.child_area;
+    decoded_area += other.decoded_area;
+    triangle_area += other.triangle_area;
+    children += other.children;
+    leaves += other.leaves;
+    references += other.references;
+    levels = std::max(levels, other.levels);
+}
+
+void WidePart::clear() {
+    nodes.clear();
+    blocks.clear();
+    filler = {};
+    sums = {};
+}
+
+WideSums join_parts(std::span<const WidePart> parts, WideBvh::Arrays& out) {
+    std::vector<Bases> bases;
+    std::size_t nodes = 0, blocks = 0;
+    WideSums sums;
+    for (const WidePart& part : parts) {
+        bases.push_back({static_cast<std::uint32_t>(nodes), static_cast<std::uint32_t>(blocks)});
+        nodes += part.nodes.size();
+        blocks += part.blocks.size();
+        sums.add(part.sums);
+    }
+    if (blocks > max_places / lanes)
+        throw InputError("a wide tree holds " + std::to_string(max_places) +
+                         " triangle references at most");
+    out.nodes.reset(nodes);
+    out.blocks.reset(blocks);
+    for_each_index(
+        parts.size(),
+        [&](std::size_t p) {
+            const WidePart& part = parts[p];
+            WideNode* node = out.nodes.data() + bases[p].node;
+            for (const WideNode& own : part.nodes) *node++ = placed(own, bases[p], bases);
+            std::copy(part.blocks.begin(), part.blocks.end(),
+                      out.blocks.data() + bases[p].block);
+        },
+        1);
+    set_figures(sums, out);
+    return sums;
+}
+
+}  // namespace raydix

@@ -1,0 +1,169 @@
+// Collapsed subtrees -> nodes and triangle blocks of one part of a WideBvh.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/math.h"
+#include "layout/collapse_plan.h"
+#include "layout/wide_bvh.h"
+#include "layout/wide_part.h"
+
+namespace raydix {
+
+/// A child on its way into a node. `word` as in WideNode::child; inner_word: its node comes later.
+struct WideChild {
+    static constexpr std::uint32_t inner_word = 0;
+    Aabb box;
+    std::uint32_t word;
+    std::uint32_t source;  // the caller's name for it
+};
+
+template <int width, class View>
+class WidePartWriter {
+public:
+    using Collapsed = Collapse<width, View>;
+
+    WidePartWriter(const View& view, WidePart& out) : view_(view), out_(out) {}
+
+    /// An empty node; returns its number.
+    std::uint32_t add_node() {
+        WideNode& node = out_.nodes.emplace_back();
+        std::fill_n(node.child, quantised_width, wide_no_child);
+        return static_cast<std::uint32_t>(out_.nodes.size() - 1);
+    }
+
+    /// Puts children into a node that has none, and calls wait(source, slot) for those that are
+    /// inner nodes. The node is `depth` edges below the root of the tree.
+    template <class Wait>
+    void fill_node(std::uint32_t w, std::span<const WideChild> children, std::uint32_t depth,
+                   const Wait& wait) {
+        out_.sums.levels = std::max(out_.sums.levels, depth + 1);
+        if (children.empty()) return;
+        std::array<Aabb, quantised_width> boxes;
+        std::array<int, quantised_width> slots;
+        Aabb all = empty_box();
+        for (std::size_t k = 0; k < children.size(); ++k) {
+            boxes[k] = children[k].box;
+            all = unite(all, boxes[k]);
+            add_figures(children[k]);
+        }
+        assign_octant_slots_greedily(std::span(boxes).first(children.size()), slots.data());
+        SlotBoxes by_slot;
+        WideNode& node = out_.nodes[w];
+        for (std::size_t k = 0; k < children.size(); ++k) {
+            by_slot.set(slots[k], boxes[k]);
+            node.child[slots[k]] = children[k].word;
+            if (children[k].word == WideChild::inner_word)
+                wait(children[k].source, static_cast<std::uint32_t>(slots[k]));
+        }
+        node.used = static_cast<std::uint8_t>(by_slot.used);
+        set_boxes(node, quantise(by_slot, all));
+        out_.sums.node_area += half_area(all);
+        out_.sums.decoded_area += decoded_area(node);
+    }
+
+    /// Writes the wide nodes of a subtree depth first: what rays visit together lies together, at
+    /// every size of page and cache. Returns the number of the first.
+    std::uint32_t write(const Collapsed& subtree, std::uint32_t depth) {
+        const auto first = static_cast<std::uint32_t>(out_.nodes.size());
+        waiting_.assign(1, {0, no_parent, 0, depth});
+        std::array<std::uint32_t, width> chosen;
+        std::array<WideChild, width> children;
+        while (!waiting_.empty()) {
+            const Waiting at = waiting_.back();
+            waiting_.pop_back();
+            const std::uint32_t w = add_node();
+            if (at.parent != no_parent) out_.nodes[at.parent].child[at.slot] = w;
+            std::size_t count = 0;
+            const auto all = static_cast<std::size_t>(subtree.children(at.entry, chosen));
+            for (std::size_t k = 0; k < all; ++k) {
+                const std::uint32_t word = subtree.is_leaf(chosen[k])
+                                               ? leaf_word(subtree, chosen[k])
+                                               : WideChild::inner_word;
+                if (word != wide_no_child)
+                    children[count++] = {subtree.entry(chosen[k]).box, word, chosen[k]};
+            }
+            fill_node(w, std::span(children).first(count), at.depth,
+                      [&](std::uint32_t entry, std::uint32_t slot) {
+                          waiting_.push_back({entry, w, slot, at.depth + 1});
+                      });
+        }
+        return first;
+    }
+
+    /// The word of a leaf; wide_no_child if none of its triangles has an area: those are left out.
+    std::uint32_t leaf_word(const Collapsed& subtree, std::uint32_t leaf) {
+        std::uint32_t kept = 0;
+        subtree.for_each_primitive(leaf, [&](std::uint32_t position) {
+            if (view_.is_flat(position)) return;
+            copies_.push_back({position, 0});
+            ++kept;
+        });
+        if (kept == 0) return wide_no_child;
+        const std::uint32_t place = out_.filler.place(kept);
+        for (std::uint32_t j = 0; j < kept; ++j)
+            copies_[copies_.size() - kept + j].place = place + j;
+        return wide_leaf_bit | place << 3 | (kept - 1);
+    }
+
+    /// When all leaves have their places.
+    void copy_triangles() {
+        constexpr std::size_t indices_ahead = 32, corners_ahead = 16;
+        out_.blocks.resize(out_.filler.blocks());
+        for (std::size_t k = 0; k < copies_.size(); ++k) {
+            if (k + indices_ahead < copies_.size()) {
+                view_.prefetch_indices(copies_[k + indices_ahead].position);
+                view_.prefetch_corners(copies_[k + corners_ahead].position);
+            }
+            const auto [position, place] = copies_[k];
+            out_.blocks[place / BlockFiller::lanes].set(
+                place % BlockFiller::lanes, view_.triangle(position), view_.id(position));
+        }
+    }
+
+private:
+    static constexpr std::uint32_t no_parent = ~std::uint32_t{0};
+    struct Waiting {
+        std::uint32_t entry, parent, slot, depth;
+    };
+    struct Copy {
+        std::uint32_t position, place;
+    };
+
+    void add_figures(const WideChild& child) {
+        const double area = half_area(child.box);
+        ++out_.sums.children;
+        out_.sums.child_area += area;
+        if ((child.word & wide_leaf_bit) == 0) return;
+        const std::uint32_t triangles = (child.word & 7) + 1;
+        ++out_.sums.leaves;
+        out_.sums.references += triangles;
+        out_.sums.triangle_area += area * triangles;
+    }
+
+    /// In double, to within a rounding.
+    static double decoded_area(const WideNode& node) {
+        const double step[3] = {quantised_step(node.exponent[0]), quantised_step(node.exponent[1]),
+                                quantised_step(node.exponent[2])};
+        double sum = 0;
+        for (int s = 0; s < quantised_width; ++s) {
+            if ((node.used >> s & 1) == 0) continue;
+            const double x = (node.hi[0][s] - node.lo[0][s]) * step[0],
+                         y = (node.hi[1][s] - node.lo[1][s]) * step[1],
+                         z = (node.hi[2][s] - node.lo[2][s]) * step[2];
+            sum += x * y + y * z + z * x;
+        }
+        return sum;
+    }
+
+    const View& view_;
+    WidePart& out_;
+    std::vector<Waiting> waiting_;
+    std::vector<Copy> copies_;
+};
+
+}  // namespace raydix
