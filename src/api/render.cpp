@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "api/render_light.h"
@@ -41,14 +42,23 @@ void check_options(const RenderOptions& options) {
                          "; it must be 0.." + std::to_string(max_samples));
 }
 
-RenderScene make_scene(const Bvh& bvh, const Camera& camera, const RenderOptions& options) {
+/// Making a wide tree takes about as long as tracing so many rays per triangle without it.
+constexpr std::uint64_t rays_per_triangle = 1;
+
+RenderScene make_scene(const Bvh& bvh, const Camera& camera, const RenderOptions& options,
+                       std::optional<WideBvh>& wide) {
     const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
     const int asked = options.samples > 0 ? options.samples : options.view == View::ao ? 64 : 32;
     const std::uint32_t samples =
         gathers_light(options.view) ? static_cast<std::uint32_t>(asked) : 0;
     const std::uint32_t per_pixel = samples >= 4 ? 4 : 1;
+    const std::uint64_t rays =
+        std::uint64_t{options.width} * options.height * (per_pixel + samples);
+    if (options.view != View::steps && rays > bvh.order().size() * rays_per_triangle)
+        wide.emplace(bvh);
     const Aabb box = bvh.empty() ? Aabb{{0, 0, 0}, {0, 0, 0}} : bvh.bounds();
     return {bvh,
+            wide ? &*wide : nullptr,
             options,
             frame,
             PrimitiveLookup(bvh),
@@ -190,7 +200,7 @@ PrimarySamples trace_primary(const RenderScene& scene, std::span<const std::uint
     PrimarySamples primary;
     primary.rays = primary_rays(scene, pixels);
     primary.hits.resize(primary.rays.size());
-    trace(scene.bvh, primary.rays, primary.hits);
+    scene.closest(primary.rays, primary.hits);
     primary.hit_positions = positions_of_hits(primary.hits);
     primary.points = points_of_hits(scene, primary.rays, primary.hits, primary.hit_positions);
     for (std::size_t k = 0; k < primary.points.size(); ++k) {
@@ -219,7 +229,8 @@ Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& option
     require_triangles(bvh, "render");
     Picture picture{options.width, options.height, {}};
     with_threads(options.threads, [&] {
-        const RenderScene scene = make_scene(bvh, camera, options);
+        std::optional<WideBvh> wide;
+        const RenderScene scene = make_scene(bvh, camera, options, wide);
         picture.pixels.resize(std::size_t{options.width} * options.height);
         render_chunks(scene, picture);
     });

@@ -53,7 +53,7 @@ std::vector<Vec3> direct_light(const RenderScene& scene, std::span<const Surface
         rays[2 * i + 1] = faces_lamp ? Ray{p.origin, 0.0f, to_lamp, 1.0f} : empty_ray(p.origin);
     });
     std::vector<std::uint8_t> occluded(rays.size());
-    trace_any(scene.bvh, rays, occluded);
+    scene.occluded(rays, occluded);
 
     const Vec3 lamp_light = between(lamp_outside, lamp_inside, lights.enclosed);
     std::vector<Vec3> light(points.size());
@@ -89,7 +89,7 @@ std::vector<Ray> hemisphere_rays(const RenderScene& scene, std::span<const Surfa
 std::vector<float> open_parts(const RenderScene& scene, std::span<const SurfacePoint> points) {
     const std::vector<Ray> rays = hemisphere_rays(scene, points, scene.ao_radius);
     std::vector<std::uint8_t> occluded(rays.size());
-    trace_any(scene.bvh, rays, occluded);
+    scene.occluded(rays, occluded);
     const std::uint32_t per_point = scene.samples_per_ray;
     std::vector<float> open(points.size());
     for_each_index(points.size(), [&](std::size_t i) {
@@ -105,7 +105,7 @@ std::vector<float> open_parts(const RenderScene& scene, std::span<const SurfaceP
 std::vector<Vec3> bounced_light(const RenderScene& scene, std::span<const SurfacePoint> points) {
     const std::vector<Ray> rays = hemisphere_rays(scene, points, infinity);
     std::vector<Hit> hits(rays.size());
-    trace(scene.bvh, rays, hits);
+    scene.closest(rays, hits);
     const std::vector<std::uint32_t> positions = positions_of_hits(hits);
     const std::vector<SurfacePoint> seen = points_of_hits(scene, rays, hits, positions);
     const std::vector<Vec3> light_on_seen = direct_light(scene, seen);

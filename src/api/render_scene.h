@@ -4,6 +4,7 @@
 
 #include <raydix/picture.h>
 #include <raydix/trace.h>
+#include <raydix/wide.h>
 
 #include <cstdint>
 #include <span>
@@ -25,6 +26,7 @@ struct Lights {
 
 struct RenderScene {
     const Bvh& bvh;
+    const WideBvh* wide;  // traced instead if there is one: the same hits, in less time
     const RenderOptions& options;
     CameraFrame frame;
     PrimitiveLookup lookup;
@@ -33,6 +35,14 @@ struct RenderScene {
     float ao_radius;
     std::uint32_t rays_per_pixel;   // primary ones: 1, or 4 where edges are smoothed
     std::uint32_t samples_per_ray;  // secondary rays from each primary hit
+
+    void closest(std::span<const Ray> rays, std::span<Hit> hits) const {
+        static_cast<void>(wide != nullptr ? trace(*wide, rays, hits) : trace(bvh, rays, hits));
+    }
+    void occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const {
+        static_cast<void>(wide != nullptr ? trace_any(*wide, rays, found)
+                                          : trace_any(bvh, rays, found));
+    }
 };
 
 /// Primary rays and their closest hits, those of a pixel in a row: [pixels * rays_per_pixel].
