@@ -118,7 +118,8 @@ void add_peer_options(CLI::App& app, CpuBench& options) {
         return app.add_option(name, values, what)->delimiter(',')->allow_extra_args(false);
     };
     list("--quality", options.qualities, "Our builds")
-        ->check(CLI::IsMember({"fast", "balanced", "high"}))
+        ->check(CLI::IsMember(
+            {"fast", "balanced", "high", "fast+compact", "balanced+compact", "high+compact"}))
         ->capture_default_str();
     list("--embree", options.embree,
          "Embree's builds: low, medium or high, each also with +compact, +robust")

@@ -106,12 +106,15 @@ public:
         cli::CommonOptions common = bench.common;
         common.threads = threads;
         cli::TreeOptions tree;
-        tree.quality = quality;
+        const std::size_t end = quality.find("+compact");
+        tree.quality = quality.substr(0, end);
+        wide_options_.width = bench.width;
+        wide_options_.compact = end != std::string::npos;
         tree.max_leaf = bench.max_leaf;
         build_options_ = tree.build_options(common);
     }
 
-    void build() override { builder_.build(mesh_, build_options_, wide_, bench_.width); }
+    void build() override { builder_.build(mesh_, build_options_, wide_, wide_options_); }
 
     std::optional<double> layout_ms() const override { return wide_.stats().layout_ms; }
     PeerBytes bytes() override { return {wide_.stats().bytes, 0}; }
@@ -186,6 +189,7 @@ private:
     const Mesh& mesh_;
     const CpuBench& bench_;
     BuildOptions build_options_;
+    WideBvhOptions wide_options_;
     WideBvhBuilder builder_;
     WideBvh wide_;
 };

@@ -138,9 +138,9 @@ void run_build(const BuildCommand& options) {
     if (options.tree.device == "cuda") build["peak_bytes"] = timed.device_bytes;
     build["kept_ms"] = spread_json(totals(timed.kept));
     if (options.tree.layout == "cwbvh") add_cwbvh(build, timed.bvh, options.common);
-    if (options.tree.layout == "wide8")
+    if (is_wide_layout(options.tree.layout))
         add_wide_builds(build, scene.mesh, options.tree.build_options(options.common),
-                        options.repeat);
+                        options.tree.layout, options.repeat);
     document["build"] = build;
     if (options.common.prints_tables()) {
         fmt::print("{}: {} triangles, {} vertices, loaded in {:.1f} ms\n", scene.name,

@@ -56,8 +56,11 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->check(CLI::Range(0, 21))
         ->type_name("LEVEL");
     command
-        .add_option("--layout", options.layout, "Memory layout that is traced; cwbvh: build only")
-        ->check(CLI::IsMember({"binary", "wide8", "cwbvh"}))
+        .add_option("--layout", options.layout,
+                    "Memory layout that is traced: of simd wide8, wide4 or compact, which is wide8 "
+                    "with shared "
+                    "vertices; cwbvh: build only")
+        ->check(CLI::IsMember({"binary", "wide4", "wide8", "compact", "cwbvh"}))
         ->capture_default_str()
         ->group(group);
     command

@@ -332,7 +332,8 @@ void run_trace(const TraceCommand& given) {
         });
     std::optional<WideTracer> wide;
     if (options.kernel == "simd")
-        about(options.scene, [&] { wide.emplace(input.bvh, options.wide, options.common); });
+        about(options.scene,
+              [&] { wide.emplace(input.bvh, options.tree.layout, options.wide, options.common); });
     Batch batch{input.bvh,
                 mode,
                 options.common,

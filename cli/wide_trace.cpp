@@ -18,14 +18,30 @@ void add_wide_trace_options(CLI::App& command, WideTraceOptions& options) {
                              ->check(CLI::IsMember(simd_instruction_sets()));
 }
 
+namespace {
+
+WideBvhOptions wide_options(const std::string& layout, int threads) {
+    return {.width = layout == "wide4" ? 4 : 8, .compact = layout == "compact", .threads = threads};
+}
+
+std::string layout_name(const WideBvhStats& stats) {
+    return stats.compact ? "compact" : stats.width == 4 ? "wide4" : "wide8";
+}
+
+}  // namespace
+
+bool is_wide_layout(const std::string& layout) {
+    return layout == "wide8" || layout == "wide4" || layout == "compact";
+}
+
 std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
                               const WideTraceOptions& options) {
-    const bool wide = tree.layout == "wide8";
+    const bool wide = is_wide_layout(tree.layout);
     const bool simd = kernel == "simd" || (kernel.empty() && wide && tree.device == "cpu");
     if (!simd) {
         if (wide && !kernel.empty())
-            throw CLI::ValidationError("--layout",
-                                       "wide8 goes with --kernel simd, not with " + kernel);
+            throw CLI::ValidationError(
+                "--layout", tree.layout + " goes with --kernel simd, not with " + kernel);
         for (const CLI::Option* option : {options.path_option, options.isa_option})
             if (option->count() != 0)
                 throw CLI::ValidationError(option->get_name(), "belongs to --kernel simd");
@@ -35,12 +51,13 @@ std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
         throw CLI::ValidationError("--kernel", "simd traces a bvh, not a " + tree.tree);
     if (tree.layout == "cwbvh")
         throw CLI::ValidationError("--layout", "cwbvh does not go with --kernel simd, wide8 does");
-    tree.layout = "wide8";
+    if (!wide) tree.layout = "wide8";
     return "simd";
 }
 
-WideTracer::WideTracer(const Bvh& bvh, const WideTraceOptions& options, const CommonOptions& common)
-    : tree_(bvh, {.threads = common.threads}),
+WideTracer::WideTracer(const Bvh& bvh, const std::string& layout, const WideTraceOptions& options,
+                       const CommonOptions& common)
+    : tree_(bvh, wide_options(layout, common.threads)),
       path_(simd_path_from_name(options.path)),
       isa_(options.isa.empty() ? simd_instruction_sets().front() : options.isa) {}
 
@@ -77,9 +94,10 @@ void WideTracer::explain_tree(const CommonOptions& common) const {
     if (!common.prints_tables()) return;
     const WideBvhStats& s = tree_.stats();
     fmt::print(
-        "kernel simd: wide8 layout, nodes of up to 8 children with boxes of 8 bits an axis, blocks "
-        "of 8 triangles, {} code, paths chosen by batch ({})\n",
-        isa_, simd_path_name(path_));
+        "kernel simd: {} layout, nodes of up to {} children with boxes of 8 bits an axis, blocks "
+        "of 8 triangles{}, {} code, paths chosen by batch ({})\n",
+        layout_name(s), s.width, s.compact ? " with shared vertices" : "", isa_,
+        simd_path_name(path_));
     fmt::print("             {} nodes, {} leaves, {:.1f} MB\n", s.nodes, s.leaves,
                static_cast<double>(s.bytes) * 1e-6);
 }
@@ -92,10 +110,11 @@ void WideTracer::explain_paths(const CommonOptions& common) const {
 
 void add_wide(Json& build, const WideBvh& tree) {
     const WideBvhStats& s = tree.stats();
-    build["layout"] = "wide8";
+    build["layout"] = layout_name(s);
     build["layout_nodes"] = s.nodes;
     build["bytes"] = s.bytes;
-    build["wide"] = {{"nodes", s.nodes},
+    build["wide"] = {{"layout", layout_name(s)},
+                     {"nodes", s.nodes},
                      {"leaves", s.leaves},
                      {"references", s.references},
                      {"max_depth", s.max_depth},
@@ -110,18 +129,20 @@ void add_wide(Json& build, const WideBvh& tree) {
                      {"kept_ms", nullptr}};
 }
 
-void add_wide_builds(Json& build, const Mesh& mesh, const BuildOptions& options, int repeat) {
+void add_wide_builds(Json& build, const Mesh& mesh, const BuildOptions& options,
+                     const std::string& layout, int repeat) {
+    const WideBvhOptions wide = wide_options(layout, options.threads);
     std::vector<double> fresh, kept;
-    WideBvh tree = build_wide_bvh(mesh, options);
+    WideBvh tree = build_wide_bvh(mesh, options, wide);
     for (int i = 0; i < repeat; ++i) {
         tree = WideBvh();
-        tree = build_wide_bvh(mesh, options);
+        tree = build_wide_bvh(mesh, options, wide);
         fresh.push_back(tree.stats().ms);
     }
     WideBvhBuilder builder;
-    builder.build(mesh, options, tree);
+    builder.build(mesh, options, tree, wide);
     for (int i = 0; i < repeat; ++i) {
-        builder.build(mesh, options, tree);
+        builder.build(mesh, options, tree, wide);
         kept.push_back(tree.stats().ms);
     }
     add_wide(build, tree);
@@ -130,8 +151,9 @@ void add_wide_builds(Json& build, const Mesh& mesh, const BuildOptions& options,
 }
 
 void print_wide_table(const Json& wide) {
-    fmt::print("\nwide8        {} nodes of {:.2f} children, {} leaves, depth {}\n",
-               grouped(wide["nodes"].get<std::uint64_t>()), wide["children_per_node"].get<double>(),
+    fmt::print("\n{:<12} {} nodes of {:.2f} children, {} leaves, depth {}\n",
+               wide["layout"].get<std::string>(), grouped(wide["nodes"].get<std::uint64_t>()),
+               wide["children_per_node"].get<double>(),
                grouped(wide["leaves"].get<std::uint64_t>()),
                wide["max_depth"].get<std::uint32_t>());
     for (const auto& [label, field] :

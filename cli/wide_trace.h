@@ -19,7 +19,10 @@ struct WideTraceOptions {
 
 void add_wide_trace_options(CLI::App& command, WideTraceOptions& options);
 
-/// --kernel simd goes with --layout wide8 and either of them is enough. Usage errors: one without
+/// wide4, wide8 and compact.
+[[nodiscard]] bool is_wide_layout(const std::string& layout);
+
+/// --kernel simd goes with a wide layout and either of them is enough. Usage errors: one without
 /// the other, options of simd for another kernel.
 std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
                               const WideTraceOptions& options);
@@ -27,7 +30,8 @@ std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
 /// A wide tree, and which paths its batches took.
 class WideTracer {
 public:
-    WideTracer(const Bvh& bvh, const WideTraceOptions& options, const CommonOptions& common);
+    WideTracer(const Bvh& bvh, const std::string& layout, const WideTraceOptions& options,
+               const CommonOptions& common);
     TraceCounts closest(std::span<const Ray> rays, std::span<Hit> hits, TraceOptions options);
     TraceCounts any(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                     TraceOptions options);
@@ -52,7 +56,8 @@ private:
 void add_wide(Json& build, const WideBvh& tree);
 /// Times builds of it, into new memory and into kept memory, without the binary tree where that is
 /// possible; then as add_wide.
-void add_wide_builds(Json& build, const Mesh& mesh, const BuildOptions& options, int repeat);
+void add_wide_builds(Json& build, const Mesh& mesh, const BuildOptions& options,
+                     const std::string& layout, int repeat);
 void print_wide_table(const Json& wide);
 
 }  // namespace raydix::cli

@@ -16,12 +16,15 @@
 namespace raydix {
 
 struct WideBvhOptions {
-    int width = 8;    // children a node at most: 4 or 8
-    int threads = 0;  // as in BuildOptions; the layout does not depend on it
+    int width = 8;         // children a node at most: 4 or 8
+    bool compact = false;  // corners are looked up in a list of vertices: half the bytes or less
+                           // where triangles share them, for somewhat slower rays
+    int threads = 0;       // as in BuildOptions; the layout does not depend on it
 };
 
 struct WideBvhStats {
     int width = 0;
+    bool compact = false;
     std::uint64_t nodes = 0;
     std::uint64_t leaves = 0;
     std::uint64_t references = 0;  // triangles in leaves; those without area are left out
@@ -31,10 +34,10 @@ struct WideBvhStats {
                      // the root has no area
     double widening =
         0;  // surface of all quantised child boxes / that of the exact ones; 1 without surface
-    std::uint64_t node_bytes = 0, triangle_bytes = 0;
-    std::uint64_t bytes = 0;  // every byte a trace touches
-    double ms = 0;            // of making it: from a binary tree, or from a mesh
-    double layout_ms = 0;     // the part of it after the binary tree or its clusters
+    std::uint64_t node_bytes = 0, triangle_bytes = 0;  // vertices are among the latter
+    std::uint64_t bytes = 0;                           // every byte a trace touches
+    double ms = 0;         // of making it: from a binary tree, or from a mesh
+    double layout_ms = 0;  // the part of it after the binary tree or its clusters
     std::uint64_t input_count = 0, left_out = 0;  // triangles given; invalid ones among them
 };
 
@@ -73,9 +76,10 @@ public:
 
     /// The same bits as WideBvh(build_bvh(mesh, options)), without the binary tree in between where
     /// the builder is ploc, hploc or binned and max_leaf is at most 4. The mesh may go afterwards.
-    /// Throws InputError as both of them do, and if the mesh has vertices but no triangles.
+    /// `wide.threads` has no effect, that of `options` counts. Throws InputError as both of them
+    /// do, and if the mesh has vertices but no triangles.
     void build(const MeshView& mesh, const BuildOptions& options, WideBvh& tree,
-               int width = WideBvhOptions{}.width);
+               const WideBvhOptions& wide = {});
 
 private:
     struct Scratch;
@@ -84,9 +88,11 @@ private:
 
 /// As WideBvhBuilder makes it.
 [[nodiscard]] WideBvh build_wide_bvh(
-    const MeshView& mesh, const BuildOptions& options = build_options_for(Quality::balanced));
+    const MeshView& mesh, const BuildOptions& options = build_options_for(Quality::balanced),
+    const WideBvhOptions& wide = {});
 [[nodiscard]] WideBvh build_wide_bvh(
-    const Mesh& mesh, const BuildOptions& options = build_options_for(Quality::balanced));
+    const Mesh& mesh, const BuildOptions& options = build_options_for(Quality::balanced),
+    const WideBvhOptions& wide = {});
 
 /// As trace(), trace_any() and trace_all() of a Bvh, bit for bit, by the kernel `simd`.
 /// options.path says how rays go through the tree, options.isa with which instructions;

@@ -21,10 +21,10 @@ using TakeClusters = std::function<void(const ClusterTree& clusters, const Trian
                                         const std::uint8_t* flat)>;
 
 struct BvhBuilderAccess {
-    /// As build(), but the clusters of a builder that grows some go to `take`, inside of which loops
-    /// have the threads of `options`; `tree` then has no nodes, only figures: input_count, left_out,
-    /// build_ms (fit is the time of `take`, layout 0) and peak_bytes. Without a valid triangle `take`
-    /// is not called. mesh has triangles.
+    /// As build(), but the clusters of a builder that grows some go to `take`, inside of which
+    /// loops have the threads of `options`; `tree` then has no nodes, only figures: input_count,
+    /// left_out, build_ms (fit is the time of `take`, layout 0) and peak_bytes. Without a valid
+    /// triangle `take` is not called. mesh has triangles.
     static void build_clusters(BvhBuilder& builder, const MeshView& mesh,
                                const BuildOptions& options, Bvh& tree, const TakeClusters& take);
 };

@@ -21,7 +21,8 @@ WideOptions collapse_options(const WideBvhOptions& options) {
                                .max_leaf = wide_max_leaf,
                                .node_cost = 1.0,
                                .primitive_cost = wide_primitive_cost,
-                               .block = wide_block};
+                               .block = wide_block,
+                               .compact = options.compact};
     check_wide_options(collapse);
     return collapse;
 }
@@ -31,7 +32,7 @@ WideOptions collapse_options(const WideBvhOptions& options) {
 WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
     : arrays_(std::make_unique<Arrays>()) {
     const WideOptions collapse = collapse_options(options);
-    arrays_->clear(options.width);
+    arrays_->clear(collapse);
     arrays_->stats.input_count = bvh.input_count();
     arrays_->stats.left_out = bvh.left_out();
     if (bvh.empty()) return;
@@ -47,7 +48,7 @@ WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
     });
 }
 
-WideBvh::WideBvh() : arrays_(std::make_unique<Arrays>()) { arrays_->clear(WideBvhOptions{}.width); }
+WideBvh::WideBvh() : arrays_(std::make_unique<Arrays>()) { arrays_->clear({}); }
 WideBvh::~WideBvh() = default;
 WideBvh::WideBvh(WideBvh&&) noexcept = default;
 WideBvh& WideBvh::operator=(WideBvh&&) noexcept = default;
@@ -64,10 +65,10 @@ WideBvhBuilder::WideBvhBuilder(WideBvhBuilder&&) noexcept = default;
 WideBvhBuilder& WideBvhBuilder::operator=(WideBvhBuilder&&) noexcept = default;
 
 void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, WideBvh& tree,
-                           int width) {
+                           const WideBvhOptions& wide) {
     const FloatEnvironment environment;
     Stopwatch watch;
-    const WideOptions collapse = collapse_options({.width = width});
+    const WideOptions collapse = collapse_options(wide);
     if (mesh.triangles.empty() && !mesh.vertices.empty())
         throw InputError("rays need triangles; this mesh has vertices alone");
     WideBvh::Arrays& arrays = *tree.arrays_;
@@ -79,7 +80,7 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
         layout_ms = stage.lap();
     };
     try {
-        arrays.clear(width);
+        arrays.clear(collapse);
         if (grows_clusters(options.builder) &&
             options.max_leaf <= static_cast<int>(wide_max_leaf)) {
             BvhBuilderAccess::build_clusters(
@@ -97,7 +98,7 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
                 });
         }
     } catch (...) {
-        arrays.clear(width);  // nothing half-built gets out
+        arrays.clear(collapse);  // nothing half-built gets out
         throw;
     }
     arrays.stats.input_count = bvh.input_count();
@@ -106,17 +107,18 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
     arrays.stats.ms = watch.lap();
 }
 
-WideBvh build_wide_bvh(const MeshView& mesh, const BuildOptions& options) {
+WideBvh build_wide_bvh(const MeshView& mesh, const BuildOptions& options,
+                       const WideBvhOptions& wide) {
     WideBvh tree;
-    WideBvhBuilder().build(mesh, options, tree);
+    WideBvhBuilder().build(mesh, options, tree, wide);
     return tree;
 }
 
-WideBvh build_wide_bvh(const Mesh& mesh, const BuildOptions& options) {
-    return build_wide_bvh(MeshView(mesh), options);
+WideBvh build_wide_bvh(const Mesh& mesh, const BuildOptions& options, const WideBvhOptions& wide) {
+    return build_wide_bvh(MeshView(mesh), options, wide);
 }
 
-bool WideBvh::empty() const { return arrays_->blocks.empty(); }
+bool WideBvh::empty() const { return arrays_->blocks.empty() && arrays_->compact.empty(); }
 const WideBvhStats& WideBvh::stats() const { return arrays_->stats; }
 
 }  // namespace raydix

@@ -29,6 +29,9 @@ public:
 
     BinaryView(const Bvh& bvh, std::uint32_t max_leaf);
 
+    /// Of triangles: gives equal corners one number, for corners() and vertex().
+    void weld();
+
     [[nodiscard]] Ref root() const { return 0; }
     [[nodiscard]] bool is_leaf(Ref ref) const { return nodes_[ref].is_leaf(); }
     [[nodiscard]] Aabb box(Ref ref) const { return {nodes_[ref].lo, nodes_[ref].hi}; }
@@ -40,7 +43,9 @@ public:
     /// About how many primitives are below: what lies between its first leaf and its last in the
     /// tree's order.
     [[nodiscard]] std::uint32_t size(Ref ref) const;
-    [[nodiscard]] PrimitiveRun run(Ref leaf) const { return {nodes_[leaf].first, nodes_[leaf].count}; }
+    [[nodiscard]] PrimitiveRun run(Ref leaf) const {
+        return {nodes_[leaf].first, nodes_[leaf].count};
+    }
     [[nodiscard]] static PrimitiveRun join(PrimitiveRun a, PrimitiveRun b) {
         const std::uint32_t count = a.count + b.count;
         if (a.first != PrimitiveRun::several && b.first != PrimitiveRun::several) {
@@ -62,6 +67,12 @@ public:
     [[nodiscard]] LeafTriangle triangle(std::uint32_t position) const {
         return bvh_.triangles()[position];
     }
+    [[nodiscard]] std::array<std::uint32_t, 3> corners(std::uint32_t position) const {
+        const std::size_t first = 3 * std::size_t{position};
+        return {corners_[first], corners_[first + 1], corners_[first + 2]};
+    }
+    [[nodiscard]] std::size_t vertex_count() const { return vertices_.size(); }
+    [[nodiscard]] Vec3 vertex(std::uint32_t number) const { return vertices_[number]; }
     void prefetch_indices(std::uint32_t) const {}
     void prefetch_corners(std::uint32_t position) const {
         __builtin_prefetch(&bvh_.triangles()[position]);
@@ -73,6 +84,8 @@ private:
     const Bvh& bvh_;
     std::span<const BvhNode> nodes_;
     std::vector<BvhNode> own_;  // new pairs of children stand behind the old nodes
+    std::vector<std::uint32_t> corners_;
+    std::vector<Vec3> vertices_;
 };
 
 }  // namespace raydix

@@ -61,6 +61,13 @@ public:
     [[nodiscard]] LeafTriangle triangle(std::uint32_t place) const {
         return copy_primitive(source_, tree_.ids[place]);
     }
+    [[nodiscard]] std::array<std::uint32_t, 3> corners(std::uint32_t place) const {
+        return source_.triangles[tree_.ids[place]];
+    }
+    [[nodiscard]] std::size_t vertex_count() const { return source_.vertex_count; }
+    [[nodiscard]] Vec3 vertex(std::uint32_t number) const {
+        return without_negative_zero(source_.vertices[number]);
+    }
     void prefetch_indices(std::uint32_t place) const {
         raydix::prefetch_indices(source_, tree_.ids[place]);
     }

@@ -19,7 +19,8 @@ template <class Ref>
 struct CollapseEntry {
     Aabb box;
     Ref ref;
-    std::uint32_t children;  // the first one; of a leaf, leaf_bit and where its primitives are listed
+    std::uint32_t
+        children;  // the first one; of a leaf, leaf_bit and where its primitives are listed
     PrimitiveRun run;
 
     static constexpr std::uint32_t leaf_bit = 0x80000000u;

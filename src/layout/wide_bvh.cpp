@@ -27,7 +27,9 @@ void make_layout(const View& view, const WideOptions& options, WideBvh::Arrays& 
 
 void make_wide_layout(const Bvh& bvh, const WideOptions& options, WideBvh::Arrays& out,
                       WideScratch& scratch) {
-    make_layout(BinaryView(bvh, options.max_leaf), options, out, *scratch.memory);
+    BinaryView view(bvh, options.max_leaf);
+    if (options.compact) view.weld();
+    make_layout(view, options, out, *scratch.memory);
 }
 
 void make_wide_layout(const ClusterView& clusters, const WideOptions& options, WideBvh::Arrays& out,

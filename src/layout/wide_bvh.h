@@ -57,19 +57,31 @@ struct alignas(32) TriangleBlock {
 };
 static_assert(sizeof(TriangleBlock) == 320);
 
+/// Eight triangles by their corners' places in a list of vertices: vertex[corner][lane].
+struct alignas(32) CompactBlock {
+    std::uint32_t vertex[3][8];
+    std::uint32_t prim[8];
+};
+static_assert(sizeof(CompactBlock) == 128);
+
 struct WideBvh::Arrays {
     Buffer<WideNode> nodes;
-    Buffer<TriangleBlock> blocks;
-    Aabb bounds{};  // the root's exact box: rays widen boxes by its size
+    Buffer<TriangleBlock> blocks;  // empty if the tree is compact,
+    Buffer<CompactBlock> compact;  // else these two are
+    Buffer<Vec3> vertices;         // in the order in which blocks need them first
+    Aabb bounds{};                 // the root's exact box: rays widen boxes by its size
     WideBvhStats stats;
 
     /// Nothing to hit; the memory stays.
-    void clear(int width) {
+    void clear(const WideOptions& options) {
         nodes.reset(0);
         blocks.reset(0);
+        compact.reset(0);
+        vertices.reset(0);
         bounds = {};
         stats = {};
-        stats.width = width;
+        stats.width = options.width;
+        stats.compact = options.compact;
         stats.widening = 1.0;
     }
 };

@@ -17,6 +17,7 @@ struct WideOptions {
     double node_cost = 1.0;       // of visiting a wide node, against ...
     double primitive_cost = 1.0;  // ... testing one primitive
     std::uint32_t block = 1;      // so many primitives are tested at the cost of one
+    bool compact = false;         // WideBvh alone: corners by way of a list of vertices
 };
 
 /// Node w has the children [w * width, (w + 1) * width), used ones first. A child is a BvhNode: an

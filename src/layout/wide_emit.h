@@ -40,10 +40,12 @@ public:
                 collapse.plan(roots_[begin].ref);
                 Writer writer(view_, part);
                 writer.write(collapse, roots_[begin].depth);
-                writer.copy_triangles();
+                finish(writer);
             }
         });
         const WideSums sums = join_parts(std::span(parts_).first(roots_.size() + 1), out);
+        if (options_.compact) number_vertices(out);
+        count_bytes(out);
         out.bounds = view_.box(view_.root());
         const double root = half_area(out.bounds);
         out.stats.sah =
@@ -86,7 +88,41 @@ private:
                                  waiting.push_back({chosen[k], w, slot, at.depth + 1});
                              });
         }
-        writer.copy_triangles();
+        finish(writer);
+    }
+
+    void finish(Writer& writer) const {
+        options_.compact ? writer.list_corners() : writer.copy_triangles();
+    }
+
+    /// Vertices get numbers in the order in which blocks name them, and those that none names none.
+    void number_vertices(WideBvh::Arrays& out) const {
+        std::vector<std::uint32_t> numbers(view_.vertex_count(), no_vertex), used;
+        for (CompactBlock& block : out.compact.span())
+            for (auto& corners : block.vertex)
+                for (std::uint32_t& vertex : corners) {
+                    if (vertex == no_vertex) {  // of an empty lane
+                        vertex = 0;
+                        continue;
+                    }
+                    if (numbers[vertex] == no_vertex) {
+                        numbers[vertex] = static_cast<std::uint32_t>(used.size());
+                        used.push_back(vertex);
+                    }
+                    vertex = numbers[vertex];
+                }
+        out.vertices.reset(used.size());
+        for_each_index(used.size(),
+                       [&](std::size_t k) { out.vertices[k] = view_.vertex(used[k]); });
+    }
+
+    static void count_bytes(WideBvh::Arrays& out) {
+        WideBvhStats& stats = out.stats;
+        stats.node_bytes = out.nodes.size() * sizeof(WideNode);
+        stats.triangle_bytes = out.blocks.size() * sizeof(TriangleBlock) +
+                               out.compact.size() * sizeof(CompactBlock) +
+                               out.vertices.size() * sizeof(Vec3);
+        stats.bytes = stats.node_bytes + stats.triangle_bytes;
     }
 
     /// The children of a node of the top: the largest one is replaced by its own two while there is

@@ -41,9 +41,6 @@ void set_figures(const WideSums& sums, WideBvh::Arrays& out) {
     stats.children_per_node =
         static_cast<double>(sums.children) / static_cast<double>(out.nodes.size());
     stats.widening = sums.child_area > 0 ? sums.decoded_area / sums.child_area : 1.0;
-    stats.node_bytes = out.nodes.size() * sizeof(WideNode);
-    stats.triangle_bytes = out.blocks.size() * sizeof(TriangleBlock);
-    stats.bytes = stats.node_bytes + stats.triangle_bytes;
 }
 
 }  // namespace
@@ -62,6 +59,7 @@ void WideSums::add(const WideSums& other) {
 void WidePart::clear() {
     nodes.clear();
     blocks.clear();
+    compact.clear();
     filler = {};
     sums = {};
 }
@@ -69,26 +67,29 @@ void WidePart::clear() {
 WideSums join_parts(std::span<const WidePart> parts, WideBvh::Arrays& out) {
     std::vector<Bases> bases;
     std::size_t nodes = 0, blocks = 0;
+    bool compact = false;
     WideSums sums;
     for (const WidePart& part : parts) {
         bases.push_back({static_cast<std::uint32_t>(nodes), static_cast<std::uint32_t>(blocks)});
         nodes += part.nodes.size();
-        blocks += part.blocks.size();
+        blocks += part.filler.blocks();
+        compact = compact || !part.compact.empty();
         sums.add(part.sums);
     }
     if (blocks > max_places / lanes)
         throw InputError("a wide tree holds " + std::to_string(max_places) +
                          " triangle references at most");
     out.nodes.reset(nodes);
-    out.blocks.reset(blocks);
+    out.blocks.reset(compact ? 0 : blocks);
+    out.compact.reset(compact ? blocks : 0);
     for_each_index(
         parts.size(),
         [&](std::size_t p) {
             const WidePart& part = parts[p];
             WideNode* node = out.nodes.data() + bases[p].node;
             for (const WideNode& own : part.nodes) *node++ = placed(own, bases[p], bases);
-            std::copy(part.blocks.begin(), part.blocks.end(),
-                      out.blocks.data() + bases[p].block);
+            std::ranges::copy(part.blocks, out.blocks.data() + bases[p].block);
+            std::ranges::copy(part.compact, out.compact.data() + bases[p].block);
         },
         1);
     set_figures(sums, out);

@@ -20,6 +20,9 @@ struct WideSums {
     void add(const WideSums& other);
 };
 
+/// In compact blocks, until vertices have their numbers: there is no triangle in this lane.
+inline constexpr std::uint32_t no_vertex = ~std::uint32_t{0};
+
 /// In the word of a child that is the first node of another part: which one, of parts[1 + ...].
 /// Only the first part has such children.
 inline constexpr std::uint32_t wide_part_bit = 0x40000000u;
@@ -28,13 +31,14 @@ inline constexpr std::uint32_t wide_part_bit = 0x40000000u;
 struct WidePart {
     std::vector<WideNode> nodes;
     std::vector<TriangleBlock> blocks;
+    std::vector<CompactBlock> compact;  // instead; vertices by the view's numbers
     BlockFiller filler;
     WideSums sums;
     void clear();
 };
 
-/// Puts the nodes and blocks of all parts behind each other; fills the arrays' figures but for time,
-/// width and SAH. Throws InputError for too many triangles.
+/// Puts the nodes and blocks of all parts behind each other; fills the arrays' figures but for
+/// time, width and SAH. Throws InputError for too many triangles.
 WideSums join_parts(std::span<const WidePart> parts, WideBvh::Arrays& out);
 
 }  // namespace raydix

@@ -111,6 +111,19 @@ public:
     }
 
     /// When all leaves have their places.
+    void list_corners() {
+        CompactBlock none;
+        std::fill_n(&none.vertex[0][0], 24, no_vertex);
+        std::fill_n(none.prim, 8, no_primitive);
+        out_.compact.resize(out_.filler.blocks(), none);
+        for (const auto [position, place] : copies_) {
+            CompactBlock& block = out_.compact[place / BlockFiller::lanes];
+            const std::uint32_t lane = place % BlockFiller::lanes;
+            const std::array<std::uint32_t, 3> corners = view_.corners(position);
+            for (std::size_t v = 0; v < 3; ++v) block.vertex[v][lane] = corners[v];
+            block.prim[lane] = view_.id(position);
+        }
+    }
     void copy_triangles() {
         constexpr std::size_t indices_ahead = 32, corners_ahead = 16;
         out_.blocks.resize(out_.filler.blocks());

@@ -177,7 +177,7 @@ class Usage(ProgramTest):
         self.assertGreater(self.document("build", MEDIUM, "--epo", "0.5")["build"]["epo"], 0)
 
     def test_progress_only_on_a_terminal(self):
-        command = ["render", "builtin:figure?triangles=20000", "--view", "ao", "--size", "160x120", "-o", "p.png"]
+        command = ["render", "builtin:figure?triangles=20000", "--view", "ao", "--size", "1600x1200", "-o", "p.png"]
         samples = 64
         for _ in range(8):
             started = time.monotonic()

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <map>
 
 #include "layout/wide_bvh.h"
@@ -49,7 +50,12 @@ private:
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
         EXPECT_LE(place % 8 + count, 8u);
         EXPECT_LE(count, wide_max_leaf);
-        const TriangleBlock& block = arrays_.blocks[place / 8];
+        TriangleBlock block{};
+        for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane)
+            if (arrays_.stats.compact)
+                put_together(arrays_.compact[place / 8], lane, block);
+            else
+                block = arrays_.blocks[place / 8];
         Aabb box = empty_box();
         for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane) {
             ++seen[block.prim[lane]];
@@ -63,14 +69,19 @@ private:
         return box;
     }
 
+    void put_together(const CompactBlock& from, std::uint32_t lane, TriangleBlock& block) const {
+        const auto corner = [&](int v) { return arrays_.vertices[from.vertex[v][lane]]; };
+        block.set(lane, {corner(0), corner(1), corner(2)}, from.prim[lane]);
+    }
+
     const WideBvh::Arrays& arrays_;
     std::vector<int> nodes_;
     std::map<std::uint32_t, int> places_;
 };
 
-void expect_sound(const Mesh& mesh, const BuildOptions& options, int width = 8) {
+void expect_sound(const Mesh& mesh, const BuildOptions& options, const WideBvhOptions& layout) {
     const Bvh bvh = build_bvh(mesh, options);
-    const WideBvh tree(bvh, {.width = width});
+    const WideBvh tree(bvh, layout);
     std::uint64_t with_area = 0;
     for (const LeafTriangle& t : bvh.triangles()) with_area += !has_zero_area(t);
     const WideBvhStats& stats = tree.stats();
@@ -84,17 +95,25 @@ void expect_sound(const Mesh& mesh, const BuildOptions& options, int width = 8) 
     for (std::size_t k = 0; k < bvh.order().size(); ++k)
         if (!has_zero_area(bvh.triangles()[k])) ++wanted[bvh.order()[k]];
     EXPECT_EQ(walk.seen, wanted);
-    EXPECT_EQ(stats.bytes, stats.nodes * 96 + tree.arrays().blocks.size() * 320);
+    EXPECT_EQ(stats.bytes, stats.nodes * 96 + tree.arrays().blocks.size() * 320 +
+                               tree.arrays().compact.size() * 128 +
+                               tree.arrays().vertices.size() * 12);
+    EXPECT_TRUE(layout.compact ? tree.arrays().blocks.empty() : tree.arrays().compact.empty());
     EXPECT_GE(stats.widening, 1.0 - 1e-12);
-    EXPECT_LE(stats.children_per_node, width);
+    EXPECT_LE(stats.children_per_node, layout.width);
+}
+
+void expect_sound(const Mesh& mesh, const BuildOptions& options) {
+    for (const bool compact : {false, true})
+        for (const int width : {4, 8})
+            expect_sound(mesh, options, {.width = width, .compact = compact});
 }
 
 TEST(WideLayout, HoldsEveryTriangleInItsBoxes) {
-    for (const std::size_t n : {1u, 2u, 3u, 4u, 5u, 8u, 9u, 33u, 1000u, 20'000u})
-        for (const int width : {4, 8}) {
-            expect_sound(random_soup(n, n), {}, width);
-            expect_sound(lattice_mesh(n, 7, n), {.builder = Builder::binned, .max_leaf = 1}, width);
-        }
+    for (const std::size_t n : {1u, 2u, 3u, 4u, 5u, 8u, 9u, 33u, 1000u, 20'000u}) {
+        expect_sound(random_soup(n, n), {});
+        expect_sound(lattice_mesh(n, 7, n), {.builder = Builder::binned, .max_leaf = 1});
+    }
     for (const float scale : {1e-9f, 1e12f}) expect_sound(scaled(random_soup(500, 3), scale), {});
     expect_sound(moved(random_soup(500, 3), {1e9f, -1e9f, 1e3f}), {});
 }
@@ -118,6 +137,21 @@ bool same_bits(const WideBvh& a, const WideBvh& b) {
         return std::ranges::equal(std::as_bytes(x.view()), std::as_bytes(y.view()));
     };
     return equal(a.arrays().nodes, b.arrays().nodes) && equal(a.arrays().blocks, b.arrays().blocks);
+}
+
+/// Vertices may be other ones: a mesh can hold the same place twice.
+bool same_compact_triangles(const WideBvh& a, const WideBvh& b) {
+    const WideBvh::Arrays &x = a.arrays(), &y = b.arrays();
+    if (x.compact.size() != y.compact.size()) return false;
+    for (std::size_t k = 0; k < x.compact.size(); ++k)
+        for (int lane = 0; lane < 8; ++lane)
+            for (int v = 0; v < 3; ++v)
+                if (x.compact[k].prim[lane] != y.compact[k].prim[lane] ||
+                    (x.compact[k].prim[lane] != no_primitive &&
+                     std::memcmp(&x.vertices[x.compact[k].vertex[v][lane]],
+                                 &y.vertices[y.compact[k].vertex[v][lane]], sizeof(Vec3)) != 0))
+                    return false;
+    return true;
 }
 
 TEST(WideLayout, IsTheSameForEveryThreadCount) {
@@ -152,7 +186,7 @@ TEST(WideBuild, GivesTheTreeThatTheBinaryOneGives) {
             for (const int max_leaf : {1, 4, 5})
                 for (const int width : {4, 8}) {
                     const BuildOptions options{.builder = name, .max_leaf = max_leaf, .threads = 3};
-                    builder.build(mesh, options, tree, width);
+                    builder.build(mesh, options, tree, {.width = width});
                     const WideBvh other(build_bvh(mesh, options), {.width = width});
                     EXPECT_TRUE(same_bits(tree, other))
                         << builder_name(name) << ", " << mesh.triangles.size() << " triangles";
@@ -160,6 +194,20 @@ TEST(WideBuild, GivesTheTreeThatTheBinaryOneGives) {
                     EXPECT_EQ(tree.stats().sah, other.stats().sah);
                     EXPECT_EQ(tree.stats().input_count, mesh.triangles.size());
                 }
+}
+
+TEST(WideBuild, CompactTreesShareVertices) {
+    const Mesh mesh = load_scene("builtin:figure?triangles=20000").mesh;
+    const BuildOptions options = build_options_for(Quality::balanced);
+    const WideBvhOptions layout{.compact = true};
+    const WideBvh tree = build_wide_bvh(mesh, options, layout),
+                  welded(build_bvh(mesh, options), layout), copied = build_wide_bvh(mesh, options);
+    EXPECT_EQ(tree.arrays().vertices.size(), mesh.vertices.size());
+    EXPECT_LE(welded.arrays().vertices.size(), mesh.vertices.size());
+    EXPECT_TRUE(same_compact_triangles(tree, welded));
+    EXPECT_TRUE(std::ranges::equal(std::as_bytes(tree.arrays().nodes.view()),
+                                   std::as_bytes(copied.arrays().nodes.view())));
+    EXPECT_LT(tree.stats().bytes, 0.75 * static_cast<double>(copied.stats().bytes));
 }
 
 TEST(WideBuild, OfManyPartsHoldsEveryTriangleInItsBoxes) {
@@ -195,7 +243,7 @@ TEST(WideBuild, RefusesPointsAndOtherWidths) {
     EXPECT_THROW(static_cast<void>(build_wide_bvh(MeshView(points, {}))), InputError);
     WideBvhBuilder builder;
     WideBvh tree;
-    EXPECT_THROW(builder.build(random_soup(10, 1), {}, tree, 5), InputError);
+    EXPECT_THROW(builder.build(random_soup(10, 1), {}, tree, {.width = 5}), InputError);
     EXPECT_TRUE(closest_hit(WideBvh(), Ray{{0, 0, 0}, 0, {0, 0, 1}, infinity}).prim ==
                 no_primitive);
 }

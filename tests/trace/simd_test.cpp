@@ -65,12 +65,18 @@ void expect_like_scalar(const std::string& what, const Bvh& bvh, std::span<const
     if (some_hit) {
         EXPECT_GT(counts.hits, 0u);
     }
-    for (const int width : {8, 4}) {
-        const WideBvh tree(bvh, {.width = width});
+    for (const WideBvhOptions layout :
+         {WideBvhOptions{}, WideBvhOptions{.width = 4}, WideBvhOptions{.compact = true}}) {
+        const WideBvh tree(bvh, layout);
+        const bool is_default = layout.width == 8 && !layout.compact;
+        const std::string what_layout = what + (layout.compact      ? ", compact"
+                                                : layout.width == 4 ? ", wide4"
+                                                                    : "");
         for (const std::string& isa : simd_instruction_sets())
             for (const SimdPath path : paths) {
-                if (width == 4 && path != SimdPath::automatic) continue;
-                expect_like(what, tree, rays, wanted, counts,
+                // What a layout changes is the same code for each instruction set.
+                if (!is_default && isa != simd_instruction_sets().front()) continue;
+                expect_like(what_layout, tree, rays, wanted, counts,
                             {.counters = path == SimdPath::stream, .path = path, .isa = isa});
             }
     }

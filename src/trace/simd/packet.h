@@ -207,7 +207,7 @@ private:
 
     void test_leaf(std::uint32_t word, std::uint64_t active) {
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
-        const TriangleBlock& block = tree_.blocks[place / 8];
+        const TriangleBlock& block = tree_.block(place, count);
         if constexpr (counting)
             counts_.tests += count * static_cast<std::uint64_t>(std::popcount(active));
         bool changed = false;

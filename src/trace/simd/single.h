@@ -139,7 +139,7 @@ private:
 
     HWY_INLINE bool test_leaf(std::uint32_t word) {
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
-        const TriangleBlock& block = tree_.blocks[place / 8];
+        const TriangleBlock& block = tree_.block(place, count);
         if constexpr (counting) counts_.tests += count;
         if constexpr (wanted == Wanted::all) {
             for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane) {

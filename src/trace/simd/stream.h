@@ -221,7 +221,7 @@ private:
     void test_leaf(const StreamEntry& entry) {
         const std::uint32_t place = (entry.word & ~wide_leaf_bit) >> 3,
                             count = (entry.word & 7) + 1;
-        const TriangleBlock& block = tree_.blocks[place / 8];
+        const TriangleBlock& block = tree_.block(place, count);
         std::uint32_t* const list = memory_.lists() + entry.begin;
         if constexpr (counting) counts_.tests += std::uint64_t{count} * entry.count;
         pad_list(list, entry.count);

@@ -30,9 +30,14 @@ const SimdKernels& kernels_for(const std::string& isa) {
     throw InputError("instruction set " + isa + ": this processor and build have " + known);
 }
 
-WideView view_of(const WideBvh& tree) {
+WideView view_of(const WideBvh& tree, TriangleBlock& room) {
     const WideBvh::Arrays& arrays = tree.arrays();
-    return {arrays.nodes.data(), arrays.blocks.data(), arrays.bounds};
+    return {arrays.nodes.data(),
+            arrays.blocks.empty() ? nullptr : arrays.blocks.data(),
+            arrays.compact.data(),
+            arrays.vertices.data(),
+            &room,
+            arrays.bounds};
 }
 
 /// Stacks for the deepest path of a tree.
@@ -97,7 +102,8 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hit
                            StackMemory stack(tree.stats().max_depth);
                            StreamMemory memory;
                            const std::size_t from = order.empty() ? begin : 0;
-                           const SimdJob job{view_of(tree),
+                           TriangleBlock room{};
+                           const SimdJob job{view_of(tree, room),
                                              rays.data() + from,
                                              order.empty() ? nullptr : order.data() + begin,
                                              end - begin,
@@ -163,9 +169,17 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
         for_each_block(
             rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
                 StackMemory stack(tree.stats().max_depth);
-                const SimdJob job{
-                    view_of(tree), rays.data() + begin, nullptr, end - begin, nullptr,
-                    nullptr,       stack.view(),        {},      nullptr,     options.counters};
+                TriangleBlock room{};
+                const SimdJob job{view_of(tree, room),
+                                  rays.data() + begin,
+                                  nullptr,
+                                  end - begin,
+                                  nullptr,
+                                  nullptr,
+                                  stack.view(),
+                                  {},
+                                  nullptr,
+                                  options.counters};
                 kernels.all_hits(job, found[block], &all.offsets[begin + 1], parts[block]);
             });
         join_blocks(found, block_size, all);
@@ -220,7 +234,9 @@ Result one_ray(const WideBvh& tree, const Ray& ray) {
     }
     Result result{};
     SimdCounts counts;
-    SimdJob job{view_of(tree), &ray, nullptr, 1, nullptr, nullptr, stack, {}, nullptr, false};
+    TriangleBlock room;
+    if (tree.stats().compact) room = {};  // which takes a while, for one ray
+    SimdJob job{view_of(tree, room), &ray, nullptr, 1, nullptr, nullptr, stack, {}, nullptr, false};
     if constexpr (std::is_same_v<Result, Hit>)
         job.hits = &result;
     else

@@ -16,8 +16,23 @@ namespace raydix {
 
 struct WideView {
     const WideNode* nodes;
-    const TriangleBlock* blocks;
-    Aabb bounds;  // of the root
+    const TriangleBlock* blocks;  // null if the tree is compact,
+    const CompactBlock* compact;  // else these two are
+    const Vec3* vertices;
+    TriangleBlock* room;  // of a compact tree, one for each thread
+    Aabb bounds;          // of the root
+
+    /// The block of a leaf; in a compact tree its triangles are put together in `room`.
+    [[nodiscard]] const TriangleBlock& block(std::uint32_t place, std::uint32_t count) const {
+        if (blocks != nullptr) return blocks[place / 8];
+        const CompactBlock& from = compact[place / 8];
+        for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane)
+            room->set(lane,
+                      {vertices[from.vertex[0][lane]], vertices[from.vertex[1][lane]],
+                       vertices[from.vertex[2][lane]]},
+                      from.prim[lane]);
+        return *room;
+    }
 };
 
 /// Children still to visit: words of WideNode::child and where the ray enters them.
