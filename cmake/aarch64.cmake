@@ -18,7 +18,6 @@ set(CMAKE_LIBRARY_ARCHITECTURE aarch64-linux-gnu)
 set(ENV{PKG_CONFIG_LIBDIR} ${raydix_sysroot_lib}/pkgconfig:${raydix_sysroot}/usr/share/pkgconfig)
 set(ENV{PKG_CONFIG_SYSROOT_DIR} ${raydix_sysroot})
 set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,-rpath-link,${raydix_sysroot_lib}")
-set(CMAKE_BUILD_RPATH ${raydix_sysroot_lib})
 
 find_program(raydix_qemu NAMES qemu-aarch64-static qemu-aarch64 REQUIRED)
-set(CMAKE_CROSSCOMPILING_EMULATOR "${raydix_qemu};-L;/usr/aarch64-linux-gnu")
+set(CMAKE_CROSSCOMPILING_EMULATOR "${raydix_qemu};-L;/usr/aarch64-linux-gnu;-E;LD_LIBRARY_PATH=${raydix_sysroot_lib}")
