@@ -113,7 +113,8 @@ private:
     /// Unknown statements are passed over as long as they look like text.
     void check_keyword(std::string_view keyword) {
         for (const char c : keyword.substr(0, keyword.find('#')))
-            if (c >= 0 && c < 0x20) lines_.fail(in_quotes(keyword) + " is not an OBJ statement");
+            if (static_cast<unsigned char>(c) < 0x20)
+                lines_.fail(in_quotes(keyword) + " is not an OBJ statement");
     }
 
     ByteSource& in_;

@@ -33,8 +33,9 @@ private:
     std::filesystem::path path_;
 };
 
-/// Fewer rays under the sanitizers, which slow everything down by an order of magnitude.
-#ifdef RAYDIX_SANITIZED
+/// Fewer rays under the sanitizers and on an emulated processor, which slow everything down by an
+/// order of magnitude.
+#if defined(RAYDIX_SANITIZED) || defined(RAYDIX_EMULATED)
 inline constexpr std::size_t thorough = 1;
 #else
 inline constexpr std::size_t thorough = 20;

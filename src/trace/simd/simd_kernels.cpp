@@ -41,7 +41,7 @@ std::span<const SimdKernels> simd_kernels() {
 #endif
         found.push_back(HWY_STATIC_DISPATCH(kernels)(HWY_STATIC_TARGET == HWY_SSE4    ? "sse4"
                                                      : HWY_STATIC_TARGET == HWY_SSSE3 ? "ssse3"
-                                                     : HWY_STATIC_TARGET == HWY_NEON  ? "neon"
+                                                     : HWY_ARCH_ARM                   ? "neon"
                                                                                       : "scalar"));
         return found;
     }();

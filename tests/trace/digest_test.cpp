@@ -1,0 +1,92 @@
+// Trees and hits of small built-in scenes against digests kept here: the same bits on every
+// processor, whatever its instructions and its compiler. Where one differs, the first column that
+// differs says which step did it: scene, rays, tree or hits.
+#include <gtest/gtest.h>
+#include <raydix/cwbvh.h>
+#include <raydix/raydix.h>
+#include <raydix/wide.h>
+#include <xxhash.h>
+
+#include <fmt/format.h>
+
+#include <ostream>
+
+#include "support/ray_sets.h"
+#include "support/support.h"
+
+namespace raydix::test {
+namespace {
+
+constexpr std::uint64_t seed = 12;
+constexpr std::size_t ray_count = 3000;
+
+template <class T>
+std::string digest(std::span<const T> values) {
+    return fmt::format("{:016x}", XXH3_64bits(values.data(), values.size_bytes()));
+}
+
+template <class T>
+std::string digest(const std::vector<T>& values) {
+    return digest(std::span<const T>(values));
+}
+
+struct Digests {
+    const char* scene;
+    const char *vertices, *rays;
+    const char *lbvh, *ploc, *binned, *sbvh;  // first half of tree_hash
+    const char *closest, *all;
+};
+
+constexpr Digests known[] = {
+    {"builtin:atrium?triangles=10000", "9b189ca5b773022f", "abef4cab60fadd6b", "b0c9063e6200a84a",
+     "326c0dc8b535350b", "f66f16a2dcf88ff9", "aa749bd46b157532", "9d215004b5692e2b",
+     "fe82dbeb3e0ff6e1"},
+    {"builtin:figure?triangles=10000", "86169cf030e543a6", "ac760758788a2d24", "866077f163dadbef",
+     "9ae7a66050e32c98", "8b66d61ccbd2e119", "62916fb590f4e3e8", "941171456f8eeb06",
+     "6c80bfe41296829f"},
+    {"builtin:grove?triangles=10000", "fec19bb12fb78fd9", "dfe5e99bd7359ece", "4ff96a6826b72639",
+     "6b1084891925e578", "87a2e50c4453800f", "511602fff714d2a1", "7622aa9dd52c6e3e",
+     "232a71e2288d6f2f"},
+    {"builtin:soup?triangles=10000", "0e6a9a461ef361d2", "3f8d78360de16f29", "f0b7bd9717862a30",
+     "d96209d38419eacf", "f82f7788c9d67c29", "30b4926d88007127", "b87a779c7a045a0b",
+     "1bb100088a1e25dc"},
+};
+
+std::string tree_digest(const MeshView& mesh, Builder builder) {
+    return tree_hash(build_bvh(mesh, {.builder = builder})).substr(0, 16);
+}
+
+void PrintTo(const Digests& digests, std::ostream* out) { *out << digests.scene; }
+
+class Digest : public testing::TestWithParam<Digests> {};
+
+TEST_P(Digest, SceneRaysTreesAndHits) {
+    const Digests& wanted = GetParam();
+    const Scene scene = load_scene(wanted.scene);
+    const auto rays = make_mixed_rays(scene, ray_count, seed);
+    EXPECT_EQ(digest(scene.mesh.vertices), wanted.vertices);
+    EXPECT_EQ(digest(rays), wanted.rays);
+    EXPECT_EQ(tree_digest(scene.mesh, Builder::karras), wanted.lbvh);
+    EXPECT_EQ(tree_digest(scene.mesh, Builder::apetrei), wanted.lbvh);
+    EXPECT_EQ(tree_digest(scene.mesh, Builder::ploc), wanted.ploc);
+    EXPECT_EQ(tree_digest(scene.mesh, Builder::binned), wanted.binned);
+    EXPECT_EQ(tree_digest(scene.mesh, Builder::sbvh), wanted.sbvh);
+
+    const Bvh bvh = build_bvh(scene.mesh);
+    EXPECT_EQ(digest(trace(bvh, rays)), wanted.closest) << "scalar";
+    const WideBvh wide(bvh);
+    for (const std::string& isa : simd_instruction_sets()) {
+        for (const SimdPath path :
+             {SimdPath::single, SimdPath::packet, SimdPath::stream, SimdPath::sorted})
+            EXPECT_EQ(digest(trace(wide, rays, {.path = path, .isa = isa})), wanted.closest)
+                << isa << ", " << simd_path_name(path);
+        EXPECT_EQ(digest(trace_all(wide, rays, {.isa = isa}).hits), wanted.all) << isa;
+    }
+    EXPECT_EQ(digest(trace(Cwbvh(bvh), rays)), wanted.closest) << "cwbvh";
+    EXPECT_EQ(digest(trace_all(bvh, rays).hits), wanted.all) << "scalar";
+}
+
+INSTANTIATE_TEST_SUITE_P(Builtin, Digest, testing::ValuesIn(known));
+
+}  // namespace
+}  // namespace raydix::test
