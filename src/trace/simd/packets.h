@@ -133,15 +133,32 @@ public:
     static constexpr std::size_t max_rays = max_job_rays;
 
     void sort(const SimdJob& job) {
+        if (job.order == nullptr)
+            sort_by([](std::size_t k) { return static_cast<std::int32_t>(k); }, job);
+        else
+            sort_by([order = job.order](std::size_t k) { return static_cast<std::int32_t>(order[k]); },
+                    job);
+    }
+    [[nodiscard]] const std::int32_t* rays(std::uint32_t code) const {
+        return order_ + begin_[code];
+    }
+    [[nodiscard]] std::uint32_t count(std::uint32_t code) const { return count_[code]; }
+
+private:
+    /// `place_of` is where ray k of the job lies. What loops read is copied to locals: bytes that are
+    /// written could be anything else to a compiler.
+    template <class PlaceOf>
+    HWY_INLINE void sort_by(const PlaceOf& place_of, const SimdJob& job) {
+        const Ray* const rays = job.rays;
+        const std::size_t n = job.n, last = n - 1;
         HWY_ALIGN std::int32_t index[16], codes[16];
         std::uint32_t counts[ray_class_count] = {};
-        for (std::size_t k = 0; k < job.n; k += lanes16) {
+        for (std::size_t k = 0; k < n; k += lanes16) {
+            for (std::size_t l = 0; l < lanes16; ++l) index[l] = place_of(std::min(k + l, last));
             for (std::size_t l = 0; l < lanes16; ++l)
-                index[l] = place_of(job, std::min(k + l, job.n - 1));
-            for (std::size_t l = 0; l < lanes16; ++l)
-                hwy::Prefetch(job.rays + place_of(job, std::min(k + l + 128, job.n - 1)));
-            hn::Store(classify(read_rays(job.rays, index)), I16(), codes);
-            for (std::size_t l = 0; l < lanes16 && k + l < job.n; ++l) {
+                hwy::Prefetch(rays + place_of(std::min(k + l + 128, last)));
+            hn::Store(classify(read_rays(rays, index)), I16(), codes);
+            for (std::size_t l = 0; l < lanes16 && k + l < n; ++l) {
                 code_[k + l] = static_cast<std::uint8_t>(codes[l]);
                 ++counts[codes[l]];
             }
@@ -152,20 +169,12 @@ public:
             count_[c] = counts[c];
             at += (counts[c] + 15u) & ~15u;
         }
-        for (std::size_t k = 0; k < job.n; ++k) order_[next[code_[k]]++] = place_of(job, k);
+        for (std::size_t k = 0; k < n; ++k) order_[next[code_[k]]++] = place_of(k);
         for (std::uint32_t c = 0; c < ray_class_count; ++c)  // the last ray again, to fill vectors
             for (; counts[c] > 0 && next[c] % 16 != 0; ++next[c])
                 order_[next[c]] = order_[next[c] - 1];
     }
-    [[nodiscard]] static std::int32_t place_of(const SimdJob& job, std::size_t k) {
-        return static_cast<std::int32_t>(job.order == nullptr ? k : job.order[k]);
-    }
-    [[nodiscard]] const std::int32_t* rays(std::uint32_t code) const {
-        return order_ + begin_[code];
-    }
-    [[nodiscard]] std::uint32_t count(std::uint32_t code) const { return count_[code]; }
 
-private:
     std::uint32_t begin_[ray_class_count], count_[ray_class_count];
     std::uint8_t code_[max_rays];
     HWY_ALIGN std::int32_t order_[max_rays + 16 * ray_class_count];
