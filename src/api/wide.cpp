@@ -118,7 +118,7 @@ WideBvh build_wide_bvh(const Mesh& mesh, const BuildOptions& options, const Wide
     return build_wide_bvh(MeshView(mesh), options, wide);
 }
 
-bool WideBvh::empty() const { return arrays_->blocks.empty() && arrays_->compact.empty(); }
+bool WideBvh::empty() const { return arrays_->blocks.empty() && arrays_->compact_blocks.empty(); }
 const WideBvhStats& WideBvh::stats() const { return arrays_->stats; }
 
 }  // namespace raydix

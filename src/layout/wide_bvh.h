@@ -1,5 +1,6 @@
 // What a wide tree of the CPU consists of (raydix/wide.h). A finished binary tree, or the clusters
-// that it would be made of -> nodes [wide nodes], blocks [references / 8, a little more].
+// that it would be made of -> nodes [wide nodes], blocks [references / 8, a little more]. In a
+// compact tree boxes are quantised and triangles share vertices.
 #pragma once
 
 #include <raydix/buffer.h>
@@ -16,7 +17,7 @@ namespace raydix {
 
 class ClusterView;
 
-/// A word of WideNode::child: the node's index, or with the highest bit set, a leaf's place among
+/// A word of a node's `child`: the node's index, or with the highest bit set, a leaf's place among
 /// the triangles times 8 plus its count less one. Place p is lane p % 8 of block p / 8; no leaf
 /// goes over the end of a block.
 inline constexpr std::uint32_t wide_leaf_bit = 0x80000000u;
@@ -27,10 +28,21 @@ inline constexpr std::uint32_t wide_max_leaf = 4;
 inline constexpr std::uint32_t wide_block = 1;
 inline constexpr double wide_primitive_cost = 0.4;
 
-/// Frame and boxes fill the first 64 bytes. A child in slot s has the box origin + lo[.][s] * step
-/// to origin + hi[.][s] * step, where the step of an axis is 2^(exponent - 127); slots are those of
+/// Children's boxes as they are, but about the middle of the tree's bounds
+/// (WideBvh::Arrays::middle), rounded outward: then a plane meets a ray after plane * inverse + (a
+/// constant of the ray), with an error that depends on the size of the scene and not on where it
+/// lies. A missing child has lo = infinity and hi = -infinity. Slots are those of
 /// assign_octant_slots.
 struct alignas(32) WideNode {
+    float lo[3][8], hi[3][8];
+    std::uint32_t child[8];
+};
+static_assert(sizeof(WideNode) == 224);
+
+/// The node of compact trees. Frame and boxes fill the first 64 bytes. A child in slot s has the
+/// box origin + lo[.][s] * step to origin + hi[.][s] * step, where the step of an axis is
+/// 2^(exponent - 127); slots are those of assign_octant_slots.
+struct alignas(32) CompactNode {
     float origin[3];
     std::uint8_t exponent[3];
     std::uint8_t used;  // bit s: there is a child in slot s
@@ -38,7 +50,7 @@ struct alignas(32) WideNode {
     std::uint8_t hi[3][quantised_width];
     std::uint32_t child[quantised_width];
 };
-static_assert(sizeof(WideNode) == 96);
+static_assert(sizeof(CompactNode) == 96);
 
 /// Eight triangles, one a lane: corner[3 * vertex + axis][lane].
 struct alignas(32) TriangleBlock {
@@ -64,19 +76,23 @@ struct alignas(32) CompactBlock {
 };
 static_assert(sizeof(CompactBlock) == 128);
 
+/// Nodes and blocks of one kind.
 struct WideBvh::Arrays {
     Buffer<WideNode> nodes;
-    Buffer<TriangleBlock> blocks;  // empty if the tree is compact,
-    Buffer<CompactBlock> compact;  // else these two are
-    Buffer<Vec3> vertices;         // in the order in which blocks need them first
-    Aabb bounds{};                 // the root's exact box: rays widen boxes by its size
+    Buffer<TriangleBlock> blocks;
+    Buffer<CompactNode> compact_nodes;
+    Buffer<CompactBlock> compact_blocks;
+    Buffer<Vec3> vertices;  // of compact ones, in the order in which blocks need them first
+    Vec3 middle{};          // of the bounds
+    Aabb bounds{};          // the root's exact box: rays widen boxes by its size
     WideBvhStats stats;
 
     /// Nothing to hit; the memory stays.
     void clear(const WideOptions& options) {
         nodes.reset(0);
         blocks.reset(0);
-        compact.reset(0);
+        compact_nodes.reset(0);
+        compact_blocks.reset(0);
         vertices.reset(0);
         bounds = {};
         stats = {};
@@ -85,6 +101,9 @@ struct WideBvh::Arrays {
         stats.widening = 1.0;
     }
 };
+
+/// Fills the boxes of a node.
+void set_boxes_about(Vec3 middle, const SlotBoxes& boxes, WideNode& node);
 
 /// Memory that making a layout takes, kept from one to the next.
 struct WideScratch {

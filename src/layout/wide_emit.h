@@ -38,15 +38,17 @@ public:
                 WidePart& part = parts_[begin + 1];
                 part.clear();
                 collapse.plan(roots_[begin].ref);
-                Writer writer(view_, part);
+                Writer writer(view_, options_.compact, part);
                 writer.write(collapse, roots_[begin].depth);
-                finish(writer);
+                writer.write_triangles();
             }
         });
-        const WideSums sums = join_parts(std::span(parts_).first(roots_.size() + 1), out);
+        const WideSums sums =
+            join_parts(std::span(parts_).first(roots_.size() + 1), options_.compact, out);
         if (options_.compact) number_vertices(out);
         count_bytes(out);
         out.bounds = view_.box(view_.root());
+        out.middle = center_of(out.bounds);
         const double root = half_area(out.bounds);
         out.stats.sah =
             root > 0 ? (sums.node_area + wide_primitive_cost * sums.triangle_area) / root : 0;
@@ -67,7 +69,7 @@ private:
 
     void write_top(WidePart& top) {
         constexpr std::uint32_t no_parent = ~std::uint32_t{0};
-        Writer writer(view_, top);
+        Writer writer(view_, options_.compact, top);
         Collapse<width, View> small(view_, options_);
         std::vector<Waiting> waiting{{view_.root(), no_parent, 0, 0}};
         std::array<Ref, width> chosen;
@@ -76,7 +78,7 @@ private:
             const Waiting at = waiting.back();
             waiting.pop_back();
             const std::uint32_t w = writer.add_node();
-            if (at.parent != no_parent) top.nodes[at.parent].child[at.slot] = w;
+            if (at.parent != no_parent) writer.set_child(at.parent, at.slot, w);
             const std::size_t all = take_apart(at.ref, chosen);
             std::size_t count = 0;
             for (std::uint32_t k = 0; k < all; ++k) {
@@ -88,17 +90,13 @@ private:
                                  waiting.push_back({chosen[k], w, slot, at.depth + 1});
                              });
         }
-        finish(writer);
-    }
-
-    void finish(Writer& writer) const {
-        options_.compact ? writer.list_corners() : writer.copy_triangles();
+        writer.write_triangles();
     }
 
     /// Vertices get numbers in the order in which blocks name them, and those that none names none.
     void number_vertices(WideBvh::Arrays& out) const {
         std::vector<std::uint32_t> numbers(view_.vertex_count(), no_vertex), used;
-        for (CompactBlock& block : out.compact.span())
+        for (CompactBlock& block : out.compact_blocks.span())
             for (auto& corners : block.vertex)
                 for (std::uint32_t& vertex : corners) {
                     if (vertex == no_vertex) {  // of an empty lane
@@ -118,9 +116,10 @@ private:
 
     static void count_bytes(WideBvh::Arrays& out) {
         WideBvhStats& stats = out.stats;
-        stats.node_bytes = out.nodes.size() * sizeof(WideNode);
+        stats.node_bytes =
+            out.nodes.size() * sizeof(WideNode) + out.compact_nodes.size() * sizeof(CompactNode);
         stats.triangle_bytes = out.blocks.size() * sizeof(TriangleBlock) +
-                               out.compact.size() * sizeof(CompactBlock) +
+                               out.compact_blocks.size() * sizeof(CompactBlock) +
                                out.vertices.size() * sizeof(Vec3);
         stats.bytes = stats.node_bytes + stats.triangle_bytes;
     }

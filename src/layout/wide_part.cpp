@@ -19,7 +19,8 @@ struct Bases {
     std::uint32_t node, block;
 };
 
-WideNode placed(WideNode node, const Bases& own, std::span<const Bases> parts) {
+template <class Node>
+Node placed(Node node, const Bases& own, std::span<const Bases> parts) {
     for (std::uint32_t& word : node.child) {
         if (word == wide_no_child) continue;
         if ((word & wide_leaf_bit) != 0)
@@ -34,13 +35,13 @@ WideNode placed(WideNode node, const Bases& own, std::span<const Bases> parts) {
 
 void set_figures(const WideSums& sums, WideBvh::Arrays& out) {
     WideBvhStats& stats = out.stats;
-    stats.nodes = out.nodes.size();
+    stats.nodes = std::max(out.nodes.size(), out.compact_nodes.size());
     stats.leaves = sums.leaves;
     stats.references = sums.references;
     stats.max_depth = sums.levels;
-    stats.children_per_node =
-        static_cast<double>(sums.children) / static_cast<double>(out.nodes.size());
-    stats.widening = sums.child_area > 0 ? sums.decoded_area / sums.child_area : 1.0;
+    stats.children_per_node = static_cast<double>(sums.children) / static_cast<double>(stats.nodes);
+    const bool quantised = !out.compact_nodes.empty() && sums.child_area > 0;
+    stats.widening = quantised ? sums.decoded_area / sums.child_area : 1.0;
 }
 
 }  // namespace
@@ -59,37 +60,39 @@ void WideSums::add(const WideSums& other) {
 void WidePart::clear() {
     nodes.clear();
     blocks.clear();
-    compact.clear();
+    compact_nodes.clear();
+    compact_blocks.clear();
     filler = {};
     sums = {};
 }
 
-WideSums join_parts(std::span<const WidePart> parts, WideBvh::Arrays& out) {
+WideSums join_parts(std::span<const WidePart> parts, bool compact, WideBvh::Arrays& out) {
     std::vector<Bases> bases;
     std::size_t nodes = 0, blocks = 0;
-    bool compact = false;
     WideSums sums;
     for (const WidePart& part : parts) {
         bases.push_back({static_cast<std::uint32_t>(nodes), static_cast<std::uint32_t>(blocks)});
-        nodes += part.nodes.size();
+        nodes += part.node_count();
         blocks += part.filler.blocks();
-        compact = compact || !part.compact.empty();
         sums.add(part.sums);
     }
     if (blocks > max_places / lanes)
         throw InputError("a wide tree holds " + std::to_string(max_places) +
                          " triangle references at most");
-    out.nodes.reset(nodes);
+    out.nodes.reset(compact ? 0 : nodes);
     out.blocks.reset(compact ? 0 : blocks);
-    out.compact.reset(compact ? blocks : 0);
+    out.compact_nodes.reset(compact ? nodes : 0);
+    out.compact_blocks.reset(compact ? blocks : 0);
     for_each_index(
         parts.size(),
         [&](std::size_t p) {
             const WidePart& part = parts[p];
-            WideNode* node = out.nodes.data() + bases[p].node;
-            for (const WideNode& own : part.nodes) *node++ = placed(own, bases[p], bases);
+            const auto place = [&](const auto& node) { return placed(node, bases[p], bases); };
+            std::ranges::transform(part.nodes, out.nodes.data() + bases[p].node, place);
+            std::ranges::transform(part.compact_nodes, out.compact_nodes.data() + bases[p].node,
+                                   place);
             std::ranges::copy(part.blocks, out.blocks.data() + bases[p].block);
-            std::ranges::copy(part.compact, out.compact.data() + bases[p].block);
+            std::ranges::copy(part.compact_blocks, out.compact_blocks.data() + bases[p].block);
         },
         1);
     set_figures(sums, out);

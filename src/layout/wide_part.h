@@ -31,14 +31,17 @@ inline constexpr std::uint32_t wide_part_bit = 0x40000000u;
 struct WidePart {
     std::vector<WideNode> nodes;
     std::vector<TriangleBlock> blocks;
-    std::vector<CompactBlock> compact;  // instead; vertices by the view's numbers
+    std::vector<CompactNode> compact_nodes;
+    std::vector<CompactBlock> compact_blocks;  // vertices by the view's numbers
     BlockFiller filler;
     WideSums sums;
+
     void clear();
+    [[nodiscard]] std::size_t node_count() const { return nodes.size() + compact_nodes.size(); }
 };
 
 /// Puts the nodes and blocks of all parts behind each other; fills the arrays' figures but for
 /// time, width and SAH. Throws InputError for too many triangles.
-WideSums join_parts(std::span<const WidePart> parts, WideBvh::Arrays& out);
+WideSums join_parts(std::span<const WidePart> parts, bool compact, WideBvh::Arrays& out);
 
 }  // namespace raydix

@@ -27,13 +27,17 @@ class WidePartWriter {
 public:
     using Collapsed = Collapse<width, View>;
 
-    WidePartWriter(const View& view, WidePart& out) : view_(view), out_(out) {}
+    /// Compact nodes and blocks, or plain ones.
+    WidePartWriter(const View& view, bool compact, WidePart& out)
+        : view_(view), compact_(compact), middle_(center_of(view.box(view.root()))), out_(out) {}
 
     /// An empty node; returns its number.
     std::uint32_t add_node() {
-        WideNode& node = out_.nodes.emplace_back();
-        std::fill_n(node.child, quantised_width, wide_no_child);
-        return static_cast<std::uint32_t>(out_.nodes.size() - 1);
+        const auto w = static_cast<std::uint32_t>(out_.node_count());
+        std::fill_n(
+            compact_ ? out_.compact_nodes.emplace_back().child : out_.nodes.emplace_back().child,
+            quantised_width, wide_no_child);
+        return w;
     }
 
     /// Puts children into a node that has none, and calls wait(source, slot) for those that are
@@ -42,7 +46,6 @@ public:
     void fill_node(std::uint32_t w, std::span<const WideChild> children, std::uint32_t depth,
                    const Wait& wait) {
         out_.sums.levels = std::max(out_.sums.levels, depth + 1);
-        if (children.empty()) return;
         std::array<Aabb, quantised_width> boxes;
         std::array<int, quantised_width> slots;
         Aabb all = empty_box();
@@ -53,23 +56,31 @@ public:
         }
         assign_octant_slots_greedily(std::span(boxes).first(children.size()), slots.data());
         SlotBoxes by_slot;
-        WideNode& node = out_.nodes[w];
         for (std::size_t k = 0; k < children.size(); ++k) {
             by_slot.set(slots[k], boxes[k]);
-            node.child[slots[k]] = children[k].word;
+            set_child(w, static_cast<std::uint32_t>(slots[k]), children[k].word);
             if (children[k].word == WideChild::inner_word)
                 wait(children[k].source, static_cast<std::uint32_t>(slots[k]));
         }
-        node.used = static_cast<std::uint8_t>(by_slot.used);
-        set_boxes(node, quantise(by_slot, all));
-        out_.sums.node_area += half_area(all);
-        out_.sums.decoded_area += decoded_area(node);
+        if (!compact_) {
+            set_boxes_about(middle_, by_slot, out_.nodes[w]);
+        } else if (!children.empty()) {
+            CompactNode& node = out_.compact_nodes[w];
+            node.used = static_cast<std::uint8_t>(by_slot.used);
+            set_boxes(node, quantise(by_slot, all));
+            out_.sums.decoded_area += decoded_area(node);
+        }
+        if (!children.empty()) out_.sums.node_area += half_area(all);
+    }
+
+    void set_child(std::uint32_t w, std::uint32_t slot, std::uint32_t word) {
+        (compact_ ? out_.compact_nodes[w].child : out_.nodes[w].child)[slot] = word;
     }
 
     /// Writes the wide nodes of a subtree depth first: what rays visit together lies together, at
     /// every size of page and cache. Returns the number of the first.
     std::uint32_t write(const Collapsed& subtree, std::uint32_t depth) {
-        const auto first = static_cast<std::uint32_t>(out_.nodes.size());
+        const auto first = static_cast<std::uint32_t>(out_.node_count());
         waiting_.assign(1, {0, no_parent, 0, depth});
         std::array<std::uint32_t, width> chosen;
         std::array<WideChild, width> children;
@@ -77,7 +88,7 @@ public:
             const Waiting at = waiting_.back();
             waiting_.pop_back();
             const std::uint32_t w = add_node();
-            if (at.parent != no_parent) out_.nodes[at.parent].child[at.slot] = w;
+            if (at.parent != no_parent) set_child(at.parent, at.slot, w);
             std::size_t count = 0;
             const auto all = static_cast<std::size_t>(subtree.children(at.entry, chosen));
             for (std::size_t k = 0; k < all; ++k) {
@@ -111,13 +122,24 @@ public:
     }
 
     /// When all leaves have their places.
+    void write_triangles() { compact_ ? list_corners() : copy_triangles(); }
+
+private:
+    static constexpr std::uint32_t no_parent = ~std::uint32_t{0};
+    struct Waiting {
+        std::uint32_t entry, parent, slot, depth;
+    };
+    struct Copy {
+        std::uint32_t position, place;
+    };
+
     void list_corners() {
         CompactBlock none;
         std::fill_n(&none.vertex[0][0], 24, no_vertex);
         std::fill_n(none.prim, 8, no_primitive);
-        out_.compact.resize(out_.filler.blocks(), none);
+        out_.compact_blocks.resize(out_.filler.blocks(), none);
         for (const auto [position, place] : copies_) {
-            CompactBlock& block = out_.compact[place / BlockFiller::lanes];
+            CompactBlock& block = out_.compact_blocks[place / BlockFiller::lanes];
             const std::uint32_t lane = place % BlockFiller::lanes;
             const std::array<std::uint32_t, 3> corners = view_.corners(position);
             for (std::size_t v = 0; v < 3; ++v) block.vertex[v][lane] = corners[v];
@@ -138,15 +160,6 @@ public:
         }
     }
 
-private:
-    static constexpr std::uint32_t no_parent = ~std::uint32_t{0};
-    struct Waiting {
-        std::uint32_t entry, parent, slot, depth;
-    };
-    struct Copy {
-        std::uint32_t position, place;
-    };
-
     void add_figures(const WideChild& child) {
         const double area = half_area(child.box);
         ++out_.sums.children;
@@ -159,7 +172,7 @@ private:
     }
 
     /// In double, to within a rounding.
-    static double decoded_area(const WideNode& node) {
+    static double decoded_area(const CompactNode& node) {
         const double step[3] = {quantised_step(node.exponent[0]), quantised_step(node.exponent[1]),
                                 quantised_step(node.exponent[2])};
         double sum = 0;
@@ -174,6 +187,8 @@ private:
     }
 
     const View& view_;
+    bool compact_;
+    Vec3 middle_;
     WidePart& out_;
     std::vector<Waiting> waiting_;
     std::vector<Copy> copies_;

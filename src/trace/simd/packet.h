@@ -37,7 +37,7 @@ struct Packet {
     float least_tmin;
 };
 
-template <bool any, bool counting>
+template <bool any, bool counting, bool compact>
 class PacketWalk {
 public:
     PacketWalk(const WideView& tree, Packet& packet, const PacketStackView& stack,
@@ -64,7 +64,7 @@ public:
                 test_leaf(word, active);
                 if (any && done_ == ~std::uint64_t{0}) return;
             } else {
-                top = visit(tree_.nodes[word], active, top);
+                top = visit(tree_.template node<compact>(word), active, top);
             }
         }
     }
@@ -88,38 +88,51 @@ private:
         reach_ = hn::GetLane(hn::MaxOfLanes(f16, farthest));
     }
 
-    struct NodeSteps {
-        HWY_ALIGN float near[3][8], far[3][8];  // in steps
-        float step[3];
+    /// Planes of a node's children; of a compact node in steps.
+    struct Planes {
+        HWY_ALIGN float near[3][8], far[3][8];
     };
+    /// The planes are at origin + step * plane; `steps` are 1 for plain nodes.
+    struct Frame {
+        float origin[3], step[3];
+    };
+    static HWY_INLINE Frame frame_of(const CompactNode& node) {
+        Frame frame;
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::uint32_t bits = std::uint32_t{node.exponent[axis]} << 23;
+            std::memcpy(&frame.step[axis], &bits, sizeof(float));
+            frame.origin[axis] = node.origin[axis];
+        }
+        return frame;
+    }
+    HWY_INLINE Frame frame_of(const WideNode&) const {
+        return {{tree_.middle.x, tree_.middle.y, tree_.middle.z}, {1.0f, 1.0f, 1.0f}};
+    }
+    static HWY_INLINE auto read(const float* from) { return hn::Load(f8, from); }
+    static HWY_INLINE auto read(const std::uint8_t* from) {
+        return hn::ConvertTo(f8, hn::PromoteTo(I8(), hn::LoadU(B8(), from)));
+    }
 
     /// Entry of the nearest and exit of the farthest ray for each child; bits of children that some
     /// ray may meet.
-    HWY_INLINE std::uint32_t test_intervals(const WideNode& node, NodeSteps& steps,
+    template <class Node>
+    HWY_INLINE std::uint32_t test_intervals(const Node& node, const Frame& frame, Planes& planes,
                                             float* entries) const {
         std::uint32_t met = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            const std::uint32_t bits = std::uint32_t{node.exponent[axis]} << 23;
-            std::memcpy(&steps.step[axis], &bits, sizeof(float));
-        }
         for (std::size_t l = 0; l < 8; l += lanes8) {
             auto entry = hn::Set(f8, p_.least_tmin);
             auto leave = hn::Set(f8, infinity);
             for (int axis = 0; axis < 3; ++axis) {
                 const bool negative = negative_[axis];
-                const auto read = [&](const std::uint8_t* from) {
-                    return hn::ConvertTo(f8, hn::PromoteTo(I8(), hn::LoadU(B8(), from + l)));
-                };
-                const auto near = read(negative ? node.hi[axis] : node.lo[axis]);
-                const auto far = read(negative ? node.lo[axis] : node.hi[axis]);
-                hn::Store(near, f8, steps.near[axis] + l);
-                hn::Store(far, f8, steps.far[axis] + l);
-                const float sign = negative ? -1.0f : 1.0f;
-                const float rate = sign * steps.step[axis];
-                const float start = negative ? p_.origin_lo[axis] - node.origin[axis]
-                                             : node.origin[axis] - p_.origin_hi[axis];
-                const float end = negative ? p_.origin_hi[axis] - node.origin[axis]
-                                           : node.origin[axis] - p_.origin_lo[axis];
+                const auto near = read((negative ? node.hi[axis] : node.lo[axis]) + l);
+                const auto far = read((negative ? node.lo[axis] : node.hi[axis]) + l);
+                hn::Store(near, f8, planes.near[axis] + l);
+                hn::Store(far, f8, planes.far[axis] + l);
+                const float rate = (negative ? -1.0f : 1.0f) * frame.step[axis];
+                const float start = negative ? p_.origin_lo[axis] - frame.origin[axis]
+                                             : frame.origin[axis] - p_.origin_hi[axis];
+                const float end = negative ? p_.origin_hi[axis] - frame.origin[axis]
+                                           : frame.origin[axis] - p_.origin_lo[axis];
                 const auto from =
                     hn::MulAdd(near, hn::Set(f8, rate), hn::Set(f8, start - p_.pad[axis]));
                 const auto to = hn::MulAdd(far, hn::Set(f8, rate), hn::Set(f8, end + p_.pad[axis]));
@@ -132,52 +145,57 @@ private:
             hn::Store(entry, f8, entries + l);
             met |= bits_of(f8, hn::Le(entry, exit)) << l;
         }
-        return met & node.used;
+        return met & used_of(node);
     }
+    static HWY_INLINE std::uint32_t used_of(const CompactNode& node) { return node.used; }
+    /// A missing child's box is never met.
+    static HWY_INLINE std::uint32_t used_of(const WideNode&) { return 0xFF; }
 
     /// What a vector of rays needs of a node.
     struct RayNode {
         V rate[3], near[3], far[3];
     };
-    HWY_INLINE RayNode ray_node(const WideNode& node, const NodeSteps& steps, std::size_t i) const {
+    HWY_INLINE RayNode ray_node(const Frame& frame, std::size_t i) const {
         RayNode out;
         for (int axis = 0; axis < 3; ++axis) {
             const V inverse = hn::Load(f16, p_.inverse[axis] + i);
             const V from =
-                hn::Sub(hn::Set(f16, node.origin[axis]), hn::Load(f16, p_.origin[axis] + i));
+                hn::Sub(hn::Set(f16, frame.origin[axis]), hn::Load(f16, p_.origin[axis] + i));
             const V pad = hn::Set(f16, negative_[axis] ? p_.pad[axis] : -p_.pad[axis]);
-            out.rate[axis] = hn::Mul(hn::Set(f16, steps.step[axis]), inverse);
+            out.rate[axis] = compact ? hn::Mul(hn::Set(f16, frame.step[axis]), inverse) : inverse;
             out.near[axis] = hn::Mul(hn::Add(from, pad), inverse);
             out.far[axis] = hn::Mul(hn::Sub(from, pad), inverse);
         }
         return out;
     }
 
-    HWY_INLINE std::uint32_t test_rays(const RayNode& ray, const NodeSteps& steps,
-                                       std::size_t child, std::size_t i) const {
+    HWY_INLINE std::uint32_t test_rays(const RayNode& ray, const Planes& planes, std::size_t child,
+                                       std::size_t i) const {
         V entry = hn::Load(f16, p_.tmin + i);
         V leave = hn::Set(f16, infinity);
         for (int axis = 0; axis < 3; ++axis) {
-            entry = hn::Max(entry, hn::MulAdd(hn::Set(f16, steps.near[axis][child]), ray.rate[axis],
-                                              ray.near[axis]));
-            leave = hn::Min(leave, hn::MulAdd(hn::Set(f16, steps.far[axis][child]), ray.rate[axis],
+            entry = hn::Max(entry, hn::MulAdd(hn::Set(f16, planes.near[axis][child]),
+                                              ray.rate[axis], ray.near[axis]));
+            leave = hn::Min(leave, hn::MulAdd(hn::Set(f16, planes.far[axis][child]), ray.rate[axis],
                                               ray.far[axis]));
         }
         const V exit = hn::Min(leave, hn::Load(f16, p_.t + i));
         return bits_of(f16, hn::Le(entry, exit));
     }
 
-    HWY_INLINE std::size_t visit(const WideNode& node, std::uint64_t active, std::size_t top) {
+    template <class Node>
+    HWY_INLINE std::size_t visit(const Node& node, std::uint64_t active, std::size_t top) {
         if constexpr (counting) counts_.visits += static_cast<std::uint64_t>(std::popcount(active));
-        NodeSteps steps;
+        const Frame frame = frame_of(node);
+        Planes planes;
         HWY_ALIGN float entries[8];
-        const std::uint32_t met = test_intervals(node, steps, entries);
+        const std::uint32_t met = test_intervals(node, frame, planes, entries);
         if (met == 0) return top;
         RayNode rays[packet_size / lanes16];
         std::uint32_t vectors[packet_size / lanes16], vector_count = 0;
         for (std::uint32_t v = 0; v < packet_size / lanes16; ++v) {
             if ((active >> (v * lanes16) & vector_bits) == 0) continue;
-            rays[vector_count] = ray_node(node, steps, v * lanes16);
+            rays[vector_count] = ray_node(frame, v * lanes16);
             vectors[vector_count++] = v;
         }
         // Bit l: the child that comes l-th from the far end.
@@ -186,7 +204,7 @@ private:
             std::uint64_t hit = 0;
             for (std::uint32_t k = 0; k < vector_count; ++k) {
                 const std::size_t shift = vectors[k] * lanes16;
-                hit |= std::uint64_t{test_rays(rays[k], steps, s, shift)} << shift;
+                hit |= std::uint64_t{test_rays(rays[k], planes, s, shift)} << shift;
             }
             hit &= active;
             if (hit == 0) continue;
@@ -207,7 +225,7 @@ private:
 
     void test_leaf(std::uint32_t word, std::uint64_t active) {
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
-        const TriangleBlock& block = tree_.block(place, count);
+        const TriangleBlock& block = tree_.template block<compact>(place, count);
         if constexpr (counting)
             counts_.tests += count * static_cast<std::uint64_t>(std::popcount(active));
         bool changed = false;

@@ -136,8 +136,9 @@ public:
         if (job.order == nullptr)
             sort_by([](std::size_t k) { return static_cast<std::int32_t>(k); }, job);
         else
-            sort_by([order = job.order](std::size_t k) { return static_cast<std::int32_t>(order[k]); },
-                    job);
+            sort_by(
+                [order = job.order](std::size_t k) { return static_cast<std::int32_t>(order[k]); },
+                job);
     }
     [[nodiscard]] const std::int32_t* rays(std::uint32_t code) const {
         return order_ + begin_[code];
@@ -145,8 +146,8 @@ public:
     [[nodiscard]] std::uint32_t count(std::uint32_t code) const { return count_[code]; }
 
 private:
-    /// `place_of` is where ray k of the job lies. What loops read is copied to locals: bytes that are
-    /// written could be anything else to a compiler.
+    /// `place_of` is where ray k of the job lies. What loops read is copied to locals: bytes that
+    /// are written could be anything else to a compiler.
     template <class PlaceOf>
     HWY_INLINE void sort_by(const PlaceOf& place_of, const SimdJob& job) {
         const Ray* const rays = job.rays;
@@ -196,7 +197,7 @@ void store_packet(const SimdJob& job, const std::int32_t* index, const Packet& p
     }
 }
 
-template <bool any, bool counting>
+template <bool any, bool counting, bool compact>
 void trace_packets(const SimdJob& job, SimdCounts& counts) {
     RaySorter sorter;
     sorter.sort(job);
@@ -210,14 +211,14 @@ void trace_packets(const SimdJob& job, SimdCounts& counts) {
             for (std::uint32_t k = 0; k < count; k += 2) hwy::Prefetch(ahead + k);
             ahead += count;
             fill_packet(job.tree, job.rays, rays + at, count, code, packet);
-            PacketWalk<any, counting> walk(job.tree, packet, job.packet_stack, counts);
+            PacketWalk<any, counting, compact> walk(job.tree, packet, job.packet_stack, counts);
             walk.trace();
             store_packet<any>(job, rays + at, packet, walk.found(), counts);
         }
     }
     const std::int32_t* const odd = sorter.rays(odd_ray_class);
     for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k)
-        trace_one<any, counting>(job, static_cast<std::size_t>(odd[k]), counts);
+        trace_one<any, counting, compact>(job, static_cast<std::size_t>(odd[k]), counts);
 }
 
 using F4 = hn::FixedTag<float, 4>;
@@ -268,7 +269,7 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
     return frame;
 }
 
-template <bool any, bool counting>
+template <bool any, bool counting, bool compact>
 void trace_streams(const SimdJob& job, SimdCounts& counts) {
     RaySorter sorter;
     sorter.sort(job);
@@ -276,7 +277,7 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
         const std::uint32_t count = sorter.count(code);
         if (count == 0) continue;
         const StreamFrame frame = fill_stream(job, sorter.rays(code), count, code);
-        StreamWalk<any, counting>(job.tree, frame, *job.memory, job.stack, counts).trace();
+        StreamWalk<any, counting, compact>(job.tree, frame, *job.memory, job.stack, counts).trace();
         const StreamHit* found = job.memory->hits().data();
         for (const StreamRay& ray : job.memory->rays()) {
             const bool hit = ray.prim != no_primitive;
@@ -290,25 +291,21 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
     }
     const std::int32_t* const odd = sorter.rays(odd_ray_class);
     for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k)
-        trace_one<any, counting>(job, static_cast<std::size_t>(odd[k]), counts);
+        trace_one<any, counting, compact>(job, static_cast<std::size_t>(odd[k]), counts);
 }
 
 inline void streams(const SimdJob& job, SimdCounts& counts) {
-    if (job.hits == nullptr)
-        job.counting ? trace_streams<true, true>(job, counts)
-                     : trace_streams<true, false>(job, counts);
-    else
-        job.counting ? trace_streams<false, true>(job, counts)
-                     : trace_streams<false, false>(job, counts);
+    with_constants(job, [&](auto counting, auto compact) {
+        job.hits == nullptr ? trace_streams<true, counting, compact>(job, counts)
+                            : trace_streams<false, counting, compact>(job, counts);
+    });
 }
 
 inline void packets(const SimdJob& job, SimdCounts& counts) {
-    if (job.hits == nullptr)
-        job.counting ? trace_packets<true, true>(job, counts)
-                     : trace_packets<true, false>(job, counts);
-    else
-        job.counting ? trace_packets<false, true>(job, counts)
-                     : trace_packets<false, false>(job, counts);
+    with_constants(job, [&](auto counting, auto compact) {
+        job.hits == nullptr ? trace_packets<true, counting, compact>(job, counts)
+                            : trace_packets<false, counting, compact>(job, counts);
+    });
 }
 
 }  // namespace raydix::HWY_NAMESPACE

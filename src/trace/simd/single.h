@@ -21,13 +21,21 @@ constexpr std::size_t parts8 = 8 / lanes8;
 
 enum class Wanted { closest, any, all };
 
-template <Wanted wanted, bool counting>
+template <Wanted wanted, bool counting, bool compact>
 class SingleRay {
 public:
     SingleRay(const WideView& tree, const RayFrame& frame, const WideRay& ray,
               const WideStackView& stack, SimdCounts& counts)
         : tree_(tree), frame_(frame), ray_(ray), stack_(stack), counts_(counts) {
         origin_[0] = frame.origin.x, origin_[1] = frame.origin.y, origin_[2] = frame.origin.z;
+        for (int axis = 0; axis < 3; ++axis) {
+            const float pad = coordinate(ray.near_pad, axis),
+                        start = coordinate(tree.middle, axis) - origin_[axis],
+                        inverse = coordinate(ray.inverse, axis);
+            limited_[axis] = inverse;
+            near_start_[axis] = (start + pad) * inverse;
+            far_start_[axis] = (start - pad) * inverse;
+        }
         inverse_[0] = frame.inverse.x, inverse_[1] = frame.inverse.y, inverse_[2] = frame.inverse.z;
         for (std::size_t l = 0; l < 8; ++l)
             slot_[l] = static_cast<std::int32_t>(l ^ ray_.negative ^ 7u);
@@ -52,52 +60,70 @@ public:
             if ((word & wide_leaf_bit) != 0) {
                 if (test_leaf(word)) break;
             } else {
-                top = visit(tree_.nodes[word], top);
+                top = visit(tree_.template node<compact>(word), top);
             }
         }
         return best_;
     }
 
 private:
-    /// Children that the ray meets go onto the stack, the nearest last.
-    HWY_INLINE std::size_t visit(const WideNode& node, std::size_t top) {
-        if constexpr (counting) ++counts_.visits;
-        const auto rate_of = [&](int axis, float inverse) {
+    using V = hn::Vec<F8>;
+
+    /// How a ray's distances follow from the planes of a node: plane * rate + start.
+    struct Rates {
+        V rate[3], near[3], far[3];
+    };
+    HWY_INLINE Rates rates_of(const CompactNode& node) const {
+        Rates out;
+        for (int axis = 0; axis < 3; ++axis) {
             const std::uint32_t bits = std::uint32_t{node.exponent[axis]} << 23;
             float step;
             std::memcpy(&step, &bits, sizeof(step));
-            return hn::Set(f8, step * inverse);
-        };
-        const Vec3 from{node.origin[0] - frame_.origin.x, node.origin[1] - frame_.origin.y,
-                        node.origin[2] - frame_.origin.z};
-        const Vec3& pad = ray_.near_pad;
-        const Vec3& inverse = ray_.inverse;
-        const auto rate_x = rate_of(0, inverse.x), rate_y = rate_of(1, inverse.y),
-                   rate_z = rate_of(2, inverse.z);
-        const auto near_x = hn::Set(f8, (from.x + pad.x) * inverse.x),
-                   near_y = hn::Set(f8, (from.y + pad.y) * inverse.y),
-                   near_z = hn::Set(f8, (from.z + pad.z) * inverse.z);
-        const auto far_x = hn::Set(f8, (from.x - pad.x) * inverse.x),
-                   far_y = hn::Set(f8, (from.y - pad.y) * inverse.y),
-                   far_z = hn::Set(f8, (from.z - pad.z) * inverse.z);
-        const std::uint8_t* const near_plane[3] = {ray_.negative & 1 ? node.hi[0] : node.lo[0],
-                                                   ray_.negative & 2 ? node.hi[1] : node.lo[1],
-                                                   ray_.negative & 4 ? node.hi[2] : node.lo[2]};
-        const std::uint8_t* const far_plane[3] = {ray_.negative & 1 ? node.lo[0] : node.hi[0],
-                                                  ray_.negative & 2 ? node.lo[1] : node.hi[1],
-                                                  ray_.negative & 4 ? node.lo[2] : node.hi[2]};
-        const auto steps = [](const std::uint8_t* from8) {
-            return hn::ConvertTo(f8, hn::PromoteTo(I8(), hn::LoadU(B8(), from8)));
-        };
+            const float from = node.origin[axis] - origin_[axis],
+                        pad = coordinate(ray_.near_pad, axis), inverse = limited_[axis];
+            out.rate[axis] = hn::Set(f8, step * inverse);
+            out.near[axis] = hn::Set(f8, (from + pad) * inverse);
+            out.far[axis] = hn::Set(f8, (from - pad) * inverse);
+        }
+        return out;
+    }
+    HWY_INLINE Rates rates_of(const WideNode&) const {
+        Rates out;
+        for (int axis = 0; axis < 3; ++axis) {
+            out.rate[axis] = hn::Set(f8, limited_[axis]);
+            out.near[axis] = hn::Set(f8, near_start_[axis]);
+            out.far[axis] = hn::Set(f8, far_start_[axis]);
+        }
+        return out;
+    }
+    static HWY_INLINE V planes(const float* from) { return hn::Load(f8, from); }
+    static HWY_INLINE V planes(const std::uint8_t* from) {
+        return hn::ConvertTo(f8, hn::PromoteTo(I8(), hn::LoadU(B8(), from)));
+    }
+
+    /// Where the ray enters children l to l + lanes8 - 1, and where it leaves or need not look.
+    template <class Node>
+    HWY_INLINE void test_boxes(const Node& node, const Rates& rates, std::size_t l, V& entry,
+                               V& exit) const {
+        entry = hn::Set(f8, frame_.tmin);
+        exit = hn::Set(f8, best_.t);
+        for (int axis = 0; axis < 3; ++axis) {
+            const bool negative = (ray_.negative >> axis & 1) != 0;
+            const auto near = planes((negative ? node.hi[axis] : node.lo[axis]) + l),
+                       far = planes((negative ? node.lo[axis] : node.hi[axis]) + l);
+            entry = hn::Max(hn::MulAdd(near, rates.rate[axis], rates.near[axis]), entry);
+            exit = hn::Min(hn::MulAdd(far, rates.rate[axis], rates.far[axis]), exit);
+        }
+    }
+
+    /// Children that the ray meets go onto the stack, the nearest last.
+    template <class Node>
+    HWY_INLINE std::size_t visit(const Node& node, std::size_t top) {
+        if constexpr (counting) ++counts_.visits;
+        const Rates rates = rates_of(node);
+        V entry, exit;
         if constexpr (parts8 == 1) {
-            const auto entry = hn::Max(hn::Max(hn::MulAdd(steps(near_plane[0]), rate_x, near_x),
-                                               hn::MulAdd(steps(near_plane[1]), rate_y, near_y)),
-                                       hn::Max(hn::MulAdd(steps(near_plane[2]), rate_z, near_z),
-                                               hn::Set(f8, frame_.tmin)));
-            const auto leave = hn::Min(hn::Min(hn::MulAdd(steps(far_plane[0]), rate_x, far_x),
-                                               hn::MulAdd(steps(far_plane[1]), rate_y, far_y)),
-                                       hn::MulAdd(steps(far_plane[2]), rate_z, far_z));
-            const auto exit = hn::Min(leave, hn::Set(f8, best_.t));
+            test_boxes(node, rates, 0, entry, exit);
             const auto slot = hn::IndicesFromVec(f8, hn::Load(I8(), slot_));
             const auto words =
                 hn::TableLookupLanes(hn::BitCast(f8, hn::Load(U8(), node.child)), slot);
@@ -111,25 +137,14 @@ private:
         } else {
             HWY_ALIGN float entries[8];
             std::uint32_t met = 0;
-            for (std::size_t part = 0; part < parts8; ++part) {
-                const std::size_t l = part * lanes8;
-                const auto entry =
-                    hn::Max(hn::Max(hn::MulAdd(steps(near_plane[0] + l), rate_x, near_x),
-                                    hn::MulAdd(steps(near_plane[1] + l), rate_y, near_y)),
-                            hn::Max(hn::MulAdd(steps(near_plane[2] + l), rate_z, near_z),
-                                    hn::Set(f8, frame_.tmin)));
-                const auto leave =
-                    hn::Min(hn::Min(hn::MulAdd(steps(far_plane[0] + l), rate_x, far_x),
-                                    hn::MulAdd(steps(far_plane[1] + l), rate_y, far_y)),
-                            hn::MulAdd(steps(far_plane[2] + l), rate_z, far_z));
-                const auto exit = hn::Min(leave, hn::Set(f8, best_.t));
+            for (std::size_t l = 0; l < 8; l += lanes8) {
+                test_boxes(node, rates, l, entry, exit);
                 hn::Store(entry, f8, entries + l);
                 met |= bits_of(f8, hn::Le(entry, exit)) << l;
             }
-            met &= node.used;
             for (std::size_t k = 0; met != 0 && k < 8; ++k) {
                 const auto s = static_cast<std::size_t>(slot_[k]);
-                if ((met >> s & 1) == 0) continue;
+                if ((met >> s & 1) == 0 || node.child[s] == wide_no_child) continue;
                 stack_.words[top] = node.child[s];
                 stack_.entries[top++] = entries[s];
             }
@@ -139,7 +154,7 @@ private:
 
     HWY_INLINE bool test_leaf(std::uint32_t word) {
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
-        const TriangleBlock& block = tree_.block(place, count);
+        const TriangleBlock& block = tree_.template block<compact>(place, count);
         if constexpr (counting) counts_.tests += count;
         if constexpr (wanted == Wanted::all) {
             for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane) {
@@ -158,7 +173,6 @@ private:
         return false;
     }
 
-    using V = hn::Vec<F8>;
     struct Sheared {
         V x, y, z;  // z before shear_z
     };
@@ -260,20 +274,21 @@ private:
     WideBest best_{};
     std::vector<Hit>* all_ = nullptr;
     float origin_[3], inverse_[3];
+    float limited_[3], near_start_[3], far_start_[3];  // of boxes about the tree's middle
     HWY_ALIGN std::int32_t slot_[8];
 };
 
-template <bool any, bool counting>
+template <bool any, bool counting, bool compact>
 void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
     Hit hit;
     if (!is_valid(job.rays[i])) {
         ++counts.invalid;
     } else {
         const RayFrame frame = make_frame(job.rays[i]);
-        const WideBest best = SingleRay < any ? Wanted::any : Wanted::closest,
-                       counting > (job.tree, frame, make_wide_ray(frame, job.tree.bounds),
-                                   job.stack, counts)
-                                      .trace(0, {frame.tmax});
+        const WideRay ray = make_wide_ray(frame, job.tree.bounds);
+        SingleRay<any ? Wanted::any : Wanted::closest, counting, compact> single(
+            job.tree, frame, ray, job.stack, counts);
+        const WideBest best = single.trace(0, {frame.tmax});
         if (best.found()) hit = {best.t * frame.t_scale, best.prim, best.u, best.v};
     }
     counts.hits += hit.hit();
@@ -283,14 +298,14 @@ void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
         job.hits[i] = hit;
 }
 
-template <bool any, bool counting>
+template <bool any, bool counting, bool compact>
 void trace_single(const SimdJob& job, SimdCounts& counts) {
     for (std::size_t k = 0; k < job.n; ++k)
-        trace_one<any, counting>(job, job.order == nullptr ? k : job.order[k], counts);
+        trace_one<any, counting, compact>(job, job.order == nullptr ? k : job.order[k], counts);
 }
 
 /// All hits of each ray behind those of the one before; counts.hits of each in hit_counts.
-template <bool counting>
+template <bool counting, bool compact>
 void trace_all_of(const SimdJob& job, std::vector<Hit>& found, std::uint64_t* hit_counts,
                   SimdCounts& counts) {
     for (std::size_t i = 0; i < job.n; ++i) {
@@ -299,8 +314,8 @@ void trace_all_of(const SimdJob& job, std::vector<Hit>& found, std::uint64_t* hi
             ++counts.invalid;
         } else {
             const RayFrame frame = make_frame(job.rays[i]);
-            SingleRay<Wanted::all, counting>(job.tree, frame, make_wide_ray(frame, job.tree.bounds),
-                                             job.stack, counts)
+            const WideRay ray = make_wide_ray(frame, job.tree.bounds);
+            SingleRay<Wanted::all, counting, compact>(job.tree, frame, ray, job.stack, counts)
                 .trace_all(found);
             finish_ray(found, before);
         }
@@ -309,19 +324,30 @@ void trace_all_of(const SimdJob& job, std::vector<Hit>& found, std::uint64_t* hi
     }
 }
 
+/// Calls run(counting, compact) with what the job wants, as constants. Code for compact trees
+/// always counts: there is enough of it as it is.
+template <class Run>
+void with_constants(const SimdJob& job, const Run& run) {
+    using Yes = std::true_type;
+    using No = std::false_type;
+    if (job.tree.is_compact)
+        run(Yes(), Yes());
+    else
+        job.counting ? run(Yes(), No()) : run(No(), No());
+}
+
 inline void all_hits(const SimdJob& job, std::vector<Hit>& found, std::uint64_t* hit_counts,
                      SimdCounts& counts) {
-    job.counting ? trace_all_of<true>(job, found, hit_counts, counts)
-                 : trace_all_of<false>(job, found, hit_counts, counts);
+    with_constants(job, [&](auto counting, auto compact) {
+        trace_all_of<counting, compact>(job, found, hit_counts, counts);
+    });
 }
 
 inline void single(const SimdJob& job, SimdCounts& counts) {
-    if (job.hits == nullptr)
-        job.counting ? trace_single<true, true>(job, counts)
-                     : trace_single<true, false>(job, counts);
-    else
-        job.counting ? trace_single<false, true>(job, counts)
-                     : trace_single<false, false>(job, counts);
+    with_constants(job, [&](auto counting, auto compact) {
+        job.hits == nullptr ? trace_single<true, counting, compact>(job, counts)
+                            : trace_single<false, counting, compact>(job, counts);
+    });
 }
 
 }  // namespace raydix::HWY_NAMESPACE

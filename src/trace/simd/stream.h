@@ -19,7 +19,7 @@ namespace raydix::HWY_NAMESPACE {
 /// Lists of fewer rays go on one by one.
 constexpr std::uint32_t few_rays = 4;
 
-template <bool any, bool counting>
+template <bool any, bool counting, bool compact>
 class StreamWalk {
 public:
     StreamWalk(const WideView& tree, const StreamFrame& frame, StreamMemory& memory,
@@ -83,6 +83,45 @@ private:
         hn::StoreU(hn::Set(U16(), list[count - 1]), U16(), list + count);
     }
 
+    /// Planes of a node's children: at origin + step * plane.
+    struct CompactPlanes {
+        HWY_ALIGN float near[3][8], far[3][8];
+        float origin[3], step[3];
+    };
+    struct PlainPlanes {
+        const float *near[3], *far[3];
+        float origin[3];
+    };
+    using Planes = std::conditional_t<compact, CompactPlanes, PlainPlanes>;
+
+    HWY_INLINE CompactPlanes planes_of(const CompactNode& node) const {
+        CompactPlanes out;
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::uint32_t bits = std::uint32_t{node.exponent[axis]} << 23;
+            std::memcpy(&out.step[axis], &bits, sizeof(float));
+            out.origin[axis] = node.origin[axis];
+            const std::uint8_t* const near = negative_[axis] ? node.hi[axis] : node.lo[axis];
+            const std::uint8_t* const far = negative_[axis] ? node.lo[axis] : node.hi[axis];
+            for (std::size_t l = 0; l < 8; l += lanes8) {
+                const auto read = [&](const std::uint8_t* from) {
+                    return hn::ConvertTo(f8, hn::PromoteTo(I8(), hn::LoadU(B8(), from)));
+                };
+                hn::Store(read(near + l), f8, out.near[axis] + l);
+                hn::Store(read(far + l), f8, out.far[axis] + l);
+            }
+        }
+        return out;
+    }
+    HWY_INLINE PlainPlanes planes_of(const WideNode& node) const {
+        PlainPlanes out;
+        for (int axis = 0; axis < 3; ++axis) {
+            out.near[axis] = negative_[axis] ? node.hi[axis] : node.lo[axis];
+            out.far[axis] = negative_[axis] ? node.lo[axis] : node.hi[axis];
+            out.origin[axis] = coordinate(tree_.middle, axis);
+        }
+        return out;
+    }
+
     HWY_INLINE void visit(const StreamEntry& entry) {
         if constexpr (counting) counts_.visits += entry.count;
         const std::uint32_t stride = entry.count + StreamMemory::slack;
@@ -91,26 +130,12 @@ private:
         std::uint32_t* const lists = memory_.lists();
         std::uint32_t* const list = lists + entry.begin;
         pad_list(list, entry.count);
-        const WideNode& node = tree_.nodes[entry.word];
-        HWY_ALIGN float near_steps[3][8], far_steps[3][8];
-        float step[3];
-        for (int axis = 0; axis < 3; ++axis) {
-            const std::uint32_t bits = std::uint32_t{node.exponent[axis]} << 23;
-            std::memcpy(&step[axis], &bits, sizeof(float));
-            const std::uint8_t* const near = negative_[axis] ? node.hi[axis] : node.lo[axis];
-            const std::uint8_t* const far = negative_[axis] ? node.lo[axis] : node.hi[axis];
-            for (std::size_t l = 0; l < 8; l += lanes8) {
-                const auto read = [&](const std::uint8_t* from) {
-                    return hn::ConvertTo(f8, hn::PromoteTo(I8(), hn::LoadU(B8(), from + l)));
-                };
-                hn::Store(read(near), f8, near_steps[axis] + l);
-                hn::Store(read(far), f8, far_steps[axis] + l);
-            }
-        }
+        const auto& node = tree_.template node<compact>(entry.word);
+        const Planes planes = planes_of(node);
         std::uint32_t children[8], child_count = 0;  // slots, farthest first
         std::uint32_t* ends[8];
         for (const std::uint32_t s : slot_)
-            if ((node.used >> s & 1) != 0) {
+            if (node.child[s] != wide_no_child) {
                 ends[child_count] = lists + out_begin + child_count * stride;
                 children[child_count++] = s;
             }
@@ -123,9 +148,11 @@ private:
             const V16 reach = place[3], tmin = way[3];
             V16 rate[3], near[3], far[3];
             for (int axis = 0; axis < 3; ++axis) {
-                const V16 from = hn::Sub(hn::Set(f16, node.origin[axis]), place[axis]);
+                const V16 from = hn::Sub(hn::Set(f16, planes.origin[axis]), place[axis]);
                 const V16 pad = hn::Set(f16, frame_.near_pad[axis]);
-                rate[axis] = hn::Mul(hn::Set(f16, step[axis]), way[axis]);
+                rate[axis] = way[axis];
+                if constexpr (compact)
+                    rate[axis] = hn::Mul(hn::Set(f16, planes.step[axis]), way[axis]);
                 near[axis] = hn::Mul(hn::Add(from, pad), way[axis]);
                 far[axis] = hn::Mul(hn::Sub(from, pad), way[axis]);
             }
@@ -136,13 +163,13 @@ private:
             for (std::uint32_t c = 0; c < child_count; ++c) {
                 const std::uint32_t s = children[c];
                 V16 in = tmin;
-                V16 leave = hn::MulAdd(hn::Set(f16, far_steps[0][s]), rate[0], far[0]);
-                in = hn::Max(in, hn::MulAdd(hn::Set(f16, near_steps[0][s]), rate[0], near[0]));
+                V16 leave = hn::MulAdd(hn::Set(f16, planes.far[0][s]), rate[0], far[0]);
+                in = hn::Max(in, hn::MulAdd(hn::Set(f16, planes.near[0][s]), rate[0], near[0]));
                 for (int axis = 1; axis < 3; ++axis) {
                     in = hn::Max(
-                        in, hn::MulAdd(hn::Set(f16, near_steps[axis][s]), rate[axis], near[axis]));
-                    leave = hn::Min(
-                        leave, hn::MulAdd(hn::Set(f16, far_steps[axis][s]), rate[axis], far[axis]));
+                        in, hn::MulAdd(hn::Set(f16, planes.near[axis][s]), rate[axis], near[axis]));
+                    leave = hn::Min(leave, hn::MulAdd(hn::Set(f16, planes.far[axis][s]), rate[axis],
+                                                      far[axis]));
                 }
                 const auto met = hn::And(hn::Le(in, hn::Min(leave, reach)), active);
                 const auto item = hn::Or(hn::And(hn::BitCast(U16(), in), high), numbers);
@@ -154,7 +181,8 @@ private:
     }
 
     /// Lists that hold a ray go onto the stack, moved together: gaps would add up in deep trees.
-    HWY_INLINE void push_children(const WideNode& node, const std::uint32_t* children,
+    template <class Node>
+    HWY_INLINE void push_children(const Node& node, const std::uint32_t* children,
                                   std::uint32_t* const* ends, std::uint32_t child_count,
                                   std::uint32_t out_begin, std::uint32_t stride) {
         std::uint32_t* const lists = memory_.lists();
@@ -174,8 +202,9 @@ private:
         StreamRay& ray = rays_[k];
         if (!(entry_of(item) <= ray.t)) return;
         const RayFrame frame = frame_.frame_of(ray);
-        SingleRay<any ? Wanted::any : Wanted::closest, counting> single(
-            tree_, frame, frame_.wide_ray_of(ray), single_stack_, counts_);
+        const WideRay wide_ray = frame_.wide_ray_of(ray);
+        SingleRay<any ? Wanted::any : Wanted::closest, counting, compact> single(
+            tree_, frame, wide_ray, single_stack_, counts_);
         const WideBest best = single.trace(word, {ray.t, ray.prim, hits_[k].u, hits_[k].v});
         if (any) {
             if (best.found()) ray.settle();
@@ -221,7 +250,7 @@ private:
     void test_leaf(const StreamEntry& entry) {
         const std::uint32_t place = (entry.word & ~wide_leaf_bit) >> 3,
                             count = (entry.word & 7) + 1;
-        const TriangleBlock& block = tree_.block(place, count);
+        const TriangleBlock& block = tree_.template block<compact>(place, count);
         std::uint32_t* const list = memory_.lists() + entry.begin;
         if constexpr (counting) counts_.tests += std::uint64_t{count} * entry.count;
         pad_list(list, entry.count);

@@ -33,11 +33,14 @@ const SimdKernels& kernels_for(const std::string& isa) {
 WideView view_of(const WideBvh& tree, TriangleBlock& room) {
     const WideBvh::Arrays& arrays = tree.arrays();
     return {arrays.nodes.data(),
-            arrays.blocks.empty() ? nullptr : arrays.blocks.data(),
-            arrays.compact.data(),
+            arrays.blocks.data(),
+            arrays.compact_nodes.data(),
+            arrays.compact_blocks.data(),
             arrays.vertices.data(),
             &room,
-            arrays.bounds};
+            arrays.bounds,
+            arrays.middle,
+            arrays.stats.compact};
 }
 
 /// Stacks for the deepest path of a tree.

@@ -16,16 +16,29 @@ namespace raydix {
 
 struct WideView {
     const WideNode* nodes;
-    const TriangleBlock* blocks;  // null if the tree is compact,
-    const CompactBlock* compact;  // else these two are
+    const TriangleBlock* blocks;
+    const CompactNode* compact_nodes;
+    const CompactBlock* compact_blocks;
     const Vec3* vertices;
     TriangleBlock* room;  // of a compact tree, one for each thread
     Aabb bounds;          // of the root
+    Vec3 middle;          // of the bounds: planes of WideNode are about it
+    bool is_compact;
+
+    template <bool compact>
+    [[nodiscard]] const auto& node(std::uint32_t word) const {
+        if constexpr (compact)
+            return compact_nodes[word];
+        else
+            return nodes[word];
+    }
 
     /// The block of a leaf; in a compact tree its triangles are put together in `room`.
-    [[nodiscard]] const TriangleBlock& block(std::uint32_t place, std::uint32_t count) const {
-        if (blocks != nullptr) return blocks[place / 8];
-        const CompactBlock& from = compact[place / 8];
+    template <bool compact>
+    [[nodiscard]] const TriangleBlock& block(std::uint32_t place,
+                                             [[maybe_unused]] std::uint32_t count) const {
+        if constexpr (!compact) return blocks[place / 8];
+        const CompactBlock& from = compact_blocks[place / 8];
         for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane)
             room->set(lane,
                       {vertices[from.vertex[0][lane]], vertices[from.vertex[1][lane]],
