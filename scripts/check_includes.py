@@ -21,6 +21,8 @@ MAY_INCLUDE = {
     "rays": {"base", "exec", "keys", "sort"},
     "simt": {"base"},
     "trace": {"base", "exec", "primitives", "layout", "rays", "simt"},
+    # walks through the same trees as rays do, with the same stacks
+    "proximity": {"base", "exec", "primitives", "tree", "rays", "trace"},
     "measure": {"base", "exec"},  # exec: the number of threads is a property of the machine
     "report": {"base", "measure"},
     "api": {"*"},

@@ -5,6 +5,7 @@
 #include <raydix/bvh.h>              // IWYU pragma: export
 #include <raydix/camera.h>           // IWYU pragma: export
 #include <raydix/check.h>            // IWYU pragma: export
+#include <raydix/closest.h>          // IWYU pragma: export
 #include <raydix/cwbvh.h>            // IWYU pragma: export
 #include <raydix/device.h>           // IWYU pragma: export
 #include <raydix/device_cwbvh.h>     // IWYU pragma: export
