@@ -22,7 +22,7 @@ MAY_INCLUDE = {
     "simt": {"base"},
     "trace": {"base", "exec", "primitives", "layout", "rays", "simt"},
     # walks through the same trees as rays do, with the same stacks
-    "proximity": {"base", "exec", "primitives", "tree", "rays", "trace"},
+    "proximity": {"base", "exec", "primitives", "sort", "tree", "rays", "trace"},
     "measure": {"base", "exec"},  # exec: the number of threads is a property of the machine
     "report": {"base", "measure"},
     "api": {"*"},

@@ -23,6 +23,7 @@
 #include <raydix/report.h>           // IWYU pragma: export
 #include <raydix/scene.h>            // IWYU pragma: export
 #include <raydix/simulate.h>         // IWYU pragma: export
+#include <raydix/solid.h>            // IWYU pragma: export
 #include <raydix/trace.h>            // IWYU pragma: export
 #include <raydix/tree_view.h>        // IWYU pragma: export
 #include <raydix/types.h>            // IWYU pragma: export
