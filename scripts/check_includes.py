@@ -23,6 +23,7 @@ MAY_INCLUDE = {
     "trace": {"base", "exec", "primitives", "layout", "rays", "simt"},
     # walks through the same trees as rays do, with the same stacks
     "proximity": {"base", "exec", "primitives", "sort", "tree", "rays", "trace"},
+    "instances": {"base", "exec", "trace"},
     "measure": {"base", "exec"},  # exec: the number of threads is a property of the machine
     "report": {"base", "measure"},
     "api": {"*"},
@@ -36,6 +37,7 @@ PRIVATE_LIBRARIES = {
     r"(tbb|oneapi)/.*": r"src/exec/parallel\.cpp",
     r"(cuda|cub|thrust|nv|nvtx3)/.*|cuda.*\.h": r"(src|tests|bench)/.*\.cuh?|src/base/atomic\.h",
     r"(embree\d?|nanoflann).*": r"(tests|bench)/.*",
+    r"CGAL/.*": r"bench/.*",
     r"gtest/.*|gmock/.*": r"tests/.*",
     r"CLI/.*": r"(cli|bench)/.*",
 }

@@ -23,7 +23,7 @@ ClosestPoint public_point(const ClosestTriangle& best) {
 
 ClosestCounts closest_batch(const Bvh& bvh, std::span<const Vec3> queries,
                             std::span<ClosestPoint> results, float limit) {
-    const TriangleTree tree(bvh);
+    const PaddedTree tree(bvh);
     std::vector<ClosestCounts> parts(block_count(queries.size()));
     for_each_query_block(
         bvh, queries, [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
@@ -77,7 +77,7 @@ ClosestPoint closest_point(const Bvh& bvh, Vec3 query, float max_distance) {
     const float limit = square_limit(max_distance);
     if (bvh.empty() || !is_finite(query)) return {};
     const FloatEnvironment plain;
-    const TriangleTree tree(bvh);
+    const PaddedTree tree(bvh);
     WalkStack stack(tree.max_depth);
     return public_point(find_closest_triangle(tree, query, limit, no_primitive, stack));
 }

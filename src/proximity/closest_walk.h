@@ -6,32 +6,23 @@
 #include <cmath>
 
 #include "proximity/walk_outward.h"
+#include "trace/tree_hits.h"
 
 namespace raydix {
-
-/// What a walk reads, without going through the Bvh each time. The tree must hold triangles.
-struct TriangleTree {
-    const BvhNode* nodes;
-    const LeafTriangle* triangles;
-    const std::uint32_t* order;
-    std::uint32_t max_depth;
-    float pad;
-    bool empty;
-
-    explicit TriangleTree(const Bvh& bvh)
-        : nodes(bvh.nodes().data()),
-          triangles(bvh.triangles().data()),
-          order(bvh.order().data()),
-          max_depth(bvh.max_depth()),
-          pad(bvh.empty() ? 0.0f : box_pad(bvh)),
-          empty(bvh.empty()) {}
-};
 
 /// The best so far; `position` in leaf order.
 struct ClosestTriangle {
     TrianglePoint point;
     std::uint32_t prim = no_primitive;
     std::uint32_t position = no_primitive;
+};
+
+/// A tree with the pad of its boxes.
+struct PaddedTree : TriangleTree {
+    float pad;
+
+    explicit PaddedTree(const Bvh& bvh)
+        : TriangleTree(bvh), pad(bvh.empty() ? 0.0f : box_pad(bvh)) {}
 };
 
 inline bool is_finite(Vec3 p) {
@@ -52,7 +43,7 @@ inline void try_triangle(const TriangleTree& tree, std::uint32_t position, Vec3 
 /// The least (d2, prim) with d2 <= limit. `guess`: a position in leaf order that may be near, or
 /// no_primitive; it saves time, and changes nothing else. The query must be finite, the tree not
 /// empty.
-inline ClosestTriangle find_closest_triangle(const TriangleTree& tree, Vec3 query, float limit,
+inline ClosestTriangle find_closest_triangle(const PaddedTree& tree, Vec3 query, float limit,
                                              std::uint32_t guess, WalkStack& stack) {
     ClosestTriangle best{{{}, 0.0f, 0.0f, limit}};
     if (guess != no_primitive) try_triangle(tree, guess, query, best);
