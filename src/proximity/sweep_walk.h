@@ -43,7 +43,7 @@ inline Contact find_first_contact(const TriangleTree& tree, const SphereSweep& s
     // A part of a triangle may be entered later than the whole by rounding in double.
     const auto enter = [&](const BvhNode& node) {
         const double t = boxes.enter(node.lo, node.hi);
-        return static_cast<float>(t - 1e-12 * t);
+        return t == never ? infinity : static_cast<float>(t * (1.0 - 1e-12));
     };
     Contact best;
     PendingNode* const bottom = stack.begin();

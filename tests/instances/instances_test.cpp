@@ -103,7 +103,7 @@ TEST(Instances, AreEveryInstanceOnItsOwn) {
         in_scene.push_back({i % 6 == 0   ? middle
                             : i % 6 == 1 ? inner
                                          : objects[random.below(3)],
-                            random.transform(20), i % 9 ? ~0u : 2u});
+                            random.transform(5), i % 9 ? ~0u : 2u});
     for (const Instance& i : in_inner) scene.add_instance(inner, i);
     for (const Instance& i : in_middle) scene.add_instance(middle, i);
     for (const Instance& i : in_scene) scene.add_instance(InstancedScene::scene, i);
@@ -133,7 +133,7 @@ TEST(Instances, AreEveryInstanceOnItsOwn) {
     show(in_scene, {nullptr, 0, {}, {}, InstanceHit::unused()});
     ASSERT_GT(all.size(), 100u);
 
-    const std::vector<Ray> rays = random_rays(300 * test::thorough, 20);
+    const std::vector<Ray> rays = random_rays(100 * test::thorough, 5);
     std::vector<std::uint32_t> masks;
     for (std::size_t i = 0; i < rays.size(); ++i)
         masks.push_back(i % 3 == 0 ? ~0u : 1u << random.below(4));
