@@ -76,7 +76,7 @@ std::vector<PrimitivePair> cgal_pairs(const Mesh& mesh, bool narrow, int cutoff)
             if (!share_a_corner(s, t) && (!narrow || triangles_touch(s, t)))
                 pairs.push_back({i, j});
         },
-        cutoff, CGAL::Box_intersection_d::CLOSED);
+        std::ptrdiff_t{cutoff}, CGAL::Box_intersection_d::CLOSED);
     std::sort(pairs.begin(), pairs.end(), [](const PrimitivePair& x, const PrimitivePair& y) {
         return x.first != y.first ? x.first < y.first : x.second < y.second;
     });

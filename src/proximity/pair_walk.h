@@ -4,8 +4,9 @@
 
 #include <raydix/bvh.h>
 
+#include <array>
+#include <bit>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "base/check.h"
@@ -26,12 +27,59 @@ struct PairBox {
 };
 static_assert(sizeof(PairBox) == sizeof(BvhNode));
 
+/// A number for the place of each corner of a triangle: equal places have equal ones.
+struct alignas(16) CornerKeys {
+    std::array<std::uint32_t, 4> keys;  // the last is no corner's
+};
+
+inline CornerKeys corner_keys(const LeafTriangle& t) {
+    const auto key = [](Vec3 p) {
+        const auto bits = [](float x) { return std::bit_cast<std::uint32_t>(x); };
+        const std::uint32_t mixed =
+            (bits(p.x) * 0x9e3779b1u ^ bits(p.y)) * 0x85ebca77u ^ bits(p.z) * 0xc2b2ae3du;
+        return mixed ^ mixed >> 15;
+    };
+    return {{key(t.v0), key(t.v1), key(t.v2), 0}};
+}
+
+/// Bit 4 * i + j: key i of `a` is key j of `b`, for the first three of both.
+inline unsigned equal_keys(const CornerKeys& a, const CornerKeys& b) {
+#if defined(__SSE2__)
+    const __m128i x = _mm_load_si128(reinterpret_cast<const __m128i*>(a.keys.data()));
+    const __m128i y = _mm_load_si128(reinterpret_cast<const __m128i*>(b.keys.data()));
+    const auto bits = [](__m128i equal) {
+        return static_cast<unsigned>(_mm_movemask_ps(_mm_castsi128_ps(equal)) & 7);
+    };
+    return bits(_mm_cmpeq_epi32(_mm_shuffle_epi32(x, 0x00), y)) |
+           bits(_mm_cmpeq_epi32(_mm_shuffle_epi32(x, 0x55), y)) << 4 |
+           bits(_mm_cmpeq_epi32(_mm_shuffle_epi32(x, 0xAA), y)) << 8;
+#else
+    unsigned equal = 0;
+    for (unsigned i = 0; i < 3; ++i)
+        for (unsigned j = 0; j < 3; ++j)
+            if (a.keys[i] == b.keys[j]) equal |= 1u << (4 * i + j);
+    return equal;
+#endif
+}
+
 /// What walks read of a tree. Each primitive is in one leaf.
 struct PairTree {
     const BvhNode* nodes;
     const PairBox* boxes;           // [references]
     const LeafTriangle* triangles;  // [references]; null unless they are triangles
+    const CornerKeys* keys;         // the same
     std::uint32_t max_depth;
+
+    /// Whether two triangles have a corner at the same place.
+    [[nodiscard]] bool share_a_corner(std::uint32_t k, std::uint32_t l) const {
+        const Vec3* s = &triangles[k].v0;
+        const Vec3* t = &triangles[l].v0;
+        for (unsigned equal = equal_keys(keys[k], keys[l]); equal != 0; equal &= equal - 1) {
+            const int bit = std::countr_zero(equal);
+            if (s[bit / 4] == t[bit % 4]) return true;
+        }
+        return false;
+    }
 };
 
 /// Closed boxes of nodes or primitives.

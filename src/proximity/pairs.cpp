@@ -29,9 +29,12 @@ public:
             const Aabb box = box_at(bvh, k);
             boxes_[k] = {box.lo, bvh.order()[k], box.hi, 0};
         });
-        tree = {bvh.nodes().data(), boxes_.data(),
-                bvh.kind() == PrimitiveKind::triangles ? bvh.triangles().data() : nullptr,
-                bvh.max_depth()};
+        keys_.reset(bvh.triangles().size());
+        for_each_index(keys_.size(),
+                       [&](std::size_t k) { keys_[k] = corner_keys(bvh.triangles()[k]); });
+        const bool triangles = bvh.kind() == PrimitiveKind::triangles;
+        tree = {bvh.nodes().data(), boxes_.data(), triangles ? bvh.triangles().data() : nullptr,
+                keys_.data(), bvh.max_depth()};
     }
 
     PairTree tree;
@@ -46,6 +49,7 @@ private:
 
     std::optional<Bvh> whole_;
     Buffer<PairBox> boxes_;
+    Buffer<CornerKeys> keys_;
 };
 
 /// What happens to the pairs that one task finds.
@@ -78,8 +82,7 @@ private:
 /// Whether primitives whose boxes overlap are a pair.
 template <bool same>
 bool is_pair(const PairTree& a, const PairTree& b, std::uint32_t k, std::uint32_t l, bool narrow) {
-    if (same && a.triangles != nullptr && share_a_corner(a.triangles[k], a.triangles[l]))
-        return false;
+    if (same && a.triangles != nullptr && a.share_a_corner(k, l)) return false;
     return !narrow || triangles_touch(a.triangles[k], b.triangles[l]);
 }
 

@@ -11,9 +11,11 @@
 
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <limits>
+#include <random>
 
-#include "support/ray_sets.h"
+#include "base/math.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
