@@ -1,0 +1,26 @@
+// What a PointIndex owns.
+#pragma once
+
+#include <raydix/buffer.h>
+#include <raydix/points.h>
+
+#include "points/point_tree.h"
+#include "sort/radix_sort.h"
+
+namespace raydix::detail {
+
+template <class Scalar, int Dim>
+struct PointArrays {
+    Buffer<PointLeaf<Scalar, Dim>> leaves;
+    Buffer<PointNode<Scalar, Dim>> nodes;
+    Buffer<std::uint32_t> lowest_ids;
+    PointTreeView<Scalar, Dim> tree;
+    typename PointOf<Scalar, Dim>::Box bounds;
+    PointsOptions options;
+    PointsTree chosen = PointsTree::kdtree;
+    std::uint64_t input_count = 0, left_out = 0, peak_bytes = 0;
+    PointsBuildMs ms;
+    SortScratch<std::uint64_t> sort_scratch;  // kept from the first rebuild on
+};
+
+}  // namespace raydix::detail

@@ -1,0 +1,98 @@
+// The doors to the queries that are compiled once per instruction set.
+#pragma once
+
+#include <raydix/buffer.h>
+#include <raydix/points.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "points/point_tree.h"
+
+namespace raydix {
+
+/// Queries of a batch: point `order[k]`, or `k` without an order. Results go to the same places.
+template <class T, int Dim>
+struct PointJob {
+    PointTreeView<T, Dim> tree;
+    const T* queries;            // points, or boxes: lo then hi
+    const std::uint32_t* order;  // may be null
+    std::size_t n;
+
+    [[nodiscard]] std::size_t place(std::size_t k) const { return order == nullptr ? k : order[k]; }
+};
+
+template <class T, int Dim>
+struct NearestJob : PointJob<T, Dim> {
+    std::uint32_t k;
+    std::uint32_t* indices;  // [queries * k]
+    T* distances;            // [queries * k]
+};
+
+/// Points found, one after the other, with room for more behind them.
+template <class T>
+struct FoundPoints {
+    Buffer<std::uint32_t> ids;
+    Buffer<T> d2;
+    std::size_t size = 0;
+
+    /// Room for `more` behind the last.
+    void reserve(std::size_t more) {
+        if (size + more > ids.size()) grow(size + more);
+    }
+    void grow(std::size_t least);
+};
+
+/// Which of the points found are kept: all, all but the query itself, or only later ones.
+enum class KeepPoints : std::uint32_t { all, others, later };
+
+template <class T, int Dim>
+struct WithinJob : PointJob<T, Dim> {
+    const T* radii;  // one of each query; null: `radius` for all
+    T radius;
+    bool by_distance;
+    KeepPoints keep;             // else queries must be points of the index in its order, and
+    const std::uint32_t* itself;  // their ids are here: [n]
+    std::uint32_t* counts;       // [queries]
+    std::size_t most_found;      // a block that finds more is given up on the way
+
+    [[nodiscard]] T radius_of(std::size_t place) const {
+        return radii == nullptr ? radius : radii[place];
+    }
+};
+
+struct PointJobCounts {
+    std::uint64_t invalid = 0, found = 0;
+};
+
+/// Called for each point within a radius; false stops.
+template <class T>
+struct PointVisitor {
+    bool (*call)(void* data, std::uint32_t id, T distance);
+    void* data;
+};
+
+template <class T, int Dim>
+struct PointKernels {
+    std::string_view isa;
+    void (*nearest)(const NearestJob<T, Dim>& job, PointJobCounts& counts);
+    /// How many points are within, to job.counts.
+    void (*count_ball)(const WithinJob<T, Dim>& job, PointJobCounts& counts);
+    void (*count_box)(const WithinJob<T, Dim>& job, PointJobCounts& counts);
+    /// The rows of one query after the other, sorted, with true distances in found.d2, to the end
+    /// or until there are more than most_found.
+    void (*collect_ball)(const WithinJob<T, Dim>& job, FoundPoints<T>& found,
+                         PointJobCounts& counts);
+    void (*collect_box)(const WithinJob<T, Dim>& job, FoundPoints<T>& found,
+                        PointJobCounts& counts);
+    bool (*visit_ball)(const PointTreeView<T, Dim>& tree, const T* query, T radius,
+                       const PointVisitor<T>& visitor);
+};
+
+/// Best first; those this processor can run.
+template <class T, int Dim>
+[[nodiscard]] std::span<const PointKernels<T, Dim>> point_kernels();
+
+}  // namespace raydix
