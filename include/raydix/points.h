@@ -80,7 +80,7 @@ struct PointsOptions {
 
 /// Milliseconds of a build.
 struct PointsBuildMs {
-    double bounds = 0, sort = 0, leaves = 0, boxes = 0, total = 0;
+    double bounds = 0, sort = 0, nodes = 0, leaves = 0, boxes = 0, total = 0;
 };
 
 namespace detail {
@@ -92,8 +92,8 @@ struct PointArrays;
 /// `build_points`; an index that was never built is empty and may be asked.
 template <class Scalar_, int Dim_>
 class PointIndex {
-    static_assert((std::is_same_v<Scalar_, float> || std::is_same_v<Scalar_, double>) &&
-                  (Dim_ == 2 || Dim_ == 3));
+    static_assert((std::is_same_v<Scalar_, float> || std::is_same_v<Scalar_, double>)&&(Dim_ == 2 ||
+                                                                                        Dim_ == 3));
 
 public:
     using Scalar = Scalar_;

@@ -42,13 +42,23 @@ void build(const T* points, std::size_t n, detail::PointArrays<T, Dim>& arrays) 
     set_bounds(bounds, arrays.bounds);
     arrays.ms.bounds = stage.lap();
     if (bounds.left_out == n) return;
-    sort_into_leaves(points, n, bounds, arrays);
-    arrays.ms.sort = stage.lap();
+    const auto valid = static_cast<std::uint32_t>(n - bounds.left_out);
     arrays.chosen = arrays.options.tree == PointsTree::bvh ? PointsTree::bvh : PointsTree::kdtree;
-    if (arrays.chosen == PointsTree::kdtree) halve_runs(arrays);
+    const bool kdtree = arrays.chosen == PointsTree::kdtree;
+    sort_along_curve(points, n, bounds, arrays);
+    arrays.ms.sort = stage.lap();
+    const std::vector<BottomRange> bottoms = divide_into_nodes(points, valid, kdtree, arrays);
+    arrays.ms.nodes = stage.lap();
+    fill_leaves(points, bottoms, kdtree, arrays);
     arrays.ms.leaves = stage.lap();
-    arrays.tree.points = static_cast<std::uint32_t>(n - bounds.left_out);
     fit_point_nodes(arrays);
+    arrays.tree = {arrays.leaves.data(),
+                   arrays.nodes.data(),
+                   valid,
+                   static_cast<std::uint32_t>(arrays.leaves.size()),
+                   static_cast<std::uint32_t>(arrays.nodes.size()),
+                   static_cast<std::uint32_t>(arrays.level_starts.size() - 1)};
+    RAYDIX_CHECK(arrays.tree.depth, <=, max_point_depth);
     arrays.ms.boxes = stage.lap();
     arrays.ms.total = total.lap();
 }
@@ -72,14 +82,12 @@ void rebuild_arrays(detail::PointArrays<T, Dim>& arrays, const T* points, std::s
     if (n > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
         throw InputError(std::to_string(n) + " points; an index holds fewer than 2^31");
     if (static_cast<std::uint32_t>(options.tree) >= std::size(tree_names))
-        throw InputError("points tree " +
-                         std::to_string(static_cast<std::uint32_t>(options.tree)) +
+        throw InputError("points tree " + std::to_string(static_cast<std::uint32_t>(options.tree)) +
                          " is not one of automatic, kdtree, bvh");
     arrays.options = options;
     const bool first = arrays.leaves.empty();
     memory_count().restart_peak();
     const std::uint64_t held = arrays.leaves.capacity_bytes() + arrays.nodes.capacity_bytes() +
-                               arrays.lowest_ids.capacity_bytes() +
                                arrays.sort_scratch.records.capacity_bytes() +
                                arrays.sort_scratch.spare.capacity_bytes() +
                                arrays.sort_scratch.histogram.capacity_bytes();
@@ -163,20 +171,19 @@ PointsTree PointIndex<T, Dim>::tree() const {
 }
 template <class T, int Dim>
 std::uint32_t PointIndex<T, Dim>::leaf_count() const {
-    return empty() ? 0 : arrays().tree.children[0];
+    return arrays().tree.leaf_count;
 }
 template <class T, int Dim>
 std::uint32_t PointIndex<T, Dim>::node_count() const {
-    return empty() ? 0 : arrays().tree.start[depth() - 1] + 1;
+    return arrays().tree.node_count;
 }
 template <class T, int Dim>
 std::uint32_t PointIndex<T, Dim>::depth() const {
-    return arrays().tree.levels;
+    return arrays().tree.depth;
 }
 template <class T, int Dim>
 std::uint64_t PointIndex<T, Dim>::bytes() const {
-    return leaf_count() * sizeof(PointLeaf<T, Dim>) +
-           node_count() * (sizeof(PointNode<T, Dim>) + boxes_per_node * sizeof(std::uint32_t));
+    return leaf_count() * sizeof(PointLeaf<T, Dim>) + node_count() * sizeof(PointNode<T, Dim>);
 }
 template <class T, int Dim>
 std::uint64_t PointIndex<T, Dim>::peak_bytes() const {
@@ -188,9 +195,11 @@ const PointsBuildMs& PointIndex<T, Dim>::build_ms() const {
 }
 template <class T, int Dim>
 std::vector<std::uint32_t> PointIndex<T, Dim>::order() const {
-    std::vector<std::uint32_t> ids(size());
-    for (std::size_t i = 0; i < ids.size(); ++i)
-        ids[i] = arrays().tree.leaves[i / points_per_leaf].id[i % points_per_leaf];
+    std::vector<std::uint32_t> ids;
+    ids.reserve(size());
+    for (std::uint32_t leaf = 0; leaf < leaf_count(); ++leaf)
+        for (const std::uint32_t id : arrays().tree.leaves[leaf].id)
+            if (id != no_primitive) ids.push_back(id);
     return ids;
 }
 

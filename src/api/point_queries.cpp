@@ -49,9 +49,8 @@ std::vector<std::uint32_t> order_for(const Index& index, const typename Index::S
                                      std::size_t n, std::size_t stride, QueryOrder wanted) {
     if (index.empty()) return {};
     const typename Index::Box bounds = index.bounds();
-    return order_of_queries<typename Index::Scalar, Index::dimension>(queries, n, stride,
-                                                                      &bounds.lo.x, &bounds.hi.x,
-                                                                      wanted);
+    return order_of_queries<typename Index::Scalar, Index::dimension>(
+        queries, n, stride, &bounds.lo.x, &bounds.hi.x, wanted);
 }
 
 /// The part of a batch that is block [begin, end).
@@ -104,10 +103,9 @@ public:
 
     PointQueryCounts count() {
         order();
-        for_each_block(job_.n, queries_per_block,
-                       [&](std::size_t b, std::size_t begin, std::size_t end) {
-                           count_block(b, begin, end);
-                       });
+        for_each_block(
+            job_.n, queries_per_block,
+            [&](std::size_t b, std::size_t begin, std::size_t end) { count_block(b, begin, end); });
         return sum_of(parts_, job_.n);
     }
 
@@ -320,8 +318,7 @@ NearestPoints<typename Index::Scalar> knn(const Index& index, PointsOf<Index> qu
     NearestPoints<Scalar> result;
     result.indices.reset(queries.size() * k);
     result.distances.reset(queries.size() * k);
-    result.counts =
-        knn(index, queries, k, result.indices.span(), result.distances.span(), options);
+    result.counts = knn(index, queries, k, result.indices.span(), result.distances.span(), options);
     return result;
 }
 
@@ -350,8 +347,8 @@ PointLists<typename Index::Scalar> radius_search(const Index& index, PointsOf<In
                                                  ScalarOf<Index> radius,
                                                  const PointQueryOptions& options) {
     check_radius(radius, "");
-    Within<Index> job = within_job(index, values_of<typename Index::Scalar>(queries),
-                                   queries.size(), options);
+    Within<Index> job =
+        within_job(index, values_of<typename Index::Scalar>(queries), queries.size(), options);
     job.radius = radius;
     return lists_of(index, job, Index::dimension, false, "radius search", options);
 }
@@ -365,9 +362,9 @@ PointLists<typename Index::Scalar> radius_search(
         throw InputError("radius search: " + std::to_string(queries.size()) + " queries, but " +
                          std::to_string(radii.size()) + " radii");
     for (std::size_t i = 0; i < radii.size(); ++i)
-        if (!(radii[i] >= 0)) check_radius(radii[i], " " + std::to_string(i));
-    Within<Index> job = within_job(index, values_of<typename Index::Scalar>(queries),
-                                   queries.size(), options);
+        if (!(radii[i] >= 0)) check_radius(radii[i], std::string(" ").append(std::to_string(i)));
+    Within<Index> job =
+        within_job(index, values_of<typename Index::Scalar>(queries), queries.size(), options);
     job.radii = radii.data();
     return lists_of(index, job, Index::dimension, false, "radius search", options);
 }
@@ -379,8 +376,8 @@ PointQueryCounts radius_count(const Index& index, PointsOf<Index> queries, Scala
     if (counts.size() != queries.size())
         throw InputError("radius count: " + std::to_string(queries.size()) +
                          " queries, but room for " + std::to_string(counts.size()) + " counts");
-    Within<Index> job = within_job(index, values_of<typename Index::Scalar>(queries),
-                                   queries.size(), options);
+    Within<Index> job =
+        within_job(index, values_of<typename Index::Scalar>(queries), queries.size(), options);
     job.radius = radius;
     job.counts = counts.data();
     PointQueryCounts sum;
@@ -425,12 +422,13 @@ PointLists<typename Index::Scalar> neighbour_lists(const Index& index, ScalarOf<
     with_threads(options.threads, [&] {
         Buffer<Scalar> queries(std::size_t{tree.points} * dim);
         Buffer<std::uint32_t> ids(tree.points);
-        for_each_index(tree.points, [&](std::size_t i) {
-            const PointLeaf<Scalar, dim>& leaf = tree.leaves[i / points_per_leaf];
-            for (int d = 0; d < dim; ++d)
-                queries[i * dim + d] = leaf.at[d][i % points_per_leaf];
-            ids[i] = leaf.id[i % points_per_leaf];
-        });
+        std::size_t at = 0;
+        for (std::uint32_t leaf = 0; leaf < tree.leaf_count; ++leaf)
+            for (std::uint32_t i = 0; i < points_per_leaf; ++i) {
+                if (tree.leaves[leaf].id[i] == no_primitive) break;
+                for (int d = 0; d < dim; ++d) queries[at * dim + d] = tree.leaves[leaf].at[d][i];
+                ids[at++] = tree.leaves[leaf].id[i];
+            }
         Within<Index> job = within_job(index, queries.data(), tree.points, options);
         job.radius = radius;
         job.keep = rows == PairRows::half ? KeepPoints::later : KeepPoints::others;
@@ -467,9 +465,8 @@ bool visit_radius(const Index& index, const typename Index::Point& query,
                                ScalarsOf<Index>);                                                 \
     template PointLists<Index::Scalar> radius_search(const Index&, PointsOf<Index>,               \
                                                      ScalarOf<Index>, const PointQueryOptions&);  \
-    template PointLists<Index::Scalar> radius_search(const Index&, PointsOf<Index>,               \
-                                                     std::span<const Index::Scalar>,              \
-                                                     const PointQueryOptions&);                   \
+    template PointLists<Index::Scalar> radius_search(                                             \
+        const Index&, PointsOf<Index>, std::span<const Index::Scalar>, const PointQueryOptions&); \
     template PointQueryCounts radius_count(const Index&, PointsOf<Index>, ScalarOf<Index>,        \
                                            std::span<std::uint32_t>, const PointQueryOptions&);   \
     template std::uint32_t radius_count(const Index&, const Index::Point&, ScalarOf<Index>);      \

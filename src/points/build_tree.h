@@ -1,9 +1,11 @@
-// Points -> the tree of point_tree.h: sorted along a Morton curve, put into groups of 16 (which may
-// be parted again by medians), boxes fitted level by level.
+// Points -> the tree of point_tree.h. Codes along a Morton curve are sorted and divided from the
+// top until 256 points are left; those are parted into groups of 16 by medians; boxes are fitted
+// from the bottom.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "points/point_arrays.h"
 
@@ -17,20 +19,35 @@ struct PointBounds {
     std::size_t first_left_out = 0;  // if left_out > 0
 };
 
+/// The sorted records [begin, end) are the points of bottom node `node`.
+struct BottomRange {
+    std::uint32_t begin, end, node;
+};
+
 /// points [n * Dim], one after the other.
 template <class T, int Dim>
 [[nodiscard]] PointBounds<T, Dim> bounds_of_points(const T* points, std::size_t n);
 
-/// Copies the valid points into arrays.leaves in the order of the curve.
+/// Codes of the points along the curve, ascending, to arrays.sort_scratch.records; invalid ones
+/// last.
 template <class T, int Dim>
-void sort_into_leaves(const T* points, std::size_t n, const PointBounds<T, Dim>& bounds,
+void sort_along_curve(const T* points, std::size_t n, const PointBounds<T, Dim>& bounds,
                       detail::PointArrays<T, Dim>& arrays);
 
-/// Parts each run of groups that becomes one node by medians of the widest side.
+/// The first `valid` records -> nodes without boxes, and room for the groups. `kdtree` divides
+/// where codes first differ, else into runs of the same length. Returns the records of each bottom
+/// node.
 template <class T, int Dim>
-void halve_runs(detail::PointArrays<T, Dim>& arrays);
+[[nodiscard]] std::vector<BottomRange> divide_into_nodes(const T* points, std::uint32_t valid,
+                                                         bool kdtree,
+                                                         detail::PointArrays<T, Dim>& arrays);
 
-/// Nodes from leaves, and the view.
+/// Points to groups, parted by medians of the widest side if `kdtree`; boxes of bottom nodes.
+template <class T, int Dim>
+void fill_leaves(const T* points, const std::vector<BottomRange>& bottoms, bool kdtree,
+                 detail::PointArrays<T, Dim>& arrays);
+
+/// Boxes of all other nodes.
 template <class T, int Dim>
 void fit_point_nodes(detail::PointArrays<T, Dim>& arrays);
 

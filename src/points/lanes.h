@@ -37,6 +37,13 @@ HWY_INLINE std::uint32_t bits_of(D d, Mask mask) {
     return bits & ((1u << hn::MaxLanes(d)) - 1);
 }
 
+template <class D>
+HWY_INLINE hn::Mask<D> mask_of(D d, std::uint32_t bits) {
+    std::uint8_t bytes[8] = {};
+    std::memcpy(bytes, &bits, sizeof(bits));
+    return hn::LoadMaskBits(d, bytes);
+}
+
 /// body(part) for each vector of 16 values; unrolled by the compiler.
 template <class T, class Body>
 HWY_INLINE std::uint32_t each_part(const Body& body) {

@@ -85,8 +85,7 @@ private:
 
     HWY_INLINE void store(std::uint64_t* keys) const {
         constexpr hn::RebindToUnsigned<D> u;
-        for (int i = 0; i < vectors; ++i)
-            hn::Store(hn::BitCast(u, keys_[i]), u, keys + i * lanes);
+        for (int i = 0; i < vectors; ++i) hn::Store(hn::BitCast(u, keys_[i]), u, keys + i * lanes);
     }
 
     V keys_[vectors];
@@ -204,90 +203,96 @@ private:
 };
 
 /// One level of a walk: the node, how near its children are, and which are still to be entered.
-template <class T>
+template <class T, int Dim>
 struct NearestFrame {
     alignas(64) T d2[boxes_per_node];
-    std::uint32_t node, waiting;
+    const PointNode<T, Dim>* node;
+    std::uint32_t waiting;
 };
 
 /// Depth first, the nearest child first; the tree's exact depth bounds the frames.
 template <class T, int Dim, class Row>
 class NearestWalk {
+    using Frame = NearestFrame<T, Dim>;
+
 public:
     HWY_INLINE NearestWalk(const PointTreeView<T, Dim>& tree, const T* query, Row& row)
         : tree_(tree), query_(query), row_(row) {}
 
     HWY_INLINE void run() {
-        std::uint32_t level = tree_.levels - 1;
-        enter(level, 0);
+        Frame* frame = frames_;
+        enter(*frame, tree_.nodes[0]);
         for (;;) {
-            NearestFrame<T>& frame = frames_[level];
-            if (frame.waiting == 0) {
-                if (++level == tree_.levels) return;
-                drop_far(frames_[level], level);
+            if (frame->waiting == 0) {
+                if (frame == frames_) return;
+                drop_far(*--frame);
                 continue;
             }
-            const std::uint32_t child = nearest_of(frame);
-            frame.waiting &= ~(1u << child);
-            const std::uint32_t below = frame.node * boxes_per_node + child;
-            if (level != 0) {
-                enter(--level, below);
+            const std::uint32_t child = nearest_of(*frame);
+            frame->waiting &= ~(1u << child);
+            const std::uint32_t below = frame->node->below + child;
+            if (frame->node->is_bottom == 0) {
+                enter(*++frame, tree_.nodes[below]);
             } else {
                 scan(tree_.leaves[below]);
-                drop_far(frame, 0);
+                drop_far(*frame);
             }
         }
     }
 
 private:
-    [[nodiscard]] static HWY_INLINE std::uint32_t nearest_of(const NearestFrame<T>& frame) {
-        std::uint32_t waiting = frame.waiting;
-        auto best = static_cast<std::uint32_t>(std::countr_zero(waiting));
-        for (waiting &= waiting - 1; waiting != 0; waiting &= waiting - 1) {
-            const auto c = static_cast<std::uint32_t>(std::countr_zero(waiting));
-            best = frame.d2[c] < frame.d2[best] ? c : best;
+    /// The nearest that waits. Keys are d2 with its lowest bits replaced by the number of the
+    /// child: which of two almost equal ones comes first does not matter.
+    [[nodiscard]] static HWY_INLINE std::uint32_t nearest_of(const Frame& frame) {
+        if ((frame.waiting & (frame.waiting - 1)) == 0)
+            return static_cast<std::uint32_t>(std::countr_zero(frame.waiting));
+        using Key = hwy::MakeUnsigned<T>;
+        constexpr hn::RebindToUnsigned<Lanes<T>> u;
+        const auto none = hn::Set(u, hwy::LimitsMax<Key>());
+        auto least = none;
+        for (std::uint32_t part = 0; part < parts_of<T>; ++part) {
+            const std::uint32_t from = part * lanes_of<T>;
+            const auto d2 = hn::BitCast(u, hn::Load(Lanes<T>(), frame.d2 + from));
+            const auto key =
+                hn::Or(hn::AndNot(hn::Set(u, Key{15}), d2), hn::Iota(u, static_cast<Key>(from)));
+            const auto waits = mask_of(u, frame.waiting >> from);
+            least = hn::Min(least, hn::IfThenElse(waits, key, none));
         }
-        return best;
+        return static_cast<std::uint32_t>(hn::GetLane(hn::MinOfLanes(u, least)) & 15);
     }
 
-    HWY_INLINE void enter(std::uint32_t level, std::uint32_t node) {
-        NearestFrame<T>& frame = frames_[level];
-        frame.node = node;
-        const PointNode<T, Dim>& boxes = tree_.nodes[tree_.start[level] + node];
+    HWY_INLINE void enter(Frame& frame, const PointNode<T, Dim>& node) {
+        frame.node = &node;
         const auto worst = hn::Set(Lanes<T>(), row_.worst_d2());
         std::uint32_t equal = 0;
-        const std::uint32_t near = each_part<T>([&](std::uint32_t from) {
-            const auto d2 = least_squared_distances(boxes, query_, from);
+        const std::uint32_t near = each_part<T>([&](std::uint32_t from) HWY_ATTR {
+            const auto d2 = least_squared_distances(node, query_, from);
             hn::Store(d2, Lanes<T>(), frame.d2 + from);
             equal |= bits_of(Lanes<T>(), hn::Eq(d2, worst)) << from;
             return bits_of(Lanes<T>(), hn::Le(d2, worst));
         });
-        const std::uint32_t there = tree_.child_mask(level, node);
-        frame.waiting = near & there;
-        if (HWY_UNLIKELY((equal & there) != 0)) drop_later(frame, level, equal & there);
+        frame.waiting = near & node.child_mask();
+        if (HWY_UNLIKELY((equal & frame.waiting) != 0)) drop_later(frame, equal & frame.waiting);
     }
 
-    HWY_INLINE void drop_far(NearestFrame<T>& frame, std::uint32_t level) {
+    HWY_INLINE void drop_far(Frame& frame) {
         if (frame.waiting == 0) return;
         const auto worst = hn::Set(Lanes<T>(), row_.worst_d2());
         std::uint32_t equal = 0;
-        frame.waiting &= each_part<T>([&](std::uint32_t from) {
+        frame.waiting &= each_part<T>([&](std::uint32_t from) HWY_ATTR {
             const auto d2 = hn::Load(Lanes<T>(), frame.d2 + from);
             equal |= bits_of(Lanes<T>(), hn::Eq(d2, worst)) << from;
             return bits_of(Lanes<T>(), hn::Le(d2, worst));
         });
-        if (HWY_UNLIKELY((equal & frame.waiting) != 0))
-            drop_later(frame, level, equal & frame.waiting);
+        if (HWY_UNLIKELY((equal & frame.waiting) != 0)) drop_later(frame, equal & frame.waiting);
     }
 
     /// Children that are just as far as the last of the row matter only if they hold a lower id:
     /// without this, each of many equal points would be looked at.
-    HWY_NOINLINE void drop_later(NearestFrame<T>& frame, std::uint32_t level, std::uint32_t equal) {
-        const std::uint32_t* lowest =
-            tree_.lowest_ids + std::size_t{tree_.start[level] + frame.node} * boxes_per_node;
+    HWY_NOINLINE void drop_later(Frame& frame, std::uint32_t equal) {
         for (; equal != 0; equal &= equal - 1) {
             const auto c = static_cast<std::uint32_t>(std::countr_zero(equal));
-            if (lowest[c] > row_.worst_id()) frame.waiting &= ~(1u << c);
+            if (frame.node->lowest_id[c] > row_.worst_id()) frame.waiting &= ~(1u << c);
         }
     }
 
@@ -309,7 +314,7 @@ private:
     const PointTreeView<T, Dim>& tree_;
     QueryLanes<T, Dim> query_;
     Row& row_;
-    NearestFrame<T> frames_[max_point_levels];
+    Frame frames_[max_point_depth];
 };
 
 template <class T, int Dim>

@@ -4,6 +4,8 @@
 #include <raydix/buffer.h>
 #include <raydix/points.h>
 
+#include <vector>
+
 #include "points/point_tree.h"
 #include "sort/radix_sort.h"
 
@@ -13,7 +15,7 @@ template <class Scalar, int Dim>
 struct PointArrays {
     Buffer<PointLeaf<Scalar, Dim>> leaves;
     Buffer<PointNode<Scalar, Dim>> nodes;
-    Buffer<std::uint32_t> lowest_ids;
+    std::vector<std::size_t> level_starts;  // nodes of level i: [i], ... [i + 1]
     PointTreeView<Scalar, Dim> tree;
     typename PointOf<Scalar, Dim>::Box bounds;
     PointsOptions options;

@@ -72,18 +72,18 @@ constexpr std::string_view baseline_name = HWY_STATIC_TARGET == HWY_SSE4    ? "s
 #else
 #define RAYDIX_ADD_AVX2(name)
 #endif
-#define RAYDIX_POINT_KERNELS(T, Dim, name)                                     \
-    template <>                                                                \
-    std::span<const PointKernels<T, Dim>> point_kernels<T, Dim>() {            \
-        static const std::vector<PointKernels<T, Dim>> all = [] {              \
-            std::vector<PointKernels<T, Dim>> found;                           \
+#define RAYDIX_POINT_KERNELS(T, Dim, name)                                      \
+    template <>                                                                 \
+    std::span<const PointKernels<T, Dim>> point_kernels<T, Dim>() {             \
+        static const std::vector<PointKernels<T, Dim>> all = [] {               \
+            std::vector<PointKernels<T, Dim>> found;                            \
             [[maybe_unused]] const std::int64_t here = hwy::SupportedTargets(); \
-            RAYDIX_ADD_AVX3(name)                                              \
-            RAYDIX_ADD_AVX2(name)                                              \
-            found.push_back(HWY_STATIC_DISPATCH(name)(baseline_name));         \
-            return found;                                                      \
-        }();                                                                   \
-        return all;                                                            \
+            RAYDIX_ADD_AVX3(name)                                               \
+            RAYDIX_ADD_AVX2(name)                                               \
+            found.push_back(HWY_STATIC_DISPATCH(name)(baseline_name));          \
+            return found;                                                       \
+        }();                                                                    \
+        return all;                                                             \
     }
 RAYDIX_POINT_KERNELS(float, 2, kernels_f2)
 RAYDIX_POINT_KERNELS(float, 3, kernels_f3)

@@ -53,10 +53,10 @@ struct WithinJob : PointJob<T, Dim> {
     const T* radii;  // one of each query; null: `radius` for all
     T radius;
     bool by_distance;
-    KeepPoints keep;             // else queries must be points of the index in its order, and
+    KeepPoints keep;              // else queries must be points of the index in its order, and
     const std::uint32_t* itself;  // their ids are here: [n]
-    std::uint32_t* counts;       // [queries]
-    std::size_t most_found;      // a block that finds more is given up on the way
+    std::uint32_t* counts;        // [queries]
+    std::size_t most_found;       // a block that finds more is given up on the way
 
     [[nodiscard]] T radius_of(std::size_t place) const {
         return radii == nullptr ? radius : radii[place];

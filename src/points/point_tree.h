@@ -1,22 +1,19 @@
 // The form that queries read: points in groups of 16, stored by coordinate, and above them nodes of
-// 16 boxes each. Everything but the last group and the last node of a level is full, so places
-// follow from numbers: child c of node i is node, or group, 16 * i + c of the level below.
+// up to 16 boxes. The children of a node lie side by side: groups below a bottom node, nodes below
+// the others.
 #pragma once
 
 #include <raydix/types.h>
 
-#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
-#include <type_traits>
 
 namespace raydix {
 
 inline constexpr std::uint32_t points_per_leaf = 16, boxes_per_node = 16;
-/// 2^31 points are 2^27 groups: 7 levels of nodes.
-inline constexpr std::uint32_t max_point_levels = 7;
+/// Each level of nodes takes a bit of a Morton code at least, or halves what has equal codes.
+inline constexpr std::uint32_t max_point_depth = 63 + 31 + 1;
 
 template <class T, int Dim>
 struct alignas(64) PointLeaf {
@@ -24,35 +21,29 @@ struct alignas(64) PointLeaf {
     std::uint32_t id[points_per_leaf];  // no_primitive behind the last point
 };
 
-/// The boxes of 16 children; those behind the last child have lo = hi = 0 and are never looked at.
 template <class T, int Dim>
 struct alignas(64) PointNode {
-    T lo[Dim][boxes_per_node];
+    T lo[Dim][boxes_per_node];  // of the children; 0 behind the last
     T hi[Dim][boxes_per_node];
+    std::uint32_t below;                                  // the first child: a group or a node
+    std::uint32_t children;                               // how many
+    std::uint32_t is_bottom;                              // 1: they are groups
+    alignas(64) std::uint32_t lowest_id[boxes_per_node];  // below each child
+    std::uint32_t points[boxes_per_node];                 // below each child
+
+    /// Bit c: child c is there.
+    [[nodiscard]] std::uint32_t child_mask() const { return (1u << children) - 1; }
 };
 
-/// Pointers to a tree. `levels` = 0: no points.
+/// Pointers to a tree; nodes[0] is the root.
 template <class T, int Dim>
 struct PointTreeView {
     const PointLeaf<T, Dim>* leaves = nullptr;
-    const PointNode<T, Dim>* nodes = nullptr;  // those above the leaves first, the root last
-    const std::uint32_t* lowest_ids = nullptr;  // [node][child]: the lowest id below it
-    std::uint32_t points = 0, levels = 0;
-    /// Where the nodes of a level begin, and how many children they have together.
-    std::array<std::uint32_t, max_point_levels> start{}, children{};
+    const PointNode<T, Dim>* nodes = nullptr;
+    std::uint32_t points = 0, leaf_count = 0, node_count = 0;
+    std::uint32_t depth = 0;  // nodes from the root to the deepest, both included
 
-    [[nodiscard]] bool empty() const { return levels == 0; }
-    /// Bit c: child c of a node is there.
-    [[nodiscard]] std::uint32_t child_mask(std::uint32_t level, std::uint32_t node) const {
-        const std::uint32_t left = children[level] - node * boxes_per_node;
-        return left >= boxes_per_node ? 0xFFFFu : (1u << left) - 1;
-    }
-    /// How many points lie below child `child` of all children of a level.
-    [[nodiscard]] std::uint32_t points_below(std::uint32_t level, std::uint32_t child) const {
-        const std::uint64_t each = std::uint64_t{points_per_leaf} << 4 * level;
-        const std::uint64_t begin = child * each, rest = points - begin;
-        return static_cast<std::uint32_t>(rest < each ? rest : each);
-    }
+    [[nodiscard]] bool empty() const { return points == 0; }
 };
 
 /// Whether (d2, id) orders like the unsigned number it gives: floats that are not negative are in

@@ -54,8 +54,8 @@ std::vector<std::uint32_t> order_of_queries(const T* queries, std::size_t n, std
     return order;
 }
 
-#define RAYDIX_QUERY_ORDER(T, Dim)                                                             \
-    template std::vector<std::uint32_t> order_of_queries<T, Dim>(                              \
+#define RAYDIX_QUERY_ORDER(T, Dim)                                \
+    template std::vector<std::uint32_t> order_of_queries<T, Dim>( \
         const T*, std::size_t, std::size_t, const T*, const T*, QueryOrder);
 RAYDIX_QUERY_ORDER(float, 2)
 RAYDIX_QUERY_ORDER(float, 3)

@@ -99,37 +99,32 @@ HWY_INLINE bool walk_region(const PointTreeView<T, Dim>& tree, const Region& reg
                             const Leaf& leaf, const Whole& whole) {
     constexpr bool skips_whole = !std::is_same_v<Whole, std::nullptr_t>;
     struct Frame {
-        std::uint32_t node, waiting;
-    } frames[max_point_levels];
-    std::uint32_t level = tree.levels - 1;
-    const auto enter = [&](std::uint32_t node) HWY_ATTR {
-        const PointNode<T, Dim>& boxes = tree.nodes[tree.start[level] + node];
-        std::uint32_t met = region.boxes_met(boxes) & tree.child_mask(level, node);
+        const PointNode<T, Dim>* node;
+        std::uint32_t waiting;
+    } frames[max_point_depth];
+    Frame* frame = frames;
+    const auto enter = [&](const PointNode<T, Dim>& node) HWY_ATTR {
+        std::uint32_t met = region.boxes_met(node) & node.child_mask();
         if constexpr (skips_whole) {
             // Just above the groups the test would cost as much as it saves.
-            std::uint32_t inside = level != 0 ? region.boxes_inside(boxes) & met : 0;
+            std::uint32_t inside = node.is_bottom == 0 ? region.boxes_inside(node) & met : 0;
             met &= ~inside;
-            for (; inside != 0; inside &= inside - 1)
-                whole(tree.points_below(
-                    level, node * boxes_per_node +
-                               static_cast<std::uint32_t>(std::countr_zero(inside))));
+            for (; inside != 0; inside &= inside - 1) whole(node.points[std::countr_zero(inside)]);
         }
-        frames[level] = {node, met};
+        *frame = {&node, met};
     };
-    enter(0);
+    enter(tree.nodes[0]);
     for (;;) {
-        Frame& frame = frames[level];
-        if (frame.waiting == 0) {
-            if (++level == tree.levels) return true;
+        if (frame->waiting == 0) {
+            if (frame-- == frames) return true;
             continue;
         }
         const std::uint32_t below =
-            frame.node * boxes_per_node +
-            static_cast<std::uint32_t>(std::countr_zero(frame.waiting));
-        frame.waiting &= frame.waiting - 1;
-        if (level != 0) {
-            --level;
-            enter(below);
+            frame->node->below + static_cast<std::uint32_t>(std::countr_zero(frame->waiting));
+        frame->waiting &= frame->waiting - 1;
+        if (frame->node->is_bottom == 0) {
+            ++frame;
+            enter(tree.nodes[below]);
             continue;
         }
         alignas(64) T d2[points_per_leaf];
@@ -268,12 +263,11 @@ void count_within(const WithinJob<T, Dim>& job, PointJobCounts& counts) {
         [&](const Region& region, std::size_t k, std::size_t place) HWY_ATTR {
             std::uint32_t found = 0;
             if (job.keep == KeepPoints::later) {
-                const auto leaf = [&](const PointLeaf<T, Dim>& group, std::uint32_t in, const T*)
-                                      HWY_ATTR {
-                                          found += bit_count(
-                                              kept_of(group, in, job.keep, job.itself[k]));
-                                          return true;
-                                      };
+                const auto leaf = [&](const PointLeaf<T, Dim>& group, std::uint32_t in,
+                                      const T*) HWY_ATTR {
+                    found += bit_count(kept_of(group, in, job.keep, job.itself[k]));
+                    return true;
+                };
                 walk_region(job.tree, region, leaf, nullptr);
             } else {
                 const auto leaf = [&](const PointLeaf<T, Dim>&, std::uint32_t in, const T*)
