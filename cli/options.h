@@ -87,6 +87,7 @@ void add_build_command(CLI::App& app);
 void add_check_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
 void add_render_command(CLI::App& app);
+void add_query_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
 void add_bench_command(CLI::App& app);
 /// bench traversal

@@ -1,6 +1,7 @@
 // Everything at once.
 #pragma once
 
+#include <raydix/arrays.h>           // IWYU pragma: export
 #include <raydix/buffer.h>           // IWYU pragma: export
 #include <raydix/bvh.h>              // IWYU pragma: export
 #include <raydix/camera.h>           // IWYU pragma: export
@@ -17,6 +18,7 @@
 #include <raydix/mesh.h>             // IWYU pragma: export
 #include <raydix/octree.h>           // IWYU pragma: export
 #include <raydix/picture.h>          // IWYU pragma: export
+#include <raydix/points.h>           // IWYU pragma: export
 #include <raydix/rays.h>             // IWYU pragma: export
 #include <raydix/rdx.h>              // IWYU pragma: export
 #include <raydix/report.h>           // IWYU pragma: export
