@@ -24,13 +24,11 @@ void add_kinds(CLI::App& command, QueryCommand& options) {
         ->check(CLI::Range(std::uint32_t{1}, std::uint32_t{0xFFFFFFFE}))
         ->type_name("K")
         ->group(group);
-    command
-        .add_option("--radius", options.radius, "All points within distance R of each query")
+    command.add_option("--radius", options.radius, "All points within distance R of each query")
         ->check(finite_number(true))
         ->type_name("R")
         ->group(group);
-    command.add_flag("--box", options.box, "All points in each box; needs --queries")
-        ->group(group);
+    command.add_flag("--box", options.box, "All points in each box; needs --queries")->group(group);
 }
 
 }  // namespace
@@ -39,13 +37,13 @@ Json query_json(const QueryFigures& figures) {
     std::vector<double> rates;
     for (const double seconds : figures.seconds)
         rates.push_back(static_cast<double>(figures.queries) / seconds / 1e6);
-    return {{"kind", figures.kind},
-            {"queries", figures.queries},
-            {"invalid_queries", figures.invalid_queries},
-            {"found", figures.found},
-            {"mqueries_per_s", figures.queries == 0 || rates.empty()
-                                   ? Json(nullptr)
-                                   : spread_json(spread_of(rates))}};
+    return {
+        {"kind", figures.kind},
+        {"queries", figures.queries},
+        {"invalid_queries", figures.invalid_queries},
+        {"found", figures.found},
+        {"mqueries_per_s",
+         figures.queries == 0 || rates.empty() ? Json(nullptr) : spread_json(spread_of(rates))}};
 }
 
 void print_query(const Json& query) {
@@ -55,8 +53,8 @@ void print_query(const Json& query) {
     const auto number = [&](const char* name) {
         return rate.is_null() ? std::string("-") : fmt::format("{:.3f}", rate[name].get<double>());
     };
-    fmt::print("{:<10} {:>12} {:>14} {:>12} {:>12} {:>9} {:>9}\n",
-               query["kind"].get<std::string>(), grouped(query["queries"].get<std::uint64_t>()),
+    fmt::print("{:<10} {:>12} {:>14} {:>12} {:>12} {:>9} {:>9}\n", query["kind"].get<std::string>(),
+               grouped(query["queries"].get<std::uint64_t>()),
                grouped(query["found"].get<std::uint64_t>()),
                grouped(query["invalid_queries"].get<std::uint64_t>()), number("median"),
                number("min"), number("max"));
@@ -86,7 +84,9 @@ void add_query_command(CLI::App& app) {
                      "Write PREFIX.indices.npy and PREFIX.distances.npy; --radius and --box also "
                      "PREFIX.offsets.npy")
         ->type_name("PREFIX");
-    command->add_flag("--sort", options->sort, "Rows of --radius by distance instead of by index (of --knn they always are)");
+    command->add_flag(
+        "--sort", options->sort,
+        "Rows of --radius by distance instead of by index (of --knn they always are)");
     command->add_option("--tree", options->tree, "How points are grouped; answers are the same")
         ->check(CLI::IsMember({"automatic", "kdtree", "bvh"}))
         ->capture_default_str();

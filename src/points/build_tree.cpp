@@ -11,11 +11,15 @@
 #include "base/math.h"
 #include "exec/parallel.h"
 #include "points/curve.h"
+#include "points/halve.h"
 
 namespace raydix {
 namespace {
 
 constexpr std::size_t points_per_block = 1u << 15;
+/// Ranges that these bits do not part get codes of their own.
+template <int Dim>
+constexpr int axis_bits = Dim == 3 ? 10 : 15;
 
 template <class T, int Dim>
 bool is_valid(const T* p) {
@@ -38,42 +42,6 @@ void grow(PointBounds<T, Dim>& bounds, const T* lo, const T* hi) {
     for (int d = 0; d < Dim; ++d) {
         bounds.lo[d] = lo[d] < bounds.lo[d] ? lo[d] : bounds.lo[d];
         bounds.hi[d] = hi[d] > bounds.hi[d] ? hi[d] : bounds.hi[d];
-    }
-}
-
-/// A point on its way from one group to another.
-template <class T, int Dim>
-struct MovingPoint {
-    T at[Dim];
-    std::uint32_t id;
-};
-
-template <class T, int Dim>
-int widest_side(const PointBounds<T, Dim>& box) {
-    int widest = 0;
-    for (int d = 1; d < Dim; ++d)
-        if (box.hi[d] - box.lo[d] > box.hi[widest] - box.lo[widest]) widest = d;
-    return widest;
-}
-
-/// Parts points so that each 16 of them are neighbours. The order of (coordinate, id) is total, so
-/// which points come together does not depend on the library's selection.
-template <class T, int Dim>
-void halve(MovingPoint<T, Dim>* points, std::size_t n) {
-    while (n > points_per_leaf) {
-        const std::size_t leaves = (n + points_per_leaf - 1) / points_per_leaf;
-        const std::size_t left = (leaves + 1) / 2 * points_per_leaf;
-        PointBounds<T, Dim> box = no_bounds<T, Dim>();
-        for (std::size_t i = 0; i < n; ++i) grow(box, points[i].at, points[i].at);
-        const int side = widest_side(box);
-        std::nth_element(points, points + left, points + n,
-                         [side](const MovingPoint<T, Dim>& a, const MovingPoint<T, Dim>& b) {
-                             return a.at[side] < b.at[side] ||
-                                    (a.at[side] == b.at[side] && a.id < b.id);
-                         });
-        halve(points, left);
-        points += left;
-        n -= left;
     }
 }
 
@@ -113,8 +81,7 @@ void clear_rest(PointNode<T, Dim>& node) {
     }
 }
 
-using Record = SortRecord<std::uint64_t>;
-constexpr std::uint32_t points_per_bottom = points_per_leaf * boxes_per_node;
+using Record = SortRecord<PointCode>;
 
 struct Range {
     std::uint32_t begin, end;
@@ -133,33 +100,40 @@ struct Parts {
     }
 };
 
-/// Where a range is halved. Where all codes are equal the points are put in order along the widest
-/// side of their box first, unless they are all at the same place.
+/// Codes of a range in a grid of its own box: where all of them were equal, others may not be.
 template <class T, int Dim>
-std::uint32_t middle_of(const T* points, Record* records, Range range) {
-    const std::uint64_t differs = records[range.begin].key ^ records[range.end - 1].key;
-    if (differs != 0) {
-        const std::uint64_t bit = std::bit_floor(differs);
-        return static_cast<std::uint32_t>(
-            std::partition_point(records + range.begin, records + range.end,
-                                 [bit](const Record& r) { return (r.key & bit) == 0; }) -
-            records);
-    }
-    const std::uint32_t middle = range.begin + range.size() / 2;
+void encode_again(const T* points, Record* records, Range range) {
     PointBounds<T, Dim> box = no_bounds<T, Dim>();
     for (std::uint32_t i = range.begin; i < range.end; ++i) {
         const T* p = points + std::size_t{records[i].position} * Dim;
         grow(box, p, p);
     }
-    const int side = widest_side(box);
-    if (box.lo[side] == box.hi[side]) return middle;
-    std::nth_element(records + range.begin, records + middle, records + range.end,
-                     [=](const Record& a, const Record& b) {
-                         const T x = points[std::size_t{a.position} * Dim + side],
-                                 y = points[std::size_t{b.position} * Dim + side];
-                         return x < y || (x == y && a.position < b.position);
-                     });
-    return middle;
+    if (std::equal(box.lo, box.lo + Dim, box.hi)) return;
+    const CurveGrid<T, Dim> grid(box.lo, box.hi, axis_bits<Dim>);
+    std::vector<PointCode> codes(range.size());
+    std::vector<std::uint32_t> order(range.size()), positions(range.size());
+    for (std::uint32_t i = 0; i < range.size(); ++i) {
+        positions[i] = records[range.begin + i].position;
+        codes[i] = static_cast<PointCode>(grid.code(points + std::size_t{positions[i]} * Dim));
+    }
+    SortScratch<PointCode> scratch;
+    sort_keys<PointCode>(codes, order, axis_bits<Dim> * Dim, scratch);
+    for (std::uint32_t i = 0; i < range.size(); ++i)
+        records[range.begin + i] = {codes[i], positions[order[i]]};
+}
+
+/// Where a range is halved: at the highest bit in which its codes differ; in the middle if the
+/// points are all at one place, or too close for any grid.
+template <class T, int Dim>
+std::uint32_t middle_of(const T* points, Record* records, Range range) {
+    const auto differing = [&] { return records[range.begin].key ^ records[range.end - 1].key; };
+    if (differing() == 0) encode_again<T, Dim>(points, records, range);
+    if (differing() == 0) return range.begin + range.size() / 2;
+    const PointCode bit = std::bit_floor(differing());
+    return static_cast<std::uint32_t>(
+        std::partition_point(records + range.begin, records + range.end,
+                             [bit](const Record& r) { return (r.key & bit) == 0; }) -
+        records);
 }
 
 /// Halves the largest part until there are 16, or none is left that must be divided.
@@ -228,18 +202,17 @@ PointBounds<T, Dim> bounds_of_points(const T* points, std::size_t n) {
 template <class T, int Dim>
 void sort_along_curve(const T* points, std::size_t n, const PointBounds<T, Dim>& bounds,
                       detail::PointArrays<T, Dim>& arrays) {
-    constexpr int axis_bits = CurveGrid<T, Dim>::most_axis_bits;
-    const CurveGrid<T, Dim> grid(bounds.lo, bounds.hi, axis_bits);
+    const CurveGrid<T, Dim> grid(bounds.lo, bounds.hi, axis_bits<Dim>);
     const bool all_valid = bounds.left_out == 0;
-    const auto load = [&](std::size_t begin, std::size_t end, std::uint64_t* codes) {
+    const auto load = [&](std::size_t begin, std::size_t end, PointCode* codes) {
         for (std::size_t i = begin; i < end; ++i) {
             const T* p = points + i * Dim;
-            *codes++ =
-                all_valid || is_valid<T, Dim>(p) ? grid.code(p) : left_out_key<std::uint64_t>;
+            *codes++ = all_valid || is_valid<T, Dim>(p) ? static_cast<PointCode>(grid.code(p))
+                                                        : left_out_key<PointCode>;
         }
     };
-    sort_on_the_way<std::uint64_t>(
-        n, all_valid ? axis_bits * Dim : 64, load, [](std::size_t, std::span<const Record>) {},
+    sort_on_the_way<PointCode>(
+        n, all_valid ? axis_bits<Dim> * Dim : 32, load, [](std::size_t, std::span<const Record>) {},
         arrays.sort_scratch);
 }
 
@@ -255,15 +228,19 @@ std::vector<BottomRange> divide_into_nodes(const T* points, std::uint32_t valid,
     std::vector<BottomRange> bottoms;
     std::vector<Parts> parts;
     arrays.level_starts.assign(1, 0);
-    for (std::size_t begin = 0; begin < nodes.size();) {  // a level at a time
+    // Points that no halving of space parts in so many levels are parted by their order.
+    constexpr std::uint32_t last_divided = max_point_depth - 8;
+    std::uint32_t level = 0;
+    for (std::size_t begin = 0; begin < nodes.size(); ++level) {
         const std::size_t end = nodes.size();
         parts.assign(end - begin, {});
         for_each_range(end - begin, 16, [&](std::size_t first, std::size_t last) {
             for (std::size_t i = first; i < last; ++i) {
                 const Range range = nodes[begin + i].range;
                 if (range.size() <= points_per_bottom) continue;
-                parts[i] =
-                    kdtree ? halved_parts<T, Dim>(points, records, range) : equal_parts(range);
+                parts[i] = kdtree && level < last_divided
+                               ? halved_parts<T, Dim>(points, records, range)
+                               : equal_parts(range);
             }
         });
         for (std::size_t i = begin; i < end; ++i) {
@@ -304,26 +281,29 @@ void fill_leaves(const T* points, const std::vector<BottomRange>& bottoms, bool 
                  detail::PointArrays<T, Dim>& arrays) {
     const Record* records = arrays.sort_scratch.records.data();
     for_each_range(bottoms.size(), 8, [&](std::size_t first, std::size_t last) {
-        std::array<MovingPoint<T, Dim>, points_per_bottom> moving;
+        PointRun<T, Dim> run;
+        Halver<T, Dim> halver;
         for (std::size_t b = first; b < last; ++b) {
             const BottomRange bottom = bottoms[b];
             const std::uint32_t n = bottom.end - bottom.begin;
+            const BottomRange next = bottoms[std::min(b + 1, last - 1)];
+            for (std::uint32_t i = next.begin; i < next.end; ++i)
+                __builtin_prefetch(points + std::size_t{records[i].position} * Dim);
             for (std::uint32_t i = 0; i < n; ++i) {
                 const std::uint32_t id = records[bottom.begin + i].position;
                 const T* p = points + std::size_t{id} * Dim;
-                for (int d = 0; d < Dim; ++d) moving[i].at[d] = p[d] + T{0};  // -0 becomes +0
-                moving[i].id = id;
+                for (int d = 0; d < Dim; ++d) run.at[d][i] = p[d] + T{0};  // -0 becomes +0
+                run.id[i] = id;
             }
-            if (kdtree) halve(moving.data(), n);
             PointNode<T, Dim>& node = arrays.nodes[bottom.node];
             PointLeaf<T, Dim>* leaves = arrays.leaves.data() + node.below;
-            for (std::uint32_t i = 0; i < node.children * points_per_leaf; ++i) {
-                PointLeaf<T, Dim>& leaf = leaves[i / points_per_leaf];
-                const std::uint32_t lane = i % points_per_leaf;
-                for (int d = 0; d < Dim; ++d)
-                    leaf.at[d][lane] =
-                        i < n ? moving[i].at[d] : std::numeric_limits<T>::quiet_NaN();
-                leaf.id[lane] = i < n ? moving[i].id : no_primitive;
+            if (kdtree) {
+                halver.run(run, n, leaves);
+            } else {
+                for (std::uint32_t c = 0; c < node.children; ++c)
+                    halver.write_leaf(run, c * points_per_leaf,
+                                      std::min(n - c * points_per_leaf, points_per_leaf),
+                                      leaves[c]);
             }
             for (std::uint32_t c = 0; c < node.children; ++c)
                 fit_leaf(leaves[c], std::min(n - c * points_per_leaf, points_per_leaf), node, c);

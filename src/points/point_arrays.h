@@ -9,7 +9,11 @@
 #include "points/point_tree.h"
 #include "sort/radix_sort.h"
 
-namespace raydix::detail {
+namespace raydix {
+
+using PointCode = std::uint32_t;  // a place on the curve
+
+namespace detail {
 
 template <class Scalar, int Dim>
 struct PointArrays {
@@ -22,7 +26,8 @@ struct PointArrays {
     PointsTree chosen = PointsTree::kdtree;
     std::uint64_t input_count = 0, left_out = 0, peak_bytes = 0;
     PointsBuildMs ms;
-    SortScratch<std::uint64_t> sort_scratch;  // kept from the first rebuild on
+    SortScratch<PointCode> sort_scratch;  // kept from the first rebuild on
 };
 
-}  // namespace raydix::detail
+}  // namespace detail
+}  // namespace raydix

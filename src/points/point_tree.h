@@ -12,8 +12,9 @@
 namespace raydix {
 
 inline constexpr std::uint32_t points_per_leaf = 16, boxes_per_node = 16;
-/// Each level of nodes takes a bit of a Morton code at least, or halves what has equal codes.
-inline constexpr std::uint32_t max_point_depth = 63 + 31 + 1;
+/// Nodes on a path from the root; build_tree.cpp sees to it. Uniform points need one for each
+/// factor of 16, points that come closer by halves, down to the least float, about 70.
+inline constexpr std::uint32_t max_point_depth = 96;
 
 template <class T, int Dim>
 struct alignas(64) PointLeaf {

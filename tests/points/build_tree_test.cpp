@@ -113,8 +113,7 @@ TYPED_TEST(PointTree, HoldsEachPointOnce) {
     for (const PointSet& set : point_sets(300 * thorough, seed)) {
         auto points = points_as<TypeParam>(set.points);
         if (points.size() > 5) points[5].x = -typename TypeParam::Scalar{0};
-        for (const PointsTree tree :
-             {PointsTree::automatic, PointsTree::kdtree, PointsTree::bvh}) {
+        for (const PointsTree tree : {PointsTree::automatic, PointsTree::kdtree, PointsTree::bvh}) {
             SCOPED_TRACE(set.name + ", " + std::string(points_tree_name(tree)));
             const TypeParam index = build_points(points, {.tree = tree, .threads = 2});
             Walk<TypeParam>(index, points).run();
@@ -150,7 +149,7 @@ TYPED_TEST(PointTree, MemoryIsCounted) {
     const auto& arrays = index.arrays();
     EXPECT_EQ(index.bytes(), arrays.leaves.size() * sizeof(arrays.leaves[0]) +
                                  arrays.nodes.size() * sizeof(arrays.nodes[0]));
-    EXPECT_GE(index.peak_bytes(), index.bytes() + points.size() * sizeof(SortRecord<std::uint64_t>));
+    EXPECT_GE(index.peak_bytes(), index.bytes() + points.size() * sizeof(SortRecord<PointCode>));
     EXPECT_LT(index.bytes(), points.size() * sizeof(points[0]) * 3);
 }
 

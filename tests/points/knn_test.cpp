@@ -29,9 +29,8 @@ NearestPoints<typename Index::Scalar> expected(const std::vector<typename Index:
                                                const std::vector<typename Index::Point>& queries,
                                                std::uint32_t k) {
     using T = typename Index::Scalar;
-    NearestPoints<T> rows{Buffer<std::uint32_t>(queries.size() * k),
-                          Buffer<T>(queries.size() * k),
-                          {}};
+    NearestPoints<T> rows{
+        Buffer<std::uint32_t>(queries.size() * k), Buffer<T>(queries.size() * k), {}};
     const EveryPoint<Index> every(points);
     for (std::size_t q = 0; q < queries.size(); ++q) {
         const std::vector<Near<T>> all = every.by_distance(queries[q]);
@@ -108,9 +107,8 @@ TYPED_TEST(Knn, OneByOneLikeTheBatch) {
             points_as<TypeParam>(queries_for(set.points, 20 + 2 * thorough, seed + 5));
         for (const std::uint32_t k : {1u, 5u, 20u, 50u}) {
             const auto batch = knn(index, queries, k);
-            NearestPoints<T> single{Buffer<std::uint32_t>(queries.size() * k),
-                                    Buffer<T>(queries.size() * k),
-                                    {}};
+            NearestPoints<T> single{
+                Buffer<std::uint32_t>(queries.size() * k), Buffer<T>(queries.size() * k), {}};
             std::uint64_t found = 0;
             for (std::size_t q = 0; q < queries.size(); ++q)
                 found += knn(index, queries[q], single.indices.span().subspan(q * k, k),
@@ -169,8 +167,9 @@ TYPED_TEST(Knn, BadCalls) {
     EXPECT_EQ(message([&] { knn(index, Point{}, {}, {}); }), "knn: k is 0; it must be at least 1");
     EXPECT_NE(message([&] { knn(index, queries, 3, ids, distances); }).find("room for 6"),
               std::string::npos);
-    EXPECT_NE(message([&] { knn(index, queries, 2, ids, std::span(distances).first(5)); })
-                  .find("room for 5"),
+    EXPECT_NE(message([&] {
+                  knn(index, queries, 2, ids, std::span(distances).first(5));
+              }).find("room for 5"),
               std::string::npos);
     EXPECT_NE(message([&] { (void)knn(index, queries, 0xFFFFFFFFu); }).find("does not fit"),
               std::string::npos);

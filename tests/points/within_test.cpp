@@ -23,8 +23,8 @@ TYPED_TEST_SUITE(Within, Indices);
 /// Zero, and the distances of some queries to their 1st, 10th and last points, so that points lie
 /// on the sphere exactly or nearly so.
 template <class Index>
-std::vector<typename Index::Scalar> radii_for(
-    const EveryPoint<Index>& every, const std::vector<typename Index::Point>& queries) {
+std::vector<typename Index::Scalar> radii_for(const EveryPoint<Index>& every,
+                                              const std::vector<typename Index::Point>& queries) {
     using T = typename Index::Scalar;
     std::vector<T> radii{0, std::numeric_limits<T>::infinity()};
     for (std::size_t q = 2; q < queries.size() && radii.size() < 12; q += 5) {
@@ -115,11 +115,11 @@ TYPED_TEST(Within, CallbacksMayStop) {
         for (const T radius : radii_for<TypeParam>(every, queries))
             for (const auto& query : queries) {
                 std::vector<Near<T>> found;
-                EXPECT_TRUE(for_each_in_radius(index, query, radius,
-                                               [&](std::uint32_t id, T distance) {
-                                                   found.push_back({distance, id});
-                                                   return true;
-                                               }));
+                EXPECT_TRUE(
+                    for_each_in_radius(index, query, radius, [&](std::uint32_t id, T distance) {
+                        found.push_back({distance, id});
+                        return true;
+                    }));
                 std::ranges::sort(found, {}, &Near<T>::id);
                 const auto wanted = every.within(query, radius, false);
                 ASSERT_EQ(found.size(), wanted.size()) << set.name;
@@ -181,8 +181,8 @@ TYPED_TEST(Within, NeighbourListsAreHalfOrFull) {
             ASSERT_EQ(full.indices.size(), 2 * half.indices.size()) << set.name;
             for (std::uint32_t i = 0; i < points.size(); ++i) {
                 const bool valid = EveryPoint<TypeParam>::is_valid(points[i]);
-                auto wanted = valid ? every.within(points[i], radius, false)
-                                    : std::vector<Near<T>>{};
+                auto wanted =
+                    valid ? every.within(points[i], radius, false) : std::vector<Near<T>>{};
                 std::erase_if(wanted, [&](const Near<T>& n) { return n.id == i; });
                 ASSERT_TRUE(is_row(full, i, wanted)) << set.name << ", point " << i;
                 std::erase_if(wanted, [&](const Near<T>& n) { return n.id < i; });
@@ -227,12 +227,14 @@ TYPED_TEST(Within, ResultsLargerThanMemoryAreRefused) {
     const TypeParam index = build_points(std::vector<Point>(n));  // all pairs would be n * n
     const std::vector<Point> queries(n);
     const PointQueryOptions small{.max_bytes = 100'000'000};
-    EXPECT_NE(message_of([&] { (void)radius_search(index, queries, 0, small); })
-                  .find("radius search: a result of"),
+    EXPECT_NE(message_of([&] {
+                  (void)radius_search(index, queries, 0, small);
+              }).find("radius search: a result of"),
               std::string::npos);
     for (const PairRows rows : {PairRows::half, PairRows::full})
-        EXPECT_NE(message_of([&] { (void)neighbour_lists(index, 0, rows, small); })
-                      .find("neighbour lists: a result of"),
+        EXPECT_NE(message_of([&] {
+                      (void)neighbour_lists(index, 0, rows, small);
+                  }).find("neighbour lists: a result of"),
                   std::string::npos);
     std::vector<std::uint32_t> counts(n);  // counting them is quick all the same
     EXPECT_EQ(radius_count(index, queries, 0, counts).found, std::uint64_t{n} * n);

@@ -62,7 +62,8 @@ public:
     }
     static T squared_distance(const Point& a, const Point& b) {
         const T dx = a.x - b.x, dy = a.y - b.y;
-        if constexpr (Index::dimension == 2) return dx * dx + dy * dy;
+        if constexpr (Index::dimension == 2)
+            return dx * dx + dy * dy;
         else {
             const T dz = a.z - b.z;
             return (dx * dx + dy * dy) + dz * dz;
