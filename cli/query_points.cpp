@@ -60,7 +60,8 @@ void save_lists(const QueryCommand& options, const PointLists<float>& lists) {
 
 QueryFigures answer_nearest(const QueryCommand& options, const Points& index, const Scene& scene,
                             const PointQueryOptions& how) {
-    QueryFigures figures{.kind = "knn"};
+    QueryFigures figures;
+    figures.kind = "knn";
     const std::vector<Vec3> queries = load_queries(options, scene);
     NearestPoints<float> nearest = knn(index, queries, *options.k, how);
     figures.seconds = timed_repeats(options.repeat, [&] {
@@ -73,7 +74,8 @@ QueryFigures answer_nearest(const QueryCommand& options, const Points& index, co
 
 template <class Search>
 QueryFigures answer_lists(const QueryCommand& options, const char* kind, const Search& search) {
-    QueryFigures figures{.kind = kind};
+    QueryFigures figures;
+    figures.kind = kind;
     PointLists<float> lists;
     figures.seconds = timed_repeats(options.repeat, [&] {
         lists = {};  // never two results at once

@@ -85,8 +85,7 @@ void check_radius(Scalar radius, const std::string& whose) {
 
 std::size_t blocks_of(std::size_t n) { return (n + queries_per_block - 1) / queries_per_block; }
 
-/// Queries of one kind over a whole batch: first counted or collected block by block, then put into
-/// one result.
+/// Queries of one kind over a whole batch: counted, and then filled into rows of that length.
 template <class Index>
 class RowBatch {
     using Scalar = typename Index::Scalar;
@@ -103,31 +102,38 @@ public:
 
     PointQueryCounts count() {
         order();
-        for_each_block(
-            job_.n, queries_per_block,
-            [&](std::size_t b, std::size_t begin, std::size_t end) { count_block(b, begin, end); });
+        count_all("", std::numeric_limits<std::uint64_t>::max());
         return sum_of(parts_, job_.n);
     }
 
     /// `rows`: of the result; row_of[k] is that of query k, or null: k.
     PointLists<Scalar> lists(std::size_t rows, const std::uint32_t* row_of, const char* what) {
         order();
+        Buffer<std::uint32_t> counts(job_.n);
+        job_.counts = counts.data();
         const std::uint64_t limit = memory_limit(options_.max_bytes);
-        counts_.reset(job_.n);
-        job_.counts = counts_.data();
-        collect(limit, what);
+        count_all(what, limit);
         PointLists<Scalar> result;
         result.counts = sum_of(parts_, job_.n);
         const std::uint64_t total = result.counts.found + 2 * (std::uint64_t{rows} + 1);
-        check_result_fits(what, total, sizeof(std::uint32_t) + sizeof(Scalar), limit);
+        check_result_fits(what, total, bytes_each, limit);
         set_offsets(rows, row_of, result);
         result.indices.reset(result.counts.found);
         result.distances.reset(result.counts.found);
-        fill(row_of, result);
+        job_.row_of = row_of;
+        job_.offsets = result.offsets.data();
+        job_.indices = result.indices.data();
+        job_.distances = result.distances.data();
+        for_each_block(job_.n, queries_per_block,
+                       [&](std::size_t, std::size_t begin, std::size_t end) {
+                           (boxes_ ? kernels_.fill_box : kernels_.fill_ball)(block(begin, end));
+                       });
         return result;
     }
 
 private:
+    static constexpr std::uint64_t bytes_each = sizeof(std::uint32_t) + sizeof(Scalar);
+
     void order() {
         order_ = order_for(index_, job_.queries, job_.n, values_, options_.order);
         parts_.assign(blocks_of(job_.n), {});
@@ -139,54 +145,23 @@ private:
         if (job.radii != nullptr) job.radii += begin;
         if (job.itself != nullptr) job.itself += begin;
         job.counts += begin;
+        if (job.row_of != nullptr)
+            job.row_of += begin;
+        else if (job.offsets != nullptr)
+            job.offsets += begin;
         return job;
     }
-    void count_block(std::size_t b, std::size_t begin, std::size_t end) {
-        (boxes_ ? kernels_.count_box : kernels_.count_ball)(block(begin, end), parts_[b]);
-    }
-    /// Whether all of it was collected.
-    bool collect_block(std::size_t begin, std::size_t end, std::size_t most,
-                       FoundPoints<Scalar>& found, PointJobCounts& counts) const {
-        Within<Index> job = block(begin, end);
-        job.most_found = most;
-        found.size = 0;
-        (boxes_ ? kernels_.collect_box : kernels_.collect_ball)(job, found, counts);
-        return found.size <= most;
-    }
 
-    /// Blocks are collected at once while they are small and take little memory beside the result;
-    /// the others are only counted here, so that a result that does not fit is known before it is
-    /// made.
-    void collect(std::uint64_t limit, const char* what) {
-        constexpr std::uint64_t each = sizeof(std::uint32_t) + sizeof(Scalar);
-        constexpr std::size_t most = queries_per_block * 256;
-        kept_.resize(parts_.size());
-        std::atomic<std::uint64_t> held{0}, total{0};
-        for_each_range(kept_.size(), 1, [&](std::size_t first, std::size_t last) {
-            FoundPoints<Scalar> found;
-            for (std::size_t b = first; b < last; ++b) {
-                const std::size_t begin = b * queries_per_block,
-                                  end = std::min(job_.n, begin + queries_per_block);
-                const bool room = held.load(std::memory_order_relaxed) < limit / 8;
-                if (room && collect_block(begin, end, most, found, parts_[b])) {
-                    held.fetch_add(found.size * each, std::memory_order_relaxed);
-                    keep(found, kept_[b]);
-                } else {
-                    parts_[b] = {};
-                    count_block(b, begin, end);
-                }
-                const std::uint64_t so_far =
-                    total.fetch_add(parts_[b].found, std::memory_order_relaxed) + parts_[b].found;
-                check_result_fits(what, so_far, each, limit);
-            }
-        });
-    }
-    static void keep(const FoundPoints<Scalar>& found, FoundPoints<Scalar>& copy) {
-        copy.ids.reset(found.size);
-        copy.d2.reset(found.size);
-        copy.size = found.size;
-        std::copy_n(found.ids.data(), found.size, copy.ids.data());
-        std::copy_n(found.d2.data(), found.size, copy.d2.data());
+    /// Stops as soon as the rows so far do not fit: a result that is far too large is known early.
+    void count_all(const char* what, std::uint64_t limit) {
+        std::atomic<std::uint64_t> total{0};
+        for_each_block(
+            job_.n, queries_per_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
+                (boxes_ ? kernels_.count_box : kernels_.count_ball)(block(begin, end), parts_[b]);
+                const std::uint64_t found = parts_[b].found;
+                check_result_fits(what, total.fetch_add(found, std::memory_order_relaxed) + found,
+                                  bytes_each, limit);
+            });
     }
 
     void set_offsets(std::size_t rows, const std::uint32_t* row_of, PointLists<Scalar>& result) {
@@ -194,39 +169,8 @@ private:
         std::uint64_t* offsets = result.offsets.data();
         std::fill_n(offsets, rows + 1, std::uint64_t{0});
         for (std::size_t k = 0; k < job_.n; ++k)
-            offsets[(row_of == nullptr ? k : row_of[k]) + 1] = counts_[k];
+            offsets[(row_of == nullptr ? k : row_of[k]) + 1] = job_.counts[k];
         std::inclusive_scan(offsets, offsets + rows + 1, offsets);
-    }
-
-    void fill(const std::uint32_t* row_of, PointLists<Scalar>& result) {
-        for_each_range(kept_.size(), 1, [&](std::size_t first, std::size_t last) {
-            FoundPoints<Scalar> again;
-            for (std::size_t b = first; b < last; ++b) {
-                const std::size_t begin = b * queries_per_block,
-                                  end = std::min(job_.n, begin + queries_per_block);
-                FoundPoints<Scalar>* found = &kept_[b];
-                if (found->size != parts_[b].found) {
-                    PointJobCounts counts;
-                    collect_block(begin, end, std::numeric_limits<std::size_t>::max(), again,
-                                  counts);
-                    found = &again;
-                }
-                copy_rows(*found, begin, end, row_of, result);
-                kept_[b] = {};
-            }
-        });
-    }
-    void copy_rows(const FoundPoints<Scalar>& found, std::size_t begin, std::size_t end,
-                   const std::uint32_t* row_of, PointLists<Scalar>& result) const {
-        std::size_t from = 0;
-        for (std::size_t i = begin; i < end; ++i) {
-            const std::size_t place = order_.empty() ? i : order_[i];
-            const std::size_t n = counts_[place];
-            const std::uint64_t to = result.offsets[row_of == nullptr ? place : row_of[place]];
-            std::copy_n(found.ids.data() + from, n, result.indices.data() + to);
-            std::copy_n(found.d2.data() + from, n, result.distances.data() + to);
-            from += n;
-        }
     }
 
     const Index& index_;
@@ -237,8 +181,6 @@ private:
     const KernelsOf<Index>& kernels_;
     std::vector<std::uint32_t> order_;
     std::vector<PointJobCounts> parts_;
-    std::vector<FoundPoints<Scalar>> kept_;
-    Buffer<std::uint32_t> counts_;
 };
 
 template <class Index>

@@ -113,8 +113,7 @@ private:
             const auto middle = static_cast<std::int32_t>((low + high) / 2);
             std::int32_t below = 0;
             for (std::uint32_t i = 0; i < n; ++i) below += keys_[i] < middle;
-            if (below == static_cast<std::int32_t>(rank))
-                return middle;
+            if (below == static_cast<std::int32_t>(rank)) return middle;
             if (below < static_cast<std::int32_t>(rank))
                 low = std::int64_t{middle} + 1;
             else

@@ -21,8 +21,8 @@ PointKernels<T, Dim> kernels(std::string_view isa) {
             nearest<T, Dim>,
             count_within<Ball<T, Dim>, T, Dim>,
             count_within<Window<T, Dim>, T, Dim>,
-            collect_within<Ball<T, Dim>, T, Dim>,
-            collect_within<Window<T, Dim>, T, Dim>,
+            fill_within<Ball<T, Dim>, T, Dim>,
+            fill_within<Window<T, Dim>, T, Dim>,
             visit_ball<T, Dim>};
 }
 
@@ -37,20 +37,6 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace raydix {
-
-template <class T>
-void FoundPoints<T>::grow(std::size_t least) {
-    FoundPoints larger;
-    const std::size_t room = 2 * least + 1024;
-    larger.ids.reset(room);
-    larger.d2.reset(room);
-    std::copy_n(ids.data(), size, larger.ids.data());
-    std::copy_n(d2.data(), size, larger.d2.data());
-    larger.size = size;
-    *this = std::move(larger);
-}
-template struct FoundPoints<float>;
-template struct FoundPoints<double>;
 
 namespace {
 

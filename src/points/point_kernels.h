@@ -1,7 +1,6 @@
 // The doors to the queries that are compiled once per instruction set.
 #pragma once
 
-#include <raydix/buffer.h>
 #include <raydix/points.h>
 
 #include <cstddef>
@@ -31,20 +30,6 @@ struct NearestJob : PointJob<T, Dim> {
     T* distances;            // [queries * k]
 };
 
-/// Points found, one after the other, with room for more behind them.
-template <class T>
-struct FoundPoints {
-    Buffer<std::uint32_t> ids;
-    Buffer<T> d2;
-    std::size_t size = 0;
-
-    /// Room for `more` behind the last.
-    void reserve(std::size_t more) {
-        if (size + more > ids.size()) grow(size + more);
-    }
-    void grow(std::size_t least);
-};
-
 /// Which of the points found are kept: all, all but the query itself, or only later ones.
 enum class KeepPoints : std::uint32_t { all, others, later };
 
@@ -55,8 +40,12 @@ struct WithinJob : PointJob<T, Dim> {
     bool by_distance;
     KeepPoints keep;              // else queries must be points of the index in its order, and
     const std::uint32_t* itself;  // their ids are here: [n]
-    std::uint32_t* counts;        // [queries]
-    std::size_t most_found;       // a block that finds more is given up on the way
+    std::uint32_t* counts;        // [queries], out of a count, and what it gave for a fill
+    // Out of a fill: the row of query k begins at offsets[row_of[k]], or offsets[k] without row_of.
+    const std::uint32_t* row_of;
+    const std::uint64_t* offsets;
+    std::uint32_t* indices;
+    T* distances;
 
     [[nodiscard]] T radius_of(std::size_t place) const {
         return radii == nullptr ? radius : radii[place];
@@ -81,12 +70,9 @@ struct PointKernels {
     /// How many points are within, to job.counts.
     void (*count_ball)(const WithinJob<T, Dim>& job, PointJobCounts& counts);
     void (*count_box)(const WithinJob<T, Dim>& job, PointJobCounts& counts);
-    /// The rows of one query after the other, sorted, with true distances in found.d2, to the end
-    /// or until there are more than most_found.
-    void (*collect_ball)(const WithinJob<T, Dim>& job, FoundPoints<T>& found,
-                         PointJobCounts& counts);
-    void (*collect_box)(const WithinJob<T, Dim>& job, FoundPoints<T>& found,
-                        PointJobCounts& counts);
+    /// The rows themselves, sorted, with true distances, where they belong.
+    void (*fill_ball)(const WithinJob<T, Dim>& job);
+    void (*fill_box)(const WithinJob<T, Dim>& job);
     bool (*visit_ball)(const PointTreeView<T, Dim>& tree, const T* query, T radius,
                        const PointVisitor<T>& visitor);
 };

@@ -11,9 +11,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numeric>
 #include <vector>
 
+#include "points/found_point.h"
 #include "points/lanes.h"
 #include "points/nearest.h"
 #include "points/point_kernels.h"
@@ -134,81 +134,103 @@ HWY_INLINE bool walk_region(const PointTreeView<T, Dim>& tree, const Region& reg
     }
 }
 
-/// Orders a row of points found: by id, or by (d2, id).
-template <class T>
-class RowOrder {
-public:
-    explicit RowOrder(bool by_distance) : by_distance_(by_distance) {}
+HWY_INLINE std::uint32_t bit_count(std::uint32_t bits) {
+    return static_cast<std::uint32_t>(std::popcount(bits));
+}
 
-    HWY_INLINE void sort(std::uint32_t* ids, T* d2, std::size_t n) {
-        if (n <= by_rank)
-            sort_by_rank(ids, d2, n);
-        else
-            sort_long(ids, d2, n);
+/// The points of one row as they are found, and then in order.
+template <class T>
+class FoundRow {
+    using D = Lanes<T>;
+    using Ids = hn::CappedTag<std::uint32_t, 16>;
+
+public:
+    HWY_INLINE void clear() { size_ = 0; }
+
+    /// Points of a group whose bits are set.
+    template <int Dim>
+    HWY_INLINE void add(const PointLeaf<T, Dim>& group, std::uint32_t in, const T* d2) {
+        if (size_ + 2 * points_per_leaf > room_) grow();
+        constexpr D d;
+        constexpr Ids i;
+        std::size_t at = size_;
+        for (std::uint32_t from = 0; from < 16; from += lanes_of<T>) {
+            const std::uint32_t bits = in >> from & ((1u << lanes_of<T>)-1);
+            hn::StoreU(hn::Compress(hn::Load(d, d2 + from), mask_of(d, bits)), d, &d2_[at]);
+            at += bit_count(bits);
+        }
+        at = size_;
+        constexpr auto id_lanes = static_cast<std::uint32_t>(hn::MaxLanes(i));
+        for (std::uint32_t from = 0; from < 16; from += id_lanes) {
+            const std::uint32_t bits = in >> from & ((1u << id_lanes) - 1);
+            hn::StoreU(hn::Compress(hn::Load(i, group.id + from), mask_of(i, bits)), i, &ids_[at]);
+            at += bit_count(bits);
+        }
+        size_ = at;
+    }
+
+    /// By id, or by (d2, id); distances are true ones.
+    HWY_INLINE void write(bool by_distance, std::uint32_t* ids, T* distances) {
+        if (size_ > most_ranked) return write_long(by_distance, ids, distances);
+        by_distance ? write_ranked<true>(ids, distances) : write_ranked<false>(ids, distances);
     }
 
 private:
-    static constexpr std::size_t by_rank = 64;
-    using Ids = hn::CappedTag<std::uint32_t, 16>;
+    static constexpr std::size_t most_ranked = 64;
 
-    /// A row's place is the number of those before it. There is room for 16 more behind the row.
-    HWY_INLINE void sort_by_rank(std::uint32_t* ids, T* d2, std::size_t n) {
-        alignas(64) std::uint32_t from_ids[by_rank + 16];
-        alignas(64) T from_d2[by_rank + 16];
-        const std::size_t padded = (n + 15) / 16 * 16;
-        for (std::size_t i = 0; i < n; ++i) {
-            from_ids[i] = ids[i];
-            from_d2[i] = d2[i];
-        }
-        for (std::size_t i = n; i < padded; ++i) {
-            from_ids[i] = no_primitive;
-            from_d2[i] = std::numeric_limits<T>::quiet_NaN();
-        }
-        for (std::size_t i = 0; i < n; ++i) {
-            const std::size_t rank = by_distance_ ? rank_by_distance(from_ids, from_d2, i, n)
-                                                  : rank_by_id(from_ids, from_ids[i], padded);
-            ids[rank] = from_ids[i];
-            d2[rank] = from_d2[i];
-        }
+    HWY_NOINLINE void grow() {
+        room_ = 2 * room_ + 256;
+        d2_.resize(room_);
+        ids_.resize(room_);
     }
-    static HWY_INLINE std::size_t rank_by_id(const std::uint32_t* ids, std::uint32_t id,
-                                             std::size_t padded) {
-        constexpr Ids d;
+
+    /// A point's place is the number of those before it.
+    template <bool by_distance>
+    HWY_INLINE void write_ranked(std::uint32_t* ids, T* distances) {
+        constexpr D d;
+        constexpr Ids i;
+        for (std::size_t from = 0; from < 16; from += hn::MaxLanes(i))
+            hn::StoreU(hn::Set(i, no_primitive), i, &ids_[size_ + from]);
+        for (std::size_t k = 0; k < size_; ++k) {
+            const std::size_t rank =
+                by_distance ? rank_by_distance(d2_[k], ids_[k]) : rank_by_id(ids_[k]);
+            ids[rank] = ids_[k];
+            distances[rank] = d2_[k];
+        }
+        std::size_t k = 0;
+        for (; k + lanes_of<T> <= size_; k += lanes_of<T>)
+            hn::StoreU(hn::Sqrt(hn::LoadU(d, distances + k)), d, distances + k);
+        for (; k < size_; ++k) distances[k] = std::sqrt(distances[k]);
+    }
+    /// Behind the last stand ids that are greater than any.
+    HWY_INLINE std::size_t rank_by_id(std::uint32_t id) const {
+        constexpr Ids i;
         std::size_t rank = 0;
-        for (std::size_t i = 0; i < padded; i += hn::MaxLanes(d))
-            rank += hn::CountTrue(d, hn::Lt(hn::Load(d, ids + i), hn::Set(d, id)));
+        for (std::size_t k = 0; k < size_; k += hn::MaxLanes(i))
+            rank += hn::CountTrue(i, hn::Lt(hn::LoadU(i, &ids_[k]), hn::Set(i, id)));
         return rank;
     }
-    static std::size_t rank_by_distance(const std::uint32_t* ids, const T* d2, std::size_t of,
-                                        std::size_t n) {
+    HWY_INLINE std::size_t rank_by_distance(T d2, std::uint32_t id) const {
         std::size_t rank = 0;
-        for (std::size_t i = 0; i < n; ++i)
-            rank += d2[i] < d2[of] || (d2[i] == d2[of] && ids[i] < ids[of]);
+        for (std::size_t k = 0; k < size_; ++k)
+            rank += d2_[k] < d2 || (d2_[k] == d2 && ids_[k] < id);
         return rank;
     }
 
-    struct Found {
-        T d2;
-        std::uint32_t id;
-    };
-    void sort_long(std::uint32_t* ids, T* d2, std::size_t n) {
-        row_.resize(n);
-        for (std::size_t i = 0; i < n; ++i) row_[i] = {d2[i], ids[i]};
-        if (by_distance_)
-            std::sort(row_.begin(), row_.end(), [](const Found& a, const Found& b) {
-                return a.d2 < b.d2 || (a.d2 == b.d2 && a.id < b.id);
-            });
-        else
-            std::sort(row_.begin(), row_.end(),
-                      [](const Found& a, const Found& b) { return a.id < b.id; });
-        for (std::size_t i = 0; i < n; ++i) {
-            ids[i] = row_[i].id;
-            d2[i] = row_[i].d2;
+    HWY_NOINLINE void write_long(bool by_distance, std::uint32_t* ids, T* distances) {
+        long_.resize(size_);
+        for (std::size_t k = 0; k < size_; ++k) long_[k] = {d2_[k], ids_[k]};
+        sort_found(long_, by_distance);
+        for (std::size_t k = 0; k < size_; ++k) {
+            ids[k] = long_[k].id;
+            distances[k] = std::sqrt(long_[k].d2);
         }
     }
 
-    bool by_distance_;
-    std::vector<Found> row_;
+    std::size_t size_ = 0, room_ = 0;
+    std::vector<T> d2_;
+    std::vector<std::uint32_t> ids_;
+    std::vector<FoundPoint<T>> long_;
 };
 
 /// Bits of the points that are to be kept.
@@ -252,10 +274,6 @@ HWY_INLINE void each_query(const WithinJob<T, Dim>& job, PointJobCounts& counts,
     }
 }
 
-HWY_INLINE std::uint32_t bit_count(std::uint32_t bits) {
-    return static_cast<std::uint32_t>(std::popcount(bits));
-}
-
 template <class Region, class T, int Dim>
 void count_within(const WithinJob<T, Dim>& job, PointJobCounts& counts) {
     each_query<Region>(
@@ -285,39 +303,27 @@ void count_within(const WithinJob<T, Dim>& job, PointJobCounts& counts) {
 }
 
 template <class Region, class T, int Dim>
-void collect_within(const WithinJob<T, Dim>& job, FoundPoints<T>& found, PointJobCounts& counts) {
-    RowOrder<T> order(job.by_distance);
+void fill_within(const WithinJob<T, Dim>& job) {
+    FoundRow<T> row;
+    PointJobCounts counts;
     each_query<Region>(
         job, counts,
         [&](const Region& region, std::size_t k, std::size_t place) HWY_ATTR {
-            if (found.size > job.most_found) return;
+            if (job.counts[place] == 0) return;
             const std::uint32_t itself = job.keep == KeepPoints::all ? 0 : job.itself[k];
-            const std::size_t begin = found.size;
+            row.clear();
             walk_region(
                 job.tree, region,
                 [&](const PointLeaf<T, Dim>& group, std::uint32_t in, const T* d2) HWY_ATTR {
-                    in = kept_of(group, in, job.keep, itself);
-                    found.reserve(points_per_leaf);
-                    for (; in != 0; in &= in - 1) {
-                        const auto i = static_cast<std::uint32_t>(std::countr_zero(in));
-                        found.ids[found.size] = group.id[i];
-                        found.d2[found.size++] = d2[i];
-                    }
+                    row.add(group, kept_of(group, in, job.keep, itself), d2);
                     return true;
                 },
                 nullptr);
-            const std::size_t n = found.size - begin;
-            if (n == 0) {
-                job.counts[place] = 0;
-                return;
-            }
-            T* d2 = found.d2.data() + begin;
-            order.sort(found.ids.data() + begin, d2, n);
-            for (std::size_t i = 0; i < n; ++i) d2[i] = std::sqrt(d2[i]);
-            job.counts[place] = static_cast<std::uint32_t>(n);
-            counts.found += n;
+            const std::uint64_t begin =
+                job.offsets[job.row_of == nullptr ? place : job.row_of[place]];
+            row.write(job.by_distance, job.indices + begin, job.distances + begin);
         },
-        [&](std::size_t place) { job.counts[place] = 0; });
+        [](std::size_t) {});
 }
 
 template <class T, int Dim>

@@ -136,7 +136,7 @@ TYPED_TEST(PointTree, DepthIsBoundedWhereCodesCollapse) {
     std::vector<typename TypeParam::Point> points(2000 * thorough);
     for (std::size_t i = 0; i < points.size(); ++i)
         points[i].x = static_cast<T>(1 + static_cast<double>(i * 7919 % points.size()) * 1e-6);
-    points[0].x = T{1e12};
+    points[0].x = static_cast<T>(1e12f);
     const TypeParam index = build_points(points);
     EXPECT_LE(index.depth(), 20u);
     Walk<TypeParam>(index, points).run();
@@ -185,7 +185,7 @@ TYPED_TEST(PointTree, StrictNamesTheFirstInvalidPoint) {
     auto points = points_as<TypeParam>(point_sets(100'000, seed)[5].points);
     const T inf = std::numeric_limits<T>::infinity();
     points[77'777].x = inf;
-    points[90'000].y = T{-1.1e12};
+    points[90'000].y = static_cast<T>(-1.1e12f);
     EXPECT_EQ(build_points(points).left_out(), 2u);
     try {
         (void)build_points(points, {.strict = true});
@@ -194,8 +194,8 @@ TYPED_TEST(PointTree, StrictNamesTheFirstInvalidPoint) {
         EXPECT_EQ(std::string(error.what()),
                   "point 77777: not finite or out of range, as are 1 others");
     }
-    points[77'777].x = T{1e12f};
-    points[90'000].y = -T{1e12f};
+    points[77'777].x = static_cast<T>(1e12f);
+    points[90'000].y = -static_cast<T>(1e12f);
     EXPECT_EQ(build_points(points, {.strict = true}).left_out(), 0u);
 }
 
