@@ -19,6 +19,8 @@ MAY_INCLUDE = {
     # copies primitives into leaf order, so it must know how a primitive is read
     "layout": {"base", "exec", "tree", "primitives"},
     "rays": {"base", "exec", "keys", "sort"},
+    # an index of its own: sorts points and groups them, then asks the groups
+    "points": {"base", "exec", "keys", "sort"},
     "simt": {"base"},
     "trace": {"base", "exec", "primitives", "layout", "rays", "simt"},
     # walks through the same trees as rays do, with the same stacks

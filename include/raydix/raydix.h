@@ -1,6 +1,7 @@
 // Everything at once.
 #pragma once
 
+#include <raydix/arrays.h>           // IWYU pragma: export
 #include <raydix/buffer.h>           // IWYU pragma: export
 #include <raydix/bvh.h>              // IWYU pragma: export
 #include <raydix/camera.h>           // IWYU pragma: export
@@ -21,6 +22,7 @@
 #include <raydix/overlap.h>          // IWYU pragma: export
 #include <raydix/pairs.h>            // IWYU pragma: export
 #include <raydix/picture.h>          // IWYU pragma: export
+#include <raydix/points.h>           // IWYU pragma: export
 #include <raydix/rays.h>             // IWYU pragma: export
 #include <raydix/rdx.h>              // IWYU pragma: export
 #include <raydix/refit.h>            // IWYU pragma: export

@@ -94,7 +94,10 @@ std::vector<Pairs> find_pairs(const PairTree& a, const PairTree& b, bool narrow,
     const auto in_order = [&](std::uint32_t k, std::uint32_t l, const Collector& out) {
         if (!is_pair<same>(a, b, k, l, narrow)) return;
         const std::uint32_t i = a.boxes[k].prim, j = b.boxes[l].prim;
-        same&& j < i ? out.take(j, i) : out.take(i, j);
+        if (same && j < i)
+            out.take(j, i);
+        else
+            out.take(i, j);
     };
     std::vector<Pairs> lists(1);
     std::vector<NodePair> tasks;
