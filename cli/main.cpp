@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
     raydix::cli::add_check_command(app);
     raydix::cli::add_trace_command(app);
     raydix::cli::add_render_command(app);
+    raydix::cli::add_query_command(app);
     raydix::cli::add_simulate_command(app);
     raydix::cli::add_bench_command(app);
     raydix::cli::add_report_command(app);

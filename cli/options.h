@@ -87,12 +87,15 @@ void add_build_command(CLI::App& app);
 void add_check_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
 void add_render_command(CLI::App& app);
+void add_query_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
 void add_bench_command(CLI::App& app);
 /// bench traversal
 void add_traversal_suite(CLI::App& bench);
 /// bench cpu
 void add_cpu_suite(CLI::App& bench);
+/// bench points
+void add_points_suite(CLI::App& bench);
 void add_report_command(CLI::App& app);
 
 }  // namespace raydix::cli

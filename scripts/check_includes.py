@@ -19,8 +19,13 @@ MAY_INCLUDE = {
     # copies primitives into leaf order, so it must know how a primitive is read
     "layout": {"base", "exec", "tree", "primitives"},
     "rays": {"base", "exec", "keys", "sort"},
+    # an index of its own: sorts points and groups them, then asks the groups
+    "points": {"base", "exec", "keys", "sort"},
     "simt": {"base"},
     "trace": {"base", "exec", "primitives", "layout", "rays", "simt"},
+    # walks through the same trees as rays do, with the same stacks
+    "proximity": {"base", "exec", "primitives", "sort", "tree", "rays", "trace"},
+    "instances": {"base", "exec", "trace"},
     "measure": {"base", "exec"},  # exec: the number of threads is a property of the machine
     "report": {"base", "measure"},
     "api": {"*"},
@@ -34,6 +39,7 @@ PRIVATE_LIBRARIES = {
     r"(tbb|oneapi)/.*": r"src/exec/parallel\.cpp",
     r"(cuda|cub|thrust|nv|nvtx3)/.*|cuda.*\.h": r"(src|tests|bench)/.*\.cuh?|src/base/atomic\.h",
     r"(embree\d?|nanoflann).*": r"(tests|bench)/.*",
+    r"CGAL/.*": r"bench/.*",
     r"gtest/.*|gmock/.*": r"tests/.*",
     r"CLI/.*": r"(cli|bench)/.*",
 }

@@ -8,8 +8,12 @@
 #include "sort/radix_sort.h"
 
 namespace raydix {
+namespace {
 
-std::vector<std::uint32_t> order_by_place(const Aabb& bounds, std::span<const Ray> rays) {
+/// place(i) of n elements.
+template <class Place>
+std::vector<std::uint32_t> order_along_curve(const Aabb& bounds, std::size_t n,
+                                             const Place& place) {
     constexpr int axis_bits = 7;
     constexpr float last = (1 << axis_bits) - 1;
     const Vec3 size = bounds.hi - bounds.lo;
@@ -19,15 +23,25 @@ std::vector<std::uint32_t> order_by_place(const Aabb& bounds, std::span<const Ra
     const auto cell = [&](float at, float lo) {  // NaN is in cell 0
         return static_cast<std::uint32_t>(min_of(max_of((at - lo) * scale, 0.0f), last));
     };
-    std::vector<std::uint32_t> keys(rays.size()), order(rays.size());
-    for_each_index(rays.size(), [&](std::size_t i) {
-        const Vec3 o = rays[i].origin;
+    std::vector<std::uint32_t> keys(n), order(n);
+    for_each_index(n, [&](std::size_t i) {
+        const Vec3 o = place(i);
         keys[i] = spread_bits(cell(o.x, bounds.lo.x)) << 2 |
                   spread_bits(cell(o.y, bounds.lo.y)) << 1 | spread_bits(cell(o.z, bounds.lo.z));
     });
     SortScratch<std::uint32_t> scratch;
     sort_keys<std::uint32_t>(keys, order, 3 * axis_bits, scratch);
     return order;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> order_by_place(const Aabb& bounds, std::span<const Ray> rays) {
+    return order_along_curve(bounds, rays.size(), [&](std::size_t i) { return rays[i].origin; });
+}
+
+std::vector<std::uint32_t> order_by_place(const Aabb& bounds, std::span<const Vec3> points) {
+    return order_along_curve(bounds, points.size(), [&](std::size_t i) { return points[i]; });
 }
 
 }  // namespace raydix

@@ -14,5 +14,8 @@ namespace raydix {
 /// Fewer than 2^31 rays.
 [[nodiscard]] std::vector<std::uint32_t> order_by_place(const Aabb& bounds,
                                                         std::span<const Ray> rays);
+/// The same for points.
+[[nodiscard]] std::vector<std::uint32_t> order_by_place(const Aabb& bounds,
+                                                        std::span<const Vec3> points);
 
 }  // namespace raydix

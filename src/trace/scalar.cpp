@@ -10,80 +10,22 @@
 #include "exec/parallel.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
-#include "trace/triangle_test.h"
-#include "trace/walk.h"
+#include "trace/tree_hits.h"
 
 namespace raydix {
 namespace {
 
 constexpr std::size_t rays_per_block = 1024;
 
-/// What a walk reads, without going through the Bvh each time.
-struct TreeView {
-    const BvhNode* nodes;
-    const LeafTriangle* triangles;
-    const std::uint32_t* order;
-    std::uint32_t max_depth;
-    bool empty;
-};
-
-TreeView view_of(const Bvh& bvh) {
+TriangleTree view_of(const Bvh& bvh) {
     if (bvh.kind() != PrimitiveKind::triangles && !bvh.empty())
         throw InputError(std::string("rays need triangles; this tree holds ") +
                          (bvh.kind() == PrimitiveKind::points ? "points" : "boxes"));
-    return {bvh.nodes().data(), bvh.triangles().data(), bvh.order().data(), bvh.max_depth(),
-            bvh.empty()};
+    return TriangleTree(bvh);
 }
 
 template <class Steps>
-void count_test(Steps& steps) {
-    if constexpr (!std::is_same_v<Steps, NoSteps>) ++steps.triangle_tests;
-}
-
-/// The best hit so far: position in leaf order and t in the frame's units.
-struct Closest {
-    float t;
-    std::uint32_t prim = no_primitive;
-    std::uint32_t position = no_primitive;
-    float u = 0.0f, v = 0.0f;
-};
-
-template <class Steps>
-Closest find_closest(const TreeView& tree, const RayFrame& ray, WalkStack& stack, Steps& steps) {
-    Closest best{ray.tmax};
-    const auto leaf = [&](const BvhNode& node) {
-        for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
-            TriangleHit hit;
-            count_test(steps);
-            if (!intersect_triangle<EdgeRule::closed>(ray, tree.triangles[k], best.t, hit))
-                continue;
-            // At equal t the lower primitive id wins, whatever order the leaves come in.
-            if (hit.t < best.t || tree.order[k] < best.prim)
-                best = {hit.t, tree.order[k], k, hit.u, hit.v};
-        }
-        return false;
-    };
-    walk_tree(tree.nodes, ray, stack, steps, leaf, [&] { return best.t; });
-    return best;
-}
-
-template <class Steps>
-bool find_any(const TreeView& tree, const RayFrame& ray, WalkStack& stack, Steps& steps) {
-    bool found = false;
-    const auto leaf = [&](const BvhNode& node) {
-        for (std::uint32_t k = node.first; k < node.first + node.count && !found; ++k) {
-            TriangleHit hit;
-            count_test(steps);
-            found = intersect_triangle<EdgeRule::closed>(ray, tree.triangles[k], ray.tmax, hit);
-        }
-        return found;
-    };
-    walk_tree(tree.nodes, ray, stack, steps, leaf, [&] { return ray.tmax; });
-    return found;
-}
-
-template <class Steps>
-void find_all(const TreeView& tree, const RayFrame& ray, WalkStack& stack, Steps& steps,
+void find_all(const TriangleTree& tree, const RayFrame& ray, WalkStack& stack, Steps& steps,
               std::vector<Hit>& hits) {
     const std::size_t before = hits.size();
     const auto leaf = [&](const BvhNode& node) {
@@ -99,14 +41,14 @@ void find_all(const TreeView& tree, const RayFrame& ray, WalkStack& stack, Steps
     finish_ray(hits, before);
 }
 
-Hit public_hit(const Closest& best, const RayFrame& ray) {
+Hit public_hit(const ClosestHit& best, const RayFrame& ray) {
     return best.prim == no_primitive ? Hit{} : Hit{best.t * ray.t_scale, best.prim, best.u, best.v};
 }
 
 /// Calls one(i, frame, stack, steps) -> number of hits for each valid ray and miss(i) for each
 /// other one.
 template <class Steps, class One, class Miss>
-TraceCounts for_each_ray(const TreeView& tree, std::span<const Ray> rays, const One& one,
+TraceCounts for_each_ray(const TriangleTree& tree, std::span<const Ray> rays, const One& one,
                          const Miss& miss) {
     std::vector<TraceCounts> parts((rays.size() + rays_per_block - 1) / rays_per_block);
     for_each_block(rays.size(), rays_per_block,
@@ -138,7 +80,7 @@ TraceCounts for_each_ray(const TreeView& tree, std::span<const Ray> rays, const 
 
 template <class Steps>
 TraceCounts closest_batch(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits) {
-    const TreeView tree = view_of(bvh);
+    const TriangleTree tree = view_of(bvh);
     return for_each_ray<Steps>(
         tree, rays,
         [&](std::size_t i, const RayFrame& ray, WalkStack& stack, Steps& steps) {
@@ -150,7 +92,7 @@ TraceCounts closest_batch(const Bvh& bvh, std::span<const Ray> rays, std::span<H
 
 template <class Steps>
 TraceCounts any_batch(const Bvh& bvh, std::span<const Ray> rays, std::span<std::uint8_t> occluded) {
-    const TreeView tree = view_of(bvh);
+    const TriangleTree tree = view_of(bvh);
     return for_each_ray<Steps>(
         tree, rays,
         [&](std::size_t i, const RayFrame& ray, WalkStack& stack, Steps& steps) {
@@ -162,7 +104,7 @@ TraceCounts any_batch(const Bvh& bvh, std::span<const Ray> rays, std::span<std::
 
 template <class Steps>
 AllHits all_batch(const Bvh& bvh, std::span<const Ray> rays) {
-    const TreeView tree = view_of(bvh);
+    const TriangleTree tree = view_of(bvh);
     std::vector<std::vector<Hit>> found((rays.size() + rays_per_block - 1) / rays_per_block);
     AllHits all;
     all.offsets.resize(rays.size() + 1, 0);
@@ -234,7 +176,7 @@ TraceCounts trace_steps(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit
                         std::span<RaySteps> steps, int threads) {
     check_sizes(rays.size(), hits.size());
     check_sizes(rays.size(), steps.size());
-    const TreeView tree = view_of(bvh);
+    const TriangleTree tree = view_of(bvh);
     TraceCounts counts;
     with_threads(threads, [&] {
         counts = for_each_ray<RaySteps>(
@@ -255,13 +197,13 @@ TraceCounts trace_steps(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit
 TraceCounts trace_leaf_positions(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits,
                                  int threads) {
     check_sizes(rays.size(), hits.size());
-    const TreeView tree = view_of(bvh);
+    const TriangleTree tree = view_of(bvh);
     TraceCounts counts;
     with_threads(threads, [&] {
         counts = for_each_ray<NoSteps>(
             tree, rays,
             [&](std::size_t i, const RayFrame& ray, WalkStack& stack, NoSteps& steps) {
-                const Closest best = find_closest(tree, ray, stack, steps);
+                const ClosestHit best = find_closest(tree, ray, stack, steps);
                 hits[i] = public_hit(best, ray);
                 hits[i].prim = best.position;
                 return std::uint64_t{hits[i].hit()};

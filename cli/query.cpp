@@ -1,0 +1,149 @@
+// raydix query: options, which kind it is, and how figures are told.
+#include "query.h"
+
+#include <fmt/format.h>
+#include <raydix/rdx.h>
+
+#include <memory>
+
+namespace raydix::cli {
+namespace {
+
+/// Options that mean nothing to the kind are usage errors, never ignored.
+void refuse(bool given, const char* option, const char* why) {
+    if (given) throw CLI::ValidationError(option, why);
+}
+
+void run_query(const QueryCommand& options) {
+    const int of_points = options.k.has_value() + options.radius.has_value() + options.box;
+    const int of_meshes = options.closest + options.signed_distance + options.pairs;
+    if (of_points + of_meshes != 1)
+        throw CLI::ValidationError("query",
+                                   "takes exactly one of --knn, --radius, --box, --closest, "
+                                   "--signed-distance and --pairs");
+    refuse(options.narrow && !options.pairs, "--narrow", "belongs to --pairs");
+    refuse(!options.with_scene.empty() && !options.pairs, "--with", "belongs to --pairs");
+    if (of_points != 0) {
+        refuse(!options.builder.empty(), "--builder",
+               "belongs to --closest, --signed-distance and --pairs");
+        return run_point_query(options);
+    }
+    refuse(options.sort, "--sort", "belongs to --radius and --box");
+    refuse(options.tree != "automatic", "--tree", "belongs to --knn, --radius and --box");
+    refuse(options.pairs && !options.queries_file.empty(), "--queries", "has no part in --pairs");
+    run_mesh_query(options);
+}
+
+void add_kinds(CLI::App& command, QueryCommand& options) {
+    const char* group = "Kind of query (one of them)";
+    command
+        .add_option("--knn", options.k,
+                    "The K nearest points of each query, by distance, the point itself included")
+        ->check(CLI::Range(std::uint32_t{1}, std::uint32_t{0xFFFFFFFE}))
+        ->type_name("K")
+        ->group(group);
+    command.add_option("--radius", options.radius, "All points within distance R of each query")
+        ->check(finite_number(true))
+        ->type_name("R")
+        ->group(group);
+    command.add_flag("--box", options.box, "All points in each box; needs --queries")->group(group);
+    command
+        .add_flag("--closest", options.closest,
+                  "The closest triangle to each query, the place on it and its distance")
+        ->group(group);
+    command
+        .add_flag("--signed-distance", options.signed_distance,
+                  "Distances to the mesh, negative inside")
+        ->group(group);
+    command
+        .add_flag("--pairs", options.pairs,
+                  "All pairs of triangles (or points) whose boxes overlap, but for neighbours")
+        ->group(group);
+}
+
+void add_mesh_options(CLI::App& command, QueryCommand& options) {
+    command.add_flag("--narrow", options.narrow, "--pairs: only triangles that meet");
+    command
+        .add_option("--with", options.with_scene,
+                    "--pairs: between the scene and this one instead of within it")
+        ->type_name("SCENE2");
+    std::vector<std::string> builders;
+    for (std::uint32_t i = 0; i <= static_cast<std::uint32_t>(Builder::sbvh); ++i)
+        builders.emplace_back(builder_name(static_cast<Builder>(i)));
+    command
+        .add_option("--builder", options.builder,
+                    "Of the tree over triangles; answers are the same (default: ploc)")
+        ->check(CLI::IsMember(builders));
+}
+
+}  // namespace
+
+Json query_json(const QueryFigures& figures) {
+    std::vector<double> rates;
+    for (const double seconds : figures.seconds)
+        rates.push_back(static_cast<double>(figures.queries) / seconds / 1e6);
+    return {
+        {"kind", figures.kind},
+        {"queries", figures.queries},
+        {"invalid_queries", figures.invalid_queries},
+        {"found", figures.found},
+        {"mqueries_per_s",
+         figures.queries == 0 || rates.empty() ? Json(nullptr) : spread_json(spread_of(rates))}};
+}
+
+void print_query(const Json& query) {
+    fmt::print("\n{:<10} {:>12} {:>14} {:>12} {:>12} {:>9} {:>9}\n", "query", "queries", "found",
+               "invalid", "Mqueries/s", "min", "max");
+    const Json& rate = query["mqueries_per_s"];
+    const auto number = [&](const char* name) {
+        return rate.is_null() ? std::string("-") : fmt::format("{:.3f}", rate[name].get<double>());
+    };
+    fmt::print("{:<10} {:>12} {:>14} {:>12} {:>12} {:>9} {:>9}\n", query["kind"].get<std::string>(),
+               grouped(query["queries"].get<std::uint64_t>()),
+               grouped(query["found"].get<std::uint64_t>()),
+               grouped(query["invalid_queries"].get<std::uint64_t>()), number("median"),
+               number("min"), number("max"));
+}
+
+Scene load_query_scene(const std::string& scene, const CommonOptions& common) {
+    return is_rdx(scene) ? load_rdx(scene).scene : load_scene(scene, common.seed);
+}
+
+void add_query_command(CLI::App& app) {
+    auto options = std::make_shared<QueryCommand>();
+    CLI::App* command = app.add_subcommand(
+        "query", "Nearest points, points in spheres or boxes, distances to meshes, pairs");
+    command
+        ->add_option("SCENE", options->scene,
+                     "A file, builtin:NAME?key=value&..., or a .rdx file; of a triangle mesh the "
+                     "vertices are the points")
+        ->required();
+    add_kinds(*command, *options);
+    command
+        ->add_option("--queries", options->queries_file,
+                     "A (Q, 3) .npy file or any scene with points; for --box a (Q, 6) .npy file of "
+                     "lo and hi (default: the scene's own points)")
+        ->type_name("FILE");
+    command
+        ->add_option("--out", options->prefix,
+                     "Write PREFIX.indices.npy and PREFIX.distances.npy; --radius and --box also "
+                     "PREFIX.offsets.npy; --closest also PREFIX.points.npy and PREFIX.uv.npy; "
+                     "--signed-distance distances alone; --pairs PREFIX.pairs.npy")
+        ->type_name("PREFIX");
+    command->add_flag(
+        "--sort", options->sort,
+        "Rows of --radius by distance instead of by index (of --knn they always are)");
+    command->add_option("--tree", options->tree, "How points are grouped; answers are the same")
+        ->check(CLI::IsMember({"automatic", "kdtree", "bvh"}))
+        ->capture_default_str();
+    add_mesh_options(*command, *options);
+    command->add_flag("--strict", options->strict,
+                      "Invalid points are an error instead of being left out");
+    command->add_option("--repeat", options->repeat, "Timed runs after a warm-up")
+        ->check(CLI::Range(0, 1000))
+        ->capture_default_str();
+    add_common_options(*command, options->common);
+    command->callback([options] { run_query(*options); });
+}
+
+}  // namespace raydix::cli

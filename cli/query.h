@@ -1,0 +1,61 @@
+// raydix query: what all its kinds share. One kind a call; each file query_*.cpp answers some.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "output.h"
+
+namespace raydix::cli {
+
+struct QueryCommand {
+    CommonOptions common;
+    std::string scene, queries_file, prefix, tree = "automatic";
+    std::string with_scene, builder;
+    std::optional<std::uint32_t> k;
+    std::optional<double> radius;
+    bool box = false, sort = false, strict = false;
+    bool closest = false, signed_distance = false, pairs = false, narrow = false;
+    int repeat = 5;
+};
+
+/// What a kind of query found, and how long each repeat took.
+struct QueryFigures {
+    std::string kind;
+    std::uint64_t queries = 0, invalid_queries = 0, found = 0;
+    std::vector<double> seconds;
+};
+
+/// An entry of `query[]`: kind, queries, invalid_queries, found, mqueries_per_s.
+[[nodiscard]] Json query_json(const QueryFigures& figures);
+void print_query(const Json& query);
+
+/// A file, a built-in scene, or the scene of a .rdx file.
+[[nodiscard]] Scene load_query_scene(const std::string& scene, const CommonOptions& common);
+
+/// --queries, or the scene's own points.
+[[nodiscard]] std::vector<Vec3> load_queries(const QueryCommand& options, const Scene& scene);
+
+/// Seconds of `work`, once to warm up and then `repeat` times.
+template <class Work>
+std::vector<double> timed_repeats(int repeat, const Work& work) {
+    work();
+    std::vector<double> seconds;
+    for (int i = 0; i < repeat; ++i) {
+        const auto start = std::chrono::steady_clock::now();
+        work();
+        seconds.push_back(
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    }
+    return seconds;
+}
+
+/// --knn, --radius and --box: points of a cloud, or the vertices of a mesh.
+void run_point_query(const QueryCommand& options);
+/// --closest, --signed-distance and --pairs: triangles; pairs of points too.
+void run_mesh_query(const QueryCommand& options);
+
+}  // namespace raydix::cli

@@ -1,0 +1,82 @@
+// What a segment or a sphere touches of a mesh, and where a moving sphere first does.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/shapes.h>
+#include <raydix/types.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace raydix {
+
+struct OverlapOptions {
+    std::uint64_t max_bytes = 0;  // of the ids in a result. 0: a quarter of the machine's memory
+    int threads = 0;              // 0: all the machine has. Results do not depend on it
+};
+
+/// What a batch met.
+struct OverlapCounts {
+    std::uint64_t queries = 0;
+    std::uint64_t found = 0;            // queries that touch something; of lists: ids in them
+    std::uint64_t invalid_queries = 0;  // touch nothing
+};
+
+/// Whether each query has a point in common with any triangle: 1 or 0. Segments are decided without
+/// rounding, triangles in their plane and triangles without area included. A sphere touches a
+/// triangle if d2 <= radius * radius with the d2 of closest_points. queries [n] -> touched [n].
+/// Throws InputError: sizes that differ, a tree of boxes or points.
+OverlapCounts touch_any(const Bvh& bvh, std::span<const Segment> queries,
+                        std::span<std::uint8_t> touched, const OverlapOptions& options = {});
+OverlapCounts touch_any(const Bvh& bvh, std::span<const Sphere> queries,
+                        std::span<std::uint8_t> touched, const OverlapOptions& options = {});
+[[nodiscard]] bool touches(const Bvh& bvh, const Segment& segment);
+[[nodiscard]] bool touches(const Bvh& bvh, const Sphere& sphere);
+
+/// All triangles that each query touches: those of query i are prims[offsets[i]] ..
+/// prims[offsets[i + 1]], ascending.
+struct OverlapLists {
+    std::vector<std::uint64_t> offsets;  // [queries + 1]
+    std::vector<std::uint32_t> prims;
+    OverlapCounts counts;
+};
+
+/// As touch_any, but all of them. None is ever dropped: more than options.max_bytes is an
+/// InputError.
+[[nodiscard]] OverlapLists touch_all(const Bvh& bvh, std::span<const Segment> queries,
+                                     const OverlapOptions& options = {});
+[[nodiscard]] OverlapLists touch_all(const Bvh& bvh, std::span<const Sphere> queries,
+                                     const OverlapOptions& options = {});
+
+/// A ball whose center moves along a ray, for t in [tmin, tmax] as rays have it. Radius 0 is a ray.
+/// Invalid as a ray is, or with a radius that is negative or not finite.
+struct SphereSweep {
+    Ray path;
+    float radius;
+};
+
+/// The first contact: the ball touches triangle `prim` at `position`, which is
+/// (1-u-v)*v0 + u*v1 + v*v2, when its center is at t. A ball that touches at the start has t =
+/// tmin.
+struct SweepHit {
+    float t = infinity;
+    std::uint32_t prim = no_primitive;
+    Vec3 position{infinity, infinity, infinity};
+    float u = 0.0f, v = 0.0f;
+
+    [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
+};
+
+/// First contacts: for each sweep the least (t, prim), the same bits for every builder and thread
+/// count. In double inside: faces moved by the radius, cylinders around edges, balls around
+/// corners. sweeps [n] -> hits [n]. Throws InputError: sizes that differ, a tree of boxes or
+/// points.
+OverlapCounts sweep_spheres(const Bvh& bvh, std::span<const SphereSweep> sweeps,
+                            std::span<SweepHit> hits, const OverlapOptions& options = {});
+[[nodiscard]] std::vector<SweepHit> sweep_spheres(const Bvh& bvh,
+                                                  std::span<const SphereSweep> sweeps,
+                                                  const OverlapOptions& options = {});
+[[nodiscard]] SweepHit sweep_sphere(const Bvh& bvh, const SphereSweep& sweep);
+
+}  // namespace raydix

@@ -1,0 +1,45 @@
+// Moving primitives under a tree that stays: the boxes are fitted again, the hierarchy is kept.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/types.h>
+
+#include <span>
+
+namespace raydix {
+
+/// How good a tree still is. Boxes that grow into each other cost rays time: rebuild when `ratio`
+/// has grown by more than a rebuild costs; from 1.5 on it usually has.
+struct RefitQuality {
+    double sah = 0;           // of the tree as it is now (contract.md 2, costs 1 and 1)
+    double sah_at_build = 0;  // of the tree that the Refitter was made for
+    double ratio = 1;         // sah / sah_at_build; 1 if either tree has no area
+};
+
+/// Fits a tree to new places of its primitives, in place and again and again. Made for the tree as
+/// it was built, to compare with.
+class Refitter {
+public:
+    /// Throws InputError: a tree whose triangles are in parts (builders split and sbvh, where they
+    /// did split): the parts are not kept.
+    explicit Refitter(const Bvh& built);
+
+    /// New corners, with any indices, for the same number of triangles in the same order; or new
+    /// places for points. Leaf copies, boxes of all nodes: as if the hierarchy had been built for
+    /// them. Throws InputError, the tree unchanged: another number of primitives than the tree was
+    /// built from; an index past the vertices; a primitive of the tree that is not valid any more,
+    /// or one that was left out and is valid now; a tree with parts of triangles. One case is found
+    /// late and leaves the tree empty: a triangle smaller than 1e-12 that is no point.
+    RefitQuality refit(Bvh& bvh, const MeshView& mesh, int threads = 0) const;
+    /// The same for a tree of boxes. A box smaller than 1e-12 is found late.
+    RefitQuality refit(Bvh& bvh, std::span<const Aabb> boxes, int threads = 0) const;
+
+private:
+    double sah_at_build_;
+};
+
+/// One refit; the quality is relative to the tree before it.
+RefitQuality refit(Bvh& bvh, const MeshView& mesh, int threads = 0);
+RefitQuality refit(Bvh& bvh, std::span<const Aabb> boxes, int threads = 0);
+
+}  // namespace raydix

@@ -1,0 +1,20 @@
+// Results of a size that the data decides are refused before they are allocated.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace raydix {
+
+/// Bytes that this process could still get without swapping; the greatest number if the system does
+/// not say.
+[[nodiscard]] std::uint64_t available_memory();
+
+/// What results may take: `max_bytes`, or what is available if that is 0.
+[[nodiscard]] std::uint64_t memory_limit(std::uint64_t max_bytes);
+
+/// Throws InputError that names `what` if count * bytes_each is more than the limit.
+void check_result_fits(const std::string& what, std::uint64_t count, std::uint64_t bytes_each,
+                       std::uint64_t limit);
+
+}  // namespace raydix

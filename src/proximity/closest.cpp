@@ -1,0 +1,85 @@
+// Batches of closest-point queries. Each starts from the triangle that was closest to the one
+// before it: along a Morton curve that is near, and most of the tree is out of reach at once.
+#include <raydix/closest.h>
+
+#include "base/float_env.h"
+#include "proximity/closest_walk.h"
+#include "proximity/query_batch.h"
+
+namespace raydix {
+namespace {
+
+float square_limit(float max_distance) {
+    if (!(max_distance >= 0.0f))
+        throw InputError("closest points: max_distance is " + std::to_string(max_distance) +
+                         "; it must be 0 or more");
+    return max_distance * max_distance;
+}
+
+ClosestPoint public_point(const ClosestTriangle& best) {
+    if (best.prim == no_primitive) return {};
+    return {best.point.position, std::sqrt(best.point.d2), best.prim, best.point.u, best.point.v};
+}
+
+ClosestCounts closest_batch(const Bvh& bvh, std::span<const Vec3> queries,
+                            std::span<ClosestPoint> results, float limit) {
+    const PaddedTree tree(bvh);
+    std::vector<ClosestCounts> parts(block_count(queries.size()));
+    for_each_query_block(
+        bvh, queries, [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
+            WalkStack stack(tree.max_depth);
+            std::uint32_t guess = no_primitive;
+            for (std::size_t k = begin; k < end; ++k) {
+                const std::size_t i = at(k);
+                results[i] = {};
+                if (!is_finite(queries[i])) {
+                    ++parts[block].invalid_queries;
+                } else if (!tree.empty) {
+                    const ClosestTriangle best =
+                        find_closest_triangle(tree, queries[i], limit, guess, stack);
+                    results[i] = public_point(best);
+                    if (best.prim == no_primitive) continue;
+                    guess = best.position;
+                    ++parts[block].found;
+                }
+            }
+        });
+    ClosestCounts sum;
+    sum.queries = queries.size();
+    for (const ClosestCounts& part : parts) {
+        sum.found += part.found;
+        sum.invalid_queries += part.invalid_queries;
+    }
+    return sum;
+}
+
+}  // namespace
+
+ClosestCounts closest_points(const Bvh& bvh, std::span<const Vec3> queries,
+                             std::span<ClosestPoint> results, const ClosestOptions& options) {
+    require_triangles(bvh, "closest points need");
+    require_room("closest points", queries.size(), results.size());
+    const float limit = square_limit(options.max_distance);
+    ClosestCounts counts;
+    with_threads(options.threads, [&] { counts = closest_batch(bvh, queries, results, limit); });
+    return counts;
+}
+
+std::vector<ClosestPoint> closest_points(const Bvh& bvh, std::span<const Vec3> queries,
+                                         const ClosestOptions& options) {
+    std::vector<ClosestPoint> results(queries.size());
+    closest_points(bvh, queries, results, options);
+    return results;
+}
+
+ClosestPoint closest_point(const Bvh& bvh, Vec3 query, float max_distance) {
+    require_triangles(bvh, "closest points need");
+    const float limit = square_limit(max_distance);
+    if (bvh.empty() || !is_finite(query)) return {};
+    const FloatEnvironment plain;
+    const PaddedTree tree(bvh);
+    WalkStack stack(tree.max_depth);
+    return public_point(find_closest_triangle(tree, query, limit, no_primitive, stack));
+}
+
+}  // namespace raydix

@@ -1,0 +1,57 @@
+// What all batches of mesh queries do: check their input, and take queries along a Morton curve in
+// fixed blocks.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/error.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "exec/parallel.h"
+#include "rays/place_order.h"
+
+namespace raydix {
+
+inline constexpr std::size_t queries_per_block = 512;
+/// Fewer queries are taken as they come.
+inline constexpr std::size_t worth_ordering = 2048;
+
+inline void require_triangles(const Bvh& bvh, const char* what) {
+    if (bvh.kind() != PrimitiveKind::triangles && !bvh.empty())
+        throw InputError(std::string(what) + " triangles; this tree holds " +
+                         (bvh.kind() == PrimitiveKind::points ? "points" : "boxes"));
+}
+
+inline void require_room(const char* what, std::size_t queries, std::size_t results) {
+    if (queries != results)
+        throw InputError(std::string(what) + ": " + std::to_string(queries) +
+                         " queries, but room for " + std::to_string(results) + " results");
+}
+
+/// Positions of queries in the order in which to take them; empty: as they come.
+[[nodiscard]] inline std::vector<std::uint32_t> query_order(const Bvh& bvh,
+                                                            std::span<const Vec3> places) {
+    if (places.size() < worth_ordering || places.size() >= std::size_t{1} << 31 || bvh.empty())
+        return {};
+    return order_by_place(bvh.bounds(), places);
+}
+
+/// Calls one(block, begin, end, at) with at(k) = the query that is k-th in line.
+template <class One>
+void for_each_query_block(const Bvh& bvh, std::span<const Vec3> places, const One& one) {
+    const std::vector<std::uint32_t> order = query_order(bvh, places);
+    const auto at = [&](std::size_t k) { return order.empty() ? k : order[k]; };
+    for_each_block(
+        places.size(), queries_per_block,
+        [&](std::size_t block, std::size_t begin, std::size_t end) { one(block, begin, end, at); });
+}
+
+[[nodiscard]] inline std::size_t block_count(std::size_t queries) {
+    return (queries + queries_per_block - 1) / queries_per_block;
+}
+
+}  // namespace raydix

@@ -1,0 +1,135 @@
+#include "proximity/winding_tree.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "tree/walk.h"
+
+namespace raydix {
+namespace {
+
+/// A subtree is far if the query is this many radii away: the error of the two terms, summed over
+/// a mesh, then stays below a hundredth.
+constexpr double far_radii = 4.0;
+
+struct AreaSum {
+    double area = 0;
+    Double3 place;  // sum of centers times areas
+};
+
+Double3 center_of_mass(const AreaSum& sum, const BvhNode& node) {
+    if (sum.area > 0) return sum.place * (1.0 / sum.area);
+    return (Double3(node.lo) + Double3(node.hi)) * 0.5;
+}
+
+double farthest_corner(const BvhNode& node, Double3 center) {
+    const Double3 lo = center - Double3(node.lo), hi = Double3(node.hi) - center;
+    return length({std::max(lo.x, hi.x), std::max(lo.y, hi.y), std::max(lo.z, hi.z)});
+}
+
+/// Adds what has normal n and its own center at `off` from that of the sum.
+void add_part(FarTriangles& sum, Double3 n, Double3 off) {
+    sum.normal = sum.normal + n;
+    sum.moment_x = sum.moment_x + n * off.x;
+    sum.moment_y = sum.moment_y + n * off.y;
+    sum.moment_z = sum.moment_z + n * off.z;
+}
+
+struct Facet {
+    Double3 center, normal;
+    double area;
+};
+
+Facet facet_of(const LeafTriangle& t) {
+    const Double3 a(t.v0), b(t.v1), c(t.v2);
+    const Double3 normal = cross(b - a, c - a) * 0.5;
+    return {(a + b + c) * (1.0 / 3.0), normal, length(normal)};
+}
+
+/// The two terms at d = center - query.
+double far_winding(const FarTriangles& far, Double3 d, double d2) {
+    const double inverse3 = 1.0 / (d2 * std::sqrt(d2));
+    const Double3 turned{dot(far.moment_x, d), dot(far.moment_y, d), dot(far.moment_z, d)};
+    const double trace = far.moment_x.x + far.moment_y.y + far.moment_z.z;
+    const double sum = dot(far.normal, d) + trace - 3.0 * dot(turned, d) / d2;
+    return sum * inverse3 * (0.25 * std::numbers::inv_pi);
+}
+
+}  // namespace
+
+double triangle_winding(const LeafTriangle& t, Vec3 query) {
+    const Double3 q(query), a = Double3(t.v0) - q, b = Double3(t.v1) - q, c = Double3(t.v2) - q;
+    const double la = length(a), lb = length(b), lc = length(c);
+    const double up = dot(a, cross(b, c));
+    if (up == 0.0) return 0.0;
+    const double down = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+    return std::atan2(up, down) * (0.5 * std::numbers::inv_pi);
+}
+
+WindingTree::WindingTree(const Bvh& bvh) : far_(bvh.nodes().size()) {
+    std::vector<std::uint32_t> slots;
+    slots.reserve(far_.size());
+    walk_preorder(bvh.nodes(), bvh.max_depth(), [&](std::uint32_t slot) { slots.push_back(slot); });
+    std::vector<AreaSum> areas(far_.size());
+    for (auto at = slots.rbegin(); at != slots.rend(); ++at) {  // children before parents
+        const BvhNode& node = bvh.nodes()[*at];
+        FarTriangles& far = far_[*at];
+        AreaSum& sum = areas[*at];
+        const auto add_area = [&](double area, Double3 place) {
+            sum.area += area;
+            sum.place = sum.place + place;
+        };
+        if (node.is_leaf()) {
+            const auto own = bvh.triangles().subspan(node.first, node.count);
+            for (const LeafTriangle& t : own) {
+                const Facet f = facet_of(t);
+                add_area(f.area, f.center * f.area);
+            }
+            far.center = center_of_mass(sum, node);
+            for (const LeafTriangle& t : own) {
+                const Facet f = facet_of(t);
+                add_part(far, f.normal, f.center - far.center);
+            }
+        } else {
+            const std::uint32_t left = node.first, right = left + 1;
+            for (const std::uint32_t k : {left, right}) add_area(areas[k].area, areas[k].place);
+            far.center = center_of_mass(sum, node);
+            for (const std::uint32_t k : {left, right}) {
+                const FarTriangles& part = far_[k];
+                add_part(far, part.normal, part.center - far.center);
+                far.moment_x = far.moment_x + part.moment_x;
+                far.moment_y = far.moment_y + part.moment_y;
+                far.moment_z = far.moment_z + part.moment_z;
+            }
+        }
+        far.radius = farthest_corner(node, far.center);
+    }
+}
+
+double WindingTree::at(const TriangleTree& tree, Vec3 query, WalkStack& stack) const {
+    PendingNode* const bottom = stack.begin();
+    PendingNode* top = bottom;
+    std::uint32_t slot = 0;
+    double sum = 0;
+    for (;;) {
+        const BvhNode& node = tree.nodes[slot];
+        const FarTriangles& far = far_[slot];
+        const Double3 d = far.center - Double3(query);
+        const double d2 = dot(d, d), limit = far_radii * far.radius;
+        if (d2 > limit * limit) {
+            sum += far_winding(far, d, d2);
+        } else if (node.is_leaf()) {
+            for (std::uint32_t k = node.first; k < node.first + node.count; ++k)
+                sum += triangle_winding(tree.triangles[k], query);
+        } else {
+            RAYDIX_CHECK(static_cast<std::uint32_t>(top - bottom), <, stack.capacity());
+            *top++ = {node.first + 1, 0.0f};
+            slot = node.first;
+            continue;
+        }
+        if (top == bottom) return sum;
+        slot = (--top)->slot;
+    }
+}
+
+}  // namespace raydix
