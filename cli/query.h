@@ -26,7 +26,7 @@ struct QueryCommand {
 struct QueryFigures {
     std::string kind;
     std::uint64_t queries = 0, invalid_queries = 0, found = 0;
-    std::vector<double> seconds;
+    std::vector<double> seconds{};
 };
 
 /// An entry of `query[]`: kind, queries, invalid_queries, found, mqueries_per_s.
