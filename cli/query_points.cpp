@@ -147,7 +147,7 @@ void run_point_query(const QueryCommand& options) {
     document["scene"] = scene_json(scene);
     document["load_ms"] = scene.load_ms;
     document["build"] = index_json(index, options.common.threads);
-    Json query = query_json(answer(options, index, scene));
+    Json query = query_json(about(options.scene, [&] { return answer(options, index, scene); }));
     if (options.k) query["k"] = *options.k;
     if (options.radius) query["radius"] = static_cast<float>(*options.radius);
     document["query"] = Json::array({query});
