@@ -143,8 +143,8 @@ private:
 
 using Points = PointIndex<float, 3>;
 using Points2 = PointIndex<float, 2>;
-using PointsD = PointIndex<double, 3>;
-using Points2D = PointIndex<double, 2>;
+using PointsD = PointIndex<double, 3>;   // D: double
+using Points2D = PointIndex<double, 2>;  // two coordinates, double
 
 /// points [n] -> an index of them. Points that are not finite or have a coordinate beyond 1e12 are
 /// left out and counted, or an error with `options.strict`. Same input, same index, for every

@@ -83,6 +83,11 @@ void check_radius(Scalar radius, const std::string& whose) {
                          "; it must be 0 or more");
 }
 
+std::uint64_t saturating_product(std::uint64_t a, std::uint64_t b) {
+    constexpr auto most = std::numeric_limits<std::uint64_t>::max();
+    return b != 0 && a > most / b ? most : a * b;
+}
+
 std::size_t blocks_of(std::size_t n) { return (n + queries_per_block - 1) / queries_per_block; }
 
 /// Queries of one kind over a whole batch: counted, and then filled into rows of that length.
@@ -111,7 +116,9 @@ public:
         order();
         Buffer<std::uint32_t> counts(job_.n);
         job_.counts = counts.data();
-        const std::uint64_t limit = memory_limit(options_.max_bytes);
+        const std::uint64_t most =
+            saturating_product(saturating_product(job_.n, job_.tree.points), bytes_each);
+        const std::uint64_t limit = memory_limit(options_.max_bytes, most);
         count_all(what, limit);
         PointLists<Scalar> result;
         result.counts = sum_of(parts_, job_.n);
@@ -253,10 +260,11 @@ template <class Index>
 NearestPoints<typename Index::Scalar> knn(const Index& index, PointsOf<Index> queries,
                                           std::uint32_t k, const PointQueryOptions& options) {
     using Scalar = typename Index::Scalar;
+    const std::uint64_t row_bytes = std::uint64_t{k} * (sizeof(std::uint32_t) + sizeof(Scalar));
     if (k != 0)
-        check_result_fits("knn", queries.size(),
-                          std::uint64_t{k} * (sizeof(std::uint32_t) + sizeof(Scalar)),
-                          memory_limit(options.max_bytes));
+        check_result_fits(
+            "knn", queries.size(), row_bytes,
+            memory_limit(options.max_bytes, saturating_product(queries.size(), row_bytes)));
     NearestPoints<Scalar> result;
     result.indices.reset(queries.size() * k);
     result.distances.reset(queries.size() * k);
