@@ -43,12 +43,15 @@ std::uint64_t memory_limit(std::uint64_t max_bytes, std::uint64_t most_bytes) {
     return most_bytes <= little ? no_limit : available_memory();
 }
 
-void check_result_fits(const std::string& what, std::uint64_t count, std::uint64_t bytes_each,
-                       std::uint64_t limit) {
-    if (count <= limit / bytes_each) return;
-    throw InputError(what + ": a result of " + std::to_string(count) + " times " +
-                     std::to_string(bytes_each) + " bytes does not fit into the " +
-                     std::to_string(limit) + " bytes that it may take");
+void check_result_fits(const std::string& what, std::uint64_t bytes, std::uint64_t limit) {
+    if (bytes <= limit) return;
+    throw InputError(what + ": a result of " + std::to_string(bytes) +
+                     " bytes or more does not fit into the " + std::to_string(limit) +
+                     " that it may take");
+}
+
+std::uint64_t saturating_product(std::uint64_t a, std::uint64_t b) {
+    return b != 0 && a > no_limit / b ? no_limit : a * b;
 }
 
 }  // namespace raydix

@@ -36,13 +36,12 @@ TYPED_TEST_SUITE(Nanoflann, Indices);
 
 TYPED_TEST(Nanoflann, TheSameDistancesAndNumbers) {
     using T = typename TypeParam::Scalar;
-    using Tree = nanoflann::KDTreeSingleIndexAdaptor<
-        nanoflann::L2_Simple_Adaptor<T, Cloud<TypeParam>>, Cloud<TypeParam>, TypeParam::dimension,
-        std::uint32_t>;
+    using Tree =
+        nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<T, Cloud<TypeParam>>,
+                                            Cloud<TypeParam>, TypeParam::dimension, std::uint32_t>;
     const std::string count = std::to_string(1000 * thorough);
     for (const char* kind : {"uniform", "clustered"}) {
-        const Scene scene =
-            load_scene("builtin:" + std::string(kind) + "?points=" + count, 3);
+        const Scene scene = load_scene("builtin:" + std::string(kind) + "?points=" + count, 3);
         const auto points = points_as<TypeParam>(scene.mesh.vertices);
         const TypeParam index = build_points(points);
         const Cloud<TypeParam> cloud{points};

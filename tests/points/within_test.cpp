@@ -242,7 +242,8 @@ TYPED_TEST(Within, ResultsLargerThanMemoryAreRefused) {
     // Just enough, and one byte less.
     const auto lists = radius_search(index, {queries.data(), 3}, 0);
     const std::uint64_t bytes =
-        (3 * n + 2 * 4) * (sizeof(std::uint32_t) + sizeof(typename TypeParam::Scalar));
+        3 * n * (sizeof(std::uint32_t) + sizeof(typename TypeParam::Scalar)) +
+        4 * sizeof(std::uint64_t);
     EXPECT_EQ(lists.indices.size(), 3 * n);
     EXPECT_EQ(message_of([&] {
                   (void)radius_search(index, {queries.data(), 3}, 0, {.max_bytes = bytes});
