@@ -56,10 +56,10 @@ public:
     void run() {
         Json document = cli::new_document("bench points");
         document["nanoflann"] = nanoflann_version();
-        document["options"] = {{"threads", threads_},       {"rounds", options_.rounds},
-                               {"k", options_.k},           {"queries", options_.queries},
-                               {"leaves", options_.leaves}, {"clock", options_.clock},
-                               {"seed", options_.common.seed}};
+        document["options"] = {
+            {"threads", threads_},         {"rounds", options_.rounds}, {"k", options_.k},
+            {"queries", options_.queries}, {"leaves", options_.leaves}, {"clock", options_.clock},
+            {"seed", options_.common.seed}};
         document["scenes"] = Json::array();
         for (const std::string& name : options_.scenes)
             document["scenes"].push_back(cli::about(name, [&] { return study(name); }));
@@ -78,7 +78,7 @@ private:
         std::vector<PointPeer> peers;
         for (const int leaf : options_.leaves) peers.emplace_back(points, leaf);
         const double found = compare(index, peers, random, radius);
-        Json json{{"scene", scene.name},  {"points", points.size()},
+        Json json{{"scene", scene.name},      {"points", points.size()},
                   {"queries", random.size()}, {"radius", radius},
                   {"found_by_radius", found}, {"bytes", index.bytes()},
                   {"contests", Json::array()}};
@@ -112,11 +112,11 @@ private:
     }
     /// So that a query finds mean_found points, itself included, on average.
     float radius_that_finds(const Points& index, const std::vector<Vec3>& queries) const {
-        const std::span<const Vec3> some(queries.data(), std::min<std::size_t>(4000, queries.size()));
+        const std::span<const Vec3> some(queries.data(),
+                                         std::min<std::size_t>(4000, queries.size()));
         std::vector<std::uint32_t> counts(some.size());
         const Aabb box = index.bounds();
-        float low = 0,
-              high = (box.hi.x - box.lo.x) + (box.hi.y - box.lo.y) + (box.hi.z - box.lo.z);
+        float low = 0, high = (box.hi.x - box.lo.x) + (box.hi.y - box.lo.y) + (box.hi.z - box.lo.z);
         for (int i = 0; i < 60; ++i) {
             const float middle = 0.5f * (low + high);
             const auto found = radius_count(index, some, middle, counts).found;
@@ -138,8 +138,7 @@ private:
             PeerRows rows;
             peer.knn(queries, options_.k, threads_, rows);
             for (std::size_t i = 0; i < rows.distances.size(); ++i)
-                if (rows.distances[i] != nearest.distances[i] &&
-                    nearest.indices[i] != no_primitive)
+                if (rows.distances[i] != nearest.distances[i] && nearest.indices[i] != no_primitive)
                     throw InputError(fmt::format("query {}: {} has another distance: {} and {}",
                                                  i / options_.k, peer.name(), rows.distances[i],
                                                  nearest.distances[i]));
@@ -162,13 +161,11 @@ private:
 
     Contest build_contest(const std::vector<Vec3>& points) const {
         Contest contest{"build, one thread", static_cast<double>(points.size()), {}};
-        contest.works.emplace_back("raydix", [&points] {
-            const Points index = build_points(points, {.threads = 1});
-        });
+        contest.works.emplace_back(
+            "raydix", [&points] { const Points index = build_points(points, {.threads = 1}); });
         for (const int leaf : options_.leaves)
-            contest.works.emplace_back(fmt::format("leaf {}", leaf), [&points, leaf] {
-                const PointPeer peer(points, leaf);
-            });
+            contest.works.emplace_back(fmt::format("leaf {}", leaf),
+                                       [&points, leaf] { const PointPeer peer(points, leaf); });
         return contest;
     }
     Contest knn_contest(const std::string& order, const Points& index,
@@ -180,9 +177,8 @@ private:
             raydix::knn(index, queries, options_.k, indices_, distances_, {.threads = threads_});
         });
         for (const PointPeer& peer : peers)
-            contest.works.emplace_back(peer.name(), [&, this] {
-                peer.knn(queries, options_.k, threads_, rows_);
-            });
+            contest.works.emplace_back(
+                peer.name(), [&, this] { peer.knn(queries, options_.k, threads_, rows_); });
         return contest;
     }
     Contest radius_contest(const std::string& order, const Points& index,
@@ -211,8 +207,8 @@ private:
                             std::span(distances_).subspan(i * k, k));
         });
         for (const PointPeer& peer : peers)
-            contest.works.emplace_back(
-                peer.name(), [&, this] { peer.knn(queries, options_.k, 1, rows_); });
+            contest.works.emplace_back(peer.name(),
+                                       [&, this] { peer.knn(queries, options_.k, 1, rows_); });
         return contest;
     }
 

@@ -86,8 +86,7 @@ void PointPeer::radius(std::span<const Vec3> queries, float radius, int threads,
         of_thread.distances.clear();
     }
     // nanoflann asks for d2 < the bound.
-    const float bound =
-        std::nextafter(radius * radius, std::numeric_limits<float>::infinity());
+    const float bound = std::nextafter(radius * radius, std::numeric_limits<float>::infinity());
     nanoflann::SearchParams unsorted;
     unsorted.sorted = false;
     in_chunks(queries.size(), threads, [&](int thread, std::size_t begin, std::size_t end) {

@@ -12,8 +12,7 @@ namespace raydix::cli {
 namespace {
 
 /// Returns only by an exception.
-void become(const std::string& name, const std::string& needs,
-            std::vector<std::string> arguments) {
+void become(const std::string& name, const std::string& needs, std::vector<std::string> arguments) {
     std::error_code error;
     const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
     std::string program = (self.parent_path() / ("bench_" + name)).string();

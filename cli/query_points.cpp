@@ -57,7 +57,8 @@ QueryFigures answer_nearest(const QueryCommand& options, const Points& index, co
     QueryFigures figures;
     figures.kind = "knn";
     const std::vector<Vec3> queries = load_queries(options, scene);
-    NearestPoints<float> nearest = knn(index, queries, *options.k, how);
+    NearestPoints<float> nearest =
+        about(options.scene, [&] { return knn(index, queries, *options.k, how); });
     figures.seconds = timed_repeats(options.repeat, [&] {
         knn(index, queries, *options.k, nearest.indices.span(), nearest.distances.span(), how);
     });
@@ -73,7 +74,7 @@ QueryFigures answer_lists(const QueryCommand& options, const char* kind, const S
     PointLists<float> lists;
     figures.seconds = timed_repeats(options.repeat, [&] {
         lists = {};  // never two results at once
-        lists = search();
+        lists = about(options.scene, search);
     });
     take_counts(lists.counts, figures);
     save_lists(options, lists);
@@ -142,7 +143,6 @@ void run_point_query(const QueryCommand& options) {
                                                   .strict = options.strict,
                                                   .threads = options.common.threads});
     });
-    if (options.common.prints_tables()) print_index(index);
     Json document = new_document("query");
     document["scene"] = scene_json(scene);
     document["load_ms"] = scene.load_ms;
@@ -151,7 +151,10 @@ void run_point_query(const QueryCommand& options) {
     if (options.k) query["k"] = *options.k;
     if (options.radius) query["radius"] = static_cast<float>(*options.radius);
     document["query"] = Json::array({query});
-    if (options.common.prints_tables()) print_query(query);
+    if (options.common.prints_tables()) {
+        print_index(index);
+        print_query(query);
+    }
     write_json(document, options.common);
 }
 

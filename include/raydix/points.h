@@ -106,9 +106,9 @@ public:
     PointIndex(PointIndex&&) noexcept;
     PointIndex& operator=(PointIndex&&) noexcept;
 
-    /// The same as a new index over `points` with the options of the last build, in memory that is
-    /// kept: if there are not more points than before, the second rebuild and later ones allocate
-    /// nothing. Throws what `build_points` throws; the index is then empty.
+    /// The same as a new index over `points`, with the options of the last build or others, in the
+    /// memory of the old one, which grows only where it is too small; scratch is kept as well from
+    /// the first rebuild on. Throws what `build_points` throws; the index is then empty.
     void rebuild(std::span<const Point> points);
     void rebuild(std::span<const Point> points, const PointsOptions& options);
 
@@ -143,8 +143,8 @@ private:
 
 using Points = PointIndex<float, 3>;
 using Points2 = PointIndex<float, 2>;
-using PointsD = PointIndex<double, 3>;
-using Points2D = PointIndex<double, 2>;
+using PointsD = PointIndex<double, 3>;   // D: double
+using Points2D = PointIndex<double, 2>;  // two coordinates, double
 
 /// points [n] -> an index of them. Points that are not finite or have a coordinate beyond 1e12 are
 /// left out and counted, or an error with `options.strict`. Same input, same index, for every

@@ -6,15 +6,18 @@
 
 namespace raydix {
 
-/// Bytes that this process could still get without swapping; the greatest number if the system does
-/// not say.
+/// Bytes that this process could still get without swapping, as the system and its control group
+/// tell it; the greatest number if they do not.
 [[nodiscard]] std::uint64_t available_memory();
 
-/// What results may take: `max_bytes`, or what is available if that is 0.
-[[nodiscard]] std::uint64_t memory_limit(std::uint64_t max_bytes);
+/// What a result may take: `max_bytes`, or what is available if that is 0. Nobody is asked where
+/// the result cannot be larger than `most_bytes` and that is little.
+[[nodiscard]] std::uint64_t memory_limit(std::uint64_t max_bytes, std::uint64_t most_bytes);
 
-/// Throws InputError that names `what` if count * bytes_each is more than the limit.
-void check_result_fits(const std::string& what, std::uint64_t count, std::uint64_t bytes_each,
-                       std::uint64_t limit);
+/// Throws InputError that names `what` if a result of `bytes` is more than the limit.
+void check_result_fits(const std::string& what, std::uint64_t bytes, std::uint64_t limit);
+
+/// The greatest number where the product does not fit.
+[[nodiscard]] std::uint64_t saturating_product(std::uint64_t a, std::uint64_t b);
 
 }  // namespace raydix

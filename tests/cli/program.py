@@ -15,7 +15,7 @@ PROGRAM = os.environ.get("RAYDIX_PROGRAM", "build/release/bin/raydix")
 SHARED_SCENES = pathlib.Path(os.environ.get("RAYDIX_SHARED_SCENES", "../shared/scenes"))
 SANITIZED = bool(os.environ.get("RAYDIX_SANITIZE"))
 TIME_LIMIT_S = 600 if SANITIZED else 120
-COMMANDS = ("info", "scenes", "build", "check", "trace", "render")
+COMMANDS = ("info", "scenes", "build", "check", "trace", "render", "query")
 
 MISS = 0xFFFFFFFF
 

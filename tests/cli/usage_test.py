@@ -20,6 +20,7 @@ OPTIONS = {
               "--samples", "--ao-radius", "--explain", *TREE],
     "render": ["SCENE", "--output", "--view", "--size", "--camera", "--eye", "--target", "--up", "--fov",
                "--samples", *TREE],
+    "query": ["SCENE", "--knn", "--radius", "--box", "--queries", "--out", "--sort", "--tree", "--strict", "--repeat"],
 }
 SMALL = "builtin:soup?triangles=50"
 MEDIUM = "builtin:soup?triangles=2000"

@@ -162,6 +162,9 @@ TYPED_TEST(PointTree, RebuildsInPlace) {
     const void* leaves = index.arrays().leaves.data();
     const void* records = index.arrays().sort_scratch.records.data();
     EXPECT_NE(records, nullptr);
+    index.rebuild(uniform);
+    EXPECT_EQ(index.arrays().leaves.data(), leaves);
+    EXPECT_EQ(index.arrays().sort_scratch.records.data(), records);
     for (const PointSet& set : sets) {
         const auto points = points_as<TypeParam>(set.points);
         index.rebuild(points, {.threads = 2});
@@ -170,8 +173,6 @@ TYPED_TEST(PointTree, RebuildsInPlace) {
     }
     index.rebuild(uniform);
     EXPECT_EQ(index.order(), build_points(uniform).order());
-    EXPECT_EQ(index.arrays().leaves.data(), leaves);
-    EXPECT_EQ(index.arrays().sort_scratch.records.data(), records);
     auto bad = uniform;
     bad[3].y = std::numeric_limits<typename TypeParam::Scalar>::quiet_NaN();
     EXPECT_THROW(index.rebuild(bad, {.strict = true}), InputError);

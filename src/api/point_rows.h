@@ -1,0 +1,179 @@
+// What batches of queries over points share: kernels by name, the order they are worked off in,
+// their blocks; and rows of any length, counted and then filled.
+#pragma once
+
+#include <raydix/error.h>
+#include <raydix/points.h>
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "api/result_memory.h"
+#include "exec/parallel.h"
+#include "points/point_arrays.h"
+#include "points/point_kernels.h"
+#include "points/query_order.h"
+
+namespace raydix {
+
+inline constexpr std::size_t queries_per_block = 512;
+
+template <class Index>
+using KernelsOf = PointKernels<typename Index::Scalar, Index::dimension>;
+template <class Index>
+using Within = WithinJob<typename Index::Scalar, Index::dimension>;
+
+template <class Index>
+const KernelsOf<Index>& kernels_for(const std::string& isa) {
+    const auto all = point_kernels<typename Index::Scalar, Index::dimension>();
+    if (isa.empty()) return all.front();
+    std::string known;
+    for (const auto& kernels : all) {
+        if (kernels.isa == isa) return kernels;
+        known += (known.empty() ? "" : ", ") + std::string(kernels.isa);
+    }
+    throw InputError("instruction set " + isa + ": this processor and build have " + known);
+}
+
+template <class Index>
+std::vector<std::uint32_t> order_for(const Index& index, const typename Index::Scalar* queries,
+                                     std::size_t n, std::size_t stride, QueryOrder wanted) {
+    if (index.empty()) return {};
+    const typename Index::Box bounds = index.bounds();
+    return order_of_queries<typename Index::Scalar, Index::dimension>(
+        queries, n, stride, &bounds.lo.x, &bounds.hi.x, wanted);
+}
+
+/// The part of a batch that is block [begin, end).
+template <class Job>
+Job part_of(Job job, const std::vector<std::uint32_t>& order, std::size_t begin, std::size_t end,
+            std::size_t values) {
+    job.n = end - begin;
+    if (order.empty()) {
+        job.queries += begin * values;
+        return job;
+    }
+    job.order = order.data() + begin;
+    return job;
+}
+
+inline PointQueryCounts sum_of(const std::vector<PointJobCounts>& parts, std::size_t queries) {
+    PointQueryCounts sum;
+    sum.queries = queries;
+    for (const PointJobCounts& part : parts) {
+        sum.invalid_queries += part.invalid;
+        sum.found += part.found;
+    }
+    return sum;
+}
+
+inline std::size_t blocks_of(std::size_t n) {
+    return (n + queries_per_block - 1) / queries_per_block;
+}
+
+/// Queries of one kind over a whole batch: counted, and then filled into rows of that length.
+template <class Index>
+class RowBatch {
+    using Scalar = typename Index::Scalar;
+
+public:
+    RowBatch(const Index& index, const Within<Index>& job, std::size_t values, bool boxes,
+             const PointQueryOptions& options)
+        : index_(index),
+          job_(job),
+          values_(values),
+          boxes_(boxes),
+          options_(options),
+          kernels_(kernels_for<Index>(options.isa)) {}
+
+    PointQueryCounts count() {
+        order();
+        count_all("", std::numeric_limits<std::uint64_t>::max());
+        return sum_of(parts_, job_.n);
+    }
+
+    /// `rows`: of the result; row_of[k] is that of query k, or null: k.
+    PointLists<Scalar> lists(std::size_t rows, const std::uint32_t* row_of, const char* what) {
+        order();
+        Buffer<std::uint32_t> counts(job_.n);
+        job_.counts = counts.data();
+        const std::uint64_t most =
+            saturating_product(saturating_product(job_.n, job_.tree.points), bytes_each);
+        const std::uint64_t limit = memory_limit(options_.max_bytes, most);
+        count_all(what, limit);
+        PointLists<Scalar> result;
+        result.counts = sum_of(parts_, job_.n);
+        const std::uint64_t offset_bytes = (std::uint64_t{rows} + 1) * sizeof(std::uint64_t);
+        check_result_fits(what, result.counts.found * bytes_each + offset_bytes, limit);
+        set_offsets(rows, row_of, result);
+        result.indices.reset(result.counts.found);
+        result.distances.reset(result.counts.found);
+        job_.row_of = row_of;
+        job_.offsets = result.offsets.data();
+        job_.indices = result.indices.data();
+        job_.distances = result.distances.data();
+        for_each_block(job_.n, queries_per_block,
+                       [&](std::size_t, std::size_t begin, std::size_t end) {
+                           (boxes_ ? kernels_.fill_box : kernels_.fill_ball)(block(begin, end));
+                       });
+        return result;
+    }
+
+private:
+    static constexpr std::uint64_t bytes_each = sizeof(std::uint32_t) + sizeof(Scalar);
+
+    void order() {
+        order_ = order_for(index_, job_.queries, job_.n, values_, options_.order);
+        parts_.assign(blocks_of(job_.n), {});
+    }
+
+    Within<Index> block(std::size_t begin, std::size_t end) const {
+        Within<Index> job = part_of(job_, order_, begin, end, values_);
+        if (!order_.empty()) return job;
+        if (job.radii != nullptr) job.radii += begin;
+        if (job.itself != nullptr) job.itself += begin;
+        job.counts += begin;
+        if (job.row_of != nullptr)
+            job.row_of += begin;
+        else if (job.offsets != nullptr)
+            job.offsets += begin;
+        return job;
+    }
+
+    /// Stops as soon as the rows so far do not fit: a result that is far too large is known early.
+    void count_all(const char* what, std::uint64_t limit) {
+        std::atomic<std::uint64_t> total{0};
+        for_each_block(
+            job_.n, queries_per_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
+                (boxes_ ? kernels_.count_box : kernels_.count_ball)(block(begin, end), parts_[b]);
+                const std::uint64_t found = parts_[b].found;
+                const std::uint64_t so_far =
+                    total.fetch_add(found, std::memory_order_relaxed) + found;
+                check_result_fits(what, saturating_product(so_far, bytes_each), limit);
+            });
+    }
+
+    void set_offsets(std::size_t rows, const std::uint32_t* row_of, PointLists<Scalar>& result) {
+        result.offsets.reset(rows + 1);
+        std::uint64_t* offsets = result.offsets.data();
+        std::fill_n(offsets, rows + 1, std::uint64_t{0});
+        for (std::size_t k = 0; k < job_.n; ++k)
+            offsets[(row_of == nullptr ? k : row_of[k]) + 1] = job_.counts[k];
+        std::inclusive_scan(offsets, offsets + rows + 1, offsets);
+    }
+
+    const Index& index_;
+    Within<Index> job_;
+    std::size_t values_;
+    bool boxes_;
+    const PointQueryOptions& options_;
+    const KernelsOf<Index>& kernels_;
+    std::vector<std::uint32_t> order_;
+    std::vector<PointJobCounts> parts_;
+};
+
+}  // namespace raydix
