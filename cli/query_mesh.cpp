@@ -7,8 +7,8 @@
 #include <raydix/rdx.h>
 #include <raydix/solid.h>
 
-#include <cstring>
 #include <optional>
+#include <utility>
 
 #include "query.h"
 
@@ -18,8 +18,9 @@ namespace {
 /// Built, or both read from a .rdx file.
 SceneTree load_tree(const std::string& scene, const QueryCommand& options) {
     if (is_rdx(scene)) {
-        if (!options.builder.empty())
-            throw CLI::ValidationError("--builder", scene + " brings its tree");
+        for (const auto& [given, name] : {std::pair{!options.builder.empty(), "--builder"},
+                                          std::pair{options.strict, "--strict"}})
+            if (given) throw CLI::ValidationError(name, "has no part in " + scene + ", a tree");
         RdxFile file = load_rdx(scene);
         return {std::move(file.scene), std::move(file.bvh)};
     }
@@ -38,7 +39,8 @@ QueryFigures answer_closest(const QueryCommand& options, const SceneTree& tree) 
     const std::vector<Vec3> queries = load_queries(options, tree.scene);
     std::vector<ClosestPoint> points(queries.size());
     ClosestCounts counts;
-    QueryFigures figures{.kind = "closest"};
+    QueryFigures figures;
+    figures.kind = "closest";
     figures.seconds = timed_repeats(options.repeat, [&] {
         counts = closest_points(tree.bvh, queries, points, {.threads = options.common.threads});
     });
@@ -80,7 +82,8 @@ QueryFigures answer_signed(const QueryCommand& options, const SceneTree& tree, J
                          {"open_edges", solid.open_edges()}};
     std::vector<float> distances(queries.size());
     ClosestCounts counts;
-    QueryFigures figures{.kind = "signed_distance"};
+    QueryFigures figures;
+    figures.kind = "signed_distance";
     figures.seconds = timed_repeats(options.repeat, [&] {
         counts = signed_distances(solid, queries, distances, {.threads = options.common.threads});
     });
@@ -96,7 +99,8 @@ QueryFigures answer_pairs(const QueryCommand& options, const SceneTree& tree) {
     if (!options.with_scene.empty()) other = load_tree(options.with_scene, options);
     const PairOptions how{.narrow = options.narrow, .threads = options.common.threads};
     std::vector<PrimitivePair> pairs;
-    QueryFigures figures{.kind = "pairs"};
+    QueryFigures figures;
+    figures.kind = "pairs";
     figures.seconds = timed_repeats(options.repeat, [&] {
         pairs = {};  // never two results at once
         pairs =
