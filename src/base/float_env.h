@@ -30,13 +30,16 @@ private:
 #elif defined(__aarch64__)
     FloatEnvironment() {
         asm volatile("mrs %0, fpcr" : "=r"(saved_));
-        const std::uint64_t plain = saved_ & ~special_bits;
-        asm volatile("msr fpcr, %0" : : "r"(plain));
+        if (saved_ & special_bits) set(saved_ & ~special_bits);
     }
-    ~FloatEnvironment() { asm volatile("msr fpcr, %0" : : "r"(saved_)); }
+    ~FloatEnvironment() {
+        if (saved_ & special_bits) set(saved_);
+    }
 
 private:
-    static constexpr std::uint64_t special_bits = (1ull << 24) | (3ull << 22);  // FZ, rounding mode
+    static void set(std::uint64_t bits) { asm volatile("msr fpcr, %0" : : "r"(bits)); }
+    // FZ; rounding mode; and of newer processors FIZ and AH, which flush inputs and change results.
+    static constexpr std::uint64_t special_bits = (1ull << 24) | (3ull << 22) | 3ull;
     std::uint64_t saved_ = 0;
 #else
     FloatEnvironment() = default;

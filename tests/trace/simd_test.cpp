@@ -93,7 +93,9 @@ TEST(Simd, HasCodeForThisProcessor) {
     const auto sets = simd_instruction_sets();
     ASSERT_FALSE(sets.empty());
     for (const std::string& isa : sets) std::cout << isa << "\n";
-#if defined(__x86_64__)
+#if defined(__aarch64__)
+    EXPECT_EQ(sets, std::vector<std::string>{"neon"});
+#elif defined(__x86_64__)
     EXPECT_EQ(sets.back(), "sse4");
     EXPECT_EQ(std::ranges::count(sets, "avx2"), __builtin_cpu_supports("avx2") ? 1 : 0);
     if (__builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl")) {
@@ -295,6 +297,20 @@ TEST(Simd, OneRayLikeBatches) {
 }
 
 #if defined(__SSE2__)
+constexpr std::uint64_t flush_denormals = 0x8040;
+std::uint64_t float_control() { return _mm_getcsr(); }
+void set_float_control(std::uint64_t bits) { _mm_setcsr(static_cast<unsigned>(bits)); }
+#elif defined(__aarch64__)
+constexpr std::uint64_t flush_denormals = 1u << 24;
+std::uint64_t float_control() {
+    std::uint64_t bits;
+    asm volatile("mrs %0, fpcr" : "=r"(bits));
+    return bits;
+}
+void set_float_control(std::uint64_t bits) { asm volatile("msr fpcr, %0" : : "r"(bits)); }
+#endif
+
+#if defined(__SSE2__) || defined(__aarch64__)
 /// Callers may have told their thread to flush denormals; the hits are the same, and so is the
 /// setting afterwards.
 TEST(Simd, OneRayOfACallerThatFlushesDenormals) {
@@ -304,13 +320,12 @@ TEST(Simd, OneRayOfACallerThatFlushesDenormals) {
     for (Ray& ray : rays) ray.direction = 1e-30f * ray.direction;  // t beyond the usual too
     std::vector<Hit> wanted(rays.size()), hits(rays.size());
     for (std::size_t i = 0; i < rays.size(); ++i) wanted[i] = closest_hit(tree, rays[i]);
-    const unsigned before = _mm_getcsr();
-    constexpr unsigned flush_both = 0x8040u;
-    _mm_setcsr(before | flush_both);
+    const std::uint64_t before = float_control();
+    set_float_control(before | flush_denormals);
     for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = closest_hit(tree, rays[i]);
-    const unsigned after = _mm_getcsr();
-    _mm_setcsr(before);
-    EXPECT_EQ(after & flush_both, flush_both);
+    const std::uint64_t after = float_control();
+    set_float_control(before);
+    EXPECT_EQ(after & flush_denormals, flush_denormals);
     EXPECT_TRUE(std::ranges::equal(hits, wanted, same_bits));
     EXPECT_GT(std::ranges::count_if(wanted, [](const Hit& h) { return h.hit(); }), 0);
 }
