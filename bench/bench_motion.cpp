@@ -186,7 +186,7 @@ void run_refit(const Options& options) {
 }
 
 void run_instances(const Options& options) {
-    const Bvh object = build_bvh(load_scene("builtin:figure?triangles=2000").mesh);
+    const Bvh object = build_bvh(load_scene("builtin:figure?triangles=5000").mesh);
     InstancedScene scene;
     const std::uint32_t id = scene.add_object(object);
     std::mt19937_64 random(1);

@@ -6,7 +6,7 @@ import sys
 sys.dont_write_bytecode = True
 from program import MISS, TRIANGLE, ProgramTest, main, ply, read_npy, write_npy  # noqa: E402
 
-FIGURE = "builtin:figure?triangles=2000"
+FIGURE = "builtin:figure?triangles=5000"
 BOX = ply([(x, y, z) for z in (0, 2) for y in (0, 2) for x in (0, 2)],
           [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4),
            (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)])
@@ -25,7 +25,7 @@ class QueryMesh(ProgramTest):
     def column(self, name, descr, shape):
         found, found_shape, data = read_npy(self.folder / name)
         self.assertEqual((found, found_shape), (descr, shape))
-        return [v[0] for v in struct.iter_unpack(descr, data)]
+        return [v[0] for v in struct.iter_unpack({"<f4": "<f", "<u4": "<I"}[descr], data)]
 
     def test_closest(self):
         scene = self.write("box.ply", BOX)
