@@ -57,6 +57,8 @@ public:
         : device_(rtcNewDevice(("threads=" + std::to_string(threads)).c_str())),
           scene_(rtcNewScene(device_)),
           geometry_(rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE)) {
+        // Only scenes of low quality keep a tree for each geometry, which alone can be refitted.
+        rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_LOW);
         rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_DYNAMIC);
         rtcSetGeometryBuildQuality(geometry_, RTC_BUILD_QUALITY_REFIT);
         rtcSetSharedGeometryBuffer(geometry_, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,

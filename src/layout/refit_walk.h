@@ -41,10 +41,25 @@ inline TreeParts cut_tree(const BvhNode* nodes, std::size_t wanted) {
     return parts;
 }
 
+/// Copies a primitive whose coordinates are known to be in range; returns its box.
+inline Box3 copy_with_box(const TriangleSource& source, std::uint32_t i, LeafTriangle& copy) {
+    const Float3 a = load_corner(source, i, 0), b = load_corner(source, i, 1),
+                 c = load_corner(source, i, 2);
+    a.store(copy.v0);
+    b.store(copy.v1);
+    c.store(copy.v2);
+    return {min_of(min_of(a, b), c), max_of(max_of(a, b), c)};
+}
+template <class Source, class Copy>
+Box3 copy_with_box(const Source& source, std::uint32_t i, Copy& copy) {
+    copy = copy_primitive(source, i);
+    return copy_box(copy);
+}
+
 /// What a pass found.
 struct RefitSum {
     double cost = 0;                         // half areas of nodes times their costs
-    std::uint32_t first_bad = no_primitive;  // the lowest id that is not valid
+    std::uint32_t first_bad = no_primitive;  // the lowest id that is too small
 };
 
 template <class Source, class Copy>
@@ -112,10 +127,10 @@ private:
         Box3 box = Box3::load(empty_box());
         for (std::uint32_t k = leaf.first; k < leaf.first + leaf.count; ++k) {
             prefetch(k);
-            Box3 own;
-            if (!host_box(source_, order_[k], own))
+            const Box3 own = copy_with_box(source_, order_[k], copies_[k]);
+            if (!any_at_least(own.hi - own.lo, Float3::all(min_diagonal)) &&
+                !diagonal_in_range(own.box()))
                 sum.first_bad = std::min(sum.first_bad, order_[k]);
-            copies_[k] = copy_primitive(source_, order_[k]);
             box = unite(box, own);
         }
         set_box(leaf, box.box());
