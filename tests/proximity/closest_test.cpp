@@ -161,7 +161,7 @@ TEST(Closest, DistancesAreRightToTheRoundingOfCoordinates) {
         }
     }
     std::cout << compared << " distances compared\n";
-    EXPECT_GT(compared, 500u);
+    EXPECT_GT(compared, 25u * test::thorough);
 }
 
 TEST(Closest, PositionsRepeatTheDistance) {

@@ -214,7 +214,7 @@ TEST(Overlap, SweepsStopWhereTheDistanceIsTheRadius) {
         const Vec3 d = hit.position - (sweep.path.origin + hit.t * sweep.path.direction);
         EXPECT_LT(std::sqrt(dot(d, d)), sweep.radius + 2e-6f);
     }
-    EXPECT_GT(hits, test::thorough);
+    EXPECT_GE(hits, test::thorough);
 }
 
 TEST(Overlap, SweepsWithoutARadiusAreRays) {
