@@ -194,7 +194,7 @@ TEST(Overlap, SweepsStopWhereTheDistanceIsTheRadius) {
         return static_cast<double>(least);
     };
     std::size_t hits = 0;
-    for (const SphereSweep& sweep : sweeps(20 * test::thorough, -1, 2, 0.2f)) {
+    for (const SphereSweep& sweep : sweeps(100 + 20 * test::thorough, -1, 2, 0.2f)) {
         if (sweep.radius < 0.001f) continue;
         const SweepHit hit = sweep_sphere(bvh, sweep);
         const double end = hit.hit() ? hit.t : std::min(4.0f, sweep.path.tmax);
@@ -214,7 +214,7 @@ TEST(Overlap, SweepsStopWhereTheDistanceIsTheRadius) {
         const Vec3 d = hit.position - (sweep.path.origin + hit.t * sweep.path.direction);
         EXPECT_LT(std::sqrt(dot(d, d)), sweep.radius + 2e-6f);
     }
-    EXPECT_GE(hits, test::thorough);
+    EXPECT_GT(hits, 3u);
 }
 
 TEST(Overlap, SweepsWithoutARadiusAreRays) {

@@ -82,7 +82,7 @@ void expect_all(const std::string& name, const Mesh& x, const Mesh& y, const Tou
 }
 
 TEST(Pairs, AreBruteForce) {
-    const std::size_t n = 350 + 50 * test::thorough;
+    const std::size_t n = 200 + 60 * test::thorough;
     expect_all("soups", test::random_soup(n, seed, 0.15f), test::random_soup(n, seed + 1, 0.1f),
                triangles_touch);
     expect_all("lattices", test::lattice_mesh(n / 4, 6, seed),
