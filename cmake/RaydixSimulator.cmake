@@ -1,6 +1,12 @@
 # The simulated kernels are compiled a second time for processors with AVX2 and FMA; which version
 # runs is decided at run time (src/trace/warp/simulated_kernels.cpp).
 file(GLOB raydix_simulated CONFIGURE_DEPENDS src/trace/warp/simulated_kernels_[0-9]*.cpp)
+if(RAYDIX_SKIP)
+    list(FILTER raydix_simulated EXCLUDE REGEX "${RAYDIX_SKIP}")
+endif()
+if(NOT raydix_simulated)
+    return()
+endif()
 set_source_files_properties(${raydix_simulated} PROPERTIES COMPILE_DEFINITIONS RAYDIX_SIMULATOR_ISA=base)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     set(raydix_v3_dir ${CMAKE_CURRENT_BINARY_DIR}/simulator_v3)

@@ -115,7 +115,7 @@ TEST(Hits, SoupAgainstEveryTriangle) {
                      trace(build_bvh(scene.mesh), rays), trace_brute_force(scene.mesh, rays));
 }
 
-constexpr std::size_t million = 50'000 * thorough;
+constexpr std::size_t million = thorough == 1 ? 20'000 : 1'000'000;
 
 TEST(Hits, SoupsLikeBruteForce) {
     expect_like_brute_force(scene_of(random_soup(2000, 1), "soup"), million);
