@@ -75,7 +75,7 @@ void expect_like_scalar(const std::string& what, const Bvh& bvh, std::span<const
         for (const std::string& isa : simd_instruction_sets())
             for (const SimdPath path : paths) {
                 // What a layout changes is the same code for each instruction set.
-                if (!is_default && isa != simd_instruction_sets().front()) continue;
+                if (!is_default && isa == "avx2") continue;
                 expect_like(what_layout, tree, rays, wanted, counts,
                             {.counters = path == SimdPath::stream, .path = path, .isa = isa});
             }

@@ -148,8 +148,17 @@ private:
         return met & used_of(node);
     }
     static HWY_INLINE std::uint32_t used_of(const CompactNode& node) { return node.used; }
-    /// A missing child's box is never met.
-    static HWY_INLINE std::uint32_t used_of(const WideNode&) { return 0xFF; }
+    /// The box of a missing child is not enough: where a ray's pads overflow it is NaN, which the
+    /// minima and maxima of some processors drop.
+    static HWY_INLINE std::uint32_t used_of(const WideNode& node) {
+        std::uint32_t used = 0;
+        for (std::size_t l = 0; l < 8; l += lanes8) {
+            const auto words = hn::Load(U8(), node.child + l);
+            const auto missing = hn::Eq(words, hn::Set(U8(), wide_no_child));
+            used |= bits_of(f8, hn::RebindMask(f8, hn::Not(missing))) << l;
+        }
+        return used;
+    }
 
     /// What a vector of rays needs of a node.
     struct RayNode {
