@@ -17,6 +17,7 @@ class BenchPoints(ProgramTest):
         alone = self.folder / "raydix"
         shutil.copy(PROGRAM, alone)
         done = subprocess.run([alone, "bench", "points"], capture_output=True, text=True)
+        ProgramTest.runs += 1
         self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1), done)
         for word in ("raydix: bench points", "bench_points", "libnanoflann-dev"):
             self.assertIn(word, done.stderr)
