@@ -107,7 +107,7 @@ BuildOptions TreeOptions::build_options(const CommonOptions& common) const {
     BuildOptions result;
     result.builder = quality == "fast"       ? build_options_for(Quality::fast).builder
                      : quality == "balanced" ? build_options_for(Quality::balanced).builder
-                     : quality == "high"     ? Builder::sbvh
+                     : quality == "high"     ? build_options_for(Quality::high).builder
                                              : builder_from_name(builder);
     if (!fit.empty()) result.fit = fit == "levels" ? Fit::levels : Fit::atomic;
     result.bits = bits;

@@ -63,7 +63,7 @@ struct Steps {
     }
 };
 
-/// As steps_below() and steps_above() of eight children at once.
+/// Of eight children at once: the largest steps at or below lo, the least at or above hi.
 RAYDIX_INLINE QuantisedAxis quantise_axis(float origin, int exponent, const float* lo,
                                           const float* hi) {
     const double per_step = quantised_step(254 - exponent);  // exact, as is multiplying by it
@@ -141,24 +141,6 @@ int step_exponent(float lo, float hi) {
     int biased = std::clamp(exponent - 1 + 127, min_step_exponent, max_step_exponent);
     while (!extent.at_most(max_steps * quantised_step(biased))) ++biased;
     return biased;
-}
-
-int steps_below(float origin, int exponent, float at) {
-    const ExactDifference distance(origin, at);
-    const double step = quantised_step(exponent);
-    int q = static_cast<int>(std::clamp(distance.value / step, 0.0, double(max_steps)));
-    while (q < max_steps && distance.at_least((q + 1) * step)) ++q;
-    while (q > 0 && !distance.at_least(q * step)) --q;
-    return q;
-}
-
-int steps_above(float origin, int exponent, float at) {
-    const ExactDifference distance(origin, at);
-    const double step = quantised_step(exponent);
-    int q = static_cast<int>(std::clamp(distance.value / step, 0.0, double(max_steps)));
-    while (q > 0 && distance.at_most((q - 1) * step)) --q;
-    while (q < max_steps && !distance.at_most(q * step)) ++q;
-    return q;
 }
 
 bool is_at_most(float origin, int exponent, int q, float at) {

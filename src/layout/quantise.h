@@ -1,6 +1,6 @@
 // Boxes of eight children in steps of a power of two, 8 bits an axis, that never leave anything
 // out: the frame of Ylitie, Karras and Laine 2017 (section 3.2), in exact arithmetic. Shared by the
-// nodes of cwbvh and of the wide trees of the CPU.
+// nodes of cwbvh and of the CPU's compact wide trees.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -20,10 +20,6 @@ inline constexpr int max_steps = 255;
 
 /// The biased exponent of the least power of two of which 255 reach from lo to hi.
 [[nodiscard]] int step_exponent(float lo, float hi);
-/// The largest q with origin + q * step <= at, and the least with origin + q * step >= at, held
-/// within 0 to 255: exact, whatever the sizes are. origin <= at.
-[[nodiscard]] int steps_below(float origin, int exponent, float at);
-[[nodiscard]] int steps_above(float origin, int exponent, float at);
 /// Whether origin + q * step is at most / at least `at`, exactly.
 [[nodiscard]] bool is_at_most(float origin, int exponent, int q, float at);
 [[nodiscard]] bool is_at_least(float origin, int exponent, int q, float at);
@@ -59,8 +55,10 @@ struct QuantisedBoxes {
     std::uint8_t lo[3][quantised_width], hi[3][quantised_width];
 };
 
-/// `all` is the box around all of them. What a ray can never miss by rounding is what was compared
-/// in exact arithmetic: coarser steps until every decoded box contains its child.
+/// `all` is the box around all of them. lo is the largest number of steps that is not above the
+/// child, hi the least that is not below, exactly, whatever the sizes are. What a ray can never
+/// miss by rounding is what was compared in exact arithmetic: coarser steps until every decoded box
+/// contains its child.
 [[nodiscard]] QuantisedBoxes quantise(const SlotBoxes& boxes, const Aabb& all);
 
 /// The step of an axis, 2^(exponent - 127).

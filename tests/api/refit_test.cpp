@@ -16,6 +16,7 @@
 #include <random>
 
 #include "base/math.h"
+#include "support/message.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -165,14 +166,7 @@ TEST(Refit, ATreeFromAFileGetsMemoryOfItsOwn) {
     EXPECT_TRUE(check(load_rdx(file).bvh, mesh).ok) << "the file stays as it is";
 }
 
-std::string message_of(const std::function<void()>& call) {
-    try {
-        call();
-    } catch (const InputError& error) {
-        return error.what();
-    }
-    return "no error";
-}
+using test::message_of;
 
 TEST(Refit, RefusesWhatDoesNotFit) {
     const Mesh mesh = test::random_soup(500, seed);

@@ -11,6 +11,8 @@
 #include <random>
 
 #include "instances/affine.h"
+#include "support/message.h"
+#include "support/random.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -20,13 +22,9 @@ namespace {
 constexpr std::uint64_t seed = 20140704;
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
-class Random {
+class Random : public test::Random {
 public:
-    explicit Random(std::uint64_t start) : engine_(start) {}
-    float unit() { return static_cast<float>(engine_() >> 40) * 0x1p-24f; }
-    float between(float lo, float hi) { return lo + (hi - lo) * unit(); }
-    std::size_t below(std::size_t n) { return engine_() % n; }
-    Vec3 in(float lo, float hi) { return {between(lo, hi), between(lo, hi), between(lo, hi)}; }
+    using test::Random::Random;
     /// Turned, stretched, sheared, moved; every other one mirrored.
     Transform transform(float reach) {
         Transform t;
@@ -36,9 +34,6 @@ public:
         }
         return inverse_of(affine_of(t)) ? t : transform(reach);
     }
-
-private:
-    std::mt19937_64 engine_;
 };
 
 std::vector<Ray> random_rays(std::size_t count, float reach) {
@@ -215,14 +210,7 @@ TEST(Instances, MoveAndAreBuiltAgain) {
     EXPECT_EQ(scene.instance_count(), 1u);
 }
 
-std::string message_of(const std::function<void()>& call) {
-    try {
-        call();
-    } catch (const InputError& error) {
-        return error.what();
-    }
-    return "no error";
-}
+using test::message_of;
 
 TEST(Instances, RefuseWhatCannotBe) {
     const Bvh ball = build_bvh(test::ball_mesh({0, 0, 0}));

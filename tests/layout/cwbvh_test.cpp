@@ -14,6 +14,7 @@
 
 #include "base/math.h"
 #include "layout/cwbvh.h"
+#include "support/quantised_steps.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -44,8 +45,7 @@ TEST(Cwbvh, StepsAreTheNearestOutward) {
         const Exact step = step_of(exponent), extent = Exact{v[2]} - v[0], at = Exact{v[1]} - v[0];
         ASSERT_GE(255 * step, extent);
         ASSERT_TRUE(exponent == 1 || 255 * step / 2 < extent) << v[0] << " " << v[2];
-        const int below = steps_below(v[0], exponent, v[1]),
-                  above = steps_above(v[0], exponent, v[1]);
+        const auto [below, above] = quantised_steps(v[0], v[2], v[1]);
         ASSERT_TRUE(below >= 0 && below <= above && above <= 255);
         ASSERT_TRUE(below * step <= at && (below + 1) * step > at)
             << v[0] << " " << v[1] << " " << v[2];
@@ -62,12 +62,12 @@ TEST(Cwbvh, ADifferenceNoDoubleHoldsIsRoundedTheRightWay) {
     EXPECT_GE(255 * step_of(exponent), Exact{large});
     const int q = static_cast<int>(Exact{large} / step_of(exponent));
     ASSERT_EQ(q * step_of(exponent), Exact{large});  // a whole number of steps
-    EXPECT_EQ(steps_below(0, exponent, large), q);
-    EXPECT_EQ(steps_above(0, exponent, large), q);
-    EXPECT_EQ(steps_below(-tiny, exponent, large), q);
-    EXPECT_EQ(steps_above(-tiny, exponent, large), q + 1);
-    EXPECT_EQ(steps_below(tiny, exponent, large), q - 1);
-    EXPECT_EQ(steps_above(tiny, exponent, large), q);
+    for (const float origin : {0.0f, -tiny, tiny}) {
+        ASSERT_EQ(step_exponent(origin, large), exponent);
+        const auto [below, above] = quantised_steps(origin, large, large);
+        EXPECT_EQ(below, origin > 0 ? q - 1 : q);
+        EXPECT_EQ(above, origin < 0 ? q + 1 : q);
+    }
 }
 
 double gain_of(std::span<const Aabb> boxes, std::span<const int> slots) {

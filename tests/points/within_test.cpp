@@ -7,6 +7,7 @@
 #include <iostream>
 #include <random>
 
+#include "support/message.h"
 #include "support/point_reference.h"
 #include "support/support.h"
 
@@ -209,16 +210,6 @@ TYPED_TEST(Within, ThreadsChangeNothing) {
             EXPECT_TRUE(std::ranges::equal(lists.distances.view(), wanted.distances.view()));
         }
     }
-}
-
-template <class Call>
-std::string message_of(const Call& call) {
-    try {
-        call();
-    } catch (const InputError& error) {
-        return error.what();
-    }
-    return "no error";
 }
 
 TYPED_TEST(Within, ResultsLargerThanMemoryAreRefused) {

@@ -12,6 +12,7 @@
 
 #include "primitives/zero_area.h"
 #include "proximity/closest_on_triangle.h"
+#include "support/random.h"
 #include "support/region_distance.h"
 #include "support/scenes.h"
 #include "support/support.h"
@@ -50,16 +51,7 @@ ClosestPoint look_at_all(const Mesh& mesh, Vec3 q, float max_distance = infinity
     return best;
 }
 
-class Random {
-public:
-    explicit Random(std::uint64_t start) : engine_(start) {}
-    float unit() { return static_cast<float>(engine_() >> 40) * 0x1p-24f; }
-    float between(float lo, float hi) { return lo + (hi - lo) * unit(); }
-    std::size_t below(std::size_t n) { return engine_() % n; }
-
-private:
-    std::mt19937_64 engine_;
-};
+using test::Random;
 
 /// Around the mesh, near its surface, at its corners and far away.
 std::vector<Vec3> queries_around(const Mesh& mesh, std::size_t count, std::uint64_t start) {

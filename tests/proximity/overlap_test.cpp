@@ -13,6 +13,7 @@
 #include "proximity/sweep_walk.h"
 #include "proximity/touch_walk.h"
 #include "support/exact_overlap_reference.h"
+#include "support/random.h"
 #include "support/region_distance.h"
 #include "support/scenes.h"
 #include "support/support.h"
@@ -24,17 +25,7 @@ constexpr std::uint64_t seed = 19880711;
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 constexpr const char* some_builders[] = {"karras", "apetrei", "hploc", "binned", "split", "sbvh"};
 
-class Random {
-public:
-    explicit Random(std::uint64_t start) : engine_(start) {}
-    float unit() { return static_cast<float>(engine_() >> 40) * 0x1p-24f; }
-    float between(float lo, float hi) { return lo + (hi - lo) * unit(); }
-    std::size_t below(std::size_t n) { return engine_() % n; }
-    Vec3 in(float lo, float hi) { return {between(lo, hi), between(lo, hi), between(lo, hi)}; }
-
-private:
-    std::mt19937_64 engine_;
-};
+using test::Random;
 
 LeafTriangle corners(const Mesh& mesh, std::size_t i) {
     const Triangle& t = mesh.triangles[i];

@@ -12,6 +12,7 @@
 
 #include "base/double3.h"
 #include "base/math.h"
+#include "support/random.h"
 #include "support/support.h"
 
 namespace raydix {
@@ -22,16 +23,7 @@ constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 constexpr const char* all_builders[] = {"karras", "lauterbach", "garanzha", "apetrei", "ploc",
                                         "hploc",  "binned",     "sweep",    "split",   "sbvh"};
 
-class Random {
-public:
-    explicit Random(std::uint64_t start) : engine_(start) {}
-    float unit() { return static_cast<float>(engine_() >> 40) * 0x1p-24f; }
-    float between(float lo, float hi) { return lo + (hi - lo) * unit(); }
-    Vec3 in(float lo, float hi) { return {between(lo, hi), between(lo, hi), between(lo, hi)}; }
-
-private:
-    std::mt19937_64 engine_;
-};
+using test::Random;
 
 std::vector<Ray> random_rays(std::size_t count) {
     Random random(seed);

@@ -12,6 +12,7 @@
 #include <numbers>
 
 #include "proximity/winding_tree.h"
+#include "support/random.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -21,20 +22,7 @@ namespace {
 constexpr std::uint64_t seed = 20050501;
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
-class Random {
-public:
-    explicit Random(std::uint64_t start) : engine_(start) {}
-    float unit() { return static_cast<float>(engine_() >> 40) * 0x1p-24f; }
-    float between(float lo, float hi) { return lo + (hi - lo) * unit(); }
-    std::size_t below(std::size_t n) { return engine_() % n; }
-    Vec3 in(const Aabb& box) {
-        return {between(box.lo.x, box.hi.x), between(box.lo.y, box.hi.y),
-                between(box.lo.z, box.hi.z)};
-    }
-
-private:
-    std::mt19937_64 engine_;
-};
+using test::Random;
 
 /// Over all triangles, in double; no tree.
 double exact_winding(const Mesh& mesh, Vec3 q) {

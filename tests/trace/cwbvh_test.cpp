@@ -10,6 +10,7 @@
 #include <random>
 
 #include "layout/cwbvh.h"
+#include "support/quantised_steps.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"
 #include "support/support.h"
@@ -220,8 +221,7 @@ TEST(CwbvhTrace, PlanesStayWithinTheirPad) {
         const float at = root.lo.x + unit() * (root.hi.x - root.lo.x);
         if (!(at >= root.lo.x && at <= root.hi.x)) continue;
         const float t = (at - frame.origin.x) * frame.inverse.x;
-        const int below = steps_below(root.lo.x, exponent, at),
-                  above = steps_above(root.lo.x, exponent, at);
+        const auto [below, above] = quantised_steps(root.lo.x, root.hi.x, at);
         const int near = own.negative_x ? above : below, far = own.negative_x ? below : above;
         ASSERT_LE(plane_at(float(near), axis.rate, axis.near), t) << "turn " << turn;
         ASSERT_GE(plane_at(float(far), axis.rate, axis.far), t) << "turn " << turn;
