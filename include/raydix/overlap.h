@@ -12,8 +12,9 @@
 namespace raydix {
 
 struct OverlapOptions {
-    std::uint64_t max_bytes = 0;  // of the ids in a result. 0: a quarter of the machine's memory
-    int threads = 0;              // 0: all the machine has. Results do not depend on it
+    std::uint64_t max_bytes =
+        0;            // of the ids in a result. 0: a quarter of the memory that is available
+    int threads = 0;  // 0: all the machine has. Results do not depend on it
 };
 
 /// What a batch met.

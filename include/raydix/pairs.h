@@ -20,7 +20,7 @@ static_assert(sizeof(PrimitivePair) == 8);
 struct PairOptions {
     bool narrow = false;  // the triangles themselves must have a point in common, not only their
                           // boxes; decided without rounding, coplanar ones included
-    std::uint64_t max_bytes = 0;  // of the result. 0: a quarter of the machine's memory
+    std::uint64_t max_bytes = 0;  // of the result. 0: a quarter of the memory that is available
     int threads = 0;              // 0: all the machine has. Results do not depend on it
 };
 

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "api/result_memory.h"
 #include "exec/parallel.h"
+#include "exec/result_memory.h"
 #include "points/point_arrays.h"
 #include "points/point_kernels.h"
 #include "points/query_order.h"

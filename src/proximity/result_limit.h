@@ -8,21 +8,12 @@
 #include <cstdint>
 #include <string>
 
-#if defined(__unix__) || defined(__APPLE__)
-#include <unistd.h>
-#endif
+#include "exec/result_memory.h"
 
 namespace raydix {
 
-/// A quarter of the machine's memory: parts of a result and the whole lie side by side for a while.
-inline std::uint64_t usual_result_bytes() {
-#if defined(_SC_PHYS_PAGES) && defined(_SC_PAGESIZE)
-    const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
-    if (pages > 0 && page > 0)
-        return static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page) / 4;
-#endif
-    return std::uint64_t{1} << 32;
-}
+/// A quarter of the memory there is: parts of a result and the whole lie side by side for a while.
+inline std::uint64_t usual_result_bytes() { return available_memory() / 4; }
 
 class ResultLimit {
 public:

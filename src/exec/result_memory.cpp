@@ -1,4 +1,4 @@
-#include "api/result_memory.h"
+#include "exec/result_memory.h"
 
 #include <raydix/error.h>
 
