@@ -14,11 +14,14 @@
 #include <random>
 
 #include "embree_api.h"
-#include "measure/stopwatch.h"
+#include "work_times.h"
 
 namespace {
 
 using namespace raydix;
+using bench::spread_json;
+using bench::time_of;
+using bench::Times;
 using Json = nlohmann::ordered_json;
 
 struct Options {
@@ -27,27 +30,9 @@ struct Options {
     std::uint32_t instances = 10'000;
 };
 
-struct Times {
-    double wall = 0, cpu = 0;
-};
-
-Times time_of(const std::function<void()>& work) {
-    const std::clock_t start = std::clock();
-    Stopwatch watch;
-    work();
-    const double wall = watch.lap();
-    return {wall, 1e3 * double(std::clock() - start) / CLOCKS_PER_SEC};
-}
-
-Json spread_json(std::vector<Times> times) {
-    const auto spread = [&](double Times::*field) -> Json {
-        std::sort(times.begin(), times.end(),
-                  [&](const Times& a, const Times& b) { return a.*field < b.*field; });
-        return {{"median", times[times.size() / 2].*field},
-                {"min", times.front().*field},
-                {"max", times.back().*field}};
-    };
-    return {{"wall_ms", spread(&Times::wall)}, {"cpu_ms", spread(&Times::cpu)}};
+Json both_spreads(const std::vector<Times>& times) {
+    return {{"wall_ms", spread_json(times, &Times::wall)},
+            {"cpu_ms", spread_json(times, &Times::cpu)}};
 }
 
 /// A scene of one geometry that is refitted when its vertices move.
@@ -182,8 +167,8 @@ void run_refit(const Options& options) {
     line["triangles"] = mesh.triangles.size();
     line["builder"] = options.builder;
     line["sah_ratio"] = quality.ratio;
-    line["refit"] = spread_json(ours);
-    line["embree"] = spread_json(theirs);
+    line["refit"] = both_spreads(ours);
+    line["embree"] = both_spreads(theirs);
     fmt::print("{}\n", line.dump());
 }
 
@@ -211,8 +196,8 @@ void run_instances(const Options& options) {
     }
     Json line = head("instances", options);
     line["instances"] = options.instances;
-    line["set_instance"] = spread_json(moved);
-    line["build"] = spread_json(built);
+    line["set_instance"] = both_spreads(moved);
+    line["build"] = both_spreads(built);
     fmt::print("{}\n", line.dump());
 }
 

@@ -13,12 +13,15 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "measure/stopwatch.h"
 #include "primitives/exact_overlap.h"
+#include "work_times.h"
 
 namespace {
 
 using namespace raydix;
+using bench::spread_json;
+using bench::time_of;
+using bench::Times;
 using Json = nlohmann::ordered_json;
 using CgalBox = CGAL::Box_intersection_d::Box_with_info_d<float, 3, std::uint32_t>;
 
@@ -28,26 +31,6 @@ struct Options {
     std::vector<int> cutoffs{10, 100, 1000};
     bool broad = false;
 };
-
-struct Times {
-    double wall = 0, cpu = 0;
-};
-
-Times time_of(const std::function<void()>& work) {
-    const std::clock_t start = std::clock();
-    Stopwatch watch;
-    work();
-    const double wall = watch.lap();
-    return {wall, 1e3 * double(std::clock() - start) / CLOCKS_PER_SEC};
-}
-
-Json median_json(std::vector<Times> times, double Times::*field) {
-    std::sort(times.begin(), times.end(),
-              [&](const Times& a, const Times& b) { return a.*field < b.*field; });
-    return {{"median", times[times.size() / 2].*field},
-            {"min", times.front().*field},
-            {"max", times.back().*field}};
-}
 
 LeafTriangle corners(const Mesh& mesh, std::uint32_t i) {
     const Triangle& t = mesh.triangles[i];
@@ -122,8 +105,8 @@ void run(const Options& options) {
               {"repeat", options.repeat},
               {"cgal_cutoff", best_cutoff}};
     const auto put = [&](const char* name, const std::vector<Times>& times) {
-        line[name] = {{"wall_ms", median_json(times, &Times::wall)},
-                      {"cpu_ms", median_json(times, &Times::cpu)}};
+        line[name] = {{"wall_ms", spread_json(times, &Times::wall)},
+                      {"cpu_ms", spread_json(times, &Times::cpu)}};
     };
     put("build", of_build);
     put("pairs_of_tree", of_pairs);

@@ -41,7 +41,8 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
             ->capture_default_str();
     of_the_build(
         command.add_option("--quality", options.quality,
-                           "Picks a builder: fast is apetrei, balanced is ploc, high is sbvh"))
+                           "Picks a builder and its rounds of reinsertion: fast is apetrei, "
+                           "balanced is ploc, high is sbvh and 4"))
         ->check(CLI::IsMember({"fast", "balanced", "high"}))
         ->excludes(builder);
     of_the_build(command.add_option("--bits", options.bits, "Bits of the Morton codes"))
@@ -50,6 +51,11 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
     of_the_build(command.add_option("--max-leaf", options.max_leaf, "Most primitives in a leaf"))
         ->check(CLI::Range(1, 255))
         ->capture_default_str();
+    of_the_build(command.add_option("--reinsertion-rounds", options.reinsertion_rounds,
+                                    "Then move large subtrees to better places, so often at most "
+                                    "(default: none, or those of --quality)"))
+        ->check(CLI::Range(0, 255))
+        ->type_name("ROUNDS");
     of_the_build(command.add_option("--max-level", options.max_level,
                                     "Octree: the level that is not divided any more, 0 to 21 (10 "
                                     "with 30 bits; default: the highest)"))
@@ -96,8 +102,8 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
                     "Cameras file instead of cameras.json beside the scene")
         ->type_name("FILE")
         ->group(group);
-    for (const char* name :
-         {"--builder", "--quality", "--fit", "--sah-node", "--sah-primitive", "--epo"})
+    for (const char* name : {"--builder", "--quality", "--reinsertion-rounds", "--fit",
+                             "--sah-node", "--sah-primitive", "--epo"})
         options.of_a_bvh.push_back(command.get_option(name));
 }
 
@@ -105,10 +111,15 @@ BuildOptions TreeOptions::build_options(const CommonOptions& common) const {
     refuse_simulator(*this);
     if (max_level) throw CLI::ValidationError("--max-level", "belongs to --tree octree");
     BuildOptions result;
-    result.builder = quality == "fast"       ? build_options_for(Quality::fast).builder
-                     : quality == "balanced" ? build_options_for(Quality::balanced).builder
-                     : quality == "high"     ? build_options_for(Quality::high).builder
-                                             : builder_from_name(builder);
+    if (quality == "fast")
+        result = build_options_for(Quality::fast);
+    else if (quality == "balanced")
+        result = build_options_for(Quality::balanced);
+    else if (quality == "high")
+        result = build_options_for(Quality::high);
+    else
+        result.builder = builder_from_name(builder);
+    if (reinsertion_rounds) result.reinsertion_rounds = *reinsertion_rounds;
     if (!fit.empty()) result.fit = fit == "levels" ? Fit::levels : Fit::atomic;
     result.bits = bits;
     result.max_leaf = max_leaf;

@@ -29,6 +29,7 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 struct TreeOptions {
     std::string tree = "bvh", builder = "karras", quality, layout = "binary", device = "cpu", fit;
     int bits = 63, max_leaf = 4;
+    std::optional<int> reinsertion_rounds;
     std::optional<int> max_level;  // of an octree
     bool strict = false;
     std::string cameras_file;

@@ -94,6 +94,7 @@ Json build_json(const Bvh& bvh, const TreeStats& stats, const std::vector<BuildM
                {"builder", builder_name(options.builder)},
                {"bits", options.bits},
                {"max_leaf", options.max_leaf},
+               {"reinsertion_rounds", options.reinsertion_rounds},
                {"device", "cpu"},
                {"threads", options.threads > 0 ? options.threads : machine_info().cores},
                {"primitives", bvh.input_count()},

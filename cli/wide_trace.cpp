@@ -94,10 +94,10 @@ void WideTracer::explain_tree(const CommonOptions& common) const {
     if (!common.prints_tables()) return;
     const WideBvhStats& s = tree_.stats();
     fmt::print(
-        "kernel simd: {} layout, nodes of up to {} children with boxes of 8 bits an axis, blocks "
-        "of 8 triangles{}, {} code, paths chosen by batch ({})\n",
-        layout_name(s), s.width, s.compact ? " with shared vertices" : "", isa_,
-        simd_path_name(path_));
+        "kernel simd: {} layout, nodes of up to {} children with boxes of {}, blocks of 4 "
+        "triangles{}, {} code, paths chosen by batch ({})\n",
+        layout_name(s), s.width, s.compact ? "8 bits an axis" : "floats",
+        s.compact ? " with shared vertices" : "", isa_, simd_path_name(path_));
     fmt::print("             {} nodes, {} leaves, {:.1f} MB\n", s.nodes, s.leaves,
                static_cast<double>(s.bytes) * 1e-6);
 }

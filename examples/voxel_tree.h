@@ -54,6 +54,7 @@ public:
         const Vec3 a = vertices[t[0]], b = vertices[t[1]] - a, c = vertices[t[2]] - a;
         return {a + u * b + v * c, unit(cross(b, c))};
     }
+    [[nodiscard]] Vec3 normal_of(std::uint32_t prim) const { return point_of(prim, 0, 0).normal; }
     [[nodiscard]] double area_of(std::uint32_t prim) const {
         const raydix::Triangle& t = scene.mesh.triangles[prim];
         const Vec3 a = scene.mesh.vertices[t[0]];
@@ -125,13 +126,14 @@ public:
         return size_of(static_cast<float>(octree_.options().max_level));
     }
 
-    /// Light from a cone of 60 degrees, nearest first until it is full.
-    [[nodiscard]] Vec3 cone(Vec3 from, Vec3 way) const {
+    /// Light from a cone, nearest first until it is full. `opening`: its radius over its length,
+    /// for 60 degrees unless given; voxels that wide are looked at.
+    [[nodiscard]] Vec3 cone(Vec3 from, Vec3 way, float opening = 0.577f) const {
         Face sum;
         for (float t = 0.5f * finest(); t < edge_ && sum.cover < 0.98f;) {
-            const float width = std::max(finest(), 0.577f * t);
+            const float width = std::max(finest(), opening * t);
             const Face here = sample(from + t * way, way, std::log2(edge_ / width));
-            // A step of half a width takes half of what a voxel covers.
+            // Twice over, as steps are half a width: between two layers of cells a wall would leak.
             const float cover = std::min(here.cover, 1.0f);
             if (here.cover > 0) sum.light += ((1 - sum.cover) * cover / here.cover) * here.light;
             sum.cover += (1 - sum.cover) * cover;
@@ -155,6 +157,7 @@ private:
             for (done += hall.area_of(i); static_cast<double>(points.size()) * area_ < done;) {
                 const float r = std::sqrt(random()), s = random();
                 points.push_back(hall.point_of(i, r * (1 - s), r * s));
+                prims_.push_back(i);
             }
         return points;
     }
@@ -162,22 +165,56 @@ private:
     struct Sides {
         bool front, back;
     };
-    /// Sides that look into the hall, not into the wall or the leg of a chair: only they can be
-    /// seen. A ray from there meets something, but not at once.
+    /// Sides that look into the hall: only they can be seen. Those inside a wall or a column must
+    /// not hide the light that their own outside receives.
     [[nodiscard]] std::vector<Sides> open_sides(const Hall& hall,
                                                 std::span<const Point> points) const {
+        const std::vector<SideCount> seen = count_seen_sides(hall);
+        const std::vector<raydix::Hit> hits = hall.trace(rays_to_both_sides(points));
+        const auto room = [&](std::size_t i) { return hits[i].hit() ? hits[i].t : 0.0f; };
+        std::vector<Sides> open;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            const bool turned = dot(points[i].normal, hall.normal_of(prims_[i])) < 0;
+            const SideCount of = seen[prims_[i]];
+            const std::uint32_t front = of[turned], back = of[!turned], all = front + back;
+            if (all != 0)  // a few slip through cracks
+                open.push_back({front * 20 >= all, back * 20 >= all});
+            else  // nobody saw it: the side with more room
+                open.push_back({room(2 * i) > room(2 * i + 1), room(2 * i + 1) >= room(2 * i)});
+        }
+        return open;
+    }
+    using SideCount = std::array<std::uint32_t, 2>;  // as the triangle is turned, and from behind
+
+    /// How often paths that bounce through the hall, from its cameras on, meet each triangle.
+    static std::vector<SideCount> count_seen_sides(const Hall& hall) {
+        std::vector<SideCount> seen(hall.scene.mesh.triangles.size());
+        Random random(5);
+        for (const raydix::Camera& camera : hall.scene.cameras.cameras) {
+            std::vector<Ray> paths = raydix::make_primary_rays(camera, 256, 192);
+            for (int bounce = 0; bounce < 16; ++bounce) {
+                const std::vector<raydix::Hit> hits = hall.trace(paths);
+                std::vector<Ray> next;
+                for (std::size_t i = 0; i < paths.size(); ++i) {
+                    if (!hits[i].hit()) continue;
+                    Point p = hall.point_of(hits[i].prim, hits[i].u, hits[i].v);
+                    const bool behind = dot(p.normal, paths[i].direction) > 0;
+                    ++seen[hits[i].prim][behind];
+                    if (behind) p.normal = -1.0f * p.normal;
+                    next.push_back({p.place + start_off * p.normal, 0,
+                                    cosine_direction(Frame(p.normal), random(), random())});
+                }
+                paths = std::move(next);
+            }
+        }
+        return seen;
+    }
+    static std::vector<Ray> rays_to_both_sides(std::span<const Point> points) {
         std::vector<Ray> rays;
         for (const Point& p : points)
             for (const float side : {1.0f, -1.0f})
                 rays.push_back({p.place + side * start_off * p.normal, 0, side * p.normal});
-        const std::vector<raydix::Hit> hits = hall.trace(rays);
-        const auto room = [&](std::size_t i) { return hits[i].hit() ? hits[i].t : 0.0f; };
-        std::vector<Sides> open;
-        for (std::size_t i = 0; i < hits.size(); i += 2) {
-            const float front = room(i), back = room(i + 1);
-            open.push_back({front > finest() || front > back, back > finest() || back >= front});
-        }
-        return open;
+        return rays;
     }
 
     void fill(const raydix::OctreeNode& node, std::span<const Point> points,
@@ -262,6 +299,7 @@ private:
         return at;
     }
 
+    std::vector<std::uint32_t> prims_;  // triangles of the points
     raydix::Octree octree_;
     std::vector<Voxel> voxels_;
     float edge_ = 0, area_ = 0;  // of the root cube; that a point stands for

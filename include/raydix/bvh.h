@@ -55,22 +55,32 @@ struct BuildOptions {
     Fit fit = Fit::as_published;
     bool strict = false;  // invalid primitives are an InputError instead of being left out
     int threads = 0;      // 0: all the machine has. The tree does not depend on it
+    int reinsertion_rounds =
+        0;  // 0..255: so often, at most, large subtrees are then moved to better places; each round
+            // costs 1 to 4 % of a build by sbvh or ploc. On the CPU only
 };
 
 /// What a tree is for: built each frame, built once for some million rays, built once for many.
 enum class Quality { fast, balanced, high };
 
-/// The builder that the word stands for (apetrei, ploc, sbvh), with its other options as they are.
+/// What the word stands for: apetrei; ploc; sbvh and 4 rounds of reinsertion. Other options are as
+/// they are.
 [[nodiscard]] constexpr BuildOptions build_options_for(Quality quality) {
-    return {.builder = quality == Quality::fast       ? Builder::apetrei
-                       : quality == Quality::balanced ? Builder::ploc
-                                                      : Builder::sbvh};
+    switch (quality) {
+        case Quality::fast:
+            return {.builder = Builder::apetrei};
+        case Quality::balanced:
+            return {.builder = Builder::ploc};
+        case Quality::high:
+            break;
+    }
+    return {.builder = Builder::sbvh, .reinsertion_rounds = 4};
 }
 
 /// 32 bytes. Inner: count == 0, children are nodes `first` and `first + 1`, left = lower code
-/// range. Leaf: count > 0 primitives, positions [first, first + count) of the primitive order. Slot
-/// 1 is padding, so that each pair of children lies in one 64-byte line; an inner node's `first` is
-/// even and >= 2.
+/// range, in trees with reinsertion the side of the smallest id. Leaf: count > 0 primitives,
+/// positions [first, first + count) of the primitive order. Slot 1 is padding, so that each pair of
+/// children lies in one 64-byte line; an inner node's `first` is even and >= 2.
 struct BvhNode {
     Vec3 lo;
     std::uint32_t first;

@@ -27,12 +27,13 @@ enum class View : std::uint32_t { shaded, normal, depth, primitive, ao, diffuse,
 struct RenderOptions {
     View view = View::shaded;
     std::uint32_t width = 1024, height = 768;  // each 1..16384
-    // Rays per pixel that gather light, 1..4096; 0: 64 for ao, 32 for shaded and diffuse.
+    // Rays per pixel that gather light, 1..4096; 0: 64 for ao, 32 for diffuse, 16 for shaded.
     int samples = 0;
     float ao_radius = 0.0f;  // 0: 5 % of the box diagonal
     std::uint64_t seed = 1;
     int threads = 0;
-    // Called with the part done, 0..1, from one thread at a time; what it throws ends the render.
+    // Called with the part done, 0..1, on any thread, one at a time, while others render; what it
+    // throws ends the render, and it is not called again.
     std::function<void(double)> progress;
 };
 

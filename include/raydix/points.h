@@ -27,9 +27,6 @@ struct Vec2 {
 struct Vec2d {
     double x, y;
 };
-struct Vec3d {
-    double x, y, z;
-};
 
 /// A closed box of any of these points.
 template <class Point>

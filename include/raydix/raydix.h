@@ -10,11 +10,14 @@
 #include <raydix/cwbvh.h>            // IWYU pragma: export
 #include <raydix/device.h>           // IWYU pragma: export
 #include <raydix/device_cwbvh.h>     // IWYU pragma: export
+#include <raydix/device_queries.h>   // IWYU pragma: export
 #include <raydix/device_trace.h>     // IWYU pragma: export
 #include <raydix/device_trees.h>     // IWYU pragma: export
+#include <raydix/double.h>           // IWYU pragma: export
 #include <raydix/error.h>            // IWYU pragma: export
 #include <raydix/hierarchy_study.h>  // IWYU pragma: export
 #include <raydix/instances.h>        // IWYU pragma: export
+#include <raydix/instances_d.h>      // IWYU pragma: export
 #include <raydix/kdtree.h>           // IWYU pragma: export
 #include <raydix/machine.h>          // IWYU pragma: export
 #include <raydix/mesh.h>             // IWYU pragma: export

@@ -1,5 +1,5 @@
 // The plain structs that every other header speaks in: points, boxes, rays, hits.
-// They hold float32 data only and may be copied byte for byte.
+// In float32, and those that end in `d` or `D` in double. All may be copied byte for byte.
 #pragma once
 
 #include <array>
@@ -15,6 +15,13 @@ struct Vec3 {
 /// Axis-aligned box, closed on all sides. `lo > hi` on any axis means "empty".
 struct Aabb {
     Vec3 lo, hi;
+};
+
+struct Vec3d {
+    double x, y, z;
+};
+struct AabbD {
+    Vec3d lo, hi;
 };
 
 /// Three vertex indices.
@@ -45,5 +52,23 @@ struct Hit {
     [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
 };
 static_assert(sizeof(Hit) == 16);
+
+/// As Ray and Hit, in double.
+struct RayD {
+    Vec3d origin;
+    double tmin = 0.0;
+    Vec3d direction;
+    double tmax = std::numeric_limits<double>::infinity();
+};
+static_assert(sizeof(RayD) == 64);
+
+struct HitD {
+    double t = std::numeric_limits<double>::infinity();
+    std::uint32_t prim = no_primitive;
+    double u = 0.0, v = 0.0;
+
+    [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
+    friend constexpr bool operator==(const HitD&, const HitD&) = default;
+};
 
 }  // namespace raydix

@@ -1,6 +1,6 @@
-// Wide trees for the CPU: up to eight children a node, boxes of 8 bits an axis, triangles in blocks
-// that one vector instruction reads. Made from any binary tree of triangles; traced by the kernel
-// `simd`, whose code is chosen at run time for the processor.
+// Wide trees for the CPU: up to eight children a node, boxes of floats or, if compact, of 8 bits an
+// axis, triangles in blocks of four that one vector instruction reads. Made from any binary tree of
+// triangles; traced by the kernel `simd`, whose code is chosen at run time for the processor.
 #pragma once
 
 #include <raydix/bvh.h>

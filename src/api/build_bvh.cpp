@@ -36,6 +36,7 @@ struct BvhBuilder::Scratch {
     Buffer<std::uint8_t> meeting;
     ClusterScratch clusters;
     SweepScratch sweeps;
+    TopScratch top;
     const TakeClusters* take_clusters = nullptr;  // if clusters are wanted, not a tree
 };
 
@@ -67,7 +68,7 @@ std::uint64_t bytes_held(const Scratch& s, const BvhAccess& tree) {
                s.hierarchy.memory, s.hierarchy.level_memory, s.apetrei.prefixes,
                s.apetrei.kept_bits, s.apetrei.kept_before, s.apetrei.pieces, s.apetrei.piece_counts,
                s.meeting) +
-           s.clusters.capacity_bytes() + s.sweeps.capacity_bytes() +
+           s.clusters.capacity_bytes() + s.sweeps.capacity_bytes() + s.top.capacity_bytes() +
            sum(tree.nodes(), tree.order(), tree.triangles(), tree.boxes(), tree.points());
 }
 
@@ -78,6 +79,9 @@ void check_options(const BuildOptions& options, std::size_t n) {
     if (options.max_leaf < 1 || options.max_leaf > 255)
         throw InputError("build option max_leaf is " + std::to_string(options.max_leaf) +
                          "; it must be 1 to 255");
+    if (options.reinsertion_rounds < 0 || options.reinsertion_rounds > 255)
+        throw InputError("build option reinsertion_rounds is " +
+                         std::to_string(options.reinsertion_rounds) + "; it must be 0 to 255");
     if (n >= std::size_t{1} << 31)
         throw InputError(std::to_string(n) + " primitives; a tree takes fewer than 2147483648");
 }
@@ -106,12 +110,14 @@ struct BuildRun {
 
         if (in_one_pass(valid)) {
             build_in_one_pass(valid, bounds.box, ms);
+            reinsert(ms);
             ms.total = total.lap();
             tree.build_ms() = ms;
             return;
         }
         if (sweeps(options.builder)) {
-            build_by_sweeps(source, n, valid, bounds.box, scratch.sweeps, tree, copies, ms);
+            build_by_sweeps(source, n, valid, bounds.box, scratch.sweeps, scratch.top, tree, copies,
+                            ms);
             ms.total = total.lap();
             tree.build_ms() = ms;
             return;
@@ -131,7 +137,8 @@ struct BuildRun {
 
         const std::span<const Key> keys = codes.first(valid);
         if (grows_clusters(options.builder)) {
-            build_clusters(source, keys, scratch.clusters, scratch.take_clusters, tree, copies, ms);
+            build_clusters(source, keys, scratch.clusters, scratch.top, scratch.take_clusters, tree,
+                           copies, ms);
             ms.total = total.lap();
             tree.build_ms() = ms;
             return;
@@ -146,6 +153,7 @@ struct BuildRun {
 
         fit();
         ms.fit = stage.lap();
+        reinsert(ms);
         ms.total = total.lap();
         tree.build_ms() = ms;
     }
@@ -211,6 +219,18 @@ private:
         tree.inner_count() = built.inner;
         tree.max_depth() = built.max_depth;
         ms.hierarchy = stage.lap();
+    }
+
+    /// Of a tree that is complete.
+    void reinsert(BuildMs& ms) {
+        if (options.reinsertion_rounds == 0) return;
+        Stopwatch stage;
+        const bool changed =
+            reinsert_finished(tree.nodes(), tree.order(), tree.max_depth(),
+                              top_options(options.reinsertion_rounds), scratch.top);
+        ms.hierarchy += stage.lap();
+        if (changed) copy_to_leaf_order(source, tree.order().view(), copies);
+        ms.layout += stage.lap();
     }
 
     void make_empty() {

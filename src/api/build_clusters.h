@@ -15,6 +15,7 @@
 #include "tree/bvh_access.h"
 #include "tree/place_clusters.h"
 #include "tree/ploc.h"
+#include "tree/reinsert_top.h"
 
 namespace raydix {
 
@@ -37,8 +38,8 @@ struct ClusterScratch {
 /// gets the clusters, and the arrays of the tree stay empty.
 template <class Key, class Source, class Copy>
 void build_clusters(const Source& source, std::span<const Key> keys, ClusterScratch& scratch,
-                    const TakeClusters* take, const BvhAccess& tree, Buffer<Copy>& copies,
-                    BuildMs& ms) {
+                    TopScratch& top_scratch, const TakeClusters* take, const BvhAccess& tree,
+                    Buffer<Copy>& copies, BuildMs& ms) {
     Stopwatch stage;
     std::swap(scratch.ids, tree.order());
     const std::span<const std::uint32_t> ids = scratch.ids.view();
@@ -64,7 +65,7 @@ void build_clusters(const Source& source, std::span<const Key> keys, ClusterScra
     });
     const auto max_leaf = static_cast<std::uint32_t>(tree.options().max_leaf);
     Buffer<ClusterNode>& nodes = scratch.ploc.nodes;
-    const ClusterRef root = [&] {
+    ClusterRef root = [&] {
         switch (tree.options().builder) {
             case Builder::hploc:
                 return build_hploc(keys, ids, static_cast<std::uint32_t>(tree.input_count()), boxes,
@@ -75,6 +76,9 @@ void build_clusters(const Source& source, std::span<const Key> keys, ClusterScra
                 return build_ploc(ids, max_leaf, scratch.ploc);
         }
     }();
+    if (const int rounds = tree.options().reinsertion_rounds; rounds > 0)
+        root = reinsert_clusters({nodes.data(), root, boxes, ids}, nodes.data(), max_leaf,
+                                 top_options(rounds), top_scratch);
     ms.hierarchy = stage.lap();
 
     const ClusterTree clusters{scratch.ploc.nodes.data(), root, boxes, ids};

@@ -14,6 +14,7 @@
 #include "sort/radix_sort.h"
 #include "tree/bvh_access.h"
 #include "tree/early_splits.h"
+#include "tree/reinsert_top.h"
 #include "tree/sah_build.h"
 #include "tree/sbvh_build.h"
 
@@ -105,8 +106,8 @@ inline void sort_and_build(const SahInput& input, SweepScratch& scratch, const B
 /// Of `n` primitives `valid` > 0 are not left out. On return all arrays of the tree are complete.
 template <class Source, class Copy>
 void build_by_sweeps(const Source& source, std::uint32_t n, std::uint32_t valid, const Aabb& scene,
-                     SweepScratch& scratch, const BvhAccess& tree, Buffer<Copy>& copies,
-                     BuildMs& ms) {
+                     SweepScratch& scratch, TopScratch& top_scratch, const BvhAccess& tree,
+                     Buffer<Copy>& copies, BuildMs& ms) {
     Stopwatch stage;
     const Builder builder = tree.options().builder;
     const auto max_leaf = static_cast<std::uint32_t>(tree.options().max_leaf);
@@ -133,6 +134,11 @@ void build_by_sweeps(const Source& source, std::uint32_t n, std::uint32_t valid,
     } else {
         make_references(source, n, valid, 0, scratch.sah.references);
         sort_and_build(input, scratch, tree, ms, stage);
+    }
+    if (const int rounds = tree.options().reinsertion_rounds; rounds > 0) {
+        reinsert_finished(tree.nodes(), tree.order(), tree.max_depth(), top_options(rounds),
+                          top_scratch);
+        ms.hierarchy += stage.lap();
     }
     copy_to_leaf_order(source, tree.order().view(), copies);
     ms.layout = stage.lap();

@@ -20,6 +20,10 @@ void check_device_options(const BuildOptions& options, std::uint64_t n) {
     if (!in_lbvh_family(options.builder) && options.builder != Builder::hploc)
         throw InputError("builder " + std::string(builder_name(options.builder)) +
                          " does not run on a device");
+    if (options.reinsertion_rounds != 0)
+        throw InputError("build option reinsertion_rounds is " +
+                         std::to_string(options.reinsertion_rounds) +
+                         "; a device builds without reinsertion, 0");
     if (n >= std::uint64_t{1} << 31)
         throw InputError(std::to_string(n) + " primitives; a tree takes fewer than 2147483648");
 }

@@ -93,6 +93,9 @@ HierarchyRun study_hierarchy(const MeshView& mesh, const BuildOptions& options, 
     if (!in_lbvh_family(options.builder))
         throw InputError("builder " + std::string(builder_name(options.builder)) +
                          " is not of the LBVH family");
+    if (options.reinsertion_rounds != 0)
+        throw InputError("reinsertion_rounds is " + std::to_string(options.reinsertion_rounds) +
+                         "; the study is of builds without reinsertion");
     const auto go = [&](const auto& source, std::size_t n) {
         const auto count = static_cast<std::uint32_t>(n);
         with_threads(options.threads, [&] {

@@ -75,7 +75,9 @@ inline std::size_t blocks_of(std::size_t n) {
     return (n + queries_per_block - 1) / queries_per_block;
 }
 
-/// Queries of one kind over a whole batch: counted, and then filled into rows of that length.
+/// Queries of one kind over a whole batch. Rows are found in one walk a query and kept by blocks
+/// until their places are known. What would take too much memory beside the result is only counted,
+/// and filled in by a second walk.
 template <class Index>
 class RowBatch {
     using Scalar = typename Index::Scalar;
@@ -92,7 +94,10 @@ public:
 
     PointQueryCounts count() {
         order();
-        count_all("", std::numeric_limits<std::uint64_t>::max());
+        for_each_block(job_.n, queries_per_block,
+                       [&](std::size_t b, std::size_t begin, std::size_t end) {
+                           count_block(b, block(begin, end));
+                       });
         return sum_of(parts_, job_.n);
     }
 
@@ -101,14 +106,17 @@ public:
         order();
         Buffer<std::uint32_t> counts(job_.n);
         job_.counts = counts.data();
+        job_.most_collected = most_collected;
         const std::uint64_t most =
             saturating_product(saturating_product(job_.n, job_.tree.points), bytes_each);
         const std::uint64_t limit = memory_limit(options_.max_bytes, most);
-        count_all(what, limit);
+        collect_all(what, limit);
         PointLists<Scalar> result;
         result.counts = sum_of(parts_, job_.n);
-        const std::uint64_t offset_bytes = (std::uint64_t{rows} + 1) * sizeof(std::uint64_t);
-        check_result_fits(what, result.counts.found * bytes_each + offset_bytes, limit);
+        const std::uint64_t bytes =
+            result.counts.found * bytes_each + (std::uint64_t{rows} + 1) * sizeof(std::uint64_t);
+        check_result_fits(what, bytes, limit);
+        if (bytes > limit - std::min(limit, kept_bytes_.load())) forget_rows();
         set_offsets(rows, row_of, result);
         result.indices.reset(result.counts.found);
         result.distances.reset(result.counts.found);
@@ -117,14 +125,16 @@ public:
         job_.indices = result.indices.data();
         job_.distances = result.distances.data();
         for_each_block(job_.n, queries_per_block,
-                       [&](std::size_t, std::size_t begin, std::size_t end) {
-                           (boxes_ ? kernels_.fill_box : kernels_.fill_ball)(block(begin, end));
+                       [&](std::size_t b, std::size_t begin, std::size_t end) {
+                           place_block(b, block(begin, end));
                        });
         return result;
     }
 
 private:
     static constexpr std::uint64_t bytes_each = sizeof(std::uint32_t) + sizeof(Scalar);
+    /// Points of a block: a block of more is counted without entering what lies inside entirely.
+    static constexpr std::size_t most_collected = 2048 * queries_per_block;
 
     void order() {
         order_ = order_for(index_, job_.queries, job_.n, values_, options_.order);
@@ -144,17 +154,64 @@ private:
         return job;
     }
 
+    void count_block(std::size_t b, const Within<Index>& job) {
+        parts_[b] = {};
+        (boxes_ ? kernels_.count_box : kernels_.count_ball)(job, parts_[b]);
+    }
+
+    /// False, and nothing kept, if there is too much of it.
+    bool collect_block(std::size_t b, const Within<Index>& job) {
+        RowChunk<Scalar>& chunk = chunks_[b];
+        chunk.reserve(16 * job.n);  // memory that is not written to costs nothing
+        (boxes_ ? kernels_.collect_box : kernels_.collect_ball)(job, parts_[b], chunk);
+        if (chunk.size > most_collected) {
+            chunk = {};
+            return false;
+        }
+        kept_bytes_ += chunk.size * bytes_each;
+        is_kept_[b] = 1;
+        return true;
+    }
+
     /// Stops as soon as the rows so far do not fit: a result that is far too large is known early.
-    void count_all(const char* what, std::uint64_t limit) {
+    void collect_all(const char* what, std::uint64_t limit) {
+        chunks_.resize(parts_.size());
+        is_kept_.assign(parts_.size(), 0);
         std::atomic<std::uint64_t> total{0};
-        for_each_block(
-            job_.n, queries_per_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
-                (boxes_ ? kernels_.count_box : kernels_.count_ball)(block(begin, end), parts_[b]);
-                const std::uint64_t found = parts_[b].found;
-                const std::uint64_t so_far =
-                    total.fetch_add(found, std::memory_order_relaxed) + found;
-                check_result_fits(what, saturating_product(so_far, bytes_each), limit);
-            });
+        std::atomic<bool> collects{true};
+        for_each_block(job_.n, queries_per_block,
+                       [&](std::size_t b, std::size_t begin, std::size_t end) {
+                           const Within<Index> job = block(begin, end);
+                           // Rows are kept beside the result: as much again.
+                           if (kept_bytes_ > limit / 2) collects = false;
+                           if (!collects || !collect_block(b, job)) {
+                               collects = false;
+                               count_block(b, job);
+                           }
+                           const std::uint64_t found = parts_[b].found;
+                           const std::uint64_t so_far =
+                               total.fetch_add(found, std::memory_order_relaxed) + found;
+                           check_result_fits(what, saturating_product(so_far, bytes_each), limit);
+                       });
+    }
+
+    void forget_rows() {
+        chunks_.clear();
+        is_kept_.assign(parts_.size(), 0);
+    }
+
+    /// The rows of a block to where they belong.
+    void place_block(std::size_t b, const Within<Index>& job) {
+        if (is_kept_[b] == 0) return (boxes_ ? kernels_.fill_box : kernels_.fill_ball)(job);
+        const RowChunk<Scalar> chunk = std::move(chunks_[b]);  // its memory goes back at once
+        std::size_t at = 0;
+        for (std::size_t k = 0; k < job.n; ++k) {
+            const std::size_t place = job.place(k), n = job.counts[place];
+            const std::uint64_t to = job.offset_of(place);
+            std::copy_n(chunk.ids.data() + at, n, job.indices + to);
+            std::copy_n(chunk.distances.data() + at, n, job.distances + to);
+            at += n;
+        }
     }
 
     void set_offsets(std::size_t rows, const std::uint32_t* row_of, PointLists<Scalar>& result) {
@@ -174,6 +231,9 @@ private:
     const KernelsOf<Index>& kernels_;
     std::vector<std::uint32_t> order_;
     std::vector<PointJobCounts> parts_;
+    std::vector<RowChunk<Scalar>> chunks_;  // of blocks
+    std::vector<std::uint8_t> is_kept_;     // 1: the rows of the block are in its chunk
+    std::atomic<std::uint64_t> kept_bytes_{0};
 };
 
 }  // namespace raydix

@@ -56,7 +56,9 @@ struct Header {
 static_assert(sizeof(Header) == 384 && sizeof(Header) % alignment == 0);
 
 struct Info {
-    std::uint32_t kind, builder, bits, max_leaf, strict;
+    std::uint32_t kind, builder, bits;
+    std::uint16_t max_leaf, reinsertion_rounds;
+    std::uint32_t strict;
     std::uint32_t inner_count, max_depth;
     std::uint32_t picture_width, picture_height;
     float ao_radius;

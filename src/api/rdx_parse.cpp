@@ -155,7 +155,8 @@ private:
         tree.kind() = static_cast<PrimitiveKind>(info_.kind);
         tree.options().builder = static_cast<Builder>(info_.builder);
         tree.options().bits = static_cast<int>(info_.bits);
-        tree.options().max_leaf = static_cast<int>(info_.max_leaf);
+        tree.options().max_leaf = info_.max_leaf;
+        tree.options().reinsertion_rounds = info_.reinsertion_rounds;
         tree.options().strict = info_.strict != 0;
         tree.inner_count() = info_.inner_count;
         tree.max_depth() = info_.max_depth;

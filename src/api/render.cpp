@@ -1,11 +1,13 @@
-// Tree and camera -> picture: the screen in chunks along its Morton order, one batch of rays per
-// step of a view.
+// Tree and camera -> picture: the screen in tiles along its Morton order, each tile on one thread,
+// one batch of rays per step of a view. What a tile holds stays in that core's caches.
 #include <raydix/error.h>
 #include <raydix/picture.h>
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -19,7 +21,7 @@
 namespace raydix {
 namespace {
 
-constexpr std::size_t chunk_rays = std::size_t{1} << 19;  // secondary rays held at once, about
+constexpr std::size_t tile_rays = std::size_t{1} << 15;  // of a tile, secondary ones included
 constexpr int max_samples = 4096;
 constexpr std::array<std::string_view, 7> view_names = {"shaded", "normal",  "depth", "primitive",
                                                         "ao",     "diffuse", "steps"};
@@ -42,13 +44,16 @@ void check_options(const RenderOptions& options) {
                          "; it must be 0.." + std::to_string(max_samples));
 }
 
+/// Light of `shaded` comes from the sun and an even sky, and is smooth with few rays.
+int default_samples(View view) { return view == View::ao ? 64 : view == View::diffuse ? 32 : 16; }
+
 /// Making a wide tree takes about as long as tracing so many rays per triangle without it.
 constexpr std::uint64_t rays_per_triangle = 1;
 
 RenderScene make_scene(const Bvh& bvh, const Camera& camera, const RenderOptions& options,
                        std::optional<WideBvh>& wide) {
     const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
-    const int asked = options.samples > 0 ? options.samples : options.view == View::ao ? 64 : 32;
+    const int asked = options.samples > 0 ? options.samples : default_samples(options.view);
     const std::uint32_t samples =
         gathers_light(options.view) ? static_cast<std::uint32_t>(asked) : 0;
     const std::uint32_t per_pixel = samples >= 4 ? 4 : 1;
@@ -90,22 +95,21 @@ Vec3 surface_value(const RenderScene& scene, const Ray& ray, const Hit& hit) {
 
 std::vector<Vec3> surface_values(const RenderScene& scene, const PrimarySamples& primary) {
     std::vector<Vec3> values(primary.rays.size());
-    for_each_index(values.size(), [&](std::size_t i) {
+    for (std::size_t i = 0; i < values.size(); ++i)
         values[i] = surface_value(scene, primary.rays[i], primary.hits[i]);
-    });
     return values;
 }
 
-/// Primary rays of the chunk, in a row for each pixel.
+/// Primary rays of the tile, in a row for each pixel.
 std::vector<Ray> primary_rays(const RenderScene& scene, std::span<const std::uint32_t> pixels) {
     const std::uint32_t per_pixel = scene.rays_per_pixel, width = scene.options.width;
     const auto* places = per_pixel == 4 ? four_places : one_place;
     std::vector<Ray> rays(pixels.size() * per_pixel);
-    for_each_index(rays.size(), [&](std::size_t i) {
+    for (std::size_t i = 0; i < rays.size(); ++i) {
         const std::uint32_t pixel = pixels[i / per_pixel];
         const auto& place = places[i % per_pixel];
         rays[i] = ray_through(scene.frame, pixel % width + place[0], pixel / width + place[1]);
-    });
+    }
     return rays;
 }
 
@@ -121,7 +125,7 @@ std::vector<Vec3> step_counts(const RenderScene& scene, std::span<const std::uin
     return counts;
 }
 
-std::vector<Vec3> chunk_samples(const RenderScene& scene, std::span<const std::uint32_t> pixels) {
+std::vector<Vec3> tile_samples(const RenderScene& scene, std::span<const std::uint32_t> pixels) {
     if (scene.options.view == View::steps) return step_counts(scene, pixels);
     const PrimarySamples primary = trace_primary(scene, pixels);
     switch (scene.options.view) {
@@ -161,26 +165,52 @@ void colour_steps(Picture& picture) {
     for (Vec3& p : picture.pixels) p = heat_colour(p.x / top);
 }
 
-/// Fills `picture` chunk by chunk; a pixel is the mean of its samples.
-void render_chunks(const RenderScene& scene, Picture& picture) {
-    const std::vector<std::uint32_t> order = pixels_in_morton_order(picture.width, picture.height);
-    const std::size_t rays_per_pixel = scene.rays_per_pixel;
-    const std::size_t chunk =
-        std::max<std::size_t>(64, chunk_rays / (rays_per_pixel * (scene.samples_per_ray + 1)));
-    for (std::size_t begin = 0; begin < order.size(); begin += chunk) {
-        const std::size_t count = std::min(chunk, order.size() - begin);
-        const std::span pixels(order.data() + begin, count);
-        const std::vector<Vec3> samples = chunk_samples(scene, pixels);
-        for_each_index(count, [&](std::size_t i) {
-            Vec3 sum = samples[i * rays_per_pixel];
-            for (std::size_t k = 1; k < rays_per_pixel; ++k)
-                sum = sum + samples[i * rays_per_pixel + k];
-            picture.pixels[pixels[i]] = (1.0f / static_cast<float>(rays_per_pixel)) * sum;
+/// Tells the caller how far the picture is, one tile at a time.
+class PictureProgress {
+public:
+    PictureProgress(const RenderOptions& options, std::size_t pixels)
+        : options_(options), pixels_(pixels) {}
+    void add(std::size_t pixels) {
+        if (!options_.progress) return;
+        isolated([&] {
+            const std::scoped_lock lock(telling_);
+            done_ += pixels;
+            if (ended_) return;
+            ended_ = true;  // unless the call comes back
+            options_.progress(static_cast<double>(done_) / static_cast<double>(pixels_));
+            ended_ = false;
         });
-        if (scene.options.progress)
-            scene.options.progress(static_cast<double>(begin + count) /
-                                   static_cast<double>(order.size()));
     }
+
+private:
+    const RenderOptions& options_;
+    std::size_t pixels_, done_ = 0;
+    bool ended_ = false;
+    std::mutex telling_;
+};
+
+/// Fills these pixels of `picture`; a pixel is the mean of its samples.
+void render_tile(const RenderScene& scene, std::span<const std::uint32_t> pixels,
+                 Picture& picture) {
+    const std::size_t rays_per_pixel = scene.rays_per_pixel;
+    const std::vector<Vec3> samples = tile_samples(scene, pixels);
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+        Vec3 sum = samples[i * rays_per_pixel];
+        for (std::size_t k = 1; k < rays_per_pixel; ++k)
+            sum = sum + samples[i * rays_per_pixel + k];
+        picture.pixels[pixels[i]] = (1.0f / static_cast<float>(rays_per_pixel)) * sum;
+    }
+}
+
+void render_tiles(const RenderScene& scene, Picture& picture) {
+    const std::vector<std::uint32_t> order = pixels_in_morton_order(picture.width, picture.height);
+    const std::size_t per_pixel = scene.rays_per_pixel * (scene.samples_per_ray + 1);
+    const std::size_t tile = std::bit_floor(std::max<std::size_t>(16, tile_rays / per_pixel));
+    PictureProgress progress(scene.options, order.size());
+    for_each_block(order.size(), tile, [&](std::size_t, std::size_t begin, std::size_t end) {
+        render_tile(scene, std::span(order).subspan(begin, end - begin), picture);
+        progress.add(end - begin);
+    });
 }
 
 }  // namespace
@@ -189,10 +219,10 @@ std::vector<SurfacePoint> points_of_hits(const RenderScene& scene, std::span<con
                                          std::span<const Hit> hits,
                                          std::span<const std::uint32_t> positions) {
     std::vector<SurfacePoint> points(positions.size());
-    for_each_index(positions.size(), [&](std::size_t k) {
+    for (std::size_t k = 0; k < positions.size(); ++k) {
         const std::uint32_t i = positions[k];
         points[k] = surface_point(scene.lookup, rays[i], hits[i], 0, scene.step_back);
-    });
+    }
     return points;
 }
 
@@ -232,7 +262,7 @@ Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& option
         std::optional<WideBvh> wide;
         const RenderScene scene = make_scene(bvh, camera, options, wide);
         picture.pixels.resize(std::size_t{options.width} * options.height);
-        render_chunks(scene, picture);
+        render_tiles(scene, picture);
     });
     if (options.view == View::depth) scale_depth(picture);
     if (options.view == View::steps) colour_steps(picture);

@@ -37,39 +37,54 @@ Vec3 ambient_light(const Lights& lights, Vec3 normal) {
     return between(outside, between(room_below, room_above, upward), lights.enclosed);
 }
 
-/// A ray that any-hit tracing answers with "no hit" at once: its interval is empty.
-Ray empty_ray(Vec3 origin) { return {origin, 0.0f, {0, 0, 1}, -1.0f}; }
+/// Which points face a light and see it; toward(point) is the ray there. [points]
+template <class Toward>
+std::vector<std::uint8_t> lit_points(const RenderScene& scene, std::span<const SurfacePoint> points,
+                                     const Toward& toward) {
+    std::vector<Ray> rays;
+    std::vector<std::uint32_t> facing;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const Ray ray = toward(points[i]);
+        if (!(dot(points[i].normal, ray.direction) > 0.0f)) continue;
+        rays.push_back(ray);
+        facing.push_back(static_cast<std::uint32_t>(i));
+    }
+    std::vector<std::uint8_t> occluded(rays.size()), lit(points.size(), 0);
+    scene.occluded(rays, occluded);
+    for (std::size_t k = 0; k < rays.size(); ++k) lit[facing[k]] = !occluded[k];
+    return lit;
+}
+
+/// What the camera sees, the lamp sees too, since it is there: no ray is needed.
+enum class SeenBy { camera, reflection };
 
 /// Light of sun and lamp on each point, shadows included, before the surface's own colour. [points]
-std::vector<Vec3> direct_light(const RenderScene& scene, std::span<const SurfacePoint> points) {
+std::vector<Vec3> direct_light(const RenderScene& scene, std::span<const SurfacePoint> points,
+                               SeenBy seen_by) {
     const Lights& lights = scene.lights;
-    std::vector<Ray> rays(2 * points.size());
-    for_each_index(points.size(), [&](std::size_t i) {
-        const SurfacePoint& p = points[i];
-        const Vec3 to_lamp = lights.lamp - p.origin;
-        const bool faces_sun = dot(p.normal, lights.sun) > 0.0f;
-        const bool faces_lamp = dot(p.normal, to_lamp) > 0.0f;
-        rays[2 * i] = faces_sun ? Ray{p.origin, 0.0f, lights.sun, infinity} : empty_ray(p.origin);
-        rays[2 * i + 1] = faces_lamp ? Ray{p.origin, 0.0f, to_lamp, 1.0f} : empty_ray(p.origin);
+    const auto in_sun = lit_points(scene, points, [&](const SurfacePoint& point) {
+        return Ray{point.origin, 0.0f, lights.sun, infinity};
     });
-    std::vector<std::uint8_t> occluded(rays.size());
-    scene.occluded(rays, occluded);
+    std::vector<std::uint8_t> in_lamplight(points.size(), 1);
+    if (seen_by == SeenBy::reflection)
+        in_lamplight = lit_points(scene, points, [&](const SurfacePoint& point) {
+            return Ray{point.origin, 0.0f, lights.lamp - point.origin, 1.0f};
+        });
 
     const Vec3 lamp_light = between(lamp_outside, lamp_inside, lights.enclosed);
     std::vector<Vec3> light(points.size());
-    for_each_index(points.size(), [&](std::size_t i) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
         const Double3 normal(points[i].normal);
         const Double3 to_lamp = Double3(lights.lamp) - Double3(points[i].origin);
         const double sun_cosine = dot(normal, Double3(lights.sun));
         const double lamp_distance = length(to_lamp);
         const double lamp_cosine = lamp_distance > 0.0 ? dot(normal, to_lamp) / lamp_distance : 0.0;
         Vec3 sum{0, 0, 0};
-        if (sun_cosine > 0.0 && !occluded[2 * i])
-            sum = sum + static_cast<float>(sun_cosine) * sun_light;
-        if (lamp_cosine > 0.0 && !occluded[2 * i + 1])
+        if (sun_cosine > 0.0 && in_sun[i]) sum = sum + static_cast<float>(sun_cosine) * sun_light;
+        if (lamp_cosine > 0.0 && in_lamplight[i])
             sum = sum + static_cast<float>(lamp_cosine) * lamp_light;
         light[i] = sum;
-    });
+    }
     return light;
 }
 
@@ -92,11 +107,11 @@ std::vector<float> open_parts(const RenderScene& scene, std::span<const SurfaceP
     scene.occluded(rays, occluded);
     const std::uint32_t per_point = scene.samples_per_ray;
     std::vector<float> open(points.size());
-    for_each_index(points.size(), [&](std::size_t i) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
         std::uint32_t blocked = 0;
         for (std::uint32_t k = 0; k < per_point; ++k) blocked += occluded[i * per_point + k];
         open[i] = 1.0f - static_cast<float>(blocked) / static_cast<float>(per_point);
-    });
+    }
     return open;
 }
 
@@ -108,22 +123,22 @@ std::vector<Vec3> bounced_light(const RenderScene& scene, std::span<const Surfac
     scene.closest(rays, hits);
     const std::vector<std::uint32_t> positions = positions_of_hits(hits);
     const std::vector<SurfacePoint> seen = points_of_hits(scene, rays, hits, positions);
-    const std::vector<Vec3> light_on_seen = direct_light(scene, seen);
+    const std::vector<Vec3> light_on_seen = direct_light(scene, seen, SeenBy::reflection);
 
     std::vector<Vec3> arriving(rays.size());
-    for_each_index(rays.size(), [&](std::size_t i) {
+    for (std::size_t i = 0; i < rays.size(); ++i) {
         if (!hits[i].hit()) arriving[i] = sky_colour(scene.lights, rays[i].direction);
-    });
-    for_each_index(positions.size(), [&](std::size_t k) {
+    }
+    for (std::size_t k = 0; k < positions.size(); ++k) {
         arriving[positions[k]] = tinted(surface_grey, light_on_seen[k] + later_light);
-    });
+    }
     const std::uint32_t per_point = scene.samples_per_ray;
     std::vector<Vec3> mean(points.size());
-    for_each_index(points.size(), [&](std::size_t i) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
         Vec3 sum{0, 0, 0};
         for (std::uint32_t k = 0; k < per_point; ++k) sum = sum + arriving[i * per_point + k];
         mean[i] = (1.0f / static_cast<float>(per_point)) * sum;
-    });
+    }
     return mean;
 }
 
@@ -132,11 +147,11 @@ template <class OnHit>
 std::vector<Vec3> fill_samples(const RenderScene& scene, const PrimarySamples& primary,
                                const OnHit& on_hit) {
     std::vector<Vec3> colours(primary.rays.size());
-    for_each_index(colours.size(), [&](std::size_t i) {
+    for (std::size_t i = 0; i < colours.size(); ++i) {
         colours[i] = sky_colour(scene.lights, primary.rays[i].direction);
-    });
-    for_each_index(primary.points.size(),
-                   [&](std::size_t k) { colours[primary.hit_positions[k]] = on_hit(k); });
+    }
+    for (std::size_t k = 0; k < primary.points.size(); ++k)
+        colours[primary.hit_positions[k]] = on_hit(k);
     return colours;
 }
 
@@ -183,7 +198,7 @@ Vec3 sky_colour(const Lights& lights, Vec3 direction) {
 }
 
 std::vector<Vec3> shade_samples(const RenderScene& scene, const PrimarySamples& primary) {
-    const std::vector<Vec3> direct = direct_light(scene, primary.points);
+    const std::vector<Vec3> direct = direct_light(scene, primary.points, SeenBy::camera);
     const std::vector<float> open = open_parts(scene, primary.points);
     return fill_samples(scene, primary, [&](std::size_t k) {
         const Vec3 ambient = open[k] * ambient_light(scene.lights, primary.points[k].normal);
@@ -200,7 +215,7 @@ std::vector<Vec3> open_sky_samples(const RenderScene& scene, const PrimarySample
 }
 
 std::vector<Vec3> diffuse_samples(const RenderScene& scene, const PrimarySamples& primary) {
-    const std::vector<Vec3> direct = direct_light(scene, primary.points);
+    const std::vector<Vec3> direct = direct_light(scene, primary.points, SeenBy::camera);
     const std::vector<Vec3> bounced = bounced_light(scene, primary.points);
     return fill_samples(scene, primary, [&](std::size_t k) {
         return tinted(surface_grey, direct[k] + bounced[k]);

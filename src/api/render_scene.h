@@ -1,4 +1,4 @@
-// What every view of a picture works with: the tree, the camera, and one chunk of the screen at a
+// What every view of a picture works with: the tree, the camera, and one tile of the screen at a
 // time.
 #pragma once
 
@@ -13,6 +13,7 @@
 #include "api/primitive_lookup.h"
 #include "api/surface_points.h"
 #include "rays/camera_frame.h"
+#include "trace/simd/trace_here.h"
 
 namespace raydix {
 
@@ -37,11 +38,16 @@ struct RenderScene {
     std::uint32_t samples_per_ray;  // secondary rays from each primary hit
 
     void closest(std::span<const Ray> rays, std::span<Hit> hits) const {
-        static_cast<void>(wide != nullptr ? trace(*wide, rays, hits) : trace(bvh, rays, hits));
+        if (wide != nullptr)
+            closest_here(*wide, rays, hits);
+        else
+            static_cast<void>(trace(bvh, rays, hits));
     }
     void occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const {
-        static_cast<void>(wide != nullptr ? trace_any(*wide, rays, found)
-                                          : trace_any(bvh, rays, found));
+        if (wide != nullptr)
+            occluded_here(*wide, rays, found);
+        else
+            static_cast<void>(trace_any(bvh, rays, found));
     }
 };
 

@@ -17,10 +17,13 @@ struct Double3 {
     RAYDIX_HD Double3(double x_value, double y_value, double z_value)
         : x(x_value), y(y_value), z(z_value) {}
     RAYDIX_HD explicit Double3(Vec3 p) : x(p.x), y(p.y), z(p.z) {}
+    RAYDIX_HD explicit Double3(Vec3d p) : x(p.x), y(p.y), z(p.z) {}
 
     [[nodiscard]] RAYDIX_HD Vec3 rounded() const {
         return {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
     }
+    RAYDIX_HD void round_to(Vec3& p) const { p = rounded(); }
+    RAYDIX_HD void round_to(Vec3d& p) const { p = {x, y, z}; }
 };
 
 RAYDIX_HD inline Double3 operator+(Double3 a, Double3 b) {

@@ -13,12 +13,11 @@
 
 namespace raydix {
 
-/// The exact sum of up to 48 doubles, as parts that do not overlap, smallest first (Shewchuk 1997,
-/// figure 6, grow-expansion without zeros).
-class ExactSum {
+/// The exact sum of up to `capacity` doubles, as parts that do not overlap, smallest first
+/// (Shewchuk 1997, figure 6, grow-expansion without zeros).
+template <int capacity>
+class BasicExactSum {
 public:
-    static constexpr int capacity = 48;
-
     RAYDIX_HD void add(double term) {
         int kept = 0;
         for (int i = 0; i < size_; ++i) {
@@ -32,6 +31,17 @@ public:
         size_ = kept;
         RAYDIX_CHECK(size_, <=, capacity);
     }
+    [[nodiscard]] RAYDIX_HD int sign() const {
+        return size_ == 0 ? 0 : parts_[size_ - 1] > 0.0 ? 1 : -1;
+    }
+
+private:
+    double parts_[capacity];
+    int size_ = 0;
+};
+
+class ExactSum : public BasicExactSum<48> {
+public:
     /// Adds x * y * z of floats. x * y has at most 48 bits, exact in double; its two halves times z
     /// are exact too.
     RAYDIX_HD void add_product(float x, float y, float z) {
@@ -41,13 +51,6 @@ public:
         add(high * z);
         add((xy - high) * z);
     }
-    [[nodiscard]] RAYDIX_HD int sign() const {
-        return size_ == 0 ? 0 : parts_[size_ - 1] > 0.0 ? 1 : -1;
-    }
-
-private:
-    double parts_[capacity];
-    int size_ = 0;
 };
 
 RAYDIX_HD inline int sign_of(double x) { return x > 0.0 ? 1 : x < 0.0 ? -1 : 0; }

@@ -2,7 +2,9 @@
 #pragma once
 
 #if defined(__x86_64__) || defined(_M_X64)
-#include <xmmintrin.h>
+#include <emmintrin.h>
+
+#include <limits>
 #elif defined(__aarch64__)
 #include <cstdint>
 #endif
@@ -27,6 +29,21 @@ private:
     static constexpr unsigned special_bits =
         0x8000u | 0x0040u | 0x6000u;  // FTZ, DAZ, rounding mode
     unsigned saved_;
+
+public:
+    /// Whether nothing is to be set, by what four additions give: reading the control register
+    /// waits for all arithmetic before it, and so keeps short calls from overlapping.
+    [[nodiscard]] static bool is_plain() {
+        constexpr float least = std::numeric_limits<float>::min();
+        // A result below `least`, an operand below it, and ties that go either way from 1.
+        __m128 a = _mm_setr_ps(1.5f * least, 0.5f * least, 1.0f, 1.0f);
+        const __m128 b = _mm_setr_ps(-least, 0.0f, 0x1p-24f, -0x1p-25f),
+                     nearest = _mm_setr_ps(0.5f * least, 0.5f * least, 1.0f, 1.0f);
+        asm volatile("" : "+x"(a));  // not at compile time
+        const __m128i same =
+            _mm_cmpeq_epi32(_mm_castps_si128(_mm_add_ps(a, b)), _mm_castps_si128(nearest));
+        return _mm_movemask_epi8(same) == 0xFFFF;
+    }
 #elif defined(__aarch64__)
     FloatEnvironment() {
         asm volatile("mrs %0, fpcr" : "=r"(saved_));
@@ -41,8 +58,12 @@ private:
     // FZ; rounding mode; and of newer processors FIZ and AH, which flush inputs and change results.
     static constexpr std::uint64_t special_bits = (1ull << 24) | (3ull << 22) | 3ull;
     std::uint64_t saved_ = 0;
+
+public:
+    [[nodiscard]] static bool is_plain() { return false; }
 #else
     FloatEnvironment() = default;
+    [[nodiscard]] static bool is_plain() { return true; }
 #endif
 };
 

@@ -18,7 +18,14 @@ RAYDIX_HD inline Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, 
 RAYDIX_HD inline Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 RAYDIX_HD inline Vec3 operator*(Vec3 a, float s) { return {a.x * s, a.y * s, a.z * s}; }
 RAYDIX_HD inline Vec3 operator*(float s, Vec3 a) { return a * s; }
+RAYDIX_HD inline Vec3d operator+(Vec3d a, Vec3d b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+RAYDIX_HD inline Vec3d operator-(Vec3d a, Vec3d b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+RAYDIX_HD inline Vec3d operator*(Vec3d a, double s) { return {a.x * s, a.y * s, a.z * s}; }
+RAYDIX_HD inline Vec3d operator*(double s, Vec3d a) { return a * s; }
 RAYDIX_HD inline bool operator==(Vec3 a, Vec3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+RAYDIX_HD inline bool operator==(Vec3d a, Vec3d b) {
+    return a.x == b.x && a.y == b.y && a.z == b.z;
+}
 
 RAYDIX_HD inline float dot(Vec3 a, Vec3 b) { return (a.x * b.x + a.y * b.y) + a.z * b.z; }
 RAYDIX_HD inline Vec3 cross(Vec3 a, Vec3 b) {
@@ -29,10 +36,18 @@ RAYDIX_HD inline Vec3 cross(Vec3 a, Vec3 b) {
 // operand comes out.
 RAYDIX_HD inline float min_of(float a, float b) { return a < b ? a : b; }
 RAYDIX_HD inline float max_of(float a, float b) { return a > b ? a : b; }
+RAYDIX_HD inline double min_of(double a, double b) { return a < b ? a : b; }
+RAYDIX_HD inline double max_of(double a, double b) { return a > b ? a : b; }
 RAYDIX_HD inline Vec3 min_of(Vec3 a, Vec3 b) {
     return {min_of(a.x, b.x), min_of(a.y, b.y), min_of(a.z, b.z)};
 }
 RAYDIX_HD inline Vec3 max_of(Vec3 a, Vec3 b) {
+    return {max_of(a.x, b.x), max_of(a.y, b.y), max_of(a.z, b.z)};
+}
+RAYDIX_HD inline Vec3d min_of(Vec3d a, Vec3d b) {
+    return {min_of(a.x, b.x), min_of(a.y, b.y), min_of(a.z, b.z)};
+}
+RAYDIX_HD inline Vec3d max_of(Vec3d a, Vec3d b) {
     return {max_of(a.x, b.x), max_of(a.y, b.y), max_of(a.z, b.z)};
 }
 
@@ -49,12 +64,16 @@ RAYDIX_HD inline Aabb unite(const Aabb& a, const Aabb& b) {
 RAYDIX_HD inline Aabb box_of(Vec3 a, Vec3 b, Vec3 c) {
     return {min_of(min_of(a, b), c), max_of(max_of(a, b), c)};
 }
+RAYDIX_HD inline AabbD box_of(Vec3d a, Vec3d b, Vec3d c) {
+    return {min_of(min_of(a, b), c), max_of(max_of(a, b), c)};
+}
 
 /// 0.5 * (lo + hi), as contract.md 2 has it.
 RAYDIX_HD inline Vec3 center_of(const Aabb& b) { return 0.5f * (b.lo + b.hi); }
 
 /// -0 becomes +0; everything else stays, bit for bit.
 RAYDIX_HD inline Vec3 without_negative_zero(Vec3 p) { return {p.x + 0.0f, p.y + 0.0f, p.z + 0.0f}; }
+RAYDIX_HD inline Vec3d without_negative_zero(Vec3d p) { return {p.x + 0.0, p.y + 0.0, p.z + 0.0}; }
 
 /// False for NaN, Inf and |coordinate| > 1e12.
 RAYDIX_HD inline bool in_range(Vec3 p) {

@@ -108,9 +108,10 @@ struct SetWord {
 };
 
 /// Bytes that CUB wants for a scan or a sort of so many.
-inline std::size_t cub_scan_bytes(std::uint32_t n) {
+template <class Value = std::uint32_t>
+std::size_t cub_scan_bytes(std::uint32_t n) {
     std::size_t bytes = 0;
-    std::uint32_t* values = nullptr;
+    Value* values = nullptr;
     RAYDIX_CUDA_TRY(cub::DeviceScan::ExclusiveSum(nullptr, bytes, values, values, n));
     return bytes;
 }
@@ -141,6 +142,9 @@ public:
     void exclusive_scan_counted(const char*, std::uint32_t*, const std::uint32_t*,
                                 std::uint32_t limit) {
         grow(cub_scan_bytes(limit + 1));
+    }
+    void exclusive_scan_wide(const char*, std::uint64_t*, std::uint32_t n) {
+        if (n != 0) grow(cub_scan_bytes<std::uint64_t>(n));
     }
     template <class Key>
     void sort_pairs(const char*, const SortArrays<Key>&, std::uint32_t limit, const std::uint32_t*,
@@ -224,6 +228,13 @@ public:
                                 const std::uint32_t* count, std::uint32_t limit) {
         launch(label, limit + 1, ClearUnusedValues{values, count});
         exclusive_scan(label, values, limit + 1, nullptr);
+    }
+
+    void exclusive_scan_wide(const char* label, std::uint64_t* values, std::uint32_t n) {
+        if (n == 0) return;
+        const ProfilerRange range(label);
+        std::size_t bytes = memory_bytes_;
+        RAYDIX_CUDA_TRY(cub::DeviceScan::ExclusiveSum(memory_, bytes, values, values, n, stream_));
     }
 
     template <class Key>

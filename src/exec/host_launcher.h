@@ -14,6 +14,8 @@
 //   exclusive_scan_counted(label, values, count, limit)
 //                               the same for the first *count <= limit values; the sum of all
 //                               goes behind them, to values[*count]
+//   exclusive_scan_wide(label, values, n)
+//                               the same for values of 64 bits, without their sum
 //   sort_pairs(label, arrays, limit, count, key_bits)
 //                               the first *count pairs by key, stable; all `limit` if count is
 //                               null
@@ -100,7 +102,7 @@ public:
     void exclusive_scan(const char* label, std::uint32_t* values, std::uint32_t n,
                         std::uint32_t* total) {
         const Clock::time_point start = Clock::now();
-        const std::uint32_t sum = raydix::exclusive_scan({values, n});
+        const std::uint32_t sum = raydix::exclusive_scan(std::span<std::uint32_t>(values, n));
         if (total != nullptr) *total = sum;
         // One read and one write a value, as a single-pass scan on a GPU has; blocks hand sums on.
         note({label, n, std::uint64_t{n} * 8, 4, n}, start);
@@ -110,6 +112,12 @@ public:
                                 const std::uint32_t* count, std::uint32_t limit) {
         const std::uint32_t n = std::min(*count, limit);
         exclusive_scan(label, values, n, values + n);
+    }
+
+    void exclusive_scan_wide(const char* label, std::uint64_t* values, std::uint32_t n) {
+        const Clock::time_point start = Clock::now();
+        static_cast<void>(raydix::exclusive_scan(std::span<std::uint64_t>(values, n)));
+        note({label, n, std::uint64_t{n} * 16, 4, n}, start);
     }
 
     template <class Key>

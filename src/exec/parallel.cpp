@@ -28,6 +28,8 @@ void with_threads(int threads, const std::function<void()>& body) {
     arena.execute(body);
 }
 
+void isolated(const std::function<void()>& body) { tbb::this_task_arena::isolate(body); }
+
 int thread_count() { return tbb::this_task_arena::max_concurrency(); }
 
 namespace detail {

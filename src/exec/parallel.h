@@ -17,6 +17,10 @@ void with_threads(int threads, const std::function<void()>& body);
 /// How many threads the loops of the calling context may use.
 [[nodiscard]] int thread_count();
 
+/// Calls body() within a loop so that the calling thread takes no other part of that loop up while
+/// loops inside of body wait: what body holds, a mutex for one, stays out of reach of itself.
+void isolated(const std::function<void()>& body);
+
 namespace detail {
 void parallel_ranges(std::size_t n, std::size_t grain,
                      void (*call)(const void*, std::size_t, std::size_t), const void* body);

@@ -8,5 +8,6 @@ namespace raydix {
 
 /// Returns the sum of all. Parallel: sums per block, sums of blocks, then sums within blocks.
 std::uint32_t exclusive_scan(std::span<std::uint32_t> values);
+std::uint64_t exclusive_scan(std::span<std::uint64_t> values);
 
 }  // namespace raydix

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/math.h"
+#include "base/prefetch.h"
 #include "primitives/zero_area.h"
 
 namespace raydix {
@@ -74,7 +75,7 @@ public:
     [[nodiscard]] std::size_t vertex_count() const { return vertices_.size(); }
     [[nodiscard]] Vec3 vertex(std::uint32_t number) const { return vertices_[number]; }
     void prefetch_indices(std::uint32_t) const {}
-    void prefetch_corners(std::uint32_t position) const {
+    RAYDIX_PREFETCHING void prefetch_corners(std::uint32_t position) const {
         __builtin_prefetch(&bvh_.triangles()[position]);
     }
 

@@ -1,4 +1,4 @@
-// Where the triangles of leaves go: into blocks of eight, no leaf over the end of one.
+// Where the triangles of leaves go: into blocks of four, no leaf over the end of one.
 #pragma once
 
 #include <array>
@@ -7,12 +7,15 @@
 
 namespace raydix {
 
+/// Triangles of a block: what one vector instruction of every processor takes, and a leaf at most.
+inline constexpr std::uint32_t block_lanes = 4;
+
 /// Puts each leaf into the block that it fills best of a few that are not full.
 class BlockFiller {
 public:
-    static constexpr std::uint32_t lanes = 8;
+    static constexpr std::uint32_t lanes = block_lanes;
 
-    /// The place of the first of `count` triangles, 1 to 8: lane place % 8 of block place / 8.
+    /// The place of the first of `count` triangles, 1 to 4: lane place % 4 of block place / 4.
     std::uint32_t place(std::uint32_t count) {
         std::size_t best = open_.size();
         for (std::size_t k = 0; k < open_.size(); ++k)

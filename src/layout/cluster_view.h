@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/prefetch.h"
 #include "layout/binary_view.h"
 #include "layout/leaf_order.h"
 #include "tree/place_clusters.h"
@@ -33,7 +34,7 @@ public:
     [[nodiscard]] std::array<Ref, 2> children(Ref inner) const {
         return {tree_.nodes[inner].left, tree_.nodes[inner].right};
     }
-    void prefetch(Ref inner) const {
+    RAYDIX_PREFETCHING void prefetch(Ref inner) const {
         for (const Ref child : children(inner))
             if (!is_primitive(child)) __builtin_prefetch(&tree_.nodes[child]);
     }
@@ -68,10 +69,10 @@ public:
     [[nodiscard]] Vec3 vertex(std::uint32_t number) const {
         return without_negative_zero(source_.vertices[number]);
     }
-    void prefetch_indices(std::uint32_t place) const {
+    RAYDIX_PREFETCHING void prefetch_indices(std::uint32_t place) const {
         raydix::prefetch_indices(source_, tree_.ids[place]);
     }
-    void prefetch_corners(std::uint32_t place) const {
+    RAYDIX_PREFETCHING void prefetch_corners(std::uint32_t place) const {
         raydix::prefetch_corners(source_, tree_.ids[place]);
     }
 

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 
+#include "base/prefetch.h"
 #include "exec/parallel.h"
 #include "primitives/host_box.h"
 
@@ -36,10 +37,10 @@ inline Box3 copy_box(const Aabb& box) { return Box3::load(box); }
 inline Box3 copy_box(Vec3 p) { return Box3::load(p, p); }
 
 /// Asks for what copying triangle i will read, in two steps: the indices, then the vertices.
-inline void prefetch_indices(const TriangleSource& source, std::uint32_t i) {
+RAYDIX_PREFETCHING void prefetch_indices(const TriangleSource& source, std::uint32_t i) {
     __builtin_prefetch(&source.triangles[i]);
 }
-inline void prefetch_corners(const TriangleSource& source, std::uint32_t i) {
+RAYDIX_PREFETCHING void prefetch_corners(const TriangleSource& source, std::uint32_t i) {
     for (const std::uint32_t vertex : source.triangles[i])
         __builtin_prefetch(&source.vertices[vertex]);
 }

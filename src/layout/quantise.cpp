@@ -191,43 +191,4 @@ void assign_octant_slots(std::span<const Aabb> children, int* slots) {
     }
 }
 
-void assign_octant_slots_greedily(std::span<const Aabb> children, int* slots) {
-    const auto count = static_cast<int>(children.size());
-    Aabb all = empty_box();
-    for (const Aabb& box : children) all = unite(all, box);
-    const Vec3 middle = center_of(all);
-    std::array<Vec3, quantised_width> away;
-    std::array<float, quantised_width> most;  // what the best slot would give
-    std::array<int, quantised_width> owner, waiting;
-    owner.fill(-1);
-    int waiting_count = 0;
-    for (int k = 0; k < count; ++k) {
-        const auto at = static_cast<std::size_t>(k);
-        const Vec3 d = away[at] = center_of(children[at]) - middle;
-        most[at] = (std::fabs(d.x) + std::fabs(d.y)) + std::fabs(d.z);
-        int& other = owner[(d.x > 0 ? 1u : 0u) | (d.y > 0 ? 2u : 0u) | (d.z > 0 ? 4u : 0u)];
-        int loser = other;
-        if (other < 0 || most[at] > most[static_cast<std::size_t>(other)])
-            other = k;
-        else
-            loser = k;
-        if (loser >= 0) waiting[static_cast<std::size_t>(waiting_count++)] = loser;
-    }
-    for (int w = 0; w < waiting_count; ++w) {
-        const int k = waiting[static_cast<std::size_t>(w)];
-        const Vec3 d = away[static_cast<std::size_t>(k)];
-        float best = -infinity;
-        int* slot = nullptr;
-        for (unsigned s = 0; s < quantised_width; ++s) {
-            const float gain = ((s & 1 ? d.x : -d.x) + (s & 2 ? d.y : -d.y)) + (s & 4 ? d.z : -d.z);
-            if (owner[s] >= 0 || (gain <= best && slot != nullptr)) continue;
-            best = gain;
-            slot = &owner[s];
-        }
-        *slot = k;
-    }
-    for (int s = 0; s < quantised_width; ++s)
-        if (const int k = owner[static_cast<std::size_t>(s)]; k >= 0) slots[k] = s;
-}
-
 }  // namespace raydix

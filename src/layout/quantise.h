@@ -29,10 +29,6 @@ inline constexpr int max_steps = 255;
 /// section 3.2, solved exactly. slots [count], out.
 void assign_octant_slots(std::span<const Aabb> children, int* slots);
 
-/// The same by rule of thumb, in a small part of the time: each gets the slot of its octant, of
-/// several in one octant the one farthest from the middle; the others the best slots that are left.
-void assign_octant_slots_greedily(std::span<const Aabb> children, int* slots);
-
 inline float coordinate(Vec3 v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
 /// Boxes of the children of a wide node, by slot.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/check.h"
+#include "base/prefetch.h"
 #include "exec/parallel.h"
 #include "layout/leaf_order.h"
 #include "tree/fit.h"
@@ -110,15 +111,17 @@ private:
             } else {
                 stack.back().done = true;
                 BvhNode* pair = nodes_ + node.first;
-                // Leaves at once: only inner children wait.
+                // Leaves from left to right, at once where nothing waits before them.
+                if (!pair[0].is_leaf()) {
+                    stack.push_back({node.first + 1, false});
+                    stack.push_back({node.first, false});
+                    continue;
+                }
+                fit_leaf(pair[0], sum);
                 if (pair[1].is_leaf())
                     fit_leaf(pair[1], sum);
                 else
                     stack.push_back({node.first + 1, false});
-                if (pair[0].is_leaf())
-                    fit_leaf(pair[0], sum);
-                else
-                    stack.push_back({node.first, false});
             }
         }
     }
@@ -141,8 +144,8 @@ private:
         set_box(node, unite(box_of(pair[0]), box_of(pair[1])));
         sum.cost += half_area(box_of(node));
     }
-    /// Leaves come in ascending order of positions, nearly.
-    void prefetch(std::uint32_t k) const {
+    /// Leaves come in ascending order of positions.
+    RAYDIX_PREFETCHING void prefetch(std::uint32_t k) const {
         constexpr std::uint32_t indices_ahead = 32, corners_ahead = 16;
         if (k + indices_ahead >= order_.size()) return;
         prefetch_indices(source_, order_[k + indices_ahead]);

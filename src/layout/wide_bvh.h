@@ -1,5 +1,5 @@
 // What a wide tree of the CPU consists of (raydix/wide.h). A finished binary tree, or the clusters
-// that it would be made of -> nodes [wide nodes], blocks [references / 8, a little more]. In a
+// that it would be made of -> nodes [wide nodes], blocks [references / 4, a little more]. In a
 // compact tree boxes are quantised and triangles share vertices.
 #pragma once
 
@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "layout/block_filler.h"
 #include "layout/quantise.h"
 #include "layout/wide_collapse.h"
 
@@ -18,7 +19,7 @@ namespace raydix {
 class ClusterView;
 
 /// A word of a node's `child`: the node's index, or with the highest bit set, a leaf's place among
-/// the triangles times 8 plus its count less one. Place p is lane p % 8 of block p / 8; no leaf
+/// the triangles times 8 plus its count less one. Place p is lane p % 4 of block p / 4; no leaf
 /// goes over the end of a block.
 inline constexpr std::uint32_t wide_leaf_bit = 0x80000000u;
 inline constexpr std::uint32_t wide_no_child = 0xFFFFFFFFu;
@@ -31,8 +32,8 @@ inline constexpr double wide_primitive_cost = 0.4;
 /// Children's boxes as they are, but about the middle of the tree's bounds
 /// (WideBvh::Arrays::middle), rounded outward: then a plane meets a ray after plane * inverse + (a
 /// constant of the ray), with an error that depends on the size of the scene and not on where it
-/// lies. A missing child has lo = infinity and hi = -infinity. Slots are those of
-/// assign_octant_slots.
+/// lies. A missing child has lo = infinity and hi = -infinity. Children are in order of
+/// area, the smallest box in slot 0.
 struct alignas(32) WideNode {
     float lo[3][8], hi[3][8];
     std::uint32_t child[8];
@@ -41,7 +42,7 @@ static_assert(sizeof(WideNode) == 224);
 
 /// The node of compact trees. Frame and boxes fill the first 64 bytes. A child in slot s has the
 /// box origin + lo[.][s] * step to origin + hi[.][s] * step, where the step of an axis is
-/// 2^(exponent - 127); slots are those of assign_octant_slots.
+/// 2^(exponent - 127); slots as above.
 struct alignas(32) CompactNode {
     float origin[3];
     std::uint8_t exponent[3];
@@ -52,10 +53,10 @@ struct alignas(32) CompactNode {
 };
 static_assert(sizeof(CompactNode) == 96);
 
-/// Eight triangles, one a lane: corner[3 * vertex + axis][lane].
+/// Four triangles, one a lane: corner[3 * vertex + axis][lane]. A leaf touches three cache lines.
 struct alignas(32) TriangleBlock {
-    float corner[9][8];
-    std::uint32_t prim[8];
+    float corner[9][block_lanes];
+    std::uint32_t prim[block_lanes];
 
     void set(std::uint32_t lane, const LeafTriangle& t, std::uint32_t id) {
         const Vec3 corners[3] = {t.v0, t.v1, t.v2};
@@ -67,14 +68,14 @@ struct alignas(32) TriangleBlock {
         prim[lane] = id;
     }
 };
-static_assert(sizeof(TriangleBlock) == 320);
+static_assert(sizeof(TriangleBlock) == 160);
 
-/// Eight triangles by their corners' places in a list of vertices: vertex[corner][lane].
-struct alignas(32) CompactBlock {
-    std::uint32_t vertex[3][8];
-    std::uint32_t prim[8];
+/// Four triangles by their corners' places in a list of vertices: vertex[corner][lane].
+struct alignas(64) CompactBlock {
+    std::uint32_t vertex[3][block_lanes];
+    std::uint32_t prim[block_lanes];
 };
-static_assert(sizeof(CompactBlock) == 128);
+static_assert(sizeof(CompactBlock) == 64);
 
 /// Nodes and blocks of one kind.
 struct WideBvh::Arrays {
@@ -85,7 +86,23 @@ struct WideBvh::Arrays {
     Buffer<Vec3> vertices;  // of compact ones, in the order in which blocks need them first
     Vec3 middle{};          // of the bounds
     Aabb bounds{};          // the root's exact box: rays widen boxes by its size
+    // Once more, a vector each, the last float 0: a single ray loads them where they are, since
+    // floats that were just copied one by one cannot be loaded as a vector at once.
+    struct Frame {
+        alignas(16) float lo[4]{}, hi[4]{}, middle[4]{};
+    } frame;
     WideBvhStats stats;
+
+    void set_bounds(const Aabb& box) {
+        bounds = box;
+        middle = center_of(box);
+        const auto copy = [](const Vec3& from, float* to) {
+            to[0] = from.x, to[1] = from.y, to[2] = from.z;
+        };
+        copy(box.lo, frame.lo);
+        copy(box.hi, frame.hi);
+        copy(middle, frame.middle);
+    }
 
     /// Nothing to hit; the memory stays.
     void clear(const WideOptions& options) {
@@ -95,6 +112,7 @@ struct WideBvh::Arrays {
         compact_blocks.reset(0);
         vertices.reset(0);
         bounds = {};
+        frame = {};
         stats = {};
         stats.width = options.width;
         stats.compact = options.compact;

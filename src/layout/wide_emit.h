@@ -47,8 +47,7 @@ public:
             join_parts(std::span(parts_).first(roots_.size() + 1), options_.compact, out);
         if (options_.compact) number_vertices(out);
         count_bytes(out);
-        out.bounds = view_.box(view_.root());
-        out.middle = center_of(out.bounds);
+        out.set_bounds(view_.box(view_.root()));
         const double root = half_area(out.bounds);
         out.stats.sah =
             root > 0 ? (sums.node_area + wide_primitive_cost * sums.triangle_area) / root : 0;

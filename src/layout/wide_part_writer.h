@@ -46,21 +46,18 @@ public:
     void fill_node(std::uint32_t w, std::span<const WideChild> children, std::uint32_t depth,
                    const Wait& wait) {
         out_.sums.levels = std::max(out_.sums.levels, depth + 1);
-        std::array<Aabb, quantised_width> boxes;
-        std::array<int, quantised_width> slots;
         Aabb all = empty_box();
-        for (std::size_t k = 0; k < children.size(); ++k) {
-            boxes[k] = children[k].box;
-            all = unite(all, boxes[k]);
-            add_figures(children[k]);
+        for (const WideChild& child : children) {
+            all = unite(all, child.box);
+            add_figures(child);
         }
-        assign_octant_slots_greedily(std::span(boxes).first(children.size()), slots.data());
+        const auto order = by_area(children);
         SlotBoxes by_slot;
-        for (std::size_t k = 0; k < children.size(); ++k) {
-            by_slot.set(slots[k], boxes[k]);
-            set_child(w, static_cast<std::uint32_t>(slots[k]), children[k].word);
-            if (children[k].word == WideChild::inner_word)
-                wait(children[k].source, static_cast<std::uint32_t>(slots[k]));
+        for (std::uint32_t slot = 0; slot < children.size(); ++slot) {
+            const WideChild& child = children[order[slot]];
+            by_slot.set(static_cast<int>(slot), child.box);
+            set_child(w, slot, child.word);
+            if (child.word == WideChild::inner_word) wait(child.source, slot);
         }
         if (!compact_) {
             set_boxes_about(middle_, by_slot, out_.nodes[w]);
@@ -125,6 +122,24 @@ public:
     void write_triangles() { compact_ ? list_corners() : copy_triangles(); }
 
 private:
+    /// The children's places, the smallest box first: rays that stop at any hit take the last slot
+    /// first, where a hit is likeliest. Equal areas keep their order.
+    static std::array<std::uint32_t, quantised_width> by_area(std::span<const WideChild> children) {
+        std::array<std::uint32_t, quantised_width> order;
+        std::array<float, quantised_width> areas;
+        for (std::uint32_t k = 0; k < children.size(); ++k) {
+            const auto area = static_cast<float>(half_area(children[k].box));
+            std::uint32_t at = k;
+            for (; at > 0 && areas[at - 1] > area; --at) {
+                areas[at] = areas[at - 1];
+                order[at] = order[at - 1];
+            }
+            areas[at] = area;
+            order[at] = k;
+        }
+        return order;
+    }
+
     static constexpr std::uint32_t no_parent = ~std::uint32_t{0};
     struct Waiting {
         std::uint32_t entry, parent, slot, depth;
@@ -135,8 +150,8 @@ private:
 
     void list_corners() {
         CompactBlock none;
-        std::fill_n(&none.vertex[0][0], 24, no_vertex);
-        std::fill_n(none.prim, 8, no_primitive);
+        std::fill_n(&none.vertex[0][0], 3 * block_lanes, no_vertex);
+        std::fill_n(none.prim, block_lanes, no_primitive);
         out_.compact_blocks.resize(out_.filler.blocks(), none);
         for (const auto [position, place] : copies_) {
             CompactBlock& block = out_.compact_blocks[place / BlockFiller::lanes];

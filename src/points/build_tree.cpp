@@ -10,6 +10,7 @@
 
 #include "base/math.h"
 #include "exec/parallel.h"
+#include "keys/morton.h"
 #include "points/curve.h"
 #include "points/halve.h"
 
@@ -17,9 +18,6 @@ namespace raydix {
 namespace {
 
 constexpr std::size_t points_per_block = 1u << 15;
-/// Ranges that these bits do not part get codes of their own.
-template <int Dim>
-constexpr int axis_bits = Dim == 3 ? 10 : 15;
 
 template <class T, int Dim>
 bool is_valid(const T* p) {
@@ -48,16 +46,14 @@ void grow(PointBounds<T, Dim>& bounds, const T* lo, const T* hi) {
 template <class T, int Dim>
 void fit_leaf(const PointLeaf<T, Dim>& leaf, std::uint32_t count, PointNode<T, Dim>& node,
               std::uint32_t child) {
-    node.lowest_id[child] = *std::min_element(leaf.id, leaf.id + count);
+    std::uint32_t lowest = no_primitive;
+    for (const std::uint32_t id : leaf.id) lowest = std::min(lowest, id);
+    node.lowest_id[child] = lowest;
     node.points[child] = count;
     for (int d = 0; d < Dim; ++d) {
-        T lo = leaf.at[d][0], hi = lo;
-        for (std::uint32_t i = 1; i < points_per_leaf; ++i) {  // NaN changes neither
-            lo = leaf.at[d][i] < lo ? leaf.at[d][i] : lo;
-            hi = leaf.at[d][i] > hi ? leaf.at[d][i] : hi;
-        }
-        node.lo[d][child] = lo;
-        node.hi[d][child] = hi;
+        const Interval<T> side = interval_of(leaf.at[d], points_per_leaf);
+        node.lo[d][child] = side.lo;
+        node.hi[d][child] = side.hi;
     }
 }
 
@@ -104,20 +100,20 @@ struct Parts {
 template <class T, int Dim>
 void encode_again(const T* points, Record* records, Range range) {
     PointBounds<T, Dim> box = no_bounds<T, Dim>();
-    for (std::uint32_t i = range.begin; i < range.end; ++i) {
-        const T* p = points + std::size_t{records[i].position} * Dim;
-        grow(box, p, p);
-    }
-    if (std::equal(box.lo, box.lo + Dim, box.hi)) return;
-    const CurveGrid<T, Dim> grid(box.lo, box.hi, axis_bits<Dim>);
-    std::vector<PointCode> codes(range.size());
+    std::vector<T> of_range(std::size_t{range.size()} * Dim);
     std::vector<std::uint32_t> order(range.size()), positions(range.size());
     for (std::uint32_t i = 0; i < range.size(); ++i) {
         positions[i] = records[range.begin + i].position;
-        codes[i] = static_cast<PointCode>(grid.code(points + std::size_t{positions[i]} * Dim));
+        const T* p = points + std::size_t{positions[i]} * Dim;
+        std::copy_n(p, Dim, &of_range[std::size_t{i} * Dim]);
+        grow(box, p, p);
     }
+    if (std::equal(box.lo, box.lo + Dim, box.hi)) return;
+    const CurveGrid<T, Dim> grid(box.lo, box.hi);
+    std::vector<PointCode> codes(range.size());
+    grid.codes(of_range.data(), range.size(), codes.data());
     SortScratch<PointCode> scratch;
-    sort_keys<PointCode>(codes, order, axis_bits<Dim> * Dim, scratch);
+    sort_keys<PointCode>(codes, order, grid.bits, scratch);
     for (std::uint32_t i = 0; i < range.size(); ++i)
         records[range.begin + i] = {codes[i], positions[order[i]]};
 }
@@ -202,17 +198,16 @@ PointBounds<T, Dim> bounds_of_points(const T* points, std::size_t n) {
 template <class T, int Dim>
 void sort_along_curve(const T* points, std::size_t n, const PointBounds<T, Dim>& bounds,
                       detail::PointArrays<T, Dim>& arrays) {
-    const CurveGrid<T, Dim> grid(bounds.lo, bounds.hi, axis_bits<Dim>);
+    const CurveGrid<T, Dim> grid(bounds.lo, bounds.hi);
     const bool all_valid = bounds.left_out == 0;
     const auto load = [&](std::size_t begin, std::size_t end, PointCode* codes) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const T* p = points + i * Dim;
-            *codes++ = all_valid || is_valid<T, Dim>(p) ? static_cast<PointCode>(grid.code(p))
-                                                        : left_out_key<PointCode>;
-        }
+        grid.codes(points + begin * Dim, end - begin, codes);
+        if (all_valid) return;
+        for (std::size_t i = begin; i < end; ++i)
+            if (!is_valid<T, Dim>(points + i * Dim)) codes[i - begin] = left_out_key<PointCode>;
     };
     sort_on_the_way<PointCode>(
-        n, all_valid ? axis_bits<Dim> * Dim : 32, load, [](std::size_t, std::span<const Record>) {},
+        n, all_valid ? grid.bits : 32, load, [](std::size_t, std::span<const Record>) {},
         arrays.sort_scratch);
 }
 

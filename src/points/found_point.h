@@ -1,7 +1,12 @@
-// A point that a query found, and the orders of rows that are too long for the kernels.
+// A point that a query found, the orders of rows that are too long for the kernels, and the rows of
+// a block of queries one after the other.
 #pragma once
 
+#include <raydix/buffer.h>
+
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cstdint>
 #include <vector>
 
@@ -13,17 +18,69 @@ struct FoundPoint {
     std::uint32_t id;
 };
 
-/// By id, or by (d2, id).
+/// By (d2, id).
 template <class T>
-void sort_found(std::vector<FoundPoint<T>>& row, bool by_distance) {
+void sort_by_distance(std::vector<FoundPoint<T>>& row) {
     using Point = FoundPoint<T>;
-    if (by_distance)
-        std::sort(row.begin(), row.end(), [](const Point& a, const Point& b) {
-            return a.d2 < b.d2 || (a.d2 == b.d2 && a.id < b.id);
-        });
-    else
-        std::sort(row.begin(), row.end(),
-                  [](const Point& a, const Point& b) { return a.id < b.id; });
+    std::sort(row.begin(), row.end(), [](const Point& a, const Point& b) {
+        return a.d2 < b.d2 || (a.d2 == b.d2 && a.id < b.id);
+    });
 }
+
+/// One digit of a radix sort: `row` goes to `sorted`, in the order of bits [shift, shift + bits) of
+/// the ids.
+template <class T>
+void sort_by_digit(const std::vector<FoundPoint<T>>& row, int shift, int bits,
+                   std::vector<FoundPoint<T>>& sorted) {
+    std::array<std::uint32_t, 1 << 11> places;
+    const std::uint32_t mask = (1u << bits) - 1;
+    std::fill_n(places.begin(), mask + 1, 0u);
+    for (const FoundPoint<T>& point : row) ++places[point.id >> shift & mask];
+    std::uint32_t sum = 0;
+    for (std::uint32_t digit = 0; digit <= mask; ++digit) {
+        const std::uint32_t count = places[digit];
+        places[digit] = sum;
+        sum += count;
+    }
+    sorted.resize(row.size());
+    for (const FoundPoint<T>& point : row) sorted[places[point.id >> shift & mask]++] = point;
+}
+
+/// By id. Sorts digit by digit, of those bits alone in which ids differ: comparisons that nobody
+/// can foresee made this most of the time of long rows. `spare` is lost.
+template <class T>
+void sort_by_id(std::vector<FoundPoint<T>>& row, std::vector<FoundPoint<T>>& spare) {
+    if (row.empty()) return;
+    std::uint32_t differing = 0;
+    for (const FoundPoint<T>& point : row) differing |= point.id ^ row.front().id;
+    if (differing == 0) return;
+    const int low = std::countr_zero(differing), width = std::bit_width(differing) - low;
+    const int most_bits = row.size() < 2048 ? 8 : 11;  // counters should be fewer than points
+    const int passes = (width + most_bits - 1) / most_bits, bits = (width + passes - 1) / passes;
+    for (int shift = low; shift < low + width; shift += bits) {
+        sort_by_digit(row, shift, std::min(bits, 32 - shift), spare);
+        std::swap(row, spare);
+    }
+}
+
+/// Rows of points one after the other, as long as they come.
+template <class T>
+struct RowChunk {
+    Buffer<std::uint32_t> ids;
+    Buffer<T> distances;
+    std::size_t size = 0;
+
+    /// Room for `more` beyond size.
+    void reserve(std::size_t more) {
+        if (size + more <= ids.size()) return;
+        const std::size_t room = 2 * ids.size() + more;
+        Buffer<std::uint32_t> longer_ids(room);
+        Buffer<T> longer_distances(room);
+        std::copy_n(ids.data(), size, longer_ids.data());
+        std::copy_n(distances.data(), size, longer_distances.data());
+        ids = std::move(longer_ids);
+        distances = std::move(longer_distances);
+    }
+};
 
 }  // namespace raydix

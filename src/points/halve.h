@@ -2,6 +2,8 @@
 // are left. All loops are over plain arrays and free of branches that depend on the data.
 #pragma once
 
+#include <hwy/highway.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <limits>
@@ -9,6 +11,8 @@
 #include "points/point_tree.h"
 
 namespace raydix {
+
+namespace hn = hwy::HWY_NAMESPACE;  // of the instruction set that all processors have
 
 inline constexpr std::uint32_t points_per_bottom = points_per_leaf * boxes_per_node;
 
@@ -24,24 +28,22 @@ struct Interval {
     T lo, hi;
 };
 
-/// Of n > 0 values, none of them NaN.
+/// Of n >= 16 values; NaN among them is passed over, unless it is the first.
 template <class T>
 Interval<T> interval_of(const T* values, std::uint32_t n) {
-    constexpr std::uint32_t lanes = 8;  // independent, so that they become vectors
-    T lo[lanes], hi[lanes];
-    for (std::uint32_t k = 0; k < lanes; ++k) lo[k] = hi[k] = values[0];
+    // Vectors by name: GCC turns loops over arrays of minima into conditional moves.
+    const hn::CappedTag<T, 16> d;
+    const auto lanes = static_cast<std::uint32_t>(hn::Lanes(d));
+    auto lo = hn::Set(d, values[0]), hi = lo;
+    const auto take = [&](std::uint32_t from) {
+        const auto x = hn::LoadU(d, values + from);
+        lo = hn::IfThenElse(hn::Lt(x, lo), x, lo);
+        hi = hn::IfThenElse(hn::Gt(x, hi), x, hi);
+    };
     std::uint32_t i = 0;
-    for (; i + lanes <= n; i += lanes)
-        for (std::uint32_t k = 0; k < lanes; ++k) {
-            const T x = values[i + k];
-            lo[k] = x < lo[k] ? x : lo[k];
-            hi[k] = x > hi[k] ? x : hi[k];
-        }
-    for (; i < n; ++i) {
-        lo[0] = std::min(lo[0], values[i]);
-        hi[0] = std::max(hi[0], values[i]);
-    }
-    return {*std::min_element(lo, lo + lanes), *std::max_element(hi, hi + lanes)};
+    for (; i + lanes <= n; i += lanes) take(i);
+    if (i != n) take(n - lanes);  // some values a second time
+    return {hn::GetLane(hn::MinOfLanes(d, lo)), hn::GetLane(hn::MaxOfLanes(d, hi))};
 }
 
 template <class T, int Dim>
@@ -106,19 +108,31 @@ private:
         }
     }
 
-    /// A number that `rank` of the first n keys, no two of which are equal, are below.
+    /// A number that `rank` of the first n keys, no two of which are equal, are below. Between two
+    /// numbers whose ranks are known the next one is where keys spread evenly would have it, or,
+    /// every other time, in the middle, so that any keys need few steps.
     [[nodiscard]] std::int32_t key_of_rank(std::uint32_t n, std::uint32_t rank) const {
-        std::int64_t low = 0, high = std::int64_t{1} << 31;
-        for (;;) {
-            const auto middle = static_cast<std::int32_t>((low + high) / 2);
-            std::int32_t below = 0;
-            for (std::uint32_t i = 0; i < n; ++i) below += keys_[i] < middle;
-            if (below == static_cast<std::int32_t>(rank)) return middle;
-            if (below < static_cast<std::int32_t>(rank))
-                low = std::int64_t{middle} + 1;
-            else
+        std::int64_t low = 0, high = std::int64_t{1} << 31;  // ranks: below `rank`, above it
+        std::int64_t low_rank = 0, high_rank = n;
+        for (bool even = true;; even = !even) {
+            const std::int64_t middle =
+                even ? low + (high - low) * (rank - low_rank) / (high_rank - low_rank)
+                     : low + (high - low) / 2;
+            const std::uint32_t below = count_below(n, static_cast<std::int32_t>(middle));
+            if (below == rank) return static_cast<std::int32_t>(middle);
+            if (below < rank) {
+                low = middle + 1;
+                low_rank = below;
+            } else {
                 high = middle;
+                high_rank = below;
+            }
         }
+    }
+    [[nodiscard]] std::uint32_t count_below(std::uint32_t n, std::int32_t key) const {
+        std::int32_t below = 0;
+        for (std::uint32_t i = 0; i < n; ++i) below += keys_[i] < key;
+        return static_cast<std::uint32_t>(below);
     }
 
     PointRun<T, Dim> spare_;

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "base/compress_lanes.h"
 #include "points/point_tree.h"
 
 HWY_BEFORE_NAMESPACE();

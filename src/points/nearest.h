@@ -12,6 +12,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "base/heap_row.h"
 #include "points/lanes.h"
 #include "points/point_kernels.h"
 
@@ -135,71 +136,6 @@ private:
     std::uint32_t* ids_;
     T* d2_;
     std::uint32_t k_;
-};
-
-/// For large k: a heap in the caller's memory with the last of the k on top.
-template <class T>
-class HeapRow {
-public:
-    HeapRow(std::uint32_t k, std::uint32_t* indices, T* distances)
-        : ids_(indices), d2_(distances), k_(k) {}
-    [[nodiscard]] T worst_d2() const {
-        return size_ < k_ ? std::numeric_limits<T>::infinity() : d2_[0];
-    }
-    [[nodiscard]] std::uint32_t worst_id() const { return size_ < k_ ? no_primitive : ids_[0]; }
-    void offer(T d2, std::uint32_t id) {
-        if (size_ < k_) {
-            std::uint32_t hole = size_++;
-            for (; hole > 0 && is_after(d2, id, (hole - 1) / 2); hole = (hole - 1) / 2)
-                move((hole - 1) / 2, hole);
-            put(hole, d2, id);
-        } else if (is_after(d2_[0], ids_[0], d2, id)) {
-            sift_down(d2, id, size_);
-        }
-    }
-    void settle() const {}
-    /// Heap sort: ascending; missing ones at the end.
-    std::uint32_t finish(std::uint32_t*, T*) {
-        for (std::uint32_t end = size_; end > 1;) {
-            const T d2 = d2_[--end];
-            const std::uint32_t id = ids_[end];
-            move(0, end);
-            sift_down(d2, id, end);
-        }
-        for (std::uint32_t i = 0; i < k_; ++i)
-            i < size_ ? put(i, std::sqrt(d2_[i]), ids_[i])
-                      : put(i, std::numeric_limits<T>::infinity(), no_primitive);
-        return size_;
-    }
-
-private:
-    static bool is_after(T d2, std::uint32_t id, T other_d2, std::uint32_t other_id) {
-        return d2 > other_d2 || (d2 == other_d2 && id > other_id);
-    }
-    [[nodiscard]] bool is_after(T d2, std::uint32_t id, std::uint32_t at) const {
-        return is_after(d2, id, d2_[at], ids_[at]);
-    }
-    void put(std::uint32_t at, T d2, std::uint32_t id) {
-        d2_[at] = d2;
-        ids_[at] = id;
-    }
-    void move(std::uint32_t from, std::uint32_t to) { put(to, d2_[from], ids_[from]); }
-    /// Puts (d2, id) in place of the top of the first `size`.
-    void sift_down(T d2, std::uint32_t id, std::uint32_t size) {
-        std::uint32_t hole = 0;
-        for (std::uint64_t child = 1; child < size; child = 2 * std::uint64_t{hole} + 1) {
-            auto next = static_cast<std::uint32_t>(child);
-            if (next + 1 < size && is_after(d2_[next + 1], ids_[next + 1], next)) ++next;
-            if (!is_after(d2_[next], ids_[next], d2, id)) break;
-            move(next, hole);
-            hole = next;
-        }
-        put(hole, d2, id);
-    }
-
-    std::uint32_t* ids_;
-    T* d2_;
-    std::uint32_t k_, size_ = 0;
 };
 
 /// One level of a walk: the node, how near its children are, and which are still to be entered.

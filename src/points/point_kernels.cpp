@@ -21,6 +21,8 @@ PointKernels<T, Dim> kernels(std::string_view isa) {
             nearest<T, Dim>,
             count_within<Ball<T, Dim>, T, Dim>,
             count_within<Window<T, Dim>, T, Dim>,
+            collect_within<Ball<T, Dim>, T, Dim>,
+            collect_within<Window<T, Dim>, T, Dim>,
             fill_within<Ball<T, Dim>, T, Dim>,
             fill_within<Window<T, Dim>, T, Dim>,
             visit_ball<T, Dim>};

@@ -8,6 +8,7 @@
 #include <span>
 #include <string_view>
 
+#include "points/found_point.h"
 #include "points/point_tree.h"
 
 namespace raydix {
@@ -41,6 +42,7 @@ struct WithinJob : PointJob<T, Dim> {
     KeepPoints keep;              // else queries must be points of the index in its order, and
     const std::uint32_t* itself;  // their ids are here: [n]
     std::uint32_t* counts;        // [queries], out of a count, and what it gave for a fill
+    std::size_t most_collected;   // points in a chunk, beyond which queries are left out
     // Out of a fill: the row of query k begins at offsets[row_of[k]], or offsets[k] without row_of.
     const std::uint32_t* row_of;
     const std::uint64_t* offsets;
@@ -49,6 +51,9 @@ struct WithinJob : PointJob<T, Dim> {
 
     [[nodiscard]] T radius_of(std::size_t place) const {
         return radii == nullptr ? radius : radii[place];
+    }
+    [[nodiscard]] std::uint64_t offset_of(std::size_t place) const {
+        return offsets[row_of == nullptr ? place : row_of[place]];
     }
 };
 
@@ -70,6 +75,10 @@ struct PointKernels {
     /// How many points are within, to job.counts.
     void (*count_ball)(const WithinJob<T, Dim>& job, PointJobCounts& counts);
     void (*count_box)(const WithinJob<T, Dim>& job, PointJobCounts& counts);
+    /// Counts, and the rows behind one another in the order of the job. Stops short, and its counts
+    /// mean nothing, if rows.size > job.most_collected after it.
+    void (*collect_ball)(const WithinJob<T, Dim>& job, PointJobCounts& counts, RowChunk<T>& rows);
+    void (*collect_box)(const WithinJob<T, Dim>& job, PointJobCounts& counts, RowChunk<T>& rows);
     /// The rows themselves, sorted, with true distances, where they belong.
     void (*fill_ball)(const WithinJob<T, Dim>& job);
     void (*fill_box)(const WithinJob<T, Dim>& job);

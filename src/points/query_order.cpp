@@ -43,14 +43,13 @@ std::vector<std::uint32_t> order_of_queries(const T* queries, std::size_t n, std
     if (wanted == QueryOrder::automatic &&
         (n < fewest_sorted || is_coherent<T, Dim>(queries, n, stride, lo, hi)))
         return {};
-    constexpr int axis_bits = Dim == 3 ? 10 : 15;
-    const CurveGrid<T, Dim> grid(lo, hi, axis_bits);
+    const CurveGrid<T, Dim> grid(lo, hi);
     std::vector<std::uint32_t> keys(n), order(n);
-    for_each_index(n, [&](std::size_t i) {
-        keys[i] = static_cast<std::uint32_t>(grid.code(queries + i * stride));
+    for_each_range(n, 4096, [&](std::size_t begin, std::size_t end) {
+        grid.codes(queries + begin * stride, end - begin, keys.data() + begin, stride);
     });
     SortScratch<std::uint32_t> scratch;
-    sort_keys<std::uint32_t>(keys, order, axis_bits * Dim, scratch);
+    sort_keys<std::uint32_t>(keys, order, grid.bits, scratch);
     return order;
 }
 

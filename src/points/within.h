@@ -146,6 +146,7 @@ class FoundRow {
 
 public:
     HWY_INLINE void clear() { size_ = 0; }
+    [[nodiscard]] std::size_t size() const { return size_; }
 
     /// Points of a group whose bits are set.
     template <int Dim>
@@ -156,20 +157,20 @@ public:
         std::size_t at = size_;
         for (std::uint32_t from = 0; from < 16; from += lanes_of<T>) {
             const std::uint32_t bits = in >> from & ((1u << lanes_of<T>)-1);
-            hn::StoreU(hn::Compress(hn::Load(d, d2 + from), mask_of(d, bits)), d, &d2_[at]);
+            hn::StoreU(compress(d, hn::Load(d, d2 + from), bits), d, &d2_[at]);
             at += bit_count(bits);
         }
         at = size_;
         constexpr auto id_lanes = static_cast<std::uint32_t>(hn::MaxLanes(i));
         for (std::uint32_t from = 0; from < 16; from += id_lanes) {
             const std::uint32_t bits = in >> from & ((1u << id_lanes) - 1);
-            hn::StoreU(hn::Compress(hn::Load(i, group.id + from), mask_of(i, bits)), i, &ids_[at]);
+            hn::StoreU(compress(i, hn::Load(i, group.id + from), bits), i, &ids_[at]);
             at += bit_count(bits);
         }
         size_ = at;
     }
 
-    /// By id, or by (d2, id); distances are true ones.
+    /// By id, or by (d2, id); distances are true ones. Not for an empty row.
     HWY_INLINE void write(bool by_distance, std::uint32_t* ids, T* distances) {
         if (size_ > most_ranked) return write_long(by_distance, ids, distances);
         by_distance ? write_ranked<true>(ids, distances) : write_ranked<false>(ids, distances);
@@ -220,7 +221,7 @@ private:
     HWY_NOINLINE void write_long(bool by_distance, std::uint32_t* ids, T* distances) {
         long_.resize(size_);
         for (std::size_t k = 0; k < size_; ++k) long_[k] = {d2_[k], ids_[k]};
-        sort_found(long_, by_distance);
+        by_distance ? sort_by_distance(long_) : sort_by_id(long_, spare_);
         for (std::size_t k = 0; k < size_; ++k) {
             ids[k] = long_[k].id;
             distances[k] = std::sqrt(long_[k].d2);
@@ -230,7 +231,7 @@ private:
     std::size_t size_ = 0, room_ = 0;
     std::vector<T> d2_;
     std::vector<std::uint32_t> ids_;
-    std::vector<FoundPoint<T>> long_;
+    std::vector<FoundPoint<T>> long_, spare_;
 };
 
 /// Bits of the points that are to be kept.
@@ -302,6 +303,44 @@ void count_within(const WithinJob<T, Dim>& job, PointJobCounts& counts) {
         [&](std::size_t place) { job.counts[place] = 0; });
 }
 
+/// The row of query k of a job; of one that holds more than `most` points a part that does too.
+template <class Region, class T, int Dim>
+HWY_INLINE void find_row(const WithinJob<T, Dim>& job, const Region& region, std::size_t k,
+                         std::size_t most, FoundRow<T>& row) {
+    const std::uint32_t itself = job.keep == KeepPoints::all ? 0 : job.itself[k];
+    row.clear();
+    walk_region(
+        job.tree, region,
+        [&](const PointLeaf<T, Dim>& group, std::uint32_t in, const T* d2) HWY_ATTR {
+            row.add(group, kept_of(group, in, job.keep, itself), d2);
+            return row.size() <= most;
+        },
+        nullptr);
+}
+
+template <class Region, class T, int Dim>
+void collect_within(const WithinJob<T, Dim>& job, PointJobCounts& counts, RowChunk<T>& rows) {
+    FoundRow<T> row;
+    each_query<Region>(
+        job, counts,
+        [&](const Region& region, std::size_t k, std::size_t place) HWY_ATTR {
+            if (rows.size > job.most_collected) return;
+            find_row(job, region, k, job.most_collected, row);
+            if (row.size() > job.most_collected) {  // by itself too much to keep
+                rows.size = row.size();
+                return;
+            }
+            job.counts[place] = static_cast<std::uint32_t>(row.size());
+            if (row.size() == 0) return;
+            rows.reserve(row.size());
+            row.write(job.by_distance, rows.ids.data() + rows.size,
+                      rows.distances.data() + rows.size);
+            rows.size += row.size();
+            counts.found += row.size();
+        },
+        [&](std::size_t place) { job.counts[place] = 0; });
+}
+
 template <class Region, class T, int Dim>
 void fill_within(const WithinJob<T, Dim>& job) {
     FoundRow<T> row;
@@ -310,17 +349,8 @@ void fill_within(const WithinJob<T, Dim>& job) {
         job, counts,
         [&](const Region& region, std::size_t k, std::size_t place) HWY_ATTR {
             if (job.counts[place] == 0) return;
-            const std::uint32_t itself = job.keep == KeepPoints::all ? 0 : job.itself[k];
-            row.clear();
-            walk_region(
-                job.tree, region,
-                [&](const PointLeaf<T, Dim>& group, std::uint32_t in, const T* d2) HWY_ATTR {
-                    row.add(group, kept_of(group, in, job.keep, itself), d2);
-                    return true;
-                },
-                nullptr);
-            const std::uint64_t begin =
-                job.offsets[job.row_of == nullptr ? place : job.row_of[place]];
+            find_row(job, region, k, std::numeric_limits<std::size_t>::max(), row);
+            const std::uint64_t begin = job.offset_of(place);
             row.write(job.by_distance, job.indices + begin, job.distances + begin);
         },
         [](std::size_t) {});

@@ -2,6 +2,7 @@
 // kind of input. Boxes hold no -0, so that minima and maxima have one bit pattern.
 #pragma once
 
+#include <raydix/bvh.h>
 #include <raydix/types.h>
 
 #include <cstdint>
@@ -23,6 +24,9 @@ struct TriangleSource {
     }
     [[nodiscard]] RAYDIX_HD Vec3 corner(std::uint32_t i, int k) const {
         return without_negative_zero(vertices[triangles[i][static_cast<std::size_t>(k)]]);
+    }
+    [[nodiscard]] LeafTriangle corners(std::uint32_t i) const {
+        return {corner(i, 0), corner(i, 1), corner(i, 2)};
     }
     /// False if the triangle is to be left out; `box` is written either way.
     RAYDIX_HD bool box(std::uint32_t i, Aabb& box) const {

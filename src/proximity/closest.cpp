@@ -1,6 +1,7 @@
 // Batches of closest-point queries. Each starts from the triangle that was closest to the one
 // before it: along a Morton curve that is near, and most of the tree is out of reach at once.
 #include <raydix/closest.h>
+#include <raydix/double.h>
 
 #include "base/float_env.h"
 #include "proximity/closest_walk.h"
@@ -9,25 +10,30 @@
 namespace raydix {
 namespace {
 
-float square_limit(float max_distance) {
-    if (!(max_distance >= 0.0f))
+template <class Scalar>
+Scalar square_limit(Scalar max_distance) {
+    if (!(max_distance >= 0))
         throw InputError("closest points: max_distance is " + std::to_string(max_distance) +
                          "; it must be 0 or more");
     return max_distance * max_distance;
 }
 
-ClosestPoint public_point(const ClosestTriangle& best) {
+template <class Result, class Scalar>
+Result public_point(const BasicClosestTriangle<Scalar>& best) {
     if (best.prim == no_primitive) return {};
     return {best.point.position, std::sqrt(best.point.d2), best.prim, best.point.u, best.point.v};
 }
 
-ClosestCounts closest_batch(const Bvh& bvh, std::span<const Vec3> queries,
-                            std::span<ClosestPoint> results, float limit) {
-    const PaddedTree tree(bvh);
+/// Tree: PaddedTree of a Bvh, PaddedTreeD of a BvhD.
+template <class Tree, class AnyBvh, class Vec, class Result>
+ClosestCounts closest_batch(const AnyBvh& bvh, std::span<const Vec> queries,
+                            std::span<Result> results, typename Tree::Scalar limit) {
+    using Scalar = typename Tree::Scalar;
+    const Tree tree(bvh);
     std::vector<ClosestCounts> parts(block_count(queries.size()));
     for_each_query_block(
         bvh, queries, [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
-            WalkStack stack(tree.max_depth);
+            BasicWalkStack<Scalar> stack(tree.max_depth);
             std::uint32_t guess = no_primitive;
             for (std::size_t k = begin; k < end; ++k) {
                 const std::size_t i = at(k);
@@ -35,9 +41,9 @@ ClosestCounts closest_batch(const Bvh& bvh, std::span<const Vec3> queries,
                 if (!is_finite(queries[i])) {
                     ++parts[block].invalid_queries;
                 } else if (!tree.empty) {
-                    const ClosestTriangle best =
+                    const BasicClosestTriangle<Scalar> best =
                         find_closest_triangle(tree, queries[i], limit, guess, stack);
-                    results[i] = public_point(best);
+                    results[i] = public_point<Result>(best);
                     if (best.prim == no_primitive) continue;
                     guess = best.position;
                     ++parts[block].found;
@@ -53,6 +59,17 @@ ClosestCounts closest_batch(const Bvh& bvh, std::span<const Vec3> queries,
     return sum;
 }
 
+template <class Tree, class Result, class AnyBvh, class Vec>
+Result closest_one(const AnyBvh& bvh, Vec query, typename Tree::Scalar max_distance) {
+    require_triangles(bvh, "closest points need");
+    const auto limit = square_limit(max_distance);
+    if (bvh.empty() || !is_finite(query)) return {};
+    const FloatEnvironment plain;
+    const Tree tree(bvh);
+    BasicWalkStack<typename Tree::Scalar> stack(tree.max_depth);
+    return public_point<Result>(find_closest_triangle(tree, query, limit, no_primitive, stack));
+}
+
 }  // namespace
 
 ClosestCounts closest_points(const Bvh& bvh, std::span<const Vec3> queries,
@@ -61,7 +78,18 @@ ClosestCounts closest_points(const Bvh& bvh, std::span<const Vec3> queries,
     require_room("closest points", queries.size(), results.size());
     const float limit = square_limit(options.max_distance);
     ClosestCounts counts;
-    with_threads(options.threads, [&] { counts = closest_batch(bvh, queries, results, limit); });
+    with_threads(options.threads,
+                 [&] { counts = closest_batch<PaddedTree>(bvh, queries, results, limit); });
+    return counts;
+}
+
+ClosestCounts closest_points(const BvhD& bvh, std::span<const Vec3d> queries,
+                             std::span<ClosestPointD> results, const ClosestOptionsD& options) {
+    require_room("closest points", queries.size(), results.size());
+    const double limit = square_limit(options.max_distance);
+    ClosestCounts counts;
+    with_threads(options.threads,
+                 [&] { counts = closest_batch<PaddedTreeD>(bvh, queries, results, limit); });
     return counts;
 }
 
@@ -72,14 +100,19 @@ std::vector<ClosestPoint> closest_points(const Bvh& bvh, std::span<const Vec3> q
     return results;
 }
 
+std::vector<ClosestPointD> closest_points(const BvhD& bvh, std::span<const Vec3d> queries,
+                                          const ClosestOptionsD& options) {
+    std::vector<ClosestPointD> results(queries.size());
+    closest_points(bvh, queries, results, options);
+    return results;
+}
+
 ClosestPoint closest_point(const Bvh& bvh, Vec3 query, float max_distance) {
-    require_triangles(bvh, "closest points need");
-    const float limit = square_limit(max_distance);
-    if (bvh.empty() || !is_finite(query)) return {};
-    const FloatEnvironment plain;
-    const PaddedTree tree(bvh);
-    WalkStack stack(tree.max_depth);
-    return public_point(find_closest_triangle(tree, query, limit, no_primitive, stack));
+    return closest_one<PaddedTree, ClosestPoint>(bvh, query, max_distance);
+}
+
+ClosestPointD closest_point(const BvhD& bvh, Vec3d query, double max_distance) {
+    return closest_one<PaddedTreeD, ClosestPointD>(bvh, query, max_distance);
 }
 
 }  // namespace raydix

@@ -1,22 +1,23 @@
 // The point of a triangle that is closest to a query: one pure function of float32 inputs, called
 // by every walk and by brute force. In double inside, because slivers and huge triangles leave
-// nothing of a float32 normal.
+// nothing of a float32 normal. The same for inputs in double, with more care for slivers.
+//
+// Vec: Vec3 or Vec3d; Corners: LeafTriangle or LeafTriangleD.
 #pragma once
 
 #include <raydix/bvh.h>
+#include <raydix/double.h>
 #include <raydix/types.h>
 
+#include <cmath>
+
+#include "base/distance.h"
 #include "base/double3.h"
 #include "base/hd.h"
 #include "base/math.h"
+#include "base/scalar.h"
 
 namespace raydix {
-
-/// As contract.md 8 has it.
-RAYDIX_HD inline float squared_distance(Vec3 a, Vec3 b) {
-    const float dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
-    return (dx * dx + dy * dy) + dz * dz;
-}
 
 /// Square of the distance to a box. Each |p - q| with p in the box is at least `off` after
 /// rounding, squares and sums are monotone: never greater than squared_distance(p, q).
@@ -24,12 +25,19 @@ RAYDIX_HD inline float squared_distance_to_box(const Aabb& box, Vec3 q) {
     const Vec3 off = max_of(max_of(box.lo - q, q - box.hi), Vec3{0.0f, 0.0f, 0.0f});
     return (off.x * off.x + off.y * off.y) + off.z * off.z;
 }
+inline double squared_distance_to_box(const AabbD& box, Vec3d q) {
+    const Vec3d off = max_of(max_of(box.lo - q, q - box.hi), Vec3d{0.0, 0.0, 0.0});
+    return (off.x * off.x + off.y * off.y) + off.z * off.z;
+}
 
-struct TrianglePoint {
-    Vec3 position;
-    float u, v;  // weights of v1 and v2
-    float d2;
+template <class Scalar>
+struct BasicTrianglePoint {
+    VecOf<Scalar> position;
+    Scalar u, v;  // weights of v1 and v2
+    Scalar d2;
 };
+using TrianglePoint = BasicTrianglePoint<float>;
+using TrianglePointD = BasicTrianglePoint<double>;
 
 /// A candidate in double.
 struct CandidatePoint {
@@ -37,14 +45,16 @@ struct CandidatePoint {
     double u, v, d2;
 };
 
-RAYDIX_HD inline bool comes_first(Vec3 a, Vec3 b) {
+template <class Vec>
+RAYDIX_HD inline bool comes_first(Vec a, Vec b) {
     return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
 /// The closest point of segment a, b, and in `s` the weight of b. The ends are put in order first,
 /// so that two triangles get the same bits on the edge that they share: such ties go to the lower
 /// id.
-RAYDIX_HD inline Double3 closest_on_segment(Vec3 a, Vec3 b, Double3 query, double& s) {
+template <class Vec>
+RAYDIX_HD inline Double3 closest_on_segment(Vec a, Vec b, Double3 query, double& s) {
     const bool swapped = comes_first(b, a);
     const Double3 from(swapped ? b : a), to(swapped ? a : b);
     const Double3 along = to - from;
@@ -64,7 +74,8 @@ RAYDIX_HD inline void offer(CandidatePoint& best, Double3 position, double u, do
 }
 
 /// The least of three segments.
-RAYDIX_HD inline CandidatePoint closest_on_outline(const LeafTriangle& t, Double3 query) {
+template <class Corners>
+RAYDIX_HD inline CandidatePoint closest_on_outline(const Corners& t, Double3 query) {
     double s;
     const Double3 on_ab = closest_on_segment(t.v0, t.v1, query, s);
     const Double3 off = on_ab - query;
@@ -76,30 +87,90 @@ RAYDIX_HD inline CandidatePoint closest_on_outline(const LeafTriangle& t, Double
     return best;
 }
 
-/// The query's foot on the triangle's plane if it lies inside, else the closest point of the
-/// outline. A triangle thinner than 2^-40 of its length is its outline: no point of it is farther
-/// from that than float32 can tell.
-RAYDIX_HD inline TrianglePoint closest_on_triangle(const LeafTriangle& t, Vec3 q) {
-    const Double3 query(q), a(t.v0), b(t.v1), c(t.v2);
+/// a x b with little more than one rounding in each component (Kahan's difference of products;
+/// Jeannerod, Louvet, Muller, "Further analysis of Kahan's algorithm", 2013).
+RAYDIX_HD inline Double3 accurate_cross(Double3 a, Double3 b) {
+    const auto difference = [](double p, double q, double r, double s) {
+        const double rs = r * s;
+        return std::fma(p, q, -rs) + std::fma(-r, s, rs);
+    };
+    return {difference(a.y, b.z, a.z, b.y), difference(a.z, b.x, a.x, b.z),
+            difference(a.x, b.y, a.y, b.x)};
+}
+
+template <bool accurate>
+RAYDIX_HD inline Double3 cross_of(Double3 a, Double3 b) {
+    if constexpr (accurate)
+        return accurate_cross(a, b);
+    else
+        return cross(a, b);
+}
+
+/// The query's foot on the plane with this normal, which is not 0; false if it is outside of the
+/// triangle.
+template <bool accurate = false, class Corners>
+RAYDIX_HD inline bool foot_on_plane(const Corners& t, Double3 query, Double3 normal,
+                                    CandidatePoint& foot) {
+    const Double3 a(t.v0), b(t.v1), c(t.v2);
     const Double3 ab = b - a, ac = c - a, bc = c - b;
+    const double u = dot(cross_of<accurate>(query - a, ac), normal),
+                 v = dot(cross_of<accurate>(ab, query - a), normal),
+                 w = dot(cross_of<accurate>(bc, query - b), normal);
+    if (!(u >= 0.0 && v >= 0.0 && w >= 0.0)) return false;
+    const double sum = (u + v) + w;
+    const double weight_b = u / sum, weight_c = v / sum;
+    foot = {a + ab * weight_b + ac * weight_c, weight_b, weight_c, 0.0};
+    return true;
+}
+
+/// A triangle thinner than this part of its length, squared, is its outline: no point of it is
+/// farther from that than float32 can tell.
+inline constexpr double outline_only = 0x1p-80;
+
+RAYDIX_HD inline CandidatePoint closest_candidate(const LeafTriangle& t, Double3 query) {
+    const Double3 a(t.v0), ab = Double3(t.v1) - a, ac = Double3(t.v2) - a;
     const Double3 normal = cross(ab, ac);
-    const double area2 = dot(normal, normal);
     CandidatePoint best;
-    const double u = dot(cross(query - a, ac), normal), v = dot(cross(ab, query - a), normal),
-                 w = dot(cross(bc, query - b), normal);
-    if (u >= 0.0 && v >= 0.0 && w >= 0.0 && area2 > 0x1p-80 * dot(ab, ab) * dot(ac, ac)) {
-        const double sum = (u + v) + w;
-        const double weight_b = u / sum, weight_c = v / sum;
-        best = {a + ab * weight_b + ac * weight_c, weight_b, weight_c, 0.0};
-    } else {
-        best = closest_on_outline(t, query);
-    }
+    if (dot(normal, normal) > outline_only * dot(ab, ab) * dot(ac, ac) &&
+        foot_on_plane(t, query, normal, best))
+        return best;
+    return closest_on_outline(t, query);
+}
+
+/// In double a sliver's foot and its outline both compete: near its plane the foot is right, far
+/// from it, where a weak normal moves the foot, the outline is as near.
+inline CandidatePoint closest_on_sliver(const LeafTriangleD& t, Double3 query) {
+    const Double3 a(t.v0);
+    const Double3 normal = accurate_cross(Double3(t.v1) - a, Double3(t.v2) - a);
+    CandidatePoint best = closest_on_outline(t, query), foot;
+    if (dot(normal, normal) > 0.0 && foot_on_plane<true>(t, query, normal, foot))
+        offer(best, foot.position, foot.u, foot.v, query);
+    return best;
+}
+
+inline CandidatePoint closest_candidate(const LeafTriangleD& t, Double3 query) {
+    constexpr double sliver = 0x1p-40;
+    const Double3 a(t.v0), ab = Double3(t.v1) - a, ac = Double3(t.v2) - a;
+    const Double3 normal = cross(ab, ac);
+    if (!(dot(normal, normal) > sliver * dot(ab, ab) * dot(ac, ac)))
+        return closest_on_sliver(t, query);
+    CandidatePoint best;
+    return foot_on_plane(t, query, normal, best) ? best : closest_on_outline(t, query);
+}
+
+/// The query's foot on the triangle's plane if it lies inside, else the closest point of the
+/// outline.
+template <class Corners, class Vec>
+RAYDIX_HD inline auto closest_on_triangle(const Corners& t, Vec q) {
+    using Scalar = decltype(q.x);
+    const CandidatePoint best = closest_candidate(t, Double3(q));
     // Rounding must not carry the point out of the boxes that the tree has around the triangle.
-    const Aabb box = box_of(t.v0, t.v1, t.v2);
-    const Vec3 position =
-        without_negative_zero(min_of(max_of(best.position.rounded(), box.lo), box.hi));
-    return {position, static_cast<float>(best.u), static_cast<float>(best.v),
-            squared_distance(position, q)};
+    const BoxOf<Scalar> box = box_of(t.v0, t.v1, t.v2);
+    Vec position;
+    best.position.round_to(position);
+    position = without_negative_zero(min_of(max_of(position, box.lo), box.hi));
+    return BasicTrianglePoint<Scalar>{position, static_cast<Scalar>(best.u),
+                                      static_cast<Scalar>(best.v), squared_distance(position, q)};
 }
 
 }  // namespace raydix

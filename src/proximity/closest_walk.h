@@ -2,20 +2,24 @@
 #pragma once
 
 #include <raydix/bvh.h>
+#include <raydix/double.h>
 
 #include <cmath>
 
 #include "proximity/walk_outward.h"
+#include "trace/double_tree.h"
 #include "trace/tree_hits.h"
 
 namespace raydix {
 
 /// The best so far; `position` in leaf order.
-struct ClosestTriangle {
-    TrianglePoint point;
+template <class Scalar>
+struct BasicClosestTriangle {
+    BasicTrianglePoint<Scalar> point;
     std::uint32_t prim = no_primitive;
     std::uint32_t position = no_primitive;
 };
+using ClosestTriangle = BasicClosestTriangle<float>;
 
 /// A tree with the pad of its boxes.
 struct PaddedTree : TriangleTree {
@@ -23,18 +27,38 @@ struct PaddedTree : TriangleTree {
 
     explicit PaddedTree(const Bvh& bvh)
         : TriangleTree(bvh), pad(bvh.empty() ? 0.0f : box_pad(bvh)) {}
+
+    [[nodiscard]] BoxDistances distances(Vec3 query) const { return {query, pad}; }
 };
 
-inline bool is_finite(Vec3 p) {
-    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
-}
+struct PaddedTreeD : TriangleTreeD {
+    double reach = 0.0;  // of the nodes' coordinates
+    double square;       // of the scale
+
+    explicit PaddedTreeD(const BvhD& bvh) : TriangleTreeD(bvh), square(bvh.scale() * bvh.scale()) {
+        if (bvh.empty()) return;
+        const BvhNode& root = bvh.tree().nodes()[0];
+        const Vec3 far = max_of(max_of(root.hi, -1.0f * root.lo), Vec3{0.0f, 0.0f, 0.0f});
+        reach = max_of(max_of(far.x, far.y), far.z);
+    }
+
+    /// The query is rounded on its way to the nodes, and each distance once more: the pad is four
+    /// times what both can add.
+    [[nodiscard]] BoxDistancesD distances(Vec3d query) const {
+        const Vec3d q = space.local(query);
+        const double far = max_of(max_of(std::fabs(q.x), std::fabs(q.y)), std::fabs(q.z));
+        return {q, 0x1p-50 * (far + reach)};
+    }
+    [[nodiscard]] double local_square(double d2) const { return d2 * square; }
+};
 
 /// Takes the triangle at `position` if its (d2, prim) is less.
-inline void try_triangle(const TriangleTree& tree, std::uint32_t position, Vec3 query,
-                         ClosestTriangle& best) {
-    const LeafTriangle& t = tree.triangles[position];
+template <class Tree, class Scalar>
+RAYDIX_HD inline void try_triangle(const Tree& tree, std::uint32_t position, VecOf<Scalar> query,
+                                   BasicClosestTriangle<Scalar>& best) {
+    const auto& t = tree.triangles[position];
     if (squared_distance_to_box(box_of(t.v0, t.v1, t.v2), query) > best.point.d2) return;
-    const TrianglePoint point = closest_on_triangle(t, query);
+    const BasicTrianglePoint<Scalar> point = closest_on_triangle(t, query);
     const std::uint32_t prim = tree.order[position];
     if (point.d2 < best.point.d2 || (point.d2 == best.point.d2 && prim < best.prim))
         best = {point, prim, position};
@@ -42,19 +66,28 @@ inline void try_triangle(const TriangleTree& tree, std::uint32_t position, Vec3 
 
 /// The least (d2, prim) with d2 <= limit. `guess`: a position in leaf order that may be near, or
 /// no_primitive; it saves time, and changes nothing else. The query must be finite, the tree not
-/// empty.
-inline ClosestTriangle find_closest_triangle(const PaddedTree& tree, Vec3 query, float limit,
-                                             std::uint32_t guess, WalkStack& stack) {
-    ClosestTriangle best{{{}, 0.0f, 0.0f, limit}};
+/// empty. Tree: TriangleTree, PaddedTree or PaddedTreeD; distances and stack go with it.
+template <class Tree, class Distances, class Stack>
+RAYDIX_HD BasicClosestTriangle<typename Tree::Scalar> find_closest_triangle(
+    const Tree& tree, const Distances& distances, VecOf<typename Tree::Scalar> query,
+    typename Tree::Scalar limit, std::uint32_t guess, Stack& stack) {
+    BasicClosestTriangle<typename Tree::Scalar> best{{{}, 0, 0, limit}};
     if (guess != no_primitive) try_triangle(tree, guess, query, best);
     const auto leaf = [&](const BvhNode& node) {
         for (std::uint32_t k = node.first; k < node.first + node.count; ++k)
             try_triangle(tree, k, query, best);
         return false;
     };
-    walk_outward(tree.nodes, BoxDistances(query, tree.pad), stack, leaf,
-                 [&] { return best.point.d2; });
+    walk_outward(tree.nodes, distances, stack, leaf,
+                 [&] { return tree.local_square(best.point.d2); });
     return best;
+}
+
+template <class Tree, class Stack>
+BasicClosestTriangle<typename Tree::Scalar> find_closest_triangle(
+    const Tree& tree, VecOf<typename Tree::Scalar> query, typename Tree::Scalar limit,
+    std::uint32_t guess, Stack& stack) {
+    return find_closest_triangle(tree, tree.distances(query), query, limit, guess, stack);
 }
 
 }  // namespace raydix

@@ -6,6 +6,8 @@
 // and a point on an edge counts as right of it. Both triangles of an edge see the same edge from
 // its lower end to its upper, so their answers fit. Whether the crossing is before or behind the
 // point is the side of the triangle's plane on which the point lies.
+//
+// Vec: Vec3 or Vec3d; Corners: LeafTriangle or LeafTriangleD.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -14,6 +16,7 @@
 #include "primitives/exact_overlap.h"
 #include "proximity/closest_walk.h"
 #include "trace/walk.h"
+#include "tree/around_center.h"
 
 #if defined(__SSE4_1__)
 #include <smmintrin.h>
@@ -28,21 +31,24 @@ struct Crossings {
 };
 
 /// What an edge adds to the winding number of a triangle's projection around the moved point.
-RAYDIX_HD inline int edge_cover(Vec3 from, Vec3 to, Vec3 p) {
+template <class Vec>
+RAYDIX_HD inline int edge_cover(Vec from, Vec to, Vec p) {
     const bool upward = to.z > p.z;
     if ((from.z > p.z) == upward) return 0;
-    const Vec3 low = upward ? from : to, high = upward ? to : from;
-    const bool left = turn_sign({low.y, low.z}, {high.y, high.z}, {p.y, p.z}) > 0;
+    const Vec low = upward ? from : to, high = upward ? to : from;
+    const bool left = turn_sign(drop_axis(low, 0), drop_axis(high, 0), drop_axis(p, 0)) > 0;
     return left ? (upward ? 1 : -1) : 0;
 }
 
 /// 1 or -1 if the moved line goes through the triangle, out of its front or into it; else 0.
-RAYDIX_HD inline int line_cover(const LeafTriangle& t, Vec3 p) {
+template <class Corners, class Vec>
+RAYDIX_HD inline int line_cover(const Corners& t, Vec p) {
     return edge_cover(t.v0, t.v1, p) + edge_cover(t.v1, t.v2, p) + edge_cover(t.v2, t.v0, p);
 }
 
-RAYDIX_HD inline void add_crossing(const LeafTriangle& t, Vec3 p, Crossings& sum) {
-    const Aabb box = box_of(t.v0, t.v1, t.v2);
+template <class Corners, class Vec>
+RAYDIX_HD inline void add_crossing(const Corners& t, Vec p, Crossings& sum) {
+    const auto box = box_of(t.v0, t.v1, t.v2);
     if (box.hi.x < p.x || p.y < box.lo.y || p.y > box.hi.y || p.z < box.lo.z || p.z > box.hi.z)
         return;
     const int cover = line_cover(t, p);
@@ -60,12 +66,14 @@ RAYDIX_HD inline void add_crossing(const LeafTriangle& t, Vec3 p, Crossings& sum
     }
 }
 
-/// Which of two nodes in a row the half line from a point along +x meets: bits 0 and 1.
+/// Which of two nodes in a row the half line from a point along +x meets: bits 0 and 1. Of the
+/// point, a box that holds it will do.
 class LineBoxes {
 public:
 #if defined(__SSE4_1__)
-    explicit LineBoxes(Vec3 p)
-        : above_(_mm_set_ps(infinity, p.z, p.y, infinity)), below_(_mm_set_ps(0, p.z, p.y, p.x)) {}
+    explicit LineBoxes(const Aabb& p)
+        : above_(_mm_set_ps(infinity, p.hi.z, p.hi.y, infinity)),
+          below_(_mm_set_ps(0, p.lo.z, p.lo.y, p.lo.x)) {}
     [[nodiscard]] int operator()(const BvhNode* pair) const {
         const float* p = &pair->lo.x;
         return met(p) | met(p + 8) << 1;
@@ -79,26 +87,32 @@ private:
     }
     __m128 above_, below_;
 #else
-    explicit LineBoxes(Vec3 p) : p_(p) {}
+    explicit LineBoxes(const Aabb& p) : p_(p) {}
     [[nodiscard]] int operator()(const BvhNode* pair) const {
         return met(pair[0]) | met(pair[1]) << 1;
     }
 
 private:
     [[nodiscard]] int met(const BvhNode& n) const {
-        return n.hi.x >= p_.x && n.lo.y <= p_.y && n.hi.y >= p_.y && n.lo.z <= p_.z &&
-               n.hi.z >= p_.z;
+        return n.hi.x >= p_.lo.x && n.lo.y <= p_.hi.y && n.hi.y >= p_.lo.y && n.lo.z <= p_.hi.z &&
+               n.hi.z >= p_.lo.z;
     }
-    Vec3 p_;
+    Aabb p_;
 #endif
 };
 
+inline LineBoxes line_boxes(const TriangleTree&, Vec3 p) { return LineBoxes({p, p}); }
+inline LineBoxes line_boxes(const TriangleTreeD& tree, Vec3d p) {
+    return LineBoxes(box_around_center({p, p}, tree.space.center, tree.space.scale));
+}
+
 /// Each triangle must be in one leaf only. The point must be finite, the tree not empty.
-inline Crossings count_crossings(const TriangleTree& tree, Vec3 p, WalkStack& stack) {
+template <class Tree, class Vec, class Scalar>
+inline Crossings count_crossings(const Tree& tree, Vec p, BasicWalkStack<Scalar>& stack) {
     Crossings sum;
-    const LineBoxes boxes(p);
-    PendingNode* const bottom = stack.begin();
-    PendingNode* top = bottom;
+    const LineBoxes boxes = line_boxes(tree, p);
+    BasicPendingNode<Scalar>* const bottom = stack.begin();
+    BasicPendingNode<Scalar>* top = bottom;
     std::uint32_t slot = 0;
     for (;;) {
         const BvhNode& node = tree.nodes[slot];
@@ -109,7 +123,7 @@ inline Crossings count_crossings(const TriangleTree& tree, Vec3 p, WalkStack& st
         } else if (const int met = boxes(&tree.nodes[node.first]); met != 0) {
             if (met == 3) {
                 RAYDIX_CHECK(static_cast<std::uint32_t>(top - bottom), <, stack.capacity());
-                *top++ = {node.first + 1, 0.0f};
+                *top++ = {node.first + 1, 0};
             }
             slot = node.first + (met == 2 ? 1u : 0u);
             continue;

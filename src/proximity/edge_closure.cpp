@@ -17,37 +17,46 @@ namespace raydix {
 namespace {
 
 /// From its first end to its last in the order of comes_first.
+template <class Vec>
 struct Edge {
-    Vec3 from, to;
+    Vec from, to;
     bool turned;  // the triangle runs through it the other way
 
     [[nodiscard]] bool empty() const { return from == to; }
 };
 
-Edge edge_of(std::span<const LeafTriangle> triangles, std::uint32_t id) {
-    const LeafTriangle& t = triangles[id / 3];
+template <class Corners, class Vec = decltype(Corners::v0)>
+Edge<Vec> edge_of(std::span<const Corners> triangles, std::uint32_t id) {
+    const Corners& t = triangles[id / 3];
     const std::uint32_t k = id % 3;
-    const Vec3 a = k == 0 ? t.v0 : k == 1 ? t.v1 : t.v2, b = k == 0 ? t.v1 : k == 1 ? t.v2 : t.v0;
-    return comes_first(b, a) ? Edge{b, a, true} : Edge{a, b, false};
+    const Vec a = k == 0 ? t.v0 : k == 1 ? t.v1 : t.v2, b = k == 0 ? t.v1 : k == 1 ? t.v2 : t.v0;
+    return comes_first(b, a) ? Edge<Vec>{b, a, true} : Edge<Vec>{a, b, false};
 }
 
-bool same_ends(const Edge& a, const Edge& b) { return a.from == b.from && a.to == b.to; }
-bool before(const Edge& a, const Edge& b) {
+template <class Vec>
+bool same_ends(const Edge<Vec>& a, const Edge<Vec>& b) {
+    return a.from == b.from && a.to == b.to;
+}
+template <class Vec>
+bool before(const Edge<Vec>& a, const Edge<Vec>& b) {
     return a.from == b.from ? comes_first(a.to, b.to) : comes_first(a.from, b.from);
 }
 
 /// Multiplies and folds each word in; any spread will do, equal edges are found by comparison.
-std::uint64_t hash_of(const Edge& edge) {
+template <class Vec>
+std::uint64_t hash_of(const Edge<Vec>& edge) {
+    using Word = std::conditional_t<sizeof(edge.from.x) == 4, std::uint32_t, std::uint64_t>;
     std::uint64_t hash = 0x243f6a8885a308d3ull;
-    for (const float x : {edge.from.x, edge.from.y, edge.from.z, edge.to.x, edge.to.y, edge.to.z}) {
-        hash = (hash ^ std::bit_cast<std::uint32_t>(x)) * 0x9e3779b97f4a7c15ull;
+    for (const auto x : {edge.from.x, edge.from.y, edge.from.z, edge.to.x, edge.to.y, edge.to.z}) {
+        hash = (hash ^ std::bit_cast<Word>(x)) * 0x9e3779b97f4a7c15ull;
         hash ^= hash >> 29;
     }
     return hash;
 }
 
 /// One run of equal edges.
-void count_run(std::span<const LeafTriangle> triangles, std::span<const std::uint32_t> run,
+template <class Corners>
+void count_run(std::span<const Corners> triangles, std::span<const std::uint32_t> run,
                EdgeClosure& closure) {
     if (edge_of(triangles, run[0]).empty()) return;
     std::int64_t balance = 0;
@@ -57,24 +66,24 @@ void count_run(std::span<const LeafTriangle> triangles, std::span<const std::uin
 }
 
 /// Edges of one hash.
-void count_group(std::span<const LeafTriangle> triangles, std::span<std::uint32_t> group,
+template <class Corners>
+void count_group(std::span<const Corners> triangles, std::span<std::uint32_t> group,
                  EdgeClosure& closure) {
     const auto edge = [&](std::uint32_t id) { return edge_of(triangles, id); };
     std::sort(group.begin(), group.end(), [&](std::uint32_t a, std::uint32_t b) {
-        const Edge ea = edge(a), eb = edge(b);
+        const auto ea = edge(a), eb = edge(b);
         return same_ends(ea, eb) ? a < b : before(ea, eb);
     });
     for (std::size_t begin = 0; begin < group.size();) {
         std::size_t end = begin + 1;
         while (end < group.size() && same_ends(edge(group[begin]), edge(group[end]))) ++end;
-        count_run(triangles, group.subspan(begin, end - begin), closure);
+        count_run<Corners>(triangles, group.subspan(begin, end - begin), closure);
         begin = end;
     }
 }
 
-}  // namespace
-
-EdgeClosure match_edges(std::span<const LeafTriangle> triangles) {
+template <class Corners>
+EdgeClosure match_all(std::span<const Corners> triangles) {
     if (triangles.size() > 0xFFFFFFFFull / 3)
         throw InputError(std::to_string(triangles.size()) +
                          " triangles; edges can be matched for up to 1431655765");
@@ -100,5 +109,10 @@ EdgeClosure match_edges(std::span<const LeafTriangle> triangles) {
     });
     return {odd, unbalanced};
 }
+
+}  // namespace
+
+EdgeClosure match_edges(std::span<const LeafTriangle> triangles) { return match_all(triangles); }
+EdgeClosure match_edges(std::span<const LeafTriangleD> triangles) { return match_all(triangles); }
 
 }  // namespace raydix

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <raydix/bvh.h>
+#include <raydix/double.h>
 
 #include <cstdint>
 #include <span>
@@ -16,5 +17,6 @@ struct EdgeClosure {
 /// Edges without length do not count. Coordinates must not be -0. Throws InputError for more
 /// triangles than 32 bits have edges for.
 [[nodiscard]] EdgeClosure match_edges(std::span<const LeafTriangle> triangles);
+[[nodiscard]] EdgeClosure match_edges(std::span<const LeafTriangleD> triangles);
 
 }  // namespace raydix

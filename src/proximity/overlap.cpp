@@ -1,4 +1,5 @@
-// Batches of segments and spheres against the triangles of a tree.
+// Batches of segments and spheres against the triangles of a tree, in float and in double.
+#include <raydix/double.h>
 #include <raydix/overlap.h>
 
 #include <algorithm>
@@ -13,26 +14,31 @@ namespace {
 
 constexpr const char* what = "overlap queries need";
 
+PaddedTree padded_tree(const Bvh& bvh) { return PaddedTree(bvh); }
+PaddedTreeD padded_tree(const BvhD& bvh) { return PaddedTreeD(bvh); }
+
 template <class Query>
-std::vector<Vec3> places_of(std::span<const Query> queries) {
-    std::vector<Vec3> places(queries.size());
+auto places_of(std::span<const Query> queries) {
+    std::vector<decltype(place_of(queries[0]))> places(queries.size());
     for_each_index(queries.size(), [&](std::size_t i) { places[i] = place_of(queries[i]); });
     return places;
 }
 
 /// Calls one(i, stack) -> how many were found, for each valid query.
-template <class Query, class One>
-OverlapCounts for_each_query(const Bvh& bvh, std::span<const Query> queries, const One& one) {
+template <class Tree, class AnyBvh, class Query, class One>
+OverlapCounts for_each_query(const Tree& tree, const AnyBvh& bvh, std::span<const Query> queries,
+                             const One& one) {
     std::vector<OverlapCounts> parts(block_count(queries.size()));
+    const auto places = places_of(queries);
     for_each_query_block(
-        bvh, places_of(queries),
+        bvh, std::span(places),
         [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
-            WalkStack stack(bvh.max_depth());
+            BasicWalkStack<typename Tree::Scalar> stack(tree.max_depth);
             for (std::size_t k = begin; k < end; ++k) {
                 const std::size_t i = at(k);
                 if (!is_valid(queries[i]))
                     ++parts[block].invalid_queries;
-                else if (!bvh.empty())
+                else if (!tree.empty)
                     parts[block].found += one(i, stack);
             }
         });
@@ -45,23 +51,23 @@ OverlapCounts for_each_query(const Bvh& bvh, std::span<const Query> queries, con
     return sum;
 }
 
-template <class Query>
-bool touches_any(const PaddedTree& tree, const Query& query, WalkStack& stack) {
+template <class Tree, class Query, class Stack>
+bool touches_any(const Tree& tree, const Query& query, Stack& stack) {
     bool touched = false;
-    for_each_touched(tree, query, stack, [&](std::uint32_t) { return touched = true; });
+    for_each_touched(tree, prepared(query), stack, [&](std::uint32_t) { return touched = true; });
     return touched;
 }
 
-template <class Query>
-OverlapCounts any_batch(const Bvh& bvh, std::span<const Query> queries,
+template <class AnyBvh, class Query>
+OverlapCounts any_batch(const AnyBvh& bvh, std::span<const Query> queries,
                         std::span<std::uint8_t> touched, const OverlapOptions& options) {
     require_triangles(bvh, what);
     require_room("overlap queries", queries.size(), touched.size());
     std::fill(touched.begin(), touched.end(), std::uint8_t{0});
     OverlapCounts counts;
-    const PaddedTree tree(bvh);
+    const auto tree = padded_tree(bvh);
     with_threads(options.threads, [&] {
-        counts = for_each_query(bvh, queries, [&](std::size_t i, WalkStack& stack) {
+        counts = for_each_query(tree, bvh, queries, [&](std::size_t i, auto& stack) {
             touched[i] = touches_any(tree, queries[i], stack);
             return std::uint64_t{touched[i]};
         });
@@ -70,18 +76,18 @@ OverlapCounts any_batch(const Bvh& bvh, std::span<const Query> queries,
 }
 
 /// Each query's ids in a list of its own at first: rows of any length fit, and end in order.
-template <class Query>
-OverlapLists all_batch(const Bvh& bvh, std::span<const Query> queries,
+template <class AnyBvh, class Query>
+OverlapLists all_batch(const AnyBvh& bvh, std::span<const Query> queries,
                        const OverlapOptions& options) {
     require_triangles(bvh, what);
-    const PaddedTree tree(bvh);
+    const auto tree = padded_tree(bvh);
     ResultLimit limit("overlap queries", options.max_bytes, sizeof(std::uint32_t));
     std::vector<std::vector<std::uint32_t>> rows(queries.size());
     OverlapLists lists;
     with_threads(options.threads, [&] {
-        lists.counts = for_each_query(bvh, queries, [&](std::size_t i, WalkStack& stack) {
+        lists.counts = for_each_query(tree, bvh, queries, [&](std::size_t i, auto& stack) {
             std::vector<std::uint32_t>& row = rows[i];
-            for_each_touched(tree, queries[i], stack, [&](std::uint32_t position) {
+            for_each_touched(tree, prepared(queries[i]), stack, [&](std::uint32_t position) {
                 row.push_back(tree.order[position]);
                 return false;
             });
@@ -102,13 +108,14 @@ OverlapLists all_batch(const Bvh& bvh, std::span<const Query> queries,
     return lists;
 }
 
-template <class Query>
-bool touches_one(const Bvh& bvh, const Query& query) {
+template <class AnyBvh, class Query>
+bool touches_one(const AnyBvh& bvh, const Query& query) {
     require_triangles(bvh, what);
     if (bvh.empty() || !is_valid(query)) return false;
     const FloatEnvironment plain;
-    WalkStack stack(bvh.max_depth());
-    return touches_any(PaddedTree(bvh), query, stack);
+    const auto tree = padded_tree(bvh);
+    BasicWalkStack<typename decltype(padded_tree(bvh))::Scalar> stack(tree.max_depth);
+    return touches_any(tree, query, stack);
 }
 
 }  // namespace
@@ -129,6 +136,26 @@ OverlapLists touch_all(const Bvh& bvh, std::span<const Segment> queries,
     return all_batch(bvh, queries, options);
 }
 OverlapLists touch_all(const Bvh& bvh, std::span<const Sphere> queries,
+                       const OverlapOptions& options) {
+    return all_batch(bvh, queries, options);
+}
+
+OverlapCounts touch_any(const BvhD& bvh, std::span<const SegmentD> queries,
+                        std::span<std::uint8_t> touched, const OverlapOptions& options) {
+    return any_batch(bvh, queries, touched, options);
+}
+OverlapCounts touch_any(const BvhD& bvh, std::span<const SphereD> queries,
+                        std::span<std::uint8_t> touched, const OverlapOptions& options) {
+    return any_batch(bvh, queries, touched, options);
+}
+bool touches(const BvhD& bvh, const SegmentD& segment) { return touches_one(bvh, segment); }
+bool touches(const BvhD& bvh, const SphereD& sphere) { return touches_one(bvh, sphere); }
+
+OverlapLists touch_all(const BvhD& bvh, std::span<const SegmentD> queries,
+                       const OverlapOptions& options) {
+    return all_batch(bvh, queries, options);
+}
+OverlapLists touch_all(const BvhD& bvh, std::span<const SphereD> queries,
                        const OverlapOptions& options) {
     return all_batch(bvh, queries, options);
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <raydix/bvh.h>
+#include <raydix/double.h>
 
 #include <array>
 #include <bit>
@@ -32,9 +33,16 @@ struct alignas(16) CornerKeys {
     std::array<std::uint32_t, 4> keys;  // the last is no corner's
 };
 
-inline CornerKeys corner_keys(const LeafTriangle& t) {
-    const auto key = [](Vec3 p) {
-        const auto bits = [](float x) { return std::bit_cast<std::uint32_t>(x); };
+inline std::uint32_t key_bits(float x) { return std::bit_cast<std::uint32_t>(x); }
+inline std::uint32_t key_bits(double x) {
+    const auto bits = std::bit_cast<std::uint64_t>(x);
+    return static_cast<std::uint32_t>(bits ^ bits >> 32);
+}
+
+template <class Corners>
+inline CornerKeys corner_keys(const Corners& t) {
+    const auto key = [](auto p) {
+        const auto bits = [](auto x) { return key_bits(x); };
         const std::uint32_t mixed =
             (bits(p.x) * 0x9e3779b1u ^ bits(p.y)) * 0x85ebca77u ^ bits(p.z) * 0xc2b2ae3du;
         return mixed ^ mixed >> 15;
@@ -62,18 +70,20 @@ inline unsigned equal_keys(const CornerKeys& a, const CornerKeys& b) {
 #endif
 }
 
-/// What walks read of a tree. Each primitive is in one leaf.
-struct PairTree {
+/// What walks read of a tree. Each primitive is in one leaf. Corners: LeafTriangle, or
+/// LeafTriangleD with boxes and nodes around those of the triangles.
+template <class Corners>
+struct BasicPairTree {
     const BvhNode* nodes;
-    const PairBox* boxes;           // [references]
-    const LeafTriangle* triangles;  // [references]; null unless they are triangles
-    const CornerKeys* keys;         // the same
+    const PairBox* boxes;      // [references]
+    const Corners* triangles;  // [references]; null unless they are triangles
+    const CornerKeys* keys;    // the same
     std::uint32_t max_depth;
 
     /// Whether two triangles have a corner at the same place.
     [[nodiscard]] bool share_a_corner(std::uint32_t k, std::uint32_t l) const {
-        const Vec3* s = &triangles[k].v0;
-        const Vec3* t = &triangles[l].v0;
+        const auto* s = &triangles[k].v0;
+        const auto* t = &triangles[l].v0;
         for (unsigned equal = equal_keys(keys[k], keys[l]); equal != 0; equal &= equal - 1) {
             const int bit = std::countr_zero(equal);
             if (s[bit / 4] == t[bit % 4]) return true;
@@ -81,6 +91,8 @@ struct PairTree {
         return false;
     }
 };
+using PairTree = BasicPairTree<LeafTriangle>;
+using PairTreeD = BasicPairTree<LeafTriangleD>;
 
 /// Closed boxes of nodes or primitives.
 template <class A, class B>
@@ -90,25 +102,25 @@ bool boxes_overlap(const A& a, const B& b) {
                                    _mm_cmpgt_ps(_mm_loadu_ps(&b.lo.x), _mm_loadu_ps(&a.hi.x)));
     return (_mm_movemask_ps(apart) & 7) == 0;  // the fourth lanes are no coordinates
 #else
-    return boxes_touch({a.lo, a.hi}, {b.lo, b.hi});
+    return boxes_touch(Aabb{a.lo, a.hi}, Aabb{b.lo, b.hi});
 #endif
 }
 
-struct NodePair {
+struct SlotPair {
     std::uint32_t a, b;
 };
 
 /// `same`: both trees are one, and (n, n) stands for all pairs within n. pair(k, l) gets positions
 /// in leaf order of primitives whose boxes overlap.
-template <bool same, class Pair>
+template <bool same, class Tree, class Pair>
 class PairWalk {
 public:
-    PairWalk(const PairTree& a, const PairTree& b, const Pair& pair) : a_(a), b_(b), pair_(pair) {}
+    PairWalk(const Tree& a, const Tree& b, const Pair& pair) : a_(a), b_(b), pair_(pair) {}
 
-    /// Gives the pairs of nodes that `at` falls into to push(NodePair); at leaves, its primitives
+    /// Gives the pairs of nodes that `at` falls into to push(SlotPair); at leaves, its primitives
     /// to pair().
     template <class Push>
-    void step(NodePair at, const Push& push) const {
+    void step(SlotPair at, const Push& push) const {
         const BvhNode& a = a_.nodes[at.a];
         const BvhNode& b = b_.nodes[at.b];
         if constexpr (same) {
@@ -131,7 +143,7 @@ public:
 
 private:
     template <class Push>
-    void offer(NodePair next, const Push& push) const {
+    void offer(SlotPair next, const Push& push) const {
         if (boxes_overlap(a_.nodes[next.a], b_.nodes[next.b])) push(next);
     }
     static float size(const BvhNode& n) {
@@ -150,8 +162,8 @@ private:
         }
     }
 
-    const PairTree& a_;
-    const PairTree& b_;
+    const Tree& a_;
+    const Tree& b_;
     const Pair& pair_;
 };
 
@@ -159,16 +171,16 @@ private:
 /// where they are one, and leaves at most one pair, or two, behind: the sum of both depths is
 /// enough room.
 template <class Walk>
-void walk_pairs(const Walk& walk, NodePair start, std::uint32_t depths,
-                std::vector<NodePair>& stack) {
+void walk_pairs(const Walk& walk, SlotPair start, std::uint32_t depths,
+                std::vector<SlotPair>& stack) {
     const std::size_t room = std::size_t{depths} + 3;
     stack.clear();
     stack.reserve(room);
     stack.push_back(start);
     while (!stack.empty()) {
-        const NodePair at = stack.back();
+        const SlotPair at = stack.back();
         stack.pop_back();
-        walk.step(at, [&](NodePair next) { stack.push_back(next); });
+        walk.step(at, [&](SlotPair next) { stack.push_back(next); });
         RAYDIX_CHECK(stack.size(), <=, room);
     }
 }
@@ -176,11 +188,11 @@ void walk_pairs(const Walk& walk, NodePair start, std::uint32_t depths,
 /// Work for many threads: pairs of nodes that together stand for `start`, at least `wanted` if
 /// there are so many. Leaves that are met on the way go to pair().
 template <class Walk>
-std::vector<NodePair> spread_pairs(const Walk& walk, NodePair start, std::size_t wanted) {
-    std::vector<NodePair> level{start}, next;
+std::vector<SlotPair> spread_pairs(const Walk& walk, SlotPair start, std::size_t wanted) {
+    std::vector<SlotPair> level{start}, next;
     while (!level.empty() && level.size() < wanted) {
         next.clear();
-        for (const NodePair at : level) walk.step(at, [&](NodePair n) { next.push_back(n); });
+        for (const SlotPair at : level) walk.step(at, [&](SlotPair n) { next.push_back(n); });
         std::swap(level, next);
     }
     return level;

@@ -1,27 +1,20 @@
-// Pairs of primitives: both trees are walked together by many threads, then the pairs are brought
-// into order by counting those of each first id.
+// Pairs of primitives of trees in float.
 #include <raydix/error.h>
 #include <raydix/pairs.h>
 
-#include <algorithm>
-#include <atomic>
 #include <optional>
 #include <string>
 
-#include "exec/parallel.h"
-#include "proximity/pair_walk.h"
-#include "proximity/result_limit.h"
+#include "proximity/pair_search.h"
 #include "proximity/whole_tree.h"
 
 namespace raydix {
 namespace {
 
-using Pairs = std::vector<PrimitivePair>;
-
 /// A tree in the shape that walks want, with what had to be made for that.
 class PairSide {
 public:
-    explicit PairSide(const Bvh& given) {
+    PairSide(const Bvh& given, const Bvh&) {
         if (given.has_split_primitives()) whole_ = make_whole_tree(given);
         const Bvh& bvh = whole_ ? *whole_ : given;
         boxes_.reset(bvh.order().size());
@@ -52,151 +45,38 @@ private:
     Buffer<CornerKeys> keys_;
 };
 
-/// What happens to the pairs that one task finds.
-class Collector {
-public:
-    Collector(bool keep, ResultLimit& limit, Pairs& found)
-        : keep_(keep), limit_(limit), found_(found) {}
-    Collector(const Collector&) = delete;
-    Collector& operator=(const Collector&) = delete;
-
-    void take(std::uint32_t first, std::uint32_t second) const {
-        ++count_;
-        if (!keep_) return;
-        found_.push_back({first, second});
-        if (count_ == pairs_between_checks) report();
-    }
-    void report() const {
-        limit_.add(count_);
-        count_ = 0;
-    }
-
-private:
-    static constexpr std::uint64_t pairs_between_checks = 1u << 16;
-    bool keep_;
-    ResultLimit& limit_;
-    Pairs& found_;
-    mutable std::uint64_t count_ = 0;
-};
-
-/// Whether primitives whose boxes overlap are a pair.
-template <bool same>
-bool is_pair(const PairTree& a, const PairTree& b, std::uint32_t k, std::uint32_t l, bool narrow) {
-    if (same && a.triangles != nullptr && a.share_a_corner(k, l)) return false;
-    return !narrow || triangles_touch(a.triangles[k], b.triangles[l]);
-}
-
-/// All pairs, in lists without order; empty ones if they are only counted.
-template <bool same>
-std::vector<Pairs> find_pairs(const PairTree& a, const PairTree& b, bool narrow, bool keep,
-                              ResultLimit& limit) {
-    constexpr std::size_t tasks_wanted = 4096;
-    const auto in_order = [&](std::uint32_t k, std::uint32_t l, const Collector& out) {
-        if (!is_pair<same>(a, b, k, l, narrow)) return;
-        const std::uint32_t i = a.boxes[k].prim, j = b.boxes[l].prim;
-        if (same && j < i)
-            out.take(j, i);
-        else
-            out.take(i, j);
-    };
-    std::vector<Pairs> lists(1);
-    std::vector<NodePair> tasks;
-    {
-        const Collector out(keep, limit, lists[0]);
-        const auto pair = [&](std::uint32_t k, std::uint32_t l) { in_order(k, l, out); };
-        tasks = spread_pairs(PairWalk<same, decltype(pair)>(a, b, pair), {0, 0}, tasks_wanted);
-        out.report();
-    }
-    lists.resize(tasks.size() + 1);
-    for_each_range(tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
-        std::vector<NodePair> stack;
-        for (std::size_t task = begin; task < end; ++task) {
-            const Collector out(keep, limit, lists[task + 1]);
-            const auto pair = [&](std::uint32_t k, std::uint32_t l) { in_order(k, l, out); };
-            walk_pairs(PairWalk<same, decltype(pair)>(a, b, pair), tasks[task],
-                       a.max_depth + b.max_depth, stack);
-            out.report();
-        }
-    });
-    return lists;
-}
-
-/// Lists in any order -> one by (first, second); `rows` is past the highest first id.
-Pairs sort_pairs(std::vector<Pairs>& lists, std::size_t rows, std::uint64_t total) {
-    std::vector<std::uint64_t> ends(rows + 1, 0);  // of the rows, once the pairs are in place
-    const auto for_each_pair = [&](const auto& visit) {
-        for_each_index(
-            lists.size(),
-            [&](std::size_t list) {
-                for (const PrimitivePair& pair : lists[list]) visit(pair);
-            },
-            1);
-    };
-    for_each_pair([&](const PrimitivePair& pair) {
-        std::atomic_ref(ends[pair.first + 1]).fetch_add(1, std::memory_order_relaxed);
-    });
-    for (std::size_t row = 0; row < rows; ++row) ends[row + 1] += ends[row];
-    Pairs sorted(total);
-    for_each_pair([&](const PrimitivePair& pair) {  // ends[row]: the next free place of the row
-        sorted[std::atomic_ref(ends[pair.first]).fetch_add(1, std::memory_order_relaxed)] = pair;
-    });
-    for_each_index(rows, [&](std::size_t row) {
-        const std::uint64_t begin = row == 0 ? 0 : ends[row - 1];
-        std::sort(
-            sorted.begin() + static_cast<std::ptrdiff_t>(begin),
-            sorted.begin() + static_cast<std::ptrdiff_t>(ends[row]),
-            [](const PrimitivePair& x, const PrimitivePair& y) { return x.second < y.second; });
-    });
-    return sorted;
-}
-
 void check_narrow(const Bvh& bvh, const PairOptions& options) {
     if (options.narrow && !bvh.empty() && bvh.kind() != PrimitiveKind::triangles)
         throw InputError(std::string("pairs: narrow needs triangles; this tree holds ") +
                          (bvh.kind() == PrimitiveKind::points ? "points" : "boxes"));
 }
 
-/// Finds and, if wanted, sorts them; returns how many. `b` null: within `a`.
-std::uint64_t run(const Bvh& a, const Bvh* b, const PairOptions& options, Pairs* result) {
+void check_narrow(const Bvh& a, const Bvh& b, const PairOptions& options) {
     check_narrow(a, options);
-    if (b != nullptr) check_narrow(*b, options);
-    if (a.empty() || (b != nullptr && b->empty())) return 0;
-    ResultLimit limit("pairs", result != nullptr ? options.max_bytes : ~std::uint64_t{0},
-                      sizeof(PrimitivePair));
-    with_threads(options.threads, [&] {
-        const PairSide side_a(a);
-        const bool keep = result != nullptr;
-        std::vector<Pairs> lists;
-        if (b == nullptr)
-            lists = find_pairs<true>(side_a.tree, side_a.tree, options.narrow, keep, limit);
-        else
-            lists = find_pairs<false>(side_a.tree, PairSide(*b).tree, options.narrow, keep, limit);
-        if (keep) *result = sort_pairs(lists, a.input_count(), limit.count());
-    });
-    return limit.count();
+    check_narrow(b, options);
 }
 
 }  // namespace
 
 std::vector<PrimitivePair> overlapping_pairs(const Bvh& bvh, const PairOptions& options) {
-    Pairs pairs;
-    run(bvh, nullptr, options, &pairs);
-    return pairs;
+    check_narrow(bvh, options);
+    return all_pairs<PairSide, Bvh>(bvh, nullptr, options);
 }
 
 std::vector<PrimitivePair> overlapping_pairs(const Bvh& a, const Bvh& b,
                                              const PairOptions& options) {
-    Pairs pairs;
-    run(a, &b, options, &pairs);
-    return pairs;
+    check_narrow(a, b, options);
+    return all_pairs<PairSide>(a, &b, options);
 }
 
 std::uint64_t count_overlapping_pairs(const Bvh& bvh, const PairOptions& options) {
-    return run(bvh, nullptr, options, nullptr);
+    check_narrow(bvh, options);
+    return run_pairs<PairSide, Bvh>(bvh, nullptr, options, nullptr);
 }
 
 std::uint64_t count_overlapping_pairs(const Bvh& a, const Bvh& b, const PairOptions& options) {
-    return run(a, &b, options, nullptr);
+    check_narrow(a, b, options);
+    return run_pairs<PairSide>(a, &b, options, nullptr);
 }
 
 }  // namespace raydix

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <raydix/bvh.h>
+#include <raydix/double.h>
 #include <raydix/error.h>
 
 #include <cstddef>
@@ -11,8 +12,10 @@
 #include <string>
 #include <vector>
 
+#include "base/double3.h"
 #include "exec/parallel.h"
 #include "rays/place_order.h"
+#include "trace/double_tree.h"
 
 namespace raydix {
 
@@ -25,6 +28,9 @@ inline void require_triangles(const Bvh& bvh, const char* what) {
         throw InputError(std::string(what) + " triangles; this tree holds " +
                          (bvh.kind() == PrimitiveKind::points ? "points" : "boxes"));
 }
+
+/// Always: there is nothing else in it.
+inline void require_triangles(const BvhD&, const char*) {}
 
 inline void require_room(const char* what, std::size_t queries, std::size_t results) {
     if (queries != results)
@@ -39,10 +45,19 @@ inline void require_room(const char* what, std::size_t queries, std::size_t resu
         return {};
     return order_by_place(bvh.bounds(), places);
 }
+[[nodiscard]] inline std::vector<std::uint32_t> query_order(const BvhD& bvh,
+                                                            std::span<const Vec3d> places) {
+    if (places.size() < worth_ordering) return {};
+    const TreeSpace space{bvh.center(), bvh.scale()};
+    std::vector<Vec3> local(places.size());
+    for_each_index(places.size(),
+                   [&](std::size_t i) { Double3(space.local(places[i])).round_to(local[i]); });
+    return query_order(bvh.tree(), local);
+}
 
 /// Calls one(block, begin, end, at) with at(k) = the query that is k-th in line.
-template <class One>
-void for_each_query_block(const Bvh& bvh, std::span<const Vec3> places, const One& one) {
+template <class AnyBvh, class Vec, class One>
+void for_each_query_block(const AnyBvh& bvh, std::span<const Vec> places, const One& one) {
     const std::vector<std::uint32_t> order = query_order(bvh, places);
     const auto at = [&](std::size_t k) { return order.empty() ? k : order[k]; };
     for_each_block(

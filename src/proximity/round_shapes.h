@@ -10,18 +10,9 @@
 
 #include "base/double3.h"
 #include "proximity/closest_on_triangle.h"
+#include "trace/grown_boxes.h"
 
 namespace raydix {
-
-/// origin + t * direction for t in [tmin, tmax].
-struct Path {
-    Double3 origin, direction;
-    double tmin, tmax;
-
-    [[nodiscard]] Double3 at(double t) const { return origin + direction * t; }
-};
-
-inline constexpr double never = std::numeric_limits<double>::infinity();
 
 /// Enters the set at t, or never; a path that starts in it enters at tmin. `enter` and `leave`
 /// bound the line's stay.
@@ -94,9 +85,9 @@ inline double enter_capsule(const Path& path, Double3 a, Double3 b, double radiu
                      enter_cylinder(path, a, b, radius)});
 }
 
-/// The prism of height `radius` on both sides of the triangle.
-inline double enter_prism(const Path& path, Double3 a, Double3 b, Double3 c, double radius) {
-    const Double3 normal = cross(b - a, c - a);
+/// The prism of height `radius` on both sides of the triangle; `normal` is that of its plane.
+inline double enter_prism(const Path& path, Double3 a, Double3 b, Double3 c, Double3 normal,
+                          double radius) {
     const double size = length(normal);
     if (size == 0.0) return never;
     Stay stay{-never, never};
@@ -119,46 +110,27 @@ inline double enter_prism(const Path& path, Double3 a, Double3 b, Double3 c, dou
 }
 
 /// All points within `radius` of the triangle.
-inline double enter_rounded_triangle(const Path& path, const LeafTriangle& t, double radius) {
-    const Double3 a(t.v0), b(t.v1), c(t.v2);
-    return std::min({enter_prism(path, a, b, c, radius), enter_ball(path, a, radius),
+inline double enter_rounded_triangle(const Path& path, Double3 a, Double3 b, Double3 c,
+                                     Double3 normal, double radius) {
+    return std::min({enter_prism(path, a, b, c, normal, radius), enter_ball(path, a, radius),
                      enter_ball(path, b, radius), enter_ball(path, c, radius),
                      enter_cylinder(path, a, b, radius), enter_cylinder(path, b, c, radius),
                      enter_cylinder(path, c, a, radius)});
 }
 
-/// When the path enters a box that is `radius` larger on all sides: each step is monotone, so a box
-/// around another is never entered later. Never, if it misses by more than rounding.
-class GrownBoxes {
-public:
-    GrownBoxes(const Path& path, double radius)
-        : path_(path),
-          radius_(radius),
-          inverse_(1.0 / path.direction.x, 1.0 / path.direction.y, 1.0 / path.direction.z) {}
+inline double enter_rounded_triangle(const Path& path, const LeafTriangle& t, double radius) {
+    const Double3 a(t.v0), b(t.v1), c(t.v2);
+    return enter_rounded_triangle(path, a, b, c, cross(b - a, c - a), radius);
+}
 
-    [[nodiscard]] double enter(const Vec3& lo, const Vec3& hi) const {
-        double enter = path_.tmin, leave = path_.tmax;
-        const auto axis = [&](double from, double to, double origin, double direction,
-                              double inverse) {
-            const double below = from - origin - radius_, above = to - origin + radius_;
-            if (direction == 0.0) {
-                if (below > 0.0 || above < 0.0) leave = -never;
-                return;
-            }
-            enter = std::max(enter, (direction > 0.0 ? below : above) * inverse);
-            leave = std::min(leave, (direction > 0.0 ? above : below) * inverse);
-        };
-        axis(lo.x, hi.x, path_.origin.x, path_.direction.x, inverse_.x);
-        axis(lo.y, hi.y, path_.origin.y, path_.direction.y, inverse_.y);
-        axis(lo.z, hi.z, path_.origin.z, path_.direction.z, inverse_.z);
-        const double slack = 1e-12 * (std::fabs(enter) + std::fabs(leave));
-        return enter <= leave + slack ? enter : never;
-    }
-
-private:
-    Path path_;
-    double radius_;
-    Double3 inverse_;
-};
+/// In double the path must start at 0 and `start` is where that is in the scene: corners are taken
+/// from there, so that a place far from the origin costs no digits. The normal is that of the
+/// corners as they are, since a sliver's would not survive a rounding of its edges.
+inline double enter_rounded_triangle(const Path& path, Vec3d start, const LeafTriangleD& t,
+                                     double radius) {
+    const Double3 a(t.v0), b(t.v1), c(t.v2), from(start);
+    return enter_rounded_triangle(path, a - from, b - from, c - from, accurate_cross(b - a, c - a),
+                                  radius);
+}
 
 }  // namespace raydix

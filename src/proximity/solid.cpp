@@ -1,4 +1,6 @@
-// Solids: edges are matched once, then each query is told inside or outside by the rule.
+// Solids: edges are matched once, then each query is told inside or outside by the rule. In float
+// and in double by the same templates.
+#include <raydix/double.h>
 #include <raydix/error.h>
 #include <raydix/solid.h>
 
@@ -14,14 +16,21 @@
 
 namespace raydix {
 
-struct Solid::State {
-    const Bvh* bvh;
-    std::optional<Bvh> whole;  // where the caller's tree has triangles in several leaves
+namespace {
+
+/// What is known of a tree of triangles, each of which is in one leaf.
+struct Inside {
     EdgeClosure edges;
     InsideRule rule;
     std::optional<WindingTree> winding;
 
-    [[nodiscard]] const Bvh& single() const { return whole ? *whole : *bvh; }
+    template <class Tree>
+    Inside(const Tree& tree, std::span<const typename Tree::Corners> triangles,
+           std::span<const BvhNode> nodes, InsideRule wanted)
+        : edges(match_edges(triangles)) {
+        choose(wanted);
+        if (rule == InsideRule::winding) winding.emplace(tree, nodes);
+    }
     [[nodiscard]] Closure closure() const {
         return edges.odd != 0          ? Closure::open
                : edges.unbalanced != 0 ? Closure::closed
@@ -36,9 +45,30 @@ struct Solid::State {
     }
 };
 
+}  // namespace
+
+struct Solid::State {
+    using Tree = TriangleTree;
+    const Bvh* bvh;
+    std::optional<Bvh> whole;  // where the caller's tree has triangles in several leaves
+    std::optional<Inside> inside;
+
+    [[nodiscard]] const Bvh& single() const { return whole ? *whole : *bvh; }
+};
+
+struct SolidD::State {
+    using Tree = TriangleTreeD;
+    const BvhD* bvh;
+    std::optional<Inside> inside;
+
+    [[nodiscard]] const BvhD& single() const { return *bvh; }
+};
+
 struct SolidAccess {
-    using State = Solid::State;
-    static const State& state(const Solid& solid) { return *solid.state_; }
+    template <class AnySolid>
+    static const auto& state(const AnySolid& solid) {
+        return *solid.state_;
+    }
 };
 
 namespace {
@@ -49,39 +79,51 @@ struct Winding {
     bool inside;
 };
 
+template <class State>
 class InsideTest {
+    using Tree = typename State::Tree;
+
 public:
-    explicit InsideTest(const Solid& solid)
-        : state_(SolidAccess::state(solid)), tree_(state_.single()), stack_(tree_.max_depth) {}
+    explicit InsideTest(const State& state)
+        : inside_(*state.inside), tree_(state.single()), stack_(tree_.max_depth) {}
 
     /// `query` must be finite.
-    Winding operator()(Vec3 query) {
+    Winding operator()(VecOf<typename Tree::Scalar> query) {
         if (tree_.empty) return {0.0, false};
-        if (state_.rule == InsideRule::winding) {
-            const double number = state_.winding->at(tree_, query, stack_);
+        if (inside_.rule == InsideRule::winding) {
+            const double number = inside_.winding->at(tree_, query, stack_);
             return {number, std::fabs(number) >= 0.5};
         }
         const Crossings c = count_crossings(tree_, query, stack_);
         if (c.on_surface) return {0.0, true};
-        if (state_.rule == InsideRule::parity) return {double(c.count % 2), c.count % 2 != 0};
+        if (inside_.rule == InsideRule::parity) return {double(c.count % 2), c.count % 2 != 0};
         return {double(c.winding), c.winding != 0};
     }
 
 private:
-    const SolidAccess::State& state_;
-    TriangleTree tree_;
-    WalkStack stack_;
+    const Inside& inside_;
+    Tree tree_;
+    BasicWalkStack<typename Tree::Scalar> stack_;
 };
 
+/// A query as the signs of exact_sign_double.h want it.
+Vec3 prepared(Vec3 query) { return query; }
+Vec3d prepared(Vec3d query) { return without_tiny(query); }
+
+template <class AnySolid, class Vec>
+Winding test_one(const AnySolid& solid, Vec query) {
+    return InsideTest(SolidAccess::state(solid))(prepared(query));
+}
+
 /// Calls one(i, winding) for each query and bad(i) for those that are not finite.
-template <class One, class Bad>
-ClosestCounts for_each_query(const Solid& solid, std::span<const Vec3> queries, const One& one,
+template <class AnySolid, class Vec, class One, class Bad>
+ClosestCounts for_each_query(const AnySolid& solid, std::span<const Vec> queries, const One& one,
                              const Bad& bad) {
     std::vector<ClosestCounts> parts(block_count(queries.size()));
     for_each_query_block(
         solid.bvh(), queries,
         [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
-            InsideTest test(solid);
+            InsideTest test(SolidAccess::state(solid));
             for (std::size_t k = begin; k < end; ++k) {
                 const std::size_t i = at(k);
                 if (!is_finite(queries[i])) {
@@ -89,7 +131,7 @@ ClosestCounts for_each_query(const Solid& solid, std::span<const Vec3> queries, 
                     bad(i);
                     continue;
                 }
-                const Winding winding = test(queries[i]);
+                const Winding winding = test(prepared(queries[i]));
                 parts[block].found += winding.inside;
                 one(i, winding);
             }
@@ -103,33 +145,14 @@ ClosestCounts for_each_query(const Solid& solid, std::span<const Vec3> queries, 
     return sum;
 }
 
-float with_sign(float distance, bool inside) {
-    return inside && distance > 0.0f ? -distance : distance;
+template <class Scalar>
+Scalar with_sign(Scalar distance, bool inside) {
+    return inside && distance > 0 ? -distance : distance;
 }
 
-}  // namespace
-
-Solid::Solid(const Bvh& bvh, const SolidOptions& options) : state_(std::make_unique<State>()) {
-    require_triangles(bvh, "a solid needs");
-    with_threads(options.threads, [&] {
-        state_->bvh = &bvh;
-        if (bvh.has_split_primitives()) state_->whole = make_whole_tree(bvh);
-        state_->edges = match_edges(state_->single().triangles());
-        state_->choose(options.rule);
-        if (state_->rule == InsideRule::winding) state_->winding.emplace(state_->single());
-    });
-}
-Solid::~Solid() = default;
-Solid::Solid(Solid&&) noexcept = default;
-Solid& Solid::operator=(Solid&&) noexcept = default;
-
-Closure Solid::closure() const { return state_->closure(); }
-InsideRule Solid::rule() const { return state_->rule; }
-std::uint64_t Solid::open_edges() const { return state_->edges.odd; }
-const Bvh& Solid::bvh() const { return *state_->bvh; }
-
-ClosestCounts contains(const Solid& solid, std::span<const Vec3> queries,
-                       std::span<std::uint8_t> inside, int threads) {
+template <class AnySolid, class Vec>
+ClosestCounts contains_batch(const AnySolid& solid, std::span<const Vec> queries,
+                             std::span<std::uint8_t> inside, int threads) {
     require_room("contains", queries.size(), inside.size());
     ClosestCounts counts;
     with_threads(threads, [&] {
@@ -140,16 +163,13 @@ ClosestCounts contains(const Solid& solid, std::span<const Vec3> queries,
     return counts;
 }
 
-bool contains(const Solid& solid, Vec3 query) {
-    const FloatEnvironment plain;
-    return is_finite(query) && InsideTest(solid)(query).inside;
-}
-
-ClosestCounts signed_distances(const Solid& solid, std::span<const Vec3> queries,
-                               std::span<float> distances, const ClosestOptions& options) {
+template <class Result, class AnySolid, class Vec, class Scalar, class Options>
+ClosestCounts signed_batch(const AnySolid& solid, std::span<const Vec> queries,
+                           std::span<Scalar> distances, const Options& options) {
     require_room("signed distances", queries.size(), distances.size());
-    std::vector<ClosestPoint> points(queries.size());
-    const ClosestCounts counts = closest_points(solid.bvh(), queries, points, options);
+    std::vector<Result> points(queries.size());
+    const ClosestCounts counts =
+        closest_points(solid.bvh(), queries, std::span<Result>(points), options);
     with_threads(options.threads, [&] {
         for_each_query(
             solid, queries,
@@ -161,19 +181,9 @@ ClosestCounts signed_distances(const Solid& solid, std::span<const Vec3> queries
     return counts;
 }
 
-std::vector<float> signed_distances(const Solid& solid, std::span<const Vec3> queries,
-                                    const ClosestOptions& options) {
-    std::vector<float> distances(queries.size());
-    signed_distances(solid, queries, distances, options);
-    return distances;
-}
-
-float signed_distance(const Solid& solid, Vec3 query) {
-    return with_sign(closest_point(solid.bvh(), query).distance, contains(solid, query));
-}
-
-std::vector<double> winding_numbers(const Solid& solid, std::span<const Vec3> queries,
-                                    int threads) {
+template <class AnySolid, class Vec>
+std::vector<double> winding_batch(const AnySolid& solid, std::span<const Vec> queries,
+                                  int threads) {
     std::vector<double> numbers(queries.size());
     with_threads(threads, [&] {
         for_each_query(
@@ -181,6 +191,99 @@ std::vector<double> winding_numbers(const Solid& solid, std::span<const Vec3> qu
             [&](std::size_t i) { numbers[i] = std::numeric_limits<double>::quiet_NaN(); });
     });
     return numbers;
+}
+
+}  // namespace
+
+Solid::Solid(const Bvh& bvh, const SolidOptions& options) : state_(std::make_unique<State>()) {
+    require_triangles(bvh, "a solid needs");
+    with_threads(options.threads, [&] {
+        state_->bvh = &bvh;
+        if (bvh.has_split_primitives()) state_->whole = make_whole_tree(bvh);
+        const Bvh& single = state_->single();
+        state_->inside.emplace(TriangleTree(single), single.triangles(), single.nodes(),
+                               options.rule);
+    });
+}
+Solid::~Solid() = default;
+Solid::Solid(Solid&&) noexcept = default;
+Solid& Solid::operator=(Solid&&) noexcept = default;
+
+SolidD::SolidD(const BvhD& bvh, const SolidOptions& options) : state_(std::make_unique<State>()) {
+    with_threads(options.threads, [&] {
+        state_->bvh = &bvh;
+        state_->inside.emplace(TriangleTreeD(bvh), bvh.triangles(), bvh.tree().nodes(),
+                               options.rule);
+    });
+}
+SolidD::~SolidD() = default;
+SolidD::SolidD(SolidD&&) noexcept = default;
+SolidD& SolidD::operator=(SolidD&&) noexcept = default;
+
+Closure Solid::closure() const { return state_->inside->closure(); }
+InsideRule Solid::rule() const { return state_->inside->rule; }
+std::uint64_t Solid::open_edges() const { return state_->inside->edges.odd; }
+const Bvh& Solid::bvh() const { return *state_->bvh; }
+
+Closure SolidD::closure() const { return state_->inside->closure(); }
+InsideRule SolidD::rule() const { return state_->inside->rule; }
+std::uint64_t SolidD::open_edges() const { return state_->inside->edges.odd; }
+const BvhD& SolidD::bvh() const { return *state_->bvh; }
+
+ClosestCounts contains(const Solid& solid, std::span<const Vec3> queries,
+                       std::span<std::uint8_t> inside, int threads) {
+    return contains_batch(solid, queries, inside, threads);
+}
+ClosestCounts contains(const SolidD& solid, std::span<const Vec3d> queries,
+                       std::span<std::uint8_t> inside, int threads) {
+    return contains_batch(solid, queries, inside, threads);
+}
+
+bool contains(const Solid& solid, Vec3 query) {
+    const FloatEnvironment plain;
+    return is_finite(query) && test_one(solid, query).inside;
+}
+bool contains(const SolidD& solid, Vec3d query) {
+    const FloatEnvironment plain;
+    return is_finite(query) && test_one(solid, query).inside;
+}
+
+ClosestCounts signed_distances(const Solid& solid, std::span<const Vec3> queries,
+                               std::span<float> distances, const ClosestOptions& options) {
+    return signed_batch<ClosestPoint>(solid, queries, distances, options);
+}
+ClosestCounts signed_distances(const SolidD& solid, std::span<const Vec3d> queries,
+                               std::span<double> distances, const ClosestOptionsD& options) {
+    return signed_batch<ClosestPointD>(solid, queries, distances, options);
+}
+
+std::vector<float> signed_distances(const Solid& solid, std::span<const Vec3> queries,
+                                    const ClosestOptions& options) {
+    std::vector<float> distances(queries.size());
+    signed_distances(solid, queries, distances, options);
+    return distances;
+}
+std::vector<double> signed_distances(const SolidD& solid, std::span<const Vec3d> queries,
+                                     const ClosestOptionsD& options) {
+    std::vector<double> distances(queries.size());
+    signed_distances(solid, queries, distances, options);
+    return distances;
+}
+
+float signed_distance(const Solid& solid, Vec3 query) {
+    return with_sign(closest_point(solid.bvh(), query).distance, contains(solid, query));
+}
+double signed_distance(const SolidD& solid, Vec3d query) {
+    return with_sign(closest_point(solid.bvh(), query).distance, contains(solid, query));
+}
+
+std::vector<double> winding_numbers(const Solid& solid, std::span<const Vec3> queries,
+                                    int threads) {
+    return winding_batch(solid, queries, threads);
+}
+std::vector<double> winding_numbers(const SolidD& solid, std::span<const Vec3d> queries,
+                                    int threads) {
+    return winding_batch(solid, queries, threads);
 }
 
 }  // namespace raydix

@@ -1,4 +1,6 @@
-// Batches of moving balls. Balls without a radius are rays, with the watertight test of rays.
+// Batches of moving balls, in float and in double. Balls without a radius are rays, with the
+// watertight test of rays.
+#include <raydix/double.h>
 #include <raydix/overlap.h>
 
 #include "base/float_env.h"
@@ -8,39 +10,60 @@
 namespace raydix {
 namespace {
 
-SweepHit sweep_as_ray(const TriangleTree& tree, const Ray& ray, WalkStack& stack) {
-    const RayFrame frame = make_frame(ray);
+constexpr const char* what = "sweeps need";
+
+struct FloatSweeps {
+    using Tree = TriangleTree;
+    using Frame = SweepFrame;
+    using Hit = SweepHit;
+};
+struct DoubleSweeps {
+    using Tree = PaddedTreeD;
+    using Frame = SweepFrameD;
+    using Hit = SweepHitD;
+};
+
+FloatSweeps kind_of(const Bvh&) { return {}; }
+DoubleSweeps kind_of(const BvhD&) { return {}; }
+
+template <class Kind, class Stack>
+typename Kind::Hit sweep_as_ray(const typename Kind::Tree& tree, const auto& ray, Stack& stack) {
+    const auto frame = make_frame(ray);
     NoSteps steps;
-    const ClosestHit hit = find_closest(tree, frame, stack, steps);
+    const auto hit = find_closest(tree, frame, stack, steps);
     if (hit.prim == no_primitive) return {};
-    const LeafTriangle& t = tree.triangles[hit.position];
+    const auto& t = tree.triangles[hit.position];
     const Double3 a(t.v0), b(t.v1), c(t.v2);
     const Double3 at = a + (b - a) * hit.u + (c - a) * hit.v;
-    return {hit.t * frame.t_scale, hit.prim, at.rounded(), hit.u, hit.v};
+    typename Kind::Hit contact{hit.t * frame.t_scale, hit.prim, {}, hit.u, hit.v};
+    at.round_to(contact.position);
+    return contact;
 }
 
-SweepHit sweep_one(const TriangleTree& tree, const SphereSweep& sweep, WalkStack& stack) {
-    if (sweep.radius == 0.0f) return sweep_as_ray(tree, sweep.path, stack);
-    const Contact contact = find_first_contact(tree, sweep, stack);
+template <class Kind, class Sweep, class Stack>
+typename Kind::Hit sweep_one(const typename Kind::Tree& tree, const Sweep& sweep, Stack& stack) {
+    if (sweep.radius == 0) return sweep_as_ray<Kind>(tree, sweep.path, stack);
+    const typename Kind::Frame frame(tree, sweep);
+    const auto contact = find_first_contact(tree, frame, stack);
     if (contact.prim == no_primitive) return {};
-    const Vec3 center = path_of(sweep.path).at(contact.t).rounded();
-    const TrianglePoint at = closest_on_triangle(tree.triangles[contact.position], center);
-    return {contact.t, contact.prim, at.position, at.u, at.v};
+    const auto at = closest_on_triangle(tree.triangles[contact.position], frame.center(contact.t));
+    return {frame.in_units_of_caller(contact.t), contact.prim, at.position, at.u, at.v};
 }
 
-OverlapCounts sweep_batch(const Bvh& bvh, std::span<const SphereSweep> sweeps,
-                          std::span<SweepHit> hits) {
-    const TriangleTree tree(bvh);
+template <class Kind, class AnyBvh, class Sweep>
+OverlapCounts sweep_batch(const AnyBvh& bvh, std::span<const Sweep> sweeps,
+                          std::span<typename Kind::Hit> hits) {
+    const typename Kind::Tree tree(bvh);
     std::vector<OverlapCounts> parts(block_count(sweeps.size()));
     for_each_block(sweeps.size(), queries_per_block,
                    [&](std::size_t block, std::size_t begin, std::size_t end) {
-                       WalkStack stack(tree.max_depth);
+                       BasicWalkStack<typename Kind::Tree::Scalar> stack(tree.max_depth);
                        for (std::size_t i = begin; i < end; ++i) {
                            hits[i] = {};
                            if (!is_valid(sweeps[i]))
                                ++parts[block].invalid_queries;
                            else if (!tree.empty)
-                               hits[i] = sweep_one(tree, sweeps[i], stack);
+                               hits[i] = sweep_one<Kind>(tree, sweeps[i], stack);
                            parts[block].found += hits[i].hit();
                        }
                    });
@@ -53,30 +76,53 @@ OverlapCounts sweep_batch(const Bvh& bvh, std::span<const SphereSweep> sweeps,
     return sum;
 }
 
+template <class AnyBvh, class Sweep, class AnyHit>
+OverlapCounts sweep_all(const AnyBvh& bvh, std::span<const Sweep> sweeps, std::span<AnyHit> hits,
+                        const OverlapOptions& options) {
+    require_triangles(bvh, what);
+    require_room("sweeps", sweeps.size(), hits.size());
+    OverlapCounts counts;
+    with_threads(options.threads,
+                 [&] { counts = sweep_batch<decltype(kind_of(bvh))>(bvh, sweeps, hits); });
+    return counts;
+}
+
+template <class AnyBvh, class Sweep>
+auto sweep_single(const AnyBvh& bvh, const Sweep& sweep) {
+    using Kind = decltype(kind_of(bvh));
+    require_triangles(bvh, what);
+    if (bvh.empty() || !is_valid(sweep)) return typename Kind::Hit{};
+    const FloatEnvironment plain;
+    BasicWalkStack<typename Kind::Tree::Scalar> stack(bvh.max_depth());
+    return sweep_one<Kind>(typename Kind::Tree(bvh), sweep, stack);
+}
+
 }  // namespace
 
 OverlapCounts sweep_spheres(const Bvh& bvh, std::span<const SphereSweep> sweeps,
                             std::span<SweepHit> hits, const OverlapOptions& options) {
-    require_triangles(bvh, "sweeps need");
-    require_room("sweeps", sweeps.size(), hits.size());
-    OverlapCounts counts;
-    with_threads(options.threads, [&] { counts = sweep_batch(bvh, sweeps, hits); });
-    return counts;
+    return sweep_all(bvh, sweeps, hits, options);
 }
-
 std::vector<SweepHit> sweep_spheres(const Bvh& bvh, std::span<const SphereSweep> sweeps,
                                     const OverlapOptions& options) {
     std::vector<SweepHit> hits(sweeps.size());
     sweep_spheres(bvh, sweeps, hits, options);
     return hits;
 }
+SweepHit sweep_sphere(const Bvh& bvh, const SphereSweep& sweep) { return sweep_single(bvh, sweep); }
 
-SweepHit sweep_sphere(const Bvh& bvh, const SphereSweep& sweep) {
-    require_triangles(bvh, "sweeps need");
-    if (bvh.empty() || !is_valid(sweep)) return {};
-    const FloatEnvironment plain;
-    WalkStack stack(bvh.max_depth());
-    return sweep_one(TriangleTree(bvh), sweep, stack);
+OverlapCounts sweep_spheres(const BvhD& bvh, std::span<const SphereSweepD> sweeps,
+                            std::span<SweepHitD> hits, const OverlapOptions& options) {
+    return sweep_all(bvh, sweeps, hits, options);
+}
+std::vector<SweepHitD> sweep_spheres(const BvhD& bvh, std::span<const SphereSweepD> sweeps,
+                                     const OverlapOptions& options) {
+    std::vector<SweepHitD> hits(sweeps.size());
+    sweep_spheres(bvh, sweeps, hits, options);
+    return hits;
+}
+SweepHitD sweep_sphere(const BvhD& bvh, const SphereSweepD& sweep) {
+    return sweep_single(bvh, sweep);
 }
 
 }  // namespace raydix

@@ -1,16 +1,24 @@
-// The first contact of a moving ball with the triangles of a tree.
+// The first contact of a moving ball with the triangles of a tree, in float and in double.
 #pragma once
 
+#include <raydix/double.h>
 #include <raydix/overlap.h>
 
 #include "proximity/closest_walk.h"
 #include "proximity/round_shapes.h"
+#include "trace/grown_boxes.h"
 #include "trace/ray_frame.h"
 
 namespace raydix {
 
 inline bool is_valid(const SphereSweep& s) {
     return is_valid(s.path) && s.radius >= 0.0f && s.radius < infinity;
+}
+inline bool is_valid(const SphereSweepD& s) {
+    constexpr double limit = 1e150;  // squares of what is larger overflow
+    const auto ok = [](double x) { return std::fabs(x) <= limit; };
+    return is_valid(s.path) && ok(s.path.origin.x) && ok(s.path.origin.y) && ok(s.path.origin.z) &&
+           s.radius >= 0.0 && s.radius <= limit;
 }
 
 /// `ray` must be valid.
@@ -30,51 +38,113 @@ inline float first_contact(const Path& path, const GrownBoxes& boxes, double rad
     return at == never ? infinity : static_cast<float>(std::max(at, own));
 }
 
-struct Contact {
-    float t = infinity;
-    std::uint32_t prim = no_primitive, position = no_primitive;
+/// A valid sweep among the nodes and triangles of a tree.
+class SweepFrame {
+public:
+    SweepFrame(const TriangleTree&, const SphereSweep& sweep)
+        : path_(path_of(sweep.path)), radius_(sweep.radius), boxes_(path_, sweep.radius) {}
+
+    [[nodiscard]] float contact(const LeafTriangle& t) const {
+        return first_contact(path_, boxes_, radius_, t);
+    }
+    [[nodiscard]] float enter(const BvhNode& node) const {
+        // A part of a triangle may be entered later than the whole by rounding in double.
+        const double t = boxes_.enter(node.lo, node.hi);
+        return t == never ? infinity : static_cast<float>(t * (1.0 - 1e-12));
+    }
+    [[nodiscard]] Vec3 center(float t) const { return path_.at(t).rounded(); }
+    [[nodiscard]] float in_units_of_caller(float t) const { return t; }
+
+private:
+    Path path_;
+    double radius_;
+    GrownBoxes boxes_;
 };
 
-/// The least (t, prim). The sweep must be valid, the tree not empty.
-inline Contact find_first_contact(const TriangleTree& tree, const SphereSweep& sweep,
-                                  WalkStack& stack) {
-    const Path path = path_of(sweep.path);
-    const GrownBoxes boxes(path, sweep.radius);
-    // A part of a triangle may be entered later than the whole by rounding in double.
-    const auto enter = [&](const BvhNode& node) {
-        const double t = boxes.enter(node.lo, node.hi);
-        return t == never ? infinity : static_cast<float>(t * (1.0 - 1e-12));
-    };
-    Contact best;
-    PendingNode* const bottom = stack.begin();
-    PendingNode* top = bottom;
-    std::uint32_t slot = 0;
-    for (;;) {
-        const BvhNode& node = tree.nodes[slot];
-        if (node.is_leaf()) {
-            for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
-                const float t = first_contact(path, boxes, sweep.radius, tree.triangles[k]);
-                if (t < best.t || (t == best.t && t < infinity && tree.order[k] < best.prim))
-                    best = {t, tree.order[k], k};
-            }
-        } else {
-            const float a = enter(tree.nodes[node.first]), b = enter(tree.nodes[node.first + 1]);
-            const bool b_first = b < a;
-            const float nearer = b_first ? b : a, farther = b_first ? a : b;
-            if (nearer <= best.t && nearer < infinity) {
-                if (farther <= best.t && farther < infinity) {
-                    RAYDIX_CHECK(static_cast<std::uint32_t>(top - bottom), <, stack.capacity());
-                    *top++ = {node.first + (b_first ? 0u : 1u), farther};
-                }
-                slot = node.first + (b_first ? 1u : 0u);
-                continue;
-            }
-        }
-        do {
-            if (top == bottom) return best;
-            slot = (--top)->slot;
-        } while (top->entry > best.t);
+/// The same in double. Long and short directions are scaled as those of rays, or their squares
+/// would overflow; t is in units of the scaled one.
+class SweepFrameD {
+public:
+    SweepFrameD(const PaddedTreeD& tree, const SphereSweepD& sweep)
+        : SweepFrameD(make_frame(sweep.path), tree, sweep) {}
+
+    /// As first_contact: a pure function of sweep and triangle.
+    [[nodiscard]] double contact(const LeafTriangleD& t) const {
+        const AabbD box = box_of(t.v0, t.v1, t.v2);
+        const double own = boxes_.enter(box.lo - start_, box.hi - start_);
+        if (own == never) return never;
+        const double at = enter_rounded_triangle(path_, start_, t, radius_);
+        return at == never ? never : std::max(at, own);
     }
+    /// Not later than any triangle's own box in it, see `room`.
+    [[nodiscard]] double enter(const BvhNode& node) const {
+        return nodes_.enter(node.lo, node.hi) * (1.0 - 1e-12);
+    }
+    [[nodiscard]] Vec3d center(double t) const {
+        Vec3d at;
+        (Double3(start_) + path_.direction * t).round_to(at);
+        return at;
+    }
+    [[nodiscard]] double in_units_of_caller(double t) const {
+        return t * t_scale_ + 0.0;  // -0 becomes +0
+    }
+
+private:
+    SweepFrameD(const RayFrameD& ray, const PaddedTreeD& tree, const SphereSweepD& sweep)
+        : start_(ray.origin),
+          path_{{},
+                Double3(sweep.path.direction * ray.t_scale),
+                ray.tmin,
+                sweep.path.tmax / ray.t_scale},
+          radius_(sweep.radius),
+          t_scale_(ray.t_scale),
+          boxes_(path_, radius_),
+          nodes_(path_among_nodes(tree.space), room(tree)) {}
+
+    [[nodiscard]] Path path_among_nodes(const TreeSpace& space) const {
+        return {Double3(space.local(start_)), path_.direction * space.scale, path_.tmin,
+                path_.tmax};
+    }
+    /// Start and sums are rounded where the nodes are: eight times the bound of one rounding holds
+    /// what these and the own box's differ by.
+    [[nodiscard]] double room(const PaddedTreeD& tree) const {
+        const Vec3d at = tree.space.local(start_);
+        const double far = max_of(max_of(std::fabs(at.x), std::fabs(at.y)), std::fabs(at.z));
+        const double radius = radius_ * tree.space.scale;
+        return radius + 0x1p-50 * (far + tree.reach + radius);
+    }
+
+    Vec3d start_;
+    Path path_;  // starts at 0
+    double radius_, t_scale_;
+    GrownBoxes boxes_;  // around corners that are relative to the start
+    GrownBoxes nodes_;
+};
+
+template <class Scalar>
+struct BasicContact {
+    Scalar t = infinity;
+    std::uint32_t prim = no_primitive, position = no_primitive;
+};
+using Contact = BasicContact<float>;
+
+/// The least (t, prim), in the frame's units. The tree must not be empty.
+template <class Tree, class Frame, class Scalar = typename Tree::Scalar>
+BasicContact<Scalar> find_first_contact(const Tree& tree, const Frame& sweep,
+                                        BasicWalkStack<Scalar>& stack) {
+    BasicContact<Scalar> best;
+    const auto leaf = [&](const BvhNode& node) {
+        for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
+            const Scalar t = sweep.contact(tree.triangles[k]);
+            if (t < best.t || (t == best.t && t < infinity && tree.order[k] < best.prim))
+                best = {t, tree.order[k], k};
+        }
+        return false;
+    };
+    walk_entered(
+        tree.nodes, stack, [&](const BvhNode& node) { return sweep.enter(node); }, leaf,
+        [&] { return best.t; });
+    return best;
 }
 
 }  // namespace raydix

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <raydix/bvh.h>
+#include <raydix/double.h>
 #include <raydix/overlap.h>
 
 #include <algorithm>
 
 #include "primitives/exact_overlap.h"
 #include "proximity/closest_walk.h"
+#include "tree/around_center.h"
 
 namespace raydix {
 
@@ -16,22 +18,37 @@ inline bool is_valid(const Sphere& s) {
     return is_finite(s.center) && s.radius >= 0.0f && s.radius < infinity;
 }
 
+inline bool is_valid(const SegmentD& s) { return in_range(s.a) && in_range(s.b); }
+inline bool is_valid(const SphereD& s) {
+    return is_finite(s.center) && s.radius >= 0.0 && s.radius < infinity;
+}
+
 /// Where a query is, for the order in which queries are taken.
 inline Vec3 place_of(const Segment& s) { return 0.5f * s.a + 0.5f * s.b; }
 inline Vec3 place_of(const Sphere& s) { return s.center; }
+inline Vec3d place_of(const SegmentD& s) { return 0.5 * s.a + 0.5 * s.b; }
+inline Vec3d place_of(const SphereD& s) { return s.center; }
+
+/// A query as the signs of exact_sign_double.h want it.
+inline const Segment& prepared(const Segment& s) { return s; }
+inline const Sphere& prepared(const Sphere& s) { return s; }
+inline SegmentD prepared(const SegmentD& s) { return {without_tiny(s.a), without_tiny(s.b)}; }
+inline const SphereD& prepared(const SphereD& s) { return s; }
 
 /// Which boxes a segment may touch: its own box decides first, then the planes of the slabs it
-/// runs between, with room for rounding.
-class SegmentBoxes {
+/// runs between, with room for rounding. `padded`: the ends are off by rounding, the slabs grow.
+template <bool padded>
+class BasicSegmentBoxes {
 public:
-    explicit SegmentBoxes(const Segment& s)
-        : box_(segment_box(s.a, s.b)),
-          from_(s.a),
-          inverse_(1.0 / (double(s.b.x) - s.a.x), 1.0 / (double(s.b.y) - s.a.y),
-                   1.0 / (double(s.b.z) - s.a.z)) {}
+    /// `box` holds the segment, exactly.
+    BasicSegmentBoxes(const Aabb& box, Double3 from, Double3 to, double pad)
+        : box_(box),
+          from_(from),
+          inverse_(1.0 / (to.x - from.x), 1.0 / (to.y - from.y), 1.0 / (to.z - from.z)),
+          pad_(pad) {}
 
     [[nodiscard]] bool meet(const BvhNode& node) const {
-        if (!boxes_touch(box_, {node.lo, node.hi})) return false;
+        if (!boxes_touch(box_, Aabb{node.lo, node.hi})) return false;
         double enter = 0.0, leave = 1.0;
         cut(node.lo.x, node.hi.x, from_.x, inverse_.x, enter, leave);
         cut(node.lo.y, node.hi.y, from_.y, inverse_.y, enter, leave);
@@ -40,23 +57,40 @@ public:
     }
 
 private:
-    static void cut(float lo, float hi, double from, double inverse, double& enter, double& leave) {
+    void cut(double lo, double hi, double from, double inverse, double& enter,
+             double& leave) const {
         if (std::isinf(inverse)) return;  // the box has decided
+        if constexpr (padded) {
+            lo -= pad_;
+            hi += pad_;
+        }
         const double a = (lo - from) * inverse, b = (hi - from) * inverse;
         enter = std::max(enter, std::min(a, b));
         leave = std::min(leave, std::max(a, b));
     }
     Aabb box_;
     Double3 from_, inverse_;
+    double pad_;
 };
 
+inline BasicSegmentBoxes<false> segment_boxes(const PaddedTree&, const Segment& s) {
+    return {segment_box(s.a, s.b), Double3(s.a), Double3(s.b), 0.0};
+}
+inline BasicSegmentBoxes<true> segment_boxes(const PaddedTreeD& tree, const SegmentD& s) {
+    const Vec3d from = tree.space.local(s.a), to = tree.space.local(s.b);
+    const Vec3d far = max_of(max_of(from, -1.0 * from), max_of(to, -1.0 * to));
+    return {box_around_center(segment_box(s.a, s.b), tree.space.center, tree.space.scale),
+            Double3(from), Double3(to), 0x1p-50 * max_of(max_of(far.x, far.y), far.z)};
+}
+
 /// visit(position in leaf order) -> whether to stop. The query must be valid, the tree not empty.
-template <class Visit>
-void for_each_touched(const PaddedTree& tree, const Segment& s, WalkStack& stack,
-                      const Visit& visit) {
-    const SegmentBoxes boxes(s);
-    PendingNode* const bottom = stack.begin();
-    PendingNode* top = bottom;
+template <class Tree, class AnySegment, class Visit>
+requires requires(AnySegment s) { s.b; }
+void for_each_touched(const Tree& tree, const AnySegment& s,
+                      BasicWalkStack<typename Tree::Scalar>& stack, const Visit& visit) {
+    const auto boxes = segment_boxes(tree, s);
+    auto* const bottom = stack.begin();
+    auto* top = bottom;
     std::uint32_t slot = 0;
     for (;;) {
         const BvhNode& node = tree.nodes[slot];
@@ -68,7 +102,7 @@ void for_each_touched(const PaddedTree& tree, const Segment& s, WalkStack& stack
                        right = boxes.meet(tree.nodes[node.first + 1]);
             if (left && right) {
                 RAYDIX_CHECK(static_cast<std::uint32_t>(top - bottom), <, stack.capacity());
-                *top++ = {node.first + 1, 0.0f};
+                *top++ = {node.first + 1, 0};
             }
             if (left || right) {
                 slot = node.first + (left ? 0u : 1u);
@@ -80,20 +114,22 @@ void for_each_touched(const PaddedTree& tree, const Segment& s, WalkStack& stack
     }
 }
 
-template <class Visit>
-void for_each_touched(const PaddedTree& tree, const Sphere& s, WalkStack& stack,
-                      const Visit& visit) {
-    const float limit = s.radius * s.radius;
+template <class Tree, class AnySphere, class Visit>
+requires requires(AnySphere s) { s.radius; }
+void for_each_touched(const Tree& tree, const AnySphere& s,
+                      BasicWalkStack<typename Tree::Scalar>& stack, const Visit& visit) {
+    const auto limit = s.radius * s.radius;
     const auto leaf = [&](const BvhNode& node) {
         for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
-            const LeafTriangle& t = tree.triangles[k];
+            const auto& t = tree.triangles[k];
             if (squared_distance_to_box(box_of(t.v0, t.v1, t.v2), s.center) <= limit &&
                 closest_on_triangle(t, s.center).d2 <= limit && visit(k))
                 return true;
         }
         return false;
     };
-    walk_outward(tree.nodes, BoxDistances(s.center, tree.pad), stack, leaf, [&] { return limit; });
+    walk_outward(tree.nodes, tree.distances(s.center), stack, leaf,
+                 [&] { return tree.local_square(limit); });
 }
 
 }  // namespace raydix

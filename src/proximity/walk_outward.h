@@ -15,10 +15,29 @@
 
 namespace raydix {
 
-/// Lower bounds for the squares of the distances to all that is in two boxes.
-struct PairDistance {
-    float a, b;
+struct NodeBoxes {
+    Aabb a, b;
 };
+/// Boxes of two nodes in a row: on a device in four loads of 16 bytes, for which the pair must be
+/// aligned.
+RAYDIX_HD inline NodeBoxes load_boxes(const BvhNode* pair) {
+#if defined(__CUDA_ARCH__)
+    const float4* from = reinterpret_cast<const float4*>(pair);
+    const float4 a_lo = from[0], a_hi = from[1], b_lo = from[2], b_hi = from[3];
+    return {{{a_lo.x, a_lo.y, a_lo.z}, {a_hi.x, a_hi.y, a_hi.z}},
+            {{b_lo.x, b_lo.y, b_lo.z}, {b_hi.x, b_hi.y, b_hi.z}}};
+#else
+    return {{pair[0].lo, pair[0].hi}, {pair[1].lo, pair[1].hi}};
+#endif
+}
+
+/// Lower bounds for the squares of the distances to all that is in two boxes.
+template <class Scalar>
+struct BasicPairDistance {
+    Scalar a, b;
+};
+using PairDistance = BasicPairDistance<float>;
+using PairDistanceD = BasicPairDistance<double>;
 
 /// A query's distances to the boxes of a tree. Boxes grow by `pad` first: where triangles are in
 /// several leaves, a point that double arithmetic put onto a part's face may be that far off it.
@@ -65,6 +84,48 @@ private:
 #endif
 };
 
+/// The same in double; the query is where the nodes are.
+class BoxDistancesD {
+public:
+    BoxDistancesD(Vec3d query, double pad) : query_(query), pad_(pad) {}
+    [[nodiscard]] PairDistanceD operator()(const BvhNode* pair) const {
+        return {bound(pair[0]), bound(pair[1])};
+    }
+
+private:
+    [[nodiscard]] double bound(const BvhNode& node) const {
+        const auto square = [&](float lo, float hi, double q) {
+            const double off = max_of(max_of(lo - q, q - hi) - pad_, 0.0);
+            return off * off;
+        };
+        return (square(node.lo.x, node.hi.x, query_.x) + square(node.lo.y, node.hi.y, query_.y)) +
+               square(node.lo.z, node.hi.z, query_.z);
+    }
+    Vec3d query_;
+    double pad_;
+};
+
+/// The same for a thread of a device, over trees in which each triangle is in one leaf.
+struct DeviceBoxDistances {
+    Vec3 query;
+
+    [[nodiscard]] RAYDIX_HD PairDistance operator()(const BvhNode* pair) const {
+        const NodeBoxes boxes = load_boxes(pair);
+        return {squared_distance_to_box(boxes.a, query), squared_distance_to_box(boxes.b, query)};
+    }
+};
+
+/// A thread's own stack, for trees of up to `entries` levels.
+template <int entries>
+class LocalWalkStack {
+public:
+    [[nodiscard]] RAYDIX_HD PendingNode* begin() { return entries_; }
+    [[nodiscard]] RAYDIX_HD std::uint32_t capacity() const { return entries; }
+
+private:
+    PendingNode entries_[entries];
+};
+
 /// 0 unless triangles may be in several leaves.
 inline float box_pad(const Bvh& bvh) {
     if (!bvh.has_split_primitives()) return 0.0f;
@@ -75,20 +136,20 @@ inline float box_pad(const Bvh& bvh) {
 
 /// `leaf(node) -> bool` handles a leaf and says whether to stop; a subtree is left out only if its
 /// distance is greater than `reach()`. The tree must not be empty.
-template <class Leaf, class Reach>
-void walk_outward(const BvhNode* nodes, const BoxDistances& distances, WalkStack& stack,
-                  const Leaf& leaf, const Reach& reach) {
-    PendingNode* const bottom = stack.begin();
-    PendingNode* top = bottom;
+template <class Distances, class Stack, class Leaf, class Reach>
+RAYDIX_HD void walk_outward(const BvhNode* nodes, const Distances& distances, Stack& stack,
+                            const Leaf& leaf, const Reach& reach) {
+    auto* const bottom = stack.begin();
+    auto* top = bottom;
     std::uint32_t slot = 0;
     for (;;) {
         const BvhNode& node = nodes[slot];
         if (node.is_leaf()) {
             if (leaf(node)) return;
         } else {
-            const PairDistance d = distances(&nodes[node.first]);
+            const auto d = distances(&nodes[node.first]);
             const bool b_first = d.b < d.a;
-            const float nearer = b_first ? d.b : d.a, farther = b_first ? d.a : d.b;
+            const auto nearer = b_first ? d.b : d.a, farther = b_first ? d.a : d.b;
             if (nearer <= reach()) {
                 if (farther <= reach()) {
                     RAYDIX_CHECK(static_cast<std::uint32_t>(top - bottom), <, stack.capacity());

@@ -40,14 +40,13 @@ struct Facet {
     double area;
 };
 
-Facet facet_of(const LeafTriangle& t) {
-    const Double3 a(t.v0), b(t.v1), c(t.v2);
-    const Double3 normal = cross(b - a, c - a) * 0.5;
-    return {(a + b + c) * (1.0 / 3.0), normal, length(normal)};
+inline Facet facet_of(const LocalCorners& t) {
+    const Double3 normal = cross(t.b - t.a, t.c - t.a) * 0.5;
+    return {(t.a + t.b + t.c) * (1.0 / 3.0), normal, length(normal)};
 }
 
 /// The two terms at d = center - query.
-double far_winding(const FarTriangles& far, Double3 d, double d2) {
+inline double far_winding(const FarTriangles& far, Double3 d, double d2) {
     const double inverse3 = 1.0 / (d2 * std::sqrt(d2));
     const Double3 turned{dot(far.moment_x, d), dot(far.moment_y, d), dot(far.moment_z, d)};
     const double trace = far.moment_x.x + far.moment_y.y + far.moment_z.z;
@@ -55,10 +54,8 @@ double far_winding(const FarTriangles& far, Double3 d, double d2) {
     return sum * inverse3 * (0.25 * std::numbers::inv_pi);
 }
 
-}  // namespace
-
-double triangle_winding(const LeafTriangle& t, Vec3 query) {
-    const Double3 q(query), a = Double3(t.v0) - q, b = Double3(t.v1) - q, c = Double3(t.v2) - q;
+inline double solid_angle_part(const LocalCorners& t, Double3 query) {
+    const Double3 a = t.a - query, b = t.b - query, c = t.c - query;
     const double la = length(a), lb = length(b), lc = length(c);
     const double up = dot(a, cross(b, c));
     if (up == 0.0) return 0.0;
@@ -66,13 +63,21 @@ double triangle_winding(const LeafTriangle& t, Vec3 query) {
     return std::atan2(up, down) * (0.5 * std::numbers::inv_pi);
 }
 
-WindingTree::WindingTree(const Bvh& bvh) : far_(bvh.nodes().size()) {
+}  // namespace
+
+double triangle_winding(const LocalCorners& t, Double3 query) { return solid_angle_part(t, query); }
+double triangle_winding(const LeafTriangle& t, Vec3 query) {
+    return solid_angle_part({Double3(t.v0), Double3(t.v1), Double3(t.v2)}, Double3(query));
+}
+
+template <class Tree>
+WindingTree::WindingTree(const Tree& tree, std::span<const BvhNode> nodes) : far_(nodes.size()) {
     std::vector<std::uint32_t> slots;
     slots.reserve(far_.size());
-    walk_preorder(bvh.nodes(), bvh.max_depth(), [&](std::uint32_t slot) { slots.push_back(slot); });
+    walk_preorder(nodes, tree.max_depth, [&](std::uint32_t slot) { slots.push_back(slot); });
     std::vector<AreaSum> areas(far_.size());
     for (auto at = slots.rbegin(); at != slots.rend(); ++at) {  // children before parents
-        const BvhNode& node = bvh.nodes()[*at];
+        const BvhNode& node = nodes[*at];
         FarTriangles& far = far_[*at];
         AreaSum& sum = areas[*at];
         const auto add_area = [&](double area, Double3 place) {
@@ -80,14 +85,14 @@ WindingTree::WindingTree(const Bvh& bvh) : far_(bvh.nodes().size()) {
             sum.place = sum.place + place;
         };
         if (node.is_leaf()) {
-            const auto own = bvh.triangles().subspan(node.first, node.count);
-            for (const LeafTriangle& t : own) {
-                const Facet f = facet_of(t);
+            const std::uint32_t end = node.first + node.count;
+            for (std::uint32_t k = node.first; k < end; ++k) {
+                const Facet f = facet_of(local_corners(tree, k));
                 add_area(f.area, f.center * f.area);
             }
             far.center = center_of_mass(sum, node);
-            for (const LeafTriangle& t : own) {
-                const Facet f = facet_of(t);
+            for (std::uint32_t k = node.first; k < end; ++k) {
+                const Facet f = facet_of(local_corners(tree, k));
                 add_part(far, f.normal, f.center - far.center);
             }
         } else {
@@ -106,24 +111,27 @@ WindingTree::WindingTree(const Bvh& bvh) : far_(bvh.nodes().size()) {
     }
 }
 
-double WindingTree::at(const TriangleTree& tree, Vec3 query, WalkStack& stack) const {
-    PendingNode* const bottom = stack.begin();
-    PendingNode* top = bottom;
+template <class Tree, class Vec>
+double WindingTree::at(const Tree& tree, Vec query,
+                       BasicWalkStack<typename Tree::Scalar>& stack) const {
+    const Double3 place = local_place(tree, query);
+    auto* const bottom = stack.begin();
+    auto* top = bottom;
     std::uint32_t slot = 0;
     double sum = 0;
     for (;;) {
         const BvhNode& node = tree.nodes[slot];
         const FarTriangles& far = far_[slot];
-        const Double3 d = far.center - Double3(query);
+        const Double3 d = far.center - place;
         const double d2 = dot(d, d), limit = far_radii * far.radius;
         if (d2 > limit * limit) {
             sum += far_winding(far, d, d2);
         } else if (node.is_leaf()) {
             for (std::uint32_t k = node.first; k < node.first + node.count; ++k)
-                sum += triangle_winding(tree.triangles[k], query);
+                sum += solid_angle_part(local_corners(tree, k), place);
         } else {
             RAYDIX_CHECK(static_cast<std::uint32_t>(top - bottom), <, stack.capacity());
-            *top++ = {node.first + 1, 0.0f};
+            *top++ = {node.first + 1, 0};
             slot = node.first;
             continue;
         }
@@ -131,5 +139,10 @@ double WindingTree::at(const TriangleTree& tree, Vec3 query, WalkStack& stack) c
         slot = (--top)->slot;
     }
 }
+
+template WindingTree::WindingTree(const TriangleTree&, std::span<const BvhNode>);
+template WindingTree::WindingTree(const TriangleTreeD&, std::span<const BvhNode>);
+template double WindingTree::at(const TriangleTree&, Vec3, WalkStack&) const;
+template double WindingTree::at(const TriangleTreeD&, Vec3d, WalkStackD&) const;
 
 }  // namespace raydix

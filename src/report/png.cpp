@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "exec/parallel.h"
 #include "report/picture_codec.h"
 #include "report/tone.h"
 
@@ -30,11 +31,13 @@ struct PngImage {
 };
 
 std::vector<std::uint8_t> screen_bytes(const Picture& picture, bool tone_map) {
-    std::vector<std::uint8_t> bytes;
-    bytes.reserve(3 * picture.pixels.size());
-    for (const Vec3& pixel : picture.pixels)
-        for (const float value : {pixel.x, pixel.y, pixel.z})
-            bytes.push_back(srgb_byte(tone_map ? film_curve(value) : value));
+    std::vector<std::uint8_t> bytes(3 * picture.pixels.size());
+    for_each_index(picture.pixels.size(), [&](std::size_t i) {
+        const Vec3& pixel = picture.pixels[i];
+        const float values[3] = {pixel.x, pixel.y, pixel.z};
+        for (std::size_t k = 0; k < 3; ++k)
+            bytes[3 * i + k] = srgb_byte(tone_map ? film_curve(values[k]) : values[k]);
+    });
     return bytes;
 }
 
@@ -46,6 +49,8 @@ std::vector<std::byte> encode_png(const Picture& picture, bool tone_map) {
     png.image.width = picture.width;
     png.image.height = picture.height;
     png.image.format = PNG_FORMAT_RGB;
+    // No filters and a lighter search: a third of the time, and pictures with grain get smaller.
+    png.image.flags = PNG_IMAGE_FLAG_FAST;
     png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png.image);
     std::vector<std::byte> file(size);
     if (!png_image_write_to_memory(&png.image, file.data(), &size, 0, pixels.data(), 0, nullptr))

@@ -63,7 +63,7 @@ private:
         if (!found->is_array() || found->size() != 3) fail(key, "not a list of three numbers");
         const json& list = *found;
         return without_negative_zero(
-            {read_number(list[0], key), read_number(list[1], key), read_number(list[2], key)});
+            Vec3{read_number(list[0], key), read_number(list[1], key), read_number(list[2], key)});
     }
 
     float read_number(const json& value, const char* key) const {

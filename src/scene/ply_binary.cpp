@@ -144,7 +144,7 @@ private:
                 const char* at = records + offset[axis];
                 xyz[axis] = plain ? load<float>(at, false) : scalar(at, type[axis]);
             }
-            out[i] = without_negative_zero({xyz[0], xyz[1], xyz[2]});
+            out[i] = without_negative_zero(Vec3{xyz[0], xyz[1], xyz[2]});
         }
     }
 

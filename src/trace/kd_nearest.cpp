@@ -3,8 +3,8 @@
 #include <raydix/kdtree.h>
 
 #include <algorithm>
-#include <cmath>
 
+#include "base/distance.h"
 #include "exec/parallel.h"
 #include "trace/kd_walk.h"
 
@@ -61,13 +61,6 @@ private:
     std::span<KdNeighbor> row_;
     std::size_t size_ = 0;
 };
-
-float squared_distance(Vec3 a, Vec3 b) {
-    const float dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
-    return (dx * dx + dy * dy) + dz * dz;
-}
-
-bool is_finite(Vec3 p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
 template <class Steps>
 void find_nearest(const KdTreeView& tree, const Vec3* points, Vec3 query, NeighborRow& row,

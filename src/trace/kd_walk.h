@@ -1,7 +1,7 @@
-// Walks through a k-d tree: one ray front to back, or one point outward from where it lies. Both
-// keep what is left of a node's part of space, narrowed on one axis a level, and skip a node only
-// if nothing in it can count: the bounds use the arithmetic of the exact tests, each step of which
-// is monotone under rounding.
+// Walk of one ray through a k-d tree, front to back; kd_outward.h has that of a point. Both keep
+// what is left of a node's part of space, narrowed on one axis a level, and skip a node only if
+// nothing in it can count: the bounds use the arithmetic of the exact tests, each step of which is
+// monotone under rounding.
 #pragma once
 
 #include <raydix/kdtree.h>
@@ -12,27 +12,12 @@
 #include <type_traits>
 
 #include "base/check.h"
+#include "trace/kd_outward.h"
 #include "trace/scalar.h"
 #include "trace/slab.h"
 #include "trace/walk.h"
 
 namespace raydix {
-
-/// What walks read, without going through the KdTree each time.
-struct KdTreeView {
-    const KdNode* nodes;
-    const std::uint32_t* order;
-    Aabb bounds;
-    std::uint32_t max_depth;
-    bool empty;
-
-    explicit KdTreeView(const KdTree& tree)
-        : nodes(tree.nodes().data()),
-          order(tree.order().data()),
-          bounds(tree.bounds()),
-          max_depth(tree.max_depth()),
-          empty(tree.empty()) {}
-};
 
 /// Room for one pending sibling per level of the deepest path: no walk can run over.
 template <class Pending>
@@ -119,77 +104,6 @@ void walk_kd_tree(const KdTreeView& tree, const RayFrame& ray, KdStack<KdRayPart
             if (stack.empty()) return;
             at = stack.pop();
         } while (at.entry > reach());
-    }
-}
-
-/// A node, and how far the query lies outside what is known of its primitives, on each axis.
-struct KdDistancePart {
-    std::uint32_t slot;
-    std::array<float, 3> off;
-
-    /// No point of the node has a smaller d2: |dx| is at least off[0] after rounding, and so on.
-    [[nodiscard]] float bound() const {
-        return (off[0] * off[0] + off[1] * off[1]) + off[2] * off[2];
-    }
-};
-
-/// How far q lies outside [lo, hi].
-inline float gap(float lo, float hi, float q) { return max_of(max_of(lo - q, q - hi), 0.0f); }
-
-/// The lowest primitive id below a node whose codes are all equal: the sort is stable, so it stands
-/// first.
-inline std::uint32_t first_id(const KdTreeView& tree, std::uint32_t slot) {
-    while (!tree.nodes[slot].is_leaf()) slot = tree.nodes[slot].child();
-    return tree.order[tree.nodes[slot].first];
-}
-
-/// Whether a node whose points are no nearer than `bound` may hold one that comes before `worst` by
-/// (d2, id). Among equal points only ids decide; without that a query would meet every one of them.
-inline bool may_improve(const KdTreeView& tree, std::uint32_t slot, float bound,
-                        const KdNeighbor& worst) {
-    if (bound != worst.d2) return bound < worst.d2;
-    const KdNode& node = tree.nodes[slot];
-    if (node.is_leaf() || !node.splits_equal_codes()) return true;
-    return first_id(tree, slot) < worst.point;
-}
-
-/// `leaf(node)` looks at a leaf's points; `worst()` is what a point must come before to count. The
-/// nearer child is visited first. The tree must not be empty.
-template <class Steps, class Leaf, class Worst>
-void walk_kd_tree_outward(const KdTreeView& tree, Vec3 query, KdStack<KdDistancePart>& stack,
-                          Steps& steps, const Leaf& leaf, const Worst& worst) {
-    const std::array<float, 3> q{query.x, query.y, query.z};
-    const Aabb& box = tree.bounds;
-    stack.clear();
-    KdDistancePart at{0,
-                      {gap(box.lo.x, box.hi.x, q[0]), gap(box.lo.y, box.hi.y, q[1]),
-                       gap(box.lo.z, box.hi.z, q[2])}};
-    for (;;) {
-        const KdNode& node = tree.nodes[at.slot];
-        if constexpr (!std::is_same_v<Steps, NoSteps>) ++steps.node_visits;
-        if (node.is_leaf()) {
-            leaf(node);
-        } else {
-            const std::uint32_t axis = node.axis(), slot = node.child();
-            const KdNode &left = tree.nodes[slot], &right = tree.nodes[slot + 1];
-            KdDistancePart a = at, b = at;
-            a.slot = slot;
-            b.slot = slot + 1;
-            a.off[axis] = max_of(at.off[axis], gap(left.lo, left.hi, q[axis]));
-            b.off[axis] = max_of(at.off[axis], gap(right.lo, right.hi, q[axis]));
-            const bool right_first = b.off[axis] < a.off[axis];
-            const KdDistancePart& near = right_first ? b : a;
-            const KdDistancePart& far = right_first ? a : b;
-            if (far.bound() <= worst().d2) stack.push(far);
-            if (may_improve(tree, near.slot, near.bound(), worst())) {
-                at = near;
-                continue;
-            }
-        }
-        do {
-            if (stack.empty()) return;
-            at = stack.pop();
-        } while (!may_improve(tree, at.slot, at.bound(), worst()));
     }
 }
 

@@ -10,68 +10,83 @@
 
 #include "base/hd.h"
 #include "base/math.h"
+#include "base/scalar.h"
 
 namespace raydix {
 
 RAYDIX_HD inline float component(Vec3 v, int axis) {
     return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
 }
+RAYDIX_HD inline double component(Vec3d v, int axis) {
+    return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
+}
 
-struct RayFrame {
-    Vec3 origin;
-    Vec3 inverse;    // 1 / direction; Inf for components of 0, with their sign
-    int kx, ky, kz;  // kz: the longest axis of the direction; kx, ky keep the winding
-    float shear_x, shear_y, shear_z;
-    float tmin, tmax;  // in units of the scaled direction, within [0, largest float]
-    float t_scale;     // t of the caller = t_scale * t of this frame; a power of two
+template <class Scalar>
+struct BasicRayFrame {
+    VecOf<Scalar> origin;
+    VecOf<Scalar> inverse;  // 1 / direction; Inf for components of 0, with their sign
+    int kx, ky, kz;         // kz: the longest axis of the direction; kx, ky keep the winding
+    Scalar shear_x, shear_y, shear_z;
+    Scalar tmin, tmax;  // in units of the scaled direction, within [0, largest number]
+    Scalar t_scale;     // t of the caller = t_scale * t of this frame; a power of two
 };
+using RayFrame = BasicRayFrame<float>;
+using RayFrameD = BasicRayFrame<double>;
 
 /// False for rays that are misses by definition (contract.md 3).
-RAYDIX_HD inline bool is_valid(const Ray& ray) {
-    const auto finite = [](float x) { return std::fabs(x) <= std::numeric_limits<float>::max(); };
-    const Vec3 o = ray.origin, d = ray.direction;
+template <class AnyRay>
+RAYDIX_HD inline bool is_valid_ray(const AnyRay& ray) {
+    using Scalar = decltype(ray.tmin);
+    const auto finite = [](Scalar x) { return std::fabs(x) <= std::numeric_limits<Scalar>::max(); };
+    const VecOf<Scalar> o = ray.origin, d = ray.direction;
     return finite(o.x) && finite(o.y) && finite(o.z) && finite(d.x) && finite(d.y) && finite(d.z) &&
-           (d.x != 0.0f || d.y != 0.0f || d.z != 0.0f) && ray.tmin <= ray.tmax && ray.tmax >= 0.0f;
+           (d.x != 0 || d.y != 0 || d.z != 0) && ray.tmin <= ray.tmax && ray.tmax >= 0;
 }
+RAYDIX_HD inline bool is_valid(const Ray& ray) { return is_valid_ray(ray); }
+RAYDIX_HD inline bool is_valid(const RayD& ray) { return is_valid_ray(ray); }
 
 /// Long or short directions are scaled by a power of two, so that no product of the triangle test
 /// overflows or underflows on their account: twice an area of up to 1.6e25 times a depth of up to
 /// 2e12, divided by the direction, must stay below 3.4e38. 1 for all near unit length.
-RAYDIX_HD inline float direction_scale(float longest) {
-    if (longest > 0x1p-3f && longest < 0x1p3f) return 1.0f;
+template <class Scalar>
+RAYDIX_HD inline Scalar direction_scale(Scalar longest) {
+    if (longest > Scalar(0x1p-3f) && longest < Scalar(0x1p3f)) return 1;
     int exponent;
     std::frexp(longest, &exponent);
     // A subnormal direction would need more than the largest power of two that has a finite
     // inverse.
-    const int limited = exponent < -125 ? -125 : exponent > 125 ? 125 : exponent;
-    return std::ldexp(1.0f, -limited);
+    constexpr int limit = -std::numeric_limits<Scalar>::min_exponent;
+    const int limited = exponent < -limit ? -limit : exponent > limit ? limit : exponent;
+    return std::ldexp(Scalar(1), -limited);
 }
 
 /// `ray` must be valid.
-RAYDIX_HD inline RayFrame make_frame(const Ray& ray) {
-    RayFrame frame;
+template <class AnyRay, class Scalar = decltype(AnyRay::tmin)>
+RAYDIX_HD inline BasicRayFrame<Scalar> make_frame(const AnyRay& ray) {
+    BasicRayFrame<Scalar> frame;
     frame.origin = without_negative_zero(ray.origin);
-    const float ax = std::fabs(ray.direction.x), ay = std::fabs(ray.direction.y),
-                az = std::fabs(ray.direction.z);
-    const float longest = max_of(max_of(ax, ay), az);
-    const float scale = direction_scale(longest);
-    const Vec3 d = ray.direction * scale;
+    const Scalar ax = std::fabs(ray.direction.x), ay = std::fabs(ray.direction.y),
+                 az = std::fabs(ray.direction.z);
+    const Scalar longest = max_of(max_of(ax, ay), az);
+    const Scalar scale = direction_scale(longest);
+    const VecOf<Scalar> d = ray.direction * scale;
     frame.kz = az == longest ? 2 : ay == longest ? 1 : 0;
     frame.kx = frame.kz == 2 ? 0 : frame.kz + 1;
     frame.ky = frame.kx == 2 ? 0 : frame.kx + 1;
-    if (component(d, frame.kz) < 0.0f) {
+    if (component(d, frame.kz) < 0) {
         const int swapped = frame.kx;
         frame.kx = frame.ky;
         frame.ky = swapped;
     }
-    const float dz = component(d, frame.kz);
+    const Scalar dz = component(d, frame.kz);
     frame.shear_x = component(d, frame.kx) / dz;
     frame.shear_y = component(d, frame.ky) / dz;
-    frame.shear_z = 1.0f / dz;
-    frame.inverse = {1.0f / d.x, 1.0f / d.y, 1.0f / d.z};
+    const Scalar one = 1;
+    frame.shear_z = one / dz;
+    frame.inverse = {one / d.x, one / d.y, one / d.z};
     frame.t_scale = scale;
-    frame.tmin = (ray.tmin > 0.0f ? ray.tmin : 0.0f) / scale;
-    frame.tmax = min_of(ray.tmax / scale, std::numeric_limits<float>::max());
+    frame.tmin = (ray.tmin > 0 ? ray.tmin : 0) / scale;
+    frame.tmax = min_of(ray.tmax / scale, std::numeric_limits<Scalar>::max());
     return frame;
 }
 

@@ -5,6 +5,7 @@
 #include <raydix/types.h>
 
 #include <cmath>
+#include <type_traits>
 
 #include "base/hd.h"
 #include "base/math.h"
@@ -17,57 +18,73 @@ namespace raydix {
 /// sheared plane (two roundings for the vertex, three for the shear). All boxes of the tree grow by
 /// twice that bound on every side, taken at the root, as Woop, Benthin and Wald (2013, section 4)
 /// suggest; the quotients' own error is covered by Ize's factor (2013).
-struct SlabFrame {
-    Vec3 origin, inverse;
-    Vec3 near_pad,
+/// In double the boxes are still floats, relative to a point of the scene (BvhD): there the pad is
+/// four times the bound, since the origin is rounded once more on its way to that point.
+template <class Scalar>
+struct BasicSlabFrame {
+    VecOf<Scalar> origin, inverse;
+    VecOf<Scalar> near_pad,
         far_pad;  // with sign: near planes move toward the ray's start, far planes away from it
     int near_x, near_y,
         near_z;  // offset of the near plane in the eight floats of a node: 0 lo, 4 hi
 };
+using SlabFrame = BasicSlabFrame<float>;
+using SlabFrameD = BasicSlabFrame<double>;
 
-inline constexpr float slab_pad = 8.0f * 0x1p-24f;
+template <class Scalar>
+inline constexpr Scalar slab_pad_of = (sizeof(Scalar) == 4 ? 8 : 16) * rounding_of<Scalar>;
+inline constexpr float slab_pad = slab_pad_of<float>;
 /// 1 + 2 gamma(3), rounded up.
-inline constexpr float slab_exit_factor = 1.0f + 0x1p-21f;
+template <class Scalar>
+inline constexpr Scalar slab_exit_factor_of = 1 + 8 * rounding_of<Scalar>;
+inline constexpr float slab_exit_factor = slab_exit_factor_of<float>;
 
-RAYDIX_HD inline SlabFrame make_slab_frame(const RayFrame& ray, const Aabb& root) {
-    const auto reach = [](float lo, float hi, float o) {
+template <class Scalar>
+RAYDIX_HD inline BasicSlabFrame<Scalar> make_slab_frame(const BasicRayFrame<Scalar>& ray,
+                                                        const Aabb& root) {
+    const auto reach = [](float lo, float hi, Scalar o) {
         return max_of(std::fabs(lo - o), std::fabs(hi - o));
     };
-    const Vec3 far{reach(root.lo.x, root.hi.x, ray.origin.x),
-                   reach(root.lo.y, root.hi.y, ray.origin.y),
-                   reach(root.lo.z, root.hi.z, ray.origin.z)};
-    const float far_z = component(far, ray.kz);
-    const Vec3 pad{slab_pad * (far.x + far_z), slab_pad * (far.y + far_z),
-                   slab_pad * (far.z + far_z)};
+    const VecOf<Scalar> far{reach(root.lo.x, root.hi.x, ray.origin.x),
+                            reach(root.lo.y, root.hi.y, ray.origin.y),
+                            reach(root.lo.z, root.hi.z, ray.origin.z)};
+    const Scalar far_z = component(far, ray.kz), unit = slab_pad_of<Scalar>;
+    const VecOf<Scalar> pad{unit * (far.x + far_z), unit * (far.y + far_z), unit * (far.z + far_z)};
     const bool nx = std::signbit(ray.inverse.x), ny = std::signbit(ray.inverse.y),
                nz = std::signbit(ray.inverse.z);
-    const Vec3 near_pad{nx ? pad.x : -pad.x, ny ? pad.y : -pad.y, nz ? pad.z : -pad.z};
-    return {ray.origin, ray.inverse, near_pad,  -1.0f * near_pad,
+    const VecOf<Scalar> near_pad{nx ? pad.x : -pad.x, ny ? pad.y : -pad.y, nz ? pad.z : -pad.z};
+    return {ray.origin, ray.inverse, near_pad,  Scalar(-1) * near_pad,
             nx ? 4 : 0, ny ? 4 : 0,  nz ? 4 : 0};
 }
 
 /// Entry and exit of the padded box that starts at `node` (lo.xyz, link, hi.xyz, count). 0 * Inf, a
 /// plane that holds a ray parallel to it, is NaN, and comparisons drop it: such a ray is inside the
 /// slab.
-struct SlabInterval {
-    float entry, exit;
+template <class Scalar>
+struct BasicSlabInterval {
+    Scalar entry, exit;
 };
+using SlabInterval = BasicSlabInterval<float>;
 
-RAYDIX_HD inline SlabInterval intersect_slabs(const SlabFrame& ray, const float* node, float tmin,
-                                              float tmax) {
+template <class Scalar>
+RAYDIX_HD inline BasicSlabInterval<Scalar> intersect_slabs(const BasicSlabFrame<Scalar>& ray,
+                                                           const float* node,
+                                                           std::type_identity_t<Scalar> tmin,
+                                                           std::type_identity_t<Scalar> tmax) {
     // The pad is added to the difference: added to the origin it would be lost where coordinates
     // are large.
-    const auto plane = [](float at, float origin, float pad, float inverse) {
+    const auto plane = [](float at, Scalar origin, Scalar pad, Scalar inverse) {
         return ((at - origin) + pad) * inverse;
     };
-    const float ex = plane(node[ray.near_x], ray.origin.x, ray.near_pad.x, ray.inverse.x);
-    const float ey = plane(node[ray.near_y + 1], ray.origin.y, ray.near_pad.y, ray.inverse.y);
-    const float ez = plane(node[ray.near_z + 2], ray.origin.z, ray.near_pad.z, ray.inverse.z);
-    const float lx = plane(node[4 - ray.near_x], ray.origin.x, ray.far_pad.x, ray.inverse.x);
-    const float ly = plane(node[5 - ray.near_y], ray.origin.y, ray.far_pad.y, ray.inverse.y);
-    const float lz = plane(node[6 - ray.near_z], ray.origin.z, ray.far_pad.z, ray.inverse.z);
-    const float entry = max_of(ez, max_of(ey, max_of(ex, tmin)));
-    const float leave = min_of(lz, min_of(ly, min_of(lx, infinity))) * slab_exit_factor;
+    const Scalar ex = plane(node[ray.near_x], ray.origin.x, ray.near_pad.x, ray.inverse.x);
+    const Scalar ey = plane(node[ray.near_y + 1], ray.origin.y, ray.near_pad.y, ray.inverse.y);
+    const Scalar ez = plane(node[ray.near_z + 2], ray.origin.z, ray.near_pad.z, ray.inverse.z);
+    const Scalar lx = plane(node[4 - ray.near_x], ray.origin.x, ray.far_pad.x, ray.inverse.x);
+    const Scalar ly = plane(node[5 - ray.near_y], ray.origin.y, ray.far_pad.y, ray.inverse.y);
+    const Scalar lz = plane(node[6 - ray.near_z], ray.origin.z, ray.far_pad.z, ray.inverse.z);
+    const Scalar entry = max_of(ez, max_of(ey, max_of(ex, tmin)));
+    const Scalar leave =
+        min_of(lz, min_of(ly, min_of(lx, Scalar(infinity)))) * slab_exit_factor_of<Scalar>;
     return {entry, min_of(leave, tmax)};
 }
 

@@ -1,4 +1,4 @@
-// Closest and any hit of one ray in a binary tree of triangles.
+// Closest, any and all hits of one ray in a binary tree of triangles, of floats or of doubles.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -13,18 +13,27 @@ namespace raydix {
 
 /// What a walk reads, without going through the Bvh each time. The tree must hold triangles.
 struct TriangleTree {
-    const BvhNode* nodes;
-    const LeafTriangle* triangles;
-    const std::uint32_t* order;
-    std::uint32_t max_depth;
-    bool empty;
+    using Scalar = float;
+    using Corners = LeafTriangle;
 
+    const BvhNode* nodes = nullptr;
+    const LeafTriangle* triangles = nullptr;
+    const std::uint32_t* order = nullptr;
+    std::uint32_t max_depth = 0;
+    bool empty = true;
+
+    TriangleTree() = default;
     explicit TriangleTree(const Bvh& bvh)
         : nodes(bvh.nodes().data()),
           triangles(bvh.triangles().data()),
           order(bvh.order().data()),
           max_depth(bvh.max_depth()),
           empty(bvh.empty()) {}
+
+    /// The ray where the nodes are: they are where the triangles are.
+    [[nodiscard]] const RayFrame& local(const RayFrame& ray) const { return ray; }
+    /// A squared distance of the caller, where the nodes are.
+    [[nodiscard]] RAYDIX_HD float local_square(float d2) const { return d2; }
 };
 
 template <class Steps>
@@ -33,20 +42,23 @@ void count_test(Steps& steps) {
 }
 
 /// The best hit so far: position in leaf order and t in the frame's units.
-struct ClosestHit {
-    float t;
+template <class Scalar>
+struct BasicClosestHit {
+    Scalar t;
     std::uint32_t prim = no_primitive;
     std::uint32_t position = no_primitive;
-    float u = 0.0f, v = 0.0f;
+    Scalar u = 0, v = 0;
 };
+using ClosestHit = BasicClosestHit<float>;
 
-template <class Steps>
-ClosestHit find_closest(const TriangleTree& tree, const RayFrame& ray, WalkStack& stack,
-                        Steps& steps) {
-    ClosestHit best{ray.tmax};
+/// Tree: TriangleTree or TriangleTreeD.
+template <class Tree, class Scalar, class Steps>
+BasicClosestHit<Scalar> find_closest(const Tree& tree, const BasicRayFrame<Scalar>& ray,
+                                     BasicWalkStack<Scalar>& stack, Steps& steps) {
+    BasicClosestHit<Scalar> best{ray.tmax};
     const auto leaf = [&](const BvhNode& node) {
         for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
-            TriangleHit hit;
+            BasicTriangleHit<Scalar> hit;
             count_test(steps);
             if (!intersect_triangle<EdgeRule::closed>(ray, tree.triangles[k], best.t, hit))
                 continue;
@@ -56,23 +68,41 @@ ClosestHit find_closest(const TriangleTree& tree, const RayFrame& ray, WalkStack
         }
         return false;
     };
-    walk_tree(tree.nodes, ray, stack, steps, leaf, [&] { return best.t; });
+    walk_tree(tree.nodes, tree.local(ray), stack, steps, leaf, [&] { return best.t; });
     return best;
 }
 
-template <class Steps>
-bool find_any(const TriangleTree& tree, const RayFrame& ray, WalkStack& stack, Steps& steps) {
+template <class Tree, class Scalar, class Steps>
+bool find_any(const Tree& tree, const BasicRayFrame<Scalar>& ray, BasicWalkStack<Scalar>& stack,
+              Steps& steps) {
     bool found = false;
     const auto leaf = [&](const BvhNode& node) {
         for (std::uint32_t k = node.first; k < node.first + node.count && !found; ++k) {
-            TriangleHit hit;
+            BasicTriangleHit<Scalar> hit;
             count_test(steps);
             found = intersect_triangle<EdgeRule::closed>(ray, tree.triangles[k], ray.tmax, hit);
         }
         return found;
     };
-    walk_tree(tree.nodes, ray, stack, steps, leaf, [&] { return ray.tmax; });
+    walk_tree(tree.nodes, tree.local(ray), stack, steps, leaf, [&] { return ray.tmax; });
     return found;
+}
+
+/// Calls take(t, position, u, v) for each triangle hit, once per leaf that it is in; t in the
+/// caller's units.
+template <class Tree, class Scalar, class Steps, class Take>
+void find_all(const Tree& tree, const BasicRayFrame<Scalar>& ray, BasicWalkStack<Scalar>& stack,
+              Steps& steps, const Take& take) {
+    const auto leaf = [&](const BvhNode& node) {
+        for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
+            BasicTriangleHit<Scalar> hit;
+            count_test(steps);
+            if (intersect_triangle<EdgeRule::half_open>(ray, tree.triangles[k], ray.tmax, hit))
+                take(hit.t * ray.t_scale, k, hit.u, hit.v);
+        }
+        return false;
+    };
+    walk_tree(tree.nodes, tree.local(ray), stack, steps, leaf, [&] { return ray.tmax; });
 }
 
 }  // namespace raydix

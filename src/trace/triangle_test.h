@@ -1,13 +1,15 @@
 // The watertight ray-triangle test (Woop, Benthin, Wald 2013) as a pure function of ray and
 // triangle, with the two edge rules of contract.md 3. Every kernel, builder and brute force calls
-// this one function.
+// this one function, in float or in double.
 #pragma once
 
 #include <raydix/bvh.h>
 #include <raydix/types.h>
 
 #include <cmath>
+#include <type_traits>
 
+#include "base/exact_product.h"
 #include "base/hd.h"
 #include "base/math.h"
 #include "primitives/zero_area.h"
@@ -20,18 +22,25 @@ enum class EdgeRule {
     half_open  // to exactly one of them: all hits and counts
 };
 
-struct TriangleHit {
-    float t, u, v;  // t in the units of the frame
+template <class Scalar>
+struct BasicTriangleHit {
+    Scalar t, u, v;  // t in the units of the frame
 };
+using TriangleHit = BasicTriangleHit<float>;
 
 /// A vertex in the ray's sheared plane: the ray is the origin there.
-struct ShearedVertex {
-    float x, y, z;
+template <class Scalar>
+struct BasicShearedVertex {
+    Scalar x, y, z;
 };
+using ShearedVertex = BasicShearedVertex<float>;
+using ShearedVertexD = BasicShearedVertex<double>;
 
-RAYDIX_HD inline ShearedVertex shear(const RayFrame& ray, Vec3 vertex) {
-    const Vec3 v = vertex - ray.origin;
-    const float z = component(v, ray.kz);
+template <class Scalar>
+RAYDIX_HD inline BasicShearedVertex<Scalar> shear(const BasicRayFrame<Scalar>& ray,
+                                                  VecOf<Scalar> vertex) {
+    const VecOf<Scalar> v = vertex - ray.origin;
+    const Scalar z = component(v, ray.kz);
     return {component(v, ray.kx) - ray.shear_x * z, component(v, ray.ky) - ray.shear_y * z,
             ray.shear_z * z};
 }
@@ -39,7 +48,9 @@ RAYDIX_HD inline ShearedVertex shear(const RayFrame& ray, Vec3 vertex) {
 /// Twice the signed area of (ray, a, b): which side of the edge the ray passes. edge(a, b) ==
 /// -edge(b, a) bit for bit, and the sign is exact wherever the value is not 0, since rounding is
 /// monotone.
-RAYDIX_HD inline float edge_function(const ShearedVertex& a, const ShearedVertex& b) {
+template <class Scalar>
+RAYDIX_HD inline Scalar edge_function(const BasicShearedVertex<Scalar>& a,
+                                      const BasicShearedVertex<Scalar>& b) {
     return a.x * b.y - a.y * b.x;
 }
 
@@ -47,10 +58,16 @@ RAYDIX_HD inline float edge_function(const ShearedVertex& a, const ShearedVertex
 RAYDIX_HD inline double exact_edge_function(const ShearedVertex& a, const ShearedVertex& b) {
     return double(a.x) * double(b.y) - double(a.y) * double(b.x);
 }
+/// Of doubles, what rounding took from the two products decides.
+RAYDIX_HD inline double exact_edge_function(const ShearedVertexD& a, const ShearedVertexD& b) {
+    return product_difference(a.x, b.y, a.y, b.x);
+}
 
 /// Sign of the edge function with the ray moved by an infinitesimal step along x and a smaller one
 /// along y, so that it lies on no edge: the top-left rule. 0 only if a and b coincide in the plane.
-RAYDIX_HD inline int perturbed_edge_sign(const ShearedVertex& a, const ShearedVertex& b) {
+template <class Scalar>
+RAYDIX_HD inline int perturbed_edge_sign(const BasicShearedVertex<Scalar>& a,
+                                         const BasicShearedVertex<Scalar>& b) {
     const double e = exact_edge_function(a, b);
     if (e != 0.0) return e > 0.0 ? 1 : -1;
     if (a.y != b.y) return a.y > b.y ? 1 : -1;
@@ -60,17 +77,20 @@ RAYDIX_HD inline int perturbed_edge_sign(const ShearedVertex& a, const ShearedVe
 
 /// t of the slab planes of the triangle's own box; the same arithmetic as the traversal's, without
 /// its pads.
+template <class Scalar>
 struct BoxInterval {
-    float entry, exit;
+    Scalar entry, exit;
 };
 
-RAYDIX_HD inline BoxInterval own_box_interval(const RayFrame& ray, const LeafTriangle& triangle) {
-    const Aabb box = box_of(triangle.v0, triangle.v1, triangle.v2);
-    BoxInterval interval{-infinity, infinity};
-    const auto axis = [&](float lo, float hi, float origin, float inverse) {
+template <class Scalar, class Corners>
+RAYDIX_HD inline BoxInterval<Scalar> own_box_interval(const BasicRayFrame<Scalar>& ray,
+                                                      const Corners& triangle) {
+    const BoxOf<Scalar> box = box_of(triangle.v0, triangle.v1, triangle.v2);
+    BoxInterval<Scalar> interval{-infinity, infinity};
+    const auto axis = [&](Scalar lo, Scalar hi, Scalar origin, Scalar inverse) {
         const bool negative = std::signbit(inverse);
-        const float near = ((negative ? hi : lo) - origin) * inverse,
-                    far = ((negative ? lo : hi) - origin) * inverse;
+        const Scalar near = ((negative ? hi : lo) - origin) * inverse,
+                     far = ((negative ? lo : hi) - origin) * inverse;
         interval.entry = max_of(near, interval.entry);
         interval.exit = min_of(far, interval.exit);
     };
@@ -84,33 +104,35 @@ RAYDIX_HD inline BoxInterval own_box_interval(const RayFrame& ray, const LeafTri
 /// One step beyond the paper: t is held within the triangle's own box. A traversal's entry into any
 /// box around the triangle is then never greater than t (rounding is monotone), so culling cannot
 /// change which hit is closest.
-template <EdgeRule rule>
-RAYDIX_HD bool intersect_triangle(const RayFrame& ray, const LeafTriangle& triangle, float tmax,
-                                  TriangleHit& hit) {
-    const ShearedVertex a = shear(ray, triangle.v0), b = shear(ray, triangle.v1),
-                        c = shear(ray, triangle.v2);
-    float u = edge_function(c, b), v = edge_function(a, c), w = edge_function(b, a);
-    if ((u < 0.0f || v < 0.0f || w < 0.0f) && (u > 0.0f || v > 0.0f || w > 0.0f)) return false;
-    if (u == 0.0f || v == 0.0f || w == 0.0f) {
+/// Corners: LeafTriangle or LeafTriangleD.
+template <EdgeRule rule, class Scalar, class Corners>
+RAYDIX_HD bool intersect_triangle(const BasicRayFrame<Scalar>& ray, const Corners& triangle,
+                                  std::type_identity_t<Scalar> tmax,
+                                  BasicTriangleHit<Scalar>& hit) {
+    const BasicShearedVertex<Scalar> a = shear(ray, triangle.v0), b = shear(ray, triangle.v1),
+                                     c = shear(ray, triangle.v2);
+    Scalar u = edge_function(c, b), v = edge_function(a, c), w = edge_function(b, a);
+    if ((u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0)) return false;
+    if (u == 0 || v == 0 || w == 0) {
         // A zero may be lost precision: the ray passes near an edge. Once more, exactly.
         // Signs before the conversion: what is too small for a float would lose its own.
         const double du = exact_edge_function(c, b), dv = exact_edge_function(a, c),
                      dw = exact_edge_function(b, a);
         if ((du < 0 || dv < 0 || dw < 0) && (du > 0 || dv > 0 || dw > 0)) return false;
-        u = static_cast<float>(du);
-        v = static_cast<float>(dv);
-        w = static_cast<float>(dw);
+        u = static_cast<Scalar>(du);
+        v = static_cast<Scalar>(dv);
+        w = static_cast<Scalar>(dw);
         if constexpr (rule == EdgeRule::half_open) {
             const int su = perturbed_edge_sign(c, b), sv = perturbed_edge_sign(a, c),
                       sw = perturbed_edge_sign(b, a);
             if (su != sv || sv != sw) return false;
         }
     }
-    const float determinant = (u + v) + w;
+    const Scalar determinant = (u + v) + w;
     // Not finite: the ray starts so far away that the edge functions overflow.
-    if (!(determinant != 0.0f && std::fabs(determinant) < infinity)) return false;
-    float t = ((u * a.z + v * b.z) + w * c.z) / determinant;
-    const BoxInterval own = own_box_interval(ray, triangle);
+    if (!(determinant != 0 && std::fabs(determinant) < infinity)) return false;
+    Scalar t = ((u * a.z + v * b.z) + w * c.z) / determinant;
+    const BoxInterval<Scalar> own = own_box_interval(ray, triangle);
     if (own.entry <= own.exit) t = min_of(max_of(t, own.entry), own.exit);
     if (!(t >= ray.tmin && t <= tmax)) return false;
     if (has_zero_area(triangle)) return false;

@@ -15,26 +15,32 @@
 
 namespace raydix {
 
-struct PendingNode {
+template <class Scalar>
+struct BasicPendingNode {
     std::uint32_t slot;
-    float entry;
+    Scalar entry;
 };
+using PendingNode = BasicPendingNode<float>;
 
 /// Room for one pending sibling per level of the deepest path: taken from the tree's exact depth,
 /// so that no walk can run over. Radix trees fit the array; deeper ones use the heap.
-class WalkStack {
+template <class Scalar>
+class BasicWalkStack {
 public:
-    explicit WalkStack(std::uint32_t max_depth) : capacity_(max_depth) {
-        if (max_depth > inside_.size()) outside_ = std::make_unique<PendingNode[]>(max_depth);
+    using Pending = BasicPendingNode<Scalar>;
+    explicit BasicWalkStack(std::uint32_t max_depth) : capacity_(max_depth) {
+        if (max_depth > inside_.size()) outside_ = std::make_unique<Pending[]>(max_depth);
     }
-    [[nodiscard]] PendingNode* begin() { return outside_ ? outside_.get() : inside_.data(); }
+    [[nodiscard]] Pending* begin() { return outside_ ? outside_.get() : inside_.data(); }
     [[nodiscard]] std::uint32_t capacity() const { return capacity_; }
 
 private:
-    std::array<PendingNode, 96> inside_;
-    std::unique_ptr<PendingNode[]> outside_;
+    std::array<Pending, 96> inside_;
+    std::unique_ptr<Pending[]> outside_;
     std::uint32_t capacity_;
 };
+using WalkStack = BasicWalkStack<float>;
+using WalkStackD = BasicWalkStack<double>;
 
 /// Counts nothing; RaySteps counts.
 struct NoSteps {};
@@ -42,16 +48,16 @@ struct NoSteps {};
 /// `leaf(node) -> bool` handles a leaf and says whether to stop; `reach()` is the largest t that
 /// still matters: a node is skipped only if its padded entry is greater. The tree must not be
 /// empty.
-template <class Steps, class Leaf, class Reach>
-void walk_tree(const BvhNode* nodes, const RayFrame& ray, WalkStack& stack, Steps& steps,
-               const Leaf& leaf, const Reach& reach) {
+template <class Scalar, class Steps, class Leaf, class Reach>
+void walk_tree(const BvhNode* nodes, const BasicRayFrame<Scalar>& ray,
+               BasicWalkStack<Scalar>& stack, Steps& steps, const Leaf& leaf, const Reach& reach) {
     constexpr bool counting = !std::is_same_v<Steps, NoSteps>;
-    const SlabFrame slabs = make_slab_frame(ray, {nodes[0].lo, nodes[0].hi});
-    const SlabInterval whole = intersect_slabs(slabs, &nodes[0].lo.x, ray.tmin, reach());
+    const auto slabs = make_slab_frame(ray, {nodes[0].lo, nodes[0].hi});
+    const auto whole = intersect_slabs(slabs, &nodes[0].lo.x, ray.tmin, reach());
     if (!(whole.entry <= whole.exit)) return;
-    const HostSlabs children(slabs, ray.tmin);
-    PendingNode* const bottom = stack.begin();
-    PendingNode* top = bottom;
+    const HostSlabsOf<Scalar> children(slabs, ray.tmin);
+    BasicPendingNode<Scalar>* const bottom = stack.begin();
+    BasicPendingNode<Scalar>* top = bottom;
     std::uint32_t slot = 0;
     for (;;) {
         const BvhNode& node = nodes[slot];
@@ -59,7 +65,7 @@ void walk_tree(const BvhNode* nodes, const RayFrame& ray, WalkStack& stack, Step
         if (node.is_leaf()) {
             if (leaf(node)) return;
         } else {
-            const PairInterval pair = children.intersect(&nodes[node.first], reach());
+            const auto pair = children.intersect(&nodes[node.first], reach());
             if (pair.hit == 3) {
                 const bool b_first = pair.entry_b < pair.entry_a;
                 RAYDIX_CHECK(static_cast<std::uint32_t>(top - bottom), <, stack.capacity());

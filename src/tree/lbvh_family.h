@@ -14,6 +14,12 @@ namespace raydix {
            builder == Builder::garanzha || builder == Builder::apetrei;
 }
 
+/// Whether the finished tree still divides sorted codes at each node: reinsertion moves nodes
+/// elsewhere.
+[[nodiscard]] constexpr bool follows_codes(const BuildOptions& options) {
+    return in_lbvh_family(options.builder) && options.reinsertion_rounds == 0;
+}
+
 /// Below each split the common prefix is longer by a bit: at most `bits` times in the code, then
 /// ceil(log2 n) times in the position that tells equal codes apart. n > 0.
 [[nodiscard]] constexpr std::uint32_t lbvh_depth_bound(int bits, std::uint64_t n) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "base/prefetch.h"
 #include "exec/parallel.h"
 #include "tree/radix_tree.h"
 
@@ -95,7 +96,7 @@ private:
         waiting.push_back(at);
     }
 
-    void prefetch(ClusterRef ref) const {
+    RAYDIX_PREFETCHING void prefetch(ClusterRef ref) const {
         if (!is_primitive(ref)) __builtin_prefetch(&tree_.nodes[ref]);
     }
 

@@ -46,7 +46,7 @@ TreeStats tree_stats(const Bvh& bvh, const StatsOptions& options) {
     stats.max_depth = bvh.max_depth();
     stats.sah_constants = options.sah;
     stats.bytes = bvh.bytes();
-    if (!bvh.empty() && in_lbvh_family(bvh.options().builder))
+    if (!bvh.empty() && follows_codes(bvh.options()))
         stats.depth_bound = lbvh_depth_bound(bvh.options().bits, stats.references);
     with_threads(options.threads, [&] {
         stats.sah = sah_cost(bvh, options.sah);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "base/prefetch.h"
 #include "exec/parallel.h"
 
 namespace raydix {
@@ -52,7 +53,7 @@ private:
     [[nodiscard]] const SahReference& at(std::uint32_t k) const {
         return lists_.references[order_[k]];
     }
-    void prefetch(std::uint32_t k) const { __builtin_prefetch(&at(k)); }
+    RAYDIX_PREFETCHING void prefetch(std::uint32_t k) const { __builtin_prefetch(&at(k)); }
 
     const SweepLists& lists_;
     const std::uint32_t* order_;

@@ -23,6 +23,9 @@ Fault validate_options(const BuildOptions& options) {
         return fmt::format("info: {} code bits, not 30 or 63", options.bits);
     if (options.max_leaf < 1 || options.max_leaf > 255)
         return fmt::format("info: max_leaf {} is not in 1..255", options.max_leaf);
+    if (options.reinsertion_rounds < 0 || options.reinsertion_rounds > 255)
+        return fmt::format("info: {} rounds of reinsertion, not 0 to 255",
+                           options.reinsertion_rounds);
     return {};
 }
 
@@ -232,7 +235,7 @@ Fault validate_topology(const Bvh& bvh) {
     if (Fault fault = TopologyWalk(bvh).run()) return fault;
     if (!all_bits_zero(bvh.nodes()[padding_slot]))
         return fmt::format("nodes: slot {} is padding, but not zero", padding_slot);
-    if (!in_lbvh_family(bvh.options().builder)) return {};
+    if (!follows_codes(bvh.options())) return {};
     const std::uint32_t bound = lbvh_depth_bound(bvh.options().bits, bvh.order().size());
     if (bvh.max_depth() > bound)
         return fmt::format(

@@ -115,6 +115,8 @@ TEST(HierarchyStudy, FewAndNoPrimitives) {
             EXPECT_EQ(study(random_soup(n, 1), builder, Fit::levels).inner_nodes, n - 1);
     }
     EXPECT_THROW(study(random_soup(5, 1), Builder::ploc, Fit::atomic), InputError);
+    EXPECT_THROW((void)study_hierarchy(random_soup(5, 1), {.reinsertion_rounds = 1}, 1),
+                 InputError);
     Mesh bad = random_soup(5, 1);
     bad.triangles[3] = {0, 1, 99};
     EXPECT_THROW(study(bad, Builder::lauterbach, Fit::atomic), InputError);

@@ -1,6 +1,8 @@
 // src/api/render.cpp: what each view shows, and golden pictures of all of them.
 #include <raydix/error.h>
 #include <raydix/picture.h>
+#include <raydix/rays.h>
+#include <raydix/trace.h>
 
 #include <algorithm>
 #include <cmath>
@@ -170,6 +172,23 @@ TEST(Render, ReportsProgressUpToOne) {
     ASSERT_GT(parts.size(), 2u);
     EXPECT_TRUE(std::is_sorted(parts.begin(), parts.end()));
     EXPECT_EQ(parts.back(), 1.0);
+}
+
+TEST(Render, ProgressMayThrowAndMayTrace) {
+    const Bvh bvh = build_bvh(test::ball_and_boxes());
+    RenderOptions options = options_for(View::ao, 128, 128);
+    options.samples = 256;
+    int calls = 0;
+    options.progress = [&](double) {
+        ++calls;
+        throw std::runtime_error("enough");
+    };
+    EXPECT_THROW((void)render(bvh, golden_camera(), options), std::runtime_error);
+    EXPECT_EQ(calls, 1);
+    const std::vector<Ray> rays = make_primary_rays(golden_camera(), 64, 64);
+    options.progress = [&](double) { calls += trace(bvh, rays).size() == rays.size(); };
+    (void)render(bvh, golden_camera(), options);
+    EXPECT_GT(calls, 2);
 }
 
 TEST(Render, EmptyTreesShowTheBackground) {

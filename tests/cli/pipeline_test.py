@@ -250,12 +250,12 @@ class Pipeline(ProgramTest):
         self.succeed("build", scene, "-o", "figure.rdx", "--repeat", "1")
         seen = set()
         for view in ("shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps"):
-            self.succeed("render", "figure.rdx", "--view", view, "--size", "40x30", "--samples", "4", "-o", "a.png")
+            self.succeed("render", "figure.rdx", "--view", view, "--size", "40x30", "--samples", "16", "-o", "a.png")
             width, height, values = read_png(self.folder / "a.png")
             self.assertEqual((width, height), (40, 30), view)
             self.assertGreater(values, 4, f"{view}: the picture is empty")
             seen.add((self.folder / "a.png").read_bytes())
-            self.succeed("render", scene, "--view", view, "--size", "40x30", "--samples", "4", "-o", "b.png",
+            self.succeed("render", scene, "--view", view, "--size", "40x30", "--samples", "16", "-o", "b.png",
                          "--threads", "1")
             self.assertEqual((self.folder / "a.png").read_bytes(), (self.folder / "b.png").read_bytes(), view)
         self.assertEqual(len(seen), 7)

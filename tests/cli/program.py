@@ -146,7 +146,7 @@ def read_rays(file):
 
 
 def read_png(file):
-    """(width, height, colours): an 8-bit RGB picture with right checksums; how many different pixel rows it has."""
+    """(width, height, values): an 8-bit RGB picture with right checksums; how many different bytes its rows hold."""
     content = pathlib.Path(file).read_bytes()
     assert content[:8] == b"\x89PNG\r\n\x1a\n"
     at, data, size = 8, b"", None

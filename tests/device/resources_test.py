@@ -36,6 +36,12 @@ EXPECTED |= {"launch_warps_closest.cu": KERNELS, "launch_warps_any.cu": KERNELS,
                                    "SaveLastValue": 32, "AddLastValue": 32, "SetWord": 32}}
 # The traversal stack itself, of the larger size: an array that the kernel indexes.
 STACK_BYTES = {"trace_rays": 4 * 128, "cwbvh_rays": 8 * 128, "persistent_cwbvh_rays": 8 * 128}
+# Queries: stacks of 96 entries of 16, 8 and 4 bytes; exact tests of pairs hold sums of up to 48 doubles besides, three of them.
+STACK_BYTES |= {"FindNearest": 96 * 16, "CountWithin": 96 * 16, "FillWithin": 96 * 16, "FindClosest": 96 * 8,
+                "CountPartners": 96 * 4 + 1184, "FillPartners": 96 * 4 + 1184}
+EXPECTED["device_queries_cuda.cu"] = {
+    "FindNearest": 32, "CountWithin": 32, "FillWithin": 32, "FindClosest": 96, "CountPartners": 136,
+    "FillPartners": 136, "ClearOffset": 32, "ClearUnusedValues": 32, "SaveLastValue": 32, "AddLastValue": 32, "SetWord": 32}
 # 64: half of an sm_90 multiprocessor's threads at once; 72: 28 of its 64 warps.
 EXPECTED["device_cwbvh_cuda.cu"] = {"cwbvh_rays": 64, "persistent_cwbvh_rays": 72, "fill_misses": 16}
 ENTRY = re.compile(r"Compiling entry function '(\w+)'.*?(\d+) bytes stack frame, (\d+) bytes spill stores, "

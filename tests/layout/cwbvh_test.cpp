@@ -104,31 +104,6 @@ TEST(Cwbvh, OctantSlotsAreTheBestOfAllAssignments) {
         }
 }
 
-/// Slots by rule of thumb: one a child, and on the whole nearly as good as the best.
-TEST(Cwbvh, GreedyOctantSlotsAreNearlyTheBest) {
-    std::mt19937_64 random(seed);
-    const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
-    double greedy = 0, exact = 0;
-    for (int turn = 0; turn < 500; ++turn) {
-        const std::size_t count = 1 + static_cast<std::size_t>(turn) % 8;
-        std::vector<Aabb> boxes;
-        for (std::size_t k = 0; k < count; ++k) {
-            const Vec3 at{unit(), unit(), turn % 3 == 0 ? 0.5f : unit()};
-            boxes.push_back({at, at + Vec3{unit(), unit(), 0.0f}});
-        }
-        std::array<int, 8> slots{};
-        assign_octant_slots_greedily(boxes, slots.data());
-        const std::span<const int> own = std::span<const int>(slots).first(count);
-        ASSERT_EQ(std::set<int>(own.begin(), own.end()).size(), count);
-        for (const int slot : own) ASSERT_TRUE(slot >= 0 && slot < 8);
-        greedy += gain_of(boxes, slots);
-        assign_octant_slots(boxes, slots.data());
-        exact += gain_of(boxes, slots);
-    }
-    EXPECT_LE(greedy, exact);
-    EXPECT_GE(greedy, 0.9 * exact);
-}
-
 /// Eight boxes at the corners of a cube lie in the slots of their corners.
 TEST(Cwbvh, CornersOfACubeLieInTheirSlots) {
     std::vector<Aabb> boxes;

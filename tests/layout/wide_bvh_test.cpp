@@ -69,18 +69,18 @@ private:
 
     Aabb leaf_box(std::uint32_t word) {
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
-        EXPECT_LE(place % 8 + count, 8u);
+        EXPECT_LE(place % block_lanes + count, block_lanes);
         EXPECT_LE(count, wide_max_leaf);
         TriangleBlock block{};
-        for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane)
+        for (std::uint32_t lane = place % block_lanes; lane < place % block_lanes + count; ++lane)
             if (arrays_.stats.compact)
-                put_together(arrays_.compact_blocks[place / 8], lane, block);
+                put_together(arrays_.compact_blocks[place / block_lanes], lane, block);
             else
-                block = arrays_.blocks[place / 8];
+                block = arrays_.blocks[place / block_lanes];
         Aabb box = empty_box();
-        for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane) {
+        for (std::uint32_t lane = place % block_lanes; lane < place % block_lanes + count; ++lane) {
             ++seen[block.prim[lane]];
-            EXPECT_TRUE(places_.emplace(place / 8 * 8 + lane, 0).second);
+            EXPECT_TRUE(places_.emplace(place / block_lanes * block_lanes + lane, 0).second);
             for (int v = 0; v < 3; ++v) {
                 const Vec3 p{block.corner[3 * v][lane], block.corner[3 * v + 1][lane],
                              block.corner[3 * v + 2][lane]};
@@ -117,8 +117,8 @@ void expect_sound(const Mesh& mesh, const BuildOptions& options, const WideBvhOp
         if (!has_zero_area(bvh.triangles()[k])) ++wanted[bvh.order()[k]];
     EXPECT_EQ(walk.seen, wanted);
     EXPECT_EQ(stats.bytes,
-              stats.nodes * (layout.compact ? 96 : 224) + tree.arrays().blocks.size() * 320 +
-                  tree.arrays().compact_blocks.size() * 128 + tree.arrays().vertices.size() * 12);
+              stats.nodes * (layout.compact ? 96 : 224) + tree.arrays().blocks.size() * 160 +
+                  tree.arrays().compact_blocks.size() * 64 + tree.arrays().vertices.size() * 12);
     EXPECT_TRUE(layout.compact ? tree.arrays().blocks.empty()
                                : tree.arrays().compact_blocks.empty());
     EXPECT_GE(stats.widening, 1.0 - 1e-12);
@@ -150,7 +150,7 @@ TEST(WideLayout, LeavesOutWhatHasNoArea) {
 
 TEST(WideLayout, WastesLittleOnBlocks) {
     const WideBvh tree(build_bvh(random_soup(20'000, 1), {.max_leaf = 1}));
-    const auto places = static_cast<double>(8 * tree.arrays().blocks.size());
+    const auto places = static_cast<double>(block_lanes * tree.arrays().blocks.size());
     EXPECT_LT(places, 1.1 * static_cast<double>(tree.stats().references));
 }
 
@@ -168,7 +168,7 @@ bool same_compact_triangles(const WideBvh& a, const WideBvh& b) {
     const WideBvh::Arrays &x = a.arrays(), &y = b.arrays();
     if (x.compact_blocks.size() != y.compact_blocks.size()) return false;
     for (std::size_t k = 0; k < x.compact_blocks.size(); ++k)
-        for (int lane = 0; lane < 8; ++lane)
+        for (int lane = 0; lane < int{block_lanes}; ++lane)
             for (int v = 0; v < 3; ++v)
                 if (x.compact_blocks[k].prim[lane] != y.compact_blocks[k].prim[lane] ||
                     (x.compact_blocks[k].prim[lane] != no_primitive &&

@@ -246,6 +246,47 @@ TYPED_TEST(Within, ResultsLargerThanMemoryAreRefused) {
               "no error");
 }
 
+/// Rows are found in one walk and kept until their places are known. Where there is no memory for
+/// that beside the result, and where a block finds very many, they are found by two walks instead.
+TYPED_TEST(Within, RowsOfOneWalkAndOfTwo) {
+    using T = typename TypeParam::Scalar;
+    std::mt19937_64 random(seed + 10);
+    const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+    std::vector<Vec3> places(200 * thorough);
+    for (Vec3& p : places) p = {unit(), unit(), unit()};
+    const auto points = points_as<TypeParam>(places);
+    const auto queries = points_as<TypeParam>(queries_for(places, 4500, seed + 11));
+    const TypeParam index = build_points(points);
+    const auto same = [&](const auto& a, const auto& b) {
+        return std::ranges::equal(a.offsets.view(), b.offsets.view()) &&
+               std::ranges::equal(a.indices.view(), b.indices.view()) &&
+               std::ranges::equal(a.distances.view(), b.distances.view());
+    };
+    for (const T radius : {T(0.05), T(0.2), std::numeric_limits<T>::infinity()}) {
+        const auto wanted = radius_search(index, queries, radius);
+        const std::uint64_t least = wanted.indices.size() * (sizeof(std::uint32_t) + sizeof(T)) +
+                                    wanted.offsets.size() * sizeof(std::uint64_t);
+        for (const std::uint64_t room : {least, least * 5 / 4, least * 3})
+            for (const QueryOrder order : {QueryOrder::as_given, QueryOrder::sorted})
+                EXPECT_TRUE(
+                    same(radius_search(index, queries, radius, {.order = order, .max_bytes = room}),
+                         wanted))
+                    << "radius " << radius << ", " << room << " bytes";
+    }
+    // More than a block keeps: all of 5,000 points for each of 700 queries.
+    const TypeParam large =
+        build_points(points_as<TypeParam>(queries_for(places, 5000, seed + 12)));
+    const std::vector<typename TypeParam::Point> some(queries.begin(), queries.begin() + 700);
+    const auto all = radius_search(large, some, std::numeric_limits<T>::infinity());
+    for (std::size_t q = 0; q < some.size(); ++q) {
+        const std::uint64_t n = all.offsets[q + 1] - all.offsets[q];
+        ASSERT_TRUE(n == 0 || n == large.size());
+        ASSERT_TRUE(std::ranges::is_sorted(all.indices.view().subspan(all.offsets[q], n)));
+    }
+    EXPECT_EQ(all.counts.found,
+              (some.size() - all.counts.invalid_queries) * std::uint64_t{large.size()});
+}
+
 TYPED_TEST(Within, LongRowsBesideShortOnes) {
     using Point = typename TypeParam::Point;
     std::vector<Point> points(150 * thorough);

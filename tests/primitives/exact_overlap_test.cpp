@@ -51,7 +51,8 @@ TEST(ExactOverlap, TrianglesTouchAsInWholeNumbers) {
         touching += expected;
         ASSERT_EQ(triangles_touch(s, t), expected) << "seed " << seed << " case " << i;
         ASSERT_EQ(triangles_touch(t, s), expected);
-        ASSERT_EQ(triangles_touch({s.v1, s.v2, s.v0}, {t.v0, t.v2, t.v1}), expected);
+        ASSERT_EQ(triangles_touch(LeafTriangle{s.v1, s.v2, s.v0}, LeafTriangle{t.v0, t.v2, t.v1}),
+                  expected);
         // The same, small and far from the origin where that is exact, and huge.
         const Vec3 by{1024.0f, -2048.0f, 4096.0f};
         ASSERT_EQ(triangles_touch(moved(s, by, 0x1p-9f), moved(t, by, 0x1p-9f)), expected);
@@ -75,7 +76,7 @@ TEST(ExactOverlap, SegmentsAndPointsTouchAsInWholeNumbers) {
         touching += expected;
         on += p_on;
         ASSERT_EQ(segment_touches_triangle(p, q, t), expected) << "seed " << seed << " case " << i;
-        ASSERT_EQ(segment_touches_triangle(q, p, {t.v2, t.v1, t.v0}), expected);
+        ASSERT_EQ(segment_touches_triangle(q, p, LeafTriangle{t.v2, t.v1, t.v0}), expected);
         ASSERT_EQ(point_on_triangle(p, t), p_on);
     }
     std::cout << cases << " segments, " << touching << " touch; " << on << " points on, seed "

@@ -84,7 +84,7 @@ void expect_all(const std::string& name, const Mesh& x, const Mesh& y, const Tou
 TEST(Pairs, AreBruteForce) {
     const std::size_t n = 200 + 60 * test::thorough;
     expect_all("soups", test::random_soup(n, seed, 0.15f), test::random_soup(n, seed + 1, 0.1f),
-               triangles_touch);
+               triangles_touch<LeafTriangle>);
     expect_all("lattices", test::lattice_mesh(n / 4, 6, seed),
                test::lattice_mesh(n / 4, 5, seed + 1), test::whole_triangles_touch);
     const Mesh ball = test::ball_mesh({0, 0, 0}), other = test::ball_mesh({60, 10, -20});

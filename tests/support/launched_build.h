@@ -28,6 +28,7 @@ struct IdleLauncher {
     void launch_warps(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
     void exclusive_scan(const char*, std::uint32_t*, std::uint32_t, std::uint32_t*) {}
     void exclusive_scan_counted(const char*, std::uint32_t*, const std::uint32_t*, std::uint32_t) {}
+    void exclusive_scan_wide(const char*, std::uint64_t*, std::uint32_t) {}
     template <class Key>
     void sort_pairs(const char*, const SortArrays<Key>&, std::uint32_t, const std::uint32_t*, int) {
     }

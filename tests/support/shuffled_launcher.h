@@ -67,6 +67,10 @@ public:
         host_.exclusive_scan_counted(label, values, count, limit);
     }
 
+    void exclusive_scan_wide(const char* label, std::uint64_t* values, std::uint32_t n) {
+        host_.exclusive_scan_wide(label, values, n);
+    }
+
     /// As on a GPU, the places behind the last pair do not keep what they held.
     template <class Key>
     void sort_pairs(const char* label, const SortArrays<Key>& arrays, std::uint32_t limit,

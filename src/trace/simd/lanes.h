@@ -12,6 +12,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "base/compress_lanes.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
@@ -24,6 +26,10 @@ using U8 = hn::RebindToUnsigned<F8>;
 using B8 = hn::Rebind<std::uint8_t, F8>;
 constexpr F8 f8;
 constexpr std::size_t lanes8 = hn::MaxLanes(f8);
+
+/// One ray's axes, or the triangles of a block.
+using F4 = hn::FixedTag<float, 4>;
+constexpr F4 f4;
 
 /// Rays of a packet: as many as the widest vector holds.
 using F16 = hn::CappedTag<float, 16>;
@@ -40,6 +46,39 @@ HWY_INLINE std::uint32_t bits_of(D d, Mask mask) {
     std::uint32_t bits;
     std::memcpy(&bits, bytes, sizeof(bits));
     return bits & static_cast<std::uint32_t>((std::uint64_t{1} << hn::MaxLanes(d)) - 1);
+}
+
+/// Bit l: a <= b in lane l. With AVX-512 by way of a vector: masks take longer to come to a general
+/// register.
+HWY_INLINE std::uint32_t bits_of_le(hn::Vec<F8> a, hn::Vec<F8> b) {
+#if HWY_TARGET == HWY_AVX3
+    return static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.raw, b.raw, _CMP_LE_OQ)));
+#else
+    return bits_of(f8, hn::Le(a, b));
+#endif
+}
+
+/// Bit l: lane l of `least` is below 0 and that of `largest` above it.
+HWY_INLINE std::uint32_t bits_astride(hn::Vec<F4> least, hn::Vec<F4> largest) {
+#if HWY_TARGET == HWY_AVX3
+    const __m128 zero = _mm_setzero_ps();
+    return static_cast<std::uint32_t>(_mm_movemask_ps(_mm_and_ps(
+        _mm_cmp_ps(least.raw, zero, _CMP_LT_OQ), _mm_cmp_ps(largest.raw, zero, _CMP_GT_OQ))));
+#else
+    return bits_of(f4, hn::And(hn::Lt(least, hn::Zero(f4)), hn::Gt(largest, hn::Zero(f4))));
+#endif
+}
+
+/// Lanes of the mask moved to the front; `bits` are those of the mask, for where it takes a table.
+template <class D>
+HWY_INLINE hn::Vec<D> compress(D d, hn::Vec<D> v, [[maybe_unused]] hn::Mask<D> mask,
+                               [[maybe_unused]] std::uint32_t bits) {
+#if HWY_TARGET == HWY_AVX3
+    static_cast<void>(d);
+    return hn::Compress(v, mask);
+#else
+    return compress(d, v, bits);
+#endif
 }
 
 template <class D>

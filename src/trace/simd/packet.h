@@ -10,6 +10,7 @@
 
 #include <hwy/highway.h>
 
+#include "trace/simd/children.h"
 #include "trace/simd/lanes.h"
 #include "trace/simd/ray_classes.h"
 #include "trace/simd/wide_ray.h"
@@ -44,7 +45,6 @@ public:
                SimdCounts& counts)
         : tree_(tree), p_(packet), stack_(stack), counts_(counts) {
         for (int axis = 0; axis < 3; ++axis) negative_[axis] = packet.kind.negative(axis);
-        flip_ = packet.kind.negatives ^ 7u;
     }
 
     void trace() {
@@ -106,7 +106,7 @@ private:
         return frame;
     }
     HWY_INLINE Frame frame_of(const WideNode&) const {
-        return {{tree_.middle.x, tree_.middle.y, tree_.middle.z}, {1.0f, 1.0f, 1.0f}};
+        return {{tree_.middle[0], tree_.middle[1], tree_.middle[2]}, {1.0f, 1.0f, 1.0f}};
     }
     static HWY_INLINE auto read(const float* from) { return hn::Load(f8, from); }
     static HWY_INLINE auto read(const std::uint8_t* from) {
@@ -145,21 +145,10 @@ private:
             hn::Store(entry, f8, entries + l);
             met |= bits_of(f8, hn::Le(entry, exit)) << l;
         }
-        return met & used_of(node);
+        // The box of a missing child is not enough: where a ray's pads overflow it is NaN, which
+        // the minima and maxima of some processors drop.
+        return met & used_slots(node);
     }
-    static HWY_INLINE std::uint32_t used_of(const CompactNode& node) { return node.used; }
-    /// The box of a missing child is not enough: where a ray's pads overflow it is NaN, which the
-    /// minima and maxima of some processors drop.
-    static HWY_INLINE std::uint32_t used_of(const WideNode& node) {
-        std::uint32_t used = 0;
-        for (std::size_t l = 0; l < 8; l += lanes8) {
-            const auto words = hn::Load(U8(), node.child + l);
-            const auto missing = hn::Eq(words, hn::Set(U8(), wide_no_child));
-            used |= bits_of(f8, hn::RebindMask(f8, hn::Not(missing))) << l;
-        }
-        return used;
-    }
-
     /// What a vector of rays needs of a node.
     struct RayNode {
         V rate[3], near[3], far[3];
@@ -207,9 +196,11 @@ private:
             rays[vector_count] = ray_node(frame, v * lanes16);
             vectors[vector_count++] = v;
         }
-        // Bit l: the child that comes l-th from the far end.
-        for (std::uint32_t left = in_order(met); left != 0; left &= left - 1) {
-            const std::size_t s = static_cast<std::size_t>(std::countr_zero(left)) ^ flip_;
+        std::uint32_t order[8];
+        const std::uint32_t child_count =
+            any ? order_by_area(met, order) : order_by_entry(met, entries, order);
+        for (std::uint32_t c = 0; c < child_count; ++c) {
+            const std::uint32_t s = order[c];
             std::uint64_t hit = 0;
             for (std::uint32_t k = 0; k < vector_count; ++k) {
                 const std::size_t shift = vectors[k] * lanes16;
@@ -224,17 +215,9 @@ private:
         return top;
     }
 
-    /// Moves bit s to bit s ^ flip_.
-    [[nodiscard]] std::uint32_t in_order(std::uint32_t bits) const {
-        if ((flip_ & 1) != 0) bits = (bits & 0x55) << 1 | (bits & 0xAA) >> 1;
-        if ((flip_ & 2) != 0) bits = (bits & 0x33) << 2 | (bits & 0xCC) >> 2;
-        if ((flip_ & 4) != 0) bits = (bits & 0x0F) << 4 | (bits & 0xF0) >> 4;
-        return bits;
-    }
-
     void test_leaf(std::uint32_t word, std::uint64_t active) {
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
-        const TriangleBlock& block = tree_.template block<compact>(place, count);
+        const TriangleBlock& block = tree_.template block<compact>(place);
         if constexpr (counting)
             counts_.tests += count * static_cast<std::uint64_t>(std::popcount(active));
         bool changed = false;
@@ -243,7 +226,7 @@ private:
                 static_cast<std::uint32_t>(active >> (vector * lanes16) & vector_bits);
             if (wanted == 0) continue;
             for (std::uint32_t k = 0; k < count; ++k)
-                changed |= test_triangle(block, place % 8 + k, vector * lanes16, wanted);
+                changed |= test_triangle(block, place % block_lanes + k, vector * lanes16, wanted);
         }
         if (changed && !any) find_reach();
     }
@@ -371,7 +354,6 @@ private:
     const PacketStackView stack_;
     SimdCounts& counts_;
     bool negative_[3];
-    std::uint32_t flip_;
     std::uint64_t done_ = 0;  // closest: rays that have hit; any: rays that need nothing more
     float reach_ = 0;
 };

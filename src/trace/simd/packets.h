@@ -59,11 +59,11 @@ HWY_INLINE hn::Vec<I16> classify(const RayVectors& ray) {
 
 /// The largest pad of make_slab_frame over rays whose origins lie between `least` and `largest`,
 /// times `factor`; positive.
-inline void largest_pad(const Aabb& bounds, const float* least, const float* largest,
+inline void largest_pad(const WideView& tree, const float* least, const float* largest,
                         std::uint32_t kz, float factor, float* pad) {
     float far[3];
     for (int a = 0; a < 3; ++a) {
-        const float lo = coordinate(bounds.lo, a), hi = coordinate(bounds.hi, a);
+        const float lo = tree.lo[a], hi = tree.hi[a];
         far[a] = max_of(max_of(std::fabs(lo - least[a]), std::fabs(lo - largest[a])),
                         max_of(std::fabs(hi - least[a]), std::fabs(hi - largest[a])));
     }
@@ -123,7 +123,7 @@ HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::in
         p.largest_inverse[a] = hn::GetLane(hn::MaxOfLanes(f16, largest[a]));
     }
     p.least_tmin = hn::GetLane(hn::MinOfLanes(f16, least_tmin));
-    largest_pad(tree.bounds, p.origin_lo, p.origin_hi, p.kind.kz, packet_pad_factor, p.pad);
+    largest_pad(tree, p.origin_lo, p.origin_hi, p.kind.kz, packet_pad_factor, p.pad);
 }
 
 /// Rays of a job by class: order[begin[c]] to order[begin[c + 1]], each class in the caller's
@@ -221,13 +221,10 @@ void trace_packets(const SimdJob& job, SimdCounts& counts) {
         trace_one<any, counting, compact>(job, static_cast<std::size_t>(odd[k]), counts);
 }
 
-using F4 = hn::FixedTag<float, 4>;
-
 /// Rays index[0, count) of one class as a stream.
 HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index,
                                    std::uint32_t count, std::uint32_t code) {
     std::vector<StreamRay>& rays = job.memory->rays();
-    const F4 f4;
     StreamFrame frame;
     frame.kind = ray_class_of(code);
     rays.resize(count);
@@ -263,7 +260,7 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
     HWY_ALIGN float least[4], largest[4];
     hn::Store(lo, f4, least);
     hn::Store(hi, f4, largest);
-    largest_pad(job.tree.bounds, least, largest, frame.kind.kz, wide_pad_factor, frame.near_pad);
+    largest_pad(job.tree, least, largest, frame.kind.kz, wide_pad_factor, frame.near_pad);
     for (int a = 0; a < 3; ++a)
         if (!frame.kind.negative(a)) frame.near_pad[a] = -frame.near_pad[a];
     return frame;

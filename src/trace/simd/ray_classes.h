@@ -2,6 +2,7 @@
 // read the same planes and corners for all of them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 namespace raydix {
@@ -14,10 +15,10 @@ struct RayClass {
     std::uint32_t negatives;   // bit a: component a of the direction is negative (or -0)
     std::uint32_t kx, ky, kz;  // as in RayFrame
 
-    [[nodiscard]] bool negative(int axis) const { return (negatives >> axis & 1) != 0; }
+    [[nodiscard]] constexpr bool negative(int axis) const { return (negatives >> axis & 1) != 0; }
 };
 
-inline RayClass ray_class_of(std::uint32_t code) {
+constexpr RayClass ray_class_of(std::uint32_t code) {
     RayClass out{code & 7, 0, 0, code >> 3};
     out.kx = out.kz == 2 ? 0 : out.kz + 1;
     out.ky = out.kx == 2 ? 0 : out.kx + 1;
@@ -28,5 +29,12 @@ inline RayClass ray_class_of(std::uint32_t code) {
     }
     return out;
 }
+
+/// [code]
+inline constexpr auto ray_classes = [] {
+    std::array<RayClass, odd_ray_class> table{};
+    for (std::uint32_t code = 0; code < odd_ray_class; ++code) table[code] = ray_class_of(code);
+    return table;
+}();
 
 }  // namespace raydix

@@ -21,7 +21,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-SimdKernels kernels(std::string_view isa) { return {isa, single, packets, streams, all_hits}; }
+SimdKernels kernels(std::string_view isa) {
+    return {isa, one<false>, one<true>, single, packets, streams, all_hits};
+}
 
 }  // namespace raydix::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -34,6 +34,9 @@ struct SimdJob {
 
 struct SimdKernels {
     std::string_view isa;
+    /// One ray; for any hit only the primitive has a meaning.
+    Hit (*closest)(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack);
+    Hit (*any)(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack);
     void (*single)(const SimdJob& job, SimdCounts& counts);
     void (*packets)(const SimdJob& job, SimdCounts& counts);
     void (*streams)(const SimdJob& job, SimdCounts& counts);

@@ -9,6 +9,7 @@
 #define RAYDIX_SIMD_STREAM_H
 #endif
 
+#include "trace/simd/children.h"
 #include "trace/simd/quads.h"
 #include "trace/simd/single.h"
 #include "trace/simd/stream_rays.h"
@@ -32,7 +33,6 @@ public:
           single_stack_(single_stack),
           counts_(counts) {
         for (int axis = 0; axis < 3; ++axis) negative_[axis] = frame.kind.negative(axis);
-        for (std::uint32_t l = 0; l < 8; ++l) slot_[l] = l ^ frame.kind.negatives ^ 7u;
         count_ = static_cast<std::uint32_t>(memory.rays().size());
     }
 
@@ -117,9 +117,25 @@ private:
         for (int axis = 0; axis < 3; ++axis) {
             out.near[axis] = negative_[axis] ? node.hi[axis] : node.lo[axis];
             out.far[axis] = negative_[axis] ? node.lo[axis] : node.hi[axis];
-            out.origin[axis] = coordinate(tree_.middle, axis);
+            out.origin[axis] = tree_.middle[axis];
         }
         return out;
+    }
+
+    /// Where a ray enters the children, about.
+    HWY_INLINE void find_entries(const Planes& planes, const StreamRay& ray, float* entries) const {
+        for (std::size_t l = 0; l < 8; l += lanes8) {
+            auto entry = hn::Set(f8, -infinity);
+            for (int axis = 0; axis < 3; ++axis) {
+                const float inverse = ray.inverse[axis];
+                const float start = (planes.origin[axis] - ray.origin[axis]) * inverse;
+                float rate = inverse;
+                if constexpr (compact) rate *= planes.step[axis];
+                const auto near = hn::Load(f8, planes.near[axis] + l);
+                entry = hn::Max(entry, hn::MulAdd(near, hn::Set(f8, rate), hn::Set(f8, start)));
+            }
+            hn::Store(entry, f8, entries + l);
+        }
     }
 
     HWY_INLINE void visit(const StreamEntry& entry) {
@@ -132,13 +148,16 @@ private:
         pad_list(list, entry.count);
         const auto& node = tree_.template node<compact>(entry.word);
         const Planes planes = planes_of(node);
-        std::uint32_t children[8], child_count = 0;  // slots, farthest first
+        std::uint32_t children[8], child_count;  // the farthest first
+        if constexpr (any) {
+            child_count = order_by_area(used_slots(node), children);
+        } else {
+            HWY_ALIGN float entries[8];
+            find_entries(planes, rays_[*list & ray_bits], entries);
+            child_count = order_by_entry(used_slots(node), entries, children);
+        }
         std::uint32_t* ends[8];
-        for (const std::uint32_t s : slot_)
-            if (node.child[s] != wide_no_child) {
-                ends[child_count] = lists + out_begin + child_count * stride;
-                children[child_count++] = s;
-            }
+        for (std::uint32_t c = 0; c < child_count; ++c) ends[c] = lists + out_begin + c * stride;
         const auto high = hn::Set(U16(), ~ray_bits), low = hn::Set(U16(), ray_bits);
         for (std::uint32_t k = 0; k < entry.count; k += lanes16) {
             V16 place[4], way[4];
@@ -173,8 +192,10 @@ private:
                 }
                 const auto met = hn::And(hn::Le(in, hn::Min(leave, reach)), active);
                 const auto item = hn::Or(hn::And(hn::BitCast(U16(), in), high), numbers);
-                hn::StoreU(hn::Compress(item, hn::RebindMask(U16(), met)), U16(), ends[c]);
-                ends[c] += hn::CountTrue(f16, met);
+                const std::uint32_t going = bits_of(f16, met);
+                hn::StoreU(compress(U16(), item, hn::RebindMask(U16(), met), going), U16(),
+                           ends[c]);
+                ends[c] += std::popcount(going);
             }
         }
         push_children(node, children, ends, child_count, out_begin, stride);
@@ -201,10 +222,10 @@ private:
         const std::uint32_t k = item & ray_bits;
         StreamRay& ray = rays_[k];
         if (!(entry_of(item) <= ray.t)) return;
-        const RayFrame frame = frame_.frame_of(ray);
-        const WideRay wide_ray = frame_.wide_ray_of(ray);
+        SingleFrame frame;
+        fill_frame(tree_, frame_, ray, frame);
         SingleRay<any ? Wanted::any : Wanted::closest, counting, compact> single(
-            tree_, frame, wide_ray, single_stack_, counts_);
+            tree_, frame, single_stack_, counts_);
         const WideBest best = single.trace(word, {ray.t, ray.prim, hits_[k].u, hits_[k].v});
         if (any) {
             if (best.found()) ray.settle();
@@ -250,7 +271,7 @@ private:
     void test_leaf(const StreamEntry& entry) {
         const std::uint32_t place = (entry.word & ~wide_leaf_bit) >> 3,
                             count = (entry.word & 7) + 1;
-        const TriangleBlock& block = tree_.template block<compact>(place, count);
+        const TriangleBlock& block = tree_.template block<compact>(place);
         std::uint32_t* const list = memory_.lists() + entry.begin;
         if constexpr (counting) counts_.tests += std::uint64_t{count} * entry.count;
         pad_list(list, entry.count);
@@ -265,7 +286,8 @@ private:
                 active = hn::And(active, hn::FirstN(f16, entry.count - k));
             const std::uint32_t wanted = bits_of(f16, active);
             if (wanted == 0) continue;
-            for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane)
+            for (std::uint32_t lane = place % block_lanes; lane < place % block_lanes + count;
+                 ++lane)
                 test_triangle(block, lane, chunk, wanted);
         }
     }
@@ -281,11 +303,12 @@ private:
     /// intersect_triangle for the rays of the chunk in `wanted`: the same bits.
     HWY_INLINE void test_triangle(const TriangleBlock& block, std::uint32_t lane, Chunk& chunk,
                                   std::uint32_t wanted) {
+        constexpr std::size_t next = 3 * block_lanes;
         const float* const x = block.corner[frame_.kind.kx] + lane;
         const float* const y = block.corner[frame_.kind.ky] + lane;
         const float* const z = block.corner[frame_.kind.kz] + lane;
-        const Sheared a = shear(x, y, z, chunk), b = shear(x + 24, y + 24, z + 24, chunk),
-                      c = shear(x + 48, y + 48, z + 48, chunk);
+        const Sheared a = shear(x, y, z, chunk), b = shear(x + next, y + next, z + next, chunk),
+                      c = shear(x + 2 * next, y + 2 * next, z + 2 * next, chunk);
         const V16 u = edge(c, b), v = edge(a, c), w = edge(b, a);
         const V16 zero = hn::Zero(f16);
         const V16 least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
@@ -381,7 +404,6 @@ private:
     SimdCounts& counts_;
     std::uint32_t count_;
     bool negative_[3];
-    std::uint32_t slot_[8];
 };
 
 }  // namespace raydix::HWY_NAMESPACE

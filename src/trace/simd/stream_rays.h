@@ -29,7 +29,7 @@ struct StreamHit {
 /// What all rays of a stream share.
 struct StreamFrame {
     RayClass kind;
-    float near_pad[3];  // with the sign that moves near planes toward the ray's start
+    float near_pad[4];  // with the sign that moves near planes toward the ray's start
 
     [[nodiscard]] RayFrame frame_of(const StreamRay& ray) const {
         RayFrame frame;
@@ -42,11 +42,6 @@ struct StreamFrame {
         frame.tmin = ray.tmin, frame.tmax = ray.t;
         frame.t_scale = 1.0f;
         return frame;
-    }
-    [[nodiscard]] WideRay wide_ray_of(const StreamRay& ray) const {
-        return {{ray.inverse[0], ray.inverse[1], ray.inverse[2]},
-                {near_pad[0], near_pad[1], near_pad[2]},
-                kind.negatives};
     }
 };
 

@@ -15,6 +15,7 @@
 #include "trace/all_hits.h"
 #include "trace/batch.h"
 #include "trace/simd/simd_kernels.h"
+#include "trace/simd/trace_here.h"
 
 namespace raydix {
 namespace {
@@ -28,19 +29,6 @@ const SimdKernels& kernels_for(const std::string& isa) {
         known += (known.empty() ? "" : ", ") + std::string(kernels.isa);
     }
     throw InputError("instruction set " + isa + ": this processor and build have " + known);
-}
-
-WideView view_of(const WideBvh& tree, TriangleBlock& room) {
-    const WideBvh::Arrays& arrays = tree.arrays();
-    return {arrays.nodes.data(),
-            arrays.blocks.data(),
-            arrays.compact_nodes.data(),
-            arrays.compact_blocks.data(),
-            arrays.vertices.data(),
-            &room,
-            arrays.bounds,
-            arrays.middle,
-            arrays.stats.compact};
 }
 
 /// Stacks for the deepest path of a tree.
@@ -91,35 +79,62 @@ SimdPath path_for(const WideBvh& tree, std::span<const Ray> rays, SimdPath wante
     return path == SimdPath::sorted && !can_sort ? SimdPath::stream : path;
 }
 
+/// A batch as its jobs see it: hits, or else occluded.
+struct Batch {
+    const WideBvh& tree;
+    const SimdKernels& kernels;
+    SimdPath path;
+    std::span<const Ray> rays;
+    Hit* hits;
+    std::uint8_t* occluded;
+    bool counters;
+    std::vector<std::uint32_t> order{};  // of the path `sorted`
+
+    void run(std::size_t begin, std::size_t end, SimdCounts& counts) const {
+        StackMemory stack(tree.stats().max_depth);
+        StreamMemory memory;
+        const std::size_t from = order.empty() ? begin : 0;
+        TriangleBlock room{};
+        const SimdJob job{view_of(tree.arrays(), room),
+                          rays.data() + from,
+                          order.empty() ? nullptr : order.data() + begin,
+                          end - begin,
+                          hits == nullptr ? nullptr : hits + from,
+                          hits == nullptr ? occluded + from : nullptr,
+                          stack.view(),
+                          stack.packet_view(),
+                          &memory,
+                          counters};
+        job_of(kernels, path)(job, counts);
+    }
+};
+
 TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hits,
                         std::uint8_t* occluded, const TraceOptions& options) {
     const SimdKernels& kernels = kernels_for(options.isa);
     const SimdPath path = path_for(tree, rays, options.path);
     const std::size_t block_size = rays_per_job(rays.size(), path);
     std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
+    Batch batch{tree, kernels, path, rays, hits, occluded, options.counters};
     with_threads(options.threads, [&] {
-        std::vector<std::uint32_t> order;
-        if (path == SimdPath::sorted) order = order_by_place(tree.arrays().bounds, rays);
+        if (path == SimdPath::sorted) batch.order = order_by_place(tree.arrays().bounds, rays);
         for_each_block(rays.size(), block_size,
                        [&](std::size_t block, std::size_t begin, std::size_t end) {
-                           StackMemory stack(tree.stats().max_depth);
-                           StreamMemory memory;
-                           const std::size_t from = order.empty() ? begin : 0;
-                           TriangleBlock room{};
-                           const SimdJob job{view_of(tree, room),
-                                             rays.data() + from,
-                                             order.empty() ? nullptr : order.data() + begin,
-                                             end - begin,
-                                             hits == nullptr ? nullptr : hits + from,
-                                             hits == nullptr ? occluded + from : nullptr,
-                                             stack.view(),
-                                             stack.packet_view(),
-                                             &memory,
-                                             options.counters};
-                           job_of(kernels, path)(job, parts[block]);
+                           batch.run(begin, end, parts[block]);
                        });
     });
     return sum_of(parts, rays.size());
+}
+
+/// Largest jobs, one after the other, in the caller's floating-point environment.
+void trace_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, Hit* hits,
+                          std::uint8_t* occluded) {
+    SimdPath path = choose_simd_path(tree, rays);
+    if (path == SimdPath::sorted) path = SimdPath::stream;
+    const Batch batch{tree, simd_kernels().front(), path, rays, hits, occluded, false};
+    SimdCounts counts;
+    for (std::size_t begin = 0; begin < rays.size(); begin += max_job_rays)
+        batch.run(begin, std::min(begin + max_job_rays, rays.size()), counts);
 }
 
 /// Nothing to hit: all rays miss, but invalid ones still count.
@@ -157,6 +172,23 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
     return miss_all(rays);
 }
 
+void closest_here(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit> hits) {
+    check_sizes(rays.size(), hits.size());
+    if (tree.empty())
+        std::ranges::fill(hits, Hit{});
+    else
+        trace_on_this_thread(tree, rays, hits.data(), nullptr);
+}
+
+void occluded_here(const WideBvh& tree, std::span<const Ray> rays,
+                   std::span<std::uint8_t> occluded) {
+    check_sizes(rays.size(), occluded.size());
+    if (tree.empty())
+        std::ranges::fill(occluded, std::uint8_t{0});
+    else
+        trace_on_this_thread(tree, rays, nullptr, occluded.data());
+}
+
 AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOptions& options) {
     const SimdKernels& kernels = kernels_for(options.isa);
     AllHits all;
@@ -173,7 +205,7 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
             rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
                 StackMemory stack(tree.stats().max_depth);
                 TriangleBlock room{};
-                const SimdJob job{view_of(tree, room),
+                const SimdJob job{view_of(tree.arrays(), room),
                                   rays.data() + begin,
                                   nullptr,
                                   end - begin,
@@ -223,40 +255,36 @@ SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays) {
 
 namespace {
 
-template <class Result>
-Result one_ray(const WideBvh& tree, const Ray& ray) {
-    const FloatEnvironment plain;
+using OneRay = Hit (*)(const WideBvh::Arrays&, const Ray&, const WideStackView&);
+
+/// In a plain environment.
+Hit trace_one_ray(OneRay kernel, const WideBvh& tree, const Ray& ray) {
     constexpr std::size_t inside = 512;
+    if (wide_stack_capacity(tree.stats().max_depth) > inside) {
+        StackMemory stack(tree.stats().max_depth);
+        return kernel(tree.arrays(), ray, stack.view());
+    }
     std::uint32_t words[inside];
     float entries[inside];
-    std::unique_ptr<StackMemory> outside;
-    WideStackView stack{words, entries};
-    if (wide_stack_capacity(tree.stats().max_depth) > inside) {
-        outside = std::make_unique<StackMemory>(tree.stats().max_depth);
-        stack = outside->view();
-    }
-    Result result{};
-    SimdCounts counts;
-    TriangleBlock room;
-    if (tree.stats().compact) room = {};  // which takes a while, for one ray
-    SimdJob job{view_of(tree, room), &ray, nullptr, 1, nullptr, nullptr, stack, {}, nullptr, false};
-    if constexpr (std::is_same_v<Result, Hit>)
-        job.hits = &result;
-    else
-        job.occluded = &result;
-    static const SimdKernels& kernels = simd_kernels().front();
-    kernels.single(job, counts);
-    return result;
+    return kernel(tree.arrays(), ray, {words, entries});
+}
+
+Hit one_ray(OneRay kernel, const WideBvh& tree, const Ray& ray) {
+    if (FloatEnvironment::is_plain()) return trace_one_ray(kernel, tree, ray);
+    const FloatEnvironment plain;
+    return trace_one_ray(kernel, tree, ray);
 }
 
 }  // namespace
 
 Hit closest_hit(const WideBvh& tree, const Ray& ray) {
-    return tree.empty() ? Hit{} : one_ray<Hit>(tree, ray);
+    static const OneRay kernel = simd_kernels().front().closest;
+    return tree.empty() ? Hit{} : one_ray(kernel, tree, ray);
 }
 
 bool any_hit(const WideBvh& tree, const Ray& ray) {
-    return !tree.empty() && one_ray<std::uint8_t>(tree, ray) != 0;
+    static const OneRay kernel = simd_kernels().front().any;
+    return !tree.empty() && one_ray(kernel, tree, ray).hit();
 }
 
 namespace {

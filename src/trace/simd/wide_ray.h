@@ -5,6 +5,7 @@
 #include <raydix/types.h>
 
 #include <cstdint>
+#include <cstring>
 
 #include "base/math.h"
 #include "layout/wide_bvh.h"
@@ -12,7 +13,36 @@
 #include "trace/slab.h"
 #include "trace/triangle_test.h"
 
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
 namespace raydix {
+
+/// All lanes, since empty ones name vertex 0. Whole vectors are written, as they are read next.
+inline void fill_block(const CompactBlock& from, const Vec3* vertices, TriangleBlock& block) {
+#if defined(__SSE2__)
+    static_assert(block_lanes == 4);
+    for (int v = 0; v < 3; ++v) {
+        __m128 corner[4];
+        for (int lane = 0; lane < 4; ++lane) {
+            const float* const p = &vertices[from.vertex[v][lane]].x;
+            corner[lane] = _mm_movelh_ps(
+                _mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))),
+                _mm_load_ss(p + 2));
+        }
+        _MM_TRANSPOSE4_PS(corner[0], corner[1], corner[2], corner[3]);
+        for (int axis = 0; axis < 3; ++axis) _mm_store_ps(block.corner[3 * v + axis], corner[axis]);
+    }
+    std::memcpy(block.prim, from.prim, sizeof(block.prim));
+#else
+    for (std::uint32_t lane = 0; lane < block_lanes; ++lane)
+        block.set(lane,
+                  {vertices[from.vertex[0][lane]], vertices[from.vertex[1][lane]],
+                   vertices[from.vertex[2][lane]]},
+                  from.prim[lane]);
+#endif
+}
 
 struct WideView {
     const WideNode* nodes;
@@ -21,9 +51,10 @@ struct WideView {
     const CompactBlock* compact_blocks;
     const Vec3* vertices;
     TriangleBlock* room;  // of a compact tree, one for each thread
-    Aabb bounds;          // of the root
-    Vec3 middle;          // of the bounds: planes of WideNode are about it
     bool is_compact;
+    // By axis, the last is 0: the root's bounds, and their middle, which planes of WideNode are
+    // about.
+    const float *lo, *hi, *middle;
 
     template <bool compact>
     [[nodiscard]] const auto& node(std::uint32_t word) const {
@@ -35,18 +66,20 @@ struct WideView {
 
     /// The block of a leaf; in a compact tree its triangles are put together in `room`.
     template <bool compact>
-    [[nodiscard]] const TriangleBlock& block(std::uint32_t place,
-                                             [[maybe_unused]] std::uint32_t count) const {
-        if constexpr (!compact) return blocks[place / 8];
-        const CompactBlock& from = compact_blocks[place / 8];
-        for (std::uint32_t lane = place % 8; lane < place % 8 + count; ++lane)
-            room->set(lane,
-                      {vertices[from.vertex[0][lane]], vertices[from.vertex[1][lane]],
-                       vertices[from.vertex[2][lane]]},
-                      from.prim[lane]);
+    [[nodiscard]] const TriangleBlock& block(std::uint32_t place) const {
+        if constexpr (!compact) return blocks[place / block_lanes];
+        fill_block(compact_blocks[place / block_lanes], vertices, *room);
         return *room;
     }
 };
+
+/// `room` is for compact trees.
+inline WideView view_of(const WideBvh::Arrays& arrays, TriangleBlock& room) {
+    return {arrays.nodes.data(),          arrays.blocks.data(),   arrays.compact_nodes.data(),
+            arrays.compact_blocks.data(), arrays.vertices.data(), &room,
+            arrays.stats.compact,         arrays.frame.lo,        arrays.frame.hi,
+            arrays.frame.middle};
+}
 
 /// Children still to visit: words of WideNode::child and where the ray enters them.
 struct WideStackView {
@@ -75,25 +108,6 @@ inline constexpr float wide_longest_inverse = 0x1p80f;
 inline constexpr float wide_pad_factor = 2.0f;
 /// The bounds of a packet round once more (docs/algorithms/wide.md).
 inline constexpr float packet_pad_factor = 3.0f;
-
-struct WideRay {
-    Vec3 inverse;            // limited
-    Vec3 near_pad;           // with the sign that moves near planes toward the ray's start
-    std::uint32_t negative;  // bit a: the direction's component a is negative (or -0)
-};
-
-inline WideRay make_wide_ray(const RayFrame& frame, const Aabb& bounds) {
-    const SlabFrame slabs = make_slab_frame(frame, bounds);
-    const auto limited = [](float inverse) {
-        return max_of(min_of(inverse, wide_longest_inverse), -wide_longest_inverse);
-    };
-    WideRay ray;
-    ray.inverse = {limited(slabs.inverse.x), limited(slabs.inverse.y), limited(slabs.inverse.z)};
-    ray.near_pad = wide_pad_factor * slabs.near_pad;
-    ray.negative = (slabs.near_x != 0 ? 1u : 0u) | (slabs.near_y != 0 ? 2u : 0u) |
-                   (slabs.near_z != 0 ? 4u : 0u);
-    return ray;
-}
 
 inline LeafTriangle triangle_of(const TriangleBlock& block, std::uint32_t lane) {
     const auto corner = [&](int v) {

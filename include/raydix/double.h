@@ -1,0 +1,246 @@
+// Meshes with double coordinates: trees, rays and queries whose answers are computed in double.
+// For geometry far from the origin (georeferenced, CAD), where float32 has steps of half a metre at
+// 5,000,000, and for answers with more than seven digits.
+//
+// The rules are those of the float calls of the same names: ties, edges, limits, invalid input and
+// its counts. Answers are pure functions of the caller's doubles, so they are the same bits for
+// every builder and thread count. Doubles other than 0 below 2^-500 in magnitude count as 0.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/closest.h>
+#include <raydix/overlap.h>
+#include <raydix/pairs.h>
+#include <raydix/refit.h>
+#include <raydix/solid.h>
+#include <raydix/trace.h>
+#include <raydix/types.h>
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace raydix {
+
+/// As Mesh.
+struct MeshD {
+    std::string name;
+    std::vector<Vec3d> vertices;
+    std::vector<Triangle> triangles;
+};
+
+/// As MeshView: [vertices], [triangles], kept alive by the caller during the call.
+struct MeshViewD {
+    std::span<const Vec3d> vertices;
+    std::span<const Triangle> triangles;
+
+    MeshViewD() = default;
+    MeshViewD(std::span<const Vec3d> v, std::span<const Triangle> t) : vertices(v), triangles(t) {}
+    MeshViewD(const MeshD& mesh)
+        : vertices(mesh.vertices), triangles(mesh.triangles) {}  // NOLINT: meant to be implicit
+};
+
+struct LeafTriangleD {
+    Vec3d v0, v1, v2;
+};
+static_assert(sizeof(LeafTriangleD) == 72);
+
+/// A tree over triangles in double. Its nodes are those of a float tree over the triangles' boxes,
+/// moved so that `center()`, near which most triangles are, is at 0, scaled down where the scene
+/// reaches farther than 2^39 (`scale()`), and rounded outward: as small as a float tree, and any
+/// builder can make it. Its leaves hold the corners as the caller gave them. Where detail is finer
+/// than 2^-24 of its distance from the center, boxes overlap more than they need to: queries take
+/// longer, and are as right.
+class BvhD {
+public:
+    [[nodiscard]] bool empty() const { return tree_.empty(); }
+    /// A tree of boxes; a point p of the scene is at (p - center()) * scale() in it.
+    [[nodiscard]] const Bvh& tree() const { return tree_; }
+    [[nodiscard]] Vec3d center() const { return center_; }
+    /// 1, 1/2 or 1/4.
+    [[nodiscard]] double scale() const { return scale_; }
+    /// Position in leaf order -> the caller's triangle, [references].
+    [[nodiscard]] std::span<const std::uint32_t> order() const { return tree_.order(); }
+    /// Corners in leaf order, [references].
+    [[nodiscard]] std::span<const LeafTriangleD> triangles() const { return triangles_.view(); }
+    /// Around all triangles of the tree, exactly; lo > hi if there are none.
+    [[nodiscard]] AabbD bounds() const { return bounds_; }
+
+    [[nodiscard]] std::uint32_t max_depth() const { return tree_.max_depth(); }
+    /// Triangles the caller gave, and how many of them were invalid and left out.
+    [[nodiscard]] std::uint64_t input_count() const { return tree_.input_count(); }
+    [[nodiscard]] std::uint64_t left_out() const { return tree_.left_out(); }
+    /// Milliseconds of the float tree's stages; `total` is of all.
+    [[nodiscard]] const BuildMs& build_ms() const { return build_ms_; }
+    /// Every byte a trace touches.
+    [[nodiscard]] std::uint64_t bytes() const;
+
+private:
+    friend struct BvhDAccess;
+    Bvh tree_;
+    Buffer<LeafTriangleD> triangles_;
+    Vec3d center_{0.0, 0.0, 0.0};
+    double scale_ = 1.0;
+    AabbD bounds_{};
+    BuildMs build_ms_;
+};
+
+/// Builds a tree over the mesh's triangles; a mesh without any gives an empty tree (points:
+/// <raydix/points.h>). Triangles with a coordinate that is not finite or beyond 1e12, and those
+/// with a diagonal in (0, 1e-12), are left out and counted; `options.strict` throws instead.
+/// Builders split and sbvh are sweep here. Throws InputError: option out of range, a vertex index
+/// past the end, 2^31 triangles or more.
+[[nodiscard]] BvhD build_bvh(const MeshViewD& mesh, const BuildOptions& options = {});
+[[nodiscard]] BvhD build_bvh(const MeshD& mesh, const BuildOptions& options = {});
+
+/// New corners for the same number of triangles in the same order; the hierarchy is kept. Throws
+/// InputError that names a triangle, the tree unchanged, as Refitter::refit does; nothing is found
+/// late here.
+RefitQuality refit(BvhD& bvh, const MeshViewD& mesh, int threads = 0);
+
+/// Closest hit of each ray, the least (t, prim): Woop, Benthin, Wald (2013) in double, watertight.
+/// rays [n] -> hits [n]. Of the options, `threads` and `counters` matter. Throws InputError if the
+/// sizes differ.
+TraceCounts trace(const BvhD& bvh, std::span<const RayD> rays, std::span<HitD> hits,
+                  const TraceOptions& options = {});
+[[nodiscard]] std::vector<HitD> trace(const BvhD& bvh, std::span<const RayD> rays,
+                                      const TraceOptions& options = {});
+TraceCounts trace_any(const BvhD& bvh, std::span<const RayD> rays, std::span<std::uint8_t> occluded,
+                      const TraceOptions& options = {});
+
+/// As AllHits.
+struct AllHitsD {
+    std::vector<std::uint64_t> offsets;  // [rays + 1]
+    std::vector<HitD> hits;
+    TraceCounts counts;
+};
+[[nodiscard]] AllHitsD trace_all(const BvhD& bvh, std::span<const RayD> rays,
+                                 const TraceOptions& options = {});
+
+[[nodiscard]] HitD closest_hit(const BvhD& bvh, const RayD& ray);
+[[nodiscard]] bool any_hit(const BvhD& bvh, const RayD& ray);
+
+/// The same answers by testing every triangle.
+[[nodiscard]] std::vector<HitD> trace_brute_force(const MeshViewD& mesh, std::span<const RayD> rays,
+                                                  int threads = 0);
+
+/// As ClosestPoint: `position` is rounded to double and within the triangle's box, `distance` is
+/// sqrt(d2) with d2 = (dx*dx + dy*dy) + dz*dz from the query to `position`, without FMA.
+struct ClosestPointD {
+    Vec3d position{infinity, infinity, infinity};
+    double distance = infinity;
+    std::uint32_t prim = no_primitive;
+    double u = 0.0, v = 0.0;
+
+    [[nodiscard]] constexpr bool found() const { return prim != no_primitive; }
+};
+
+struct ClosestOptionsD {
+    double max_distance = infinity;  // d2 <= R*R, closed
+    int threads = 0;
+};
+
+/// For each query the least (d2, prim). queries [n] -> results [n]. Throws InputError: sizes that
+/// differ, a max_distance that is negative or NaN.
+ClosestCounts closest_points(const BvhD& bvh, std::span<const Vec3d> queries,
+                             std::span<ClosestPointD> results, const ClosestOptionsD& options = {});
+[[nodiscard]] std::vector<ClosestPointD> closest_points(const BvhD& bvh,
+                                                        std::span<const Vec3d> queries,
+                                                        const ClosestOptionsD& options = {});
+[[nodiscard]] ClosestPointD closest_point(const BvhD& bvh, Vec3d query,
+                                          double max_distance = infinity);
+
+/// As Solid, over a tree that must outlive it. Signs are exact in double.
+class SolidD {
+public:
+    explicit SolidD(const BvhD& bvh, const SolidOptions& options = {});
+    ~SolidD();
+    SolidD(SolidD&&) noexcept;
+    SolidD& operator=(SolidD&&) noexcept;
+
+    [[nodiscard]] Closure closure() const;
+    [[nodiscard]] InsideRule rule() const;
+    [[nodiscard]] std::uint64_t open_edges() const;
+    [[nodiscard]] const BvhD& bvh() const;
+
+private:
+    friend struct SolidAccess;
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+ClosestCounts contains(const SolidD& solid, std::span<const Vec3d> queries,
+                       std::span<std::uint8_t> inside, int threads = 0);
+[[nodiscard]] bool contains(const SolidD& solid, Vec3d query);
+ClosestCounts signed_distances(const SolidD& solid, std::span<const Vec3d> queries,
+                               std::span<double> distances, const ClosestOptionsD& options = {});
+[[nodiscard]] std::vector<double> signed_distances(const SolidD& solid,
+                                                   std::span<const Vec3d> queries,
+                                                   const ClosestOptionsD& options = {});
+[[nodiscard]] double signed_distance(const SolidD& solid, Vec3d query);
+[[nodiscard]] std::vector<double> winding_numbers(const SolidD& solid,
+                                                  std::span<const Vec3d> queries, int threads = 0);
+
+/// As Segment and Sphere. A segment with an end beyond 1e12 is invalid here too: its signs would
+/// overflow.
+struct SegmentD {
+    Vec3d a, b;
+};
+struct SphereD {
+    Vec3d center;
+    double radius;
+};
+
+/// As the calls in <raydix/overlap.h>.
+OverlapCounts touch_any(const BvhD& bvh, std::span<const SegmentD> queries,
+                        std::span<std::uint8_t> touched, const OverlapOptions& options = {});
+OverlapCounts touch_any(const BvhD& bvh, std::span<const SphereD> queries,
+                        std::span<std::uint8_t> touched, const OverlapOptions& options = {});
+[[nodiscard]] bool touches(const BvhD& bvh, const SegmentD& segment);
+[[nodiscard]] bool touches(const BvhD& bvh, const SphereD& sphere);
+[[nodiscard]] OverlapLists touch_all(const BvhD& bvh, std::span<const SegmentD> queries,
+                                     const OverlapOptions& options = {});
+[[nodiscard]] OverlapLists touch_all(const BvhD& bvh, std::span<const SphereD> queries,
+                                     const OverlapOptions& options = {});
+
+/// As SphereSweep. A start or a radius beyond 1e150 is invalid here too: its square would overflow.
+struct SphereSweepD {
+    RayD path;
+    double radius;
+};
+
+/// As SweepHit; `position` is the point of the triangle closest to the ball's center at t, as
+/// closest_points has it.
+struct SweepHitD {
+    double t = infinity;
+    std::uint32_t prim = no_primitive;
+    Vec3d position{infinity, infinity, infinity};
+    double u = 0.0, v = 0.0;
+
+    [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
+};
+
+/// First contacts, as in <raydix/overlap.h>: for each sweep the least (t, prim). All lengths are
+/// measured from the start, so that t and the place of the contact are as exact far from the origin
+/// as the corners are. sweeps [n] -> hits [n]. Throws InputError if the sizes differ.
+OverlapCounts sweep_spheres(const BvhD& bvh, std::span<const SphereSweepD> sweeps,
+                            std::span<SweepHitD> hits, const OverlapOptions& options = {});
+[[nodiscard]] std::vector<SweepHitD> sweep_spheres(const BvhD& bvh,
+                                                   std::span<const SphereSweepD> sweeps,
+                                                   const OverlapOptions& options = {});
+[[nodiscard]] SweepHitD sweep_sphere(const BvhD& bvh, const SphereSweepD& sweep);
+
+/// As the calls in <raydix/pairs.h>: boxes and triangles are those of the doubles.
+[[nodiscard]] std::vector<PrimitivePair> overlapping_pairs(const BvhD& bvh,
+                                                           const PairOptions& options = {});
+[[nodiscard]] std::vector<PrimitivePair> overlapping_pairs(const BvhD& a, const BvhD& b,
+                                                           const PairOptions& options = {});
+[[nodiscard]] std::uint64_t count_overlapping_pairs(const BvhD& bvh,
+                                                    const PairOptions& options = {});
+[[nodiscard]] std::uint64_t count_overlapping_pairs(const BvhD& a, const BvhD& b,
+                                                    const PairOptions& options = {});
+
+}  // namespace raydix

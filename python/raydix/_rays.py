@@ -1,0 +1,85 @@
+"""Rays in any of their forms -> the arguments of a call of the core."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ._arrays import FLOAT32, FLOAT64, describe, floats, to_numpy
+
+
+def _limit(value: Any, name: str, lead: tuple[int, ...]) -> Any:
+    """tmin or tmax: a number as it is; an array that fits the rays as (...) of their leading
+    shape."""
+    if isinstance(value, (int, float)):
+        return float(value)
+    limit = to_numpy(value, name)
+    if limit.dtype.kind not in "iuf":
+        raise TypeError(
+            f"{name}: expected a number or shape {lead} float32 or float64, given {describe(limit)}"
+        )
+    if limit.ndim == 0:
+        return float(limit)
+    try:
+        return np.broadcast_to(limit, lead)
+    except ValueError:
+        raise ValueError(
+            f"{name}: expected a number or shape {lead}, given {describe(limit)}"
+        ) from None
+
+
+def _columns(
+    origins: np.ndarray, directions: np.ndarray, tmin: Any, tmax: Any
+) -> tuple[tuple, tuple[int, ...]]:
+    """Origins, directions and limits (n,) of one type, read where they lie if they have it."""
+    if origins.shape != directions.shape:
+        try:
+            shape = np.broadcast_shapes(origins.shape, directions.shape)
+        except ValueError:
+            raise ValueError(
+                f"directions: expected a shape that fits origins, {origins.shape}, "
+                f"given {describe(directions)}"
+            ) from None
+        origins, directions = np.broadcast_to(origins, shape), np.broadcast_to(directions, shape)
+    lead = origins.shape[:-1]
+    parts = [origins, directions]
+    near = 0.0 if tmin is None else _limit(tmin, "tmin", lead)
+    far = np.inf if tmax is None else _limit(tmax, "tmax", lead)
+    arrays = parts + [limit for limit in (near, far) if not isinstance(limit, float)]
+    if origins.dtype != FLOAT32 or any(array.dtype != FLOAT32 for array in arrays):
+        arrays = [array.astype(FLOAT64, copy=False) for array in arrays]
+    if origins.ndim != 2:
+        arrays = [
+            array.reshape(-1, 3) if i < 2 else array.reshape(-1) for i, array in enumerate(arrays)
+        ]
+    limits = iter(arrays[2:])
+    return (
+        *arrays[:2],
+        *(limit if isinstance(limit, float) else next(limits) for limit in (near, far)),
+    ), lead
+
+
+def ray_batch(
+    rays: Any, directions: Any, tmin: Any, tmax: Any, dtype: np.dtype = FLOAT32
+) -> tuple[tuple, tuple[int, ...]]:
+    """The arguments that stand for the rays, and their leading shape.
+
+    `dtype`, the scene's, of shape (..., 8) in one run goes over as it is; all other forms are read
+    where they lie.
+    """
+    if directions is not None:
+        return _columns(
+            floats(rays, "origins", (3,)), floats(directions, "directions", (3,)), tmin, tmax
+        )
+    if type(rays) is not np.ndarray or rays.ndim != 2 or rays.shape[1] != 8:
+        rays = floats(rays, "rays", (8, 6))
+    if rays.shape[-1] == 6:
+        return _columns(rays[..., :3], rays[..., 3:], tmin, tmax)
+    if tmin is not None or tmax is not None:
+        raise ValueError("tmin, tmax: rays of shape (..., 8) have their own, in columns 3 and 7")
+    flags = rays.flags
+    if rays.dtype == dtype and flags.c_contiguous and flags.aligned:
+        return (rays if rays.ndim == 2 else rays.reshape(-1, 8),), rays.shape[:-1]
+    rays = floats(rays, "rays", (8,))
+    return _columns(rays[..., :3], rays[..., 4:7], rays[..., 3], rays[..., 7])

@@ -1,0 +1,138 @@
+"""Scenes placed many times by affine transforms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _core
+from ._arrays import FLOAT32, UINT32, cast, describe, require_float32, to_numpy
+from ._rays import ray_batch
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+
+def _transforms(value: Any) -> np.ndarray:
+    array = to_numpy(value, "transforms")
+    if array.dtype.kind not in "iuf":
+        raise TypeError(
+            "transforms: expected shape (M, 3, 4) or (M, 4, 4) float32 or float64, "
+            f"given {describe(array)}"
+        )
+    if array.ndim != 3 or array.shape[1:] not in ((3, 4), (4, 4)):
+        raise ValueError(
+            f"transforms: expected shape (M, 3, 4) or (M, 4, 4), given {describe(array)}"
+        )
+    if array.shape[1] == 4 and not (array[:, 3] == (0, 0, 0, 1)).all():
+        raise ValueError("transforms: expected affine ones, with (0, 0, 0, 1) in the last row")
+    return cast(array[:, :3], FLOAT32).reshape(-1, 12)
+
+
+def _indices(value: ArrayLike, name: str, count: int) -> np.ndarray:
+    array = to_numpy(value, name)
+    if array.dtype.kind not in "iu" or array.shape != (count,):
+        raise ValueError(
+            f"{name}: expected shape ({count},) of whole numbers, given {describe(array)}"
+        )
+    return cast(array, UINT32)
+
+
+class Instances:
+    """Scenes placed many times. Memory goes with the number of scenes and that of places, not their
+    product.
+
+    Parameters
+    ----------
+    scenes :
+        The objects to place. They may not be refitted while this is in use: make a new one then.
+    transforms :
+        Shape (M, 3, 4) or (M, 4, 4): from the object's space to the world's. They may mirror and
+        shear, but not flatten.
+    objects :
+        Shape (M,): which of `scenes` stands in each place; all the first if left out.
+    masks :
+        Shape (M,) of 32-bit masks: rays see a place if its mask & theirs is not 0.
+
+    ValueError (InputError) names the place whose transform is singular or not finite.
+    """
+
+    def __init__(
+        self,
+        scenes: Sequence[Scene],
+        transforms: ArrayLike,
+        objects: ArrayLike | None = None,
+        *,
+        masks: ArrayLike | None = None,
+        threads: int = 0,
+    ) -> None:
+        self.threads = threads
+        self.scenes = list(scenes)
+        for scene in self.scenes:
+            require_float32(scene, "instances")
+        rows = _transforms(transforms)
+        count = len(rows)
+        which = np.zeros(count, UINT32) if objects is None else _indices(objects, "objects", count)
+        mask = (
+            np.full(count, 0xFFFFFFFF, UINT32) if masks is None else _indices(masks, "masks", count)
+        )
+        if count and which.max(initial=0) >= len(self.scenes):
+            raise ValueError(
+                f"objects: expected numbers below {len(self.scenes)}, given {int(which.max())}"
+            )
+        self._core = _core.Instances(
+            tuple(scene._core for scene in self.scenes), rows, which, mask, threads
+        )
+
+    def move(self, transforms: ArrayLike) -> None:
+        """New places, as many as before. The objects' own trees are not touched."""
+        self._core.move(_transforms(transforms), self.threads)
+
+    def intersect(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        tmin: Any = None,
+        tmax: Any = None,
+        mask: int = 0xFFFFFFFF,
+    ) -> dict[str, np.ndarray]:
+        """As `Scene.intersect`, with two more arrays: "instance", the place, and "object", which
+        scene (uint32).
+
+        `t` is in units of the ray's direction in the world. At equal t the lower place wins, then
+        the lower triangle.
+        """
+        args, lead = ray_batch(rays, directions, tmin, tmax)
+        hits = self._core.intersect(*args, mask, self.threads).reshape(lead + (6,))
+        ids = hits.view(UINT32)
+        return {
+            "t": hits[..., 0],
+            "prim": ids[..., 1],
+            "u": hits[..., 2],
+            "v": hits[..., 3],
+            "object": ids[..., 4],
+            "instance": ids[..., 5],
+        }
+
+    def occluded(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        tmin: Any = None,
+        tmax: Any = None,
+        mask: int = 0xFFFFFFFF,
+    ) -> np.ndarray:
+        """Whether each ray hits anything that it may see: bool, with the leading shape of the
+        rays."""
+        args, lead = ray_batch(rays, directions, tmin, tmax)
+        flags = np.empty(lead, np.bool_)
+        self._core.occluded(*args, flags.reshape(-1), mask, self.threads)
+        return flags
+
+    def __len__(self) -> int:
+        return len(self._core)

@@ -1,0 +1,169 @@
+"""Pictures of scenes, rays of cameras, and what a notebook shows."""
+
+from __future__ import annotations
+
+import base64
+import html
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _core
+from ._arrays import FLOAT32, cast, describe, floats, require_float32, rows
+from .cameras import Camera
+
+VIEWS = ("shaded", "normal", "depth", "primitive", "ao", "diffuse", "steps")
+
+
+class SceneViews:
+    """What a Scene shows of itself."""
+
+    _core: Any
+    dtype: np.dtype
+    _cameras: list[Camera]
+    threads: int
+    name: str
+
+    @property
+    def cameras(self) -> list[Camera]:
+        """Those that came with the file or the built-in scene, else one that sees all of the
+        mesh."""
+        require_float32(self, "cameras")
+        if not self._cameras:
+            lo, hi = self._core.info()["bounds"]
+            if not lo[0] <= hi[0]:
+                return [Camera()]
+            self._cameras = [Camera(**_core.fit_camera(lo, hi, 45.0))]
+        return list(self._cameras)
+
+    def _camera(self, camera: Camera | int | None) -> Camera:
+        if isinstance(camera, Camera):
+            return camera
+        return self.cameras[camera or 0]
+
+    def render(
+        self,
+        camera: Camera | int | None = None,
+        *,
+        view: str = "shaded",
+        size: tuple[int, int] = (1024, 768),
+        samples: int = 0,
+        ao_radius: float = 0.0,
+        seed: int = 1,
+    ) -> np.ndarray:
+        """A picture of linear colours: shape (height, width, 3) float32, rows from the top.
+
+        `view`: "shaded" (sun and sky, a lamp in closed rooms), "normal", "depth", "primitive",
+        "ao", "diffuse" or "steps" (node visits). `size`: (width, height), each 1 to 16384.
+        `samples`: rays a pixel that gather light, 1 to 4096; 0: 64 for "ao", 32 for "shaded" and
+        "diffuse". `ao_radius`: 0 means 5 % of the diagonal. The same picture for every number of
+        threads. Ctrl-C ends it. `raydix.to_srgb` makes 8-bit colours of it.
+        """
+        require_float32(self, "render")
+        width, height = size
+        return _core.render(
+            self._core,
+            self._camera(camera)._fields(),
+            view,
+            width,
+            height,
+            samples,
+            ao_radius,
+            seed,
+            self.threads,
+        )
+
+    def primary_rays(
+        self, camera: Camera | int | None = None, *, size: tuple[int, int] = (1024, 768)
+    ) -> dict[str, np.ndarray]:
+        """One ray for each pixel centre, pixels in 2-D Morton order (neighbours in the picture are
+        neighbours in the batch).
+
+        Returns "rays" (N, 8) float32 with unit directions, and "pixels" (N,) uint32: y * width + x.
+        """
+        require_float32(self, "primary_rays")
+        rays, pixels = _core.primary_rays(self._camera(camera)._fields(), *size)
+        return {"rays": rays, "pixels": pixels}
+
+    def secondary_rays(
+        self,
+        rays: ArrayLike,
+        kind: str = "ao",
+        *,
+        samples: int = 32,
+        ao_radius: float = 0.0,
+        seed: int = 1,
+    ) -> np.ndarray:
+        """Rays from where `rays` hit, `samples` each, (M, 8) float32: "ao", "diffuse" or
+        "diffuse_shuffled".
+
+        Halton points, cosine-weighted about the normal (Aila, Laine 2009), sorted by origin and
+        direction. Rays that miss have none.
+        """
+        require_float32(self, "secondary_rays")
+        primary, _ = rows(rays, "rays", (8,), FLOAT32)
+        return _core.secondary_rays(
+            self._core, primary, kind, samples, ao_radius, seed, self.threads
+        )
+
+    def _repr_html_(self) -> str | None:
+        """Statistics and a small picture, for notebooks, which show `repr` for None."""
+        if self.dtype != FLOAT32:
+            return None
+        info, wide = self._core.info(), self._core.wide_stats()
+        lines = [
+            ("triangles", f"{info['triangles']:,}"),
+            ("vertices", f"{info['vertices']:,}"),
+            ("left out", f"{info['left_out_triangles']:,}"),
+            ("without area", f"{info['zero_area_triangles']:,}"),
+            (
+                "bounds",
+                " to ".join(str(tuple(round(c, 4) for c in corner)) for corner in info["bounds"]),
+            ),
+            (
+                "tree",
+                f"{wide['nodes']:,} nodes, depth {wide['max_depth']}, {wide['bytes'] / 1e6:.2f} MB",
+            ),
+            ("built in", f"{wide['ms']:.1f} ms"),
+        ]
+        cells = "".join(
+            f"<tr><th style='text-align:left'>{k}</th><td>{html.escape(v)}</td></tr>"
+            for k, v in lines
+        )
+        picture = ""
+        if info["triangles"] > info["left_out_triangles"]:
+            png = to_png(self.render(size=(240, 180), samples=4))
+            data = base64.b64encode(png).decode()
+            picture = f"<img width=240 height=180 src='data:image/png;base64,{data}'>"
+        title = html.escape(self.name or "raydix.Scene")
+        shown = f"{picture}<table>{cells}</table>"
+        return f"<div><b>{title}</b><div style='display:flex;gap:1em'>{shown}</div></div>"
+
+
+def _picture(value: ArrayLike) -> np.ndarray:
+    picture = floats(value, "picture", (3,))
+    if picture.ndim != 3:
+        raise ValueError(f"picture: expected shape (height, width, 3), given {describe(picture)}")
+    return cast(picture, FLOAT32)
+
+
+def to_srgb(picture: ArrayLike) -> np.ndarray:
+    """Linear colours (H, W, 3) -> 8-bit sRGB of the same shape (uint8), clamped to [0, 1], without
+    a tone curve."""
+    linear = np.clip(_picture(picture), 0.0, 1.0)
+    coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.power(linear, 1 / 2.4) - 0.055)
+    return np.rint(coded * 255.0).astype(np.uint8)
+
+
+def to_png(picture: ArrayLike, *, tone_map: bool = True) -> bytes:
+    """Linear colours (H, W, 3) -> the bytes of a PNG file, 8-bit sRGB; `tone_map`: after a filmic
+    curve."""
+    return _core.png(_picture(picture), tone_map)
+
+
+def save_picture(file: str | os.PathLike, picture: ArrayLike, *, tone_map: bool = True) -> None:
+    """Writes linear colours (H, W, 3) as .png (8-bit sRGB) or .exr (float). InputError names the
+    file."""
+    _core.save_picture(os.fspath(file), _picture(picture), tone_map)

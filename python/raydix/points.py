@@ -1,0 +1,193 @@
+"""Point clouds: who is near."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _core
+from ._arrays import MISSING, UINT32, cast, describe, floats, rows
+
+_INDICES = {
+    (np.dtype(np.float32), 2): _core.PointIndex2f,
+    (np.dtype(np.float32), 3): _core.PointIndex3f,
+    (np.dtype(np.float64), 2): _core.PointIndex2d,
+    (np.dtype(np.float64), 3): _core.PointIndex3d,
+}
+
+
+class Points:
+    """An index over points in two or three dimensions.
+
+    Parameters
+    ----------
+    points :
+        Shape (N, 2) or (N, 3), float32 or float64. Queries are answered in this type; those of the
+        other are rounded to it.
+    tree :
+        "kdtree", "bvh", or "automatic". Answers do not depend on it.
+    strict :
+        Points with NaN, infinity or a coordinate beyond 1e12 raise InputError; otherwise they are
+        left out.
+    threads :
+        Threads for the build and for queries; 0: all the machine has. No result depends on it.
+
+    Distances are sqrt((dx*dx + dy*dy) + dz*dz), in the type of the points, without fused
+    operations: NumPy gives the same bits. Answers are exact and the same for every number of
+    threads. The points are copied. Any number of threads may ask at once. Missing neighbours have
+    the index 0xFFFFFFFF and an infinite distance; queries with NaN or infinity have none.
+    """
+
+    def __init__(
+        self, points: ArrayLike, *, tree: str = "automatic", strict: bool = False, threads: int = 0
+    ) -> None:
+        array = floats(points, "points", (3, 2))
+        if array.ndim != 2:
+            raise ValueError(
+                "points: expected shape (N, 2) or (N, 3) float32 or float64, "
+                f"given {describe(array)}"
+            )
+        self.dtype = array.dtype
+        self.dimension = array.shape[1]
+        self.threads = threads
+        self._core = _INDICES[self.dtype, self.dimension](
+            cast(array, self.dtype), tree, strict, threads
+        )
+        self._given = len(array)
+
+    def knn(
+        self, queries: ArrayLike, k: int, *, threads: int | None = None
+    ) -> dict[str, np.ndarray]:
+        """The k nearest points of each query, nearest first; equal distances by index.
+
+        `queries`: shape (..., D). `k`: any number of 1 or more. Returns "indices" (uint32) and
+        "distances", both of shape (..., k). A query that is one of the points finds itself.
+        """
+        asked, lead = rows(queries, "queries", (self.dimension,), self.dtype)
+        if k < 1 or k != int(k):
+            raise ValueError(f"k: expected a whole number of 1 or more, given {k}")
+        shape = lead + (int(k),)
+        indices, distances = np.empty(shape, UINT32), np.empty(shape, self.dtype)
+        flat = (len(asked), int(k))
+        self._core.knn(
+            asked,
+            indices.reshape(flat),
+            distances.reshape(flat),
+            self.threads if threads is None else threads,
+        )
+        return {"indices": indices, "distances": distances}
+
+    def radius(
+        self,
+        queries: ArrayLike,
+        r: ArrayLike,
+        *,
+        sort: bool = False,
+        padded: bool = False,
+        threads: int | None = None,
+    ) -> dict[str, np.ndarray]:
+        """All points within a distance of each query, the distance itself included.
+
+        `queries`: shape (..., D). `r`: a number, or one for each query (their leading shape); 0
+        finds equal points, infinity all. Rows ascend by index, with `sort` by (distance, index).
+        Returns a dict: "offsets" (uint64, one more than queries), "indices" (uint32), "distances":
+        row i, counted in C order, is offsets[i] to offsets[i + 1]. With `padded`: "counts" (...),
+        "indices" and "distances" (..., longest row), filled up with 0xFFFFFFFF and infinity.
+        ValueError for a negative or NaN radius; InputError for a result larger than memory.
+        """
+        asked, lead = rows(queries, "queries", (self.dimension,), self.dtype)
+        radii = np.asarray(r, self.dtype)
+        if radii.ndim:
+            if radii.shape != lead:
+                raise ValueError(f"r: expected a number or shape {lead}, given {describe(radii)}")
+        radii = np.ascontiguousarray(radii.reshape(-1))
+        offsets, indices, distances = self._core.radius(
+            asked, radii, sort, self.threads if threads is None else threads
+        )
+        if not padded:
+            return {"offsets": offsets, "indices": indices, "distances": distances}
+        return _padded(offsets, indices, distances, lead)
+
+    def count(self, queries: ArrayLike, r: float, *, threads: int | None = None) -> np.ndarray:
+        """How many points lie within the distance `r` of each query: uint32, with the leading shape
+        of the queries."""
+        asked, lead = rows(queries, "queries", (self.dimension,), self.dtype)
+        counts = np.empty(lead, UINT32)
+        self._core.count(asked, r, counts.reshape(-1), self.threads if threads is None else threads)
+        return counts
+
+    def box(self, boxes: ArrayLike, *, threads: int | None = None) -> dict[str, np.ndarray]:
+        """All points in each closed box.
+
+        `boxes`: shape (..., 2 D): lowest corner, highest corner. A box with lo > hi on an axis, NaN
+        or infinity holds none. Returns "offsets" and "indices" as in `radius`, rows ascending.
+        """
+        asked, _ = rows(boxes, "boxes", (2 * self.dimension,), self.dtype)
+        offsets, indices, _ = self._core.box(asked, self.threads if threads is None else threads)
+        return {"offsets": offsets, "indices": indices}
+
+    def pairs(self, r: float, *, threads: int | None = None) -> dict[str, np.ndarray]:
+        """All pairs of points no farther apart than `r`.
+
+        Returns "pairs" (P, 2) uint32 with i < j, sorted, and "distances" (P,). Points at the same
+        place are a pair.
+        """
+        offsets, others, distances = self._core.neighbours(
+            r, False, self.threads if threads is None else threads
+        )
+        pairs = np.empty((len(others), 2), UINT32)
+        pairs[:, 0] = np.repeat(
+            np.arange(len(offsets) - 1, dtype=UINT32), np.diff(offsets).astype(np.int64)
+        )
+        pairs[:, 1] = others
+        return {"pairs": pairs, "distances": distances}
+
+    def neighbours(self, r: float, *, threads: int | None = None) -> dict[str, np.ndarray]:
+        """The points within `r` of each point, itself left out: one row for each point, as `radius`
+        has them."""
+        offsets, others, distances = self._core.neighbours(
+            r, True, self.threads if threads is None else threads
+        )
+        return {"offsets": offsets, "indices": others, "distances": distances}
+
+    def stats(self) -> dict[str, Any]:
+        """Figures of the index, and the milliseconds of its stages ("ms")."""
+        return self._core.stats()
+
+    def __len__(self) -> int:
+        """Points in the index; those left out are not."""
+        return len(self._core)
+
+    def __repr__(self) -> str:
+        return f"<raydix.Points: {len(self):,} points, {self.dimension}-D {self.dtype}>"
+
+
+def _padded(
+    offsets: np.ndarray, indices: np.ndarray, distances: np.ndarray, lead: tuple[int, ...]
+) -> dict[str, np.ndarray]:
+    """Rows of any length -> a table as wide as the longest."""
+    counts = np.diff(offsets).astype(np.int64)
+    width = int(counts.max(initial=0))
+    table = np.full((len(counts), width), MISSING, UINT32)
+    far = np.full((len(counts), width), np.inf, distances.dtype)
+    used = np.arange(width) < counts[:, None]
+    table[used] = indices
+    far[used] = distances
+    shape = lead + (width,)
+    return {
+        "counts": counts.astype(UINT32).reshape(lead),
+        "indices": table.reshape(shape),
+        "distances": far.reshape(shape),
+    }
+
+
+def load_points(file: str | os.PathLike) -> np.ndarray:
+    """The vertices of a file, (N, 3) float32: .ply, .xyz, .npy, .obj, .stl, .off, .gltf, .glb, also
+    with .gz, .xz or .zst.
+
+    InputError names the file, the element and the reason.
+    """
+    return _core.load_scene(os.fspath(file), 1)["vertices"]

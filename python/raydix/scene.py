@@ -1,0 +1,445 @@
+"""Meshes: rays, closest points, inside and outside, overlaps."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
+
+from . import _core
+from ._arrays import (
+    FLOAT32,
+    FLOAT64,
+    UINT32,
+    float_type,
+    mesh_faces,
+    mesh_vertices,
+    require_float32,
+    rows,
+)
+from ._rays import ray_batch
+from .cameras import Camera
+from .devices import CudaRays
+from .instances import Instances
+from .pictures import SceneViews
+
+QUALITIES = {"fast": ("apetrei", 0), "balanced": ("ploc", 0), "high": ("sbvh", 4)}
+"""Which builder and how many rounds of reinsertion each quality stands for."""
+
+
+class Scene(SceneViews):
+    """A triangle mesh that can be asked with rays, points and other meshes.
+
+    Parameters
+    ----------
+    vertices :
+        Shape (V, 3), float32 or float64; or, with `faces` left out, the path of a file (.ply, .obj,
+        .stl, .gltf, .glb, .off, each also with .gz, .xz or .zst), the name of a built-in scene
+        ("builtin:atrium?triangles=10000"), or an object with the attributes `vertices` and `faces`,
+        such as a `trimesh.Trimesh`.
+    faces :
+        Shape (F, 3), whole numbers: three vertex indices for each triangle.
+    quality :
+        What the tree is for: "fast" is built each frame, "balanced" once for some million rays,
+        "high" once for many.
+    builder :
+        The name of a builder, instead of `quality`: see `raydix.builders`.
+    reinsertion_rounds :
+        So often, at most 255, large subtrees are moved to better places after the build; None: what
+        `quality` asks for (4 for "high", else 0), and 0 where `builder` is given.
+    max_leaf, bits :
+        Primitives in a leaf at most, and bits of the Morton codes (30 or 63).
+    strict :
+        Triangles with a NaN, an infinite or a huge (beyond 1e12) vertex raise InputError; otherwise
+        they are left out.
+    threads :
+        Threads for builds and queries; 0: all the machine has. No result depends on it.
+    device :
+        "cpu", or "cuda" for an NVIDIA GPU: `intersect` and `occluded` then run there and take
+        arrays of CuPy, PyTorch and others that lie there. All other queries run on the processor.
+    precision :
+        "float32" (also None), or "float64": coordinates as they are given, and all answers computed
+        and returned in float64. For meshes far from the origin (float32 has steps of half a metre
+        at 5,000,000) and for more than seven digits. Rays then take three (scattered ones) to seven
+        times (those of a camera) as long, because they go through a binary tree and not through the
+        wide one.
+
+    Notes
+    -----
+    The arrays are copied: changing them later does not change the scene; `refit` does. With
+    precision "float32", coordinates given as float64, NumPy's usual type, are rounded once, here,
+    and every answer is about the rounded mesh. Trees are built when a query first needs them. Any
+    number of threads may ask at once.
+
+    With precision "float64" these raise NotImplementedError: device="cuda", `render`, `cameras`,
+    `primary_rays`, `secondary_rays`, `info`, `wide_stats`, `instances` and `raydix.simulate`; files
+    raise ValueError, because they are read in float32. Builders "split" and "sbvh" (quality "high")
+    are "sweep" there. Numbers other than 0 below 2**-500 count as 0.
+
+    Raises ValueError (InputError is one) and TypeError that name the argument, what was expected
+    and what was given.
+    """
+
+    def __init__(
+        self,
+        vertices: ArrayLike | str | os.PathLike | Any,
+        faces: ArrayLike | None = None,
+        *,
+        quality: str = "balanced",
+        builder: str | None = None,
+        reinsertion_rounds: int | None = None,
+        max_leaf: int = 4,
+        bits: int = 63,
+        strict: bool = False,
+        threads: int = 0,
+        device: str = "cpu",
+        precision: DTypeLike = None,
+    ) -> None:
+        if quality not in QUALITIES:
+            raise ValueError(f"quality: expected one of {', '.join(QUALITIES)}, given {quality!r}")
+        asked_builder, asked_rounds = (builder, 0) if builder else QUALITIES[quality]
+        if device not in ("cpu", "cuda"):
+            raise ValueError(f"device: expected 'cpu' or 'cuda', given {device!r}")
+        self.dtype = float_type(precision, "precision")
+        """float32 or float64: what the scene computes in and its results are."""
+        self.threads = threads
+        self.device = device
+        self.name = ""
+        self._cameras: list[Camera] = []
+        self._cuda: CudaRays | None = None
+        if device == "cuda":
+            require_float32(self, "device='cuda'")
+        if faces is None:
+            vertices, faces = self._from_source(vertices)
+        corners = mesh_vertices(vertices, dtype=self.dtype)
+        triangles = mesh_faces(faces, len(corners))
+        trees = _core.SceneTrees if self.dtype == FLOAT32 else _core.SceneTreesD
+        self._core: Any = trees(
+            corners,
+            triangles,
+            asked_builder,
+            asked_rounds if reinsertion_rounds is None else reinsertion_rounds,
+            bits,
+            max_leaf,
+            strict,
+            threads,
+        )
+
+    def _from_source(self, source: Any) -> tuple[Any, Any]:
+        """Vertices and faces of a file, a built-in scene or another library's mesh."""
+        if isinstance(source, (str, os.PathLike)):
+            if self.dtype != FLOAT32 and not str(source).startswith("builtin:"):
+                raise ValueError(
+                    f"precision: files are read in float32, given 'float64' and the path {source}; "
+                    "give vertices and faces as another library has read them"
+                )
+            loaded = _core.load_scene(os.fspath(source), 1)
+            self.name = loaded["name"]
+            self._cameras = [Camera(**camera) for camera in loaded["cameras"]]
+            return loaded["vertices"], loaded["faces"]
+        if hasattr(source, "vertices") and hasattr(source, "faces"):
+            return source.vertices, source.faces
+        raise TypeError(
+            "vertices: expected a path, a mesh with .vertices and .faces, "
+            "or an array together with faces, "
+            f"given {type(source).__name__} alone"
+        )
+
+    def _on_cuda(self) -> CudaRays:
+        if self._cuda is None:
+            self._cuda = CudaRays(self._core)
+        return self._cuda
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """Shape (V, 3) in `dtype`, a read-only view of the scene's copy; `refit` replaces it."""
+        return self._core.vertices
+
+    @property
+    def faces(self) -> np.ndarray:
+        """Shape (F, 3) uint32, a read-only view of the scene's copy."""
+        return self._core.faces
+
+    def __len__(self) -> int:
+        """Triangles, degenerate ones and those left out included."""
+        return len(self._core.faces)
+
+    def __repr__(self) -> str:
+        name = f" {self.name!r}" if self.name else ""
+        double = "" if self.dtype == FLOAT32 else ", float64"
+        counts = f"{len(self):,} triangles, {len(self.vertices):,} vertices"
+        return f"<raydix.Scene{name}: {counts}{double}>"
+
+    def _hits(self, hits: np.ndarray) -> dict[str, np.ndarray]:
+        """The columns of hits (..., 4): "prim" is a uint32 in the room of a scalar."""
+        prim = self.dtype.itemsize // UINT32.itemsize
+        return {
+            "t": hits[..., 0],
+            "prim": hits.view(UINT32)[..., prim],
+            "u": hits[..., 2],
+            "v": hits[..., 3],
+        }
+
+    def intersect(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        tmin: Any = None,
+        tmax: Any = None,
+        stream: int = 0,
+    ) -> dict[str, np.ndarray]:
+        """The closest hit of each ray.
+
+        Parameters
+        ----------
+        rays :
+            Shape (..., 8): origin, tmin, direction, tmax (ox oy oz tmin dx dy dz tmax); or (...,
+            6): origin, direction; or, with `directions`, (..., 3): origins. float32 or float64,
+            converted to the scene's type; any strides. Those of that type and of shape (..., 8) in
+            one run are read where they lie, without a copy.
+        directions :
+            Shape (..., 3), any length but 0; t is in its units.
+        tmin, tmax :
+            Numbers or arrays, 0 and infinity if left out: hits outside of [tmin, tmax] do not
+            count. Not with (..., 8).
+        stream :
+            Only with device="cuda" and rays that lie on the GPU, float32 of shape (..., 8): the
+            CUDA stream to run on, as a number (`cupy.cuda.get_current_stream().ptr`). Results are
+            then arrays of the same library, on the GPU, and not waited for.
+
+        Returns
+        -------
+        dict of arrays with the leading shape of the rays: "t" (the scene's type; infinity: nothing
+        was hit), "prim" (uint32, the position in `faces`; 0xFFFFFFFF: nothing), "u" and "v" (the
+        scene's type): the point is (1-u-v)*v0 + u*v1 + v*v2. All four are views of one array. At
+        equal t the lower "prim" wins. Rays through an edge hit at least one of its triangles (Woop,
+        Benthin, Wald 2013). Rays with NaN, a zero direction or tmin > tmax miss.
+        """
+        if self.device == "cuda":
+            return self._on_cuda().intersect(rays, directions, tmin, tmax, stream)
+        args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
+        hits = np.empty(lead + (4,), self.dtype)
+        self._core.intersect(*args, hits if hits.ndim == 2 else hits.reshape(-1, 4), self.threads)
+        return self._hits(hits)
+
+    def occluded(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        tmin: Any = None,
+        tmax: Any = None,
+        stream: int = 0,
+    ) -> np.ndarray:
+        """Whether each ray hits anything at all: bool, with the leading shape of the rays. Rays as
+        in `intersect`.
+
+        For rays that lie on a GPU: uint8, 1 or 0, there.
+        """
+        if self.device == "cuda":
+            return self._on_cuda().occluded(rays, directions, tmin, tmax, stream)
+        args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
+        flags = np.empty(lead, np.bool_)
+        self._core.occluded(*args, flags.reshape(-1), self.threads)
+        return flags
+
+    def count(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        tmin: Any = None,
+        tmax: Any = None,
+    ) -> np.ndarray:
+        """How many triangles each ray hits: uint32, with the leading shape of the rays. Rays as in
+        `intersect`.
+
+        Edges are half open, as in `all_hits`: on a closed mesh the number is even for rays that
+        start outside, through edges and vertices too.
+        """
+        args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
+        counts = np.empty(lead, UINT32)
+        self._core.count(*args, counts.reshape(-1), self.threads)
+        return counts
+
+    def all_hits(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        tmin: Any = None,
+        tmax: Any = None,
+    ) -> dict[str, np.ndarray]:
+        """Every hit of every ray, from one traversal. Rays as in `intersect`.
+
+        Returns a dict: "offsets" (uint64, one more than there are rays); those of ray i, counted in
+        C order, stand at offsets[i] to offsets[i + 1] of "t", "prim", "u", "v", which are as in
+        `intersect`, sorted by (t, prim). Each triangle counts once a ray; an edge belongs to one of
+        its two triangles, so that crossings of a closed mesh are counted exactly.
+        """
+        args, _ = ray_batch(rays, directions, tmin, tmax, self.dtype)
+        offsets, hits, _ = self._core.all_hits(*args, self.threads)
+        return {"offsets": offsets, **self._hits(hits)}
+
+    def closest_point(
+        self, points: ArrayLike, *, max_distance: float = np.inf
+    ) -> dict[str, np.ndarray]:
+        """The point of the mesh that is closest to each query.
+
+        `points`: shape (..., 3), converted to the scene's type. Beyond `max_distance` nothing is
+        found. Returns a dict of arrays with the leading shape of the queries: "point" (..., 3),
+        "distance", "u" and "v" in the scene's type, "prim" uint32. At equal distances the lower
+        "prim" wins; nothing found: infinity and 0xFFFFFFFF. ValueError for a negative or NaN
+        `max_distance`.
+        """
+        asked, lead = rows(points, "points", (3,), self.dtype)
+        places = np.empty((len(asked), 7), self.dtype)
+        self._core.closest(asked, places, max_distance, self.threads)
+        places = places.reshape(lead + (7,))
+        ids = places.view(UINT32)[..., 4 * (self.dtype.itemsize // UINT32.itemsize)]
+        return {
+            "point": places[..., :3],
+            "distance": places[..., 3],
+            "prim": ids,
+            "u": places[..., 5],
+            "v": places[..., 6],
+        }
+
+    def signed_distance(
+        self, points: ArrayLike, *, max_distance: float = np.inf, rule: str = "automatic"
+    ) -> np.ndarray:
+        """Distance of each point from the mesh, negative inside: in the scene's type, with the
+        leading shape of the queries.
+
+        (`trimesh.proximity.signed_distance` has the other sign.) `rule` as in `contains`. Beyond
+        `max_distance` the answer is infinite, with its sign; for points with NaN or infinity it is
+        infinite.
+        """
+        asked, lead = rows(points, "points", (3,), self.dtype)
+        distances = np.empty(lead, self.dtype)
+        self._core.signed_distance(asked, distances.reshape(-1), max_distance, rule, self.threads)
+        return distances
+
+    def contains(self, points: ArrayLike, *, rule: str = "automatic") -> np.ndarray:
+        """Whether each point is inside of the mesh: bool, with the leading shape of the queries.
+
+        `rule`: "crossings" (signed crossings to infinity are not 0), "parity" (their number is
+        odd), "winding" (generalized winding number of 1/2 or more, Jacobson et al. 2013: for meshes
+        with holes), or "automatic": the first of these that the mesh is closed enough for. The
+        first two are decided without rounding, at edges and vertices too, and points of the surface
+        are inside. Points with NaN or infinity are outside.
+        """
+        asked, lead = rows(points, "points", (3,), self.dtype)
+        flags = np.empty(lead, np.bool_)
+        self._core.contains(asked, flags.reshape(-1), rule, self.threads)
+        return flags
+
+    def winding_number(self, points: ArrayLike, *, rule: str = "automatic") -> np.ndarray:
+        """The number that `contains` decides by: float64, with the leading shape; NaN for points
+        with NaN or infinity."""
+        asked, lead = rows(points, "points", (3,), self.dtype)
+        numbers = np.empty(lead, FLOAT64)
+        self._core.winding(asked, numbers.reshape(-1), rule, self.threads)
+        return numbers
+
+    def overlaps(
+        self, other: Scene | None = None, *, narrow: bool = False, max_bytes: int = 0
+    ) -> np.ndarray:
+        """All pairs of triangles whose boxes overlap: shape (P, 2) uint32, sorted.
+
+        Within this scene (i < j; pairs that share a corner are left out), or between it and `other`
+        (i of this one, j of `other`). With `narrow` the triangles themselves must meet, decided
+        without rounding. InputError if the result would take more than `max_bytes` (0: a quarter of
+        the memory that is available): no pair is ever dropped. TypeError for scenes of different
+        types.
+        """
+        return self._core.overlaps(self._partner(other), narrow, max_bytes, self.threads)
+
+    def _partner(self, other: Scene | None) -> Any:
+        """The core of a scene that this one can be held against."""
+        if other is None:
+            return None
+        if other.dtype != self.dtype:
+            raise TypeError(
+                f"other: expected a scene in {self.dtype}, as this one, given one in {other.dtype}"
+            )
+        return other._core
+
+    def count_overlaps(self, other: Scene | None = None, *, narrow: bool = False) -> int:
+        """How many pairs `overlaps` would give, without keeping them."""
+        return self._core.count_overlaps(self._partner(other), narrow, self.threads)
+
+    def touched_by(
+        self,
+        *,
+        spheres: ArrayLike | None = None,
+        segments: ArrayLike | None = None,
+        max_bytes: int = 0,
+    ) -> dict[str, np.ndarray]:
+        """All triangles that each ball (x y z radius, shape (..., 4)) or segment (two points, shape
+        (..., 6)) touches.
+
+        Returns a dict: "offsets" (uint64, one more than queries) and "prim" (uint32, ascending in
+        each row). `max_bytes` as in `overlaps`.
+        """
+        if (spheres is None) == (segments is None):
+            raise ValueError("touched_by: expected either spheres or segments")
+        if spheres is not None:
+            shapes, _ = rows(spheres, "spheres", (4,), self.dtype)
+            offsets, prims = self._core.touched_by_spheres(shapes, max_bytes, self.threads)
+        else:
+            shapes, _ = rows(segments, "segments", (6,), self.dtype)
+            offsets, prims = self._core.touched_by_segments(shapes, max_bytes, self.threads)
+        return {"offsets": offsets, "prim": prims}
+
+    def refit(self, vertices: ArrayLike) -> dict[str, float]:
+        """Moves the vertices, shape (V, 3) as before, converted to the scene's type; the tree keeps
+        its hierarchy, its boxes are fitted again.
+
+        Returns "sah", "sah_at_build" and their "ratio": from about 1.5 on a new Scene is usually
+        worth its time. InputError, the scene unchanged: triangles that were valid are so no more,
+        or the other way round; a tree with parts of triangles (builders split and sbvh, quality
+        "high", in float32). Waits for queries of other threads.
+        """
+        corners = mesh_vertices(vertices, dtype=self.dtype)
+        if len(corners) != len(self.vertices):
+            raise ValueError(
+                f"vertices: expected shape ({len(self.vertices)}, 3), given {corners.shape}"
+            )
+        self._cuda = None
+        return self._core.refit(corners, self.threads)
+
+    def instances(self, transforms: ArrayLike, *, masks: ArrayLike | None = None) -> Instances:
+        """This scene placed many times: see `raydix.Instances`. `transforms`: shape (M, 3, 4) or
+        (M, 4, 4)."""
+        return Instances([self], transforms, masks=masks)
+
+    def info(self) -> dict[str, Any]:
+        """Counts, bounds and degenerate elements of the mesh."""
+        require_float32(self, "info")
+        return self._core.info()
+
+    def stats(self) -> dict[str, Any]:
+        """Figures of the binary tree, its hash, and the milliseconds of its stages ("ms")."""
+        return self._core.stats()
+
+    def wide_stats(self) -> dict[str, Any]:
+        """Figures of the wide tree that rays go through."""
+        require_float32(self, "wide_stats")
+        return self._core.wide_stats()
+
+    def closure(self) -> dict[str, Any]:
+        """ "closure": "open", "closed" or "oriented"; "open_edges": edges of an odd number of
+        triangles; "rule": the rule that "automatic" stands for in `contains`."""
+        kind, open_edges, rule = self._core.closure()
+        return {"closure": kind, "open_edges": open_edges, "rule": rule}
+
+    def check(self) -> None:
+        """Verifies every invariant of the binary tree (in float64: of its boxes); RuntimeError
+        names the first that does not hold."""
+        ok, broken = self._core.check()
+        if not ok:
+            raise RuntimeError(broken)

@@ -1,0 +1,201 @@
+"""Trees as arrays: BVHs, octrees and k-d trees over triangles or points, with their statistics."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _core
+from ._arrays import (
+    FLOAT32,
+    UINT32,
+    mesh_faces,
+    mesh_vertices,
+    require_float32,
+    rows,
+    to_numpy,
+)
+
+BVH_NODE = np.dtype([("lo", "<f4", 3), ("first", "<u4"), ("hi", "<f4", 3), ("count", "<u4")])
+"""32 bytes. Leaf: count > 0, order[first : first + count]. Inner: count 0, children are nodes first
+and first + 1. Slot 1 is padding."""
+
+OCTREE_NODE = np.dtype(
+    [
+        ("code", "<u8"),
+        ("parent", "<u4"),
+        ("first_child", "<u4"),
+        ("first_point", "<u4"),
+        ("point_count", "<u4"),
+        ("child_mask", "<u4"),
+        ("level", "<u4"),
+    ]
+)
+"""32 bytes. `code`: the cell's coordinates on its level, interleaved. Leaf: child_mask 0;
+0xFFFFFFFF stands for no node."""
+
+KD_NODE = np.dtype([("lo", "<f4"), ("hi", "<f4"), ("plane", "<f4"), ("link", "<u4")])
+"""16 bytes. link & 3: axis, or 3 for a leaf. Inner: children at slots 2 * (link >> 2) + 2 and the
+next. Leaf: link >> 2 primitives from `plane` seen as uint32 on, in the order."""
+
+
+def _mesh(vertices: Any, faces: Any) -> tuple[np.ndarray, np.ndarray]:
+    if faces is None and hasattr(vertices, "faces") and hasattr(vertices, "vertices"):
+        if hasattr(vertices, "dtype"):
+            require_float32(vertices, "trees as arrays")
+        vertices, faces = vertices.vertices, vertices.faces
+    corners = mesh_vertices(vertices)
+    return corners, np.zeros((0, 3), UINT32) if faces is None else mesh_faces(faces, len(corners))
+
+
+class _Tree:
+    """What the three kinds have in common."""
+
+    def __init__(self, core: Any, node: np.dtype) -> None:
+        self._core = core
+        self._node = node
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """The nodes as a structured array, read-only: the tree's own memory. Node 0 is the root; an
+        empty tree has none."""
+        raw = self._core.nodes
+        return raw.reshape(-1).view(self._node) if len(raw) else np.empty(0, self._node)
+
+    @property
+    def order(self) -> np.ndarray:
+        """Which primitive stands at each position of the leaves: uint32."""
+        return self._core.order
+
+    @property
+    def ms(self) -> dict[str, float]:
+        """Milliseconds of the stages of the build."""
+        return self._core.ms
+
+    @property
+    def left_out(self) -> int:
+        """Primitives that are not in the tree, because they are not finite or too large."""
+        return self._core.left_out
+
+    def stats(self) -> dict[str, Any]:
+        """Figures of the tree, and its hash: equal exactly when the trees are."""
+        return self._core.stats()
+
+    def check(self) -> None:
+        """Verifies every invariant; RuntimeError names the first that does not hold."""
+        self._core.check()
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.order):,} primitives, {len(self.nodes):,} nodes"
+        return f"<raydix.{type(self).__name__}: {counts}>"
+
+
+class Bvh(_Tree):
+    """A binary bounding volume hierarchy, made by `raydix.bvh`. Its nodes are
+    `raydix.trees.BVH_NODE`."""
+
+    def stats(
+        self, *, epo: bool = False, node_cost: float = 1.0, primitive_cost: float = 1.0
+    ) -> dict[str, Any]:
+        """Figures of the tree: "sah" with these costs, "epo" (Aila, Karras, Laine 2013) if asked
+        for, and the hash."""
+        return self._core.stats(epo, node_cost, primitive_cost)
+
+
+class Octree(_Tree):
+    """An octree (Karras 2012, section 5), made by `raydix.octree`. Its nodes are
+    `raydix.trees.OCTREE_NODE`."""
+
+    @property
+    def points(self) -> np.ndarray:
+        """The points in the order of the leaves, (N, 3) float32; of triangles the centres of their
+        boxes."""
+        return self._core.points
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Lowest and highest corner of the primitives."""
+        return self._core.bounds
+
+    def boxes(self, nodes: ArrayLike) -> np.ndarray:
+        """The cubes of nodes, given by their numbers (M,): (M, 6) float32, lowest corner and
+        highest. InputError: no such node."""
+        numbers = to_numpy(nodes, "nodes")
+        return self._core.boxes(np.ascontiguousarray(numbers.reshape(-1), UINT32))
+
+    def locate(self, points: ArrayLike) -> np.ndarray:
+        """The deepest node that holds each point (..., 3): uint32, 0xFFFFFFFF outside of the
+        root."""
+        asked, lead = rows(points, "points", (3,), FLOAT32)
+        return self._core.locate(asked).reshape(lead)
+
+    def points_in_boxes(self, boxes: ArrayLike) -> dict[str, np.ndarray]:
+        """Points in closed boxes (..., 6): "offsets" and "indices", rows ascending."""
+        asked, _ = rows(boxes, "boxes", (6,), FLOAT32)
+        offsets, indices = self._core.points_in_boxes(asked)
+        return {"offsets": offsets, "indices": indices}
+
+
+class KdTree(_Tree):
+    """A k-d tree (Karras 2012, section 5), made by `raydix.kdtree`. Its nodes are
+    `raydix.trees.KD_NODE`."""
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Lowest and highest corner of the primitives."""
+        return self._core.bounds
+
+
+def bvh(
+    vertices: ArrayLike,
+    faces: ArrayLike | None = None,
+    *,
+    builder: str = "karras",
+    bits: int = 63,
+    max_leaf: int = 4,
+    strict: bool = False,
+    threads: int = 0,
+) -> Bvh:
+    """A BVH over triangles; over the vertices as points if there are no faces.
+
+    `builder`: one of `raydix.builders()`. "karras", "lauterbach", "garanzha" and "apetrei" give the
+    same tree bit for bit. The same tree for every number of threads. Arguments as in
+    `raydix.Scene`.
+    """
+    return Bvh(
+        _core.Bvh(*_mesh(vertices, faces), builder, bits, max_leaf, strict, threads), BVH_NODE
+    )
+
+
+def octree(
+    vertices: ArrayLike,
+    faces: ArrayLike | None = None,
+    *,
+    bits: int = 63,
+    max_level: int = -1,
+    max_leaf: int = 4,
+    strict: bool = False,
+    threads: int = 0,
+) -> Octree:
+    """An octree over points, or over the centres of triangles: nodes with more than `max_leaf` are
+    divided, down to `max_level`."""
+    return Octree(
+        _core.Octree(*_mesh(vertices, faces), bits, max_level, max_leaf, strict, threads),
+        OCTREE_NODE,
+    )
+
+
+def kdtree(
+    vertices: ArrayLike,
+    faces: ArrayLike | None = None,
+    *,
+    bits: int = 63,
+    max_leaf: int = 0,
+    strict: bool = False,
+    threads: int = 0,
+) -> KdTree:
+    """A k-d tree over triangles or points. `max_leaf` 0: 8 points or 4 triangles. For neighbours
+    use `raydix.Points`: it is faster."""
+    return KdTree(_core.KdTree(*_mesh(vertices, faces), bits, max_leaf, strict, threads), KD_NODE)

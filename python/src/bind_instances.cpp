@@ -1,0 +1,207 @@
+// Scenes placed many times, and rays through them.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/variant.h>
+#include <raydix/instances.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "arrays.h"
+#include "batch.h"
+#include "bindings.h"
+#include "ray_parts.h"
+#include "scene_trees.h"
+
+namespace raydix::python {
+namespace {
+
+using TransformRows = In<float, nb::shape<-1, 12>>;
+using Ids = In<std::uint32_t, nb::ndim<1>>;
+using FlagsOut = Out<bool, nb::ndim<1>>;
+
+/// What rays find, as one row of an array.
+struct PlacedHit {
+    Hit hit;
+    std::uint32_t object, instance;
+};
+static_assert(sizeof(PlacedHit) == 24);
+
+/// The objects' trees must outlive this: the binding keeps them.
+class PlacedScenes {
+public:
+    PlacedScenes(std::vector<SceneTrees*> scenes, std::span<const Transform> transforms,
+                 std::span<const std::uint32_t> objects, std::span<const std::uint32_t> masks,
+                 int threads)
+        : scenes_(std::move(scenes)), threads_(threads) {
+        distinct_ = scenes_;
+        std::sort(distinct_.begin(), distinct_.end(), std::less<>());
+        distinct_.erase(std::unique(distinct_.begin(), distinct_.end()), distinct_.end());
+        const auto locks = hold();
+        for (SceneTrees* scene : scenes_) ids_.push_back(placed_.add_object(scene->bvh()));
+        for (std::size_t i = 0; i < transforms.size(); ++i)
+            placed_.add_instance(InstancedScene::scene,
+                                 {ids_[objects[i]], transforms[i], masks[i]});
+        build();
+    }
+
+    void move(std::span<const Transform> transforms, int threads) {
+        const std::unique_lock lock(use_);
+        const auto locks = hold();
+        threads_ = threads;
+        for (std::uint32_t i = 0; i < transforms.size(); ++i) {
+            Instance instance = placed_.instance(InstancedScene::scene, i);
+            instance.transform = transforms[i];
+            placed_.set_instance(InstancedScene::scene, i, instance);
+        }
+        build();
+    }
+
+    [[nodiscard]] std::uint32_t size() const { return placed_.instance_count(); }
+
+    /// Calls ask(scene, begin, end) for pieces of n rays; the objects stay as they are meanwhile.
+    template <class Ask>
+    void read_in_pieces(std::size_t n, const Ask& ask) {
+        std::shared_lock<std::shared_mutex> lock(use_, std::defer_lock);
+        std::vector<Reading> locks;
+        in_pieces(n, [&](std::size_t begin, std::size_t end) {
+            if (!lock.owns_lock()) {
+                lock.lock();
+                locks = hold();
+                rebuild_if_moved();
+            }
+            ask(std::as_const(placed_), begin, end);
+        });
+    }
+
+private:
+    [[nodiscard]] std::vector<Reading> hold() const {
+        std::vector<Reading> locks;
+        for (SceneTrees* scene : distinct_) locks.push_back(scene->read());
+        return locks;
+    }
+    void build() {
+        versions_.clear();
+        for (SceneTrees* scene : scenes_) versions_.push_back(scene->version());
+        placed_.build(threads_for(threads_));
+    }
+    /// A refit moved an object's boxes, which the tree over the places stands on.
+    void rebuild_if_moved() {
+        const std::lock_guard lock(rebuild_);
+        for (std::size_t i = 0; i < scenes_.size(); ++i)
+            if (scenes_[i]->version() != versions_[i]) return build();
+    }
+
+    std::vector<SceneTrees*> scenes_, distinct_;
+    std::vector<std::uint32_t> ids_;
+    std::vector<std::uint64_t> versions_;
+    InstancedScene placed_;
+    std::shared_mutex use_;
+    std::mutex rebuild_;
+    int threads_;
+};
+
+void make(PlacedScenes* self, const nb::tuple& scenes, const TransformRows& transforms,
+          const Ids& objects, const Ids& masks, int threads) {
+    static_assert(sizeof(Transform) == 12 * sizeof(float));
+    std::vector<SceneTrees*> trees;
+    for (nb::handle scene : scenes) trees.push_back(&nb::cast<SceneTrees&>(scene));
+    const auto placed = rows<Transform>(transforms);
+    const std::span which(objects.data(), objects.shape(0)), mask(masks.data(), masks.shape(0));
+    if (which.size() != placed.size() || mask.size() != placed.size())
+        throw nb::value_error("objects, masks and transforms differ in length");
+    for (const std::uint32_t object : which)
+        if (object >= trees.size()) throw nb::value_error("objects: no such scene");
+    const nb::gil_scoped_release unlocked;
+    new (self) PlacedScenes(std::move(trees), placed, which, mask, threads);
+}
+
+void move(PlacedScenes& self, const TransformRows& transforms, int threads) {
+    const auto placed = rows<Transform>(transforms);
+    if (placed.size() != self.size())
+        throw nb::value_error("transforms: another number than there are places");
+    const nb::gil_scoped_release unlocked;
+    self.move(placed, threads);
+}
+
+template <class Rays>
+Array2<float> intersect(PlacedScenes& self, Rays& rays, std::uint32_t mask, int threads) {
+    Buffer<PlacedHit> hits(rays.size());
+    const InstanceTraceOptions options{.mask = mask, .threads = threads_for(threads)};
+    self.read_in_pieces(
+        rays.size(), [&](const InstancedScene& scene, std::size_t begin, std::size_t end) {
+            const std::vector<InstanceHit> found = trace(scene, rays.piece(begin, end), options);
+            for (std::size_t i = 0; i < found.size(); ++i)
+                hits[begin + i] = {found[i].hit, found[i].object, found[i].path[0]};
+        });
+    return hand_over_rows<float>(std::move(hits));
+}
+
+template <class Rays>
+void occluded(PlacedScenes& self, Rays& rays, const FlagsOut& out, std::uint32_t mask,
+              int threads) {
+    const std::span flags(reinterpret_cast<std::uint8_t*>(out.data()), out.shape(0));
+    if (flags.size() != rays.size())
+        throw nb::value_error("a result has another length than its queries");
+    const InstanceTraceOptions options{.mask = mask, .threads = threads_for(threads)};
+    self.read_in_pieces(
+        rays.size(), [&](const InstancedScene& scene, std::size_t begin, std::size_t end) {
+            trace_any(scene, rays.piece(begin, end), flags.subspan(begin, end - begin), options);
+        });
+}
+
+}  // namespace
+
+void bind_instances(nb::module_& module) {
+    using Columns = StridedRows;
+    nb::class_<PlacedScenes>(module, "Instances", "Placed scenes; raydix.Instances is what to use.")
+        .def("__init__", &make, nb::keep_alive<1, 2>(), nb::arg("scenes"),
+             nb::arg("transforms").noconvert(), nb::arg("objects").noconvert(),
+             nb::arg("masks").noconvert(), nb::arg("threads"))
+        .def("move", &move, nb::arg("transforms").noconvert(), nb::arg("threads"))
+        .def("__len__", &PlacedScenes::size)
+        .def(
+            "intersect",
+            [](PlacedScenes& self, const RaysIn& rays, std::uint32_t mask, int threads) {
+                RayRows<Ray> batch(rays);
+                return intersect(self, batch, mask, threads);
+            },
+            nb::arg("rays").noconvert(), nb::arg("mask"), nb::arg("threads"))
+        .def(
+            "intersect",
+            [](PlacedScenes& self, const Columns& origins, const Columns& directions,
+               const Limits& tmin, const Limits& tmax, std::uint32_t mask, int threads) {
+                RayParts<Ray> batch(origins, directions, tmin, tmax);
+                return intersect(self, batch, mask, threads);
+            },
+            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
+            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("mask"),
+            nb::arg("threads"))
+        .def(
+            "occluded",
+            [](PlacedScenes& self, const RaysIn& rays, const FlagsOut& flags, std::uint32_t mask,
+               int threads) {
+                RayRows<Ray> batch(rays);
+                occluded(self, batch, flags, mask, threads);
+            },
+            nb::arg("rays").noconvert(), nb::arg("flags").noconvert(), nb::arg("mask"),
+            nb::arg("threads"))
+        .def(
+            "occluded",
+            [](PlacedScenes& self, const Columns& origins, const Columns& directions,
+               const Limits& tmin, const Limits& tmax, const FlagsOut& flags, std::uint32_t mask,
+               int threads) {
+                RayParts<Ray> batch(origins, directions, tmin, tmax);
+                occluded(self, batch, flags, mask, threads);
+            },
+            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
+            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("flags").noconvert(),
+            nb::arg("mask"), nb::arg("threads"));
+}
+
+}  // namespace raydix::python

@@ -1,0 +1,541 @@
+// Meshes: rays, closest points, inside and outside, overlaps.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/variant.h>
+#include <raydix/check.h>
+#include <raydix/closest.h>
+#include <raydix/double.h>
+#include <raydix/error.h>
+#include <raydix/overlap.h>
+#include <raydix/pairs.h>
+#include <raydix/trace.h>
+#include <raydix/wide.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "arrays.h"
+#include "batch.h"
+#include "bindings.h"
+#include "figures.h"
+#include "lists.h"
+#include "ray_parts.h"
+#include "scene_trees.h"
+
+namespace raydix::python {
+namespace {
+
+using Counts = std::pair<std::uint64_t, std::uint64_t>;  // hits or found, invalid
+using FlagsOut = Out<bool, nb::ndim<1>>;
+
+/// Throws what an output of another length deserves: memory past its end is not ours.
+void require_length(std::size_t length, std::size_t wanted) {
+    if (length != wanted) throw nb::value_error("a result has another length than its queries");
+}
+
+BuildOptions build_options(const std::string& builder, int reinsertion_rounds, int bits,
+                           int max_leaf, bool strict, int threads) {
+    return {.builder = builder_from_name(builder),
+            .bits = bits,
+            .max_leaf = max_leaf,
+            .strict = strict,
+            .threads = threads,
+            .reinsertion_rounds = reinsertion_rounds};
+}
+
+// What both types of scenes call by the same names.
+template <class Scene>
+using Scalar = typename Scene::Types::Scalar;
+template <class Scene>
+using Point = typename Scene::Types::Point;
+template <class Scene>
+using PointRows = In<Scalar<Scene>, nb::shape<-1, 3>>;
+template <class Scene>
+using ValuesOut = Out<Scalar<Scene>, nb::ndim<1>>;
+/// Rows of structs in scalars; a whole number takes the room of one: t, prim, u, v of hits.
+template <class Scene>
+using HitRows = Out<Scalar<Scene>, nb::shape<-1, 4>>;
+static_assert(sizeof(Hit) == 4 * sizeof(float) && sizeof(HitD) == 4 * sizeof(double));
+/// x, y, z, distance, prim, u, v of closest points.
+template <class Scene>
+using PlaceRows = Out<Scalar<Scene>, nb::shape<-1, 7>>;
+static_assert(sizeof(ClosestPoint) == 7 * sizeof(float) &&
+              sizeof(ClosestPointD) == 7 * sizeof(double));
+
+template <class Scene>
+void make_scene(Scene* self, const PointRows<Scene>& vertices, const FacesIn& faces,
+                const std::string& builder, int reinsertion_rounds, int bits, int max_leaf,
+                bool strict, int threads) {
+    const auto corners = rows<Point<Scene>>(vertices);
+    const auto triangles = rows<Triangle>(faces);
+    const BuildOptions options =
+        build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads);
+    const nb::gil_scoped_release unlocked;
+    new (self) Scene({{}, {corners.begin(), corners.end()}, {triangles.begin(), triangles.end()}},
+                     options);
+}
+
+/// As in_pieces, and the trees stay as they are from the first piece to the last.
+template <class Scene, class Body>
+void read_in_pieces(Scene& scene, std::size_t n, const Body& body) {
+    Reading lock;
+    in_pieces(n, [&](std::size_t begin, std::size_t end) {
+        if (!lock.owns_lock()) lock = scene.read();
+        body(begin, end);
+    });
+}
+
+/// So few rays are traced on the caller's thread, one by one: a batch's set-up would cost more.
+constexpr std::size_t few_rays = 8;
+
+/// Contract.md 3: what cannot hit anything.
+template <class RayType>
+bool is_valid(const RayType& ray) {
+    const auto finite = [](const auto& v) {
+        return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+    };
+    return finite(ray.origin) && finite(ray.direction) &&
+           (ray.direction.x != 0 || ray.direction.y != 0 || ray.direction.z != 0) &&
+           std::max(ray.tmin, decltype(ray.tmin){0}) <= ray.tmax && !std::isnan(ray.tmin);
+}
+
+template <class Scene, class Rays>
+Counts intersect(Scene& scene, Rays& rays, const HitRows<Scene>& out, int threads) {
+    const auto hits = rows_out<typename Scene::Types::Hit>(out);
+    require_length(hits.size(), rays.size());
+    const TraceOptions options{.threads = threads_for(threads)};
+    Counts counts{0, 0};
+    read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
+        const auto piece = rays.piece(begin, end);
+        if (rays.size() <= few_rays) {
+            for (std::size_t i = 0; i < piece.size(); ++i) {
+                hits[i] = closest_hit(scene.ray_tree(), piece[i]);
+                counts.first += hits[i].hit();
+                counts.second += !is_valid(piece[i]);
+            }
+            return;
+        }
+        const TraceCounts met =
+            trace(scene.ray_tree(), piece, hits.subspan(begin, end - begin), options);
+        counts.first += met.hits;
+        counts.second += met.invalid_rays;
+    });
+    return counts;
+}
+
+template <class Scene, class Rays>
+Counts occluded(Scene& scene, Rays& rays, const FlagsOut& out, int threads) {
+    const std::span flags(reinterpret_cast<std::uint8_t*>(out.data()), out.shape(0));
+    require_length(flags.size(), rays.size());
+    const TraceOptions options{.threads = threads_for(threads)};
+    Counts counts{0, 0};
+    read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
+        const auto piece = rays.piece(begin, end);
+        if (rays.size() <= few_rays) {
+            for (std::size_t i = 0; i < piece.size(); ++i) {
+                flags[i] = any_hit(scene.ray_tree(), piece[i]);
+                counts.first += flags[i];
+                counts.second += !is_valid(piece[i]);
+            }
+            return;
+        }
+        const TraceCounts met =
+            trace_any(scene.ray_tree(), piece, flags.subspan(begin, end - begin), options);
+        counts.first += met.hits;
+        counts.second += met.invalid_rays;
+    });
+    return counts;
+}
+
+template <class Scene, class Rays>
+nb::tuple all_hits(Scene& scene, Rays& rays, int threads) {
+    const TraceOptions options{.threads = threads_for(threads)};
+    std::vector<typename Scene::Types::AllHits> pieces;
+    std::uint64_t invalid = 0;
+    read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
+        pieces.push_back(trace_all(scene.ray_tree(), rays.piece(begin, end), options));
+        invalid += pieces.back().counts.invalid_rays;
+    });
+    auto offsets = join_offsets(pieces);
+    return nb::make_tuple(
+        offsets, hand_over_rows<Scalar<Scene>>(join_column(pieces, &Scene::Types::AllHits::hits)),
+        invalid);
+}
+
+template <class Scene, class Rays>
+Counts count_hits(Scene& scene, Rays& rays, const Out<std::uint32_t, nb::ndim<1>>& out,
+                  int threads) {
+    require_length(out.shape(0), rays.size());
+    const TraceOptions options{.threads = threads_for(threads)};
+    Counts counts{0, 0};
+    // Smaller pieces: what is counted is first listed.
+    read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
+        constexpr std::size_t part = piece_size / 8;
+        for (std::size_t first = begin; first < end; first += part) {
+            const std::size_t last = std::min(end, first + part);
+            const auto all = trace_all(scene.ray_tree(), rays.piece(first, last), options);
+            for (std::size_t i = first; i < last; ++i)
+                out.data()[i] =
+                    static_cast<std::uint32_t>(all.offsets[i - first + 1] - all.offsets[i - first]);
+            counts.first += all.counts.hits;
+            counts.second += all.counts.invalid_rays;
+        }
+    });
+    return counts;
+}
+
+template <class Scene>
+Counts closest(Scene& scene, const PointRows<Scene>& points, const PlaceRows<Scene>& out,
+               Scalar<Scene> max_distance, int threads) {
+    const auto queries = rows<Point<Scene>>(points);
+    const auto results = rows_out<typename Scene::Types::ClosestPoint>(out);
+    require_length(results.size(), queries.size());
+    const typename Scene::Types::ClosestOptions options{.max_distance = max_distance,
+                                                        .threads = threads_for(threads)};
+    Counts counts{0, 0};
+    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
+        const ClosestCounts met = closest_points(scene.bvh(), queries.subspan(begin, end - begin),
+                                                 results.subspan(begin, end - begin), options);
+        counts.first += met.found;
+        counts.second += met.invalid_queries;
+    });
+    return counts;
+}
+
+InsideRule inside_rule(const std::string& name) {
+    static const std::pair<const char*, InsideRule> rules[] = {{"automatic", InsideRule::automatic},
+                                                               {"crossings", InsideRule::crossings},
+                                                               {"parity", InsideRule::parity},
+                                                               {"winding", InsideRule::winding}};
+    for (const auto& [known, rule] : rules)
+        if (name == known) return rule;
+    throw InputError("unknown rule \"" + name +
+                     "\"; known are automatic, crossings, parity, winding");
+}
+
+template <class Scene>
+Counts signed_distance(Scene& scene, const PointRows<Scene>& points, const ValuesOut<Scene>& out,
+                       Scalar<Scene> max_distance, const std::string& rule_name, int threads) {
+    const auto queries = rows<Point<Scene>>(points);
+    const std::span distances(out.data(), out.shape(0));
+    require_length(distances.size(), queries.size());
+    const InsideRule rule = inside_rule(rule_name);
+    const typename Scene::Types::ClosestOptions options{.max_distance = max_distance,
+                                                        .threads = threads_for(threads)};
+    Counts counts{0, 0};
+    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
+        const ClosestCounts met =
+            signed_distances(scene.solid(rule), queries.subspan(begin, end - begin),
+                             distances.subspan(begin, end - begin), options);
+        counts.first += met.found;
+        counts.second += met.invalid_queries;
+    });
+    return counts;
+}
+
+template <class Scene>
+Counts inside(Scene& scene, const PointRows<Scene>& points, const FlagsOut& out,
+              const std::string& rule_name, int threads) {
+    const auto queries = rows<Point<Scene>>(points);
+    const std::span flags(reinterpret_cast<std::uint8_t*>(out.data()), out.shape(0));
+    require_length(flags.size(), queries.size());
+    const InsideRule rule = inside_rule(rule_name);
+    Counts counts{0, 0};
+    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
+        const ClosestCounts met = contains(scene.solid(rule), queries.subspan(begin, end - begin),
+                                           flags.subspan(begin, end - begin), threads_for(threads));
+        counts.first += met.found;
+        counts.second += met.invalid_queries;
+    });
+    return counts;
+}
+
+template <class Scene>
+void winding(Scene& scene, const PointRows<Scene>& points, const Out<double, nb::ndim<1>>& out,
+             const std::string& rule_name, int threads) {
+    const auto queries = rows<Point<Scene>>(points);
+    require_length(out.shape(0), queries.size());
+    const InsideRule rule = inside_rule(rule_name);
+    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
+        const std::vector<double> numbers = winding_numbers(
+            scene.solid(rule), queries.subspan(begin, end - begin), threads_for(threads));
+        std::copy(numbers.begin(), numbers.end(), out.data() + begin);
+    });
+}
+
+/// closure, open edges, and the rule that `automatic` stands for.
+template <class Scene>
+nb::tuple closure(Scene& scene) {
+    static const char* const closures[] = {"open", "closed", "oriented"};
+    static const char* const rules[] = {"automatic", "crossings", "parity", "winding"};
+    const auto [kind, open_edges, rule] = [&] {
+        const nb::gil_scoped_release unlocked;
+        const auto lock = scene.read();
+        const auto& solid = scene.solid(InsideRule::automatic);
+        return std::tuple(solid.closure(), solid.open_edges(), solid.rule());
+    }();
+    return nb::make_tuple(closures[static_cast<int>(kind)], open_edges,
+                          rules[static_cast<int>(rule)]);
+}
+
+/// One lock for a scene that is asked about itself: two of the same thread may block each other.
+template <class Scene, class Call>
+auto with_two(Scene& scene, Scene* other, const Call& call) {
+    const nb::gil_scoped_release unlocked;
+    Scene* const last = other == nullptr ? &scene : other;
+    Reading first_lock, second_lock;
+    first_lock = std::min(&scene, last, std::less<>())->read();
+    const typename Scene::Types::Bvh* second = nullptr;
+    if (last == &scene) return call(scene.bvh(), second);
+    second_lock = std::max(&scene, last, std::less<>())->read();
+    second = &other->bvh();
+    return call(scene.bvh(), second);
+}
+
+template <class Scene>
+Array2<std::uint32_t> overlaps(Scene& scene, Scene* other, bool narrow, std::uint64_t max_bytes,
+                               int threads) {
+    const PairOptions options{
+        .narrow = narrow, .max_bytes = max_bytes, .threads = threads_for(threads)};
+    auto pairs = with_two(scene, other, [&](const auto& a, const auto* b) {
+        return b != nullptr ? overlapping_pairs(a, *b, options) : overlapping_pairs(a, options);
+    });
+    return hand_over_rows<std::uint32_t>(std::move(pairs));
+}
+
+template <class Scene>
+std::uint64_t count_overlaps(Scene& scene, Scene* other, bool narrow, int threads) {
+    const PairOptions options{.narrow = narrow, .threads = threads_for(threads)};
+    return with_two(scene, other, [&](const auto& a, const auto* b) {
+        return b != nullptr ? count_overlapping_pairs(a, *b, options)
+                            : count_overlapping_pairs(a, options);
+    });
+}
+
+template <class Shape, class Scene, class Array>
+nb::tuple touched(Scene& scene, const Array& shapes, std::uint64_t max_bytes, int threads) {
+    const auto queries = rows<Shape>(shapes);
+    const OverlapOptions options{.max_bytes = max_bytes, .threads = threads_for(threads)};
+    std::vector<OverlapLists> pieces;
+    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
+        pieces.push_back(touch_all(scene.bvh(), queries.subspan(begin, end - begin), options));
+    });
+    auto offsets = join_offsets(pieces);
+    return nb::make_tuple(offsets, hand_over(join_column(pieces, &OverlapLists::prims)));
+}
+
+template <class Scene>
+nb::dict refit(Scene& scene, const PointRows<Scene>& vertices, int threads) {
+    const auto corners = rows<Point<Scene>>(vertices);
+    RefitQuality quality;
+    {
+        const nb::gil_scoped_release unlocked;
+        quality = scene.refit({corners.begin(), corners.end()}, threads);
+    }
+    nb::dict fields;
+    fields["sah"] = quality.sah;
+    fields["sah_at_build"] = quality.sah_at_build;
+    fields["ratio"] = quality.ratio;
+    return fields;
+}
+
+/// Runs call(scene) without the interpreter's lock and with the trees held.
+template <class Scene, class Call>
+auto reading(Scene& scene, const Call& call) {
+    const nb::gil_scoped_release unlocked;
+    const auto lock = scene.read();
+    return call();
+}
+
+nb::dict wide_stats(SceneTrees& scene) {
+    return wide_figures(reading(scene, [&] { return scene.wide().stats(); }));
+}
+
+const Bvh& boxes_of(const Bvh& bvh) { return bvh; }
+const Bvh& boxes_of(const BvhD& bvh) { return bvh.tree(); }
+
+/// Of the binary tree; with its stages' milliseconds, and what was left out.
+template <class Scene>
+nb::dict stats(Scene& scene) {
+    BuildMs ms;
+    std::uint64_t left_out = 0, bytes = 0;
+    const TreeStats figures = reading(scene, [&] {
+        const auto& bvh = scene.bvh();
+        ms = bvh.build_ms();
+        left_out = bvh.left_out();
+        bytes = bvh.bytes();
+        return tree_stats(boxes_of(bvh), {.threads = threads_for(scene.options().threads)});
+    });
+    nb::dict fields = tree_figures(figures);
+    if (std::is_same_v<Scene, SceneTreesD>) fields["bytes"] = bytes;  // with corners in double
+    fields["builder"] = std::string(builder_name(scene.options().builder));
+    fields["reinsertion_rounds"] = scene.options().reinsertion_rounds;
+    fields["left_out"] = left_out;
+    fields["ms"] = stage_ms(ms);
+    return fields;
+}
+
+nb::dict mesh_info(SceneTrees& scene) {
+    return mesh_figures(reading(scene, [&] { return inspect(scene.mesh()); }));
+}
+
+std::pair<bool, std::string> check_trees(SceneTrees& scene) {
+    const CheckReport report = reading(scene, [&] { return check(scene.bvh(), scene.mesh()); });
+    return {report.ok, report.broken};
+}
+
+/// Of the tree of boxes: the library has no check that knows the triangles in double.
+std::pair<bool, std::string> check_boxes(SceneTreesD& scene) {
+    const CheckReport report = reading(scene, [&] { return check(scene.bvh().tree()); });
+    return {report.ok, report.broken};
+}
+
+/// The four calls with rays, for rays of the library's layout and for columns.
+template <class Scene>
+void bind_rays(nb::class_<Scene>& scene) {
+    using Rows = RayRows<typename Scene::Types::Ray>;
+    using Parts = RayParts<typename Scene::Types::Ray>;
+    using RowsIn = typename Rows::Array;
+    using Hits = HitRows<Scene>;
+    using Counted = Out<std::uint32_t, nb::ndim<1>>;
+    scene
+        .def(
+            "intersect",
+            [](Scene& self, const RowsIn& rays, const Hits& hits, int threads) {
+                Rows batch(rays);
+                return intersect(self, batch, hits, threads);
+            },
+            nb::arg("rays").noconvert(), nb::arg("hits").noconvert(), nb::arg("threads") = 0)
+        .def(
+            "intersect",
+            [](Scene& self, const StridedRows& origins, const StridedRows& directions,
+               const Limits& tmin, const Limits& tmax, const Hits& hits, int threads) {
+                Parts batch(origins, directions, tmin, tmax);
+                return intersect(self, batch, hits, threads);
+            },
+            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
+            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("hits").noconvert(),
+            nb::arg("threads") = 0)
+        .def(
+            "occluded",
+            [](Scene& self, const RowsIn& rays, const FlagsOut& flags, int threads) {
+                Rows batch(rays);
+                return occluded(self, batch, flags, threads);
+            },
+            nb::arg("rays").noconvert(), nb::arg("flags").noconvert(), nb::arg("threads") = 0)
+        .def(
+            "occluded",
+            [](Scene& self, const StridedRows& origins, const StridedRows& directions,
+               const Limits& tmin, const Limits& tmax, const FlagsOut& flags, int threads) {
+                Parts batch(origins, directions, tmin, tmax);
+                return occluded(self, batch, flags, threads);
+            },
+            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
+            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("flags").noconvert(),
+            nb::arg("threads") = 0)
+        .def(
+            "count",
+            [](Scene& self, const StridedRows& origins, const StridedRows& directions,
+               const Limits& tmin, const Limits& tmax, const Counted& counts, int threads) {
+                Parts batch(origins, directions, tmin, tmax);
+                return count_hits(self, batch, counts, threads);
+            },
+            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
+            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("counts").noconvert(),
+            nb::arg("threads") = 0)
+        .def(
+            "count",
+            [](Scene& self, const RowsIn& rays, const Counted& counts, int threads) {
+                Rows batch(rays);
+                return count_hits(self, batch, counts, threads);
+            },
+            nb::arg("rays").noconvert(), nb::arg("counts").noconvert(), nb::arg("threads") = 0)
+        .def(
+            "all_hits",
+            [](Scene& self, const StridedRows& origins, const StridedRows& directions,
+               const Limits& tmin, const Limits& tmax, int threads) {
+                Parts batch(origins, directions, tmin, tmax);
+                return all_hits(self, batch, threads);
+            },
+            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
+            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("threads") = 0)
+        .def(
+            "all_hits",
+            [](Scene& self, const RowsIn& rays, int threads) {
+                Rows batch(rays);
+                return all_hits(self, batch, threads);
+            },
+            nb::arg("rays").noconvert(), nb::arg("threads") = 0);
+}
+
+template <class Scene>
+void bind_queries(nb::class_<Scene>& scene) {
+    using Sphere = typename Scene::Types::Sphere;
+    using Segment = typename Scene::Types::Segment;
+    using Spheres = In<Scalar<Scene>, nb::shape<-1, 4>>;
+    using Segments = In<Scalar<Scene>, nb::shape<-1, 6>>;
+    scene
+        .def("closest", &closest<Scene>, nb::arg("points").noconvert(), nb::arg("out").noconvert(),
+             nb::arg("max_distance"), nb::arg("threads") = 0)
+        .def("signed_distance", &signed_distance<Scene>, nb::arg("points").noconvert(),
+             nb::arg("out").noconvert(), nb::arg("max_distance"), nb::arg("rule"),
+             nb::arg("threads") = 0)
+        .def("contains", &inside<Scene>, nb::arg("points").noconvert(),
+             nb::arg("flags").noconvert(), nb::arg("rule"), nb::arg("threads") = 0)
+        .def("winding", &winding<Scene>, nb::arg("points").noconvert(), nb::arg("out").noconvert(),
+             nb::arg("rule"), nb::arg("threads") = 0)
+        .def("closure", &closure<Scene>)
+        .def("overlaps", &overlaps<Scene>, nb::arg("other").none(), nb::arg("narrow"),
+             nb::arg("max_bytes") = 0, nb::arg("threads") = 0)
+        .def("count_overlaps", &count_overlaps<Scene>, nb::arg("other").none(), nb::arg("narrow"),
+             nb::arg("threads") = 0)
+        .def("touched_by_spheres", &touched<Sphere, Scene, Spheres>, nb::arg("spheres").noconvert(),
+             nb::arg("max_bytes") = 0, nb::arg("threads") = 0)
+        .def("touched_by_segments", &touched<Segment, Scene, Segments>,
+             nb::arg("segments").noconvert(), nb::arg("max_bytes") = 0, nb::arg("threads") = 0)
+        .def("refit", &refit<Scene>, nb::arg("vertices").noconvert(), nb::arg("threads") = 0);
+}
+
+template <class Scene>
+nb::class_<Scene> bind_trees_of(nb::module_& module, const char* name, const char* doc) {
+    nb::class_<Scene> scene(module, name, doc);
+    scene.def("__init__", &make_scene<Scene>, nb::arg("vertices").noconvert(),
+              nb::arg("faces").noconvert(), nb::arg("builder"), nb::arg("reinsertion_rounds"),
+              nb::arg("bits"), nb::arg("max_leaf"), nb::arg("strict"), nb::arg("threads"));
+    scene.def_prop_ro("vertices", [](nb::handle_t<Scene> self) {
+        const auto& mesh = nb::cast<Scene&>(self).mesh();
+        return view_rows<Scalar<Scene>>(std::span<const Point<Scene>>(mesh.vertices), self);
+    });
+    scene.def_prop_ro("faces", [](nb::handle_t<Scene> self) {
+        const auto& mesh = nb::cast<Scene&>(self).mesh();
+        return view_rows<std::uint32_t>(std::span<const Triangle>(mesh.triangles), self);
+    });
+    scene.def("stats", &stats<Scene>);
+    bind_rays(scene);
+    bind_queries(scene);
+    return scene;
+}
+
+}  // namespace
+
+void bind_scene(nb::module_& module) {
+    bind_trees_of<SceneTrees>(module, "SceneTrees",
+                              "A mesh and its trees; raydix.Scene is what to use.")
+        .def("wide_stats", &wide_stats)
+        .def("info", &mesh_info)
+        .def("check", &check_trees);
+    bind_trees_of<SceneTreesD>(module, "SceneTreesD",
+                               "A mesh in double and its tree; raydix.Scene is what to use.")
+        .def("check", &check_boxes);
+}
+
+}  // namespace raydix::python

@@ -1,0 +1,77 @@
+// Structs of figures -> dicts.
+#include "figures.h"
+
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+namespace nb = nanobind;
+
+namespace raydix::python {
+
+nb::dict tree_figures(const TreeStats& stats) {
+    nb::dict fields;
+    fields["nodes"] = stats.nodes;
+    fields["leaves"] = stats.leaves;
+    fields["references"] = stats.references;
+    fields["layout_nodes"] = stats.layout_nodes;
+    fields["max_depth"] = stats.max_depth;
+    fields["depth_bound"] = nb::cast(stats.depth_bound);
+    fields["sah"] = nb::cast(stats.sah);
+    fields["epo"] = nb::cast(stats.epo);
+    fields["bytes"] = stats.bytes;
+    fields["tree_hash"] = stats.tree_hash;
+    return fields;
+}
+
+nb::dict wide_figures(const WideBvhStats& stats) {
+    nb::dict fields;
+    fields["width"] = stats.width;
+    fields["nodes"] = stats.nodes;
+    fields["leaves"] = stats.leaves;
+    fields["references"] = stats.references;
+    fields["max_depth"] = stats.max_depth;
+    fields["children_per_node"] = stats.children_per_node;
+    fields["sah"] = stats.sah;
+    fields["widening"] = stats.widening;
+    fields["node_bytes"] = stats.node_bytes;
+    fields["triangle_bytes"] = stats.triangle_bytes;
+    fields["bytes"] = stats.bytes;
+    fields["ms"] = stats.ms;
+    fields["left_out"] = stats.left_out;
+    return fields;
+}
+
+nb::tuple corners(const Aabb& box) {
+    return nb::make_tuple(nb::make_tuple(box.lo.x, box.lo.y, box.lo.z),
+                          nb::make_tuple(box.hi.x, box.hi.y, box.hi.z));
+}
+
+nb::dict mesh_figures(const MeshInfo& info) {
+    nb::dict fields;
+    fields["vertices"] = info.vertices;
+    fields["triangles"] = info.triangles;
+    fields["points"] = info.points;
+    fields["bounds"] = corners(info.bounds);
+    fields["non_finite_vertices"] = info.non_finite_vertices;
+    fields["out_of_range_vertices"] = info.out_of_range_vertices;
+    fields["unreferenced_vertices"] = info.unreferenced_vertices;
+    fields["zero_area_triangles"] = info.zero_area_triangles;
+    fields["repeated_index_triangles"] = info.repeated_index_triangles;
+    fields["left_out_triangles"] = info.left_out_triangles;
+    fields["bytes"] = info.bytes;
+    return fields;
+}
+
+nb::dict stage_ms(const BuildMs& ms) {
+    nb::dict fields;
+    fields["bounds"] = ms.bounds;
+    fields["codes"] = ms.codes;
+    fields["sort"] = ms.sort;
+    fields["hierarchy"] = ms.hierarchy;
+    fields["fit"] = ms.fit;
+    fields["layout"] = ms.layout;
+    fields["total"] = ms.total;
+    return fields;
+}
+
+}  // namespace raydix::python

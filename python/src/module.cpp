@@ -1,0 +1,92 @@
+// The module raydix._core: errors, the machine, and what the other files bind.
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+#include <pthread.h>
+#include <raydix/device.h>
+#include <raydix/error.h>
+#include <raydix/machine.h>
+#include <raydix/version.h>
+#include <raydix/wide.h>
+
+#include <atomic>
+#include <string>
+#include <utility>
+
+#include "batch.h"
+#include "bindings.h"
+
+namespace raydix::python {
+
+namespace nb = nanobind;
+
+namespace {
+
+std::atomic<bool> threads_were_started{false};
+std::atomic<bool> threads_were_lost{false};
+
+void in_forked_child() {
+    if (threads_were_started) threads_were_lost = true;
+}
+
+/// InputError is a ValueError as well: both names can be caught.
+void bind_errors(nb::module_& module) {
+    nb::exception<InputError>(module, "InputError", PyExc_ValueError).doc() =
+        "The input is at fault: a file, a mesh, an option. The message says where and why.";
+    nb::exception<BackendUnavailable>(module, "BackendUnavailable", PyExc_RuntimeError).doc() =
+        "The call asks for a device or a feature that this build or this machine does not have.";
+    nb::exception<DeviceError>(module, "DeviceError", PyExc_RuntimeError).doc() =
+        "A call to a device failed. The message holds the driver's text.";
+}
+
+nb::dict machine() {
+    const MachineInfo info = machine_info();
+    nb::dict fields;
+    fields["cpu"] = info.cpu;
+    fields["cores"] = info.cores;
+    fields["isa"] = info.isa;
+    fields["gpu"] = info.gpu;
+    return fields;
+}
+
+/// The name of the GPU, or why there is none to use.
+std::pair<bool, std::string> cuda_device() {
+    if (!device_available()) {
+        try {
+            return {false, device_name()};
+        } catch (const std::exception& error) {
+            return {false, error.what()};
+        }
+    }
+    return {true, device_name()};
+}
+
+}  // namespace
+
+int threads_for(int asked) {
+    if (threads_were_lost) return 1;
+    threads_were_started = true;
+    return asked;
+}
+
+}  // namespace raydix::python
+
+NB_MODULE(_core, module) {
+    using namespace raydix::python;
+    module.doc() = "The C++ library, array by array. Use the package raydix.";
+    pthread_atfork(nullptr, nullptr, in_forked_child);
+    module.attr("__version__") = raydix::version;
+    bind_errors(module);
+    module.def("machine", &machine, "The processor, cores this process may use, instruction set.");
+    module.def("cuda_device", &cuda_device, "(whether a GPU can be used, its name or the reason).");
+    module.def("simd_instruction_sets", &raydix::simd_instruction_sets,
+               "Instruction sets that rays can be traced with here, best first.");
+    bind_scene(module);
+    bind_points(module);
+    bind_device(module);
+    bind_instances(module);
+    bind_pictures(module);
+    bind_simulator(module);
+    bind_trees(module);
+}

@@ -1,0 +1,174 @@
+// Affine maps in double: inverses to the last digits, rays through them, and boxes around what they
+// make of boxes, with what rounding may add.
+#pragma once
+
+#include <raydix/instances_d.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "base/double3.h"
+#include "base/math.h"
+
+namespace raydix {
+
+/// A sum of two doubles that do not overlap. Error bounds: Joldes, Muller, Popescu, "Tight and
+/// rigorous error bounds for basic building blocks of double-word arithmetic", 2017.
+struct TwoDoubles {
+    double hi, lo;
+};
+inline TwoDoubles two_sum(double a, double b) {
+    const double sum = a + b, back = sum - a;
+    return {sum, (a - (sum - back)) + (b - back)};
+}
+inline TwoDoubles exact_product(double a, double b) {
+    const double product = a * b;
+    return {product, std::fma(a, b, -product)};
+}
+/// Relative error 2^-104 (AccurateDWPlusDW, algorithm 6), whatever cancels.
+inline TwoDoubles operator+(TwoDoubles a, TwoDoubles b) {
+    const TwoDoubles high = two_sum(a.hi, b.hi), low = two_sum(a.lo, b.lo);
+    const TwoDoubles sum = two_sum(high.hi, high.lo + low.hi);
+    return two_sum(sum.hi, low.lo + sum.lo);
+}
+/// Relative error 2^-104 (DWTimesFP3, algorithm 9).
+inline TwoDoubles operator*(TwoDoubles a, double b) {
+    const TwoDoubles high = exact_product(a.hi, b);
+    return two_sum(high.hi, std::fma(a.lo, b, high.lo));
+}
+
+/// a * b - c * d.
+inline TwoDoubles minor_of(double a, double b, double c, double d) {
+    return exact_product(a, b) + exact_product(-c, d);
+}
+
+/// Rows and translation of a map.
+struct AffineD {
+    Double3 x, y, z;
+    Double3 move;
+
+    [[nodiscard]] Double3 vector(Double3 v) const { return {dot(x, v), dot(y, v), dot(z, v)}; }
+    /// Largest sum of a row's magnitudes: what the map may make of a vector's largest component.
+    [[nodiscard]] double norm() const {
+        const auto sum = [](Double3 row) {
+            return std::fabs(row.x) + std::fabs(row.y) + std::fabs(row.z);
+        };
+        return std::max({sum(x), sum(y), sum(z)});
+    }
+};
+
+inline AffineD affine_of(const TransformD& t) {
+    const auto row = [&](std::size_t i) { return Double3(t.m[i][0], t.m[i][1], t.m[i][2]); };
+    return {row(0), row(1), row(2), {t.m[0][3], t.m[1][3], t.m[2][3]}};
+}
+
+/// The way into an object's space: v = rows * (p - move) with the move of the way out, since a
+/// place far from the origin would cost digits if it were mapped before it is subtracted.
+struct InverseD {
+    AffineD rows;
+
+    [[nodiscard]] Double3 vector(Double3 v) const { return rows.vector(v); }
+    [[nodiscard]] Double3 point(Double3 p) const { return rows.vector(p - rows.move); }
+};
+
+/// The cofactors of rows of about unit size, and their determinant.
+struct CofactorsD {
+    Double3 x, y, z;  // rows of the transposed matrix of cofactors
+    double determinant;
+
+    CofactorsD(Double3 a, Double3 b, Double3 c) {
+        const TwoDoubles bc_x = minor_of(b.y, c.z, b.z, c.y), bc_y = minor_of(b.z, c.x, b.x, c.z),
+                         bc_z = minor_of(b.x, c.y, b.y, c.x);
+        determinant = (bc_x * a.x + bc_y * a.y + bc_z * a.z).hi;
+        x = {bc_x.hi, minor_of(c.y, a.z, c.z, a.y).hi, minor_of(a.y, b.z, a.z, b.y).hi};
+        y = {bc_y.hi, minor_of(c.z, a.x, c.x, a.z).hi, minor_of(a.z, b.x, a.x, b.z).hi};
+        z = {bc_z.hi, minor_of(c.x, a.y, c.y, a.x).hi, minor_of(a.x, b.y, a.y, b.x).hi};
+    }
+};
+
+/// None if the map flattens: a determinant of at most 2^-40 of the product of the rows' lengths, as
+/// what rounding makes of dependent rows has, or anything that is not finite. Else each entry of
+/// the inverse is off by at most four roundings.
+inline std::optional<InverseD> inverse_of(const AffineD& a) {
+    const auto largest = [](Double3 row) {
+        return std::max({std::fabs(row.x), std::fabs(row.y), std::fabs(row.z)});
+    };
+    if (!is_finite(a.x) || !is_finite(a.y) || !is_finite(a.z) || !is_finite(a.move)) return {};
+    const double size = std::max({largest(a.x), largest(a.y), largest(a.z)});
+    if (size == 0.0) return {};
+    int exponent;
+    std::frexp(size, &exponent);
+    // In two steps: 2^1074 is no double.
+    const auto scaled = [&](Double3 row) {
+        return row * std::ldexp(1.0, -exponent / 2) * std::ldexp(1.0, -exponent - -exponent / 2);
+    };
+    const Double3 x = scaled(a.x), y = scaled(a.y), z = scaled(a.z);
+    const CofactorsD c(x, y, z);
+    const double box = length(x) * length(y) * length(z);
+    // Rows so unlike each other that products lose digits count as flat too.
+    if (!(std::fabs(c.determinant) > 0x1p-40 * box) || box < 0x1p-800) return {};
+    const auto row = [&](Double3 cofactors) {
+        return scaled({cofactors.x / c.determinant, cofactors.y / c.determinant,
+                       cofactors.z / c.determinant});
+    };
+    const InverseD inverse{{row(c.x), row(c.y), row(c.z), a.move}};
+    if (!is_finite(inverse.rows.x) || !is_finite(inverse.rows.y) || !is_finite(inverse.rows.z))
+        return {};
+    return inverse;
+}
+
+/// A ray in some space; t keeps its meaning from space to space.
+struct LineD {
+    Double3 origin, direction;
+
+    explicit LineD(const RayD& ray) : origin(ray.origin), direction(ray.direction) {}
+    LineD(Double3 o, Double3 d) : origin(o), direction(d) {}
+
+    [[nodiscard]] RayD ray(double tmin, double tmax) const {
+        RayD out{{}, tmin, {}, tmax};
+        origin.round_to(out.origin);
+        direction.round_to(out.direction);
+        return out;
+    }
+    [[nodiscard]] LineD into(const InverseD& inverse) const {
+        return {inverse.point(origin), inverse.vector(direction)};
+    }
+};
+
+/// A box around something, and how far beside it rays may be told that they hit: at t, a ray is
+/// within error * (the greatest distance from its origin to the box, by components) of the box.
+struct ExtentD {
+    AabbD box;
+    double error;
+};
+
+/// Of what a map makes of `inner`. With M = |L| |L^-1| for the map's matrix L, rounding on the way
+/// in moves the point at t by at most 2^-49 M (|origin - move| + |point - origin|): L^-1 is off by
+/// 4 roundings, the difference by 1, products and sums by 3, and there is as much to spare. The
+/// part of that which does not grow with the ray's distance goes into the box, as do the
+/// roundings of the box itself.
+inline ExtentD image_of(const AffineD& a, const InverseD& inverse, const ExtentD& inner) {
+    constexpr double rounding = 0x1p-48;
+    const double condition = a.norm() * inverse.rows.norm();
+    const Double3 lo(inner.box.lo), hi(inner.box.hi);
+    const Double3 middle = lo * 0.5 + hi * 0.5, half = hi * 0.5 - lo * 0.5;
+    const Double3 far{std::max(std::fabs(lo.x), std::fabs(hi.x)),
+                      std::max(std::fabs(lo.y), std::fabs(hi.y)),
+                      std::max(std::fabs(lo.z), std::fabs(hi.z))};
+    const double turned = condition * a.norm() * std::max({far.x, far.y, far.z});
+    const auto reach = [](Double3 row, Double3 by) {
+        return std::fabs(row.x) * by.x + std::fabs(row.y) * by.y + std::fabs(row.z) * by.z;
+    };
+    const auto side = [&](Double3 row, double move) {
+        return reach(row, half) + rounding * (reach(row, far) + std::fabs(move) + turned);
+    };
+    const Double3 center = a.vector(middle) + a.move;
+    const Double3 by{side(a.x, a.move.x), side(a.y, a.move.y), side(a.z, a.move.z)};
+    ExtentD out{{}, condition * (inner.error + rounding)};
+    (center - by).round_to(out.box.lo);
+    (center + by).round_to(out.box.hi);
+    return out;
+}
+
+}  // namespace raydix

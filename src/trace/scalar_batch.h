@@ -1,0 +1,109 @@
+// Batches of rays over threads, each ray by walk_tree, in float or in double. Blocks of rays are
+// fixed, so that counts and the order of all-hits results do not depend on the number of threads.
+#pragma once
+
+#include <raydix/trace.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "exec/parallel.h"
+#include "trace/all_hits.h"
+#include "trace/batch.h"
+#include "trace/scalar.h"
+#include "trace/tree_hits.h"
+
+namespace raydix {
+
+inline constexpr std::size_t rays_per_block = 1024;
+
+template <class AnyHit, class Scalar>
+AnyHit public_hit(const BasicClosestHit<Scalar>& best, const BasicRayFrame<Scalar>& ray) {
+    if (best.prim == no_primitive) return {};
+    return {best.t * ray.t_scale, best.prim, best.u, best.v};
+}
+
+/// Calls one(i, frame, stack, steps) -> number of hits for each valid ray and miss(i) for each
+/// other one.
+template <class Steps, class Tree, class AnyRay, class One, class Miss>
+TraceCounts for_each_ray(const Tree& tree, std::span<const AnyRay> rays, const One& one,
+                         const Miss& miss) {
+    std::vector<TraceCounts> parts((rays.size() + rays_per_block - 1) / rays_per_block);
+    for_each_block(rays.size(), rays_per_block,
+                   [&](std::size_t block, std::size_t begin, std::size_t end) {
+                       BasicWalkStack<typename Tree::Scalar> stack(tree.max_depth);
+                       TraceCounts part;
+                       part.rays = end - begin;
+                       for (std::size_t i = begin; i < end; ++i) {
+                           if (!is_valid(rays[i])) {
+                               ++part.invalid_rays;
+                               miss(i);
+                           } else if (tree.empty) {
+                               miss(i);
+                           } else {
+                               Steps steps;
+                               part.hits += one(i, make_frame(rays[i]), stack, steps);
+                               if constexpr (std::is_same_v<Steps, RaySteps>) {
+                                   part.node_visits += steps.node_visits;
+                                   part.triangle_tests += steps.triangle_tests;
+                               }
+                           }
+                       }
+                       parts[block] = part;
+                   });
+    TraceCounts sum;
+    for (const TraceCounts& part : parts) add(sum, part);
+    return sum;
+}
+
+template <class Steps, class Tree, class AnyRay, class AnyHit>
+TraceCounts closest_batch(const Tree& tree, std::span<const AnyRay> rays, std::span<AnyHit> hits) {
+    return for_each_ray<Steps>(
+        tree, rays,
+        [&](std::size_t i, const auto& ray, auto& stack, Steps& steps) {
+            hits[i] = public_hit<AnyHit>(find_closest(tree, ray, stack, steps), ray);
+            return std::uint64_t{hits[i].hit()};
+        },
+        [&](std::size_t i) { hits[i] = AnyHit{}; });
+}
+
+template <class Steps, class Tree, class AnyRay>
+TraceCounts any_batch(const Tree& tree, std::span<const AnyRay> rays,
+                      std::span<std::uint8_t> occluded) {
+    return for_each_ray<Steps>(
+        tree, rays,
+        [&](std::size_t i, const auto& ray, auto& stack, Steps& steps) {
+            occluded[i] = find_any(tree, ray, stack, steps);
+            return std::uint64_t{occluded[i]};
+        },
+        [&](std::size_t i) { occluded[i] = 0; });
+}
+
+/// All: AllHits or AllHitsD.
+template <class All, class Steps, class Tree, class AnyRay>
+All all_batch(const Tree& tree, std::span<const AnyRay> rays) {
+    using Hits = decltype(All::hits);
+    std::vector<Hits> found((rays.size() + rays_per_block - 1) / rays_per_block);
+    All all;
+    all.offsets.resize(rays.size() + 1, 0);
+    all.counts = for_each_ray<Steps>(
+        tree, rays,
+        [&](std::size_t i, const auto& ray, auto& stack, Steps& steps) {
+            Hits& block = found[i / rays_per_block];
+            const std::size_t before = block.size();
+            find_all(tree, ray, stack, steps, [&](auto t, std::uint32_t k, auto u, auto v) {
+                block.push_back({t, tree.order[k], u, v});
+            });
+            finish_ray(block, before);
+            all.offsets[i + 1] = block.size() - before;
+            return all.offsets[i + 1];
+        },
+        [](std::size_t) {});
+    join_blocks(found, rays_per_block, all);
+    return all;
+}
+
+}  // namespace raydix

@@ -1,0 +1,165 @@
+// What boxes and triangles need of one ray: a Ray -> SingleFrame, a few vector operations for
+// usual rays. Included once per instruction set.
+#if defined(RAYDIX_SIMD_SINGLE_FRAME_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef RAYDIX_SIMD_SINGLE_FRAME_H
+#undef RAYDIX_SIMD_SINGLE_FRAME_H
+#else
+#define RAYDIX_SIMD_SINGLE_FRAME_H
+#endif
+
+#include <hwy/highway.h>
+
+#include "trace/simd/lanes.h"
+#include "trace/simd/ray_classes.h"
+#include "trace/simd/stream_rays.h"
+#include "trace/simd/wide_ray.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace raydix::HWY_NAMESPACE {
+
+/// By axis; what a fourth float holds has no meaning.
+struct SingleFrame {
+    alignas(16) float origin[4];
+    alignas(16) float true_inverse[4];
+    alignas(16) float inverse[4];       // limited
+    alignas(16) float near_pad[4];      // with the sign that moves near planes toward the start
+    alignas(16) float near[4], far[4];  // starts of planes about the tree's middle
+    alignas(16) float shear[4];         // of x and y
+    RayClass kind;
+    float tmin, tmax, t_scale;
+    bool careful;  // planes of plain nodes may overflow
+
+    [[nodiscard]] float shear_z() const { return true_inverse[kind.kz]; }
+
+    /// For the triangle test of one triangle.
+    [[nodiscard]] RayFrame ray_frame() const {
+        RayFrame out;
+        out.origin = {origin[0], origin[1], origin[2]};
+        out.inverse = {true_inverse[0], true_inverse[1], true_inverse[2]};
+        out.kx = static_cast<int>(kind.kx), out.ky = static_cast<int>(kind.ky),
+        out.kz = static_cast<int>(kind.kz);
+        out.shear_x = shear[0], out.shear_y = shear[1], out.shear_z = shear_z();
+        out.tmin = tmin, out.tmax = tmax, out.t_scale = t_scale;
+        return out;
+    }
+};
+
+using V4 = hn::Vec<F4>;
+
+/// Where planes start; the rest of the frame is there.
+HWY_INLINE void set_starts(const WideView& tree, V4 origin, V4 inverse, V4 near_pad,
+                           SingleFrame& out) {
+    const V4 from = hn::Sub(hn::Load(f4, tree.middle), origin);
+    const V4 near = hn::Mul(hn::Add(from, near_pad), inverse),
+             far = hn::Mul(hn::Sub(from, near_pad), inverse);
+    hn::Store(near, f4, out.near);
+    hn::Store(far, f4, out.far);
+    const V4 most = hn::Set(f4, std::numeric_limits<float>::max());
+    out.careful = (bits_of(f4, hn::Le(hn::Add(hn::Abs(near), hn::Abs(far)), most)) & 7) != 7;
+}
+
+/// How far boxes widen for one ray (slab.h), with sign. `way` has the signs of the direction.
+HWY_INLINE V4 pad_of(const WideView& tree, V4 origin, V4 way, std::uint32_t kz) {
+    const V4 reach = hn::Max(hn::Abs(hn::Sub(hn::Load(f4, tree.lo), origin)),
+                             hn::Abs(hn::Sub(hn::Load(f4, tree.hi), origin)));
+    alignas(16) float reaches[4];
+    hn::Store(reach, f4, reaches);
+    const V4 pad =
+        hn::Mul(hn::Set(f4, wide_pad_factor * slab_pad), hn::Add(reach, hn::Set(f4, reaches[kz])));
+    return hn::CopySignToAbs(pad, hn::Neg(way));
+}
+
+HWY_INLINE V4 limited(V4 inverse) {
+    const V4 limit = hn::Set(f4, wide_longest_inverse);
+    return hn::Max(hn::Min(inverse, limit), hn::Neg(limit));
+}
+
+/// Any valid ray.
+HWY_NOINLINE void fill_odd_frame(const WideView& tree, const Ray& ray, SingleFrame& out) {
+    const RayFrame frame = make_frame(ray);
+    const Vec3 o = frame.origin, i = frame.inverse;
+    const auto quad = [](float x, float y, float z, float* to) {
+        to[0] = x, to[1] = y, to[2] = z, to[3] = 0.0f;
+    };
+    quad(o.x, o.y, o.z, out.origin);
+    quad(i.x, i.y, i.z, out.true_inverse);
+    quad(frame.shear_x, frame.shear_y, 0.0f, out.shear);
+    const V4 origin = hn::Load(f4, out.origin), way = hn::Load(f4, out.true_inverse);
+    const auto negatives = static_cast<std::uint32_t>(std::signbit(i.x)) |
+                           static_cast<std::uint32_t>(std::signbit(i.y)) << 1 |
+                           static_cast<std::uint32_t>(std::signbit(i.z)) << 2;
+    out.kind = ray_classes[negatives + 8 * static_cast<std::uint32_t>(frame.kz)];
+    const V4 inverse = limited(way), pad = pad_of(tree, origin, way, out.kind.kz);
+    hn::Store(inverse, f4, out.inverse);
+    hn::Store(pad, f4, out.near_pad);
+    set_starts(tree, origin, inverse, pad, out);
+    out.tmin = frame.tmin, out.tmax = frame.tmax, out.t_scale = frame.t_scale;
+}
+
+/// Three floats that the caller may have written a moment ago, one by one: loaded as a vector they
+/// would have to wait until all of them are in the cache.
+HWY_INLINE V4 load_axes(const float* from) {
+#if HWY_ARCH_X86
+    return V4{_mm_movelh_ps(_mm_unpacklo_ps(_mm_load_ss(from), _mm_load_ss(from + 1)),
+                            _mm_load_ss(from + 2))};
+#else
+    return hn::LoadU(f4, from);
+#endif
+}
+
+/// False if the ray is invalid. The same numbers as make_frame's for all valid rays.
+HWY_INLINE bool fill_frame(const WideView& tree, const Ray& ray, SingleFrame& out) {
+    const V4 place = load_axes(&ray.origin.x), way = load_axes(&ray.direction.x);
+    const float ax = std::fabs(ray.direction.x), ay = std::fabs(ray.direction.y),
+                az = std::fabs(ray.direction.z);
+    const float longest = max_of(max_of(ax, ay), az);
+    const V4 most = hn::Set(f4, std::numeric_limits<float>::max());
+    const std::uint32_t finite = bits_of(f4, hn::Le(hn::Abs(place), most)) &
+                                 bits_of(f4, hn::Le(hn::Abs(way), hn::Set(f4, longest))) & 7;
+    const bool usual = finite == 7 && longest > 0x1p-3f && longest < 0x1p3f &&
+                       ray.tmin <= ray.tmax && ray.tmax >= 0.0f;
+    if (!usual) {
+        if (!is_valid(ray)) return false;
+        fill_odd_frame(tree, ray, out);
+        return true;
+    }
+    const hn::RebindToSigned<F4> i4;
+    const std::uint32_t negatives = bits_of(i4, hn::Lt(hn::BitCast(i4, way), hn::Zero(i4))) & 7;
+    const std::uint32_t kz = az == longest ? 2 : ay == longest ? 1 : 0;
+    out.kind = ray_classes[negatives + 8 * kz];
+    const V4 origin = hn::Add(place, hn::Zero(f4));  // -0 becomes +0
+    const V4 whole = hn::Div(hn::Set(f4, 1.0f), way), inverse = limited(whole);
+    const V4 pad = pad_of(tree, origin, way, kz);
+    const float* const components = &ray.direction.x;
+    hn::Store(origin, f4, out.origin);
+    hn::Store(whole, f4, out.true_inverse);
+    hn::Store(inverse, f4, out.inverse);
+    hn::Store(pad, f4, out.near_pad);
+    set_starts(tree, origin, inverse, pad, out);
+    out.shear[0] = components[out.kind.kx] / components[kz];
+    out.shear[1] = components[out.kind.ky] / components[kz];
+    out.tmin = ray.tmin > 0.0f ? ray.tmin : 0.0f;
+    out.tmax = min_of(ray.tmax, std::numeric_limits<float>::max());
+    out.t_scale = 1.0f;
+    return true;
+}
+
+/// A ray of a stream.
+HWY_INLINE void fill_frame(const WideView& tree, const StreamFrame& frame, const StreamRay& ray,
+                           SingleFrame& out) {
+    const V4 origin = hn::Load(f4, ray.origin), inverse = hn::Load(f4, ray.inverse),
+             pad = hn::LoadU(f4, frame.near_pad);
+    hn::Store(origin, f4, out.origin);
+    hn::Store(hn::Load(f4, ray.true_inverse), f4, out.true_inverse);
+    hn::Store(inverse, f4, out.inverse);
+    hn::Store(pad, f4, out.near_pad);
+    set_starts(tree, origin, inverse, pad, out);
+    out.shear[0] = ray.shear[0], out.shear[1] = ray.shear[1];
+    out.kind = frame.kind;
+    out.tmin = ray.tmin, out.tmax = ray.t;
+    out.t_scale = 1.0f;
+}
+
+}  // namespace raydix::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

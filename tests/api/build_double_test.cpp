@@ -1,0 +1,205 @@
+// Trees in double: boxes that hold their triangles in exact arithmetic, input that is left out,
+// refits.
+#include <gtest/gtest.h>
+#include <raydix/raydix.h>
+
+#include <limits>
+
+#include "support/double_scenes.h"
+#include "support/message.h"
+#include "support/support.h"
+
+namespace raydix::test {
+namespace {
+
+constexpr double inf = std::numeric_limits<double>::infinity();
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+struct Place {
+    ExactPoint center;
+    Exact scale;
+};
+
+void expect_inside(const Place& place, Vec3d p, const BvhNode& node) {
+    const ExactPoint at = exact(p) - place.center;
+    const auto within = [&](const Exact& x, float lo, float hi) {
+        return Exact(lo) <= x * place.scale && x * place.scale <= Exact(hi);
+    };
+    EXPECT_TRUE(within(at.x, node.lo.x, node.hi.x) && within(at.y, node.lo.y, node.hi.y) &&
+                within(at.z, node.lo.z, node.hi.z));
+}
+
+/// Every leaf's box holds its triangles with no rounding, and every parent's its children.
+void expect_outward(const BvhD& bvh) {
+    const Place place{exact(bvh.center()), Exact(bvh.scale())};
+    std::vector<std::uint32_t> slots{0};
+    std::size_t seen = 0;
+    while (!slots.empty()) {
+        const BvhNode& node = bvh.tree().nodes()[slots.back()];
+        slots.pop_back();
+        if (!node.is_leaf()) slots.insert(slots.end(), {node.first, node.first + 1});
+        for (std::uint32_t k = node.first; k < node.first + node.count; ++k, ++seen)
+            for (const Vec3d& p :
+                 {bvh.triangles()[k].v0, bvh.triangles()[k].v1, bvh.triangles()[k].v2})
+                expect_inside(place, p, node);
+    }
+    EXPECT_EQ(seen, bvh.input_count() - bvh.left_out());
+    const CheckReport report = check(bvh.tree());
+    EXPECT_TRUE(report.ok) << report.broken;
+}
+
+TEST(BuildDouble, BoxesHoldTheirTrianglesExactly) {
+    for (const MeshD& mesh :
+         {random_soup_d(300, 1), in_double(random_soup(300, 2), 100.0, utm_place),
+          in_double(random_soup(300, 3), 1.8e12, {-0.9e12, -0.9e12, -0.9e12}),
+          in_double(random_soup(300, 4), 1e-6, {1e5, -2e5, 3e5}),
+          in_double(random_soup(300, 5), 1e-10)})
+        for (const Builder builder : {Builder::karras, Builder::hploc, Builder::binned})
+            expect_outward(build_bvh(mesh, {.builder = builder, .max_leaf = 1}));
+}
+
+TEST(BuildDouble, TheWholeRangeOfCoordinates) {
+    const MeshD mesh{"",
+                     {{-1e12, -1e12, -1e12}, {1e12, 1e12, 1e12}, {1e12, -1e12, 1e12}, {0, 0, 1}},
+                     {{0, 1, 2}, {1, 2, 3}}};
+    const BvhD bvh = build_bvh(mesh);
+    EXPECT_EQ(bvh.left_out(), 0u);
+    EXPECT_EQ(bvh.scale(), 0.25);
+    expect_outward(bvh);
+    EXPECT_TRUE(closest_hit(bvh, {{1e12, 0, -1e12}, 0.0, {-1, 0, 1}}).hit());
+}
+
+/// A forgotten vertex at 0, as files of maps have it.
+TEST(BuildDouble, OneStrayTriangleDoesNotMoveTheCenter) {
+    MeshD mesh = in_double(random_soup(5000, 10), 1.0, utm_place);
+    const std::vector<RayD> rays = mixed_rays(mesh, 200 * thorough, 5);
+    std::vector<HitD> wanted(rays.size()), hits(rays.size());
+    const BuildOptions by_area{
+        .builder = Builder::sweep};  // one grid of codes over all would be too coarse
+    const TraceCounts work = trace(build_bvh(mesh, by_area), rays, wanted, {.counters = true});
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(), {{0, 0, 0}, {0, 0, 1}, {0, 1, 0}});
+    mesh.triangles.insert(mesh.triangles.begin() + 2500, {first, first + 1, first + 2});
+    const BvhD bvh = build_bvh(mesh, by_area);
+    EXPECT_LT(bvh.center().x - utm_place.x, 1.0);
+    EXPECT_GT(bvh.center().x - utm_place.x, 0.0);
+    expect_outward(bvh);
+    const TraceCounts with_stray = trace(bvh, rays, hits, {.counters = true});
+    EXPECT_LT(with_stray.node_visits, work.node_visits * 3 / 2);
+    EXPECT_EQ(with_stray.hits, work.hits);
+}
+
+/// Where every triangle that is asked for the center is invalid, the box's middle serves.
+TEST(BuildDouble, TheCenterIsInTheBoxWhateverIsLeftOut) {
+    MeshD mesh = in_double(random_soup(2048, 11), 1.0, utm_place);
+    for (std::size_t i = 0; i < 2048; i += 2) mesh.vertices[mesh.triangles[i][0]].x = nan;
+    const BvhD bvh = build_bvh(mesh);
+    EXPECT_EQ(bvh.left_out(), 1024u);
+    EXPECT_TRUE(bvh.bounds().lo.x <= bvh.center().x && bvh.center().x <= bvh.bounds().hi.x);
+    expect_outward(bvh);
+}
+
+TEST(BuildDouble, WhatIsNotValidIsLeftOut) {
+    MeshD mesh = random_soup_d(20, 6);
+    mesh.vertices[3 * 4].x = nan;
+    mesh.vertices[3 * 5 + 1].y = inf;
+    mesh.vertices[3 * 6 + 2].z = 1.0000001e12;
+    const Vec3d at{7.0, 7.0, 7e-14};
+    mesh.vertices[3 * 8] = mesh.vertices[3 * 8 + 1] = mesh.vertices[3 * 8 + 2] = at;
+    mesh.vertices[3 * 8].z = 0.0;  // too small a box
+    for (std::size_t k = 0; k < 3; ++k) mesh.vertices[3 * 9 + k] = {0.3, -0.0, 1e-200};  // a point
+    const BvhD bvh = build_bvh(mesh);
+    EXPECT_EQ(bvh.input_count(), 20u);
+    EXPECT_EQ(bvh.left_out(), 4u);
+    EXPECT_EQ(bvh.order().size(), 16u);
+    EXPECT_GT(bvh.bytes(), 16u * (72 + 4));
+    expect_outward(bvh);
+    const auto at_9 =
+        static_cast<std::size_t>(std::ranges::find(bvh.order(), 9u) - bvh.order().begin());
+    EXPECT_FALSE(std::signbit(bvh.triangles()[at_9].v0.y));
+    EXPECT_EQ(bvh.triangles()[at_9].v0.z, 0.0);  // below 2^-500
+    EXPECT_EQ(message_of([&] { (void)build_bvh(mesh, {.strict = true}); }),
+              "triangle 4: not finite or out of range, as are 3 others");
+    mesh.triangles[11][2] = 60;
+    EXPECT_EQ(message_of([&] { (void)build_bvh(mesh); }),
+              "triangle 11: index 60 is past the last of 60 vertices");
+    EXPECT_THROW((void)build_bvh(random_soup_d(3, 1), {.bits = 31}), InputError);
+}
+
+TEST(BuildDouble, EmptyMeshes) {
+    MeshD mesh;
+    EXPECT_TRUE(build_bvh(mesh).empty());
+    mesh.vertices.assign(3, Vec3d{nan, 0, 0});
+    mesh.triangles = {{0, 1, 2}};
+    const BvhD bvh = build_bvh(mesh);
+    EXPECT_TRUE(bvh.empty());
+    EXPECT_EQ(bvh.left_out(), 1u);
+    EXPECT_FALSE(bvh.bounds().lo.x <= bvh.bounds().hi.x);
+    EXPECT_EQ(bvh.bytes(), 0u);
+}
+
+TEST(BuildDouble, TreesDoNotDependOnThreads) {
+    const MeshD mesh = in_double(random_soup(20'000, 7), 100.0, utm_place);
+    for (const Builder builder :
+         {Builder::karras, Builder::ploc, Builder::hploc, Builder::binned, Builder::sweep}) {
+        const BvhD one = build_bvh(mesh, {.builder = builder, .threads = 1});
+        const BvhD three = build_bvh(mesh, {.builder = builder, .threads = 3});
+        EXPECT_EQ(tree_hash(one.tree()), tree_hash(three.tree())) << builder_name(builder);
+        EXPECT_TRUE(one.center() == three.center());
+    }
+}
+
+TEST(BuildDouble, RefitsToNewPlaces) {
+    const MeshD mesh = in_double(random_soup(500, 8), 100.0, utm_place);
+    MeshD moved = in_double(random_soup(500, 9), 50.0, {-7e5, 1e3, 20.0});
+    BvhD bvh = build_bvh(mesh, {.builder = Builder::ploc});
+    EXPECT_GT(refit(bvh, moved).sah, 0.0);
+    expect_outward(bvh);
+    const std::vector<RayD> rays = mixed_rays(moved, 500 * thorough, 3);
+    EXPECT_EQ(trace(bvh, rays), trace_brute_force(moved, rays));
+    const AabbD box = bvh.bounds(), wanted = box_of_mesh(moved);
+    EXPECT_TRUE(box.lo == wanted.lo && box.hi == wanted.hi);
+    moved.vertices[30].x = nan;
+    EXPECT_THROW(refit(bvh, moved), InputError);
+    EXPECT_TRUE(bvh.bounds().lo == wanted.lo);  // nothing has changed
+    moved.triangles.pop_back();
+    EXPECT_THROW(refit(bvh, moved), InputError);
+}
+
+TEST(BuildDouble, RefitsNameTheTriangle) {
+    const MeshD mesh = in_double(random_soup(500, 8), 100.0, utm_place);
+    for (const int threads : {1, 3}) {
+        BvhD bvh = build_bvh(mesh);
+        const auto message = [&](const MeshD& changed) {
+            return message_of([&] { refit(bvh, changed, threads); });
+        };
+        MeshD changed = mesh;
+        changed.vertices[3 * 400].x = nan;
+        changed.vertices[3 * 77 + 1].y = 1.1e12;
+        changed.vertices[3 * 123 + 2].z = inf;
+        EXPECT_EQ(message(changed), "refit: triangle 77 is not finite or out of range now");
+        changed = mesh;
+        const Vec3d at{0, 0, 0};
+        for (std::size_t k = 0; k < 3; ++k) changed.vertices[3 * 9 + k] = at;
+        changed.vertices[3 * 9].x = 1e-13;  // smaller than 1e-12, but no point
+        EXPECT_EQ(message(changed), "refit: triangle 9 is not finite or out of range now");
+        changed.vertices[3 * 9].x = 0.0;
+        EXPECT_EQ(message(changed), "no error");
+        changed = mesh;
+        changed.triangles[30][1] = 1500;
+        EXPECT_EQ(message(changed), "triangle 30: index 1500 is past the last of 1500 vertices");
+        changed = mesh;
+        changed.triangles.resize(400);
+        EXPECT_EQ(message(changed), "refit: 400 triangles, but the tree was built from 500");
+        // Left out at first, valid now.
+        MeshD broken = mesh;
+        broken.vertices[3 * 5].x = nan;
+        bvh = build_bvh(broken);
+        EXPECT_EQ(message(mesh),
+                  "refit: 1 triangle(s) were left out when the tree was built, but are valid now");
+        EXPECT_EQ(message(broken), "no error");
+    }
+}
+
+}  // namespace
+}  // namespace raydix::test

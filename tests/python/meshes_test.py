@@ -1,0 +1,341 @@
+"""Scene: closest points, inside and outside, overlaps, refit, instances, where meshes come from."""
+
+import numpy as np
+import pytest
+import support
+
+import raydix
+
+BOX = support.box_mesh([-1, -2, -3], [1, 2, 3])
+
+
+def distance_to_box(points, lo, hi):
+    outside = np.maximum(np.maximum(lo - points, points - hi), 0)
+    inside = np.minimum(points - lo, hi - points).min(axis=-1)
+    return np.where(inside >= 0, -inside, np.sqrt((outside**2).sum(axis=-1)))
+
+
+def test_distances_to_a_box(rng):
+    scene = raydix.Scene(*BOX)
+    points = rng.uniform(-5, 5, (7, 100, 3)).astype(np.float32)
+    wanted = distance_to_box(points.astype(np.float64), BOX[0].min(axis=0), BOX[0].max(axis=0))
+    near = scene.closest_point(points)
+    np.testing.assert_allclose(near["distance"], abs(wanted), rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(scene.signed_distance(points), wanted, rtol=1e-5, atol=1e-6)
+    np.testing.assert_array_equal(scene.contains(points), wanted <= 0)
+    np.testing.assert_allclose(
+        np.linalg.norm(near["point"] - points, axis=-1), near["distance"], rtol=1e-5, atol=1e-6
+    )
+    assert near["prim"].shape == near["u"].shape == (7, 100) and near["point"].shape == (7, 100, 3)
+
+
+def test_closest_point_equals_brute_force(rng):
+    vertices, faces = support.random_triangles(rng, 60)
+    points = rng.uniform(-2, 2, (50, 3)).astype(np.float32)
+    near = raydix.Scene(vertices, faces).closest_point(points)
+    grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 101)] * 2), axis=-1).reshape(-1, 2)
+    grid = grid[grid.sum(axis=1) <= 1]
+    corners = vertices[faces].astype(np.float64)
+    samples = (
+        corners[:, None, 0]
+        + grid[:, :1] * (corners[:, None, 1] - corners[:, None, 0])
+        + grid[:, 1:] * (corners[:, None, 2] - corners[:, None, 0])
+    )
+    sampled = np.linalg.norm(samples[None] - points[:, None, None].astype(np.float64), axis=-1).min(
+        axis=(1, 2)
+    )
+    assert (near["distance"] <= sampled + 1e-6).all() and (near["distance"] >= sampled - 0.01).all()
+
+
+def test_far_and_invalid_points():
+    scene = raydix.Scene(*BOX)
+    near = scene.closest_point([[9, 0, 0], [np.nan, 0, 0], [1.5, 0, 0]], max_distance=1)
+    assert near["distance"].tolist() == [np.inf, np.inf, 0.5]
+    assert near["prim"][:2].tolist() == [raydix.MISSING] * 2
+    assert not scene.contains([np.nan, 0, 0]) and not scene.contains([np.inf, 0, 0])
+    assert (
+        np.isnan(scene.winding_number([np.nan, 0, 0])) and abs(scene.winding_number([0, 0, 0])) == 1
+    )
+    for wrong in (-1, np.nan):
+        with pytest.raises(ValueError, match="max_distance"):
+            scene.closest_point([0, 0, 0], max_distance=wrong)
+    with pytest.raises(raydix.InputError, match="unknown rule"):
+        scene.contains([0, 0, 0], rule="guess")
+    with pytest.raises(
+        ValueError,
+        match=r"points: expected shape \(..., 3\) float32 or float64, given shape \(2,\) float64",
+    ):
+        scene.contains([1.0, 2.0])
+
+
+def test_contains_is_exact_for_a_million_points(rng):
+    """A scaled and moved closed mesh: its box is known, so is the answer, at edges, faces and
+    corners too."""
+    scale, shift = np.float32(37.3), np.array([1234.5, -77.25, 9.125], np.float32)
+    vertices = BOX[0].astype(np.float32) * scale + shift
+    lo, hi = vertices.min(axis=0), vertices.max(axis=0)
+    points = rng.uniform(lo - 20, hi + 20, (1_000_000, 3)).astype(np.float32)
+    planes = rng.integers(
+        0, 3, (300_000, 3)
+    )  # a third each: on the lower plane, on the upper, anywhere
+    points[:300_000] = np.where(planes == 0, lo, np.where(planes == 1, hi, points[:300_000]))
+    wanted = ((points >= lo) & (points <= hi)).all(axis=1)
+    assert 100_000 < wanted.sum() < 900_000
+    assert (raydix.Scene(vertices, BOX[1]).contains(points) != wanted).sum() == 0
+
+
+def test_contains_through_vertices_and_edges():
+    """Rays from these points to infinity along an axis pass through corners and edges of an
+    octahedron."""
+    vertices = np.array(
+        [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float
+    )
+    faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
+    grid = np.linspace(-2, 2, 33)
+    points = np.stack(np.meshgrid(grid, grid, grid), axis=-1)
+    for rule in ("automatic", "crossings", "parity"):
+        np.testing.assert_array_equal(
+            raydix.Scene(vertices, faces).contains(points, rule=rule), abs(points).sum(axis=-1) <= 1
+        )
+
+
+def test_open_meshes_say_so():
+    scene = raydix.Scene(BOX[0], BOX[1][1:])
+    assert scene.closure() == {"closure": "open", "open_edges": 3, "rule": "winding"}
+    assert raydix.Scene(*BOX).closure() == {
+        "closure": "oriented",
+        "open_edges": 0,
+        "rule": "crossings",
+    }
+    assert scene.contains([0.1, 0, 0]) and not scene.contains([0, 9, 0])
+
+
+def test_overlaps_equal_brute_force(rng):
+    scenes = []
+    for _ in range(2):
+        vertices, faces = support.random_triangles(rng, 200)
+        corners = vertices[faces]
+        scenes.append((raydix.Scene(vertices, faces), corners.min(axis=1), corners.max(axis=1)))
+    (a, lo_a, hi_a), (b, lo_b, hi_b) = scenes
+
+    def meet(lo, hi, lo2, hi2):
+        return ((lo[:, None] <= hi2[None]) & (lo2[None] <= hi[:, None])).all(axis=-1)
+
+    np.testing.assert_array_equal(a.overlaps(b), np.argwhere(meet(lo_a, hi_a, lo_b, hi_b)))
+    np.testing.assert_array_equal(
+        a.overlaps(), np.argwhere(np.triu(meet(lo_a, hi_a, lo_a, hi_a), 1))
+    )
+    assert (
+        a.count_overlaps(b) == len(a.overlaps(b))
+        and a.overlaps(a).tolist() == a.overlaps().tolist()
+    )
+    narrow = a.overlaps(b, narrow=True)
+    assert 0 < len(narrow) < len(a.overlaps(b)) and set(map(tuple, narrow)) <= set(
+        map(tuple, a.overlaps(b))
+    )
+    with pytest.raises(raydix.InputError):
+        a.overlaps(b, max_bytes=8)
+
+
+def test_touched_by_shapes():
+    scene = raydix.Scene(*BOX)
+    found = scene.touched_by(spheres=[[0, 0, 0, 0.5], [0, 0, 0, 1], [0, 0, 0, 9]])
+    assert (
+        np.diff(found["offsets"]).tolist()[0] == 0 and np.diff(found["offsets"]).tolist()[2] == 12
+    )
+    assert len(scene.touched_by(segments=[[0, 0, 0, 5, 0.1, 0.2]])["prim"]) == 1
+    with pytest.raises(ValueError, match="either spheres or segments"):
+        scene.touched_by()
+
+
+def test_refit_follows_the_vertices(rng):
+    vertices, faces = support.random_triangles(rng, 500)
+    scene = raydix.Scene(vertices, faces)
+    rays = support.random_rays(rng, 500)
+    before = scene.intersect(rays)
+    moved = (vertices * 0.7 + 0.1).astype(np.float32)
+    quality = scene.refit(moved)
+    assert quality["ratio"] == pytest.approx(quality["sah"] / quality["sah_at_build"])
+    fresh = raydix.Scene(moved, faces)
+    for field, values in scene.intersect(rays).items():
+        np.testing.assert_array_equal(values, fresh.intersect(rays)[field])
+    assert not np.array_equal(before["t"], scene.intersect(rays)["t"])
+    np.testing.assert_array_equal(scene.vertices, moved)
+    scene.check()
+    with pytest.raises(ValueError, match=r"expected shape \(1500, 3\), given \(1499, 3\)"):
+        scene.refit(moved[1:])
+    with pytest.raises(raydix.InputError):
+        scene.refit(np.where(np.arange(1500)[:, None] == 7, np.nan, moved))
+    np.testing.assert_array_equal(
+        scene.intersect(rays)["t"], fresh.intersect(rays)["t"]
+    )  # as before the error
+
+
+def test_instances_equal_moved_copies(rng):
+    vertices, faces = support.random_triangles(rng, 100)
+    base = raydix.Scene(vertices, faces)
+    shifts = np.array([[0, 0, 0], [4, 0, 0], [0, 8, 0]], np.float32)
+    transforms = np.tile(np.eye(4), (3, 1, 1))
+    transforms[:, :3, 3] = shifts
+    placed = base.instances(transforms)
+    assert len(placed) == 3
+    rays = support.random_rays(rng, 300)
+    rays[:, :3] += shifts[np.arange(300) % 3]
+    hits = placed.intersect(rays)
+    merged = raydix.Scene(
+        np.concatenate([vertices + s for s in shifts]),
+        np.concatenate([faces + 300 * i for i in range(3)]),
+    )
+    wanted = merged.intersect(rays)
+    found = wanted["prim"] != raydix.MISSING
+    agree = np.where(
+        found,
+        hits["instance"] * 100 + hits["prim"] == wanted["prim"],
+        hits["prim"] == raydix.MISSING,
+    )
+    assert (
+        found.sum() > 50 and agree.mean() > 0.99
+    )  # rays are rounded on their way into the object's space
+    np.testing.assert_array_equal(placed.occluded(rays), hits["prim"] != raydix.MISSING)
+    base.refit(vertices + np.float32(100))
+    assert not placed.occluded(rays).any()  # it saw that its object moved
+    placed.move(transforms[:, :3] - np.array([0, 0, 0, 100]))
+    assert (placed.occluded(rays) == found).mean() > 0.99
+    with pytest.raises(ValueError, match="another number"):
+        placed.move(transforms[:2])
+    with pytest.raises(raydix.InputError):
+        base.instances(np.zeros((1, 3, 4)))
+    with pytest.raises(ValueError, match=r"transforms: expected shape \(M, 3, 4\)"):
+        base.instances(np.eye(3))
+
+
+def test_masks_hide_instances():
+    base = raydix.Scene(*BOX)
+    placed = base.instances(np.eye(4)[None], masks=[2])
+    ray = [0, 0, 9, 0, 0, -1]
+    assert (
+        placed.occluded(ray) and placed.occluded(ray, mask=3) and not placed.occluded(ray, mask=1)
+    )
+
+
+def test_where_meshes_come_from(tmp_path, figure):
+    file = tmp_path / "box.obj"
+    file.write_text(
+        "".join(f"v {x} {y} {z}\n" for x, y, z in BOX[0])
+        + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in BOX[1])
+    )
+    from_file = raydix.Scene(file)
+    assert (
+        len(from_file) == 12 and from_file.name == "box.obj" and "12 triangles" in repr(from_file)
+    )
+    np.testing.assert_array_equal(from_file.vertices, BOX[0].astype(np.float32))
+    assert len(figure) > 10_000 and len(figure.cameras) >= 1
+    copy = raydix.Scene(figure)  # has .vertices and .faces, as a trimesh.Trimesh has
+    np.testing.assert_array_equal(copy.faces, figure.faces)
+    with pytest.raises(raydix.InputError, match="nowhere.ply"):
+        raydix.Scene(tmp_path / "nowhere.ply")
+    with pytest.raises(TypeError, match="vertices: expected a path, a mesh"):
+        raydix.Scene(np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize(
+    "error, text, vertices, faces",
+    [
+        (
+            ValueError,
+            r"vertices: expected shape \(..., 3\) .* given shape \(4, 2\) float64",
+            np.zeros((4, 2)),
+            [[0, 1, 2]],
+        ),
+        (
+            ValueError,
+            r"faces: expected shape \(F, 3\) of whole numbers, given shape \(1, 4\) int64",
+            np.zeros((4, 3)),
+            [[0, 1, 2, 3]],
+        ),
+        (
+            TypeError,
+            r"faces: expected .* given shape \(1, 3\) float64",
+            np.zeros((4, 3)),
+            [[0.0, 1, 2]],
+        ),
+        (
+            ValueError,
+            r"faces: face 1 is \[0, 1, 4\], but there are 4 vertices",
+            np.zeros((4, 3)),
+            [[0, 1, 2], [0, 1, 4]],
+        ),
+        (ValueError, r"faces: face 0 is \[-1, 1, 2\]", np.zeros((4, 3)), [[-1, 1, 2]]),
+        (TypeError, "vertices: expected", np.zeros((4, 3), complex), [[0, 1, 2]]),
+    ],
+)
+def test_errors_of_meshes(error, text, vertices, faces):
+    with pytest.raises(error, match=text):
+        raydix.Scene(vertices, faces)
+
+
+def test_options_are_checked_and_invalid_triangles_left_out():
+    vertices = BOX[0].copy()
+    vertices[0, 0] = np.nan
+    scene = raydix.Scene(vertices, BOX[1])
+    touching = int((BOX[1] == 0).any(axis=1).sum())
+    assert (
+        scene.info()["left_out_triangles"]
+        == touching
+        == scene.stats()["left_out"]
+        == scene.wide_stats()["left_out"]
+    )
+    with pytest.raises(raydix.InputError):
+        raydix.Scene(vertices, BOX[1], strict=True).stats()
+    with pytest.raises(
+        ValueError, match="quality: expected one of fast, balanced, high, given 'best'"
+    ):
+        raydix.Scene(*BOX, quality="best")
+    with pytest.raises(raydix.InputError, match="karras"):
+        raydix.Scene(*BOX, builder="carrots")
+    with pytest.raises(ValueError, match="device: expected 'cpu' or 'cuda'"):
+        raydix.Scene(*BOX, device="tpu")
+
+
+def test_the_scene_has_its_own_copy_of_the_mesh():
+    vertices, faces = BOX[0].astype(np.float32), BOX[1].astype(np.uint32)
+    scene = raydix.Scene(vertices, faces)
+    vertices += 100
+    faces[:] = 0
+    assert scene.occluded([0, 0, 9, 0, 0, -1])
+    with pytest.raises(ValueError):
+        scene.vertices[0, 0] = 5
+
+
+def test_a_shared_mesh_scaled_and_moved_stays_closed(rng):
+    """Igea, 100 times as large and far away: crossings along two directions, winding numbers and
+    distances agree on every point."""
+    given = support.shared_scene("igea")
+    assert given.closure()["closure"] == "oriented"
+    scene = raydix.Scene(
+        given.vertices * np.float32(100) + np.float32([3e4, -2e4, 500]), given.faces
+    )
+    lo, hi = np.array(scene.info()["bounds"])
+    points = rng.uniform(lo, hi, (100_000, 3)).astype(np.float32)
+    inside = scene.contains(points)
+    assert 20_000 < inside.sum() < 80_000
+    distance = scene.signed_distance(points)
+    apart = distance != 0  # a point beside the surface may be 0 away in float32, on either side
+    assert apart.mean() > 0.999
+    np.testing.assert_array_equal(distance[apart] < 0, inside[apart])
+    np.testing.assert_array_equal(scene.winding_number(points) != 0, inside)
+    for direction in ([0, 0, 1], [0.3, -0.5, 0.2]):
+        np.testing.assert_array_equal(scene.count(points, np.float32(direction)) % 2 == 1, inside)
+
+
+def test_the_order_of_queries_does_not_matter(rng):
+    """A wide tree made from the binary one, if that was there first, is the one made from the mesh."""
+    vertices, faces = support.random_triangles(rng, 3000)
+    rays = support.random_rays(rng, 1000)
+    for quality in ("fast", "balanced", "high"):
+        first, second = (raydix.Scene(vertices, faces, quality=quality) for _ in range(2))
+        first.stats()
+        stats = [scene.wide_stats() | {"ms": 0} for scene in (first, second)]
+        assert stats[0] == stats[1]
+        for field, values in first.intersect(rays).items():
+            np.testing.assert_array_equal(values, second.intersect(rays)[field])

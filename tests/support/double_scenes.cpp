@@ -1,0 +1,154 @@
+#include "support/double_scenes.h"
+
+#include <cmath>
+#include <limits>
+
+namespace raydix::test {
+
+namespace {
+
+Vec3d in_double(Vec3 p) { return {p.x, p.y, p.z}; }
+double& coordinate(Vec3d& p, std::size_t axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
+
+class RayMaker {
+public:
+    RayMaker(const MeshD& mesh, std::uint64_t seed)
+        : mesh_(mesh), box_(box_of_mesh(mesh)), random_(seed) {
+        const Vec3d size = box_.hi - box_.lo;
+        const double margin = 0.05 * max_of(max_of(size.x, size.y), max_of(size.z, 1e-12));
+        box_.lo = box_.lo - Vec3d{margin, margin, margin};
+        box_.hi = box_.hi + Vec3d{margin, margin, margin};
+    }
+
+    RayD make(std::size_t kind) {
+        RayD ray = toward(corner());
+        switch (kind % 10) {
+            case 0:
+                return ray;
+            case 1:
+                return toward(edge_middle());
+            case 2:
+                return along_axis();
+            case 3:
+                return zero_component(ray);
+            case 4:
+                ray.tmax = 2.0 * random_.unit();
+                return ray;
+            case 5:
+                ray.tmin = 1.5 * random_.unit();
+                return ray;
+            case 6:
+                return {edge_middle(), 0.0, random_.direction()};
+            case 7:
+                ray.direction =
+                    std::ldexp(1.0, static_cast<int>(random_.below(1201)) - 600) * ray.direction;
+                return ray;
+            case 8:
+                return along_edge();
+            default:
+                return toward(random_.in(box_));
+        }
+    }
+
+private:
+    const Triangle& triangle() { return mesh_.triangles[random_.below(mesh_.triangles.size())]; }
+    Vec3d corner() { return mesh_.vertices[triangle()[random_.below(3)]]; }
+    Vec3d edge_middle() {
+        const Triangle& t = triangle();
+        const std::size_t k = random_.below(3);
+        return 0.5 * (mesh_.vertices[t[k]] + mesh_.vertices[t[(k + 1) % 3]]);
+    }
+    RayD toward(Vec3d target) {
+        const Vec3d origin = random_.in(box_);
+        return {origin, 0.0, target - origin};
+    }
+    double zero() { return random_.below(2) != 0 ? 0.0 : -0.0; }
+    RayD along_axis() {
+        RayD ray{corner(), 0.0, {zero(), zero(), zero()}};
+        const std::size_t axis = random_.below(3);
+        Vec3d start = random_.in(box_);
+        coordinate(ray.origin, axis) = coordinate(start, axis);
+        coordinate(ray.direction, axis) = random_.below(2) != 0 ? 1.0 : -1.0;
+        return ray;
+    }
+    RayD zero_component(RayD ray) {
+        const std::size_t axis = random_.below(3);
+        Vec3d target = ray.origin + ray.direction;
+        coordinate(ray.origin, axis) = coordinate(target, axis);
+        coordinate(ray.direction, axis) = zero();
+        return ray;
+    }
+    RayD along_edge() {
+        const Triangle& t = triangle();
+        const std::size_t k = random_.below(3);
+        const Vec3d a = mesh_.vertices[t[k]], b = mesh_.vertices[t[(k + 1) % 3]];
+        return {a - static_cast<double>(random_.below(3)) * (b - a), 0.0, b - a};
+    }
+
+    const MeshD& mesh_;
+    AabbD box_;
+    RandomD random_;
+};
+
+}  // namespace
+
+MeshD in_double(const Mesh& mesh, double scale, Vec3d move) {
+    MeshD out{mesh.name, {}, mesh.triangles};
+    for (const Vec3& v : mesh.vertices) out.vertices.push_back(scale * in_double(v) + move);
+    return out;
+}
+
+Mesh in_float(const MeshD& mesh) {
+    Mesh out{mesh.name, {}, mesh.triangles};
+    for (const Vec3d& v : mesh.vertices)
+        out.vertices.push_back(
+            {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)});
+    return out;
+}
+
+Vec3d RandomD::direction() {
+    for (;;) {
+        const Vec3d d{2 * unit() - 1, 2 * unit() - 1, 2 * unit() - 1};
+        const double length2 = d.x * d.x + d.y * d.y + d.z * d.z;
+        if (length2 > 0.01 && length2 < 1.0) return d;
+    }
+}
+
+MeshD random_soup_d(std::size_t count, std::uint64_t seed, double size) {
+    RandomD random(seed);
+    MeshD mesh;
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const Vec3d at{random.unit(), random.unit(), random.unit()};
+        for (int k = 0; k < 3; ++k) mesh.vertices.push_back(at + size * random.direction());
+        mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    return mesh;
+}
+
+AabbD box_of_mesh(const MeshD& mesh) {
+    AabbD box{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
+    for (const Vec3d& v : mesh.vertices) {
+        const double largest = max_of(max_of(std::fabs(v.x), std::fabs(v.y)), std::fabs(v.z));
+        if (!(largest <= 1e12) || std::isnan(v.x + v.y + v.z)) continue;
+        box = {min_of(box.lo, v), max_of(box.hi, v)};
+    }
+    return box;
+}
+
+std::vector<RayD> mixed_rays(const MeshD& mesh, std::size_t count, std::uint64_t seed) {
+    RayMaker maker(mesh, seed);
+    std::vector<RayD> rays(count);
+    for (std::size_t i = 0; i < count; ++i) rays[i] = maker.make(i);
+    return rays;
+}
+
+ExactPoint exact(Vec3d p) { return {Exact(p.x), Exact(p.y), Exact(p.z)}; }
+ExactPoint operator-(const ExactPoint& a, const ExactPoint& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+Exact dot(const ExactPoint& a, const ExactPoint& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+ExactPoint cross(const ExactPoint& a, const ExactPoint& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+}  // namespace raydix::test

@@ -1,0 +1,64 @@
+// Scenes and rays in double, and exact arithmetic to judge them with.
+#pragma once
+
+#include <raydix/double.h>
+#include <raydix/mesh.h>
+
+#include <boost/multiprecision/cpp_int.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "base/math.h"
+
+namespace raydix::test {
+
+/// Where georeferenced meshes lie: metres east and north of a UTM zone's origin, and a height.
+inline constexpr Vec3d utm_place{500'000.0, 4'500'000.0, 250.0};
+
+/// scale * p + move of every corner, in double.
+MeshD in_double(const Mesh& mesh, double scale = 1.0, Vec3d move = {0.0, 0.0, 0.0});
+/// Rounded to float.
+Mesh in_float(const MeshD& mesh);
+
+class RandomD {
+public:
+    explicit RandomD(std::uint64_t seed) : engine_(seed) {}
+    double unit() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+    double between(double lo, double hi) { return lo + (hi - lo) * unit(); }
+    std::size_t below(std::size_t n) { return engine_() % n; }
+    Vec3d in(const AabbD& box) {
+        return {between(box.lo.x, box.hi.x), between(box.lo.y, box.hi.y),
+                between(box.lo.z, box.hi.z)};
+    }
+    /// Neither short nor long, in any direction.
+    Vec3d direction();
+
+private:
+    std::mt19937_64 engine_;
+};
+
+/// `count` small triangles, each within `size` of a place in the unit cube.
+MeshD random_soup_d(std::size_t count, std::uint64_t seed, double size = 0.05);
+
+/// Around the corners that are finite and within 1e12.
+AabbD box_of_mesh(const MeshD& mesh);
+
+/// Rays of ten kinds in turn: anywhere, at corners and middles of edges, along axes through
+/// corners, with a component of 0 or -0, with limits, from surfaces, of any length, along edges.
+std::vector<RayD> mixed_rays(const MeshD& mesh, std::size_t count, std::uint64_t seed);
+
+using Exact = boost::multiprecision::cpp_rational;
+
+struct ExactPoint {
+    Exact x, y, z;
+};
+ExactPoint exact(Vec3d p);
+ExactPoint operator-(const ExactPoint& a, const ExactPoint& b);
+Exact dot(const ExactPoint& a, const ExactPoint& b);
+ExactPoint cross(const ExactPoint& a, const ExactPoint& b);
+
+}  // namespace raydix::test
