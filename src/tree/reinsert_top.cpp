@@ -189,7 +189,8 @@ private:
 ClusterRef reinsert_clusters(const ClusterTree& tree, ClusterNode* clusters, std::uint32_t max_leaf,
                              const TopOptions& options, TopScratch& scratch) {
     const ClusterTop view{tree};
-    if (tree.nodes[tree.root].sum.inner < least_inner_nodes) return tree.root;
+    if (is_primitive(tree.root) || tree.nodes[tree.root].sum.inner < least_inner_nodes)
+        return tree.root;
     TopTree& top = scratch.top;
     TopCut(view, top).run(top_size(tree.nodes[tree.root].sum.inner, options));
     if (reinsert_nodes(top.nodes, options.reinsertion, scratch.reinsertion).moves == 0)

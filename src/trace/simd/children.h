@@ -6,7 +6,10 @@
 #define RAYDIX_SIMD_CHILDREN_H
 #endif
 
+#include <hwy/cache_control.h>
+
 #include <bit>
+#include <type_traits>
 
 #include "trace/simd/lanes.h"
 #include "trace/simd/wide_ray.h"
@@ -24,6 +27,30 @@ HWY_INLINE std::uint32_t used_slots(const WideNode& node) {
         used |= bits_of(f8, hn::RebindMask(f8, hn::Not(missing))) << l;
     }
     return used;
+}
+
+/// Asks for the cache lines of a child, node or leaf, that will be visited soon.
+template <bool compact>
+HWY_INLINE void ask_for(const WideView& tree, std::uint32_t word) {
+    using Node = std::conditional_t<compact, CompactNode, WideNode>;
+    using Block = std::conditional_t<compact, CompactBlock, TriangleBlock>;
+    constexpr std::size_t line = 64;
+    const auto ask = [](const auto* at) {
+        const auto* const bytes = reinterpret_cast<const char*>(at);
+        for (std::size_t k = 0; k < sizeof(*at); k += line) hwy::Prefetch(bytes + k);
+    };
+    const std::size_t place = (word & ~wide_leaf_bit) >> 3;
+    if ((word & wide_leaf_bit) != 0) {
+        const Block* blocks;
+        if constexpr (compact)
+            blocks = tree.compact_blocks;
+        else
+            blocks = tree.blocks;
+        ask(blocks + place / block_lanes);
+    } else {
+        const Node* const node = &tree.template node<compact>(word);
+        ask(node);
+    }
 }
 
 /// `slots` into `order`, the smallest box first; how many.

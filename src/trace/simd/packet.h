@@ -209,6 +209,7 @@ private:
             hit &= active;
             if (hit == 0) continue;
             stack_.words[top] = node.child[s];
+            ask_for<compact>(tree_, node.child[s]);
             stack_.entries[top] = entries[s];
             stack_.active[top++] = hit;
         }

@@ -168,6 +168,8 @@ private:
         const bool swap = entries[second] < entries[first];
         const std::size_t near = swap ? second : first, far = swap ? first : second;
         word = child[near];
+        ask_for<compact>(tree_, child[near]);
+        ask_for<compact>(tree_, child[far]);
         float nearest = entries[near];
         stack_.words[top] = child[far];
         stack_.entries[top] = entries[far];
@@ -175,6 +177,7 @@ private:
         for (; met != 0; met &= met - 1) {
             const auto s = static_cast<std::size_t>(std::countr_zero(met));
             std::uint32_t moved = child[s];
+            ask_for<compact>(tree_, child[s]);
             float at = entries[s];
             if (at < nearest) std::swap(at, nearest), std::swap(moved, word);
             std::size_t k = top++;
