@@ -9,13 +9,21 @@
 #include <hwy/cache_control.h>
 
 #include <bit>
-#include <type_traits>
 
+#include "base/prefetch.h"
 #include "trace/simd/lanes.h"
 #include "trace/simd/wide_ray.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
+
+/// Of any object: a prefetch for each of its cache lines.
+template <class Object>
+RAYDIX_PREFETCHING void ask_for_all(const Object& object) {
+    constexpr std::size_t line = 64;
+    const auto* const bytes = reinterpret_cast<const char*>(&object);
+    for (std::size_t k = 0; k < sizeof(Object); k += line) hwy::Prefetch(bytes + k);
+}
 
 /// Bit s: there is a child in slot s.
 HWY_INLINE std::uint32_t used_slots(const CompactNode& node) { return node.used; }
@@ -32,24 +40,12 @@ HWY_INLINE std::uint32_t used_slots(const WideNode& node) {
 /// Asks for the cache lines of a child, node or leaf, that will be visited soon.
 template <bool compact>
 HWY_INLINE void ask_for(const WideView& tree, std::uint32_t word) {
-    using Node = std::conditional_t<compact, CompactNode, WideNode>;
-    using Block = std::conditional_t<compact, CompactBlock, TriangleBlock>;
-    constexpr std::size_t line = 64;
-    const auto ask = [](const auto* at) {
-        const auto* const bytes = reinterpret_cast<const char*>(at);
-        for (std::size_t k = 0; k < sizeof(*at); k += line) hwy::Prefetch(bytes + k);
-    };
-    const std::size_t place = (word & ~wide_leaf_bit) >> 3;
-    if ((word & wide_leaf_bit) != 0) {
-        const Block* blocks;
-        if constexpr (compact)
-            blocks = tree.compact_blocks;
-        else
-            blocks = tree.blocks;
-        ask(blocks + place / block_lanes);
+    const bool leaf = (word & wide_leaf_bit) != 0;
+    const std::size_t block = ((word & ~wide_leaf_bit) >> 3) / block_lanes;
+    if constexpr (compact) {
+        leaf ? ask_for_all(tree.compact_blocks[block]) : ask_for_all(tree.compact_nodes[word]);
     } else {
-        const Node* const node = &tree.template node<compact>(word);
-        ask(node);
+        leaf ? ask_for_all(tree.blocks[block]) : ask_for_all(tree.nodes[word]);
     }
 }
 

@@ -146,39 +146,68 @@ public:
     [[nodiscard]] std::uint32_t count(std::uint32_t code) const { return count_[code]; }
 
 private:
-    /// `place_of` is where ray k of the job lies. What loops read is copied to locals: bytes that
-    /// are written could be anything else to a compiler.
+    using Bytes = hn::Rebind<std::uint8_t, I16>;
+    /// Behind a class: what whole vectors write, and what fills the last one.
+    static constexpr std::uint32_t slack = 32;
+
+    /// Calls each(code, lanes with that code) for what is in `codes`; neighbours mostly agree.
+    template <class Each>
+    static HWY_INLINE void for_each_code(hn::Vec<I16> codes, const std::uint8_t* bytes,
+                                         std::uint32_t lanes, const Each& each) {
+        while (lanes != 0) {
+            const std::uint8_t code = bytes[std::countr_zero(lanes)];
+            const auto same = hn::Eq(codes, hn::Set(I16(), std::int32_t{code}));
+            const std::uint32_t met = bits_of(I16(), same) & lanes;
+            each(code, met);
+            lanes &= ~met;
+        }
+    }
+    static HWY_INLINE std::uint32_t lanes_of(std::size_t left) {
+        return static_cast<std::uint32_t>((std::uint64_t{1} << std::min(left, lanes16)) - 1);
+    }
+
+    /// `place_of` is where ray k of the job lies.
     template <class PlaceOf>
     HWY_INLINE void sort_by(const PlaceOf& place_of, const SimdJob& job) {
         const Ray* const rays = job.rays;
         const std::size_t n = job.n, last = n - 1;
-        HWY_ALIGN std::int32_t index[16], codes[16];
+        HWY_ALIGN std::int32_t index[16];
         std::uint32_t counts[ray_class_count] = {};
         for (std::size_t k = 0; k < n; k += lanes16) {
             for (std::size_t l = 0; l < lanes16; ++l) index[l] = place_of(std::min(k + l, last));
             for (std::size_t l = 0; l < lanes16; ++l)
                 hwy::Prefetch(rays + place_of(std::min(k + l + 128, last)));
-            hn::Store(classify(read_rays(rays, index)), I16(), codes);
-            for (std::size_t l = 0; l < lanes16 && k + l < n; ++l) {
-                code_[k + l] = static_cast<std::uint8_t>(codes[l]);
-                ++counts[codes[l]];
-            }
+            const auto codes = classify(read_rays(rays, index));
+            hn::StoreU(hn::DemoteTo(Bytes(), codes), Bytes(), code_ + k);
+            for_each_code(codes, code_ + k, lanes_of(n - k),
+                          [&](std::uint8_t code, std::uint32_t lanes) {
+                              counts[code] += static_cast<std::uint32_t>(std::popcount(lanes));
+                          });
         }
         std::uint32_t at = 0, next[ray_class_count];
         for (std::uint32_t c = 0; c < ray_class_count; ++c) {
             begin_[c] = next[c] = at;
             count_[c] = counts[c];
-            at += (counts[c] + 15u) & ~15u;
+            if (counts[c] != 0) at += counts[c] + slack;
         }
-        for (std::size_t k = 0; k < n; ++k) order_[next[code_[k]]++] = place_of(k);
+        for (std::size_t k = 0; k < n; k += lanes16) {
+            for (std::size_t l = 0; l < lanes16; ++l) index[l] = place_of(std::min(k + l, last));
+            const auto places = hn::Load(I16(), index);
+            const auto codes = hn::PromoteTo(I16(), hn::LoadU(Bytes(), code_ + k));
+            for_each_code(
+                codes, code_ + k, lanes_of(n - k), [&](std::uint8_t code, std::uint32_t lanes) {
+                    const auto mask = mask_of(I16(), lanes);
+                    hn::StoreU(compress(I16(), places, mask, lanes), I16(), order_ + next[code]);
+                    next[code] += static_cast<std::uint32_t>(std::popcount(lanes));
+                });
+        }
         for (std::uint32_t c = 0; c < ray_class_count; ++c)  // the last ray again, to fill vectors
-            for (; counts[c] > 0 && next[c] % 16 != 0; ++next[c])
-                order_[next[c]] = order_[next[c] - 1];
+            if (counts[c] != 0) std::fill_n(order_ + next[c], lanes16, order_[next[c] - 1]);
     }
 
     std::uint32_t begin_[ray_class_count], count_[ray_class_count];
     std::uint8_t code_[max_rays];
-    HWY_ALIGN std::int32_t order_[max_rays + 16 * ray_class_count];
+    HWY_ALIGN std::int32_t order_[max_rays + slack * ray_class_count];
 };
 
 template <bool any>
@@ -221,45 +250,52 @@ void trace_packets(const SimdJob& job, SimdCounts& counts) {
         trace_one<any, counting, compact>(job, static_cast<std::size_t>(odd[k]), counts);
 }
 
-/// Rays index[0, count) of one class as a stream.
+/// Rays index[0, count) of one class as a stream; `index` may be read up to the next multiple of
+/// lanes16.
 HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index,
                                    std::uint32_t count, std::uint32_t code) {
     std::vector<StreamRay>& rays = job.memory->rays();
     StreamFrame frame;
     frame.kind = ray_class_of(code);
-    rays.resize(count);
+    rays.resize((count + lanes16 - 1) / lanes16 * lanes16);
     job.memory->hits().resize(count);
-    const hn::FixedTag<std::uint8_t, 16> b16;
-    HWY_ALIGN std::uint8_t bytes[16];
-    for (std::uint32_t b = 0; b < 16; ++b)
-        bytes[b] = static_cast<std::uint8_t>(4 * (b < 4 ? frame.kind.kx : frame.kind.ky) + b % 4);
-    const auto order = hn::Load(b16, bytes);
-    auto lo = hn::Set(f4, infinity), hi = hn::Set(f4, -infinity);
-    const auto limit = hn::Set(f4, wide_longest_inverse);
-    for (std::uint32_t k = 0; k < count; ++k) {
-        StreamRay& ray = rays[k];
-        const float* const from = &job.rays[index[k]].origin.x;
-        const auto origin = hn::Add(hn::LoadU(f4, from), hn::Zero(f4));  // -0 becomes +0
-        const auto direction = hn::LoadU(f4, from + ray_direction);
-        const auto inverse = hn::Div(hn::Set(f4, 1.0f), direction);
-        const auto sheared =
-            hn::BitCast(f4, hn::TableLookupBytes(hn::BitCast(b16, direction), order));
-        const auto shear =
-            hn::Div(sheared, hn::Set(f4, from[ray_direction + static_cast<int>(frame.kind.kz)]));
-        if (k + 16 < count) hwy::Prefetch(job.rays + index[k + 16]);
-        lo = hn::Min(lo, origin), hi = hn::Max(hi, origin);
-        hn::Store(origin, f4, ray.origin);
-        hn::Store(hn::Max(hn::Min(inverse, limit), hn::Neg(limit)), f4, ray.inverse);
-        hn::Store(shear, f4, ray.shear);
-        hn::Store(inverse, f4, ray.true_inverse);
-        ray.t = min_of(from[ray_tmax], std::numeric_limits<float>::max());
-        ray.tmin = from[ray_tmin] > 0.0f ? from[ray_tmin] : 0.0f;
-        ray.prim = no_primitive;
-        ray.index = static_cast<std::uint32_t>(index[k]);
+    V16 lo[3], hi[3];
+    for (int a = 0; a < 3; ++a) lo[a] = hn::Set(f16, infinity), hi[a] = hn::Set(f16, -infinity);
+    const V16 zero = hn::Zero(f16), one = hn::Set(f16, 1.0f),
+              limit = hn::Set(f16, wide_longest_inverse);
+    for (std::uint32_t k = 0; k < count; k += lanes16) {
+        for (std::size_t l = 0; l < lanes16; ++l)
+            hwy::Prefetch(job.rays + index[std::min<std::size_t>(k + lanes16 + l, count - 1)]);
+        const RayVectors ray = read_rays(job.rays, index + k);
+        V16 place[4], way[4], shear[4], true_way[4];
+        for (int a = 0; a < 3; ++a) {
+            place[a] = hn::Add(ray.place[a], zero);  // -0 becomes +0
+            lo[a] = hn::Min(lo[a], place[a]), hi[a] = hn::Max(hi[a], place[a]);
+            true_way[a] = hn::Div(one, ray.way[a]);
+            way[a] = hn::Max(hn::Min(true_way[a], limit), hn::Neg(limit));
+        }
+        place[3] = hn::Min(ray.way[3], hn::Set(f16, std::numeric_limits<float>::max()));
+        way[3] = hn::IfThenElseZero(hn::Gt(ray.place[3], zero), ray.place[3]);
+        shear[0] = hn::Div(ray.way[frame.kind.kx], ray.way[frame.kind.kz]);
+        shear[1] = hn::Div(ray.way[frame.kind.ky], ray.way[frame.kind.kz]);
+        shear[2] = hn::BitCast(f16, hn::Set(U16(), no_primitive));
+        shear[3] = hn::BitCast(f16, hn::LoadU(I16(), index + k));
+        true_way[3] = zero;
+        const auto quad = [to = reinterpret_cast<float*>(rays.data() + k)](std::size_t q) {
+            return
+                [=](std::size_t l) { return to + sizeof(StreamRay) / sizeof(float) * l + 4 * q; };
+        };
+        store_quads(place, quad(0));
+        store_quads(way, quad(1));
+        store_quads(shear, quad(2));
+        store_quads(true_way, quad(3));
     }
-    HWY_ALIGN float least[4], largest[4];
-    hn::Store(lo, f4, least);
-    hn::Store(hi, f4, largest);
+    rays.resize(count);
+    float least[3], largest[3];
+    for (int a = 0; a < 3; ++a) {
+        least[a] = hn::GetLane(hn::MinOfLanes(f16, lo[a]));
+        largest[a] = hn::GetLane(hn::MaxOfLanes(f16, hi[a]));
+    }
     largest_pad(job.tree, least, largest, frame.kind.kz, wide_pad_factor, frame.near_pad);
     for (int a = 0; a < 3; ++a)
         if (!frame.kind.negative(a)) frame.near_pad[a] = -frame.near_pad[a];
