@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import FLOAT32, UINT32, cast, describe, require_float32, to_numpy
+from ._arrays import FLOAT32, UINT32, cast, describe, to_numpy
 from ._rays import ray_batch
 
 if TYPE_CHECKING:
     from .scene import Scene
 
 
-def _transforms(value: Any) -> np.ndarray:
+def _transforms(value: Any, dtype: np.dtype) -> np.ndarray:
     array = to_numpy(value, "transforms")
     if array.dtype.kind not in "iuf":
         raise TypeError(
@@ -29,7 +29,7 @@ def _transforms(value: Any) -> np.ndarray:
         )
     if array.shape[1] == 4 and not (array[:, 3] == (0, 0, 0, 1)).all():
         raise ValueError("transforms: expected affine ones, with (0, 0, 0, 1) in the last row")
-    return cast(array[:, :3], FLOAT32).reshape(-1, 12)
+    return cast(array[:, :3], dtype).reshape(-1, 12)
 
 
 def _indices(value: ArrayLike, name: str, count: int) -> np.ndarray:
@@ -48,7 +48,8 @@ class Instances:
     Parameters
     ----------
     scenes :
-        The objects to place. They may not be refitted while this is in use: make a new one then.
+        The objects to place, all of one precision, in which rays are answered. What a `refit` of
+        one changes, the next call here sees.
     transforms :
         Shape (M, 3, 4) or (M, 4, 4): from the object's space to the world's. They may mirror and
         shear, but not flatten.
@@ -71,9 +72,12 @@ class Instances:
     ) -> None:
         self.threads = threads
         self.scenes = list(scenes)
-        for scene in self.scenes:
-            require_float32(scene, "instances")
-        rows = _transforms(transforms)
+        types = {scene.dtype for scene in self.scenes}
+        if len(types) > 1:
+            raise ValueError("scenes: expected all in float32 or all in float64, given both")
+        self.dtype = types.pop() if types else FLOAT32
+        """That of the scenes: what rays are answered in."""
+        rows = _transforms(transforms, self.dtype)
         count = len(rows)
         which = np.zeros(count, UINT32) if objects is None else _indices(objects, "objects", count)
         mask = (
@@ -83,13 +87,14 @@ class Instances:
             raise ValueError(
                 f"objects: expected numbers below {len(self.scenes)}, given {int(which.max())}"
             )
-        self._core = _core.Instances(
+        core = _core.Instances if self.dtype == FLOAT32 else _core.InstancesD
+        self._core = core(
             tuple(scene._core for scene in self.scenes), rows, which, mask, threads
         )
 
     def move(self, transforms: ArrayLike) -> None:
         """New places, as many as before. The objects' own trees are not touched."""
-        self._core.move(_transforms(transforms), self.threads)
+        self._core.move(_transforms(transforms, self.dtype), self.threads)
 
     def intersect(
         self,
@@ -100,22 +105,24 @@ class Instances:
         tmax: Any = None,
         mask: int = 0xFFFFFFFF,
     ) -> dict[str, np.ndarray]:
-        """As `Scene.intersect`, with two more arrays: "instance", the place, and "object", which
-        scene (uint32).
+        """As `Scene.intersect`, with two more arrays: "instance", the place, and "object", its
+        position in `scenes` (uint32; 0xFFFFFFFF: nothing was hit).
 
         `t` is in units of the ray's direction in the world. At equal t the lower place wins, then
         the lower triangle.
         """
-        args, lead = ray_batch(rays, directions, tmin, tmax)
-        hits = self._core.intersect(*args, mask, self.threads).reshape(lead + (6,))
-        ids = hits.view(UINT32)
+        args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
+        hits = self._core.intersect(*args, mask, self.threads)
+        hits = hits.reshape((*lead, hits.shape[-1]))
+        ids = hits.view(UINT32)  # one, or two of which the second is unused, in a scalar's room
+        words = self.dtype.itemsize // UINT32.itemsize
         return {
             "t": hits[..., 0],
-            "prim": ids[..., 1],
+            "prim": ids[..., words],
             "u": hits[..., 2],
             "v": hits[..., 3],
-            "object": ids[..., 4],
-            "instance": ids[..., 5],
+            "object": ids[..., 4 * words],
+            "instance": ids[..., 4 * words + 1],
         }
 
     def occluded(
@@ -129,7 +136,7 @@ class Instances:
     ) -> np.ndarray:
         """Whether each ray hits anything that it may see: bool, with the leading shape of the
         rays."""
-        args, lead = ray_batch(rays, directions, tmin, tmax)
+        args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         flags = np.empty(lead, np.bool_)
         self._core.occluded(*args, flags.reshape(-1), mask, self.threads)
         return flags

@@ -74,8 +74,8 @@ class Scene(SceneViews):
     number of threads may ask at once.
 
     With precision "float64" these raise NotImplementedError: device="cuda", `render`, `cameras`,
-    `primary_rays`, `secondary_rays`, `info`, `wide_stats`, `instances` and `raydix.simulate`; files
-    raise ValueError, because they are read in float32. Builders "split" and "sbvh" (quality "high")
+    `primary_rays`, `secondary_rays`, `info`, `wide_stats` and `raydix.simulate`; files raise
+    ValueError, because they are read in float32. Builders "split" and "sbvh" (quality "high")
     are "sweep" there. Numbers other than 0 below 2**-500 count as 0.
 
     Raises ValueError (InputError is one) and TypeError that name the argument, what was expected

@@ -3,6 +3,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/variant.h>
 #include <raydix/instances.h>
+#include <raydix/instances_d.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -21,21 +22,53 @@
 namespace raydix::python {
 namespace {
 
-using TransformRows = In<float, nb::shape<-1, 12>>;
 using Ids = In<std::uint32_t, nb::ndim<1>>;
 using FlagsOut = Out<bool, nb::ndim<1>>;
 
+/// The library's names of placed things in float32.
+struct PlacedInFloat {
+    using Scalar = float;
+    using Trees = SceneTrees;
+    using Scene = InstancedScene;
+    using Transform = raydix::Transform;
+    using Instance = raydix::Instance;
+    using Ray = raydix::Ray;
+    using Hit = raydix::Hit;
+};
+
+/// The same in double.
+struct PlacedInDouble {
+    using Scalar = double;
+    using Trees = SceneTreesD;
+    using Scene = InstancedSceneD;
+    using Transform = TransformD;
+    using Instance = InstanceD;
+    using Ray = RayD;
+    using Hit = HitD;
+};
+
+template <class Names>
+using TransformRows = In<typename Names::Scalar, nb::shape<-1, 12>>;
+
 /// What rays find, as one row of an array.
+template <class Hit>
 struct PlacedHit {
     Hit hit;
     std::uint32_t object, instance;
 };
-static_assert(sizeof(PlacedHit) == 24);
+static_assert(sizeof(PlacedHit<Hit>) == 6 * sizeof(float));
+static_assert(sizeof(PlacedHit<HitD>) == 5 * sizeof(double));
 
 /// The objects' trees must outlive this: the binding keeps them.
+template <class Names>
 class PlacedScenes {
 public:
-    PlacedScenes(std::vector<SceneTrees*> scenes, std::span<const Transform> transforms,
+    using Types = Names;
+    using Trees = typename Names::Trees;
+    using Scene = typename Names::Scene;
+    using Transform = typename Names::Transform;
+
+    PlacedScenes(std::vector<Trees*> scenes, std::span<const Transform> transforms,
                  std::span<const std::uint32_t> objects, std::span<const std::uint32_t> masks,
                  int threads)
         : scenes_(std::move(scenes)), threads_(threads) {
@@ -43,10 +76,9 @@ public:
         std::sort(distinct_.begin(), distinct_.end(), std::less<>());
         distinct_.erase(std::unique(distinct_.begin(), distinct_.end()), distinct_.end());
         const auto locks = hold();
-        for (SceneTrees* scene : scenes_) ids_.push_back(placed_.add_object(scene->bvh()));
+        for (Trees* scene : scenes_) ids_.push_back(placed_.add_object(scene->bvh()));
         for (std::size_t i = 0; i < transforms.size(); ++i)
-            placed_.add_instance(InstancedScene::scene,
-                                 {ids_[objects[i]], transforms[i], masks[i]});
+            placed_.add_instance(Scene::scene, {ids_[objects[i]], transforms[i], masks[i]});
         build();
     }
 
@@ -55,14 +87,18 @@ public:
         const auto locks = hold();
         threads_ = threads;
         for (std::uint32_t i = 0; i < transforms.size(); ++i) {
-            Instance instance = placed_.instance(InstancedScene::scene, i);
+            typename Names::Instance instance = placed_.instance(Scene::scene, i);
             instance.transform = transforms[i];
-            placed_.set_instance(InstancedScene::scene, i, instance);
+            placed_.set_instance(Scene::scene, i, instance);
         }
         build();
     }
 
     [[nodiscard]] std::uint32_t size() const { return placed_.instance_count(); }
+    /// An object's number among the scenes. Objects were added one after the other.
+    [[nodiscard]] std::uint32_t scene_of(std::uint32_t object) const {
+        return object == no_primitive ? no_primitive : object - ids_.front();
+    }
 
     /// Calls ask(scene, begin, end) for pieces of n rays; the objects stay as they are meanwhile.
     template <class Ask>
@@ -82,12 +118,15 @@ public:
 private:
     [[nodiscard]] std::vector<Reading> hold() const {
         std::vector<Reading> locks;
-        for (SceneTrees* scene : distinct_) locks.push_back(scene->read());
+        for (Trees* scene : distinct_) locks.push_back(scene->read());
         return locks;
     }
     void build() {
         versions_.clear();
-        for (SceneTrees* scene : scenes_) versions_.push_back(scene->version());
+        for (Trees* scene : scenes_) {
+            static_cast<void>(scene->bvh());  // a refit that failed may have taken it
+            versions_.push_back(scene->version());
+        }
         placed_.build(threads_for(threads_));
     }
     /// A refit moved an object's boxes, which the tree over the places stands on.
@@ -97,20 +136,23 @@ private:
             if (scenes_[i]->version() != versions_[i]) return build();
     }
 
-    std::vector<SceneTrees*> scenes_, distinct_;
+    std::vector<Trees*> scenes_, distinct_;
     std::vector<std::uint32_t> ids_;
     std::vector<std::uint64_t> versions_;
-    InstancedScene placed_;
+    Scene placed_;
     std::shared_mutex use_;
     std::mutex rebuild_;
     int threads_;
 };
 
-void make(PlacedScenes* self, const nb::tuple& scenes, const TransformRows& transforms,
-          const Ids& objects, const Ids& masks, int threads) {
-    static_assert(sizeof(Transform) == 12 * sizeof(float));
-    std::vector<SceneTrees*> trees;
-    for (nb::handle scene : scenes) trees.push_back(&nb::cast<SceneTrees&>(scene));
+template <class Names>
+void make(PlacedScenes<Names>* self, const nb::tuple& scenes,
+          const TransformRows<Names>& transforms, const Ids& objects, const Ids& masks,
+          int threads) {
+    using Transform = typename Names::Transform;
+    static_assert(sizeof(Transform) == 12 * sizeof(typename Names::Scalar));
+    std::vector<typename Names::Trees*> trees;
+    for (nb::handle scene : scenes) trees.push_back(&nb::cast<typename Names::Trees&>(scene));
     const auto placed = rows<Transform>(transforms);
     const std::span which(objects.data(), objects.shape(0)), mask(masks.data(), masks.shape(0));
     if (which.size() != placed.size() || mask.size() != placed.size())
@@ -118,64 +160,66 @@ void make(PlacedScenes* self, const nb::tuple& scenes, const TransformRows& tran
     for (const std::uint32_t object : which)
         if (object >= trees.size()) throw nb::value_error("objects: no such scene");
     const nb::gil_scoped_release unlocked;
-    new (self) PlacedScenes(std::move(trees), placed, which, mask, threads);
+    new (self) PlacedScenes<Names>(std::move(trees), placed, which, mask, threads);
 }
 
-void move(PlacedScenes& self, const TransformRows& transforms, int threads) {
-    const auto placed = rows<Transform>(transforms);
+template <class Names>
+void move(PlacedScenes<Names>& self, const TransformRows<Names>& transforms, int threads) {
+    const auto placed = rows<typename Names::Transform>(transforms);
     if (placed.size() != self.size())
         throw nb::value_error("transforms: another number than there are places");
     const nb::gil_scoped_release unlocked;
     self.move(placed, threads);
 }
 
-template <class Rays>
-Array2<float> intersect(PlacedScenes& self, Rays& rays, std::uint32_t mask, int threads) {
-    Buffer<PlacedHit> hits(rays.size());
+template <class Names, class Rays>
+Array2<typename Names::Scalar> intersect(PlacedScenes<Names>& self, Rays& rays, std::uint32_t mask,
+                                         int threads) {
+    Buffer<PlacedHit<typename Names::Hit>> hits(rays.size());
     const InstanceTraceOptions options{.mask = mask, .threads = threads_for(threads)};
-    self.read_in_pieces(
-        rays.size(), [&](const InstancedScene& scene, std::size_t begin, std::size_t end) {
-            const std::vector<InstanceHit> found = trace(scene, rays.piece(begin, end), options);
-            for (std::size_t i = 0; i < found.size(); ++i)
-                hits[begin + i] = {found[i].hit, found[i].object, found[i].path[0]};
-        });
-    return hand_over_rows<float>(std::move(hits));
+    self.read_in_pieces(rays.size(), [&](const auto& scene, std::size_t begin, std::size_t end) {
+        const auto found = trace(scene, rays.piece(begin, end), options);
+        for (std::size_t i = 0; i < found.size(); ++i)
+            hits[begin + i] = {found[i].hit, self.scene_of(found[i].object), found[i].path[0]};
+    });
+    return hand_over_rows<typename Names::Scalar>(std::move(hits));
 }
 
-template <class Rays>
-void occluded(PlacedScenes& self, Rays& rays, const FlagsOut& out, std::uint32_t mask,
+template <class Names, class Rays>
+void occluded(PlacedScenes<Names>& self, Rays& rays, const FlagsOut& out, std::uint32_t mask,
               int threads) {
     const std::span flags(reinterpret_cast<std::uint8_t*>(out.data()), out.shape(0));
     if (flags.size() != rays.size())
         throw nb::value_error("a result has another length than its queries");
     const InstanceTraceOptions options{.mask = mask, .threads = threads_for(threads)};
-    self.read_in_pieces(
-        rays.size(), [&](const InstancedScene& scene, std::size_t begin, std::size_t end) {
-            trace_any(scene, rays.piece(begin, end), flags.subspan(begin, end - begin), options);
-        });
+    self.read_in_pieces(rays.size(), [&](const auto& scene, std::size_t begin, std::size_t end) {
+        trace_any(scene, rays.piece(begin, end), flags.subspan(begin, end - begin), options);
+    });
 }
 
-}  // namespace
-
-void bind_instances(nb::module_& module) {
+template <class Names>
+void bind_as(nb::module_& module, const char* name, const char* text) {
+    using Placed = PlacedScenes<Names>;
+    using Ray = typename Names::Ray;
+    using RowsIn = typename RayRows<Ray>::Array;
     using Columns = StridedRows;
-    nb::class_<PlacedScenes>(module, "Instances", "Placed scenes; raydix.Instances is what to use.")
-        .def("__init__", &make, nb::keep_alive<1, 2>(), nb::arg("scenes"),
+    nb::class_<Placed>(module, name, text)
+        .def("__init__", &make<Names>, nb::keep_alive<1, 2>(), nb::arg("scenes"),
              nb::arg("transforms").noconvert(), nb::arg("objects").noconvert(),
              nb::arg("masks").noconvert(), nb::arg("threads"))
-        .def("move", &move, nb::arg("transforms").noconvert(), nb::arg("threads"))
-        .def("__len__", &PlacedScenes::size)
+        .def("move", &move<Names>, nb::arg("transforms").noconvert(), nb::arg("threads"))
+        .def("__len__", &Placed::size)
         .def(
             "intersect",
-            [](PlacedScenes& self, const RaysIn& rays, std::uint32_t mask, int threads) {
+            [](Placed& self, const RowsIn& rays, std::uint32_t mask, int threads) {
                 RayRows<Ray> batch(rays);
                 return intersect(self, batch, mask, threads);
             },
             nb::arg("rays").noconvert(), nb::arg("mask"), nb::arg("threads"))
         .def(
             "intersect",
-            [](PlacedScenes& self, const Columns& origins, const Columns& directions,
-               const Limits& tmin, const Limits& tmax, std::uint32_t mask, int threads) {
+            [](Placed& self, const Columns& origins, const Columns& directions, const Limits& tmin,
+               const Limits& tmax, std::uint32_t mask, int threads) {
                 RayParts<Ray> batch(origins, directions, tmin, tmax);
                 return intersect(self, batch, mask, threads);
             },
@@ -184,7 +228,7 @@ void bind_instances(nb::module_& module) {
             nb::arg("threads"))
         .def(
             "occluded",
-            [](PlacedScenes& self, const RaysIn& rays, const FlagsOut& flags, std::uint32_t mask,
+            [](Placed& self, const RowsIn& rays, const FlagsOut& flags, std::uint32_t mask,
                int threads) {
                 RayRows<Ray> batch(rays);
                 occluded(self, batch, flags, mask, threads);
@@ -193,15 +237,22 @@ void bind_instances(nb::module_& module) {
             nb::arg("threads"))
         .def(
             "occluded",
-            [](PlacedScenes& self, const Columns& origins, const Columns& directions,
-               const Limits& tmin, const Limits& tmax, const FlagsOut& flags, std::uint32_t mask,
-               int threads) {
+            [](Placed& self, const Columns& origins, const Columns& directions, const Limits& tmin,
+               const Limits& tmax, const FlagsOut& flags, std::uint32_t mask, int threads) {
                 RayParts<Ray> batch(origins, directions, tmin, tmax);
                 occluded(self, batch, flags, mask, threads);
             },
             nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
             nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("flags").noconvert(),
             nb::arg("mask"), nb::arg("threads"));
+}
+
+}  // namespace
+
+void bind_instances(nb::module_& module) {
+    bind_as<PlacedInFloat>(module, "Instances", "Placed scenes; raydix.Instances is what to use.");
+    bind_as<PlacedInDouble>(module, "InstancesD",
+                            "Placed scenes in double; raydix.Instances is what to use.");
 }
 
 }  // namespace raydix::python

@@ -122,6 +122,7 @@ SceneTreesD::SceneTreesD(MeshD mesh, const BuildOptions& options)
 RefitQuality SceneTreesD::refit(std::vector<Vec3d> vertices, int threads) {
     const Writing lock(queue_, use_);
     const bool had_nodes = !bvh_locked().empty();
+    ++version_;
     RefitQuality quality;
     try {
         quality = raydix::refit(*bvh_, MeshViewD(vertices, mesh_.triangles), threads_for(threads));

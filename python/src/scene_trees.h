@@ -110,6 +110,8 @@ public:
     // While reading.
     [[nodiscard]] const typename Types::Bvh& bvh();
     [[nodiscard]] const typename Types::Solid& solid(InsideRule rule);
+    /// Changes whenever the tree does.
+    [[nodiscard]] std::uint64_t version() const { return version_; }
 
 protected:
     const typename Types::Bvh& bvh_locked();
@@ -120,6 +122,7 @@ protected:
     mutable std::shared_mutex use_;
     std::mutex build_;  // one thread builds, the others wait
     std::optional<typename Types::Bvh> bvh_;
+    std::uint64_t version_ = 0;
     std::array<std::optional<typename Types::Solid>, 4> solids_;  // by rule
 };
 
@@ -136,9 +139,6 @@ public:
     [[nodiscard]] const WideBvh& wide();
     [[nodiscard]] const WideBvh& ray_tree() { return wide(); }
 
-    /// Counts refits. While reading.
-    [[nodiscard]] std::uint64_t version() const { return version_; }
-
     /// Throws InputError as Refitter::refit does, and in a signal handler within a query; the scene
     /// is then as before.
     RefitQuality refit(std::vector<Vec3> vertices, int threads);
@@ -146,7 +146,6 @@ public:
 private:
     std::optional<WideBvh> wide_;
     std::optional<Refitter> refitter_;
-    std::uint64_t version_ = 0;  // refits so far
 };
 
 /// In double. There is one tree, for all queries.

@@ -209,6 +209,16 @@ def test_instances_equal_moved_copies(rng):
         base.instances(np.eye(3))
 
 
+def test_instances_name_their_scenes():
+    near, far = raydix.Scene(*BOX), raydix.Scene(*BOX)
+    transforms = np.tile(np.eye(4), (3, 1, 1))
+    transforms[1:, 0, 3] = 10, 20
+    placed = raydix.Instances([near, far], transforms, [1, 0, 1])
+    hits = placed.intersect([[x, 0, 9, 0, 0, -1] for x in (0, 10, 20, 30)])
+    assert hits["object"].tolist() == [1, 0, 1, raydix.MISSING]
+    assert hits["instance"].tolist() == [0, 1, 2, raydix.MISSING]
+
+
 def test_masks_hide_instances():
     base = raydix.Scene(*BOX)
     placed = base.instances(np.eye(4)[None], masks=[2])
