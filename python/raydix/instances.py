@@ -38,6 +38,9 @@ def _indices(value: ArrayLike, name: str, count: int) -> np.ndarray:
         raise ValueError(
             f"{name}: expected shape ({count},) of whole numbers, given {describe(array)}"
         )
+    most = np.iinfo(UINT32).max
+    if count and (array.min() < 0 or array.max() > most):
+        raise ValueError(f"{name}: expected 0 to {most}, given {array.min()} to {array.max()}")
     return cast(array, UINT32)
 
 

@@ -36,7 +36,10 @@ class Points:
         Threads for the build and for queries; 0: all the machine has. No result depends on it.
 
     Distances are sqrt((dx*dx + dy*dy) + dz*dz), in the type of the points, without fused
-    operations: NumPy gives the same bits. Answers are exact and the same for every number of
+    operations: NumPy gives the same bits. What is compared is what stands under the root, rounded:
+    with other such squares, at equal ones the lower index goes first; and with r * r, rounded, up
+    to which a point is within r. Two distances may be equal whose squares are not. Answers are
+    exact in this sense and the same for every number of
     threads. The points are copied. Any number of threads may ask at once. Missing neighbours have
     the index 0xFFFFFFFF and an infinite distance; queries with NaN or infinity have none.
     """
@@ -89,7 +92,7 @@ class Points:
         padded: bool = False,
         threads: int | None = None,
     ) -> dict[str, np.ndarray]:
-        """All points within a distance of each query, the distance itself included.
+        """All points within a distance of each query, the distance itself included (squares decide: see the class).
 
         `queries`: shape (..., D). `r`: a number, or one for each query (their leading shape); 0
         finds equal points, infinity all. Rows ascend by index, with `sort` by (distance, index).

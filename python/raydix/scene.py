@@ -289,8 +289,8 @@ class Scene(SceneViews):
     ) -> dict[str, np.ndarray]:
         """The point of the mesh that is closest to each query.
 
-        `points`: shape (..., 3), converted to the scene's type. Beyond `max_distance` nothing is
-        found. Returns a dict of arrays with the leading shape of the queries: "point" (..., 3),
+        `points`: shape (..., 3), converted to the scene's type. Beyond `max_distance`
+        (its square decides, rounded) nothing is found. Returns a dict of arrays with the leading shape of the queries: "point" (..., 3),
         "distance", "u" and "v" in the scene's type, "prim" uint32. At equal distances the lower
         "prim" wins; nothing found: infinity and 0xFFFFFFFF. ValueError for a negative or NaN
         `max_distance`.
@@ -328,7 +328,8 @@ class Scene(SceneViews):
 
         `rule`: "crossings" (signed crossings to infinity are not 0), "parity" (their number is
         odd), "winding" (generalized winding number of 1/2 or more, Jacobson et al. 2013: for meshes
-        with holes), or "automatic": the first of these that the mesh is closed enough for. The
+        with holes; parts far away count by a series, Barill et al. 2018, with errors below 0.01),
+        or "automatic": the first of these that the mesh is closed enough for. The
         first two are decided without rounding, at edges and vertices too, and points of the surface
         are inside. Points with NaN or infinity are outside.
         """
@@ -439,7 +440,9 @@ class Scene(SceneViews):
 
     def check(self) -> None:
         """Verifies every invariant of the binary tree (in float64: of its boxes); RuntimeError
-        names the first that does not hold."""
+        names the first that does not hold. After a `refit` trees that were made from Morton codes
+        (quality "fast", LBVH builders) are no longer in their order, which is then what it names.
+        """
         ok, broken = self._core.check()
         if not ok:
             raise RuntimeError(broken)

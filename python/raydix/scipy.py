@@ -3,7 +3,8 @@
     from raydix.scipy import cKDTree
 
 Euclidean distances in two or three dimensions, float64. Answers are exact, whatever `eps`. Of two
-neighbours at the same distance the one with the lower index comes first; SciPy promises no order.
+neighbours at the same squared distance the one with the lower index comes first; SciPy promises no
+order. Coordinates go to 1e12; there are no `boxsize`, no `indices` and no pickling.
 """
 
 from __future__ import annotations

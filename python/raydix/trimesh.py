@@ -22,7 +22,7 @@ class RayMeshIntersector:
 
     The mesh and its rays are moved to the middle of its box before they are rounded to float32, so
     that a mesh far from the origin keeps its details. `scale_to_box` is accepted and has no effect:
-    float32 has no preferred scale. Edits of the mesh are noticed.
+    meshes may be 1e-9 to 1e12 units large. Edits of the mesh are noticed.
     """
 
     def __init__(self, geometry: Any, scale_to_box: bool = True) -> None:
@@ -34,10 +34,13 @@ class RayMeshIntersector:
         now = hash(self.mesh)
         if self._made_for != now:
             vertices = np.asarray(self.mesh.vertices, np.float64)
+            faces = np.asarray(self.mesh.faces)
+            corners = vertices[np.unique(faces)]  # what no triangle has does not count
+            corners = corners[np.isfinite(corners).all(axis=1)]
             self._middle = (
-                (vertices.min(axis=0) + vertices.max(axis=0)) / 2 if len(vertices) else np.zeros(3)
+                (corners.min(axis=0) + corners.max(axis=0)) / 2 if len(corners) else np.zeros(3)
             )
-            self._kept = Scene(vertices - self._middle, np.asarray(self.mesh.faces))
+            self._kept = Scene(vertices - self._middle, faces)
             self._made_for = now
         return self._kept
 

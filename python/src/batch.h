@@ -4,6 +4,7 @@
 #include <nanobind/nanobind.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 
 namespace raydix::python {
@@ -18,18 +19,31 @@ inline void hear_signals() {
 }
 
 /// Calls body(begin, end) for pieces of [0, n) in order, without the interpreter's lock. Called
-/// with it.
+/// with it. The first has `first` queries; the others more or fewer, by how long it took.
 template <class Body>
-void in_pieces(std::size_t n, const Body& body) {
-    for (std::size_t begin = 0; begin < n; begin += piece_size) {
+void in_pieces(std::size_t n, const Body& body, std::size_t first = piece_size) {
+    using Clock = std::chrono::steady_clock;
+    constexpr auto short_time = std::chrono::milliseconds(20), long_time = 5 * short_time;
+    constexpr std::size_t smallest = 1024;
+    std::size_t size = first;
+    for (std::size_t begin = 0; begin < n;) {
         if (begin != 0) hear_signals();
+        const std::size_t end = std::min(n, begin + size);
         const nanobind::gil_scoped_release unlocked;
-        body(begin, std::min(n, begin + piece_size));
+        const auto start = Clock::now();
+        body(begin, end);
+        const auto time = Clock::now() - start;
+        if (time < short_time)
+            size = std::min(4 * size, piece_size);
+        else if (time > long_time)
+            size = std::max(size / 4, smallest);
+        begin = end;
     }
 }
 
 /// What to ask the library for: all threads of the machine, unless this process is a fork of one
-/// that had started them. Threads do not survive a fork, and a pool does not know.
+/// that had started them. Threads do not survive a fork, and a pool does not know. Throws
+/// InputError: not 0 to 1024.
 [[nodiscard]] int threads_for(int asked);
 
 }  // namespace raydix::python

@@ -2,6 +2,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/variant.h>
+#include <raydix/error.h>
 #include <raydix/instances.h>
 #include <raydix/instances_d.h>
 
@@ -86,12 +87,15 @@ public:
         const std::unique_lock lock(use_);
         const auto locks = hold();
         threads_ = threads;
-        for (std::uint32_t i = 0; i < transforms.size(); ++i) {
-            typename Names::Instance instance = placed_.instance(Scene::scene, i);
-            instance.transform = transforms[i];
-            placed_.set_instance(Scene::scene, i, instance);
+        std::vector<Transform> before;
+        for (std::uint32_t i = 0; i < transforms.size(); ++i)
+            before.push_back(placed_.instance(Scene::scene, i).transform);
+        try {
+            place(transforms);
+        } catch (const InputError&) {
+            place(before);
+            throw;
         }
-        build();
     }
 
     [[nodiscard]] std::uint32_t size() const { return placed_.instance_count(); }
@@ -120,6 +124,14 @@ private:
         std::vector<Reading> locks;
         for (Trees* scene : distinct_) locks.push_back(scene->read());
         return locks;
+    }
+    void place(std::span<const Transform> transforms) {
+        for (std::uint32_t i = 0; i < transforms.size(); ++i) {
+            typename Names::Instance instance = placed_.instance(Scene::scene, i);
+            instance.transform = transforms[i];
+            placed_.set_instance(Scene::scene, i, instance);
+        }
+        build();
     }
     void build() {
         versions_.clear();

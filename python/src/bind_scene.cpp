@@ -18,6 +18,8 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -86,13 +88,19 @@ void make_scene(Scene* self, const PointRows<Scene>& vertices, const FacesIn& fa
 
 /// As in_pieces, and the trees stay as they are from the first piece to the last.
 template <class Scene, class Body>
-void read_in_pieces(Scene& scene, std::size_t n, const Body& body) {
+void read_in_pieces(Scene& scene, std::size_t n, const Body& body, std::size_t first = piece_size) {
     Reading lock;
-    in_pieces(n, [&](std::size_t begin, std::size_t end) {
-        if (!lock.owns_lock()) lock = scene.read();
-        body(begin, end);
-    });
+    in_pieces(
+        n,
+        [&](std::size_t begin, std::size_t end) {
+            if (!lock.owns_lock()) lock = scene.read();
+            body(begin, end);
+        },
+        first);
 }
+
+/// Of rays whose hits are all listed, which may be many.
+constexpr std::size_t first_listed = piece_size / 64;
 
 /// So few rays are traced on the caller's thread, one by one: a batch's set-up would cost more.
 constexpr std::size_t few_rays = 8;
@@ -161,10 +169,13 @@ nb::tuple all_hits(Scene& scene, Rays& rays, int threads) {
     const TraceOptions options{.threads = threads_for(threads)};
     std::vector<typename Scene::Types::AllHits> pieces;
     std::uint64_t invalid = 0;
-    read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
-        pieces.push_back(trace_all(scene.ray_tree(), rays.piece(begin, end), options));
-        invalid += pieces.back().counts.invalid_rays;
-    });
+    read_in_pieces(
+        scene, rays.size(),
+        [&](std::size_t begin, std::size_t end) {
+            pieces.push_back(trace_all(scene.ray_tree(), rays.piece(begin, end), options));
+            invalid += pieces.back().counts.invalid_rays;
+        },
+        first_listed);
     auto offsets = join_offsets(pieces);
     return nb::make_tuple(
         offsets, hand_over_rows<Scalar<Scene>>(join_column(pieces, &Scene::Types::AllHits::hits)),
@@ -178,7 +189,7 @@ Counts count_hits(Scene& scene, Rays& rays, const Out<std::uint32_t, nb::ndim<1>
     const TraceOptions options{.threads = threads_for(threads)};
     Counts counts{0, 0};
     // Smaller pieces: what is counted is first listed.
-    read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
+    const auto count = [&](std::size_t begin, std::size_t end) {
         constexpr std::size_t part = piece_size / 8;
         for (std::size_t first = begin; first < end; first += part) {
             const std::size_t last = std::min(end, first + part);
@@ -189,7 +200,8 @@ Counts count_hits(Scene& scene, Rays& rays, const Out<std::uint32_t, nb::ndim<1>
             counts.first += all.counts.hits;
             counts.second += all.counts.invalid_rays;
         }
-    });
+    };
+    read_in_pieces(scene, rays.size(), count, first_listed);
     return counts;
 }
 
@@ -389,7 +401,11 @@ nb::dict mesh_info(SceneTrees& scene) {
 }
 
 std::pair<bool, std::string> check_trees(SceneTrees& scene) {
-    const CheckReport report = reading(scene, [&] { return check(scene.bvh(), scene.mesh()); });
+    const CheckReport report = reading(scene, [&] {
+        // The vertices of a scene without triangles are no points.
+        return scene.mesh().triangles.empty() ? check(scene.bvh())
+                                              : check(scene.bvh(), scene.mesh());
+    });
     return {report.ok, report.broken};
 }
 
@@ -505,16 +521,33 @@ void bind_queries(nb::class_<Scene>& scene) {
         .def("refit", &refit<Scene>, nb::arg("vertices").noconvert(), nb::arg("threads") = 0);
 }
 
+/// A view that stays as it is when the scene moves its vertices or goes.
+template <class Scene>
+auto vertices_of(nb::handle_t<Scene> self) {
+    struct Kept {
+        std::shared_ptr<const void> vertices;
+        nb::object scene;
+    };
+    auto kept = std::make_unique<Kept>();
+    auto& trees = nb::cast<Scene&>(self);
+    std::span<const Point<Scene>> vertices;
+    {
+        const nb::gil_scoped_release unlocked;
+        const Reading lock = trees.read();
+        vertices = trees.mesh().vertices;
+        kept->vertices = trees.keep_vertices();
+    }
+    kept->scene = nb::borrow(self);
+    return view_rows<Scalar<Scene>>(vertices, owner_of(std::move(kept)));
+}
+
 template <class Scene>
 nb::class_<Scene> bind_trees_of(nb::module_& module, const char* name, const char* doc) {
     nb::class_<Scene> scene(module, name, doc);
     scene.def("__init__", &make_scene<Scene>, nb::arg("vertices").noconvert(),
               nb::arg("faces").noconvert(), nb::arg("builder"), nb::arg("reinsertion_rounds"),
               nb::arg("bits"), nb::arg("max_leaf"), nb::arg("strict"), nb::arg("threads"));
-    scene.def_prop_ro("vertices", [](nb::handle_t<Scene> self) {
-        const auto& mesh = nb::cast<Scene&>(self).mesh();
-        return view_rows<Scalar<Scene>>(std::span<const Point<Scene>>(mesh.vertices), self);
-    });
+    scene.def_prop_ro("vertices", &vertices_of<Scene>, nb::rv_policy::automatic);
     scene.def_prop_ro("faces", [](nb::handle_t<Scene> self) {
         const auto& mesh = nb::cast<Scene&>(self).mesh();
         return view_rows<std::uint32_t>(std::span<const Triangle>(mesh.triangles), self);

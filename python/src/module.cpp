@@ -65,6 +65,10 @@ std::pair<bool, std::string> cuda_device() {
 }  // namespace
 
 int threads_for(int asked) {
+    constexpr int most = 1024;
+    if (asked < 0 || asked > most)
+        throw InputError("threads: expected 0 (all of the machine) to " + std::to_string(most) +
+                         ", given " + std::to_string(asked));
     if (threads_were_lost) return 1;
     threads_were_started = true;
     return asked;

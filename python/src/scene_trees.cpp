@@ -74,6 +74,27 @@ const typename Names::Solid& MeshTrees<Names>::solid(InsideRule rule) {
     return *kept;
 }
 
+template <class Names>
+std::shared_ptr<const void> MeshTrees<Names>::keep_vertices() {
+    const std::lock_guard lock(build_);
+    if (!old_vertices_) old_vertices_ = std::make_shared<Vertices>();
+    return old_vertices_;
+}
+
+template <class Names>
+void MeshTrees<Names>::take_vertices(Vertices vertices) {
+    if (old_vertices_ && old_vertices_.use_count() > 1) *old_vertices_ = std::move(mesh_.vertices);
+    old_vertices_.reset();
+    mesh_.vertices = std::move(vertices);
+    for (auto& solid : solids_) solid.reset();
+}
+
+template <class Names>
+void MeshTrees<Names>::drop_trees() {
+    for (auto& solid : solids_) solid.reset();
+    bvh_.reset();
+}
+
 template class MeshTrees<InFloat>;
 template class MeshTrees<InDouble>;
 
@@ -99,13 +120,28 @@ const WideBvh& SceneTrees::wide() {
 
 RefitQuality SceneTrees::refit(std::vector<Vec3> vertices, int threads) {
     const Writing lock(queue_, use_);
+    if (mesh_.triangles.empty()) {
+        take_vertices(std::move(vertices));
+        return {};
+    }
     if (!refitter_) refitter_.emplace(bvh_locked());
-    const RefitQuality quality =
-        refitter_->refit(*bvh_, MeshView(vertices, mesh_.triangles), threads_for(threads));
-    mesh_.vertices = std::move(vertices);
+    const bool had_nodes = !bvh_locked().empty();
     ++version_;
+    RefitQuality quality;
+    try {
+        quality =
+            refitter_->refit(*bvh_, MeshView(vertices, mesh_.triangles), threads_for(threads));
+    } catch (const InputError&) {
+        // Found late, the tree is gone: the mesh is still there, and makes it again.
+        if (had_nodes && bvh_->empty()) {
+            drop_trees();
+            wide_.reset();
+            refitter_.reset();
+        }
+        throw;
+    }
+    take_vertices(std::move(vertices));
     wide_.reset();
-    for (auto& solid : solids_) solid.reset();
     return quality;
 }
 
@@ -121,21 +157,23 @@ SceneTreesD::SceneTreesD(MeshD mesh, const BuildOptions& options)
 
 RefitQuality SceneTreesD::refit(std::vector<Vec3d> vertices, int threads) {
     const Writing lock(queue_, use_);
+    if (mesh_.triangles.empty()) {
+        take_vertices(std::move(vertices));
+        return {};
+    }
     const bool had_nodes = !bvh_locked().empty();
     ++version_;
     RefitQuality quality;
     try {
         quality = raydix::refit(*bvh_, MeshViewD(vertices, mesh_.triangles), threads_for(threads));
     } catch (const InputError&) {
-        // Found late, the tree is gone: the mesh is still there, and makes it again.
-        if (had_nodes && bvh_->empty()) {
-            for (auto& solid : solids_) solid.reset();
-            bvh_.reset();
+        if (had_nodes && bvh_->empty()) {  // as in float32
+            drop_trees();
+            sah_at_build_.reset();
         }
         throw;
     }
-    mesh_.vertices = std::move(vertices);
-    for (auto& solid : solids_) solid.reset();
+    take_vertices(std::move(vertices));
     // Each refit tells of the tree before it; that before the first is the one that was built.
     if (!sah_at_build_) sah_at_build_ = quality.sah_at_build;
     quality.sah_at_build = *sah_at_build_;

@@ -105,6 +105,9 @@ public:
     [[nodiscard]] Reading read() const;
 
     [[nodiscard]] const typename Types::Mesh& mesh() const { return mesh_; }
+    /// What has to be kept, beside this, for as long as the present vertices are looked at: a refit
+    /// leaves their memory there. While reading.
+    [[nodiscard]] std::shared_ptr<const void> keep_vertices();
     [[nodiscard]] const BuildOptions& options() const { return options_; }
 
     // While reading.
@@ -114,7 +117,13 @@ public:
     [[nodiscard]] std::uint64_t version() const { return version_; }
 
 protected:
+    using Vertices = std::vector<typename Types::Point>;
+
     const typename Types::Bvh& bvh_locked();
+    /// While writing: what a refit that succeeded ends with.
+    void take_vertices(Vertices vertices);
+    /// While writing: a refit has spoilt the tree, which the mesh will make again.
+    void drop_trees();
 
     typename Types::Mesh mesh_;
     BuildOptions options_;
@@ -123,6 +132,7 @@ protected:
     std::mutex build_;  // one thread builds, the others wait
     std::optional<typename Types::Bvh> bvh_;
     std::uint64_t version_ = 0;
+    std::shared_ptr<Vertices> old_vertices_;  // empty until a refit, and null if nobody looks
     std::array<std::optional<typename Types::Solid>, 4> solids_;  // by rule
 };
 
@@ -139,8 +149,8 @@ public:
     [[nodiscard]] const WideBvh& wide();
     [[nodiscard]] const WideBvh& ray_tree() { return wide(); }
 
-    /// Throws InputError as Refitter::refit does, and in a signal handler within a query; the scene
-    /// is then as before.
+    /// Throws InputError as Refitter::refit does, and in a signal handler within a query; answers
+    /// are then as before.
     RefitQuality refit(std::vector<Vec3> vertices, int threads);
 
 private:

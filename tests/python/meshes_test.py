@@ -171,6 +171,58 @@ def test_refit_follows_the_vertices(rng):
     )  # as before the error
 
 
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_a_refused_refit_changes_no_answer(rng, precision):
+    vertices, faces = support.random_triangles(rng, 200)
+    scene = raydix.Scene(vertices, faces, precision=precision)
+    placed = scene.instances(np.eye(4)[None])
+    rays, points = support.random_rays(rng, 300), rng.uniform(-1, 1, (50, 3))
+    wanted = scene.count(rays), placed.occluded(rays), scene.closest_point(points)["distance"]
+    small = vertices.copy()  # valid numbers, found too small when the boxes are made
+    small[faces[7]] = [[0, 0, 0], [1e-13, 0, 0], [0, 1e-13, 0]]
+    for bad in (small, np.where(np.arange(len(vertices))[:, None] == 5, np.nan, vertices)):
+        with pytest.raises(raydix.InputError):
+            scene.refit(bad)
+        np.testing.assert_array_equal(scene.count(rays), wanted[0])
+        np.testing.assert_array_equal(placed.occluded(rays), wanted[1])
+        np.testing.assert_array_equal(scene.closest_point(points)["distance"], wanted[2])
+        scene.check()
+    assert scene.refit(vertices)["ratio"] == pytest.approx(1)
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_views_of_vertices_outlive_refits_and_scenes(rng, precision):
+    vertices, faces = support.random_triangles(rng, 300_000)
+    scene = raydix.Scene(vertices, faces, precision=precision)
+    first = scene.vertices
+    scene.refit(vertices + np.float32(1))
+    second, again = scene.vertices, scene.vertices
+    scene.refit(vertices + np.float32(2))
+    scene.refit(vertices + np.float32(3))
+    np.testing.assert_array_equal(first, vertices)
+    np.testing.assert_array_equal(second, (vertices + np.float32(1)).astype(second.dtype))
+    assert not second.flags.writeable and second.ctypes.data == again.ctypes.data
+    third = scene.vertices
+    del scene
+    np.testing.assert_array_equal(third, (vertices + np.float32(3)).astype(third.dtype))
+
+
+def test_vertices_without_triangles():
+    scene = raydix.Scene(BOX[0], [])
+    scene.check()
+    scene.refit(np.asarray(BOX[0]) + 1)
+    assert scene.vertices.min() == np.asarray(BOX[0]).min() + 1
+    assert not scene.occluded([0, 0, 9, 0, 0, -1])
+
+
+def test_numbers_of_threads():
+    for wrong in (-1, 1025, 1_000_000):
+        with pytest.raises(ValueError, match="threads: expected 0"):
+            raydix.Points(BOX[0], threads=wrong).knn(np.zeros((4, 3)), 1)
+        with pytest.raises(ValueError, match="threads: expected 0"):
+            raydix.Scene(*BOX, threads=wrong).intersect(np.zeros((100, 8)))
+
+
 def test_instances_equal_moved_copies(rng):
     vertices, faces = support.random_triangles(rng, 100)
     base = raydix.Scene(vertices, faces)
@@ -203,6 +255,14 @@ def test_instances_equal_moved_copies(rng):
     assert (placed.occluded(rays) == found).mean() > 0.99
     with pytest.raises(ValueError, match="another number"):
         placed.move(transforms[:2])
+    before, bad = placed.occluded(rays), transforms.copy()
+    bad[1, 0, 0] = np.nan
+    with pytest.raises(raydix.InputError, match="instance 1"):
+        placed.move(bad)
+    np.testing.assert_array_equal(placed.occluded(rays), before)
+    for wrong in ([0, 1, 2**32], [0, 0, -1]):
+        with pytest.raises(ValueError, match="masks: expected 0 to 4294967295"):
+            base.instances(transforms, masks=wrong)
     with pytest.raises(raydix.InputError):
         base.instances(np.zeros((1, 3, 4)))
     with pytest.raises(ValueError, match=r"transforms: expected shape \(M, 3, 4\)"):

@@ -130,14 +130,18 @@ print(os.waitstatus_to_exitcode(status))
 ENDLESS = {
     "occluded": "scene.occluded(np.broadcast_to(rays[5000, :3], (1 << 33, 3)), rays[5000, 4:7])",
     "picture": "scene.render(view='ao', size=(4000, 4000), samples=4096)",
+    "count": "r = np.random.default_rng(1); "
+    "soup = raydix.Scene(r.random((5000, 3)), r.integers(0, 5000, (3000, 3))); "
+    "soup.count(np.broadcast_to([0.5, 0.5, 0.5], (10**9, 3)), np.array([0.1, 0.2, 0.3]))",
     "simulator": "[raydix.simulate(scene, rays) for _ in range(100)]",
 }
 
 
-@pytest.mark.parametrize("what", ["occluded", "picture", "simulator"])
+@pytest.mark.parametrize("what", list(ENDLESS))
 def test_ctrl_c_ends_a_long_call(what):
     code = (
-        SETUP
+        "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        + SETUP  # a job in the background is born deaf to it
         + f"print('started', flush=True)\ntry:\n    {ENDLESS[what]}\n"
         + "except KeyboardInterrupt:\n    print('interrupted')\n"
     )

@@ -44,6 +44,18 @@ def test_first_hits_agree(meshes, rays):
     assert (a == b).mean() > 0.999 and b.dtype == bool
 
 
+def test_vertices_without_triangles_do_not_matter(trimesh, figure, rays):
+    far = trimesh.Trimesh(
+        np.vstack([figure.vertices, [[1e9, 1e9, 1e9], [np.nan, 0, 0]]]), figure.faces, process=False
+    )
+    wanted = raydix.trimesh.RayMeshIntersector(
+        trimesh.Trimesh(figure.vertices, figure.faces, process=False)
+    ).intersects_any(*rays)
+    assert wanted.sum() > 1000
+    found = raydix.trimesh.RayMeshIntersector(far).intersects_any(*rays)
+    np.testing.assert_array_equal(found, wanted)
+
+
 def test_locations_agree(meshes, rays):
     results = []
     for mesh in meshes:
