@@ -6,6 +6,7 @@ Nothing is copied that already has the right type and lies in one run.
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 import numpy as np
@@ -98,6 +99,38 @@ def rows(
         return cast(value, dtype), value.shape[:1]
     array = floats(value, name, columns)
     return cast(array, dtype).reshape(-1, array.shape[-1]), array.shape[:-1]
+
+
+def number(value: Any, name: str) -> float:
+    """Any real number as a float."""
+    if not isinstance(value, str):
+        try:
+            return float(value)
+        except (TypeError, ValueError):
+            pass
+    raise TypeError(f"{name}: expected a number, given {value!r}")
+
+
+def whole(value: Any, name: str, least: int, most: int) -> int:
+    """A whole number from `least` to `most`; floats that are whole count."""
+    expected = f"{name}: expected a whole number, {least} to {most}, given {value!r}"
+    try:
+        found = operator.index(value)
+    except TypeError:
+        found = None
+    if found is None:
+        if not isinstance(value, (float, np.floating)):
+            raise TypeError(expected)
+        if value != np.floor(value) or np.isinf(value):  # NaN too
+            raise ValueError(expected)
+        found = int(value)
+    if not least <= found <= most:
+        raise ValueError(expected)
+    return found
+
+
+def thread_count(value: Any) -> int:
+    return whole(value, "threads", 0, 1024)
 
 
 def float_type(value: Any, name: str) -> np.dtype:

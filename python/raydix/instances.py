@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import FLOAT32, UINT32, cast, describe, to_numpy
+from ._arrays import FLOAT32, UINT32, cast, describe, thread_count, to_numpy, whole
 from ._rays import ray_batch
 
 if TYPE_CHECKING:
@@ -44,6 +44,10 @@ def _indices(value: ArrayLike, name: str, count: int) -> np.ndarray:
     return cast(array, UINT32)
 
 
+def _mask(value: Any) -> int:
+    return whole(value, "mask", 0, int(np.iinfo(UINT32).max))
+
+
 class Instances:
     """Scenes placed many times. Memory goes with the number of scenes and that of places, not their
     product.
@@ -73,8 +77,16 @@ class Instances:
         masks: ArrayLike | None = None,
         threads: int = 0,
     ) -> None:
-        self.threads = threads
-        self.scenes = list(scenes)
+        from .scene import Scene
+
+        self.threads = threads = thread_count(threads)
+        try:
+            self.scenes = list(scenes)
+            known = all(isinstance(scene, Scene) for scene in self.scenes)
+        except TypeError:
+            known = False
+        if not known:
+            raise TypeError(f"scenes: expected a sequence of Scene, given {scenes!r}")
         types = {scene.dtype for scene in self.scenes}
         if len(types) > 1:
             raise ValueError("scenes: expected all in float32 or all in float64, given both")
@@ -86,7 +98,9 @@ class Instances:
         mask = (
             np.full(count, 0xFFFFFFFF, UINT32) if masks is None else _indices(masks, "masks", count)
         )
-        if count and which.max(initial=0) >= len(self.scenes):
+        if count and not self.scenes:
+            raise ValueError(f"scenes: expected one or more for {count} transforms, given none")
+        if count and which.max() >= len(self.scenes):
             raise ValueError(
                 f"objects: expected numbers below {len(self.scenes)}, given {int(which.max())}"
             )
@@ -97,7 +111,12 @@ class Instances:
 
     def move(self, transforms: ArrayLike) -> None:
         """New places, as many as before. The objects' own trees are not touched."""
-        self._core.move(_transforms(transforms, self.dtype), self.threads)
+        rows = _transforms(transforms, self.dtype)
+        if len(rows) != len(self):
+            raise ValueError(
+                f"transforms: expected {len(self)}, as many as there are places, given {len(rows)}"
+            )
+        self._core.move(rows, self.threads)
 
     def intersect(
         self,
@@ -115,7 +134,7 @@ class Instances:
         the lower triangle.
         """
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
-        hits = self._core.intersect(*args, mask, self.threads)
+        hits = self._core.intersect(*args, _mask(mask), self.threads)
         hits = hits.reshape((*lead, hits.shape[-1]))
         ids = hits.view(UINT32)  # one, or two of which the second is unused, in a scalar's room
         words = self.dtype.itemsize // UINT32.itemsize
@@ -141,7 +160,7 @@ class Instances:
         rays."""
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         flags = np.empty(lead, np.bool_)
-        self._core.occluded(*args, flags.reshape(-1), mask, self.threads)
+        self._core.occluded(*args, flags.reshape(-1), _mask(mask), self.threads)
         return flags
 
     def __len__(self) -> int:

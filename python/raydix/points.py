@@ -9,7 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import MISSING, UINT32, cast, describe, floats, rows
+from ._arrays import (
+    MISSING,
+    UINT32,
+    cast,
+    describe,
+    floats,
+    number,
+    rows,
+    thread_count,
+    whole,
+)
 
 _INDICES = {
     (np.dtype(np.float32), 2): _core.PointIndex2f,
@@ -55,7 +65,7 @@ class Points:
             )
         self.dtype = array.dtype
         self.dimension = array.shape[1]
-        self.threads = threads
+        self.threads = threads = thread_count(threads)
         self._core = _INDICES[self.dtype, self.dimension](
             cast(array, self.dtype), tree, strict, threads
         )
@@ -70,16 +80,15 @@ class Points:
         "distances", both of shape (..., k). A query that is one of the points finds itself.
         """
         asked, lead = rows(queries, "queries", (self.dimension,), self.dtype)
-        if k < 1 or k != int(k):
-            raise ValueError(f"k: expected a whole number of 1 or more, given {k}")
-        shape = lead + (int(k),)
+        k = whole(k, "k", 1, 2**31)
+        shape = lead + (k,)
         indices, distances = np.empty(shape, UINT32), np.empty(shape, self.dtype)
-        flat = (len(asked), int(k))
+        flat = (len(asked), k)
         self._core.knn(
             asked,
             indices.reshape(flat),
             distances.reshape(flat),
-            self.threads if threads is None else threads,
+            self._threads(threads),
         )
         return {"indices": indices, "distances": distances}
 
@@ -92,7 +101,8 @@ class Points:
         padded: bool = False,
         threads: int | None = None,
     ) -> dict[str, np.ndarray]:
-        """All points within a distance of each query, the distance itself included (squares decide: see the class).
+        """All points within a distance of each query, the distance itself included (squares
+        decide: see the class).
 
         `queries`: shape (..., D). `r`: a number, or one for each query (their leading shape); 0
         finds equal points, infinity all. Rows ascend by index, with `sort` by (distance, index).
@@ -102,13 +112,16 @@ class Points:
         ValueError for a negative or NaN radius; InputError for a result larger than memory.
         """
         asked, lead = rows(queries, "queries", (self.dimension,), self.dtype)
-        radii = np.asarray(r, self.dtype)
+        try:
+            radii = np.asarray(r, self.dtype)
+        except (TypeError, ValueError):
+            raise TypeError(f"r: expected a number or shape {lead}, given {r!r}") from None
         if radii.ndim:
             if radii.shape != lead:
                 raise ValueError(f"r: expected a number or shape {lead}, given {describe(radii)}")
         radii = np.ascontiguousarray(radii.reshape(-1))
         offsets, indices, distances = self._core.radius(
-            asked, radii, sort, self.threads if threads is None else threads
+            asked, radii, sort, self._threads(threads)
         )
         if not padded:
             return {"offsets": offsets, "indices": indices, "distances": distances}
@@ -119,7 +132,7 @@ class Points:
         of the queries."""
         asked, lead = rows(queries, "queries", (self.dimension,), self.dtype)
         counts = np.empty(lead, UINT32)
-        self._core.count(asked, r, counts.reshape(-1), self.threads if threads is None else threads)
+        self._core.count(asked, number(r, "r"), counts.reshape(-1), self._threads(threads))
         return counts
 
     def box(self, boxes: ArrayLike, *, threads: int | None = None) -> dict[str, np.ndarray]:
@@ -129,7 +142,7 @@ class Points:
         or infinity holds none. Returns "offsets" and "indices" as in `radius`, rows ascending.
         """
         asked, _ = rows(boxes, "boxes", (2 * self.dimension,), self.dtype)
-        offsets, indices, _ = self._core.box(asked, self.threads if threads is None else threads)
+        offsets, indices, _ = self._core.box(asked, self._threads(threads))
         return {"offsets": offsets, "indices": indices}
 
     def pairs(self, r: float, *, threads: int | None = None) -> dict[str, np.ndarray]:
@@ -139,7 +152,7 @@ class Points:
         place are a pair.
         """
         offsets, others, distances = self._core.neighbours(
-            r, False, self.threads if threads is None else threads
+            number(r, "r"), False, self._threads(threads)
         )
         pairs = np.empty((len(others), 2), UINT32)
         pairs[:, 0] = np.repeat(
@@ -152,9 +165,12 @@ class Points:
         """The points within `r` of each point, itself left out: one row for each point, as `radius`
         has them."""
         offsets, others, distances = self._core.neighbours(
-            r, True, self.threads if threads is None else threads
+            number(r, "r"), True, self._threads(threads)
         )
         return {"offsets": offsets, "indices": others, "distances": distances}
+
+    def _threads(self, threads: int | None) -> int:
+        return self.threads if threads is None else thread_count(threads)
 
     def stats(self) -> dict[str, Any]:
         """Figures of the index, and the milliseconds of its stages ("ms")."""

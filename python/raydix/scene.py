@@ -16,8 +16,10 @@ from ._arrays import (
     float_type,
     mesh_faces,
     mesh_vertices,
+    number,
     require_float32,
     rows,
+    thread_count,
 )
 from ._rays import ray_batch
 from .cameras import Camera
@@ -104,7 +106,7 @@ class Scene(SceneViews):
             raise ValueError(f"device: expected 'cpu' or 'cuda', given {device!r}")
         self.dtype = float_type(precision, "precision")
         """float32 or float64: what the scene computes in and its results are."""
-        self.threads = threads
+        self.threads = threads = thread_count(threads)
         self.device = device
         self.name = ""
         self._cameras: list[Camera] = []
@@ -297,7 +299,8 @@ class Scene(SceneViews):
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
         places = np.empty((len(asked), 7), self.dtype)
-        self._core.closest(asked, places, max_distance, self.threads)
+        reach = number(max_distance, "max_distance")
+        self._core.closest(asked, places, reach, self.threads)
         places = places.reshape(lead + (7,))
         ids = places.view(UINT32)[..., 4 * (self.dtype.itemsize // UINT32.itemsize)]
         return {
@@ -320,7 +323,8 @@ class Scene(SceneViews):
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
         distances = np.empty(lead, self.dtype)
-        self._core.signed_distance(asked, distances.reshape(-1), max_distance, rule, self.threads)
+        reach = number(max_distance, "max_distance")
+        self._core.signed_distance(asked, distances.reshape(-1), reach, rule, self.threads)
         return distances
 
     def contains(self, points: ArrayLike, *, rule: str = "automatic") -> np.ndarray:
@@ -363,6 +367,8 @@ class Scene(SceneViews):
         """The core of a scene that this one can be held against."""
         if other is None:
             return None
+        if not isinstance(other, Scene):
+            raise TypeError(f"other: expected a Scene, given {other!r}")
         if other.dtype != self.dtype:
             raise TypeError(
                 f"other: expected a scene in {self.dtype}, as this one, given one in {other.dtype}"

@@ -348,7 +348,7 @@ def test_instances_are_of_one_precision(rng):
         raydix.Instances(scenes, np.eye(4)[None])
     with pytest.raises(raydix.InputError, match="instance 0"):
         scenes[1].instances(np.zeros((1, 3, 4)))
-    with pytest.raises(ValueError, match="another number"):
+    with pytest.raises(ValueError, match="transforms: expected 1, as many as there are places, given 2"):
         scenes[1].instances(np.eye(4)[None]).move(np.tile(np.eye(4), (2, 1, 1)))
     assert len(raydix.Instances([], np.zeros((0, 3, 4)))) == 0
 

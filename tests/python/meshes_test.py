@@ -217,10 +217,37 @@ def test_vertices_without_triangles():
 
 def test_numbers_of_threads():
     for wrong in (-1, 1025, 1_000_000):
-        with pytest.raises(ValueError, match="threads: expected 0"):
+        with pytest.raises(ValueError, match="threads: expected"):
             raydix.Points(BOX[0], threads=wrong).knn(np.zeros((4, 3)), 1)
-        with pytest.raises(ValueError, match="threads: expected 0"):
+        with pytest.raises(ValueError, match="threads: expected"):
             raydix.Scene(*BOX, threads=wrong).intersect(np.zeros((100, 8)))
+
+
+def test_errors_name_the_argument():
+    scene, cloud = raydix.Scene(*BOX), raydix.Points(BOX[0])
+    one = np.eye(4)[None]
+    placed = scene.instances(one)
+    calls = {
+        "k": lambda wrong: cloud.knn(BOX[0], wrong),
+        "r": lambda wrong: cloud.radius(BOX[0], wrong),
+        "r ": lambda wrong: cloud.count(BOX[0], wrong),
+        "r  ": lambda wrong: cloud.pairs(wrong),
+        "max_distance": lambda wrong: scene.closest_point(BOX[0], max_distance=wrong),
+        "mask": lambda wrong: placed.occluded(np.zeros((1, 8)), mask=wrong),
+        "other": lambda wrong: scene.overlaps(wrong),
+        "scenes": lambda wrong: raydix.Instances(wrong, one),
+        "scenes ": lambda wrong: raydix.Instances([wrong], one),
+        "threads": lambda wrong: raydix.Scene(*BOX, threads=wrong),
+    }
+    for name, call in calls.items():
+        with pytest.raises(TypeError, match=f"^{name.strip()}: expected .*, given .*three"):
+            call("three")
+    for name, call in {"k": calls["k"], "mask": calls["mask"], "threads": calls["threads"]}.items():
+        for wrong in (np.nan, np.inf, 1.5, -1, 2**40):
+            with pytest.raises(ValueError, match=f"^{name}: expected a whole number, .* given"):
+                call(wrong)
+    with pytest.raises(ValueError, match="^scenes: expected one or more for 1 transforms"):
+        raydix.Instances([], one)
 
 
 def test_instances_equal_moved_copies(rng):
@@ -253,7 +280,7 @@ def test_instances_equal_moved_copies(rng):
     assert not placed.occluded(rays).any()  # it saw that its object moved
     placed.move(transforms[:, :3] - np.array([0, 0, 0, 100]))
     assert (placed.occluded(rays) == found).mean() > 0.99
-    with pytest.raises(ValueError, match="another number"):
+    with pytest.raises(ValueError, match="transforms: expected 3, as many as there are places, given 2"):
         placed.move(transforms[:2])
     before, bad = placed.occluded(rays), transforms.copy()
     bad[1, 0, 0] = np.nan

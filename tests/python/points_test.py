@@ -164,7 +164,7 @@ def test_nothing_and_nonsense():
         ),
         (
             ValueError,
-            "k: expected a whole number of 1 or more, given 0",
+            "k: expected a whole number, 1 to 2147483648, given 0",
             lambda i: i.knn([0, 0, 0], 0),
         ),
         (
