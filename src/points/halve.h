@@ -30,12 +30,12 @@ struct Interval {
 
 /// Of n >= 16 values; NaN among them is passed over, unless it is the first.
 template <class T>
-Interval<T> interval_of(const T* values, std::uint32_t n) {
+HWY_ATTR Interval<T> interval_of(const T* values, std::uint32_t n) {
     // Vectors by name: GCC turns loops over arrays of minima into conditional moves.
     const hn::CappedTag<T, 16> d;
     const auto lanes = static_cast<std::uint32_t>(hn::Lanes(d));
     auto lo = hn::Set(d, values[0]), hi = lo;
-    const auto take = [&](std::uint32_t from) {
+    const auto take = [&](std::uint32_t from) HWY_ATTR {
         const auto x = hn::LoadU(d, values + from);
         lo = hn::IfThenElse(hn::Lt(x, lo), x, lo);
         hi = hn::IfThenElse(hn::Gt(x, hi), x, hi);
