@@ -3,6 +3,8 @@
 #include <raydix/double.h>
 #include <raydix/overlap.h>
 
+#include <type_traits>
+
 #include "base/float_env.h"
 #include "proximity/query_batch.h"
 #include "proximity/sweep_walk.h"
@@ -23,8 +25,8 @@ struct DoubleSweeps {
     using Hit = SweepHitD;
 };
 
-FloatSweeps kind_of(const Bvh&) { return {}; }
-DoubleSweeps kind_of(const BvhD&) { return {}; }
+template <class AnyBvh>
+using SweepsOf = std::conditional_t<std::is_same_v<AnyBvh, Bvh>, FloatSweeps, DoubleSweeps>;
 
 template <class Kind, class Stack>
 typename Kind::Hit sweep_as_ray(const typename Kind::Tree& tree, const auto& ray, Stack& stack) {
@@ -82,14 +84,15 @@ OverlapCounts sweep_all(const AnyBvh& bvh, std::span<const Sweep> sweeps, std::s
     require_triangles(bvh, what);
     require_room("sweeps", sweeps.size(), hits.size());
     OverlapCounts counts;
-    with_threads(options.threads,
-                 [&] { counts = sweep_batch<decltype(kind_of(bvh))>(bvh, sweeps, hits); });
+    with_threads(options.threads, [&] {
+        counts = sweep_batch<SweepsOf<std::remove_cvref_t<decltype(bvh)>>>(bvh, sweeps, hits);
+    });
     return counts;
 }
 
 template <class AnyBvh, class Sweep>
 auto sweep_single(const AnyBvh& bvh, const Sweep& sweep) {
-    using Kind = decltype(kind_of(bvh));
+    using Kind = SweepsOf<std::remove_cvref_t<decltype(bvh)>>;
     require_triangles(bvh, what);
     if (bvh.empty() || !is_valid(sweep)) return typename Kind::Hit{};
     const FloatEnvironment plain;
