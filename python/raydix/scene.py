@@ -73,8 +73,8 @@ class Scene(SceneViews):
     The arrays are copied: changing them later does not change the scene; `refit` does. With
     precision "float32", coordinates given as float64, NumPy's usual type, are rounded once, here,
     and every answer is about the rounded mesh. Trees are built when a query first needs them. Any
-    number of threads may ask at once. Triangles whose box has a diagonal below 1e-12 are left out, as
-    degenerate.
+    number of threads may ask at once. Triangles whose box has a diagonal above 0 and
+    below 1e-12 are left out, as those that are not finite.
 
     With precision "float64" these raise NotImplementedError: device="cuda", `render`, `cameras`,
     `primary_rays`, `secondary_rays`, `info`, `wide_stats` and `raydix.simulate`; files raise

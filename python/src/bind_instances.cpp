@@ -26,26 +26,20 @@ namespace {
 using Ids = In<std::uint32_t, nb::ndim<1>>;
 using FlagsOut = Out<bool, nb::ndim<1>>;
 
-/// The library's names of placed things in float32.
-struct PlacedInFloat {
-    using Scalar = float;
+/// What scenes have, and the library's names of placed things in float32.
+struct PlacedInFloat : InFloat {
     using Trees = SceneTrees;
     using Scene = InstancedScene;
     using Transform = raydix::Transform;
     using Instance = raydix::Instance;
-    using Ray = raydix::Ray;
-    using Hit = raydix::Hit;
 };
 
 /// The same in double.
-struct PlacedInDouble {
-    using Scalar = double;
+struct PlacedInDouble : InDouble {
     using Trees = SceneTreesD;
     using Scene = InstancedSceneD;
     using Transform = TransformD;
     using Instance = InstanceD;
-    using Ray = RayD;
-    using Hit = HitD;
 };
 
 template <class Names>
@@ -213,50 +207,26 @@ template <class Names>
 void bind_as(nb::module_& module, const char* name, const char* text) {
     using Placed = PlacedScenes<Names>;
     using Ray = typename Names::Ray;
-    using RowsIn = typename RayRows<Ray>::Array;
-    using Columns = StridedRows;
-    nb::class_<Placed>(module, name, text)
+    nb::class_<Placed> placed(module, name, text);
+    placed
         .def("__init__", &make<Names>, nb::keep_alive<1, 2>(), nb::arg("scenes"),
              nb::arg("transforms").noconvert(), nb::arg("objects").noconvert(),
              nb::arg("masks").noconvert(), nb::arg("threads"))
         .def("move", &move<Names>, nb::arg("transforms").noconvert(), nb::arg("threads"))
-        .def("__len__", &Placed::size)
-        .def(
-            "intersect",
-            [](Placed& self, const RowsIn& rays, std::uint32_t mask, int threads) {
-                RayRows<Ray> batch(rays);
-                return intersect(self, batch, mask, threads);
-            },
-            nb::arg("rays").noconvert(), nb::arg("mask"), nb::arg("threads"))
-        .def(
-            "intersect",
-            [](Placed& self, const Columns& origins, const Columns& directions, const Limits& tmin,
-               const Limits& tmax, std::uint32_t mask, int threads) {
-                RayParts<Ray> batch(origins, directions, tmin, tmax);
-                return intersect(self, batch, mask, threads);
-            },
-            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
-            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("mask"),
-            nb::arg("threads"))
-        .def(
-            "occluded",
-            [](Placed& self, const RowsIn& rays, const FlagsOut& flags, std::uint32_t mask,
-               int threads) {
-                RayRows<Ray> batch(rays);
-                occluded(self, batch, flags, mask, threads);
-            },
-            nb::arg("rays").noconvert(), nb::arg("flags").noconvert(), nb::arg("mask"),
-            nb::arg("threads"))
-        .def(
-            "occluded",
-            [](Placed& self, const Columns& origins, const Columns& directions, const Limits& tmin,
-               const Limits& tmax, const FlagsOut& flags, std::uint32_t mask, int threads) {
-                RayParts<Ray> batch(origins, directions, tmin, tmax);
-                occluded(self, batch, flags, mask, threads);
-            },
-            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
-            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("flags").noconvert(),
-            nb::arg("mask"), nb::arg("threads"));
+        .def("__len__", &Placed::size);
+    def_for_rays<Ray>(
+        placed, "intersect",
+        [](Placed& self, auto& rays, std::uint32_t mask, int threads) {
+            return intersect(self, rays, mask, threads);
+        },
+        MoreArguments<std::uint32_t, int>(), nb::arg("mask"), nb::arg("threads"));
+    def_for_rays<Ray>(
+        placed, "occluded",
+        [](Placed& self, auto& rays, const FlagsOut& flags, std::uint32_t mask, int threads) {
+            occluded(self, rays, flags, mask, threads);
+        },
+        MoreArguments<const FlagsOut&, std::uint32_t, int>(), nb::arg("flags").noconvert(),
+        nb::arg("mask"), nb::arg("threads"));
 }
 
 }  // namespace

@@ -418,79 +418,31 @@ std::pair<bool, std::string> check_boxes(SceneTreesD& scene) {
 /// The four calls with rays, for rays of the library's layout and for columns.
 template <class Scene>
 void bind_rays(nb::class_<Scene>& scene) {
-    using Rows = RayRows<typename Scene::Types::Ray>;
-    using Parts = RayParts<typename Scene::Types::Ray>;
-    using RowsIn = typename Rows::Array;
+    using Ray = typename Scene::Types::Ray;
     using Hits = HitRows<Scene>;
     using Counted = Out<std::uint32_t, nb::ndim<1>>;
-    scene
-        .def(
-            "intersect",
-            [](Scene& self, const RowsIn& rays, const Hits& hits, int threads) {
-                Rows batch(rays);
-                return intersect(self, batch, hits, threads);
-            },
-            nb::arg("rays").noconvert(), nb::arg("hits").noconvert(), nb::arg("threads") = 0)
-        .def(
-            "intersect",
-            [](Scene& self, const StridedRows& origins, const StridedRows& directions,
-               const Limits& tmin, const Limits& tmax, const Hits& hits, int threads) {
-                Parts batch(origins, directions, tmin, tmax);
-                return intersect(self, batch, hits, threads);
-            },
-            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
-            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("hits").noconvert(),
-            nb::arg("threads") = 0)
-        .def(
-            "occluded",
-            [](Scene& self, const RowsIn& rays, const FlagsOut& flags, int threads) {
-                Rows batch(rays);
-                return occluded(self, batch, flags, threads);
-            },
-            nb::arg("rays").noconvert(), nb::arg("flags").noconvert(), nb::arg("threads") = 0)
-        .def(
-            "occluded",
-            [](Scene& self, const StridedRows& origins, const StridedRows& directions,
-               const Limits& tmin, const Limits& tmax, const FlagsOut& flags, int threads) {
-                Parts batch(origins, directions, tmin, tmax);
-                return occluded(self, batch, flags, threads);
-            },
-            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
-            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("flags").noconvert(),
-            nb::arg("threads") = 0)
-        .def(
-            "count",
-            [](Scene& self, const StridedRows& origins, const StridedRows& directions,
-               const Limits& tmin, const Limits& tmax, const Counted& counts, int threads) {
-                Parts batch(origins, directions, tmin, tmax);
-                return count_hits(self, batch, counts, threads);
-            },
-            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
-            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("counts").noconvert(),
-            nb::arg("threads") = 0)
-        .def(
-            "count",
-            [](Scene& self, const RowsIn& rays, const Counted& counts, int threads) {
-                Rows batch(rays);
-                return count_hits(self, batch, counts, threads);
-            },
-            nb::arg("rays").noconvert(), nb::arg("counts").noconvert(), nb::arg("threads") = 0)
-        .def(
-            "all_hits",
-            [](Scene& self, const StridedRows& origins, const StridedRows& directions,
-               const Limits& tmin, const Limits& tmax, int threads) {
-                Parts batch(origins, directions, tmin, tmax);
-                return all_hits(self, batch, threads);
-            },
-            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
-            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), nb::arg("threads") = 0)
-        .def(
-            "all_hits",
-            [](Scene& self, const RowsIn& rays, int threads) {
-                Rows batch(rays);
-                return all_hits(self, batch, threads);
-            },
-            nb::arg("rays").noconvert(), nb::arg("threads") = 0);
+    const auto threads = nb::arg("threads") = 0;
+    def_for_rays<Ray>(
+        scene, "intersect",
+        [](Scene& self, auto& rays, const Hits& hits, int n) {
+            return intersect(self, rays, hits, n);
+        },
+        MoreArguments<const Hits&, int>(), nb::arg("hits").noconvert(), threads);
+    def_for_rays<Ray>(
+        scene, "occluded",
+        [](Scene& self, auto& rays, const FlagsOut& flags, int n) {
+            return occluded(self, rays, flags, n);
+        },
+        MoreArguments<const FlagsOut&, int>(), nb::arg("flags").noconvert(), threads);
+    def_for_rays<Ray>(
+        scene, "count",
+        [](Scene& self, auto& rays, const Counted& counts, int n) {
+            return count_hits(self, rays, counts, n);
+        },
+        MoreArguments<const Counted&, int>(), nb::arg("counts").noconvert(), threads);
+    def_for_rays<Ray>(
+        scene, "all_hits", [](Scene& self, auto& rays, int n) { return all_hits(self, rays, n); },
+        MoreArguments<int>(), threads);
 }
 
 template <class Scene>

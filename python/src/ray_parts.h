@@ -74,4 +74,32 @@ private:
     std::span<const RayType> rays_;
 };
 
+/// Types of a call's arguments behind the rays.
+template <class... Types>
+struct MoreArguments {};
+
+/// Defines `name` for both forms of rays: ask(self, rays, more...), where `names` are of `more`.
+template <class RayType, class Self, class Ask, class... More, class... Names>
+void def_for_rays(nb::class_<Self>& bound, const char* name, const Ask& ask, MoreArguments<More...>,
+                  const Names&... names) {
+    using Rows = RayRows<RayType>;
+    bound
+        .def(
+            name,
+            [ask](Self& self, const typename Rows::Array& rays, More... more) {
+                Rows batch(rays);
+                return ask(self, batch, more...);
+            },
+            nb::arg("rays").noconvert(), names...)
+        .def(
+            name,
+            [ask](Self& self, const StridedRows& origins, const StridedRows& directions,
+                  const Limits& tmin, const Limits& tmax, More... more) {
+                RayParts<RayType> batch(origins, directions, tmin, tmax);
+                return ask(self, batch, more...);
+            },
+            nb::arg("origins").noconvert(), nb::arg("directions").noconvert(),
+            nb::arg("tmin").noconvert(), nb::arg("tmax").noconvert(), names...);
+}
+
 }  // namespace raydix::python
