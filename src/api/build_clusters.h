@@ -73,7 +73,9 @@ void build_clusters(const Source& source, std::span<const Key> keys, ClusterScra
             case Builder::binned:
                 return build_binned(keys, ids, boxes, max_leaf, nodes, scratch.binned);
             default:
-                return build_ploc(ids, max_leaf, scratch.ploc);
+                // The keys have done their work, and leaf copies are written last.
+                return build_ploc(ids, max_leaf, scratch.ploc,
+                                  std::as_writable_bytes(copies.span()));
         }
     }();
     if (const int rounds = tree.options().reinsertion_rounds; rounds > 0)

@@ -56,10 +56,11 @@ public:
         return {PrimitiveRun::several, count};
     }
 
-    /// Appends the positions of a leaf's primitives in the tree's order.
-    void list_primitives(Ref leaf, std::vector<std::uint32_t>& positions) const {
+    /// Calls take(position) for a leaf's primitives in the tree's order.
+    template <class Take>
+    void for_each_primitive(Ref leaf, const Take& take) const {
         const auto [first, count] = run(leaf);
-        for (std::uint32_t k = first; k < first + count; ++k) positions.push_back(k);
+        for (std::uint32_t k = first; k < first + count; ++k) take(k);
     }
     [[nodiscard]] bool is_flat(std::uint32_t position) const {
         return has_zero_area(bvh_.triangles()[position]);

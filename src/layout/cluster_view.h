@@ -6,11 +6,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
+#include <utility>
 
 #include "base/prefetch.h"
 #include "layout/binary_view.h"
 #include "layout/leaf_order.h"
+#include "layout/wide_bvh.h"
 #include "tree/place_clusters.h"
 
 namespace raydix {
@@ -34,8 +35,10 @@ public:
     [[nodiscard]] std::array<Ref, 2> children(Ref inner) const {
         return {tree_.nodes[inner].left, tree_.nodes[inner].right};
     }
-    RAYDIX_PREFETCHING void prefetch(Ref inner) const {
-        for (const Ref child : children(inner))
+    /// What lies below `ref` will be asked for.
+    RAYDIX_PREFETCHING void prefetch(Ref ref) const {
+        if (is_primitive(ref)) return;
+        for (const Ref child : children(ref))
             if (!is_primitive(child)) __builtin_prefetch(&tree_.nodes[child]);
     }
     [[nodiscard]] std::uint32_t size(Ref ref) const { return run(ref).count; }
@@ -47,15 +50,17 @@ public:
         return {0, a.count + b.count};
     }
 
-    /// Appends the places of a leaf's primitives in Morton order, ascending by id.
-    void list_primitives(Ref leaf, std::vector<std::uint32_t>& places) const {
-        if (is_primitive(leaf)) return places.push_back(leaf & ~primitive_cluster);
-        const auto begin = static_cast<std::ptrdiff_t>(places.size());
-        list(leaf, places);
+    /// Calls take(place) for a leaf's primitives, places in Morton order, ascending by id.
+    template <class Take>
+    void for_each_primitive(Ref leaf, const Take& take) const {
+        if (is_primitive(leaf)) return take(leaf & ~primitive_cluster);
         // A few that are nearly in order.
-        for (auto at = places.begin() + begin; at != places.end(); ++at)
-            for (auto k = at; k != places.begin() + begin && id(*(k - 1)) > id(*k); --k)
-                std::iter_swap(k - 1, k);
+        std::array<std::uint32_t, most_in_leaf> places;
+        const std::size_t count = list(leaf, places, 0);
+        for (std::size_t at = 1; at < count; ++at)
+            for (std::size_t k = at; k > 0 && id(places[k - 1]) > id(places[k]); --k)
+                std::swap(places[k - 1], places[k]);
+        std::for_each_n(places.begin(), count, take);
     }
     [[nodiscard]] bool is_flat(std::uint32_t place) const { return flat_[place] != 0; }
     [[nodiscard]] std::uint32_t id(std::uint32_t place) const { return tree_.ids[place]; }
@@ -77,10 +82,16 @@ public:
     }
 
 private:
-    void list(Ref ref, std::vector<std::uint32_t>& places) const {
-        if (is_primitive(ref)) return places.push_back(ref & ~primitive_cluster);
-        list(tree_.nodes[ref].left, places);
-        list(tree_.nodes[ref].right, places);
+    /// Of the builders' options, for trees that become wide.
+    static constexpr std::size_t most_in_leaf = wide_max_leaf;
+
+    std::size_t list(Ref ref, std::array<std::uint32_t, most_in_leaf>& places,
+                     std::size_t count) const {
+        if (is_primitive(ref)) {
+            places[count] = ref & ~primitive_cluster;
+            return count + 1;
+        }
+        return list(tree_.nodes[ref].right, places, list(tree_.nodes[ref].left, places, count));
     }
 
     ClusterTree tree_;

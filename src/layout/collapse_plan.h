@@ -19,12 +19,11 @@ template <class Ref>
 struct CollapseEntry {
     Aabb box;
     Ref ref;
-    std::uint32_t
-        children;  // the first one; of a leaf, leaf_bit and where its primitives are listed
+    std::uint32_t children;  // the first one; none of a leaf
     PrimitiveRun run;
 
-    static constexpr std::uint32_t leaf_bit = 0x80000000u;
-    [[nodiscard]] bool is_leaf() const { return (children & leaf_bit) != 0; }
+    static constexpr std::uint32_t none = ~std::uint32_t{0};
+    [[nodiscard]] bool is_leaf() const { return children == none; }
 };
 
 /// What is best for the subtree of an entry.
@@ -58,15 +57,14 @@ public:
 
     /// Enters and plans the subtree of `root`.
     void plan(Ref root) {
-        entries_.clear();
-        positions_.clear();
-        enter(root);
+        entries_.reserve(2 * std::size_t{view_.size(root)});
+        entries_.assign(1, entry_of(root));
         for (std::size_t k = 0; k < entries_.size(); ++k) {
             if (entries_[k].is_leaf()) continue;
             entries_[k].children = static_cast<std::uint32_t>(entries_.size());
             const auto [a, b] = view_.children(entries_[k].ref);
-            enter(a);
-            enter(b);
+            entries_.push_back(entry_of(a));
+            entries_.push_back(entry_of(b));
         }
         plans_.resize(entries_.size());
         for (std::size_t k = entries_.size(); k-- > 0;)
@@ -85,8 +83,7 @@ public:
     void for_each_primitive(std::uint32_t k, const Take& take) const {
         const Entry& e = entries_[k];
         if (e.is_leaf()) {
-            const std::uint32_t* first = &positions_[e.children & ~Entry::leaf_bit];
-            std::for_each_n(first, e.run.count, take);
+            view_.for_each_primitive(e.ref, take);
         } else {
             for_each_primitive(e.children, take);
             for_each_primitive(e.children + 1, take);
@@ -127,15 +124,10 @@ public:
 
 private:
     /// What its children will be read from is asked for ahead.
-    void enter(Ref ref) {
-        if (view_.is_leaf(ref)) {
-            const auto listed = static_cast<std::uint32_t>(positions_.size());
-            view_.list_primitives(ref, positions_);
-            entries_.push_back({view_.box(ref), ref, Entry::leaf_bit | listed, view_.run(ref)});
-        } else {
-            view_.prefetch(ref);
-            entries_.push_back({view_.box(ref), ref, 0, {0, 0}});
-        }
+    [[nodiscard]] Entry entry_of(Ref ref) const {
+        view_.prefetch(ref);
+        if (view_.is_leaf(ref)) return {view_.box(ref), ref, Entry::none, view_.run(ref)};
+        return {view_.box(ref), ref, 0, {0, 0}};
     }
 
     void plan_leaf(std::size_t k) {
@@ -205,7 +197,6 @@ private:
     double per_area_ = 0;
     std::vector<Entry> entries_;
     std::vector<Plan> plans_;
-    std::vector<std::uint32_t> positions_;  // of the primitives of all leaves
 };
 
 }  // namespace raydix

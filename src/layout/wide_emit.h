@@ -1,10 +1,13 @@
 // A view of a binary tree -> the nodes and triangle blocks of a WideBvh. Subtrees of some thousand
-// primitives are collapsed and written by themselves, each while it is in a cache, into memory of
-// their own, and then put behind each other: the arrays do not depend on the number of threads.
+// primitives are collapsed, written and put behind each other, each while it is in a cache: the
+// arrays do not depend on the number of threads.
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "base/math.h"
@@ -20,31 +23,20 @@ class WideEmitter {
 public:
     using Ref = typename View::Ref;
 
-    WideEmitter(const View& view, const WideOptions& options, std::vector<WidePart>& parts)
-        : view_(view), options_(options), parts_(parts) {}
+    WideEmitter(const View& view, const WideOptions& options, PartPool& pool)
+        : view_(view), options_(options), pool_(pool) {}
 
     void run(WideBvh::Arrays& out) {
-        WidePart top;
+        std::unique_ptr<WidePart> top = take_part(pool_);
         if (view_.size(view_.root()) > most) {
-            write_top(top);
+            write_top(*top);
         } else {
             roots_.push_back({view_.root(), 0});
         }
-        if (parts_.size() < roots_.size() + 1) parts_.resize(roots_.size() + 1);
-        std::swap(parts_[0], top);
-        for_each_range(roots_.size(), 1, [&](std::size_t begin, std::size_t end) {
-            Collapse<width, View> collapse(view_, options_);
-            for (; begin < end; ++begin) {
-                WidePart& part = parts_[begin + 1];
-                part.clear();
-                collapse.plan(roots_[begin].ref);
-                Writer writer(view_, options_.compact, part);
-                writer.write(collapse, roots_[begin].depth);
-                writer.write_triangles();
-            }
-        });
-        const WideSums sums =
-            join_parts(std::span(parts_).first(roots_.size() + 1), options_.compact, out);
+        PartPlacer placer(options_.compact, view_.size(view_.root()), roots_.size(), pool_, out);
+        placer.set_top(std::move(top));
+        write_parts(placer);
+        const WideSums sums = placer.finish();
         if (options_.compact) number_vertices(out);
         count_bytes(out);
         out.set_bounds(view_.box(view_.root()));
@@ -65,6 +57,26 @@ private:
         Ref ref;
         std::uint32_t parent, slot, depth;
     };
+
+    /// From the first one on, each thread the next, so that few wait for their places.
+    void write_parts(PartPlacer& placer) const {
+        std::atomic<std::size_t> next = 0;
+        const auto threads = std::min(roots_.size(), static_cast<std::size_t>(thread_count()));
+        for_each_index(
+            threads,
+            [&](std::size_t) {
+                Collapse<width, View> collapse(view_, options_);
+                for (std::size_t k = next++; k < roots_.size(); k = next++) {
+                    std::unique_ptr<WidePart> part = placer.take();
+                    collapse.plan(roots_[k].ref);
+                    Writer writer(view_, options_.compact, *part);
+                    writer.write(collapse, roots_[k].depth);
+                    writer.write_triangles();
+                    placer.place(k, std::move(part));
+                }
+            },
+            1);
+    }
 
     void write_top(WidePart& top) {
         constexpr std::uint32_t no_parent = ~std::uint32_t{0};
@@ -159,7 +171,7 @@ private:
 
     const View& view_;
     WideOptions options_;
-    std::vector<WidePart>& parts_;
+    PartPool& pool_;
     std::vector<Root> roots_;
 };
 

@@ -1,8 +1,9 @@
-// A part of a WideBvh that was written by itself, and what makes one tree of all parts.
+// Parts of a WideBvh that are written each by itself, and the places where they come to lie.
 #pragma once
 
 #include <cstdint>
-#include <span>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "layout/block_filler.h"
@@ -23,8 +24,7 @@ struct WideSums {
 /// In compact blocks, until vertices have their numbers: there is no triangle in this lane.
 inline constexpr std::uint32_t no_vertex = ~std::uint32_t{0};
 
-/// In the word of a child that is the first node of another part: which one, of parts[1 + ...].
-/// Only the first part has such children.
+/// In the word of a child of the top that is the first node of another part: which one.
 inline constexpr std::uint32_t wide_part_bit = 0x40000000u;
 
 /// Children that are nodes, and places of leaves, are numbered within the part.
@@ -40,8 +40,60 @@ struct WidePart {
     [[nodiscard]] std::size_t node_count() const { return nodes.size() + compact_nodes.size(); }
 };
 
-/// Puts the nodes and blocks of all parts behind each other; fills the arrays' figures but for
-/// time, width and SAH. Throws InputError for too many triangles.
-WideSums join_parts(std::span<const WidePart> parts, bool compact, WideBvh::Arrays& out);
+/// Memory of parts that wait for their places, kept from one tree to the next.
+using PartPool = std::vector<std::unique_ptr<WidePart>>;
+/// An empty part.
+[[nodiscard]] std::unique_ptr<WidePart> take_part(PartPool& pool);
+
+/// Puts parts behind each other into the arrays of a tree, the top first. A part is copied as soon
+/// as the sizes of all before it are known, while it is in a cache, and its memory serves the next:
+/// what a build touches for the first time is little more than the tree. The arrays do not depend
+/// on the order in which parts are finished.
+class PartPlacer {
+public:
+    /// `references`: of the binary tree. The room for nodes and blocks is guessed from them; what
+    /// does not fit waits, and is copied once more.
+    PartPlacer(bool compact, std::size_t references, std::size_t parts, PartPool& pool,
+               WideBvh::Arrays& out);
+
+    /// The part that all others hang from; before all others.
+    void set_top(std::unique_ptr<WidePart> top);
+    /// An empty part to write to. Any thread.
+    [[nodiscard]] std::unique_ptr<WidePart> take();
+    /// Part k, from 0, is written. Any thread, each part once.
+    void place(std::size_t k, std::unique_ptr<WidePart> part);
+    /// When all parts are placed: the arrays are complete, and those figures that need no more than
+    /// sums. Throws InputError for too many triangles.
+    WideSums finish();
+
+private:
+    /// Where a part's arrays begin in those of the whole tree.
+    struct Bases {
+        std::size_t node = 0, block = 0;
+    };
+    struct State {
+        std::unique_ptr<WidePart> waiting;
+        std::size_t nodes = 0, blocks = 0;
+        Bases bases;
+        WideSums sums;
+        bool written = false;
+    };
+
+    void make_room(Bases room);
+    [[nodiscard]] bool fits(const State& state) const;
+    void copy(const WidePart& part, const Bases& bases);
+    void copy_top();
+    void set_figures(const WideSums& sums);
+
+    bool compact_;
+    PartPool& pool_;
+    WideBvh::Arrays& out_;
+    std::unique_ptr<WidePart> top_;
+    std::mutex mutex_;  // of all that follows, and of the pool
+    std::vector<State> states_;
+    std::size_t next_ = 0;  // the first part whose place is not known
+    Bases end_;             // of the parts whose places are known
+    Bases room_;
+};
 
 }  // namespace raydix

@@ -5,11 +5,13 @@
 namespace raydix {
 
 void BoxLanes::reset(std::uint32_t capacity) {
-    // Each lane starts on a cache line of its own, with a margin on both sides.
-    const std::size_t stride = (std::size_t{capacity} + 2 * margin + 15) / 16 * 16;
-    memory_.reset(6 * stride);
+    memory_.reset(floats_for(capacity));
+    place(memory_.data(), capacity);
+}
+
+void BoxLanes::place(float* memory, std::uint32_t capacity) {
     for (std::size_t k = 0; k < 6; ++k) {
-        lanes_[k] = memory_.data() + k * stride + margin;
+        lanes_[k] = memory + k * stride_for(capacity) + margin;
         const float infinite = k < 3 ? -infinity : infinity;
         std::fill(lanes_[k] - margin, lanes_[k], infinite);
     }

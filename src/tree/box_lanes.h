@@ -17,6 +17,11 @@ public:
     static constexpr std::uint32_t margin = 128;
 
     void reset(std::uint32_t capacity);
+    /// As reset, in memory that somebody else keeps: floats_for(capacity) of them, on a cache line.
+    void place(float* memory, std::uint32_t capacity);
+    [[nodiscard]] static constexpr std::size_t floats_for(std::uint32_t capacity) {
+        return 6 * stride_for(capacity);
+    }
     /// Puts the box of infinite area on all places of the margin behind `count`.
     void close(std::uint32_t count);
 
@@ -37,6 +42,11 @@ public:
     [[nodiscard]] std::size_t capacity_bytes() const { return memory_.capacity_bytes(); }
 
 private:
+    /// Each lane starts on a cache line of its own, with a margin on both sides.
+    [[nodiscard]] static constexpr std::size_t stride_for(std::uint32_t capacity) {
+        return (std::size_t{capacity} + 2 * margin + 15) / 16 * 16;
+    }
+
     Buffer<float> memory_;
     std::array<float*, 6> lanes_{};
 };

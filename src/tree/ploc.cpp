@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 
 #include "exec/parallel.h"
 #include "tree/nearest_cluster.h"
@@ -27,10 +28,11 @@ constexpr std::uint32_t short_list = 1024;
 class PlocRun {
 public:
     PlocRun(std::span<const std::uint32_t> ids, std::uint32_t max_leaf, PlocScratch& scratch,
-            const PlocOptions& options)
+            std::span<std::byte> spare, const PlocOptions& options)
         : ids_(ids),
           max_leaf_(max_leaf),
           scratch_(scratch),
+          spare_(spare),
           options_(options),
           count_(static_cast<std::uint32_t>(ids.size())) {}
 
@@ -45,9 +47,7 @@ public:
         for (std::size_t to = 0; count_ > 1; to = 1 - to) {
             const std::uint32_t merges = choose_partners(*boxes, slow);
             const std::uint32_t rest = count_ - merges;
-            ClusterList& next = scratch_.lists[to];
-            next.boxes.reset(rest);
-            next.refs.reset(rest);
+            ClusterList& next = list_for(to, rest);
             merge_partners({*boxes, refs}, next);
             next.boxes.close(rest);
             slow = count_ > short_list && merges < count_ / slow_round;
@@ -60,6 +60,29 @@ public:
     }
 
 private:
+    /// Lists only grow shorter: what was borrowed for the first of two rounds does for all others.
+    ClusterList& list_for(std::size_t to, std::uint32_t size) {
+        ClusterList& borrowed = borrowed_[to];
+        if (!borrowed.refs.empty()) return borrowed;
+        constexpr std::size_t line = 64;
+        const auto lines = [](std::size_t bytes) { return (bytes + line - 1) / line * line; };
+        const std::size_t boxes = lines(BoxLanes::floats_for(size) * sizeof(float));
+        const std::size_t refs = lines(size * sizeof(ClusterRef));
+        void* memory = spare_.data();
+        std::size_t room = spare_.size();
+        if (std::align(line, boxes + refs, memory, room) == nullptr) {
+            ClusterList& own = scratch_.lists[to];
+            own.boxes.reset(size);
+            own.refs.reset(size);
+            return own;
+        }
+        auto* bytes = static_cast<std::byte*>(memory);
+        borrowed.boxes.place(reinterpret_cast<float*>(bytes), size);
+        borrowed.refs = {nullptr, reinterpret_cast<ClusterRef*>(bytes + boxes), size};
+        spare_ = {bytes + boxes + refs, room - boxes - refs};
+        return borrowed;
+    }
+
     struct From {
         const BoxLanes& boxes;
         const ClusterRef* refs;
@@ -196,6 +219,8 @@ private:
     std::span<const std::uint32_t> ids_;
     std::uint32_t max_leaf_;
     PlocScratch& scratch_;
+    std::span<std::byte> spare_;
+    std::array<ClusterList, 2> borrowed_;
     const PlocOptions& options_;
     std::uint32_t count_;
     std::uint32_t nodes_ = 0;
@@ -204,8 +229,9 @@ private:
 }  // namespace
 
 ClusterRef build_ploc(std::span<const std::uint32_t> ids, std::uint32_t max_leaf,
-                      PlocScratch& scratch, const PlocOptions& options) {
-    return PlocRun(ids, max_leaf, scratch, options).run();
+                      PlocScratch& scratch, std::span<std::byte> spare,
+                      const PlocOptions& options) {
+    return PlocRun(ids, max_leaf, scratch, spare, options).run();
 }
 
 }  // namespace raydix

@@ -7,6 +7,7 @@
 #include <raydix/buffer.h>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -39,8 +40,11 @@ struct PlocScratch {
 };
 
 /// scratch.primitives [n], n >= 1, and their ids [n] in Morton order -> scratch.nodes [n - 1],
-/// children before parents. Returns the root, which is a primitive if n = 1.
+/// children before parents. Returns the root, which is a primitive if n = 1. Lists go to `spare` as
+/// far as there is room, which nobody else may use meanwhile: memory that has been touched before
+/// is cheaper than memory that has not.
 ClusterRef build_ploc(std::span<const std::uint32_t> ids, std::uint32_t max_leaf,
-                      PlocScratch& scratch, const PlocOptions& options = {});
+                      PlocScratch& scratch, std::span<std::byte> spare,
+                      const PlocOptions& options = {});
 
 }  // namespace raydix

@@ -11,6 +11,15 @@ namespace {
 /// Shorter extents are not divided: the scale would overflow.
 constexpr float least_extent = 1e-30f;
 
+/// References across no more planes than this on any axis are priced as their boxes, cut at the
+/// planes: what slicing them would take off is less than a few bins. In small nodes that is much,
+/// and all are sliced that are cut at all.
+constexpr std::int32_t planes_of_small(std::uint32_t bins) {
+    return bins >= max_spatial_bins ? 3 : bins >= 16 ? 1 : 0;
+}
+/// Of small references so many are priced, each for several.
+constexpr std::uint32_t priced_references = 4096;
+
 struct DoubleBox {
     Polygon::Point lo{infinity, infinity, infinity}, hi{-infinity, -infinity, -infinity};
 
@@ -158,8 +167,14 @@ private:
 
 class SpatialBins {
 public:
-    explicit SpatialBins(const SpatialGrid& grid) : grid_(grid), rows_(grid.bins) {}
+    SpatialBins(const SpatialGrid& grid, std::uint32_t stride)
+        : grid_(grid),
+          rows_(grid.bins),
+          stride_(stride),
+          small_planes_(planes_of_small(grid.bins)) {}
 
+    /// Of the small ones about one in `stride` stands for all: what one of them adds to a box is
+    /// little.
     void take(const ReferenceCutter& cutter, std::span<const SplitBox> references) {
         for (const SplitBox& reference : references) {
             const LowCorners box{Float4::load(&reference.lo.x).xyz(),
@@ -167,24 +182,29 @@ public:
             std::array<std::int32_t, 4> from, to;
             grid_.bins_of(box.lo, from);
             grid_.bins_of(Float4::all(0) - box.minus_hi, to);
-            bool across = false;
+            const std::int32_t planes =
+                std::max({to[0] - from[0], to[1] - from[1], to[2] - from[2]});
+            const bool small = planes <= small_planes_;
+            if (small && !is_sampled(reference.first)) continue;
+            const std::uint32_t stands_for = small ? stride_ : 1;
             for (std::size_t axis = 0; axis < 3; ++axis) {
                 SpatialRow& first = rows_[static_cast<std::size_t>(from[axis])];
-                ++first.begins[axis];
-                ++rows_[static_cast<std::size_t>(to[axis])].ends[axis];
+                first.begins[axis] += stands_for;
+                rows_[static_cast<std::size_t>(to[axis])].ends[axis] += stands_for;
                 if (from[axis] == to[axis])
                     first.corners[axis].add(box);
-                else
-                    across = true;
+                else if (small)
+                    chop(box, axis, static_cast<std::uint32_t>(from[axis]),
+                         static_cast<std::uint32_t>(to[axis]));
             }
-            if (across) slice(cutter.corners(reference), box, from, to);
+            if (!small) slice(cutter.corners(reference), box, from, to);
         }
     }
     void add(const SpatialBins& other) {
         for (std::size_t b = 0; b < rows_.size(); ++b) rows_[b].add(other.rows_[b]);
     }
 
-    [[nodiscard]] SpatialSplit best(std::uint32_t n) const {
+    [[nodiscard]] SpatialSplit best() const {
         std::array<Float4, max_spatial_bins> right_cost;
         SpatialRow side;
         for (std::uint32_t b = grid_.bins - 1; b > 0; --b) {
@@ -208,10 +228,28 @@ public:
         for (std::uint32_t a = 1; a < 3; ++a)
             if (costs[a] < costs[axis]) axis = a;
         if (!(costs[axis] < infinity)) return {};
-        return split_at(axis, static_cast<std::uint32_t>(planes[axis]), costs[axis], n);
+        return split_at(axis, static_cast<std::uint32_t>(planes[axis]), costs[axis]);
     }
 
 private:
+    /// One id of `stride_`, spread by the golden ratio: the choice is the reference's own.
+    [[nodiscard]] bool is_sampled(std::uint32_t id) const {
+        return id * 0x9E3779B9u <= ~std::uint32_t{0} / stride_;
+    }
+    /// Adds a box that reaches from bin `first` to bin `last`, cut at the planes between them.
+    void chop(LowCorners box, std::size_t axis, std::uint32_t first, std::uint32_t last) {
+        std::array<float, 4> lo, minus_hi;
+        lo.fill(-infinity);
+        minus_hi.fill(-infinity);
+        for (; first < last; ++first) {
+            lo[axis] = grid_.plane(axis, first + 1);
+            minus_hi[axis] = -lo[axis];
+            rows_[first].corners[axis].add(
+                {box.lo, max_of(box.minus_hi, Float4::load(minus_hi.data()))});
+            box.lo = max_of(box.lo, Float4::load(lo.data()));
+        }
+        rows_[last].corners[axis].add(box);
+    }
     void slice(const std::array<Vec3, 3>& exact, const LowCorners& box,
                const std::array<std::int32_t, 4>& from, const std::array<std::int32_t, 4>& to) {
         const std::array<Float4, 3> corners{load_point(exact[0]), load_point(exact[1]),
@@ -250,15 +288,15 @@ private:
         rows_[std::min(std::max(bin, first), last)].corners[axis].add(inside(triangle.middle()));
     }
 
-    [[nodiscard]] SpatialSplit split_at(std::uint32_t axis, std::uint32_t b, float cost,
-                                        std::uint32_t n) const {
-        SpatialSplit split{cost, axis, grid_.plane(axis, b), 0, n, {}, {}};
+    [[nodiscard]] SpatialSplit split_at(std::uint32_t axis, std::uint32_t b, float cost) const {
+        SpatialSplit split{cost, axis, grid_.plane(axis, b), 0, 0, {}, {}};
         LowCorners left, right;
         for (std::uint32_t k = 0; k < grid_.bins; ++k) {
             (k < b ? left : right).add(rows_[k].corners[axis]);
-            if (k >= b) continue;
-            split.left += rows_[k].begins[axis];
-            split.right -= rows_[k].ends[axis];
+            if (k < b)
+                split.left += rows_[k].begins[axis];
+            else
+                split.right += rows_[k].ends[axis];
         }
         split.left_box = left.box();
         split.right_box = right.box();
@@ -267,6 +305,8 @@ private:
 
     const SpatialGrid& grid_;
     std::vector<SpatialRow> rows_;
+    std::uint32_t stride_;
+    std::int32_t small_planes_;
 };
 
 }  // namespace
@@ -303,18 +343,20 @@ SpatialSplit find_spatial_split(const ReferenceCutter& cutter, std::span<const S
                                 const Aabb& box, std::uint32_t bins) {
     const SpatialGrid grid(box, bins);
     const auto n = static_cast<std::uint32_t>(references.size());
+    const std::uint32_t stride = std::max(n / priced_references, 1u);
     if (references.size() < 2 * parallel_boxes) {
-        SpatialBins all(grid);
+        SpatialBins all(grid, stride);
         all.take(cutter, references);
-        return all.best(n);
+        return all.best();
     }
     // Minima and whole numbers: as exact in parts as at once.
-    std::vector<SpatialBins> parts((n + parallel_boxes - 1) / parallel_boxes, SpatialBins(grid));
+    std::vector<SpatialBins> parts((n + parallel_boxes - 1) / parallel_boxes,
+                                   SpatialBins(grid, stride));
     for_each_block(n, parallel_boxes, [&](std::size_t b, std::size_t begin, std::size_t end) {
         parts[b].take(cutter, references.subspan(begin, end - begin));
     });
     for (std::size_t b = 1; b < parts.size(); ++b) parts[0].add(parts[b]);
-    return parts[0].best(n);
+    return parts[0].best();
 }
 
 void SpatialSides::choose(const ReferenceCutter& cutter, std::span<const SplitBox> references,
