@@ -104,8 +104,7 @@ Placed in_order() {
     for (std::uint32_t k = 0; k < part_count; ++k) {
         for (std::uint32_t i = 0; i < nodes_of(k); ++i) {
             const std::uint32_t place = (block + k % blocks_of(k)) << 5;
-            all.words.insert(all.words.end(),
-                             {wide_leaf_bit | place | 1, node + nodes_of(k) - 1});
+            all.words.insert(all.words.end(), {wide_leaf_bit | place | 1, node + nodes_of(k) - 1});
             all.words.insert(all.words.end(), quantised_width - 2, wide_no_child);
         }
         all.prims.insert(all.prims.end(), blocks_of(k), k);
