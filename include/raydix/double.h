@@ -48,12 +48,12 @@ struct LeafTriangleD {
 };
 static_assert(sizeof(LeafTriangleD) == 72);
 
-/// A tree over triangles in double. Its nodes are those of a float tree over the triangles' boxes,
-/// moved so that `center()`, near which most triangles are, is at 0, scaled down where the scene
-/// reaches farther than 2^39 (`scale()`), and rounded outward: as small as a float tree, and any
-/// builder can make it. Its leaves hold the corners as the caller gave them. Where detail is finer
-/// than 2^-24 of its distance from the center, boxes overlap more than they need to: queries take
-/// longer, and are as right.
+/// A tree over triangles in double. Its nodes are those of a float tree over boxes of the triangles
+/// or, with the builders split and sbvh, of their parts, moved so that `center()`, near which most
+/// triangles are, is at 0, scaled down where the scene reaches farther than 2^39 (`scale()`), and
+/// rounded outward: as small as a float tree, and any builder can make it. Its leaves hold the
+/// corners as the caller gave them. Where detail is finer than 2^-24 of its distance from the
+/// center, boxes overlap more than they need to: queries take longer, and are as right.
 class BvhD {
 public:
     [[nodiscard]] bool empty() const { return tree_.empty(); }
@@ -91,14 +91,13 @@ private:
 /// Builds a tree over the mesh's triangles; a mesh without any gives an empty tree (points:
 /// <raydix/points.h>). Triangles with a coordinate that is not finite or beyond 1e12, and those
 /// with a diagonal in (0, 1e-12), are left out and counted; `options.strict` throws instead.
-/// Builders split and sbvh are sweep here. Throws InputError: option out of range, a vertex index
-/// past the end, 2^31 triangles or more.
+/// Throws InputError: option out of range, a vertex index past the end, 2^31 triangles or more.
 [[nodiscard]] BvhD build_bvh(const MeshViewD& mesh, const BuildOptions& options = {});
 [[nodiscard]] BvhD build_bvh(const MeshD& mesh, const BuildOptions& options = {});
 
 /// New corners for the same number of triangles in the same order; the hierarchy is kept. Throws
-/// InputError that names a triangle, the tree unchanged, as Refitter::refit does; nothing is found
-/// late here.
+/// InputError that names a triangle, or for a tree with parts of triangles, the tree unchanged, as
+/// Refitter::refit does; nothing is found late here.
 RefitQuality refit(BvhD& bvh, const MeshViewD& mesh, int threads = 0);
 
 /// Closest hit of each ray, the least (t, prim): Woop, Benthin, Wald (2013) in double, watertight.

@@ -78,8 +78,7 @@ class Scene(SceneViews):
 
     With precision "float64" these raise NotImplementedError: device="cuda", `render`, `cameras`,
     `primary_rays`, `secondary_rays`, `info`, `wide_stats` and `raydix.simulate`; files raise
-    ValueError, because they are read in float32. Builders "split" and "sbvh" (quality "high")
-    are "sweep" there. Numbers other than 0 below 2**-500 count as 0.
+    ValueError, because they are read in float32. Numbers other than 0 below 2**-500 count as 0.
 
     Raises ValueError (InputError is one) and TypeError that name the argument, what was expected
     and what was given.
@@ -410,7 +409,7 @@ class Scene(SceneViews):
         Returns "sah", "sah_at_build" and their "ratio": from about 1.5 on a new Scene is usually
         worth its time. InputError, the scene unchanged: triangles that were valid are so no more,
         or the other way round; a tree with parts of triangles (builders split and sbvh, quality
-        "high", in float32). Waits for queries of other threads.
+        "high"). Waits for queries of other threads.
         """
         corners = mesh_vertices(vertices, dtype=self.dtype)
         if len(corners) != len(self.vertices):

@@ -19,13 +19,6 @@ std::mutex& unless_reading(std::mutex& queue) {
     return queue;
 }
 
-/// Splits of triangles are for float trees: over boxes both builders are `sweep`, and say so.
-BuildOptions in_double(BuildOptions options) {
-    if (options.builder == Builder::split || options.builder == Builder::sbvh)
-        options.builder = Builder::sweep;
-    return options;
-}
-
 }  // namespace
 
 Writing::Writing(std::mutex& queue, std::shared_mutex& use)
@@ -146,7 +139,7 @@ RefitQuality SceneTrees::refit(std::vector<Vec3> vertices, int threads) {
 }
 
 SceneTreesD::SceneTreesD(MeshD mesh, const BuildOptions& options)
-    : MeshTrees(std::move(mesh), in_double(options)) {
+    : MeshTrees(std::move(mesh), options) {
     for (std::size_t i = 0; i < mesh_.triangles.size(); ++i)
         for (const std::uint32_t corner : mesh_.triangles[i])
             if (corner >= mesh_.vertices.size())

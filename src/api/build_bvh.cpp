@@ -342,6 +342,16 @@ void BvhBuilderAccess::build_clusters(BvhBuilder& builder, const MeshView& mesh,
     builder.build(mesh, options, tree);
 }
 
+void BvhBuilderAccess::build_around(BvhBuilder& builder, std::span<const Aabb> boxes,
+                                    const TriangleCorners& corners, const BuildOptions& options,
+                                    Bvh& tree) {
+    const TriangleCorners*& known = builder.scratch_->sweeps.corners;
+    known = &corners;
+    const auto forget = [&](void*) { known = nullptr; };
+    const std::unique_ptr<void, decltype(forget)> guard(&builder, forget);
+    builder.build(boxes, options, tree);
+}
+
 void BvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Bvh& tree) {
     const bool same_kind =
         tree.kind() == (mesh.triangles.empty() ? PrimitiveKind::points : PrimitiveKind::triangles);

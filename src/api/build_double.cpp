@@ -1,39 +1,21 @@
-// build_bvh in double: boxes -> center -> float boxes around it -> a float tree -> corners in leaf
-// order.
+// build_bvh in double: boxes -> center -> float boxes around it -> a float tree over them or over
+// parts -> corners in leaf order.
 #include <raydix/double.h>
 #include <raydix/error.h>
 
 #include <algorithm>
 
+#include "api/bvh_builder_access.h"
+#include "api/refit_checks.h"
 #include "exec/parallel.h"
 #include "exec/search.h"
 #include "measure/stopwatch.h"
 #include "primitives/double_sources.h"
 #include "tree/around_center.h"
+#include "tree/bvh_d_access.h"
 #include "tree/median_center.h"
 
 namespace raydix {
-
-struct BvhDAccess {
-    BvhD& bvh;
-
-    [[nodiscard]] Bvh& tree() const { return bvh.tree_; }
-    [[nodiscard]] BuildMs& build_ms() const { return bvh.build_ms_; }
-
-    void place(const AabbD& bounds, Vec3d center) const {
-        bvh.bounds_ = bounds;
-        bvh.center_ = center;
-        bvh.scale_ = scale_around(center, bounds);
-    }
-    [[nodiscard]] Aabb local(const AabbD& box) const {
-        return box_around_center(box, bvh.center_, bvh.scale_);
-    }
-    void copy_corners(const TriangleSourceD& source) const {
-        bvh.triangles_.reset(bvh.order().size());
-        for_each_index(bvh.order().size(),
-                       [&](std::size_t k) { bvh.triangles_[k] = source.corners(bvh.order()[k]); });
-    }
-};
 
 namespace {
 
@@ -100,13 +82,26 @@ void require_triangles_that_fit(const MeshViewD& mesh, const BoundsD& bounds, bo
                          std::to_string(bounds.left_out - 1) + " others");
 }
 
+void place(const BvhDAccess& tree, const AabbD& bounds, Vec3d center) {
+    tree.bounds() = bounds;
+    tree.center() = center;
+    tree.scale() = scale_around(center, bounds);
+}
+
+void copy_corners(const BvhDAccess& tree, const TriangleSourceD& source) {
+    const std::span<const std::uint32_t> order = tree.bvh.order();
+    tree.triangles().reset(order.size());
+    for_each_index(order.size(),
+                   [&](std::size_t k) { tree.triangles()[k] = source.corners(order[k]); });
+}
+
 /// Triangles that are left out get a box that float builders leave out.
 Buffer<Aabb> local_boxes(const TriangleSourceD& source, std::size_t n, const BvhDAccess& tree) {
     Buffer<Aabb> boxes(n);
     for_each_index(n, [&](std::size_t i) {
         AabbD box;
         const bool valid = source.box(static_cast<std::uint32_t>(i), box);
-        boxes[i] = valid ? tree.local(box) : empty_box();
+        boxes[i] = valid ? box_around_center(box, tree.center(), tree.scale()) : empty_box();
     });
     return boxes;
 }
@@ -117,14 +112,16 @@ void build(const MeshViewD& mesh, const BuildOptions& options, const BvhDAccess&
     const TriangleSourceD source{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()};
     const BoundsD bounds = bounds_of(source, n);
     require_triangles_that_fit(mesh, bounds, options.strict);
-    tree.place(bounds.box, center_of(source, n, bounds.box));
+    place(tree, bounds.box, center_of(source, n, bounds.box));
     BuildOptions over_boxes = options;
     over_boxes.strict = false;
     const Buffer<Aabb> boxes = local_boxes(source, n, tree);
     const double before = stage.lap();
-    tree.tree() = build_bvh(boxes.view(), over_boxes);
+    BvhBuilder builder;
+    BvhBuilderAccess::build_around(builder, boxes.view(), {mesh, tree.center(), tree.scale()},
+                                   over_boxes, tree.tree());
     stage.lap();
-    tree.copy_corners(source);
+    copy_corners(tree, source);
     BuildMs ms = tree.tree().build_ms();
     ms.bounds += before;
     ms.layout += stage.lap();
@@ -179,6 +176,7 @@ void require_same_valid(const BvhD& bvh, const TriangleSourceD& source, std::uin
 }  // namespace
 
 RefitQuality refit(BvhD& bvh, const MeshViewD& mesh, int threads) {
+    require_whole(bvh.tree());
     const std::size_t n = mesh.triangles.size();
     if (n != bvh.input_count())
         throw InputError("refit: " + std::to_string(n) +
@@ -192,11 +190,11 @@ RefitQuality refit(BvhD& bvh, const MeshViewD& mesh, int threads) {
         BvhD moved;
         const BvhDAccess to{moved}, tree{bvh};
         const Vec3d center = center_of(source, n, bounds.box);
-        to.place(bounds.box, center);
+        place(to, bounds.box, center);
         require_same_valid(bvh, source, bounds.left_out);
         quality = refit(tree.tree(), local_boxes(source, n, to).view(), threads);
-        tree.place(bounds.box, center);
-        tree.copy_corners(source);
+        place(tree, bounds.box, center);
+        copy_corners(tree, source);
     });
     return quality;
 }

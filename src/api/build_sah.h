@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <numeric>
-#include <type_traits>
+#include <optional>
 #include <vector>
 
 #include "layout/leaf_order.h"
@@ -25,6 +25,7 @@ namespace raydix {
 }
 
 struct SweepScratch {
+    const TriangleCorners* corners = nullptr;  // of the triangles that boxes are around, if any
     SahScratch sah;
     SbvhScratch sbvh;
     Buffer<SahReference> spare;
@@ -103,6 +104,21 @@ inline void sort_and_build(const SahInput& input, SweepScratch& scratch, const B
     ms.hierarchy = stage.lap();
 }
 
+/// What can be cut: triangles, and those that boxes are around.
+inline std::optional<TriangleCorners> corners_of(const TriangleSource& source, std::uint32_t n,
+                                                 const SweepScratch&) {
+    return MeshView{{source.vertices, source.vertex_count}, {source.triangles, n}};
+}
+inline std::optional<TriangleCorners> corners_of(const BoxSource&, std::uint32_t,
+                                                 const SweepScratch& scratch) {
+    if (scratch.corners == nullptr) return {};
+    return *scratch.corners;
+}
+inline std::optional<TriangleCorners> corners_of(const PointSource&, std::uint32_t,
+                                                 const SweepScratch&) {
+    return {};
+}
+
 /// Of `n` primitives `valid` > 0 are not left out. On return all arrays of the tree are complete.
 template <class Source, class Copy>
 void build_by_sweeps(const Source& source, std::uint32_t n, std::uint32_t valid, const Aabb& scene,
@@ -112,27 +128,22 @@ void build_by_sweeps(const Source& source, std::uint32_t n, std::uint32_t valid,
     const Builder builder = tree.options().builder;
     const auto max_leaf = static_cast<std::uint32_t>(tree.options().max_leaf);
     SahInput input{valid, max_leaf};
-    if constexpr (std::is_same_v<Source, TriangleSource>) {
-        const MeshView mesh{{source.vertices, source.vertex_count}, {source.triangles, n}};
-        if (builder == Builder::sbvh) {
-            const ReferenceCutter cutter(mesh);
-            const SbvhInput cut_input{cutter, valid, max_leaf};
-            make_references(source, n, valid, spatial_spare(valid, cut_input.options),
-                            scratch.sbvh.references);
-            ms.codes = stage.lap();
-            tree.inner_count() =
-                build_sbvh(cut_input, scratch.sbvh, tree.nodes(), tree.order(), tree.max_depth());
-            ms.hierarchy = stage.lap();
-        } else {
-            make_references(source, n, valid, 0, scratch.sah.references);
-            if (builder == Builder::split) {
-                split_early(mesh, scene, {}, scratch.sah.references, scratch.spare);
-                input.references = static_cast<std::uint32_t>(scratch.sah.references.size());
-            }
-            sort_and_build(input, scratch, tree, ms, stage);
-        }
+    const std::optional<TriangleCorners> corners = corners_of(source, n, scratch);
+    if (builder == Builder::sbvh && corners) {
+        const ReferenceCutter cutter(*corners);
+        const SbvhInput cut_input{cutter, valid, max_leaf};
+        make_references(source, n, valid, spatial_spare(valid, cut_input.options),
+                        scratch.sbvh.references);
+        ms.codes = stage.lap();
+        tree.inner_count() =
+            build_sbvh(cut_input, scratch.sbvh, tree.nodes(), tree.order(), tree.max_depth());
+        ms.hierarchy = stage.lap();
     } else {
         make_references(source, n, valid, 0, scratch.sah.references);
+        if (builder == Builder::split && corners) {
+            split_early(*corners, scene, {}, scratch.sah.references, scratch.spare);
+            input.references = static_cast<std::uint32_t>(scratch.sah.references.size());
+        }
         sort_and_build(input, scratch, tree, ms, stage);
     }
     if (const int rounds = tree.options().reinsertion_rounds; rounds > 0) {

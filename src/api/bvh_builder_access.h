@@ -1,13 +1,16 @@
-// The way into a BvhBuilder for those who want its clusters instead of a finished tree.
+// The way into a BvhBuilder for those who want its clusters instead of a finished tree, and for
+// boxes around triangles that it may cut.
 #pragma once
 
 #include <raydix/bvh.h>
 
 #include <cstdint>
 #include <functional>
+#include <span>
 
 #include "primitives/sources.h"
 #include "tree/place_clusters.h"
+#include "tree/triangle_corners.h"
 
 namespace raydix {
 
@@ -27,6 +30,11 @@ struct BvhBuilderAccess {
     /// triangle `take` is not called. mesh has triangles.
     static void build_clusters(BvhBuilder& builder, const MeshView& mesh,
                                const BuildOptions& options, Bvh& tree, const TakeClusters& take);
+    /// As build() over boxes, each around the triangle of the same number: builders that cut cut
+    /// those.
+    static void build_around(BvhBuilder& builder, std::span<const Aabb> boxes,
+                             const TriangleCorners& corners, const BuildOptions& options,
+                             Bvh& tree);
 };
 
 }  // namespace raydix

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "api/refit_checks.h"
 #include "exec/search.h"
 #include "layout/refit_walk.h"
 #include "primitives/bounds.h"
@@ -20,14 +21,6 @@ std::string count_text(std::uint64_t n, PrimitiveKind kind) {
     return std::to_string(n) + (kind == PrimitiveKind::triangles ? " triangles"
                                 : kind == PrimitiveKind::boxes   ? " boxes"
                                                                  : " points");
-}
-
-void require_whole(const Bvh& bvh) {
-    if (bvh.has_split_primitives())
-        throw InputError("refit: this tree of builder " +
-                         std::string(builder_name(bvh.options().builder)) +
-                         " holds parts of triangles, which are not kept; build it again, or with "
-                         "another builder");
 }
 
 void require_fit(const Bvh& bvh, PrimitiveKind kind, std::size_t n) {

@@ -51,4 +51,12 @@ RAYDIX_HD inline double product_difference(double a, double b, double c, double 
     return difference != 0.0 ? difference : lost_difference(a, b, c, d) + 0.0;
 }
 
+/// a * b - c * d to a few roundings of its own value, however much cancels; its sign is that of
+/// product_difference, or it is 0.
+RAYDIX_HD inline double accurate_product_difference(double a, double b, double c, double d) {
+    const double ab = a * b, cd = c * d;
+    if (ab == cd) return lost_difference(a, b, c, d) + 0.0;
+    return (ab - cd) + (std::fma(a, b, -ab) - std::fma(c, d, -cd));
+}
+
 }  // namespace raydix

@@ -13,9 +13,8 @@
 namespace raydix {
 namespace {
 
-/// Of rays and triangles: t is held within the triangle's own box, which the ray is in then, up to
-/// rounding; where rounding leaves no such t, the bound of slab.h holds. Both several times over.
-constexpr double triangle_error = 0x1p-48;
+/// Of rays and triangles: at t the ray is as near to the triangle as slab.h says, twice over.
+constexpr double triangle_error = 0x1p-46;
 
 constexpr AabbD nothing{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
 

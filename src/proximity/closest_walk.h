@@ -34,20 +34,30 @@ struct PaddedTree : TriangleTree {
 struct PaddedTreeD : TriangleTreeD {
     double reach = 0.0;  // of the nodes' coordinates
     double square;       // of the scale
+    bool parts;          // leaves may hold parts of triangles
+    double part_pad = 0.0;
 
-    explicit PaddedTreeD(const BvhD& bvh) : TriangleTreeD(bvh), square(bvh.scale() * bvh.scale()) {
+    explicit PaddedTreeD(const BvhD& bvh)
+        : TriangleTreeD(bvh),
+          square(bvh.scale() * bvh.scale()),
+          parts(bvh.tree().has_split_primitives()) {
         if (bvh.empty()) return;
         const BvhNode& root = bvh.tree().nodes()[0];
         const Vec3 far = max_of(max_of(root.hi, -1.0f * root.lo), Vec3{0.0f, 0.0f, 0.0f});
         reach = max_of(max_of(far.x, far.y), far.z);
+        if (!parts) return;
+        const AabbD box = bvh.bounds();
+        const Vec3d most = max_of(max_of(box.hi, -1.0 * box.hi), max_of(box.lo, -1.0 * box.lo));
+        part_pad = 0x1p-46 * bvh.scale() * max_of(max_of(most.x, most.y), most.z);
     }
 
     /// The query is rounded on its way to the nodes, and each distance once more: the pad is four
-    /// times what both can add.
+    /// times what both can add. A point found is in the triangle's own box, but up to a dozen
+    /// roundings of the scene's coordinates beside its parts: `part_pad` is ten times that.
     [[nodiscard]] BoxDistancesD distances(Vec3d query) const {
         const Vec3d q = space.local(query);
         const double far = max_of(max_of(std::fabs(q.x), std::fabs(q.y)), std::fabs(q.z));
-        return {q, 0x1p-50 * (far + reach)};
+        return {q, 0x1p-50 * (far + reach) + part_pad};
     }
     [[nodiscard]] double local_square(double d2) const { return d2 * square; }
 };

@@ -1,7 +1,10 @@
 // Pairs of triangles of trees in double.
 #include <raydix/double.h>
 
+#include <optional>
+
 #include "proximity/pair_search.h"
+#include "proximity/whole_tree.h"
 #include "trace/double_tree.h"
 #include "tree/around_center.h"
 #include "tree/walk.h"
@@ -13,8 +16,12 @@ namespace {
 /// center.
 class PairSideD {
 public:
-    PairSideD(const BvhD& bvh, const BvhD& where)
-        : boxes_(bvh.order().size()), keys_(bvh.order().size()), nodes_(bvh.tree().nodes().size()) {
+    PairSideD(const BvhD& given, const BvhD& where) {
+        if (has_parts(given)) whole_ = make_whole_tree(given);
+        const BvhD& bvh = whole_ ? *whole_ : given;
+        boxes_.reset(bvh.order().size());
+        keys_.reset(bvh.order().size());
+        nodes_.reset(bvh.tree().nodes().size());
         const TreeSpace space{where.center(), where.scale()};
         for_each_index(boxes_.size(), [&](std::size_t k) {
             const LeafTriangleD& t = bvh.triangles()[k];
@@ -48,6 +55,7 @@ private:
         }
     }
 
+    std::optional<BvhD> whole_;
     Buffer<PairBox> boxes_;
     Buffer<CornerKeys> keys_;
     Buffer<BvhNode> nodes_;

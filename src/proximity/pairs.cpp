@@ -15,7 +15,7 @@ namespace {
 class PairSide {
 public:
     PairSide(const Bvh& given, const Bvh&) {
-        if (given.has_split_primitives()) whole_ = make_whole_tree(given);
+        if (has_parts(given)) whole_ = make_whole_tree(given);
         const Bvh& bvh = whole_ ? *whole_ : given;
         boxes_.reset(bvh.order().size());
         for_each_index(boxes_.size(), [&](std::size_t k) {

@@ -47,22 +47,31 @@ struct Inside {
 
 }  // namespace
 
-struct Solid::State {
-    using Tree = TriangleTree;
-    const Bvh* bvh;
-    std::optional<Bvh> whole;  // where the caller's tree has triangles in several leaves
+namespace {
+
+std::span<const BvhNode> nodes_of(const Bvh& bvh) { return bvh.nodes(); }
+std::span<const BvhNode> nodes_of(const BvhD& bvh) { return bvh.tree().nodes(); }
+
+template <class AnyTree, class AnyBvh>
+struct SolidState {
+    using Tree = AnyTree;
+    const AnyBvh* bvh;
+    std::optional<AnyBvh> whole;  // where the caller's tree has triangles in several leaves
     std::optional<Inside> inside;
 
-    [[nodiscard]] const Bvh& single() const { return whole ? *whole : *bvh; }
+    [[nodiscard]] const AnyBvh& single() const { return whole ? *whole : *bvh; }
+
+    void prepare(const AnyBvh& given, InsideRule rule) {
+        bvh = &given;
+        if (has_parts(given)) whole = make_whole_tree(given);
+        inside.emplace(Tree(single()), single().triangles(), nodes_of(single()), rule);
+    }
 };
 
-struct SolidD::State {
-    using Tree = TriangleTreeD;
-    const BvhD* bvh;
-    std::optional<Inside> inside;
+}  // namespace
 
-    [[nodiscard]] const BvhD& single() const { return *bvh; }
-};
+struct Solid::State : SolidState<TriangleTree, Bvh> {};
+struct SolidD::State : SolidState<TriangleTreeD, BvhD> {};
 
 struct SolidAccess {
     template <class AnySolid>
@@ -197,24 +206,14 @@ std::vector<double> winding_batch(const AnySolid& solid, std::span<const Vec> qu
 
 Solid::Solid(const Bvh& bvh, const SolidOptions& options) : state_(std::make_unique<State>()) {
     require_triangles(bvh, "a solid needs");
-    with_threads(options.threads, [&] {
-        state_->bvh = &bvh;
-        if (bvh.has_split_primitives()) state_->whole = make_whole_tree(bvh);
-        const Bvh& single = state_->single();
-        state_->inside.emplace(TriangleTree(single), single.triangles(), single.nodes(),
-                               options.rule);
-    });
+    with_threads(options.threads, [&] { state_->prepare(bvh, options.rule); });
 }
 Solid::~Solid() = default;
 Solid::Solid(Solid&&) noexcept = default;
 Solid& Solid::operator=(Solid&&) noexcept = default;
 
 SolidD::SolidD(const BvhD& bvh, const SolidOptions& options) : state_(std::make_unique<State>()) {
-    with_threads(options.threads, [&] {
-        state_->bvh = &bvh;
-        state_->inside.emplace(TriangleTreeD(bvh), bvh.triangles(), bvh.tree().nodes(),
-                               options.rule);
-    });
+    with_threads(options.threads, [&] { state_->prepare(bvh, options.rule); });
 }
 SolidD::~SolidD() = default;
 SolidD::SolidD(SolidD&&) noexcept = default;

@@ -106,12 +106,13 @@ private:
                 path_.tmax};
     }
     /// Start and sums are rounded where the nodes are: eight times the bound of one rounding holds
-    /// what these and the own box's differ by.
+    /// what these and the own box's differ by. Parts have no own box: their room is how far the
+    /// ball may be from touching at the contact, worst where it moves nearly along an edge (2^-26).
     [[nodiscard]] double room(const PaddedTreeD& tree) const {
         const Vec3d at = tree.space.local(start_);
         const double far = max_of(max_of(std::fabs(at.x), std::fabs(at.y)), std::fabs(at.z));
         const double radius = radius_ * tree.space.scale;
-        return radius + 0x1p-50 * (far + tree.reach + radius);
+        return radius + (tree.parts ? 0x1p-24 : 0x1p-50) * (far + tree.reach + radius);
     }
 
     Vec3d start_;

@@ -2,30 +2,39 @@
 
 #include <vector>
 
-#include "exec/parallel.h"
 #include "tree/bvh_access.h"
+#include "tree/bvh_d_access.h"
 
 namespace raydix {
+namespace {
 
-Bvh make_whole_tree(const Bvh& bvh) {
+BvhAccess access_to(Bvh& bvh) { return {bvh}; }
+BvhAccess access_to(BvhD& bvh) { return {BvhDAccess{bvh}.tree()}; }
+
+template <class View, class Vec, class AnyBvh>
+AnyBvh whole_tree_of(const AnyBvh& bvh) {
     std::vector<bool> seen(bvh.input_count());
-    std::vector<Vec3> corners;
+    std::vector<Vec> corners;
     std::vector<Triangle> triangles;
     std::vector<std::uint32_t> prims;
     for (std::size_t k = 0; k < bvh.order().size(); ++k) {
         const std::uint32_t prim = bvh.order()[k];
         if (seen[prim]) continue;
         seen[prim] = true;
-        const LeafTriangle& t = bvh.triangles()[k];
+        const auto& t = bvh.triangles()[k];
         const auto first = static_cast<std::uint32_t>(corners.size());
         corners.insert(corners.end(), {t.v0, t.v1, t.v2});
         triangles.push_back({first, first + 1, first + 2});
         prims.push_back(prim);
     }
-    Bvh whole = build_bvh(MeshView(corners, triangles), {.builder = Builder::apetrei});
-    const BvhAccess access{whole};
-    for (std::uint32_t& prim : access.order().span()) prim = prims[prim];
+    AnyBvh whole = build_bvh(View(corners, triangles), {.builder = Builder::apetrei});
+    for (std::uint32_t& prim : access_to(whole).order().span()) prim = prims[prim];
     return whole;
 }
+
+}  // namespace
+
+Bvh make_whole_tree(const Bvh& bvh) { return whole_tree_of<MeshView, Vec3>(bvh); }
+BvhD make_whole_tree(const BvhD& bvh) { return whole_tree_of<MeshViewD, Vec3d>(bvh); }
 
 }  // namespace raydix

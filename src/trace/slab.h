@@ -18,8 +18,10 @@ namespace raydix {
 /// sheared plane (two roundings for the vertex, three for the shear). All boxes of the tree grow by
 /// twice that bound on every side, taken at the root, as Woop, Benthin and Wald (2013, section 4)
 /// suggest; the quotients' own error is covered by Ize's factor (2013).
-/// In double the boxes are still floats, relative to a point of the scene (BvhD): there the pad is
-/// four times the bound, since the origin is rounded once more on its way to that point.
+/// In double the boxes are still floats, relative to a point of the scene (BvhD), and may be around
+/// parts of triangles. There the pad is sixteen times the bound: it holds how far the point of the
+/// triangle that t belongs to may be beside the ray at t (45 roundings of the same distances:
+/// test 4, weights 32, t 8, the origin on its way to that point 1).
 template <class Scalar>
 struct BasicSlabFrame {
     VecOf<Scalar> origin, inverse;
@@ -32,7 +34,7 @@ using SlabFrame = BasicSlabFrame<float>;
 using SlabFrameD = BasicSlabFrame<double>;
 
 template <class Scalar>
-inline constexpr Scalar slab_pad_of = (sizeof(Scalar) == 4 ? 8 : 16) * rounding_of<Scalar>;
+inline constexpr Scalar slab_pad_of = (sizeof(Scalar) == 4 ? 8 : 64) * rounding_of<Scalar>;
 inline constexpr float slab_pad = slab_pad_of<float>;
 /// 1 + 2 gamma(3), rounded up.
 template <class Scalar>

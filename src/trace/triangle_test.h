@@ -100,10 +100,40 @@ RAYDIX_HD inline BoxInterval<Scalar> own_box_interval(const BasicRayFrame<Scalar
     return interval;
 }
 
+/// The edge functions of a hit in double. Cancellation may leave nothing of their ratios, and t
+/// would then be that of any place of the triangle: `accurate` has them once more.
+struct EdgesD {
+    double u, v, w;
+
+    [[nodiscard]] RAYDIX_HD double sum() const { return (u + v) + w; }
+
+    /// Whether the weighed corners, which should meet the ray, may miss it by more than 16
+    /// roundings of (their distance beside it + along it): each function is off by at most two
+    /// roundings of the largest product.
+    [[nodiscard]] RAYDIX_HD bool may_stray(const ShearedVertexD& a, const ShearedVertexD& b,
+                                           const ShearedVertexD& c, double shear_z) const {
+        const auto beside = [](const ShearedVertexD& p) {
+            return max_of(std::fabs(p.x), std::fabs(p.y));
+        };
+        const double m = max_of(max_of(beside(a), beside(b)), beside(c));
+        const double z = max_of(max_of(std::fabs(a.z), std::fabs(b.z)), std::fabs(c.z));
+        const double scale = std::fabs(shear_z);  // z is in units of the ray's t
+        return 3.0 * (m * m) * (m * scale) > 8.0 * std::fabs(sum()) * (m * scale + z);
+    }
+    [[nodiscard]] RAYDIX_HD static EdgesD accurate(const ShearedVertexD& a, const ShearedVertexD& b,
+                                                   const ShearedVertexD& c) {
+        const auto edge = [](const ShearedVertexD& p, const ShearedVertexD& q) {
+            return accurate_product_difference(p.x, q.y, p.y, q.x);
+        };
+        return {edge(c, b), edge(a, c), edge(b, a)};
+    }
+};
+
 /// True if the ray hits within [ray.tmin, tmax]. u weighs v1, v weighs v2.
-/// One step beyond the paper: t is held within the triangle's own box. A traversal's entry into any
-/// box around the triangle is then never greater than t (rounding is monotone), so culling cannot
-/// change which hit is closest.
+/// One step beyond the paper, so that culling cannot change which hit is closest. In float t is
+/// held within the triangle's own box: a traversal's entry into any box around the triangle is then
+/// never greater than t (rounding is monotone). In double the point of the triangle at t is within
+/// the pads of the ray, so that this holds for boxes around parts too.
 /// Corners: LeafTriangle or LeafTriangleD.
 template <EdgeRule rule, class Scalar, class Corners>
 RAYDIX_HD bool intersect_triangle(const BasicRayFrame<Scalar>& ray, const Corners& triangle,
@@ -128,12 +158,25 @@ RAYDIX_HD bool intersect_triangle(const BasicRayFrame<Scalar>& ray, const Corner
             if (su != sv || sv != sw) return false;
         }
     }
+    if constexpr (sizeof(Scalar) == 8) {
+        const EdgesD rounded{u, v, w};
+        if (rounded.may_stray(a, b, c, ray.shear_z))
+            if (const EdgesD edges = EdgesD::accurate(a, b, c); edges.sum() != 0)
+                u = edges.u, v = edges.v, w = edges.w;
+    }
     const Scalar determinant = (u + v) + w;
     // Not finite: the ray starts so far away that the edge functions overflow.
     if (!(determinant != 0 && std::fabs(determinant) < infinity)) return false;
     Scalar t = ((u * a.z + v * b.z) + w * c.z) / determinant;
-    const BoxInterval<Scalar> own = own_box_interval(ray, triangle);
-    if (own.entry <= own.exit) t = min_of(max_of(t, own.entry), own.exit);
+    if constexpr (sizeof(Scalar) == 8) {
+        // Within its corners, along the ray's longest axis: a slower one could move t much farther
+        // than rounding did.
+        t = max_of(t, min_of(min_of(a.z, b.z), c.z));
+        t = min_of(t, max_of(max_of(a.z, b.z), c.z));
+    } else {
+        const BoxInterval<Scalar> own = own_box_interval(ray, triangle);
+        if (own.entry <= own.exit) t = min_of(max_of(t, own.entry), own.exit);
+    }
     if (!(t >= ray.tmin && t <= tmax)) return false;
     if (has_zero_area(triangle)) return false;
     hit = {t, v / determinant, w / determinant};

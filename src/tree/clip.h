@@ -71,9 +71,11 @@ inline Polygon clip(const Polygon& in, std::size_t axis, double plane, double si
     return out;
 }
 
-/// The part of `polygon` inside the closed box; no corners if there is none.
-inline Polygon clip(Polygon polygon, const Aabb& box) {
-    const Polygon::Point lo{box.lo.x, box.lo.y, box.lo.z}, hi{box.hi.x, box.hi.y, box.hi.z};
+/// The part of `polygon` inside the closed box, larger by `room` on all sides; no corners if there
+/// is none.
+inline Polygon clip(Polygon polygon, const Aabb& box, double room = 0.0) {
+    const Polygon::Point lo{box.lo.x - room, box.lo.y - room, box.lo.z - room},
+        hi{box.hi.x + room, box.hi.y + room, box.hi.z + room};
     for (std::size_t axis = 0; axis < 3 && polygon.count; ++axis) {
         double least = polygon.corners[0][axis], most = least;
         for (std::size_t i = 1; i < polygon.count; ++i) {

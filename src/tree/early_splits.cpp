@@ -25,23 +25,26 @@ struct Part {
 
 class TriangleCutter {
 public:
-    TriangleCutter(const MeshView& mesh, const Aabb& scene) : mesh_(mesh), scene_(scene) {}
+    TriangleCutter(const TriangleCorners& corners, const Aabb& scene)
+        : corners_(corners), scene_(scene) {}
 
     [[nodiscard]] Part whole(const SahReference& reference) const {
-        return {reference.box(), waste(triangle(reference.primitive_id), reference.box())};
+        return {reference.box(), waste(corners_.polygon(reference.primitive_id), reference.box())};
     }
 
     /// Calls take(box) for the parts that up to `cuts` cuts make of one triangle.
     template <class Take>
     void cut(const SahReference& reference, std::uint32_t cuts, const Take& take) const {
-        cut(triangle(reference.primitive_id), whole(reference), cuts, take);
+        if (cuts == 0) return take(reference.box());
+        const Polygon triangle = corners_.polygon(reference.primitive_id);
+        cut({triangle, corners_.room(triangle)}, whole(reference), cuts, take);
     }
 
 private:
-    [[nodiscard]] Polygon triangle(std::uint32_t id) const {
-        const Triangle& t = mesh_.triangles[id];
-        return polygon_of(mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]);
-    }
+    struct Whole {
+        const Polygon& triangle;
+        double room;  // what its parts are larger by
+    };
 
     /// What the box has beyond a parallelogram: of a triangle half of which fills its flat box,
     /// nothing. Cutting walls only made trees worse (docs/algorithms/split.md).
@@ -51,8 +54,7 @@ private:
 
     /// Each cut halves a cell of the grid, so this ends after 24 levels an axis.
     template <class Take>
-    void cut(const Polygon& triangle, const Part& part, std::uint32_t cuts,
-             const Take& take) const {
+    void cut(const Whole& triangle, const Part& part, std::uint32_t cuts, const Take& take) const {
         std::pair<Aabb, Aabb> halves;
         if (cuts == 0 || !halve(part.box, halves)) return take(part.box);
         const Part a = part_in(triangle, halves.first), b = part_in(triangle, halves.second);
@@ -65,9 +67,9 @@ private:
         cut(triangle, b, sum > 0 ? left - cuts_a : 0u, take);
     }
 
-    [[nodiscard]] static Part part_in(const Polygon& triangle, const Aabb& half) {
-        const Polygon polygon = clip(triangle, half);
-        const Aabb box = outward_box(polygon, half);
+    [[nodiscard]] static Part part_in(const Whole& whole, const Aabb& half) {
+        const Polygon polygon = clip(whole.triangle, half, whole.room);
+        const Aabb box = outward_box(polygon, half, whole.room);
         return {box, waste(polygon, box)};
     }
 
@@ -96,7 +98,7 @@ private:
         return true;
     }
 
-    const MeshView& mesh_;
+    const TriangleCorners& corners_;
     Aabb scene_;
 };
 
@@ -128,12 +130,12 @@ double cuts_per_weight(const std::vector<float>& weights, double least_weight,
 
 }  // namespace
 
-void split_early(const MeshView& mesh, const Aabb& scene, const EarlySplits& options,
+void split_early(const TriangleCorners& corners, const Aabb& scene, const EarlySplits& options,
                  Buffer<SahReference>& references, Buffer<SahReference>& spare) {
     const std::size_t n = references.size();
     const double share = half_area(scene) / static_cast<double>(n);
     if (!(share > 0)) return;
-    const TriangleCutter cutter(mesh, scene);
+    const TriangleCutter cutter(corners, scene);
     std::vector<float> weights(n);
     for_each_index(n, [&](std::size_t i) {
         weights[i] = static_cast<float>(std::sqrt(cutter.whole(references[i]).waste));

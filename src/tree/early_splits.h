@@ -5,11 +5,11 @@
 #pragma once
 
 #include <raydix/buffer.h>
-#include <raydix/mesh.h>
 
 #include <cstdint>
 
 #include "tree/sah_reference.h"
+#include "tree/triangle_corners.h"
 
 namespace raydix {
 
@@ -23,7 +23,7 @@ struct EarlySplits {
 /// references [n]: one for each triangle that is not left out, n >= 1, inside `scene`. On return
 /// they are those of the parts: a triangle's stand together, triangles in the old order. The boxes
 /// of a triangle's parts cover it. At most (1 + budget) n.
-void split_early(const MeshView& mesh, const Aabb& scene, const EarlySplits& options,
+void split_early(const TriangleCorners& corners, const Aabb& scene, const EarlySplits& options,
                  Buffer<SahReference>& references, Buffer<SahReference>& spare);
 
 }  // namespace raydix

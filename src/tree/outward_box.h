@@ -23,9 +23,9 @@ inline float round_down(double x) {
 }
 inline float round_up(double x) { return 0.0f - round_down(-x); }
 
-/// Around the polygon, but not beyond `within`, which holds it up to rounding. Not empty, even if
-/// the polygon is: then it is `within`.
-inline Aabb outward_box(const Polygon& polygon, const Aabb& within) {
+/// Around the polygon with `room` on all sides, but not beyond `within`, which holds it up to
+/// rounding. Not empty, even if the polygon is: then it is `within`.
+inline Aabb outward_box(const Polygon& polygon, const Aabb& within, double room = 0.0) {
     if (polygon.count == 0) return within;
     Polygon::Point lo = polygon.corners[0], hi = lo;
     for (std::size_t i = 1; i < polygon.count; ++i)
@@ -33,8 +33,8 @@ inline Aabb outward_box(const Polygon& polygon, const Aabb& within) {
             lo[k] = std::min(lo[k], polygon.corners[i][k]);
             hi[k] = std::max(hi[k], polygon.corners[i][k]);
         }
-    const Vec3 down{round_down(lo[0]), round_down(lo[1]), round_down(lo[2])};
-    const Vec3 up{round_up(hi[0]), round_up(hi[1]), round_up(hi[2])};
+    const Vec3 down{round_down(lo[0] - room), round_down(lo[1] - room), round_down(lo[2] - room)};
+    const Vec3 up{round_up(hi[0] + room), round_up(hi[1] + room), round_up(hi[2] + room)};
     return {min_of(max_of(down, within.lo), within.hi), max_of(min_of(up, within.hi), within.lo)};
 }
 

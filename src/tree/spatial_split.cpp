@@ -29,6 +29,13 @@ struct DoubleBox {
             hi[k] = std::max(hi[k], p[k]);
         }
     }
+    void add(const Polygon& polygon, double room) {
+        for (std::size_t i = 0; i < polygon.count; ++i) {
+            const Polygon::Point& p = polygon.corners[i];
+            add({p[0] - room, p[1] - room, p[2] - room});
+            add({p[0] + room, p[1] + room, p[2] + room});
+        }
+    }
     /// Rounded outward; inside `within`, empty if they do not meet.
     [[nodiscard]] Aabb inside(const Aabb& within) const {
         if (!(lo[0] <= hi[0])) return empty_box();
@@ -39,6 +46,14 @@ struct DoubleBox {
 
 float& coordinate(Vec3& p, std::size_t axis) { return (&p.x)[axis]; }
 float coordinate(const Vec3& p, std::size_t axis) { return (&p.x)[axis]; }
+
+/// What each side of a plane may hold of a reference's box.
+CutReference halves(const SplitBox& reference, std::uint32_t axis, float plane) {
+    CutReference sides{reference.box(), reference.box()};
+    coordinate(sides.left.hi, axis) = plane;
+    coordinate(sides.right.lo, axis) = plane;
+    return sides;
+}
 
 float half_surface(const Aabb& box) {
     const Vec3 d = box.hi - box.lo;
@@ -313,6 +328,7 @@ private:
 
 CutReference ReferenceCutter::cut(const SplitBox& reference, std::uint32_t axis,
                                   float plane) const {
+    if (!corners_.exact()) return cut_with_room(reference, axis, plane);
     std::array<Polygon::Point, 3> v;
     const std::array<Vec3, 3> exact = corners(reference);
     for (std::size_t k = 0; k < 3; ++k) v[k] = {exact[k].x, exact[k].y, exact[k].z};
@@ -331,10 +347,23 @@ CutReference ReferenceCutter::cut(const SplitBox& reference, std::uint32_t axis,
             right.add(p);
         }
     }
-    Aabb low = reference.box(), high = low;
-    coordinate(low.hi, axis) = plane;
-    coordinate(high.lo, axis) = plane;
-    CutReference parts{left.inside(low), right.inside(high)};
+    const CutReference sides = halves(reference, axis, plane);
+    CutReference parts{left.inside(sides.left), right.inside(sides.right)};
+    if (is_empty(parts.left) && is_empty(parts.right)) parts.left = reference.box();
+    return parts;
+}
+
+/// A corner that is off by rounding may be on the wrong side, and an edge nearly along the plane
+/// meets it elsewhere: both sides reach beyond the plane by the room, and each box by as much.
+CutReference ReferenceCutter::cut_with_room(const SplitBox& reference, std::uint32_t axis,
+                                            float plane) const {
+    const Polygon triangle = corners_.polygon(reference.first);
+    const double room = corners_.room(triangle);
+    DoubleBox left, right;
+    left.add(clip(triangle, axis, plane + room, 1.0), room);
+    right.add(clip(triangle, axis, plane - room, -1.0), room);
+    const CutReference sides = halves(reference, axis, plane);
+    CutReference parts{left.inside(sides.left), right.inside(sides.right)};
     if (is_empty(parts.left) && is_empty(parts.right)) parts.left = reference.box();
     return parts;
 }

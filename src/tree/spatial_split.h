@@ -3,14 +3,13 @@
 // Hierarchies", sections 3 and 4.
 #pragma once
 
-#include <raydix/mesh.h>
-
 #include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "tree/split_bins.h"
+#include "tree/triangle_corners.h"
 
 namespace raydix {
 
@@ -43,18 +42,20 @@ struct CutReference {
 /// Cuts references to triangles of a mesh. A reference is a box, `first` the triangle's id.
 class ReferenceCutter {
 public:
-    explicit ReferenceCutter(const MeshView& mesh) : mesh_(mesh) {}
+    explicit ReferenceCutter(const TriangleCorners& corners) : corners_(corners) {}
 
     /// The boxes cover what the reference's box holds of its triangle. At least one is not empty.
     [[nodiscard]] CutReference cut(const SplitBox& reference, std::uint32_t axis,
                                    float plane) const;
     [[nodiscard]] std::array<Vec3, 3> corners(const SplitBox& reference) const {
-        const Triangle& t = mesh_.triangles[reference.first];
-        return {mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]};
+        return corners_.rounded(reference.first);
     }
 
 private:
-    MeshView mesh_;
+    [[nodiscard]] CutReference cut_with_room(const SplitBox& reference, std::uint32_t axis,
+                                             float plane) const;
+
+    TriangleCorners corners_;
 };
 
 /// The best of bins - 1 planes on each axis; of equals the lowest (axis, plane). `box` is that of

@@ -14,9 +14,12 @@ namespace raydix {
 /// None: all is well.
 using Fault = std::optional<std::string>;
 
-/// Whether leaves may hold parts of primitives: trees of `split` and `sbvh` over triangles.
+/// Whether leaves may hold parts of primitives: trees of `split` and `sbvh` over triangles, and
+/// over the boxes of triangles in double.
 [[nodiscard]] inline bool may_split_primitives(const Bvh& bvh) {
-    return bvh.kind() == PrimitiveKind::triangles &&
+    const bool cut = bvh.kind() == PrimitiveKind::triangles ||
+                     (bvh.kind() == PrimitiveKind::boxes && bvh.has_split_primitives());
+    return cut &&
            (bvh.options().builder == Builder::split || bvh.options().builder == Builder::sbvh);
 }
 

@@ -109,7 +109,7 @@ bool boxes_cover(const LeafTriangle& triangle, std::span<const Aabb> boxes) {
 }
 
 Fault validate_cover(const Bvh& bvh) {
-    if (!may_split_primitives(bvh) || bvh.empty()) return {};
+    if (!may_split_primitives(bvh) || bvh.triangles().empty()) return {};
     struct Held {
         std::uint32_t primitive_id, position, leaf;
     };

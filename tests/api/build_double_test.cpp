@@ -3,11 +3,18 @@
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
 
+#include <algorithm>
 #include <limits>
+#include <map>
+#include <string>
+#include <vector>
 
 #include "support/double_scenes.h"
 #include "support/message.h"
 #include "support/support.h"
+#include "tree/around_center.h"
+#include "tree/early_splits.h"
+#include "tree/spatial_split.h"
 
 namespace raydix::test {
 namespace {
@@ -138,14 +145,179 @@ TEST(BuildDouble, EmptyMeshes) {
     EXPECT_EQ(bvh.bytes(), 0u);
 }
 
+/// A piece of a triangle's plane, in rational arithmetic.
+using ExactPiece = std::vector<ExactPoint>;
+Exact coordinate(const ExactPoint& p, std::size_t k) { return k == 0 ? p.x : k == 1 ? p.y : p.z; }
+float coordinate(Vec3 p, std::size_t k) { return (&p.x)[k]; }
+
+/// Where sign * (coordinate - plane) <= 0.
+ExactPiece clipped(const ExactPiece& piece, std::size_t axis, const Exact& plane, int sign) {
+    ExactPiece out;
+    for (std::size_t i = 0; i < piece.size(); ++i) {
+        const ExactPoint &a = piece[i], &b = piece[(i + 1) % piece.size()];
+        const Exact from = sign * (coordinate(a, axis) - plane),
+                    to = sign * (coordinate(b, axis) - plane);
+        if (from <= 0) out.push_back(a);
+        if (from * to >= 0) continue;
+        const Exact t = from / (from - to);
+        const ExactPoint d = b - a;
+        out.push_back({a.x + t * d.x, a.y + t * d.y, a.z + t * d.z});
+    }
+    return out;
+}
+
+/// Cut at faces of boxes until each piece is in one, or in none.
+bool covered(const ExactPiece& piece, const std::vector<Aabb>& boxes) {
+    Exact lo[3], hi[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+        lo[k] = hi[k] = coordinate(piece[0], k);
+        for (const ExactPoint& p : piece) {
+            lo[k] = std::min(lo[k], coordinate(p, k));
+            hi[k] = std::max(hi[k], coordinate(p, k));
+        }
+    }
+    for (const Aabb& box : boxes) {
+        bool meets = true, holds = true;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Exact from(coordinate(box.lo, k)), to(coordinate(box.hi, k));
+            meets = meets && lo[k] <= to && hi[k] >= from;
+            holds = holds && lo[k] >= from && hi[k] <= to;
+        }
+        if (holds) return true;
+        if (!meets) continue;
+        for (std::size_t k = 0; k < 3; ++k)
+            for (const float face : {coordinate(box.lo, k), coordinate(box.hi, k)})
+                if (const Exact plane(face); lo[k] < plane && plane < hi[k])
+                    return covered(clipped(piece, k, plane, 1), boxes) &&
+                           covered(clipped(piece, k, plane, -1), boxes);
+    }
+    return false;
+}
+
+/// How many triangles' parts do not hold all of it.
+std::size_t count_uncovered(const BvhD& bvh) {
+    std::map<std::uint32_t, std::vector<Aabb>> boxes;
+    std::map<std::uint32_t, LeafTriangleD> triangles;
+    for (const BvhNode& node : bvh.tree().nodes())
+        for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
+            boxes[bvh.order()[k]].push_back({node.lo, node.hi});
+            triangles[bvh.order()[k]] = bvh.triangles()[k];
+        }
+    const ExactPoint center = exact(bvh.center());
+    const Exact scale(bvh.scale());
+    std::size_t uncovered = 0;
+    for (const auto& [id, parts] : boxes) {
+        ExactPiece whole;
+        for (const Vec3d& p : {triangles[id].v0, triangles[id].v1, triangles[id].v2}) {
+            const ExactPoint at = exact(p) - center;
+            whole.push_back({at.x * scale, at.y * scale, at.z * scale});
+        }
+        uncovered += !covered(whole, parts);
+    }
+    return uncovered;
+}
+
+TEST(BuildDouble, PartsCoverTheirTriangles) {
+    MeshD nearly_flat = slivers_d(800, 13, {});  // edges that barely cross a plane
+    for (Vec3d& p : nearly_flat.vertices) p.z = p.z * 1e-11 + 1.0 / 3;
+    for (const MeshD& mesh :
+         {slivers_d(800, 12), with_stray(slivers_d(800, 12), utm_place - Vec3d{800.0, 0.0, 0.0}),
+          slivers_d(800, 12, {}), nearly_flat,
+          in_double(in_float(slivers_d(800, 14, {})), 3e9, {-0.1e12, 0.2e12, 0.1e12})})
+        for (const Builder builder : {Builder::split, Builder::sbvh}) {
+            const BvhD bvh = build_bvh(mesh, {.builder = builder, .max_leaf = 1});
+            EXPECT_EQ(bvh.left_out(), 0u);
+            if (builder == Builder::sbvh) {
+                EXPECT_GT(bvh.order().size(), mesh.triangles.size());
+            }
+            EXPECT_EQ(count_uncovered(bvh), 0u)
+                << builder_name(builder) << " around " << bvh.center().x;
+            const CheckReport report = check(bvh.tree());
+            EXPECT_TRUE(report.ok) << report.broken;
+        }
+}
+
+/// The image of a triangle, without rounding.
+ExactPiece image(const LeafTriangleD& t, Vec3d center) {
+    return {exact(t.v0) - exact(center), exact(t.v1) - exact(center), exact(t.v2) - exact(center)};
+}
+
+/// An edge along the plane of a cut, a few roundings off it: rounded corners lie on the wrong side.
+TEST(BuildDouble, CutsHoldWhatRoundingMoved) {
+    RandomD random(16);
+    const Vec3d center{1.0 / 3, -1.0 / 7, 0.1};
+    const float plane = 64.0f;
+    MeshD mesh;
+    Buffer<SahReference> references(2000), spare;
+    for (std::uint32_t i = 0; i < 2000; ++i) {
+        const auto near = [&] {
+            const double steps = 0x1p-47 * static_cast<double>(random.below(9));
+            return plane + center.x + steps - 0x1p-45;
+        };
+        mesh.vertices.insert(mesh.vertices.end(),
+                             {{near(), random.between(10, 50), random.between(10, 50)},
+                              {near(), random.between(60, 99), random.between(60, 99)},
+                              {random.between(1, 127), random.between(1, 99), 50.0}});
+        mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+        const auto& v = mesh.vertices;
+        references[i] = make_reference(
+            box_around_center(box_of(v[3 * i], v[3 * i + 1], v[3 * i + 2]), center, 1.0), i);
+    }
+    const TriangleCorners corners(mesh, center, 1.0);
+    const ReferenceCutter cutter(corners);
+    std::vector<std::vector<Aabb>> early(2000);
+    std::size_t uncovered = 0, uncovered_early = 0, cuts = 0;
+    split_early(corners, {{0, 0, 0}, {128, 128, 128}}, {.budget = 9, .least_waste = 1e-3},
+                references, spare);
+    for (const SahReference& r : references.view()) early[r.primitive_id].push_back(r.box());
+    EXPECT_GT(references.size(), 4000u);
+    for (std::uint32_t i = 0; i < 2000; ++i) {
+        const auto* v = &mesh.vertices[3 * std::size_t{i}];
+        const ExactPiece whole = image({v[0], v[1], v[2]}, center);
+        uncovered_early += !covered(whole, early[i]);
+        const Aabb box = box_around_center(box_of(v[0], v[1], v[2]), center, 1.0);
+        if (!(box.lo.x < plane && plane < box.hi.x)) continue;
+        ++cuts;
+        const CutReference parts = cutter.cut(SplitBox::of(box, i, 1), 0, plane);
+        uncovered += !covered(whole, {parts.left, parts.right});
+    }
+    EXPECT_GT(cuts, 1000u);
+    EXPECT_EQ(uncovered, 0u);
+    EXPECT_EQ(uncovered_early, 0u);
+}
+
+TEST(BuildDouble, TreesOfPartsLeaveOutAndRefuseWhatOthersDo) {
+    MeshD mesh = slivers_d(6000, 15);
+    const MeshD good = mesh;
+    mesh.vertices[3 * 4].x = nan;
+    mesh.vertices[3 * 32 + 1].y = inf;
+    for (const Builder builder : {Builder::split, Builder::sbvh}) {
+        BvhD bvh = build_bvh(mesh, {.builder = builder});
+        EXPECT_EQ(bvh.left_out(), 2u);
+        EXPECT_GT(bvh.order().size(), mesh.triangles.size());
+        EXPECT_EQ(bvh.order().size(), bvh.triangles().size());
+        EXPECT_EQ(std::ranges::count(bvh.order(), 32u), 0);
+        EXPECT_EQ(count_uncovered(bvh), 0u);
+        EXPECT_THROW((void)build_bvh(mesh, {.builder = builder, .strict = true}), InputError);
+        EXPECT_EQ(message_of([&] { refit(bvh, mesh); }),
+                  "refit: this tree of builder " + std::string(builder_name(builder)) +
+                      " holds parts of triangles, which are not kept; build it again, or with "
+                      "another builder");
+        MeshD one{"", {good.vertices[0], good.vertices[1], good.vertices[2]}, {{0, 1, 2}}};
+        EXPECT_EQ(build_bvh(one, {.builder = builder}).order().size(), 1u);
+    }
+}
+
 TEST(BuildDouble, TreesDoNotDependOnThreads) {
-    const MeshD mesh = in_double(random_soup(20'000, 7), 100.0, utm_place);
-    for (const Builder builder :
-         {Builder::karras, Builder::ploc, Builder::hploc, Builder::binned, Builder::sweep}) {
+    const MeshD mesh = slivers_d(20'000, 7);
+    for (const Builder builder : {Builder::karras, Builder::ploc, Builder::hploc, Builder::binned,
+                                  Builder::sweep, Builder::split, Builder::sbvh}) {
         const BvhD one = build_bvh(mesh, {.builder = builder, .threads = 1});
-        const BvhD three = build_bvh(mesh, {.builder = builder, .threads = 3});
-        EXPECT_EQ(tree_hash(one.tree()), tree_hash(three.tree())) << builder_name(builder);
-        EXPECT_TRUE(one.center() == three.center());
+        for (const int threads : {2, 7}) {
+            const BvhD more = build_bvh(mesh, {.builder = builder, .threads = threads});
+            EXPECT_EQ(tree_hash(one.tree()), tree_hash(more.tree())) << builder_name(builder);
+            EXPECT_TRUE(one.center() == more.center());
+        }
     }
 }
 

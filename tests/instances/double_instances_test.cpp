@@ -74,7 +74,7 @@ InstanceHitD look_at_all(const std::vector<Shown>& all, const RayD& ray, std::ui
 class Nest {
 public:
     Nest(Vec3d place, double reach, double flat, std::size_t count)
-        : soup_(build_bvh(random_soup_d(200, 1))),
+        : soup_(build_bvh(random_soup_d(200, 1, 0.5), {.builder = Builder::sbvh, .max_leaf = 1})),
           ball_(build_bvh(in_double(ball_mesh({0, 0, 0}), 0.01))),
           floats_(build_bvh(random_soup(200, 3), {.builder = Builder::sbvh})),
           of_floats_(build_bvh(in_double(random_soup(200, 3)))) {

@@ -66,7 +66,8 @@ TEST(DoubleQueries, ClosestPointsLikeEveryTriangle) {
     for (const MeshD& mesh :
          {random_soup_d(500, 1), in_double(random_soup(500, 2), 100.0, utm_place),
           in_double(random_soup(500, 3), 1.4e12, {-0.7e12, -0.7e12, -0.7e12}),
-          in_double(random_soup(500, 4), 1e-9)}) {
+          in_double(random_soup(500, 4), 1e-9), slivers_d(500, 12),
+          with_stray(slivers_d(500, 12), {}), slivers_d(500, 13, {})}) {
         const std::vector<Vec3d> queries = queries_for(mesh, 300 * thorough);
         std::vector<ClosestPointD> wanted;
         for (const Vec3d& q : queries) wanted.push_back(closest_of_all(mesh, q));
@@ -189,6 +190,41 @@ TEST(DoubleQueries, InsideFarAwayAsAtHome) {
     std::cout << queries.size() << " points, " << counts.found << " inside\n";
 }
 
+/// A ball drawn out along a diagonal: where the builder cuts, each triangle still counts once.
+TEST(DoubleQueries, SolidsFromTreesOfParts) {
+    MeshD mesh = in_double(load_scene("builtin:figure?triangles=10000").mesh);
+    for (Vec3d& p : mesh.vertices)
+        p = Vec3d{p.x + 20 * p.y, p.y + 15 * p.z, p.z + 20 * p.x} + utm_place;
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    const std::vector<Vec3d> queries = queries_for(mesh, 1000 * thorough);
+    for (const Vec3d p : {Vec3d{0, 0, 0}, Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}})
+        mesh.vertices.push_back(utm_place + Vec3d{0.0, 150.0, 0.0} + p);  // a stray tetrahedron
+    for (const Triangle t : {Triangle{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}})
+        mesh.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+    const BvhD whole = build_bvh(mesh, {.builder = Builder::sweep});
+    const SolidD plain(whole);
+    EXPECT_EQ(plain.closure(), Closure::oriented);
+    std::vector<std::uint8_t> wanted(queries.size()), inside(queries.size());
+    EXPECT_GT(contains(plain, queries, wanted).found, queries.size() / 20);
+    const auto distances = signed_distances(plain, queries);
+    for (const Builder builder : {Builder::split, Builder::sbvh}) {
+        const BvhD bvh = build_bvh(mesh, {.builder = builder, .max_leaf = 1});
+        EXPECT_EQ(bvh.order().size() > mesh.triangles.size(), builder == Builder::sbvh);
+        const SolidD solid(bvh), winding(bvh, {.rule = InsideRule::winding});
+        EXPECT_EQ(solid.closure(), Closure::oriented);
+        EXPECT_EQ(solid.open_edges(), 0u);
+        EXPECT_EQ(&solid.bvh(), &bvh);
+        contains(solid, queries, inside, 3);
+        EXPECT_EQ(inside, wanted) << builder_name(builder);
+        EXPECT_EQ(signed_distances(solid, queries), distances) << builder_name(builder);
+        const std::vector<double> numbers = winding_numbers(winding, queries);
+        for (std::size_t i = 0; i < queries.size(); ++i)
+            if (i % 8 > 1) {  // on corners and edges solid angles jump
+                ASSERT_NEAR(std::fabs(numbers[i]), wanted[i], 0.01) << i;
+            }
+    }
+}
+
 TEST(DoubleQueries, WindingNumbersOfAnOpenMesh) {
     auto [home, away] = figure_pair();
     away.triangles.resize(away.triangles.size() * 9 / 10);
@@ -216,7 +252,8 @@ TEST(DoubleQueries, WindingNumbersOfAnOpenMesh) {
 TEST(DoubleQueries, SegmentsAndSpheresLikeEveryTriangle) {
     for (const MeshD& mesh :
          {random_soup_d(400, 5, 0.2), in_double(random_soup(400, 6, 0.2f), 100.0, utm_place),
-          in_double(random_soup(400, 7, 0.2f), 1.2e12, {-0.6e12, -0.6e12, -0.6e12})}) {
+          in_double(random_soup(400, 7, 0.2f), 1.2e12, {-0.6e12, -0.6e12, -0.6e12}),
+          slivers_d(400, 14), with_stray(slivers_d(400, 14), {}), slivers_d(400, 15, {})}) {
         RandomD random(seed);
         const AabbD box = box_of_mesh(mesh);
         const double size = box.hi.x - box.lo.x;
@@ -243,7 +280,8 @@ TEST(DoubleQueries, SegmentsAndSpheresLikeEveryTriangle) {
                 if (closest_on_triangle(t, s.center).d2 <= s.radius * s.radius)
                     by_sphere[i].push_back(k);
             }
-        for (const Builder builder : {Builder::karras, Builder::hploc, Builder::sweep})
+        for (const Builder builder :
+             {Builder::karras, Builder::hploc, Builder::sweep, Builder::split, Builder::sbvh})
             for (const int threads : {1, 3}) {
                 const BvhD bvh = build_bvh(mesh, {.builder = builder});
                 const auto expect_rows = [&](const OverlapLists& lists, const auto& wanted) {
@@ -281,26 +319,33 @@ std::vector<PrimitivePair> every_pair(const MeshD& a, const MeshD& b, bool withi
     return pairs;
 }
 
+void expect_every_pair(const MeshD& a, const MeshD& b) {
+    for (const bool narrow : {false, true}) {
+        const auto within = every_pair(a, a, true, narrow);
+        const auto between = every_pair(a, b, false, narrow);
+        EXPECT_GT(within.size(), narrow ? 0u : 100u);
+        for (const Builder builder :
+             {Builder::karras, Builder::ploc, Builder::sweep, Builder::split, Builder::sbvh})
+            for (const int threads : {1, 3}) {
+                const PairOptions options{.narrow = narrow, .threads = threads};
+                const BvhD bvh = build_bvh(a, {.builder = builder});
+                const BvhD other = build_bvh(b, {.builder = builder});
+                EXPECT_EQ(overlapping_pairs(bvh, options), within) << builder_name(builder);
+                EXPECT_EQ(overlapping_pairs(bvh, other, options), between);
+                EXPECT_EQ(count_overlapping_pairs(bvh, options), within.size());
+                EXPECT_EQ(count_overlapping_pairs(bvh, other, options), between.size());
+            }
+    }
+}
+
 TEST(DoubleQueries, PairsLikeEveryPair) {
     // A metre of detail at 4,500,000: in float most of these boxes are one.
     const MeshD a = in_double(random_soup(600, 8, 0.2f), 1.0, utm_place);
     MeshD b = in_double(random_soup(300, 9, 0.3f), 1.3, utm_place);
     b.vertices.insert(b.vertices.end(), {{-1e6, 0, 0}, {-1e6, 1, 0}, {-1e6, 0, 1}});
     b.triangles.push_back({900, 901, 902});  // so that its center is elsewhere
-    for (const bool narrow : {false, true})
-        for (const Builder builder : {Builder::karras, Builder::ploc, Builder::sbvh})
-            for (const int threads : {1, 3}) {
-                const PairOptions options{.narrow = narrow, .threads = threads};
-                const BvhD bvh = build_bvh(a, {.builder = builder});
-                const BvhD other = build_bvh(b, {.builder = builder});
-                const auto within = every_pair(a, a, true, narrow);
-                const auto between = every_pair(a, b, false, narrow);
-                EXPECT_GT(within.size(), 100u);
-                EXPECT_EQ(overlapping_pairs(bvh, options), within) << builder_name(builder);
-                EXPECT_EQ(overlapping_pairs(bvh, other, options), between);
-                EXPECT_EQ(count_overlapping_pairs(bvh, options), within.size());
-                EXPECT_EQ(count_overlapping_pairs(bvh, other, options), between.size());
-            }
+    expect_every_pair(a, b);
+    expect_every_pair(slivers_d(2000, 16), with_stray(slivers_d(400, 17), {}));
 }
 
 TEST(DoubleQueries, NeighboursOfOneMeshAreNoPairs) {

@@ -66,7 +66,9 @@ TEST(DoubleSweeps, LikeEveryTriangle) {
     for (const MeshD& mesh :
          {random_soup_d(300, 1), in_double(random_soup(300, 2), 100.0, utm_place),
           in_double(random_soup(300, 3), 1.4e12, {-0.7e12, -0.7e12, -0.7e12}),
-          in_double(random_soup(300, 4), 1e-9), in_double(lattice_mesh(300, 5, seed))}) {
+          in_double(random_soup(300, 4), 1e-9), slivers_d(300, 5),
+          with_stray(slivers_d(300, 5), {}), slivers_d(300, 6, {}),
+          in_double(lattice_mesh(300, 5, seed))}) {
         const std::vector<SphereSweepD> sweeps = sweeps_for(mesh, 80 * thorough);
         const BvhD any_tree = build_bvh(mesh);
         std::vector<SweepHitD> wanted;

@@ -125,6 +125,47 @@ MeshD random_soup_d(std::size_t count, std::uint64_t seed, double size) {
     return mesh;
 }
 
+MeshD slivers_d(std::size_t count, std::uint64_t seed, Vec3d place) {
+    RandomD random(seed);
+    MeshD mesh;
+    const auto add = [&](Vec3d a, Vec3d b, Vec3d c) {
+        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+        mesh.vertices.insert(mesh.vertices.end(), {a, b, c});
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    };
+    for (std::size_t i = 0; i < count; ++i) {
+        const bool small = i % 16 != 0;
+        const Vec3d at = place + random.in({{0.0, 0.0, 0.0}, {100.0, 100.0, 100.0}});
+        const Vec3d along = (small ? 1.0 : 60.0) * random.direction();
+        const double width = small ? 1.0 : std::ldexp(30.0, -static_cast<int>(random.below(30)));
+        add(at, at + along, at + 0.3 * along + width * random.direction());
+    }
+    return mesh;
+}
+
+MeshD with_stray(MeshD mesh, Vec3d at) {
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(),
+                         {at, at + Vec3d{0.0, 1.0, 0.0}, at + Vec3d{1.0, 0.0, 1.0}});
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    return mesh;
+}
+
+std::vector<RayD> rays_in_planes(const MeshD& mesh, std::size_t count, std::uint64_t seed) {
+    RandomD random(seed);
+    std::vector<RayD> rays;
+    for (std::size_t i = 0; i < count; ++i) {
+        const Triangle& t = mesh.triangles[random.below(mesh.triangles.size() / 16) * 16];
+        const Vec3d a = mesh.vertices[t[0]], ab = mesh.vertices[t[1]] - a,
+                    ac = mesh.vertices[t[2]] - a;
+        const auto at = [&](double u, double v) { return a + u * ab + v * ac; };
+        const Vec3d from = at(random.between(-2, 2), random.between(-2, 2));
+        const double v = 0.5 * random.unit();
+        rays.push_back({from, 0.0, at(random.unit() * (1 - v), v) - from});
+    }
+    return rays;
+}
+
 AabbD box_of_mesh(const MeshD& mesh) {
     AabbD box{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
     for (const Vec3d& v : mesh.vertices) {

@@ -44,6 +44,14 @@ private:
 /// `count` small triangles, each within `size` of a place in the unit cube.
 MeshD random_soup_d(std::size_t count, std::uint64_t seed, double size = 0.05);
 
+/// Where builders cut: long thin triangles in all directions among small ones.
+MeshD slivers_d(std::size_t count, std::uint64_t seed, Vec3d place = utm_place);
+/// One more triangle. Far away it makes the scene so large that builders find little to cut.
+MeshD with_stray(MeshD mesh, Vec3d at);
+
+/// Rays in the planes of triangles, up to rounding: what they hit, and where, is nearly chance.
+std::vector<RayD> rays_in_planes(const MeshD& mesh, std::size_t count, std::uint64_t seed);
+
 /// Around the corners that are finite and within 1e12.
 AabbD box_of_mesh(const MeshD& mesh);
 

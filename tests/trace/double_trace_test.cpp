@@ -79,6 +79,9 @@ std::vector<Case> cases() {
             {"tiny soup", in_double(random_soup(500, 4), 1e-9)},
             {"tiny soup far off", in_double(random_soup(500, 5), 1e-6, {1e5, -2e5, 3e5})},
             {"huge soup", in_double(random_soup(500, 6), 1.4e12, {-0.7e12, -0.7e12, -0.7e12})},
+            {"slivers", slivers_d(700, 9, {})},
+            {"slivers at a UTM place", slivers_d(700, 10)},
+            {"slivers and a stray triangle", with_stray(slivers_d(700, 10), {})},
             {"lattice", in_double(lattice)},
             {"lattice at a UTM place", in_double(lattice, 0.1, utm_place)}};
 }
@@ -94,8 +97,80 @@ TEST(DoubleTrace, EveryBuilderLikeEveryTriangle) {
             EXPECT_EQ(count_different(trace(bvh, rays), wanted), 0u)
                 << name << ", " << builder_name(builder) << ", seed " << seed;
         }
-        expect_any_and_all_agree(build_bvh(mesh), mesh, rays, wanted);
+        for (const Builder builder : {Builder::ploc, Builder::split, Builder::sbvh})
+            expect_any_and_all_agree(build_bvh(mesh, {.builder = builder}), mesh, rays, wanted);
     }
+}
+
+/// What trees of parts stand on: at t, the ray is where the triangle is at (u, v), up to the pads
+/// of slab.h, even if the ray lies in the triangle's plane.
+TEST(DoubleTrace, TheRayIsAtTheTriangleWhereItHits) {
+    using Real = long double;
+    std::size_t hits = 0;
+    Real worst = 0;
+    for (const Vec3d place : {Vec3d{}, utm_place}) {
+        const MeshD mesh = slivers_d(1600, 13, place);
+        std::vector<RayD> rays = rays_in_planes(mesh, 5'000 * thorough, seed);
+        const std::vector<RayD> others = mixed_rays(mesh, 500 * thorough, seed);
+        rays.insert(rays.end(), others.begin(), others.end());
+        const std::vector<HitD> found = trace(build_bvh(mesh), rays);
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            if (!found[i].hit()) continue;
+            ++hits;
+            const Triangle& t = mesh.triangles[found[i].prim];
+            Real off = 0, far = 0;
+            for (std::size_t k = 0; k < 3; ++k) {
+                const auto at = [&](Vec3d p) { return Real((&p.x)[k]); };
+                const auto from_origin = [&](std::size_t corner) {
+                    return at(mesh.vertices[t[corner]]) - at(rays[i].origin);
+                };
+                const Real a = from_origin(0), b = from_origin(1), c = from_origin(2);
+                const Real point = a + Real(found[i].u) * (b - a) + Real(found[i].v) * (c - a);
+                off = std::max(off, std::fabs(Real(found[i].t) * at(rays[i].direction) - point));
+                for (const Real x : {a, b, c}) far = std::max(far, std::fabs(x));
+            }
+            ASSERT_LE(off, 64 * 0x1p-53L * 2 * far) << "ray " << i << ", seed " << seed;
+            worst = std::max(worst, off / (0x1p-53L * 2 * far));
+        }
+    }
+    std::cout << hits << " hits, off by up to " << worst << " roundings\n";
+    EXPECT_GT(hits, 1000 * thorough);
+}
+
+/// Parts of triangles are entered later than the whole. Where nearly no digit of a hit's t is
+/// certain, a tree of whole triangles and a tree of parts must still agree.
+TEST(DoubleTrace, PartsOfTrianglesChangeNoBit) {
+    std::size_t split_parts = 0, sbvh_parts = 0;
+    for (const MeshD& mesh :
+         {slivers_d(6000, 11, {}), slivers_d(6000, 11),
+          with_stray(slivers_d(6000, 12), utm_place + Vec3d{0.0, -900.0, 0.0})}) {
+        std::vector<RayD> rays = rays_in_planes(mesh, 4'000 * thorough, seed);
+        const std::vector<RayD> others = mixed_rays(mesh, 1000 * thorough, seed);
+        rays.insert(rays.end(), others.begin(), others.end());
+        const BvhD whole = build_bvh(mesh, {.builder = Builder::sweep});
+        const std::vector<HitD> wanted = trace(whole, rays);
+        const AllHitsD all = trace_all(whole, rays);
+        EXPECT_EQ(count_different(std::span(wanted).last(300),
+                                  trace_brute_force(mesh, std::span(rays).last(300))),
+                  0u);
+        EXPECT_EQ(count_different(std::span(wanted).first(300),
+                                  trace_brute_force(mesh, std::span(rays).first(300))),
+                  0u);
+        for (const Builder builder : {Builder::split, Builder::sbvh}) {
+            const BvhD bvh = build_bvh(mesh, {.builder = builder, .max_leaf = 1});
+            (builder == Builder::split ? split_parts : sbvh_parts) +=
+                bvh.order().size() - mesh.triangles.size();
+            EXPECT_EQ(count_different(trace(bvh, rays), wanted), 0u)
+                << builder_name(builder) << ", seed " << seed;
+            const AllHitsD own = trace_all(bvh, rays);
+            EXPECT_EQ(own.offsets, all.offsets) << builder_name(builder);
+            EXPECT_EQ(own.hits, all.hits) << builder_name(builder);
+            std::vector<std::uint8_t> occluded(rays.size());
+            EXPECT_EQ(trace_any(bvh, rays, occluded).hits, count_hits(wanted));
+        }
+    }
+    EXPECT_GT(split_parts, 100u);
+    EXPECT_GT(sbvh_parts, 1000u);
 }
 
 TEST(DoubleTrace, BuiltinScenesLikeEveryTriangle) {

@@ -1,0 +1,19 @@
+// The one door to the private members of a BvhD, for those who make one.
+#pragma once
+
+#include <raydix/double.h>
+
+namespace raydix {
+
+struct BvhDAccess {
+    BvhD& bvh;
+
+    [[nodiscard]] Bvh& tree() const { return bvh.tree_; }
+    [[nodiscard]] Buffer<LeafTriangleD>& triangles() const { return bvh.triangles_; }
+    [[nodiscard]] Vec3d& center() const { return bvh.center_; }
+    [[nodiscard]] double& scale() const { return bvh.scale_; }
+    [[nodiscard]] AabbD& bounds() const { return bvh.bounds_; }
+    [[nodiscard]] BuildMs& build_ms() const { return bvh.build_ms_; }
+};
+
+}  // namespace raydix
