@@ -192,6 +192,11 @@ struct SphereD {
     Vec3d center;
     double radius;
 };
+/// As Capsule, for rays through <raydix/user_geometry_d.h>.
+struct CapsuleD {
+    Vec3d a, b;
+    double radius;
+};
 
 /// As the calls in <raydix/overlap.h>.
 OverlapCounts touch_any(const BvhD& bvh, std::span<const SegmentD> queries,

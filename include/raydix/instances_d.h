@@ -94,4 +94,8 @@ InstanceTraceCounts trace_any(const InstancedSceneD& scene, std::span<const RayD
 [[nodiscard]] InstanceHitD closest_hit(const InstancedSceneD& scene, const RayD& ray,
                                        std::uint32_t mask = 0xFFFFFFFFu);
 
+/// Many small trees in double in one call, as build_many of meshes in float.
+[[nodiscard]] std::vector<BvhD> build_many(std::span<const MeshViewD> meshes,
+                                           const BuildOptions& options = {});
+
 }  // namespace raydix

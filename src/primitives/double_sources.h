@@ -1,4 +1,4 @@
-// Triangles in double: what counts as one, its box, and whether it has an area.
+// Triangles and boxes in double: what counts as one, its box, and whether it has an area.
 #pragma once
 
 #include <raydix/double.h>
@@ -47,6 +47,17 @@ struct TriangleSourceD {
         const LeafTriangleD t = corners(i);
         box = box_of(t.v0, t.v1, t.v2);
         return in_range(t.v0) && in_range(t.v1) && in_range(t.v2) && diagonal_in_range(box);
+    }
+};
+
+struct BoxSourceD {
+    const AabbD* boxes;
+
+    [[nodiscard]] bool readable(std::uint32_t) const { return true; }
+    bool box(std::uint32_t i, AabbD& box) const {
+        box = {without_negative_zero(boxes[i].lo), without_negative_zero(boxes[i].hi)};
+        return in_range(box.lo) && in_range(box.hi) && box.lo.x <= box.hi.x &&
+               box.lo.y <= box.hi.y && box.lo.z <= box.hi.z && diagonal_in_range(box);
     }
 };
 

@@ -74,6 +74,43 @@ inline Stay stay_in_cylinder(const Path& path, Double3 a, Double3 b, double radi
     return {std::max(stay.enter, std::min(t0, t1)), std::min(stay.leave, std::max(t0, t1))};
 }
 
+/// As stay_in_cylinder, for paths that start at 0, in any direction: nearly along the axis too. All
+/// lengths are taken from where the path comes closest to the segment's middle, and what is across
+/// the axis from products with it, so that what rounding does is a shift of the cylinder by a few
+/// roundings of the distance and its length.
+inline Stay stay_in_far_cylinder(const Path& path, Double3 a, Double3 b, double radius) {
+    const Double3 axis = b - a;
+    const double length2 = dot(axis, axis);
+    if (length2 == 0.0) return {};
+    const double middle =
+        dot(a + axis * 0.5 - path.origin, path.direction) / dot(path.direction, path.direction);
+    const Double3 from_a = path.at(middle) - a;
+    // Turned by a quarter and longer by the axis: the offset from it, and its change with t.
+    const Double3 off = cross(from_a, axis), drift = cross(path.direction, axis);
+    const double drift2 = dot(drift, drift), limit2 = radius * radius * length2;
+    Stay stay{-never, never};
+    if (drift2 > 0.0) {
+        const double closest = -dot(off, drift) / drift2;
+        const Double3 least = off + drift * closest;
+        const double room = limit2 - dot(least, least);
+        if (!(room >= 0.0)) return {};
+        const double half = std::sqrt(room / drift2);
+        stay = {closest - half, closest + half};
+    } else if (!(dot(off, off) <= limit2)) {  // parallel: in or out for good
+        return {};
+    }
+    const double along = dot(path.direction, axis), start = -dot(from_a, axis),
+                 end = start + length2;
+    if (along == 0.0) {
+        if (!(start <= 0.0 && end >= 0.0)) return {};
+    } else {
+        const double t0 = start / along, t1 = end / along;
+        stay = {std::max(stay.enter, std::min(t0, t1)), std::min(stay.leave, std::max(t0, t1))};
+    }
+    if (!(stay.enter <= stay.leave)) return {};
+    return {middle + stay.enter, middle + stay.leave};
+}
+
 inline double enter_cylinder(const Path& path, Double3 a, Double3 b, double radius) {
     const Stay stay = stay_in_cylinder(path, a, b, radius);
     return stay.enter <= stay.leave ? first_stay(path, stay.enter, stay.leave) : never;

@@ -16,6 +16,13 @@ struct TreeSpace {
     double scale;
 
     [[nodiscard]] Vec3d local(Vec3d p) const { return scale * (p - center); }
+    /// The ray where the nodes are, with the same t. For boxes only: its origin is rounded.
+    [[nodiscard]] RayFrameD local(const RayFrameD& ray) const {
+        RayFrameD moved = ray;
+        moved.origin = local(ray.origin);
+        moved.inverse = ray.inverse * (1.0 / scale);
+        return moved;
+    }
 };
 
 struct TriangleTreeD {
@@ -37,13 +44,7 @@ struct TriangleTreeD {
           empty(bvh.empty()),
           space{bvh.center(), bvh.scale()} {}
 
-    /// The ray where the nodes are, with the same t. For boxes only: its origin is rounded.
-    [[nodiscard]] RayFrameD local(const RayFrameD& ray) const {
-        RayFrameD moved = ray;
-        moved.origin = space.local(ray.origin);
-        moved.inverse = ray.inverse * (1.0 / space.scale);
-        return moved;
-    }
+    [[nodiscard]] RayFrameD local(const RayFrameD& ray) const { return space.local(ray); }
 };
 
 }  // namespace raydix

@@ -46,16 +46,17 @@ using WalkStackD = BasicWalkStack<double>;
 struct NoSteps {};
 
 /// `leaf(node) -> bool` handles a leaf and says whether to stop; `reach()` is the largest t that
-/// still matters: a node is skipped only if its padded entry is greater. The tree must not be
-/// empty.
+/// still matters: a node is skipped only if its padded entry is greater, or its padded exit less
+/// than `tmin`. The tree must not be empty.
 template <class Scalar, class Steps, class Leaf, class Reach>
-void walk_tree(const BvhNode* nodes, const BasicRayFrame<Scalar>& ray,
-               BasicWalkStack<Scalar>& stack, Steps& steps, const Leaf& leaf, const Reach& reach) {
+[[gnu::always_inline]] inline void walk_slabs(const BvhNode* nodes,
+                                              const BasicSlabFrame<Scalar>& slabs, Scalar tmin,
+                                              BasicWalkStack<Scalar>& stack, Steps& steps,
+                                              const Leaf& leaf, const Reach& reach) {
     constexpr bool counting = !std::is_same_v<Steps, NoSteps>;
-    const auto slabs = make_slab_frame(ray, {nodes[0].lo, nodes[0].hi});
-    const auto whole = intersect_slabs(slabs, &nodes[0].lo.x, ray.tmin, reach());
+    const auto whole = intersect_slabs(slabs, &nodes[0].lo.x, tmin, reach());
     if (!(whole.entry <= whole.exit)) return;
-    const HostSlabsOf<Scalar> children(slabs, ray.tmin);
+    const HostSlabsOf<Scalar> children(slabs, tmin);
     BasicPendingNode<Scalar>* const bottom = stack.begin();
     BasicPendingNode<Scalar>* top = bottom;
     std::uint32_t slot = 0;
@@ -83,6 +84,13 @@ void walk_tree(const BvhNode* nodes, const BasicRayFrame<Scalar>& ray,
             slot = (--top)->slot;
         } while (top->entry > reach());
     }
+}
+
+template <class Scalar, class Steps, class Leaf, class Reach>
+void walk_tree(const BvhNode* nodes, const BasicRayFrame<Scalar>& ray,
+               BasicWalkStack<Scalar>& stack, Steps& steps, const Leaf& leaf, const Reach& reach) {
+    walk_slabs(nodes, make_slab_frame(ray, {nodes[0].lo, nodes[0].hi}), ray.tmin, stack, steps,
+               leaf, reach);
 }
 
 }  // namespace raydix

@@ -10,11 +10,24 @@
 
 namespace raydix {
 
+/// value + lost = x - y exactly (Knuth's two-sum: no branch, any magnitudes).
+struct TwoDifference {
+    double value, lost;
+};
+inline TwoDifference two_difference(double x, double y) {
+    const double difference = x - y, back = difference - x;
+    return {difference, (x - (difference - back)) + (-y - back)};
+}
+
+/// The largest double that is not above x - y.
+inline double below_difference(double x, double y) {
+    const auto [difference, lost] = two_difference(x, y);
+    return lost < 0.0 ? std::nextafter(difference, -double(infinity)) : difference;
+}
+
 /// The largest float that is not above scale * (x - center); scale a power of two.
 inline float below_difference(double x, double center, double scale) {
-    // The difference and what rounding took from it (Knuth's two-sum: no branch, any magnitudes).
-    const double difference = x - center, back = difference - x;
-    const double lost = (x - (difference - back)) + (-center - back);
+    const auto [difference, lost] = two_difference(x, center);
     const double scaled = scale * difference;
     const auto nearest = static_cast<float>(scaled);
     const bool above = double(nearest) > scaled || (double(nearest) == scaled && lost < 0.0);

@@ -3,6 +3,9 @@
 
 #include <raydix/double.h>
 
+#include "tree/around_center.h"
+#include "tree/median_center.h"
+
 namespace raydix {
 
 struct BvhDAccess {
@@ -14,6 +17,16 @@ struct BvhDAccess {
     [[nodiscard]] double& scale() const { return bvh.scale_; }
     [[nodiscard]] AabbD& bounds() const { return bvh.bounds_; }
     [[nodiscard]] BuildMs& build_ms() const { return bvh.build_ms_; }
+
+    void place(const AabbD& box, Vec3d at) const {
+        bounds() = box;
+        center() = at;
+        scale() = scale_around(at, box);
+    }
+    /// The float box where the nodes are.
+    [[nodiscard]] Aabb local(const AabbD& box) const {
+        return box_around_center(box, center(), scale());
+    }
 };
 
 }  // namespace raydix

@@ -373,5 +373,42 @@ TEST(BuildDouble, RefitsNameTheTriangle) {
     }
 }
 
+TEST(BuildManyDouble, AreTheTreesOfEachMesh) {
+    std::vector<MeshD> meshes;
+    for (std::size_t i = 0; i < 150; ++i) {
+        const Vec3d place = static_cast<double>(i % 3) * utm_place;
+        meshes.push_back(
+            in_double(random_soup(i % 40, 20 + i), 1.0 + static_cast<double>(i), place));
+    }
+    meshes[60].vertices[0].x = nan;
+    const std::vector<MeshViewD> views(meshes.begin(), meshes.end());
+    for (const int threads : {1, 2, 7})
+        for (const Builder builder : {Builder::apetrei, Builder::ploc, Builder::sbvh}) {
+            const std::vector<BvhD> trees =
+                build_many(views, {.builder = builder, .threads = threads});
+            ASSERT_EQ(trees.size(), meshes.size());
+            for (std::size_t i = 0; i < trees.size(); ++i) {
+                const BvhD one = build_bvh(meshes[i], {.builder = builder});
+                EXPECT_EQ(tree_hash(trees[i].tree()), tree_hash(one.tree()));
+                EXPECT_EQ(trees[i].center(), one.center());
+                EXPECT_EQ(trees[i].scale(), one.scale());
+                EXPECT_EQ(trees[i].left_out(), one.left_out());
+                EXPECT_EQ(trees[i].bounds().hi, one.bounds().hi);
+                EXPECT_EQ(trees[i].tree().peak_bytes(), 0u);
+                ASSERT_EQ(trees[i].triangles().size(), one.triangles().size());
+                for (std::size_t k = 0; k < one.triangles().size(); ++k)
+                    EXPECT_EQ(trees[i].triangles()[k].v2, one.triangles()[k].v2);
+            }
+        }
+    meshes[123].triangles[0][0] = 100000;
+    const std::vector<MeshViewD> broken(meshes.begin(), meshes.end());
+    const auto message = [&](const BuildOptions& options) {
+        return message_of([&] { static_cast<void>(build_many(broken, options)); }).substr(0, 23);
+    };
+    EXPECT_EQ(message({}), "mesh 123: triangle 0: i");
+    EXPECT_EQ(message({.strict = true, .threads = 1}), "mesh 60: triangle 0: no");
+    EXPECT_TRUE(build_many(std::span<const MeshViewD>{}).empty());
+}
+
 }  // namespace
 }  // namespace raydix::test
