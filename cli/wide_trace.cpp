@@ -62,9 +62,13 @@ WideTracer::WideTracer(const Bvh& bvh, const std::string& layout, const WideTrac
       isa_(options.isa.empty() ? simd_instruction_sets().front() : options.isa) {}
 
 TraceOptions WideTracer::with_path(std::span<const Ray> rays, TraceOptions options) {
-    options.path = path_ == SimdPath::automatic ? choose_simd_path(tree_, rays) : path_;
+    options.path = path_;
     options.isa = isa_;
-    if (options.counters) ++batches_[std::string(simd_path_name(options.path))];
+    // With counters `automatic` takes one path for the whole batch, this one.
+    if (options.counters) {
+        const SimdPath taken = path_ == SimdPath::automatic ? choose_simd_path(tree_, rays) : path_;
+        ++batches_[std::string(simd_path_name(taken))];
+    }
     return options;
 }
 

@@ -14,6 +14,7 @@
 #include "rays/place_order.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
+#include "trace/simd/path_race.h"
 #include "trace/simd/simd_kernels.h"
 #include "trace/simd/trace_here.h"
 
@@ -79,6 +80,9 @@ SimdPath path_for(const WideBvh& tree, std::span<const Ray> rays, SimdPath wante
     return path == SimdPath::sorted && !can_sort ? SimdPath::stream : path;
 }
 
+/// With fewer jobs than this a trial would cost more than it may gain.
+constexpr std::size_t least_jobs_of_race = 8;
+
 /// A batch as its jobs see it: hits, or else occluded.
 struct Batch {
     const WideBvh& tree;
@@ -91,6 +95,9 @@ struct Batch {
     std::vector<std::uint32_t> order{};  // of the path `sorted`
 
     void run(std::size_t begin, std::size_t end, SimdCounts& counts) const {
+        run(path, begin, end, counts);
+    }
+    void run(SimdPath own, std::size_t begin, std::size_t end, SimdCounts& counts) const {
         StackMemory stack(tree.stats().max_depth);
         StreamMemory memory;
         const std::size_t from = order.empty() ? begin : 0;
@@ -105,7 +112,7 @@ struct Batch {
                           stack.packet_view(),
                           &memory,
                           counters};
-        job_of(kernels, path)(job, counts);
+        job_of(kernels, own)(job, counts);
     }
 };
 
@@ -116,11 +123,19 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hit
     const std::size_t block_size = rays_per_job(rays.size(), path);
     std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
     Batch batch{tree, kernels, path, rays, hits, occluded, options.counters};
+    // Counters are those of one path: they do not depend on times.
+    const bool race = options.path == SimdPath::automatic && path == SimdPath::stream &&
+                      hits == nullptr && !options.counters && parts.size() >= least_jobs_of_race;
+    PathRace paths;
     with_threads(options.threads, [&] {
         if (path == SimdPath::sorted) batch.order = order_by_place(tree.arrays().bounds, rays);
         for_each_block(rays.size(), block_size,
                        [&](std::size_t block, std::size_t begin, std::size_t end) {
-                           batch.run(begin, end, parts[block]);
+                           if (!race) return batch.run(begin, end, parts[block]);
+                           const SimdPath path_here = paths.next();
+                           const std::int64_t start = PathRace::thread_ns();
+                           batch.run(path_here, begin, end, parts[block]);
+                           paths.add(path_here, end - begin, PathRace::thread_ns() - start);
                        });
     });
     return sum_of(parts, rays.size());
