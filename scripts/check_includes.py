@@ -17,7 +17,7 @@ MAY_INCLUDE = {
     "sort": {"base", "exec"},
     "tree": {"base", "exec", "keys"},
     # copies primitives into leaf order, so it must know how a primitive is read
-    "layout": {"base", "exec", "tree", "primitives"},
+    "layout": {"base", "exec", "sort", "tree", "primitives"},
     "rays": {"base", "exec", "keys", "sort"},
     # an index of its own: sorts points and groups them, then asks the groups
     "points": {"base", "exec", "keys", "sort"},

@@ -4,7 +4,9 @@
 //
 // The rules are those of the float calls of the same names: ties, edges, limits, invalid input and
 // its counts. Answers are pure functions of the caller's doubles, so they are the same bits for
-// every builder and thread count. Doubles other than 0 below 2^-500 in magnitude count as 0.
+// every builder and thread count; but winding numbers (<raydix/solid.h>), and what follows from
+// them on open meshes, are sums over the tree, the same for every thread count. Doubles other than
+// 0 below 2^-500 in magnitude count as 0.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -152,7 +154,7 @@ ClosestCounts closest_points(const BvhD& bvh, std::span<const Vec3d> queries,
 [[nodiscard]] ClosestPointD closest_point(const BvhD& bvh, Vec3d query,
                                           double max_distance = infinity);
 
-/// As Solid, over a tree that must outlive it. Signs are exact in double.
+/// As Solid, over a tree that must outlive it. Crossings and their signs are exact in double.
 class SolidD {
 public:
     explicit SolidD(const BvhD& bvh, const SolidOptions& options = {});

@@ -87,7 +87,7 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
                 scratch_->builder, mesh, options, bvh,
                 [&](const ClusterTree& clusters, const TriangleSource& source,
                     const std::uint8_t* flat) {
-                    const ClusterView view(clusters, source, flat);
+                    ClusterView view(clusters, source, flat);
                     lay_out([&] { make_wide_layout(view, collapse, arrays, scratch_->wide); });
                 });
         } else {

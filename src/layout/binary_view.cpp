@@ -3,9 +3,9 @@
 #include <raydix/error.h>
 
 #include <algorithm>
-#include <numeric>
 
 #include "layout/leaf_copies.h"
+#include "layout/weld.h"
 
 namespace raydix {
 namespace {
@@ -40,23 +40,10 @@ BinaryView::BinaryView(const Bvh& bvh, std::uint32_t max_leaf) : bvh_(bvh), node
 }
 
 void BinaryView::weld() {
-    const auto corner = [&](std::uint32_t k) -> const Vec3& {
-        const LeafTriangle& t = bvh_.triangles()[k / 3];
-        return k % 3 == 0 ? t.v0 : k % 3 == 1 ? t.v1 : t.v2;
-    };
-    const auto coordinates = [](const Vec3& p) { return std::array{p.x, p.y, p.z}; };
     const std::size_t count = 3 * bvh_.triangles().size();
     if (count > ~std::uint32_t{0})
         throw InputError("a compact tree holds 1431655765 triangle references at most");
-    std::vector<std::uint32_t> order(count);
-    std::iota(order.begin(), order.end(), 0u);
-    std::ranges::sort(order, {}, [&](std::uint32_t k) { return coordinates(corner(k)); });
-    corners_.resize(count);
-    for (const std::uint32_t k : order) {
-        if (vertices_.empty() || coordinates(vertices_.back()) != coordinates(corner(k)))
-            vertices_.push_back(corner(k));
-        corners_[k] = static_cast<std::uint32_t>(vertices_.size() - 1);
-    }
+    corners_ = raydix::weld(count, [&](std::size_t k) { return corner(k); });
 }
 
 std::uint32_t BinaryView::size(Ref ref) const {

@@ -73,8 +73,8 @@ public:
         const std::size_t first = 3 * std::size_t{position};
         return {corners_[first], corners_[first + 1], corners_[first + 2]};
     }
-    [[nodiscard]] std::size_t vertex_count() const { return vertices_.size(); }
-    [[nodiscard]] Vec3 vertex(std::uint32_t number) const { return vertices_[number]; }
+    [[nodiscard]] std::size_t vertex_count() const { return corners_.size(); }
+    [[nodiscard]] Vec3 vertex(std::uint32_t number) const { return corner(number); }
     void prefetch_indices(std::uint32_t) const {}
     RAYDIX_PREFETCHING void prefetch_corners(std::uint32_t position) const {
         __builtin_prefetch(&bvh_.triangles()[position]);
@@ -82,12 +82,15 @@ public:
 
 private:
     void divide(std::size_t slot);
+    [[nodiscard]] Vec3 corner(std::size_t k) const {
+        const LeafTriangle& t = bvh_.triangles()[k / 3];
+        return k % 3 == 0 ? t.v0 : k % 3 == 1 ? t.v1 : t.v2;
+    }
 
     const Bvh& bvh_;
     std::span<const BvhNode> nodes_;
     std::vector<BvhNode> own_;  // new pairs of children stand behind the old nodes
     std::vector<std::uint32_t> corners_;
-    std::vector<Vec3> vertices_;
 };
 
 }  // namespace raydix

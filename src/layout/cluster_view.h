@@ -7,10 +7,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "base/prefetch.h"
 #include "layout/binary_view.h"
 #include "layout/leaf_order.h"
+#include "layout/weld.h"
 #include "layout/wide_bvh.h"
 #include "tree/place_clusters.h"
 
@@ -23,6 +25,12 @@ public:
     /// `flat` [n] in Morton order: 1 for triangles without area.
     ClusterView(const ClusterTree& tree, const TriangleSource& source, const std::uint8_t* flat)
         : tree_(tree), source_(source), flat_(flat) {}
+
+    /// Gives equal corners one number, for corners() and vertex().
+    void weld() {
+        same_ = raydix::weld(source_.vertex_count,
+                             [&](std::size_t v) { return vertex(static_cast<std::uint32_t>(v)); });
+    }
 
     [[nodiscard]] Ref root() const { return tree_.root; }
     [[nodiscard]] bool is_leaf(Ref ref) const {
@@ -68,7 +76,8 @@ public:
         return copy_primitive(source_, tree_.ids[place]);
     }
     [[nodiscard]] std::array<std::uint32_t, 3> corners(std::uint32_t place) const {
-        return source_.triangles[tree_.ids[place]];
+        const Triangle& t = source_.triangles[tree_.ids[place]];
+        return {same_[t[0]], same_[t[1]], same_[t[2]]};
     }
     [[nodiscard]] std::size_t vertex_count() const { return source_.vertex_count; }
     [[nodiscard]] Vec3 vertex(std::uint32_t number) const {
@@ -97,6 +106,7 @@ private:
     ClusterTree tree_;
     TriangleSource source_;
     const std::uint8_t* flat_;
+    std::vector<std::uint32_t> same_;  // [vertices], once welded
 };
 
 }  // namespace raydix

@@ -60,8 +60,9 @@ void make_wide_layout(const Bvh& bvh, const WideOptions& options, WideBvh::Array
     make_layout(view, options, out, *scratch.memory);
 }
 
-void make_wide_layout(const ClusterView& clusters, const WideOptions& options, WideBvh::Arrays& out,
+void make_wide_layout(ClusterView& clusters, const WideOptions& options, WideBvh::Arrays& out,
                       WideScratch& scratch) {
+    if (options.compact) clusters.weld();
     make_layout(clusters, options, out, *scratch.memory);
 }
 

@@ -137,7 +137,7 @@ struct WideScratch {
 /// made of.
 void make_wide_layout(const Bvh& bvh, const WideOptions& options, WideBvh::Arrays& out,
                       WideScratch& scratch);
-void make_wide_layout(const ClusterView& clusters, const WideOptions& options, WideBvh::Arrays& out,
+void make_wide_layout(ClusterView& clusters, const WideOptions& options, WideBvh::Arrays& out,
                       WideScratch& scratch);
 
 }  // namespace raydix

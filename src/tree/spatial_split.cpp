@@ -424,10 +424,10 @@ void SpatialSides::choose(const ReferenceCutter& cutter, std::span<const SplitBo
             }
             if (side == left_side) {
                 left_box = with_left;
-                --right;
+                right -= std::min(right, 1u);  // they are estimates
             } else if (side == right_side) {
                 right_box = with_right;
-                --left;
+                left -= std::min(left, 1u);
             }
         }
         left_count_ += side != right_side ? 1 : 0;
