@@ -70,15 +70,8 @@ RefitQuality refit(BoxBvhD& bvh, std::span<const AabbD> boxes, int threads) {
     const BoxSourceD source{boxes.data()};
     RefitQuality quality;
     with_threads(threads, [&] {
-        const BoundsD bounds = bounds_of(source, n);
-        BoxBvhD moved;
-        const BoxBvhDAccess to{moved}, tree{bvh};
-        const Vec3d center = center_of(source, n, bounds.box);
-        to.place(bounds.box, center);
-        require_same_valid(bvh, source, bounds.left_out, "box");
-        Buffer<Aabb> local;
-        quality = refit(tree.tree(), local_boxes(source, n, to, local), threads);
-        tree.place(bounds.box, center);
+        quality =
+            refit_around_center<BoxBvhDAccess>(bvh, source, bounds_of(source, n), "box", threads);
     });
     return quality;
 }

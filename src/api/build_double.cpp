@@ -96,15 +96,8 @@ RefitQuality refit(BvhD& bvh, const MeshViewD& mesh, int threads) {
     with_threads(threads, [&] {
         const BoundsD bounds = bounds_of(source, n);
         require_triangles_that_fit(mesh, bounds, false);
-        BvhD moved;
-        const BvhDAccess to{moved}, tree{bvh};
-        const Vec3d center = center_of(source, n, bounds.box);
-        to.place(bounds.box, center);
-        require_same_valid(bvh, source, bounds.left_out, "triangle");
-        Buffer<Aabb> boxes;
-        quality = refit(tree.tree(), local_boxes(source, n, to, boxes), threads);
-        tree.place(bounds.box, center);
-        copy_corners(tree, source);
+        quality = refit_around_center<BvhDAccess>(bvh, source, bounds, "triangle", threads);
+        copy_corners({bvh}, source);
     });
     return quality;
 }

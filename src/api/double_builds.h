@@ -5,6 +5,7 @@
 
 #include <raydix/buffer.h>
 #include <raydix/error.h>
+#include <raydix/refit.h>
 #include <raydix/types.h>
 
 #include <algorithm>
@@ -119,6 +120,23 @@ void require_same_valid(const Tree& bvh, const Source& source, std::uint64_t lef
     if (left_out != bvh.left_out())
         throw InputError("refit: " + std::to_string(bvh.left_out() - left_out) + ' ' + kind +
                          "(s) were left out when the tree was built, but are valid now");
+}
+
+/// The hierarchy kept, boxes around the center that the primitives have now. `bounds` are theirs.
+/// On an error the tree is as it was.
+template <class Access, class Tree, class Source>
+RefitQuality refit_around_center(Tree& bvh, const Source& source, const BoundsD& bounds,
+                                 const std::string& kind, int threads) {
+    const std::size_t n = bvh.input_count();
+    Tree moved;
+    const Access to{moved}, tree{bvh};
+    const Vec3d center = center_of(source, n, bounds.box);
+    to.place(bounds.box, center);
+    require_same_valid(bvh, source, bounds.left_out, kind);
+    Buffer<Aabb> boxes;
+    const RefitQuality quality = refit(tree.tree(), local_boxes(source, n, to, boxes), threads);
+    tree.place(bounds.box, center);
+    return quality;
 }
 
 }  // namespace raydix
