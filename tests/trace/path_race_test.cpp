@@ -6,6 +6,7 @@
 #include <raydix/scene.h>
 #include <raydix/wide.h>
 
+#include <cstring>
 #include <vector>
 
 namespace raydix::test {
@@ -14,28 +15,58 @@ namespace {
 TEST(PathRace, TriesBothAndTakesTheFaster) {
     for (const SimdPath faster : {SimdPath::stream, SimdPath::packet}) {
         PathRace race;
-        EXPECT_EQ(race.next(), SimdPath::stream);
-        EXPECT_EQ(race.next(), SimdPath::packet);
+        for (std::uint32_t k = 0; k < PathRace::trials; ++k)
+            EXPECT_EQ(race.next(), k % 2 == 0 ? SimdPath::stream : SimdPath::packet);
         EXPECT_EQ(race.next(), SimdPath::stream);  // neither has ended
+        // The first of each, with whatever memory was like then, says nothing.
+        race.add(SimdPath::stream, 1000, faster == SimdPath::stream ? 900000 : 1);
+        race.add(SimdPath::packet, 1000, faster == SimdPath::packet ? 900000 : 1);
+        EXPECT_EQ(race.next(), SimdPath::stream);
         race.add(SimdPath::stream, 1000, faster == SimdPath::stream ? 1000 : 3000);
         race.add(SimdPath::packet, 500, 1000);
         EXPECT_EQ(race.next(), faster);
-        // The first job was no measure of the others.
+        // The trials were no measure of the jobs that followed.
         race.add(faster, 10000, 100000);
         EXPECT_NE(race.next(), faster);
     }
 }
 
-TEST(PathRace, ChangesNoAnswer) {
+/// Rays of which many jobs are made, and for which streams would be taken, or sorted streams.
+struct ManyRays {
+    WideBvh tree;
+    std::vector<Ray> rays;
+};
+ManyRays many_rays(RayKind kind) {
     const Scene scene = load_scene("builtin:atrium?triangles=20000", 5);
     const Bvh bvh = build_bvh(scene.mesh);
-    const WideBvh tree(bvh);
     std::vector<std::uint32_t> pixels;
     const auto primary = make_primary_rays(scene.cameras.cameras.at(0), 160, 120, &pixels);
-    const auto rays = make_secondary_rays(bvh, primary, trace(bvh, primary), pixels,
-                                          {.kind = RayKind::ao, .samples = 8, .seed = 3});
-    ASSERT_EQ(choose_simd_path(tree, rays), SimdPath::stream);
-    ASSERT_GE(rays.size(), 100000u);  // jobs enough for a race
+    ManyRays out{WideBvh(bvh), make_secondary_rays(bvh, primary, trace(bvh, primary), pixels,
+                                                   {.kind = kind, .samples = 8, .seed = 3})};
+    EXPECT_GE(out.rays.size(), 100000u);  // jobs enough for a race
+    EXPECT_EQ(choose_simd_path(out.tree, out.rays),
+              kind == RayKind::diffuse_shuffled ? SimdPath::sorted : SimdPath::stream);
+    return out;
+}
+
+TEST(PathRace, ChangesNoClosestHit) {
+    for (const RayKind kind : {RayKind::diffuse, RayKind::diffuse_shuffled}) {
+        const auto [tree, rays] = many_rays(kind);
+        std::vector<Hit> expected(rays.size()), found(rays.size());
+        const TraceCounts counts = trace(tree, rays, expected, {.path = SimdPath::single});
+        EXPECT_GT(counts.hits, rays.size() / 20);
+        for (const SimdPath path : {SimdPath::automatic, SimdPath::packet, SimdPath::sorted})
+            for (const int threads : {1, 2, 7}) {
+                const TraceCounts own =
+                    trace(tree, rays, found, {.threads = threads, .path = path});
+                EXPECT_EQ(own.hits, counts.hits);
+                EXPECT_EQ(std::memcmp(found.data(), expected.data(), rays.size() * sizeof(Hit)), 0);
+            }
+    }
+}
+
+TEST(PathRace, ChangesNoAnswer) {
+    const auto [tree, rays] = many_rays(RayKind::ao);
     std::vector<std::uint8_t> expected(rays.size()), found(rays.size());
     const TraceCounts counts = trace_any(tree, rays, expected, {.path = SimdPath::stream});
     EXPECT_GT(counts.hits, rays.size() / 20);

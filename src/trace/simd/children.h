@@ -8,7 +8,10 @@
 
 #include <hwy/cache_control.h>
 
+#include <algorithm>
 #include <bit>
+#include <cstring>
+#include <type_traits>
 
 #include "base/prefetch.h"
 #include "trace/simd/lanes.h"
@@ -37,17 +40,57 @@ HWY_INLINE std::uint32_t used_slots(const WideNode& node) {
     return used;
 }
 
-/// Asks for the cache lines of a child, node or leaf, that will be visited soon.
+/// Asks for the cache lines of a child, node or leaf, that will be visited soon. Without branches:
+/// which of both it is cannot be foreseen.
 template <bool compact>
-HWY_INLINE void ask_for(const WideView& tree, std::uint32_t word) {
+RAYDIX_PREFETCHING void ask_for(const WideView& tree, std::uint32_t word) {
+    using Node = std::conditional_t<compact, CompactNode, WideNode>;
+    using Block = std::conditional_t<compact, CompactBlock, TriangleBlock>;
+    constexpr std::size_t line = 64, node_lines = (sizeof(Node) + line - 1) / line,
+                          block_lines = (sizeof(Block) + line - 1) / line;
     const bool leaf = (word & wide_leaf_bit) != 0;
-    const std::size_t block = ((word & ~wide_leaf_bit) >> 3) / block_lanes;
+    const char *nodes, *blocks;
     if constexpr (compact) {
-        leaf ? ask_for_all(tree.compact_blocks[block]) : ask_for_all(tree.compact_nodes[word]);
+        nodes = reinterpret_cast<const char*>(tree.compact_nodes);
+        blocks = reinterpret_cast<const char*>(tree.compact_blocks);
     } else {
-        leaf ? ask_for_all(tree.blocks[block]) : ask_for_all(tree.nodes[word]);
+        nodes = reinterpret_cast<const char*>(tree.nodes);
+        blocks = reinterpret_cast<const char*>(tree.blocks);
     }
+    const std::size_t block = ((word & ~wide_leaf_bit) >> 3) / block_lanes;
+    const char* const place =
+        (leaf ? blocks : nodes) + (leaf ? block * sizeof(Block) : std::size_t{word} * sizeof(Node));
+    constexpr std::size_t least = std::min(node_lines, block_lines);
+    for (std::size_t k = 0; k < least; ++k) hwy::Prefetch(place + k * line);
+    // The rest of the larger kind; the first line once more for the other.
+    for (std::size_t k = least; k < std::max(node_lines, block_lines); ++k)
+        hwy::Prefetch(place + (leaf == (block_lines > least) ? k * line : 0));
 }
+
+/// For each of eight children a set of up to 64 rays.
+class RaySets {
+public:
+#if HWY_TARGET == HWY_AVX3
+    HWY_INLINE RaySets() : sets_(_mm512_setzero_si512()) {}
+    /// `ray` into the sets of the children in `met`.
+    HWY_INLINE void add(std::uint32_t met, std::uint64_t ray) {
+        const __m512i one = _mm512_set1_epi64(static_cast<long long>(ray));
+        sets_ = _mm512_mask_or_epi64(sets_, static_cast<__mmask8>(met), sets_, one);
+    }
+    HWY_INLINE void store(std::uint64_t* to) const { _mm512_store_si512(to, sets_); }
+
+private:
+    __m512i sets_;
+#else
+    HWY_INLINE void add(std::uint32_t met, std::uint64_t ray) {
+        for (std::uint32_t c = 0; c < 8; ++c) sets_[c] |= (met >> c & 1) != 0 ? ray : 0;
+    }
+    HWY_INLINE void store(std::uint64_t* to) const { std::memcpy(to, sets_, sizeof(sets_)); }
+
+private:
+    std::uint64_t sets_[8] = {};
+#endif
+};
 
 /// `slots` into `order`, the smallest box first; how many.
 HWY_INLINE std::uint32_t order_by_area(std::uint32_t slots, std::uint32_t* order) {

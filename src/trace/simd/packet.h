@@ -1,6 +1,7 @@
 // Up to 64 rays of one class through a wide tree together: children are first tested against
-// intervals that hold all rays (Boulos, Wald, Shirley 2006), then against the rays in vectors.
-// Included once per instruction set by simd_kernels.cpp.
+// intervals that hold all rays (Boulos, Wald, Shirley 2006), then against the rays in vectors;
+// where few rays are left, each of them against all children. Included once per instruction set by
+// simd_kernels.cpp.
 #if defined(RAYDIX_SIMD_PACKET_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef RAYDIX_SIMD_PACKET_H
 #undef RAYDIX_SIMD_PACKET_H
@@ -12,43 +13,26 @@
 
 #include "trace/simd/children.h"
 #include "trace/simd/lanes.h"
-#include "trace/simd/ray_classes.h"
+#include "trace/simd/packet_triangles.h"
 #include "trace/simd/wide_ray.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-constexpr std::size_t packet_size = 64;
-
-/// Rays of one class (ray_classes.h), as arrays. Places from `count` on repeat the last ray and
-/// are never active.
-struct Packet {
-    HWY_ALIGN float origin[3][packet_size];
-    HWY_ALIGN float inverse[3][packet_size];  // limited
-    HWY_ALIGN float true_inverse[3][packet_size];
-    HWY_ALIGN float shear_x[packet_size], shear_y[packet_size], shear_z[packet_size];
-    HWY_ALIGN float tmin[packet_size];
-    HWY_ALIGN float t[packet_size], u[packet_size], v[packet_size];
-    HWY_ALIGN std::uint32_t prim[packet_size];
-    std::uint32_t count;
-    RayClass kind;
-    float pad[3];  // of boxes, the largest of all rays; positive
-    float origin_lo[3], origin_hi[3];
-    float least_inverse[3], largest_inverse[3];  // magnitudes
-    float least_tmin;
-};
+/// Up to so many rays of a packet go to a node one by one.
+constexpr int few_rays_of_packet = 12;
 
 template <bool any, bool counting, bool compact>
 class PacketWalk {
 public:
-    PacketWalk(const WideView& tree, Packet& packet, const PacketStackView& stack,
-               SimdCounts& counts)
-        : tree_(tree), p_(packet), stack_(stack), counts_(counts) {
+    /// `rays`: what the packet was filled with, rays[index[k]].
+    PacketWalk(const WideView& tree, Packet& packet, const Ray* rays, const std::int32_t* index,
+               const PacketStackView& stack, SimdCounts& counts)
+        : tree_(tree), p_(packet), triangles_(packet, rays, index), stack_(stack), counts_(counts) {
         for (int axis = 0; axis < 3; ++axis) negative_[axis] = packet.kind.negative(axis);
     }
 
     void trace() {
-        done_ = ~all_rays();
         find_reach();
         stack_.words[0] = 0;
         stack_.entries[0] = p_.least_tmin;
@@ -57,19 +41,20 @@ public:
         while (top > 0) {
             --top;
             if (!(stack_.entries[top] <= reach_)) continue;
-            const std::uint64_t active = any ? stack_.active[top] & ~done_ : stack_.active[top];
+            std::uint64_t active = stack_.active[top];
+            if constexpr (any) active &= ~triangles_.found();
             if (active == 0) continue;
             const std::uint32_t word = stack_.words[top];
             if ((word & wide_leaf_bit) != 0) {
                 test_leaf(word, active);
-                if (any && done_ == ~std::uint64_t{0}) return;
+                if (any && triangles_.found() == all_rays()) return;
             } else {
                 top = visit(tree_.template node<compact>(word), active, top);
             }
         }
     }
 
-    [[nodiscard]] std::uint64_t found() const { return done_ & all_rays(); }
+    [[nodiscard]] std::uint64_t found() const { return triangles_.found(); }
 
 private:
     using V = hn::Vec<F16>;
@@ -151,69 +136,162 @@ private:
     }
     /// What a vector of rays needs of a node.
     struct RayNode {
-        V rate[3], near[3], far[3];
+        V rate[3], near[3], far[3], tmin, reach;
     };
     HWY_INLINE RayNode ray_node(const Frame& frame, std::size_t i) const {
         RayNode out;
+        out.tmin = hn::Load(f16, p_.tmin + i);
+        out.reach = hn::Load(f16, p_.t + i);
         for (int axis = 0; axis < 3; ++axis) {
             const V inverse = hn::Load(f16, p_.inverse[axis] + i);
-            const V from =
-                hn::Sub(hn::Set(f16, frame.origin[axis]), hn::Load(f16, p_.origin[axis] + i));
-            const V pad = hn::Set(f16, negative_[axis] ? p_.pad[axis] : -p_.pad[axis]);
-            out.rate[axis] = compact ? hn::Mul(hn::Set(f16, frame.step[axis]), inverse) : inverse;
-            out.near[axis] = hn::Mul(hn::Add(from, pad), inverse);
-            out.far[axis] = hn::Mul(hn::Sub(from, pad), inverse);
+            if constexpr (compact) {
+                const V from =
+                    hn::Sub(hn::Set(f16, frame.origin[axis]), hn::Load(f16, p_.origin[axis] + i));
+                const V pad = hn::Set(f16, negative_[axis] ? p_.pad[axis] : -p_.pad[axis]);
+                out.rate[axis] = hn::Mul(hn::Set(f16, frame.step[axis]), inverse);
+                out.near[axis] = hn::Mul(hn::Add(from, pad), inverse);
+                out.far[axis] = hn::Mul(hn::Sub(from, pad), inverse);
+            } else {
+                out.rate[axis] = inverse;
+                out.near[axis] = hn::Load(f16, p_.near[axis] + i);
+                out.far[axis] = hn::Load(f16, p_.far[axis] + i);
+            }
         }
         return out;
     }
 
-    HWY_INLINE std::uint32_t test_rays(const RayNode& ray, const Planes& planes, std::size_t child,
-                                       std::size_t i) const {
-        V entry = hn::Load(f16, p_.tmin + i);
-        V leave = hn::Set(f16, infinity);
+    HWY_INLINE std::uint32_t test_rays(const RayNode& ray, const Planes& planes,
+                                       std::size_t child) const {
+        V entry = ray.tmin;
+        V leave = ray.reach;
         for (int axis = 0; axis < 3; ++axis) {
             entry = hn::Max(entry, hn::MulAdd(hn::Set(f16, planes.near[axis][child]),
                                               ray.rate[axis], ray.near[axis]));
             leave = hn::Min(leave, hn::MulAdd(hn::Set(f16, planes.far[axis][child]), ray.rate[axis],
                                               ray.far[axis]));
         }
-        const V exit = hn::Min(leave, hn::Load(f16, p_.t + i));
-        return bits_of(f16, hn::Le(entry, exit));
+        return bits_of(f16, hn::Le(entry, leave));
     }
 
     template <class Node>
     HWY_INLINE std::size_t visit(const Node& node, std::uint64_t active, std::size_t top) {
-        if constexpr (counting) counts_.visits += static_cast<std::uint64_t>(std::popcount(active));
+        const int ray_count = std::popcount(active);
+        if constexpr (counting) counts_.visits += static_cast<std::uint64_t>(ray_count);
         const Frame frame = frame_of(node);
+        return ray_count <= few_rays_of_packet ? visit_by_ray(node, frame, active, top)
+                                               : visit_by_vector(node, frame, active, top);
+    }
+
+    template <class Node>
+    HWY_INLINE std::size_t visit_by_vector(const Node& node, const Frame& frame,
+                                           std::uint64_t active, std::size_t top) {
         Planes planes;
         HWY_ALIGN float entries[8];
         const std::uint32_t met = test_intervals(node, frame, planes, entries);
         if (met == 0) return top;
-        RayNode rays[packet_size / lanes16];
-        std::uint32_t vectors[packet_size / lanes16], vector_count = 0;
-        for (std::uint32_t v = 0; v < packet_size / lanes16; ++v) {
-            if ((active >> (v * lanes16) & vector_bits) == 0) continue;
-            rays[vector_count] = ray_node(frame, v * lanes16);
-            vectors[vector_count++] = v;
-        }
         std::uint32_t order[8];
-        const std::uint32_t child_count =
-            any ? order_by_area(met, order) : order_by_entry(met, entries, order);
+        const std::uint32_t child_count = order_of(met, entries, order);
+        std::uint64_t hit[8] = {};
+        for (std::size_t i = 0; i < packet_size; i += lanes16) {
+            if ((active >> i & vector_bits) == 0) continue;
+            const RayNode ray = ray_node(frame, i);
+            for (std::uint32_t c = 0; c < child_count; ++c)
+                hit[c] |= std::uint64_t{test_rays(ray, planes, order[c])} << i;
+        }
         for (std::uint32_t c = 0; c < child_count; ++c) {
             const std::uint32_t s = order[c];
-            std::uint64_t hit = 0;
-            for (std::uint32_t k = 0; k < vector_count; ++k) {
-                const std::size_t shift = vectors[k] * lanes16;
-                hit |= std::uint64_t{test_rays(rays[k], planes, s, shift)} << shift;
-            }
-            hit &= active;
-            if (hit == 0) continue;
-            stack_.words[top] = node.child[s];
             ask_for<compact>(tree_, node.child[s]);
+            stack_.words[top] = node.child[s];
             stack_.entries[top] = entries[s];
-            stack_.active[top++] = hit;
+            stack_.active[top] = hit[c] & active;
+            top += stack_.active[top] != 0;  // whether any ray goes on cannot be foreseen
         }
         return top;
+    }
+
+    /// What one ray needs of a node: a plane is near + rate * plane away, or far + rate * plane.
+    struct OneRay {
+        float rate[3], near[3], far[3];
+    };
+    HWY_INLINE OneRay one_ray(const Frame& frame, std::size_t k) const {
+        OneRay out;
+        for (int axis = 0; axis < 3; ++axis) {
+            const float inverse = p_.inverse[axis][k];
+            if constexpr (compact) {
+                const float from = frame.origin[axis] - p_.origin[axis][k],
+                            pad = negative_[axis] ? p_.pad[axis] : -p_.pad[axis];
+                out.rate[axis] = frame.step[axis] * inverse;
+                out.near[axis] = (from + pad) * inverse;
+                out.far[axis] = (from - pad) * inverse;
+            } else {
+                out.rate[axis] = inverse;
+                out.near[axis] = p_.near[axis][k];
+                out.far[axis] = p_.far[axis][k];
+            }
+        }
+        return out;
+    }
+
+    /// A few rays, each against all children.
+    template <class Node>
+    HWY_INLINE std::size_t visit_by_ray(const Node& node, const Frame& frame, std::uint64_t active,
+                                        std::size_t top) {
+        using V8 = hn::Vec<F8>;
+        constexpr std::size_t parts = 8 / lanes8;
+        V8 near[3][parts], far[3][parts], least[parts];
+        for (std::size_t part = 0; part < parts; ++part) {
+            const std::size_t l = part * lanes8;
+            least[part] = hn::Set(f8, infinity);
+            for (int axis = 0; axis < 3; ++axis) {
+                near[axis][part] = read((negative_[axis] ? node.hi[axis] : node.lo[axis]) + l);
+                far[axis][part] = read((negative_[axis] ? node.lo[axis] : node.hi[axis]) + l);
+            }
+        }
+        RaySets rays;
+        std::uint32_t met = 0;
+        for (; active != 0; active &= active - 1) {
+            const auto k = static_cast<std::size_t>(std::countr_zero(active));
+            const OneRay ray = one_ray(frame, k);
+            std::uint32_t here = 0;
+            for (std::size_t part = 0; part < parts; ++part) {
+                V8 entry = hn::Set(f8, p_.tmin[k]), leave = hn::Set(f8, p_.t[k]);
+                for (int axis = 0; axis < 3; ++axis) {
+                    const V8 rate = hn::Set(f8, ray.rate[axis]);
+                    entry = hn::Max(
+                        entry, hn::MulAdd(near[axis][part], rate, hn::Set(f8, ray.near[axis])));
+                    leave = hn::Min(leave,
+                                    hn::MulAdd(far[axis][part], rate, hn::Set(f8, ray.far[axis])));
+                }
+                const auto meets = hn::Le(entry, leave);
+                here |= bits_of(f8, meets) << (part * lanes8);
+                least[part] =
+                    hn::Min(least[part], hn::IfThenElse(meets, entry, hn::Set(f8, infinity)));
+            }
+            met |= here;
+            rays.add(here, std::uint64_t{1} << k);
+        }
+        met &= used_slots(node);
+        if (met == 0) return top;
+        HWY_ALIGN float entries[8];
+        for (std::size_t part = 0; part < parts; ++part)
+            hn::Store(least[part], f8, entries + part * lanes8);
+        HWY_ALIGN std::uint64_t sets[8];
+        rays.store(sets);
+        std::uint32_t order[8];
+        const std::uint32_t child_count = order_of(met, entries, order);
+        for (std::uint32_t c = 0; c < child_count; ++c) {
+            const std::uint32_t s = order[c];
+            ask_for<compact>(tree_, node.child[s]);
+            stack_.words[top] = node.child[s];
+            stack_.entries[top] = entries[s];
+            stack_.active[top++] = sets[s];
+        }
+        return top;
+    }
+
+    static HWY_INLINE std::uint32_t order_of(std::uint32_t met, const float* entries,
+                                             std::uint32_t* order) {
+        return any ? order_by_area(met, order) : order_by_entry(met, entries, order);
     }
 
     void test_leaf(std::uint32_t word, std::uint64_t active) {
@@ -221,141 +299,15 @@ private:
         const TriangleBlock& block = tree_.template block<compact>(place);
         if constexpr (counting)
             counts_.tests += count * static_cast<std::uint64_t>(std::popcount(active));
-        bool changed = false;
-        for (std::size_t vector = 0; vector < packet_size / lanes16; ++vector) {
-            const auto wanted =
-                static_cast<std::uint32_t>(active >> (vector * lanes16) & vector_bits);
-            if (wanted == 0) continue;
-            for (std::uint32_t k = 0; k < count; ++k)
-                changed |= test_triangle(block, place % block_lanes + k, vector * lanes16, wanted);
-        }
-        if (changed && !any) find_reach();
-    }
-
-    struct Sheared {
-        V x, y, z;  // z before shear_z
-    };
-    HWY_INLINE Sheared shear(const TriangleBlock& block, int vertex, std::uint32_t lane,
-                             std::size_t i) const {
-        const auto at = [&](std::uint32_t axis) {
-            return hn::Sub(hn::Set(f16, block.corner[3 * vertex + static_cast<int>(axis)][lane]),
-                           hn::Load(f16, p_.origin[axis] + i));
-        };
-        const V z = at(p_.kind.kz);
-        return {hn::Sub(at(p_.kind.kx), hn::Mul(hn::Load(f16, p_.shear_x + i), z)),
-                hn::Sub(at(p_.kind.ky), hn::Mul(hn::Load(f16, p_.shear_y + i), z)), z};
-    }
-    static HWY_INLINE V edge(const Sheared& a, const Sheared& b) {
-        return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
-    }
-
-    /// intersect_triangle for the rays i + (bits of `wanted`): the same bits. Whether any ray came
-    /// nearer.
-    HWY_INLINE bool test_triangle(const TriangleBlock& block, std::uint32_t lane, std::size_t i,
-                                  std::uint32_t wanted) {
-        const Sheared a = shear(block, 0, lane, i), b = shear(block, 1, lane, i),
-                      c = shear(block, 2, lane, i);
-        const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
-        const V zero = hn::Zero(f16);
-        const V least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
-        const auto outside = hn::And(hn::Lt(least, zero), hn::Gt(largest, zero));
-        std::uint32_t candidates = wanted & ~bits_of(f16, outside);
-        if (candidates == 0) return false;
-        const auto on_edge = hn::Or(hn::Or(hn::Eq(u, zero), hn::Eq(v, zero)), hn::Eq(w, zero));
-        const std::uint32_t near_edge = candidates & bits_of(f16, on_edge);
-        bool changed = false;
-        if (near_edge != 0) changed = test_exactly(block, lane, i, near_edge);
-        candidates &= ~near_edge;
-        if (candidates == 0) return changed;
-        return accept(block, lane, i, candidates, a, b, c, u, v, w) || changed;
-    }
-
-    [[nodiscard]] RayFrame frame_of(std::size_t k) const {
-        RayFrame frame;
-        frame.origin = {p_.origin[0][k], p_.origin[1][k], p_.origin[2][k]};
-        frame.inverse = {p_.true_inverse[0][k], p_.true_inverse[1][k], p_.true_inverse[2][k]};
-        frame.kx = static_cast<int>(p_.kind.kx), frame.ky = static_cast<int>(p_.kind.ky),
-        frame.kz = static_cast<int>(p_.kind.kz);
-        frame.shear_x = p_.shear_x[k], frame.shear_y = p_.shear_y[k], frame.shear_z = p_.shear_z[k];
-        frame.tmin = p_.tmin[k], frame.tmax = p_.t[k];
-        frame.t_scale = 1.0f;
-        return frame;
-    }
-
-    HWY_NOINLINE bool test_exactly(const TriangleBlock& block, std::uint32_t lane, std::size_t i,
-                                   std::uint32_t rays) {
-        bool changed = false;
-        for (; rays != 0; rays &= rays - 1) {
-            const std::size_t k = i + static_cast<std::size_t>(std::countr_zero(rays));
-            TriangleHit hit;
-            if (!intersect_triangle<EdgeRule::closed>(frame_of(k), triangle_of(block, lane),
-                                                      p_.t[k], hit))
-                continue;
-            done_ |= std::uint64_t{1} << k;
-            if (hit.t < p_.t[k] || block.prim[lane] < p_.prim[k]) {
-                p_.t[k] = hit.t, p_.u[k] = hit.u, p_.v[k] = hit.v, p_.prim[k] = block.prim[lane];
-                changed = true;
-            }
-        }
-        return changed;
-    }
-
-    HWY_INLINE bool accept(const TriangleBlock& block, std::uint32_t lane, std::size_t i,
-                           std::uint32_t candidates, const Sheared& a, const Sheared& b,
-                           const Sheared& c, V u, V v, V w) {
-        const V determinant = hn::Add(hn::Add(u, v), w);
-        const V shear_z = hn::Load(f16, p_.shear_z + i);
-        const V depth =
-            hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)), hn::Mul(v, hn::Mul(shear_z, b.z))),
-                    hn::Mul(w, hn::Mul(shear_z, c.z)));
-        V t = hn::Div(depth, determinant);
-        V entry = hn::Set(f16, -infinity), exit = hn::Set(f16, infinity);
-        for (int axis = 0; axis < 3; ++axis) {
-            const float p = block.corner[axis][lane], q = block.corner[3 + axis][lane],
-                        r = block.corner[6 + axis][lane];
-            const float lo = min_of(min_of(p, q), r), hi = max_of(max_of(p, q), r);
-            const V origin = hn::Load(f16, p_.origin[axis] + i);
-            const V inverse = hn::Load(f16, p_.true_inverse[axis] + i);
-            const V near =
-                hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? hi : lo), origin), inverse);
-            const V far =
-                hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? lo : hi), origin), inverse);
-            entry = hn::IfThenElse(hn::Gt(near, entry), near, entry);
-            exit = hn::IfThenElse(hn::Lt(far, exit), far, exit);
-        }
-        V held = hn::IfThenElse(hn::Gt(t, entry), t, entry);
-        held = hn::IfThenElse(hn::Lt(held, exit), held, exit);
-        t = hn::IfThenElse(hn::Le(entry, exit), held, t);
-        const V reach = hn::Load(f16, p_.t + i);
-        const auto sound = hn::And(hn::Ne(determinant, hn::Zero(f16)),
-                                   hn::Lt(hn::Abs(determinant), hn::Set(f16, infinity)));
-        const auto in_reach = hn::And(hn::Ge(t, hn::Load(f16, p_.tmin + i)), hn::Le(t, reach));
-        candidates &= bits_of(f16, hn::And(sound, in_reach));
-        if (candidates == 0) return false;
-        done_ |= std::uint64_t{candidates} << i;
-        if constexpr (any) return true;
-        // At equal t the lower primitive wins.
-        const U16 u16;
-        const auto prim = hn::Set(u16, block.prim[lane]);
-        const auto old_prim = hn::Load(u16, p_.prim + i);
-        const auto better =
-            hn::Or(hn::Lt(t, reach), hn::RebindMask(f16, hn::Eq(hn::Min(prim, old_prim), prim)));
-        const auto take = hn::And(better, mask_of(f16, candidates));
-        hn::Store(hn::IfThenElse(take, t, reach), f16, p_.t + i);
-        hn::Store(hn::IfThenElse(take, hn::Div(v, determinant), hn::Load(f16, p_.u + i)), f16,
-                  p_.u + i);
-        hn::Store(hn::IfThenElse(take, hn::Div(w, determinant), hn::Load(f16, p_.v + i)), f16,
-                  p_.v + i);
-        hn::Store(hn::IfThenElse(hn::RebindMask(u16, take), prim, old_prim), u16, p_.prim + i);
-        return true;
+        if (triangles_.test(block, place % block_lanes, count, active) && !any) find_reach();
     }
 
     const WideView& tree_;
     Packet& p_;
+    PacketTriangles<any> triangles_;
     const PacketStackView stack_;
     SimdCounts& counts_;
     bool negative_[3];
-    std::uint64_t done_ = 0;  // closest: rays that have hit; any: rays that need nothing more
     float reach_ = 0;
 };
 

@@ -9,6 +9,10 @@
 
 #include <hwy/cache_control.h>
 
+#include <algorithm>
+#include <bit>
+#include <numeric>
+
 #include "trace/simd/packet.h"
 #include "trace/simd/single.h"
 #include "trace/simd/stream.h"
@@ -70,9 +74,11 @@ inline void largest_pad(const WideView& tree, const float* least, const float* l
     for (int a = 0; a < 3; ++a) pad[a] = factor * slab_pad * (far[a] + far[kz]);
 }
 
-/// Rays index[0, count) of one class; `index` may be read up to the next multiple of lanes16.
-HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::int32_t* index,
-                            std::uint32_t count, std::uint32_t code, Packet& p) {
+/// `count` rays of one class; read(i) gives rays i to i + lanes16 - 1, of which those beyond
+/// `count` repeat others.
+template <class Read>
+HWY_INLINE void fill_packet(const WideView& tree, const Read& read, std::uint32_t count,
+                            std::uint32_t code, Packet& p) {
     using V = V16;
     p.count = count;
     p.kind = ray_class_of(code);
@@ -88,7 +94,7 @@ HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::in
             hn::Store(hn::Set(f16, -infinity), f16, p.t + i);
             continue;
         }
-        const RayVectors ray = read_rays(rays, index + i);
+        const RayVectors ray = read(i);
         V inverse[3];
         for (int a = 0; a < 3; ++a) {
             const V o = hn::Add(ray.place[a], hn::Zero(f16));  // -0 becomes +0
@@ -106,7 +112,7 @@ HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::in
         const V depth = ray.way[p.kind.kz];
         hn::Store(hn::Div(ray.way[p.kind.kx], depth), f16, p.shear_x + i);
         hn::Store(hn::Div(ray.way[p.kind.ky], depth), f16, p.shear_y + i);
-        hn::Store(hn::Div(hn::Set(f16, 1.0f), depth), f16, p.shear_z + i);
+        hn::Store(inverse[p.kind.kz], f16, p.shear_z + i);
         const V tmin = ray.place[3];
         const V start = hn::IfThenElseZero(hn::Gt(tmin, hn::Zero(f16)), tmin);
         hn::Store(start, f16, p.tmin + i);
@@ -122,8 +128,19 @@ HWY_INLINE void fill_packet(const WideView& tree, const Ray* rays, const std::in
         p.least_inverse[a] = hn::GetLane(hn::MinOfLanes(f16, least[a]));
         p.largest_inverse[a] = hn::GetLane(hn::MaxOfLanes(f16, largest[a]));
     }
+    p.one_origin = true;
+    for (int a = 0; a < 3; ++a) p.one_origin = p.one_origin && p.origin_lo[a] == p.origin_hi[a];
     p.least_tmin = hn::GetLane(hn::MinOfLanes(f16, least_tmin));
     largest_pad(tree, p.origin_lo, p.origin_hi, p.kind.kz, packet_pad_factor, p.pad);
+    for (int a = 0; a < 3; ++a) {
+        const V pad = hn::Set(f16, p.kind.negative(a) ? p.pad[a] : -p.pad[a]);
+        for (std::size_t i = 0; i < count; i += lanes16) {
+            const V from = hn::Sub(hn::Set(f16, tree.middle[a]), hn::Load(f16, p.origin[a] + i));
+            const V inverse = hn::Load(f16, p.inverse[a] + i);
+            hn::Store(hn::Mul(hn::Add(from, pad), inverse), f16, p.near[a] + i);
+            hn::Store(hn::Mul(hn::Sub(from, pad), inverse), f16, p.far[a] + i);
+        }
+    }
 }
 
 /// Rays of a job by class: order[begin[c]] to order[begin[c + 1]], each class in the caller's
@@ -211,43 +228,110 @@ private:
 };
 
 template <bool any>
-void store_packet(const SimdJob& job, const std::int32_t* index, const Packet& p,
-                  std::uint64_t found, SimdCounts& counts) {
-    for (std::uint32_t k = 0; k < p.count; ++k) {
-        const auto i = static_cast<std::size_t>(index[k]);
-        if constexpr (any) {
-            job.occluded[i] = found >> k & 1;
-            counts.hits += found >> k & 1;
-        } else {
-            const bool hit = p.prim[k] != no_primitive;
-            counts.hits += hit;
-            job.hits[i] = hit ? Hit{p.t[k], p.prim[k], p.u[k], p.v[k]} : Hit{};
-        }
+HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, const Packet& p,
+                             std::uint64_t found, SimdCounts& counts) {
+    counts.hits += static_cast<std::uint64_t>(std::popcount(found));
+    if constexpr (any) {
+        for (std::uint32_t k = 0; k < p.count; ++k) job.occluded[index[k]] = found >> k & 1;
+        return;
     }
+    std::uint32_t k = 0;
+    for (; k + lanes16 <= p.count; k += lanes16) {
+        const auto prim = hn::Load(U16(), p.prim + k);
+        const auto hit = hn::RebindMask(f16, hn::Ne(prim, hn::Set(U16(), no_primitive)));
+        const V16 out[4] = {hn::IfThenElse(hit, hn::Load(f16, p.t + k), hn::Set(f16, infinity)),
+                            hn::BitCast(f16, prim), hn::IfThenElseZero(hit, hn::Load(f16, p.u + k)),
+                            hn::IfThenElseZero(hit, hn::Load(f16, p.v + k))};
+        store_quads(
+            out, [&](std::size_t l) { return reinterpret_cast<float*>(job.hits + index[k + l]); });
+    }
+    for (; k < p.count; ++k)
+        job.hits[index[k]] =
+            p.prim[k] != no_primitive ? Hit{p.t[k], p.prim[k], p.u[k], p.v[k]} : Hit{};
 }
+
+/// The rays of a job in packets.
+template <bool any, bool counting, bool compact>
+class PacketJob {
+public:
+    PacketJob(const SimdJob& job, SimdCounts& counts)
+        : job_(job), counts_(counts), ahead_(job.rays + job.n) {
+        std::iota(index_, index_ + packet_size, 0);
+    }
+
+    /// Windows of one class go as they are, as those of primary rays are but for the edges of
+    /// classes; from the first other one on, rays are sorted by class.
+    void trace() {
+        while (job_.n >= packet_size && job_.order == nullptr && trace_window()) leave_behind();
+        if (job_.n > 0) trace_sorted();
+    }
+
+private:
+    /// The first 64 rays; false if they are not of one class.
+    HWY_INLINE bool trace_window() {
+        RayVectors rays[packet_size / lanes16];
+        std::uint32_t code = 0;
+        for (std::size_t i = 0; i < packet_size; i += lanes16) {
+            RayVectors& here = rays[i / lanes16];
+            here = read_rays(job_.rays, index_ + i);
+            const auto codes = classify(here);
+            if (i == 0) code = static_cast<std::uint32_t>(hn::GetLane(codes));
+            const auto same = hn::Eq(codes, hn::Set(I16(), static_cast<std::int32_t>(code)));
+            if (code == odd_ray_class || !hn::AllTrue(I16(), same)) return false;
+        }
+        trace_packet([&](std::size_t i) { return rays[i / lanes16]; }, index_, packet_size, code);
+        return true;
+    }
+
+    void leave_behind() {
+        job_.rays += packet_size, job_.n -= packet_size;
+        if constexpr (any)
+            job_.occluded += packet_size;
+        else
+            job_.hits += packet_size;
+    }
+
+    void trace_sorted() {
+        RaySorter sorter;
+        sorter.sort(job_);
+        for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
+            const std::int32_t* const rays = sorter.rays(code);
+            for (std::uint32_t at = 0; at < sorter.count(code); at += packet_size) {
+                const std::int32_t* const index = rays + at;
+                trace_packet([&](std::size_t i) { return read_rays(job_.rays, index + i); }, index,
+                             std::min<std::uint32_t>(packet_size, sorter.count(code) - at), code);
+            }
+        }
+        const std::int32_t* const odd = sorter.rays(odd_ray_class);
+        for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k)
+            trace_one<any, counting, compact>(job_, static_cast<std::size_t>(odd[k]), counts_);
+    }
+
+    template <class Read>
+    HWY_INLINE void trace_packet(const Read& read, const std::int32_t* index, std::uint32_t count,
+                                 std::uint32_t code) {
+        if (job_.order == nullptr) {
+            // What the next job will read first, while there is something to do.
+            for (std::uint32_t k = 0; k < count; k += 2) hwy::Prefetch(ahead_ + k);
+            ahead_ += count;
+        }
+        fill_packet(job_.tree, read, count, code, packet_);
+        PacketWalk<any, counting, compact> walk(job_.tree, packet_, job_.rays, index,
+                                                job_.packet_stack, counts_);
+        walk.trace();
+        store_packet<any>(job_, index, packet_, walk.found(), counts_);
+    }
+
+    SimdJob job_;  // what is left of it
+    SimdCounts& counts_;
+    const Ray* ahead_;
+    HWY_ALIGN std::int32_t index_[packet_size];
+    Packet packet_;
+};
 
 template <bool any, bool counting, bool compact>
 void trace_packets(const SimdJob& job, SimdCounts& counts) {
-    RaySorter sorter;
-    sorter.sort(job);
-    Packet packet;
-    const Ray* ahead = job.rays + job.n;
-    for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
-        const std::int32_t* const rays = sorter.rays(code);
-        for (std::uint32_t at = 0; at < sorter.count(code); at += packet_size) {
-            const auto count = std::min<std::uint32_t>(packet_size, sorter.count(code) - at);
-            // What the next job will read first, while there is something to do.
-            for (std::uint32_t k = 0; k < count; k += 2) hwy::Prefetch(ahead + k);
-            ahead += count;
-            fill_packet(job.tree, job.rays, rays + at, count, code, packet);
-            PacketWalk<any, counting, compact> walk(job.tree, packet, job.packet_stack, counts);
-            walk.trace();
-            store_packet<any>(job, rays + at, packet, walk.found(), counts);
-        }
-    }
-    const std::int32_t* const odd = sorter.rays(odd_ray_class);
-    for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k)
-        trace_one<any, counting, compact>(job, static_cast<std::size_t>(odd[k]), counts);
+    PacketJob<any, counting, compact>(job, counts).trace();
 }
 
 /// Rays index[0, count) of one class as a stream; `index` may be read up to the next multiple of

@@ -81,7 +81,7 @@ SimdPath path_for(const WideBvh& tree, std::span<const Ray> rays, SimdPath wante
 }
 
 /// With fewer jobs than this a trial would cost more than it may gain.
-constexpr std::size_t least_jobs_of_race = 8;
+constexpr std::size_t least_jobs_of_race = 16;
 
 /// A batch as its jobs see it: hits, or else occluded.
 struct Batch {
@@ -124,8 +124,8 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hit
     std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
     Batch batch{tree, kernels, path, rays, hits, occluded, options.counters};
     // Counters are those of one path: they do not depend on times.
-    const bool race = options.path == SimdPath::automatic && path == SimdPath::stream &&
-                      hits == nullptr && !options.counters && parts.size() >= least_jobs_of_race;
+    const bool race = options.path == SimdPath::automatic && path != SimdPath::packet &&
+                      !options.counters && parts.size() >= least_jobs_of_race;
     PathRace paths;
     with_threads(options.threads, [&] {
         if (path == SimdPath::sorted) batch.order = order_by_place(tree.arrays().bounds, rays);
