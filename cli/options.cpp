@@ -42,7 +42,7 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
     of_the_build(
         command.add_option("--quality", options.quality,
                            "Picks a builder and its rounds of reinsertion: fast is apetrei, "
-                           "balanced is ploc, high is sbvh and 4"))
+                           "balanced is ploc and 2, high is sbvh and 4"))
         ->check(CLI::IsMember({"fast", "balanced", "high"}))
         ->excludes(builder);
     of_the_build(command.add_option("--bits", options.bits, "Bits of the Morton codes"))

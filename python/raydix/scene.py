@@ -27,7 +27,7 @@ from .devices import CudaRays
 from .instances import Instances
 from .pictures import SceneViews
 
-QUALITIES = {"fast": ("apetrei", 0), "balanced": ("ploc", 0), "high": ("sbvh", 4)}
+QUALITIES = {"fast": ("apetrei", 0), "balanced": ("ploc", 2), "high": ("sbvh", 4)}
 """Which builder and how many rounds of reinsertion each quality stands for."""
 
 
@@ -50,7 +50,7 @@ class Scene(SceneViews):
         The name of a builder, instead of `quality`: see `raydix.builders`.
     reinsertion_rounds :
         So often, at most 255, large subtrees are moved to better places after the build; None: what
-        `quality` asks for (4 for "high", else 0), and 0 where `builder` is given.
+        `quality` asks for (2 for "balanced", 4 for "high", else 0), and 0 where `builder` is given.
     max_leaf, bits :
         Primitives in a leaf at most, and bits of the Morton codes (30 or 63).
     strict :

@@ -10,6 +10,7 @@
 
 #include "base/math.h"
 #include "layout/binary_view.h"
+#include "layout/divisions.h"
 #include "layout/wide_collapse.h"
 
 namespace raydix {
@@ -143,41 +144,20 @@ private:
         return area * static_cast<float>(blocks) * static_cast<float>(options_.primitive_cost);
     }
 
-    /// The j-th division of i subtrees among two children, from even ones to uneven ones: among
-    /// equal costs (flat scenes have no others) the tree stays shallow.
-    static constexpr int left_part(int i, int j) {
-        return j % 2 == 1 ? i / 2 + (j + 1) / 2 : i / 2 - j / 2;
-    }
-
     void make_plan(std::size_t k) {
         Entry& entry = entries_[k];
         const Plan& a = plans_[entry.children];
         const Plan& b = plans_[entry.children + 1];
-        std::array<float, width + 1> shared;
-        std::array<int, width + 1> part;
-#pragma GCC unroll 8
-        for (int i = 2; i <= width; ++i) {
-            const int even = left_part(i, 0);
-            float best = a.cost[even - 1] + b.cost[i - even - 1];
-            int best_part = even;
-#pragma GCC unroll 8
-            for (int j = 1; j < i - 1; ++j) {
-                const int left = left_part(i, j);
-                const float cost = a.cost[left - 1] + b.cost[i - left - 1];
-                best_part = cost < best ? left : best_part;
-                best = std::min(best, cost);
-            }
-            shared[static_cast<std::size_t>(i)] = best;
-            part[static_cast<std::size_t>(i)] = best_part;
-        }
+        const Divisions<width> shared = divide(a, b);
+        const auto left = [&](std::size_t i) { return shared.left[i - 1]; };
         Plan& plan = plans_[k];
         plan.choices = 0;
         entry.run = view_.join(entries_[entry.children].run, entries_[entry.children + 1].run);
         const float area = relative_area(entry.box);
-        plan.choose(width, part[width]);
+        plan.choose(width, left(width));
         // The root is a node in any case: nothing is saved by making it a leaf, its only child.
         const double node_cost = entry.ref == view_.root() ? 0.0 : options_.node_cost;
-        plan.cost[0] = shared[width] + area * static_cast<float>(node_cost);
+        plan.cost[0] = shared.cost[width - 1] + area * static_cast<float>(node_cost);
         if (entry.run.first != PrimitiveRun::several && entry.run.count <= options_.max_leaf) {
             const float as_leaf = leaf_cost(area, entry.run.count);
             if (as_leaf <= plan.cost[0]) {
@@ -186,15 +166,28 @@ private:
             }
         }
         for (std::size_t i = 2; i < width; ++i) {
-            const bool divided = shared[i] <= plan.cost[i - 2];
-            plan.cost[i - 1] = divided ? shared[i] : plan.cost[i - 2];
-            if (divided) plan.choose(static_cast<int>(i), part[i]);
+            const float together = plan.cost[i - 2], apart = shared.cost[i - 1];
+            plan.cost[i - 1] = apart <= together ? apart : together;
+            plan.choose(static_cast<int>(i), apart <= together ? left(i) : 0);
         }
+    }
+
+    /// Plans begin with their costs, and end with another word.
+    [[nodiscard]] Divisions<width> divide(const Plan& a, const Plan& b) const {
+#if defined(RAYDIX_DIVIDES_WITH_AVX2)
+        static_assert(sizeof(Plan) == width * sizeof(float));
+        if constexpr (width == 8)
+            if (with_avx2_) return cheapest_divisions_avx2(a.cost.data(), b.cost.data());
+#endif
+        return cheapest_divisions<width>(a.cost.data(), b.cost.data());
     }
 
     const View& view_;
     WideOptions options_;
     double per_area_ = 0;
+#if defined(RAYDIX_DIVIDES_WITH_AVX2)
+    const bool with_avx2_ = __builtin_cpu_supports("avx2");
+#endif
     std::vector<Entry> entries_;
     std::vector<Plan> plans_;
 };

@@ -20,10 +20,15 @@ struct TopOptions {
     std::uint32_t least = 2048;  // inner nodes of the top, if there are so many
 };
 
-/// As builds do it.
+/// As builds do it: who asks for few rounds gets a smaller top, too.
 [[nodiscard]] inline TopOptions top_options(int rounds) {
     TopOptions options;
     options.reinsertion.rounds = rounds;
+    constexpr int whole = 4;
+    if (rounds < whole) {
+        options.part *= static_cast<double>(rounds) / whole;
+        options.least = options.least / whole * static_cast<std::uint32_t>(rounds);
+    }
     return options;
 }
 

@@ -128,7 +128,7 @@ INSTANTIATE_TEST_SUITE_P(Builders, Reinserted, testing::ValuesIn(builders),
 TEST(ReinsertionOption, QualityWordsBringTheirs) {
     EXPECT_EQ(build_options_for(Quality::fast).reinsertion_rounds, 0);
     EXPECT_EQ(build_options_for(Quality::balanced).builder, Builder::ploc);
-    EXPECT_EQ(build_options_for(Quality::balanced).reinsertion_rounds, 0);
+    EXPECT_EQ(build_options_for(Quality::balanced).reinsertion_rounds, 2);
     EXPECT_EQ(build_options_for(Quality::high).builder, Builder::sbvh);
     EXPECT_EQ(build_options_for(Quality::high).reinsertion_rounds, 4);
 }

@@ -93,8 +93,7 @@ private:
         Corners corners;
         if constexpr (one_origin) {
             for (std::size_t k = 0; k < 9; ++k)
-                hn::Store(hn::Sub(hn::Load(f4, block.corner[k]),
-                                  hn::Set(f4, p_.origin_lo[k % 3])),
+                hn::Store(hn::Sub(hn::Load(f4, block.corner[k]), hn::Set(f4, p_.origin_lo[k % 3])),
                           f4, corners.from_origin[k]);
         }
         bool changed = false;
@@ -142,8 +141,8 @@ private:
     static HWY_INLINE V spread(V row, std::uint32_t axis) {
         const hn::Repartition<std::uint8_t, F16> bytes;
         const auto index = hn::Set(U16(), 0x03020100u + 0x04040404u * axis);
-        return hn::BitCast(f16,
-                           hn::TableLookupBytes(hn::BitCast(bytes, row), hn::BitCast(bytes, index)));
+        return hn::BitCast(
+            f16, hn::TableLookupBytes(hn::BitCast(bytes, row), hn::BitCast(bytes, index)));
     }
 
     HWY_INLINE bool test_quad(const TriangleBlock& block, const std::uint32_t* ray,
