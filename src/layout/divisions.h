@@ -25,9 +25,7 @@ namespace raydix {
 
 /// The j-th division of i subtrees among two children, from even ones to uneven ones: among equal
 /// costs (flat scenes have no others) the tree stays shallow.
-constexpr int left_part(int i, int j) {
-    return j % 2 == 1 ? i / 2 + (j + 1) / 2 : i / 2 - j / 2;
-}
+constexpr int left_part(int i, int j) { return j % 2 == 1 ? i / 2 + (j + 1) / 2 : i / 2 - j / 2; }
 
 /// [i - 1]: the cost of i subtrees, and how many of them go to the left child. i = 1 has no
 /// meaning.
@@ -88,8 +86,7 @@ __attribute__((target("avx2"))) inline Divisions<8> cheapest_divisions_avx2(cons
         reinterpret_cast<const __m256i*>(division_places.in_a.data()->data());
     const auto* const places_b =
         reinterpret_cast<const __m256i*>(division_places.in_b.data()->data());
-    const auto* const lefts =
-        reinterpret_cast<const __m256i*>(division_places.left.data()->data());
+    const auto* const lefts = reinterpret_cast<const __m256i*>(division_places.left.data()->data());
     const __m256 none = _mm256_set1_ps(infinity);
     const __m256 from_a = _mm256_blend_ps(_mm256_loadu_ps(a), none, 0x80);
     const __m256 from_b = _mm256_blend_ps(_mm256_loadu_ps(b), none, 0x80);
@@ -97,14 +94,14 @@ __attribute__((target("avx2"))) inline Divisions<8> cheapest_divisions_avx2(cons
     __m256i best_left = _mm256_setzero_si256();
 #pragma GCC unroll 7
     for (std::size_t j = 0; j < 7; ++j) {
-        const __m256 cost = _mm256_add_ps(
-            _mm256_permutevar8x32_ps(from_a, _mm256_load_si256(places_a + j)),
-            _mm256_permutevar8x32_ps(from_b, _mm256_load_si256(places_b + j)));
+        const __m256 cost =
+            _mm256_add_ps(_mm256_permutevar8x32_ps(from_a, _mm256_load_si256(places_a + j)),
+                          _mm256_permutevar8x32_ps(from_b, _mm256_load_si256(places_b + j)));
         const __m256 less = j == 0 ? _mm256_castsi256_ps(_mm256_set1_epi32(-1))
                                    : _mm256_cmp_ps(cost, best, _CMP_LT_OQ);
         best = _mm256_blendv_ps(best, cost, less);
-        best_left = _mm256_blendv_epi8(best_left, _mm256_load_si256(lefts + j),
-                                       _mm256_castps_si256(less));
+        best_left =
+            _mm256_blendv_epi8(best_left, _mm256_load_si256(lefts + j), _mm256_castps_si256(less));
     }
     Divisions<8> out;
     _mm256_store_ps(out.cost.data(), best);

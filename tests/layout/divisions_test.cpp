@@ -42,7 +42,9 @@ TEST(Divisions, AreTheCheapestAndAmongEqualOnesTheMostEven) {
             ASSERT_TRUE(left >= 1 && left < i);
             EXPECT_EQ(found.cost[i - 1], least);
             EXPECT_EQ(at(left), least);
-            const auto unevenness = [&](std::size_t k) { return k > i - k ? 2 * k - i : i - 2 * k; };
+            const auto unevenness = [&](std::size_t k) {
+                return k > i - k ? 2 * k - i : i - 2 * k;
+            };
             for (std::size_t other = 1; other < i; ++other) {
                 if (at(other) != least) continue;
                 EXPECT_LE(unevenness(left), unevenness(other));
