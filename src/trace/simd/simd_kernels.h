@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "trace/simd/call_history.h"
 #include "trace/simd/stream_rays.h"
 #include "trace/simd/wide_ray.h"
 
@@ -32,11 +33,14 @@ struct SimdJob {
     bool counting;
 };
 
+using OneRay = Hit(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,
+                   CallHistory& history);
+
 struct SimdKernels {
     std::string_view isa;
     /// One ray; for any hit only the primitive has a meaning.
-    Hit (*closest)(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack);
-    Hit (*any)(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack);
+    OneRay* closest;
+    OneRay* any;
     void (*single)(const SimdJob& job, SimdCounts& counts);
     void (*packets)(const SimdJob& job, SimdCounts& counts);
     void (*streams)(const SimdJob& job, SimdCounts& counts);

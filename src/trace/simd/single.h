@@ -11,6 +11,7 @@
 
 #include "base/check.h"
 #include "trace/all_hits.h"
+#include "trace/simd/call_history.h"
 #include "trace/simd/children.h"
 #include "trace/simd/lanes.h"
 #include "trace/simd/single_frame.h"
@@ -23,7 +24,8 @@ constexpr std::size_t parts8 = 8 / lanes8;
 
 enum class Wanted { closest, any, all };
 
-template <Wanted wanted, bool counting, bool compact>
+/// `guessing`: rays that follow each other take much the same way.
+template <Wanted wanted, bool counting, bool compact, bool guessing = false>
 class SingleRay {
 public:
     SingleRay(const WideView& tree, const SingleFrame& frame, const WideStackView& stack,
@@ -117,6 +119,38 @@ private:
     /// that no ray meets them unless something overflows; in a compact one pads may turn them.
     static constexpr bool always_careful = compact;
 
+    template <std::size_t k>
+    static HWY_INLINE std::uint32_t load_child(const std::uint32_t* child) {
+        std::uint32_t word = child[k];
+#if defined(__GNUC__)
+        asm volatile("" : "+r"(word));  // else all cases become one load again
+#endif
+        return word;
+    }
+    /// child[k], 0 <= k < 8. Guessing, by a jump for every k: where the processor foresees the jump
+    /// it reads the child while it still finds out which one is next.
+    static HWY_INLINE std::uint32_t choose(const std::uint32_t* child, std::size_t k) {
+        if constexpr (!guessing) return child[k];
+        switch (k) {
+            case 0:
+                return load_child<0>(child);
+            case 1:
+                return load_child<1>(child);
+            case 2:
+                return load_child<2>(child);
+            case 3:
+                return load_child<3>(child);
+            case 4:
+                return load_child<4>(child);
+            case 5:
+                return load_child<5>(child);
+            case 6:
+                return load_child<6>(child);
+            default:
+                return load_child<7>(child);
+        }
+    }
+
     /// `word` becomes the nearest child that the ray meets, or for any hit the largest; the others
     /// go onto the stack, the farthest or smallest first. False if it meets none.
     template <class Node>
@@ -135,7 +169,7 @@ private:
         if (always_careful || frame_.careful) met &= used_slots(node);
         if (met == 0) return false;
         if ((met & (met - 1)) == 0) {
-            word = node.child[std::countr_zero(met)];
+            word = choose(node.child, static_cast<std::size_t>(std::countr_zero(met)));
         } else if constexpr (wanted == Wanted::closest) {
             push_sorted(node.child, entries, met, top, word);
         } else {
@@ -155,7 +189,7 @@ private:
             for (std::uint32_t left = met; (left & (left - 1)) != 0; left &= left - 1)
                 stack_.words[top++] = child[std::countr_zero(left)];
         }
-        word = child[std::bit_width(met) - 1];
+        word = choose(child, static_cast<std::size_t>(std::bit_width(met)) - 1);
     }
 
     /// Two children or more, by where the ray enters them.
@@ -167,7 +201,7 @@ private:
         met &= met - 1;
         const bool swap = entries[second] < entries[first];
         const std::size_t near = swap ? second : first, far = swap ? first : second;
-        word = child[near];
+        word = choose(child, near);
         ask_for<compact>(tree_, child[near]);
         ask_for<compact>(tree_, child[far]);
         float nearest = entries[near];
@@ -309,18 +343,38 @@ private:
     std::uint32_t near_at_[3], far_at_[3];  // where planes are, from a node's boxes on
 };
 
+/// Whether the ray is probably like the next one: so many of the last have been like each other.
+HWY_INLINE bool follows(const WideView& tree, const SingleFrame& frame, CallHistory& history) {
+    const V4 origin = hn::Load(f4, frame.origin);
+    const V4 moved = hn::Abs(hn::Sub(origin, hn::Load(f4, history.origin)));
+    const V4 size = hn::Sub(hn::Load(f4, tree.hi), hn::Load(f4, tree.lo));
+    const V4 most = hn::Mul(size, hn::Set(f4, CallHistory::near));
+    const std::uint32_t ray_class = frame.kind.negatives + 8 * frame.kind.kz;
+    history.add(ray_class == history.ray_class && (bits_of(f4, hn::Le(moved, most)) & 7) == 7);
+    history.ray_class = ray_class;
+    hn::Store(origin, f4, history.origin);
+    return history.is_coherent();
+}
+
+template <bool any, bool counting, bool compact, bool guessing>
+HWY_INLINE WideBest search(const WideView& tree, const SingleFrame& frame,
+                           const WideStackView& stack, SimdCounts& counts) {
+    return SingleRay < any ? Wanted::any : Wanted::closest, counting, compact,
+           guessing > (tree, frame, stack, counts).trace(0, {frame.tmax});
+}
+
 /// A miss if the ray is invalid; for any hit only `prim` has a meaning.
 template <bool any, bool counting, bool compact>
 HWY_INLINE Hit find_one(const WideView& tree, const Ray& ray, const WideStackView& stack,
-                        SimdCounts& counts) {
+                        SimdCounts& counts, CallHistory* history = nullptr) {
     SingleFrame frame;
     if (!fill_frame(tree, ray, frame)) {
         ++counts.invalid;
         return {};
     }
-    SingleRay<any ? Wanted::any : Wanted::closest, counting, compact> single(tree, frame, stack,
-                                                                             counts);
-    const WideBest best = single.trace(0, {frame.tmax});
+    const WideBest best = history != nullptr && follows(tree, frame, *history)
+                              ? search<any, counting, compact, true>(tree, frame, stack, counts)
+                              : search<any, counting, compact, false>(tree, frame, stack, counts);
     if (!best.found()) return {};
     ++counts.hits;
     return {best.t * frame.t_scale, best.prim, best.u, best.v};
@@ -387,13 +441,14 @@ inline void single(const SimdJob& job, SimdCounts& counts) {
 }
 
 template <bool any>
-Hit one(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack) {
+Hit one(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,
+        CallHistory& history) {
     SimdCounts counts;
     TriangleBlock room;
     if (!arrays.stats.compact)
-        return find_one<any, false, false>(view_of(arrays, room), ray, stack, counts);
+        return find_one<any, false, false>(view_of(arrays, room), ray, stack, counts, &history);
     room = {};
-    return find_one<any, true, true>(view_of(arrays, room), ray, stack, counts);
+    return find_one<any, true, true>(view_of(arrays, room), ray, stack, counts, &history);
 }
 
 }  // namespace raydix::HWY_NAMESPACE

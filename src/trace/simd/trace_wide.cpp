@@ -270,21 +270,27 @@ SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays) {
 
 namespace {
 
-using OneRay = Hit (*)(const WideBvh::Arrays&, const Ray&, const WideStackView&);
+#if defined(__GNUC__)
+/// Found without a call, wherever the library is linked into.
+#define RAYDIX_NEAR_THREAD_LOCAL __attribute__((tls_model("initial-exec")))
+#else
+#define RAYDIX_NEAR_THREAD_LOCAL
+#endif
+thread_local CallHistory call_history RAYDIX_NEAR_THREAD_LOCAL;
 
 /// In a plain environment.
-Hit trace_one_ray(OneRay kernel, const WideBvh& tree, const Ray& ray) {
+Hit trace_one_ray(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
     constexpr std::size_t inside = 512;
     if (wide_stack_capacity(tree.stats().max_depth) > inside) {
         StackMemory stack(tree.stats().max_depth);
-        return kernel(tree.arrays(), ray, stack.view());
+        return kernel(tree.arrays(), ray, stack.view(), call_history);
     }
     std::uint32_t words[inside];
     float entries[inside];
-    return kernel(tree.arrays(), ray, {words, entries});
+    return kernel(tree.arrays(), ray, {words, entries}, call_history);
 }
 
-Hit one_ray(OneRay kernel, const WideBvh& tree, const Ray& ray) {
+Hit one_ray(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
     if (FloatEnvironment::is_plain()) return trace_one_ray(kernel, tree, ray);
     const FloatEnvironment plain;
     return trace_one_ray(kernel, tree, ray);
@@ -293,12 +299,12 @@ Hit one_ray(OneRay kernel, const WideBvh& tree, const Ray& ray) {
 }  // namespace
 
 Hit closest_hit(const WideBvh& tree, const Ray& ray) {
-    static const OneRay kernel = simd_kernels().front().closest;
+    static OneRay* const kernel = simd_kernels().front().closest;
     return tree.empty() ? Hit{} : one_ray(kernel, tree, ray);
 }
 
 bool any_hit(const WideBvh& tree, const Ray& ray) {
-    static const OneRay kernel = simd_kernels().front().any;
+    static OneRay* const kernel = simd_kernels().front().any;
     return !tree.empty() && one_ray(kernel, tree, ray).hit();
 }
 
