@@ -270,13 +270,7 @@ SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays) {
 
 namespace {
 
-#if defined(__GNUC__)
-/// Found without a call, wherever the library is linked into.
-#define RAYDIX_NEAR_THREAD_LOCAL __attribute__((tls_model("initial-exec")))
-#else
-#define RAYDIX_NEAR_THREAD_LOCAL
-#endif
-thread_local CallHistory call_history RAYDIX_NEAR_THREAD_LOCAL;
+thread_local CallHistory call_history;
 
 /// In a plain environment.
 Hit trace_one_ray(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
