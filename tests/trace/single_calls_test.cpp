@@ -50,8 +50,7 @@ TEST(SingleCalls, FindTheSameWhateverCameBefore) {
                     CallHistory history;
                     history.agreeing = agreeing;
                     const WideStackView stack{words.data(), entries.data()};
-                    const Hit hit =
-                        kernels.closest(tree.arrays(), view.rays[i], stack, history);
+                    const Hit hit = kernels.closest(tree.arrays(), view.rays[i], stack, history);
                     coherent += history.is_coherent();
                     different += !same_bits(hit, view.hits[i]);
                     const Hit any = kernels.any(tree.arrays(), view.rays[i], stack, history);

@@ -9,7 +9,7 @@ namespace raydix {
 struct CallHistory {
     alignas(16) float origin[4] = {};  // of the last ray
     std::uint32_t ray_class = 0;       // of the last ray: ray_classes.h
-    int agreeing = 0;                  // 0 to most: how many of the last rays were like those before
+    int agreeing = 0;  // 0 to most: how many of the last rays were like those before
 
     static constexpr int most = 8, enough = 4;
     /// Of the scene's size, along each axis: origins of neighbours are no farther apart.
