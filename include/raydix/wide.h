@@ -108,9 +108,10 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
 [[nodiscard]] AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays,
                                 const TraceOptions& options = {});
 
-/// The path that `automatic` takes, but for large batches of any hits without counters, where a
-/// stream's jobs may go as packets. Judged by a few windows of 64 rays, evenly spread: packets if
-/// in most of them origins and directions lie close together, streams if origins do, else sorted.
+/// The path that `automatic` takes, but for large batches without counters, where the jobs of
+/// streams, sorted or not, may go as packets. Judged by a few windows of 64 rays, evenly spread:
+/// packets if in most of them origins and directions lie close together, streams if origins do,
+/// else sorted.
 [[nodiscard]] SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays);
 
 /// One ray, on the caller's thread, without any set-up.

@@ -46,6 +46,10 @@ void expect_like(const std::string& what, const WideBvh& tree, std::span<const R
     if (options.counters && counts.hits > 0) {
         EXPECT_GE(own.triangle_tests, own.hits);
     }
+    if (!options.counters) {
+        EXPECT_EQ(own.node_visits, 0u);
+        EXPECT_EQ(own.triangle_tests, 0u);
+    }
     std::vector<std::uint8_t> occluded(rays.size(), 2);
     const TraceCounts any = trace_any(tree, rays, occluded, options);
     EXPECT_EQ(any.hits, counts.hits);

@@ -22,8 +22,9 @@ namespace raydix::HWY_NAMESPACE {
 
 constexpr std::size_t packet_size = 64;
 
-/// Rays of one class (ray_classes.h), as arrays. Places from `count` on repeat the last ray and
-/// are never active.
+/// Rays of one class (ray_classes.h), as arrays. Places from `count` on are never active: their t
+/// is -infinity; the rest repeats a ray in the last vector that holds one, and is not set behind
+/// it.
 struct Packet {
     HWY_ALIGN float origin[3][packet_size];
     HWY_ALIGN float inverse[3][packet_size];  // limited

@@ -62,12 +62,14 @@ void (*job_of(const SimdKernels& kernels, SimdPath path))(const SimdJob&, SimdCo
     return path == SimdPath::packet ? kernels.packets : kernels.streams;
 }
 
-TraceCounts sum_of(const std::vector<SimdCounts>& parts, std::size_t rays) {
+/// Kernels of compact trees count unasked: what they count depends on the paths of the jobs.
+TraceCounts sum_of(const std::vector<SimdCounts>& parts, std::size_t rays, bool counters) {
     TraceCounts sum;
     sum.rays = rays;
     for (const SimdCounts& part : parts) {
         sum.hits += part.hits;
         sum.invalid_rays += part.invalid;
+        if (!counters) continue;
         sum.node_visits += part.visits;
         sum.triangle_tests += part.tests;
     }
@@ -138,7 +140,7 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hit
                            paths.add(path_here, end - begin, PathRace::thread_ns() - start);
                        });
     });
-    return sum_of(parts, rays.size());
+    return sum_of(parts, rays.size(), options.counters);
 }
 
 /// Largest jobs, one after the other, in the caller's floating-point environment.
@@ -234,7 +236,7 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
             });
         join_blocks(found, block_size, all);
     });
-    all.counts = sum_of(parts, rays.size());
+    all.counts = sum_of(parts, rays.size(), options.counters);
     return all;
 }
 
