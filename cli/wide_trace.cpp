@@ -108,8 +108,12 @@ void WideTracer::explain_tree(const CommonOptions& common) const {
 
 void WideTracer::explain_paths(const CommonOptions& common) const {
     if (!common.prints_tables()) return;
-    for (const auto& [path, batches] : batches_)
-        fmt::print("path {}: {} {}\n", path, batches, batches == 1 ? "batch" : "batches");
+    for (const auto& [path, batches] : batches_) {
+        const bool may_race =
+            path_ == SimdPath::automatic && (path == "stream" || path == "sorted");
+        fmt::print("path {}: {} {}{}\n", path, batches, batches == 1 ? "batch" : "batches",
+                   may_race ? "; jobs of large ones as packets where those take less time" : "");
+    }
 }
 
 void add_wide(Json& build, const WideBvh& tree) {
