@@ -174,7 +174,7 @@ private:
 
     /// Plans begin with their costs, and end with another word.
     [[nodiscard]] Divisions<width> divide(const Plan& a, const Plan& b) const {
-#if defined(RAYDIX_DIVIDES_WITH_AVX2)
+#if defined(RAYDIX_X86_INTRINSICS)
         static_assert(sizeof(Plan) == width * sizeof(float));
         if constexpr (width == 8)
             if (with_avx2_) return cheapest_divisions_avx2(a.cost.data(), b.cost.data());
@@ -185,7 +185,7 @@ private:
     const View& view_;
     WideOptions options_;
     double per_area_ = 0;
-#if defined(RAYDIX_DIVIDES_WITH_AVX2)
+#if defined(RAYDIX_X86_INTRINSICS)
     const bool with_avx2_ = __builtin_cpu_supports("avx2");
 #endif
     std::vector<Entry> entries_;

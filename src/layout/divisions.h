@@ -7,19 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#if defined(__x86_64__) && defined(__GNUC__)
-// GCC 12 takes the undefined operands of its own intrinsics for mistakes.
-#pragma GCC diagnostic push
-#if !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wuninitialized"
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
-#include <immintrin.h>
-#pragma GCC diagnostic pop
-#define RAYDIX_DIVIDES_WITH_AVX2
-#endif
-
 #include "base/math.h"
+#include "base/x86_intrinsics.h"
 
 namespace raydix {
 
@@ -60,7 +49,7 @@ Divisions<width> cheapest_divisions(const float* a, const float* b) {
     return out;
 }
 
-#if defined(RAYDIX_DIVIDES_WITH_AVX2)
+#if defined(RAYDIX_X86_INTRINSICS)
 
 /// Lane i - 1 of [j]: where the two costs of the j-th division of i lie; 7, where there is none.
 struct DivisionPlaces {

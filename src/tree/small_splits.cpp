@@ -4,16 +4,9 @@
 
 #include "base/float4.h"
 #include "base/math.h"
+#include "base/x86_intrinsics.h"
 
-#if defined(__x86_64__) && defined(__GNUC__)
-// GCC 12 takes the undefined operands of its own intrinsics for mistakes.
-#pragma GCC diagnostic push
-#if !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wuninitialized"
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
-#include <immintrin.h>
-#pragma GCC diagnostic pop
+#if defined(RAYDIX_X86_INTRINSICS)
 #define RAYDIX_WITH_WIDE_LANES
 #define RAYDIX_AVX2 __attribute__((target("avx2")))
 #define RAYDIX_AVX512 __attribute__((target("avx512f")))

@@ -54,7 +54,7 @@ TEST(Divisions, AreTheCheapestAndAmongEqualOnesTheMostEven) {
 }
 
 TEST(Divisions, TakeSubtreesTheSameWayInVectors) {
-#if defined(RAYDIX_DIVIDES_WITH_AVX2)
+#if defined(RAYDIX_X86_INTRINSICS)
     if (!__builtin_cpu_supports("avx2")) GTEST_SKIP() << "the processor has no AVX2";
     std::mt19937 random(8);
     for (int round = 0; round < 5000; ++round) {

@@ -167,13 +167,9 @@ private:
         };
         const Sheared a = at(0), b = at(1), c = at(2);
         const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
-        const V zero = hn::Zero(f16);
-        const V least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
-        const auto outside = hn::And(hn::Lt(least, zero), hn::Gt(largest, zero));
-        std::uint32_t candidates = wanted & ~bits_of(f16, outside);
+        std::uint32_t candidates = wanted & ~bits_of(f16, outside(u, v, w));
         if (candidates == 0) return false;
-        const auto on_edge = hn::Or(hn::Or(hn::Eq(u, zero), hn::Eq(v, zero)), hn::Eq(w, zero));
-        std::uint32_t near_edge = candidates & bits_of(f16, on_edge);
+        std::uint32_t near_edge = candidates & bits_of(f16, on_edge(u, v, w));
         candidates &= ~near_edge;
         bool changed = false;
         for (; near_edge != 0; near_edge &= near_edge - 1) {
@@ -190,10 +186,7 @@ private:
         const V determinant = hn::Add(hn::Add(u, v), w);
         const V inverse = hn::Div(hn::Set(f16, 1.0f), direction);
         const V shear_z = spread(inverse, p_.kind.kz);
-        const V depth =
-            hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)), hn::Mul(v, hn::Mul(shear_z, b.z))),
-                    hn::Mul(w, hn::Mul(shear_z, c.z)));
-        V t = hn::Div(depth, determinant);
+        V t = hn::Div(depth_of(a, b, c, u, v, w, shear_z), determinant);
         V entry = hn::Set(f16, -infinity), exit = hn::Set(f16, infinity);
         for (std::uint32_t axis = 0; axis < 3; ++axis) {
             const V p = hn::LoadDup128(f16, block.corner[axis]),
@@ -206,11 +199,8 @@ private:
             entry = hn::IfThenElse(hn::Gt(near, entry), near, entry);
             exit = hn::IfThenElse(hn::Lt(far, exit), far, exit);
         }
-        V held = hn::IfThenElse(hn::Gt(t, entry), t, entry);
-        held = hn::IfThenElse(hn::Lt(held, exit), held, exit);
-        t = hn::IfThenElse(hn::Le(entry, exit), held, t);
-        const auto sound = hn::And(hn::Ne(determinant, hn::Zero(f16)),
-                                   hn::Lt(hn::Abs(determinant), hn::Set(f16, infinity)));
+        t = held_within(t, entry, exit);
+        const Lanes sound = is_sound(determinant);
         candidates &= bits_of(f16, sound);
         HWY_ALIGN float ts[lanes16], us[lanes16], vs[lanes16];
         hn::Store(t, f16, ts);
@@ -245,6 +235,33 @@ private:
     static HWY_INLINE V edge(const Sheared& a, const Sheared& b) {
         return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
     }
+    using Lanes = hn::Mask<F16>;
+    /// Edge functions of both signs.
+    static HWY_INLINE Lanes outside(V u, V v, V w) {
+        const V zero = hn::Zero(f16);
+        return hn::And(hn::Lt(hn::Min(hn::Min(u, v), w), zero),
+                       hn::Gt(hn::Max(hn::Max(u, v), w), zero));
+    }
+    static HWY_INLINE Lanes on_edge(V u, V v, V w) {
+        const V zero = hn::Zero(f16);
+        return hn::Or(hn::Or(hn::Eq(u, zero), hn::Eq(v, zero)), hn::Eq(w, zero));
+    }
+    static HWY_INLINE V depth_of(const Sheared& a, const Sheared& b, const Sheared& c, V u, V v,
+                                 V w, V shear_z) {
+        return hn::Add(
+            hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)), hn::Mul(v, hn::Mul(shear_z, b.z))),
+            hn::Mul(w, hn::Mul(shear_z, c.z)));
+    }
+    /// t within the triangle's box.
+    static HWY_INLINE V held_within(V t, V entry, V exit) {
+        V held = hn::IfThenElse(hn::Gt(t, entry), t, entry);
+        held = hn::IfThenElse(hn::Lt(held, exit), held, exit);
+        return hn::IfThenElse(hn::Le(entry, exit), held, t);
+    }
+    static HWY_INLINE Lanes is_sound(V determinant) {
+        return hn::And(hn::Ne(determinant, hn::Zero(f16)),
+                       hn::Lt(hn::Abs(determinant), hn::Set(f16, infinity)));
+    }
 
     /// intersect_triangle for the rays i + (bits of `wanted`): the same bits. Whether any ray came
     /// nearer.
@@ -255,13 +272,9 @@ private:
                       b = shear<one_origin>(block, corners, 1, lane, i),
                       c = shear<one_origin>(block, corners, 2, lane, i);
         const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
-        const V zero = hn::Zero(f16);
-        const V least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
-        const auto outside = hn::And(hn::Lt(least, zero), hn::Gt(largest, zero));
-        std::uint32_t candidates = wanted & ~bits_of(f16, outside);
+        std::uint32_t candidates = wanted & ~bits_of(f16, outside(u, v, w));
         if (candidates == 0) return false;
-        const auto on_edge = hn::Or(hn::Or(hn::Eq(u, zero), hn::Eq(v, zero)), hn::Eq(w, zero));
-        const std::uint32_t near_edge = candidates & bits_of(f16, on_edge);
+        const std::uint32_t near_edge = candidates & bits_of(f16, on_edge(u, v, w));
         bool changed = false;
         if (near_edge != 0) changed = test_exactly(block, lane, i, near_edge);
         candidates &= ~near_edge;
@@ -304,10 +317,7 @@ private:
                            const Sheared& c, V u, V v, V w) {
         const V determinant = hn::Add(hn::Add(u, v), w);
         const V shear_z = hn::Load(f16, p_.shear_z + i);
-        const V depth =
-            hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)), hn::Mul(v, hn::Mul(shear_z, b.z))),
-                    hn::Mul(w, hn::Mul(shear_z, c.z)));
-        V t = hn::Div(depth, determinant);
+        V t = hn::Div(depth_of(a, b, c, u, v, w, shear_z), determinant);
         V entry = hn::Set(f16, -infinity), exit = hn::Set(f16, infinity);
         for (int axis = 0; axis < 3; ++axis) {
             const float p = block.corner[axis][lane], q = block.corner[3 + axis][lane],
@@ -322,12 +332,9 @@ private:
             entry = hn::IfThenElse(hn::Gt(near, entry), near, entry);
             exit = hn::IfThenElse(hn::Lt(far, exit), far, exit);
         }
-        V held = hn::IfThenElse(hn::Gt(t, entry), t, entry);
-        held = hn::IfThenElse(hn::Lt(held, exit), held, exit);
-        t = hn::IfThenElse(hn::Le(entry, exit), held, t);
+        t = held_within(t, entry, exit);
         const V reach = hn::Load(f16, p_.t + i);
-        const auto sound = hn::And(hn::Ne(determinant, hn::Zero(f16)),
-                                   hn::Lt(hn::Abs(determinant), hn::Set(f16, infinity)));
+        const Lanes sound = is_sound(determinant);
         const auto in_reach = hn::And(hn::Ge(t, hn::Load(f16, p_.tmin + i)), hn::Le(t, reach));
         candidates &= bits_of(f16, hn::And(sound, in_reach));
         if (candidates == 0) return false;
