@@ -1,7 +1,5 @@
 #include "core_tree.h"
 
-#include <raydix/machine.h>
-
 namespace raydix::cli {
 
 Json core_tree_json(const CoreFigures& f) {
@@ -10,7 +8,7 @@ Json core_tree_json(const CoreFigures& f) {
             {"bits", f.bits},
             {"max_leaf", f.max_leaf},
             {"device", "cpu"},
-            {"threads", f.threads > 0 ? f.threads : machine_info().cores},
+            {"threads", threads_at_work(f.threads)},
             {"primitives", f.input_count},
             {"left_out", f.left_out},
             {"nodes", f.nodes},

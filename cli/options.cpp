@@ -11,12 +11,23 @@
 
 namespace raydix::cli {
 
+void add_result_limit(CLI::App& command, std::uint64_t& max_result_bytes) {
+    command
+        .add_option("--max-result-bytes", max_result_bytes,
+                    "Memory that a result of any length may take, with all it needs on the way "
+                    "(0: half of what is left); more is an error")
+        ->check(CLI::NonNegativeNumber)
+        ->type_name("BYTES");
+}
+
 void add_common_options(CLI::App& command, CommonOptions& options) {
     command
         .add_option("--json", options.json_file,
                     "Write one JSON document to FILE ('-': standard output)")
         ->type_name("FILE");
-    command.add_option("--threads", options.threads, "Threads to use (0: all the machine has)")
+    command
+        .add_option("--threads", options.threads,
+                    "Threads to use, 0 to 1024 (0, or more than the machine has: all it has)")
         ->check(CLI::Range(0, 1024));
     command.add_flag("--quiet", options.quiet, "Print no tables and no progress");
     command.add_option("--seed", options.seed, "Seed of built-in scenes and sampling")

@@ -65,6 +65,9 @@ void refuse_device(const TreeOptions& tree);
 /// For add_option(...)->check: a finite number above 0, or from 0 on.
 [[nodiscard]] CLI::Validator finite_number(bool zero_too);
 
+/// --max-result-bytes.
+void add_result_limit(CLI::App& command, std::uint64_t& max_result_bytes);
+
 /// Runs `work`; puts the scene that the user named before what the library has to say about its
 /// geometry.
 template <class Work>

@@ -2,16 +2,15 @@
 
 #include <fmt/format.h>
 #include <raydix/error.h>
+#include <raydix/files.h>
 #include <raydix/machine.h>
 #include <raydix/version.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <iostream>
 
 namespace raydix::cli {
@@ -96,7 +95,7 @@ Json build_json(const Bvh& bvh, const TreeStats& stats, const std::vector<BuildM
                {"max_leaf", options.max_leaf},
                {"reinsertion_rounds", options.reinsertion_rounds},
                {"device", "cpu"},
-               {"threads", options.threads > 0 ? options.threads : machine_info().cores},
+               {"threads", threads_at_work(options.threads)},
                {"primitives", bvh.input_count()},
                {"left_out", bvh.left_out()},
                {"nodes", stats.nodes},
@@ -183,9 +182,7 @@ void write_json(const Json& document, const CommonOptions& common) {
         if (!std::cout) throw InputError("standard output: cannot be written");
         return;
     }
-    std::ofstream file(common.json_file, std::ios::binary);
-    file << text << std::flush;
-    if (!file) throw InputError(common.json_file + ": cannot be written: " + std::strerror(errno));
+    write_file(common.json_file, std::as_bytes(std::span(text)));
 }
 
 Progress::Progress(std::string what, const CommonOptions& common)
@@ -207,6 +204,11 @@ void Progress::show(double part) {
 
 Progress::~Progress() {
     if (shown_) fmt::print(stderr, "\r\033[K");
+}
+
+int threads_at_work(int asked) {
+    const int cores = machine_info().cores;
+    return asked > 0 ? std::min(asked, cores) : cores;
 }
 
 std::string grouped(std::uint64_t n) {

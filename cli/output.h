@@ -56,6 +56,9 @@ private:
     double started_, last_ = 0.0;
 };
 
+/// How many threads an option stands for: no more than the machine has, and all for 0.
+[[nodiscard]] int threads_at_work(int asked);
+
 /// 12345678 -> "12,345,678".
 [[nodiscard]] std::string grouped(std::uint64_t n);
 

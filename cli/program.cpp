@@ -14,27 +14,28 @@ namespace raydix::cli {
 namespace {
 
 /// One line, whatever the names of files hold.
-int report(std::string_view reason) {
+int report(std::string_view reason, int code = 1) {
     std::string line = "raydix: ";
     for (const char c : reason) {
         const auto byte = static_cast<unsigned char>(c);
         line += byte < 0x20 || byte == 0x7F ? fmt::format("\\x{:02X}", byte) : std::string(1, c);
     }
     fmt::print(stderr, "{}\n", line);
-    return 1;
+    return code;
 }
 
+/// 0 if only help or the version was asked for.
 int usage(const CLI::App& app, const CLI::ParseError& error, const char* first_word) {
+    if (error.get_exit_code() == 0) return app.exit(error);
     const bool unknown = app.get_require_subcommand_min() > 0 && first_word != nullptr &&
                          first_word[0] != '-' &&
                          app.get_subcommands([&](const CLI::App* command) {
                                 return command->get_name() == first_word;
                             })
                              .empty();
-    if (!unknown) return app.exit(error) == 0 ? 0 : 2;
-    fmt::print(stderr, "'{}' is not a command\nRun with --help for more information.\n",
-               first_word);
-    return 2;
+    const std::string reason =
+        unknown ? fmt::format("'{}' is not a command", first_word) : error.what();
+    return report(reason + "; run with --help for more information", 2);
 }
 
 }  // namespace

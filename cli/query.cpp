@@ -29,6 +29,8 @@ void run_query(const QueryCommand& options) {
         return run_point_query(options);
     }
     refuse(options.sort, "--sort", "belongs to --radius and --box");
+    refuse(options.max_result_bytes != 0 && !options.pairs, "--max-result-bytes",
+           "belongs to --knn, --radius, --box and --pairs");
     refuse(options.tree != "automatic", "--tree", "belongs to --knn, --radius and --box");
     refuse(options.pairs && !options.queries_file.empty(), "--queries", "has no part in --pairs");
     run_mesh_query(options);
@@ -142,6 +144,7 @@ void add_query_command(CLI::App& app) {
     command->add_option("--repeat", options->repeat, "Timed runs after a warm-up")
         ->check(CLI::Range(0, 1000))
         ->capture_default_str();
+    add_result_limit(*command, options->max_result_bytes);
     add_common_options(*command, options->common);
     command->callback([options] { run_query(*options); });
 }

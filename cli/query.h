@@ -20,6 +20,7 @@ struct QueryCommand {
     bool box = false, sort = false, strict = false;
     bool closest = false, signed_distance = false, pairs = false, narrow = false;
     int repeat = 5;
+    std::uint64_t max_result_bytes = 0;
 };
 
 /// What a kind of query found, and how long each repeat took.

@@ -97,7 +97,9 @@ QueryFigures answer_signed(const QueryCommand& options, const SceneTree& tree, J
 QueryFigures answer_pairs(const QueryCommand& options, const SceneTree& tree) {
     std::optional<SceneTree> other;
     if (!options.with_scene.empty()) other = load_tree(options.with_scene, options);
-    const PairOptions how{.narrow = options.narrow, .threads = options.common.threads};
+    const PairOptions how{.narrow = options.narrow,
+                          .max_result_bytes = options.max_result_bytes,
+                          .threads = options.common.threads};
     std::vector<PrimitivePair> pairs;
     QueryFigures figures;
     figures.kind = "pairs";

@@ -82,7 +82,9 @@ QueryFigures answer_lists(const QueryCommand& options, const char* kind, const S
 }
 
 QueryFigures answer(const QueryCommand& options, const Points& index, const Scene& scene) {
-    const PointQueryOptions how{.threads = options.common.threads, .sort = options.sort};
+    const PointQueryOptions how{.threads = options.common.threads,
+                                .sort = options.sort,
+                                .max_result_bytes = options.max_result_bytes};
     if (options.k) return answer_nearest(options, index, scene, how);
     if (options.radius) {
         const std::vector<Vec3> queries = load_queries(options, scene);
@@ -98,7 +100,7 @@ Json index_json(const Points& index, int threads) {
     const PointsBuildMs& ms = index.build_ms();
     return {{"tree", points_tree_name(index.tree())},
             {"device", "cpu"},
-            {"threads", threads},
+            {"threads", threads_at_work(threads)},
             {"points", index.size()},
             {"left_out", index.left_out()},
             {"nodes", index.node_count() + index.leaf_count()},

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <raydix/error.h>
 #include <raydix/rays.h>
+#include <raydix/result_limit.h>
 #include <raydix/trace.h>
 
 #include <chrono>
@@ -34,6 +35,7 @@ struct TraceCommand {
     float ao_radius = 0.0f;
     bool explain = false;
     WideTraceOptions wide;
+    std::uint64_t max_result_bytes = 0;
 };
 
 /// Figures that grow with each batch.
@@ -54,6 +56,8 @@ struct Batch {
     std::vector<Hit> hits;               // of the last run, closest and all
     std::vector<std::uint64_t> offsets;  // of the last run, all
     std::vector<std::uint8_t> occluded;
+    std::uint64_t result_limit = 0;  // of all hits, those that are kept included; 0: of one run
+    std::uint64_t kept_bytes = 0;
 
     TraceCounts run(std::span<const Ray> rays, bool counters) {
         const TraceOptions options{.threads = common.threads, .counters = counters};
@@ -63,17 +67,31 @@ struct Batch {
             if (wide != nullptr) return wide->any(rays, occluded, options);
             return trace_any(bvh, rays, occluded, options);
         }
-        if (mode == Mode::all) {
+        if (mode == Mode::all) return run_all(rays, options);
+        hits.resize(rays.size());
+        if (kdtree != nullptr) return kd_trace(*kdtree, rays, hits, options);
+        if (wide != nullptr) return wide->closest(rays, hits, options);
+        return trace(bvh, rays, hits, options);
+    }
+
+private:
+    TraceCounts run_all(std::span<const Ray> rays, TraceOptions options) {
+        hits = {};  // never two results at once
+        offsets = {};
+        if (result_limit != 0 && kept_bytes >= result_limit)
+            throw ResultTooLarge("all hits", result_limit, false, result_limit);
+        options.max_result_bytes = result_limit - kept_bytes;
+        try {
             AllHits all =
                 wide != nullptr ? wide->all(rays, options) : trace_all(bvh, rays, options);
             hits = std::move(all.hits);
             offsets = std::move(all.offsets);
             return all.counts;
+        } catch (const ResultTooLarge& error) {
+            if (kept_bytes == 0) throw;
+            throw ResultTooLarge("all hits", kept_bytes + error.bytes(), error.is_exact(),
+                                 result_limit);
         }
-        hits.resize(rays.size());
-        if (kdtree != nullptr) return kd_trace(*kdtree, rays, hits, options);
-        if (wide != nullptr) return wide->closest(rays, hits, options);
-        return trace(bvh, rays, hits, options);
     }
 };
 
@@ -120,16 +138,41 @@ struct Kept {
     std::vector<Ray> rays;
     std::vector<Hit> hits;
     std::vector<std::uint64_t> offsets{0};  // all hits: where those of each ray begin
+
+    [[nodiscard]] std::uint64_t bytes() const {
+        return hits.capacity() * sizeof(Hit) + offsets.capacity() * sizeof(std::uint64_t);
+    }
 };
 
-void keep(const TraceCommand& options, std::span<const Ray> rays, const Batch& batch, Kept& kept) {
-    if (!options.rays_file.empty()) kept.rays.insert(kept.rays.end(), rays.begin(), rays.end());
-    if (options.hits_file.empty()) return;
-    const std::uint64_t before = kept.hits.size();
-    kept.hits.insert(kept.hits.end(), batch.hits.begin(), batch.hits.end());
-    if (batch.mode != Mode::all) return;
+/// Moves all hits of a batch behind those that are kept. For a while both and the longer list that
+/// takes them are there.
+void keep_all_hits(Batch& batch, Kept& kept) {
+    const std::uint64_t batch_bytes =
+        batch.hits.capacity() * sizeof(Hit) + batch.offsets.capacity() * sizeof(std::uint64_t);
+    const std::uint64_t longer =
+        (kept.hits.size() + batch.hits.size()) * sizeof(Hit) +
+        (kept.offsets.size() + batch.offsets.size()) * sizeof(std::uint64_t);
+    if (kept.hits.empty()) {
+        kept.hits = std::move(batch.hits);
+    } else {
+        require_result_bytes("all hits", kept.bytes() + batch_bytes + longer, batch.result_limit);
+        kept.hits.reserve(kept.hits.size() + batch.hits.size());
+        kept.hits.insert(kept.hits.end(), batch.hits.begin(), batch.hits.end());
+    }
+    batch.hits = {};
+    const std::uint64_t before = kept.offsets.back();
+    kept.offsets.reserve(kept.offsets.size() + batch.offsets.size());
     for (std::size_t i = 1; i < batch.offsets.size(); ++i)
         kept.offsets.push_back(before + batch.offsets[i]);
+    batch.offsets = {};
+    batch.kept_bytes = kept.bytes();
+}
+
+void keep(const TraceCommand& options, std::span<const Ray> rays, Batch& batch, Kept& kept) {
+    if (!options.rays_file.empty()) kept.rays.insert(kept.rays.end(), rays.begin(), rays.end());
+    if (options.hits_file.empty()) return;
+    if (batch.mode == Mode::all) return keep_all_hits(batch, kept);
+    kept.hits.insert(kept.hits.end(), batch.hits.begin(), batch.hits.end());
 }
 
 /// hits.npy; all hits also have hits.offsets.npy beside it.
@@ -316,6 +359,8 @@ void run_trace(const TraceCommand& given) {
     on_cpu.device = "cpu";
     const KdTraced traced = load_kdtree_traced(options.scene, on_cpu, options.common);
     const bool through_kdtree = traced.kdtree.has_value();
+    if (options.max_result_bytes != 0 && mode != Mode::all)
+        throw CLI::ValidationError("--max-result-bytes", "belongs to --mode all");
     if (through_kdtree && mode == Mode::all)
         throw CLI::ValidationError("--mode",
                                    "all hits go through a bvh; a kdtree gives the closest or any");
@@ -342,7 +387,12 @@ void run_trace(const TraceCommand& given) {
                 wide ? &*wide : nullptr,
                 {},
                 {},
-                {}};
+                {},
+                options.max_result_bytes,
+                0};
+    // What several batches keep has one limit, by the memory that is left before the first.
+    if (!options.hits_file.empty() && options.max_result_bytes == 0)
+        batch.result_limit = usual_result_bytes();
     Tally tally;
     Kept kept;
     if (!through_kdtree && !warps && !wide) explain(options, input.bvh);
@@ -449,6 +499,7 @@ void add_trace_command(CLI::App& app) {
         ->type_name("FILE.npy");
     command->add_option("--save-rays", options->rays_file, "Save the rays")->type_name("FILE.npy");
     command->add_flag("--explain", options->explain, "Say which layout and which code ran");
+    add_result_limit(*command, options->max_result_bytes);
     add_wide_trace_options(*command, options->wide);
     add_tree_options(*command, options->tree);
     add_common_options(*command, options->common);

@@ -19,3 +19,12 @@ if(RAYDIX_SANITIZE)
 elseif(CMAKE_BUILD_TYPE STREQUAL "Debug")
     target_compile_definitions(raydix_options INTERFACE RAYDIX_CHECKS=1)
 endif()
+
+# What the program `raydix` is hardened with in release builds. The library is not: rays would pay.
+# tests/structure/check_hardening.py looks.
+set(raydix_hardened_compile)
+set(raydix_hardened_link)
+if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT RAYDIX_SANITIZE)
+    set(raydix_hardened_compile -fstack-protector-strong -U_FORTIFY_SOURCE -D_FORTIFY_SOURCE=2)
+    set(raydix_hardened_link -pie -Wl,-z,relro -Wl,-z,now -Wl,-z,noexecstack)
+endif()

@@ -32,12 +32,12 @@ MAY_INCLUDE = {
     "api": {"*"},
 }
 # The lowest folders know only the plain structs, errors and arrays of the public headers.
-PUBLIC_HEADERS = {"base": {"types.h", "error.h"}, "exec": {"types.h", "error.h", "buffer.h"}}
+PUBLIC_HEADERS = {"base": {"types.h", "error.h"}, "exec": {"types.h", "error.h", "buffer.h", "result_limit.h"}}
 # Programs on top of the public API: none of src/, and their own folder.
 PROGRAMS = ("cli", "examples", "python")
 # Headers of one library -> the only files that may include them.
 PRIVATE_LIBRARIES = {
-    r"(tbb|oneapi)/.*": r"src/exec/parallel\.cpp",
+    r"(tbb|oneapi)/.*": r"src/exec/parallel\.cpp|tests/more_threads\.cpp",
     r"(cuda|cub|thrust|nv|nvtx3)/.*|cuda.*\.h": r"(src|tests|bench)/.*\.cuh?|src/base/atomic\.h",
     r"(embree\d?|nanoflann).*": r"(tests|bench)/.*",
     r"CGAL/.*": r"bench/.*",

@@ -14,8 +14,8 @@ namespace raydix {
 /// Throws InputError that names the file.
 [[nodiscard]] std::vector<float> load_array(const std::filesystem::path& file, std::size_t columns);
 
-/// Writes shape (N,), or (N, columns) if columns > 0, little-endian. Throws InputError that names
-/// the file.
+/// Writes shape (N,), or (N, columns) if columns > 0, little-endian. Throws as write_file of
+/// files.h.
 void save_array(const std::filesystem::path& file, std::span<const float> values,
                 std::size_t columns = 0);
 void save_array(const std::filesystem::path& file, std::span<const std::uint32_t> values,

@@ -54,7 +54,8 @@ struct BuildOptions {
         4;  // 1..255 primitives in a leaf; more means fewer nodes and more primitive tests
     Fit fit = Fit::as_published;
     bool strict = false;  // invalid primitives are an InputError instead of being left out
-    int threads = 0;      // 0: all the machine has. The tree does not depend on it
+    int threads = 0;      // 0 to 1,024; 0, or more than the machine has: all it has. The tree does
+                          // not depend on it
     int reinsertion_rounds =
         0;  // 0..255: so often, at most, large subtrees are then moved to better places; each round
             // costs 1 to 4 % of a build by sbvh or ploc, of small meshes up to 7 %, and up to 4
@@ -64,8 +65,12 @@ struct BuildOptions {
 /// What a tree is for: built each frame, built once for some million rays, built once for many.
 enum class Quality { fast, balanced, high };
 
+namespace detail {
+[[noreturn]] void refuse_quality(int number);
+}
+
 /// What the word stands for: apetrei; ploc and 2 rounds of reinsertion; sbvh and 4. Other options
-/// are as they are.
+/// are as they are. Throws InputError for a number that is none of the three.
 [[nodiscard]] constexpr BuildOptions build_options_for(Quality quality) {
     switch (quality) {
         case Quality::fast:
@@ -73,9 +78,9 @@ enum class Quality { fast, balanced, high };
         case Quality::balanced:
             return {.builder = Builder::ploc, .reinsertion_rounds = 2};
         case Quality::high:
-            break;
+            return {.builder = Builder::sbvh, .reinsertion_rounds = 4};
     }
-    return {.builder = Builder::sbvh, .reinsertion_rounds = 4};
+    detail::refuse_quality(static_cast<int>(quality));
 }
 
 /// 32 bytes. Inner: count == 0, children are nodes `first` and `first + 1`, left = lower code
@@ -134,6 +139,9 @@ public:
     [[nodiscard]] bool has_split_primitives() const {
         return order_.size() != input_count_ - left_out_;
     }
+    /// Whether the primitives have moved since the build (refit.h): a tree of the LBVH family is
+    /// then no longer in the order of its Morton codes.
+    [[nodiscard]] bool refitted() const { return refitted_; }
     [[nodiscard]] Aabb bounds() const;
 
     [[nodiscard]] const BuildMs& build_ms() const { return build_ms_; }
@@ -155,6 +163,7 @@ private:
     std::uint32_t max_depth_ = 0;
     std::uint64_t input_count_ = 0;
     std::uint64_t left_out_ = 0;
+    bool refitted_ = false;
     BuildMs build_ms_;
     std::uint64_t peak_bytes_ = 0;
 };
@@ -214,7 +223,7 @@ struct StatsOptions {
     bool with_epo = false;
     double epo_sample = 1.0;  // part of the triangles that EPO sums over, evenly spread, in (0, 1]
     bool with_hash = true;
-    int threads = 0;
+    int threads = 0;  // 0 to 1,024; 0: all the machine has
 };
 
 /// Walks the tree once for its statistics. SAH and EPO are sums in double, the same for every

@@ -17,7 +17,9 @@ struct CheckReport {
 
 /// Every invariant: slots in range and used once (so no cycle), each primitive in exactly one leaf,
 /// leaves within max_leaf and in order, every box the tight union of what it holds, exact depth,
-/// padding zero.
+/// padding zero. Trees of the LBVH family also: depth within its bound, no inner node that a leaf
+/// could have held, and, unless they were refitted, codes that ascend and split where they first
+/// differ.
 [[nodiscard]] CheckReport check(const Bvh& bvh);
 
 /// The same, and the leaf triangles are bit for bit those of `mesh`, or the leaf points its

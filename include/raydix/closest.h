@@ -26,7 +26,7 @@ struct ClosestPoint {
 struct ClosestOptions {
     float max_distance = infinity;  // points farther away are not found: d2 <= R*R, closed. A small
                                     // one saves time
-    int threads = 0;                // 0: all the machine has. Results do not depend on it
+    int threads = 0;  // 0 to 1,024; 0: all the machine has. Results do not depend on it
 };
 
 /// What a batch met.

@@ -141,7 +141,7 @@ struct ClosestPointD {
 
 struct ClosestOptionsD {
     double max_distance = infinity;  // d2 <= R*R, closed
-    int threads = 0;
+    int threads = 0;                 // 0 to 1,024; 0: all the machine has
 };
 
 /// For each query the least (d2, prim). queries [n] -> results [n]. Throws InputError: sizes that

@@ -1,6 +1,7 @@
 // What the library throws. It never exits, aborts or prints.
 #pragma once
 
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 
@@ -11,6 +12,27 @@ namespace raydix {
 class InputError : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
+};
+
+/// The result of a call, with all that the call holds on its way there, is larger than the option
+/// `max_result_bytes` lets it be. The message names the bytes.
+class ResultTooLarge : public InputError {
+public:
+    /// `exact`: the call needs `bytes`. Otherwise it needs more than that; it stopped before it
+    /// knew how many.
+    ResultTooLarge(const std::string& what, std::uint64_t bytes, bool exact, std::uint64_t limit)
+        : InputError(what + ": the result needs " + (exact ? "" : "more than ") +
+                     std::to_string(bytes) + " bytes; max_result_bytes lets it have " +
+                     std::to_string(limit)),
+          bytes_(bytes),
+          exact_(exact) {}
+
+    [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+    [[nodiscard]] bool is_exact() const { return exact_; }
+
+private:
+    std::uint64_t bytes_;
+    bool exact_;
 };
 
 /// The call asks for a device or a feature that this build or this machine does not have.

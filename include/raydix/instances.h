@@ -45,7 +45,7 @@ struct InstanceHit {
 struct InstanceTraceOptions {
     std::uint32_t mask = 0xFFFFFFFFu;           // of all rays
     std::span<const std::uint32_t> masks = {};  // of each ray, [rays], instead; or empty
-    int threads = 0;                            // 0: all the machine has
+    int threads = 0;                            // 0 to 1,024; 0: all the machine has
 };
 
 struct InstanceTraceCounts {

@@ -21,7 +21,7 @@ struct KdTreeOptions {
     int max_leaf = 0;     // 1..255 primitives in a leaf; more means fewer nodes and more tests.
                           // 0: 8 points or 4 triangles
     bool strict = false;  // invalid primitives are an InputError instead of being left out
-    int threads = 0;      // 0: all the machine has. The tree does not depend on it
+    int threads = 0;      // 0 to 1,024; 0: all the machine has. The tree does not depend on it
 };
 
 /// 16 bytes; the two children of a node lie side by side in 32.
@@ -143,8 +143,11 @@ struct KdNeighbor {
 };
 
 struct KdQueryOptions {
-    int threads = 0;        // 0: all the machine has. Results do not depend on it
+    int threads = 0;        // 0 to 1,024; 0: all the machine has. Results do not depend on it
     bool counters = false;  // also count nodes and distances; costs a little time
+    /// Bounds the peak of a call that makes room for its result. 0: half of what is left
+    /// (result_limit.h).
+    std::uint64_t max_result_bytes = 0;
 };
 
 /// What a batch met. The last two are 0 unless asked for.
@@ -158,7 +161,8 @@ struct KdQueryCounts {
 /// The k nearest points of each query, ordered by (d2, id), where d2 = (dx*dx + dy*dy) + dz*dz in
 /// float32 without FMA (contract.md 8). Any k > 0: rows end with missing ones where there are fewer
 /// points. A distance whose square overflows is infinite, but the point is there. queries [n] ->
-/// neighbors [n * k]. Throws InputError: sizes that do not fit, k = 0, a tree of triangles.
+/// neighbors [n * k]. Throws InputError: sizes that do not fit, k = 0, a tree of triangles; what
+/// makes room for its result throws ResultTooLarge before it does so.
 KdQueryCounts kd_nearest(const KdTree& tree, std::span<const Vec3> queries, std::uint32_t k,
                          std::span<KdNeighbor> neighbors, const KdQueryOptions& options = {});
 [[nodiscard]] std::vector<KdNeighbor> kd_nearest(const KdTree& tree, std::span<const Vec3> queries,

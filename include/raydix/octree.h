@@ -24,7 +24,7 @@ struct OctreeOptions {
     int max_level = -1;   // 0..10 or 0..21, the level that is not divided any more; -1: the highest
     int max_leaf = 4;     // 1.. points; a node with more is divided, unless it is at max_level
     bool strict = false;  // invalid primitives are an InputError instead of being left out
-    int threads = 0;      // 0: all the machine has. The tree does not depend on it
+    int threads = 0;      // 0 to 1,024; 0: all the machine has. The tree does not depend on it
 };
 
 /// 32 bytes. A node at level k is a cell of the grid that cuts the root in 2^k parts along each
@@ -168,10 +168,13 @@ struct PointsInBoxes {
 
 /// Ids of the points p with lo <= p <= hi on every axis, compared as floats: exact, and never cut
 /// short. Whole subtrees are skipped or taken by their integer cells, which is exact because the
-/// grid is monotone. Of triangles it is the centres that are asked about.
-[[nodiscard]] std::vector<std::uint32_t> points_in_box(const Octree& octree, const Aabb& box);
+/// grid is monotone. Of triangles it is the centres that are asked about. `max_result_bytes` bounds
+/// the peak of the call, 0: half of what is left (result_limit.h). Throws ResultTooLarge, an
+/// InputError, if it would take more.
+[[nodiscard]] std::vector<std::uint32_t> points_in_box(const Octree& octree, const Aabb& box,
+                                                       std::uint64_t max_result_bytes = 0);
 [[nodiscard]] PointsInBoxes points_in_boxes(const Octree& octree, std::span<const Aabb> boxes,
-                                            int threads = 0);
+                                            int threads = 0, std::uint64_t max_result_bytes = 0);
 
 struct OctreeStats {
     std::uint64_t nodes = 0;  // inner + leaves

@@ -12,9 +12,9 @@
 namespace raydix {
 
 struct OverlapOptions {
-    std::uint64_t max_bytes =
-        0;            // of the ids in a result. 0: a quarter of the memory that is available
-    int threads = 0;  // 0: all the machine has. Results do not depend on it
+    /// touch_all only: bounds the peak of the call. 0: half of what is left (result_limit.h).
+    std::uint64_t max_result_bytes = 0;
+    int threads = 0;  // 0 to 1,024; 0: all the machine has. Results do not depend on it
 };
 
 /// What a batch met.
@@ -43,8 +43,8 @@ struct OverlapLists {
     OverlapCounts counts;
 };
 
-/// As touch_any, but all of them. None is ever dropped: more than options.max_bytes is an
-/// InputError.
+/// As touch_any, but all of them. None is ever dropped. Throws ResultTooLarge, an InputError, if
+/// the call would take more than options.max_result_bytes.
 [[nodiscard]] OverlapLists touch_all(const Bvh& bvh, std::span<const Segment> queries,
                                      const OverlapOptions& options = {});
 [[nodiscard]] OverlapLists touch_all(const Bvh& bvh, std::span<const Sphere> queries,
@@ -69,10 +69,10 @@ struct SweepHit {
     [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
 };
 
-/// First contacts: for each sweep the least (t, prim), the same bits for every builder and thread
-/// count. In double inside: faces moved by the radius, cylinders around edges, balls around
-/// corners. sweeps [n] -> hits [n]. Throws InputError: sizes that differ, a tree of boxes or
-/// points.
+/// First contacts: for each sweep the least (t, prim) of those with a finite t, the same bits for
+/// every builder and thread count. In double inside: faces moved by the radius, cylinders around
+/// edges, balls around corners. sweeps [n] -> hits [n]. Throws InputError: sizes that differ, a
+/// tree of boxes or points.
 OverlapCounts sweep_spheres(const Bvh& bvh, std::span<const SphereSweep> sweeps,
                             std::span<SweepHit> hits, const OverlapOptions& options = {});
 [[nodiscard]] std::vector<SweepHit> sweep_spheres(const Bvh& bvh,

@@ -20,15 +20,16 @@ static_assert(sizeof(PrimitivePair) == 8);
 struct PairOptions {
     bool narrow = false;  // the triangles themselves must have a point in common, not only their
                           // boxes; decided without rounding, coplanar ones included
-    std::uint64_t max_bytes = 0;  // of the result. 0: a quarter of the memory that is available
-    int threads = 0;              // 0: all the machine has. Results do not depend on it
+    /// Bounds the peak of a call that keeps the pairs. 0: half of what is left (result_limit.h).
+    std::uint64_t max_result_bytes = 0;
+    int threads = 0;  // 0 to 1,024; 0: all the machine has. Results do not depend on it
 };
 
 /// Pairs whose boxes overlap (closed: to touch is to overlap), each once, sorted by (first,
 /// second); with `narrow`, of those the triangles that meet. Pairs of triangles of one tree that
 /// share a corner (the same place, bit for bit) are left out. All builders give the same pairs.
-/// None is ever dropped: a result of more than max_bytes is an InputError as soon as that is known,
-/// before room for it is made. Throws InputError: `narrow` for a tree of boxes or points.
+/// None is ever dropped. Throws InputError: `narrow` for a tree of boxes or points; ResultTooLarge,
+/// as soon as that is known, if the call would take more than max_result_bytes.
 [[nodiscard]] std::vector<PrimitivePair> overlapping_pairs(const Bvh& bvh,
                                                            const PairOptions& options = {});
 /// Between two trees; each may hold triangles, boxes or points. Nothing is left out.

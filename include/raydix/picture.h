@@ -31,7 +31,7 @@ struct RenderOptions {
     int samples = 0;
     float ao_radius = 0.0f;  // 0: 5 % of the box diagonal
     std::uint64_t seed = 1;
-    int threads = 0;
+    int threads = 0;  // 0 to 1,024; 0: all the machine has
     // Called with the part done, 0..1, on any thread, one at a time, while others render; what it
     // throws ends the render, and it is not called again.
     std::function<void(double)> progress;

@@ -72,7 +72,7 @@ enum class PointsTree : std::uint32_t {
 struct PointsOptions {
     PointsTree tree = PointsTree::automatic;
     bool strict = false;  // points that are not finite or beyond 1e12 are an InputError
-    int threads = 0;      // 0: all the machine has. The index does not depend on it
+    int threads = 0;      // 0 to 1,024; 0: all the machine has. The index does not depend on it
 };
 
 /// Milliseconds of a build.
@@ -162,11 +162,13 @@ enum class QueryOrder : std::uint32_t {
 };
 
 struct PointQueryOptions {
-    int threads = 0;    // 0: all the machine has
+    int threads = 0;    // 0 to 1,024; 0: all the machine has
     bool sort = false;  // rows by (distance, index) instead of by index
     QueryOrder order = QueryOrder::automatic;
-    std::uint64_t max_bytes = 0;  // of a result; 0: what the machine has left
-    std::string isa = {};         // one of point_instruction_sets(); empty: the best
+    /// Bounds the peak of a call that makes room for its result. 0: half of what is left
+    /// (result_limit.h).
+    std::uint64_t max_result_bytes = 0;
+    std::string isa = {};  // one of point_instruction_sets(); empty: the best
 };
 
 /// Instruction sets that batches can run in here, best first.
@@ -206,7 +208,8 @@ template <class Index>
 using ScalarOf = std::type_identity_t<typename Index::Scalar>;
 
 /// queries [n] -> indices and distances [n * k], the query's own point included if it is one of the
-/// index. Throws InputError: k = 0, sizes that do not fit, more memory than there is.
+/// index. Throws InputError: k = 0, sizes that do not fit. What makes
+/// room for its result throws ResultTooLarge, before it does so.
 template <class Index>
 PointQueryCounts knn(const Index& index, PointsOf<Index> queries, std::uint32_t k,
                      std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
@@ -222,7 +225,8 @@ std::uint32_t knn(const Index& index, const typename Index::Point& query,
                   std::span<std::uint32_t> indices, ScalarsOf<Index> distances);
 
 /// All points with d2 <= R*R. Zero finds equal points, infinity all. Throws InputError: a radius is
-/// negative or NaN (it is named), a result larger than memory (found before it is allocated).
+/// negative or NaN (it is named). ResultTooLarge, an InputError: the call would take more than
+/// options.max_result_bytes; known before the result is allocated.
 template <class Index>
 [[nodiscard]] PointLists<typename Index::Scalar> radius_search(
     const Index& index, PointsOf<Index> queries, ScalarOf<Index> radius,

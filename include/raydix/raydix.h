@@ -15,6 +15,7 @@
 #include <raydix/device_trees.h>     // IWYU pragma: export
 #include <raydix/double.h>           // IWYU pragma: export
 #include <raydix/error.h>            // IWYU pragma: export
+#include <raydix/files.h>            // IWYU pragma: export
 #include <raydix/hierarchy_study.h>  // IWYU pragma: export
 #include <raydix/instances.h>        // IWYU pragma: export
 #include <raydix/instances_d.h>      // IWYU pragma: export
@@ -30,6 +31,7 @@
 #include <raydix/rdx.h>              // IWYU pragma: export
 #include <raydix/refit.h>            // IWYU pragma: export
 #include <raydix/report.h>           // IWYU pragma: export
+#include <raydix/result_limit.h>     // IWYU pragma: export
 #include <raydix/scene.h>            // IWYU pragma: export
 #include <raydix/shapes.h>           // IWYU pragma: export
 #include <raydix/simulate.h>         // IWYU pragma: export

@@ -34,7 +34,7 @@ struct SecondaryOptions {
     // where tmax is finite), direction to 2^21. If not, rays follow the hits, `samples` in a row;
     // diffuse_shuffled rays are permuted at random by `seed` in any case.
     bool sorted = true;
-    int threads = 0;
+    int threads = 0;  // 0 to 1,024; 0: all the machine has
 };
 
 /// `samples` rays from each of `hits` (missed rays give none): Halton points (bases 2, 3),

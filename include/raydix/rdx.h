@@ -10,7 +10,7 @@
 namespace raydix {
 
 /// Versioned, little-endian, 64-byte aligned sections, a checksum (XXH3-128) per section and one
-/// over the header. Writes beside the target and renames, so that a reader never sees half a file.
+/// over the header. Writes as write_file of files.h, so that a reader never sees half a file.
 /// Throws InputError.
 void save_rdx(const std::filesystem::path& file, const Bvh& bvh, const Scene& scene);
 

@@ -26,10 +26,11 @@ public:
 
     /// New corners, with any indices, for the same number of triangles in the same order; or new
     /// places for points. Leaf copies, boxes of all nodes: as if the hierarchy had been built for
-    /// them. Throws InputError, the tree unchanged: another number of primitives than the tree was
-    /// built from; an index past the vertices; a primitive of the tree that is not valid any more,
-    /// or one that was left out and is valid now; a tree with parts of triangles. One case is found
-    /// late and leaves the tree empty: a triangle smaller than 1e-12 that is no point.
+    /// them. Bvh::refitted() is true from then on. Throws InputError, the tree unchanged: another
+    /// number of primitives than the tree was built from; an index past the vertices; a primitive
+    /// of the tree that is not valid any more, or one that was left out and is valid now; a tree
+    /// with parts of triangles. One case is found late and leaves the tree empty: a triangle
+    /// smaller than 1e-12 that is no point.
     RefitQuality refit(Bvh& bvh, const MeshView& mesh, int threads = 0) const;
     /// The same for a tree of boxes. A box smaller than 1e-12 is found late.
     RefitQuality refit(Bvh& bvh, std::span<const Aabb> boxes, int threads = 0) const;

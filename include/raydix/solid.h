@@ -33,7 +33,7 @@ enum class InsideRule : std::uint32_t {
 
 struct SolidOptions {
     InsideRule rule = InsideRule::automatic;
-    int threads = 0;  // 0: all the machine has. Results do not depend on it
+    int threads = 0;  // 0 to 1,024; 0: all the machine has. Results do not depend on it
 };
 
 /// A tree of triangles as the boundary of a body. Refers to the tree, which must outlive it and

@@ -29,10 +29,12 @@ enum class SimdPath : std::uint32_t {
 
 struct TraceOptions {
     TraceKernel kernel = TraceKernel::scalar;
-    int threads = 0;        // 0: all the machine has. Results do not depend on it
+    int threads = 0;        // 0 to 1,024; 0: all the machine has. Results do not depend on it
     bool counters = false;  // also count node visits and triangle tests; costs a little time
     SimdPath path = SimdPath::automatic;  // wide trees only
     std::string isa = {};  // wide trees only: one of simd_instruction_sets(); empty: the best
+    /// trace_all only: bounds the peak of the call. 0: half of what is left (result_limit.h).
+    std::uint64_t max_result_bytes = 0;
 };
 
 /// What a batch met. Counters are 0 unless asked for.
@@ -68,6 +70,8 @@ struct AllHits {
 
 /// Each triangle at most once per ray. Edges are half open (exact sign, then a top-left rule), so
 /// that the number of crossings of a closed mesh is right for rays through edges and vertices too.
+/// Throws ResultTooLarge, an InputError, if the call would take more than
+/// options.max_result_bytes.
 [[nodiscard]] AllHits trace_all(const Bvh& bvh, std::span<const Ray> rays,
                                 const TraceOptions& options = {});
 

@@ -15,7 +15,8 @@
 namespace raydix {
 
 /// Whether `ray` hits primitive `prim`, a position in the boxes that the tree was built over; if
-/// so, where: hit.t in [ray.tmin, ray.tmax] (others are no hits), and hit.u and hit.v as it likes.
+/// so, where: a finite hit.t in [ray.tmin, ray.tmax] (others are no hits; -0 becomes +0), and hit.u
+/// and hit.v as it likes.
 /// `ray` is the caller's, with tmax cut to the best hit so far. Called from several threads at
 /// once, in any order, at least once for each primitive that may have the closest hit.
 using IntersectPrimitive = std::function<bool(std::uint32_t prim, const Ray& ray, Hit& hit)>;

@@ -72,16 +72,27 @@ class Points:
         self._given = len(array)
 
     def knn(
-        self, queries: ArrayLike, k: int, *, threads: int | None = None
+        self,
+        queries: ArrayLike,
+        k: int,
+        *,
+        max_result_bytes: int = 0,
+        threads: int | None = None,
     ) -> dict[str, np.ndarray]:
         """The k nearest points of each query, nearest first; equal distances by index.
 
         `queries`: shape (..., D). `k`: any number of 1 or more. Returns "indices" (uint32) and
         "distances", both of shape (..., k). A query that is one of the points finds itself.
+        `max_result_bytes` bounds both arrays; 0: half of the memory that is left. InputError,
+        before they are made, if they would take more.
         """
         asked, lead = rows(queries, "queries", (self.dimension,), self.dtype)
         k = whole(k, "k", 1, 2**31)
         shape = lead + (k,)
+        bytes_each = UINT32.itemsize + self.dtype.itemsize
+        _core.require_result_bytes(
+            "knn", min(len(asked) * k * bytes_each, 2**64 - 1), max_result_bytes
+        )
         indices, distances = np.empty(shape, UINT32), np.empty(shape, self.dtype)
         flat = (len(asked), k)
         self._core.knn(
@@ -99,6 +110,7 @@ class Points:
         *,
         sort: bool = False,
         padded: bool = False,
+        max_result_bytes: int = 0,
         threads: int | None = None,
     ) -> dict[str, np.ndarray]:
         """All points within a distance of each query, the distance itself included (squares
@@ -109,7 +121,9 @@ class Points:
         Returns a dict: "offsets" (uint64, one more than queries), "indices" (uint32), "distances":
         row i, counted in C order, is offsets[i] to offsets[i + 1]. With `padded`: "counts" (...),
         "indices" and "distances" (..., longest row), filled up with 0xFFFFFFFF and infinity.
-        ValueError for a negative or NaN radius; InputError for a result larger than memory.
+        `max_result_bytes` bounds the peak memory of the call, the arrays included; 0: half of what
+        is left. InputError if it would take more: no point is ever dropped. ValueError for a
+        negative or NaN radius.
         """
         asked, lead = rows(queries, "queries", (self.dimension,), self.dtype)
         try:
@@ -121,11 +135,11 @@ class Points:
                 raise ValueError(f"r: expected a number or shape {lead}, given {describe(radii)}")
         radii = np.ascontiguousarray(radii.reshape(-1))
         offsets, indices, distances = self._core.radius(
-            asked, radii, sort, self._threads(threads)
+            asked, radii, sort, max_result_bytes, self._threads(threads)
         )
         if not padded:
             return {"offsets": offsets, "indices": indices, "distances": distances}
-        return _padded(offsets, indices, distances, lead)
+        return _padded(offsets, indices, distances, lead, max_result_bytes)
 
     def count(self, queries: ArrayLike, r: float, *, threads: int | None = None) -> np.ndarray:
         """How many points lie within the distance `r` of each query: uint32, with the leading shape
@@ -135,24 +149,34 @@ class Points:
         self._core.count(asked, number(r, "r"), counts.reshape(-1), self._threads(threads))
         return counts
 
-    def box(self, boxes: ArrayLike, *, threads: int | None = None) -> dict[str, np.ndarray]:
+    def box(
+        self, boxes: ArrayLike, *, max_result_bytes: int = 0, threads: int | None = None
+    ) -> dict[str, np.ndarray]:
         """All points in each closed box.
 
         `boxes`: shape (..., 2 D): lowest corner, highest corner. A box with lo > hi on an axis, NaN
         or infinity holds none. Returns "offsets" and "indices" as in `radius`, rows ascending.
+        `max_result_bytes` as in `radius`.
         """
         asked, _ = rows(boxes, "boxes", (2 * self.dimension,), self.dtype)
-        offsets, indices, _ = self._core.box(asked, self._threads(threads))
+        offsets, indices, _ = self._core.box(asked, max_result_bytes, self._threads(threads))
         return {"offsets": offsets, "indices": indices}
 
-    def pairs(self, r: float, *, threads: int | None = None) -> dict[str, np.ndarray]:
+    def pairs(
+        self, r: float, *, max_result_bytes: int = 0, threads: int | None = None
+    ) -> dict[str, np.ndarray]:
         """All pairs of points no farther apart than `r`.
 
         Returns "pairs" (P, 2) uint32 with i < j, sorted, and "distances" (P,). Points at the same
-        place are a pair.
+        place are a pair. `max_result_bytes` as in `radius`.
         """
         offsets, others, distances = self._core.neighbours(
-            number(r, "r"), False, self._threads(threads)
+            number(r, "r"), False, max_result_bytes, self._threads(threads)
+        )
+        lists = offsets.nbytes + others.nbytes + distances.nbytes
+        first, lengths = others.nbytes, 2 * offsets.nbytes + UINT32.itemsize * len(offsets)
+        _core.require_result_bytes(
+            "pairs", lists + 2 * others.nbytes + first + lengths, max_result_bytes
         )
         pairs = np.empty((len(others), 2), UINT32)
         pairs[:, 0] = np.repeat(
@@ -161,11 +185,13 @@ class Points:
         pairs[:, 1] = others
         return {"pairs": pairs, "distances": distances}
 
-    def neighbours(self, r: float, *, threads: int | None = None) -> dict[str, np.ndarray]:
+    def neighbours(
+        self, r: float, *, max_result_bytes: int = 0, threads: int | None = None
+    ) -> dict[str, np.ndarray]:
         """The points within `r` of each point, itself left out: one row for each point, as `radius`
-        has them."""
+        has them. `max_result_bytes` as in `radius`."""
         offsets, others, distances = self._core.neighbours(
-            number(r, "r"), True, self._threads(threads)
+            number(r, "r"), True, max_result_bytes, self._threads(threads)
         )
         return {"offsets": offsets, "indices": others, "distances": distances}
 
@@ -185,11 +211,18 @@ class Points:
 
 
 def _padded(
-    offsets: np.ndarray, indices: np.ndarray, distances: np.ndarray, lead: tuple[int, ...]
+    offsets: np.ndarray,
+    indices: np.ndarray,
+    distances: np.ndarray,
+    lead: tuple[int, ...],
+    max_result_bytes: int,
 ) -> dict[str, np.ndarray]:
     """Rows of any length -> a table as wide as the longest."""
     counts = np.diff(offsets).astype(np.int64)
     width = int(counts.max(initial=0))
+    lists = 3 * offsets.nbytes + indices.nbytes + distances.nbytes
+    place = UINT32.itemsize + distances.itemsize + 1  # of a table, and whether it is used
+    _core.require_result_bytes("radius", lists + len(counts) * width * place, max_result_bytes)
     table = np.full((len(counts), width), MISSING, UINT32)
     far = np.full((len(counts), width), np.inf, distances.dtype)
     used = np.arange(width) < counts[:, None]

@@ -274,6 +274,7 @@ class Scene(SceneViews):
         *,
         tmin: Any = None,
         tmax: Any = None,
+        max_result_bytes: int = 0,
     ) -> dict[str, np.ndarray]:
         """Every hit of every ray, from one traversal. Rays as in `intersect`.
 
@@ -281,9 +282,11 @@ class Scene(SceneViews):
         C order, stand at offsets[i] to offsets[i + 1] of "t", "prim", "u", "v", which are as in
         `intersect`, sorted by (t, prim). Each triangle counts once a ray; an edge belongs to one of
         its two triangles, so that crossings of a closed mesh are counted exactly.
+        `max_result_bytes` bounds the peak memory of the call, the arrays included; 0: half of what
+        is left. InputError if it would take more: no hit is ever dropped.
         """
         args, _ = ray_batch(rays, directions, tmin, tmax, self.dtype)
-        offsets, hits, _ = self._core.all_hits(*args, self.threads)
+        offsets, hits, _ = self._core.all_hits(*args, max_result_bytes, self.threads)
         return {"offsets": offsets, **self._hits(hits)}
 
     def closest_point(
@@ -351,17 +354,16 @@ class Scene(SceneViews):
         return numbers
 
     def overlaps(
-        self, other: Scene | None = None, *, narrow: bool = False, max_bytes: int = 0
+        self, other: Scene | None = None, *, narrow: bool = False, max_result_bytes: int = 0
     ) -> np.ndarray:
         """All pairs of triangles whose boxes overlap: shape (P, 2) uint32, sorted.
 
         Within this scene (i < j; pairs that share a corner are left out), or between it and `other`
         (i of this one, j of `other`). With `narrow` the triangles themselves must meet, decided
-        without rounding. InputError if the result would take more than `max_bytes` (0: a quarter of
-        the memory that is available): no pair is ever dropped. TypeError for scenes of different
-        types.
+        without rounding. `max_result_bytes` as in `all_hits`: no pair is ever dropped. TypeError
+        for scenes of different types.
         """
-        return self._core.overlaps(self._partner(other), narrow, max_bytes, self.threads)
+        return self._core.overlaps(self._partner(other), narrow, max_result_bytes, self.threads)
 
     def _partner(self, other: Scene | None) -> Any:
         """The core of a scene that this one can be held against."""
@@ -384,22 +386,22 @@ class Scene(SceneViews):
         *,
         spheres: ArrayLike | None = None,
         segments: ArrayLike | None = None,
-        max_bytes: int = 0,
+        max_result_bytes: int = 0,
     ) -> dict[str, np.ndarray]:
         """All triangles that each ball (x y z radius, shape (..., 4)) or segment (two points, shape
         (..., 6)) touches.
 
         Returns a dict: "offsets" (uint64, one more than queries) and "prim" (uint32, ascending in
-        each row). `max_bytes` as in `overlaps`.
+        each row). `max_result_bytes` as in `all_hits`.
         """
         if (spheres is None) == (segments is None):
             raise ValueError("touched_by: expected either spheres or segments")
         if spheres is not None:
             shapes, _ = rows(spheres, "spheres", (4,), self.dtype)
-            offsets, prims = self._core.touched_by_spheres(shapes, max_bytes, self.threads)
+            offsets, prims = self._core.touched_by_spheres(shapes, max_result_bytes, self.threads)
         else:
             shapes, _ = rows(segments, "segments", (6,), self.dtype)
-            offsets, prims = self._core.touched_by_segments(shapes, max_bytes, self.threads)
+            offsets, prims = self._core.touched_by_segments(shapes, max_result_bytes, self.threads)
         return {"offsets": offsets, "prim": prims}
 
     def refit(self, vertices: ArrayLike) -> dict[str, float]:
@@ -446,9 +448,8 @@ class Scene(SceneViews):
 
     def check(self) -> None:
         """Verifies every invariant of the binary tree (in float64: of its boxes); RuntimeError
-        names the first that does not hold. After a `refit` trees that were made from Morton codes
-        (quality "fast", LBVH builders) are no longer in their order, which is then what it names.
-        """
+        names the first that does not hold. Of trees that were made from Morton codes (quality
+        "fast", LBVH builders) their order is one, until a `refit`."""
         ok, broken = self._core.check()
         if not ok:
             raise RuntimeError(broken)

@@ -131,10 +131,13 @@ class Octree(_Tree):
         asked, lead = rows(points, "points", (3,), FLOAT32)
         return self._core.locate(asked).reshape(lead)
 
-    def points_in_boxes(self, boxes: ArrayLike) -> dict[str, np.ndarray]:
-        """Points in closed boxes (..., 6): "offsets" and "indices", rows ascending."""
+    def points_in_boxes(
+        self, boxes: ArrayLike, *, max_result_bytes: int = 0
+    ) -> dict[str, np.ndarray]:
+        """Points in closed boxes (..., 6): "offsets" and "indices", rows ascending.
+        `max_result_bytes` as in `Scene.all_hits`."""
         asked, _ = rows(boxes, "boxes", (6,), FLOAT32)
-        offsets, indices = self._core.points_in_boxes(asked)
+        offsets, indices = self._core.points_in_boxes(asked, max_result_bytes)
         return {"offsets": offsets, "indices": indices}
 
 

@@ -38,8 +38,10 @@ struct PointCalls {
         new (self) Index(build_points(given, options));
     }
 
-    static PointQueryOptions query_options(int threads, bool sort = false) {
-        return {.threads = threads_for(threads), .sort = sort};
+    static PointQueryOptions query_options(int threads, std::uint64_t max_result_bytes = 0,
+                                           bool sort = false) {
+        return {
+            .threads = threads_for(threads), .sort = sort, .max_result_bytes = max_result_bytes};
     }
 
     static std::pair<std::uint64_t, std::uint64_t> nearest(
@@ -69,6 +71,24 @@ struct PointCalls {
         return counts;
     }
 
+    /// search(options, begin, end) -> lists of these queries.
+    template <class Search>
+    static nb::tuple lists_in_pieces(const char* what, std::size_t queries,
+                                     PointQueryOptions options, const Search& search) {
+        PieceLimit limit(what, options.max_result_bytes);
+        std::vector<Lists> pieces;
+        in_pieces(queries, [&](std::size_t begin, std::size_t end) {
+            pieces.push_back(limit.next([&](std::uint64_t bytes) {
+                options.max_result_bytes = bytes;
+                return search(options, begin, end);
+            }));
+            limit.hold(
+                piece_bytes(pieces.back(), &Lists::offsets, &Lists::indices, &Lists::distances));
+        });
+        require_room_to_join(limit, pieces, &Lists::offsets, &Lists::indices, &Lists::distances);
+        return lists_of(pieces);
+    }
+
     static nb::tuple lists_of(std::vector<Lists>& pieces) {
         auto offsets = join_offsets(pieces);
         auto indices = hand_over(join_column(pieces, &Lists::indices));
@@ -77,20 +97,19 @@ struct PointCalls {
 
     /// One radius for all, or one for each.
     static nb::tuple radius(const Index& index, const PointRows& queries, const Values& radii,
-                            bool sort, int threads) {
+                            bool sort, std::uint64_t max_result_bytes, int threads) {
         const auto asked = rows<Point>(queries);
         const std::span all(radii.data(), radii.shape(0));
         if (all.size() != 1 && all.size() != asked.size())
             throw nb::value_error("radii have another length than the queries");
-        std::vector<Lists> pieces;
-        in_pieces(asked.size(), [&](std::size_t begin, std::size_t end) {
-            const auto part = asked.subspan(begin, end - begin);
-            pieces.push_back(all.size() == 1
-                                 ? radius_search(index, part, all[0], query_options(threads, sort))
-                                 : radius_search(index, part, all.subspan(begin, end - begin),
-                                                 query_options(threads, sort)));
-        });
-        return lists_of(pieces);
+        return lists_in_pieces(
+            "radius", asked.size(), query_options(threads, max_result_bytes, sort),
+            [&](const PointQueryOptions& options, std::size_t begin, std::size_t end) {
+                const auto part = asked.subspan(begin, end - begin);
+                return all.size() == 1
+                           ? radius_search(index, part, all[0], options)
+                           : radius_search(index, part, all.subspan(begin, end - begin), options);
+            });
     }
 
     static void count(const Index& index, const PointRows& queries, Scalar radius,
@@ -105,22 +124,23 @@ struct PointCalls {
         });
     }
 
-    static nb::tuple box(const Index& index, const BoxRows& boxes, int threads) {
+    static nb::tuple box(const Index& index, const BoxRows& boxes, std::uint64_t max_result_bytes,
+                         int threads) {
         const auto asked = rows<Box>(boxes);
-        std::vector<Lists> pieces;
-        in_pieces(asked.size(), [&](std::size_t begin, std::size_t end) {
-            pieces.push_back(
-                box_search(index, asked.subspan(begin, end - begin), query_options(threads)));
-        });
-        return lists_of(pieces);
+        return lists_in_pieces(
+            "box", asked.size(), query_options(threads, max_result_bytes),
+            [&](const PointQueryOptions& options, std::size_t begin, std::size_t end) {
+                return box_search(index, asked.subspan(begin, end - begin), options);
+            });
     }
 
-    static nb::tuple neighbours(const Index& index, Scalar radius, bool full, int threads) {
+    static nb::tuple neighbours(const Index& index, Scalar radius, bool full,
+                                std::uint64_t max_result_bytes, int threads) {
         std::vector<Lists> pieces;
         {
             const nb::gil_scoped_release unlocked;
             pieces.push_back(neighbour_lists(index, radius, full ? PairRows::full : PairRows::half,
-                                             query_options(threads)));
+                                             query_options(threads, max_result_bytes)));
         }
         return lists_of(pieces);
     }
@@ -154,12 +174,13 @@ struct PointCalls {
             .def("knn", &nearest, nb::arg("queries").noconvert(), nb::arg("indices").noconvert(),
                  nb::arg("distances").noconvert(), nb::arg("threads") = 0)
             .def("radius", &radius, nb::arg("queries").noconvert(), nb::arg("radii").noconvert(),
-                 nb::arg("sort") = false, nb::arg("threads") = 0)
+                 nb::arg("sort") = false, nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
             .def("count", &count, nb::arg("queries").noconvert(), nb::arg("radius"),
                  nb::arg("counts").noconvert(), nb::arg("threads") = 0)
-            .def("box", &box, nb::arg("boxes").noconvert(), nb::arg("threads") = 0)
-            .def("neighbours", &neighbours, nb::arg("radius"), nb::arg("full"),
+            .def("box", &box, nb::arg("boxes").noconvert(), nb::arg("max_result_bytes") = 0,
                  nb::arg("threads") = 0)
+            .def("neighbours", &neighbours, nb::arg("radius"), nb::arg("full"),
+                 nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
             .def("order", [](const Index& index) { return hand_over(index.order()); })
             .def("stats", &stats)
             .def("__len__", [](const Index& index) { return index.size(); });

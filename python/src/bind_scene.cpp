@@ -165,21 +165,27 @@ Counts occluded(Scene& scene, Rays& rays, const FlagsOut& out, int threads) {
 }
 
 template <class Scene, class Rays>
-nb::tuple all_hits(Scene& scene, Rays& rays, int threads) {
-    const TraceOptions options{.threads = threads_for(threads)};
-    std::vector<typename Scene::Types::AllHits> pieces;
+nb::tuple all_hits(Scene& scene, Rays& rays, std::uint64_t max_result_bytes, int threads) {
+    using AllHits = typename Scene::Types::AllHits;
+    TraceOptions options{.threads = threads_for(threads)};
+    PieceLimit limit("all_hits", max_result_bytes);
+    std::vector<AllHits> pieces;
     std::uint64_t invalid = 0;
     read_in_pieces(
         scene, rays.size(),
         [&](std::size_t begin, std::size_t end) {
-            pieces.push_back(trace_all(scene.ray_tree(), rays.piece(begin, end), options));
+            pieces.push_back(limit.next([&](std::uint64_t bytes) {
+                options.max_result_bytes = bytes;
+                return trace_all(scene.ray_tree(), rays.piece(begin, end), options);
+            }));
+            limit.hold(piece_bytes(pieces.back(), &AllHits::offsets, &AllHits::hits));
             invalid += pieces.back().counts.invalid_rays;
         },
         first_listed);
+    require_room_to_join(limit, pieces, &AllHits::offsets, &AllHits::hits);
     auto offsets = join_offsets(pieces);
     return nb::make_tuple(
-        offsets, hand_over_rows<Scalar<Scene>>(join_column(pieces, &Scene::Types::AllHits::hits)),
-        invalid);
+        offsets, hand_over_rows<Scalar<Scene>>(join_column(pieces, &AllHits::hits)), invalid);
 }
 
 template <class Scene, class Rays>
@@ -314,10 +320,10 @@ auto with_two(Scene& scene, Scene* other, const Call& call) {
 }
 
 template <class Scene>
-Array2<std::uint32_t> overlaps(Scene& scene, Scene* other, bool narrow, std::uint64_t max_bytes,
-                               int threads) {
+Array2<std::uint32_t> overlaps(Scene& scene, Scene* other, bool narrow,
+                               std::uint64_t max_result_bytes, int threads) {
     const PairOptions options{
-        .narrow = narrow, .max_bytes = max_bytes, .threads = threads_for(threads)};
+        .narrow = narrow, .max_result_bytes = max_result_bytes, .threads = threads_for(threads)};
     auto pairs = with_two(scene, other, [&](const auto& a, const auto* b) {
         return b != nullptr ? overlapping_pairs(a, *b, options) : overlapping_pairs(a, options);
     });
@@ -334,13 +340,19 @@ std::uint64_t count_overlaps(Scene& scene, Scene* other, bool narrow, int thread
 }
 
 template <class Shape, class Scene, class Array>
-nb::tuple touched(Scene& scene, const Array& shapes, std::uint64_t max_bytes, int threads) {
+nb::tuple touched(Scene& scene, const Array& shapes, std::uint64_t max_result_bytes, int threads) {
     const auto queries = rows<Shape>(shapes);
-    const OverlapOptions options{.max_bytes = max_bytes, .threads = threads_for(threads)};
+    OverlapOptions options{.threads = threads_for(threads)};
+    PieceLimit limit("touched_by", max_result_bytes);
     std::vector<OverlapLists> pieces;
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        pieces.push_back(touch_all(scene.bvh(), queries.subspan(begin, end - begin), options));
+        pieces.push_back(limit.next([&](std::uint64_t bytes) {
+            options.max_result_bytes = bytes;
+            return touch_all(scene.bvh(), queries.subspan(begin, end - begin), options);
+        }));
+        limit.hold(piece_bytes(pieces.back(), &OverlapLists::offsets, &OverlapLists::prims));
     });
+    require_room_to_join(limit, pieces, &OverlapLists::offsets, &OverlapLists::prims);
     auto offsets = join_offsets(pieces);
     return nb::make_tuple(offsets, hand_over(join_column(pieces, &OverlapLists::prims)));
 }
@@ -441,8 +453,11 @@ void bind_rays(nb::class_<Scene>& scene) {
         },
         MoreArguments<const Counted&, int>(), nb::arg("counts").noconvert(), threads);
     def_for_rays<Ray>(
-        scene, "all_hits", [](Scene& self, auto& rays, int n) { return all_hits(self, rays, n); },
-        MoreArguments<int>(), threads);
+        scene, "all_hits",
+        [](Scene& self, auto& rays, std::uint64_t max_result_bytes, int n) {
+            return all_hits(self, rays, max_result_bytes, n);
+        },
+        MoreArguments<std::uint64_t, int>(), nb::arg("max_result_bytes") = 0, threads);
 }
 
 template <class Scene>
@@ -463,13 +478,14 @@ void bind_queries(nb::class_<Scene>& scene) {
              nb::arg("rule"), nb::arg("threads") = 0)
         .def("closure", &closure<Scene>)
         .def("overlaps", &overlaps<Scene>, nb::arg("other").none(), nb::arg("narrow"),
-             nb::arg("max_bytes") = 0, nb::arg("threads") = 0)
+             nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
         .def("count_overlaps", &count_overlaps<Scene>, nb::arg("other").none(), nb::arg("narrow"),
              nb::arg("threads") = 0)
         .def("touched_by_spheres", &touched<Sphere, Scene, Spheres>, nb::arg("spheres").noconvert(),
-             nb::arg("max_bytes") = 0, nb::arg("threads") = 0)
+             nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
         .def("touched_by_segments", &touched<Segment, Scene, Segments>,
-             nb::arg("segments").noconvert(), nb::arg("max_bytes") = 0, nb::arg("threads") = 0)
+             nb::arg("segments").noconvert(), nb::arg("max_result_bytes") = 0,
+             nb::arg("threads") = 0)
         .def("refit", &refit<Scene>, nb::arg("vertices").noconvert(), nb::arg("threads") = 0);
 }
 

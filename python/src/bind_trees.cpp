@@ -152,17 +152,18 @@ void bind_octree(nb::module_& module) {
             nb::arg("points").noconvert())
         .def(
             "points_in_boxes",
-            [](const Octree& tree, const In<float, nb::shape<-1, 6>>& boxes) {
+            [](const Octree& tree, const In<float, nb::shape<-1, 6>>& boxes,
+               std::uint64_t max_result_bytes) {
                 const auto queries = rows<Aabb>(boxes);
                 PointsInBoxes found;
                 {
                     const nb::gil_scoped_release unlocked;
-                    found = points_in_boxes(tree, queries, threads_for(0));
+                    found = points_in_boxes(tree, queries, threads_for(0), max_result_bytes);
                 }
                 return nb::make_tuple(hand_over(std::move(found.offsets)),
                                       hand_over(std::move(found.ids)));
             },
-            nb::arg("boxes").noconvert())
+            nb::arg("boxes").noconvert(), nb::arg("max_result_bytes") = 0)
         .def(
             "check", [](const Octree& tree) { require_ok(check(tree)); },
             nb::call_guard<nb::gil_scoped_release>());

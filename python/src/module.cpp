@@ -7,10 +7,12 @@
 #include <raydix/device.h>
 #include <raydix/error.h>
 #include <raydix/machine.h>
+#include <raydix/result_limit.h>
 #include <raydix/version.h>
 #include <raydix/wide.h>
 
 #include <atomic>
+#include <cstdint>
 #include <string>
 #include <utility>
 
@@ -38,6 +40,17 @@ void bind_errors(nb::module_& module) {
         "The call asks for a device or a feature that this build or this machine does not have.";
     nb::exception<DeviceError>(module, "DeviceError", PyExc_RuntimeError).doc() =
         "A call to a device failed. The message holds the driver's text.";
+}
+
+void bind_limits(nb::module_& module) {
+    module.def(
+        "require_result_bytes",
+        [](const std::string& what, std::uint64_t bytes, std::uint64_t max_result_bytes) {
+            require_result_bytes(what.c_str(), bytes, max_result_bytes);
+        },
+        nb::arg("what"), nb::arg("bytes"), nb::arg("max_result_bytes"),
+        "InputError if a result of so many bytes is more than the limit, or, that being 0, than "
+        "half of the memory that is left.");
 }
 
 nb::dict machine() {
@@ -82,6 +95,7 @@ NB_MODULE(_core, module) {
     pthread_atfork(nullptr, nullptr, in_forked_child);
     module.attr("__version__") = raydix::version;
     bind_errors(module);
+    bind_limits(module);
     module.def("machine", &machine, "The processor, cores this process may use, instruction set.");
     module.def("cuda_device", &cuda_device, "(whether a GPU can be used, its name or the reason).");
     module.def("simd_instruction_sets", &raydix::simd_instruction_sets,

@@ -9,6 +9,7 @@
 #include "api/bvh_builder_access.h"
 #include "api/input_checks.h"
 #include "base/check.h"
+#include "base/options.h"
 #include "exec/host_launcher.h"
 #include "exec/memory.h"
 #include "exec/parallel.h"
@@ -73,6 +74,8 @@ std::uint64_t bytes_held(const Scratch& s, const BvhAccess& tree) {
 }
 
 void check_options(const BuildOptions& options, std::size_t n) {
+    check_enum("builder", options.builder, Builder::sbvh);
+    check_enum("fit", options.fit, Fit::atomic);
     if (options.bits != 30 && options.bits != 63)
         throw InputError("build option bits is " + std::to_string(options.bits) +
                          "; it must be 30 or 63");
@@ -292,6 +295,7 @@ void build(const Source& source, std::size_t n, const char* kind_name, Primitive
     memory_count().restart_peak();
     tree.kind() = kind;
     tree.options() = options;
+    tree.refitted() = false;
     const auto run = [&] {
         const auto count = static_cast<std::uint32_t>(n);
         if (options.bits == 30)

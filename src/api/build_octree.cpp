@@ -94,7 +94,7 @@ private:
         for_each_index(order.size(), [&](std::size_t k) {
             Aabb box;
             source.box(order[k], box);
-            points[k] = center_of(box);
+            points[k] = without_negative_zero(center_of(box));  // of two subnormals it may be -0
         });
     }
 };

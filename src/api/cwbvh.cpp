@@ -7,6 +7,7 @@
 
 #include "base/float_env.h"
 #include "base/math.h"
+#include "base/options.h"
 #include "exec/parallel.h"
 #include "layout/cwbvh.h"
 #include "layout/wide_collapse.h"
@@ -61,6 +62,7 @@ CwbvhStats stats_of(const WideTree& wide, const WideOptions& options, const Bvh&
 }  // namespace
 
 Cwbvh::Cwbvh(const Bvh& bvh, int threads) : arrays_(std::make_unique<Arrays>()) {
+    check_threads(threads);
     if (bvh.empty()) return;
     if (bvh.kind() != PrimitiveKind::triangles)
         throw InputError(std::string("rays need triangles; this tree holds ") +

@@ -6,11 +6,15 @@
 
 #include "api/device_build.h"
 #include "api/device_fetch.h"
+#include "base/options.h"
 #include "tree/bvh_access.h"
 
 namespace raydix {
 
 void check_device_options(const BuildOptions& options, std::uint64_t n) {
+    check_enum("builder", options.builder, Builder::sbvh);
+    check_enum("fit", options.fit, Fit::atomic);
+    check_threads(options.threads);
     if (options.bits != 30 && options.bits != 63)
         throw InputError("build option bits is " + std::to_string(options.bits) +
                          "; it must be 30 or 63");

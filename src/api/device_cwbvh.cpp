@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "base/options.h"
 #include "layout/cwbvh.h"
 
 namespace raydix {
@@ -29,13 +30,13 @@ DeviceCwbvh::DeviceCwbvh(const Cwbvh& tree, Stream stream) {
 DeviceCwbvhTree DeviceCwbvh::tree() const { return tree_; }
 
 std::size_t device_cwbvh_scratch_bytes(CwbvhKernel kernel) {
+    check_enum("kernel", kernel, CwbvhKernel::persistent_cwbvh);
     return kernel == CwbvhKernel::persistent_cwbvh ? 256 : 0;
 }
 
 void check_cwbvh_launch(const DeviceCwbvhTree& tree, std::uint32_t count, CwbvhKernel kernel,
                         std::span<std::byte> scratch) {
-    if (kernel != CwbvhKernel::cwbvh && kernel != CwbvhKernel::persistent_cwbvh)
-        throw InputError("no such kernel of compressed wide trees");
+    check_enum("kernel", kernel, CwbvhKernel::persistent_cwbvh);
     if (count >= 1u << 31) throw InputError("2^31 rays or more in one launch");
     if (tree.max_depth > device_cwbvh_max_depth)
         throw InputError("the wide tree is " + std::to_string(tree.max_depth) +

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <string>
 
+#include "base/options.h"
 #include "exec/arena.h"
 #include "trace/warp/launch_warps.h"
 
@@ -25,6 +26,7 @@ struct DeviceWarpTree::Arrays {
     std::array<std::array<std::uint32_t, 2>, warp_kernel_count> resident_blocks{};
 
     [[nodiscard]] WarpLaunch launch(WarpKernel kernel, bool any_hit) const {
+        check_enum("kernel", kernel, WarpKernel::dynamic_fetch);
         return {kernel, any_hit, max_depth + 1};
     }
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "base/options.h"
 #include "exec/parallel.h"
 #include "keys/host_encode.h"
 #include "primitives/bounds.h"
@@ -90,6 +91,8 @@ HierarchyRun study_hierarchy(const MeshView& mesh, const BuildOptions& options, 
     run.fit = options.fit;
     run.bits = options.bits;
     run.max_leaf = options.max_leaf;
+    check_enum("builder", options.builder, Builder::sbvh);
+    check_enum("fit", options.fit, Fit::atomic);
     if (!in_lbvh_family(options.builder))
         throw InputError("builder " + std::string(builder_name(options.builder)) +
                          " is not of the LBVH family");

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "base/check.h"
+#include "base/options.h"
 #include "exec/memory.h"
 #include "exec/parallel.h"
 #include "measure/stopwatch.h"
@@ -81,9 +82,7 @@ void rebuild_arrays(detail::PointArrays<T, Dim>& arrays, const T* points, std::s
     forget(arrays);
     if (n > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
         throw InputError(std::to_string(n) + " points; an index holds fewer than 2^31");
-    if (static_cast<std::uint32_t>(options.tree) >= std::size(tree_names))
-        throw InputError("points tree " + std::to_string(static_cast<std::uint32_t>(options.tree)) +
-                         " is not one of automatic, kdtree, bvh");
+    check_enum("tree", options.tree, PointsTree::bvh);
     arrays.options = options;
     const bool first = arrays.leaves.empty();
     memory_count().restart_peak();
@@ -106,7 +105,8 @@ void rebuild_arrays(detail::PointArrays<T, Dim>& arrays, const T* points, std::s
 }  // namespace
 
 std::string_view points_tree_name(PointsTree tree) {
-    return tree_names[static_cast<std::uint32_t>(tree)];
+    const auto k = static_cast<std::uint32_t>(tree);
+    return k < std::size(tree_names) ? tree_names[k] : "unknown";
 }
 
 PointsTree points_tree_from_name(std::string_view name) {

@@ -5,6 +5,7 @@
 
 #include "api/point_rows.h"
 #include "base/float_env.h"
+#include "base/options.h"
 
 namespace raydix {
 namespace {
@@ -37,11 +38,47 @@ template <class Index>
 PointLists<typename Index::Scalar> lists_of(const Index& index, const Within<Index>& job,
                                             std::size_t values, bool boxes, const char* what,
                                             const PointQueryOptions& options) {
+    check_enum("order", options.order, QueryOrder::sorted);
     PointLists<typename Index::Scalar> result;
     with_threads(options.threads, [&] {
-        result = RowBatch<Index>(index, job, values, boxes, options).lists(job.n, nullptr, what);
+        ResultBudget budget(what, options.max_result_bytes);
+        result = RowBatch<Index>(index, job, values, boxes, options).lists(job.n, nullptr, budget);
     });
     return result;
+}
+
+/// order(queries) -> the order in which to take them.
+template <class Index, class Order>
+PointQueryCounts nearest(const Index& index, PointsOf<Index> queries, std::uint32_t k,
+                         std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
+                         const PointQueryOptions& options, const Order& order_of) {
+    using Scalar = typename Index::Scalar;
+    const KernelsOf<Index>& kernels = kernels_for<Index>(options.isa);
+    NearestJob<Scalar, Index::dimension> job{};
+    job.tree = index.arrays().tree;
+    job.queries = values_of<Scalar>(queries);
+    job.n = queries.size();
+    job.k = k;
+    job.indices = indices.data();
+    job.distances = distances.data();
+    std::vector<PointJobCounts> parts(blocks_of(job.n));
+    with_threads(options.threads, [&] {
+        const std::vector<std::uint32_t> order = order_of(job.queries);
+        for_each_block(job.n, queries_per_block,
+                       [&](std::size_t b, std::size_t begin, std::size_t end) {
+                           auto part = part_of(job, order, begin, end, Index::dimension);
+                           if (order.empty()) {
+                               part.indices += begin * k;
+                               part.distances += begin * k;
+                           }
+                           kernels.nearest(part, parts[b]);
+                       });
+    });
+    return sum_of(parts, job.n);
+}
+
+void require_neighbours(std::uint32_t k) {
+    if (k == 0) throw InputError("knn: k is 0; it must be at least 1");
 }
 
 }  // namespace
@@ -56,48 +93,36 @@ template <class Index>
 PointQueryCounts knn(const Index& index, PointsOf<Index> queries, std::uint32_t k,
                      std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
                      const PointQueryOptions& options) {
-    using Scalar = typename Index::Scalar;
-    if (k == 0) throw InputError("knn: k is 0; it must be at least 1");
+    check_enum("order", options.order, QueryOrder::sorted);
+    require_neighbours(k);
     for (const std::size_t room : {indices.size(), distances.size()})
         if (room / k != queries.size() || room % k != 0)
             throw InputError("knn: " + std::to_string(queries.size()) + " queries for " +
                              std::to_string(k) + " each, but room for " + std::to_string(room) +
                              " results");
-    const KernelsOf<Index>& kernels = kernels_for<Index>(options.isa);
-    NearestJob<Scalar, Index::dimension> job{};
-    job.tree = index.arrays().tree;
-    job.queries = values_of<Scalar>(queries);
-    job.n = queries.size();
-    job.k = k;
-    job.indices = indices.data();
-    job.distances = distances.data();
-    std::vector<PointJobCounts> parts(blocks_of(job.n));
-    with_threads(options.threads, [&] {
-        const auto order = order_for(index, job.queries, job.n, Index::dimension, options.order);
-        for_each_block(job.n, queries_per_block,
-                       [&](std::size_t b, std::size_t begin, std::size_t end) {
-                           auto part = part_of(job, order, begin, end, Index::dimension);
-                           if (order.empty()) {
-                               part.indices += begin * k;
-                               part.distances += begin * k;
-                           }
-                           kernels.nearest(part, parts[b]);
-                       });
-    });
-    return sum_of(parts, job.n);
+    return nearest(
+        index, queries, k, indices, distances, options, [&](const typename Index::Scalar* first) {
+            return order_for(index, first, queries.size(), Index::dimension, options.order);
+        });
 }
 
 template <class Index>
 NearestPoints<typename Index::Scalar> knn(const Index& index, PointsOf<Index> queries,
                                           std::uint32_t k, const PointQueryOptions& options) {
     using Scalar = typename Index::Scalar;
-    const std::uint64_t row_bytes = std::uint64_t{k} * (sizeof(std::uint32_t) + sizeof(Scalar));
-    const std::uint64_t bytes = saturating_product(queries.size(), row_bytes);
-    check_result_fits("knn", bytes, memory_limit(options.max_bytes, bytes));
+    check_enum("order", options.order, QueryOrder::sorted);
+    require_neighbours(k);
+    ResultBudget budget("knn", options.max_result_bytes);
+    budget.take_last(
+        saturating_product(queries.size(), k * (sizeof(std::uint32_t) + sizeof(Scalar))));
     NearestPoints<Scalar> result;
     result.indices.reset(queries.size() * k);
     result.distances.reset(queries.size() * k);
-    result.counts = knn(index, queries, k, result.indices.span(), result.distances.span(), options);
+    result.counts = nearest(index, queries, k, result.indices.span(), result.distances.span(),
+                            options, [&](const Scalar* first) {
+                                return order_within(budget, index, first, queries.size(),
+                                                    Index::dimension, options.order);
+                            });
     return result;
 }
 
@@ -129,7 +154,7 @@ PointLists<typename Index::Scalar> radius_search(const Index& index, PointsOf<In
     Within<Index> job =
         within_job(index, values_of<typename Index::Scalar>(queries), queries.size(), options);
     job.radius = radius;
-    return lists_of(index, job, Index::dimension, false, "radius search", options);
+    return lists_of(index, job, Index::dimension, false, "radius_search", options);
 }
 
 template <class Index>
@@ -145,12 +170,13 @@ PointLists<typename Index::Scalar> radius_search(
     Within<Index> job =
         within_job(index, values_of<typename Index::Scalar>(queries), queries.size(), options);
     job.radii = radii.data();
-    return lists_of(index, job, Index::dimension, false, "radius search", options);
+    return lists_of(index, job, Index::dimension, false, "radius_search", options);
 }
 
 template <class Index>
 PointQueryCounts radius_count(const Index& index, PointsOf<Index> queries, ScalarOf<Index> radius,
                               std::span<std::uint32_t> counts, const PointQueryOptions& options) {
+    check_enum("order", options.order, QueryOrder::sorted);
     check_radius(radius, "");
     if (counts.size() != queries.size())
         throw InputError("radius count: " + std::to_string(queries.size()) +
@@ -186,7 +212,7 @@ PointLists<typename Index::Scalar> box_search(
     const PointQueryOptions& options) {
     const Within<Index> job =
         within_job(index, values_of<typename Index::Scalar>(boxes), boxes.size(), options);
-    return lists_of(index, job, 2 * Index::dimension, true, "box search", options);
+    return lists_of(index, job, 2 * Index::dimension, true, "box_search", options);
 }
 
 template <class Index>
@@ -195,10 +221,14 @@ PointLists<typename Index::Scalar> neighbour_lists(const Index& index, ScalarOf<
                                                    const PointQueryOptions& options) {
     using Scalar = typename Index::Scalar;
     constexpr int dim = Index::dimension;
+    check_enum("rows", rows, PairRows::full);
+    check_enum("order", options.order, QueryOrder::sorted);
     check_radius(radius, "");
     const PointTreeView<Scalar, dim>& tree = index.arrays().tree;
     PointLists<Scalar> result;
     with_threads(options.threads, [&] {
+        ResultBudget budget("neighbour_lists", options.max_result_bytes);
+        budget.take(tree.points * (dim * sizeof(Scalar) + sizeof(std::uint32_t)));
         Buffer<Scalar> queries(std::size_t{tree.points} * dim);
         Buffer<std::uint32_t> ids(tree.points);
         std::size_t at = 0;
@@ -215,7 +245,7 @@ PointLists<typename Index::Scalar> neighbour_lists(const Index& index, ScalarOf<
         PointQueryOptions as_given = options;
         as_given.order = QueryOrder::as_given;  // the index's own order
         result = RowBatch<Index>(index, job, dim, false, as_given)
-                     .lists(index.input_count(), ids.data(), "neighbour lists");
+                     .lists(index.input_count(), ids.data(), budget);
     });
     return result;
 }

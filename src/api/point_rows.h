@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "exec/parallel.h"
-#include "exec/result_memory.h"
+#include "exec/result_budget.h"
 #include "points/point_arrays.h"
 #include "points/point_kernels.h"
 #include "points/query_order.h"
@@ -46,6 +46,19 @@ std::vector<std::uint32_t> order_for(const Index& index, const typename Index::S
     const typename Index::Box bounds = index.bounds();
     return order_of_queries<typename Index::Scalar, Index::dimension>(
         queries, n, stride, &bounds.lo.x, &bounds.hi.x, wanted);
+}
+
+/// The same for a call whose memory has a limit: without room to put them in order, queries are
+/// taken as they come.
+template <class Index>
+std::vector<std::uint32_t> order_within(ResultBudget& budget, const Index& index,
+                                        const typename Index::Scalar* queries, std::size_t n,
+                                        std::size_t stride, QueryOrder wanted) {
+    const std::uint64_t bytes = n * 6 * sizeof(std::uint32_t);  // keys, order, what a sort holds
+    if (!budget.try_take(bytes)) return {};
+    auto order = order_for(index, queries, n, stride, wanted);
+    budget.give_back(bytes - order.size() * sizeof(std::uint32_t));
+    return order;
 }
 
 /// The part of a batch that is block [begin, end).
@@ -93,7 +106,8 @@ public:
           kernels_(kernels_for<Index>(options.isa)) {}
 
     PointQueryCounts count() {
-        order();
+        order_ = order_for(index_, job_.queries, job_.n, values_, options_.order);
+        parts_.assign(blocks_of(job_.n), {});
         for_each_block(job_.n, queries_per_block,
                        [&](std::size_t b, std::size_t begin, std::size_t end) {
                            count_block(b, block(begin, end));
@@ -102,21 +116,22 @@ public:
     }
 
     /// `rows`: of the result; row_of[k] is that of query k, or null: k.
-    PointLists<Scalar> lists(std::size_t rows, const std::uint32_t* row_of, const char* what) {
-        order();
+    PointLists<Scalar> lists(std::size_t rows, const std::uint32_t* row_of, ResultBudget& budget) {
+        budget.take(job_.n * sizeof(std::uint32_t) + (rows + 1) * sizeof(std::uint64_t) +
+                    blocks_of(job_.n) * block_bytes);
+        order_ = order_within(budget, index_, job_.queries, job_.n, values_, options_.order);
+        parts_.assign(blocks_of(job_.n), {});
         Buffer<std::uint32_t> counts(job_.n);
         job_.counts = counts.data();
         job_.most_collected = most_collected;
-        const std::uint64_t most =
-            saturating_product(saturating_product(job_.n, job_.tree.points), bytes_each);
-        const std::uint64_t limit = memory_limit(options_.max_bytes, most);
-        collect_all(what, limit);
+        // Rows are kept beside the result: each takes its place there too.
+        ResultBudget kept(budget, 2);
+        std::vector<RowChunk<Scalar>> chunks;
+        collect_all(budget, kept, chunks);
         PointLists<Scalar> result;
         result.counts = sum_of(parts_, job_.n);
-        const std::uint64_t bytes =
-            result.counts.found * bytes_each + (std::uint64_t{rows} + 1) * sizeof(std::uint64_t);
-        check_result_fits(what, bytes, limit);
-        if (bytes > limit - std::min(limit, kept_bytes_.load())) forget_rows();
+        kept.count_once();
+        make_room(result.counts.found * bytes_each, budget, chunks);
         set_offsets(rows, row_of, result);
         result.indices.reset(result.counts.found);
         result.distances.reset(result.counts.found);
@@ -124,9 +139,11 @@ public:
         job_.offsets = result.offsets.data();
         job_.indices = result.indices.data();
         job_.distances = result.distances.data();
+        job_.budget = &budget;
         for_each_block(job_.n, queries_per_block,
                        [&](std::size_t b, std::size_t begin, std::size_t end) {
-                           place_block(b, block(begin, end));
+                           budget.go_on();
+                           place_block(b, block(begin, end), chunks[b]);
                        });
         return result;
     }
@@ -136,10 +153,8 @@ private:
     /// Points of a block: a block of more is counted without entering what lies inside entirely.
     static constexpr std::size_t most_collected = 2048 * queries_per_block;
 
-    void order() {
-        order_ = order_for(index_, job_.queries, job_.n, values_, options_.order);
-        parts_.assign(blocks_of(job_.n), {});
-    }
+    static constexpr std::uint64_t block_bytes =
+        sizeof(PointJobCounts) + sizeof(RowChunk<Scalar>) + sizeof(std::uint8_t);
 
     Within<Index> block(std::size_t begin, std::size_t end) const {
         Within<Index> job = part_of(job_, order_, begin, end, values_);
@@ -160,50 +175,59 @@ private:
     }
 
     /// False, and nothing kept, if there is too much of it.
-    bool collect_block(std::size_t b, const Within<Index>& job) {
-        RowChunk<Scalar>& chunk = chunks_[b];
-        chunk.reserve(16 * job.n);  // memory that is not written to costs nothing
-        (boxes_ ? kernels_.collect_box : kernels_.collect_ball)(job, parts_[b], chunk);
-        if (chunk.size > most_collected) {
-            chunk = {};
+    bool collect_block(std::size_t b, const Within<Index>& job, RowChunk<Scalar>& chunk) {
+        try {
+            chunk.reserve(16 * job.n);  // memory that is not written to costs little time
+            (boxes_ ? kernels_.collect_box : kernels_.collect_ball)(job, parts_[b], chunk);
+        } catch (const ResultTooLarge&) {  // only for rows that are kept
+            chunk.clear();
             return false;
         }
-        kept_bytes_ += chunk.size * bytes_each;
+        if (chunk.size > most_collected) {
+            chunk.clear();
+            return false;
+        }
         is_kept_[b] = 1;
         return true;
     }
 
     /// Stops as soon as the rows so far do not fit: a result that is far too large is known early.
-    void collect_all(const char* what, std::uint64_t limit) {
-        chunks_.resize(parts_.size());
+    void collect_all(ResultBudget& budget, ResultBudget& kept,
+                     std::vector<RowChunk<Scalar>>& chunks) {
+        chunks.reserve(parts_.size());
+        for (std::size_t b = 0; b < parts_.size(); ++b) chunks.emplace_back(&kept);
         is_kept_.assign(parts_.size(), 0);
+        job_.budget = &kept;
+        const std::uint64_t others = budget.held();
         std::atomic<std::uint64_t> total{0};
         std::atomic<bool> collects{true};
         for_each_block(job_.n, queries_per_block,
                        [&](std::size_t b, std::size_t begin, std::size_t end) {
                            const Within<Index> job = block(begin, end);
-                           // Rows are kept beside the result: as much again.
-                           if (kept_bytes_ > limit / 2) collects = false;
-                           if (!collects || !collect_block(b, job)) {
+                           if (!collects || !collect_block(b, job, chunks[b])) {
                                collects = false;
                                count_block(b, job);
                            }
                            const std::uint64_t found = parts_[b].found;
                            const std::uint64_t so_far =
                                total.fetch_add(found, std::memory_order_relaxed) + found;
-                           check_result_fits(what, saturating_product(so_far, bytes_each), limit);
+                           budget.expect(others + saturating_product(so_far, bytes_each));
                        });
     }
 
-    void forget_rows() {
-        chunks_.clear();
+    /// Takes what the result needs; without room for kept rows beside it they are forgotten.
+    void make_room(std::uint64_t bytes, ResultBudget& budget,
+                   std::vector<RowChunk<Scalar>>& chunks) {
+        if (budget.try_take(bytes)) return;
+        for (RowChunk<Scalar>& chunk : chunks) chunk.clear();
         is_kept_.assign(parts_.size(), 0);
+        budget.take_last(bytes);
     }
 
     /// The rows of a block to where they belong.
-    void place_block(std::size_t b, const Within<Index>& job) {
+    void place_block(std::size_t b, const Within<Index>& job, RowChunk<Scalar>& rows) {
         if (is_kept_[b] == 0) return (boxes_ ? kernels_.fill_box : kernels_.fill_ball)(job);
-        const RowChunk<Scalar> chunk = std::move(chunks_[b]);  // its memory goes back at once
+        const RowChunk<Scalar> chunk = std::move(rows);  // its memory goes back at once
         std::size_t at = 0;
         for (std::size_t k = 0; k < job.n; ++k) {
             const std::size_t place = job.place(k), n = job.counts[place];
@@ -231,9 +255,7 @@ private:
     const KernelsOf<Index>& kernels_;
     std::vector<std::uint32_t> order_;
     std::vector<PointJobCounts> parts_;
-    std::vector<RowChunk<Scalar>> chunks_;  // of blocks
-    std::vector<std::uint8_t> is_kept_;     // 1: the rows of the block are in its chunk
-    std::atomic<std::uint64_t> kept_bytes_{0};
+    std::vector<std::uint8_t> is_kept_;  // of a block, 1: its rows are in its chunk
 };
 
 }  // namespace raydix

@@ -55,10 +55,13 @@ struct Header {
 };
 static_assert(sizeof(Header) == 384 && sizeof(Header) % alignment == 0);
 
+/// Of Info::flags.
+inline constexpr std::uint32_t strict_flag = 1, refitted_flag = 2;
+
 struct Info {
     std::uint32_t kind, builder, bits;
     std::uint16_t max_leaf, reinsertion_rounds;
-    std::uint32_t strict;
+    std::uint32_t flags;
     std::uint32_t inner_count, max_depth;
     std::uint32_t picture_width, picture_height;
     float ao_radius;

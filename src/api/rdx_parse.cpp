@@ -114,7 +114,8 @@ private:
         if (header_.sections[info].count != 1)
             fail("info", fmt::format("{} of them, not 1", header_.sections[info].count));
         std::memcpy(&info_, section_bytes(info).data(), sizeof(Info));
-        if (info_.strict > 1) fail("info", fmt::format("strict is {}, not 0 or 1", info_.strict));
+        if (info_.flags > (strict_flag | refitted_flag))
+            fail("info", fmt::format("flags are {}, not 0 to 3", info_.flags));
         if (info_.kind > static_cast<std::uint32_t>(PrimitiveKind::points))
             fail("info", fmt::format("primitive kind {} is unknown", info_.kind));
         const std::uint32_t expected = primitive_bytes(static_cast<PrimitiveKind>(info_.kind));
@@ -157,7 +158,8 @@ private:
         tree.options().bits = static_cast<int>(info_.bits);
         tree.options().max_leaf = info_.max_leaf;
         tree.options().reinsertion_rounds = info_.reinsertion_rounds;
-        tree.options().strict = info_.strict != 0;
+        tree.options().strict = (info_.flags & strict_flag) != 0;
+        tree.refitted() = (info_.flags & refitted_flag) != 0;
         tree.inner_count() = info_.inner_count;
         tree.max_depth() = info_.max_depth;
         tree.input_count() = info_.input_count;

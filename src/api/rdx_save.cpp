@@ -9,7 +9,7 @@
 
 #include "api/rdx_faults.h"
 #include "api/rdx_format.h"
-#include "base/replace_file.h"
+#include "base/write_file.h"
 #include "exec/parallel.h"
 #include "scene/input_error.h"
 
@@ -42,7 +42,8 @@ rdx::Info make_info(const Bvh& bvh, const Scene& scene) {
             .bits = static_cast<std::uint32_t>(bvh.options().bits),
             .max_leaf = static_cast<std::uint16_t>(bvh.options().max_leaf),
             .reinsertion_rounds = static_cast<std::uint16_t>(bvh.options().reinsertion_rounds),
-            .strict = bvh.options().strict,
+            .flags = (bvh.options().strict ? rdx::strict_flag : 0) |
+                     (bvh.refitted() ? rdx::refitted_flag : 0),
             .inner_count = bvh.inner_count(),
             .max_depth = bvh.max_depth(),
             .picture_width = scene.cameras.width,
@@ -126,7 +127,7 @@ void write(const std::filesystem::path& file, const rdx::Header& header, const C
         pieces.push_back(contents[id].bytes);
         position = header.sections[id].offset + contents[id].bytes.size();
     }
-    replace_file(file, pieces);
+    write_pieces(file, pieces);
 }
 
 }  // namespace

@@ -91,6 +91,7 @@ double refit_all(Bvh& bvh, const Source& source, Buffer<Copy>& copies) {
         throw InputError("refit: " + std::string(kind) + ' ' + std::to_string(sum.first_bad) +
                          " is too small now; the tree is empty");
     }
+    tree.refitted() = true;
     const double area = half_area(bvh.bounds());
     return area > 0.0 ? sum.cost / area : 0.0;
 }

@@ -14,6 +14,7 @@
 #include "api/render_light.h"
 #include "api/render_scene.h"
 #include "base/math.h"
+#include "base/options.h"
 #include "rays/screen_order.h"
 #include "report/colour_map.h"
 #include "trace/scalar.h"
@@ -36,9 +37,7 @@ bool gathers_light(View view) {
 }
 
 void check_options(const RenderOptions& options) {
-    if (static_cast<std::size_t>(options.view) >= view_names.size())
-        throw InputError("render: unknown view " +
-                         std::to_string(static_cast<std::uint32_t>(options.view)));
+    check_enum("view", options.view, View::steps);
     if (options.samples < 0 || options.samples > max_samples)
         throw InputError("render: samples is " + std::to_string(options.samples) +
                          "; it must be 0.." + std::to_string(max_samples));

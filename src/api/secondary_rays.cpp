@@ -8,6 +8,7 @@
 
 #include "api/surface_points.h"
 #include "base/double3.h"
+#include "base/options.h"
 #include "exec/parallel.h"
 #include "rays/ray_order.h"
 
@@ -26,6 +27,7 @@ void check_arguments(const Bvh& bvh, std::span<const Ray> rays, std::span<const 
     if (options.samples < 1 || options.samples > max_samples)
         throw InputError("samples is " + std::to_string(options.samples) + "; it must be 1.." +
                          std::to_string(max_samples));
+    check_enum("kind", options.kind, RayKind::diffuse_shuffled);
     if (options.kind != RayKind::ao && options.kind != RayKind::diffuse &&
         options.kind != RayKind::diffuse_shuffled)
         throw InputError("make_secondary_rays makes ao, diffuse and diffuse_shuffled rays");

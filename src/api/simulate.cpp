@@ -6,6 +6,7 @@
 #include <array>
 #include <string>
 
+#include "base/options.h"
 #include "exec/parallel.h"
 #include "layout/warp_tree.h"
 #include "trace/warp/kernel_list.h"
@@ -45,6 +46,7 @@ WarpScene scene_of(const WarpTree& tree) {
 }
 
 void check_options(const SimulateOptions& options) {
+    check_enum("kernel", options.kernel, kernels.back());
     const MachineModel& m = options.machine;
     if (options.width < 1 || options.width > 64 || (options.width & (options.width - 1)) != 0)
         throw InputError("width is " + std::to_string(options.width) +
@@ -92,7 +94,8 @@ Simulation without_tree(const SimulateOptions& options, std::size_t rays) {
 std::span<const WarpKernel> warp_kernels() { return kernels; }
 
 std::string_view warp_kernel_name(WarpKernel kernel) {
-    return kernel_names[static_cast<std::size_t>(kernel)];
+    const auto k = static_cast<std::size_t>(kernel);
+    return k < kernel_names.size() ? kernel_names[k] : "unknown";
 }
 
 WarpKernel warp_kernel_from_name(std::string_view name) {
@@ -140,6 +143,7 @@ void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<
     if (rays.size() != hits.size())
         throw InputError("trace_reference: " + std::to_string(rays.size()) +
                          " rays, but room for " + std::to_string(hits.size()) + " hits");
+    check_threads(threads);
     std::fill(hits.begin(), hits.end(), Hit{});
     if (tree.empty()) return;
     const PreparedRays prepared(rays);

@@ -6,6 +6,7 @@
 
 #include "api/bvh_builder_access.h"
 #include "base/float_env.h"
+#include "base/options.h"
 #include "exec/parallel.h"
 #include "layout/cluster_view.h"
 #include "layout/wide_bvh.h"
@@ -24,6 +25,7 @@ WideOptions collapse_options(const WideBvhOptions& options) {
                                .block = wide_block,
                                .compact = options.compact};
     check_wide_options(collapse);
+    check_threads(options.threads);
     return collapse;
 }
 

@@ -5,26 +5,28 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
-#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
+
 #include "base/float_env.h"
+#include "base/options.h"
 
 namespace raydix {
 
 void with_threads(int threads, const std::function<void()>& body) {
+    check_threads(threads);
     const FloatEnvironment plain;
-    if (threads <= 0) {
+    if (threads == 0) {
         body();
         return;
     }
-    // More threads than cores are allowed: results must not depend on the number, and tests show
-    // it.
-    const tbb::global_control limit(
-        tbb::global_control::max_allowed_parallelism,
-        static_cast<std::size_t>(std::max(threads, tbb::info::default_concurrency())));
-    tbb::task_arena arena(threads);
+    // An arena that asks for more than the process may have at work gets no more, and oneTBB prints
+    // a warning.
+    const std::size_t most =
+        tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    tbb::task_arena arena(static_cast<int>(std::min(static_cast<std::size_t>(threads), most)));
     arena.execute(body);
 }
 

@@ -10,8 +10,9 @@
 
 namespace raydix {
 
-/// Runs `body` with at most `threads` threads at work in the loops inside it (0: all the machine
-/// has). Exceptions of the loops come out of here.
+/// Runs `body` with at most `threads` threads at work in the loops inside it. 0, or more than the
+/// machine has: all it has. Exceptions of the loops come out of here. Throws InputError unless
+/// `threads` is 0 to 1,024: every call with an option of that name comes through here.
 void with_threads(int threads, const std::function<void()>& body);
 
 /// How many threads the loops of the calling context may use.

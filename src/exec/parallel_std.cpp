@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/float_env.h"
+#include "base/options.h"
 #include "exec/parallel.h"
 
 namespace raydix {
@@ -61,8 +62,10 @@ struct SharedLoop {
 }  // namespace
 
 void with_threads(int threads, const std::function<void()>& body) {
+    check_threads(threads);
     const FloatEnvironment plain;
-    const Restore limited(threads > 0 ? threads : thread_limit, inside_loop);
+    constexpr int most = 16;  // threads are made anew for each loop
+    const Restore limited(threads > 0 ? std::min(threads, most) : thread_limit, inside_loop);
     body();
 }
 

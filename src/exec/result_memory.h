@@ -1,23 +1,28 @@
-// Results of a size that the data decides are refused before they are allocated.
+// How much memory is left to this process.
 #pragma once
 
 #include <cstdint>
-#include <string>
+#include <filesystem>
 
 namespace raydix {
 
-/// Bytes that this process could still get without swapping, as the system and its control group
-/// tell it; the greatest number if they do not.
+/// What was found nowhere.
+inline constexpr std::uint64_t unknown_memory = ~std::uint64_t{0};
+
+/// Bytes that the system still has without swapping, by a file as /proc/meminfo is.
+[[nodiscard]] std::uint64_t system_memory_left(const std::filesystem::path& meminfo);
+
+/// Bytes that the memory control groups of this process leave, the least of all levels. `cgroup`: a
+/// file as /proc/self/cgroup; `mount`: as /sys/fs/cgroup, of version 1, 2 or both.
+[[nodiscard]] std::uint64_t group_memory_left(const std::filesystem::path& cgroup,
+                                              const std::filesystem::path& mount);
+
+/// The lesser of both; the physical memory where neither is known.
 [[nodiscard]] std::uint64_t available_memory();
 
-/// What a result may take: `max_bytes`, or what is available if that is 0. Nobody is asked where
-/// the result cannot be larger than `most_bytes` and that is little.
-[[nodiscard]] std::uint64_t memory_limit(std::uint64_t max_bytes, std::uint64_t most_bytes);
-
-/// Throws InputError that names `what` if a result of `bytes` is more than the limit.
-void check_result_fits(const std::string& what, std::uint64_t bytes, std::uint64_t limit);
-
 /// The greatest number where the product does not fit.
-[[nodiscard]] std::uint64_t saturating_product(std::uint64_t a, std::uint64_t b);
+[[nodiscard]] inline std::uint64_t saturating_product(std::uint64_t a, std::uint64_t b) {
+    return b != 0 && a > unknown_memory / b ? unknown_memory : a * b;
+}
 
 }  // namespace raydix

@@ -137,7 +137,7 @@ private:
         }
         const BasicClosestHit<double> found = find_closest(tree, frame, stack, steps);
         if (found.prim == no_primitive) return;
-        const HitD hit{found.t * frame.t_scale, found.prim, found.u, found.v};
+        const HitD hit{found.t * frame.t_scale + 0.0, found.prim, found.u, found.v};
         // At equal t the lower path wins; within one instance find_closest has chosen.
         if (hit.t < best_.hit.t || !best_.hit.hit() || path_ < best_.path)
             best_ = {hit, object, path_};

@@ -78,6 +78,23 @@ RAYDIX_HD inline std::uint64_t spread_bits(std::uint64_t v) {
     return v;
 }
 
+/// The inverse of spread_bits: every third bit from bit 0 on, moved together.
+RAYDIX_HD inline std::uint32_t gather_bits(std::uint32_t v) {
+    v &= 0x09249249u;
+    v = (v | v >> 2) & 0x030C30C3u;
+    v = (v | v >> 4) & 0x0300F00Fu;
+    v = (v | v >> 8) & 0x030000FFu;
+    return (v | v >> 16) & 0x000003FFu;
+}
+RAYDIX_HD inline std::uint64_t gather_bits(std::uint64_t v) {
+    v &= 0x1249249249249249ull;
+    v = (v | v >> 2) & 0x10C30C30C30C30C3ull;
+    v = (v | v >> 4) & 0x100F00F00F00F00Full;
+    v = (v | v >> 8) & 0x001F0000FF0000FFull;
+    v = (v | v >> 16) & 0x001F00000000FFFFull;
+    return (v | v >> 32) & 0x00000000001FFFFFull;
+}
+
 template <class Key>
 RAYDIX_HD inline Key interleave(Cell c) {
     return spread_bits(Key{c.x}) << 2 | spread_bits(Key{c.y}) << 1 | spread_bits(Key{c.z});

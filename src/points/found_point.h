@@ -8,7 +8,10 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <utility>
 #include <vector>
+
+#include "exec/result_budget.h"
 
 namespace raydix {
 
@@ -20,7 +23,7 @@ struct FoundPoint {
 
 /// By (d2, id).
 template <class T>
-void sort_by_distance(std::vector<FoundPoint<T>>& row) {
+void sort_by_distance(BudgetVector<FoundPoint<T>>& row) {
     using Point = FoundPoint<T>;
     std::sort(row.begin(), row.end(), [](const Point& a, const Point& b) {
         return a.d2 < b.d2 || (a.d2 == b.d2 && a.id < b.id);
@@ -30,8 +33,8 @@ void sort_by_distance(std::vector<FoundPoint<T>>& row) {
 /// One digit of a radix sort: `row` goes to `sorted`, in the order of bits [shift, shift + bits) of
 /// the ids.
 template <class T>
-void sort_by_digit(const std::vector<FoundPoint<T>>& row, int shift, int bits,
-                   std::vector<FoundPoint<T>>& sorted) {
+void sort_by_digit(const BudgetVector<FoundPoint<T>>& row, int shift, int bits,
+                   BudgetVector<FoundPoint<T>>& sorted) {
     std::array<std::uint32_t, 1 << 11> places;
     const std::uint32_t mask = (1u << bits) - 1;
     std::fill_n(places.begin(), mask + 1, 0u);
@@ -49,7 +52,7 @@ void sort_by_digit(const std::vector<FoundPoint<T>>& row, int shift, int bits,
 /// By id. Sorts digit by digit, of those bits alone in which ids differ: comparisons that nobody
 /// can foresee made this most of the time of long rows. `spare` is lost.
 template <class T>
-void sort_by_id(std::vector<FoundPoint<T>>& row, std::vector<FoundPoint<T>>& spare) {
+void sort_by_id(BudgetVector<FoundPoint<T>>& row, BudgetVector<FoundPoint<T>>& spare) {
     if (row.empty()) return;
     std::uint32_t differing = 0;
     for (const FoundPoint<T>& point : row) differing |= point.id ^ row.front().id;
@@ -63,24 +66,53 @@ void sort_by_id(std::vector<FoundPoint<T>>& row, std::vector<FoundPoint<T>>& spa
     }
 }
 
-/// Rows of points one after the other, as long as they come.
+/// Rows of points one after the other, as long as they come. Its memory is charged to a budget.
 template <class T>
-struct RowChunk {
+class RowChunk {
+public:
+    explicit RowChunk(ResultBudget* budget = nullptr) : budget_(budget) {}
+    RowChunk(RowChunk&& other) noexcept
+        : ids(std::move(other.ids)),
+          distances(std::move(other.distances)),
+          size(std::exchange(other.size, 0)),
+          budget_(other.budget_),
+          charged_(std::exchange(other.charged_, 0)) {}
+    RowChunk& operator=(RowChunk&&) = delete;
+    ~RowChunk() { clear(); }
+
+    void clear() noexcept {
+        ids = {};
+        distances = {};
+        size = 0;
+        if (budget_ != nullptr) budget_->give_back(charged_);
+        charged_ = 0;
+    }
+    /// Room for `more` beyond size. Throws ResultTooLarge.
+    void reserve(std::size_t more) {
+        if (size + more > ids.size()) grow(2 * ids.size() + more);
+    }
+
     Buffer<std::uint32_t> ids;
     Buffer<T> distances;
     std::size_t size = 0;
 
-    /// Room for `more` beyond size.
-    void reserve(std::size_t more) {
-        if (size + more <= ids.size()) return;
-        const std::size_t room = 2 * ids.size() + more;
+private:
+    void grow(std::size_t room) {
+        const std::uint64_t bytes = room * (sizeof(std::uint32_t) + sizeof(T)), old = charged_;
+        if (budget_ != nullptr) budget_->take(bytes);
+        charged_ += bytes;
         Buffer<std::uint32_t> longer_ids(room);
         Buffer<T> longer_distances(room);
         std::copy_n(ids.data(), size, longer_ids.data());
         std::copy_n(distances.data(), size, longer_distances.data());
         ids = std::move(longer_ids);
         distances = std::move(longer_distances);
+        if (budget_ != nullptr) budget_->give_back(old);
+        charged_ -= old;
     }
+
+    ResultBudget* budget_;
+    std::uint64_t charged_ = 0;
 };
 
 }  // namespace raydix

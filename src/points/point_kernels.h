@@ -43,6 +43,7 @@ struct WithinJob : PointJob<T, Dim> {
     const std::uint32_t* itself;  // their ids are here: [n]
     std::uint32_t* counts;        // [queries], out of a count, and what it gave for a fill
     std::size_t most_collected;   // points in a chunk, beyond which queries are left out
+    ResultBudget* budget;         // of the memory that rows take while they are found
     // Out of a fill: the row of query k begins at offsets[row_of[k]], or offsets[k] without row_of.
     const std::uint32_t* row_of;
     const std::uint64_t* offsets;
@@ -76,10 +77,10 @@ struct PointKernels {
     void (*count_ball)(const WithinJob<T, Dim>& job, PointJobCounts& counts);
     void (*count_box)(const WithinJob<T, Dim>& job, PointJobCounts& counts);
     /// Counts, and the rows behind one another in the order of the job. Stops short, and its counts
-    /// mean nothing, if rows.size > job.most_collected after it.
+    /// mean nothing, if rows.size > job.most_collected after it. Throws ResultTooLarge.
     void (*collect_ball)(const WithinJob<T, Dim>& job, PointJobCounts& counts, RowChunk<T>& rows);
     void (*collect_box)(const WithinJob<T, Dim>& job, PointJobCounts& counts, RowChunk<T>& rows);
-    /// The rows themselves, sorted, with true distances, where they belong.
+    /// The rows themselves, sorted, with true distances, where they belong. Throws ResultTooLarge.
     void (*fill_ball)(const WithinJob<T, Dim>& job);
     void (*fill_box)(const WithinJob<T, Dim>& job);
     bool (*visit_ball)(const PointTreeView<T, Dim>& tree, const T* query, T radius,

@@ -145,8 +145,20 @@ class FoundRow {
     using Ids = hn::CappedTag<std::uint32_t, 16>;
 
 public:
+    explicit FoundRow(ResultBudget* budget)
+        : d2_(BudgetAllocator<T>(budget)),
+          ids_(BudgetAllocator<std::uint32_t>(budget)),
+          long_(BudgetAllocator<FoundPoint<T>>(budget)),
+          spare_(BudgetAllocator<FoundPoint<T>>(budget)) {}
+
     HWY_INLINE void clear() { size_ = 0; }
     [[nodiscard]] std::size_t size() const { return size_; }
+    /// Room for a row that is known to be so long; what was found is lost.
+    HWY_INLINE void clear_for(std::size_t points) {
+        clear();
+        const std::size_t room = points + 2 * points_per_leaf;
+        if (room > room_) grow_to(std::max(room, 2 * room_));
+    }
 
     /// Points of a group whose bits are set.
     template <int Dim>
@@ -180,9 +192,22 @@ private:
     static constexpr std::size_t most_ranked = 64;
 
     HWY_NOINLINE void grow() {
-        room_ = 2 * room_ + 256;
-        d2_.resize(room_);
-        ids_.resize(room_);
+        const std::size_t room = 2 * room_ + 256;
+        d2_.resize(room);
+        ids_.resize(room);
+        room_ = room;
+    }
+    HWY_NOINLINE void grow_to(std::size_t room) {
+        room_ = 0;
+        renew(d2_, room);
+        renew(ids_, room);
+        room_ = room;
+    }
+    /// The old memory goes back first.
+    template <class List>
+    static void renew(List& list, std::size_t size) {
+        list = List(list.get_allocator());
+        list.resize(size);
     }
 
     /// A point's place is the number of those before it.
@@ -219,6 +244,7 @@ private:
     }
 
     HWY_NOINLINE void write_long(bool by_distance, std::uint32_t* ids, T* distances) {
+        if (long_.capacity() < size_) renew(long_, std::max(size_, 2 * long_.capacity()));
         long_.resize(size_);
         for (std::size_t k = 0; k < size_; ++k) long_[k] = {d2_[k], ids_[k]};
         by_distance ? sort_by_distance(long_) : sort_by_id(long_, spare_);
@@ -229,9 +255,9 @@ private:
     }
 
     std::size_t size_ = 0, room_ = 0;
-    std::vector<T> d2_;
-    std::vector<std::uint32_t> ids_;
-    std::vector<FoundPoint<T>> long_, spare_;
+    BudgetVector<T> d2_;
+    BudgetVector<std::uint32_t> ids_;
+    BudgetVector<FoundPoint<T>> long_, spare_;
 };
 
 /// Bits of the points that are to be kept.
@@ -303,12 +329,12 @@ void count_within(const WithinJob<T, Dim>& job, PointJobCounts& counts) {
         [&](std::size_t place) { job.counts[place] = 0; });
 }
 
-/// The row of query k of a job; of one that holds more than `most` points a part that does too.
+/// The row of query k of a job, behind nothing; of one that holds more than `most` points a part
+/// that does too.
 template <class Region, class T, int Dim>
 HWY_INLINE void find_row(const WithinJob<T, Dim>& job, const Region& region, std::size_t k,
                          std::size_t most, FoundRow<T>& row) {
     const std::uint32_t itself = job.keep == KeepPoints::all ? 0 : job.itself[k];
-    row.clear();
     walk_region(
         job.tree, region,
         [&](const PointLeaf<T, Dim>& group, std::uint32_t in, const T* d2) HWY_ATTR {
@@ -320,11 +346,12 @@ HWY_INLINE void find_row(const WithinJob<T, Dim>& job, const Region& region, std
 
 template <class Region, class T, int Dim>
 void collect_within(const WithinJob<T, Dim>& job, PointJobCounts& counts, RowChunk<T>& rows) {
-    FoundRow<T> row;
+    FoundRow<T> row(job.budget);
     each_query<Region>(
         job, counts,
         [&](const Region& region, std::size_t k, std::size_t place) HWY_ATTR {
             if (rows.size > job.most_collected) return;
+            row.clear();
             find_row(job, region, k, job.most_collected, row);
             if (row.size() > job.most_collected) {  // by itself too much to keep
                 rows.size = row.size();
@@ -343,12 +370,13 @@ void collect_within(const WithinJob<T, Dim>& job, PointJobCounts& counts, RowChu
 
 template <class Region, class T, int Dim>
 void fill_within(const WithinJob<T, Dim>& job) {
-    FoundRow<T> row;
+    FoundRow<T> row(job.budget);
     PointJobCounts counts;
     each_query<Region>(
         job, counts,
         [&](const Region& region, std::size_t k, std::size_t place) HWY_ATTR {
             if (job.counts[place] == 0) return;
+            row.clear_for(job.counts[place]);
             find_row(job, region, k, std::numeric_limits<std::size_t>::max(), row);
             const std::uint64_t begin = job.offset_of(place);
             row.write(job.by_distance, job.indices + begin, job.distances + begin);

@@ -36,6 +36,14 @@ public:
 
     PairTreeD tree;
 
+    /// At most, what a side holds while it is made.
+    static std::uint64_t bytes_for(const BvhD& bvh) {
+        const std::size_t nodes = bvh.tree().nodes().size();
+        const std::uint64_t own = bvh.order().size() * (sizeof(PairBox) + sizeof(CornerKeys)) +
+                                  nodes * (sizeof(BvhNode) + sizeof(std::uint32_t));
+        return own + (has_parts(bvh) ? whole_tree_bytes(bvh) : 0);
+    }
+
 private:
     void fit_nodes(const BvhD& bvh) {
         std::vector<std::uint32_t> slots;

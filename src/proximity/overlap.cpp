@@ -3,11 +3,13 @@
 #include <raydix/overlap.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "base/float_env.h"
+#include "exec/result_budget.h"
 #include "proximity/query_batch.h"
-#include "proximity/result_limit.h"
 #include "proximity/touch_walk.h"
+#include "proximity/whole_tree.h"
 
 namespace raydix {
 namespace {
@@ -24,14 +26,28 @@ auto places_of(std::span<const Query> queries) {
     return places;
 }
 
-/// Calls one(i, stack) -> how many were found, for each valid query.
-template <class Tree, class AnyBvh, class Query, class One>
-OverlapCounts for_each_query(const Tree& tree, const AnyBvh& bvh, std::span<const Query> queries,
-                             const One& one) {
-    std::vector<OverlapCounts> parts(block_count(queries.size()));
+/// Positions of queries in the order in which to take them; empty: as they come.
+template <class AnyBvh, class Query>
+std::vector<std::uint32_t> order_of(const AnyBvh& bvh, std::span<const Query> queries) {
     const auto places = places_of(queries);
+    return query_order(bvh, std::span(places));
+}
+
+/// Bytes that order_of() holds at most for each query: its place, that around the center of the
+/// tree, and what a sort holds (radix_sort.h).
+template <class Query>
+constexpr std::uint64_t ordering_bytes = sizeof(place_of(std::declval<Query>())) + sizeof(Vec3) +
+                                         6 * sizeof(std::uint32_t);
+
+/// Calls one(block, i, stack) -> how many were found, for each valid query; done(block) after those
+/// of a block. `order` as order_of() gives it.
+template <class Tree, class Query, class One, class Done>
+OverlapCounts for_each_query(const Tree& tree, std::span<const Query> queries,
+                             std::span<const std::uint32_t> order, const One& one,
+                             const Done& done) {
+    std::vector<OverlapCounts> parts(block_count(queries.size()));
     for_each_query_block(
-        bvh, std::span(places),
+        queries.size(), order,
         [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
             BasicWalkStack<typename Tree::Scalar> stack(tree.max_depth);
             for (std::size_t k = begin; k < end; ++k) {
@@ -39,8 +55,9 @@ OverlapCounts for_each_query(const Tree& tree, const AnyBvh& bvh, std::span<cons
                 if (!is_valid(queries[i]))
                     ++parts[block].invalid_queries;
                 else if (!tree.empty)
-                    parts[block].found += one(i, stack);
+                    parts[block].found += one(block, i, stack);
             }
+            done(block);
         });
     OverlapCounts sum;
     sum.queries = queries.size();
@@ -67,43 +84,107 @@ OverlapCounts any_batch(const AnyBvh& bvh, std::span<const Query> queries,
     OverlapCounts counts;
     const auto tree = padded_tree(bvh);
     with_threads(options.threads, [&] {
-        counts = for_each_query(tree, bvh, queries, [&](std::size_t i, auto& stack) {
-            touched[i] = touches_any(tree, queries[i], stack);
-            return std::uint64_t{touched[i]};
-        });
+        counts = for_each_query(
+            tree, queries, std::span<const std::uint32_t>(order_of(bvh, queries)),
+            [&](std::size_t, std::size_t i, auto& stack) {
+                touched[i] = touches_any(tree, queries[i], stack);
+                return std::uint64_t{touched[i]};
+            },
+            [](std::size_t) {});
     });
     return counts;
 }
 
-/// Each query's ids in a list of its own at first: rows of any length fit, and end in order.
+/// Rows that are found block by block, until all their lengths are known. They are put in order
+/// when they have their place in the result, so that one that does not fit is refused before; trees
+/// with parts of triangles find an id more than once, and order at once to count.
+class RowBlocks {
+public:
+    RowBlocks(std::size_t queries, bool finds_twice, ResultBudget& budget)
+        : budget_(budget),
+          finds_twice_(finds_twice),
+          found_(budget_lists<std::uint32_t>(block_count(queries), budget)) {
+        budget_.take((queries + 1) * sizeof(std::uint64_t));
+        lists_.offsets.resize(queries + 1, 0);
+    }
+
+    /// The row of query i goes behind those that its block has: each id once.
+    template <class Tree, class Query, class Stack>
+    std::uint64_t add_row(std::size_t block, std::size_t i, const Tree& tree, const Query& query,
+                          Stack& stack) {
+        BudgetVector<std::uint32_t>& ids = found_[block];
+        const std::size_t before = ids.size();
+        for_each_touched(tree, query, stack, [&](std::uint32_t position) {
+            ids.push_back(tree.order[position]);
+            return false;
+        });
+        if (finds_twice_) {
+            const auto row = ids.begin() + static_cast<std::ptrdiff_t>(before);
+            std::sort(row, ids.end());
+            ids.erase(std::unique(row, ids.end()), ids.end());
+        }
+        return lists_.offsets[i + 1] = ids.size() - before;
+    }
+    /// The block is complete. Its place in the result is taken now: too many are known early.
+    void finish(std::size_t block) {
+        pack(found_[block]);
+        budget_.take(found_[block].size() * sizeof(std::uint32_t));
+    }
+
+    /// `order`: the one in which the rows were added.
+    OverlapLists join(std::span<const std::uint32_t> order) {
+        for (std::size_t i = 0; i + 1 < lists_.offsets.size(); ++i)
+            lists_.offsets[i + 1] += lists_.offsets[i];
+        lists_.prims.resize(lists_.offsets.back());
+        for_each_query_block(
+            lists_.offsets.size() - 1, order,
+            [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
+                const BudgetVector<std::uint32_t> ids = std::move(found_[block]);
+                const std::uint32_t* from = ids.data();
+                for (std::size_t k = begin; k < end; ++k) {
+                    const std::uint64_t to = lists_.offsets[at(k)];
+                    const std::uint64_t length = lists_.offsets[at(k) + 1] - to;
+                    std::uint32_t* const row = lists_.prims.data() + to;
+                    std::copy_n(from, length, row);
+                    if (!finds_twice_) std::sort(row, row + length);
+                    from += length;
+                }
+            });
+        return std::move(lists_);
+    }
+
+private:
+    ResultBudget& budget_;
+    bool finds_twice_;
+    BudgetVector<BudgetVector<std::uint32_t>> found_;
+    OverlapLists lists_;
+};
+
 template <class AnyBvh, class Query>
 OverlapLists all_batch(const AnyBvh& bvh, std::span<const Query> queries,
                        const OverlapOptions& options) {
     require_triangles(bvh, what);
     const auto tree = padded_tree(bvh);
-    ResultLimit limit("overlap queries", options.max_bytes, sizeof(std::uint32_t));
-    std::vector<std::vector<std::uint32_t>> rows(queries.size());
     OverlapLists lists;
     with_threads(options.threads, [&] {
-        lists.counts = for_each_query(tree, bvh, queries, [&](std::size_t i, auto& stack) {
-            std::vector<std::uint32_t>& row = rows[i];
-            for_each_touched(tree, prepared(queries[i]), stack, [&](std::uint32_t position) {
-                row.push_back(tree.order[position]);
-                return false;
-            });
-            std::sort(row.begin(), row.end());
-            row.erase(std::unique(row.begin(), row.end()), row.end());
-            limit.add(row.size());
-            return std::uint64_t{row.size()};
-        });
-        lists.offsets.resize(queries.size() + 1, 0);
-        for (std::size_t i = 0; i < rows.size(); ++i)
-            lists.offsets[i + 1] = lists.offsets[i] + rows[i].size();
-        lists.prims.resize(lists.offsets.back());
-        for_each_index(rows.size(), [&](std::size_t i) {
-            std::copy(rows[i].begin(), rows[i].end(),
-                      lists.prims.begin() + static_cast<std::ptrdiff_t>(lists.offsets[i]));
-        });
+        ResultBudget budget("touch_all", options.max_result_bytes);
+        RowBlocks rows(queries.size(), has_parts(bvh), budget);
+        // Without room to put the queries in order they are taken as they come.
+        std::vector<std::uint32_t> order;
+        const std::uint64_t bytes = ordering_bytes<Query> * queries.size();
+        if (budget.try_take(bytes)) {
+            order = order_of(bvh, queries);
+            budget.give_back(bytes - order.size() * sizeof(std::uint32_t));
+        }
+        const std::span<const std::uint32_t> in_order(order);
+        const OverlapCounts counts = for_each_query(
+            tree, queries, in_order,
+            [&](std::size_t block, std::size_t i, auto& stack) {
+                return rows.add_row(block, i, tree, prepared(queries[i]), stack);
+            },
+            [&](std::size_t block) { rows.finish(block); });
+        lists = rows.join(in_order);
+        lists.counts = counts;
     });
     return lists;
 }

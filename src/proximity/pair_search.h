@@ -9,9 +9,10 @@
 #include <type_traits>
 #include <vector>
 
+#include "base/options.h"
 #include "exec/parallel.h"
+#include "exec/result_budget.h"
 #include "proximity/pair_walk.h"
-#include "proximity/result_limit.h"
 
 namespace raydix {
 
@@ -20,28 +21,31 @@ using Pairs = std::vector<PrimitivePair>;
 /// What happens to the pairs that one task finds.
 class Collector {
 public:
-    Collector(bool keep, ResultLimit& limit, Pairs& found)
-        : keep_(keep), limit_(limit), found_(found) {}
+    /// `found` null: they are only counted.
+    Collector(BudgetVector<PrimitivePair>* found, std::atomic<std::uint64_t>& total)
+        : found_(found), total_(total) {}
     Collector(const Collector&) = delete;
     Collector& operator=(const Collector&) = delete;
 
     void take(std::uint32_t first, std::uint32_t second) const {
         ++count_;
-        if (!keep_) return;
-        found_.push_back({first, second});
-        if (count_ == pairs_between_checks) report();
+        if (found_ != nullptr) found_->push_back({first, second});
     }
-    void report() const {
-        limit_.add(count_);
-        count_ = 0;
+    void finish() const {
+        if (found_ != nullptr) pack(*found_);
+        total_.fetch_add(count_, std::memory_order_relaxed);
     }
 
 private:
-    static constexpr std::uint64_t pairs_between_checks = 1u << 16;
-    bool keep_;
-    ResultLimit& limit_;
-    Pairs& found_;
+    BudgetVector<PrimitivePair>* found_;
+    std::atomic<std::uint64_t>& total_;
     mutable std::uint64_t count_ = 0;
+};
+
+/// Pairs without order, of each task, and how many there are.
+struct FoundPairs {
+    BudgetVector<BudgetVector<PrimitivePair>> lists;  // empty if they are only counted
+    std::atomic<std::uint64_t> total{0};
 };
 
 /// Whether primitives whose boxes overlap are a pair.
@@ -55,10 +59,10 @@ bool is_pair(const Tree& a, const Tree& b, std::uint32_t k, std::uint32_t l, boo
     return !narrow || triangles_touch(a.triangles[k], b.triangles[l]);
 }
 
-/// All pairs, in lists without order; empty ones if they are only counted.
+/// All pairs. `budget` null: they are only counted.
 template <bool same, class Tree>
-std::vector<Pairs> find_pairs(const Tree& a, const Tree& b, bool narrow, bool keep,
-                              ResultLimit& limit) {
+void find_pairs(const Tree& a, const Tree& b, bool narrow, ResultBudget* budget,
+                FoundPairs& found) {
     constexpr std::size_t tasks_wanted = 4096;
     const auto in_order = [&](std::uint32_t k, std::uint32_t l, const Collector& out) {
         if (!is_pair<same>(a, b, k, l, narrow)) return;
@@ -68,31 +72,37 @@ std::vector<Pairs> find_pairs(const Tree& a, const Tree& b, bool narrow, bool ke
         else
             out.take(i, j);
     };
-    std::vector<Pairs> lists(1);
+    BudgetVector<PrimitivePair> met{BudgetAllocator<PrimitivePair>(budget)};
     std::vector<SlotPair> tasks;
     {
-        const Collector out(keep, limit, lists[0]);
+        const Collector out(budget != nullptr ? &met : nullptr, found.total);
         const auto pair = [&](std::uint32_t k, std::uint32_t l) { in_order(k, l, out); };
         tasks =
             spread_pairs(PairWalk<same, Tree, decltype(pair)>(a, b, pair), {0, 0}, tasks_wanted);
-        out.report();
+        out.finish();
     }
-    lists.resize(tasks.size() + 1);
+    if (budget != nullptr) {
+        found.lists = budget_lists<PrimitivePair>(tasks.size() + 1, *budget);
+        found.lists.back() = std::move(met);
+    }
     for_each_range(tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
         std::vector<SlotPair> stack;
         for (std::size_t task = begin; task < end; ++task) {
-            const Collector out(keep, limit, lists[task + 1]);
+            if (budget != nullptr) budget->go_on();
+            const Collector out(budget != nullptr ? &found.lists[task] : nullptr, found.total);
             const auto pair = [&](std::uint32_t k, std::uint32_t l) { in_order(k, l, out); };
             walk_pairs(PairWalk<same, Tree, decltype(pair)>(a, b, pair), tasks[task],
                        a.max_depth + b.max_depth, stack);
-            out.report();
+            out.finish();
         }
     });
-    return lists;
 }
 
 /// Lists in any order -> one by (first, second); `rows` is past the highest first id.
-inline Pairs sort_pairs(std::vector<Pairs>& lists, std::size_t rows, std::uint64_t total) {
+inline Pairs sort_pairs(const FoundPairs& found, std::size_t rows, ResultBudget& budget) {
+    const std::uint64_t total = found.total;
+    budget.take_last(total * sizeof(PrimitivePair) + (rows + 1) * sizeof(std::uint64_t));
+    const auto& lists = found.lists;
     std::vector<std::uint64_t> ends(rows + 1, 0);  // of the rows, once the pairs are in place
     const auto for_each_pair = [&](const auto& visit) {
         for_each_index(
@@ -125,20 +135,22 @@ inline Pairs sort_pairs(std::vector<Pairs>& lists, std::size_t rows, std::uint64
 template <class Side, class AnyBvh>
 std::uint64_t run_pairs(const AnyBvh& a, const AnyBvh* b, const PairOptions& options,
                         Pairs* result) {
+    check_threads(options.threads);
     if (a.empty() || (b != nullptr && b->empty())) return 0;
-    ResultLimit limit("pairs", result != nullptr ? options.max_bytes : ~std::uint64_t{0},
-                      sizeof(PrimitivePair));
+    ResultBudget budget("overlapping_pairs", options.max_result_bytes);
+    ResultBudget* const kept = result != nullptr ? &budget : nullptr;
+    FoundPairs found;
     with_threads(options.threads, [&] {
+        if (kept != nullptr)
+            kept->take(Side::bytes_for(a) + (b != nullptr ? Side::bytes_for(*b) : 0));
         const Side side_a(a, a);
-        const bool keep = result != nullptr;
-        std::vector<Pairs> lists;
         if (b == nullptr)
-            lists = find_pairs<true>(side_a.tree, side_a.tree, options.narrow, keep, limit);
+            find_pairs<true>(side_a.tree, side_a.tree, options.narrow, kept, found);
         else
-            lists = find_pairs<false>(side_a.tree, Side(*b, a).tree, options.narrow, keep, limit);
-        if (keep) *result = sort_pairs(lists, a.input_count(), limit.count());
+            find_pairs<false>(side_a.tree, Side(*b, a).tree, options.narrow, kept, found);
+        if (kept != nullptr) *result = sort_pairs(found, a.input_count(), budget);
     });
-    return limit.count();
+    return found.total;
 }
 
 template <class Side, class AnyBvh>

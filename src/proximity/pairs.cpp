@@ -32,6 +32,13 @@ public:
 
     PairTree tree;
 
+    /// At most, what a side holds while it is made.
+    static std::uint64_t bytes_for(const Bvh& bvh) {
+        const std::uint64_t own =
+            bvh.order().size() * sizeof(PairBox) + bvh.triangles().size() * sizeof(CornerKeys);
+        return own + (has_parts(bvh) ? whole_tree_bytes(bvh) : 0);
+    }
+
 private:
     static Aabb box_at(const Bvh& bvh, std::size_t k) {
         if (bvh.kind() == PrimitiveKind::boxes) return bvh.boxes()[k];

@@ -55,14 +55,20 @@ inline void require_room(const char* what, std::size_t queries, std::size_t resu
     return query_order(bvh.tree(), local);
 }
 
-/// Calls one(block, begin, end, at) with at(k) = the query that is k-th in line.
-template <class AnyBvh, class Vec, class One>
-void for_each_query_block(const AnyBvh& bvh, std::span<const Vec> places, const One& one) {
-    const std::vector<std::uint32_t> order = query_order(bvh, places);
+/// Calls one(block, begin, end, at) with at(k) = the query that is k-th in line; `order` as
+/// query_order() gives it.
+template <class One>
+void for_each_query_block(std::size_t queries, std::span<const std::uint32_t> order,
+                          const One& one) {
     const auto at = [&](std::size_t k) { return order.empty() ? k : order[k]; };
     for_each_block(
-        places.size(), queries_per_block,
+        queries, queries_per_block,
         [&](std::size_t block, std::size_t begin, std::size_t end) { one(block, begin, end, at); });
+}
+template <class AnyBvh, class Vec, class One>
+void for_each_query_block(const AnyBvh& bvh, std::span<const Vec> places, const One& one) {
+    for_each_query_block(places.size(), std::span<const std::uint32_t>(query_order(bvh, places)),
+                         one);
 }
 
 [[nodiscard]] inline std::size_t block_count(std::size_t queries) {

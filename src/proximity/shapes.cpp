@@ -85,8 +85,9 @@ bool surface_hit(const AnyRay& ray, const Stay& stay, double t_scale, AnyHit& hi
     // Rounded: what rounds to the end of the ray is a hit, or ties would be lost.
     const auto enter = static_cast<Scalar>(stay.enter * t_scale),
                leave = static_cast<Scalar>(stay.leave * t_scale);
-    hit.t = enter >= ray.tmin ? enter : leave;
-    return hit.t >= ray.tmin && hit.t <= ray.tmax;
+    const Scalar tmin = max_of(ray.tmin, Scalar(0));
+    hit.t = (enter >= tmin ? enter : leave) + Scalar(0);  // -0 becomes +0
+    return hit.t >= tmin && hit.t <= min_of(ray.tmax, std::numeric_limits<Scalar>::max());
 }
 
 template <class Point, class AnyRay, class AnyHit>

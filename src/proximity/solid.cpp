@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/float_env.h"
+#include "base/options.h"
 #include "proximity/crossings.h"
 #include "proximity/edge_closure.h"
 #include "proximity/query_batch.h"
@@ -62,6 +63,7 @@ struct SolidState {
     [[nodiscard]] const AnyBvh& single() const { return whole ? *whole : *bvh; }
 
     void prepare(const AnyBvh& given, InsideRule rule) {
+        check_enum("rule", rule, InsideRule::winding);
         bvh = &given;
         if (has_parts(given)) whole = make_whole_tree(given);
         inside.emplace(Tree(single()), single().triangles(), nodes_of(single()), rule);

@@ -15,7 +15,7 @@ namespace {
 constexpr const char* what = "sweeps need";
 
 struct FloatSweeps {
-    using Tree = TriangleTree;
+    using Tree = SweepTree;
     using Frame = SweepFrame;
     using Hit = SweepHit;
 };
@@ -34,10 +34,12 @@ typename Kind::Hit sweep_as_ray(const typename Kind::Tree& tree, const auto& ray
     NoSteps steps;
     const auto hit = find_closest(tree, frame, stack, steps);
     if (hit.prim == no_primitive) return {};
+    const auto t_of_caller = hit.t * frame.t_scale + 0;  // -0 becomes +0
+    if (!(t_of_caller < infinity)) return {};
     const auto& t = tree.triangles[hit.position];
     const Double3 a(t.v0), b(t.v1), c(t.v2);
     const Double3 at = a + (b - a) * hit.u + (c - a) * hit.v;
-    typename Kind::Hit contact{hit.t * frame.t_scale, hit.prim, {}, hit.u, hit.v};
+    typename Kind::Hit contact{t_of_caller, hit.prim, {}, hit.u, hit.v};
     at.round_to(contact.position);
     return contact;
 }
@@ -48,8 +50,10 @@ typename Kind::Hit sweep_one(const typename Kind::Tree& tree, const Sweep& sweep
     const typename Kind::Frame frame(tree, sweep);
     const auto contact = find_first_contact(tree, frame, stack);
     if (contact.prim == no_primitive) return {};
+    const auto t = frame.in_units_of_caller(contact.t);
+    if (!(t < infinity)) return {};  // farther than numbers go
     const auto at = closest_on_triangle(tree.triangles[contact.position], frame.center(contact.t));
-    return {frame.in_units_of_caller(contact.t), contact.prim, at.position, at.u, at.v};
+    return {t, contact.prim, at.position, at.u, at.v};
 }
 
 template <class Kind, class AnyBvh, class Sweep>

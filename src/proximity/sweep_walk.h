@@ -38,27 +38,58 @@ inline float first_contact(const Path& path, const GrownBoxes& boxes, double rad
     return at == never ? infinity : static_cast<float>(std::max(at, own));
 }
 
+/// 2^-24 of all lengths that meet in a contact: above how far a ball at it may be from touching,
+/// which is most (2^-26) where the ball moves nearly along an edge.
+inline constexpr double part_room = 0x1p-24;
+
+/// A tree, and how far its coordinates reach if leaves may hold parts of triangles.
+struct SweepTree : TriangleTree {
+    bool parts;
+    double reach = 0.0;
+
+    explicit SweepTree(const Bvh& bvh) : TriangleTree(bvh), parts(bvh.has_split_primitives()) {
+        if (!parts) return;
+        const Vec3 far = max_of(bvh.bounds().hi, -1.0f * bvh.bounds().lo);
+        reach = max_of(max_of(far.x, far.y), max_of(far.z, 0.0f));
+    }
+};
+
 /// A valid sweep among the nodes and triangles of a tree.
 class SweepFrame {
 public:
-    SweepFrame(const TriangleTree&, const SphereSweep& sweep)
-        : path_(path_of(sweep.path)), radius_(sweep.radius), boxes_(path_, sweep.radius) {}
+    SweepFrame(const SweepTree& tree, const SphereSweep& sweep)
+        : path_(path_of(sweep.path)),
+          radius_(sweep.radius),
+          boxes_(path_, radius_),
+          nodes_(path_, radius_ + room(tree)) {}
 
     [[nodiscard]] float contact(const LeafTriangle& t) const {
         return first_contact(path_, boxes_, radius_, t);
     }
+    /// Not later than the contact with any triangle in it. Both are rounded to float in the same
+    /// way, so that a node is not skipped for a contact of equal t that is found before.
     [[nodiscard]] float enter(const BvhNode& node) const {
-        // A part of a triangle may be entered later than the whole by rounding in double.
-        const double t = boxes_.enter(node.lo, node.hi);
+        const double t = nodes_.enter(node.lo, node.hi);
         return t == never ? infinity : static_cast<float>(t * (1.0 - 1e-12));
     }
     [[nodiscard]] Vec3 center(float t) const { return path_.at(t).rounded(); }
-    [[nodiscard]] float in_units_of_caller(float t) const { return t; }
+    [[nodiscard]] float in_units_of_caller(float t) const { return t + 0.0f; }  // -0 becomes +0
 
 private:
+    /// A node around a whole triangle is entered no later than the triangle's own box, since each
+    /// step is monotone, and contacts are held behind that. Parts have no own box.
+    [[nodiscard]] double room(const SweepTree& tree) const {
+        if (!tree.parts) return 0.0;
+        const Double3 from = path_.origin;
+        const double far =
+            std::max(std::fabs(from.x), std::max(std::fabs(from.y), std::fabs(from.z)));
+        return part_room * (far + tree.reach + radius_);
+    }
+
     Path path_;
     double radius_;
-    GrownBoxes boxes_;
+    GrownBoxes boxes_;  // of triangles
+    GrownBoxes nodes_;
 };
 
 /// The same in double. Long and short directions are scaled as those of rays, or their squares
@@ -112,7 +143,7 @@ private:
         const Vec3d at = tree.space.local(start_);
         const double far = max_of(max_of(std::fabs(at.x), std::fabs(at.y)), std::fabs(at.z));
         const double radius = radius_ * tree.space.scale;
-        return radius + (tree.parts ? 0x1p-24 : 0x1p-50) * (far + tree.reach + radius);
+        return radius + (tree.parts ? part_room : 0x1p-50) * (far + tree.reach + radius);
     }
 
     Vec3d start_;

@@ -10,6 +10,13 @@ namespace raydix {
 [[nodiscard]] Bvh make_whole_tree(const Bvh& bvh);
 [[nodiscard]] BvhD make_whole_tree(const BvhD& bvh);
 
+/// More than make_whole_tree() holds at any time. A build holds up to three times the tree; the
+/// corners and their triangles lie beside it, in lists that double.
+template <class AnyBvh>
+[[nodiscard]] std::uint64_t whole_tree_bytes(const AnyBvh& bvh) {
+    return 5 * bvh.bytes();
+}
+
 [[nodiscard]] inline bool has_parts(const Bvh& bvh) { return bvh.has_split_primitives(); }
 [[nodiscard]] inline bool has_parts(const BvhD& bvh) { return bvh.tree().has_split_primitives(); }
 

@@ -1,5 +1,6 @@
 // Pictures to and from files: PNG for looking at, EXR for linear values.
 #include <raydix/error.h>
+#include <raydix/files.h>
 #include <raydix/picture.h>
 
 #include <algorithm>
@@ -7,7 +8,6 @@
 #include <fstream>
 #include <string>
 
-#include "base/replace_file.h"
 #include "report/picture_codec.h"
 
 namespace raydix {
@@ -61,7 +61,7 @@ void save_picture(const std::filesystem::path& file, const Picture& picture, boo
     } catch (const std::runtime_error& error) {
         fail(file, error.what());
     }
-    replace_file(file, bytes);
+    write_file(file, bytes);
 }
 
 Picture load_picture(const std::filesystem::path& file) {

@@ -1,5 +1,6 @@
 // Documents and pictures -> the page: parse all, ask each kind of section, put them in order.
 #include <raydix/error.h>
+#include <raydix/files.h>
 #include <raydix/report.h>
 #include <raydix/version.h>
 
@@ -8,7 +9,6 @@
 #include <fstream>
 #include <span>
 
-#include "base/replace_file.h"
 #include "report/html.h"
 #include "report/picture_codec.h"
 #include "report/sections.h"
@@ -122,7 +122,7 @@ ReportPicture make_report_picture(std::string name, std::string caption, const P
 }
 
 void save_report(const std::filesystem::path& file, const std::string& html) {
-    replace_file(file, std::as_bytes(std::span(html)));
+    write_file(file, std::as_bytes(std::span(html)));
 }
 
 }  // namespace raydix

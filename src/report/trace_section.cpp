@@ -21,7 +21,7 @@ struct TraceRow {
     SpreadFields rate;
 };
 
-std::vector<TraceRow> rows_of(const Documents& documents) {
+std::vector<TraceRow> trace_rows_of(const Documents& documents) {
     std::vector<TraceRow> rows;
     for (const Document& document : documents)
         for (const Json* trace : objects_at(document.root, "trace"))
@@ -131,7 +131,7 @@ void say(const std::string& scene, const std::vector<TraceRow>& rows, Section& s
 
 Section trace_section(const Documents& documents) {
     Section section{.id = "traces", .title = "Traces"};
-    const std::vector<TraceRow> rows = rows_of(documents);
+    const std::vector<TraceRow> rows = trace_rows_of(documents);
     std::vector<std::string> scenes;
     for (const TraceRow& row : rows)
         if (std::ranges::find(scenes, row.scene) == scenes.end()) scenes.push_back(row.scene);

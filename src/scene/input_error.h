@@ -2,18 +2,12 @@
 // name holds.
 #pragma once
 
-#include <filesystem>
 #include <string>
 #include <string_view>
 
+#include "base/printable.h"
+
 namespace raydix {
-
-/// `bytes` as printable text: valid UTF-8 stays, control characters and all other bytes become
-/// \xNN.
-[[nodiscard]] std::string printable(std::string_view bytes);
-
-/// The path as it is printed in messages.
-[[nodiscard]] std::string printable(const std::filesystem::path& path);
 
 /// A word of the input in quotes, escaped and cut to a readable length.
 [[nodiscard]] std::string in_quotes(std::string_view word);

@@ -1,17 +1,14 @@
 // .npy files <-> float32 rows, hits and index arrays; (N, >= 3) as a point cloud.
 #include "scene/npy.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cerrno>
 #include <cstring>
-#include <system_error>
 
+#include "base/write_file.h"
 #include "scene/formats.h"
 #include "scene/input_error.h"
 #include "scene/mesh_builder.h"
@@ -120,16 +117,6 @@ void check_shape(const ByteSource& in, const NpyHeader& header, std::size_t leas
     in.fail("header", fmt::format("shape {}; (N, {}) is needed", shape_text(header.shape), least));
 }
 
-void write_all(int descriptor, std::string_view bytes, const std::string& name) {
-    while (!bytes.empty()) {
-        const ssize_t done = ::write(descriptor, bytes.data(), bytes.size());
-        if (done < 0 && errno == EINTR) continue;
-        if (done < 0)
-            input_error(name, "cannot be written", std::generic_category().message(errno));
-        bytes.remove_prefix(static_cast<std::size_t>(done));
-    }
-}
-
 template <class T>
 void save_values(const std::filesystem::path& file, std::string_view type,
                  std::span<const T> values, std::size_t columns) {
@@ -179,16 +166,8 @@ void save_npy_bytes(const std::filesystem::path& file, std::string_view type,
     head += static_cast<char>(dictionary.size() >> 8);
     head += dictionary;
 
-    const std::string name = printable(file);
-    const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (descriptor < 0)
-        input_error(name, "cannot be written", std::generic_category().message(errno));
-    const struct Closer {
-        int descriptor;
-        ~Closer() { ::close(descriptor); }
-    } closer{descriptor};
-    write_all(descriptor, head, name);
-    write_all(descriptor, {reinterpret_cast<const char*>(bytes.data()), bytes.size()}, name);
+    const std::array pieces{std::as_bytes(std::span(head)), bytes};
+    write_pieces(file, pieces);
 }
 
 void save_npy(const std::filesystem::path& file, std::span<const float> values,

@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <string>
 
+#include "base/options.h"
+
 namespace raydix {
 
 /// Throws InputError if they differ.
@@ -14,6 +16,12 @@ inline void check_sizes(std::size_t rays, std::size_t results) {
     if (rays != results)
         throw InputError("trace: " + std::to_string(rays) + " rays, but room for " +
                          std::to_string(results) + " results");
+}
+
+/// Throws InputError for what no caller can have meant. `threads` is with_threads' matter.
+inline void check_options(const TraceOptions& options) {
+    check_enum("kernel", options.kernel, TraceKernel::simd);
+    check_enum("path", options.path, SimdPath::sorted);
 }
 
 inline void add(TraceCounts& sum, const TraceCounts& part) {

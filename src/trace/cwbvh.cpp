@@ -53,6 +53,7 @@ TraceCounts trace_block(const CwbvhView& view, const Cwbvh& tree, std::span<cons
 template <bool any, class Store>
 TraceCounts trace_batch(const Cwbvh& tree, std::span<const Ray> rays, const TraceOptions& options,
                         const Store& store) {
+    check_options(options);
     const Cwbvh::Arrays& arrays = tree.arrays();
     const CwbvhView view{arrays.nodes.data(), arrays.triangles.data(), arrays.bounds};
     std::vector<TraceCounts> parts((rays.size() + rays_per_block - 1) / rays_per_block);

@@ -10,6 +10,7 @@ namespace raydix {
 TraceCounts trace(const BvhD& bvh, std::span<const RayD> rays, std::span<HitD> hits,
                   const TraceOptions& options) {
     check_sizes(rays.size(), hits.size());
+    check_options(options);
     TraceCounts counts;
     with_threads(options.threads, [&] {
         const TriangleTreeD tree(bvh);
@@ -28,6 +29,7 @@ std::vector<HitD> trace(const BvhD& bvh, std::span<const RayD> rays, const Trace
 TraceCounts trace_any(const BvhD& bvh, std::span<const RayD> rays, std::span<std::uint8_t> occluded,
                       const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size());
+    check_options(options);
     TraceCounts counts;
     with_threads(options.threads, [&] {
         const TriangleTreeD tree(bvh);
@@ -38,11 +40,12 @@ TraceCounts trace_any(const BvhD& bvh, std::span<const RayD> rays, std::span<std
 }
 
 AllHitsD trace_all(const BvhD& bvh, std::span<const RayD> rays, const TraceOptions& options) {
+    check_options(options);
     AllHitsD all;
     with_threads(options.threads, [&] {
         const TriangleTreeD tree(bvh);
-        all = options.counters ? all_batch<AllHitsD, RaySteps>(tree, rays)
-                               : all_batch<AllHitsD, NoSteps>(tree, rays);
+        all = options.counters ? all_batch<AllHitsD, RaySteps>(tree, rays, options.max_result_bytes)
+                               : all_batch<AllHitsD, NoSteps>(tree, rays, options.max_result_bytes);
     });
     return all;
 }

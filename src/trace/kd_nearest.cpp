@@ -1,11 +1,13 @@
 // Batches of nearest-neighbour queries over threads, each by walk_kd_tree_outward.
 #include <raydix/error.h>
 #include <raydix/kdtree.h>
+#include <raydix/result_limit.h>
 
 #include <algorithm>
 
 #include "base/distance.h"
 #include "exec/parallel.h"
+#include "exec/result_memory.h"
 #include "trace/kd_walk.h"
 
 namespace raydix {
@@ -127,9 +129,8 @@ KdQueryCounts kd_nearest(const KdTree& tree, std::span<const Vec3> queries, std:
 
 std::vector<KdNeighbor> kd_nearest(const KdTree& tree, std::span<const Vec3> queries,
                                    std::uint32_t k, const KdQueryOptions& options) {
-    if (k != 0 && queries.size() > std::vector<KdNeighbor>().max_size() / k)
-        throw InputError("nearest neighbours: " + std::to_string(queries.size()) + " queries for " +
-                         std::to_string(k) + " each do not fit into memory");
+    require_result_bytes("kd_nearest", saturating_product(queries.size(), k * sizeof(KdNeighbor)),
+                         options.max_result_bytes);
     std::vector<KdNeighbor> neighbors(queries.size() * k);
     kd_nearest(tree, queries, k, neighbors, options);
     return neighbors;

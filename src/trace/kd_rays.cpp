@@ -6,6 +6,7 @@
 #include <string>
 
 #include "exec/parallel.h"
+#include "trace/batch.h"
 #include "trace/kd_walk.h"
 #include "trace/triangle_test.h"
 
@@ -119,7 +120,9 @@ TraceCounts any_batch(const KdTree& tree, std::span<const Ray> rays,
         [&](std::size_t i) { occluded[i] = 0; });
 }
 
-void check_call(const KdTree& tree, std::size_t rays, std::size_t results) {
+void check_call(const KdTree& tree, std::size_t rays, std::size_t results,
+                const TraceOptions& options) {
+    check_options(options);
     if (rays != results)
         throw InputError("kd_trace: " + std::to_string(rays) + " rays, but room for " +
                          std::to_string(results) + " results");
@@ -131,7 +134,7 @@ void check_call(const KdTree& tree, std::size_t rays, std::size_t results) {
 
 TraceCounts kd_trace(const KdTree& tree, std::span<const Ray> rays, std::span<Hit> hits,
                      const TraceOptions& options) {
-    check_call(tree, rays.size(), hits.size());
+    check_call(tree, rays.size(), hits.size(), options);
     TraceCounts counts;
     with_threads(options.threads, [&] {
         counts = options.counters ? closest_batch<RaySteps>(tree, rays, hits)
@@ -149,7 +152,7 @@ std::vector<Hit> kd_trace(const KdTree& tree, std::span<const Ray> rays,
 
 TraceCounts kd_trace_any(const KdTree& tree, std::span<const Ray> rays,
                          std::span<std::uint8_t> occluded, const TraceOptions& options) {
-    check_call(tree, rays.size(), occluded.size());
+    check_call(tree, rays.size(), occluded.size(), options);
     TraceCounts counts;
     with_threads(options.threads, [&] {
         counts = options.counters ? any_batch<RaySteps>(tree, rays, occluded)

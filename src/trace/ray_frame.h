@@ -21,14 +21,22 @@ RAYDIX_HD inline double component(Vec3d v, int axis) {
     return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
 }
 
+/// What the triangle test reads.
 template <class Scalar>
-struct BasicRayFrame {
-    VecOf<Scalar> origin;
+struct BasicTriangleRay {
+    VecOf<Scalar> origin, direction;  // the direction scaled
+    int kx, ky, kz;  // kz: the longest axis of the direction; kx, ky keep the winding
+    Scalar shear_x, shear_y;
+    Scalar tmin;  // in units of the scaled direction, within [0, largest number], as tmax is
+};
+using TriangleRay = BasicTriangleRay<float>;
+using TriangleRayD = BasicTriangleRay<double>;
+
+template <class Scalar>
+struct BasicRayFrame : BasicTriangleRay<Scalar> {
     VecOf<Scalar> inverse;  // 1 / direction; Inf for components of 0, with their sign
-    int kx, ky, kz;         // kz: the longest axis of the direction; kx, ky keep the winding
-    Scalar shear_x, shear_y, shear_z;
-    Scalar tmin, tmax;  // in units of the scaled direction, within [0, largest number]
-    Scalar t_scale;     // t of the caller = t_scale * t of this frame; a power of two
+    Scalar tmax;
+    Scalar t_scale;  // t of the caller = t_scale * t of this frame; a power of two
 };
 using RayFrame = BasicRayFrame<float>;
 using RayFrameD = BasicRayFrame<double>;
@@ -78,11 +86,11 @@ RAYDIX_HD inline BasicRayFrame<Scalar> make_frame(const AnyRay& ray) {
         frame.kx = frame.ky;
         frame.ky = swapped;
     }
+    frame.direction = d;
     const Scalar dz = component(d, frame.kz);
     frame.shear_x = component(d, frame.kx) / dz;
     frame.shear_y = component(d, frame.ky) / dz;
     const Scalar one = 1;
-    frame.shear_z = one / dz;
     frame.inverse = {one / d.x, one / d.y, one / d.z};
     frame.t_scale = scale;
     frame.tmin = (ray.tmin > 0 ? ray.tmin : 0) / scale;

@@ -24,6 +24,7 @@ TriangleTree view_of(const Bvh& bvh) {
 TraceCounts trace(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits,
                   const TraceOptions& options) {
     check_sizes(rays.size(), hits.size());
+    check_options(options);
     TraceCounts counts;
     with_threads(options.threads, [&] {
         const TriangleTree tree = view_of(bvh);
@@ -42,6 +43,7 @@ std::vector<Hit> trace(const Bvh& bvh, std::span<const Ray> rays, const TraceOpt
 TraceCounts trace_any(const Bvh& bvh, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                       const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size());
+    check_options(options);
     TraceCounts counts;
     with_threads(options.threads, [&] {
         const TriangleTree tree = view_of(bvh);
@@ -52,11 +54,12 @@ TraceCounts trace_any(const Bvh& bvh, std::span<const Ray> rays, std::span<std::
 }
 
 AllHits trace_all(const Bvh& bvh, std::span<const Ray> rays, const TraceOptions& options) {
+    check_options(options);
     AllHits all;
     with_threads(options.threads, [&] {
         const TriangleTree tree = view_of(bvh);
-        all = options.counters ? all_batch<AllHits, RaySteps>(tree, rays)
-                               : all_batch<AllHits, NoSteps>(tree, rays);
+        all = options.counters ? all_batch<AllHits, RaySteps>(tree, rays, options.max_result_bytes)
+                               : all_batch<AllHits, NoSteps>(tree, rays, options.max_result_bytes);
     });
     return all;
 }

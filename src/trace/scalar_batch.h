@@ -27,10 +27,10 @@ AnyHit public_hit(const BasicClosestHit<Scalar>& best, const BasicRayFrame<Scala
 }
 
 /// Calls one(i, frame, stack, steps) -> number of hits for each valid ray and miss(i) for each
-/// other one.
-template <class Steps, class Tree, class AnyRay, class One, class Miss>
+/// other one; done(b) after those of block b.
+template <class Steps, class Tree, class AnyRay, class One, class Miss, class Done>
 TraceCounts for_each_ray(const Tree& tree, std::span<const AnyRay> rays, const One& one,
-                         const Miss& miss) {
+                         const Miss& miss, const Done& done) {
     std::vector<TraceCounts> parts((rays.size() + rays_per_block - 1) / rays_per_block);
     for_each_block(rays.size(), rays_per_block,
                    [&](std::size_t block, std::size_t begin, std::size_t end) {
@@ -53,10 +53,17 @@ TraceCounts for_each_ray(const Tree& tree, std::span<const AnyRay> rays, const O
                            }
                        }
                        parts[block] = part;
+                       done(block);
                    });
     TraceCounts sum;
     for (const TraceCounts& part : parts) add(sum, part);
     return sum;
+}
+
+template <class Steps, class Tree, class AnyRay, class One, class Miss>
+TraceCounts for_each_ray(const Tree& tree, std::span<const AnyRay> rays, const One& one,
+                         const Miss& miss) {
+    return for_each_ray<Steps>(tree, rays, one, miss, [](std::size_t) {});
 }
 
 template <class Steps, class Tree, class AnyRay, class AnyHit>
@@ -84,25 +91,23 @@ TraceCounts any_batch(const Tree& tree, std::span<const AnyRay> rays,
 
 /// All: AllHits or AllHitsD.
 template <class All, class Steps, class Tree, class AnyRay>
-All all_batch(const Tree& tree, std::span<const AnyRay> rays) {
-    using Hits = decltype(All::hits);
-    std::vector<Hits> found((rays.size() + rays_per_block - 1) / rays_per_block);
-    All all;
-    all.offsets.resize(rays.size() + 1, 0);
-    all.counts = for_each_ray<Steps>(
+All all_batch(const Tree& tree, std::span<const AnyRay> rays, std::uint64_t max_result_bytes) {
+    HitBlocks<All> found(rays.size(), rays_per_block, max_result_bytes);
+    std::uint64_t* const hit_counts = found.hit_counts();
+    const TraceCounts counts = for_each_ray<Steps>(
         tree, rays,
         [&](std::size_t i, const auto& ray, auto& stack, Steps& steps) {
-            Hits& block = found[i / rays_per_block];
+            auto& block = found.hits(i / rays_per_block);
             const std::size_t before = block.size();
             find_all(tree, ray, stack, steps, [&](auto t, std::uint32_t k, auto u, auto v) {
                 block.push_back({t, tree.order[k], u, v});
             });
             finish_ray(block, before);
-            all.offsets[i + 1] = block.size() - before;
-            return all.offsets[i + 1];
+            return hit_counts[i] = block.size() - before;
         },
-        [](std::size_t) {});
-    join_blocks(found, rays_per_block, all);
+        [](std::size_t) {}, [&](std::size_t block) { found.finish(block); });
+    All all = found.join();
+    all.counts = counts;
     return all;
 }
 

@@ -13,15 +13,13 @@
 
 namespace raydix {
 
-/// The box of a tree's root, widened for one ray. The triangle test accepts a triangle if the ray
-/// passes within rounding of it: at most 4 eps (|distance along x| + |distance along z|) in its
-/// sheared plane (two roundings for the vertex, three for the shear). All boxes of the tree grow by
-/// twice that bound on every side, taken at the root, as Woop, Benthin and Wald (2013, section 4)
-/// suggest; the quotients' own error is covered by Ize's factor (2013).
-/// In double the boxes are still floats, relative to a point of the scene (BvhD), and may be around
-/// parts of triangles. There the pad is sixteen times the bound: it holds how far the point of the
-/// triangle that t belongs to may be beside the ray at t (45 roundings of the same distances:
-/// test 4, weights 32, t 8, the origin on its way to that point 1).
+/// A tree's boxes, widened for one ray. A hit at t stands for a point of its triangle, and the ray
+/// at t is within 6 u L of that point on every axis, u = 2^-24, L = the distances to the far sides
+/// of the root, summed over the axes. The planes round 5 times. So all boxes grow by 12 u L on
+/// every side (docs/algorithms/triangle-test.md has the proof), and by a little that does not
+/// underflow. In double the boxes are still floats, relative to a point of the scene (BvhD). There
+/// the point is within 45 roundings (test 4, weights 32, t 8, the origin on its way to that point
+/// 1), and the pad is 64.
 template <class Scalar>
 struct BasicSlabFrame {
     VecOf<Scalar> origin, inverse;
@@ -34,8 +32,10 @@ using SlabFrame = BasicSlabFrame<float>;
 using SlabFrameD = BasicSlabFrame<double>;
 
 template <class Scalar>
-inline constexpr Scalar slab_pad_of = (sizeof(Scalar) == 4 ? 8 : 64) * rounding_of<Scalar>;
+inline constexpr Scalar slab_pad_of = (sizeof(Scalar) == 4 ? 12 : 64) * rounding_of<Scalar>;
 inline constexpr float slab_pad = slab_pad_of<float>;
+/// Where all distances are tiny, roundings are not relative: each is below 2^-149.
+inline constexpr float least_slab_pad = 0x1p-126f;
 /// 1 + 2 gamma(3), rounded up.
 template <class Scalar>
 inline constexpr Scalar slab_exit_factor_of = 1 + 8 * rounding_of<Scalar>;
@@ -50,11 +50,10 @@ RAYDIX_HD inline BasicSlabFrame<Scalar> make_slab_frame(const BasicRayFrame<Scal
     const VecOf<Scalar> far{reach(root.lo.x, root.hi.x, ray.origin.x),
                             reach(root.lo.y, root.hi.y, ray.origin.y),
                             reach(root.lo.z, root.hi.z, ray.origin.z)};
-    const Scalar far_z = component(far, ray.kz), unit = slab_pad_of<Scalar>;
-    const VecOf<Scalar> pad{unit * (far.x + far_z), unit * (far.y + far_z), unit * (far.z + far_z)};
+    const Scalar pad = slab_pad_of<Scalar> * ((far.x + far.y) + far.z) + least_slab_pad;
     const bool nx = std::signbit(ray.inverse.x), ny = std::signbit(ray.inverse.y),
                nz = std::signbit(ray.inverse.z);
-    const VecOf<Scalar> near_pad{nx ? pad.x : -pad.x, ny ? pad.y : -pad.y, nz ? pad.z : -pad.z};
+    const VecOf<Scalar> near_pad{nx ? pad : -pad, ny ? pad : -pad, nz ? pad : -pad};
     return {ray.origin, ray.inverse, near_pad,  Scalar(-1) * near_pad,
             nx ? 4 : 0, ny ? 4 : 0,  nz ? 4 : 0};
 }

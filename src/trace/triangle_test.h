@@ -7,15 +7,26 @@
 #include <raydix/types.h>
 
 #include <cmath>
-#include <type_traits>
+#include <cstdint>
+#include <cstring>
 
+#include "base/double3.h"
 #include "base/exact_product.h"
 #include "base/hd.h"
 #include "base/math.h"
 #include "primitives/zero_area.h"
 #include "trace/ray_frame.h"
 
+// Never a call: vectors of doubles would go through memory.
+#if defined(__CUDACC__)
+#define RAYDIX_WEIGHTS __host__ __device__ __forceinline__
+#else
+#define RAYDIX_WEIGHTS [[gnu::always_inline]] inline
+#endif
+
 namespace raydix {
+
+#include "trace/corner_weights.h"
 
 enum class EdgeRule {
     closed,    // an edge belongs to both triangles: closest and any hit
@@ -28,7 +39,8 @@ struct BasicTriangleHit {
 };
 using TriangleHit = BasicTriangleHit<float>;
 
-/// A vertex in the ray's sheared plane: the ray is the origin there.
+/// A vertex in the ray's sheared plane, where the ray is the origin, and its distance along the
+/// ray's longest axis.
 template <class Scalar>
 struct BasicShearedVertex {
     Scalar x, y, z;
@@ -37,12 +49,11 @@ using ShearedVertex = BasicShearedVertex<float>;
 using ShearedVertexD = BasicShearedVertex<double>;
 
 template <class Scalar>
-RAYDIX_HD inline BasicShearedVertex<Scalar> shear(const BasicRayFrame<Scalar>& ray,
+RAYDIX_HD inline BasicShearedVertex<Scalar> shear(const BasicTriangleRay<Scalar>& ray,
                                                   VecOf<Scalar> vertex) {
     const VecOf<Scalar> v = vertex - ray.origin;
     const Scalar z = component(v, ray.kz);
-    return {component(v, ray.kx) - ray.shear_x * z, component(v, ray.ky) - ray.shear_y * z,
-            ray.shear_z * z};
+    return {component(v, ray.kx) - ray.shear_x * z, component(v, ray.ky) - ray.shear_y * z, z};
 }
 
 /// Twice the signed area of (ray, a, b): which side of the edge the ray passes. edge(a, b) ==
@@ -75,31 +86,6 @@ RAYDIX_HD inline int perturbed_edge_sign(const BasicShearedVertex<Scalar>& a,
     return 0;
 }
 
-/// t of the slab planes of the triangle's own box; the same arithmetic as the traversal's, without
-/// its pads.
-template <class Scalar>
-struct BoxInterval {
-    Scalar entry, exit;
-};
-
-template <class Scalar, class Corners>
-RAYDIX_HD inline BoxInterval<Scalar> own_box_interval(const BasicRayFrame<Scalar>& ray,
-                                                      const Corners& triangle) {
-    const BoxOf<Scalar> box = box_of(triangle.v0, triangle.v1, triangle.v2);
-    BoxInterval<Scalar> interval{-infinity, infinity};
-    const auto axis = [&](Scalar lo, Scalar hi, Scalar origin, Scalar inverse) {
-        const bool negative = std::signbit(inverse);
-        const Scalar near = ((negative ? hi : lo) - origin) * inverse,
-                     far = ((negative ? lo : hi) - origin) * inverse;
-        interval.entry = max_of(near, interval.entry);
-        interval.exit = min_of(far, interval.exit);
-    };
-    axis(box.lo.x, box.hi.x, ray.origin.x, ray.inverse.x);
-    axis(box.lo.y, box.hi.y, ray.origin.y, ray.inverse.y);
-    axis(box.lo.z, box.hi.z, ray.origin.z, ray.inverse.z);
-    return interval;
-}
-
 /// The edge functions of a hit in double. Cancellation may leave nothing of their ratios, and t
 /// would then be that of any place of the triangle: `accurate` has them once more.
 struct EdgesD {
@@ -111,13 +97,13 @@ struct EdgesD {
     /// roundings of (their distance beside it + along it): each function is off by at most two
     /// roundings of the largest product.
     [[nodiscard]] RAYDIX_HD bool may_stray(const ShearedVertexD& a, const ShearedVertexD& b,
-                                           const ShearedVertexD& c, double shear_z) const {
+                                           const ShearedVertexD& c, double per_depth) const {
         const auto beside = [](const ShearedVertexD& p) {
             return max_of(std::fabs(p.x), std::fabs(p.y));
         };
         const double m = max_of(max_of(beside(a), beside(b)), beside(c));
         const double z = max_of(max_of(std::fabs(a.z), std::fabs(b.z)), std::fabs(c.z));
-        const double scale = std::fabs(shear_z);  // z is in units of the ray's t
+        const double scale = std::fabs(per_depth);  // z is in units of the ray's t
         return 3.0 * (m * m) * (m * scale) > 8.0 * std::fabs(sum()) * (m * scale + z);
     }
     [[nodiscard]] RAYDIX_HD static EdgesD accurate(const ShearedVertexD& a, const ShearedVertexD& b,
@@ -129,57 +115,146 @@ struct EdgesD {
     }
 };
 
-/// True if the ray hits within [ray.tmin, tmax]. u weighs v1, v weighs v2.
-/// One step beyond the paper, so that culling cannot change which hit is closest. In float t is
-/// held within the triangle's own box: a traversal's entry into any box around the triangle is then
-/// never greater than t (rounding is monotone). In double the point of the triangle at t is within
-/// the pads of the ray, so that this holds for boxes around parts too.
-/// Corners: LeafTriangle or LeafTriangleD.
-template <EdgeRule rule, class Scalar, class Corners>
-RAYDIX_HD bool intersect_triangle(const BasicRayFrame<Scalar>& ray, const Corners& triangle,
-                                  std::type_identity_t<Scalar> tmax,
-                                  BasicTriangleHit<Scalar>& hit) {
-    const BasicShearedVertex<Scalar> a = shear(ray, triangle.v0), b = shear(ray, triangle.v1),
-                                     c = shear(ray, triangle.v2);
-    Scalar u = edge_function(c, b), v = edge_function(a, c), w = edge_function(b, a);
+/// Whether the ray passes the triangle a, b, c on the inside of all edges, or on one of them as the
+/// rule has it. u, v and w become the edge functions opposite a, b and c, once more and exactly
+/// where rounding left one without a sign.
+template <EdgeRule rule, class Scalar>
+RAYDIX_HD inline bool passes_inside(const BasicShearedVertex<Scalar>& a,
+                                    const BasicShearedVertex<Scalar>& b,
+                                    const BasicShearedVertex<Scalar>& c, Scalar& u, Scalar& v,
+                                    Scalar& w) {
+    u = edge_function(c, b), v = edge_function(a, c), w = edge_function(b, a);
     if ((u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0)) return false;
-    if (u == 0 || v == 0 || w == 0) {
-        // A zero may be lost precision: the ray passes near an edge. Once more, exactly.
-        // Signs before the conversion: what is too small for a float would lose its own.
-        const double du = exact_edge_function(c, b), dv = exact_edge_function(a, c),
-                     dw = exact_edge_function(b, a);
-        if ((du < 0 || dv < 0 || dw < 0) && (du > 0 || dv > 0 || dw > 0)) return false;
-        u = static_cast<Scalar>(du);
-        v = static_cast<Scalar>(dv);
-        w = static_cast<Scalar>(dw);
-        if constexpr (rule == EdgeRule::half_open) {
-            const int su = perturbed_edge_sign(c, b), sv = perturbed_edge_sign(a, c),
-                      sw = perturbed_edge_sign(b, a);
-            if (su != sv || sv != sw) return false;
-        }
+    if (std::fabs(u) > 0 && std::fabs(v) > 0 && std::fabs(w) > 0) return true;
+    // 0 may be lost precision, NaN is the difference of two products that overflow. Signs before
+    // the conversion: what is too small for a float would lose its own.
+    const double du = exact_edge_function(c, b), dv = exact_edge_function(a, c),
+                 dw = exact_edge_function(b, a);
+    if ((du < 0 || dv < 0 || dw < 0) && (du > 0 || dv > 0 || dw > 0)) return false;
+    u = static_cast<Scalar>(du);
+    v = static_cast<Scalar>(dv);
+    w = static_cast<Scalar>(dw);
+    if constexpr (rule == EdgeRule::half_open) {
+        const int su = perturbed_edge_sign(c, b), sv = perturbed_edge_sign(a, c),
+                  sw = perturbed_edge_sign(b, a);
+        if (su != sv || sv != sw) return false;
     }
-    if constexpr (sizeof(Scalar) == 8) {
-        const EdgesD rounded{u, v, w};
-        if (rounded.may_stray(a, b, c, ray.shear_z))
-            if (const EdgesD edges = EdgesD::accurate(a, b, c); edges.sum() != 0)
-                u = edges.u, v = edges.v, w = edges.w;
+    return true;
+}
+
+/// The upper 26 of a double's 53 digits.
+inline constexpr std::uint64_t narrow_digits = ~((std::uint64_t{1} << 27) - 1);
+RAYDIX_HD inline double narrowed(double x) {
+    std::uint64_t bits;
+    std::memcpy(&bits, &x, sizeof(bits));
+    bits &= narrow_digits;
+    std::memcpy(&x, &bits, sizeof(x));
+    return x;
+}
+
+RAYDIX_HD inline CornerWeights<double> weigh_corners(const TriangleRay& ray,
+                                                     const LeafTriangle& triangle) {
+    const int axis[3] = {ray.kx, ray.ky, ray.kz};
+    double corner[3][3], direction[3];
+    for (int k = 0; k < 3; ++k) {
+        const double origin = component(ray.origin, axis[k]);
+        direction[k] = component(ray.direction, axis[k]);
+        corner[0][k] = component(triangle.v0, axis[k]) - origin;
+        corner[1][k] = component(triangle.v1, axis[k]) - origin;
+        corner[2][k] = component(triangle.v2, axis[k]) - origin;
     }
-    const Scalar determinant = (u + v) + w;
+    return weigh_corners(corner, direction, 1.0, narrowed);
+}
+
+/// -0 becomes +0.
+RAYDIX_HD inline TriangleHit rounded_hit(double t, double u, double v) {
+    return {static_cast<float>(t) + 0.0f, static_cast<float>(u) + 0.0f,
+            static_cast<float>(v) + 0.0f};
+}
+
+/// t, u and v of a ray that passes inside, where double says so, too: nearly always. The limits of
+/// the ray are the caller's.
+RAYDIX_HD inline bool hit_inside(const TriangleRay& ray, const LeafTriangle& triangle,
+                                 TriangleHit& hit) {
+    const CornerWeights<double> at = weigh_corners(ray, triangle);
+    hit = rounded_hit(at.t, at.u, at.v);
+    return at.u >= 0.0 && at.v >= 0.0 && at.w >= 0.0;  // NaN where all corners fall together
+}
+
+/// As above for what is left: rays that pass within rounding of an edge on its outside. The point
+/// is moved into the triangle where it is beside it by at most 2^-23 of the way to v0 and no weight
+/// is below -1/4. Else t, u and v are those of the sheared corners as the test in float had them,
+/// whose edge functions are exact.
+RAYDIX_RARE bool hit_near_edge(const TriangleRay& ray, const LeafTriangle& triangle,
+                               TriangleHit& hit) {
+    const CornerWeights<double> at = weigh_corners(ray, triangle);
+    const auto between = [](Vec3 a, Vec3 b) {
+        const Double3 d = Double3(b) - Double3(a);
+        return (std::fabs(d.x) + std::fabs(d.y)) + std::fabs(d.z);
+    };
+    const double extent = between(triangle.v0, triangle.v1) + between(triangle.v0, triangle.v2);
+    const double room = min_of(0x1p-23 * between(ray.origin, triangle.v0) / extent, 0.25);
+    if (at.u >= -room && at.v >= -room && at.w >= -room) {
+        const double u = max_of(at.u, 0.0), v = max_of(at.v, 0.0), sum = max_of(u + v, 1.0);
+        hit = rounded_hit(at.t, u / sum, v / sum);
+        return true;
+    }
+    const ShearedVertex a = shear(ray, triangle.v0), b = shear(ray, triangle.v1),
+                        c = shear(ray, triangle.v2);
+    const double u = exact_edge_function(c, b), v = exact_edge_function(a, c),
+                 w = exact_edge_function(b, a), sum = (u + v) + w;
+    // Not finite: the ray starts so far away that the corners overflow.
+    if (!(sum != 0.0 && std::fabs(sum) < double(infinity))) return false;
+    const double depth = (u * a.z + v * b.z) + w * c.z;
+    hit = rounded_hit(depth / (sum * component(ray.direction, ray.kz)), v / sum, w / sum);
+    return true;
+}
+
+/// The second half of intersect_triangle in float, for rays that pass inside.
+RAYDIX_HD inline bool finish_hit(const TriangleRay& ray, const LeafTriangle& triangle, float tmax,
+                                 TriangleHit& hit) {
+    if (!hit_inside(ray, triangle, hit) && !hit_near_edge(ray, triangle, hit)) return false;
+    return hit.t >= ray.tmin && hit.t <= tmax && !has_zero_area(triangle);
+}
+
+/// True if the ray hits within [ray.tmin, tmax]. u weighs v1, v weighs v2. The point of the ray at
+/// t is within 6 roundings of the scene's extent of a point of the triangle, whatever its shape: no
+/// box around that point can be missed (slab.h).
+template <EdgeRule rule>
+RAYDIX_HD inline bool intersect_triangle(const TriangleRay& ray, const LeafTriangle& triangle,
+                                         float tmax, TriangleHit& hit) {
+    float u, v, w;
+    return passes_inside<rule>(shear(ray, triangle.v0), shear(ray, triangle.v1),
+                               shear(ray, triangle.v2), u, v, w) &&
+           finish_hit(ray, triangle, tmax, hit);
+}
+
+/// In double, too, the point of the triangle at t is within the pads of the ray. Corners:
+/// LeafTriangleD.
+template <EdgeRule rule, class Corners>
+RAYDIX_HD bool intersect_triangle(const TriangleRayD& ray, const Corners& triangle, double tmax,
+                                  BasicTriangleHit<double>& hit) {
+    ShearedVertexD a = shear(ray, triangle.v0), b = shear(ray, triangle.v1),
+                   c = shear(ray, triangle.v2);
+    double u, v, w;
+    if (!passes_inside<rule>(a, b, c, u, v, w)) return false;
+    const double per_depth = 1.0 / component(ray.direction, ray.kz);
+    a.z *= per_depth, b.z *= per_depth, c.z *= per_depth;
+    const EdgesD rounded{u, v, w};
+    if (rounded.may_stray(a, b, c, per_depth))
+        if (const EdgesD edges = EdgesD::accurate(a, b, c); edges.sum() != 0)
+            u = edges.u, v = edges.v, w = edges.w;
+    const double determinant = (u + v) + w;
     // Not finite: the ray starts so far away that the edge functions overflow.
-    if (!(determinant != 0 && std::fabs(determinant) < infinity)) return false;
-    Scalar t = ((u * a.z + v * b.z) + w * c.z) / determinant;
-    if constexpr (sizeof(Scalar) == 8) {
-        // Within its corners, along the ray's longest axis: a slower one could move t much farther
-        // than rounding did.
-        t = max_of(t, min_of(min_of(a.z, b.z), c.z));
-        t = min_of(t, max_of(max_of(a.z, b.z), c.z));
-    } else {
-        const BoxInterval<Scalar> own = own_box_interval(ray, triangle);
-        if (own.entry <= own.exit) t = min_of(max_of(t, own.entry), own.exit);
-    }
+    if (!(determinant != 0 && std::fabs(determinant) < double(infinity))) return false;
+    double t = ((u * a.z + v * b.z) + w * c.z) / determinant;
+    // Within its corners, along the ray's longest axis: a slower one could move t much farther than
+    // rounding did.
+    t = max_of(t, min_of(min_of(a.z, b.z), c.z));
+    t = min_of(t, max_of(max_of(a.z, b.z), c.z));
     if (!(t >= ray.tmin && t <= tmax)) return false;
     if (has_zero_area(triangle)) return false;
-    hit = {t, v / determinant, w / determinant};
+    hit = {t + 0.0, v / determinant, w / determinant};
     return true;
 }
 

@@ -32,7 +32,7 @@ public:
     /// `ray` must be valid, the tree not empty.
     AnyHit run(AnyRay ray, TraceCounts& counts) {
         const auto frame = make_frame(ray);
-        ray.tmin = max_of(ray.tmin, Scalar(0));
+        ray.tmin = max_of(ray.tmin, Scalar(0)) + Scalar(0);  // -0 becomes +0
         AnyHit best{ray.tmax};
         NoSteps steps;
         const auto leaf = [&](const BvhNode& node) {
@@ -40,11 +40,13 @@ public:
                 const std::uint32_t prim = tree_.order[k];
                 AnyHit hit;
                 ++counts.triangle_tests;
-                if (!intersect_(prim, ray, hit) || !(hit.t >= ray.tmin && hit.t <= best.t))
+                constexpr Scalar farthest = std::numeric_limits<Scalar>::max();
+                if (!intersect_(prim, ray, hit) ||
+                    !(hit.t >= ray.tmin && hit.t <= min_of(best.t, farthest)))
                     continue;
                 if (hit.t == best.t && prim > best.prim) continue;
-                best = {hit.t, prim, hit.u, hit.v};
-                ray.tmax = hit.t;
+                best = {hit.t + Scalar(0), prim, hit.u, hit.v};
+                ray.tmax = best.t;
                 if (any_) return true;
             }
             return false;
@@ -69,6 +71,7 @@ template <class Tree, class One>
 TraceCounts trace_user_rays(const Tree& tree, const typename Tree::Intersect& intersect,
                             std::span<const typename Tree::AnyRay> rays, bool any,
                             const TraceOptions& options, const One& one) {
+    check_options(options);
     constexpr std::size_t rays_per_block = 256;
     std::vector<TraceCounts> parts((rays.size() + rays_per_block - 1) / rays_per_block);
     with_threads(options.threads, [&] {

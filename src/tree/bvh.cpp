@@ -40,6 +40,10 @@ Builder builder_from_name(std::string_view name) {
     throw InputError("unknown builder '" + std::string(name) + "'; known: " + known);
 }
 
+void detail::refuse_quality(int number) {
+    throw InputError("option quality is " + std::to_string(number) + "; it must be 0 to 2");
+}
+
 Aabb Bvh::bounds() const { return empty() ? empty_box() : Aabb{nodes_[0].lo, nodes_[0].hi}; }
 
 std::uint64_t Bvh::bytes() const {

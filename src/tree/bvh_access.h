@@ -19,6 +19,7 @@ struct BvhAccess {
     [[nodiscard]] std::uint32_t& max_depth() const { return bvh.max_depth_; }
     [[nodiscard]] std::uint64_t& input_count() const { return bvh.input_count_; }
     [[nodiscard]] std::uint64_t& left_out() const { return bvh.left_out_; }
+    [[nodiscard]] bool& refitted() const { return bvh.refitted_; }
     [[nodiscard]] BuildMs& build_ms() const { return bvh.build_ms_; }
     [[nodiscard]] std::uint64_t& peak_bytes() const { return bvh.peak_bytes_; }
 

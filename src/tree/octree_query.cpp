@@ -7,6 +7,7 @@
 
 #include "base/float_env.h"
 #include "exec/parallel.h"
+#include "exec/result_budget.h"
 
 namespace raydix {
 namespace {
@@ -55,7 +56,7 @@ std::uint32_t locate_one(const Octree& octree, const Grid& grid, const Aabb& roo
 
 /// Appends the ids of a row, ascending.
 void append_points(const Octree& octree, const Grid& grid, const Aabb& box,
-                   std::vector<std::uint32_t>& ids) {
+                   BudgetVector<std::uint32_t>& ids) {
     if (!is_valid_query(box)) return;
     const auto before = static_cast<std::ptrdiff_t>(ids.size());
     for_each_point_in_box(octree, grid, box,
@@ -101,35 +102,44 @@ std::vector<std::uint32_t> locate(const Octree& octree, std::span<const Vec3> po
     return found;
 }
 
-std::vector<std::uint32_t> points_in_box(const Octree& octree, const Aabb& box) {
+std::vector<std::uint32_t> points_in_box(const Octree& octree, const Aabb& box,
+                                         std::uint64_t max_result_bytes) {
     const FloatEnvironment plain;
-    std::vector<std::uint32_t> ids;
+    ResultBudget budget("points_in_box", max_result_bytes);
+    BudgetVector<std::uint32_t> ids{BudgetAllocator<std::uint32_t>(&budget)};
     append_points(octree, grid_of(octree), box, ids);
-    return ids;
+    budget.take_last(ids.size() * sizeof(std::uint32_t));
+    return {ids.begin(), ids.end()};
 }
 
-PointsInBoxes points_in_boxes(const Octree& octree, std::span<const Aabb> boxes, int threads) {
+PointsInBoxes points_in_boxes(const Octree& octree, std::span<const Aabb> boxes, int threads,
+                              std::uint64_t max_result_bytes) {
     constexpr std::size_t block = 64;
+    ResultBudget budget("points_in_boxes", max_result_bytes);
+    budget.take((boxes.size() + 1) * sizeof(std::uint64_t));
     PointsInBoxes result;
     result.offsets.assign(boxes.size() + 1, 0);
-    std::vector<std::vector<std::uint32_t>> found((boxes.size() + block - 1) / block);
+    auto found = budget_lists<std::uint32_t>((boxes.size() + block - 1) / block, budget);
     with_threads(threads, [&] {
         for (const Aabb& box : boxes) result.invalid_queries += is_valid_query(box) ? 0 : 1;
         const Grid grid = grid_of(octree);
         for_each_block(boxes.size(), block, [&](std::size_t b, std::size_t begin, std::size_t end) {
-            std::vector<std::uint32_t>& ids = found[b];
+            budget.go_on();
+            BudgetVector<std::uint32_t>& ids = found[b];
             for (std::size_t q = begin; q < end; ++q) {
                 const std::size_t before = ids.size();
                 append_points(octree, grid, boxes[q], ids);
                 result.offsets[q + 1] = ids.size() - before;
             }
+            pack(ids);
         });
     });
     for (std::size_t q = 0; q < boxes.size(); ++q) result.offsets[q + 1] += result.offsets[q];
+    budget.take_last(result.offsets.back() * sizeof(std::uint32_t));
     result.ids.reserve(result.offsets.back());
-    for (std::vector<std::uint32_t>& ids : found) {
+    for (BudgetVector<std::uint32_t>& list : found) {
+        const BudgetVector<std::uint32_t> ids = std::move(list);
         result.ids.insert(result.ids.end(), ids.begin(), ids.end());
-        ids = {};
     }
     return result;
 }

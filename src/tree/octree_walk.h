@@ -27,20 +27,11 @@ namespace raydix {
     return make_grid(octree.bounds(), axis_bits_of(octree));
 }
 
-/// Bit 3k of a code to bit k: the inverse of spread_bits.
-RAYDIX_HD inline std::uint32_t gather_bits(std::uint64_t v) {
-    v &= 0x1249249249249249ull;
-    v = (v | v >> 2) & 0x10C30C30C30C30C3ull;
-    v = (v | v >> 4) & 0x100F00F00F00F00Full;
-    v = (v | v >> 8) & 0x001F0000FF0000FFull;
-    v = (v | v >> 16) & 0x001F00000000FFFFull;
-    v = (v | v >> 32) & 0x00000000001FFFFFull;
-    return static_cast<std::uint32_t>(v);
-}
-
 /// The cell of a node among those of its level.
 RAYDIX_HD inline Cell cell_of_code(std::uint64_t code) {
-    return {gather_bits(code >> 2), gather_bits(code >> 1), gather_bits(code)};
+    return {static_cast<std::uint32_t>(gather_bits(code >> 2)),
+            static_cast<std::uint32_t>(gather_bits(code >> 1)),
+            static_cast<std::uint32_t>(gather_bits(code))};
 }
 
 /// The deepest node at `level` or above it on the way to a cell of that level: the node itself, a

@@ -12,23 +12,6 @@
 
 namespace raydix {
 
-/// The inverse of spread_bits: every third bit from bit 0 on, moved together.
-RAYDIX_HD inline std::uint32_t gather_bits(std::uint32_t v) {
-    v &= 0x09249249u;
-    v = (v | v >> 2) & 0x030C30C3u;
-    v = (v | v >> 4) & 0x0300F00Fu;
-    v = (v | v >> 8) & 0x030000FFu;
-    return (v | v >> 16) & 0x000003FFu;
-}
-RAYDIX_HD inline std::uint64_t gather_bits(std::uint64_t v) {
-    v &= 0x1249249249249249ull;
-    v = (v | v >> 2) & 0x10C30C30C30C30C3ull;
-    v = (v | v >> 4) & 0x100F00F00F00F00Full;
-    v = (v | v >> 8) & 0x001F0000FF0000FFull;
-    v = (v | v >> 16) & 0x001F00000000FFFFull;
-    return (v | v >> 32) & 0x00000000001FFFFFull;
-}
-
 /// Finite floats as consecutive integers in the same order; 0 and -0 are one.
 RAYDIX_HD inline std::int64_t ordinal_of(float x) {
     const auto bits = std::bit_cast<std::uint32_t>(x);

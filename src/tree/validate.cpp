@@ -220,6 +220,11 @@ Fault validate_counts(const Bvh& bvh) {
     if (bvh.left_out() > bvh.input_count() || !fits)
         return fmt::format("info: {} primitives, {} left out, but {} references", bvh.input_count(),
                            bvh.left_out(), n);
+    if (bvh.refitted() && bvh.has_split_primitives())
+        return fmt::format(
+            "info: {} references to {} primitives, and refitted; parts of primitives "
+            "cannot be",
+            n, valid);
     const std::uint64_t slots = n == 0 ? 0 : 2 * std::uint64_t{bvh.inner_count()} + 2;
     if (bvh.nodes().size() != slots)
         return fmt::format("nodes: {} slots, but {} inner nodes over {} primitives need {}",

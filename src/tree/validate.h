@@ -37,6 +37,7 @@ using Fault = std::optional<std::string>;
 [[nodiscard]] Fault validate_boxes(const Bvh& bvh);
 /// Of trees with parts of triangles: the leaves' boxes cover each triangle.
 [[nodiscard]] Fault validate_cover(const Bvh& bvh);
+/// Of trees that still divide sorted codes: the codes of refitted ones are gone.
 [[nodiscard]] Fault validate_codes(const Bvh& bvh);
 [[nodiscard]] Fault validate_against_mesh(const Bvh& bvh, const MeshView& mesh);
 

@@ -47,7 +47,7 @@ int shortest_inside(const Bvh& bvh, const std::vector<std::uint64_t>& codes,
 }  // namespace
 
 Fault validate_codes(const Bvh& bvh) {
-    if (bvh.empty() || !follows_codes(bvh.options())) return {};
+    if (bvh.empty() || !follows_codes(bvh.options()) || bvh.refitted()) return {};
     const std::vector<std::uint64_t> codes = codes_in_order(bvh);
     const std::span<const std::uint32_t> order = bvh.order();
     const std::size_t pairs = codes.size() - 1;

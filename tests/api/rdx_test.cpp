@@ -343,7 +343,7 @@ std::vector<Lie> lies_in_content() {
         {"x.rdx: info: primitive kind 3", [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->kind = 3; }},
         {"x.rdx: primitives: elements of 36 bytes",
          [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->kind = 1; }},
-        {"x.rdx: info: strict is 2", [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->strict = 2; }},
+        {"x.rdx: info: flags are 4", [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->flags = 4; }},
         {"x.rdx: info: builder number 10",
          [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->builder = 10; }},
         {"x.rdx: info: -1 code bits",

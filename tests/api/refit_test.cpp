@@ -19,9 +19,12 @@
 #include "support/message.h"
 #include "support/scenes.h"
 #include "support/support.h"
+#include "tree/bvh_access.h"
 
 namespace raydix {
 namespace {
+
+using test::message_of;
 
 constexpr std::uint64_t seed = 20061113;
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -67,11 +70,8 @@ TEST(Refit, GivesTheHitsOfANewTree) {
             for (const float by : {0.3f, 1.0f}) {
                 const Mesh now = deformed(mesh, by);
                 const RefitQuality quality = refitter.refit(bvh, now, threads);
-                const CheckReport report = check(bvh, now);
-                // Codes are those of the old places: that invariant is of a build, not of a refit.
-                if (!report.ok) {
-                    EXPECT_NE(report.broken.find("code"), std::string::npos) << report.broken;
-                }
+                EXPECT_EQ(check(bvh, now).broken, "") << builder;
+                EXPECT_TRUE(bvh.refitted());
                 EXPECT_EQ(bvh.max_depth(), depth);
                 const std::vector<Ray> rays = rays_at(bvh.bounds(), 2000);
                 EXPECT_TRUE(same_hits(trace(bvh, rays), trace(build_bvh(now), rays))) << builder;
@@ -152,6 +152,61 @@ TEST(Refit, BoxesAndPointsAndFewOfThem) {
     }
 }
 
+TEST(Refit, IsSavedAndLoadedAsWhatItIs) {
+    const test::TempFolder folder;
+    const Mesh mesh = test::random_soup(2000, seed), now = deformed(mesh, 1.0f);
+    const auto file = folder.path() / "tree.rdx";
+    for (const char* builder : whole_builders)
+        for (const bool strict : {false, true}) {
+            const BuildOptions options{.builder = builder_from_name(builder), .strict = strict};
+            Bvh bvh = build_bvh(mesh, options);
+            EXPECT_FALSE(bvh.refitted());
+            Scene scene;
+            scene.mesh = now;
+            refit(bvh, now);
+            ASSERT_EQ(message_of([&] { save_rdx(file, bvh, scene); }), "no error") << builder;
+            const RdxFile loaded = load_rdx(file);
+            EXPECT_TRUE(loaded.bvh.refitted());
+            EXPECT_EQ(loaded.bvh.options().strict, strict);
+            EXPECT_EQ(check(loaded.bvh, now).broken, "");
+            EXPECT_TRUE(check_same(loaded.bvh, bvh).ok);
+            EXPECT_EQ(tree_hash(loaded.bvh), tree_hash(bvh));
+            // Built into the same memory it is a built tree again, with the hash it always had.
+            BvhBuilder().build(mesh, options, bvh);
+            EXPECT_FALSE(bvh.refitted());
+            EXPECT_EQ(tree_hash(bvh), tree_hash(build_bvh(mesh, options)));
+            scene.mesh = mesh;
+            save_rdx(file, bvh, scene);
+            EXPECT_FALSE(load_rdx(file).bvh.refitted());
+        }
+}
+
+/// Everything but the order of the codes still holds, and is looked at.
+TEST(Refit, CheckFindsWhatIsWrongWithARefittedTree) {
+    const Mesh mesh = test::random_soup(500, seed), now = deformed(mesh, 1.0f);
+    Bvh good = build_bvh(mesh);
+    refit(good, now);
+    ASSERT_EQ(check(good, now).broken, "");
+    EXPECT_NE(check(good, mesh).broken, "") << "not where the primitives were";
+    const auto broken = [&](const std::function<void(const BvhAccess&)>& change) {
+        Bvh bvh = build_bvh(mesh);
+        refit(bvh, now);
+        change(BvhAccess{bvh});
+        return check(bvh, now).broken;
+    };
+    const auto names = [](const std::string& text, const char* what) {
+        return text.find(what) != std::string::npos;
+    };
+    EXPECT_TRUE(names(broken([](const BvhAccess& t) { t.nodes()[2].hi.x += 1.0f; }), "box"));
+    EXPECT_TRUE(names(broken([](const BvhAccess& t) { t.order()[3] = t.order()[4]; }), "order"));
+    EXPECT_TRUE(names(broken([](const BvhAccess& t) { ++t.max_depth(); }), "depth"));
+    EXPECT_TRUE(names(broken([](const BvhAccess& t) { t.options().max_leaf = 200; }),
+                      "a leaf may hold 200"));
+    EXPECT_TRUE(names(broken([](const BvhAccess& t) { t.refitted() = false; }), "order: positions"))
+        << "a tree that says it was built";
+    EXPECT_NE(broken([](const BvhAccess& t) { t.triangles()[7].v0.x += 1.0f; }), "");
+}
+
 TEST(Refit, ATreeFromAFileGetsMemoryOfItsOwn) {
     const test::TempFolder folder;
     const Mesh mesh = test::random_soup(2000, seed), now = deformed(mesh, 0.5f);
@@ -165,8 +220,6 @@ TEST(Refit, ATreeFromAFileGetsMemoryOfItsOwn) {
     EXPECT_TRUE(same_hits(trace(loaded.bvh, rays), trace(build_bvh(now), rays)));
     EXPECT_TRUE(check(load_rdx(file).bvh, mesh).ok) << "the file stays as it is";
 }
-
-using test::message_of;
 
 TEST(Refit, RefusesWhatDoesNotFit) {
     const Mesh mesh = test::random_soup(500, seed);

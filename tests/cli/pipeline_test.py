@@ -65,7 +65,7 @@ class Pipeline(ProgramTest):
             self.assertLessEqual(build["ms_spread"]["min"][stage], ms)
             self.assertLessEqual(ms, build["ms_spread"]["max"][stage])
         self.assertEqual((build["tree"], build["builder"], build["bits"], build["device"], build["threads"]),
-                         ("bvh", "karras", 63, "cpu", 2))
+                         ("bvh", "karras", 63, "cpu", min(2, len(os.sched_getaffinity(0)))))
         self.assertEqual(build["nodes"], 2 * build["leaves"] - 1)
         self.assertEqual(build["references"], 2000)
         self.assertEqual(build["depth_bound"], 63 + 11)
@@ -215,6 +215,38 @@ class Pipeline(ProgramTest):
         descr, shape, data = read_npy(self.folder / "all.offsets.npy")
         self.assertEqual((descr, shape), ("<u8", (7,)))
         self.assertEqual(struct.unpack("<7Q", data), (0, 2, 3, 4, 4, 4, 4))
+
+    def test_all_hits_of_all_cameras_have_one_limit(self):
+        self.write("squares.ply", SQUARES)
+        one = '{"position": [0.5, 0.5, %g], "target": [0.5, 0.5, 0], "up": [0, 1, 0], "vfov": 40}'
+        self.write("cameras.json", '{"width": 200, "height": 100, "cameras": [%s, %s]}' % (one % 4, one % -4))
+
+        def trace(camera, *more):
+            return ["trace", "squares.ply", "--mode", "all", "--camera", camera, "--repeat", "1", *more]
+
+        def saved(name):
+            offsets = read_npy(self.folder / f"{name}.offsets.npy")[2]
+            return read_hits(self.folder / f"{name}.npy"), [n for n, in struct.iter_unpack("<Q", offsets)]
+
+        for camera in ("0", "1", "all"):
+            self.succeed(*trace(camera, "--hits", f"{camera}.npy"))
+        (first, first_ends), (second, second_ends), (both, ends) = saved("0"), saved("1"), saved("all")
+        self.assertGreater(min(len(first), len(second)), 1000)
+        self.assertEqual(both, first + second)
+        self.assertEqual(ends, first_ends + [len(first) + n for n in second_ends[1:]])
+        # Enough for each camera, and for the answers of both, but not for all that joining them takes.
+        limit = 16 * len(both) + 8 * len(ends) + 250_000
+        for camera in ("0", "1"):
+            self.succeed(*trace(camera, "--hits", "one.npy", "--max-result-bytes", str(limit)))
+        self.fail_with_one_line(*trace("all", "--hits", "refused.npy", "--max-result-bytes", str(limit)),
+                                names=["squares.ply", "all hits", "bytes", str(limit)])
+        self.succeed(*trace("all", "--hits", "enough.npy", "--max-result-bytes", str(4 * limit)))
+        self.assertEqual(saved("enough"), (both, ends))
+        self.fail_with_one_line(*trace("0", "--max-result-bytes", "1000"), names=["trace_all", "more than 1000 bytes"])
+        self.assertFalse((self.folder / "refused.npy").exists())
+        for bad in (["--max-result-bytes", "1000"], ["--mode", "all", "--max-result-bytes", "-1"],
+                    ["--mode", "all", "--max-result-bytes", "many"]):
+            self.fail_with_usage("trace", "squares.ply", *bad, names=["--max-result-bytes"])
 
     def test_bad_ray_files(self):
         ray = struct.pack("<8f", 0, 0, 1, 0, 0, 0, -1, 9)

@@ -81,10 +81,12 @@ class ProgramTest(unittest.TestCase):
         self.assertGreater(len(result.err), len("raydix: x: y"), result)
 
     def fail_with_usage(self, *arguments, names=()):
+        """Exit code 2, nothing on standard output, one line on standard error that holds all of `names`."""
         result = self.run_program(*arguments)
         self.assertEqual(result.code, 2, result)
         self.assertEqual(result.out, "", result)
-        self.assertIn("--help", result.err, result)
+        self.assertRegex(result.err, r"\Araydix: .+; run with --help for more information\n\Z", result)
+        self.assertEqual(result.err.count("\n"), 1, result)
         for name in names:
             self.assertIn(name, result.err, result)
 

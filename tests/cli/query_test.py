@@ -115,6 +115,16 @@ class Query(ProgramTest):
         self.assertEqual(document["query"][0]["invalid_queries"], 2)
         self.assertEqual(document["query"][0]["kind"], "box")
 
+    def test_results_larger_than_their_limit(self):
+        pairs = [self.write("mesh.ply", TRIANGLE), "--pairs", "--with", "mesh.ply"]
+        boxes = [self.cloud, "--box", "--queries", self.write_rows("all.npy", [(-9,) * 3 + (9,) * 3] * 50, 6)]
+        for arguments in ([self.cloud, "--radius", "9"], [self.cloud, "--knn", "300"], boxes, pairs):
+            self.succeed("query", *arguments, "--repeat", "0", "--max-result-bytes", "10000000")
+            self.fail_with_one_line("query", *arguments, "--repeat", "0", "--max-result-bytes", "7", "--out", "refused",
+                                    names=["bytes", "max_result_bytes"])
+        self.assertFalse(list(self.folder.glob("refused*")))
+        self.fail_with_usage("query", "mesh.ply", "--closest", "--max-result-bytes", "7", names=["--max-result-bytes"])
+
     def test_the_points_themselves_are_the_queries(self):
         self.document("query", self.cloud, "--knn", "1", "--out", "own", "--repeat", "0")
         indices = values(self.folder / "own.indices.npy", "I", 1)
@@ -158,12 +168,12 @@ class Query(ProgramTest):
         self.fail_with_one_line("query", self.cloud, "--box", "--queries", self.file, names=["queries.npy", "(N, 6)"])
         self.fail_with_one_line("query", self.cloud, "--box", "--queries", self.write("t.ply", TRIANGLE), names=["t.ply", "(Q, 6)"])
         self.fail_with_one_line("query", self.cloud, "--knn", "1", "--strict", names=["cloud.npy", "point 340"])
-        self.fail_with_one_line("query", self.cloud, "--knn", "4000000000", names=["cloud.npy", "does not fit"])
+        self.fail_with_one_line("query", self.cloud, "--knn", "4000000000", names=["cloud.npy", "10976000000000 bytes"])
         result = self.run_program("query", self.cloud, "--knn", "1", "--repeat", "0", "--out", "no/x")
         self.assertEqual((result.code, result.err.count("\n")), (1, 1), result)
         self.assertIn("no/x.indices.npy", result.err)
         many = self.write_rows("many.npy", [(1, 2, 3)] * 200000, 3)
-        self.fail_with_one_line("query", many, "--radius", "0", "--quiet", names=["many.npy", "does not fit"])
+        self.fail_with_one_line("query", many, "--radius", "0", "--quiet", names=["many.npy", "more than"])
 
 
 if __name__ == "__main__":

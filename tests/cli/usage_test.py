@@ -1,6 +1,8 @@
 """Help texts, exit codes, one-line errors, --quiet, --json, progress."""
+import json
 import os
 import pty
+import stat
 import subprocess
 import sys
 import time
@@ -55,7 +57,8 @@ class Usage(ProgramTest):
         self.fail_with_usage("render", SMALL, names=["--output"])
         for bad in (["--bits", "31"], ["--bits"], ["--max-leaf", "0"], ["--max-leaf", "256"], ["--builder", "other"], ["--fit", "tight"],
                     ["--tree", "other"], ["--quality", "best"], ["--device", "abacus"], ["--layout", "x"],
-                    ["--repeat", "0"], ["--threads", "-1"], ["--threads", "two"], ["--seed", "-1"], ["--epo", "0"],
+                    ["--repeat", "0"], ["--threads", "-1"], ["--threads", "1025"], ["--threads", "100000"],
+                    ["--threads", "two"], ["--seed", "-1"], ["--epo", "0"],
                     ["--epo", "1.5"], ["--epo", "much"], ["--sah-node", "-1"], ["--sah-node", "nan"],
                     ["--sah-primitive", "inf"], ["--nothing"], ["--json"], ["extra"],
                     ["--quality", "fast", "--builder", "karras"]):
@@ -68,6 +71,53 @@ class Usage(ProgramTest):
         for bad in (["--view", "inside"], ["--eye", "1", "2"], ["--fov", "0"], ["--fov", "180"], ["--camera", "-1"],
                     ["--size", "big"], ["--samples", "-1"]):
             self.fail_with_usage("render", SMALL, "-o", "x.png", *bad)
+
+    def test_usage_errors_name_what_was_typed_in_one_line(self):
+        self.fail_with_usage("build", SMALL, "--threads", "100000", names=["--threads", "100000"])
+        self.fail_with_usage("two\nlines", names=["'two\\x0Alines'"])
+        self.fail_with_usage("build", SMALL, "--builder", "two\nlines", names=["--builder", "two\\x0Alines"])
+
+    def test_outputs_go_through_links_and_into_devices(self):
+        for command, option in ((["build", SMALL, "--quiet"], "-o"), (["build", SMALL, "--quiet"], "--json"),
+                                (["trace", SMALL, "--size", "4x4", "--quiet"], "--hits"),
+                                (["trace", SMALL, "--size", "4x4", "--quiet"], "--save-rays"),
+                                (["render", SMALL, "--size", "4x4", "--quiet"], "-o")):
+            with self.subTest(command=command[0], option=option):
+                suffix = ".png" if command[0] == "render" else ".out"
+                target, link = self.folder / f"target{suffix}", self.folder / f"link{suffix}"
+                target.unlink(missing_ok=True)
+                link.unlink(missing_ok=True)
+                link.symlink_to(target.name)
+                self.succeed(*command, option, str(link))
+                self.assertTrue(link.is_symlink())
+                self.assertTrue(target.is_file() and not target.is_symlink())
+                pipe = self.folder / f"pipe{suffix}"
+                pipe.unlink(missing_ok=True)
+                os.mkfifo(pipe)
+                reader = subprocess.Popen(["cat", pipe], stdout=subprocess.PIPE)
+                self.succeed(*command, option, str(pipe))
+                sent = reader.communicate(timeout=TIME_LIMIT_S)[0]
+                self.assertTrue(stat.S_ISFIFO(os.lstat(pipe).st_mode), "still a pipe")
+                self.assertGreater(len(sent), 8)
+
+    def test_dev_stdout(self):
+        done = self.run_program("build", SMALL, "--quiet", "--json", "/dev/stdout")
+        self.assertEqual((done.code, done.err), (0, ""), done)
+        self.assertEqual(json.loads(done.out)["command"], "build")
+
+    def test_a_full_disk_leaves_the_old_file(self):
+        folder = self.folder / "full"
+        folder.mkdir()
+        old = self.write("full/old.rdx", "old")
+        code = ("import os, resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000)); "
+                "os.execv(sys.argv[1], sys.argv[1:])")
+        for arguments in (["build", MEDIUM, "--quiet", "-o", old], ["trace", MEDIUM, "--size", "64x64", "--quiet", "--hits", old],
+                          ["trace", MEDIUM, "--size", "64x64", "--quiet", "--save-rays", old]):
+            done = subprocess.run([sys.executable, "-c", code, PROGRAM, *arguments], capture_output=True, timeout=TIME_LIMIT_S)
+            self.assertEqual((done.returncode, done.stderr.count(b"\n")), (1, 1), done)
+            self.assertIn(b"old.rdx: cannot write", done.stderr)
+            self.assertEqual((folder / "old.rdx").read_bytes(), b"old")
+            self.assertEqual(os.listdir(folder), ["old.rdx"])
 
     def test_input_errors_are_1_and_one_line(self):
         file = self.write("triangle.ply", TRIANGLE)

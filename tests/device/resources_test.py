@@ -43,7 +43,8 @@ EXPECTED["device_queries_cuda.cu"] = {
     "FindNearest": 32, "CountWithin": 32, "FillWithin": 32, "FindClosest": 96, "CountPartners": 136,
     "FillPartners": 136, "ClearOffset": 32, "ClearUnusedValues": 32, "SaveLastValue": 32, "AddLastValue": 32, "SetWord": 32}
 # 64: half of an sm_90 multiprocessor's threads at once; 72: 28 of its 64 warps.
-EXPECTED["device_cwbvh_cuda.cu"] = {"cwbvh_rays": 64, "persistent_cwbvh_rays": 72, "fill_misses": 16}
+# The second half of the triangle test is in double.
+EXPECTED["device_cwbvh_cuda.cu"] = {"cwbvh_rays": 96, "persistent_cwbvh_rays": 96, "fill_misses": 16}
 ENTRY = re.compile(r"Compiling entry function '(\w+)'.*?(\d+) bytes stack frame, (\d+) bytes spill stores, "
                    r"(\d+) bytes spill loads.*?Used (\d+) registers", re.DOTALL)
 

@@ -319,5 +319,31 @@ TEST(BuildMany, AreTheTreesOfEachMesh) {
     EXPECT_TRUE(build_many({}, {}).empty());
 }
 
+/// Rays that start on a triangle, from both sides and in instances that are turned over.
+TEST(Instances, NoTIsMinusZero) {
+    const Mesh mesh{"", {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+    const Bvh bvh = build_bvh(mesh);
+    InstancedScene scene;
+    const std::uint32_t object = scene.add_object(bvh);
+    std::size_t hits = 0;
+    for (const float side : {1.0f, -1.0f}) {
+        Transform turned;
+        turned.m = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, side, 0}}};
+        if (scene.instance_count() == 0)
+            scene.add_instance(InstancedScene::scene, {object, turned});
+        else
+            scene.set_instance(InstancedScene::scene, 0, {object, turned});
+        scene.build();
+        for (const float tmin : {0.0f, -0.0f})
+            for (const Vec3 d : {Vec3{0, 0, 1}, Vec3{0, 0, -1}, Vec3{0.5f, 0.25f, -1}}) {
+                const InstanceHit hit = closest_hit(scene, {{0, -0.5f, 0}, tmin, d});
+                if (!hit.hit.hit()) continue;
+                ++hits;
+                EXPECT_FALSE(std::signbit(hit.hit.t));
+            }
+    }
+    EXPECT_EQ(hits, 12u);
+}
+
 }  // namespace
 }  // namespace raydix

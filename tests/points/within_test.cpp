@@ -217,33 +217,34 @@ TYPED_TEST(Within, ResultsLargerThanMemoryAreRefused) {
     const std::size_t n = 15'000 * thorough;
     const TypeParam index = build_points(std::vector<Point>(n));  // all pairs would be n * n
     const std::vector<Point> queries(n);
-    const PointQueryOptions small{.max_bytes = 100'000'000};
+    const PointQueryOptions small{.max_result_bytes = 100'000'000};
     EXPECT_NE(message_of([&] {
                   (void)radius_search(index, queries, 0, small);
-              }).find("radius search: a result of"),
+              }).find("radius_search: the result needs more than 100000000 bytes"),
               std::string::npos);
     for (const PairRows rows : {PairRows::half, PairRows::full})
         EXPECT_NE(message_of([&] {
                       (void)neighbour_lists(index, 0, rows, small);
-                  }).find("neighbour lists: a result of"),
+                  }).find("neighbour_lists: the result needs more than 100000000 bytes"),
                   std::string::npos);
     std::vector<std::uint32_t> counts(n);  // counting them is quick all the same
     EXPECT_EQ(radius_count(index, queries, 0, counts).found, std::uint64_t{n} * n);
     EXPECT_EQ(counts[n / 2], n);
-    // Just enough, and one byte less.
     const auto lists = radius_search(index, {queries.data(), 3}, 0);
     const std::uint64_t bytes =
         3 * n * (sizeof(std::uint32_t) + sizeof(typename TypeParam::Scalar)) +
         4 * sizeof(std::uint64_t);
     EXPECT_EQ(lists.indices.size(), 3 * n);
-    EXPECT_EQ(message_of([&] {
-                  (void)radius_search(index, {queries.data(), 3}, 0, {.max_bytes = bytes});
-              }),
-              "no error");
-    EXPECT_NE(message_of([&] {
-                  (void)radius_search(index, {queries.data(), 3}, 0, {.max_bytes = bytes - 1});
-              }),
-              "no error");
+    EXPECT_EQ(
+        message_of([&] {
+            (void)radius_search(index, {queries.data(), 3}, 0, {.max_result_bytes = 8 * bytes});
+        }),
+        "no error");
+    EXPECT_NE(
+        message_of([&] {
+            (void)radius_search(index, {queries.data(), 3}, 0, {.max_result_bytes = bytes - 1});
+        }),
+        "no error");
 }
 
 /// Rows are found in one walk and kept until their places are known. Where there is no memory for
@@ -264,14 +265,21 @@ TYPED_TEST(Within, RowsOfOneWalkAndOfTwo) {
     };
     for (const T radius : {T(0.05), T(0.2), std::numeric_limits<T>::infinity()}) {
         const auto wanted = radius_search(index, queries, radius);
-        const std::uint64_t least = wanted.indices.size() * (sizeof(std::uint32_t) + sizeof(T)) +
-                                    wanted.offsets.size() * sizeof(std::uint64_t);
-        for (const std::uint64_t room : {least, least * 5 / 4, least * 3})
-            for (const QueryOrder order : {QueryOrder::as_given, QueryOrder::sorted})
-                EXPECT_TRUE(
-                    same(radius_search(index, queries, radius, {.order = order, .max_bytes = room}),
-                         wanted))
+        for (const QueryOrder order : {QueryOrder::as_given, QueryOrder::sorted}) {
+            const auto lists_within = [&](std::uint64_t room) {
+                return radius_search(index, queries, radius,
+                                     {.threads = 1, .order = order, .max_result_bytes = room});
+            };
+            std::uint64_t refused = 0, least = std::uint64_t{1} << 40;
+            while (least - refused > 1) {
+                const std::uint64_t room = refused + (least - refused) / 2;
+                const bool fits = message_of([&] { (void)lists_within(room); }) == "no error";
+                (fits ? least : refused) = room;
+            }
+            for (const std::uint64_t room : {least, least * 5 / 4, least * 3})
+                EXPECT_TRUE(same(lists_within(room), wanted))
                     << "radius " << radius << ", " << room << " bytes";
+        }
     }
     // More than a block keeps: all of 5,000 points for each of 700 queries.
     const TypeParam large =

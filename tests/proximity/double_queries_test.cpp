@@ -381,7 +381,8 @@ TEST(DoubleQueries, BadInput) {
     EXPECT_EQ(touch_any(bvh, spheres, std::span(flags).first(3)).invalid_queries, 3u);
     EXPECT_TRUE(overlapping_pairs(empty).empty());
     EXPECT_TRUE(overlapping_pairs(bvh, empty).empty());
-    EXPECT_THROW(static_cast<void>(overlapping_pairs(bvh, bvh, {.max_bytes = 8})), InputError);
+    EXPECT_THROW(static_cast<void>(overlapping_pairs(bvh, bvh, {.max_result_bytes = 8})),
+                 InputError);
 }
 
 }  // namespace

@@ -335,5 +335,54 @@ TEST(DoubleShapes, PlaceAlongTheAxis) {
     EXPECT_FALSE(any_hit(bvh, intersect_capsules(pipe), {{4.5e6 - 0.26, -2, 0}, 0, {0, 1, 0}}));
 }
 
+/// As in float: rays that begin at infinity, and t that no double holds.
+TEST(ShapesDouble, AHitIsAtAFinitePlace) {
+    const std::vector<SphereD> balls{{{0, 0, 10}, 1}, {{0, 0, 10}, 0}};
+    const std::vector<CapsuleD> capsules{{{0, 0, 10}, {0, 0, 11}, 1}, {{0, -1, 10}, {0, 1, 10}, 0}};
+    const std::vector<Vec3d> points{{0, 0, 10}, {0, 0, 20}};
+    const std::vector<RayD> rays{
+        {{0, 0, 0}, inf, {0, 0, 1}, inf},    {{0, 0, 10}, inf, {0, 0, 1}, inf},
+        {{0, 0, 0}, inf, {1, 0, 0}, inf},    {{0, 0, 0}, 0, {0, 0, 1e-308}, inf},
+        {{0, 0, 0}, 0, {0, 0, 5e-324}, inf}, {{0, 0, 0}, 1e300, {0, 0, 1e-308}, inf}};
+    const auto expect_none = [&](const std::vector<AabbD>& boxes,
+                                 const IntersectPrimitiveD& intersect) {
+        for (const int max_leaf : {1, 4}) {
+            const BoxBvhD bvh = build_bvh(boxes, {.max_leaf = max_leaf});
+            std::vector<HitD> hits(rays.size());
+            std::vector<std::uint8_t> occluded(rays.size());
+            EXPECT_EQ(trace(bvh, intersect, rays, hits).hits, 0u);
+            EXPECT_EQ(trace_any(bvh, intersect, rays, occluded).hits, 0u);
+            for (const RayD& ray : rays) {
+                EXPECT_FALSE(closest_hit(bvh, intersect, ray).hit());
+                HitD hit;
+                for (const std::uint32_t prim : {0u, 1u}) EXPECT_FALSE(intersect(prim, ray, hit));
+            }
+        }
+    };
+    expect_none(boxes_of(balls), intersect_spheres(balls));
+    expect_none(boxes_of(capsules), intersect_capsules(capsules));
+    expect_none(boxes_of(points, 0.5), intersect_points(points, 0.5));
+}
+
+TEST(ShapesDouble, NoTIsMinusZero) {
+    const auto expect_plus = [](const std::vector<AabbD>& boxes,
+                                const IntersectPrimitiveD& intersect) {
+        const BoxBvhD bvh = build_bvh(boxes);
+        for (const double tmin : {0.0, -0.0})
+            for (const Vec3d d : {Vec3d{0, 0, 1}, Vec3d{0, 0, -1}, Vec3d{-1, -2, -3}}) {
+                const HitD hit = closest_hit(bvh, intersect, {{0, 0, 0}, tmin, d});
+                ASSERT_TRUE(hit.hit());
+                EXPECT_EQ(hit.t, 0.0);
+                EXPECT_FALSE(std::signbit(hit.t));
+            }
+    };
+    const std::vector<SphereD> balls{{{0, 0, 0}, 0}};
+    expect_plus(boxes_of(balls), intersect_spheres(balls));
+    const std::vector<CapsuleD> capsules{{{0, 0, 0}, {0, 0, 0}, 0}};
+    expect_plus(boxes_of(capsules), intersect_capsules(capsules));
+    const std::vector<Vec3d> points{{0, 0, 0}};
+    expect_plus(boxes_of(points, 0.0), intersect_points(points, 0.0));
+}
+
 }  // namespace
 }  // namespace raydix::test

@@ -221,6 +221,63 @@ TEST(Overlap, SweepsWithoutARadiusAreRays) {
     }
 }
 
+/// A ball from so far away that rounding moves the contact past the box of the part that it is on.
+TEST(Overlap, SweepsFromAfarFindParts) {
+    const Mesh mesh{"",
+                    {{-0x1.34938cp+23f, 0x1.a138bp+22f, -0x1.34cf46p+22f},
+                     {-0x1.cfbd52p+36f, 0x1.7bb37p+36f, 0x1.01806p+37f},
+                     {-0x1.1a848ap+21f, 0x1.dcea6p+22f, -0x1.8c1c38p+17f},
+                     {-0x1.e4be76p+21f, 0x1.05abdcp+23f, -0x1.61ee94p+23f},
+                     {-0x1.fd73b8p+36f, 0x1.f916b8p+30f, 0x1.3bacbep+35f},
+                     {0x1.c632bep+21f, 0x1.2e14dep+24f, -0x1.c28622p+23f},
+                     {-0x1.2d908p+23f, -0x1.ef3feep+16f, -0x1.2efe38p+23f},
+                     {-0x1.2d908p+23f, 0x1.15bd82p+37f, -0x1.2efe38p+23f},
+                     {-0x1.1eac02p+24f, -0x1.6fb6cap+22f, -0x1.40806ap+23f},
+                     {0x1.22b696p+23f, 0x1.4beecp+19f, 0x1.c98902p+20f},
+                     {-0x1.ddd8f2p+36f, 0x1.07b14cp+37f, 0x1.b2cb78p+35f},
+                     {0x1.fbc8bap+23f, 0x1.0fbf4cp+23f, 0x1.f575aep+21f},
+                     {0x1.2900c8p+22f, -0x1.30c82cp+21f, 0x1.b2a80cp+19f},
+                     {0x1.2900c8p+22f, -0x1.30c82cp+21f, 0x1.15bdfep+37f},
+                     {0x1.3c153cp+23f, -0x1.5d2e2ep+22f, 0x1.1ebe2ep+22f},
+                     {-0x1.e451e8p+21f, -0x1.6a11p+22f, 0x1.49270ap+21f},
+                     {-0x1.e451e8p+21f, -0x1.6a11p+22f, 0x1.15bedcp+37f},
+                     {-0x1.be8d28p+23f, -0x1.094eecp+22f, 0x1.5e51dap+23f}},
+                    {{0, 1, 2}, {3, 4, 5}, {6, 7, 8}, {9, 10, 11}, {12, 13, 14}, {15, 16, 17}}};
+    const SphereSweep sweep{
+        {{-0x1.d85f7p+33f, 0x1.48fc34p+36f, -0x1.4c7f6ep+92f}, 0, {0, 0, 0x1.15bd92p+37f}},
+        0x1.8c1942p+29f};
+    const SweepHit whole = sweep_sphere(build_bvh(mesh), sweep);
+    ASSERT_TRUE(whole.hit());
+    for (const Builder builder : {Builder::split, Builder::sbvh})
+        for (const int max_leaf : {1, 2, 4}) {
+            const Bvh bvh = build_bvh(mesh, {.builder = builder, .max_leaf = max_leaf});
+            const SweepHit hit = sweep_sphere(bvh, sweep);
+            EXPECT_EQ(hit.prim, whole.prim) << builder_name(builder) << ' ' << max_leaf;
+            EXPECT_TRUE(same_bits(hit.t, whole.t));
+        }
+    EXPECT_TRUE(build_bvh(mesh, {.builder = Builder::sbvh, .max_leaf = 1}).has_split_primitives());
+}
+
+TEST(Overlap, NoSweepHasMinusZeroOrNoEnd) {
+    const Mesh mesh{"", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 1, 2}}};
+    const Bvh bvh = build_bvh(mesh);
+    for (const float radius : {0.0f, 1e-30f, 0.5f, 1.0f})
+        for (const float tmin : {0.0f, -0.0f})
+            for (const Vec3 from : {Vec3{0, 0, 0}, Vec3{0.25f, 0.25f, 0}, Vec3{0, 0, 1}})
+                for (const Vec3 d : {Vec3{0, 0, 1}, Vec3{0, 0, -1}, Vec3{-1, -1, -1}}) {
+                    const SweepHit hit = sweep_sphere(bvh, {{from, tmin, d}, radius});
+                    EXPECT_FALSE(hit.t == 0.0f && std::signbit(hit.t));
+                    if (hit.hit()) {
+                        EXPECT_EQ(hit.prim, 0u);
+                    }
+                }
+    for (const float radius : {0.0f, 0.5f}) {
+        EXPECT_FALSE(
+            sweep_sphere(bvh, {{{0.2f, 0.2f, 3}, infinity, {0, 0, -1}, infinity}, radius}).hit());
+        EXPECT_FALSE(sweep_sphere(bvh, {{{0.2f, 0.2f, 1e12f}, 0, {0, 0, -1e-30f}}, radius}).hit());
+    }
+}
+
 TEST(Overlap, OddInput) {
     const Mesh mesh{"", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
     const Bvh bvh = build_bvh(mesh), none;
@@ -249,8 +306,9 @@ TEST(Overlap, OddInput) {
     EXPECT_THROW(static_cast<void>(touches(points, Sphere{{0, 0, 0}, 1})), InputError);
     EXPECT_THROW(static_cast<void>(sweep_sphere(points, {})), InputError);
     const std::vector<Sphere> many(1000, Sphere{{0, 0, 0}, 1});
-    EXPECT_THROW(static_cast<void>(touch_all(bvh, many, {.max_bytes = 3999})), InputError);
-    EXPECT_EQ(touch_all(bvh, many, {.max_bytes = 4000}).prims.size(), 1000u);
+    EXPECT_THROW(static_cast<void>(touch_all(bvh, many, {.max_result_bytes = 11'999})),
+                 ResultTooLarge);  // with the offsets
+    EXPECT_EQ(touch_all(bvh, many, {.max_result_bytes = 50'000}).prims.size(), 1000u);
 }
 
 }  // namespace

@@ -157,18 +157,17 @@ TEST(Pairs, TooManyAreAnErrorBeforeThereIsRoomForThem) {
     const std::vector<Aabb> equal(200000, Aabb{{0, 0, 0}, {1, 1, 1}});  // 2e10 pairs
     const Bvh bvh = build_bvh(equal);
     for (const int threads : {1, 2, 7}) {
-        EXPECT_THROW(
-            static_cast<void>(overlapping_pairs(bvh, {.max_bytes = 1u << 20, .threads = threads})),
-            InputError);
-        EXPECT_THROW(static_cast<void>(
-                         overlapping_pairs(bvh, bvh, {.max_bytes = 1u << 20, .threads = threads})),
+        EXPECT_THROW(static_cast<void>(overlapping_pairs(
+                         bvh, {.max_result_bytes = 1u << 20, .threads = threads})),
+                     InputError);
+        EXPECT_THROW(static_cast<void>(overlapping_pairs(
+                         bvh, bvh, {.max_result_bytes = 1u << 20, .threads = threads})),
                      InputError);
     }
-    // The last that fits.
     const Bvh few = build_bvh(std::span(equal).first(10));
-    EXPECT_EQ(overlapping_pairs(few, {.max_bytes = 45 * 8}).size(), 45u);
-    EXPECT_THROW(static_cast<void>(overlapping_pairs(few, {.max_bytes = 45 * 8 - 1})), InputError);
-    EXPECT_EQ(count_overlapping_pairs(few, {.max_bytes = 8}), 45u);
+    EXPECT_THROW(static_cast<void>(overlapping_pairs(few, {.max_result_bytes = 45 * 8 - 1})),
+                 ResultTooLarge);
+    EXPECT_EQ(count_overlapping_pairs(few, {.max_result_bytes = 8}), 45u);  // keeps none
 }
 
 TEST(Pairs, OddInput) {

@@ -112,6 +112,78 @@ TEST(Shapes, SpheresCapsulesAndPointsAreBruteForce) {
     EXPECT_EQ(build_bvh(boxes_of(points, 0.0f)).left_out(), 0u);
 }
 
+/// A hit needs a finite t: rays that begin at infinity, and shapes so far away for the length of
+/// the direction that t has no float.
+TEST(Shapes, AHitIsAtAFinitePlace) {
+    const std::vector<Sphere> balls{{{0, 0, 10}, 1}, {{0, 0, 10}, 0}};
+    const std::vector<Capsule> capsules{{{0, 0, 10}, {0, 0, 11}, 1}, {{0, -1, 10}, {0, 1, 10}, 0}};
+    const std::vector<Vec3> points{{0, 0, 10}, {0, 0, 20}};
+    const std::vector<Ray> rays{
+        {{0, 0, 0}, infinity, {0, 0, 1}, infinity}, {{0, 0, 10}, infinity, {0, 0, 1}, infinity},
+        {{0, 0, 0}, infinity, {1, 0, 0}, infinity}, {{0, 0, 0}, 0, {0, 0, 1e-38f}, infinity},
+        {{0, 0, 0}, 0, {0, 0, 1e-45f}, infinity},   {{0, 0, 0}, 1e30f, {0, 0, 1e-38f}, infinity}};
+    const auto expect_none = [&](const std::vector<Aabb>& boxes,
+                                 const IntersectPrimitive& intersect) {
+        for (const int max_leaf : {1, 4}) {
+            const Bvh bvh = build_bvh(boxes, {.max_leaf = max_leaf});
+            std::vector<Hit> hits(rays.size());
+            std::vector<std::uint8_t> occluded(rays.size());
+            EXPECT_EQ(trace(bvh, intersect, rays, hits).hits, 0u);
+            EXPECT_EQ(trace_any(bvh, intersect, rays, occluded).hits, 0u);
+            for (const Ray& ray : rays) {
+                EXPECT_FALSE(closest_hit(bvh, intersect, ray).hit());
+                Hit hit;
+                for (const std::uint32_t prim : {0u, 1u}) EXPECT_FALSE(intersect(prim, ray, hit));
+            }
+        }
+    };
+    expect_none(boxes_of(balls), intersect_spheres(balls));
+    expect_none(boxes_of(capsules), intersect_capsules(capsules));
+    expect_none(boxes_of(points, 0.5f), intersect_points(points, 0.5f));
+    // Whatever the function says.
+    const std::vector<Aabb> walls(5, Aabb{{-1, -1, 1}, {1, 1, 1}});
+    const IntersectPrimitive endless = [](std::uint32_t, const Ray&, Hit& hit) {
+        hit.t = infinity;
+        return true;
+    };
+    const Bvh bvh = build_bvh(walls);
+    EXPECT_FALSE(closest_hit(bvh, endless, {{0, 0, 0}, 0, {0, 0, 1}}).hit());
+    EXPECT_FALSE(any_hit(bvh, endless, {{0, 0, 0}, 0, {0, 0, 1}}));
+}
+
+/// Rays that begin on a shape without a radius, or less than any float before its surface.
+TEST(Shapes, NoTIsMinusZero) {
+    const auto expect_plus = [](const std::vector<Aabb>& boxes, const IntersectPrimitive& intersect,
+                                const std::vector<Ray>& rays) {
+        const Bvh bvh = build_bvh(boxes);
+        for (const Ray& ray : rays) {
+            const Hit hit = closest_hit(bvh, intersect, ray);
+            ASSERT_TRUE(hit.hit());
+            EXPECT_EQ(hit.t, 0.0f);
+            EXPECT_FALSE(std::signbit(hit.t));
+            Hit own;
+            ASSERT_TRUE(intersect(hit.prim, ray, own));
+            EXPECT_FALSE(std::signbit(own.t));
+        }
+    };
+    std::vector<Ray> rays;
+    for (const float tmin : {0.0f, -0.0f})
+        for (const Vec3 d : {Vec3{0, 0, 1}, Vec3{0, 0, -1}, Vec3{-1, -2, -3}, Vec3{-1e-20f, 0, 0}})
+            rays.push_back({{0, 0, 0}, tmin, d});
+    const std::vector<Sphere> balls{{{0, 0, 0}, 0}, {{-0.0f, -0.0f, -0.0f}, 0}};
+    expect_plus(boxes_of(balls), intersect_spheres(balls), rays);
+    const std::vector<Capsule> capsules{{{0, 0, 0}, {0, 0, 0}, 0}};
+    expect_plus(boxes_of(capsules), intersect_capsules(capsules), rays);
+    const std::vector<Vec3> points{{0, 0, 0}};
+    expect_plus(boxes_of(points, 0.0f), intersect_points(points, 0.0f), rays);
+    const IntersectPrimitive minus = [](std::uint32_t, const Ray& ray, Hit& hit) {
+        hit.t = -0.0f;
+        return !std::signbit(ray.tmin);
+    };
+    const Bvh bvh = build_bvh(std::vector<Aabb>(3, Aabb{{-1, -1, -1}, {1, 1, 1}}));
+    for (const Ray& ray : rays) EXPECT_FALSE(std::signbit(closest_hit(bvh, minus, ray).t));
+}
+
 double segment_distance(Double3 p, const Capsule& c) {
     const Double3 a(c.a), axis = Double3(c.b) - a;
     const double length2 = dot(axis, axis);

@@ -133,8 +133,8 @@ def test_overlaps_equal_brute_force(rng):
     assert 0 < len(narrow) < len(a.overlaps(b)) and set(map(tuple, narrow)) <= set(
         map(tuple, a.overlaps(b))
     )
-    with pytest.raises(raydix.InputError):
-        a.overlaps(b, max_bytes=8)
+    with pytest.raises(raydix.InputError, match="more than 8 bytes"):
+        a.overlaps(b, max_result_bytes=8)
 
 
 def test_touched_by_shapes():
@@ -169,6 +169,17 @@ def test_refit_follows_the_vertices(rng):
     np.testing.assert_array_equal(
         scene.intersect(rays)["t"], fresh.intersect(rays)["t"]
     )  # as before the error
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("builder", ["karras", "apetrei", "ploc"])
+def test_check_knows_refitted_trees(rng, builder, precision):
+    vertices, faces = support.random_triangles(rng, 500)
+    scene = raydix.Scene(vertices, faces, builder=builder, precision=precision)
+    scene.refit(vertices @ np.float32([[3, 0, 1], [0, -1, 0], [0, 2, 1]]))  # another order along x, y, z
+    scene.check()
+    scene.refit(vertices)
+    scene.check()
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])

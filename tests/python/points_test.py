@@ -139,6 +139,25 @@ def test_nothing_and_nonsense():
         raydix.Points([[np.inf, 0, 0]], strict=True)
 
 
+def test_results_larger_than_their_limit():
+    points = raydix.Points(np.zeros((2000, 3)))  # all within any radius of all
+    boxes = np.tile(np.array([-1.0, -1, -1, 1, 1, 1]), (3000, 1))
+    for call in (
+        lambda limit: points.radius(np.zeros((3000, 3)), 1, max_result_bytes=limit),
+        lambda limit: points.radius(np.zeros((300, 3)), 1, padded=True, max_result_bytes=limit),
+        lambda limit: points.box(boxes, max_result_bytes=limit),
+        lambda limit: points.pairs(1, max_result_bytes=limit),
+        lambda limit: points.neighbours(1, max_result_bytes=limit),
+        lambda limit: points.knn(np.zeros((300, 3)), 2000, max_result_bytes=limit),
+    ):
+        with pytest.raises(raydix.InputError, match="bytes; max_result_bytes lets it have 1000000"):
+            call(1_000_000)
+        for array in call(10**9).values():
+            assert array.size
+    with pytest.raises(raydix.InputError, match="knn: the result needs"):
+        points.knn(np.zeros((10**6, 3)), 2**31)
+
+
 @pytest.mark.parametrize(
     "error, text, call",
     [

@@ -254,3 +254,19 @@ def test_shared_scene_equals_itself_on_every_quality():
     assert (first["prim"] != raydix.MISSING).any()
     for field in first:
         np.testing.assert_array_equal(first[field], second[field])
+
+
+def test_all_hits_of_many_pieces_have_one_limit():
+    """Triangles behind one another, more rays than fit into the first piece."""
+    z = np.arange(300.0)
+    vertices = np.stack(
+        [np.array([[-10, -10, h], [10, -10, h], [0, 10, h]]) for h in z]
+    ).reshape(-1, 3)
+    for precision in ("float32", "float64"):
+        scene = raydix.Scene(vertices, np.arange(900).reshape(-1, 3), precision=precision)
+        rays = np.tile(np.array([0, 0, -1, 0, 0, 0, 1, np.inf]), (400_000, 1))
+        with pytest.raises(raydix.InputError, match="max_result_bytes lets it have 100000000"):
+            scene.all_hits(rays, max_result_bytes=100_000_000)
+        few = scene.all_hits(rays[:1000], max_result_bytes=100_000_000)
+        assert few["offsets"].tolist() == list(range(0, 300_001, 300))
+        assert (scene.count(rays[:5000]) == 300).all()

@@ -137,7 +137,7 @@ constexpr Pinned pinned[] = {
     {"soup?triangles=1000", "a2ad11ad8af0101e9e6f3a9ddea17af0"},
     {"uniform?points=1000", "6c12e963476b37997df0098fc1189419"},
     {"clustered?points=1000&clusters=7", "e1663aee29e77ada550b2b3227022f0c"},
-    {"lidar?points=1000&beams=16&triangles=10000", "6c7cf1f568c81c28a88943c3c806d307"},
+    {"lidar?points=1000&beams=16&triangles=10000", "18cc5f212da59c8cc4ebb108340ce171"},
 };
 
 TEST(Builtin, HaveTheSameBitsEverywhere) {

@@ -189,6 +189,56 @@ TEST(Slab, NeverLosesATriangleThatTheTestAccepts) {
     }
 }
 
+/// The same for needles of any length, far and near, and for limits that are the hit itself: a box
+/// around the hit's own point must not be lost, which is what trees of parts have.
+TEST(Slab, NeverLosesThePointOfAHitOfANeedle) {
+    constexpr std::uint64_t seed = 1515;
+    Cases cases{Random(seed), 1.0f, 0.0f};
+    int accepted = 0;
+    for (int i = 0; i < 4 * rounds; ++i) {
+        const auto power = [&](int least, int most) {
+            return std::ldexp(
+                1.0f + cases.unit(),
+                least + static_cast<int>(cases.random() % static_cast<unsigned>(most - least + 1)));
+        };
+        const auto point = [&](float size) {
+            return Vec3{(cases.unit() - 0.5f) * size, (cases.unit() - 0.5f) * size,
+                        (cases.unit() - 0.5f) * size};
+        };
+        const float size = i % 8 == 0 ? power(-140, -30) : power(-10, 10);
+        LeafTriangle t;
+        t.v0 = point(size);
+        t.v1 = t.v0 + point(size * power(0, 24));
+        t.v2 = t.v0 + point(size);
+        const float u = cases.unit(), v = (1.0f - u) * cases.unit();
+        const Vec3 target = t.v0 * (1.0f - u - v) + t.v1 * u + t.v2 * v;
+        Ray ray{point(size * power(0, 30)), 0, {}, infinity};
+        ray.direction = target - ray.origin;
+        if (!is_valid(ray)) continue;
+        const RayFrame frame = make_frame(ray);
+        TriangleHit hit;
+        if (!intersect_triangle<EdgeRule::closed>(frame, t, frame.tmax, hit)) continue;
+        ++accepted;
+        const Aabb box = box_of(t.v0, t.v1, t.v2);
+        const SlabFrame slabs = make_slab_frame(frame, box);
+        // Outward, since the point itself is no float.
+        const auto around = [&](float a, float b, float c, bool up) {
+            const Real exact = a + (Real(b) - a) * hit.u + (Real(c) - a) * hit.v,
+                       room = std::ldexp(Real(std::fabs(b - a) + std::fabs(c - a)), -24);
+            const auto end = static_cast<float>(up ? exact + room : exact - room);
+            return std::nextafter(end, up ? infinity : -infinity);
+        };
+        const auto corner = [&](bool up) {
+            return Vec3{around(t.v0.x, t.v1.x, t.v2.x, up), around(t.v0.y, t.v1.y, t.v2.y, up),
+                        around(t.v0.z, t.v1.z, t.v2.z, up)};
+        };
+        const BvhNode node = node_of({max_of(corner(false), box.lo), min_of(corner(true), box.hi)});
+        const SlabInterval found = intersect_slabs(slabs, &node.lo.x, hit.t, hit.t);
+        ASSERT_LE(found.entry, found.exit) << "seed " << seed << " case " << i;
+    }
+    EXPECT_GT(accepted, rounds);
+}
+
 TEST(Slab, PairGivesTheBitsOfTheSingleTest) {
     for (Cases& cases : all_cases(211)) {
         for (int i = 0; i < rounds / 10; ++i) {

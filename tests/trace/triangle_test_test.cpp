@@ -84,6 +84,49 @@ TEST(TriangleTest, AgreesWithDoubleOnRandomTriangles) {
     EXPECT_GT(hits, 5000);
 }
 
+/// The theorem that culling stands on (docs/algorithms/triangle-test.md): the ray at t is within 6
+/// roundings of its triangle's far distances of the point that u and v name, which are rounded,
+/// too.
+TEST(TriangleTest, PointAtTIsNearTheRay) {
+    constexpr std::uint64_t seed = 15;
+    Random random(seed);
+    const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-23f - 1.0f; };
+    const auto point = [&](float size) {
+        return Vec3{unit() * size, unit() * size, unit() * size};
+    };
+    int hits = 0;
+    long double worst = 0;
+    for (int i = 0; i < 400'000; ++i) {
+        const auto power = [&](int most) {
+            return std::ldexp(1.0f, static_cast<int>(random() % static_cast<unsigned>(most)));
+        };
+        LeafTriangle t{point(1), {}, {}};
+        t.v1 = t.v0 + point(power(24));
+        t.v2 = t.v0 + point(1.0f / power(16));
+        const float a = std::fabs(unit()), b = (1.0f - a) * std::fabs(unit());
+        Ray ray{point(power(20)), 0, {}, infinity};
+        ray.direction = (t.v0 * (1.0f - a - b) + t.v1 * a + t.v2 * b) - ray.origin;
+        const auto hit = shoot(ray, t);
+        if (!hit) continue;
+        ++hits;
+        long double far = 0, off = 0, rounded = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto at = [&](Vec3 p) { return static_cast<long double>(component(p, axis)); };
+            const long double o = at(ray.origin), e1 = at(t.v1) - at(t.v0),
+                              e2 = at(t.v2) - at(t.v0);
+            far +=
+                std::max({std::abs(at(t.v0) - o), std::abs(at(t.v1) - o), std::abs(at(t.v2) - o)});
+            off = std::max(off, std::abs(o + hit->t * at(ray.direction) -
+                                         (at(t.v0) + hit->u * e1 + hit->v * e2)));
+            rounded = std::max(rounded, 0x1p-25L * (std::abs(e1) + std::abs(e2)));
+        }
+        worst = std::max(worst, (off - rounded) / (0x1p-24L * far));
+        ASSERT_LE(off - rounded, 6 * 0x1p-24L * far) << "seed " << seed << " case " << i;
+    }
+    std::cout << hits << " hits, at most " << worst << " roundings off\n";
+    EXPECT_GT(hits, 100'000);
+}
+
 TEST(TriangleTest, ClosedRuleOwnsItsEdgesAndVertices) {
     const Vec3 border[] = {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {2, 0, 0}, {0, 2, 0},
                            {2, 2, 0}, {1, 3, 0}, {3, 1, 0}, {0, 3, 0}};

@@ -7,6 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "tree/octree_walk.h"  // once had another function of the same name: both headers in one source did not compile
+
 namespace raydix {
 namespace {
 
@@ -16,6 +18,7 @@ TEST(GatherBits, IsTheInverseOfSpreadBits) {
         const std::uint64_t noise = random(), v = random() & 0x1FFFFF;
         const std::uint64_t spread = spread_bits(v);
         ASSERT_EQ(gather_bits(spread), v);
+        ASSERT_EQ(cell_of_code(spread << 1).y, v);
         ASSERT_EQ(gather_bits(spread | (noise & ~std::uint64_t{0x1249249249249249})), v);
         const auto narrow = static_cast<std::uint32_t>(v & 0x3FF);
         ASSERT_EQ(gather_bits(spread_bits(narrow)), narrow);

@@ -69,6 +69,21 @@ HWY_INLINE std::uint32_t bits_astride(hn::Vec<F4> least, hn::Vec<F4> largest) {
 #endif
 }
 
+/// Lanes with values of both signs.
+template <class D>
+HWY_INLINE hn::Mask<D> astride(D d, hn::Vec<D> u, hn::Vec<D> v, hn::Vec<D> w) {
+    return hn::And(hn::Lt(hn::Min(hn::Min(u, v), w), hn::Zero(d)),
+                   hn::Gt(hn::Max(hn::Max(u, v), w), hn::Zero(d)));
+}
+
+/// Lanes without a 0 or a NaN.
+template <class D>
+HWY_INLINE hn::Mask<D> without_zero(D d, hn::Vec<D> u, hn::Vec<D> v, hn::Vec<D> w) {
+    const auto zero = hn::Zero(d);
+    return hn::And(hn::And(hn::Gt(hn::Abs(u), zero), hn::Gt(hn::Abs(v), zero)),
+                   hn::Gt(hn::Abs(w), zero));
+}
+
 /// Lanes of the mask moved to the front; `bits` are those of the mask, for where it takes a table.
 template <class D>
 HWY_INLINE hn::Vec<D> compress(D d, hn::Vec<D> v, [[maybe_unused]] hn::Mask<D> mask,

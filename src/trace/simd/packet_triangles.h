@@ -11,6 +11,7 @@
 
 #include <bit>
 
+#include "trace/simd/block_hits.h"
 #include "trace/simd/lanes.h"
 #include "trace/simd/quads.h"
 #include "trace/simd/ray_classes.h"
@@ -30,14 +31,14 @@ struct Packet {
     HWY_ALIGN float inverse[3][packet_size];  // limited
     // Of plain nodes: a plane is near + inverse * plane away, or far + inverse * plane.
     HWY_ALIGN float near[3][packet_size], far[3][packet_size];
-    HWY_ALIGN float true_inverse[3][packet_size];
-    HWY_ALIGN float shear_x[packet_size], shear_y[packet_size], shear_z[packet_size];
+    HWY_ALIGN float direction[3][packet_size];
+    HWY_ALIGN float shear_x[packet_size], shear_y[packet_size];
     HWY_ALIGN float tmin[packet_size];
     HWY_ALIGN float t[packet_size], u[packet_size], v[packet_size];
     HWY_ALIGN std::uint32_t prim[packet_size];
     std::uint32_t count;
     RayClass kind;
-    float pad[3];  // of boxes, the largest of all rays; positive
+    float pad;  // of boxes, the largest of all rays
     float origin_lo[3], origin_hi[3];
     float least_inverse[3], largest_inverse[3];  // magnitudes
     float least_tmin;
@@ -51,9 +52,7 @@ class PacketTriangles {
 public:
     /// `rays`: what the packet was filled with, rays[index[k]].
     PacketTriangles(Packet& packet, const Ray* rays, const std::int32_t* index)
-        : p_(packet), rays_(rays), index_(index) {
-        for (int axis = 0; axis < 3; ++axis) negative_[axis] = packet.kind.negative(axis);
-    }
+        : p_(packet), rays_(rays), index_(index) {}
 
     /// Rays that have hit.
     [[nodiscard]] std::uint64_t found() const { return found_; }
@@ -83,7 +82,7 @@ private:
         return quads <= 2 ? quads <= tests : 3 * quads <= 2 * tests;
     }
 
-    /// Corners as rays see them from where they start.
+    /// Corners as rays of one origin see them.
     struct Corners {
         HWY_ALIGN float from_origin[9][block_lanes];
     };
@@ -112,7 +111,7 @@ private:
     static constexpr std::size_t rays_a_quad = lanes16 / 4;
 
     struct Sheared {
-        V x, y, z;  // z before shear_z
+        V x, y;
     };
 
     /// The triangles of a block against a few rays each: lane 4 r + l is ray r of a few with lane
@@ -163,59 +162,17 @@ private:
             };
             const V z = hn::Sub(corner(kind.kz), origin_z);
             return Sheared{hn::Sub(hn::Sub(corner(kind.kx), origin_x), hn::Mul(shear_x, z)),
-                           hn::Sub(hn::Sub(corner(kind.ky), origin_y), hn::Mul(shear_y, z)), z};
+                           hn::Sub(hn::Sub(corner(kind.ky), origin_y), hn::Mul(shear_y, z))};
         };
         const Sheared a = at(0), b = at(1), c = at(2);
         const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
-        std::uint32_t candidates = wanted & ~bits_of(f16, outside(u, v, w));
+        std::uint32_t candidates = wanted & ~bits_of(f16, astride(f16, u, v, w));
         if (candidates == 0) return false;
-        std::uint32_t near_edge = candidates & bits_of(f16, on_edge(u, v, w));
-        candidates &= ~near_edge;
+        const std::uint32_t clear = bits_of(f16, without_zero(f16, u, v, w));
         bool changed = false;
-        for (; near_edge != 0; near_edge &= near_edge - 1) {
-            const auto l = static_cast<std::uint32_t>(std::countr_zero(near_edge));
-            changed |= test_exactly(block, l % 4, ray[l / 4], 1);
-        }
-        if (candidates == 0) return changed;
-        return accept_quad(block, ray, candidates, origin, direction, a, b, c, u, v, w) || changed;
-    }
-
-    HWY_INLINE bool accept_quad(const TriangleBlock& block, const std::uint32_t* ray,
-                                std::uint32_t candidates, V origin, V direction, const Sheared& a,
-                                const Sheared& b, const Sheared& c, V u, V v, V w) {
-        const V determinant = hn::Add(hn::Add(u, v), w);
-        const V inverse = hn::Div(hn::Set(f16, 1.0f), direction);
-        const V shear_z = spread(inverse, p_.kind.kz);
-        V t = hn::Div(depth_of(a, b, c, u, v, w, shear_z), determinant);
-        V entry = hn::Set(f16, -infinity), exit = hn::Set(f16, infinity);
-        for (std::uint32_t axis = 0; axis < 3; ++axis) {
-            const V p = hn::LoadDup128(f16, block.corner[axis]),
-                    q = hn::LoadDup128(f16, block.corner[3 + axis]),
-                    r = hn::LoadDup128(f16, block.corner[6 + axis]);
-            const V lo = hn::Min(hn::Min(p, q), r), hi = hn::Max(hn::Max(p, q), r);
-            const V o = spread(origin, axis), i = spread(inverse, axis);
-            const V near = hn::Mul(hn::Sub(negative_[axis] ? hi : lo, o), i);
-            const V far = hn::Mul(hn::Sub(negative_[axis] ? lo : hi, o), i);
-            entry = hn::IfThenElse(hn::Gt(near, entry), near, entry);
-            exit = hn::IfThenElse(hn::Lt(far, exit), far, exit);
-        }
-        t = held_within(t, entry, exit);
-        const Lanes sound = is_sound(determinant);
-        candidates &= bits_of(f16, sound);
-        HWY_ALIGN float ts[lanes16], us[lanes16], vs[lanes16];
-        hn::Store(t, f16, ts);
-        hn::Store(hn::Div(v, determinant), f16, us);
-        hn::Store(hn::Div(w, determinant), f16, vs);
-        bool changed = false;
-        for (; candidates != 0; candidates &= candidates - 1) {
-            const auto l = static_cast<std::uint32_t>(std::countr_zero(candidates));
-            const std::uint32_t k = ray[l / 4], prim = block.prim[l % 4];
-            if (!(ts[l] >= p_.tmin[k] && ts[l] <= p_.t[k])) continue;
-            found_ |= std::uint64_t{1} << k;
-            changed = true;
-            if (any) continue;
-            if (ts[l] < p_.t[k] || prim < p_.prim[k])
-                p_.t[k] = ts[l], p_.u[k] = us[l], p_.v[k] = vs[l], p_.prim[k] = prim;
+        for (std::size_t r = 0; r < rays_a_quad; ++r) {
+            const std::uint32_t mine = candidates >> (4 * r) & 0xFu;
+            if (mine != 0) changed |= finish(block, ray[r], mine, clear >> (4 * r));
         }
         return changed;
     }
@@ -230,39 +187,11 @@ private:
         };
         const V z = at(p_.kind.kz);
         return {hn::Sub(at(p_.kind.kx), hn::Mul(hn::Load(f16, p_.shear_x + i), z)),
-                hn::Sub(at(p_.kind.ky), hn::Mul(hn::Load(f16, p_.shear_y + i), z)), z};
+                hn::Sub(at(p_.kind.ky), hn::Mul(hn::Load(f16, p_.shear_y + i), z))};
     }
     static HWY_INLINE V edge(const Sheared& a, const Sheared& b) {
         return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
     }
-    using Lanes = hn::Mask<F16>;
-    /// Edge functions of both signs.
-    static HWY_INLINE Lanes outside(V u, V v, V w) {
-        const V zero = hn::Zero(f16);
-        return hn::And(hn::Lt(hn::Min(hn::Min(u, v), w), zero),
-                       hn::Gt(hn::Max(hn::Max(u, v), w), zero));
-    }
-    static HWY_INLINE Lanes on_edge(V u, V v, V w) {
-        const V zero = hn::Zero(f16);
-        return hn::Or(hn::Or(hn::Eq(u, zero), hn::Eq(v, zero)), hn::Eq(w, zero));
-    }
-    static HWY_INLINE V depth_of(const Sheared& a, const Sheared& b, const Sheared& c, V u, V v,
-                                 V w, V shear_z) {
-        return hn::Add(
-            hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)), hn::Mul(v, hn::Mul(shear_z, b.z))),
-            hn::Mul(w, hn::Mul(shear_z, c.z)));
-    }
-    /// t within the triangle's box.
-    static HWY_INLINE V held_within(V t, V entry, V exit) {
-        V held = hn::IfThenElse(hn::Gt(t, entry), t, entry);
-        held = hn::IfThenElse(hn::Lt(held, exit), held, exit);
-        return hn::IfThenElse(hn::Le(entry, exit), held, t);
-    }
-    static HWY_INLINE Lanes is_sound(V determinant) {
-        return hn::And(hn::Ne(determinant, hn::Zero(f16)),
-                       hn::Lt(hn::Abs(determinant), hn::Set(f16, infinity)));
-    }
-
     /// intersect_triangle for the rays i + (bits of `wanted`): the same bits. Whether any ray came
     /// nearer.
     template <bool one_origin>
@@ -272,94 +201,131 @@ private:
                       b = shear<one_origin>(block, corners, 1, lane, i),
                       c = shear<one_origin>(block, corners, 2, lane, i);
         const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
-        std::uint32_t candidates = wanted & ~bits_of(f16, outside(u, v, w));
+        const std::uint32_t candidates = wanted & ~bits_of(f16, astride(f16, u, v, w));
         if (candidates == 0) return false;
-        const std::uint32_t near_edge = candidates & bits_of(f16, on_edge(u, v, w));
-        bool changed = false;
-        if (near_edge != 0) changed = test_exactly(block, lane, i, near_edge);
-        candidates &= ~near_edge;
-        if (candidates == 0) return changed;
-        return accept(block, lane, i, candidates, a, b, c, u, v, w) || changed;
+        const std::uint32_t clear = bits_of(f16, without_zero(f16, u, v, w));
+        return finish_rays<one_origin>(block, lane, i, candidates, clear);
     }
 
-    [[nodiscard]] RayFrame frame_of(std::size_t k) const {
-        RayFrame frame;
-        frame.origin = {p_.origin[0][k], p_.origin[1][k], p_.origin[2][k]};
-        frame.inverse = {p_.true_inverse[0][k], p_.true_inverse[1][k], p_.true_inverse[2][k]};
-        frame.kx = static_cast<int>(p_.kind.kx), frame.ky = static_cast<int>(p_.kind.ky),
-        frame.kz = static_cast<int>(p_.kind.kz);
-        frame.shear_x = p_.shear_x[k], frame.shear_y = p_.shear_y[k], frame.shear_z = p_.shear_z[k];
-        frame.tmin = p_.tmin[k], frame.tmax = p_.t[k];
-        frame.t_scale = 1.0f;
-        return frame;
-    }
-
-    HWY_NOINLINE bool test_exactly(const TriangleBlock& block, std::uint32_t lane, std::size_t i,
-                                   std::uint32_t rays) {
+    /// The second half of the test for one ray and the triangles in `candidates`; `clear`: those
+    /// none of whose edge functions is 0 or NaN. Whether the ray has hit or came nearer.
+    HWY_NOINLINE bool finish(const TriangleBlock& block, std::size_t k, std::uint32_t candidates,
+                             std::uint32_t clear) {
+        const Ray& ray = rays_[index_[k]];
+        weights::BlockHits hits;
+        const std::uint32_t sure = weights::hit_block(block, &ray.origin.x, &ray.direction.x,
+                                                      p_.kind, candidates & clear, hits);
         bool changed = false;
-        for (; rays != 0; rays &= rays - 1) {
-            const std::size_t k = i + static_cast<std::size_t>(std::countr_zero(rays));
-            TriangleHit hit;
-            if (!intersect_triangle<EdgeRule::closed>(frame_of(k), triangle_of(block, lane),
-                                                      p_.t[k], hit))
+        for (; candidates != 0; candidates &= candidates - 1) {
+            const auto lane = static_cast<std::uint32_t>(std::countr_zero(candidates));
+            TriangleHit hit{hits.t[lane], hits.u[lane], hits.v[lane]};
+            if ((sure >> lane & 1) != 0 ? !(hit.t >= p_.tmin[k] && hit.t <= p_.t[k])
+                                        : !test_exactly(triangle_ray(k), block, lane, p_.t[k], hit))
                 continue;
             found_ |= std::uint64_t{1} << k;
-            if (hit.t < p_.t[k] || block.prim[lane] < p_.prim[k]) {
+            changed = true;
+            if constexpr (any) return true;
+            if (hit.t < p_.t[k] || block.prim[lane] < p_.prim[k])
                 p_.t[k] = hit.t, p_.u[k] = hit.u, p_.v[k] = hit.v, p_.prim[k] = block.prim[lane];
-                changed = true;
+        }
+        return changed;
+    }
+    [[nodiscard]] TriangleRay triangle_ray(std::size_t k) const {
+        return triangle_ray_of(p_.kind, {p_.origin[0][k], p_.origin[1][k], p_.origin[2][k]},
+                               {p_.direction[0][k], p_.direction[1][k], p_.direction[2][k]},
+                               p_.shear_x[k], p_.shear_y[k], p_.tmin[k]);
+    }
+
+    /// A vector of doubles, and the floats that become one.
+    using D = hn::Repartition<double, F16>;
+    using H = weights::HalfOf<D>;
+    using VD = hn::Vec<D>;
+    static constexpr std::size_t lanes_d = hn::MaxLanes(D());
+    /// Fewer rays cost less one by one.
+    static constexpr int rays_for_vectors = 2;
+
+    /// The second half of the test for the rays i + (bits of `candidates`) and one triangle.
+    template <bool one_origin>
+    HWY_INLINE bool finish_rays(const TriangleBlock& block, std::uint32_t lane, std::size_t i,
+                                std::uint32_t candidates, std::uint32_t clear) {
+        bool changed = false;
+        std::uint32_t alone = candidates;
+        if (std::popcount(candidates & clear) >= rays_for_vectors) {
+            alone &= ~clear;
+            for (std::size_t part = 0; part < lanes16; part += lanes_d) {
+                const std::uint32_t here = (candidates & clear) >> part & ((1u << lanes_d) - 1);
+                if (here != 0)
+                    alone |= finish_vector<one_origin>(block, lane, i + part, here, changed)
+                             << part;
             }
+        }
+        for (; alone != 0; alone &= alone - 1) {
+            const auto l = static_cast<std::uint32_t>(std::countr_zero(alone));
+            changed |= finish(block, i + l, 1u << lane, (clear >> l & 1) << lane);
         }
         return changed;
     }
 
-    HWY_INLINE bool accept(const TriangleBlock& block, std::uint32_t lane, std::size_t i,
-                           std::uint32_t candidates, const Sheared& a, const Sheared& b,
-                           const Sheared& c, V u, V v, V w) {
-        const V determinant = hn::Add(hn::Add(u, v), w);
-        const V shear_z = hn::Load(f16, p_.shear_z + i);
-        V t = hn::Div(depth_of(a, b, c, u, v, w, shear_z), determinant);
-        V entry = hn::Set(f16, -infinity), exit = hn::Set(f16, infinity);
-        for (int axis = 0; axis < 3; ++axis) {
-            const float p = block.corner[axis][lane], q = block.corner[3 + axis][lane],
-                        r = block.corner[6 + axis][lane];
-            const float lo = min_of(min_of(p, q), r), hi = max_of(max_of(p, q), r);
-            const V origin = hn::Load(f16, p_.origin[axis] + i);
-            const V inverse = hn::Load(f16, p_.true_inverse[axis] + i);
-            const V near =
-                hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? hi : lo), origin), inverse);
-            const V far =
-                hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? lo : hi), origin), inverse);
-            entry = hn::IfThenElse(hn::Gt(near, entry), near, entry);
-            exit = hn::IfThenElse(hn::Lt(far, exit), far, exit);
+    /// The triangle's corners from where the rays i and on start.
+    template <bool one_origin>
+    HWY_INLINE void load_corners(const TriangleBlock& block, std::uint32_t lane, std::size_t i,
+                                 VD (&corner)[3][3]) const {
+        const D d;
+        const std::uint32_t axis[3] = {p_.kind.kx, p_.kind.ky, p_.kind.kz};
+        for (std::uint32_t k = 0; k < 3; ++k) {
+            VD origin = hn::Zero(d);
+            if constexpr (!one_origin)
+                origin = hn::PromoteTo(d, hn::Load(H(), p_.origin[axis[k]] + i));
+            for (std::uint32_t v = 0; v < 3; ++v) {
+                const float at = block.corner[3 * v + axis[k]][lane];
+                if constexpr (one_origin)
+                    corner[v][k] = hn::Set(d, double{at} - double{p_.origin_lo[axis[k]]});
+                else
+                    corner[v][k] = hn::Sub(weights::spread(d, at), origin);
+            }
         }
-        t = held_within(t, entry, exit);
-        const V reach = hn::Load(f16, p_.t + i);
-        const Lanes sound = is_sound(determinant);
-        const auto in_reach = hn::And(hn::Ge(t, hn::Load(f16, p_.tmin + i)), hn::Le(t, reach));
-        candidates &= bits_of(f16, hn::And(sound, in_reach));
-        if (candidates == 0) return false;
+    }
+
+    /// hit_inside for the rays i + (bits of `candidates`); those that it leaves open.
+    template <bool one_origin>
+    HWY_INLINE std::uint32_t finish_vector(const TriangleBlock& block, std::uint32_t lane,
+                                           std::size_t i, std::uint32_t candidates, bool& changed) {
+        const D d;
+        const H h;
+        VD corner[3][3];
+        load_corners<one_origin>(block, lane, i, corner);
+        const auto way = [&](std::uint32_t axis) {
+            return hn::PromoteTo(D(), hn::Load(H(), p_.direction[axis] + i));
+        };
+        const VD direction[3] = {way(p_.kind.kx), way(p_.kind.ky), way(p_.kind.kz)};
+        const auto at = weights::weigh(d, corner, direction);
+        const std::uint32_t sure = weights::inside(d, at), open = candidates & ~sure;
+        const auto t = weights::rounded(d, at.t), reach = hn::Load(h, p_.t + i);
+        candidates &=
+            sure & bits_of(h, hn::And(hn::Ge(t, hn::Load(h, p_.tmin + i)), hn::Le(t, reach)));
+        if (candidates == 0) return open;
+        changed = true;
         found_ |= std::uint64_t{candidates} << i;
-        if constexpr (any) return true;
+        if constexpr (any) return open;
         // At equal t the lower primitive wins.
-        const U16 u16;
-        const auto prim = hn::Set(u16, block.prim[lane]);
-        const auto old_prim = hn::Load(u16, p_.prim + i);
+        const hn::RebindToUnsigned<H> n;
+        const auto own = hn::Set(n, block.prim[lane]), old = hn::Load(n, p_.prim + i);
         const auto better =
-            hn::Or(hn::Lt(t, reach), hn::RebindMask(f16, hn::Eq(hn::Min(prim, old_prim), prim)));
-        const auto take = hn::And(better, mask_of(f16, candidates));
-        hn::Store(hn::IfThenElse(take, t, reach), f16, p_.t + i);
-        hn::Store(hn::IfThenElse(take, hn::Div(v, determinant), hn::Load(f16, p_.u + i)), f16,
-                  p_.u + i);
-        hn::Store(hn::IfThenElse(take, hn::Div(w, determinant), hn::Load(f16, p_.v + i)), f16,
-                  p_.v + i);
-        hn::Store(hn::IfThenElse(hn::RebindMask(u16, take), prim, old_prim), u16, p_.prim + i);
-        return true;
+            hn::Or(hn::Lt(t, reach), hn::RebindMask(h, hn::Eq(hn::Min(own, old), own)));
+        const auto take = hn::And(better, mask_of(h, candidates));
+        const auto store = [&](auto value, float* to) {
+            hn::Store(hn::IfThenElse(take, value, hn::Load(H(), to)), H(), to);
+        };
+        store(t, p_.t + i);
+        store(weights::rounded(d, at.u), p_.u + i);
+        store(weights::rounded(d, at.v), p_.v + i);
+        hn::Store(hn::IfThenElse(hn::RebindMask(n, take), own, old), n, p_.prim + i);
+        return open;
     }
 
     Packet& p_;
     const Ray* const rays_;
     const std::int32_t* const index_;
-    bool negative_[3];
     std::uint64_t found_ = 0;
 };
 

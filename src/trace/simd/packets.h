@@ -63,15 +63,15 @@ HWY_INLINE hn::Vec<I16> classify(const RayVectors& ray) {
 
 /// The largest pad of make_slab_frame over rays whose origins lie between `least` and `largest`,
 /// times `factor`; positive.
-inline void largest_pad(const WideView& tree, const float* least, const float* largest,
-                        std::uint32_t kz, float factor, float* pad) {
+inline float largest_pad(const WideView& tree, const float* least, const float* largest,
+                         float factor) {
     float far[3];
     for (int a = 0; a < 3; ++a) {
         const float lo = tree.lo[a], hi = tree.hi[a];
         far[a] = max_of(max_of(std::fabs(lo - least[a]), std::fabs(lo - largest[a])),
                         max_of(std::fabs(hi - least[a]), std::fabs(hi - largest[a])));
     }
-    for (int a = 0; a < 3; ++a) pad[a] = factor * slab_pad * (far[a] + far[kz]);
+    return factor * slab_pad * ((far[0] + far[1]) + far[2]) + least_slab_pad;
 }
 
 /// `count` rays of one class; read(i) gives rays i to i + lanes16 - 1, of which those beyond
@@ -95,16 +95,15 @@ HWY_INLINE void fill_packet(const WideView& tree, const Read& read, std::uint32_
             continue;
         }
         const RayVectors ray = read(i);
-        V inverse[3];
         for (int a = 0; a < 3; ++a) {
             const V o = hn::Add(ray.place[a], hn::Zero(f16));  // -0 becomes +0
             hn::Store(o, f16, p.origin[a] + i);
             origin_lo[a] = hn::Min(origin_lo[a], o);
             origin_hi[a] = hn::Max(origin_hi[a], o);
-            inverse[a] = hn::Div(hn::Set(f16, 1.0f), ray.way[a]);
-            hn::Store(inverse[a], f16, p.true_inverse[a] + i);
+            hn::Store(ray.way[a], f16, p.direction[a] + i);
+            const V inverse = hn::Div(hn::Set(f16, 1.0f), ray.way[a]);
             const V limit = hn::Set(f16, wide_longest_inverse);
-            const V limited = hn::Max(hn::Min(inverse[a], limit), hn::Neg(limit));
+            const V limited = hn::Max(hn::Min(inverse, limit), hn::Neg(limit));
             hn::Store(limited, f16, p.inverse[a] + i);
             least[a] = hn::Min(least[a], hn::Abs(limited));
             largest[a] = hn::Max(largest[a], hn::Abs(limited));
@@ -112,7 +111,6 @@ HWY_INLINE void fill_packet(const WideView& tree, const Read& read, std::uint32_
         const V depth = ray.way[p.kind.kz];
         hn::Store(hn::Div(ray.way[p.kind.kx], depth), f16, p.shear_x + i);
         hn::Store(hn::Div(ray.way[p.kind.ky], depth), f16, p.shear_y + i);
-        hn::Store(inverse[p.kind.kz], f16, p.shear_z + i);
         const V tmin = ray.place[3];
         const V start = hn::IfThenElseZero(hn::Gt(tmin, hn::Zero(f16)), tmin);
         hn::Store(start, f16, p.tmin + i);
@@ -131,9 +129,9 @@ HWY_INLINE void fill_packet(const WideView& tree, const Read& read, std::uint32_
     p.one_origin = true;
     for (int a = 0; a < 3; ++a) p.one_origin = p.one_origin && p.origin_lo[a] == p.origin_hi[a];
     p.least_tmin = hn::GetLane(hn::MinOfLanes(f16, least_tmin));
-    largest_pad(tree, p.origin_lo, p.origin_hi, p.kind.kz, packet_pad_factor, p.pad);
+    p.pad = largest_pad(tree, p.origin_lo, p.origin_hi, packet_pad_factor);
     for (int a = 0; a < 3; ++a) {
-        const V pad = hn::Set(f16, p.kind.negative(a) ? p.pad[a] : -p.pad[a]);
+        const V pad = hn::Set(f16, p.kind.negative(a) ? p.pad : -p.pad);
         for (std::size_t i = 0; i < count; i += lanes16) {
             const V from = hn::Sub(hn::Set(f16, tree.middle[a]), hn::Load(f16, p.origin[a] + i));
             const V inverse = hn::Load(f16, p.inverse[a] + i);
@@ -351,12 +349,12 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
         for (std::size_t l = 0; l < lanes16; ++l)
             hwy::Prefetch(job.rays + index[std::min<std::size_t>(k + lanes16 + l, count - 1)]);
         const RayVectors ray = read_rays(job.rays, index + k);
-        V16 place[4], way[4], shear[4], true_way[4];
+        V16 place[4], way[4], shear[4], direction[4];
         for (int a = 0; a < 3; ++a) {
             place[a] = hn::Add(ray.place[a], zero);  // -0 becomes +0
             lo[a] = hn::Min(lo[a], place[a]), hi[a] = hn::Max(hi[a], place[a]);
-            true_way[a] = hn::Div(one, ray.way[a]);
-            way[a] = hn::Max(hn::Min(true_way[a], limit), hn::Neg(limit));
+            direction[a] = ray.way[a];
+            way[a] = hn::Max(hn::Min(hn::Div(one, ray.way[a]), limit), hn::Neg(limit));
         }
         place[3] = hn::Min(ray.way[3], hn::Set(f16, std::numeric_limits<float>::max()));
         way[3] = hn::IfThenElseZero(hn::Gt(ray.place[3], zero), ray.place[3]);
@@ -364,7 +362,7 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
         shear[1] = hn::Div(ray.way[frame.kind.ky], ray.way[frame.kind.kz]);
         shear[2] = hn::BitCast(f16, hn::Set(U16(), no_primitive));
         shear[3] = hn::BitCast(f16, hn::LoadU(I16(), index + k));
-        true_way[3] = zero;
+        direction[3] = zero;
         const auto quad = [to = reinterpret_cast<float*>(rays.data() + k)](std::size_t q) {
             return
                 [=](std::size_t l) { return to + sizeof(StreamRay) / sizeof(float) * l + 4 * q; };
@@ -372,7 +370,7 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
         store_quads(place, quad(0));
         store_quads(way, quad(1));
         store_quads(shear, quad(2));
-        store_quads(true_way, quad(3));
+        store_quads(direction, quad(3));
     }
     rays.resize(count);
     float least[3], largest[3];
@@ -380,9 +378,8 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
         least[a] = hn::GetLane(hn::MinOfLanes(f16, lo[a]));
         largest[a] = hn::GetLane(hn::MaxOfLanes(f16, hi[a]));
     }
-    largest_pad(job.tree, least, largest, frame.kind.kz, wide_pad_factor, frame.near_pad);
-    for (int a = 0; a < 3; ++a)
-        if (!frame.kind.negative(a)) frame.near_pad[a] = -frame.near_pad[a];
+    const float pad = largest_pad(job.tree, least, largest, wide_pad_factor);
+    for (int a = 0; a < 3; ++a) frame.near_pad[a] = frame.kind.negative(a) ? pad : -pad;
     return frame;
 }
 

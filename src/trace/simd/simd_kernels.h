@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "exec/result_budget.h"
 #include "trace/simd/call_history.h"
 #include "trace/simd/stream_rays.h"
 #include "trace/simd/wide_ray.h"
@@ -45,7 +46,7 @@ struct SimdKernels {
     void (*packets)(const SimdJob& job, SimdCounts& counts);
     void (*streams)(const SimdJob& job, SimdCounts& counts);
     /// Hits of each ray behind those of the one before, sorted; how many to hit_counts [n].
-    void (*all_hits)(const SimdJob& job, std::vector<Hit>& found, std::uint64_t* hit_counts,
+    void (*all_hits)(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t* hit_counts,
                      SimdCounts& counts);
 };
 

@@ -11,6 +11,7 @@
 
 #include "base/check.h"
 #include "trace/all_hits.h"
+#include "trace/simd/block_hits.h"
 #include "trace/simd/call_history.h"
 #include "trace/simd/children.h"
 #include "trace/simd/lanes.h"
@@ -39,7 +40,7 @@ public:
     }
 
     /// All hits, in no order, behind those in `hits`.
-    void trace_all(std::vector<Hit>& hits) {
+    void trace_all(BudgetVector<Hit>& hits) {
         all_ = &hits;
         trace(0, {frame_.tmax});
     }
@@ -229,7 +230,7 @@ private:
         const TriangleBlock& block = tree_.template block<compact>(place);
         if constexpr (counting) counts_.tests += count;
         if constexpr (wanted == Wanted::all) {
-            const RayFrame ray = frame_.ray_frame();
+            const TriangleRay ray = frame_.triangle_ray();
             for (std::uint32_t lane = place % block_lanes; lane < place % block_lanes + count;
                  ++lane) {
                 TriangleHit hit;
@@ -244,7 +245,7 @@ private:
     }
 
     struct Sheared {
-        V4 x, y, z;  // z before shear_z
+        V4 x, y;
     };
     HWY_INLINE Sheared shear(const TriangleBlock& block, int vertex) const {
         const auto at = [&](std::uint32_t axis) {
@@ -253,7 +254,7 @@ private:
         };
         const V4 z = at(frame_.kind.kz);
         return {hn::Sub(at(frame_.kind.kx), hn::Mul(hn::Set(f4, frame_.shear[0]), z)),
-                hn::Sub(at(frame_.kind.ky), hn::Mul(hn::Set(f4, frame_.shear[1]), z)), z};
+                hn::Sub(at(frame_.kind.ky), hn::Mul(hn::Set(f4, frame_.shear[1]), z))};
     }
     static HWY_INLINE V4 edge(const Sheared& a, const Sheared& b) {
         return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
@@ -263,73 +264,28 @@ private:
     HWY_INLINE bool test_lanes(const TriangleBlock& block, std::uint32_t tested) {
         const Sheared a = shear(block, 0), b = shear(block, 1), c = shear(block, 2);
         const V4 u = edge(c, b), v = edge(a, c), w = edge(b, a);
-        const V4 zero = hn::Zero(f4);
         const V4 least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
-        std::uint32_t candidates = tested & ~bits_astride(least, largest);
+        const std::uint32_t candidates = tested & ~bits_astride(least, largest);
         if (candidates == 0) return false;
-        const auto on_edge = hn::Or(hn::Or(hn::Eq(u, zero), hn::Eq(v, zero)), hn::Eq(w, zero));
-        const std::uint32_t near_edge = candidates & bits_of(f4, on_edge);
-        if (near_edge != 0 && test_exactly(block, near_edge)) return true;
-        candidates &= ~near_edge;
-        if (candidates == 0) return false;
-        return accept(block, candidates, a, b, c, u, v, w);
+        const std::uint32_t clear = bits_of(f4, without_zero(f4, u, v, w));
+        return finish(block, candidates, clear);
     }
 
-    HWY_NOINLINE bool test_exactly(const TriangleBlock& block, std::uint32_t lanes) {
-        const RayFrame ray = frame_.ray_frame();
-        for (; lanes != 0; lanes &= lanes - 1) {
-            const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
-            TriangleHit hit;
-            if (!intersect_triangle<EdgeRule::closed>(ray, triangle_of(block, lane), best_.t, hit))
+    /// `clear`: lanes none of whose edge functions is 0 or NaN.
+    HWY_INLINE bool finish(const TriangleBlock& block, std::uint32_t candidates,
+                           std::uint32_t clear) {
+        weights::BlockHits hits;
+        const std::uint32_t sure = weights::hit_block(block, frame_.origin, frame_.direction,
+                                                      frame_.kind, candidates & clear, hits);
+        for (; candidates != 0; candidates &= candidates - 1) {
+            const auto lane = static_cast<std::uint32_t>(std::countr_zero(candidates));
+            TriangleHit hit{hits.t[lane], hits.u[lane], hits.v[lane]};
+            if ((sure >> lane & 1) != 0
+                    ? !(hit.t >= frame_.tmin && hit.t <= best_.t)
+                    : !test_exactly(frame_.triangle_ray(), block, lane, best_.t, hit))
                 continue;
             best_.take(hit.t, block.prim[lane], hit.u, hit.v);
             if constexpr (wanted == Wanted::any) return true;
-        }
-        return false;
-    }
-
-    HWY_INLINE bool accept(const TriangleBlock& block, std::uint32_t candidates, const Sheared& a,
-                           const Sheared& b, const Sheared& c, V4 u, V4 v, V4 w) {
-        const V4 determinant = hn::Add(hn::Add(u, v), w);
-        const V4 shear_z = hn::Set(f4, frame_.shear_z());
-        const V4 depth =
-            hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)), hn::Mul(v, hn::Mul(shear_z, b.z))),
-                    hn::Mul(w, hn::Mul(shear_z, c.z)));
-        V4 t = hn::Div(depth, determinant);
-        V4 entry = hn::Set(f4, -infinity), exit = hn::Set(f4, infinity);
-        for (int axis = 0; axis < 3; ++axis) {
-            const V4 p = hn::Load(f4, block.corner[axis]), q = hn::Load(f4, block.corner[3 + axis]),
-                     r = hn::Load(f4, block.corner[6 + axis]);
-            const V4 lo = hn::Min(hn::Min(p, q), r), hi = hn::Max(hn::Max(p, q), r);
-            const bool negative = frame_.kind.negative(axis);
-            const V4 origin = hn::Set(f4, frame_.origin[axis]),
-                     inverse = hn::Set(f4, frame_.true_inverse[axis]);
-            const V4 near = hn::Mul(hn::Sub(negative ? hi : lo, origin), inverse);
-            const V4 far = hn::Mul(hn::Sub(negative ? lo : hi, origin), inverse);
-            // A NaN plane is dropped.
-            entry = hn::IfThenElse(hn::Gt(near, entry), near, entry);
-            exit = hn::IfThenElse(hn::Lt(far, exit), far, exit);
-        }
-        V4 held = hn::IfThenElse(hn::Gt(t, entry), t, entry);
-        held = hn::IfThenElse(hn::Lt(held, exit), held, exit);
-        t = hn::IfThenElse(hn::Le(entry, exit), held, t);
-        const auto sound = hn::And(hn::Ne(determinant, hn::Zero(f4)),
-                                   hn::Lt(hn::Abs(determinant), hn::Set(f4, infinity)));
-        const auto in_reach =
-            hn::And(hn::Ge(t, hn::Set(f4, frame_.tmin)), hn::Le(t, hn::Set(f4, best_.t)));
-        candidates &= bits_of(f4, hn::And(sound, in_reach));
-        if (candidates == 0) return false;
-        if constexpr (wanted == Wanted::any) {
-            best_.prim = 0;
-            return true;
-        }
-        HWY_ALIGN float ts[block_lanes], us[block_lanes], vs[block_lanes];
-        hn::Store(t, f4, ts);
-        hn::Store(hn::Div(v, determinant), f4, us);
-        hn::Store(hn::Div(w, determinant), f4, vs);
-        for (; candidates != 0; candidates &= candidates - 1) {
-            const auto k = static_cast<std::size_t>(std::countr_zero(candidates));
-            best_.take(ts[k], block.prim[k], us[k], vs[k]);
         }
         return false;
     }
@@ -339,7 +295,7 @@ private:
     const WideStackView stack_;
     SimdCounts& counts_;
     WideBest best_{};
-    std::vector<Hit>* all_ = nullptr;
+    BudgetVector<Hit>* all_ = nullptr;
     std::uint32_t near_at_[3], far_at_[3];  // where planes are, from a node's boxes on
 };
 
@@ -397,7 +353,7 @@ void trace_single(const SimdJob& job, SimdCounts& counts) {
 
 /// All hits of each ray behind those of the one before; counts.hits of each in hit_counts.
 template <bool counting, bool compact>
-void trace_all_of(const SimdJob& job, std::vector<Hit>& found, std::uint64_t* hit_counts,
+void trace_all_of(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t* hit_counts,
                   SimdCounts& counts) {
     for (std::size_t i = 0; i < job.n; ++i) {
         const std::size_t before = found.size();
@@ -426,7 +382,7 @@ void with_constants(const SimdJob& job, const Run& run) {
         job.counting ? run(Yes(), No()) : run(No(), No());
 }
 
-inline void all_hits(const SimdJob& job, std::vector<Hit>& found, std::uint64_t* hit_counts,
+inline void all_hits(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t* hit_counts,
                      SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
         trace_all_of<counting, compact>(job, found, hit_counts, counts);

@@ -20,7 +20,7 @@ namespace raydix::HWY_NAMESPACE {
 /// By axis; what a fourth float holds has no meaning.
 struct SingleFrame {
     alignas(16) float origin[4];
-    alignas(16) float true_inverse[4];
+    alignas(16) float direction[4];     // scaled
     alignas(16) float inverse[4];       // limited
     alignas(16) float near_pad[4];      // with the sign that moves near planes toward the start
     alignas(16) float near[4], far[4];  // starts of planes about the tree's middle
@@ -29,18 +29,11 @@ struct SingleFrame {
     float tmin, tmax, t_scale;
     bool careful;  // planes of plain nodes may overflow
 
-    [[nodiscard]] float shear_z() const { return true_inverse[kind.kz]; }
-
     /// For the triangle test of one triangle.
-    [[nodiscard]] RayFrame ray_frame() const {
-        RayFrame out;
-        out.origin = {origin[0], origin[1], origin[2]};
-        out.inverse = {true_inverse[0], true_inverse[1], true_inverse[2]};
-        out.kx = static_cast<int>(kind.kx), out.ky = static_cast<int>(kind.ky),
-        out.kz = static_cast<int>(kind.kz);
-        out.shear_x = shear[0], out.shear_y = shear[1], out.shear_z = shear_z();
-        out.tmin = tmin, out.tmax = tmax, out.t_scale = t_scale;
-        return out;
+    [[nodiscard]] TriangleRay triangle_ray() const {
+        return triangle_ray_of(kind, {origin[0], origin[1], origin[2]},
+                               {direction[0], direction[1], direction[2]}, shear[0], shear[1],
+                               tmin);
     }
 };
 
@@ -59,14 +52,13 @@ HWY_INLINE void set_starts(const WideView& tree, V4 origin, V4 inverse, V4 near_
 }
 
 /// How far boxes widen for one ray (slab.h), with sign. `way` has the signs of the direction.
-HWY_INLINE V4 pad_of(const WideView& tree, V4 origin, V4 way, std::uint32_t kz) {
+HWY_INLINE V4 pad_of(const WideView& tree, V4 origin, V4 way) {
     const V4 reach = hn::Max(hn::Abs(hn::Sub(hn::Load(f4, tree.lo), origin)),
                              hn::Abs(hn::Sub(hn::Load(f4, tree.hi), origin)));
-    alignas(16) float reaches[4];
-    hn::Store(reach, f4, reaches);
-    const V4 pad =
-        hn::Mul(hn::Set(f4, wide_pad_factor * slab_pad), hn::Add(reach, hn::Set(f4, reaches[kz])));
-    return hn::CopySignToAbs(pad, hn::Neg(way));
+    alignas(16) float far[4];
+    hn::Store(reach, f4, far);
+    const float pad = wide_pad_factor * slab_pad * ((far[0] + far[1]) + far[2]) + least_slab_pad;
+    return hn::CopySignToAbs(hn::Set(f4, pad), hn::Neg(way));
 }
 
 HWY_INLINE V4 limited(V4 inverse) {
@@ -77,19 +69,20 @@ HWY_INLINE V4 limited(V4 inverse) {
 /// Any valid ray.
 HWY_NOINLINE void fill_odd_frame(const WideView& tree, const Ray& ray, SingleFrame& out) {
     const RayFrame frame = make_frame(ray);
-    const Vec3 o = frame.origin, i = frame.inverse;
+    const Vec3 o = frame.origin, d = frame.direction, i = frame.inverse;
     const auto quad = [](float x, float y, float z, float* to) {
         to[0] = x, to[1] = y, to[2] = z, to[3] = 0.0f;
     };
     quad(o.x, o.y, o.z, out.origin);
-    quad(i.x, i.y, i.z, out.true_inverse);
+    quad(d.x, d.y, d.z, out.direction);
+    quad(i.x, i.y, i.z, out.inverse);
     quad(frame.shear_x, frame.shear_y, 0.0f, out.shear);
-    const V4 origin = hn::Load(f4, out.origin), way = hn::Load(f4, out.true_inverse);
+    const V4 origin = hn::Load(f4, out.origin), whole = hn::Load(f4, out.inverse);
     const auto negatives = static_cast<std::uint32_t>(std::signbit(i.x)) |
                            static_cast<std::uint32_t>(std::signbit(i.y)) << 1 |
                            static_cast<std::uint32_t>(std::signbit(i.z)) << 2;
     out.kind = ray_classes[negatives + 8 * static_cast<std::uint32_t>(frame.kz)];
-    const V4 inverse = limited(way), pad = pad_of(tree, origin, way, out.kind.kz);
+    const V4 inverse = limited(whole), pad = pad_of(tree, origin, whole);
     hn::Store(inverse, f4, out.inverse);
     hn::Store(pad, f4, out.near_pad);
     set_starts(tree, origin, inverse, pad, out);
@@ -128,11 +121,10 @@ HWY_INLINE bool fill_frame(const WideView& tree, const Ray& ray, SingleFrame& ou
     const std::uint32_t kz = az == longest ? 2 : ay == longest ? 1 : 0;
     out.kind = ray_classes[negatives + 8 * kz];
     const V4 origin = hn::Add(place, hn::Zero(f4));  // -0 becomes +0
-    const V4 whole = hn::Div(hn::Set(f4, 1.0f), way), inverse = limited(whole);
-    const V4 pad = pad_of(tree, origin, way, kz);
+    const V4 inverse = limited(hn::Div(hn::Set(f4, 1.0f), way)), pad = pad_of(tree, origin, way);
     const float* const components = &ray.direction.x;
     hn::Store(origin, f4, out.origin);
-    hn::Store(whole, f4, out.true_inverse);
+    hn::Store(way, f4, out.direction);
     hn::Store(inverse, f4, out.inverse);
     hn::Store(pad, f4, out.near_pad);
     set_starts(tree, origin, inverse, pad, out);
@@ -150,7 +142,7 @@ HWY_INLINE void fill_frame(const WideView& tree, const StreamFrame& frame, const
     const V4 origin = hn::Load(f4, ray.origin), inverse = hn::Load(f4, ray.inverse),
              pad = hn::LoadU(f4, frame.near_pad);
     hn::Store(origin, f4, out.origin);
-    hn::Store(hn::Load(f4, ray.true_inverse), f4, out.true_inverse);
+    hn::Store(hn::LoadU(f4, ray.direction), f4, out.direction);
     hn::Store(inverse, f4, out.inverse);
     hn::Store(pad, f4, out.near_pad);
     set_starts(tree, origin, inverse, pad, out);

@@ -9,6 +9,7 @@
 #define RAYDIX_SIMD_STREAM_H
 #endif
 
+#include "trace/simd/block_hits.h"
 #include "trace/simd/children.h"
 #include "trace/simd/quads.h"
 #include "trace/simd/single.h"
@@ -245,7 +246,7 @@ private:
     }
 
     struct Sheared {
-        V16 x, y, z;  // z before shear_z
+        V16 x, y;
     };
     static HWY_INLINE V16 edge(const Sheared& a, const Sheared& b) {
         return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
@@ -258,7 +259,9 @@ private:
         V16 shear_x, shear_y, reach;
     };
 
-    HWY_INLINE void load_chunk(Chunk& chunk) const {
+    HWY_INLINE Chunk load_chunk(const std::uint32_t* list) const {
+        Chunk chunk;
+        chunk.list = list;
         V16 place[4], way[4];
         load_quads(RowsOf{rays_, chunk.list, 0}, place);
         load_quads(RowsOf{rays_, chunk.list, 2}, way);
@@ -267,6 +270,7 @@ private:
         chunk.away[2] = hn::Neg(place[frame_.kind.kz]);
         chunk.shear_x = way[0], chunk.shear_y = way[1];
         chunk.reach = place[3];
+        return chunk;
     }
 
     void test_leaf(const StreamEntry& entry) {
@@ -277,9 +281,7 @@ private:
         if constexpr (counting) counts_.tests += std::uint64_t{count} * entry.count;
         pad_list(list, entry.count);
         for (std::uint32_t k = 0; k < entry.count; k += lanes16) {
-            Chunk chunk;
-            chunk.list = list + k;
-            load_chunk(chunk);
+            const Chunk chunk = load_chunk(list + k);
             const auto items = hn::LoadU(U16(), list + k);
             auto active =
                 hn::Le(hn::BitCast(f16, hn::And(items, hn::Set(U16(), ~ray_bits))), chunk.reach);
@@ -297,13 +299,12 @@ private:
                              const Chunk& chunk) const {
         const V16 depth = hn::Add(hn::Set(f16, *z), chunk.away[2]);
         return {hn::Sub(hn::Add(hn::Set(f16, *x), chunk.away[0]), hn::Mul(chunk.shear_x, depth)),
-                hn::Sub(hn::Add(hn::Set(f16, *y), chunk.away[1]), hn::Mul(chunk.shear_y, depth)),
-                depth};
+                hn::Sub(hn::Add(hn::Set(f16, *y), chunk.away[1]), hn::Mul(chunk.shear_y, depth))};
     }
 
     /// intersect_triangle for the rays of the chunk in `wanted`: the same bits.
-    HWY_INLINE void test_triangle(const TriangleBlock& block, std::uint32_t lane, Chunk& chunk,
-                                  std::uint32_t wanted) {
+    HWY_INLINE void test_triangle(const TriangleBlock& block, std::uint32_t lane,
+                                  const Chunk& chunk, std::uint32_t wanted) {
         constexpr std::size_t next = 3 * block_lanes;
         const float* const x = block.corner[frame_.kind.kx] + lane;
         const float* const y = block.corner[frame_.kind.ky] + lane;
@@ -311,88 +312,27 @@ private:
         const Sheared a = shear(x, y, z, chunk), b = shear(x + next, y + next, z + next, chunk),
                       c = shear(x + 2 * next, y + 2 * next, z + 2 * next, chunk);
         const V16 u = edge(c, b), v = edge(a, c), w = edge(b, a);
-        const V16 zero = hn::Zero(f16);
-        const V16 least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
-        const auto outside = hn::And(hn::Lt(least, zero), hn::Gt(largest, zero));
-        const std::uint32_t candidates = wanted & ~bits_of(f16, outside);
-        if (candidates != 0) settle_candidates(block, lane, chunk, candidates, a, b, c, u, v, w);
-    }
-
-    HWY_NOINLINE void settle_candidates(const TriangleBlock& block, std::uint32_t lane,
-                                        Chunk& chunk, std::uint32_t candidates, const Sheared& a,
-                                        const Sheared& b, const Sheared& c, const V16& u,
-                                        const V16& v, const V16& w) {
-        const V16 zero = hn::Zero(f16);
-        const auto on_edge = hn::Or(hn::Or(hn::Eq(u, zero), hn::Eq(v, zero)), hn::Eq(w, zero));
-        const std::uint32_t near_edge = candidates & bits_of(f16, on_edge);
-        candidates &= ~near_edge;
-        if (candidates != 0) accept(block, lane, chunk, candidates, a, b, c, u, v, w);
-        if (near_edge != 0) {
-            test_exactly(block, lane, chunk, near_edge);
-            load_chunk(chunk);
-        }
-    }
-
-    void test_exactly(const TriangleBlock& block, std::uint32_t lane, const Chunk& chunk,
-                      std::uint32_t lanes) {
-        for (; lanes != 0; lanes &= lanes - 1) {
-            const std::uint32_t k = chunk.list[std::countr_zero(lanes)] & ray_bits;
-            TriangleHit hit;
-            if (intersect_triangle<EdgeRule::closed>(frame_.frame_of(rays_[k]),
-                                                     triangle_of(block, lane), rays_[k].t, hit))
-                take(k, hit.t, block.prim[lane], hit.u, hit.v);
-        }
-    }
-
-    HWY_INLINE void accept(const TriangleBlock& block, std::uint32_t lane, Chunk& chunk,
-                           std::uint32_t candidates, const Sheared& a, const Sheared& b,
-                           const Sheared& c, V16 u, V16 v, V16 w) {
-        V16 place[4], way[4], true_way[4];
-        load_quads(RowsOf{rays_, chunk.list, 0}, place);
-        load_quads(RowsOf{rays_, chunk.list, 1}, way);
-        load_quads(RowsOf{rays_, chunk.list, 3}, true_way);
-        const V16 determinant = hn::Add(hn::Add(u, v), w);
-        const V16 shear_z = true_way[frame_.kind.kz];
-        const V16 depth =
-            hn::Add(hn::Add(hn::Mul(u, hn::Mul(shear_z, a.z)), hn::Mul(v, hn::Mul(shear_z, b.z))),
-                    hn::Mul(w, hn::Mul(shear_z, c.z)));
-        V16 t = hn::Div(depth, determinant);
-        V16 entry = hn::Set(f16, -infinity), exit = hn::Set(f16, infinity);
-        for (int axis = 0; axis < 3; ++axis) {
-            const float p = block.corner[axis][lane], q = block.corner[3 + axis][lane],
-                        r = block.corner[6 + axis][lane];
-            const float lo = min_of(min_of(p, q), r), hi = max_of(max_of(p, q), r);
-            const V16 inverse = true_way[axis];
-            const V16 near =
-                hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? hi : lo), place[axis]), inverse);
-            const V16 far =
-                hn::Mul(hn::Sub(hn::Set(f16, negative_[axis] ? lo : hi), place[axis]), inverse);
-            // A NaN plane is dropped.
-            entry = hn::IfThenElse(hn::Gt(near, entry), near, entry);
-            exit = hn::IfThenElse(hn::Lt(far, exit), far, exit);
-        }
-        V16 held = hn::IfThenElse(hn::Gt(t, entry), t, entry);
-        held = hn::IfThenElse(hn::Lt(held, exit), held, exit);
-        t = hn::IfThenElse(hn::Le(entry, exit), held, t);
-        const auto sound = hn::And(hn::Ne(determinant, hn::Zero(f16)),
-                                   hn::Lt(hn::Abs(determinant), hn::Set(f16, infinity)));
-        const auto in_reach = hn::And(hn::Ge(t, way[3]), hn::Le(t, chunk.reach));
-        candidates &= bits_of(f16, hn::And(sound, in_reach));
+        const std::uint32_t candidates = wanted & ~bits_of(f16, astride(f16, u, v, w));
         if (candidates == 0) return;
-        chunk.reach =
-            hn::IfThenElse(mask_of(f16, candidates), any ? hn::Set(f16, -1.0f) : t, chunk.reach);
-        HWY_ALIGN float ts[lanes16], us[lanes16], vs[lanes16];
-        if constexpr (!any) {
-            hn::Store(t, f16, ts);
-            hn::Store(hn::Div(v, determinant), f16, us);
-            hn::Store(hn::Div(w, determinant), f16, vs);
-        }
+        const std::uint32_t clear = bits_of(f16, without_zero(f16, u, v, w));
+        finish(block, lane, chunk.list, candidates, clear);
+    }
+
+    /// `clear`: rays none of whose edge functions is 0 or NaN.
+    HWY_NOINLINE void finish(const TriangleBlock& block, std::uint32_t lane,
+                             const std::uint32_t* list, std::uint32_t candidates,
+                             std::uint32_t clear) {
         for (; candidates != 0; candidates &= candidates - 1) {
-            const auto l = static_cast<std::size_t>(std::countr_zero(candidates));
-            if constexpr (any)
-                rays_[chunk.list[l] & ray_bits].settle();
-            else
-                take(chunk.list[l] & ray_bits, ts[l], block.prim[lane], us[l], vs[l]);
+            const auto l = static_cast<std::uint32_t>(std::countr_zero(candidates));
+            const std::uint32_t k = list[l] & ray_bits;
+            const StreamRay& ray = rays_[k];
+            weights::BlockHits hits;
+            const bool sure = weights::hit_block(block, ray.origin, ray.direction, frame_.kind,
+                                                 (clear >> l & 1) << lane, hits) != 0;
+            TriangleHit hit{hits.t[lane], hits.u[lane], hits.v[lane]};
+            if (sure ? hit.t >= ray.tmin && hit.t <= ray.t
+                     : test_exactly(frame_.triangle_ray(ray), block, lane, ray.t, hit))
+                take(k, hit.t, block.prim[lane], hit.u, hit.v);
         }
     }
 

@@ -15,7 +15,7 @@ struct alignas(64) StreamRay {
     float inverse[3], tmin;     // limited
     float shear[2];             // of x and y
     std::uint32_t prim, index;  // index: of the ray in its job
-    float true_inverse[3], unused;
+    float direction[3], unused;
 
     /// Any hit will do, and there is one: no box is near enough any more.
     void settle() { prim = 0, t = -1.0f; }
@@ -31,17 +31,10 @@ struct StreamFrame {
     RayClass kind;
     float near_pad[4];  // with the sign that moves near planes toward the ray's start
 
-    [[nodiscard]] RayFrame frame_of(const StreamRay& ray) const {
-        RayFrame frame;
-        frame.origin = {ray.origin[0], ray.origin[1], ray.origin[2]};
-        frame.inverse = {ray.true_inverse[0], ray.true_inverse[1], ray.true_inverse[2]};
-        frame.kx = static_cast<int>(kind.kx), frame.ky = static_cast<int>(kind.ky),
-        frame.kz = static_cast<int>(kind.kz);
-        frame.shear_x = ray.shear[0], frame.shear_y = ray.shear[1];
-        frame.shear_z = ray.true_inverse[kind.kz];
-        frame.tmin = ray.tmin, frame.tmax = ray.t;
-        frame.t_scale = 1.0f;
-        return frame;
+    [[nodiscard]] TriangleRay triangle_ray(const StreamRay& ray) const {
+        return triangle_ray_of(kind, {ray.origin[0], ray.origin[1], ray.origin[2]},
+                               {ray.direction[0], ray.direction[1], ray.direction[2]}, ray.shear[0],
+                               ray.shear[1], ray.tmin);
     }
 };
 

@@ -154,6 +154,12 @@ void trace_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, Hit* h
         batch.run(begin, std::min(begin + max_job_rays, rays.size()), counts);
 }
 
+/// Before a call may end early: an empty tree answers without any threads.
+void check_call(const TraceOptions& options) {
+    check_options(options);
+    check_threads(options.threads);
+}
+
 /// Nothing to hit: all rays miss, but invalid ones still count.
 TraceCounts miss_all(std::span<const Ray> rays) {
     TraceCounts counts;
@@ -167,6 +173,7 @@ TraceCounts miss_all(std::span<const Ray> rays) {
 TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit> hits,
                   const TraceOptions& options) {
     check_sizes(rays.size(), hits.size());
+    check_call(options);
     static_cast<void>(kernels_for(options.isa));
     if (!tree.empty()) return trace_batch(tree, rays, hits.data(), nullptr, options);
     std::ranges::fill(hits, Hit{});
@@ -183,6 +190,7 @@ std::vector<Hit> trace(const WideBvh& tree, std::span<const Ray> rays,
 TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size());
+    check_call(options);
     static_cast<void>(kernels_for(options.isa));
     if (!tree.empty()) return trace_batch(tree, rays, nullptr, occluded.data(), options);
     std::ranges::fill(occluded, std::uint8_t{0});
@@ -207,16 +215,17 @@ void occluded_here(const WideBvh& tree, std::span<const Ray> rays,
 }
 
 AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOptions& options) {
+    check_call(options);
     const SimdKernels& kernels = kernels_for(options.isa);
+    constexpr std::size_t block_size = 1024;
+    HitBlocks<AllHits> found(rays.size(), block_size, options.max_result_bytes);
     AllHits all;
-    all.offsets.resize(rays.size() + 1, 0);
     if (tree.empty()) {
+        all = found.join();
         all.counts = miss_all(rays);
         return all;
     }
-    constexpr std::size_t block_size = 1024;
     std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
-    std::vector<std::vector<Hit>> found(parts.size());
     with_threads(options.threads, [&] {
         for_each_block(
             rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
@@ -232,9 +241,10 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
                                   {},
                                   nullptr,
                                   options.counters};
-                kernels.all_hits(job, found[block], &all.offsets[begin + 1], parts[block]);
+                kernels.all_hits(job, found.hits(block), found.hit_counts() + begin, parts[block]);
+                found.finish(block);
             });
-        join_blocks(found, block_size, all);
+        all = found.join();
     });
     all.counts = sum_of(parts, rays.size(), options.counters);
     return all;
@@ -312,7 +322,8 @@ constexpr std::array<std::string_view, 5> path_names{"automatic", "single", "pac
 }  // namespace
 
 std::string_view simd_path_name(SimdPath path) {
-    return path_names[static_cast<std::size_t>(path)];
+    const auto k = static_cast<std::size_t>(path);
+    return k < path_names.size() ? path_names[k] : "unknown";
 }
 
 SimdPath simd_path_from_name(std::string_view name) {

@@ -10,6 +10,7 @@
 #include "base/math.h"
 #include "layout/wide_bvh.h"
 #include "trace/ray_frame.h"
+#include "trace/simd/ray_classes.h"
 #include "trace/slab.h"
 #include "trace/triangle_test.h"
 
@@ -104,7 +105,8 @@ inline std::size_t wide_stack_capacity(std::uint32_t max_depth) {
 /// hit (docs/algorithms/wide.md).
 inline constexpr float wide_longest_inverse = 0x1p80f;
 
-/// Boxes widen by twice the pad of slab.h: it covers the roundings of origin + steps, fused or not.
+/// Boxes widen by twice the pad of slab.h: it covers the roundings of plane * rate + start, fused
+/// or not.
 inline constexpr float wide_pad_factor = 2.0f;
 /// The bounds of a packet round once more (docs/algorithms/wide.md).
 inline constexpr float packet_pad_factor = 3.0f;
@@ -115,6 +117,24 @@ inline LeafTriangle triangle_of(const TriangleBlock& block, std::uint32_t lane) 
                     block.corner[3 * v + 2][lane]};
     };
     return {corner(0), corner(1), corner(2)};
+}
+
+inline TriangleRay triangle_ray_of(const RayClass& kind, Vec3 origin, Vec3 direction, float shear_x,
+                                   float shear_y, float tmin) {
+    return {origin,
+            direction,
+            static_cast<int>(kind.kx),
+            static_cast<int>(kind.ky),
+            static_cast<int>(kind.kz),
+            shear_x,
+            shear_y,
+            tmin};
+}
+
+/// The whole test: where an edge function is 0 or NaN, or a vector of planes leaves it open.
+[[gnu::noinline]] inline bool test_exactly(const TriangleRay& ray, const TriangleBlock& block,
+                                           std::uint32_t lane, float tmax, TriangleHit& hit) {
+    return intersect_triangle<EdgeRule::closed>(ray, triangle_of(block, lane), tmax, hit);
 }
 
 /// The best hit so far, t in the frame's units.

@@ -1,0 +1,29 @@
+#include "raydix.h"
+
+#include <raydix/version.h>
+
+#include <string>
+
+#include "options.h"
+#include "program.h"
+
+namespace raydix::cli {
+
+int run_raydix(int argc, char** argv) {
+    CLI::App app("raydix builds spatial trees in parallel and traces rays through them.", "raydix");
+    app.set_version_flag("--version", std::string("raydix ") + raydix::version);
+    app.require_subcommand(1);
+    add_info_command(app);
+    add_scenes_command(app);
+    add_build_command(app);
+    add_check_command(app);
+    add_trace_command(app);
+    add_render_command(app);
+    add_query_command(app);
+    add_simulate_command(app);
+    add_bench_command(app);
+    add_report_command(app);
+    return run_program(app, argc, argv);
+}
+
+}  // namespace raydix::cli

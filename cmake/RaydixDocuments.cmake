@@ -1,0 +1,25 @@
+# The documents that `raydix report` reads and writes. They take the optimiser longer than anything else and no time when
+# they run, so it does less here; pictures (exr, png, picture, colour_map) are compiled as the rest of the library.
+if(RAYDIX_SANITIZE)
+    set(raydix_document_flags -O0)
+elseif(CMAKE_BUILD_TYPE MATCHES "^(Release|RelWithDebInfo|MinSizeRel)$")
+    set(raydix_document_flags -O1)
+else()
+    set(raydix_document_flags)
+endif()
+set(raydix_document_sources ${raydix_sources})
+list(FILTER raydix_document_sources INCLUDE REGEX "/src/report/")
+list(FILTER raydix_document_sources EXCLUDE REGEX "/src/report/(exr|png|picture|colour_map).cpp$")
+if(NOT raydix_document_sources)
+    return()
+endif()
+list(REMOVE_ITEM raydix_sources ${raydix_document_sources})
+add_library(raydix_documents OBJECT ${raydix_document_sources})
+target_include_directories(raydix_documents PRIVATE include src)
+target_compile_features(raydix_documents PRIVATE cxx_std_20)
+target_link_libraries(raydix_documents PRIVATE raydix_options fmt::fmt nlohmann_json::nlohmann_json)
+target_compile_options(raydix_documents PRIVATE ${raydix_document_flags})
+raydix_unity(raydix_documents 13)
+# Short names of their own for the same measures of a plot.
+set_source_files_properties(src/report/bar_plot.cpp src/report/dot_plot.cpp src/report/histogram_plot.cpp
+    src/report/line_plot.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)

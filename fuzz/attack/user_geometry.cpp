@@ -1,0 +1,136 @@
+// Rays through the caller's own geometry: spheres, capsules, points with a radius and boxes,
+// against the same function called for every primitive, and spheres against extended precision.
+#include <raydix/user_geometry.h>
+#include <raydix/user_geometry_d.h>
+
+#include "attack/attack.h"
+#include "attack/precision.h"
+
+namespace raydix::attack {
+namespace {
+
+/// The least (t, prim) of `intersect` over all primitives that builders keep.
+template <class AnyHit, class AnyRay, class Intersect>
+AnyHit least_of_all(std::uint32_t count, const std::vector<bool>& kept, const Intersect& intersect,
+                    AnyRay ray) {
+    AnyHit best;
+    if (!is_finite(ray.origin) || !is_finite(ray.direction) ||
+        (ray.direction.x == 0 && ray.direction.y == 0 && ray.direction.z == 0) ||
+        !(ray.tmin <= ray.tmax))
+        return best;
+    ray.tmin = std::max(ray.tmin, decltype(ray.tmin)(0));
+    if (!(ray.tmin <= ray.tmax)) return best;
+    for (std::uint32_t i = 0; i < count; ++i) {
+        AnyHit hit;
+        if (!kept[i] || !intersect(i, ray, hit)) continue;
+        if (!(hit.t >= ray.tmin && hit.t <= ray.tmax)) continue;
+        if (!best.hit() || hit.t < best.t) {
+            best = hit;
+            best.prim = i;
+        }
+    }
+    return best;
+}
+
+template <class Scalar>
+bool same_number(Scalar a, Scalar b) {
+    return a == b || (std::isnan(a) && std::isnan(b));
+}
+template <class AnyHit>
+bool same_hit(const AnyHit& a, const AnyHit& b) {
+    return a.prim == b.prim && (!a.hit() || (a.t == b.t && same_number(a.u, b.u) && a.v == b.v));
+}
+
+template <class Box>
+std::vector<bool> kept_boxes(const std::vector<Box>& boxes) {
+    std::vector<bool> kept;
+    for (const Box& box : boxes) {
+        const Box single[] = {box};
+        kept.push_back(build_bvh(std::span<const Box>(single), {.threads = 1}).left_out() == 0);
+    }
+    return kept;
+}
+
+template <class In, class Box, class Intersect>
+void duel(Case& c, const char* shape, const std::vector<Box>& boxes, const Intersect& intersect,
+          const std::vector<typename In::AnyRay>& rays) {
+    using AnyHit = decltype(closest_hit(build_bvh(std::span<const Box>(boxes), BuildOptions{}),
+                                        intersect, rays[0]));
+    const std::vector<bool> kept = kept_boxes(boxes);
+    std::vector<AnyHit> wanted;
+    for (const auto& ray : rays)
+        wanted.push_back(
+            least_of_all<AnyHit>(static_cast<std::uint32_t>(boxes.size()), kept, intersect, ray));
+    for (const BuildOptions& build : every_builder(c.random)) {
+        const auto tree = build_bvh(std::span<const Box>(boxes), build);
+        std::vector<AnyHit> hits(rays.size());
+        std::vector<std::uint8_t> any(rays.size());
+        trace(tree, intersect, std::span(rays), hits, {.threads = 1});
+        trace_any(tree, intersect, std::span(rays), any, {.threads = 1});
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            const auto expect = [&](bool right, const char* what) {
+                c.expect(right, text("user_geometry/%s", In::name),
+                         text("%s of %s, %s", what, shape, In::name), [&] {
+                             return "    " + text_of(build) + "\n" + text_of(rays[i]) + "    got " +
+                                    text_of(hits[i]) + ", wanted " + text_of(wanted[i]) + "\n";
+                         });
+            };
+            expect(same_hit(hits[i], wanted[i]), "closest");
+            expect((any[i] != 0) == wanted[i].hit(), "any");
+            expect(!hits[i].hit() || (std::isfinite(hits[i].u) && std::isfinite(hits[i].v)),
+                   "a hit without a place: u");
+            if (i % 8 != 0) continue;
+            expect(same_hit(closest_hit(tree, intersect, rays[i]), wanted[i]), "single closest");
+            expect(any_hit(tree, intersect, rays[i]) == wanted[i].hit(), "single any");
+        }
+    }
+}
+
+template <class In>
+void attack_in(Case& c) {
+    using Scalar = typename In::Scalar;
+    // Lengths of ordinary size: what the boxes of the shapes promise is relative to them.
+    const Family families[] = {Family::soup, Family::voxels, Family::grid, Family::sphere,
+                               Family::tetrahedra};
+    const Scenery<In> scenery(c.random, make_mesh(c.random, c.random.one_of(families), 12));
+    const auto rays = scenery.rays(c.random, 80);
+    const auto radius = [&] {
+        return static_cast<Scalar>(scenery.size() * c.random.power_of_ten(-3, -0.3));
+    };
+    switch (c.random.below(3)) {
+        case 0: {
+            std::vector<typename In::AnySphere> spheres;
+            for (int i = 0; i < 20; ++i) spheres.push_back({scenery.place(c.random), radius()});
+            return duel<In>(c, "spheres",
+                            boxes_of(std::span<const typename In::AnySphere>(spheres)),
+                            intersect_spheres(spheres), rays);
+        }
+        case 1: {
+            using AnyCapsule = std::conditional_t<sizeof(Scalar) == 4, Capsule, CapsuleD>;
+            std::vector<AnyCapsule> capsules;
+            for (int i = 0; i < 20; ++i)
+                capsules.push_back({scenery.place(c.random), scenery.place(c.random), radius()});
+            return duel<In>(c, "capsules", boxes_of(std::span<const AnyCapsule>(capsules)),
+                            intersect_capsules(capsules), rays);
+        }
+        default: {
+            const Scalar common = radius();
+            const std::span<const typename In::Point> points = scenery.mesh.vertices;
+            return duel<In>(c, "points", boxes_of(points, common), intersect_points(points, common),
+                            rays);
+        }
+    }
+}
+
+}  // namespace
+
+static void attack_user_geometry(Case& c) {
+    if (c.random.chance(0.5))
+        attack_in<InFloat>(c);
+    else
+        attack_in<InDouble>(c);
+}
+
+static const Kind kind("user_geometry", attack_user_geometry, 1);
+
+}  // namespace raydix::attack

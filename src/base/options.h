@@ -1,0 +1,31 @@
+// Options that are numbers, checked: how many threads, and enumerations, which a caller may have
+// cast from anything.
+#pragma once
+
+#include <raydix/error.h>
+
+#include <cstdint>
+#include <string>
+
+namespace raydix {
+
+inline constexpr int max_threads = 1024;
+
+/// Throws InputError below 0 and above max_threads. with_threads asks it for every call; only a
+/// call that may return before that asks it itself.
+inline void check_threads(int threads) {
+    if (threads < 0 || threads > max_threads)
+        throw InputError("option threads is " + std::to_string(threads) + "; it must be 0 to " +
+                         std::to_string(max_threads) + ", where 0 is all the machine has");
+}
+
+/// Throws InputError unless `value` is one of 0 to `last`.
+template <class Enum>
+void check_enum(const char* option, Enum value, Enum last) {
+    const auto number = static_cast<std::int64_t>(value), highest = static_cast<std::int64_t>(last);
+    if (number < 0 || number > highest)
+        throw InputError(std::string("option ") + option + " is " + std::to_string(number) +
+                         "; it must be 0 to " + std::to_string(highest));
+}
+
+}  // namespace raydix
