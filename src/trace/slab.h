@@ -13,13 +13,13 @@
 
 namespace raydix {
 
-/// A tree's boxes, widened for one ray. A hit at t stands for a point of its triangle, and the ray
-/// at t is within 6 u L of that point on every axis, u = 2^-24, L = the distances to the far sides
-/// of the root, summed over the axes. The planes round 5 times. So all boxes grow by 12 u L on
-/// every side (docs/algorithms/triangle-test.md has the proof), and by a little that does not
-/// underflow. In double the boxes are still floats, relative to a point of the scene (BvhD). There
-/// the point is within 45 roundings (test 4, weights 32, t 8, the origin on its way to that point
-/// 1), and the pad is 64.
+/// A tree's boxes, widened for one ray. A hit at t stands for a point of its triangle, and on every
+/// axis the ray at t is within u (2 F + 6 Fz) of that point: u = 2^-24, F is the distance to the
+/// far side of the root along the axis, Fz along the ray's longest one. The planes round 5 times.
+/// So all boxes grow by 8 u (F + Fz) on every side (docs/algorithms/triangle-test.md has the
+/// proof), and by a little that does not underflow. In double the boxes are still floats, relative
+/// to a point of the scene (BvhD). There the point is within 45 roundings (test 4, weights 32, t 8,
+/// the origin on its way to that point 1), and the pad is 64.
 template <class Scalar>
 struct BasicSlabFrame {
     VecOf<Scalar> origin, inverse;
@@ -32,7 +32,7 @@ using SlabFrame = BasicSlabFrame<float>;
 using SlabFrameD = BasicSlabFrame<double>;
 
 template <class Scalar>
-inline constexpr Scalar slab_pad_of = (sizeof(Scalar) == 4 ? 12 : 64) * rounding_of<Scalar>;
+inline constexpr Scalar slab_pad_of = (sizeof(Scalar) == 4 ? 8 : 64) * rounding_of<Scalar>;
 inline constexpr float slab_pad = slab_pad_of<float>;
 /// Where all distances are tiny, roundings are not relative: each is below 2^-149.
 inline constexpr float least_slab_pad = 0x1p-126f;
@@ -50,10 +50,14 @@ RAYDIX_HD inline BasicSlabFrame<Scalar> make_slab_frame(const BasicRayFrame<Scal
     const VecOf<Scalar> far{reach(root.lo.x, root.hi.x, ray.origin.x),
                             reach(root.lo.y, root.hi.y, ray.origin.y),
                             reach(root.lo.z, root.hi.z, ray.origin.z)};
-    const Scalar pad = slab_pad_of<Scalar> * ((far.x + far.y) + far.z) + least_slab_pad;
+    const Scalar far_z = component(far, ray.kz);
+    const auto pad_of = [&](Scalar far_a) {
+        return slab_pad_of<Scalar> * (far_a + far_z) + least_slab_pad;
+    };
+    const VecOf<Scalar> pad{pad_of(far.x), pad_of(far.y), pad_of(far.z)};
     const bool nx = std::signbit(ray.inverse.x), ny = std::signbit(ray.inverse.y),
                nz = std::signbit(ray.inverse.z);
-    const VecOf<Scalar> near_pad{nx ? pad : -pad, ny ? pad : -pad, nz ? pad : -pad};
+    const VecOf<Scalar> near_pad{nx ? pad.x : -pad.x, ny ? pad.y : -pad.y, nz ? pad.z : -pad.z};
     return {ray.origin, ray.inverse, near_pad,  Scalar(-1) * near_pad,
             nx ? 4 : 0, ny ? 4 : 0,  nz ? 4 : 0};
 }

@@ -152,18 +152,51 @@ RAYDIX_HD inline double narrowed(double x) {
     return x;
 }
 
-RAYDIX_HD inline CornerWeights<double> weigh_corners(const TriangleRay& ray,
-                                                     const LeafTriangle& triangle) {
-    const int axis[3] = {ray.kx, ray.ky, ray.kz};
+/// Corners as a ray sees them, in double, and its direction; axes in the order kx, ky, kz.
+struct SeenTriangle {
     double corner[3][3], direction[3];
+
+    /// The largest distance of a corner along kz.
+    [[nodiscard]] RAYDIX_HD double farthest() const {
+        return max_of(max_of(std::fabs(corner[0][2]), std::fabs(corner[1][2])),
+                      std::fabs(corner[2][2]));
+    }
+};
+RAYDIX_HD inline SeenTriangle seen_by(const TriangleRay& ray, const LeafTriangle& triangle) {
+    const int axis[3] = {ray.kx, ray.ky, ray.kz};
+    SeenTriangle out;
     for (int k = 0; k < 3; ++k) {
         const double origin = component(ray.origin, axis[k]);
-        direction[k] = component(ray.direction, axis[k]);
-        corner[0][k] = component(triangle.v0, axis[k]) - origin;
-        corner[1][k] = component(triangle.v1, axis[k]) - origin;
-        corner[2][k] = component(triangle.v2, axis[k]) - origin;
+        out.direction[k] = component(ray.direction, axis[k]);
+        out.corner[0][k] = component(triangle.v0, axis[k]) - origin;
+        out.corner[1][k] = component(triangle.v1, axis[k]) - origin;
+        out.corner[2][k] = component(triangle.v2, axis[k]) - origin;
     }
-    return weigh_corners(corner, direction, 1.0, narrowed);
+    return out;
+}
+
+/// Products of what narrowed() leaves are exact, so that edge functions are, but for one rounding.
+RAYDIX_HD inline CornerWeights<double> weigh_corners(const SeenTriangle& seen) {
+    return weigh_corners(
+        seen.corner, seen.direction, 1.0, [](double x) { return narrowed(x); },
+        [](double a, double b, double c, double d) { return a * b - c * d; });
+}
+/// With all digits, at several times the cost.
+RAYDIX_RARE CornerWeights<double> weigh_corners_closely(const SeenTriangle& seen) {
+    return weigh_corners(
+        seen.corner, seen.direction, 1.0, [](double x) { return x; },
+        [](double a, double b, double c, double d) {
+            return accurate_product_difference(a, b, c, d);
+        });
+}
+
+/// The digits that narrowed() drops show in t where a ray starts next to a triangle and a corner
+/// lies so many times farther off along the ray's longest axis.
+inline constexpr double far_corner = 64;
+/// Nearer than tmin by this part of the way to that corner: no digit will help.
+inline constexpr double far_corner_slack = 0x1p-20;
+RAYDIX_HD inline bool has_far_corner(double farthest, double depth, double first) {
+    return farthest > std::fabs(depth) * far_corner && depth + farthest * far_corner_slack >= first;
 }
 
 /// -0 becomes +0.
@@ -172,28 +205,19 @@ RAYDIX_HD inline TriangleHit rounded_hit(double t, double u, double v) {
             static_cast<float>(v) + 0.0f};
 }
 
-/// t, u and v of a ray that passes inside, where double says so, too: nearly always. The limits of
-/// the ray are the caller's.
-RAYDIX_HD inline bool hit_inside(const TriangleRay& ray, const LeafTriangle& triangle,
-                                 TriangleHit& hit) {
-    const CornerWeights<double> at = weigh_corners(ray, triangle);
-    hit = rounded_hit(at.t, at.u, at.v);
-    return at.u >= 0.0 && at.v >= 0.0 && at.w >= 0.0;  // NaN where all corners fall together
-}
-
-/// As above for what is left: rays that pass within rounding of an edge on its outside. The point
-/// is moved into the triangle where it is beside it by at most 2^-23 of the way to v0 and no weight
-/// is below -1/4. Else t, u and v are those of the sheared corners as the test in float had them,
-/// whose edge functions are exact.
+/// For rays that pass within rounding of an edge on its outside; `at` is where, in double. The
+/// point is moved into the triangle where it is beside it by at most 2^-23 of the way to v0 along
+/// the ray's longest axis, and no weight is below -1/4. Else t, u and v are those of the sheared
+/// corners as the test in float had them, whose edge functions are exact.
 RAYDIX_RARE bool hit_near_edge(const TriangleRay& ray, const LeafTriangle& triangle,
-                               TriangleHit& hit) {
-    const CornerWeights<double> at = weigh_corners(ray, triangle);
+                               const CornerWeights<double>& at, TriangleHit& hit) {
     const auto between = [](Vec3 a, Vec3 b) {
         const Double3 d = Double3(b) - Double3(a);
         return (std::fabs(d.x) + std::fabs(d.y)) + std::fabs(d.z);
     };
     const double extent = between(triangle.v0, triangle.v1) + between(triangle.v0, triangle.v2);
-    const double room = min_of(0x1p-23 * between(ray.origin, triangle.v0) / extent, 0.25);
+    const double way = double(component(triangle.v0, ray.kz)) - component(ray.origin, ray.kz);
+    const double room = min_of(0x1p-23 * std::fabs(way) / extent, 0.25);
     if (at.u >= -room && at.v >= -room && at.w >= -room) {
         const double u = max_of(at.u, 0.0), v = max_of(at.v, 0.0), sum = max_of(u + v, 1.0);
         hit = rounded_hit(at.t, u / sum, v / sum);
@@ -213,7 +237,15 @@ RAYDIX_RARE bool hit_near_edge(const TriangleRay& ray, const LeafTriangle& trian
 /// The second half of intersect_triangle in float, for rays that pass inside.
 RAYDIX_HD inline bool finish_hit(const TriangleRay& ray, const LeafTriangle& triangle, float tmax,
                                  TriangleHit& hit) {
-    if (!hit_inside(ray, triangle, hit) && !hit_near_edge(ray, triangle, hit)) return false;
+    const SeenTriangle seen = seen_by(ray, triangle);
+    const double way = std::fabs(seen.direction[2]);
+    CornerWeights<double> at = weigh_corners(seen);
+    if (has_far_corner(seen.farthest(), at.t * way, ray.tmin * way))
+        at = weigh_corners_closely(seen);
+    hit = rounded_hit(at.t, at.u, at.v);
+    // NaN where all corners fall together.
+    const bool inside = at.u >= 0.0 && at.v >= 0.0 && at.w >= 0.0;
+    if (!inside && !hit_near_edge(ray, triangle, at, hit)) return false;
     return hit.t >= ray.tmin && hit.t <= tmax && !has_zero_area(triangle);
 }
 

@@ -6,7 +6,6 @@
 #include <raydix/raydix.h>
 
 #include <cstdlib>
-#include <ctime>
 #include <functional>
 #include <new>
 #include <string>
@@ -371,12 +370,11 @@ TEST_F(Limits, TheLeastIsThePeakAndHoldsForAnyNumberOfThreads) {
     }
 }
 
-/// Refuses `call` with the limits; in little time of the processor and within the memory.
+/// Refuses `call` with the limits; within the memory.
 template <class Call>
 void expect_quick_refusal(const char* name, const Call& call) {
     for (const std::uint64_t limit : {std::uint64_t{1} << 20, std::uint64_t{16} << 20})
         for (const int threads : {1, 2, 7}) {
-            const std::clock_t start = std::clock();
             const std::uint64_t peak = peak_of([&] {
                 try {
                     call(limit, threads);
@@ -384,12 +382,7 @@ void expect_quick_refusal(const char* name, const Call& call) {
                 } catch (const ResultTooLarge&) {
                 }
             });
-            const double seconds =
-                static_cast<double>(std::clock() - start) / static_cast<double>(CLOCKS_PER_SEC);
             EXPECT_LE(peak, limit + not_counted) << name << ", " << threads << " threads";
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-            EXPECT_LT(seconds, 2.0) << name << ", " << threads << " threads, " << limit;
-#endif
         }
 }
 

@@ -15,6 +15,73 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
+/// Corners in the sheared plane, and how far they are from where rays start along the rays' longest
+/// axis.
+template <class D>
+struct Sheared {
+    hn::Vec<D> x, y, z;
+};
+template <class D>
+HWY_INLINE hn::Vec<D> edge(const Sheared<D>& a, const Sheared<D>& b) {
+    return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
+}
+
+/// Rays for triangles, axes as the rays have them.
+template <class D>
+struct Limits {
+    hn::Vec<D> tmin, tmax, way;  // way: the direction along the longest axis
+    float pad;                   // as boxes have it
+    bool negative;               // way is
+};
+
+/// What floats leave open where any hit will do: most often they tell that t is within
+/// [tmin, tmax], or that it is not (docs/algorithms/triangle-test.md, "Any hit").
+struct AnyHit {
+    std::uint32_t open, certain;  // certain: of the clear ones, those that surely hit
+};
+/// `clear`: lanes none of whose edge functions u, v, w is 0 or NaN.
+template <class D>
+HWY_INLINE AnyHit any_hit(D d, const Limits<D>& ray, const Sheared<D>& a, const Sheared<D>& b,
+                          const Sheared<D>& c, hn::Vec<D> u, hn::Vec<D> v, hn::Vec<D> w,
+                          std::uint32_t candidates, std::uint32_t clear) {
+    using V = hn::Vec<D>;
+    const auto ahead = [&](V z) { return ray.negative ? hn::Neg(z) : z; };
+    const V za = ahead(a.z), zb = ahead(b.z), zc = ahead(c.z);
+    const V least = hn::Min(hn::Min(za, zb), zc), most = hn::Max(hn::Max(za, zb), zc);
+    const V rate = hn::Abs(ray.way), pad = hn::Set(d, ray.pad);
+    const V first = hn::Mul(ray.tmin, rate), last = hn::Mul(ray.tmax, rate);
+    // As slabs do for boxes, along one axis.
+    candidates &=
+        ~bits_of(d, hn::Or(hn::Gt(least, hn::Add(last, pad)), hn::Lt(most, hn::Sub(first, pad))));
+    if (candidates == 0) return {0, 0};
+    // (depth of the hit - least) * area is within `error` of `above`.
+    const auto weighed = [&](V e, V z) { return hn::Mul(e, hn::Sub(z, least)); };
+    const auto beside = [](const Sheared<D>& p) { return hn::Max(hn::Abs(p.x), hn::Abs(p.y)); };
+    const V sum = hn::Add(hn::Add(u, v), w), area = hn::Abs(sum);
+    const V above = hn::Xor(hn::Add(hn::Add(weighed(u, za), weighed(v, zb)), weighed(w, zc)),
+                            hn::Xor(sum, area));
+    const V lateral = hn::Max(hn::Max(beside(a), beside(b)), beside(c));
+    const V far = hn::Max(hn::Neg(least), most), spread = hn::Sub(most, least);
+    const V corners = hn::Mul(hn::Mul(lateral, hn::Set(d, 0x1p-17f)), hn::Add(lateral, far));
+    const V error =
+        hn::Add(hn::Mul(corners, spread), hn::Mul(hn::Mul(far, hn::Set(d, 0x1p-21f)), area));
+    // Without what overflow or underflow would do.
+    const std::uint32_t known =
+        bits_of(d, hn::And(hn::Gt(error, hn::Set(d, 0x1p-80f)),
+                           hn::Lt(hn::Max(area, spread), hn::Set(d, 0x1p60f))));
+    const auto level = [&](V depth) {
+        return hn::Mul(hn::Max(hn::Sub(hn::Min(depth, most), least), hn::Zero(d)), area);
+    };
+    const V at_first = level(first), at_last = level(last);
+    const V at_least = hn::Sub(above, error), at_most = hn::Add(above, error);
+    const std::uint32_t misses =
+        bits_of(d, hn::Or(hn::Gt(at_least, at_last), hn::Lt(at_most, at_first)));
+    const std::uint32_t hits =
+        bits_of(d, hn::And(hn::Le(at_most, at_last), hn::Ge(at_least, at_first)));
+    const std::uint32_t certain = candidates & known & clear & hits;
+    return {candidates & ~(known & misses) & ~certain, certain};
+}
+
 namespace weights {
 
 #include "trace/corner_weights.h"
@@ -31,13 +98,17 @@ HWY_INLINE hn::Vec<D> spread(D d, float x) {
 template <class D>
 HWY_INLINE CornerWeights<hn::Vec<D>> weigh(D d, const hn::Vec<D> (&corner)[3][3],
                                            const hn::Vec<D> (&direction)[3]) {
-    return weigh_corners(corner, direction, hn::Set(d, 1.0), [](hn::Vec<D> x) {
+    using VD = hn::Vec<D>;
+    const auto narrow = [](VD x) {
         const hn::RebindToUnsigned<D> bits;
         return hn::And(x, hn::BitCast(D(), hn::Set(bits, narrow_digits)));
-    });
+    };
+    // One rounding, fused or not: both products are exact.
+    const auto edge = [](VD a, VD b, VD c, VD e) { return hn::MulSub(a, b, hn::Mul(c, e)); };
+    return weigh_corners(corner, direction, hn::Set(d, 1.0), narrow, edge);
 }
 
-/// Bits of the lanes that hit_inside takes, too.
+/// Bits of the lanes that are inside in double, too.
 template <class D>
 HWY_INLINE std::uint32_t inside(D d, const CornerWeights<hn::Vec<D>>& at) {
     const auto zero = hn::Zero(d);
@@ -51,42 +122,90 @@ HWY_INLINE hn::Vec<HalfOf<D>> rounded(D, hn::Vec<D> x) {
     return hn::Add(hn::DemoteTo(h, x), hn::Zero(h));
 }
 
-/// What one ray hits of a block.
-struct BlockHits {
-    HWY_ALIGN float t[block_lanes], u[block_lanes], v[block_lanes];
-};
-
-/// hit_inside for one ray and the triangles in `wanted`: bits of those that are surely hit; the
-/// others are left to test_exactly.
-HWY_INLINE std::uint32_t hit_block(const TriangleBlock& block, const float* origin,
-                                   const float* direction, const RayClass& kind,
-                                   std::uint32_t wanted, BlockHits& hits) {
-    using D = hn::CappedTag<double, block_lanes>;
-    constexpr std::size_t lanes = hn::MaxLanes(D());
-    const D d;
-    const HalfOf<D> h;
-    const std::uint32_t axis[3] = {kind.kx, kind.ky, kind.kz};
-    std::uint32_t found = 0;
-    for (std::size_t lane = 0; lane < block_lanes; lane += lanes) {
-        if (lanes < block_lanes && (wanted >> lane & ((1u << lanes) - 1)) == 0) continue;
-        hn::Vec<D> corner[3][3], way[3];
-        for (std::uint32_t k = 0; k < 3; ++k) {
-            const auto from = spread(d, origin[axis[k]]);
-            way[k] = spread(d, direction[axis[k]]);
-            for (std::uint32_t v = 0; v < 3; ++v)
-                corner[v][k] = hn::Sub(
-                    hn::PromoteTo(d, hn::Load(h, block.corner[3 * v + axis[k]] + lane)), from);
-        }
-        const auto at = weigh(d, corner, way);
-        found |= inside(d, at) << lane;
-        hn::Store(rounded(d, at.t), h, hits.t + lane);
-        hn::Store(rounded(d, at.u), h, hits.u + lane);
-        hn::Store(rounded(d, at.v), h, hits.v + lane);
-    }
-    return found & wanted;
+/// Lanes that has_far_corner leaves alone.
+template <class D>
+HWY_INLINE std::uint32_t without_far_corner(D d, const hn::Vec<D> (&corner)[3][3], hn::Vec<D> t,
+                                            hn::Vec<D> tmin, hn::Vec<D> way) {
+    const auto rate = hn::Abs(way), depth = hn::Mul(t, rate);
+    const auto farthest =
+        hn::Max(hn::Max(hn::Abs(corner[0][2]), hn::Abs(corner[1][2])), hn::Abs(corner[2][2]));
+    const auto near = hn::Le(farthest, hn::Mul(hn::Abs(depth), hn::Set(d, far_corner)));
+    const auto slack = hn::Mul(farthest, hn::Set(d, far_corner_slack));
+    return bits_of(d, hn::Or(near, hn::Lt(hn::Add(depth, slack), hn::Mul(tmin, rate))));
 }
 
 }  // namespace weights
+
+/// One corner's component each, from `first` on: v0, v1, v2 and 0.
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+HWY_INLINE __m256d corners_from(const float* first, float origin) {
+    constexpr std::size_t next = 3 * block_lanes;
+    const __m128 v01 = _mm_insert_ps(_mm_load_ss(first), _mm_load_ss(first + next), 0x10);
+    const __m128 v012 = _mm_insert_ps(v01, _mm_load_ss(first + 2 * next), 0x20);
+    return _mm256_sub_pd(_mm256_cvtps_pd(v012), _mm256_cvtps_pd(_mm_set1_ps(origin)));
+}
+#endif
+
+/// finish_hit, but for tmin and tmax, for one ray and one triangle of a block, none of whose edge
+/// functions is 0 or NaN: most hits. False: test_exactly must be asked.
+HWY_INLINE bool hit_lane(const TriangleBlock& block, std::uint32_t lane, const float* origin,
+                         const float* direction, const RayClass& kind, float tmin,
+                         TriangleHit& hit) {
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+    // weigh_corners with a corner in each lane. The fourth lane's edge function is 0.
+    const auto way = [&](std::uint32_t axis) {
+        return _mm256_cvtps_pd(_mm_set1_ps(direction[axis]));
+    };
+    const auto corners = [&](std::uint32_t axis) {
+        return corners_from(block.corner[axis] + lane, origin[axis]);
+    };
+    const __m256d dz = way(kind.kz), z = corners(kind.kz);
+    const __m256d digits =
+        _mm256_castsi256_pd(_mm256_set1_epi64x(static_cast<std::int64_t>(narrow_digits)));
+    const auto sheared = [&](std::uint32_t axis) {
+        return _mm256_and_pd(
+            _mm256_sub_pd(_mm256_mul_pd(corners(axis), dz), _mm256_mul_pd(z, way(axis))), digits);
+    };
+    constexpr int next = 0b11'00'10'01;  // v1, v2, v0
+    const __m256d x = sheared(kind.kx), y = sheared(kind.ky),
+                  next_x = _mm256_permute4x64_pd(x, next), next_y = _mm256_permute4x64_pd(y, next);
+    const __m256d opposite = _mm256_fmsub_pd(y, next_x, _mm256_mul_pd(x, next_y));
+    const __m256d at = _mm256_permute4x64_pd(opposite, next);
+    const __m256d halves = _mm256_hadd_pd(at, _mm256_mul_pd(at, z));
+    const __m128d sums =
+        _mm_add_pd(_mm256_castpd256_pd128(halves), _mm256_extractf128_pd(halves, 1));
+    const double along = _mm256_cvtsd_f64(dz);
+    const double inverse = 1.0 / (_mm_cvtsd_f64(sums) * along);
+    const double t = _mm_cvtsd_f64(_mm_unpackhi_pd(sums, sums)) * inverse;
+    const __m256d weight = _mm256_mul_pd(at, _mm256_set1_pd(inverse * along));
+    HWY_ALIGN float weights[4];
+    _mm_store_ps(weights, _mm_add_ps(_mm256_cvtpd_ps(weight), _mm_setzero_ps()));
+    hit = {static_cast<float>(t) + 0.0f, weights[1], weights[2]};
+    const int inside =
+        _mm256_movemask_pd(_mm256_cmp_pd(weight, _mm256_setzero_pd(), _CMP_GE_OQ)) & 7;
+    const __m256d depths = _mm256_andnot_pd(_mm256_set1_pd(-0.0), z);
+    const __m128d depths01 = _mm256_castpd256_pd128(depths);
+    const double farthest =
+        _mm_cvtsd_f64(_mm_max_sd(_mm_max_sd(depths01, _mm_unpackhi_pd(depths01, depths01)),
+                                 _mm256_extractf128_pd(depths, 1)));
+    const double rate = std::fabs(along);
+    return inside == 7 && !has_far_corner(farthest, t * rate, tmin * rate);
+#else
+    const std::uint32_t axis[3] = {kind.kx, kind.ky, kind.kz};
+    SeenTriangle seen;
+    for (std::uint32_t k = 0; k < 3; ++k) {
+        const double from = origin[axis[k]];
+        seen.direction[k] = direction[axis[k]];
+        for (std::uint32_t v = 0; v < 3; ++v)
+            seen.corner[v][k] = block.corner[3 * v + axis[k]][lane] - from;
+    }
+    const CornerWeights<double> at = weigh_corners(seen);
+    const double rate = std::fabs(seen.direction[2]);
+    hit = rounded_hit(at.t, at.u, at.v);
+    return at.u >= 0.0 && at.v >= 0.0 && at.w >= 0.0 &&
+           !has_far_corner(seen.farthest(), at.t * rate, tmin * rate);
+#endif
+}
 
 }  // namespace raydix::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -118,8 +118,9 @@ private:
                                              : frame.origin[axis] - p_.origin_hi[axis];
                 const float end = negative ? p_.origin_hi[axis] - frame.origin[axis]
                                            : frame.origin[axis] - p_.origin_lo[axis];
-                const auto from = hn::MulAdd(near, hn::Set(f8, rate), hn::Set(f8, start - p_.pad));
-                const auto to = hn::MulAdd(far, hn::Set(f8, rate), hn::Set(f8, end + p_.pad));
+                const auto from =
+                    hn::MulAdd(near, hn::Set(f8, rate), hn::Set(f8, start - p_.pad[axis]));
+                const auto to = hn::MulAdd(far, hn::Set(f8, rate), hn::Set(f8, end + p_.pad[axis]));
                 const auto least = hn::Set(f8, p_.least_inverse[axis]),
                            largest = hn::Set(f8, p_.largest_inverse[axis]);
                 entry = hn::Max(entry, hn::Min(hn::Mul(from, least), hn::Mul(from, largest)));
@@ -146,7 +147,7 @@ private:
             if constexpr (compact) {
                 const V from =
                     hn::Sub(hn::Set(f16, frame.origin[axis]), hn::Load(f16, p_.origin[axis] + i));
-                const V pad = hn::Set(f16, negative_[axis] ? p_.pad : -p_.pad);
+                const V pad = hn::Set(f16, negative_[axis] ? p_.pad[axis] : -p_.pad[axis]);
                 out.rate[axis] = hn::Mul(hn::Set(f16, frame.step[axis]), inverse);
                 out.near[axis] = hn::Mul(hn::Add(from, pad), inverse);
                 out.far[axis] = hn::Mul(hn::Sub(from, pad), inverse);
@@ -218,7 +219,7 @@ private:
             const float inverse = p_.inverse[axis][k];
             if constexpr (compact) {
                 const float from = frame.origin[axis] - p_.origin[axis][k],
-                            pad = negative_[axis] ? p_.pad : -p_.pad;
+                            pad = negative_[axis] ? p_.pad[axis] : -p_.pad[axis];
                 out.rate[axis] = frame.step[axis] * inverse;
                 out.near[axis] = (from + pad) * inverse;
                 out.far[axis] = (from - pad) * inverse;

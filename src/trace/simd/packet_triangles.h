@@ -38,7 +38,7 @@ struct Packet {
     HWY_ALIGN std::uint32_t prim[packet_size];
     std::uint32_t count;
     RayClass kind;
-    float pad;  // of boxes, the largest of all rays
+    float pad[3];  // of boxes, the largest of all rays
     float origin_lo[3], origin_hi[3];
     float least_inverse[3], largest_inverse[3];  // magnitudes
     float least_tmin;
@@ -74,6 +74,7 @@ public:
 
 private:
     using V = hn::Vec<F16>;
+    using Corner = Sheared<F16>;
     static constexpr std::uint64_t vector_bits = (std::uint64_t{1} << lanes16) - 1;
 
     /// A few rays with four triangles each cost about half as much again as a vector of rays with
@@ -109,10 +110,6 @@ private:
 
     /// Rays whose tests with four triangles fill a vector.
     static constexpr std::size_t rays_a_quad = lanes16 / 4;
-
-    struct Sheared {
-        V x, y;
-    };
 
     /// The triangles of a block against a few rays each: lane 4 r + l is ray r of a few with lane
     /// l of the block. The bits of test_triangle.
@@ -161,14 +158,31 @@ private:
                 return hn::LoadDup128(f16, block.corner[3 * vertex + static_cast<int>(axis)]);
             };
             const V z = hn::Sub(corner(kind.kz), origin_z);
-            return Sheared{hn::Sub(hn::Sub(corner(kind.kx), origin_x), hn::Mul(shear_x, z)),
-                           hn::Sub(hn::Sub(corner(kind.ky), origin_y), hn::Mul(shear_y, z))};
+            return Corner{hn::Sub(hn::Sub(corner(kind.kx), origin_x), hn::Mul(shear_x, z)),
+                          hn::Sub(hn::Sub(corner(kind.ky), origin_y), hn::Mul(shear_y, z)), z};
         };
-        const Sheared a = at(0), b = at(1), c = at(2);
+        const Corner a = at(0), b = at(1), c = at(2);
         const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
         std::uint32_t candidates = wanted & ~bits_of(f16, astride(f16, u, v, w));
         if (candidates == 0) return false;
         const std::uint32_t clear = bits_of(f16, without_zero(f16, u, v, w));
+        if constexpr (any) {
+            HWY_ALIGN float tmin[lanes16], reach[lanes16];
+            for (std::size_t r = 0; r < rays_a_quad; ++r) {
+                hn::Store(hn::Set(f4, p_.tmin[ray[r]]), f4, tmin + 4 * r);
+                hn::Store(hn::Set(f4, p_.t[ray[r]]), f4, reach + 4 * r);
+            }
+            const AnyHit hit = any_hit(
+                f16, limits(hn::Load(f16, tmin), hn::Load(f16, reach), spread(direction, kind.kz)),
+                a, b, c, u, v, w, candidates, clear);
+            for (std::size_t r = 0; r < rays_a_quad; ++r) {
+                if ((hit.certain >> (4 * r) & 0xFu) == 0) continue;
+                found_ |= std::uint64_t{1} << ray[r];
+                candidates &= ~(0xFu << (4 * r));
+            }
+            candidates &= hit.open;
+            if (candidates == 0) return hit.certain != 0;
+        }
         bool changed = false;
         for (std::size_t r = 0; r < rays_a_quad; ++r) {
             const std::uint32_t mine = candidates >> (4 * r) & 0xFu;
@@ -178,8 +192,8 @@ private:
     }
 
     template <bool one_origin>
-    HWY_INLINE Sheared shear(const TriangleBlock& block, const Corners& corners, int vertex,
-                             std::uint32_t lane, std::size_t i) const {
+    HWY_INLINE Corner shear(const TriangleBlock& block, const Corners& corners, int vertex,
+                            std::uint32_t lane, std::size_t i) const {
         const auto at = [&](std::uint32_t axis) {
             const int k = 3 * vertex + static_cast<int>(axis);
             if constexpr (one_origin) return hn::Set(f16, corners.from_origin[k][lane]);
@@ -187,24 +201,36 @@ private:
         };
         const V z = at(p_.kind.kz);
         return {hn::Sub(at(p_.kind.kx), hn::Mul(hn::Load(f16, p_.shear_x + i), z)),
-                hn::Sub(at(p_.kind.ky), hn::Mul(hn::Load(f16, p_.shear_y + i), z))};
-    }
-    static HWY_INLINE V edge(const Sheared& a, const Sheared& b) {
-        return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
+                hn::Sub(at(p_.kind.ky), hn::Mul(hn::Load(f16, p_.shear_y + i), z)), z};
     }
     /// intersect_triangle for the rays i + (bits of `wanted`): the same bits. Whether any ray came
     /// nearer.
     template <bool one_origin>
     HWY_INLINE bool test_triangle(const TriangleBlock& block, const Corners& corners,
                                   std::uint32_t lane, std::size_t i, std::uint32_t wanted) {
-        const Sheared a = shear<one_origin>(block, corners, 0, lane, i),
-                      b = shear<one_origin>(block, corners, 1, lane, i),
-                      c = shear<one_origin>(block, corners, 2, lane, i);
+        const Corner a = shear<one_origin>(block, corners, 0, lane, i),
+                     b = shear<one_origin>(block, corners, 1, lane, i),
+                     c = shear<one_origin>(block, corners, 2, lane, i);
         const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
-        const std::uint32_t candidates = wanted & ~bits_of(f16, astride(f16, u, v, w));
+        std::uint32_t candidates = wanted & ~bits_of(f16, astride(f16, u, v, w));
         if (candidates == 0) return false;
         const std::uint32_t clear = bits_of(f16, without_zero(f16, u, v, w));
-        return finish_rays<one_origin>(block, lane, i, candidates, clear);
+        bool changed = false;
+        if constexpr (any) {
+            const AnyHit hit = any_hit(f16,
+                                       limits(hn::Load(f16, p_.tmin + i), hn::Load(f16, p_.t + i),
+                                              hn::Load(f16, p_.direction[p_.kind.kz] + i)),
+                                       a, b, c, u, v, w, candidates, clear);
+            found_ |= std::uint64_t{hit.certain} << i;
+            changed = hit.certain != 0;
+            candidates = hit.open;
+            if (candidates == 0) return changed;
+        }
+        return finish_rays<one_origin>(block, lane, i, candidates, clear) || changed;
+    }
+    [[nodiscard]] HWY_INLINE Limits<F16> limits(V tmin, V tmax, V way) const {
+        const std::uint32_t kz = p_.kind.kz;
+        return {tmin, tmax, way, p_.pad[kz], p_.kind.negative(static_cast<int>(kz))};
     }
 
     /// The second half of the test for one ray and the triangles in `candidates`; `clear`: those
@@ -212,15 +238,14 @@ private:
     HWY_NOINLINE bool finish(const TriangleBlock& block, std::size_t k, std::uint32_t candidates,
                              std::uint32_t clear) {
         const Ray& ray = rays_[index_[k]];
-        weights::BlockHits hits;
-        const std::uint32_t sure = weights::hit_block(block, &ray.origin.x, &ray.direction.x,
-                                                      p_.kind, candidates & clear, hits);
         bool changed = false;
         for (; candidates != 0; candidates &= candidates - 1) {
             const auto lane = static_cast<std::uint32_t>(std::countr_zero(candidates));
-            TriangleHit hit{hits.t[lane], hits.u[lane], hits.v[lane]};
-            if ((sure >> lane & 1) != 0 ? !(hit.t >= p_.tmin[k] && hit.t <= p_.t[k])
-                                        : !test_exactly(triangle_ray(k), block, lane, p_.t[k], hit))
+            TriangleHit hit;
+            if ((clear >> lane & 1) != 0 && hit_lane(block, lane, &ray.origin.x, &ray.direction.x,
+                                                     p_.kind, p_.tmin[k], hit)
+                    ? !(hit.t >= p_.tmin[k] && hit.t <= p_.t[k])
+                    : !test_exactly(triangle_ray(k), block, lane, p_.t[k], hit))
                 continue;
             found_ |= std::uint64_t{1} << k;
             changed = true;
@@ -241,23 +266,17 @@ private:
     using H = weights::HalfOf<D>;
     using VD = hn::Vec<D>;
     static constexpr std::size_t lanes_d = hn::MaxLanes(D());
-    /// Fewer rays cost less one by one.
-    static constexpr int rays_for_vectors = 2;
 
     /// The second half of the test for the rays i + (bits of `candidates`) and one triangle.
     template <bool one_origin>
     HWY_INLINE bool finish_rays(const TriangleBlock& block, std::uint32_t lane, std::size_t i,
                                 std::uint32_t candidates, std::uint32_t clear) {
         bool changed = false;
-        std::uint32_t alone = candidates;
-        if (std::popcount(candidates & clear) >= rays_for_vectors) {
-            alone &= ~clear;
-            for (std::size_t part = 0; part < lanes16; part += lanes_d) {
-                const std::uint32_t here = (candidates & clear) >> part & ((1u << lanes_d) - 1);
-                if (here != 0)
-                    alone |= finish_vector<one_origin>(block, lane, i + part, here, changed)
-                             << part;
-            }
+        std::uint32_t alone = candidates & ~clear;
+        for (std::size_t part = 0; part < lanes16; part += lanes_d) {
+            const std::uint32_t here = (candidates & clear) >> part & ((1u << lanes_d) - 1);
+            if (here != 0)
+                alone |= finish_vector<one_origin>(block, lane, i + part, here, changed) << part;
         }
         for (; alone != 0; alone &= alone - 1) {
             const auto l = static_cast<std::uint32_t>(std::countr_zero(alone));
@@ -286,7 +305,7 @@ private:
         }
     }
 
-    /// hit_inside for the rays i + (bits of `candidates`); those that it leaves open.
+    /// finish_hit for the rays i + (bits of `candidates`); those that it leaves open.
     template <bool one_origin>
     HWY_INLINE std::uint32_t finish_vector(const TriangleBlock& block, std::uint32_t lane,
                                            std::size_t i, std::uint32_t candidates, bool& changed) {
@@ -299,8 +318,11 @@ private:
         };
         const VD direction[3] = {way(p_.kind.kx), way(p_.kind.ky), way(p_.kind.kz)};
         const auto at = weights::weigh(d, corner, direction);
-        const std::uint32_t sure = weights::inside(d, at), open = candidates & ~sure;
         const auto t = weights::rounded(d, at.t), reach = hn::Load(h, p_.t + i);
+        const auto tmin = hn::PromoteTo(d, hn::Load(h, p_.tmin + i));
+        const std::uint32_t sure = weights::inside(d, at) &
+                                   weights::without_far_corner(d, corner, at.t, tmin, direction[2]),
+                            open = candidates & ~sure;
         candidates &=
             sure & bits_of(h, hn::And(hn::Ge(t, hn::Load(h, p_.tmin + i)), hn::Le(t, reach)));
         if (candidates == 0) return open;

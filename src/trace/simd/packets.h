@@ -63,15 +63,15 @@ HWY_INLINE hn::Vec<I16> classify(const RayVectors& ray) {
 
 /// The largest pad of make_slab_frame over rays whose origins lie between `least` and `largest`,
 /// times `factor`; positive.
-inline float largest_pad(const WideView& tree, const float* least, const float* largest,
-                         float factor) {
+inline void largest_pad(const WideView& tree, const float* least, const float* largest,
+                        std::uint32_t kz, float factor, float* pad) {
     float far[3];
     for (int a = 0; a < 3; ++a) {
         const float lo = tree.lo[a], hi = tree.hi[a];
         far[a] = max_of(max_of(std::fabs(lo - least[a]), std::fabs(lo - largest[a])),
                         max_of(std::fabs(hi - least[a]), std::fabs(hi - largest[a])));
     }
-    return factor * slab_pad * ((far[0] + far[1]) + far[2]) + least_slab_pad;
+    for (int a = 0; a < 3; ++a) pad[a] = factor * slab_pad * (far[a] + far[kz]) + least_slab_pad;
 }
 
 /// `count` rays of one class; read(i) gives rays i to i + lanes16 - 1, of which those beyond
@@ -129,9 +129,9 @@ HWY_INLINE void fill_packet(const WideView& tree, const Read& read, std::uint32_
     p.one_origin = true;
     for (int a = 0; a < 3; ++a) p.one_origin = p.one_origin && p.origin_lo[a] == p.origin_hi[a];
     p.least_tmin = hn::GetLane(hn::MinOfLanes(f16, least_tmin));
-    p.pad = largest_pad(tree, p.origin_lo, p.origin_hi, packet_pad_factor);
+    largest_pad(tree, p.origin_lo, p.origin_hi, p.kind.kz, packet_pad_factor, p.pad);
     for (int a = 0; a < 3; ++a) {
-        const V pad = hn::Set(f16, p.kind.negative(a) ? p.pad : -p.pad);
+        const V pad = hn::Set(f16, p.kind.negative(a) ? p.pad[a] : -p.pad[a]);
         for (std::size_t i = 0; i < count; i += lanes16) {
             const V from = hn::Sub(hn::Set(f16, tree.middle[a]), hn::Load(f16, p.origin[a] + i));
             const V inverse = hn::Load(f16, p.inverse[a] + i);
@@ -360,9 +360,9 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
         way[3] = hn::IfThenElseZero(hn::Gt(ray.place[3], zero), ray.place[3]);
         shear[0] = hn::Div(ray.way[frame.kind.kx], ray.way[frame.kind.kz]);
         shear[1] = hn::Div(ray.way[frame.kind.ky], ray.way[frame.kind.kz]);
-        shear[2] = hn::BitCast(f16, hn::Set(U16(), no_primitive));
-        shear[3] = hn::BitCast(f16, hn::LoadU(I16(), index + k));
-        direction[3] = zero;
+        shear[2] = ray.way[frame.kind.kz];
+        shear[3] = way[3];
+        direction[3] = hn::BitCast(f16, hn::Set(U16(), no_primitive));
         const auto quad = [to = reinterpret_cast<float*>(rays.data() + k)](std::size_t q) {
             return
                 [=](std::size_t l) { return to + sizeof(StreamRay) / sizeof(float) * l + 4 * q; };
@@ -378,8 +378,9 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
         least[a] = hn::GetLane(hn::MinOfLanes(f16, lo[a]));
         largest[a] = hn::GetLane(hn::MaxOfLanes(f16, hi[a]));
     }
-    const float pad = largest_pad(job.tree, least, largest, wide_pad_factor);
-    for (int a = 0; a < 3; ++a) frame.near_pad[a] = frame.kind.negative(a) ? pad : -pad;
+    largest_pad(job.tree, least, largest, frame.kind.kz, wide_pad_factor, frame.near_pad);
+    for (int a = 0; a < 3; ++a)
+        if (!frame.kind.negative(a)) frame.near_pad[a] = -frame.near_pad[a];
     return frame;
 }
 
@@ -390,17 +391,18 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
     for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
         const std::uint32_t count = sorter.count(code);
         if (count == 0) continue;
-        const StreamFrame frame = fill_stream(job, sorter.rays(code), count, code);
+        const std::int32_t* index = sorter.rays(code);
+        const StreamFrame frame = fill_stream(job, index, count, code);
         StreamWalk<any, counting, compact>(job.tree, frame, *job.memory, job.stack, counts).trace();
         const StreamHit* found = job.memory->hits().data();
         for (const StreamRay& ray : job.memory->rays()) {
             const bool hit = ray.prim != no_primitive;
             counts.hits += hit;
             if constexpr (any)
-                job.occluded[ray.index] = hit;
+                job.occluded[*index] = hit;
             else
-                job.hits[ray.index] = hit ? Hit{ray.t, ray.prim, found->u, found->v} : Hit{};
-            ++found;
+                job.hits[*index] = hit ? Hit{ray.t, ray.prim, found->u, found->v} : Hit{};
+            ++found, ++index;
         }
     }
     const std::int32_t* const odd = sorter.rays(odd_ray_class);

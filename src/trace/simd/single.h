@@ -244,43 +244,48 @@ private:
         return test_lanes(block, lanes);
     }
 
-    struct Sheared {
-        V4 x, y;
-    };
-    HWY_INLINE Sheared shear(const TriangleBlock& block, int vertex) const {
+    HWY_INLINE Sheared<F4> shear(const TriangleBlock& block, int vertex) const {
         const auto at = [&](std::uint32_t axis) {
             return hn::Sub(hn::Load(f4, block.corner[3 * vertex + static_cast<int>(axis)]),
                            hn::Set(f4, frame_.origin[axis]));
         };
         const V4 z = at(frame_.kind.kz);
         return {hn::Sub(at(frame_.kind.kx), hn::Mul(hn::Set(f4, frame_.shear[0]), z)),
-                hn::Sub(at(frame_.kind.ky), hn::Mul(hn::Set(f4, frame_.shear[1]), z))};
-    }
-    static HWY_INLINE V4 edge(const Sheared& a, const Sheared& b) {
-        return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
+                hn::Sub(at(frame_.kind.ky), hn::Mul(hn::Set(f4, frame_.shear[1]), z)), z};
     }
 
     /// intersect_triangle for the lanes in `tested`: the same bits. True: stop.
     HWY_INLINE bool test_lanes(const TriangleBlock& block, std::uint32_t tested) {
-        const Sheared a = shear(block, 0), b = shear(block, 1), c = shear(block, 2);
+        const Sheared<F4> a = shear(block, 0), b = shear(block, 1), c = shear(block, 2);
         const V4 u = edge(c, b), v = edge(a, c), w = edge(b, a);
         const V4 least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
-        const std::uint32_t candidates = tested & ~bits_astride(least, largest);
+        std::uint32_t candidates = tested & ~bits_astride(least, largest);
         if (candidates == 0) return false;
         const std::uint32_t clear = bits_of(f4, without_zero(f4, u, v, w));
+        if constexpr (wanted == Wanted::any) {
+            const auto kz = static_cast<int>(frame_.kind.kz);
+            const Limits<F4> limits{hn::Set(f4, frame_.tmin), hn::Set(f4, best_.t),
+                                    hn::Set(f4, frame_.direction[kz]),
+                                    std::fabs(frame_.near_pad[kz]), frame_.kind.negative(kz)};
+            const AnyHit hit = any_hit(f4, limits, a, b, c, u, v, w, candidates, clear);
+            if (hit.certain != 0) {
+                best_.prim = 0;
+                return true;
+            }
+            candidates = hit.open;
+            if (candidates == 0) return false;
+        }
         return finish(block, candidates, clear);
     }
 
     /// `clear`: lanes none of whose edge functions is 0 or NaN.
-    HWY_INLINE bool finish(const TriangleBlock& block, std::uint32_t candidates,
-                           std::uint32_t clear) {
-        weights::BlockHits hits;
-        const std::uint32_t sure = weights::hit_block(block, frame_.origin, frame_.direction,
-                                                      frame_.kind, candidates & clear, hits);
+    HWY_NOINLINE bool finish(const TriangleBlock& block, std::uint32_t candidates,
+                             std::uint32_t clear) {
         for (; candidates != 0; candidates &= candidates - 1) {
             const auto lane = static_cast<std::uint32_t>(std::countr_zero(candidates));
-            TriangleHit hit{hits.t[lane], hits.u[lane], hits.v[lane]};
-            if ((sure >> lane & 1) != 0
+            TriangleHit hit;
+            if ((clear >> lane & 1) != 0 && hit_lane(block, lane, frame_.origin, frame_.direction,
+                                                     frame_.kind, frame_.tmin, hit)
                     ? !(hit.t >= frame_.tmin && hit.t <= best_.t)
                     : !test_exactly(frame_.triangle_ray(), block, lane, best_.t, hit))
                 continue;

@@ -52,13 +52,15 @@ HWY_INLINE void set_starts(const WideView& tree, V4 origin, V4 inverse, V4 near_
 }
 
 /// How far boxes widen for one ray (slab.h), with sign. `way` has the signs of the direction.
-HWY_INLINE V4 pad_of(const WideView& tree, V4 origin, V4 way) {
+HWY_INLINE V4 pad_of(const WideView& tree, V4 origin, V4 way, std::uint32_t kz) {
     const V4 reach = hn::Max(hn::Abs(hn::Sub(hn::Load(f4, tree.lo), origin)),
                              hn::Abs(hn::Sub(hn::Load(f4, tree.hi), origin)));
     alignas(16) float far[4];
     hn::Store(reach, f4, far);
-    const float pad = wide_pad_factor * slab_pad * ((far[0] + far[1]) + far[2]) + least_slab_pad;
-    return hn::CopySignToAbs(hn::Set(f4, pad), hn::Neg(way));
+    const V4 pad = hn::Add(
+        hn::Mul(hn::Set(f4, wide_pad_factor * slab_pad), hn::Add(reach, hn::Set(f4, far[kz]))),
+        hn::Set(f4, least_slab_pad));
+    return hn::CopySignToAbs(pad, hn::Neg(way));
 }
 
 HWY_INLINE V4 limited(V4 inverse) {
@@ -82,7 +84,7 @@ HWY_NOINLINE void fill_odd_frame(const WideView& tree, const Ray& ray, SingleFra
                            static_cast<std::uint32_t>(std::signbit(i.y)) << 1 |
                            static_cast<std::uint32_t>(std::signbit(i.z)) << 2;
     out.kind = ray_classes[negatives + 8 * static_cast<std::uint32_t>(frame.kz)];
-    const V4 inverse = limited(whole), pad = pad_of(tree, origin, whole);
+    const V4 inverse = limited(whole), pad = pad_of(tree, origin, whole, out.kind.kz);
     hn::Store(inverse, f4, out.inverse);
     hn::Store(pad, f4, out.near_pad);
     set_starts(tree, origin, inverse, pad, out);
@@ -121,7 +123,8 @@ HWY_INLINE bool fill_frame(const WideView& tree, const Ray& ray, SingleFrame& ou
     const std::uint32_t kz = az == longest ? 2 : ay == longest ? 1 : 0;
     out.kind = ray_classes[negatives + 8 * kz];
     const V4 origin = hn::Add(place, hn::Zero(f4));  // -0 becomes +0
-    const V4 inverse = limited(hn::Div(hn::Set(f4, 1.0f), way)), pad = pad_of(tree, origin, way);
+    const V4 inverse = limited(hn::Div(hn::Set(f4, 1.0f), way)),
+             pad = pad_of(tree, origin, way, kz);
     const float* const components = &ray.direction.x;
     hn::Store(origin, f4, out.origin);
     hn::Store(way, f4, out.direction);

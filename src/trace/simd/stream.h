@@ -245,18 +245,11 @@ private:
             ray.t = t, ray.prim = prim, hits_[k] = {u, v};
     }
 
-    struct Sheared {
-        V16 x, y;
-    };
-    static HWY_INLINE V16 edge(const Sheared& a, const Sheared& b) {
-        return hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x));
-    }
-
     /// Rays of a chunk of a list, for triangles; axes in the order kx, ky, kz.
     struct Chunk {
         const std::uint32_t* list;
         V16 away[3];  // - origin: adding it is the same as subtracting the origin
-        V16 shear_x, shear_y, reach;
+        V16 shear_x, shear_y, way, tmin, reach;  // way: along kz
     };
 
     HWY_INLINE Chunk load_chunk(const std::uint32_t* list) const {
@@ -268,7 +261,7 @@ private:
         chunk.away[0] = hn::Neg(place[frame_.kind.kx]);
         chunk.away[1] = hn::Neg(place[frame_.kind.ky]);
         chunk.away[2] = hn::Neg(place[frame_.kind.kz]);
-        chunk.shear_x = way[0], chunk.shear_y = way[1];
+        chunk.shear_x = way[0], chunk.shear_y = way[1], chunk.way = way[2], chunk.tmin = way[3];
         chunk.reach = place[3];
         return chunk;
     }
@@ -295,11 +288,12 @@ private:
         }
     }
 
-    HWY_INLINE Sheared shear(const float* x, const float* y, const float* z,
-                             const Chunk& chunk) const {
+    HWY_INLINE Sheared<F16> shear(const float* x, const float* y, const float* z,
+                                  const Chunk& chunk) const {
         const V16 depth = hn::Add(hn::Set(f16, *z), chunk.away[2]);
         return {hn::Sub(hn::Add(hn::Set(f16, *x), chunk.away[0]), hn::Mul(chunk.shear_x, depth)),
-                hn::Sub(hn::Add(hn::Set(f16, *y), chunk.away[1]), hn::Mul(chunk.shear_y, depth))};
+                hn::Sub(hn::Add(hn::Set(f16, *y), chunk.away[1]), hn::Mul(chunk.shear_y, depth)),
+                depth};
     }
 
     /// intersect_triangle for the rays of the chunk in `wanted`: the same bits.
@@ -309,12 +303,23 @@ private:
         const float* const x = block.corner[frame_.kind.kx] + lane;
         const float* const y = block.corner[frame_.kind.ky] + lane;
         const float* const z = block.corner[frame_.kind.kz] + lane;
-        const Sheared a = shear(x, y, z, chunk), b = shear(x + next, y + next, z + next, chunk),
-                      c = shear(x + 2 * next, y + 2 * next, z + 2 * next, chunk);
+        const Sheared<F16> a = shear(x, y, z, chunk),
+                           b = shear(x + next, y + next, z + next, chunk),
+                           c = shear(x + 2 * next, y + 2 * next, z + 2 * next, chunk);
         const V16 u = edge(c, b), v = edge(a, c), w = edge(b, a);
-        const std::uint32_t candidates = wanted & ~bits_of(f16, astride(f16, u, v, w));
+        std::uint32_t candidates = wanted & ~bits_of(f16, astride(f16, u, v, w));
         if (candidates == 0) return;
         const std::uint32_t clear = bits_of(f16, without_zero(f16, u, v, w));
+        if constexpr (any) {
+            const Limits<F16> limits{chunk.tmin, chunk.reach, chunk.way,
+                                     std::fabs(frame_.near_pad[frame_.kind.kz]),
+                                     negative_[frame_.kind.kz]};
+            const AnyHit hit = any_hit(f16, limits, a, b, c, u, v, w, candidates, clear);
+            for (std::uint32_t left = hit.certain; left != 0; left &= left - 1)
+                rays_[chunk.list[std::countr_zero(left)] & ray_bits].settle();
+            candidates = hit.open;
+            if (candidates == 0) return;
+        }
         finish(block, lane, chunk.list, candidates, clear);
     }
 
@@ -326,12 +331,11 @@ private:
             const auto l = static_cast<std::uint32_t>(std::countr_zero(candidates));
             const std::uint32_t k = list[l] & ray_bits;
             const StreamRay& ray = rays_[k];
-            weights::BlockHits hits;
-            const bool sure = weights::hit_block(block, ray.origin, ray.direction, frame_.kind,
-                                                 (clear >> l & 1) << lane, hits) != 0;
-            TriangleHit hit{hits.t[lane], hits.u[lane], hits.v[lane]};
-            if (sure ? hit.t >= ray.tmin && hit.t <= ray.t
-                     : test_exactly(frame_.triangle_ray(ray), block, lane, ray.t, hit))
+            TriangleHit hit;
+            if ((clear >> l & 1) != 0 &&
+                        hit_lane(block, lane, ray.origin, ray.direction, frame_.kind, ray.tmin, hit)
+                    ? hit.t >= ray.tmin && hit.t <= ray.t
+                    : test_exactly(frame_.triangle_ray(ray), block, lane, ray.t, hit))
                 take(k, hit.t, block.prim[lane], hit.u, hit.v);
         }
     }

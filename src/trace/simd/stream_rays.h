@@ -12,10 +12,11 @@ namespace raydix {
 /// A cache line: what load_quads reads in fours.
 struct alignas(64) StreamRay {
     float origin[3], t;
-    float inverse[3], tmin;     // limited
-    float shear[2];             // of x and y
-    std::uint32_t prim, index;  // index: of the ray in its job
-    float direction[3], unused;
+    float inverse[3], tmin;  // limited
+    // Of triangles: the shear of x and y, the direction along kz, and tmin once more.
+    float shear[2], way, first;
+    float direction[3];
+    std::uint32_t prim;
 
     /// Any hit will do, and there is one: no box is near enough any more.
     void settle() { prim = 0, t = -1.0f; }

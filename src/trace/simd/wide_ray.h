@@ -105,11 +105,11 @@ inline std::size_t wide_stack_capacity(std::uint32_t max_depth) {
 /// hit (docs/algorithms/wide.md).
 inline constexpr float wide_longest_inverse = 0x1p80f;
 
-/// Boxes widen by twice the pad of slab.h: it covers the roundings of plane * rate + start, fused
-/// or not.
-inline constexpr float wide_pad_factor = 2.0f;
+/// Boxes widen by more than the pad of slab.h: it covers the roundings of plane * rate + start,
+/// fused or not.
+inline constexpr float wide_pad_factor = 1.25f;
 /// The bounds of a packet round once more (docs/algorithms/wide.md).
-inline constexpr float packet_pad_factor = 3.0f;
+inline constexpr float packet_pad_factor = 1.5f;
 
 inline LeafTriangle triangle_of(const TriangleBlock& block, std::uint32_t lane) {
     const auto corner = [&](int v) {
