@@ -42,9 +42,9 @@ public:
     }
 
 private:
-    /// Without a radius a sweep is its ray, whose triangle the kinds `rays` and `doubles` judge. Its
-    /// t cannot be compared here: long directions are scaled, and what differs there may be equal,
-    /// and 0, in the caller's units.
+    /// Without a radius a sweep is its ray, whose triangle the kinds `rays` and `doubles` judge.
+    /// Its t cannot be compared here: long directions are scaled, and what differs there may be
+    /// equal, and 0, in the caller's units.
     void find_alone() {
         expected_.resize(sweeps_.size());
         const auto whole = build_bvh(scenery_.mesh, {.threads = 1});

@@ -43,8 +43,7 @@ inline Stay stay_in_ball(const Path& path, Double3 center, double radius) {
 /// nearly along the axis too: all lengths are taken from where the line comes closest to the
 /// segment's middle, and what is across the axis from products with it, so that what rounding does
 /// is a shift of the cylinder by a few roundings of the distance and its length.
-inline Stay stay_in_cylinder(const Path& path, Double3 a, Double3 axis,
-                             double radius) {
+inline Stay stay_in_cylinder(const Path& path, Double3 a, Double3 axis, double radius) {
     const double length2 = dot(axis, axis);
     if (length2 == 0.0) return {};
     const double middle =
@@ -78,8 +77,7 @@ inline Stay stay_in_cylinder(const Path& path, Double3 a, Double3 axis,
 
 /// All points within `radius` of the segment.
 inline Stay stay_in_capsule(const Path& path, Double3 a, Double3 axis, double radius) {
-    const Stay ends =
-        unite(stay_in_ball(path, a, radius), stay_in_ball(path, a + axis, radius));
+    const Stay ends = unite(stay_in_ball(path, a, radius), stay_in_ball(path, a + axis, radius));
     return unite(ends, stay_in_cylinder(path, a, axis, radius));
 }
 

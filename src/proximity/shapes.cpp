@@ -46,8 +46,8 @@ auto box_of_capsule(const AnyCapsule& c) {
     return grown<Scalar>(min_of(c.a, c.b), max_of(c.a, c.b), finite ? c.radius : Scalar(-1));
 }
 
-/// A ray's line as a shape around `middle` sees it: its origin, relative to there, is where it comes
-/// closest, at t0. `t_scale`: what t of the line are multiplied with to be those of the ray.
+/// A ray's line as a shape around `middle` sees it: its origin, relative to there, is where it
+/// comes closest, at t0. `t_scale`: what t of the line are multiplied with to be those of the ray.
 struct ShapeLine {
     Path path;
     double t0, t_scale;
@@ -58,8 +58,8 @@ struct ShapeLine {
     template <class AnyRay>
     ShapeLine(const AnyRay& ray, Double3 middle) {
         const Double3 along(ray.direction);
-        t_scale = direction_scale(
-            std::max({std::fabs(along.x), std::fabs(along.y), std::fabs(along.z)}));
+        t_scale =
+            direction_scale(std::max({std::fabs(along.x), std::fabs(along.y), std::fabs(along.z)}));
         const Double3 d = along * t_scale, from = Double3(ray.origin) - middle;
         const double d2 = dot(d, d), way = -dot(from, d) / d2;
         const Double3 near = from + d * way;

@@ -154,10 +154,9 @@ TEST(Shapes, AHitIsAtAFinitePlace) {
 /// From so far that a step of double is longer than the scene, along an axis: what is across the
 /// ray has all its digits. t in units of the scaled direction is beyond all floats.
 TEST(Shapes, FromTheEndOfAllFloats) {
-    const std::vector<Capsule> capsules{
-        {{-0x1.c5be4ep-1f, -0x1.00a458p-3f, 0x1.bbe5ecp-2f},
-         {0x1.ec0ebep+11f, 0x1.0d42a4p+12f, 0x1.57c2e4p+11f},
-         0x1.27bfccp-1f}};
+    const std::vector<Capsule> capsules{{{-0x1.c5be4ep-1f, -0x1.00a458p-3f, 0x1.bbe5ecp-2f},
+                                         {0x1.ec0ebep+11f, 0x1.0d42a4p+12f, 0x1.57c2e4p+11f},
+                                         0x1.27bfccp-1f}};
     const std::vector<Sphere> balls{{{0.4f, 1.9f, 5.0f}, 0.25f}};
     const Bvh pipe = build_bvh(boxes_of(capsules)), ball = build_bvh(boxes_of(balls));
     const auto pipe_hit = [&](float x, float y, float speed) {

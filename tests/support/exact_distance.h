@@ -30,10 +30,10 @@ inline double exact_distance(const LeafTriangleD& triangle, const RayD& path, do
     const Exact n2 = dot(n, n), height = dot(n, q - a);
     const bool inside = n2 > 0 && dot(cross(b - a, q - a), n) >= 0 &&
                         dot(cross(c - b, q - b), n) >= 0 && dot(cross(a - c, q - c), n) >= 0;
-    const Exact square = inside ? Exact(height * height / n2)
-                                : std::min({exact_square_to_segment(a, b, q),
-                                            exact_square_to_segment(b, c, q),
-                                            exact_square_to_segment(c, a, q)});
+    const Exact square =
+        inside ? Exact(height * height / n2)
+               : std::min({exact_square_to_segment(a, b, q), exact_square_to_segment(b, c, q),
+                           exact_square_to_segment(c, a, q)});
     return std::sqrt(static_cast<double>(square));
 }
 
