@@ -3,6 +3,8 @@
 #include <raydix/user_geometry.h>
 #include <raydix/user_geometry_d.h>
 
+#include <type_traits>
+
 #include "base/scalar.h"
 #include "proximity/sweep_walk.h"
 #include "tree/around_center.h"
@@ -52,19 +54,30 @@ struct ShapeLine {
     Path path;
     double t0, t_scale;
 
-    /// The direction is scaled, or its square could overflow. What rounding leaves of a long way
-    /// along the line is taken away by products that an axis of direction 0 has no part in: there
-    /// the line is where the ray is.
+    /// A direction in double is scaled, or its square could overflow. What rounding leaves of a
+    /// very long way along the line is taken away by products that an axis of direction 0 has no
+    /// part in: there the line is where the ray is.
     template <class AnyRay>
-    ShapeLine(const AnyRay& ray, Double3 middle) {
-        const Double3 along(ray.direction);
-        t_scale =
-            direction_scale(std::max({std::fabs(along.x), std::fabs(along.y), std::fabs(along.z)}));
-        const Double3 d = along * t_scale, from = Double3(ray.origin) - middle;
-        const double d2 = dot(d, d), way = -dot(from, d) / d2;
-        const Double3 near = from + d * way;
-        path = {cross(d, cross(near, d)) * (1.0 / d2), d, 0.0, never};
-        t0 = way - dot(near, d) / d2;
+    ShapeLine(const AnyRay& ray, Double3 middle) : t_scale(1.0) {
+        Double3 d(ray.direction);
+        if constexpr (std::is_same_v<AnyRay, RayD>) {
+            t_scale = direction_scale(std::max({std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)}));
+            d = d * t_scale;
+        }
+        const Double3 from = Double3(ray.origin) - middle;
+        const double d2 = dot(d, d);
+        t0 = -dot(from, d) / d2;
+        Double3 near = from + d * t0;
+        const double rest = dot(near, d);
+        if (rest * rest > 0x1p-40 * dot(near, near) * d2) {
+            near = cross(d, cross(near, d)) * (1.0 / d2);
+            t0 -= rest / d2;
+        }
+        path = {near, d, 0.0, never};
+    }
+    /// Whether the line is nearer than this to the middle.
+    [[nodiscard]] bool is_within(double distance2) const {
+        return dot(path.origin, path.origin) <= distance2;
     }
 };
 
@@ -84,6 +97,7 @@ bool surface_hit(const AnyRay& ray, const ShapeLine& line, const Stay& stay, Any
 template <class Point, class AnyRay, class AnyHit>
 bool hit_ball(Point center, double radius, const AnyRay& ray, AnyHit& hit) {
     const ShapeLine line(ray, Double3(center));
+    if (!line.is_within(1.01 * (radius * radius))) return false;
     return surface_hit(ray, line, stay_in_ball(line.path, {}, radius), hit);
 }
 
@@ -92,10 +106,11 @@ bool hit_capsule(const AnyCapsule& capsule, const AnyRay& ray, AnyHit& hit) {
     using Scalar = decltype(hit.t);
     const Double3 middle = Double3(capsule.a) * 0.5 + Double3(capsule.b) * 0.5,
                   a = Double3(capsule.a) - middle, b = Double3(capsule.b) - middle, axis = b - a;
+    const double r = capsule.radius, length2 = dot(axis, axis);
     const ShapeLine line(ray, middle);
-    const Stay stay = stay_in_capsule(line.path, a, axis, capsule.radius);
-    if (!surface_hit(ray, line, stay, hit)) return false;
-    const double length2 = dot(axis, axis);
+    // The square of a sum is at most twice the sum of squares; and what rounding may take.
+    if (!line.is_within(2.01 * (0.25 * length2 + r * r))) return false;
+    if (!surface_hit(ray, line, stay_in_capsule(line.path, a, axis, r), hit)) return false;
     const Double3 from_a = line.path.at(hit.t / line.t_scale - line.t0) - a;
     const double along = length2 > 0.0 ? dot(from_a, axis) / length2 : 0.0;
     hit.u = static_cast<Scalar>(std::clamp(along, 0.0, 1.0));
