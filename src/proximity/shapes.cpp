@@ -75,7 +75,7 @@ struct ShapeLine {
         }
         path = {near, d, 0.0, never};
     }
-    /// Whether the line is nearer than this to the middle.
+    /// Whether the square of the line's distance from the middle is at most this.
     [[nodiscard]] bool is_within(double distance2) const {
         return dot(path.origin, path.origin) <= distance2;
     }
