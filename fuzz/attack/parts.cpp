@@ -24,10 +24,19 @@ long double from_segment(Wide a, Wide b) {
     return dot(p, p);
 }
 
-/// The squared distance of 0 from the triangle's inside, or infinity if its foot is outside.
+/// p * q - r * s to two roundings (Kahan).
+long double difference(long double p, long double q, long double r, long double s) {
+    const long double rs = r * s;
+    return std::fma(p, q, -rs) + std::fma(-r, s, rs);
+}
+
+/// The squared distance of 0 from the triangle's inside, or infinity if its foot is outside. Plain
+/// products would turn the plane of a needle: at its far end by 2^-64 of its length squared over
+/// its width.
 long double from_face(Wide a, Wide b, Wide c) {
     const Wide e = minus(b, a), f = minus(c, a);
-    const Wide n{e.y * f.z - e.z * f.y, e.z * f.x - e.x * f.z, e.x * f.y - e.y * f.x};
+    const Wide n{difference(e.y, f.z, e.z, f.y), difference(e.z, f.x, e.x, f.z),
+                 difference(e.x, f.y, e.y, f.x)};
     const long double n2 = dot(n, n);
     if (!(n2 > 0)) return INFINITY;
     const auto side = [&](Wide p, Wide q) {

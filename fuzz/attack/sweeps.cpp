@@ -42,15 +42,24 @@ public:
     }
 
 private:
+    /// Without a radius a sweep is its ray, whose triangle the kinds `rays` and `doubles` judge.
+    /// Its t cannot be compared here: long directions are scaled, and what differs there may be
+    /// equal, and 0, in the caller's units.
     void find_alone() {
         expected_.resize(sweeps_.size());
+        const auto whole = build_bvh(scenery_.mesh, {.threads = 1});
+        std::vector<std::uint32_t> of_ray;
+        for (const auto& sweep : sweeps_) of_ray.push_back(closest_hit(whole, sweep.path).prim);
         for_each_alone(scenery_.mesh, [&](const auto& tree, std::uint32_t triangle) {
             const auto alone = sweep_spheres(tree, sweeps_, {.threads = 1});
-            for (std::size_t q = 0; q < sweeps_.size(); ++q)
-                if (alone[q].hit() && (!expected_[q].hit() || alone[q].t < expected_[q].t)) {
-                    expected_[q] = alone[q];
-                    expected_[q].prim = triangle;
-                }
+            for (std::size_t q = 0; q < sweeps_.size(); ++q) {
+                const auto& best = expected_[q];
+                const bool first = sweeps_[q].radius == 0 ? triangle == of_ray[q]
+                                                          : !best.hit() || alone[q].t < best.t;
+                if (!alone[q].hit() || !first) continue;
+                expected_[q] = alone[q];
+                expected_[q].prim = triangle;
+            }
         });
     }
 

@@ -1,5 +1,9 @@
 // Rays through instances: down the group's tree, through the inverse of each instance that is met
 // into its object's space, and on from there.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include "base/float_env.h"
 #include "instances/instanced_scene.h"
 #include "instances/ray_batch.h"
@@ -22,15 +26,20 @@ public:
 
     /// `ray` must be valid.
     InstanceHit run(const Ray& ray) {
-        tmin_ = ray.tmin;
-        best_.hit.t = ray.tmax;
-        walk_group(state_.root(), {Double3(ray.origin), Double3(ray.direction)}, 0);
+        const Double3 d(ray.direction);
+        scale_ = direction_scale(std::max({std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)}));
+        tmin_ = in_line(ray.tmin);
+        limit_ = in_line(ray.tmax);
+        walk_group(state_.root(), {Double3(ray.origin), d * scale_}, 0);
         return best_.hit.hit() ? best_ : InstanceHit{};
     }
 
 private:
+    /// t of the line, whose direction is scaled: subnormal ones would be other directions inside.
+    [[nodiscard]] float in_line(float t) const { return static_cast<float>(double(t) / scale_); }
+
     void walk_group(const Group& group, const WideRayLine& line, std::size_t level) {
-        const Ray ray = line.rounded(tmin_, best_.hit.t);
+        const Ray ray = line.rounded(tmin_, limit_);
         const Bvh& tree = group.tree.bvh;
         if (tree.empty() || !is_valid(ray)) return;
         WalkStack stack(tree.max_depth());
@@ -42,8 +51,7 @@ private:
             return false;
         };
         walk_tree(tree.nodes().data(), frame, stack, steps, leaf, [&] {
-            return min_of(best_.hit.t / frame.t_scale * reach_factor,
-                          std::numeric_limits<float>::max());
+            return min_of(limit_ / frame.t_scale * reach_factor, std::numeric_limits<float>::max());
         });
     }
 
@@ -64,7 +72,7 @@ private:
     }
 
     void hit_object(const Bvh& bvh, std::uint32_t object, const WideRayLine& line) {
-        const Ray ray = line.rounded(tmin_, best_.hit.t);
+        const Ray ray = line.rounded(tmin_, limit_);
         if (bvh.empty() || !is_valid(ray)) return;
         WalkStack stack(bvh.max_depth());
         const TriangleTree tree(bvh);
@@ -76,16 +84,25 @@ private:
         }
         const ClosestHit found = find_closest(tree, frame, stack, steps);
         if (found.prim == no_primitive) return;
-        const Hit hit{found.t * frame.t_scale + 0.0f, found.prim, found.u, found.v};
-        // At equal t the lower path wins; within one instance find_closest has chosen.
-        if (hit.t < best_.hit.t || !best_.hit.hit() || path_ < best_.path)
-            best_ = {hit, object, path_};
+        const auto t = static_cast<float>(found.t * frame.t_scale * scale_) + 0.0f;
+        keep({{t, found.prim, found.u, found.v}, object, path_});
+    }
+
+    /// At equal t the lower path wins; within one instance find_closest has chosen. What differs in
+    /// the line may be equal in the caller's units where those are subnormal: it must be found too.
+    void keep(const InstanceHit& found) {
+        const bool nearer = !best_.hit.hit() || found.hit.t < best_.hit.t;
+        if (!nearer && !(found.hit.t == best_.hit.t && found.path < best_.path)) return;
+        best_ = found;
+        const float t = found.hit.t;
+        limit_ = in_line(t < std::numeric_limits<float>::min() ? std::nextafter(t, infinity) : t);
     }
 
     const State& state_;
     std::uint32_t mask_;
     bool any_;
-    float tmin_ = 0.0f;
+    double scale_ = 1.0;
+    float tmin_ = 0.0f, limit_ = infinity;  // of the line
     InstanceHit best_;
     std::array<std::uint32_t, InstanceHit::max_levels> path_ = InstanceHit::unused();
 };

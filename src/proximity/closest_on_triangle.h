@@ -107,7 +107,7 @@ RAYDIX_HD inline Double3 cross_of(Double3 a, Double3 b) {
 }
 
 /// The query's foot on the plane with this normal, which is not 0; false if it is outside of the
-/// triangle.
+/// triangle, or if rounding leaves nothing of its weights.
 template <bool accurate = false, class Corners>
 RAYDIX_HD inline bool foot_on_plane(const Corners& t, Double3 query, Double3 normal,
                                     CandidatePoint& foot) {
@@ -116,8 +116,8 @@ RAYDIX_HD inline bool foot_on_plane(const Corners& t, Double3 query, Double3 nor
     const double u = dot(cross_of<accurate>(query - a, ac), normal),
                  v = dot(cross_of<accurate>(ab, query - a), normal),
                  w = dot(cross_of<accurate>(bc, query - b), normal);
-    if (!(u >= 0.0 && v >= 0.0 && w >= 0.0)) return false;
     const double sum = (u + v) + w;
+    if (!(u >= 0.0 && v >= 0.0 && w >= 0.0 && sum > 0.0)) return false;
     const double weight_b = u / sum, weight_c = v / sum;
     foot = {a + ab * weight_b + ac * weight_c, weight_b, weight_c, 0.0};
     return true;

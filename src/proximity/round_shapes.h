@@ -1,5 +1,5 @@
-// A moving point against balls, capsules and rounded triangles, in double: the first t at which it
-// is in one. All of them are convex, so a path enters once.
+// A moving point against balls, capsules and rounded triangles, in double: its line's stay in them.
+// All of them are convex, so a line enters once.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -9,22 +9,24 @@
 #include <cmath>
 
 #include "base/double3.h"
-#include "proximity/closest_on_triangle.h"
+#include "proximity/contact_steps.h"
 #include "trace/grown_boxes.h"
 
 namespace raydix {
 
-/// Enters the set at t, or never; a path that starts in it enters at tmin. `enter` and `leave`
-/// bound the line's stay.
-inline double first_stay(const Path& path, double enter, double leave) {
-    const double t = std::max(enter, path.tmin);
-    return t <= leave && t <= path.tmax ? t : never;
-}
-
-/// Roots of the line against a ball around `center`; enter > leave if it misses.
+/// A part of a line; enter > leave if it is empty.
 struct Stay {
     double enter = never, leave = -never;
+
+    [[nodiscard]] bool empty() const { return !(enter <= leave); }
 };
+
+/// Of two parts of one convex set.
+inline Stay unite(const Stay& a, const Stay& b) {
+    if (a.empty()) return b;
+    if (b.empty()) return a;
+    return {std::min(a.enter, b.enter), std::max(a.leave, b.leave)};
+}
 
 /// Measured from where the line comes closest, so that a far origin costs no precision.
 inline Stay stay_in_ball(const Path& path, Double3 center, double radius) {
@@ -37,49 +39,11 @@ inline Stay stay_in_ball(const Path& path, Double3 center, double radius) {
     return {middle - half, middle + half};
 }
 
-inline double enter_ball(const Path& path, Double3 center, double radius) {
-    const Stay stay = stay_in_ball(path, center, radius);
-    return first_stay(path, stay.enter, stay.leave);
-}
-
-/// The part of the line in the cylinder around a, b, between the planes through its ends.
-inline Stay stay_in_cylinder(const Path& path, Double3 a, Double3 b, double radius) {
-    const Double3 axis = b - a;
-    const double length2 = dot(axis, axis);
-    if (length2 == 0.0) return {};
-    // What of the direction and of the origin is across the axis.
-    const double along = dot(path.direction, axis);
-    const Double3 across = path.direction - axis * (along / length2);
-    const double across2 = dot(across, across);
-    Stay stay{-never, never};
-    const auto off_axis = [&](double t) {
-        const Double3 p = path.at(t) - a;
-        return p - axis * (dot(p, axis) / length2);
-    };
-    // Parallel up to rounding: in or out for good.
-    if (across2 > 1e-28 * dot(path.direction, path.direction)) {
-        const double middle = dot(a - path.origin, across) / across2;
-        const Double3 off = off_axis(middle);
-        const double room = radius * radius - dot(off, off);
-        if (room < 0.0) return {};
-        const double half = std::sqrt(room / across2);
-        stay = {middle - half, middle + half};
-    } else {
-        const Double3 off = off_axis(0.0);
-        if (dot(off, off) > radius * radius) return {};
-    }
-    const double start = dot(a - path.origin, axis), end = dot(b - path.origin, axis);
-    if (along == 0.0) return start <= 0.0 && end >= 0.0 ? stay : Stay{};
-    const double t0 = start / along, t1 = end / along;
-    return {std::max(stay.enter, std::min(t0, t1)), std::min(stay.leave, std::max(t0, t1))};
-}
-
-/// As stay_in_cylinder, for paths that start at 0, in any direction: nearly along the axis too. All
-/// lengths are taken from where the path comes closest to the segment's middle, and what is across
-/// the axis from products with it, so that what rounding does is a shift of the cylinder by a few
-/// roundings of the distance and its length.
-inline Stay stay_in_far_cylinder(const Path& path, Double3 a, Double3 b, double radius) {
-    const Double3 axis = b - a;
+/// The part of the line in the cylinder around a, b, between the planes through its ends. Lines
+/// nearly along the axis too: all lengths are taken from where the line comes closest to the
+/// segment's middle, and what is across the axis from products with it, so that what rounding does
+/// is a shift of the cylinder by a few roundings of the distance and its length.
+inline Stay stay_in_cylinder(const Path& path, Double3 a, Double3 axis, double radius) {
     const double length2 = dot(axis, axis);
     if (length2 == 0.0) return {};
     const double middle =
@@ -111,63 +75,69 @@ inline Stay stay_in_far_cylinder(const Path& path, Double3 a, Double3 b, double 
     return {middle + stay.enter, middle + stay.leave};
 }
 
-inline double enter_cylinder(const Path& path, Double3 a, Double3 b, double radius) {
-    const Stay stay = stay_in_cylinder(path, a, b, radius);
-    return stay.enter <= stay.leave ? first_stay(path, stay.enter, stay.leave) : never;
-}
-
 /// All points within `radius` of the segment.
-inline double enter_capsule(const Path& path, Double3 a, Double3 b, double radius) {
-    return std::min({enter_ball(path, a, radius), enter_ball(path, b, radius),
-                     enter_cylinder(path, a, b, radius)});
+inline Stay stay_in_capsule(const Path& path, Double3 a, Double3 axis, double radius) {
+    const Stay ends = unite(stay_in_ball(path, a, radius), stay_in_ball(path, a + axis, radius));
+    return unite(ends, stay_in_cylinder(path, a, axis, radius));
 }
 
-/// The prism of height `radius` on both sides of the triangle; `normal` is that of its plane.
-inline double enter_prism(const Path& path, Double3 a, Double3 b, Double3 c, Double3 normal,
-                          double radius) {
-    const double size = length(normal);
-    if (size == 0.0) return never;
-    Stay stay{-never, never};
+/// All points within `radius` of a triangle that is no needle: the prism on both sides of it,
+/// cylinders around edges, balls around corners.
+inline Stay stay_in_rounded_triangle(const Path& path, const PathTriangle& t, Double3 normal,
+                                     double radius) {
+    Stay prism{-never, never};
     // Keeps the part of the line where n . (x - p) <= limit.
     const auto cut = [&](Double3 n, Double3 p, double limit) {
         const double rate = dot(n, path.direction), room = limit - dot(n, path.origin - p);
         if (rate > 0.0)
-            stay.leave = std::min(stay.leave, room / rate);
+            prism.leave = std::min(prism.leave, room / rate);
         else if (rate < 0.0)
-            stay.enter = std::max(stay.enter, room / rate);
+            prism.enter = std::max(prism.enter, room / rate);
         else if (room < 0.0)
-            stay = {};
+            prism = {};
     };
-    cut(normal, a, radius * size);
-    cut(normal * -1.0, a, radius * size);
-    cut(cross(b - a, normal), a, 0.0);
-    cut(cross(c - b, normal), b, 0.0);
-    cut(cross(a - c, normal), c, 0.0);
-    return stay.enter <= stay.leave ? first_stay(path, stay.enter, stay.leave) : never;
+    const double height = radius * length(normal);
+    cut(normal, t.a, height);
+    cut(normal * -1.0, t.a, height);
+    const double at_plane = prism.enter;
+    cut(cross(t.ab, normal), t.a, 0.0);
+    cut(cross(t.bc, normal), t.b, 0.0);
+    cut(cross(normal, t.ac), t.a, 0.0);
+    // Before it reaches one of the first two planes, a ball touches no edge either.
+    const bool first = prism.enter == at_plane || prism.enter <= path.tmin;
+    if (first && !prism.empty() && prism.leave >= path.tmin) return prism;
+    Stay stay = prism;
+    for (const Double3& corner : {t.a, t.b, t.c})
+        stay = unite(stay, stay_in_ball(path, corner, radius));
+    stay = unite(stay, stay_in_cylinder(path, t.a, t.ab, radius));
+    stay = unite(stay, stay_in_cylinder(path, t.b, t.bc, radius));
+    return unite(stay, stay_in_cylinder(path, t.a, t.ac, radius));
 }
 
-/// All points within `radius` of the triangle.
-inline double enter_rounded_triangle(const Path& path, Double3 a, Double3 b, Double3 c,
-                                     Double3 normal, double radius) {
-    return std::min({enter_prism(path, a, b, c, normal, radius), enter_ball(path, a, radius),
-                     enter_ball(path, b, radius), enter_ball(path, c, radius),
-                     enter_cylinder(path, a, b, radius), enter_cylinder(path, b, c, radius),
-                     enter_cylinder(path, c, a, radius)});
-}
+/// Height over longest edge, squared, below which a triangle is a needle: what rounding takes from
+/// a place is divided by this on the way to t, and a float's t has fewer digits to lose.
+template <class Corners>
+inline constexpr double needle = 0x1p-8;
+template <>
+inline constexpr double needle<LeafTriangle> = 0x1p-32;
 
-inline double enter_rounded_triangle(const Path& path, const LeafTriangle& t, double radius) {
-    const Double3 a(t.v0), b(t.v1), c(t.v2);
-    return enter_rounded_triangle(path, a, b, c, cross(b - a, c - a), radius);
-}
-
-/// In double the path must start at 0 and `start` is where that is in the scene: corners are taken
-/// from there, so that a place far from the origin costs no digits. The normal is that of the
-/// corners as they are, since a sliver's would not survive a rounding of its edges.
-inline double enter_rounded_triangle(const Path& path, Vec3d start, const LeafTriangleD& t,
-                                     double radius) {
-    const Double3 a(t.v0), b(t.v1), c(t.v2), from(start);
-    return enter_rounded_triangle(path, a - from, b - from, c - from, accurate_cross(b - a, c - a),
-                                  radius);
+/// When the path comes within `radius` of the triangle, not before `own`, when it enters the
+/// triangle's own box, or never. `start`: where the path's 0 is in the scene.
+template <class Corners>
+double enter_rounded_triangle(const Path& path, Double3 start, const Corners& corners,
+                              double radius, double own) {
+    const PathTriangle t(corners, start);
+    const Double3 normal = cross(t.ab, t.ac);
+    const double longest2 = std::max({dot(t.ab, t.ab), dot(t.ac, t.ac), dot(t.bc, t.bc)});
+    if (!(dot(normal, normal) > needle<Corners> * longest2 * longest2))
+        return ContactSteps(path, t, radius).run(own);
+    const Stay stay = stay_in_rounded_triangle(path, t, normal, radius);
+    const double at = std::max(stay.enter, path.tmin);
+    if (!(at <= stay.leave && at <= path.tmax)) return never;
+    if (own <= at) return at;
+    // The box of a slow axis may be entered late, even after a path that grazes has left.
+    if (own <= stay.leave && own <= path.tmax) return own;
+    return ContactSteps(path, t, radius).run(own);
 }
 
 }  // namespace raydix

@@ -28,14 +28,13 @@ inline Path path_of(const Ray& ray) {
 }
 
 /// One pure function of path, radius and triangle: t, not before the path enters the triangle's own
-/// box, or infinity.
+/// box, or infinity. What is later than `latest` may be infinity too.
 inline float first_contact(const Path& path, const GrownBoxes& boxes, double radius,
-                           const LeafTriangle& t) {
+                           const LeafTriangle& t, float latest = infinity) {
     const Aabb box = box_of(t.v0, t.v1, t.v2);
     const double own = boxes.enter(box.lo, box.hi);
-    if (own == never) return infinity;
-    const double at = enter_rounded_triangle(path, t, radius);
-    return at == never ? infinity : static_cast<float>(std::max(at, own));
+    if (own == never || static_cast<float>(own) > latest) return infinity;
+    return static_cast<float>(enter_rounded_triangle(path, {}, t, radius, own));
 }
 
 /// 2^-24 of all lengths that meet in a contact: above how far a ball at it may be from touching,
@@ -63,8 +62,8 @@ public:
           boxes_(path_, radius_),
           nodes_(path_, radius_ + room(tree)) {}
 
-    [[nodiscard]] float contact(const LeafTriangle& t) const {
-        return first_contact(path_, boxes_, radius_, t);
+    [[nodiscard]] float contact(const LeafTriangle& t, float latest = infinity) const {
+        return first_contact(path_, boxes_, radius_, t, latest);
     }
     /// Not later than the contact with any triangle in it. Both are rounded to float in the same
     /// way, so that a node is not skipped for a contact of equal t that is found before.
@@ -100,12 +99,11 @@ public:
         : SweepFrameD(make_frame(sweep.path), tree, sweep) {}
 
     /// As first_contact: a pure function of sweep and triangle.
-    [[nodiscard]] double contact(const LeafTriangleD& t) const {
+    [[nodiscard]] double contact(const LeafTriangleD& t, double latest = never) const {
         const AabbD box = box_of(t.v0, t.v1, t.v2);
         const double own = boxes_.enter(box.lo - start_, box.hi - start_);
-        if (own == never) return never;
-        const double at = enter_rounded_triangle(path_, start_, t, radius_);
-        return at == never ? never : std::max(at, own);
+        if (own == never || own > latest) return never;
+        return enter_rounded_triangle(path_, Double3(start_), t, radius_, own);
     }
     /// Not later than any triangle's own box in it, see `room`.
     [[nodiscard]] double enter(const BvhNode& node) const {
@@ -167,7 +165,7 @@ BasicContact<Scalar> find_first_contact(const Tree& tree, const Frame& sweep,
     BasicContact<Scalar> best;
     const auto leaf = [&](const BvhNode& node) {
         for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
-            const Scalar t = sweep.contact(tree.triangles[k]);
+            const Scalar t = sweep.contact(tree.triangles[k], best.t);
             if (t < best.t || (t == best.t && t < infinity && tree.order[k] < best.prim))
                 best = {t, tree.order[k], k};
         }

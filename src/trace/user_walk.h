@@ -17,6 +17,19 @@
 
 namespace raydix {
 
+/// Long directions are scaled to less than 1, and a t there may be beyond all numbers where the
+/// caller's is not: four times as long, none is.
+template <class Frame>
+Frame frame_with_room(Frame frame) {
+    if (!(frame.t_scale < 1)) return frame;
+    frame.direction = frame.direction * 4;
+    frame.inverse = frame.inverse * decltype(frame.tmin)(0.25);
+    frame.tmin /= 4;
+    frame.tmax /= 4;
+    frame.t_scale *= 4;
+    return frame;
+}
+
 /// One ray at a time.
 template <class Tree>
 class UserWalk {
@@ -31,7 +44,7 @@ public:
 
     /// `ray` must be valid, the tree not empty.
     AnyHit run(AnyRay ray, TraceCounts& counts) {
-        const auto frame = make_frame(ray);
+        const auto frame = frame_with_room(make_frame(ray));
         ray.tmin = max_of(ray.tmin, Scalar(0)) + Scalar(0);  // -0 becomes +0
         AnyHit best{ray.tmax};
         NoSteps steps;

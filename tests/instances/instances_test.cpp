@@ -319,6 +319,55 @@ TEST(BuildMany, AreTheTreesOfEachMesh) {
     EXPECT_TRUE(build_many({}, {}).empty());
 }
 
+/// A direction of few bits that is shorter by a power of two, and has no more bits as a float, hits
+/// what it did, later by that power.
+TEST(Instances, SubnormalDirectionsKeepTheirWay) {
+    Random random(seed);
+    const Bvh soup = build_bvh(test::scaled(test::random_soup(300, seed), 1e-7f));
+    InstancedScene scene;
+    const std::uint32_t object = scene.add_object(soup);
+    for (int i = 0; i < 8; ++i)
+        scene.add_instance(InstancedScene::scene, {object, random.transform(1e-7f)});
+    scene.build();
+    std::size_t hits = 0;
+    for (int i = 0; i < 8000; ++i) {
+        const auto whole = [&] { return static_cast<float>(random.below(15)) - 7.0f; };
+        const Vec3 d{whole(), whole(), whole()};
+        if (d == Vec3{0, 0, 0}) continue;
+        const Vec3 from = random.in(-1e-7f, 1e-7f);
+        const InstanceHit wanted = closest_hit(scene, {from, 0, d}),
+                          found = closest_hit(scene, {from, 0, 0x1p-146f * d});
+        ASSERT_EQ(found.hit.hit(), wanted.hit.hit());
+        if (!wanted.hit.hit()) continue;
+        ++hits;
+        ASSERT_EQ(found.hit.t, wanted.hit.t * 0x1p73f * 0x1p73f);
+        ASSERT_EQ(found.hit.prim, wanted.hit.prim);
+        ASSERT_EQ(found.hit.u, wanted.hit.u);
+        ASSERT_EQ(found.path, wanted.path);
+    }
+    EXPECT_GT(hits, 100u);
+}
+
+/// Places that differ, at t that are all less than any float: the lower path wins.
+TEST(Instances, TiesOfLongDirections) {
+    const Bvh wall =
+        build_bvh(Mesh{"", {{-1e-9f, -1e-9f, 0}, {1e-9f, -1e-9f, 0}, {0, 1e-9f, 0}}, {{0, 1, 2}}});
+    InstancedScene scene;
+    const std::uint32_t object = scene.add_object(wall);
+    for (int i = 0; i < 16; ++i) {
+        Transform moved;
+        moved.m[2][3] = static_cast<float>(16 - i) * 1e-9f;
+        scene.add_instance(InstancedScene::scene, {object, moved});
+    }
+    scene.build();
+    for (const Vec3 d : {Vec3{0, 0, 1e38f}, Vec3{1e35f, 1e36f, 1e38f}}) {
+        const InstanceHit hit = closest_hit(scene, {{0, -5e-10f, 0}, 0, d});
+        ASSERT_TRUE(hit.hit.hit());
+        EXPECT_EQ(hit.hit.t, 0.0f);
+        EXPECT_EQ(hit.path[0], 0u);
+    }
+}
+
 /// Rays that start on a triangle, from both sides and in instances that are turned over.
 TEST(Instances, NoTIsMinusZero) {
     const Mesh mesh{"", {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}}, {{0, 1, 2}}};

@@ -159,6 +159,18 @@ std::vector<Vec3> exact_queries(const Mesh& mesh, std::size_t count) {
     return queries;
 }
 
+/// So near a corner that rounding leaves nothing of the weights: no NaN, and the corner.
+TEST(DoubleQueries, ACornerOfANeedleHasAPlace) {
+    const Vec3d corner{-0x1.9c84p-135, 0.0, 0x1.11a7dap-117};
+    const BvhD bvh = build_bvh(MeshD{
+        "", {corner, {0x1.7032dap-17, 0.0, 0x1.40d71ep-22}, {-0x1p-147, 0.0, 0.0}}, {{0, 1, 2}}});
+    const ClosestPointD found = closest_point(bvh, corner);
+    EXPECT_TRUE(found.position == corner);
+    EXPECT_EQ(found.distance, 0.0);
+    EXPECT_EQ(found.u, 0.0);
+    EXPECT_EQ(found.v, 0.0);
+}
+
 TEST(DoubleQueries, InsideFarAwayAsAtHome) {
     const auto [home, away] = figure_pair();
     const Bvh home_bvh = build_bvh(home);

@@ -11,6 +11,7 @@
 #include "primitives/double_sources.h"
 #include "proximity/sweep_walk.h"
 #include "support/double_scenes.h"
+#include "support/exact_distance.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -155,29 +156,6 @@ struct Search {
         return in;
     }
 };
-
-Exact exact_square_to_segment(const ExactPoint& a, const ExactPoint& b, const ExactPoint& q) {
-    const ExactPoint along = b - a, off = q - a;
-    Exact s = dot(off, along) / dot(along, along);
-    s = s < 0 ? Exact(0) : s > 1 ? Exact(1) : s;
-    const ExactPoint rest{off.x - s * along.x, off.y - s * along.y, off.z - s * along.z};
-    return dot(rest, rest);
-}
-
-/// The distance from the center at `t`, which is not rounded, to the triangle.
-double exact_distance(const LeafTriangleD& triangle, const RayD& path, double t) {
-    const ExactPoint o = exact(path.origin), d = exact(path.direction), a = exact(triangle.v0),
-                     b = exact(triangle.v1), c = exact(triangle.v2);
-    const ExactPoint q{o.x + Exact(t) * d.x, o.y + Exact(t) * d.y, o.z + Exact(t) * d.z};
-    const ExactPoint n = cross(b - a, c - a);
-    const Exact height = dot(n, q - a);
-    Exact square = height * height / dot(n, n);
-    if (dot(cross(b - a, q - a), n) < 0 || dot(cross(c - b, q - b), n) < 0 ||
-        dot(cross(a - c, q - c), n) < 0)
-        square = std::min({exact_square_to_segment(a, b, q), exact_square_to_segment(b, c, q),
-                           exact_square_to_segment(c, a, q)});
-    return std::sqrt(static_cast<double>(square));
-}
 
 /// A triangle of 10 m, every third one a sliver of down to a nanometre, and a ball of 2 m to 4 nm
 /// that comes near it; every eighth one touches from the start.

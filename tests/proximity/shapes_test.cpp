@@ -151,6 +151,29 @@ TEST(Shapes, AHitIsAtAFinitePlace) {
     EXPECT_FALSE(any_hit(bvh, endless, {{0, 0, 0}, 0, {0, 0, 1}}));
 }
 
+/// From so far that a step of double is longer than the scene, along an axis: what is across the
+/// ray has all its digits. t in units of the scaled direction is beyond all floats.
+TEST(Shapes, FromTheEndOfAllFloats) {
+    const std::vector<Capsule> capsules{{{-0x1.c5be4ep-1f, -0x1.00a458p-3f, 0x1.bbe5ecp-2f},
+                                         {0x1.ec0ebep+11f, 0x1.0d42a4p+12f, 0x1.57c2e4p+11f},
+                                         0x1.27bfccp-1f}};
+    const std::vector<Sphere> balls{{{0.4f, 1.9f, 5.0f}, 0.25f}};
+    const Bvh pipe = build_bvh(boxes_of(capsules)), ball = build_bvh(boxes_of(balls));
+    const auto pipe_hit = [&](float x, float y, float speed) {
+        return closest_hit(pipe, intersect_capsules(capsules),
+                           {{x, y, 0x1.ff933cp+127f}, 0, {0, 0, speed}});
+    };
+    EXPECT_EQ(pipe_hit(0x1.a6ba7p-2f, 0x1.dfeb74p+0f, -0x1.504aa2p+9f).t, 0x1.856f02p+118f);
+    EXPECT_TRUE(pipe_hit(0x1.a6ba7p-2f, 0x1.dfeb74p+0f, -1.0f).hit());
+    EXPECT_FALSE(pipe_hit(0x1.a6ba7p-2f, 0x1.dfeb74p+0f, 1.0f).hit());
+    EXPECT_FALSE(pipe_hit(-2.0f, 2.0f, -100.0f).hit());
+    const auto ball_hit = [&](float x) {
+        return any_hit(ball, intersect_spheres(balls), {{x, 1.9f, 3e38f}, 0, {0, 0, -700.0f}});
+    };
+    EXPECT_TRUE(ball_hit(0.64f));
+    EXPECT_FALSE(ball_hit(0.66f));
+}
+
 /// Rays that begin on a shape without a radius, or less than any float before its surface.
 TEST(Shapes, NoTIsMinusZero) {
     const auto expect_plus = [](const std::vector<Aabb>& boxes, const IntersectPrimitive& intersect,
