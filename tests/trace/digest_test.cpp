@@ -39,17 +39,17 @@ struct Digests {
 
 constexpr Digests known[] = {
     {"builtin:atrium?triangles=10000", "9b189ca5b773022f", "abef4cab60fadd6b", "b0c9063e6200a84a",
-     "326c0dc8b535350b", "f66f16a2dcf88ff9", "aa749bd46b157532", "2334c8269d6f7d13",
-     "a6b30362f6e5578d"},
+     "326c0dc8b535350b", "f66f16a2dcf88ff9", "aa749bd46b157532", "6bb3a053e06b8f76",
+     "eb6f98938f6e90f3"},
     {"builtin:figure?triangles=10000", "86169cf030e543a6", "ac760758788a2d24", "866077f163dadbef",
-     "9ae7a66050e32c98", "8b66d61ccbd2e119", "62916fb590f4e3e8", "8ef2d73c3fd20cdf",
-     "4b79f8a4bbc8df75"},
+     "9ae7a66050e32c98", "8b66d61ccbd2e119", "62916fb590f4e3e8", "81d9c71c73ac49b8",
+     "3354f38048ec4076"},
     {"builtin:grove?triangles=10000", "fec19bb12fb78fd9", "dfe5e99bd7359ece", "4ff96a6826b72639",
-     "6b1084891925e578", "87a2e50c4453800f", "511602fff714d2a1", "5447778431f4c494",
-     "435e6853ac1764f9"},
+     "6b1084891925e578", "87a2e50c4453800f", "511602fff714d2a1", "185f6cfdf2b509c2",
+     "5c2079b985c83e16"},
     {"builtin:soup?triangles=10000", "0e6a9a461ef361d2", "3f8d78360de16f29", "f0b7bd9717862a30",
-     "d96209d38419eacf", "f82f7788c9d67c29", "30b4926d88007127", "465ee9632e692d71",
-     "f08a736ee61c931c"},
+     "d96209d38419eacf", "f82f7788c9d67c29", "30b4926d88007127", "73378adb91a22777",
+     "3946cdd521486855"},
 };
 
 std::string tree_digest(const MeshView& mesh, Builder builder) {

@@ -144,6 +144,52 @@ TEST(Simd, FewTriangles) {
     }
 }
 
+/// Limits beside t: what floats decide of any hit must be what the whole test says. Large and thin
+/// triangles, rays that start next to them and far off, scenes of all sizes.
+TEST(Simd, LimitsBesideTheHit) {
+    std::mt19937_64 random(seed);
+    const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+    const auto point = [&](float size) {
+        return Vec3{size * (2 * unit() - 1), size * (2 * unit() - 1), size * (2 * unit() - 1)};
+    };
+    for (const float size : {1.0f, 1e-12f, 1e-25f, 1e-36f, 1e9f})
+        for (const float thin : {1.0f, 1e-2f, 1e-5f}) {
+            Mesh mesh = random_soup(60, 12, 1.5f);
+            for (std::size_t v = 0; v < mesh.vertices.size();
+                 v += 3)  // one corner close to another
+                mesh.vertices[v + 1] =
+                    mesh.vertices[v] + thin * (mesh.vertices[v + 1] - mesh.vertices[v]);
+            for (Vec3& v : mesh.vertices) v = size * v;
+            const Bvh bvh = build_bvh(mesh);
+            std::vector<Ray> rays;
+            for (int k = 0; k < 6'000; ++k) {
+                const Triangle& t = mesh.triangles[random() % mesh.triangles.size()];
+                const float u = unit(), v = (1 - u) * unit();
+                const Vec3 target = mesh.vertices[t[0]] * (1 - u - v) + mesh.vertices[t[1]] * u +
+                                    mesh.vertices[t[2]] * v;
+                const int away = -static_cast<int>(random() % 26);
+                Ray ray{target + point(std::ldexp(size, away + (k % 16 == 0 ? 40 : 2))),
+                        0,
+                        {},
+                        infinity};
+                ray.direction = k % 3 == 0 ? point(1) : target - ray.origin;
+                const Hit hit = closest_hit(bvh, ray);
+                const float at = hit.hit() ? hit.t : 1.0f;
+                const auto beside = [&] {
+                    const float step = std::ldexp(1.0f, -1 - static_cast<int>(random() % 26));
+                    const float moved[] = {at, std::nextafter(at, 0.0f),
+                                           std::nextafter(at, infinity), at * (1 - step),
+                                           at * (1 + step)};
+                    return moved[random() % 5];
+                };
+                (k % 2 == 0 ? ray.tmax : ray.tmin) = beside();
+                rays.push_back(ray);
+            }
+            expect_like_scalar("size " + std::to_string(size) + ", thin " + std::to_string(thin),
+                               bvh, rays);
+        }
+}
+
 /// Around the sizes of vectors, packets and jobs.
 TEST(Simd, BatchesOfEverySize) {
     const Scene scene = scene_of(random_soup(2000, 9, 0.2f), "soup");
