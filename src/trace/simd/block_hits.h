@@ -1,4 +1,5 @@
-// The second half of the triangle test in vectors of doubles. Included once per instruction set.
+// The second half of the triangle test: what floats decide of any hit, then t, u and v in doubles,
+// for vectors of rays and for one triangle alone. Included once per instruction set.
 #if defined(RAYDIX_SIMD_BLOCK_HITS_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef RAYDIX_SIMD_BLOCK_HITS_H
 #undef RAYDIX_SIMD_BLOCK_HITS_H
@@ -15,8 +16,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-/// Corners in the sheared plane, and how far they are from where rays start along the rays' longest
-/// axis.
+/// A corner in the sheared plane, and how far it is from where rays start along their longest axis.
 template <class D>
 struct Sheared {
     hn::Vec<D> x, y, z;

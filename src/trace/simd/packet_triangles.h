@@ -75,6 +75,11 @@ public:
 private:
     using V = hn::Vec<F16>;
     using Corner = Sheared<F16>;
+    /// A vector of doubles, and the floats that become one.
+    using D = hn::Repartition<double, F16>;
+    using H = weights::HalfOf<D>;
+    using VD = hn::Vec<D>;
+    static constexpr std::size_t lanes_d = hn::MaxLanes(D());
     static constexpr std::uint64_t vector_bits = (std::uint64_t{1} << lanes16) - 1;
 
     /// A few rays with four triangles each cost about half as much again as a vector of rays with
@@ -166,6 +171,7 @@ private:
         std::uint32_t candidates = wanted & ~bits_of(f16, astride(f16, u, v, w));
         if (candidates == 0) return false;
         const std::uint32_t clear = bits_of(f16, without_zero(f16, u, v, w));
+        bool certain = false;
         if constexpr (any) {
             HWY_ALIGN float tmin[lanes16], reach[lanes16];
             for (std::size_t r = 0; r < rays_a_quad; ++r) {
@@ -180,15 +186,80 @@ private:
                 found_ |= std::uint64_t{1} << ray[r];
                 candidates &= ~(0xFu << (4 * r));
             }
+            certain = hit.certain != 0;
             candidates &= hit.open;
-            if (candidates == 0) return hit.certain != 0;
+            if (candidates == 0) return certain;
         }
+        return finish_quad(block, ray, origin, direction, candidates, clear) || certain;
+    }
+
+    /// The second half of the test for lanes of test_quad; `clear`: those none of whose edge
+    /// functions is 0 or NaN. Whether any ray has hit or came nearer.
+    HWY_INLINE bool finish_quad(const TriangleBlock& block, const std::uint32_t* ray, V origin,
+                                V direction, std::uint32_t candidates, std::uint32_t clear) {
+        const D d;
+        const H h;
+        const std::uint32_t axis[3] = {p_.kind.kx, p_.kind.ky, p_.kind.kz};
+        HWY_ALIGN float from[4][lanes16], way[3][lanes16];  // the fourth: tmin
+        for (std::size_t k = 0; k < 3; ++k) {
+            hn::Store(spread(origin, axis[k]), f16, from[k]);
+            hn::Store(spread(direction, axis[k]), f16, way[k]);
+        }
+        hn::Store(hn::Max(spread(origin, 3), hn::Zero(f16)), f16, from[3]);
+        HWY_ALIGN float t[lanes16], u[lanes16], v[lanes16];
+        std::uint32_t sure = 0;
+        for (std::size_t part = 0; part < lanes16; part += lanes_d) {
+            if (((candidates & clear) >> part & ((1u << lanes_d) - 1)) == 0) continue;
+            VD corner[3][3], way_d[3];
+            for (std::uint32_t k = 0; k < 3; ++k) {
+                const VD start = hn::PromoteTo(d, hn::Load(h, from[k] + part));
+                way_d[k] = hn::PromoteTo(d, hn::Load(h, way[k] + part));
+                for (std::uint32_t c = 0; c < 3; ++c) {
+                    const float* const row = block.corner[3 * c + axis[k]];
+                    hn::Vec<H> at;
+                    if constexpr (lanes_d >= block_lanes)
+                        at = hn::LoadDup128(h, row);
+                    else
+                        at = hn::LoadU(h, row + part % block_lanes);
+                    corner[c][k] = hn::Sub(hn::PromoteTo(d, at), start);
+                }
+            }
+            const auto at = weights::weigh(d, corner, way_d);
+            const auto tmin = hn::PromoteTo(d, hn::Load(h, from[3] + part));
+            sure |= (weights::inside(d, at) &
+                     weights::without_far_corner(d, corner, at.t, tmin, way_d[2]))
+                    << part;
+            hn::Store(weights::rounded(d, at.t), h, t + part);
+            hn::Store(weights::rounded(d, at.u), h, u + part);
+            hn::Store(weights::rounded(d, at.v), h, v + part);
+        }
+        sure &= clear;
         bool changed = false;
-        for (std::size_t r = 0; r < rays_a_quad; ++r) {
-            const std::uint32_t mine = candidates >> (4 * r) & 0xFu;
-            if (mine != 0) changed |= finish(block, ray[r], mine, clear >> (4 * r));
+        for (; candidates != 0; candidates &= candidates - 1) {
+            const auto l = static_cast<std::uint32_t>(std::countr_zero(candidates));
+            const std::uint32_t k = ray[l / 4];
+            const TriangleHit hit{t[l], u[l], v[l]};
+            if ((sure >> l & 1) == 0)
+                changed |= test_alone(block, l % 4, k);
+            else if (hit.t >= p_.tmin[k] && hit.t <= p_.t[k])
+                changed |= take(block, l % 4, k, hit);
         }
         return changed;
+    }
+
+    /// The whole test for one ray and one triangle.
+    HWY_NOINLINE bool test_alone(const TriangleBlock& block, std::uint32_t lane, std::size_t k) {
+        TriangleHit hit;
+        return test_exactly(triangle_ray(k), block, lane, p_.t[k], hit) &&
+               take(block, lane, k, hit);
+    }
+    /// A hit of ray k that is no farther than the best. Always true.
+    HWY_INLINE bool take(const TriangleBlock& block, std::uint32_t lane, std::size_t k,
+                         const TriangleHit& hit) {
+        found_ |= std::uint64_t{1} << k;
+        if (!any && (hit.t < p_.t[k] || block.prim[lane] < p_.prim[k]))
+            p_.t[k] = hit.t, p_.u[k] = hit.u, p_.v[k] = hit.v, p_.prim[k] = block.prim[lane];
+        return true;
     }
 
     template <bool one_origin>
@@ -233,39 +304,11 @@ private:
         return {tmin, tmax, way, p_.pad[kz], p_.kind.negative(static_cast<int>(kz))};
     }
 
-    /// The second half of the test for one ray and the triangles in `candidates`; `clear`: those
-    /// none of whose edge functions is 0 or NaN. Whether the ray has hit or came nearer.
-    HWY_NOINLINE bool finish(const TriangleBlock& block, std::size_t k, std::uint32_t candidates,
-                             std::uint32_t clear) {
-        const Ray& ray = rays_[index_[k]];
-        bool changed = false;
-        for (; candidates != 0; candidates &= candidates - 1) {
-            const auto lane = static_cast<std::uint32_t>(std::countr_zero(candidates));
-            TriangleHit hit;
-            if ((clear >> lane & 1) != 0 && hit_lane(block, lane, &ray.origin.x, &ray.direction.x,
-                                                     p_.kind, p_.tmin[k], hit)
-                    ? !(hit.t >= p_.tmin[k] && hit.t <= p_.t[k])
-                    : !test_exactly(triangle_ray(k), block, lane, p_.t[k], hit))
-                continue;
-            found_ |= std::uint64_t{1} << k;
-            changed = true;
-            if constexpr (any) return true;
-            if (hit.t < p_.t[k] || block.prim[lane] < p_.prim[k])
-                p_.t[k] = hit.t, p_.u[k] = hit.u, p_.v[k] = hit.v, p_.prim[k] = block.prim[lane];
-        }
-        return changed;
-    }
     [[nodiscard]] TriangleRay triangle_ray(std::size_t k) const {
         return triangle_ray_of(p_.kind, {p_.origin[0][k], p_.origin[1][k], p_.origin[2][k]},
                                {p_.direction[0][k], p_.direction[1][k], p_.direction[2][k]},
                                p_.shear_x[k], p_.shear_y[k], p_.tmin[k]);
     }
-
-    /// A vector of doubles, and the floats that become one.
-    using D = hn::Repartition<double, F16>;
-    using H = weights::HalfOf<D>;
-    using VD = hn::Vec<D>;
-    static constexpr std::size_t lanes_d = hn::MaxLanes(D());
 
     /// The second half of the test for the rays i + (bits of `candidates`) and one triangle.
     template <bool one_origin>
@@ -278,10 +321,9 @@ private:
             if (here != 0)
                 alone |= finish_vector<one_origin>(block, lane, i + part, here, changed) << part;
         }
-        for (; alone != 0; alone &= alone - 1) {
-            const auto l = static_cast<std::uint32_t>(std::countr_zero(alone));
-            changed |= finish(block, i + l, 1u << lane, (clear >> l & 1) << lane);
-        }
+        for (; alone != 0; alone &= alone - 1)
+            changed |=
+                test_alone(block, lane, i + static_cast<std::size_t>(std::countr_zero(alone)));
         return changed;
     }
 
