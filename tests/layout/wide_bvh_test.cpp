@@ -191,7 +191,7 @@ TEST(WideBuild, GivesTheTreeThatTheBinaryOneGives) {
     WideBvhBuilder builder;
     WideBvh tree;
     for (const Mesh& mesh : {crowded_mesh(), random_soup(700, 1), random_soup(1, 1), Mesh{},
-                             lattice_mesh(20'000, 7, 3), random_soup(3, 9)})
+                             lattice_mesh(1'000 * thorough, 7, 3), random_soup(3, 9)})
         for (const Builder name : {Builder::ploc, Builder::hploc, Builder::binned, Builder::karras,
                                    Builder::apetrei, Builder::sbvh})
             for (const int max_leaf : {1, 4, 5})
