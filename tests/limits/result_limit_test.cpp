@@ -155,7 +155,7 @@ struct Inputs {
 
     Inputs() {
         std::uint32_t state = 3;
-        constexpr int most = thorough > 1 ? 3000 : 1000;
+        constexpr int most = test::thorough > 1 ? 3000 : 1000;
         for (int i = 0; i < most; ++i) {
             const Vec3 a = place_at_random(state), b = place_at_random(state);
             const Vec3 d{b.x - a.x, b.y - a.y, b.z - a.z};
