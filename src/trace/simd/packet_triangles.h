@@ -124,7 +124,7 @@ private:
         for (std::size_t r = 0; r < rays_a_quad; ++r) all_lanes |= lanes << (4 * r);
         bool changed = false;
         while (active != 0) {
-            std::uint32_t ray[rays_a_quad], wanted = all_lanes;
+            std::uint32_t ray[rays_a_quad]{}, wanted = all_lanes;
             for (std::size_t r = 0; r < rays_a_quad; ++r) {
                 if (active != 0) {
                     ray[r] = static_cast<std::uint32_t>(std::countr_zero(active));
