@@ -181,12 +181,14 @@ RAYDIX_HD inline CornerWeights<double> weigh_corners(const SeenTriangle& seen) {
         seen.corner, seen.direction, 1.0, [](double x) { return narrowed(x); },
         [](double a, double b, double c, double d) { return a * b - c * d; });
 }
-/// With all digits, at several times the cost.
+/// With all digits: products with what rounding took from them. None underflows, since all come
+/// from floats.
 RAYDIX_RARE CornerWeights<double> weigh_corners_closely(const SeenTriangle& seen) {
     return weigh_corners(
         seen.corner, seen.direction, 1.0, [](double x) { return x; },
         [](double a, double b, double c, double d) {
-            return accurate_product_difference(a, b, c, d);
+            const double ab = a * b, cd = c * d;
+            return (ab - cd) + (std::fma(a, b, -ab) - std::fma(c, d, -cd));
         });
 }
 
@@ -250,8 +252,8 @@ RAYDIX_HD inline bool finish_hit(const TriangleRay& ray, const LeafTriangle& tri
 }
 
 /// True if the ray hits within [ray.tmin, tmax]. u weighs v1, v weighs v2. The point of the ray at
-/// t is within 6 roundings of the scene's extent of a point of the triangle, whatever its shape: no
-/// box around that point can be missed (slab.h).
+/// t is within a few roundings of a point of the triangle, whatever its shape: no box around that
+/// point can be missed (slab.h).
 template <EdgeRule rule>
 RAYDIX_HD inline bool intersect_triangle(const TriangleRay& ray, const LeafTriangle& triangle,
                                          float tmax, TriangleHit& hit) {
