@@ -191,14 +191,10 @@ HWY_INLINE bool hit_lane(const TriangleBlock& block, std::uint32_t lane, const f
     const double rate = std::fabs(along);
     return inside == 7 && !has_far_corner(farthest, t * rate, tmin * rate);
 #else
-    const std::uint32_t axis[3] = {kind.kx, kind.ky, kind.kz};
-    SeenTriangle seen;
-    for (std::uint32_t k = 0; k < 3; ++k) {
-        const double from = origin[axis[k]];
-        seen.direction[k] = direction[axis[k]];
-        for (std::uint32_t v = 0; v < 3; ++v)
-            seen.corner[v][k] = block.corner[3 * v + axis[k]][lane] - from;
-    }
+    const TriangleRay ray =
+        triangle_ray_of(kind, {origin[0], origin[1], origin[2]},
+                        {direction[0], direction[1], direction[2]}, 0.0f, 0.0f, tmin);
+    const SeenTriangle seen = seen_by(ray, triangle_of(block, lane));
     const CornerWeights<double> at = weigh_corners(seen);
     const double rate = std::fabs(seen.direction[2]);
     hit = rounded_hit(at.t, at.u, at.v);
