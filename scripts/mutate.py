@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """scripts/mutate.py [NUMBER...]: plants small faults in the core, one at a time, and lists those that no test notices.
+scripts/mutate.py --commit-results: writes what the last run of every fault gave to bench/results/mutations.json.
 
 Works on a copy of the tree in build/mutate. A fault is noticed if something no longer builds, or if a test program
 fails, crashes or runs out of time: first those of `tests`, then all others. Exit code 1 if a fault goes unnoticed or
@@ -7,6 +8,7 @@ no longer applies (its old text must stand exactly once in the file).
 """
 import dataclasses
 import fcntl
+import json
 import os
 import pathlib
 import shutil
@@ -17,6 +19,7 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 WORK = ROOT / "build" / "mutate"
 SOURCE, BUILD = WORK / "source", WORK / "build"
+RESULTS, COMMITTED = WORK / "results.json", ROOT / "bench" / "results" / "mutations.json"
 LEAST_TIME_LIMIT_S = 60
 JOBS = os.environ.get("RAYDIX_JOBS", str(os.cpu_count() or 1))
 
@@ -329,7 +332,33 @@ def noticed_by(fault, programs, limits):
     return None
 
 
+def known_results():
+    return json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.is_file() else {}
+
+
+def keep_result(fault, noticed):
+    """By the fault's own text, so that a fault that changed is not taken for the one that ran."""
+    results = known_results()
+    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True).stdout
+    results[f"{fault.file}: {fault.old} -> {fault.new}"] = {"noticed_by": noticed, "commit": commit.strip()}
+    RESULTS.write_text(json.dumps(results, indent=1), encoding="utf-8")
+
+
+def commit_results():
+    results = known_results()
+    rows = [{"file": fault.file, "breaks": fault.breaks, **results.get(f"{fault.file}: {fault.old} -> {fault.new}", {})}
+            for fault in FAULTS]
+    missing = [row["breaks"] for row in rows if "commit" not in row]
+    if missing:
+        sys.exit("never run:\n  " + "\n  ".join(missing))
+    summary = {"faults": len(rows), "noticed": sum(row["noticed_by"] is not None for row in rows), "rows": rows}
+    COMMITTED.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    print(f"wrote {COMMITTED.relative_to(ROOT)}: {summary['noticed']} of {summary['faults']} noticed")
+
+
 def main(arguments):
+    if arguments == ["--commit-results"]:
+        return commit_results()
     chosen = [int(a) for a in arguments] or list(range(1, len(FAULTS) + 1))
     programs, limits, _lock = prepare()  # the lock lasts as long as the run
     bad = []
@@ -347,6 +376,7 @@ def main(arguments):
                 who = noticed_by(fault, programs, limits)
             finally:
                 file.write_text(text)
+            keep_result(fault, who)
             outcome = f"noticed by {who}" if who else "NOT NOTICED"
             bad += [] if who else [number]
         print(f"{number:3}  {fault.file}: {fault.breaks}\n     {outcome} ({time.monotonic() - start:.0f} s)", flush=True)
