@@ -122,13 +122,16 @@ HWY_INLINE hn::Vec<HalfOf<D>> rounded(D, hn::Vec<D> x) {
     return hn::Add(hn::DemoteTo(h, x), hn::Zero(h));
 }
 
+/// The largest distance of a corner along kz.
+template <class V>
+HWY_INLINE V farthest(const V (&corner)[3][3]) {
+    return hn::Max(hn::Max(hn::Abs(corner[0][2]), hn::Abs(corner[1][2])), hn::Abs(corner[2][2]));
+}
 /// Lanes that has_far_corner leaves alone.
 template <class D>
-HWY_INLINE std::uint32_t without_far_corner(D d, const hn::Vec<D> (&corner)[3][3], hn::Vec<D> t,
-                                            hn::Vec<D> tmin, hn::Vec<D> way) {
+HWY_INLINE std::uint32_t without_far_corner(D d, hn::Vec<D> farthest, hn::Vec<D> t, hn::Vec<D> tmin,
+                                            hn::Vec<D> way) {
     const auto rate = hn::Abs(way), depth = hn::Mul(t, rate);
-    const auto farthest =
-        hn::Max(hn::Max(hn::Abs(corner[0][2]), hn::Abs(corner[1][2])), hn::Abs(corner[2][2]));
     const auto near = hn::Le(farthest, hn::Mul(hn::Abs(depth), hn::Set(d, far_corner)));
     const auto slack = hn::Mul(farthest, hn::Set(d, far_corner_slack));
     return bits_of(d, hn::Or(near, hn::Lt(hn::Add(depth, slack), hn::Mul(tmin, rate))));

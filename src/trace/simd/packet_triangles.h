@@ -88,27 +88,52 @@ private:
         return quads <= 2 ? quads <= tests : 3 * quads <= 2 * tests;
     }
 
-    /// Corners as rays of one origin see them.
-    struct Corners {
-        HWY_ALIGN float from_origin[9][block_lanes];
+    /// One triangle for all vectors of rays: its corners along kx, ky and kz, from where the rays
+    /// start if they all start there.
+    template <bool one_origin>
+    struct Target {
+        const TriangleBlock& block;
+        const std::uint32_t lane;
+        float corner[3][3];
+        // From the first hit on: the same in double, and what has_far_corner needs of them.
+        double exact[3][3], farthest;
+        bool has_exact = false, may_be_far;
+
+        HWY_INLINE Target(const TriangleBlock& of, std::uint32_t at, const Packet& p)
+            : block(of), lane(at) {
+            for (std::size_t v = 0; v < 3; ++v)
+                for (std::size_t k = 0; k < 3; ++k)
+                    corner[v][k] = of.corner[3 * v + p.kind.axis(k)][at] -
+                                   (one_origin ? p.origin_lo[p.kind.axis(k)] : 0.0f);
+        }
+        HWY_NOINLINE void add_exact(const Packet& p) {
+            for (std::size_t v = 0; v < 3; ++v)
+                for (std::size_t k = 0; k < 3; ++k)
+                    exact[v][k] = double{block.corner[3 * v + p.kind.axis(k)][lane]} -
+                                  double{p.origin_lo[p.kind.axis(k)]};
+            const double z[3] = {exact[0][2], exact[1][2], exact[2][2]};
+            farthest = max_of(max_of(std::fabs(z[0]), std::fabs(z[1])), std::fabs(z[2]));
+            // Rays meet it between its corners, half of far_corner leaves room for rounding.
+            const double least = min_of(min_of(std::fabs(z[0]), std::fabs(z[1])), std::fabs(z[2]));
+            may_be_far =
+                !(z[0] * z[1] > 0 && z[0] * z[2] > 0 && farthest <= least * (far_corner / 2));
+            has_exact = true;
+        }
     };
 
     template <bool one_origin>
     HWY_INLINE bool test_vectors(const TriangleBlock& block, std::uint32_t lane,
                                  std::uint32_t count, std::uint64_t active) {
-        Corners corners;
-        if constexpr (one_origin) {
-            for (std::size_t k = 0; k < 9; ++k)
-                hn::Store(hn::Sub(hn::Load(f4, block.corner[k]), hn::Set(f4, p_.origin_lo[k % 3])),
-                          f4, corners.from_origin[k]);
-        }
         bool changed = false;
-        for (std::size_t vector = 0; vector < packet_size / lanes16; ++vector) {
-            const auto wanted =
-                static_cast<std::uint32_t>(active >> (vector * lanes16) & vector_bits);
-            if (wanted == 0) continue;
-            for (std::uint32_t k = lane; k < lane + count; ++k)
-                changed |= test_triangle<one_origin>(block, corners, k, vector * lanes16, wanted);
+        for (const std::uint32_t end = lane + count; lane < end; ++lane) {
+            Target<one_origin> target(block, lane, p_);
+            for (std::uint64_t rest = active; rest != 0;) {
+                const std::size_t i =
+                    static_cast<std::size_t>(std::countr_zero(rest)) / lanes16 * lanes16;
+                rest &= ~(vector_bits << i);
+                changed |=
+                    test_triangle(target, i, static_cast<std::uint32_t>(active >> i & vector_bits));
+            }
         }
         return changed;
     }
@@ -199,11 +224,11 @@ private:
                                 V direction, std::uint32_t candidates, std::uint32_t clear) {
         const D d;
         const H h;
-        const std::uint32_t axis[3] = {p_.kind.kx, p_.kind.ky, p_.kind.kz};
+        const RayClass& kind = p_.kind;
         HWY_ALIGN float from[4][lanes16], way[3][lanes16];  // the fourth: tmin
         for (std::size_t k = 0; k < 3; ++k) {
-            hn::Store(spread(origin, axis[k]), f16, from[k]);
-            hn::Store(spread(direction, axis[k]), f16, way[k]);
+            hn::Store(spread(origin, kind.axis(k)), f16, from[k]);
+            hn::Store(spread(direction, kind.axis(k)), f16, way[k]);
         }
         hn::Store(hn::Max(spread(origin, 3), hn::Zero(f16)), f16, from[3]);
         HWY_ALIGN float t[lanes16], u[lanes16], v[lanes16];
@@ -215,7 +240,7 @@ private:
                 const VD start = hn::PromoteTo(d, hn::Load(h, from[k] + part));
                 way_d[k] = hn::PromoteTo(d, hn::Load(h, way[k] + part));
                 for (std::uint32_t c = 0; c < 3; ++c) {
-                    const float* const row = block.corner[3 * c + axis[k]];
+                    const float* const row = block.corner[3 * c + kind.axis(k)];
                     hn::Vec<H> at;
                     if constexpr (lanes_d >= block_lanes)
                         at = hn::LoadDup128(h, row);
@@ -226,9 +251,10 @@ private:
             }
             const auto at = weights::weigh(d, corner, way_d);
             const auto tmin = hn::PromoteTo(d, hn::Load(h, from[3] + part));
-            sure |= (weights::inside(d, at) &
-                     weights::without_far_corner(d, corner, at.t, tmin, way_d[2]))
-                    << part;
+            sure |=
+                (weights::inside(d, at) &
+                 weights::without_far_corner(d, weights::farthest(corner), at.t, tmin, way_d[2]))
+                << part;
             hn::Store(weights::rounded(d, at.t), h, t + part);
             hn::Store(weights::rounded(d, at.u), h, u + part);
             hn::Store(weights::rounded(d, at.v), h, v + part);
@@ -263,25 +289,22 @@ private:
     }
 
     template <bool one_origin>
-    HWY_INLINE Corner shear(const TriangleBlock& block, const Corners& corners, int vertex,
-                            std::uint32_t lane, std::size_t i) const {
-        const auto at = [&](std::uint32_t axis) {
-            const int k = 3 * vertex + static_cast<int>(axis);
-            if constexpr (one_origin) return hn::Set(f16, corners.from_origin[k][lane]);
-            return hn::Sub(hn::Set(f16, block.corner[k][lane]), hn::Load(f16, p_.origin[axis] + i));
+    HWY_INLINE Corner shear(const Target<one_origin>& target, std::uint32_t vertex,
+                            std::size_t i) const {
+        const auto at = [&](std::size_t k) {
+            const V corner = hn::Set(f16, target.corner[vertex][k]);
+            if constexpr (one_origin) return corner;
+            return hn::Sub(corner, hn::Load(f16, p_.origin[p_.kind.axis(k)] + i));
         };
-        const V z = at(p_.kind.kz);
-        return {hn::Sub(at(p_.kind.kx), hn::Mul(hn::Load(f16, p_.shear_x + i), z)),
-                hn::Sub(at(p_.kind.ky), hn::Mul(hn::Load(f16, p_.shear_y + i), z)), z};
+        const V z = at(2);
+        return {hn::Sub(at(0), hn::Mul(hn::Load(f16, p_.shear_x + i), z)),
+                hn::Sub(at(1), hn::Mul(hn::Load(f16, p_.shear_y + i), z)), z};
     }
     /// intersect_triangle for the rays i + (bits of `wanted`): the same bits. Whether any ray came
     /// nearer.
     template <bool one_origin>
-    HWY_INLINE bool test_triangle(const TriangleBlock& block, const Corners& corners,
-                                  std::uint32_t lane, std::size_t i, std::uint32_t wanted) {
-        const Corner a = shear<one_origin>(block, corners, 0, lane, i),
-                     b = shear<one_origin>(block, corners, 1, lane, i),
-                     c = shear<one_origin>(block, corners, 2, lane, i);
+    HWY_INLINE bool test_triangle(Target<one_origin>& target, std::size_t i, std::uint32_t wanted) {
+        const Corner a = shear(target, 0, i), b = shear(target, 1, i), c = shear(target, 2, i);
         const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
         std::uint32_t candidates = wanted & ~bits_of(f16, astride(f16, u, v, w));
         if (candidates == 0) return false;
@@ -297,7 +320,7 @@ private:
             candidates = hit.open;
             if (candidates == 0) return changed;
         }
-        return finish_rays<one_origin>(block, lane, i, candidates, clear) || changed;
+        return finish_rays(target, i, candidates, clear) || changed;
     }
     [[nodiscard]] HWY_INLINE Limits<F16> limits(V tmin, V tmax, V way) const {
         const std::uint32_t kz = p_.kind.kz;
@@ -312,71 +335,64 @@ private:
 
     /// The second half of the test for the rays i + (bits of `candidates`) and one triangle.
     template <bool one_origin>
-    HWY_INLINE bool finish_rays(const TriangleBlock& block, std::uint32_t lane, std::size_t i,
-                                std::uint32_t candidates, std::uint32_t clear) {
+    HWY_INLINE bool finish_rays(Target<one_origin>& target, std::size_t i, std::uint32_t candidates,
+                                std::uint32_t clear) {
         bool changed = false;
         std::uint32_t alone = candidates & ~clear;
         for (std::size_t part = 0; part < lanes16; part += lanes_d) {
             const std::uint32_t here = (candidates & clear) >> part & ((1u << lanes_d) - 1);
-            if (here != 0)
-                alone |= finish_vector<one_origin>(block, lane, i + part, here, changed) << part;
+            if (here != 0) alone |= finish_vector(target, i + part, here, changed) << part;
         }
         for (; alone != 0; alone &= alone - 1)
-            changed |=
-                test_alone(block, lane, i + static_cast<std::size_t>(std::countr_zero(alone)));
+            changed |= test_alone(target.block, target.lane,
+                                  i + static_cast<std::size_t>(std::countr_zero(alone)));
         return changed;
-    }
-
-    /// The triangle's corners from where the rays i and on start.
-    template <bool one_origin>
-    HWY_INLINE void load_corners(const TriangleBlock& block, std::uint32_t lane, std::size_t i,
-                                 VD (&corner)[3][3]) const {
-        const D d;
-        const std::uint32_t axis[3] = {p_.kind.kx, p_.kind.ky, p_.kind.kz};
-        for (std::uint32_t k = 0; k < 3; ++k) {
-            VD origin = hn::Zero(d);
-            if constexpr (!one_origin)
-                origin = hn::PromoteTo(d, hn::Load(H(), p_.origin[axis[k]] + i));
-            for (std::uint32_t v = 0; v < 3; ++v) {
-                const float at = block.corner[3 * v + axis[k]][lane];
-                if constexpr (one_origin)
-                    corner[v][k] = hn::Set(d, double{at} - double{p_.origin_lo[axis[k]]});
-                else
-                    corner[v][k] = hn::Sub(weights::spread(d, at), origin);
-            }
-        }
     }
 
     /// finish_hit for the rays i + (bits of `candidates`); those that it leaves open.
     template <bool one_origin>
-    HWY_INLINE std::uint32_t finish_vector(const TriangleBlock& block, std::uint32_t lane,
-                                           std::size_t i, std::uint32_t candidates, bool& changed) {
+    HWY_INLINE std::uint32_t finish_vector(Target<one_origin>& target, std::size_t i,
+                                           std::uint32_t candidates, bool& changed) {
         const D d;
         const H h;
-        VD corner[3][3];
-        load_corners<one_origin>(block, lane, i, corner);
-        const auto way = [&](std::uint32_t axis) {
-            return hn::PromoteTo(D(), hn::Load(H(), p_.direction[axis] + i));
+        const auto doubles = [&](const float* from) {
+            return hn::PromoteTo(D(), hn::Load(H(), from + i));
         };
-        const VD direction[3] = {way(p_.kind.kx), way(p_.kind.ky), way(p_.kind.kz)};
+        VD corner[3][3], direction[3], farthest;
+        for (std::size_t k = 0; k < 3; ++k) direction[k] = doubles(p_.direction[p_.kind.axis(k)]);
+        bool may_be_far = true;
+        if constexpr (one_origin) {
+            if (!target.has_exact) target.add_exact(p_);
+            for (std::size_t v = 0; v < 3; ++v)
+                for (std::size_t k = 0; k < 3; ++k) corner[v][k] = hn::Set(d, target.exact[v][k]);
+            may_be_far = target.may_be_far;
+            farthest = hn::Set(d, target.farthest);
+        } else {
+            for (std::size_t k = 0; k < 3; ++k) {
+                const VD origin = doubles(p_.origin[p_.kind.axis(k)]);
+                for (std::size_t v = 0; v < 3; ++v)
+                    corner[v][k] = hn::Sub(weights::spread(d, target.corner[v][k]), origin);
+            }
+            farthest = weights::farthest(corner);
+        }
         const auto at = weights::weigh(d, corner, direction);
         const auto t = weights::rounded(d, at.t), reach = hn::Load(h, p_.t + i);
-        const auto tmin = hn::PromoteTo(d, hn::Load(h, p_.tmin + i));
-        const std::uint32_t sure = weights::inside(d, at) &
-                                   weights::without_far_corner(d, corner, at.t, tmin, direction[2]),
-                            open = candidates & ~sure;
-        candidates &=
-            sure & bits_of(h, hn::And(hn::Ge(t, hn::Load(h, p_.tmin + i)), hn::Le(t, reach)));
-        if (candidates == 0) return open;
+        std::uint32_t sure = weights::inside(d, at);
+        if (may_be_far)
+            sure &= weights::without_far_corner(d, farthest, at.t, doubles(p_.tmin), direction[2]);
+        const std::uint32_t open = candidates & ~sure;
+        candidates &= sure & bits_of(h, hn::Ge(t, hn::Load(h, p_.tmin + i)));
+        const std::uint32_t equal = candidates & bits_of(h, hn::Eq(t, reach));
+        candidates &= bits_of(h, hn::Lt(t, reach));
+        if ((candidates | equal) == 0) return open;
         changed = true;
-        found_ |= std::uint64_t{candidates} << i;
+        found_ |= std::uint64_t{candidates | equal} << i;
         if constexpr (any) return open;
-        // At equal t the lower primitive wins.
         const hn::RebindToUnsigned<H> n;
-        const auto own = hn::Set(n, block.prim[lane]), old = hn::Load(n, p_.prim + i);
-        const auto better =
-            hn::Or(hn::Lt(t, reach), hn::RebindMask(h, hn::Eq(hn::Min(own, old), own)));
-        const auto take = hn::And(better, mask_of(h, candidates));
+        const auto own = hn::Set(n, target.block.prim[target.lane]), old = hn::Load(n, p_.prim + i);
+        // At equal t the lower primitive wins.
+        if (equal != 0) candidates |= equal & bits_of(h, hn::RebindMask(h, hn::Lt(own, old)));
+        const auto take = mask_of(h, candidates);
         const auto store = [&](auto value, float* to) {
             hn::Store(hn::IfThenElse(take, value, hn::Load(H(), to)), H(), to);
         };

@@ -15,6 +15,10 @@ struct RayClass {
     std::uint32_t negatives;   // bit a: component a of the direction is negative (or -0)
     std::uint32_t kx, ky, kz;  // as in RayFrame
 
+    /// kx, ky and kz.
+    [[nodiscard]] constexpr std::uint32_t axis(std::size_t k) const {
+        return k == 0 ? kx : k == 1 ? ky : kz;
+    }
     [[nodiscard]] constexpr bool negative(int axis) const { return (negatives >> axis & 1) != 0; }
 };
 
