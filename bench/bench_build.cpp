@@ -88,7 +88,7 @@ Json run_embree(const raydix::Mesh& mesh, const Options& options) {
 #endif
 
 Json run(const Options& options) {
-    raydix::Scene scene = raydix::load_scene(options.scene);
+    raydix::Model scene = raydix::load_model(options.scene);
     scene.mesh.vertices.reserve(scene.mesh.vertices.size() +
                                 1);  // Embree reads past the last vertex
     Json result;

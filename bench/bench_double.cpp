@@ -10,7 +10,7 @@
 #include <raydix/machine.h>
 #include <raydix/overlap.h>
 #include <raydix/rays.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <CLI/CLI.hpp>
@@ -58,7 +58,7 @@ struct Trees {
     raydix::Bvh in_float;
     raydix::BvhD in_double;
 
-    Trees(const raydix::Scene& scene, const Options& options)
+    Trees(const raydix::Model& scene, const Options& options)
         : mesh(scene.mesh),
           wide{"", {}, scene.mesh.triangles},
           build{.builder = raydix::builder_from_name(options.builder), .threads = options.threads},
@@ -157,7 +157,7 @@ Json bench_sweeps(const Trees& trees, std::span<const raydix::Ray> rays, const O
 /// each of them.
 template <class Scene, class Instance, class Tree>
 Scene crowd(const Tree& tree, double step, int threads) {
-    Scene scene;
+    Model scene;
     const std::uint32_t object = scene.add_object(tree);
     for (std::uint32_t k = 0; k < crowd_size; ++k) {
         Instance instance{.object = object};
@@ -202,7 +202,7 @@ Json bench_instances(const Trees& trees, std::span<const raydix::Ray> rays,
 
 void run(const Options& options) {
     for (const std::string& name : options.scenes) {
-        const raydix::Scene scene = raydix::load_scene(name, options.seed);
+        const raydix::Model scene = raydix::load_model(name, options.seed);
         const Trees trees(scene, options);
         std::vector<std::uint32_t> pixels;
         const auto primary =

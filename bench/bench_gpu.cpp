@@ -8,7 +8,7 @@
 #include <raydix/device_trees.h>
 #include <raydix/machine.h>
 #include <raydix/rays.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -182,7 +182,7 @@ Json measure_rays(const raydix::DeviceCwbvhTree& tree, const std::vector<raydix:
     return rates;
 }
 
-Json measure_cwbvh(const raydix::Scene& scene, int repeat) {
+Json measure_cwbvh(const raydix::Model& scene, int repeat) {
     const raydix::Bvh bvh =
         build_bvh(scene.mesh, {.builder = raydix::Builder::ploc, .max_leaf = 1});
     const raydix::Cwbvh tree(bvh);
@@ -204,7 +204,7 @@ void run(const Options& options) {
     const std::string device = raydix::device_name();
     const double copy_rate = raydix::measure_device_copy(options.copy_bytes, options.repeat);
     for (const std::string& name : options.scenes) {
-        const raydix::Scene scene = raydix::load_scene(name, options.seed);
+        const raydix::Model scene = raydix::load_model(name, options.seed);
         const DeviceInput input(scene.mesh);
         const auto print = [&](const Json& row) {
             Json line{{"bench", "gpu_build"},

@@ -6,7 +6,7 @@
 #include <raydix/device_trace.h>
 #include <raydix/machine.h>
 #include <raydix/rays.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <CLI/CLI.hpp>
@@ -35,7 +35,7 @@ Json spread_json(std::vector<double> values) {
 }
 
 /// Rays of one kind from the scene's first camera, at most `launch_rays`.
-std::vector<raydix::Ray> make_rays(const Options& options, const raydix::Scene& scene,
+std::vector<raydix::Ray> make_rays(const Options& options, const raydix::Model& scene,
                                    const raydix::Bvh& bvh, const std::string& kind) {
     const raydix::CameraSet& set = scene.cameras;
     std::vector<std::uint32_t> pixels;
@@ -106,7 +106,7 @@ Json measure(const raydix::DeviceWarpTree& tree, const Launch& launch, raydix::W
 void run(const Options& options) {
     const std::string device = raydix::device_name();
     for (const std::string& name : options.scenes) {
-        const raydix::Scene scene = raydix::load_scene(name, options.seed);
+        const raydix::Model scene = raydix::load_model(name, options.seed);
         raydix::BuildOptions build;
         build.builder = raydix::builder_from_name(options.builder);
         build.max_leaf = options.max_leaf;

@@ -98,7 +98,7 @@ KdTreeOptions tree_options(const Options& options) {
 
 /// Points of the set in random order, and in the order of the tree's leaves.
 void bench_nearest(const Options& options) {
-    const Scene scene = load_scene(options.points, options.seed);
+    const Model scene = load_model(options.points, options.seed);
     if (!scene.mesh.is_point_cloud()) throw InputError(options.points + ": not a set of points");
     const KdTree tree = build_kdtree(scene.mesh, tree_options(options));
     std::vector<std::uint32_t> positions(tree.order().size());
@@ -137,7 +137,7 @@ Json counts_json(const TraceCounts& counts, const Json& rate) {
             {"triangle_tests_per_ray", static_cast<double>(counts.triangle_tests) / n}};
 }
 
-void bench_rays_of(const std::string& kind, const Options& options, const Scene& scene,
+void bench_rays_of(const std::string& kind, const Options& options, const Model& scene,
                    const KdTree& tree, const Bvh& bvh, std::span<const Ray> rays) {
     std::vector<Hit> by_tree(rays.size()), by_bvh(rays.size());
     const TraceOptions counting{.threads = options.threads, .counters = true},
@@ -160,7 +160,7 @@ void bench_rays_of(const std::string& kind, const Options& options, const Scene&
 }
 
 void bench_rays(const Options& options) {
-    const Scene scene = load_scene(options.scene, options.seed);
+    const Model scene = load_model(options.scene, options.seed);
     const KdTree tree = build_kdtree(scene.mesh, tree_options(options));
     const Bvh bvh = build_bvh(scene.mesh, {.bits = options.bits, .threads = options.threads});
     std::vector<std::uint32_t> pixels;

@@ -68,7 +68,7 @@ public:
 
 private:
     Json study(const std::string& name) {
-        const Scene scene = load_scene(name, options_.common.seed);
+        const Model scene = load_model(name, options_.common.seed);
         const std::vector<Vec3>& points = scene.mesh.vertices;
         const Points index = build_points(points, {.strict = true, .threads = threads_});
         if (index.empty()) throw InputError("holds no points");

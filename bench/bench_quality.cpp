@@ -63,7 +63,7 @@ struct RayBatch {
     std::vector<raydix::Ray> primary, diffuse;
 };
 
-RayBatch make_rays(const raydix::Scene& scene, const raydix::Bvh& bvh, const Options& options) {
+RayBatch make_rays(const raydix::Model& scene, const raydix::Bvh& bvh, const Options& options) {
     RayBatch all;
     const auto append = [](std::vector<raydix::Ray>& to, const std::vector<raydix::Ray>& from) {
         to.insert(to.end(), from.begin(), from.end());
@@ -125,7 +125,7 @@ void print_table(const Json& result) {
 }
 
 Json run(const std::string& scene_name, const Options& options) {
-    raydix::Scene scene = raydix::load_scene(scene_name);
+    raydix::Model scene = raydix::load_model(scene_name);
     scene.mesh.vertices.reserve(scene.mesh.vertices.size() + 1);  // Embree reads past the last
     std::map<std::string, Peer> peers;
     std::map<std::string, raydix::BvhBuilder> builders;

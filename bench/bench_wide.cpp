@@ -6,7 +6,7 @@
 #include <raydix/cwbvh.h>
 #include <raydix/machine.h>
 #include <raydix/rays.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -129,7 +129,7 @@ Json tree_json(const raydix::Bvh& bvh, const raydix::Cwbvh& cwbvh, int repeat) {
 
 void run(const Options& options) {
     for (const std::string& name : options.scenes) {
-        const raydix::Scene scene = raydix::load_scene(name, options.seed);
+        const raydix::Model scene = raydix::load_model(name, options.seed);
         for (const std::string& builder : options.builders) {
             const raydix::Bvh bvh = build_bvh(
                 scene.mesh,

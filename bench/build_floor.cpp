@@ -2,7 +2,7 @@
 // centroids already at hand, a plain least-significant-digit sort, a gather of boxes; and a triad
 // for the memory's bandwidth.
 #include <fmt/format.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -73,7 +73,7 @@ double triad_gb_per_s() {
 }
 
 Json run(const std::string& spec, int threads) {
-    const Mesh mesh = load_scene(spec).mesh;
+    const Mesh mesh = load_model(spec).mesh;
     const std::size_t n = mesh.triangles.size();
     const TriangleSource source{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()};
     std::vector<Aabb> boxes(n), gathered(n);

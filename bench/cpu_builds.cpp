@@ -61,7 +61,7 @@ std::vector<PeerBuilds> measure_builds(const std::string& scene, const CpuBench&
 }
 
 void print_builds_of_one_peer(const CpuBench& options) {
-    Scene scene = load_scene(options.scenes.front(), options.common.seed);
+    Model scene = load_model(options.scenes.front(), options.common.seed);
     scene.mesh.vertices.reserve(scene.mesh.vertices.size() + 1);
     const auto peer = make_peer({options.build_of}, scene.mesh, options, options.common.threads);
     Json result{{"fresh_ms", nullptr}, {"kept_ms", Json::array()}, {"layout_ms", Json::array()}};

@@ -112,12 +112,12 @@ public:
         if (options_.common.prints_tables()) print_machines();
         for (const int bits : options_.bits) {
             for (const std::string& name : options_.scenes) {
-                const Scene scene = load_scene(name, options_.common.seed);
+                const Model scene = load_model(name, options_.common.seed);
                 study(scene, bits, false);
                 about(scene.name, [&] { time_builds(scene, bits); });
             }
             for (const std::uint64_t n : options_.sizes)
-                study(load_scene(fmt::format("builtin:soup?triangles={}", n), options_.common.seed),
+                study(load_model(fmt::format("builtin:soup?triangles={}", n), options_.common.seed),
                       bits, true);
         }
     }
@@ -166,7 +166,7 @@ private:
         fmt::print("\n");
     }
 
-    void study(const Scene& scene, int bits, bool size_series) {
+    void study(const Model& scene, int bits, bool size_series) {
         bool headed = false;
         std::vector<std::uint64_t> levels;
         for (const Variant& variant : variants_of(options_.builders)) {
@@ -194,7 +194,7 @@ private:
     }
 
     /// Whole builds into kept memory, stage by stage: what a user of each builder gets here.
-    void time_builds(const Scene& scene, int bits) {
+    void time_builds(const Model& scene, int bits) {
         constexpr std::array<std::pair<const char*, double BuildMs::*>, 7> stages{
             {{"bounds", &BuildMs::bounds},
              {"codes", &BuildMs::codes},
@@ -255,7 +255,7 @@ private:
         return times;
     }
 
-    void note(const Scene& scene, const Variant& variant, const HierarchyRun& run, int threads,
+    void note(const Model& scene, const Variant& variant, const HierarchyRun& run, int threads,
               bool size_series) {
         Json entry{{"scene", scene.name},
                    {"series", size_series ? "size" : "scene"},

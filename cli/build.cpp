@@ -124,7 +124,7 @@ void run_build(const BuildCommand& options) {
         throw CLI::ValidationError("--output", ".rdx files hold the binary layout");
     if (options.tree.tree != "bvh") return run_core_tree(options);
     Json document = new_document("build");
-    const Scene scene = load_scene_with_cameras(options.scene, options.tree, options.common);
+    const Model scene = load_model_with_cameras(options.scene, options.tree, options.common);
     document["scene"] = scene_json(scene);
     document["load_ms"] = scene.load_ms;
     const TimedBuilds timed = about(options.scene, [&] {

@@ -87,7 +87,7 @@ void run_core_build(const std::string& scene_name, const TreeOptions& tree_optio
                     const typename Kind::Options& options, const CommonOptions& common,
                     int repeat) {
     Json document = new_document("build");
-    const Scene scene = load_scene_with_cameras(scene_name, tree_options, common);
+    const Model scene = load_model_with_cameras(scene_name, tree_options, common);
     document["scene"] = scene_json(scene);
     document["load_ms"] = scene.load_ms;
     const auto builds = about(scene_name, [&] {
@@ -115,7 +115,7 @@ template <class Kind>
 void run_core_check(const std::string& scene_name, const TreeOptions& tree_options,
                     const typename Kind::Options& options, const CommonOptions& common) {
     Json document = new_document("check");
-    const Scene scene = load_scene_with_cameras(scene_name, tree_options, common);
+    const Model scene = load_model_with_cameras(scene_name, tree_options, common);
     const CheckReport report = about(scene_name, [&] {
         return Kind::check(build_core<Kind>(scene.mesh, options, tree_options.device, 0).tree,
                            scene.mesh);

@@ -14,7 +14,7 @@ struct InfoOptions {
     std::string scene;
 };
 
-void print_info(const Scene& scene, const MeshInfo& info) {
+void print_info(const Model& scene, const MeshInfo& info) {
     fmt::print("scene        {}\n", scene.name);
     fmt::print("triangles    {}\n", grouped(info.triangles));
     fmt::print("vertices     {}\n", grouped(info.vertices));
@@ -42,7 +42,7 @@ void run_info(const InfoOptions& options) {
     if (is_rdx(options.scene))
         input = load_scene_tree(options.scene, options.tree, options.common);
     else
-        input.scene = load_scene_with_cameras(options.scene, options.tree, options.common);
+        input.scene = load_model_with_cameras(options.scene, options.tree, options.common);
     const MeshInfo info = inspect(input.scene.mesh);
     document["scene"] = scene_json(input.scene);
     document["scene"].update(mesh_info_json(info));

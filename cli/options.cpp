@@ -143,15 +143,15 @@ bool is_rdx(const std::string& scene) { return scene.ends_with(".rdx"); }
 
 namespace {
 
-void override_cameras(Scene& scene, const TreeOptions& tree) {
+void override_cameras(Model& scene, const TreeOptions& tree) {
     if (!tree.cameras_file.empty()) scene.cameras = load_cameras(tree.cameras_file);
 }
 
 }  // namespace
 
-Scene load_scene_with_cameras(const std::string& name, const TreeOptions& tree,
+Model load_model_with_cameras(const std::string& name, const TreeOptions& tree,
                               const CommonOptions& common) {
-    Scene scene = is_rdx(name) ? load_rdx(name).scene : load_scene(name, common.seed);
+    Model scene = is_rdx(name) ? load_rdx(name).scene : load_model(name, common.seed);
     override_cameras(scene, tree);
     return scene;
 }
@@ -193,7 +193,7 @@ SceneTree load_scene_tree(const std::string& name, const TreeOptions& tree,
         override_cameras(file.scene, tree);
         return {std::move(file.scene), std::move(file.bvh)};
     }
-    SceneTree result{load_scene_with_cameras(name, tree, common), {}};
+    SceneTree result{load_model_with_cameras(name, tree, common), {}};
     result.bvh = about(name, [&] {
         const BuildOptions options = tree.build_options(common);
         return tree.device == "cuda" ? DeviceScene(result.scene.mesh, options).build().bvh

@@ -4,7 +4,7 @@
 
 #include <raydix/bvh.h>
 #include <raydix/error.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -45,11 +45,11 @@ void add_tree_options(CLI::App& command, TreeOptions& options);
 
 /// A scene and its tree: built, or both read from a .rdx file.
 struct SceneTree {
-    Scene scene;
+    Model scene;
     Bvh bvh;
 };
 [[nodiscard]] bool is_rdx(const std::string& scene);
-[[nodiscard]] Scene load_scene_with_cameras(const std::string& scene, const TreeOptions& tree,
+[[nodiscard]] Model load_model_with_cameras(const std::string& scene, const TreeOptions& tree,
                                             const CommonOptions& common);
 /// A .rdx file brings its tree: options that ask for another one are a usage error, never ignored.
 void refuse_build_options(const std::string& scene, const TreeOptions& tree);

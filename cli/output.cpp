@@ -53,7 +53,7 @@ Json new_document(const std::string& command) {
     return document;
 }
 
-Json scene_json(const Scene& scene) {
+Json scene_json(const Model& scene) {
     const Mesh& mesh = scene.mesh;
     return {{"name", scene.name},
             {"triangles", mesh.triangles.size()},

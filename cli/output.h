@@ -3,7 +3,7 @@
 
 #include <raydix/bvh.h>
 #include <raydix/mesh.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 
 /// {command, version, machine}: the start of every document.
 [[nodiscard]] Json new_document(const std::string& command);
-[[nodiscard]] Json scene_json(const Scene& scene);
+[[nodiscard]] Json scene_json(const Model& scene);
 [[nodiscard]] Json mesh_info_json(const MeshInfo& info);
 
 /// Median, least and greatest of some repeats. At least one value.

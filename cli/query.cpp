@@ -107,8 +107,8 @@ void print_query(const Json& query) {
                number("min"), number("max"));
 }
 
-Scene load_query_scene(const std::string& scene, const CommonOptions& common) {
-    return is_rdx(scene) ? load_rdx(scene).scene : load_scene(scene, common.seed);
+Model load_query_scene(const std::string& scene, const CommonOptions& common) {
+    return is_rdx(scene) ? load_rdx(scene).scene : load_model(scene, common.seed);
 }
 
 void add_query_command(CLI::App& app) {

@@ -35,10 +35,10 @@ struct QueryFigures {
 void print_query(const Json& query);
 
 /// A file, a built-in scene, or the scene of a .rdx file.
-[[nodiscard]] Scene load_query_scene(const std::string& scene, const CommonOptions& common);
+[[nodiscard]] Model load_query_scene(const std::string& scene, const CommonOptions& common);
 
 /// --queries, or the scene's own points.
-[[nodiscard]] std::vector<Vec3> load_queries(const QueryCommand& options, const Scene& scene);
+[[nodiscard]] std::vector<Vec3> load_queries(const QueryCommand& options, const Model& scene);
 
 /// Seconds of `work`, once to warm up and then `repeat` times.
 template <class Work>

@@ -52,7 +52,7 @@ void save_lists(const QueryCommand& options, const PointLists<float>& lists) {
     save_array(options.prefix + ".distances.npy", lists.distances.view());
 }
 
-QueryFigures answer_nearest(const QueryCommand& options, const Points& index, const Scene& scene,
+QueryFigures answer_nearest(const QueryCommand& options, const Points& index, const Model& scene,
                             const PointQueryOptions& how) {
     QueryFigures figures;
     figures.kind = "knn";
@@ -81,7 +81,7 @@ QueryFigures answer_lists(const QueryCommand& options, const char* kind, const S
     return figures;
 }
 
-QueryFigures answer(const QueryCommand& options, const Points& index, const Scene& scene) {
+QueryFigures answer(const QueryCommand& options, const Points& index, const Model& scene) {
     const PointQueryOptions how{.threads = options.common.threads,
                                 .sort = options.sort,
                                 .max_result_bytes = options.max_result_bytes};
@@ -130,7 +130,7 @@ void print_index(const Points& index) {
 
 }  // namespace
 
-std::vector<Vec3> load_queries(const QueryCommand& options, const Scene& scene) {
+std::vector<Vec3> load_queries(const QueryCommand& options, const Model& scene) {
     if (options.queries_file.empty()) return scene.mesh.vertices;
     if (is_npy(options.queries_file)) return rows_of<Vec3>(options.queries_file);
     return load_query_scene(options.queries_file, options.common).mesh.vertices;
@@ -139,7 +139,7 @@ std::vector<Vec3> load_queries(const QueryCommand& options, const Scene& scene) 
 void run_point_query(const QueryCommand& options) {
     if (options.box && options.queries_file.empty())
         throw CLI::ValidationError("--box", "needs --queries, a (Q, 6) .npy file of boxes");
-    const Scene scene = load_query_scene(options.scene, options.common);
+    const Model scene = load_query_scene(options.scene, options.common);
     const Points index = about(options.scene, [&] {
         return build_points(scene.mesh.vertices, {.tree = points_tree_from_name(options.tree),
                                                   .strict = options.strict,

@@ -23,7 +23,7 @@ float chosen_ao_radius(float given, const SceneTree& input) {
     return 0.05f * std::hypot(box.hi.x - box.lo.x, box.hi.y - box.lo.y, box.hi.z - box.lo.z);
 }
 
-std::vector<Camera> chosen_cameras(const std::string& which, const Scene& scene) {
+std::vector<Camera> chosen_cameras(const std::string& which, const Model& scene) {
     const std::vector<Camera>& all = scene.cameras.cameras;
     if (which == "all") return all;
     std::size_t index = 0;

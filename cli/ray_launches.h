@@ -2,7 +2,7 @@
 #pragma once
 
 #include <raydix/rays.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <functional>
@@ -65,7 +65,7 @@ private:
 };
 
 /// --camera: all of the scene's, or one.
-[[nodiscard]] std::vector<Camera> chosen_cameras(const std::string& which, const Scene& scene);
+[[nodiscard]] std::vector<Camera> chosen_cameras(const std::string& which, const Model& scene);
 /// Given, of cameras.json, or 5 % of the box diagonal, in this order.
 [[nodiscard]] float chosen_ao_radius(float given, const SceneTree& input);
 

@@ -26,7 +26,7 @@ struct RenderCommand {
 
 Vec3 vec_of(const std::vector<float>& v) { return {v[0], v[1], v[2]}; }
 
-Camera chosen_camera(const RenderCommand& options, const Scene& scene) {
+Camera chosen_camera(const RenderCommand& options, const Model& scene) {
     Camera camera;
     if (options.camera < scene.cameras.cameras.size())
         camera = scene.cameras.cameras[options.camera];

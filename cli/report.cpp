@@ -45,7 +45,7 @@ void render_views(const std::string& name, const ReportCommand& options, Size si
                   ReportInput& input) {
     const std::string spec = scene_spec(name, options.scene_folder);
     try {
-        const Scene scene = load_scene(spec, options.common.seed);
+        const Model scene = load_model(spec, options.common.seed);
         BuildOptions build;
         build.builder = Builder::ploc;
         build.threads = options.common.threads;

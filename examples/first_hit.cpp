@@ -2,7 +2,7 @@
 
 #include <cstdio>
 int main() {
-    const raydix::Scene scene = raydix::load_scene("builtin:figure?triangles=20000");
+    const raydix::Model scene = raydix::load_model("builtin:figure?triangles=20000");
     const raydix::Bvh bvh = raydix::build_bvh(scene.mesh);
     const auto rays = raydix::make_primary_rays(scene.cameras.cameras[0], 640, 480);
     std::size_t found = 0;

@@ -116,7 +116,7 @@ static void attack_files(Case& c) {
     const BuildOptions options = any_build_options(c.random);
     const Bvh tree = build_bvh(made.mesh, options);
     const ScratchFile file;
-    Scene scene;
+    Model scene;
     scene.name = "attack";
     scene.mesh = made.mesh;
     save_rdx(file.path(), tree, scene);

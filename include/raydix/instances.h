@@ -2,6 +2,7 @@
 #pragma once
 
 #include <raydix/bvh.h>
+#include <raydix/scene.h>
 #include <raydix/types.h>
 
 #include <array>
@@ -11,12 +12,6 @@
 #include <vector>
 
 namespace raydix {
-
-/// Affine: x' = m[0][0]*x + m[0][1]*y + m[0][2]*z + m[0][3], and so on; from the object's space to
-/// that of what it stands in. It may mirror and shear, but not flatten.
-struct Transform {
-    std::array<std::array<float, 4>, 3> m{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-};
 
 /// `object` is an id that InstancedScene gave. Rays see it if mask & their mask is not 0.
 struct Instance {

@@ -3,7 +3,7 @@
 
 #include <raydix/bvh.h>
 #include <raydix/mesh.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <filesystem>
 
@@ -12,10 +12,10 @@ namespace raydix {
 /// Versioned, little-endian, 64-byte aligned sections, a checksum (XXH3-128) per section and one
 /// over the header. Writes as write_file of files.h, so that a reader never sees half a file.
 /// Throws InputError.
-void save_rdx(const std::filesystem::path& file, const Bvh& bvh, const Scene& scene);
+void save_rdx(const std::filesystem::path& file, const Bvh& bvh, const Model& scene);
 
 struct RdxFile {
-    Scene scene;
+    Model scene;
     Bvh bvh;  // views the mapped file, which stays mapped as long as the tree lives
 };
 

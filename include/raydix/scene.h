@@ -1,53 +1,147 @@
-// Scenes by name: a file, or a built-in generator.
+// What rays are traced through: triangle meshes, and instances of other scenes.
 #pragma once
 
-#include <raydix/camera.h>
+#include <raydix/bvh.h>
 #include <raydix/mesh.h>
+#include <raydix/trace.h>
+#include <raydix/types.h>
 
+#include <array>
 #include <cstdint>
-#include <filesystem>
+#include <memory>
+#include <optional>
 #include <span>
 #include <string>
-#include <string_view>
+#include <vector>
 
 namespace raydix {
 
-/// Reads .ply (ascii, binary little and big endian), .obj, .stl (ascii, binary), .gltf, .glb, .off,
-/// .xyz or .npy, each also with .gz, .xz or .zst behind it. Polygons are fanned in order; the
-/// meshes of a glTF scene follow each other. -0 becomes +0. Non-finite coordinates are kept
-/// (builders leave such triangles out). Throws InputError: "FILE: ELEMENT: reason". Memory stays in
-/// proportion to what the file really holds.
-[[nodiscard]] Mesh load_mesh(const std::filesystem::path& file);
+struct Model;
 
-/// One `key=value` that a built-in scene understands.
-struct BuiltinParameter {
-    std::string_view name;
-    double default_value;
-    double min_value, max_value;
-    std::string_view meaning;
+/// Affine: x' = m[0][0]*x + m[0][1]*y + m[0][2]*z + m[0][3], and so on; from the space of what is
+/// placed to that of what it stands in. It may mirror and shear, but not flatten.
+struct Transform {
+    std::array<std::array<float, 4>, 3> m{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 };
 
-/// A scene that the library makes itself, the same on every machine for the same parameters and
-/// seed.
-struct BuiltinScene {
-    std::string_view name;
-    std::string_view what;
-    std::span<const BuiltinParameter> parameters;
+/// What happens to a scene after its first commit.
+enum class Usage : std::uint32_t {
+    fixed = 0,   // little: meshes share trees, and a change of one builds its tree again
+    moving = 1,  // much: a tree a mesh; a commit builds only those of meshes that changed
 };
 
-[[nodiscard]] std::span<const BuiltinScene> builtin_scenes();
-
-/// A mesh with what belongs to it.
-struct Scene {
-    std::string name;  // file name without folders, or the built-in's specification
-    Mesh mesh;
-    CameraSet
-        cameras;  // from cameras.json beside the file, the built-in's own, or one fitted to the box
-    double load_ms = 0.0;
+struct SceneOptions {
+    Quality quality = Quality::balanced;
+    Usage usage = Usage::fixed;
+    bool compact = false;  // the small layout (WideBvhOptions::compact)
+    int threads = 0;       // 0 to 1,024; 0: all the machine has. Hits do not depend on it
 };
 
-/// `spec` is a file path, or "builtin:NAME?key=value&key=value". `seed` drives built-in scenes.
-/// Throws InputError for anything that cannot be read or does not exist.
-[[nodiscard]] Scene load_scene(const std::string& spec, std::uint64_t seed = 1);
+/// Of a geometry. Rays see it if mask & their mask is not 0, and the same holds for each instance
+/// on the way to it.
+struct GeometryOptions {
+    std::uint32_t mask = 0xFFFFFFFFu;
+    std::optional<std::uint32_t> id = {};  // none: the next one
+};
+
+/// What a commit did.
+struct CommitReport {
+    double ms = 0;
+    std::uint64_t meshes = 0, instances = 0;  // of the scene itself
+    std::uint64_t triangles = 0;              // of its meshes
+    std::uint64_t trees_built = 0;            // of triangles; those that did not change are kept
+    std::uint64_t bytes = 0;                  // what rays read of the scene itself
+    std::uint64_t paths = 0;                  // instances, counted on every way to them
+};
+
+/// Where a ray hits: triangle `prim` of mesh `geometry`, weights u of its second corner and v of
+/// its third. `instance` 0: the mesh belongs to the scene itself. Else it is the number of the path
+/// of instances that lead to it: paths count from 1, depth first, ascending id
+/// (Scene::path). A miss has t infinity and prim no_primitive.
+struct SceneHit : Hit {
+    std::uint32_t geometry = no_primitive;
+    std::uint32_t instance = 0;
+};
+
+/// Meshes, and instances of other scenes, which may hold instances themselves. Changes take effect
+/// with `commit`; until then rays meet what the last one saw. Any number of threads may trace a
+/// scene at once; changes and commits need it for themselves.
+class Scene {
+public:
+    /// Levels of instances, at most.
+    static constexpr std::uint32_t max_levels = 32;
+
+    Scene();
+    /// One mesh with id 0, committed.
+    explicit Scene(const MeshView& mesh, const SceneOptions& options = {});
+    explicit Scene(const Mesh& mesh, const SceneOptions& options = {});
+    explicit Scene(const Model& model, const SceneOptions& options = {});
+    ~Scene();
+    Scene(Scene&&) noexcept;
+    Scene& operator=(Scene&&) noexcept;
+
+    /// Adds a mesh, of which the scene keeps a copy. Returns its id: 0, 1, 2, ... in the order of
+    /// calls. Throws InputError: an index past the vertices, vertices without triangles, an id that
+    /// was used before.
+    std::uint32_t add(const MeshView& mesh, const GeometryOptions& options = {});
+    std::uint32_t add(const Mesh& mesh, const GeometryOptions& options = {});
+    /// The same without a copy: the arrays must outlive the scene, or its last commit with this
+    /// mesh.
+    std::uint32_t share(const MeshView& mesh, const GeometryOptions& options = {});
+    /// Places another scene: as its last commit left it when this one is committed. Throws
+    /// InputError: a transform that is singular or not finite, a scene that would hold itself.
+    std::uint32_t add(const Scene& scene, const Transform& transform,
+                      const GeometryOptions& options = {});
+    /// The id is not given again. Throws InputError if there is no such geometry; so do all below.
+    void remove(std::uint32_t id);
+    /// Other vertices or triangles. A shared mesh stays shared, with these arrays.
+    void update(std::uint32_t id, const MeshView& mesh);
+    void set_transform(std::uint32_t id, const Transform& transform);
+    void set_mask(std::uint32_t id, std::uint32_t mask);
+
+    /// Takes all changes in. Throws InputError, the last commit still stands: an instance of a
+    /// scene without a commit, one that reaches beyond the range of coordinates (contract.md 1),
+    /// more than max_levels levels or 2^32 - 2 paths.
+    CommitReport commit(const SceneOptions& options = {});
+    [[nodiscard]] bool committed() const;  // nothing changed since the last commit
+
+    [[nodiscard]] std::uint32_t size() const;  // geometries
+    [[nodiscard]] bool contains(std::uint32_t id) const;
+    /// Of the last commit: around all triangles; lo > hi if there are none.
+    [[nodiscard]] Aabb bounds() const;
+    /// Of the last commit: the ids of the instances on path `number` of a hit, the outermost first.
+    /// Empty for 0. Throws InputError if there is no such path.
+    [[nodiscard]] std::vector<std::uint32_t> path(std::uint32_t number) const;
+
+private:
+    friend struct SceneAccess;
+    struct State;
+    std::shared_ptr<State> state_;
+};
+
+struct SceneTraceOptions {
+    std::uint32_t mask = 0xFFFFFFFFu;           // of all rays
+    std::span<const std::uint32_t> masks = {};  // of each ray, [rays], instead; or empty
+    int threads = 0;                            // 0 to 1,024; 0: all the machine has
+    SimdPath path = SimdPath::automatic;        // hits do not depend on it
+    std::string isa = {};                       // one of simd_instruction_sets(); empty: the best
+};
+
+/// Closest hit of each ray: the least (t, instance, geometry, prim) over all triangles that the
+/// watertight test accepts (Woop, Benthin, Wald 2013; edges belong to both triangles). Rays go
+/// through each instance's inverse in double and are rounded once, where the mesh is. rays [n] ->
+/// hits [n]. Throws InputError: sizes that differ, a scene that was never committed.
+TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<SceneHit> hits,
+                  const SceneTraceOptions& options = {});
+[[nodiscard]] std::vector<SceneHit> trace(const Scene& scene, std::span<const Ray> rays,
+                                          const SceneTraceOptions& options = {});
+/// Whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n].
+TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
+                      std::span<std::uint8_t> occluded, const SceneTraceOptions& options = {});
+
+/// One ray, on the caller's thread.
+[[nodiscard]] SceneHit closest_hit(const Scene& scene, const Ray& ray,
+                                   std::uint32_t mask = 0xFFFFFFFFu);
+[[nodiscard]] bool any_hit(const Scene& scene, const Ray& ray, std::uint32_t mask = 0xFFFFFFFFu);
 
 }  // namespace raydix

@@ -9,7 +9,7 @@
 #include <raydix/picture.h>
 #include <raydix/rays.h>
 #include <raydix/report.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <cstdint>
@@ -53,10 +53,10 @@ nb::dict camera_fields(const Camera& camera) {
 }
 
 nb::dict load(const std::string& spec, std::uint64_t seed) {
-    Scene scene;
+    Model scene;
     {
         const nb::gil_scoped_release unlocked;
-        scene = load_scene(spec, seed);
+        scene = load_model(spec, seed);
     }
     nb::dict fields;
     fields["name"] = scene.name;

@@ -1,7 +1,7 @@
 // A scene by name -> mesh and cameras: a file with the cameras beside it, or a built-in scene.
 #include <raydix/bvh.h>
 #include <raydix/camera.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <string_view>
@@ -28,9 +28,9 @@ Aabb finite_bounds(const Mesh& mesh) {
 
 }  // namespace
 
-Scene load_scene(const std::string& spec, std::uint64_t seed) {
+Model load_model(const std::string& spec, std::uint64_t seed) {
     Stopwatch watch;
-    Scene scene;
+    Model scene;
     if (spec.starts_with(builtin_prefix)) {
         BuiltinResult made =
             make_builtin(std::string_view(spec).substr(builtin_prefix.size()), seed, trace_mesh);

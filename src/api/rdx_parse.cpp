@@ -125,7 +125,7 @@ private:
                              header_.sections[primitives].element_bytes, info_.kind, expected));
     }
 
-    void read_scene(Scene& scene) const {
+    void read_scene(Model& scene) const {
         const auto vertex_view = view<Vec3>(vertices);
         const auto triangle_view = view<Triangle>(triangles);
         scene.mesh.vertices.assign(vertex_view.begin(), vertex_view.end());

@@ -28,7 +28,7 @@ Content content(std::span<const T> elements) {
 /// `name_fault` has made sure that it fits.
 std::uint32_t length_of(const std::string& name) { return static_cast<std::uint32_t>(name.size()); }
 
-Fault name_fault(const Scene& scene) {
+Fault name_fault(const Model& scene) {
     const auto too_long = [](const std::string& name) { return name.size() > UINT32_MAX; };
     const bool any = too_long(scene.name) || too_long(scene.mesh.name) ||
                      std::ranges::any_of(scene.cameras.cameras, too_long, &Camera::name);
@@ -36,7 +36,7 @@ Fault name_fault(const Scene& scene) {
     return fmt::format("names: one has more than {} bytes", UINT32_MAX);
 }
 
-rdx::Info make_info(const Bvh& bvh, const Scene& scene) {
+rdx::Info make_info(const Bvh& bvh, const Model& scene) {
     return {.kind = static_cast<std::uint32_t>(bvh.kind()),
             .builder = static_cast<std::uint32_t>(bvh.options().builder),
             .bits = static_cast<std::uint32_t>(bvh.options().bits),
@@ -61,7 +61,7 @@ struct Packed {
     std::vector<rdx::Camera> cameras;
     std::string names;
 
-    Packed(const Bvh& bvh, const Scene& scene)
+    Packed(const Bvh& bvh, const Model& scene)
         : info(make_info(bvh, scene)), names(scene.name + scene.mesh.name) {
         for (const Camera& c : scene.cameras.cameras) {
             cameras.push_back({c.position, c.target, c.up, c.vfov, length_of(c.name)});
@@ -132,7 +132,7 @@ void write(const std::filesystem::path& file, const rdx::Header& header, const C
 
 }  // namespace
 
-void save_rdx(const std::filesystem::path& file, const Bvh& bvh, const Scene& scene) {
+void save_rdx(const std::filesystem::path& file, const Bvh& bvh, const Model& scene) {
     if (!rdx::supported) throw BackendUnavailable(std::string(rdx::unsupported_text));
     Fault fault = name_fault(scene);
     if (!fault) fault = rdx::content_fault(bvh, scene.mesh, scene.cameras);

@@ -5,7 +5,7 @@
 
 #include <raydix/camera.h>
 #include <raydix/mesh.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <cstdint>
 #include <functional>

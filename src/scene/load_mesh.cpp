@@ -1,6 +1,6 @@
 // File name -> reader by extension -> mesh.
 #include <raydix/error.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <array>
 #include <cctype>

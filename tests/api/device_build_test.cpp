@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <raydix/check.h>
 #include <raydix/error.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <cmath>
 #include <numeric>
@@ -162,7 +162,7 @@ TEST(DeviceBuild, PointsAndBoxes) {
 
 TEST(DeviceBuild, EachBuiltinScene) {
     std::uint64_t seed = 100;
-    for (const Scene& scene : builtin_triangle_scenes(100 * thorough)) {
+    for (const Model& scene : builtin_triangle_scenes(100 * thorough)) {
         for (const Builder builder : builders)
             for (const int bits : {30, 63}) {
                 const BuildOptions options{.builder = builder, .bits = bits};

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 #include <raydix/error.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <cmath>
 #include <cstring>

@@ -4,7 +4,7 @@
 
 #include <raydix/error.h>
 #include <raydix/points.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <cmath>
 #include <iostream>
@@ -160,7 +160,7 @@ void expect_closest(const std::string& name, const Mesh& mesh, std::size_t count
 }
 
 TEST(DeviceQueries, ClosestPointsAreThoseOfTheHost) {
-    for (const Scene& scene : builtin_triangle_scenes(100 * thorough))
+    for (const Model& scene : builtin_triangle_scenes(100 * thorough))
         expect_closest(scene.name, scene.mesh, 10 * thorough);
     expect_closest("lattice", lattice_mesh(20 * thorough, 5, seed), 20 * thorough);
     for (const std::size_t n : {0u, 1u, 2u, 5u})

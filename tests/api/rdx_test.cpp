@@ -40,15 +40,15 @@ std::size_t files_in(const std::filesystem::path& folder) {
     return static_cast<std::size_t>(std::distance(begin(files), end(files)));
 }
 
-Scene make_scene(std::size_t triangles) {
-    Scene scene;
+Model make_scene(std::size_t triangles) {
+    Model scene;
     scene.name = "soup \xff.ply";  // names are bytes
     scene.mesh = random_soup(triangles, 31);
     scene.cameras = {640, 480, 0.5f, {{"front", {0, 0, 3}, {0, 0, 0}, {0, 1, 0}, 30}, {}}};
     return scene;
 }
 
-Bytes saved(const TempFolder& folder, const Bvh& bvh, const Scene& scene) {
+Bytes saved(const TempFolder& folder, const Bvh& bvh, const Model& scene) {
     const auto file = folder.path() / "scene.rdx";
     save_rdx(file, bvh, scene);
     return read_bytes(file);
@@ -79,7 +79,7 @@ protected:
 };
 
 TEST_F(Rdx, BytesDoNotDependOnTheThreads) {
-    const Scene scene = make_scene(3000 * thorough);
+    const Model scene = make_scene(3000 * thorough);
     for (const Builder builder :
          {Builder::karras, Builder::lauterbach, Builder::garanzha, Builder::apetrei, Builder::ploc,
           Builder::hploc, Builder::binned}) {
@@ -96,7 +96,7 @@ TEST_F(Rdx, BytesDoNotDependOnTheThreads) {
 
 TEST_F(Rdx, RoundTripOfTriangles) {
     for (const std::size_t n : {0u, 1u, 2u, 3u, 5u, 4000u}) {
-        Scene scene = make_scene(n);
+        Model scene = make_scene(n);
         if (n > 5) {
             scene.mesh.vertices[33].x = std::numeric_limits<float>::quiet_NaN();
             scene.mesh.vertices[66] = {-0.0f, 0.5f, -0.0f};
@@ -132,7 +132,7 @@ TEST_F(Rdx, RoundTripOfTriangles) {
 }
 
 TEST_F(Rdx, TracesOfALoadedTreeAreTheSame) {
-    const Scene scene = make_scene(3000);
+    const Model scene = make_scene(3000);
     const Bvh bvh = build_bvh(scene.mesh);
     save_rdx(folder_.path() / "a.rdx", bvh, scene);
     const RdxFile loaded = load_rdx(folder_.path() / "a.rdx");
@@ -147,7 +147,7 @@ TEST_F(Rdx, TracesOfALoadedTreeAreTheSame) {
 }
 
 TEST_F(Rdx, RoundTripOfPointsAndBoxes) {
-    Scene cloud = make_scene(100);
+    Model cloud = make_scene(100);
     cloud.mesh.triangles.clear();
     cloud.mesh.vertices[7].y = infinity;
     const Bvh points = build_bvh(cloud.mesh);
@@ -157,14 +157,14 @@ TEST_F(Rdx, RoundTripOfPointsAndBoxes) {
     const std::vector<Aabb> boxes{
         {{0, 0, 0}, {1, 1, 1}}, {{1, 1, 1}, {0, 0, 0}}, {{3, 0, 0}, {4, 1, 1}}};
     const Bvh of_boxes = build_bvh(boxes);
-    save_rdx(folder_.path() / "boxes.rdx", of_boxes, Scene{});
+    save_rdx(folder_.path() / "boxes.rdx", of_boxes, Model{});
     const RdxFile loaded = load_rdx(folder_.path() / "boxes.rdx");
     EXPECT_EQ(check_same(loaded.bvh, of_boxes).broken, "");
     EXPECT_EQ(loaded.bvh.left_out(), 1u);
 }
 
 TEST_F(Rdx, ALoadedTreeCanBeRebuiltAndSavedOverItself) {
-    const Scene scene = make_scene(1000);
+    const Model scene = make_scene(1000);
     const auto file = folder_.path() / "a.rdx";
     save_rdx(file, build_bvh(scene.mesh), scene);
     RdxFile loaded = load_rdx(file);
@@ -199,20 +199,20 @@ TEST_F(Rdx, FilesThatCannotBeRead) {
 }
 
 TEST_F(Rdx, SavingThatFailsLeavesNothing) {
-    const Scene scene = make_scene(50);
+    const Model scene = make_scene(50);
     const Bvh bvh = build_bvh(scene.mesh);
     EXPECT_THROW(save_rdx(folder_.path() / "no" / "such.rdx", bvh, scene), InputError);
     std::filesystem::create_directory(folder_.path() / "taken.rdx");
     EXPECT_THROW(save_rdx(folder_.path() / "taken.rdx", bvh, scene), InputError);
     EXPECT_THROW(save_rdx(folder_.path() / "other.rdx", bvh, make_scene(51)), InputError);
-    Scene bad_camera = scene;
+    Model bad_camera = scene;
     bad_camera.cameras.cameras[0].vfov = 180;
     EXPECT_THROW(save_rdx(folder_.path() / "camera.rdx", bvh, bad_camera), InputError);
     EXPECT_EQ(files_in(folder_.path()), 1u);
 }
 
 TEST_F(Rdx, FullDiskLeavesTheOldFile) {
-    const Scene small = make_scene(10), large = make_scene(5000);
+    const Model small = make_scene(10), large = make_scene(5000);
     const auto file = folder_.path() / "a.rdx";
     save_rdx(file, build_bvh(small.mesh), small);
     const Bytes before = read_bytes(file);
@@ -230,7 +230,7 @@ TEST_F(Rdx, FullDiskLeavesTheOldFile) {
 }
 
 TEST_F(Rdx, EveryTruncationIsRefused) {
-    const Scene scene = make_scene(60);
+    const Model scene = make_scene(60);
     const Bytes whole = saved(folder_, build_bvh(scene.mesh), scene);
     ASSERT_EQ(verdict(whole), "");
     std::vector<std::size_t> cuts{0, 1, 8, 63, 383, 384, whole.size() - 1};
@@ -256,7 +256,7 @@ TEST_F(Rdx, EveryTruncationIsRefused) {
 }
 
 TEST_F(Rdx, EveryByteIsGuarded) {
-    const Scene scene = make_scene(20);
+    const Model scene = make_scene(20);
     const Bytes whole = saved(folder_, build_bvh(scene.mesh), scene);
     std::mt19937_64 random(5);
     for (std::size_t i = 0; i < whole.size(); ++i) {
@@ -267,7 +267,7 @@ TEST_F(Rdx, EveryByteIsGuarded) {
 }
 
 TEST_F(Rdx, FlipsUnderRightChecksumsAreSurvived) {
-    const Scene scene = make_scene(40);
+    const Model scene = make_scene(40);
     const Bvh bvh = build_bvh(scene.mesh);
     const Bytes whole = saved(folder_, bvh, scene);
     std::mt19937_64 random(6);
@@ -391,7 +391,7 @@ std::vector<Lie> lies_in_header() {
 }
 
 TEST_F(Rdx, LiesUnderRightChecksumsAreNamed) {
-    Scene scene = make_scene(100);
+    Model scene = make_scene(100);
     scene.cameras.cameras[1].name = "x";
     const Bytes whole = saved(folder_, build_bvh(scene.mesh, {.max_leaf = 2}), scene);
     for (const auto& group : {lies_in_content(), lies_in_header()}) {
@@ -408,7 +408,7 @@ TEST_F(Rdx, LiesUnderRightChecksumsAreNamed) {
 }
 
 TEST_F(Rdx, WrongVersionIsSaid) {
-    const Scene scene = make_scene(3);
+    const Model scene = make_scene(3);
     Bytes bytes = saved(folder_, build_bvh(scene.mesh), scene);
     rdx::Header header = header_of(bytes);
     header.version = 2;
@@ -418,7 +418,7 @@ TEST_F(Rdx, WrongVersionIsSaid) {
 }
 
 TEST_F(Rdx, SectionsAreAligned) {
-    const Scene scene = make_scene(77);
+    const Model scene = make_scene(77);
     const Bytes bytes = saved(folder_, build_bvh(scene.mesh), scene);
     for (const rdx::Section& s : header_of(bytes).sections) EXPECT_EQ(s.offset % 64, 0u);
     const RdxFile loaded = load_rdx(folder_.path() / "scene.rdx");

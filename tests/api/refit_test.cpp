@@ -6,7 +6,7 @@
 #include <raydix/error.h>
 #include <raydix/rdx.h>
 #include <raydix/refit.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <cmath>
@@ -61,7 +61,7 @@ bool same_hits(const std::vector<Hit>& a, const std::vector<Hit>& b) {
 }
 
 TEST(Refit, GivesTheHitsOfANewTree) {
-    const Mesh mesh = load_scene("builtin:figure?triangles=20000").mesh;
+    const Mesh mesh = load_model("builtin:figure?triangles=20000").mesh;
     for (const char* builder : whole_builders)
         for (const int threads : {1, 2, 7}) {
             Bvh bvh = build_bvh(mesh, {.builder = builder_from_name(builder)});
@@ -161,7 +161,7 @@ TEST(Refit, IsSavedAndLoadedAsWhatItIs) {
             const BuildOptions options{.builder = builder_from_name(builder), .strict = strict};
             Bvh bvh = build_bvh(mesh, options);
             EXPECT_FALSE(bvh.refitted());
-            Scene scene;
+            Model scene;
             scene.mesh = now;
             refit(bvh, now);
             ASSERT_EQ(message_of([&] { save_rdx(file, bvh, scene); }), "no error") << builder;
@@ -210,7 +210,7 @@ TEST(Refit, CheckFindsWhatIsWrongWithARefittedTree) {
 TEST(Refit, ATreeFromAFileGetsMemoryOfItsOwn) {
     const test::TempFolder folder;
     const Mesh mesh = test::random_soup(2000, seed), now = deformed(mesh, 0.5f);
-    Scene scene;
+    Model scene;
     scene.mesh = mesh;
     const auto file = folder.path() / "tree.rdx";
     save_rdx(file, build_bvh(mesh), scene);
@@ -257,7 +257,7 @@ TEST(Refit, RefusesWhatDoesNotFit) {
     EXPECT_TRUE(emptied.empty());
     EXPECT_FALSE(closest_point(emptied, {0, 0, 0}).found());
     // Parts of triangles.
-    const Mesh large = load_scene("builtin:atrium?triangles=20000").mesh;
+    const Mesh large = load_model("builtin:atrium?triangles=20000").mesh;
     for (const Builder builder : {Builder::split, Builder::sbvh}) {
         Bvh split = build_bvh(large, {.builder = builder});
         ASSERT_TRUE(split.has_split_primitives());

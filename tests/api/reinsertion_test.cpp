@@ -4,7 +4,7 @@
 #include <raydix/check.h>
 #include <raydix/error.h>
 #include <raydix/rdx.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
 
@@ -38,7 +38,7 @@ protected:
 
 TEST_P(Reinserted, TreesAreValidAndCostNoMore) {
     int cheaper = 0;
-    for (const Scene& scene : builtin_triangle_scenes(3000)) {
+    for (const Model& scene : builtin_triangle_scenes(3000)) {
         const Bvh plain = build_bvh(scene.mesh, options(0));
         const Bvh tree = build_bvh(scene.mesh, options(8));
         const CheckReport valid = check(tree, scene.mesh);
@@ -61,7 +61,7 @@ TEST_P(Reinserted, TreeDoesNotDependOnThreads) {
 }
 
 TEST_P(Reinserted, HitsAreThoseOfBruteForce) {
-    for (const Scene& scene : builtin_triangle_scenes(2000)) {
+    for (const Model& scene : builtin_triangle_scenes(2000)) {
         const Bvh tree = build_bvh(scene.mesh, options(5));
         const std::vector<Ray> rays = make_mixed_rays(scene, 100 * thorough, seed);
         const std::vector<Hit> expected = trace_brute_force(scene.mesh, rays);
@@ -108,7 +108,7 @@ TEST_P(Reinserted, FewBrokenHugeAndEqualTriangles) {
 }
 
 TEST_P(Reinserted, FilesKeepTheNumberOfRounds) {
-    const Scene scene = scene_of(random_soup(500, seed, 0.2f), "soup");
+    const Model scene = scene_of(random_soup(500, seed, 0.2f), "soup");
     const Bvh tree = build_bvh(scene.mesh, options(7));
     const auto file = std::filesystem::path(testing::TempDir()) /
                       ("reinserted-" + std::string(builder_name(GetParam())) + ".rdx");
@@ -144,7 +144,7 @@ TEST(ReinsertionOption, IsAnErrorOutOfRange) {
 
 TEST(ReinsertionOption, WideTreesFromMeshesAreThoseFromBinaryTrees) {
     for (const Builder builder : builders)
-        for (const Scene& scene : builtin_triangle_scenes(3000)) {
+        for (const Model& scene : builtin_triangle_scenes(3000)) {
             BuildOptions options = build_options_for(Quality::high);
             options.builder = builder;
             const WideBvh direct = build_wide_bvh(scene.mesh, options);

@@ -6,7 +6,7 @@
 #include <raydix/check.h>
 #include <raydix/device_trees.h>
 #include <raydix/error.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <algorithm>
 #include <cmath>
@@ -157,8 +157,8 @@ TEST_F(GpuBuild, FewPrimitives) {
 }
 
 TEST_F(GpuBuild, EachBuiltinScene) {
-    for (const Scene& scene : builtin_triangle_scenes(200'000)) compare(scene.name, scene.mesh);
-    const Scene lidar = load_scene("builtin:lidar");
+    for (const Model& scene : builtin_triangle_scenes(200'000)) compare(scene.name, scene.mesh);
+    const Model lidar = load_model("builtin:lidar");
     compare(lidar.name, lidar.mesh);
 }
 

@@ -71,14 +71,14 @@ void compare(const std::string& what, const Bvh& bvh, std::span<const Ray> rays)
 }
 
 TEST_F(GpuCwbvh, LikeScalar) {
-    for (const Scene& scene : builtin_triangle_scenes(200'000))
+    for (const Model& scene : builtin_triangle_scenes(200'000))
         compare(scene.name, build_bvh(scene.mesh), make_mixed_rays(scene, 1'000'000, seed));
     for (const float scale : {1e-9f, 1.0f, 1e12f}) {
-        const Scene scene = scene_of(scaled(random_soup(2000, 4), scale), "soup");
+        const Model scene = scene_of(scaled(random_soup(2000, 4), scale), "soup");
         compare("soup times " + std::to_string(scale), build_bvh(scene.mesh),
                 make_mixed_rays(scene, 200'000, seed));
     }
-    const Scene lattice = scene_of(lattice_mesh(2000, 20, 5), "lattice");
+    const Model lattice = scene_of(lattice_mesh(2000, 20, 5), "lattice");
     compare("lattice", build_bvh(lattice.mesh), make_mixed_rays(lattice, 200'000, seed));
 }
 
@@ -97,7 +97,7 @@ TEST_F(GpuCwbvh, FewTrianglesAndFewRays) {
 }
 
 TEST_F(GpuCwbvh, InvalidRaysMiss) {
-    const Scene scene = scene_of(random_soup(500, 3, 0.5f), "soup");
+    const Model scene = scene_of(random_soup(500, 3, 0.5f), "soup");
     auto rays = make_mixed_rays(scene, 50'000, seed);
     for (std::size_t i = 0; i < rays.size(); ++i) {
         if (i % 3 == 0) rays[i].direction = {0, 0, 0};

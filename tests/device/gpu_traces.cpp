@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <raydix/device_trace.h>
 #include <raydix/error.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <cmath>
 #include <cstring>
@@ -79,19 +79,19 @@ void compare(const std::string& what, const WarpTree& host, const DeviceWarpTree
 
 TEST_F(GpuTrace, FewTrianglesAndFewRays) {
     for (const std::size_t n : {0u, 1u, 2u, 3u, 40u}) {
-        const Scene scene = scene_of(random_soup(n, n + 1, 0.5f), "soup");
+        const Model scene = scene_of(random_soup(n, n + 1, 0.5f), "soup");
         const WarpTree host(build_bvh(scene.mesh, {.max_leaf = 2}));
         const DeviceWarpTree tree(host);
         EXPECT_EQ(tree.empty(), n == 0);
         for (const std::size_t count : {0u, 1u, 31u, 33u, 500u}) {
-            const Scene aimed = scene_of(random_soup(40, 2, 0.5f), "soup");
+            const Model aimed = scene_of(random_soup(40, 2, 0.5f), "soup");
             compare(std::to_string(n) + " triangles", host, tree, make_mixed_rays(aimed, count, 5));
         }
     }
 }
 
 TEST_F(GpuTrace, EachBuiltinScene) {
-    for (const Scene& scene : builtin_triangle_scenes(200'000)) {
+    for (const Model& scene : builtin_triangle_scenes(200'000)) {
         const WarpTree host(build_bvh(scene.mesh, {.builder = Builder::ploc}));
         compare(scene.name, host, DeviceWarpTree(host), make_mixed_rays(scene, 200'000, 9));
     }
@@ -104,7 +104,7 @@ TEST_F(GpuTrace, ATreeThatWasBuiltThere) {
     DeviceBvh built(PrimitiveKind::triangles, 60'000, {}, true);
     built.build(DeviceMesh{vertices.data(), static_cast<std::uint32_t>(vertices.size()),
                            triangles.data(), static_cast<std::uint32_t>(triangles.size())});
-    const Scene scene = scene_of(mesh, "soup");
+    const Model scene = scene_of(mesh, "soup");
     compare("built there", WarpTree(build_bvh(mesh, {})), DeviceWarpTree(built.tree()),
             make_mixed_rays(scene, 100'000, 4));
     DeviceBvh without(PrimitiveKind::triangles, 60'000, {});
@@ -112,7 +112,7 @@ TEST_F(GpuTrace, ATreeThatWasBuiltThere) {
 }
 
 TEST_F(GpuTrace, InvalidRaysAreCountedAndMiss) {
-    const Scene scene = scene_of(random_soup(1000, 8), "soup");
+    const Model scene = scene_of(random_soup(1000, 8), "soup");
     const WarpTree host(build_bvh(scene.mesh, {}));
     const DeviceWarpTree tree(host);
     std::vector<Ray> rays = make_mixed_rays(scene, 1000, 2);
@@ -125,7 +125,7 @@ TEST_F(GpuTrace, InvalidRaysAreCountedAndMiss) {
 }
 
 TEST_F(GpuTrace, WhatDoesNotFitIsRefused) {
-    const Scene scene = scene_of(random_soup(100, 8), "soup");
+    const Model scene = scene_of(random_soup(100, 8), "soup");
     const DeviceWarpTree tree(WarpTree(build_bvh(scene.mesh, {})));
     const DeviceBuffer<Ray> rays(64);
     const DeviceBuffer<Hit> hits(64);

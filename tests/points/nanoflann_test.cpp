@@ -1,7 +1,7 @@
 // Against nanoflann, where it is installed: an index of another make, in both scalars.
 #include <gtest/gtest.h>
 #include <raydix/points.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <algorithm>
 #include <cmath>
@@ -41,7 +41,7 @@ TYPED_TEST(Nanoflann, TheSameDistancesAndNumbers) {
                                             Cloud<TypeParam>, TypeParam::dimension, std::uint32_t>;
     const std::string count = std::to_string(1000 * thorough);
     for (const char* kind : {"uniform", "clustered"}) {
-        const Scene scene = load_scene("builtin:" + std::string(kind) + "?points=" + count, 3);
+        const Model scene = load_model("builtin:" + std::string(kind) + "?points=" + count, 3);
         const auto points = points_as<TypeParam>(scene.mesh.vertices);
         const TypeParam index = build_points(points);
         const Cloud<TypeParam> cloud{points};

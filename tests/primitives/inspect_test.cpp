@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <raydix/error.h>
 #include <raydix/mesh.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <cmath>
 

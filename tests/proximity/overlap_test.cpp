@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <raydix/error.h>
 #include <raydix/overlap.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <bit>

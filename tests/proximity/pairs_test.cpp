@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 #include <raydix/error.h>
 #include <raydix/pairs.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <iostream>
 #include <limits>

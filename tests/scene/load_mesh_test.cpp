@@ -1,6 +1,6 @@
 // Files: names, folders, rights, external buffers, the whole way of load_mesh.
 #include <gtest/gtest.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <sys/wait.h>
 #include <unistd.h>
 

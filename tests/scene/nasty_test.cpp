@@ -2,7 +2,7 @@
 // message.
 #include <gtest/gtest.h>
 #include <raydix/error.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <map>
 

@@ -210,7 +210,7 @@ void compare_with_reference(const WarpTree& tree, std::span<const Ray> rays, War
 class KernelOnThreads : public ::testing::TestWithParam<WarpKernel> {};
 
 TEST_P(KernelOnThreads, GivesTheReferencesHits) {
-    const Scene scene = scene_of(random_soup(120, 11, 0.3f), "soup");
+    const Model scene = scene_of(random_soup(120, 11, 0.3f), "soup");
     const WarpTree tree(build_bvh(scene.mesh, {.max_leaf = 3}));
     for (const std::size_t count : {std::size_t{1}, 28 + 4 * thorough}) {
         const std::vector<Ray> rays = make_mixed_rays(scene, count, 3);

@@ -13,7 +13,7 @@ namespace {
 
 class Maker {
 public:
-    Maker(const Scene& scene, std::uint64_t seed)
+    Maker(const Model& scene, std::uint64_t seed)
         : mesh_(scene.mesh), box_(inspect(scene.mesh).bounds), random_(seed) {
         const Vec3 size = box_.hi - box_.lo;
         longest_ = std::max({size.x, size.y, size.z, 1e-12f});
@@ -122,7 +122,7 @@ private:
     std::mt19937_64 random_;
 };
 
-std::vector<Ray> camera_rays(const Scene& scene, std::size_t count) {
+std::vector<Ray> camera_rays(const Model& scene, std::size_t count) {
     const auto width = static_cast<std::uint32_t>(
         std::clamp(std::sqrt(1.4 * static_cast<double>(count)), 16.0, 2048.0));
     std::vector<Ray> rays =
@@ -140,7 +140,7 @@ std::string_view name_of(RaySet set) {
     return names[static_cast<std::size_t>(set)];
 }
 
-std::vector<Ray> make_rays(const Scene& scene, RaySet set, std::size_t count, std::uint64_t seed) {
+std::vector<Ray> make_rays(const Model& scene, RaySet set, std::size_t count, std::uint64_t seed) {
     if (set == RaySet::camera) return camera_rays(scene, count);
     Maker maker(scene, seed + static_cast<std::uint64_t>(set));
     std::vector<Ray> rays(count);
@@ -148,7 +148,7 @@ std::vector<Ray> make_rays(const Scene& scene, RaySet set, std::size_t count, st
     return rays;
 }
 
-std::vector<Ray> make_mixed_rays(const Scene& scene, std::size_t count, std::uint64_t seed) {
+std::vector<Ray> make_mixed_rays(const Model& scene, std::size_t count, std::uint64_t seed) {
     constexpr auto sets = static_cast<std::size_t>(RaySet::count);
     std::vector<Ray> rays;
     for (std::size_t set = sets; set-- > 0;) {

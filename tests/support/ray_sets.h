@@ -2,7 +2,7 @@
 // of 0, with limits, from surfaces, of any length.
 #pragma once
 
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <cstdint>
 #include <string_view>
@@ -27,8 +27,8 @@ enum class RaySet {
 std::string_view name_of(RaySet set);
 
 /// `count` rays of one kind; the same for the same seed.
-std::vector<Ray> make_rays(const Scene& scene, RaySet set, std::size_t count, std::uint64_t seed);
+std::vector<Ray> make_rays(const Model& scene, RaySet set, std::size_t count, std::uint64_t seed);
 /// `count` rays, the same number of every kind.
-std::vector<Ray> make_mixed_rays(const Scene& scene, std::size_t count, std::uint64_t seed);
+std::vector<Ray> make_mixed_rays(const Model& scene, std::size_t count, std::uint64_t seed);
 
 }  // namespace raydix::test

@@ -9,22 +9,22 @@
 
 namespace raydix::test {
 
-std::vector<Scene> builtin_triangle_scenes(std::size_t triangles) {
-    std::vector<Scene> scenes;
+std::vector<Model> builtin_triangle_scenes(std::size_t triangles) {
+    std::vector<Model> scenes;
     for (const BuiltinScene& builtin : builtin_scenes()) {
         if (builtin.name == "lidar") continue;  // points; its triangles are those of the atrium
         for (const BuiltinParameter& parameter : builtin.parameters) {
             if (parameter.name != "triangles") continue;
             const auto count = std::max(static_cast<std::size_t>(parameter.min_value), triangles);
-            scenes.push_back(load_scene("builtin:" + std::string(builtin.name) +
+            scenes.push_back(load_model("builtin:" + std::string(builtin.name) +
                                         "?triangles=" + std::to_string(count)));
         }
     }
     return scenes;
 }
 
-Scene scene_of(Mesh mesh, std::string name) {
-    Scene scene;
+Model scene_of(Mesh mesh, std::string name) {
+    Model scene;
     scene.name = std::move(name);
     scene.cameras.cameras.push_back(fit_camera(inspect(mesh).bounds));
     scene.mesh = std::move(mesh);

@@ -1,7 +1,7 @@
 // Scenes that hits and watertightness are tried on.
 #pragma once
 
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <cstddef>
 #include <string>
@@ -10,10 +10,10 @@
 namespace raydix::test {
 
 /// One small version of each built-in scene of triangles.
-std::vector<Scene> builtin_triangle_scenes(std::size_t triangles);
+std::vector<Model> builtin_triangle_scenes(std::size_t triangles);
 
 /// A mesh without a file gets its name and one camera that sees it.
-Scene scene_of(Mesh mesh, std::string name);
+Model scene_of(Mesh mesh, std::string name);
 
 /// Triangles on a small lattice of integers: ties, shared edges, coplanar ones, zero areas.
 Mesh lattice_mesh(std::size_t triangles, int side, std::uint64_t seed);

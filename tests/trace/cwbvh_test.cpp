@@ -49,7 +49,7 @@ void expect_like_scalar(const std::string& what, const Bvh& bvh, const Cwbvh& tr
         ASSERT_EQ(occluded[i] != 0, wanted[i].hit()) << what << ", ray " << i;
 }
 
-void expect_like_scalar(const Scene& scene, std::size_t rays, const BuildOptions& options = {}) {
+void expect_like_scalar(const Model& scene, std::size_t rays, const BuildOptions& options = {}) {
     const Bvh bvh = build_bvh(scene.mesh, options);
     expect_like_scalar(scene.name, bvh, Cwbvh(bvh), make_mixed_rays(scene, rays, seed));
 }
@@ -70,11 +70,11 @@ TEST(CwbvhTrace, SoupsLikeScalar) {
 TEST(CwbvhTrace, BuiltinScenesLikeScalar) {
     const auto scenes = builtin_triangle_scenes(20'000);
     EXPECT_GE(scenes.size(), 4u);
-    for (const Scene& scene : scenes) expect_like_scalar(scene, million);
+    for (const Model& scene : scenes) expect_like_scalar(scene, million);
 }
 
 TEST(CwbvhTrace, EveryBuilderAndLeafSize) {
-    const Scene scene = scene_of(random_soup(3000, 8, 0.2f), "soup");
+    const Model scene = scene_of(random_soup(3000, 8, 0.2f), "soup");
     for (const Builder builder : {Builder::karras, Builder::ploc, Builder::hploc, Builder::binned})
         for (const int max_leaf : {1, 4, 255})
             expect_like_scalar(scene, 1000 * thorough, {.builder = builder, .max_leaf = max_leaf});
@@ -93,7 +93,7 @@ TEST(CwbvhTrace, FewTriangles) {
 }
 
 TEST(CwbvhTrace, NastyRays) {
-    const Scene scene = scene_of(random_soup(500, 3, 0.5f), "soup");
+    const Model scene = scene_of(random_soup(500, 3, 0.5f), "soup");
     const Bvh bvh = build_bvh(scene.mesh);
     const Cwbvh tree(bvh);
     const float nan = std::nanf(""), most = std::numeric_limits<float>::max();
@@ -139,7 +139,7 @@ TEST(CwbvhTrace, NastyMeshes) {
     for (Vec3& v : flat.vertices) v.z = -0.25f;
     for (const Mesh& mesh : {laced, with_points, twice, piled, flat}) {
         const Bvh bvh = build_bvh(mesh);
-        Scene whole = scene_of(soup, "soup");
+        Model whole = scene_of(soup, "soup");
         whole.mesh.triangles = {soup.triangles.begin(), soup.triangles.begin() + 400};
         expect_like_scalar("nasty mesh", bvh, Cwbvh(bvh), make_mixed_rays(whole, 20'000, seed));
     }
@@ -147,7 +147,7 @@ TEST(CwbvhTrace, NastyMeshes) {
 
 /// As a builder that splits triangles leaves it: several references to one triangle.
 TEST(CwbvhTrace, DuplicatedReferences) {
-    const Scene scene = scene_of(random_soup(1000, 5, 0.3f), "soup");
+    const Model scene = scene_of(random_soup(1000, 5, 0.3f), "soup");
     const auto n = static_cast<std::uint32_t>(scene.mesh.triangles.size());
     Mesh doubled = scene.mesh;
     doubled.triangles.insert(doubled.triangles.end(), scene.mesh.triangles.begin(),
@@ -164,7 +164,7 @@ TEST(CwbvhTrace, DuplicatedReferences) {
 }
 
 TEST(CwbvhTrace, SameCountsForEveryThreadCount) {
-    const Scene scene = load_scene("builtin:atrium?triangles=10000");
+    const Model scene = load_model("builtin:atrium?triangles=10000");
     const auto rays = make_mixed_rays(scene, 1000 * thorough, seed);
     const Cwbvh tree(build_bvh(scene.mesh));
     std::vector<Hit> wanted(rays.size()), hits(rays.size());

@@ -62,7 +62,7 @@ class Digest : public testing::TestWithParam<Digests> {};
 
 TEST_P(Digest, SceneRaysTreesAndHits) {
     const Digests& wanted = GetParam();
-    const Scene scene = load_scene(wanted.scene);
+    const Model scene = load_model(wanted.scene);
     const auto rays = make_mixed_rays(scene, ray_count, seed);
     EXPECT_EQ(digest(scene.mesh.vertices), wanted.vertices);
     EXPECT_EQ(digest(rays), wanted.rays);

@@ -83,7 +83,7 @@ TEST(RayFaults, ZeroComponentsGiveNoNaN) {
 }
 
 TEST(RayFaults, NaNTrianglePoisonsNoBox) {
-    const Scene clean = scene_of(random_soup(200, seed, 0.5f), "soup");
+    const Model clean = scene_of(random_soup(200, seed, 0.5f), "soup");
     Mesh poisoned = clean.mesh;
     const float nan = std::nanf("");
     for (const Vec3 bad : {Vec3{nan, 0, 0}, Vec3{0, infinity, 0}, Vec3{0, 0, -infinity},
@@ -173,7 +173,7 @@ TEST(RayFaults, GpsCoordinatesCollapseCodes) {
     mesh.vertices.push_back({-1e7f, -1e7f + 1, -1e7f});
     mesh.vertices.push_back({-1e7f + 1, -1e7f, -1e7f});
     const auto v = static_cast<std::uint32_t>(mesh.vertices.size());
-    Scene scene = scene_of(mesh, "GPS");
+    Model scene = scene_of(mesh, "GPS");
     const auto rays = make_rays(scene, RaySet::at_vertex, 500 * thorough, seed);
     mesh.triangles.push_back({v - 3, v - 2, v - 1});
     expect_brute_force(mesh, rays);

@@ -81,7 +81,7 @@ void expect_all_agrees(const Bvh& bvh, const LineTree& brute_force, std::span<co
     EXPECT_EQ(different, 0u);
 }
 
-void expect_like_brute_force(const Scene& scene, std::size_t ray_count) {
+void expect_like_brute_force(const Model& scene, std::size_t ray_count) {
     ASSERT_FALSE(scene.mesh.triangles.empty()) << scene.name;
     const Bvh bvh = build_bvh(scene.mesh);
     const LineTree line_tree(scene.mesh);
@@ -98,9 +98,9 @@ void expect_like_brute_force(const Scene& scene, std::size_t ray_count) {
 
 /// The tree of lines is itself held against the plainest of loops.
 TEST(Hits, LineTreeAgreesWithEveryTriangle) {
-    for (const Scene& scene : {scene_of(random_soup(700, 3), "soup of 700"),
+    for (const Model& scene : {scene_of(random_soup(700, 3), "soup of 700"),
                                scene_of(lattice_mesh(300, 5, 9), "lattice of 300"),
-                               load_scene("builtin:figure?triangles=10000")}) {
+                               load_model("builtin:figure?triangles=10000")}) {
         const bool small = scene.mesh.triangles.size() < 1000;
         const auto rays = make_mixed_rays(scene, (small ? 2000 : 100) * thorough, seed);
         expect_same_hits(scene.name + ", line tree against trace_brute_force", rays,
@@ -109,7 +109,7 @@ TEST(Hits, LineTreeAgreesWithEveryTriangle) {
 }
 
 TEST(Hits, SoupAgainstEveryTriangle) {
-    const Scene scene = scene_of(random_soup(2000, 12, 0.3f), "soup of 2000");
+    const Model scene = scene_of(random_soup(2000, 12, 0.3f), "soup of 2000");
     const auto rays = make_mixed_rays(scene, 10'000 * thorough, seed);
     expect_same_hits(scene.name + " against trace_brute_force", rays,
                      trace(build_bvh(scene.mesh), rays), trace_brute_force(scene.mesh, rays));
@@ -133,7 +133,7 @@ TEST(Hits, SoupsLikeBruteForce) {
 TEST(Hits, BuiltinScenesLikeBruteForce) {
     const auto scenes = builtin_triangle_scenes(20'000);
     EXPECT_GE(scenes.size(), 4u);
-    for (const Scene& scene : scenes) expect_like_brute_force(scene, million);
+    for (const Model& scene : scenes) expect_like_brute_force(scene, million);
 }
 
 std::vector<Hit> hits_with(const Mesh& mesh, std::span<const Ray> rays, const BuildOptions& options,
@@ -142,7 +142,7 @@ std::vector<Hit> hits_with(const Mesh& mesh, std::span<const Ray> rays, const Bu
 }
 
 TEST(Hits, FaultResultsDifferByThreadCount) {
-    const Scene scene = load_scene("builtin:atrium?triangles=10000");
+    const Model scene = load_model("builtin:atrium?triangles=10000");
     const auto rays = make_mixed_rays(scene, 5000 * thorough, seed);
     const Bvh bvh = build_bvh(scene.mesh);
     const auto wanted = trace(bvh, rays, {.threads = 1});
@@ -156,7 +156,7 @@ TEST(Hits, FaultResultsDifferByThreadCount) {
 }
 
 TEST(Hits, LeafSizeAndCodeBitsChangeNoBit) {
-    for (const Scene& scene : {load_scene("builtin:grove?triangles=10000"),
+    for (const Model& scene : {load_model("builtin:grove?triangles=10000"),
                                scene_of(lattice_mesh(3000, 12, 8), "lattice")}) {
         const auto rays = make_mixed_rays(scene, 5000 * thorough, seed);
         const auto wanted = hits_with(scene.mesh, rays, {}, 1);
@@ -170,7 +170,7 @@ TEST(Hits, LeafSizeAndCodeBitsChangeNoBit) {
 }
 
 TEST(Hits, OneByOneAndWithCountersAsInBatches) {
-    const Scene scene = scene_of(random_soup(500, 6, 0.4f), "soup");
+    const Model scene = scene_of(random_soup(500, 6, 0.4f), "soup");
     const auto rays = make_mixed_rays(scene, 3000, seed);
     const Bvh bvh = build_bvh(scene.mesh);
     const auto wanted = trace(bvh, rays);
@@ -186,7 +186,7 @@ TEST(Hits, OneByOneAndWithCountersAsInBatches) {
 }
 
 TEST(Hits, OrderOfTrianglesDecidesOnlyTheNames) {
-    Scene scene = scene_of(random_soup(2000, 7), "soup");
+    Model scene = scene_of(random_soup(2000, 7), "soup");
     const auto rays = make_mixed_rays(scene, 50'000, seed);
     const auto wanted = trace(build_bvh(scene.mesh), rays);
     std::ranges::reverse(scene.mesh.triangles);

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 #include <raydix/error.h>
 #include <raydix/kdtree.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <algorithm>
 #include <bit>

@@ -38,7 +38,7 @@ void expect_same(const std::string& what, const KdTree& tree, std::span<const Ra
     EXPECT_EQ(any.hits, hits) << what;
 }
 
-void expect_like_brute_force(const Scene& scene, std::size_t ray_count) {
+void expect_like_brute_force(const Model& scene, std::size_t ray_count) {
     const auto rays = make_mixed_rays(scene, ray_count, seed);
     const auto wanted = LineTree(scene.mesh).closest(rays);
     for (const int max_leaf : {1, 8})
@@ -50,7 +50,7 @@ void expect_like_brute_force(const Scene& scene, std::size_t ray_count) {
 }
 
 TEST(KdRays, SoupAgainstEveryTriangle) {
-    const Scene scene = scene_of(random_soup(2000, 12, 0.3f), "soup of 2000");
+    const Model scene = scene_of(random_soup(2000, 12, 0.3f), "soup of 2000");
     const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
     expect_same(scene.name + " against trace_brute_force", build_kdtree(scene.mesh), rays,
                 trace_brute_force(scene.mesh, rays));
@@ -70,19 +70,19 @@ TEST(KdRays, SoupsLikeBruteForce) {
 TEST(KdRays, BuiltinScenesLikeBruteForce) {
     const auto scenes = builtin_triangle_scenes(1000 * thorough);
     EXPECT_GE(scenes.size(), 4u);
-    for (const Scene& scene : scenes) expect_like_brute_force(scene, 10'000 * thorough);
+    for (const Model& scene : scenes) expect_like_brute_force(scene, 10'000 * thorough);
 }
 
 TEST(KdRays, SharedBunnyLikeTheBvh) {
     const auto file = shared_scene("bunny/bunny.ply.xz");
     RAYDIX_SKIP_WITHOUT(file);
-    const Scene scene = load_scene(file.string());
+    const Model scene = load_model(file.string());
     const auto rays = make_mixed_rays(scene, 25'000 * thorough, seed);
     expect_same("bunny", build_kdtree(scene.mesh), rays, trace(build_bvh(scene.mesh), rays));
 }
 
 TEST(KdRays, ThreadsAndCountersChangeNothing) {
-    const Scene scene = load_scene("builtin:grove?triangles=10000");
+    const Model scene = load_model("builtin:grove?triangles=10000");
     const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
     const KdTree tree = build_kdtree(scene.mesh);
     const auto wanted = kd_trace(tree, rays, {.threads = 1});
@@ -102,7 +102,7 @@ TEST(KdRays, ThreadsAndCountersChangeNothing) {
 }
 
 TEST(KdRays, DescendInsteadOfLookingAtEverything) {
-    const Scene scene = load_scene("builtin:figure?triangles=20000");
+    const Model scene = load_model("builtin:figure?triangles=20000");
     const auto rays = make_primary_rays(scene.cameras.cameras[0], 64, 48);
     std::vector<Hit> hits(rays.size());
     const TraceCounts counts = kd_trace(build_kdtree(scene.mesh), rays, hits, {.counters = true});

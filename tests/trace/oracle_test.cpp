@@ -37,7 +37,7 @@ void add(Tally& sum, const Tally& part) {
 
 /// `other` answers rays; every set of rays is judged by itself.
 template <class Other>
-void expect_like(const Scene& scene, const std::string& peer, std::size_t rays_per_set,
+void expect_like(const Model& scene, const std::string& peer, std::size_t rays_per_set,
                  const Other& other) {
     ASSERT_FALSE(scene.mesh.triangles.empty()) << scene.name;
     const Bvh bvh = build_bvh(scene.mesh);
@@ -61,7 +61,7 @@ void expect_like(const Scene& scene, const std::string& peer, std::size_t rays_p
     EXPECT_GT(sum.exact, sum.rays / 4) << scene.name;
 }
 
-void expect_like_double(const Scene& scene, std::size_t rays_per_set) {
+void expect_like_double(const Model& scene, std::size_t rays_per_set) {
     expect_like(scene, "double", rays_per_set, [&](std::span<const Ray> rays) {
         std::vector<Hit> hits(rays.size());
         for_each_index(
@@ -70,7 +70,7 @@ void expect_like_double(const Scene& scene, std::size_t rays_per_set) {
     });
 }
 
-void expect_like_embree(const Scene& scene, std::size_t rays_per_set) {
+void expect_like_embree(const Model& scene, std::size_t rays_per_set) {
     const EmbreeOracle embree(scene.mesh);
     expect_like(scene, "Embree", rays_per_set,
                 [&](std::span<const Ray> rays) { return embree.closest(rays); });
@@ -90,7 +90,7 @@ TEST(Oracle, KnowsARightAngledTriangle) {
 }
 
 TEST(Oracle, FindsPlantedFaults) {
-    const Scene scene = scene_of(random_soup(300, 5, 0.5f), "soup");
+    const Model scene = scene_of(random_soup(300, 5, 0.5f), "soup");
     const auto rays = make_rays(scene, RaySet::through_box, 2000, seed);
     const auto good = trace(build_bvh(scene.mesh), rays);
     const auto wrong_after = [&](auto&& spoil) {
@@ -114,13 +114,13 @@ TEST(OracleHits, SoupsLikeDouble) {
 }
 
 TEST(OracleHits, BuiltinScenesLikeDouble) {
-    for (const Scene& scene : builtin_triangle_scenes(10'000))
+    for (const Model& scene : builtin_triangle_scenes(10'000))
         expect_like_double(scene, 100 + 5 * thorough);
 }
 
 TEST(OracleHits, BuiltinScenesLikeEmbree) {
     RAYDIX_SKIP_WITHOUT_EMBREE();
-    for (const Scene& scene : builtin_triangle_scenes(100'000))
+    for (const Model& scene : builtin_triangle_scenes(100'000))
         expect_like_embree(scene, 2500 * thorough);
 }
 
@@ -131,13 +131,13 @@ TEST_P(SharedSceneHits, LikeEmbree) {
     RAYDIX_SKIP_WITHOUT_EMBREE();
     const auto file = shared_scene(GetParam());
     RAYDIX_SKIP_WITHOUT(file);
-    expect_like_embree(load_scene(file.string()), 2500 * thorough);
+    expect_like_embree(load_model(file.string()), 2500 * thorough);
 }
 
 TEST_P(SharedSceneHits, LikeFloatBruteForce) {
     const auto file = shared_scene(GetParam());
     RAYDIX_SKIP_WITHOUT(file);
-    const Scene scene = load_scene(file.string());
+    const Model scene = load_model(file.string());
     ASSERT_FALSE(scene.mesh.triangles.empty());
     const auto rays = make_mixed_rays(scene, 50'000 * thorough, seed);
     const std::vector<Hit> ours = trace(build_bvh(scene.mesh), rays);

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <raydix/rays.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/wide.h>
 
 #include <cstring>
@@ -37,7 +37,7 @@ struct ManyRays {
     std::vector<Ray> rays;
 };
 ManyRays many_rays(RayKind kind) {
-    const Scene scene = load_scene("builtin:atrium?triangles=20000", 5);
+    const Model scene = load_model("builtin:atrium?triangles=20000", 5);
     const Bvh bvh = build_bvh(scene.mesh);
     std::vector<std::uint32_t> pixels;
     const auto primary = make_primary_rays(scene.cameras.cameras.at(0), 160, 120, &pixels);

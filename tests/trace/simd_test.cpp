@@ -87,7 +87,7 @@ void expect_like_scalar(const std::string& what, const Bvh& bvh, std::span<const
     }
 }
 
-void expect_like_scalar(const Scene& scene, std::size_t rays, const BuildOptions& options = {}) {
+void expect_like_scalar(const Model& scene, std::size_t rays, const BuildOptions& options = {}) {
     expect_like_scalar(scene.name, build_bvh(scene.mesh, options),
                        make_mixed_rays(scene, rays, seed));
 }
@@ -123,11 +123,11 @@ TEST(Simd, SoupsLikeScalar) {
 TEST(Simd, BuiltinScenesLikeScalar) {
     const auto scenes = builtin_triangle_scenes(20'000);
     EXPECT_GE(scenes.size(), 4u);
-    for (const Scene& scene : scenes) expect_like_scalar(scene, many);
+    for (const Model& scene : scenes) expect_like_scalar(scene, many);
 }
 
 TEST(Simd, EveryBuilderAndLeafSize) {
-    const Scene scene = scene_of(random_soup(3000, 8, 0.2f), "soup");
+    const Model scene = scene_of(random_soup(3000, 8, 0.2f), "soup");
     for (const Builder builder : {Builder::karras, Builder::ploc, Builder::binned, Builder::sweep,
                                   Builder::split, Builder::sbvh})
         for (const int max_leaf : {1, 4, 255})
@@ -193,7 +193,7 @@ TEST(Simd, LimitsBesideTheHit) {
 
 /// Around the sizes of vectors, packets and jobs.
 TEST(Simd, BatchesOfEverySize) {
-    const Scene scene = scene_of(random_soup(2000, 9, 0.2f), "soup");
+    const Model scene = scene_of(random_soup(2000, 9, 0.2f), "soup");
     const Bvh bvh = build_bvh(scene.mesh);
     const auto rays = make_mixed_rays(scene, 40'000, seed);
     for (const std::size_t n :
@@ -202,7 +202,7 @@ TEST(Simd, BatchesOfEverySize) {
 }
 
 TEST(Simd, NastyRays) {
-    const Scene scene = scene_of(random_soup(500, 3, 0.5f), "soup");
+    const Model scene = scene_of(random_soup(500, 3, 0.5f), "soup");
     const float nan = std::nanf(""), most = std::numeric_limits<float>::max();
     std::vector<Ray> rays{{{0, 0, 0}, 0, {0, 0, 0}, infinity},
                           {{nan, 0, 0}, 0, {1, 0, 0}, infinity},
@@ -252,7 +252,7 @@ TEST(Simd, NastyMeshes) {
     Mesh flat = soup;
     for (Vec3& v : flat.vertices) v.z = -0.25f;
     for (const Mesh& mesh : {laced, with_points, twice, piled, flat}) {
-        Scene whole = scene_of(soup, "soup");
+        Model whole = scene_of(soup, "soup");
         whole.mesh.triangles = {soup.triangles.begin(), soup.triangles.begin() + 400};
         expect_like_scalar("nasty mesh", build_bvh(mesh), make_mixed_rays(whole, 10'000, seed));
     }
@@ -294,7 +294,7 @@ TEST(Simd, DeepTreesWithAllRaysEverywhere) {
 
 /// As a builder that splits triangles leaves it: several references to one triangle.
 TEST(Simd, DuplicatedReferences) {
-    const Scene scene = scene_of(random_soup(1000, 5, 0.3f), "soup");
+    const Model scene = scene_of(random_soup(1000, 5, 0.3f), "soup");
     const auto n = static_cast<std::uint32_t>(scene.mesh.triangles.size());
     Mesh doubled = scene.mesh;
     doubled.triangles.insert(doubled.triangles.end(), scene.mesh.triangles.begin(),
@@ -315,7 +315,7 @@ TEST(Simd, DuplicatedReferences) {
 }
 
 TEST(Simd, AllHitsLikeScalar) {
-    for (const Scene& scene : builtin_triangle_scenes(5'000)) {
+    for (const Model& scene : builtin_triangle_scenes(5'000)) {
         const Bvh bvh = build_bvh(scene.mesh);
         const WideBvh tree(bvh);
         const auto rays = make_mixed_rays(scene, 1000 * thorough, seed);
@@ -333,7 +333,7 @@ TEST(Simd, AllHitsLikeScalar) {
 }
 
 TEST(Simd, OneRayLikeBatches) {
-    const Scene scene = load_scene("builtin:atrium?triangles=10000");
+    const Model scene = load_model("builtin:atrium?triangles=10000");
     const Bvh bvh = build_bvh(scene.mesh);
     const WideBvh tree(bvh);
     const auto rays = make_mixed_rays(scene, 2000, seed);
@@ -383,7 +383,7 @@ TEST(Simd, OneRayOfACallerThatFlushesDenormals) {
 #endif
 
 TEST(Simd, SameCountsForEveryThreadCount) {
-    const Scene scene = load_scene("builtin:atrium?triangles=10000");
+    const Model scene = load_model("builtin:atrium?triangles=10000");
     const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
     const WideBvh tree(build_bvh(scene.mesh));
     for (const SimdPath path : paths) {
@@ -401,7 +401,7 @@ TEST(Simd, SameCountsForEveryThreadCount) {
 }
 
 TEST(Simd, EachPathWhereItBelongs) {
-    const Scene scene = load_scene("builtin:atrium?triangles=20000");
+    const Model scene = load_model("builtin:atrium?triangles=20000");
     const Bvh bvh = build_bvh(scene.mesh);
     const WideBvh tree(bvh);
     std::vector<std::uint32_t> pixels;
@@ -421,7 +421,7 @@ TEST(Simd, EachPathWhereItBelongs) {
 
 /// Fewer nodes than `scalar` enters, since each has up to eight children.
 TEST(Simd, EntersFewerNodesThanScalar) {
-    const Scene scene = load_scene("builtin:atrium?triangles=20000");
+    const Model scene = load_model("builtin:atrium?triangles=20000");
     const Bvh bvh = build_bvh(scene.mesh);
     const auto rays = make_mixed_rays(scene, 10'000, seed);
     std::vector<Hit> hits(rays.size());

@@ -98,7 +98,7 @@ TEST(Simulate, BothChildrenMeanOnePush) {
 }
 
 TEST(Simulate, ADoubledCostMovesWhatUsesItOnly) {
-    const Scene scene = scene_of(random_soup(500, 3, 0.1f), "soup");
+    const Model scene = scene_of(random_soup(500, 3, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh));
     const std::vector<Ray> rays = make_mixed_rays(scene, 640, 3);
     std::vector<SimulateOptions> runs;
@@ -124,7 +124,7 @@ TEST(Simulate, ADoubledCostMovesWhatUsesItOnly) {
 }
 
 TEST(Simulate, OneLaneHasFullEfficiencyAndWidthsAgree) {
-    const Scene scene = scene_of(random_soup(2000, 9, 0.1f), "soup");
+    const Model scene = scene_of(random_soup(2000, 9, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh));
     const std::vector<Ray> rays = make_mixed_rays(scene, 64 * 20, 3);
     for (const WarpKernel kernel : {WarpKernel::while_while, WarpKernel::if_if}) {
@@ -185,7 +185,7 @@ bool same(const Simulation& a, const Simulation& b) {
 }
 
 TEST(Simulate, FiguresDoNotDependOnThreads) {
-    const Scene scene = scene_of(random_soup(3000, 4, 0.1f), "soup");
+    const Model scene = scene_of(random_soup(3000, 4, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh));
     const std::vector<Ray> rays = make_mixed_rays(scene, 1000 * thorough, 8);
     std::vector<SimulateOptions> runs;
@@ -203,7 +203,7 @@ TEST(Simulate, FiguresDoNotDependOnThreads) {
 }
 
 TEST(Simulate, PersistentFormsDifferByTheirFetchesOnly) {
-    const Scene scene = scene_of(random_soup(2000, 4, 0.1f), "soup");
+    const Model scene = scene_of(random_soup(2000, 4, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh));
     const std::vector<Ray> rays = make_mixed_rays(scene, 64 * 32, 8);
     std::vector<SimulateOptions> runs{options_for(WarpKernel::while_while),
@@ -226,7 +226,7 @@ TEST(Simulate, PersistentFormsDifferByTheirFetchesOnly) {
 TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
     if (simulated_kernel(WarpKernel::packet, false, 32, SimulatorIsa::v3) == nullptr)
         GTEST_SKIP() << "no AVX2 and FMA here";
-    const Scene scene = scene_of(random_soup(1000, 4, 0.1f), "soup");
+    const Model scene = scene_of(random_soup(1000, 4, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh));
     const PreparedRays rays(make_mixed_rays(scene, 640, 8));
     const auto& arrays = tree.arrays();
@@ -260,7 +260,7 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
 
 /// Warps on real threads that wait at random between turns, on one pool.
 TEST(Simulate, PoolsLoseAndRepeatNoRayWhateverTheDelays) {
-    const Scene scene = scene_of(random_soup(1000, 4, 0.1f), "soup");
+    const Model scene = scene_of(random_soup(1000, 4, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh));
     std::vector<Ray> some = make_mixed_rays(scene, 977, 8);
     for (std::size_t i = 0; i < some.size(); i += 3) some[i].tmax = 0.0f;  // very short lives

@@ -2,7 +2,7 @@
 // other, for every instruction set.
 #include <gtest/gtest.h>
 #include <raydix/rays.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/wide.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ struct View {
 };
 View atrium_view(std::uint32_t size) {
     View view;
-    const Scene scene = load_scene("builtin:atrium?triangles=20000", 4);
+    const Model scene = load_model("builtin:atrium?triangles=20000", 4);
     view.bvh = build_bvh(scene.mesh, {.builder = Builder::ploc});
     view.rays = make_primary_rays(scene.cameras.cameras.at(0), size, size);
     view.hits = trace(view.bvh, view.rays);

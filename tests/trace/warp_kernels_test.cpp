@@ -35,7 +35,7 @@ std::vector<SimulateOptions> every_run(bool any_hit) {
     return runs;
 }
 
-void expect_hits_of_the_reference(const Scene& scene, std::size_t count, int max_leaf) {
+void expect_hits_of_the_reference(const Model& scene, std::size_t count, int max_leaf) {
     const std::vector<Ray> rays = make_mixed_rays(scene, count, 7);
     const Bvh bvh = build_bvh(scene.mesh, {.builder = Builder::ploc, .max_leaf = max_leaf});
     const WarpTree tree(bvh);
@@ -59,7 +59,7 @@ void expect_hits_of_the_reference(const Scene& scene, std::size_t count, int max
 }
 
 TEST(WarpKernels, GiveTheReferencesHits) {
-    const Scene scene = scene_of(random_soup(3000, 5, 0.1f), "soup");
+    const Model scene = scene_of(random_soup(3000, 5, 0.1f), "soup");
     for (const int max_leaf : {1, 4, 16}) expect_hits_of_the_reference(scene, 1501, max_leaf);
 }
 

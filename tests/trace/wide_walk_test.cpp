@@ -39,7 +39,7 @@ Hit closest(const Bvh& bvh, const WideTree& tree, const Ray& given, WideStack& s
     return best.hit() ? Hit{best.t * ray.t_scale, best.prim, best.u, best.v} : Hit{};
 }
 
-void expect_like_scalar(const Scene& scene, const BuildOptions& options) {
+void expect_like_scalar(const Model& scene, const BuildOptions& options) {
     const Bvh bvh = build_bvh(scene.mesh, options);
     const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
     std::vector<Hit> wanted(rays.size());
@@ -62,7 +62,7 @@ void expect_like_scalar(const Scene& scene, const BuildOptions& options) {
 
 TEST(WideWalk, LikeScalar) {
     for (const int max_leaf : {1, 4}) {
-        for (const Scene& scene : builtin_triangle_scenes(5000))
+        for (const Model& scene : builtin_triangle_scenes(5000))
             expect_like_scalar(scene, {.max_leaf = max_leaf});
         expect_like_scalar(scene_of(lattice_mesh(2000, 12, 5), "lattice"), {.max_leaf = max_leaf});
         expect_like_scalar(scene_of(random_soup(2000, 5, 0.5f), "soup"), {.max_leaf = max_leaf});

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 #include <raydix/check.h>
 #include <raydix/rdx.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <algorithm>
@@ -61,7 +61,7 @@ TEST_P(Clusters, GivesTheTreeOfTheDefinition) {
 }
 
 TEST_P(Clusters, TreeDoesNotDependOnThreads) {
-    for (const Scene& scene : builtin_triangle_scenes(thorough * 2000)) {
+    for (const Model& scene : builtin_triangle_scenes(thorough * 2000)) {
         const std::string one = tree_hash(build_bvh(scene.mesh, options(4, 1)));
         for (const int threads : {2, 7})
             EXPECT_EQ(tree_hash(build_bvh(scene.mesh, options(4, threads))), one)
@@ -83,7 +83,7 @@ TEST_P(Clusters, RebuildingIntoKeptMemoryGivesTheSameTree) {
 
 TEST_P(Clusters, HitsAreThoseOfBruteForce) {
     constexpr std::uint64_t seed = 7;
-    for (const Scene& scene : builtin_triangle_scenes(2000)) {
+    for (const Model& scene : builtin_triangle_scenes(2000)) {
         const Bvh tree = build_bvh(scene.mesh, options());
         const CheckReport valid = check(tree, scene.mesh);
         ASSERT_TRUE(valid.ok) << scene.name << ": " << valid.broken;
@@ -97,7 +97,7 @@ TEST_P(Clusters, HitsAreThoseOfBruteForce) {
 }
 
 TEST_P(Clusters, SahIsBetterThanThatOfTheRadixTree) {
-    for (const Scene& scene : builtin_triangle_scenes(thorough * 2000)) {
+    for (const Model& scene : builtin_triangle_scenes(thorough * 2000)) {
         const auto sah = [&](Builder builder) {
             return *tree_stats(build_bvh(scene.mesh, options_of(builder))).sah;
         };
@@ -159,7 +159,7 @@ TEST_P(Clusters, DeepTreesAreTracedSavedAndLoaded) {
             mesh.vertices.push_back(corner);
         mesh.triangles.push_back({first, first + 1, first + 2});
     }
-    const Scene scene = scene_of(std::move(mesh), "chain");
+    const Model scene = scene_of(std::move(mesh), "chain");
     const Bvh tree = build_bvh(scene.mesh, options(1));
     // From the top down, such boxes are divided evenly.
     const std::uint32_t least_depth = GetParam() == Builder::ploc    ? 96

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <raydix/error.h>
 #include <raydix/kdtree.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <algorithm>
 #include <cstring>
@@ -68,7 +68,7 @@ TEST(KdTree, TrianglesLikeTheReference) {
     bad.vertices[300].y = std::numeric_limits<float>::quiet_NaN();
     bad.vertices[600] = {-0.0f, 0.25f, -0.0f};
     compare_all("soup with invalid ones", bad);
-    for (const Scene& scene : builtin_triangle_scenes(500 * thorough))
+    for (const Model& scene : builtin_triangle_scenes(500 * thorough))
         compare_all(scene.name, scene.mesh);
 }
 

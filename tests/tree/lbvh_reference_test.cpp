@@ -2,7 +2,7 @@
 // input, both code lengths, leaf sizes, fits, threads.
 #include <gtest/gtest.h>
 #include <raydix/check.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <algorithm>
 #include <functional>

@@ -3,7 +3,7 @@
 #include "tree/reinsertion.h"
 
 #include <gtest/gtest.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <algorithm>
 #include <cstring>

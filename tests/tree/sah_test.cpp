@@ -3,7 +3,7 @@
 #include <raydix/check.h>
 #include <raydix/error.h>
 #include <raydix/rdx.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <algorithm>
@@ -36,7 +36,7 @@ BuildOptions options_of(Builder builder, int max_leaf = 4, int threads = 0) {
 
 /// Long thin triangles along the diagonals of the cube, with small ones between them: boxes of
 /// almost nothing but air.
-Scene sticks(std::size_t count) {
+Model sticks(std::size_t count) {
     Mesh mesh = random_soup(count, seed, 0.02f);
     std::mt19937_64 random(seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
@@ -165,7 +165,7 @@ TEST(Sweep, GivesTheTreeOfTheDefinition) {
 }
 
 TEST(Sweep, IsNoWorseThanBinned) {
-    for (const Scene& scene : builtin_triangle_scenes(thorough * 2000)) {
+    for (const Model& scene : builtin_triangle_scenes(thorough * 2000)) {
         const auto sah = [&](Builder builder) {
             return *tree_stats(build_bvh(scene.mesh, options_of(builder))).sah;
         };
@@ -195,9 +195,9 @@ TEST_P(SahTrees, TakeBoxesThatBuildersGetWrong) {
 }
 
 TEST_P(SahTrees, DoNotDependOnThreads) {
-    std::vector<Scene> scenes = builtin_triangle_scenes(thorough * 1000);
+    std::vector<Model> scenes = builtin_triangle_scenes(thorough * 1000);
     scenes.push_back(sticks(thorough * 1000));
-    for (const Scene& scene : scenes) {
+    for (const Model& scene : scenes) {
         const std::string one = tree_hash(build_bvh(scene.mesh, options(4, 1)));
         for (const int threads : {2, 7})
             EXPECT_EQ(tree_hash(build_bvh(scene.mesh, options(4, threads))), one)
@@ -217,11 +217,11 @@ TEST_P(SahTrees, RebuildingIntoKeptMemoryGivesTheSameTree) {
 }
 
 TEST_P(SahTrees, HitsAreThoseOfBruteForce) {
-    std::vector<Scene> scenes = builtin_triangle_scenes(2000);
+    std::vector<Model> scenes = builtin_triangle_scenes(2000);
     scenes.push_back(sticks(2000));
     scenes.push_back(scene_of(lattice_mesh(500, 6, seed), "lattice"));
     scenes.push_back(scene_of(moved(sticks(500).mesh, {1e5f, -1e5f, 3e4f}), "far"));
-    for (const Scene& scene : scenes) {
+    for (const Model& scene : scenes) {
         const Bvh tree = build_bvh(scene.mesh, options());
         const CheckReport valid = check(tree, scene.mesh);
         ASSERT_TRUE(valid.ok) << scene.name << ": " << valid.broken;
@@ -247,7 +247,7 @@ TEST_P(SahTrees, HitsAreThoseOfBruteForce) {
 }
 
 TEST_P(SahTrees, NoRayLeavesAClosedSurface) {
-    Mesh mesh = load_scene("builtin:figure?triangles=20000").mesh;
+    Mesh mesh = load_model("builtin:figure?triangles=20000").mesh;
     const Aabb box = build_bvh(mesh).bounds();
     const Vec3 center = 0.5f * (box.lo + box.hi);
     // Stretched, so that its triangles are long and lie across.
@@ -271,7 +271,7 @@ TEST_P(SahTrees, NoRayLeavesAClosedSurface) {
 }
 
 TEST_P(SahTrees, EachPointOfATriangleIsInALeafThatHoldsIt) {
-    const Scene scene = sticks(2000);
+    const Model scene = sticks(2000);
     const Bvh tree = build_bvh(scene.mesh, options());
     std::map<std::uint32_t, std::vector<Aabb>> boxes;
     for (const BvhNode& node : tree.nodes())
@@ -299,7 +299,7 @@ TEST_P(SahTrees, EachPointOfATriangleIsInALeafThatHoldsIt) {
 }
 
 TEST_P(SahTrees, AreSavedAndLoaded) {
-    const Scene scene = sticks(500);
+    const Model scene = sticks(500);
     const Bvh tree = build_bvh(scene.mesh, options());
     EXPECT_EQ(tree.has_split_primitives(), GetParam() != Builder::sweep);
     EXPECT_EQ(tree_stats(tree).references, tree.order().size());
@@ -353,7 +353,7 @@ INSTANTIATE_TEST_SUITE_P(Builders, SahTrees,
                          [](const auto& p) { return std::string(builder_name(p.param)); });
 
 TEST(SplitTrees, AreBetterThanSweepOverSticks) {
-    const Scene scene = sticks(20'000);
+    const Model scene = sticks(20'000);
     const auto sah = [&](Builder builder) {
         return *tree_stats(build_bvh(scene.mesh, options_of(builder))).sah;
     };
@@ -363,7 +363,7 @@ TEST(SplitTrees, AreBetterThanSweepOverSticks) {
 }
 
 TEST(SplitTrees, CheckFindsWhatIsWrong) {
-    const Scene scene = sticks(500);
+    const Model scene = sticks(500);
     const auto broken = [&](const auto& damage) {
         Bvh tree = build_bvh(scene.mesh, options_of(Builder::sbvh));
         damage(BvhAccess{tree});

@@ -1,7 +1,7 @@
 // Spatial splits against clipping in double, and the builder's independence of lanes and threads.
 #include <gtest/gtest.h>
 #include <raydix/check.h>
-#include <raydix/scene.h>
+#include <raydix/model.h>
 
 #include <algorithm>
 #include <cmath>

@@ -64,14 +64,16 @@ HWY_INLINE hn::Vec<I16> classify(const RayVectors& ray) {
 /// The largest pad of make_slab_frame over rays whose origins lie between `least` and `largest`,
 /// times `factor`; positive.
 inline void largest_pad(const WideView& tree, const float* least, const float* largest,
-                        std::uint32_t kz, float factor, float* pad) {
+                        std::uint32_t kz, float factor, float* pad, PadGrowth growth = {}) {
     float far[3];
     for (int a = 0; a < 3; ++a) {
         const float lo = tree.lo[a], hi = tree.hi[a];
         far[a] = max_of(max_of(std::fabs(lo - least[a]), std::fabs(lo - largest[a])),
                         max_of(std::fabs(hi - least[a]), std::fabs(hi - largest[a])));
     }
-    for (int a = 0; a < 3; ++a) pad[a] = factor * slab_pad * (far[a] + far[kz]) + least_slab_pad;
+    const float grown = growth.rate * max_of(max_of(far[0], far[1]), far[2]) + growth.least;
+    for (int a = 0; a < 3; ++a)
+        pad[a] = factor * slab_pad * (far[a] + far[kz]) + least_slab_pad + grown;
 }
 
 /// `count` rays of one class; read(i) gives rays i to i + lanes16 - 1, of which those beyond
@@ -241,10 +243,10 @@ HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, cons
                             hn::BitCast(f16, prim), hn::IfThenElseZero(hit, hn::Load(f16, p.u + k)),
                             hn::IfThenElseZero(hit, hn::Load(f16, p.v + k))};
         store_quads(
-            out, [&](std::size_t l) { return reinterpret_cast<float*>(job.hits + index[k + l]); });
+            out, [&](std::size_t l) { return reinterpret_cast<float*>(job.hits.at(static_cast<std::size_t>(index[k + l]))); });
     }
     for (; k < p.count; ++k)
-        job.hits[index[k]] =
+        *job.hits.at(static_cast<std::size_t>(index[k])) =
             p.prim[k] != no_primitive ? Hit{p.t[k], p.prim[k], p.u[k], p.v[k]} : Hit{};
 }
 
@@ -286,7 +288,7 @@ private:
         if constexpr (any)
             job_.occluded += packet_size;
         else
-            job_.hits += packet_size;
+            job_.hits.first = job_.hits.at(packet_size);
     }
 
     void trace_sorted() {
@@ -335,7 +337,8 @@ void trace_packets(const SimdJob& job, SimdCounts& counts) {
 /// Rays index[0, count) of one class as a stream; `index` may be read up to the next multiple of
 /// lanes16.
 HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index,
-                                   std::uint32_t count, std::uint32_t code) {
+                                   std::uint32_t count, std::uint32_t code,
+                                   PadGrowth growth = {}) {
     std::vector<StreamRay>& rays = job.memory->rays();
     StreamFrame frame;
     frame.kind = ray_class_of(code);
@@ -378,7 +381,7 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
         least[a] = hn::GetLane(hn::MinOfLanes(f16, lo[a]));
         largest[a] = hn::GetLane(hn::MaxOfLanes(f16, hi[a]));
     }
-    largest_pad(job.tree, least, largest, frame.kind.kz, wide_pad_factor, frame.near_pad);
+    largest_pad(job.tree, least, largest, frame.kind.kz, wide_pad_factor, frame.near_pad, growth);
     for (int a = 0; a < 3; ++a)
         if (!frame.kind.negative(a)) frame.near_pad[a] = -frame.near_pad[a];
     return frame;
@@ -401,7 +404,7 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
             if constexpr (any)
                 job.occluded[*index] = hit;
             else
-                job.hits[*index] = hit ? Hit{ray.t, ray.prim, found->u, found->v} : Hit{};
+                *job.hits.at(static_cast<std::size_t>(*index)) = hit ? Hit{ray.t, ray.prim, found->u, found->v} : Hit{};
             ++found, ++index;
         }
     }
@@ -410,16 +413,41 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
         trace_one<any, counting, compact>(job, static_cast<std::size_t>(odd[k]), counts);
 }
 
+template <bool any>
+void visit_parts(const PartJob& job) {
+    const SimdJob rays{job.tree, job.rays, nullptr,  job.n,      {},
+                       nullptr,  job.stack, {},      job.memory, false};
+    RaySorter sorter;
+    sorter.sort(rays);
+    SimdCounts counts;
+    for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
+        const std::uint32_t count = sorter.count(code);
+        if (count == 0) continue;
+        const std::int32_t* const index = sorter.rays(code);
+        const StreamFrame frame = fill_stream(rays, index, count, code, job.growth);
+        StreamWalk<any, false, false, true>(job.tree, frame, *job.memory, job.stack, counts, &job,
+                                            index)
+            .trace();
+    }
+}
+
+inline void parts(const PartJob& job) {
+    if (job.n == 1)
+        job.any ? visit_parts_of_one<true>(job) : visit_parts_of_one<false>(job);
+    else
+        job.any ? visit_parts<true>(job) : visit_parts<false>(job);
+}
+
 inline void streams(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
-        job.hits == nullptr ? trace_streams<true, counting, compact>(job, counts)
+        !job.hits ? trace_streams<true, counting, compact>(job, counts)
                             : trace_streams<false, counting, compact>(job, counts);
     });
 }
 
 inline void packets(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
-        job.hits == nullptr ? trace_packets<true, counting, compact>(job, counts)
+        !job.hits ? trace_packets<true, counting, compact>(job, counts)
                             : trace_packets<false, counting, compact>(job, counts);
     });
 }

@@ -25,13 +25,20 @@ constexpr std::size_t parts8 = 8 / lanes8;
 
 enum class Wanted { closest, any, all };
 
-/// `guessing`: rays that follow each other take much the same way.
-template <Wanted wanted, bool counting, bool compact, bool guessing = false>
+/// How far a ray goes that parts of a scene may have ended.
+HWY_INLINE float reach_of(const Ray& ray) {
+    return min_of(ray.tmax, std::numeric_limits<float>::max());
+}
+
+/// `guessing`: rays that follow each other take much the same way. `parts`: leaves hold parts of a
+/// scene.
+template <Wanted wanted, bool counting, bool compact, bool guessing = false, bool parts = false>
 class SingleRay {
 public:
+    /// `job` and the ray's place there: for parts.
     SingleRay(const WideView& tree, const SingleFrame& frame, const WideStackView& stack,
-              SimdCounts& counts)
-        : tree_(tree), frame_(frame), stack_(stack), counts_(counts) {
+              SimdCounts& counts, const PartJob* job = nullptr, std::uint32_t place = 0)
+        : tree_(tree), frame_(frame), stack_(stack), counts_(counts), job_(job), place_(place) {
         for (int axis = 0; axis < 3; ++axis) {
             const std::uint32_t negative = frame.kind.negatives >> axis & 1;
             near_at_[axis] = 8 * static_cast<std::uint32_t>(axis) + 24 * negative;
@@ -227,6 +234,14 @@ private:
 
     HWY_INLINE bool test_leaf(std::uint32_t word) {
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
+        if constexpr (parts) {
+            for (std::uint32_t part = place; part < place + count; ++part) {
+                job_->visitor->visit(part, &place_, 1);
+                best_.t = reach_of(job_->rays[place_]);
+                if (wanted == Wanted::any && best_.t < frame_.tmin) return true;
+            }
+            return false;
+        }
         const TriangleBlock& block = tree_.template block<compact>(place);
         if constexpr (counting) counts_.tests += count;
         if constexpr (wanted == Wanted::all) {
@@ -299,6 +314,8 @@ private:
     const SingleFrame& frame_;
     const WideStackView stack_;
     SimdCounts& counts_;
+    const PartJob* const job_;
+    const std::uint32_t place_;
     WideBest best_{};
     BudgetVector<Hit>* all_ = nullptr;
     std::uint32_t near_at_[3], far_at_[3];  // where planes are, from a node's boxes on
@@ -347,13 +364,40 @@ void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
     if constexpr (any)
         job.occluded[i] = hit.hit() ? 1 : 0;
     else
-        job.hits[i] = hit;
+        *job.hits.at(i) = hit;
 }
 
 template <bool any, bool counting, bool compact>
 void trace_single(const SimdJob& job, SimdCounts& counts) {
     for (std::size_t k = 0; k < job.n; ++k)
         trace_one<any, counting, compact>(job, job.order == nullptr ? k : job.order[k], counts);
+}
+
+/// Boxes of parts widen once more. `way` has the signs of the direction.
+HWY_INLINE void grow_pads(const PartJob& job, SingleFrame& frame) {
+    const V4 origin = hn::Load(f4, frame.origin);
+    alignas(16) float far[4];
+    hn::Store(hn::Max(hn::Abs(hn::Sub(hn::Load(f4, job.tree.lo), origin)),
+                      hn::Abs(hn::Sub(hn::Load(f4, job.tree.hi), origin))),
+              f4, far);
+    const float grown =
+        job.growth.rate * max_of(max_of(far[0], far[1]), far[2]) + job.growth.least;
+    const V4 pad = hn::Load(f4, frame.near_pad);
+    const V4 whole = hn::CopySign(hn::Add(hn::Abs(pad), hn::Set(f4, grown)), pad);
+    hn::Store(whole, f4, frame.near_pad);
+    set_starts(job.tree, origin, hn::Load(f4, frame.inverse), whole, frame);
+}
+
+/// The first ray of a job.
+template <bool any>
+void visit_parts_of_one(const PartJob& job) {
+    SingleFrame frame;
+    if (!fill_frame(job.tree, job.rays[0], frame)) return;
+    grow_pads(job, frame);
+    SimdCounts counts;
+    SingleRay<any ? Wanted::any : Wanted::closest, false, false, false, true>(
+        job.tree, frame, job.stack, counts, &job, 0)
+        .trace(0, {frame.tmax});
 }
 
 /// All hits of each ray behind those of the one before; counts.hits of each in hit_counts.
@@ -396,7 +440,7 @@ inline void all_hits(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t
 
 inline void single(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
-        job.hits == nullptr ? trace_single<true, counting, compact>(job, counts)
+        !job.hits ? trace_single<true, counting, compact>(job, counts)
                             : trace_single<false, counting, compact>(job, counts);
     });
 }

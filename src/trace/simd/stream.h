@@ -21,12 +21,17 @@ namespace raydix::HWY_NAMESPACE {
 /// Lists of fewer rays go on one by one.
 constexpr std::uint32_t few_rays = 4;
 
-template <bool any, bool counting, bool compact>
+/// Leaves hold triangles, or with `parts` parts of a scene.
+template <bool any, bool counting, bool compact, bool parts = false>
 class StreamWalk {
 public:
+    /// `job` and where its rays lie: for parts.
     StreamWalk(const WideView& tree, const StreamFrame& frame, StreamMemory& memory,
-               const WideStackView& single_stack, SimdCounts& counts)
-        : tree_(tree),
+               const WideStackView& single_stack, SimdCounts& counts, const PartJob* job = nullptr,
+               const std::int32_t* index = nullptr)
+        : job_(job),
+          index_(index),
+          tree_(tree),
           frame_(frame),
           rays_(memory.rays().data()),
           hits_(memory.hits().data()),
@@ -48,7 +53,10 @@ public:
             const StreamEntry next = stack.back();
             stack.pop_back();
             if ((next.word & wide_leaf_bit) != 0) {
-                test_leaf(next);
+                if constexpr (parts)
+                    visit_parts(next);
+                else
+                    test_leaf(next);
             } else if (next.count <= few_rays) {
                 for (std::uint32_t k = 0; k < next.count; ++k)
                     go_alone(memory_.lists()[next.begin + k], next.word);
@@ -226,6 +234,14 @@ private:
         if (!(entry_of(item) <= ray.t)) return;
         SingleFrame frame;
         fill_frame(tree_, frame_, ray, frame);
+        if constexpr (parts) {
+            const auto place = static_cast<std::uint32_t>(index_[k]);
+            SingleRay<any ? Wanted::any : Wanted::closest, counting, compact, false, true>(
+                tree_, frame, single_stack_, counts_, job_, place)
+                .trace(word, {ray.t});
+            ray.t = reach_of(job_->rays[place]);
+            return;
+        }
         SingleRay<any ? Wanted::any : Wanted::closest, counting, compact> single(
             tree_, frame, single_stack_, counts_);
         const WideBest best = single.trace(word, {ray.t, ray.prim, hits_[k].u, hits_[k].v});
@@ -233,6 +249,26 @@ private:
             if (best.found()) ray.settle();
         } else {
             ray.t = best.t, ray.prim = best.prim, hits_[k] = {best.u, best.v};
+        }
+    }
+
+    /// The rays of a list that may still hit something there go to each part of a leaf.
+    void visit_parts(const StreamEntry& entry) {
+        const std::uint32_t place = (entry.word & ~wide_leaf_bit) >> 3,
+                            count = (entry.word & 7) + 1;
+        std::vector<std::uint32_t>& going = memory_.going();
+        for (std::uint32_t part = place; part < place + count; ++part) {
+            going.clear();
+            const std::uint32_t* const list = memory_.lists() + entry.begin;
+            for (std::uint32_t k = 0; k < entry.count; ++k)
+                if (entry_of(list[k]) <= rays_[list[k] & ray_bits].t)
+                    going.push_back(static_cast<std::uint32_t>(index_[list[k] & ray_bits]));
+            if (going.empty()) return;
+            job_->visitor->visit(part, going.data(), static_cast<std::uint32_t>(going.size()));
+            for (std::uint32_t k = 0; k < entry.count; ++k) {
+                const std::uint32_t ray = list[k] & ray_bits;
+                rays_[ray].t = reach_of(job_->rays[index_[ray]]);
+            }
         }
     }
 
@@ -340,6 +376,8 @@ private:
         }
     }
 
+    const PartJob* const job_;
+    const std::int32_t* const index_;
     const WideView& tree_;
     const StreamFrame& frame_;
     StreamRay* const rays_;

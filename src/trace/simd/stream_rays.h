@@ -53,6 +53,7 @@ public:
     [[nodiscard]] std::vector<StreamEntry>& stack() { return stack_; }
     [[nodiscard]] std::vector<StreamRay>& rays() { return rays_; }
     [[nodiscard]] std::vector<StreamHit>& hits() { return hits_; }
+    [[nodiscard]] std::vector<std::uint32_t>& going() { return going_; }
     /// Room for `count` items from `begin` on, with slack.
     void reserve(std::uint32_t begin, std::uint32_t count) {
         const std::size_t wanted = std::size_t{begin} + count + slack;
@@ -64,6 +65,7 @@ private:
     std::vector<StreamEntry> stack_;
     std::vector<StreamRay> rays_;
     std::vector<StreamHit> hits_;
+    std::vector<std::uint32_t> going_;
 };
 
 }  // namespace raydix

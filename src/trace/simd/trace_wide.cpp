@@ -17,9 +17,9 @@
 #include "trace/simd/path_race.h"
 #include "trace/simd/simd_kernels.h"
 #include "trace/simd/trace_here.h"
+#include "trace/simd/wide_batch.h"
 
 namespace raydix {
-namespace {
 
 const SimdKernels& kernels_for(const std::string& isa) {
     const auto all = simd_kernels();
@@ -32,22 +32,6 @@ const SimdKernels& kernels_for(const std::string& isa) {
     throw InputError("instruction set " + isa + ": this processor and build have " + known);
 }
 
-/// Stacks for the deepest path of a tree.
-class StackMemory {
-public:
-    explicit StackMemory(std::uint32_t max_depth)
-        : words_(wide_stack_capacity(max_depth)), entries_(words_.size()), active_(words_.size()) {}
-    [[nodiscard]] WideStackView view() { return {words_.data(), entries_.data()}; }
-    [[nodiscard]] PacketStackView packet_view() {
-        return {words_.data(), entries_.data(), active_.data()};
-    }
-
-private:
-    std::vector<std::uint32_t> words_;
-    std::vector<float> entries_;
-    std::vector<std::uint64_t> active_;
-};
-
 /// Rays of a job: as many as give full vectors deep in the tree and still lie in the second-level
 /// cache; fewer where the batch would not keep many threads busy. Depends on the batch alone, so
 /// that counts do not depend on the threads.
@@ -56,6 +40,8 @@ std::size_t rays_per_job(std::size_t n, SimdPath path) {
     if (path != SimdPath::stream && path != SimdPath::sorted) return smallest;
     return std::clamp(n / jobs / smallest * smallest, smallest, max_job_rays);
 }
+
+namespace {
 
 void (*job_of(const SimdKernels& kernels, SimdPath path))(const SimdJob&, SimdCounts&) {
     if (path == SimdPath::single) return kernels.single;
@@ -91,7 +77,7 @@ struct Batch {
     const SimdKernels& kernels;
     SimdPath path;
     std::span<const Ray> rays;
-    Hit* hits;
+    HitRows hits;
     std::uint8_t* occluded;
     bool counters;
     std::vector<std::uint32_t> order{};  // of the path `sorted`
@@ -108,8 +94,8 @@ struct Batch {
                           rays.data() + from,
                           order.empty() ? nullptr : order.data() + begin,
                           end - begin,
-                          hits == nullptr ? nullptr : hits + from,
-                          hits == nullptr ? occluded + from : nullptr,
+                          hits ? HitRows{hits.at(from), hits.bytes} : HitRows{},
+                          hits ? nullptr : occluded + from,
                           stack.view(),
                           stack.packet_view(),
                           &memory,
@@ -118,8 +104,9 @@ struct Batch {
     }
 };
 
-TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hits,
-                        std::uint8_t* occluded, const TraceOptions& options) {
+TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
+                        std::uint8_t* occluded, const TraceOptions& options,
+                        const RowsDone* done = nullptr) {
     const SimdKernels& kernels = kernels_for(options.isa);
     const SimdPath path = path_for(tree, rays, options.path);
     const std::size_t block_size = rays_per_job(rays.size(), path);
@@ -131,20 +118,25 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, Hit* hit
     PathRace paths;
     with_threads(options.threads, [&] {
         if (path == SimdPath::sorted) batch.order = order_by_place(tree.arrays().bounds, rays);
-        for_each_block(rays.size(), block_size,
-                       [&](std::size_t block, std::size_t begin, std::size_t end) {
-                           if (!race) return batch.run(begin, end, parts[block]);
-                           const SimdPath path_here = paths.next();
-                           const std::int64_t start = PathRace::thread_ns();
-                           batch.run(path_here, begin, end, parts[block]);
-                           paths.add(path_here, end - begin, PathRace::thread_ns() - start);
-                       });
+        for_each_block(
+            rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
+                if (race) {
+                    const SimdPath path_here = paths.next();
+                    const std::int64_t start = PathRace::thread_ns();
+                    batch.run(path_here, begin, end, parts[block]);
+                    paths.add(path_here, end - begin, PathRace::thread_ns() - start);
+                } else {
+                    batch.run(begin, end, parts[block]);
+                }
+                if (done != nullptr)
+                    (*done)(batch.order.empty() ? nullptr : batch.order.data(), begin, end);
+            });
     });
     return sum_of(parts, rays.size(), options.counters);
 }
 
 /// Largest jobs, one after the other, in the caller's floating-point environment.
-void trace_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, Hit* hits,
+void trace_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
                           std::uint8_t* occluded) {
     SimdPath path = choose_simd_path(tree, rays);
     if (path == SimdPath::sorted) path = SimdPath::stream;
@@ -175,7 +167,7 @@ TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit>
     check_sizes(rays.size(), hits.size());
     check_call(options);
     static_cast<void>(kernels_for(options.isa));
-    if (!tree.empty()) return trace_batch(tree, rays, hits.data(), nullptr, options);
+    if (!tree.empty()) return trace_batch(tree, rays, {hits.data()}, nullptr, options);
     std::ranges::fill(hits, Hit{});
     return miss_all(rays);
 }
@@ -192,7 +184,7 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
     check_sizes(rays.size(), occluded.size());
     check_call(options);
     static_cast<void>(kernels_for(options.isa));
-    if (!tree.empty()) return trace_batch(tree, rays, nullptr, occluded.data(), options);
+    if (!tree.empty()) return trace_batch(tree, rays, {}, occluded.data(), options);
     std::ranges::fill(occluded, std::uint8_t{0});
     return miss_all(rays);
 }
@@ -202,7 +194,7 @@ void closest_here(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit>
     if (tree.empty())
         std::ranges::fill(hits, Hit{});
     else
-        trace_on_this_thread(tree, rays, hits.data(), nullptr);
+        trace_on_this_thread(tree, rays, {hits.data()}, nullptr);
 }
 
 void occluded_here(const WideBvh& tree, std::span<const Ray> rays,
@@ -211,7 +203,7 @@ void occluded_here(const WideBvh& tree, std::span<const Ray> rays,
     if (tree.empty())
         std::ranges::fill(occluded, std::uint8_t{0});
     else
-        trace_on_this_thread(tree, rays, nullptr, occluded.data());
+        trace_on_this_thread(tree, rays, {}, occluded.data());
 }
 
 AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOptions& options) {
@@ -235,7 +227,7 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
                                   rays.data() + begin,
                                   nullptr,
                                   end - begin,
-                                  nullptr,
+                                  {},
                                   nullptr,
                                   stack.view(),
                                   {},
@@ -250,11 +242,28 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
     return all;
 }
 
+TraceCounts trace_rows(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
+                       std::uint8_t* occluded, const TraceOptions& options, const RowsDone& done) {
+    check_call(options);
+    static_cast<void>(kernels_for(options.isa));
+    if (!tree.empty()) return trace_batch(tree, rays, hits, occluded, options, &done);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        if (hits)
+            *hits.at(i) = {};
+        else
+            occluded[i] = 0;
+    done(nullptr, 0, rays.size());
+    return miss_all(rays);
+}
+
 SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays) {
+    return choose_path(tree.arrays().bounds, rays);
+}
+
+SimdPath choose_path(const Aabb& bounds, std::span<const Ray> rays) {
     const FloatEnvironment plain;
     constexpr std::size_t window = 64, windows = 32;
     constexpr float small_angle = 0.25f, small_part = 0.05f;
-    const Aabb& bounds = tree.arrays().bounds;
     const Vec3 size = bounds.hi - bounds.lo;
     const float near = small_part * max_of(max_of(size.x, size.y), size.z);
     std::size_t looked_at = 0, coherent = 0, close = 0;

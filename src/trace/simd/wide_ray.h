@@ -74,6 +74,12 @@ struct WideView {
     }
 };
 
+/// How boxes around parts of a scene widen once more, along every axis: by `rate` of the ray's
+/// greatest distance to the tree's bounds, by components, and by `least`.
+struct PadGrowth {
+    float rate = 0, least = 0;
+};
+
 /// `room` is for compact trees.
 inline WideView view_of(const WideBvh::Arrays& arrays, TriangleBlock& room) {
     return {arrays.nodes.data(),          arrays.blocks.data(),   arrays.compact_nodes.data(),

@@ -1,0 +1,191 @@
+#include "engine/commit.h"
+
+#include <raydix/error.h>
+
+#include <limits>
+#include <string>
+
+#include "engine/part_tree.h"
+#include "exec/parallel.h"
+
+namespace raydix {
+namespace {
+
+using Geometry = SceneAccess::State::Geometry;
+
+/// Parts whose error is larger stand in a tree of their own.
+constexpr double wild_error = 0x1p-12;
+
+/// Meshes that one tree holds.
+struct Group {
+    std::uint32_t mask;
+    std::vector<std::uint32_t> ids;
+};
+
+std::vector<Group> groups_of(const SceneAccess::State& state, Usage usage) {
+    std::vector<Group> groups;
+    std::map<std::uint32_t, std::size_t> by_mask;
+    for (const auto& [id, geometry] : state.geometries) {
+        if (geometry.is_instance() || geometry.mesh.triangles.empty()) continue;
+        const auto found = by_mask.find(geometry.mask);
+        if (usage == Usage::fixed && found != by_mask.end()) {
+            groups[found->second].ids.push_back(id);
+        } else {
+            by_mask[geometry.mask] = groups.size();
+            groups.push_back({geometry.mask, {id}});
+        }
+    }
+    return groups;
+}
+
+/// The meshes behind each other.
+Mesh merged(const SceneAccess::State& state, const Group& group, std::vector<std::uint32_t>& first) {
+    std::size_t vertices = 0, triangles = 0;
+    for (const std::uint32_t id : group.ids) {
+        const MeshView& mesh = state.geometries.at(id).mesh;
+        first.push_back(static_cast<std::uint32_t>(triangles));
+        vertices += mesh.vertices.size();
+        triangles += mesh.triangles.size();
+    }
+    if (std::max(vertices, triangles) >= no_primitive)
+        throw InputError("scene: " + std::to_string(triangles) + " triangles of " +
+                         std::to_string(vertices) + " vertices are too many for one tree");
+    Mesh out;
+    out.vertices.resize(vertices);
+    out.triangles.resize(triangles);
+    std::size_t vertex = 0;
+    for (std::size_t k = 0; k < group.ids.size(); ++k) {
+        const MeshView& mesh = state.geometries.at(group.ids[k]).mesh;
+        std::copy(mesh.vertices.begin(), mesh.vertices.end(), out.vertices.begin() + vertex);
+        const auto offset = static_cast<std::uint32_t>(vertex);
+        for_each_index(mesh.triangles.size(), [&](std::size_t i) {
+            const Triangle& t = mesh.triangles[i];
+            out.triangles[first[k] + i] = {t[0] + offset, t[1] + offset, t[2] + offset};
+        });
+        vertex += mesh.vertices.size();
+    }
+    return out;
+}
+
+class Commit {
+public:
+    Commit(const SceneAccess::State& state, const SceneOptions& options, CommitReport& report)
+        : state_(state), options_(options), report_(report) {}
+
+    std::shared_ptr<const SceneTree> run() {
+        for (const Group& group : groups_of(state_, options_.usage))
+            tree_->meshes.push_back(mesh_tree(group));
+        for (const auto& mesh : tree_->meshes) {
+            extents_.push_back(extent_of_mesh(mesh->tree->arrays().bounds));
+            report_.meshes += mesh->ids.size();
+            report_.triangles += mesh->triangles;
+            report_.bytes += mesh->tree->stats().bytes;
+            if (!mesh->tree->empty())
+                tree_->bounds = unite(tree_->bounds, mesh->tree->arrays().bounds);
+        }
+        place_instances();
+        build_tops();
+        report_.instances = tree_->instances.size();
+        report_.paths = tree_->paths;
+        return std::move(tree_);
+    }
+
+private:
+    std::shared_ptr<const MeshTree> mesh_tree(const Group& group) {
+        auto out = std::make_shared<MeshTree>();
+        out->ids = group.ids;
+        out->mask = group.mask;
+        if (const MeshTree* const old = kept(group)) {
+            out->tree = old->tree, out->first = old->first, out->triangles = old->triangles;
+            return out;
+        }
+        WideBvh built;
+        WideBvhBuilder builder;
+        BuildOptions build = build_options_for(options_.quality);
+        build.threads = options_.threads;
+        const WideBvhOptions wide{.compact = options_.compact};
+        if (group.ids.size() == 1) {
+            const MeshView& mesh = state_.geometries.at(group.ids.front()).mesh;
+            out->first = {0};
+            out->triangles = mesh.triangles.size();
+            builder.build(mesh, build, built, wide);
+        } else {
+            const Mesh mesh = merged(state_, group, out->first);
+            out->triangles = mesh.triangles.size();
+            builder.build(mesh, build, built, wide);
+        }
+        ++report_.trees_built;
+        out->tree = std::make_shared<const WideBvh>(std::move(built));
+        return out;
+    }
+
+    /// The tree that the last commit made of the same triangles in the same way.
+    [[nodiscard]] const MeshTree* kept(const Group& group) const {
+        if (state_.tree == nullptr || options_.quality != state_.tree_options.quality ||
+            options_.compact != state_.tree_options.compact)
+            return nullptr;
+        for (const std::uint32_t id : group.ids)
+            if (state_.geometries.at(id).changed) return nullptr;
+        for (const auto& mesh : state_.tree->meshes)
+            if (mesh->ids == group.ids) return mesh.get();
+        return nullptr;
+    }
+
+    void place_instances() {
+        for (const auto& [id, geometry] : state_.geometries) {
+            if (!geometry.is_instance()) continue;
+            const std::string name = "instance " + std::to_string(id);
+            const auto& inner = geometry.scene->tree;
+            if (inner == nullptr)
+                throw InputError(name + ": the scene that it places was never committed");
+            if (inner->levels >= Scene::max_levels)
+                throw InputError(name + ": more than " + std::to_string(Scene::max_levels) +
+                                 " levels of instances");
+            tree_->levels = std::max(tree_->levels, inner->levels + 1);
+            const auto number = static_cast<std::uint32_t>(tree_->paths + 1);
+            tree_->paths += 1 + inner->paths;
+            if (tree_->paths > no_primitive - 1)
+                throw InputError(name + ": more than 2^32 - 2 paths through instances");
+            tree_->instances.push_back(
+                {id, geometry.mask, number, geometry.inverse, inner});
+            const Extent extent =
+                image_of(affine_of(geometry.transform), geometry.inverse, inner->extent);
+            if (!extent.empty() && !(in_range(extent.box.lo) && in_range(extent.box.hi)))
+                throw InputError(name + ": it reaches beyond 1e12, or is not finite");
+            extents_.push_back(extent);
+            if (!extent.empty()) tree_->bounds = unite(tree_->bounds, extent.box);
+        }
+    }
+
+    void build_tops() {
+        for (const Extent& extent : extents_) tree_->extent = unite(tree_->extent, extent);
+        if (tree_->only_mesh() != nullptr) return;
+        std::vector<std::uint32_t> near, wild;
+        for (std::uint32_t part = 0; part < extents_.size(); ++part)
+            if (!extents_[part].empty())
+                (extents_[part].error <= wild_error ? near : wild).push_back(part);
+        build_part_tree(near, extents_, tree_->near);
+        build_part_tree(wild, extents_, tree_->wild);
+        report_.bytes += (tree_->near.arrays.nodes.size() + tree_->wild.arrays.nodes.size()) *
+                             sizeof(WideNode) +
+                         tree_->instances.size() * sizeof(PlacedScene);
+    }
+
+    const SceneAccess::State& state_;
+    const SceneOptions& options_;
+    CommitReport& report_;
+    std::shared_ptr<SceneTree> tree_ = std::make_shared<SceneTree>();
+    std::vector<Extent> extents_;  // [mesh trees + instances]
+};
+
+}  // namespace
+
+std::shared_ptr<const SceneTree> make_scene_tree(const SceneAccess::State& state,
+                                                 const SceneOptions& options,
+                                                 CommitReport& report) {
+    std::shared_ptr<const SceneTree> out;
+    with_threads(options.threads, [&] { out = Commit(state, options, report).run(); });
+    return out;
+}
+
+}  // namespace raydix

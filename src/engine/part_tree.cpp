@@ -1,0 +1,66 @@
+#include "engine/part_tree.h"
+
+#include <algorithm>
+
+#include "layout/wide_collapse.h"
+
+namespace raydix {
+namespace {
+
+/// Where a line is as floats have it: their roundings are 2^-24 of its origin and of the way to the
+/// part, twice as much with what is to spare.
+constexpr double float_rounding = 0x1p-22;
+
+Bvh binary_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents) {
+    std::vector<Aabb> boxes(parts.size());
+    for (std::size_t k = 0; k < parts.size(); ++k) boxes[k] = extents[parts[k]].box;
+    BuildOptions options = build_options_for(Quality::balanced);
+    options.max_leaf = 1;
+    return build_bvh(std::span<const Aabb>(boxes), options);
+}
+
+std::uint32_t word_of(const BvhNode& child) {
+    if (WideTree::is_inner(child)) return child.first;
+    return wide_leaf_bit | child.first << 3 | (child.count - 1);
+}
+
+}  // namespace
+
+void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
+                     PartTree& out) {
+    out.part.clear();
+    if (parts.empty()) return;
+    const Bvh bvh = binary_tree(parts, extents);
+    const WideTree wide = collapse_to_wide(bvh, {.width = quantised_width, .max_leaf = 1});
+    out.arrays.set_bounds(bvh.bounds());
+    out.arrays.nodes.reset(wide.node_count());
+    for (std::uint32_t w = 0; w < wide.node_count(); ++w) {
+        WideNode& node = out.arrays.nodes[w];
+        // The smallest box in slot 0, as in trees of triangles.
+        std::array<BvhNode, quantised_width> children{};
+        std::size_t count = 0;
+        for (const BvhNode& child : wide.node(w))
+            if (!WideTree::is_unused(child)) children[count++] = child;
+        std::stable_sort(children.begin(), children.begin() + count,
+                         [](const BvhNode& a, const BvhNode& b) {
+                             return half_area({a.lo, a.hi}) < half_area({b.lo, b.hi});
+                         });
+        SlotBoxes boxes;
+        std::fill_n(node.child, quantised_width, wide_no_child);
+        for (std::size_t s = 0; s < count; ++s) {
+            boxes.set(static_cast<int>(s), {children[s].lo, children[s].hi});
+            node.child[s] = word_of(children[s]);
+        }
+        set_boxes_about(out.arrays.middle, boxes, node);
+    }
+    out.arrays.stats.max_depth = wide.max_depth;
+    out.part.resize(parts.size());
+    for (std::size_t k = 0; k < parts.size(); ++k) out.part[k] = parts[bvh.order()[k]];
+    double error = 0;
+    for (const std::uint32_t part : parts) error = std::max(error, extents[part].error);
+    out.growth.rate = std::nextafterf(static_cast<float>(error + float_rounding), infinity);
+    out.growth.least =
+        static_cast<float>(float_rounding * largest_coordinate(out.arrays.bounds));
+}
+
+}  // namespace raydix

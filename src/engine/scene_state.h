@@ -1,0 +1,53 @@
+// The inside of a Scene: what was added, and what the last commit made of it.
+#pragma once
+
+#include <raydix/scene.h>
+
+#include <map>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "engine/scene_tree.h"
+
+namespace raydix {
+
+struct Scene::State {
+    struct Geometry {
+        // A mesh; its arrays are the scene's own unless they are shared.
+        MeshView mesh;
+        std::vector<Vec3> vertices;
+        std::vector<Triangle> triangles;
+        bool shared = false;
+        // An instance, if there is a scene.
+        std::shared_ptr<const State> scene;
+        Transform transform;
+        Affine inverse;
+
+        std::uint32_t mask = 0xFFFFFFFFu;
+        bool changed = true;  // its triangles, since the last commit
+
+        [[nodiscard]] bool is_instance() const { return scene != nullptr; }
+    };
+
+    std::map<std::uint32_t, Geometry> geometries;
+    std::uint64_t next_id = 0;      // all below were given once
+    std::set<std::uint32_t> taken;  // those above, chosen by the caller
+    bool changed = true;
+    std::shared_ptr<const SceneTree> tree;  // null before the first commit
+    SceneOptions tree_options;
+
+    [[nodiscard]] Geometry& at(std::uint32_t id);
+    /// Whether rays through this scene may come to `other`.
+    [[nodiscard]] bool holds(const State* other) const;
+};
+
+struct SceneAccess {
+    using State = Scene::State;
+    static State& state(Scene& scene) { return *scene.state_; }
+    static const std::shared_ptr<State>& shared_state(const Scene& scene) { return scene.state_; }
+    /// Throws InputError if there is none.
+    static const std::shared_ptr<const SceneTree>& tree(const Scene& scene);
+};
+
+}  // namespace raydix

@@ -1,0 +1,190 @@
+// Batches and single rays through scenes.
+#include <raydix/error.h>
+#include <raydix/scene.h>
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include "base/float_env.h"
+#include "base/options.h"
+#include "engine/scene_state.h"
+#include "engine/scene_walk.h"
+#include "exec/parallel.h"
+#include "rays/place_order.h"
+#include "trace/batch.h"
+#include "trace/ray_frame.h"
+#include "trace/simd/wide_batch.h"
+
+namespace raydix {
+namespace {
+
+/// Rays and where their answers go: hits, or else occluded.
+struct Batch {
+    std::span<const Ray> rays;
+    SceneHit* hits;
+    std::uint8_t* occluded;
+    const SceneTraceOptions& options;
+
+    [[nodiscard]] std::uint32_t mask(std::size_t i) const {
+        return options.masks.empty() ? options.mask : options.masks[i];
+    }
+    void set(std::size_t i, const SceneHit& hit) const {
+        if (hits != nullptr)
+            hits[i] = hit;
+        else
+            occluded[i] = hit.hit();
+    }
+};
+
+struct JobCounts {
+    std::uint64_t hits = 0, invalid = 0;
+};
+
+/// The walk of each thread: its memory stays from batch to batch.
+SceneWalk& walk_of_this_thread() {
+    thread_local SceneWalk walk;
+    return walk;
+}
+
+/// Rays number(0) to number(n - 1).
+template <class Number>
+JobCounts trace_job(const SceneTree& tree, const SceneQuery& query, const Batch& batch,
+                    std::size_t n, const Number& number) {
+    JobCounts counts;
+    SceneWalk& walk = walk_of_this_thread();
+    walk.begin(tree, query);
+    for (std::size_t k = 0; k < n; ++k) {
+        const std::size_t i = number(k);
+        if (is_valid(batch.rays[i]))
+            walk.add(batch.rays[i], batch.mask(i));
+        else
+            ++counts.invalid;
+    }
+    walk.trace();
+    std::size_t place = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+        const std::size_t i = number(k);
+        const bool valid = is_valid(batch.rays[i]);
+        const SceneHit hit = valid ? walk.hit(place) : SceneHit{};
+        place += valid;
+        counts.hits += hit.hit();
+        batch.set(i, hit);
+    }
+    return counts;
+}
+
+TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
+    const std::size_t n = batch.rays.size();
+    SimdPath path = batch.options.path;
+    if (path == SimdPath::automatic) path = choose_path(tree.extent.box, batch.rays);
+    const bool sorted =
+        path == SimdPath::sorted && n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
+    const SceneQuery query{&kernels_for(batch.options.isa), batch.hits == nullptr,
+                           path == SimdPath::packet};
+    const std::size_t job_size =
+        path == SimdPath::single ? 1 : rays_per_job(n, SimdPath::stream);
+    std::vector<JobCounts> parts((n + job_size - 1) / job_size);
+    with_threads(batch.options.threads, [&] {
+        std::vector<std::uint32_t> order;
+        if (sorted) order = order_by_place(tree.extent.box, batch.rays);
+        for_each_block(n, job_size, [&](std::size_t job, std::size_t begin, std::size_t end) {
+            parts[job] = sorted ? trace_job(tree, query, batch, end - begin,
+                                            [&](std::size_t k) -> std::size_t {
+                                                return order[begin + k];
+                                            })
+                                : trace_job(tree, query, batch, end - begin,
+                                            [&](std::size_t k) { return begin + k; });
+        });
+    });
+    TraceCounts sum;
+    sum.rays = n;
+    for (const JobCounts& part : parts) sum.hits += part.hits, sum.invalid_rays += part.invalid;
+    return sum;
+}
+
+/// One tree for all: the kernels write where the answers go.
+TraceCounts trace_mesh(const MeshTree& mesh, const Batch& batch) {
+    TraceOptions options;
+    options.threads = batch.options.threads;
+    options.path = batch.options.path;
+    options.isa = batch.options.isa;
+    const HitRows rows{batch.hits, sizeof(SceneHit)};
+    return trace_rows(*mesh.tree, batch.rays, rows, batch.occluded, options,
+                      [&](const std::uint32_t* order, std::size_t begin, std::size_t end) {
+                          if (batch.hits == nullptr) return;
+                          for (std::size_t k = begin; k < end; ++k) {
+                              SceneHit& hit = batch.hits[order == nullptr ? k : order[k]];
+                              hit.geometry = no_primitive, hit.instance = 0;
+                              if (hit.hit()) mesh.name(hit);
+                          }
+                      });
+}
+
+TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
+    const SceneTree& tree = *SceneAccess::tree(scene);
+    const SceneTraceOptions& options = batch.options;
+    check_enum("path", options.path, SimdPath::sorted);
+    if (!options.masks.empty() && options.masks.size() != batch.rays.size())
+        throw InputError("trace: " + std::to_string(batch.rays.size()) + " rays, but " +
+                         std::to_string(options.masks.size()) + " masks");
+    static_cast<void>(kernels_for(options.isa));
+    const MeshTree* const mesh = tree.only_mesh();
+    const std::uint32_t all = ~std::uint32_t{0};
+    const bool sees_all = mesh != nullptr && options.masks.empty() &&
+                          (mesh->mask == all ? options.mask != 0 : (mesh->mask & options.mask) != 0);
+    return sees_all ? trace_mesh(*mesh, batch) : trace_scene(tree, batch);
+}
+
+SceneHit trace_one(const Scene& scene, const Ray& ray, std::uint32_t mask, bool any) {
+    const SceneTree& tree = *SceneAccess::tree(scene);
+    if (const MeshTree* const mesh = tree.only_mesh()) {
+        SceneHit hit;
+        if ((mesh->mask & mask) == 0) return hit;
+        if (any) {
+            hit.prim = any_hit(*mesh->tree, ray) ? 0 : no_primitive;
+            return hit;
+        }
+        static_cast<Hit&>(hit) = closest_hit(*mesh->tree, ray);
+        if (hit.hit()) mesh->name(hit);
+        return hit;
+    }
+    if (!is_valid(ray)) return {};
+    const FloatEnvironment plain;
+    SceneWalk& walk = walk_of_this_thread();
+    walk.begin(tree, {&simd_kernels().front(), any, false});
+    walk.add(ray, mask);
+    walk.trace();
+    return walk.hit(0);
+}
+
+}  // namespace
+
+TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<SceneHit> hits,
+                  const SceneTraceOptions& options) {
+    check_sizes(rays.size(), hits.size());
+    return trace_batch(scene, {rays, hits.data(), nullptr, options});
+}
+
+std::vector<SceneHit> trace(const Scene& scene, std::span<const Ray> rays,
+                            const SceneTraceOptions& options) {
+    std::vector<SceneHit> hits(rays.size());
+    trace(scene, rays, hits, options);
+    return hits;
+}
+
+TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
+                      std::span<std::uint8_t> occluded, const SceneTraceOptions& options) {
+    check_sizes(rays.size(), occluded.size());
+    return trace_batch(scene, {rays, nullptr, occluded.data(), options});
+}
+
+SceneHit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
+    return trace_one(scene, ray, mask, false);
+}
+
+bool any_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
+    return trace_one(scene, ray, mask, true).hit();
+}
+
+}  // namespace raydix

@@ -1,0 +1,79 @@
+// What a commit makes of a scene: trees over triangles, and a tree over those and the instances.
+// Nothing in it changes afterwards, so that any number of threads and of other scenes may use it.
+#pragma once
+
+#include <raydix/scene.h>
+#include <raydix/wide.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "engine/extent.h"
+#include "instances/affine.h"
+#include "layout/wide_bvh.h"
+#include "trace/simd/wide_ray.h"
+
+namespace raydix {
+
+/// One tree over the triangles of one mesh or of several, which follow each other by id.
+struct MeshTree {
+    std::shared_ptr<const WideBvh> tree;
+    std::vector<std::uint32_t> ids;    // [meshes] ascending
+    std::vector<std::uint32_t> first;  // [meshes]: the first triangle of each in the tree's counting
+    std::uint32_t mask = 0;            // of all of them
+    std::uint64_t triangles = 0;
+
+    /// Triangle `prim` of the tree: the mesh that it belongs to, by its place.
+    [[nodiscard]] std::size_t mesh_of(std::uint32_t prim) const {
+        return static_cast<std::size_t>(std::upper_bound(first.begin() + 1, first.end(), prim) -
+                                        first.begin()) -
+               1;
+    }
+    /// Gives a hit of the tree its mesh.
+    void name(SceneHit& hit) const {
+        const std::size_t m = first.size() == 1 ? 0 : mesh_of(hit.prim);
+        hit.geometry = ids[m];
+        hit.prim -= first[m];
+    }
+};
+
+struct SceneTree;
+
+struct PlacedScene {
+    std::uint32_t id;
+    std::uint32_t mask;
+    std::uint32_t number;  // of the path that ends here
+    Affine inverse;
+    std::shared_ptr<const SceneTree> scene;
+};
+
+/// A wide tree whose leaves hold one part each. Parts are numbered: mesh trees first, then
+/// instances.
+struct PartTree {
+    WideBvh::Arrays arrays;           // nodes and bounds alone
+    std::vector<std::uint32_t> part;  // by the place that leaves name
+    PadGrowth growth;
+
+    [[nodiscard]] bool empty() const { return part.empty(); }
+};
+
+struct SceneTree {
+    std::vector<std::shared_ptr<const MeshTree>> meshes;
+    std::vector<PlacedScene> instances;  // by ascending id
+    /// Over all parts that are not empty: instances whose maps keep errors small, and those that
+    /// do not, whose boxes must widen so much that they would spoil a common tree.
+    PartTree near, wild;
+    Extent extent;
+    Aabb bounds = empty_box();  // without what rays may miss it by
+    std::uint64_t paths = 0;
+    std::uint32_t levels = 0;  // of instances, below this scene
+
+    /// The only mesh tree, if rays need nothing else.
+    [[nodiscard]] const MeshTree* only_mesh() const {
+        return instances.empty() && meshes.size() == 1 ? meshes.front().get() : nullptr;
+    }
+};
+
+}  // namespace raydix

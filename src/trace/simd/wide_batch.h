@@ -1,0 +1,53 @@
+// Batches through one wide tree, for what stands on top of them.
+#pragma once
+
+#include <raydix/wide.h>
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "trace/simd/simd_kernels.h"
+
+namespace raydix {
+
+/// Throws InputError that names those there are. Empty: the best.
+[[nodiscard]] const SimdKernels& kernels_for(const std::string& isa);
+
+/// choose_simd_path for rays through anything with these bounds.
+[[nodiscard]] SimdPath choose_path(const Aabb& bounds, std::span<const Ray> rays);
+
+/// So many rays are a job of this path.
+[[nodiscard]] std::size_t rays_per_job(std::size_t n, SimdPath path);
+
+/// Stacks for the deepest path of a tree.
+class StackMemory {
+public:
+    explicit StackMemory(std::uint32_t max_depth) { reserve(max_depth); }
+    StackMemory() = default;
+    void reserve(std::uint32_t max_depth) {
+        const std::size_t n = wide_stack_capacity(max_depth);
+        if (n <= words_.size()) return;
+        words_.resize(n), entries_.resize(n), active_.resize(n);
+    }
+    [[nodiscard]] WideStackView view() { return {words_.data(), entries_.data()}; }
+    [[nodiscard]] PacketStackView packet_view() {
+        return {words_.data(), entries_.data(), active_.data()};
+    }
+
+private:
+    std::vector<std::uint32_t> words_;
+    std::vector<float> entries_;
+    std::vector<std::uint64_t> active_;
+};
+
+/// The hits of rays order[begin] to order[end - 1], or begin to end - 1 without an order, are there.
+using RowsDone =
+    std::function<void(const std::uint32_t* order, std::size_t begin, std::size_t end)>;
+
+/// As trace or, without rows for hits, trace_any; `done` comes once for each ray, on any thread.
+TraceCounts trace_rows(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
+                       std::uint8_t* occluded, const TraceOptions& options, const RowsDone& done);
+
+}  // namespace raydix
