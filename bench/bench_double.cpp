@@ -8,9 +8,9 @@
 #include <raydix/double.h>
 #include <raydix/instances_d.h>
 #include <raydix/machine.h>
+#include <raydix/model.h>
 #include <raydix/overlap.h>
 #include <raydix/rays.h>
-#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <CLI/CLI.hpp>

@@ -7,8 +7,8 @@
 #include <raydix/device_cwbvh.h>
 #include <raydix/device_trees.h>
 #include <raydix/machine.h>
-#include <raydix/rays.h>
 #include <raydix/model.h>
+#include <raydix/rays.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 #include <raydix/device_trace.h>
 #include <raydix/machine.h>
-#include <raydix/rays.h>
 #include <raydix/model.h>
+#include <raydix/rays.h>
 #include <raydix/trace.h>
 
 #include <CLI/CLI.hpp>

@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 #include <raydix/cwbvh.h>
 #include <raydix/machine.h>
-#include <raydix/rays.h>
 #include <raydix/model.h>
+#include <raydix/rays.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

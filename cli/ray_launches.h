@@ -1,8 +1,8 @@
 // Rays of the protocol as launches: what `simulate` and `bench traversal` send through kernels.
 #pragma once
 
-#include <raydix/rays.h>
 #include <raydix/model.h>
+#include <raydix/rays.h>
 #include <raydix/trace.h>
 
 #include <functional>

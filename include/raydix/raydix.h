@@ -22,6 +22,7 @@
 #include <raydix/kdtree.h>           // IWYU pragma: export
 #include <raydix/machine.h>          // IWYU pragma: export
 #include <raydix/mesh.h>             // IWYU pragma: export
+#include <raydix/model.h>            // IWYU pragma: export
 #include <raydix/octree.h>           // IWYU pragma: export
 #include <raydix/overlap.h>          // IWYU pragma: export
 #include <raydix/pairs.h>            // IWYU pragma: export
@@ -32,7 +33,6 @@
 #include <raydix/refit.h>            // IWYU pragma: export
 #include <raydix/report.h>           // IWYU pragma: export
 #include <raydix/result_limit.h>     // IWYU pragma: export
-#include <raydix/model.h>            // IWYU pragma: export
 #include <raydix/shapes.h>           // IWYU pragma: export
 #include <raydix/simulate.h>         // IWYU pragma: export
 #include <raydix/solid.h>            // IWYU pragma: export

@@ -6,10 +6,10 @@
 #include <nanobind/stl/vector.h>
 #include <raydix/camera.h>
 #include <raydix/error.h>
+#include <raydix/model.h>
 #include <raydix/picture.h>
 #include <raydix/rays.h>
 #include <raydix/report.h>
-#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <cstdint>

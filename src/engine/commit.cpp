@@ -39,7 +39,8 @@ std::vector<Group> groups_of(const SceneAccess::State& state, Usage usage) {
 }
 
 /// The meshes behind each other.
-Mesh merged(const SceneAccess::State& state, const Group& group, std::vector<std::uint32_t>& first) {
+Mesh merged(const SceneAccess::State& state, const Group& group,
+            std::vector<std::uint32_t>& first) {
     std::size_t vertices = 0, triangles = 0;
     for (const std::uint32_t id : group.ids) {
         const MeshView& mesh = state.geometries.at(id).mesh;
@@ -146,8 +147,7 @@ private:
             tree_->paths += 1 + inner->paths;
             if (tree_->paths > no_primitive - 1)
                 throw InputError(name + ": more than 2^32 - 2 paths through instances");
-            tree_->instances.push_back(
-                {id, geometry.mask, number, geometry.inverse, inner});
+            tree_->instances.emplace_back(geometry.inverse, inner, id, geometry.mask, number);
             const Extent extent =
                 image_of(affine_of(geometry.transform), geometry.inverse, inner->extent);
             if (!extent.empty() && !(in_range(extent.box.lo) && in_range(extent.box.hi)))
@@ -166,9 +166,9 @@ private:
                 (extents_[part].error <= wild_error ? near : wild).push_back(part);
         build_part_tree(near, extents_, tree_->near);
         build_part_tree(wild, extents_, tree_->wild);
-        report_.bytes += (tree_->near.arrays.nodes.size() + tree_->wild.arrays.nodes.size()) *
-                             sizeof(WideNode) +
-                         tree_->instances.size() * sizeof(PlacedScene);
+        report_.bytes +=
+            (tree_->near.arrays.nodes.size() + tree_->wild.arrays.nodes.size()) * sizeof(WideNode) +
+            tree_->instances.size() * sizeof(PlacedScene);
     }
 
     const SceneAccess::State& state_;

@@ -27,8 +27,8 @@ struct Extent {
 inline double largest_coordinate(const Aabb& box) {
     double most = 0;
     for (const Vec3 p : {box.lo, box.hi})
-        most = std::max({most, std::fabs(double{p.x}), std::fabs(double{p.y}),
-                         std::fabs(double{p.z})});
+        most = std::max(
+            {most, std::fabs(double{p.x}), std::fabs(double{p.y}), std::fabs(double{p.z})});
     return most;
 }
 

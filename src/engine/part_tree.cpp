@@ -59,8 +59,7 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
     double error = 0;
     for (const std::uint32_t part : parts) error = std::max(error, extents[part].error);
     out.growth.rate = std::nextafterf(static_cast<float>(error + float_rounding), infinity);
-    out.growth.least =
-        static_cast<float>(float_rounding * largest_coordinate(out.arrays.bounds));
+    out.growth.least = static_cast<float>(float_rounding * largest_coordinate(out.arrays.bounds));
 }
 
 }  // namespace raydix

@@ -8,8 +8,8 @@
 
 #include "base/float_env.h"
 #include "base/options.h"
+#include "engine/scene_job.h"
 #include "engine/scene_state.h"
-#include "engine/scene_walk.h"
 #include "exec/parallel.h"
 #include "rays/place_order.h"
 #include "trace/batch.h"
@@ -41,35 +41,40 @@ struct JobCounts {
     std::uint64_t hits = 0, invalid = 0;
 };
 
-/// The walk of each thread: its memory stays from batch to batch.
-SceneWalk& walk_of_this_thread() {
-    thread_local SceneWalk walk;
-    return walk;
+/// The job of each thread: its memory stays from batch to batch.
+SceneJob& job_of_this_thread() {
+    thread_local SceneJob job;
+    return job;
 }
 
-/// Rays number(0) to number(n - 1).
-template <class Number>
-JobCounts trace_job(const SceneTree& tree, const SceneQuery& query, const Batch& batch,
-                    std::size_t n, const Number& number) {
+/// How a batch goes through a scene.
+struct Way {
+    const SimdKernels* kernels;
+    const SceneKernels* scene;
+    bool packets, single;
+};
+
+/// Rays begin to end - 1, or order[begin] to order[end - 1].
+JobCounts trace_job(const SceneTree& tree, const Way& way, const Batch& batch,
+                    const std::vector<std::uint32_t>& order, std::size_t begin, std::size_t end) {
+    SceneJob& job = job_of_this_thread();
+    const std::size_t from = order.empty() ? begin : 0;
+    job.tree = &tree;
+    job.kernels = way.kernels;
+    job.rays = batch.rays.data() + from;
+    job.order = order.empty() ? nullptr : order.data() + begin;
+    job.n = end - begin;
+    job.mask = batch.options.mask;
+    job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + from;
+    job.any = batch.hits == nullptr;
+    job.packets = way.packets;
+    job.single = way.single;
+    way.scene->trace(job);
     JobCounts counts;
-    SceneWalk& walk = walk_of_this_thread();
-    walk.begin(tree, query);
-    for (std::size_t k = 0; k < n; ++k) {
-        const std::size_t i = number(k);
-        if (is_valid(batch.rays[i]))
-            walk.add(batch.rays[i], batch.mask(i));
-        else
-            ++counts.invalid;
-    }
-    walk.trace();
-    std::size_t place = 0;
-    for (std::size_t k = 0; k < n; ++k) {
-        const std::size_t i = number(k);
-        const bool valid = is_valid(batch.rays[i]);
-        const SceneHit hit = valid ? walk.hit(place) : SceneHit{};
-        place += valid;
-        counts.hits += hit.hit();
-        batch.set(i, hit);
+    counts.invalid = job.invalid;
+    for (std::size_t k = 0; k < job.n; ++k) {
+        counts.hits += job.hits[k].hit();
+        batch.set(order.empty() ? begin + k : order[begin + k], job.hits[k]);
     }
     return counts;
 }
@@ -80,21 +85,15 @@ TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
     if (path == SimdPath::automatic) path = choose_path(tree.extent.box, batch.rays);
     const bool sorted =
         path == SimdPath::sorted && n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
-    const SceneQuery query{&kernels_for(batch.options.isa), batch.hits == nullptr,
-                           path == SimdPath::packet};
-    const std::size_t job_size =
-        path == SimdPath::single ? 1 : rays_per_job(n, SimdPath::stream);
+    const Way way{&kernels_for(batch.options.isa), &scene_kernels_for(batch.options.isa),
+                  path == SimdPath::packet, path == SimdPath::single};
+    const std::size_t job_size = rays_per_job(n, SimdPath::stream);
     std::vector<JobCounts> parts((n + job_size - 1) / job_size);
     with_threads(batch.options.threads, [&] {
         std::vector<std::uint32_t> order;
         if (sorted) order = order_by_place(tree.extent.box, batch.rays);
         for_each_block(n, job_size, [&](std::size_t job, std::size_t begin, std::size_t end) {
-            parts[job] = sorted ? trace_job(tree, query, batch, end - begin,
-                                            [&](std::size_t k) -> std::size_t {
-                                                return order[begin + k];
-                                            })
-                                : trace_job(tree, query, batch, end - begin,
-                                            [&](std::size_t k) { return begin + k; });
+            parts[job] = trace_job(tree, way, batch, order, begin, end);
         });
     });
     TraceCounts sum;
@@ -131,8 +130,9 @@ TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
     static_cast<void>(kernels_for(options.isa));
     const MeshTree* const mesh = tree.only_mesh();
     const std::uint32_t all = ~std::uint32_t{0};
-    const bool sees_all = mesh != nullptr && options.masks.empty() &&
-                          (mesh->mask == all ? options.mask != 0 : (mesh->mask & options.mask) != 0);
+    const bool sees_all =
+        mesh != nullptr && options.masks.empty() &&
+        (mesh->mask == all ? options.mask != 0 : (mesh->mask & options.mask) != 0);
     return sees_all ? trace_mesh(*mesh, batch) : trace_scene(tree, batch);
 }
 
@@ -151,11 +151,15 @@ SceneHit trace_one(const Scene& scene, const Ray& ray, std::uint32_t mask, bool 
     }
     if (!is_valid(ray)) return {};
     const FloatEnvironment plain;
-    SceneWalk& walk = walk_of_this_thread();
-    walk.begin(tree, {&simd_kernels().front(), any, false});
-    walk.add(ray, mask);
-    walk.trace();
-    return walk.hit(0);
+    static const SceneKernels& kernels = scene_kernels_for({});
+    SceneJob& job = job_of_this_thread();
+    job.tree = &tree;
+    job.kernels = &simd_kernels().front();
+    job.rays = &ray, job.order = nullptr, job.n = 1;
+    job.mask = mask, job.masks = nullptr;
+    job.any = any, job.packets = false, job.single = true;
+    kernels.trace(job);
+    return job.hits[0];
 }
 
 }  // namespace

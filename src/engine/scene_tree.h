@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "engine/extent.h"
@@ -20,9 +21,10 @@ namespace raydix {
 /// One tree over the triangles of one mesh or of several, which follow each other by id.
 struct MeshTree {
     std::shared_ptr<const WideBvh> tree;
-    std::vector<std::uint32_t> ids;    // [meshes] ascending
-    std::vector<std::uint32_t> first;  // [meshes]: the first triangle of each in the tree's counting
-    std::uint32_t mask = 0;            // of all of them
+    std::vector<std::uint32_t> ids;  // [meshes] ascending
+    std::vector<std::uint32_t>
+        first;               // [meshes]: the first triangle of each in the tree's counting
+    std::uint32_t mask = 0;  // of all of them
     std::uint64_t triangles = 0;
 
     /// Triangle `prim` of the tree: the mesh that it belongs to, by its place.
@@ -42,11 +44,23 @@ struct MeshTree {
 struct SceneTree;
 
 struct PlacedScene {
+    // The way in, by columns: of x, y and z, and the move.
+    alignas(32) double columns[4][4];
+    std::shared_ptr<const SceneTree> scene;
     std::uint32_t id;
     std::uint32_t mask;
     std::uint32_t number;  // of the path that ends here
-    Affine inverse;
-    std::shared_ptr<const SceneTree> scene;
+
+    PlacedScene(const Affine& inverse, std::shared_ptr<const SceneTree> placed,
+                std::uint32_t own_id, std::uint32_t own_mask, std::uint32_t own_number)
+        : columns{{inverse.x.x, inverse.y.x, inverse.z.x, 0},
+                  {inverse.x.y, inverse.y.y, inverse.z.y, 0},
+                  {inverse.x.z, inverse.y.z, inverse.z.z, 0},
+                  {inverse.move.x, inverse.move.y, inverse.move.z, 0}},
+          scene(std::move(placed)),
+          id(own_id),
+          mask(own_mask),
+          number(own_number) {}
 };
 
 /// A wide tree whose leaves hold one part each. Parts are numbered: mesh trees first, then

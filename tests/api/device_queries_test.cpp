@@ -3,8 +3,8 @@
 #include "api/device_queries.h"
 
 #include <raydix/error.h>
-#include <raydix/points.h>
 #include <raydix/model.h>
+#include <raydix/points.h>
 
 #include <cmath>
 #include <iostream>

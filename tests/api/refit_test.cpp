@@ -4,9 +4,9 @@
 #include <raydix/check.h>
 #include <raydix/closest.h>
 #include <raydix/error.h>
+#include <raydix/model.h>
 #include <raydix/rdx.h>
 #include <raydix/refit.h>
-#include <raydix/model.h>
 #include <raydix/trace.h>
 
 #include <cmath>

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 #include <raydix/check.h>
 #include <raydix/error.h>
-#include <raydix/rdx.h>
 #include <raydix/model.h>
+#include <raydix/rdx.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
 

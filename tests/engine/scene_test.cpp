@@ -70,9 +70,8 @@ struct Sight {
 };
 
 /// All of `world`, seen by `lines`; `number`: of the path that leads here.
-void look(const World& world, const std::vector<WideRayLine>& lines,
-          const std::vector<bool>& sees, std::span<const Ray> rays, std::uint32_t number,
-          Sight& sight) {
+void look(const World& world, const std::vector<WideRayLine>& lines, const std::vector<bool>& sees,
+          std::span<const Ray> rays, std::uint32_t number, Sight& sight) {
     std::uint32_t next = number + 1;
     for (const World::Item& item : world.items) {
         std::vector<bool> seen(rays.size());
@@ -111,8 +110,8 @@ Sight look(const World& world, std::span<const Ray> rays, std::vector<std::uint3
 }
 
 bool same(const SceneHit& a, const SceneHit& b) {
-    return a.t == b.t && a.prim == b.prim && a.u == b.u && a.v == b.v &&
-           a.geometry == b.geometry && a.instance == b.instance;
+    return a.t == b.t && a.prim == b.prim && a.u == b.u && a.v == b.v && a.geometry == b.geometry &&
+           a.instance == b.instance;
 }
 
 struct Recipe {
@@ -136,7 +135,9 @@ std::shared_ptr<World> random_world(Random& random, const Recipe& recipe, std::u
             item.transform = random.transform(level == 0 ? 4.0f : 2.0f, recipe.shear);
             world->scene.add(item.inside->scene, item.transform, options);
         } else {
-            item.mesh = random.below(8) == 0 ? Mesh{} : test::random_soup(1 + random.below(40), id + 100 * level, 0.6f);
+            item.mesh = random.below(8) == 0
+                            ? Mesh{}
+                            : test::random_soup(1 + random.below(40), id + 100 * level, 0.6f);
             world->scene.add(item.mesh, options);
         }
         world->items.push_back(std::move(item));

@@ -1,7 +1,7 @@
 // Against nanoflann, where it is installed: an index of another make, in both scalars.
 #include <gtest/gtest.h>
-#include <raydix/points.h>
 #include <raydix/model.h>
+#include <raydix/points.h>
 
 #include <algorithm>
 #include <cmath>

@@ -2,8 +2,8 @@
 // distances along their path in higher precision.
 #include <gtest/gtest.h>
 #include <raydix/error.h>
-#include <raydix/overlap.h>
 #include <raydix/model.h>
+#include <raydix/overlap.h>
 #include <raydix/trace.h>
 
 #include <bit>

@@ -1,8 +1,8 @@
 // Pairs against a look at all of them, and against whole numbers.
 #include <gtest/gtest.h>
 #include <raydix/error.h>
-#include <raydix/pairs.h>
 #include <raydix/model.h>
+#include <raydix/pairs.h>
 
 #include <iostream>
 #include <limits>

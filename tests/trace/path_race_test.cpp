@@ -2,8 +2,8 @@
 #include "trace/simd/path_race.h"
 
 #include <gtest/gtest.h>
-#include <raydix/rays.h>
 #include <raydix/model.h>
+#include <raydix/rays.h>
 #include <raydix/wide.h>
 
 #include <cstring>

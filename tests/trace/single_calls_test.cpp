@@ -1,8 +1,8 @@
 // Single calls: the same hits as `scalar`, bit for bit, whether or not a thread's rays follow each
 // other, for every instruction set.
 #include <gtest/gtest.h>
-#include <raydix/rays.h>
 #include <raydix/model.h>
+#include <raydix/rays.h>
 #include <raydix/wide.h>
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // Builders ploc and hploc against their definitions, and what holds for every tree of theirs.
 #include <gtest/gtest.h>
 #include <raydix/check.h>
-#include <raydix/rdx.h>
 #include <raydix/model.h>
+#include <raydix/rdx.h>
 #include <raydix/trace.h>
 
 #include <algorithm>

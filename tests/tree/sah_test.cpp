@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 #include <raydix/check.h>
 #include <raydix/error.h>
-#include <raydix/rdx.h>
 #include <raydix/model.h>
+#include <raydix/rdx.h>
 #include <raydix/trace.h>
 
 #include <algorithm>

@@ -242,8 +242,9 @@ HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, cons
         const V16 out[4] = {hn::IfThenElse(hit, hn::Load(f16, p.t + k), hn::Set(f16, infinity)),
                             hn::BitCast(f16, prim), hn::IfThenElseZero(hit, hn::Load(f16, p.u + k)),
                             hn::IfThenElseZero(hit, hn::Load(f16, p.v + k))};
-        store_quads(
-            out, [&](std::size_t l) { return reinterpret_cast<float*>(job.hits.at(static_cast<std::size_t>(index[k + l]))); });
+        store_quads(out, [&](std::size_t l) {
+            return reinterpret_cast<float*>(job.hits.at(static_cast<std::size_t>(index[k + l])));
+        });
     }
     for (; k < p.count; ++k)
         *job.hits.at(static_cast<std::size_t>(index[k])) =
@@ -337,8 +338,7 @@ void trace_packets(const SimdJob& job, SimdCounts& counts) {
 /// Rays index[0, count) of one class as a stream; `index` may be read up to the next multiple of
 /// lanes16.
 HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index,
-                                   std::uint32_t count, std::uint32_t code,
-                                   PadGrowth growth = {}) {
+                                   std::uint32_t count, std::uint32_t code, PadGrowth growth = {}) {
     std::vector<StreamRay>& rays = job.memory->rays();
     StreamFrame frame;
     frame.kind = ray_class_of(code);
@@ -404,7 +404,8 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
             if constexpr (any)
                 job.occluded[*index] = hit;
             else
-                *job.hits.at(static_cast<std::size_t>(*index)) = hit ? Hit{ray.t, ray.prim, found->u, found->v} : Hit{};
+                *job.hits.at(static_cast<std::size_t>(*index)) =
+                    hit ? Hit{ray.t, ray.prim, found->u, found->v} : Hit{};
             ++found, ++index;
         }
     }
@@ -413,42 +414,17 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
         trace_one<any, counting, compact>(job, static_cast<std::size_t>(odd[k]), counts);
 }
 
-template <bool any>
-void visit_parts(const PartJob& job) {
-    const SimdJob rays{job.tree, job.rays, nullptr,  job.n,      {},
-                       nullptr,  job.stack, {},      job.memory, false};
-    RaySorter sorter;
-    sorter.sort(rays);
-    SimdCounts counts;
-    for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
-        const std::uint32_t count = sorter.count(code);
-        if (count == 0) continue;
-        const std::int32_t* const index = sorter.rays(code);
-        const StreamFrame frame = fill_stream(rays, index, count, code, job.growth);
-        StreamWalk<any, false, false, true>(job.tree, frame, *job.memory, job.stack, counts, &job,
-                                            index)
-            .trace();
-    }
-}
-
-inline void parts(const PartJob& job) {
-    if (job.n == 1)
-        job.any ? visit_parts_of_one<true>(job) : visit_parts_of_one<false>(job);
-    else
-        job.any ? visit_parts<true>(job) : visit_parts<false>(job);
-}
-
 inline void streams(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
         !job.hits ? trace_streams<true, counting, compact>(job, counts)
-                            : trace_streams<false, counting, compact>(job, counts);
+                  : trace_streams<false, counting, compact>(job, counts);
     });
 }
 
 inline void packets(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
         !job.hits ? trace_packets<true, counting, compact>(job, counts)
-                            : trace_packets<false, counting, compact>(job, counts);
+                  : trace_packets<false, counting, compact>(job, counts);
     });
 }
 

@@ -45,31 +45,6 @@ struct SimdJob {
     bool counting;
 };
 
-/// What stands in the leaves of a tree over parts of a scene: trees of their own.
-class PartVisitor {
-public:
-    /// Rays `rays[0, count)` of the job against the part at `place` of the leaves' order. Rays end
-    /// where they hit: their tmax in the job's array becomes less, or negative where any hit will
-    /// do.
-    virtual void visit(std::uint32_t place, const std::uint32_t* rays, std::uint32_t count) = 0;
-
-protected:
-    ~PartVisitor() = default;
-};
-
-/// At most max_job_rays rays through a tree over parts. Each part is visited with all rays that may
-/// hit it, near ones first where rays agree on that.
-struct PartJob {
-    WideView tree;
-    const Ray* rays;  // directions near unit length; others are left out
-    std::size_t n;
-    bool any;  // any hit will do
-    WideStackView stack;
-    StreamMemory* memory;
-    PadGrowth growth;
-    PartVisitor* visitor;
-};
-
 using OneRay = Hit(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,
                    CallHistory& history);
 
@@ -81,7 +56,6 @@ struct SimdKernels {
     void (*single)(const SimdJob& job, SimdCounts& counts);
     void (*packets)(const SimdJob& job, SimdCounts& counts);
     void (*streams)(const SimdJob& job, SimdCounts& counts);
-    void (*parts)(const PartJob& job);
     /// Hits of each ray behind those of the one before, sorted; how many to hit_counts [n].
     void (*all_hits)(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t* hit_counts,
                      SimdCounts& counts);

@@ -25,20 +25,21 @@ constexpr std::size_t parts8 = 8 / lanes8;
 
 enum class Wanted { closest, any, all };
 
-/// How far a ray goes that parts of a scene may have ended.
-HWY_INLINE float reach_of(const Ray& ray) {
-    return min_of(ray.tmax, std::numeric_limits<float>::max());
-}
+/// Leaves hold triangles. Else Parts is what takes the rays on at a leaf, a part of a scene:
+///   float visit_one(std::uint32_t part, std::uint32_t ray)
+///       ray `ray` of the job into the part; how far it goes from now on
+///   void visit(std::uint32_t part, const std::uint32_t* rays, std::uint32_t count)
+///   float reach(std::uint32_t ray)
+struct NoParts {};
 
-/// `guessing`: rays that follow each other take much the same way. `parts`: leaves hold parts of a
-/// scene.
-template <Wanted wanted, bool counting, bool compact, bool guessing = false, bool parts = false>
+/// `guessing`: rays that follow each other take much the same way.
+template <Wanted wanted, bool counting, bool compact, bool guessing = false, class Parts = NoParts>
 class SingleRay {
 public:
-    /// `job` and the ray's place there: for parts.
+    /// `parts` and the ray's place in the job: unless leaves hold triangles.
     SingleRay(const WideView& tree, const SingleFrame& frame, const WideStackView& stack,
-              SimdCounts& counts, const PartJob* job = nullptr, std::uint32_t place = 0)
-        : tree_(tree), frame_(frame), stack_(stack), counts_(counts), job_(job), place_(place) {
+              SimdCounts& counts, Parts* parts = nullptr, std::uint32_t place = 0)
+        : tree_(tree), frame_(frame), stack_(stack), counts_(counts), parts_(parts), place_(place) {
         for (int axis = 0; axis < 3; ++axis) {
             const std::uint32_t negative = frame.kind.negatives >> axis & 1;
             near_at_[axis] = 8 * static_cast<std::uint32_t>(axis) + 24 * negative;
@@ -234,14 +235,18 @@ private:
 
     HWY_INLINE bool test_leaf(std::uint32_t word) {
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
-        if constexpr (parts) {
+        if constexpr (!std::is_same_v<Parts, NoParts>) {
             for (std::uint32_t part = place; part < place + count; ++part) {
-                job_->visitor->visit(part, &place_, 1);
-                best_.t = reach_of(job_->rays[place_]);
-                if (wanted == Wanted::any && best_.t < frame_.tmin) return true;
+                best_.t = parts_->visit_one(part, place_);
+                if (wanted == Wanted::any && best_.t < 0) return true;
             }
             return false;
+        } else {
+            return test_triangles(place, count);
         }
+    }
+
+    HWY_INLINE bool test_triangles(std::uint32_t place, std::uint32_t count) {
         const TriangleBlock& block = tree_.template block<compact>(place);
         if constexpr (counting) counts_.tests += count;
         if constexpr (wanted == Wanted::all) {
@@ -314,7 +319,7 @@ private:
     const SingleFrame& frame_;
     const WideStackView stack_;
     SimdCounts& counts_;
-    const PartJob* const job_;
+    Parts* const parts_;
     const std::uint32_t place_;
     WideBest best_{};
     BudgetVector<Hit>* all_ = nullptr;
@@ -373,33 +378,6 @@ void trace_single(const SimdJob& job, SimdCounts& counts) {
         trace_one<any, counting, compact>(job, job.order == nullptr ? k : job.order[k], counts);
 }
 
-/// Boxes of parts widen once more. `way` has the signs of the direction.
-HWY_INLINE void grow_pads(const PartJob& job, SingleFrame& frame) {
-    const V4 origin = hn::Load(f4, frame.origin);
-    alignas(16) float far[4];
-    hn::Store(hn::Max(hn::Abs(hn::Sub(hn::Load(f4, job.tree.lo), origin)),
-                      hn::Abs(hn::Sub(hn::Load(f4, job.tree.hi), origin))),
-              f4, far);
-    const float grown =
-        job.growth.rate * max_of(max_of(far[0], far[1]), far[2]) + job.growth.least;
-    const V4 pad = hn::Load(f4, frame.near_pad);
-    const V4 whole = hn::CopySign(hn::Add(hn::Abs(pad), hn::Set(f4, grown)), pad);
-    hn::Store(whole, f4, frame.near_pad);
-    set_starts(job.tree, origin, hn::Load(f4, frame.inverse), whole, frame);
-}
-
-/// The first ray of a job.
-template <bool any>
-void visit_parts_of_one(const PartJob& job) {
-    SingleFrame frame;
-    if (!fill_frame(job.tree, job.rays[0], frame)) return;
-    grow_pads(job, frame);
-    SimdCounts counts;
-    SingleRay<any ? Wanted::any : Wanted::closest, false, false, false, true>(
-        job.tree, frame, job.stack, counts, &job, 0)
-        .trace(0, {frame.tmax});
-}
-
 /// All hits of each ray behind those of the one before; counts.hits of each in hit_counts.
 template <bool counting, bool compact>
 void trace_all_of(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t* hit_counts,
@@ -441,7 +419,7 @@ inline void all_hits(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t
 inline void single(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
         !job.hits ? trace_single<true, counting, compact>(job, counts)
-                            : trace_single<false, counting, compact>(job, counts);
+                  : trace_single<false, counting, compact>(job, counts);
     });
 }
 

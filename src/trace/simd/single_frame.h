@@ -69,7 +69,7 @@ HWY_INLINE V4 limited(V4 inverse) {
 }
 
 /// Any valid ray.
-HWY_NOINLINE void fill_odd_frame(const WideView& tree, const Ray& ray, SingleFrame& out) {
+inline HWY_NOINLINE void fill_odd_frame(const WideView& tree, const Ray& ray, SingleFrame& out) {
     const RayFrame frame = make_frame(ray);
     const Vec3 o = frame.origin, d = frame.direction, i = frame.inverse;
     const auto quad = [](float x, float y, float z, float* to) {

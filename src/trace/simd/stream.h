@@ -21,15 +21,15 @@ namespace raydix::HWY_NAMESPACE {
 /// Lists of fewer rays go on one by one.
 constexpr std::uint32_t few_rays = 4;
 
-/// Leaves hold triangles, or with `parts` parts of a scene.
-template <bool any, bool counting, bool compact, bool parts = false>
+/// Leaves hold triangles, or parts of a scene (single.h).
+template <bool any, bool counting, bool compact, class Parts = NoParts>
 class StreamWalk {
 public:
-    /// `job` and where its rays lie: for parts.
+    /// `parts` and the places of the rays in the job: unless leaves hold triangles.
     StreamWalk(const WideView& tree, const StreamFrame& frame, StreamMemory& memory,
-               const WideStackView& single_stack, SimdCounts& counts, const PartJob* job = nullptr,
+               const WideStackView& single_stack, SimdCounts& counts, Parts* parts = nullptr,
                const std::int32_t* index = nullptr)
-        : job_(job),
+        : parts_(parts),
           index_(index),
           tree_(tree),
           frame_(frame),
@@ -53,7 +53,7 @@ public:
             const StreamEntry next = stack.back();
             stack.pop_back();
             if ((next.word & wide_leaf_bit) != 0) {
-                if constexpr (parts)
+                if constexpr (has_parts)
                     visit_parts(next);
                 else
                     test_leaf(next);
@@ -67,6 +67,7 @@ public:
     }
 
 private:
+    static constexpr bool has_parts = !std::is_same_v<Parts, NoParts>;
     static constexpr std::uint32_t ray_bits = 0xFFFFu;
 
     /// A ray's number in the lower half, where it enters in the upper: the upper half of a float,
@@ -234,12 +235,10 @@ private:
         if (!(entry_of(item) <= ray.t)) return;
         SingleFrame frame;
         fill_frame(tree_, frame_, ray, frame);
-        if constexpr (parts) {
+        if constexpr (has_parts) {
             const auto place = static_cast<std::uint32_t>(index_[k]);
-            SingleRay<any ? Wanted::any : Wanted::closest, counting, compact, false, true>(
-                tree_, frame, single_stack_, counts_, job_, place)
-                .trace(word, {ray.t});
-            ray.t = reach_of(job_->rays[place]);
+            ray.t = SingleRay < any ? Wanted::any : Wanted::closest, counting, compact, false,
+            Parts > (tree_, frame, single_stack_, counts_, parts_, place).trace(word, {ray.t}).t;
             return;
         }
         SingleRay<any ? Wanted::any : Wanted::closest, counting, compact> single(
@@ -264,10 +263,10 @@ private:
                 if (entry_of(list[k]) <= rays_[list[k] & ray_bits].t)
                     going.push_back(static_cast<std::uint32_t>(index_[list[k] & ray_bits]));
             if (going.empty()) return;
-            job_->visitor->visit(part, going.data(), static_cast<std::uint32_t>(going.size()));
+            parts_->visit(part, going.data(), static_cast<std::uint32_t>(going.size()));
             for (std::uint32_t k = 0; k < entry.count; ++k) {
                 const std::uint32_t ray = list[k] & ray_bits;
-                rays_[ray].t = reach_of(job_->rays[index_[ray]]);
+                rays_[ray].t = parts_->reach(static_cast<std::uint32_t>(index_[ray]));
             }
         }
     }
@@ -376,7 +375,7 @@ private:
         }
     }
 
-    const PartJob* const job_;
+    Parts* const parts_;
     const std::int32_t* const index_;
     const WideView& tree_;
     const StreamFrame& frame_;

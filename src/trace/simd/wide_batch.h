@@ -42,7 +42,8 @@ private:
     std::vector<std::uint64_t> active_;
 };
 
-/// The hits of rays order[begin] to order[end - 1], or begin to end - 1 without an order, are there.
+/// The hits of rays order[begin] to order[end - 1], or begin to end - 1 without an order, are
+/// there.
 using RowsDone =
     std::function<void(const std::uint32_t* order, std::size_t begin, std::size_t end)>;
 

@@ -1,0 +1,84 @@
+// A job of rays through a scene: what it is asked, what it answers, and the memory that it works
+// in. The work is in scene_walk.h, compiled once per instruction set.
+#pragma once
+
+#include <raydix/scene.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "engine/scene_tree.h"
+#include "trace/simd/simd_kernels.h"
+#include "trace/simd/wide_batch.h"
+
+namespace raydix {
+
+/// A ray in the space of a scene. Its direction is near unit length, by a power of two.
+struct alignas(64) SceneLine {
+    double origin[3];
+    double scale;  // t of the caller's ray = scale * t here
+    double direction[3];
+    std::uint32_t id;  // in the job
+};
+
+/// The rays in the space of one scene, on one level of instances.
+struct SceneLevel {
+    std::size_t count = 0;
+    std::vector<SceneLine> lines;
+    std::vector<Ray> rays;  // as floats have the lines; tmax: as far as they still go
+    // Of the jobs that triangles get.
+    std::vector<Hit> hits;
+    std::vector<std::uint8_t> occluded;
+    std::vector<std::uint32_t> seen;  // those of a list that may see something
+    StreamMemory parts_memory, mesh_memory;
+    StackMemory parts_stack, mesh_stack;
+
+    /// No rays, and room for `most`.
+    void begin(std::size_t most) {
+        count = 0;
+        if (lines.size() < most) lines.resize(most), rays.resize(most);
+    }
+};
+
+/// Memory is kept from job to job. Not for two threads at once.
+struct SceneJob {
+    // At most max_job_rays rays, rays[order[k]], or rays[k] without an order.
+    const SceneTree* tree = nullptr;
+    const SimdKernels* kernels = nullptr;
+    const Ray* rays = nullptr;
+    const std::uint32_t* order = nullptr;
+    std::size_t n = 0;
+    std::uint32_t mask = 0;
+    const std::uint32_t* masks = nullptr;  // [rays] instead; or null
+    bool any = false;                      // any hit will do; only prim of a hit has a meaning
+    bool packets = false;                  // neighbours are alike: triangles take packets of them
+    bool single = false;                   // one ray after the other
+
+    std::vector<SceneHit> hits;  // [n], by k
+    std::uint64_t invalid = 0;
+
+    struct Limits {
+        float tmin, reach;  // of the caller's ray; reach: as far as it still goes
+        std::uint32_t mask;
+    };
+    std::vector<Limits> limits;  // [n]
+    std::vector<std::unique_ptr<SceneLevel>> levels;
+
+    [[nodiscard]] SceneLevel& level(std::size_t depth) {
+        while (levels.size() <= depth) levels.push_back(std::make_unique<SceneLevel>());
+        return *levels[depth];
+    }
+};
+
+struct SceneKernels {
+    std::string_view isa;
+    void (*trace)(SceneJob& job);
+};
+
+/// Empty: the best. The names are those of simd_kernels().
+[[nodiscard]] const SceneKernels& scene_kernels_for(std::string_view isa);
+
+}  // namespace raydix
