@@ -16,19 +16,25 @@
 
 namespace raydix {
 
-/// A ray in the space of a scene. Its direction is near unit length, by a power of two.
-struct alignas(64) SceneLine {
-    double origin[3];
-    double scale;  // t of the caller's ray = scale * t here
-    double direction[3];
+/// A ray in the space of a scene, in double.
+struct SceneLine {
+    double origin[3], direction[3];
+};
+
+/// Where a ray of a level comes from.
+struct SceneRaySource {
+    double scale;      // t of the caller's ray = scale * t here
     std::uint32_t id;  // in the job
 };
 
-/// The rays in the space of one scene, on one level of instances.
+/// The rays in the space of one scene, on one level of instances. Their directions are near unit
+/// length, by powers of two.
 struct SceneLevel {
     std::size_t count = 0;
+    std::vector<Ray> rays;  // tmax: as far as they still go
+    std::vector<SceneRaySource> sources;
+    // Of scenes that hold instances, below the first level: what floats do not have of the rays.
     std::vector<SceneLine> lines;
-    std::vector<Ray> rays;  // as floats have the lines; tmax: as far as they still go
     // Of the jobs that triangles get.
     std::vector<Hit> hits;
     std::vector<std::uint8_t> occluded;
@@ -37,9 +43,10 @@ struct SceneLevel {
     StackMemory parts_stack, mesh_stack;
 
     /// No rays, and room for `most`.
-    void begin(std::size_t most) {
+    void begin(std::size_t most, bool with_lines) {
         count = 0;
-        if (lines.size() < most) lines.resize(most), rays.resize(most);
+        if (rays.size() < most) rays.resize(most), sources.resize(most);
+        if (with_lines && lines.size() < most) lines.resize(most);
     }
 };
 

@@ -42,22 +42,23 @@ public:
 
     void run() {
         SceneLevel& first = job_.level(0);
-        first.begin(job_.n);
+        first.begin(job_.n, false);
         job_.hits.assign(job_.n, {});
         job_.limits.resize(job_.n);
         job_.invalid = 0;
+        const auto place = [&](std::size_t k) { return job_.order == nullptr ? k : job_.order[k]; };
+        constexpr std::size_t ahead = 16;
         for (std::size_t k = 0; k < job_.n; ++k) {
-            const std::size_t i = job_.order == nullptr ? k : job_.order[k];
+            if (job_.order != nullptr)
+                hwy::Prefetch(job_.rays + place(std::min(k + ahead, job_.n - 1)));
+            const std::size_t i = place(k);
             const Ray& ray = job_.rays[i];
             job_.limits[k] = {ray.tmin, ray.tmax,
                               job_.masks == nullptr ? job_.mask : job_.masks[i]};
-            if (!is_valid(ray)) {
+            if (is_valid(ray))
+                add_first(first, ray, static_cast<std::uint32_t>(k));
+            else
                 ++job_.invalid;
-                continue;
-            }
-            alignas(32) double origin[4] = {ray.origin.x, ray.origin.y, ray.origin.z};
-            alignas(32) double direction[4] = {ray.direction.x, ray.direction.y, ray.direction.z};
-            add(first, origin, direction, 1.0, static_cast<std::uint32_t>(k));
         }
         walk(0, *job_.tree, 0);
     }
@@ -102,39 +103,47 @@ private:
 
     /// Ends a ray where its best hit is; how far it goes.
     HWY_INLINE float shorten(SceneLevel& level, std::size_t ray) {
-        const SceneLine& line = level.lines[ray];
-        const float reach = in_units_of(line.scale, job_.limits[line.id].reach);
+        const SceneRaySource& source = level.sources[ray];
+        const float reach = in_units_of(source.scale, job_.limits[source.id].reach);
         level.rays[ray].tmax = reach;
         return min_of(reach, std::numeric_limits<float>::max());
     }
 
-    /// A ray that becomes the last one of a level, unless it can hit nothing there.
-    HWY_INLINE void add(SceneLevel& level, double* origin, double* direction, double scale,
-                        std::uint32_t id) {
-        const double longest = max_of(max_of(std::fabs(direction[0]), std::fabs(direction[1])),
-                                      std::fabs(direction[2]));
-        if (!(longest > 0x1p-3 && longest < 0x1p3)) {
-            const double by = direction_scale(longest);
-            for (int a = 0; a < 3; ++a) direction[a] *= by;
-            scale *= by;
-        }
-        const SceneJob::Limits& limits = job_.limits[id];
-        Ray& ray = level.rays[level.count];
-        ray.origin = {static_cast<float>(origin[0]), static_cast<float>(origin[1]),
-                      static_cast<float>(origin[2])};
-        ray.direction = {static_cast<float>(direction[0]), static_cast<float>(direction[1]),
-                         static_cast<float>(direction[2])};
-        ray.tmin = in_units_of(scale, limits.tmin);
-        ray.tmax = in_units_of(scale, limits.reach);
-        if (!is_valid(ray)) return;
-        SceneLine& line = level.lines[level.count++];
-        for (int a = 0; a < 3; ++a) line.origin[a] = origin[a], line.direction[a] = direction[a];
-        line.scale = scale;
-        line.id = id;
+    [[nodiscard]] static bool near_unit_length(double longest) {
+        return longest > 0x1p-3 && longest < 0x1p3;
     }
 
-    /// Through the inverse of an instance, in double: ((x + y) + z) + move, nothing fused.
-    HWY_INLINE void enter(const SceneLine& from, const PlacedScene& placed, SceneLevel& to) {
+    /// A ray as the caller has it becomes the last one of a level.
+    HWY_INLINE void add_first(SceneLevel& level, const Ray& ray, std::uint32_t id) {
+        level.rays[level.count] = ray;
+        level.sources[level.count++] = {1.0, id};
+        const Vec3 d = ray.direction;
+        const float longest = max_of(max_of(std::fabs(d.x), std::fabs(d.y)), std::fabs(d.z));
+        if (!near_unit_length(longest)) rescale(level, longest);
+    }
+    HWY_NOINLINE void rescale(SceneLevel& level, float longest) {
+        Ray& ray = level.rays[level.count - 1];
+        SceneRaySource& source = level.sources[level.count - 1];
+        source.scale = direction_scale(double{longest});
+        const Double3 scaled = Double3(ray.direction) * source.scale;
+        ray.direction = scaled.rounded();
+        ray.tmin = in_units_of(source.scale, ray.tmin);
+        ray.tmax = in_units_of(source.scale, ray.tmax);
+    }
+
+    /// Ray `ray` of one level, in double.
+    [[nodiscard]] HWY_INLINE SceneLine line_of(const Place& place, const SceneLevel& level,
+                                               std::uint32_t ray) const {
+        if (place.depth != 0) return level.lines[ray];
+        const Ray& exact = level.rays[ray];
+        return {{exact.origin.x, exact.origin.y, exact.origin.z},
+                {exact.direction.x, exact.direction.y, exact.direction.z}};
+    }
+
+    /// A ray goes through the inverse of an instance, in double: ((x + y) + z) + move, nothing
+    /// fused. It becomes the last one of the level inside, unless it can hit nothing there.
+    HWY_INLINE void enter(const SceneLine& from, const SceneRaySource& source,
+                          const PlacedScene& placed, SceneLevel& to) {
         using D = hn::CappedTag<double, 4>;
         const D d;
         alignas(32) double origin[4], direction[4];
@@ -150,7 +159,29 @@ private:
                       origin + l);
             hn::Store(turned(from.direction), d, direction + l);
         }
-        add(to, origin, direction, from.scale, from.id);
+        const double longest = max_of(max_of(std::fabs(direction[0]), std::fabs(direction[1])),
+                                      std::fabs(direction[2]));
+        double scale = source.scale;
+        if (!near_unit_length(longest)) {
+            const double by = direction_scale(longest);
+            for (int a = 0; a < 3; ++a) direction[a] *= by;
+            scale *= by;
+        }
+        const SceneJob::Limits& limits = job_.limits[source.id];
+        Ray& ray = to.rays[to.count];
+        ray.origin = {static_cast<float>(origin[0]), static_cast<float>(origin[1]),
+                      static_cast<float>(origin[2])};
+        ray.direction = {static_cast<float>(direction[0]), static_cast<float>(direction[1]),
+                         static_cast<float>(direction[2])};
+        ray.tmin = in_units_of(scale, limits.tmin);
+        ray.tmax = in_units_of(scale, limits.reach);
+        if (!is_valid(ray)) return;
+        if (!placed.scene->instances.empty()) {
+            SceneLine& line = to.lines[to.count];
+            for (int a = 0; a < 3; ++a)
+                line.origin[a] = origin[a], line.direction[a] = direction[a];
+        }
+        to.sources[to.count++] = {scale, source.id};
     }
 
     /// All rays of the level of `place`.
@@ -226,11 +257,12 @@ private:
             return;
         }
         const PlacedScene& placed = place.scene.instances[part - meshes];
-        const SceneLine& line = job_.level(place.depth).lines[ray];
-        if ((placed.mask & job_.limits[line.id].mask) == 0) return;
+        const SceneLevel& outside = job_.level(place.depth);
+        const SceneRaySource& source = outside.sources[ray];
+        if ((placed.mask & job_.limits[source.id].mask) == 0) return;
         SceneLevel& inside = job_.level(place.depth + 1);
-        inside.begin(1);
-        enter(line, placed, inside);
+        inside.begin(1, !placed.scene->instances.empty());
+        enter(line_of(place, outside, ray), source, placed, inside);
         if (inside.count != 0)
             walk_one({*placed.scene, place.depth + 1, place.number + placed.number}, 0);
     }
@@ -245,17 +277,18 @@ private:
         const PlacedScene& placed = place.scene.instances[part - meshes];
         const SceneLevel& outside = job_.level(place.depth);
         SceneLevel& inside = job_.level(place.depth + 1);
-        inside.begin(count);
+        inside.begin(count, !placed.scene->instances.empty());
         for (std::uint32_t k = 0; k < count; ++k) {
-            const SceneLine& line = outside.lines[rays[k]];
-            if ((placed.mask & job_.limits[line.id].mask) != 0) enter(line, placed, inside);
+            const SceneRaySource& source = outside.sources[rays[k]];
+            if ((placed.mask & job_.limits[source.id].mask) != 0)
+                enter(line_of(place, outside, rays[k]), source, placed, inside);
         }
         walk(place.depth + 1, *placed.scene, place.number + placed.number);
     }
 
     void visit_mesh_with_one(const Place& place, const MeshTree& mesh, std::uint32_t ray) {
         SceneLevel& level = job_.level(place.depth);
-        if (mesh.tree->empty() || (mesh.mask & job_.limits[level.lines[ray].id].mask) == 0) return;
+        if (mesh.tree->empty() || (mesh.mask & job_.limits[level.sources[ray].id].mask) == 0) return;
         level.mesh_stack.reserve(mesh.tree->stats().max_depth);
         const WideBvh::Arrays& arrays = mesh.tree->arrays();
         SimdCounts counts;
@@ -286,7 +319,7 @@ private:
             level.seen.clear();
             for (std::uint32_t k = 0; k < count; ++k) {
                 const std::uint32_t ray = rays == nullptr ? k : rays[k];
-                if ((mesh.mask & job_.limits[level.lines[ray].id].mask) != 0)
+                if ((mesh.mask & job_.limits[level.sources[ray].id].mask) != 0)
                     level.seen.push_back(ray);
             }
             rays = level.seen.data();
@@ -322,16 +355,16 @@ private:
 
     HWY_INLINE void take(SceneLevel& level, const MeshTree& mesh, std::uint32_t number,
                          std::uint32_t ray, const Hit& hit) {
-        const SceneLine& line = level.lines[ray];
-        SceneHit& best = job_.hits[line.id];
-        float& reach = job_.limits[line.id].reach;
+        const SceneRaySource& source = level.sources[ray];
+        SceneHit& best = job_.hits[source.id];
+        float& reach = job_.limits[source.id].reach;
         if constexpr (any) {
             best.prim = 0;
             reach = level.rays[ray].tmax = -1.0f;
             return;
         }
         SceneHit found{hit, no_primitive, number};
-        found.t = static_cast<float>(double{hit.t} * line.scale) + 0.0f;
+        found.t = static_cast<float>(double{hit.t} * source.scale) + 0.0f;
         if (best.hit() && found.t > best.t) return;
         mesh.name(found);
         const auto key = [](const SceneHit& h) {

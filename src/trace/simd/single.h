@@ -201,6 +201,11 @@ private:
         word = choose(child, static_cast<std::size_t>(std::bit_width(met)) - 1);
     }
 
+    /// Trees over parts are small.
+    RAYDIX_PREFETCHING void ask_for_child(std::uint32_t word) const {
+        if constexpr (std::is_same_v<Parts, NoParts>) ask_for<compact>(tree_, word);
+    }
+
     /// Two children or more, by where the ray enters them.
     HWY_INLINE void push_sorted(const std::uint32_t* child, const float* entries, std::uint32_t met,
                                 std::size_t& top, std::uint32_t& word) {
@@ -211,8 +216,8 @@ private:
         const bool swap = entries[second] < entries[first];
         const std::size_t near = swap ? second : first, far = swap ? first : second;
         word = choose(child, near);
-        ask_for<compact>(tree_, child[near]);
-        ask_for<compact>(tree_, child[far]);
+        ask_for_child(child[near]);
+        ask_for_child(child[far]);
         float nearest = entries[near];
         stack_.words[top] = child[far];
         stack_.entries[top] = entries[far];
@@ -220,7 +225,7 @@ private:
         for (; met != 0; met &= met - 1) {
             const auto s = static_cast<std::size_t>(std::countr_zero(met));
             std::uint32_t moved = child[s];
-            ask_for<compact>(tree_, child[s]);
+            ask_for_child(child[s]);
             float at = entries[s];
             if (at < nearest) std::swap(at, nearest), std::swap(moved, word);
             std::size_t k = top++;

@@ -222,7 +222,7 @@ private:
             const std::uint32_t* const list = lists + out_begin + c * stride;
             const auto count = static_cast<std::uint32_t>(ends[c] - list);
             if (count == 0) continue;
-            ask_for<compact>(tree_, node.child[children[c]]);
+            if constexpr (!has_parts) ask_for<compact>(tree_, node.child[children[c]]);
             std::memmove(lists + free, list, count * sizeof(*lists));
             memory_.stack().push_back({node.child[children[c]], free, count});
             free += count + StreamMemory::slack;
