@@ -90,9 +90,9 @@ public:
         while (groups.size() < layout.groups.size()) groups.push_back(scene.add_group());
         for (std::size_t g = 0; g < groups.size(); ++g)
             for (const Placed& placed : layout.groups[g])
-                scene.add_instance(groups[g],
-                                   Calls::instance((placed.group ? groups : meshes)[placed.what],
-                                                   placed));
+                scene.add_instance(
+                    groups[g],
+                    Calls::instance((placed.group ? groups : meshes)[placed.what], placed));
         scene.build();
     }
 
@@ -249,14 +249,14 @@ Question closest_question(std::shared_ptr<Traced<Calls>> traced) {
     for (const Builder builder : {Builder::karras, Builder::ploc, Builder::sbvh}) {
         const auto built = traced->scene(builder);
         for (const int threads : {1, 2})
-            question.ways.push_back(
-                {fmt::format("{}, {} threads", builder_name(builder), threads),
-                 [=] { return traced->closest(built->scene, threads); }});
+            question.ways.push_back({fmt::format("{}, {} threads", builder_name(builder), threads),
+                                     [=] { return traced->closest(built->scene, threads); }});
     }
     const auto built = traced->scene(Builder::ploc);
     question.ways.push_back(
         {"one by one", [=] { return traced->closest_one_by_one(built->scene); }});
-    question.ways.push_back({"a mask a call", [=] { return traced->closest_by_mask(built->scene); }});
+    question.ways.push_back(
+        {"a mask a call", [=] { return traced->closest_by_mask(built->scene); }});
     question.ways.push_back(
         {"each alone", [=] { return traced->answer(traced->closest_of_each_alone()); }});
     return question;
@@ -268,9 +268,8 @@ Question any_question(std::shared_ptr<Traced<Calls>> traced) {
     for (const Builder builder : {Builder::karras, Builder::sbvh}) {
         const auto built = traced->scene(builder);
         for (const int threads : {1, 2})
-            question.ways.push_back(
-                {fmt::format("{}, {} threads", builder_name(builder), threads),
-                 [=] { return traced->any(built->scene, threads); }});
+            question.ways.push_back({fmt::format("{}, {} threads", builder_name(builder), threads),
+                                     [=] { return traced->any(built->scene, threads); }});
     }
     question.ways.push_back({"each alone", [=] {
                                  std::vector<std::uint8_t> hit_or_miss;
@@ -285,8 +284,7 @@ Question any_question(std::shared_ptr<Traced<Calls>> traced) {
 void add_float_trees(Question& question, std::shared_ptr<Traced<DoubleCalls>> traced) {
     const auto built = std::make_shared<Built<DoubleCalls, Bvh>>(
         traced->layout(), FloatCalls::trees(traced->layout(), Builder::ploc));
-    question.ways.push_back(
-        {"trees in float", [=] { return traced->closest(built->scene, 2); }});
+    question.ways.push_back({"trees in float", [=] { return traced->closest(built->scene, 2); }});
 }
 
 Question ask(const std::string& scene, const std::string& query) {
@@ -320,6 +318,8 @@ constexpr Known known[] = {
     {"float deep", "any", "127ca8c9c56c3c0d", "07385c12ae1bdd70", "-"},
     {"float masks", "closest", "eaacfaaf44d46e00", "0163e05a8251bb21", "6a7cf0e6ecf3d771"},
     {"float masks", "any", "eaacfaaf44d46e00", "a2e6f83ba807eb60", "-"},
+    {"float offset", "closest", "cdb32e5e1bf95544", "5985df39f65de503", "50b1f945934cc206"},
+    {"float offset", "any", "cdb32e5e1bf95544", "49e2acd248ef7b33", "-"},
     {"double grid", "closest", "499aa8f03ce67169", "84247a682d964f80", "a5665460299bcedd"},
     {"double grid", "any", "499aa8f03ce67169", "10bb7d5949fa6ee2", "-"},
     {"double far", "closest", "531b047cfcfa9d15", "0920312029b00354", "79c86943bfc5a539"},
@@ -338,6 +338,8 @@ constexpr Known known[] = {
     {"double deep", "any", "5b13c1dc78129653", "7e9237a358fb837c", "-"},
     {"double masks", "closest", "7fbcd9a95c5ad09a", "172da56069ad2e82", "cc8d146a7a987072"},
     {"double masks", "any", "7fbcd9a95c5ad09a", "5c39b53f9f615e66", "-"},
+    {"double offset", "closest", "7901168de57a5676", "4d6def58b19a2a4c", "e3df6c8bd8065638"},
+    {"double offset", "any", "7901168de57a5676", "421f01a4ec4a22bc", "-"},
 };
 
 class InstanceDigest : public testing::TestWithParam<Known> {};

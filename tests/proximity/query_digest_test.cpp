@@ -130,11 +130,12 @@ public:
         Tree tree;
     };
 
-    explicit Asked(const std::string& name) : wide_(mesh_named(name)), box_(box_of_mesh(wide_)), torn_(name.starts_with("torn")) {
+    explicit Asked(const std::string& name)
+        : wide_(mesh_named(name)), box_(box_of_mesh(wide_)), torn_(name.starts_with("torn")) {
         const auto mesh = Calls::mesh(wide_);
         for (const Builder builder : builders)
-            trees.push_back({std::string(builder_name(builder)),
-                             build_bvh(mesh, {.builder = builder})});
+            trees.push_back(
+                {std::string(builder_name(builder)), build_bvh(mesh, {.builder = builder})});
         MeshD beside = thinned(wide_, 5);
         for (Vec3d& p : beside.vertices) p = p + 0.01 * (box_.hi - box_.lo);
         other = build_bvh(Calls::mesh(beside), {.builder = Builder::ploc});
@@ -185,10 +186,9 @@ private:
             balls.push_back({Calls::point(corner), Number{0}});
         }
         for (const auto& ray : Calls::rays(digest_rays(wide_, query_count, seed)))
-            sweeps.push_back({ray, static_cast<Number>(
-                                       sweeps.size() % 5 == 0
-                                           ? 0.0
-                                           : random.between(0, 0.02) * extent())});
+            sweeps.push_back({ray, static_cast<Number>(sweeps.size() % 5 == 0
+                                                           ? 0.0
+                                                           : random.between(0, 0.02) * extent())});
     }
     Vec3d a_corner(RandomD& random) const {
         const Triangle& t = wide_.triangles[random.below(wide_.triangles.size())];
@@ -388,7 +388,8 @@ void add_other_ways(Question& question, const std::string& query,
     };
     const auto unlimited = std::numeric_limits<typename Calls::Number>::infinity();
     const auto most = query == "closest" ? unlimited : asked->part(0.02);
-    if (query.starts_with("closest")) add("one by one", [=](auto one) { return one.closest(most); });
+    if (query.starts_with("closest"))
+        add("one by one", [=](auto one) { return one.closest(most); });
     if (query == "lines touch")
         add("one by one", [](auto one) { return one.touch(one.data.lines); });
     if (query == "balls touch")
@@ -408,11 +409,11 @@ Question question_of(const std::string& mesh, const std::string& query) {
     Question question{asked->input(), 30, {}};
     for (const auto& named : asked->trees)
         for (const int threads : {1, 2})
-            question.ways.push_back({fmt::format("{}, {} threads", named.name, threads),
-                                     [asked, query, threads, tree = &named.tree] {
-                                         return answer_of(query,
-                                                          Call<Calls>{*asked, *tree, threads});
-                                     }});
+            question.ways.push_back(
+                {fmt::format("{}, {} threads", named.name, threads),
+                 [asked, query, threads, tree = &named.tree] {
+                     return answer_of(query, Call<Calls>{*asked, *tree, threads});
+                 }});
     add_other_ways(question, query, asked);
     return question;
 }
@@ -433,29 +434,38 @@ constexpr Known known[] = {
     {"float figure", "sweep", "e4483db60bc3bf09", "e669f80c4266acaa", "-"},
     {"float figure", "pairs", "e4483db60bc3bf09", "8f00c1098b6172b6", "bd0b59e21abcd197"},
     {"float figure", "pairs of two", "e4483db60bc3bf09", "4c5f919aefb32582", "03df6bbe3415a02b"},
-    {"float figure", "pairs of two, narrow", "e4483db60bc3bf09", "87e0bbdbfbcc8822", "865599b1785d130c"},
+    {"float figure", "pairs of two, narrow", "e4483db60bc3bf09", "87e0bbdbfbcc8822",
+     "865599b1785d130c"},
     {"float lattice", "closest", "b17547c90a07c3cf", "14ab772f0f6a96a3", "-"},
     {"float lattice", "closest within", "b17547c90a07c3cf", "65514dd19a3f6a38", "-"},
     {"float lattice", "lines touch", "b17547c90a07c3cf", "17108db94e54ec81", "-"},
-    {"float lattice", "lines touch all", "b17547c90a07c3cf", "d1884834b638c729", "44ce4e35fe00d7b3"},
+    {"float lattice", "lines touch all", "b17547c90a07c3cf", "d1884834b638c729",
+     "44ce4e35fe00d7b3"},
     {"float lattice", "balls touch", "b17547c90a07c3cf", "31904db16da6ab3e", "-"},
-    {"float lattice", "balls touch all", "b17547c90a07c3cf", "d1ee2caaf7685e3f", "b9d5f03b4f034150"},
+    {"float lattice", "balls touch all", "b17547c90a07c3cf", "d1ee2caaf7685e3f",
+     "b9d5f03b4f034150"},
     {"float lattice", "sweep", "b17547c90a07c3cf", "120150395b36ecf5", "-"},
     {"float lattice", "pairs", "b17547c90a07c3cf", "5d16afaa1d823fc6", "29f7bde5b5c111c3"},
     {"float lattice", "pairs, narrow", "b17547c90a07c3cf", "32551db34cefd2c4", "317a5bd22bdac283"},
     {"float lattice", "pairs of two", "b17547c90a07c3cf", "b7268852fe008606", "1a2de254eb37afe7"},
-    {"float lattice", "pairs of two, narrow", "b17547c90a07c3cf", "03401ab71d438a7b", "caa757636c662d8d"},
+    {"float lattice", "pairs of two, narrow", "b17547c90a07c3cf", "03401ab71d438a7b",
+     "caa757636c662d8d"},
     {"float degenerate", "closest", "2c9f4cfd297cab9f", "fa66c15f3c21cee1", "-"},
     {"float degenerate", "closest within", "2c9f4cfd297cab9f", "dd0dc92084883a59", "-"},
     {"float degenerate", "lines touch", "2c9f4cfd297cab9f", "c1e2a013ef251469", "-"},
-    {"float degenerate", "lines touch all", "2c9f4cfd297cab9f", "15e9ee57b2ae6ee2", "64dd7af4730b8db8"},
+    {"float degenerate", "lines touch all", "2c9f4cfd297cab9f", "15e9ee57b2ae6ee2",
+     "64dd7af4730b8db8"},
     {"float degenerate", "balls touch", "2c9f4cfd297cab9f", "215bd32733952d24", "-"},
-    {"float degenerate", "balls touch all", "2c9f4cfd297cab9f", "52893bd9937f4eb6", "1fb527d140a612f7"},
+    {"float degenerate", "balls touch all", "2c9f4cfd297cab9f", "52893bd9937f4eb6",
+     "1fb527d140a612f7"},
     {"float degenerate", "sweep", "2c9f4cfd297cab9f", "1edd7f05d3069651", "-"},
     {"float degenerate", "pairs", "2c9f4cfd297cab9f", "85984f831e947b44", "35f3ced7ffc23568"},
-    {"float degenerate", "pairs, narrow", "2c9f4cfd297cab9f", "262b2e46a36a8409", "b6314bdb4cebccbb"},
-    {"float degenerate", "pairs of two", "2c9f4cfd297cab9f", "349f5d151fb6a08e", "6a4b0f80282b4b7b"},
-    {"float degenerate", "pairs of two, narrow", "2c9f4cfd297cab9f", "4dad52d56222d51b", "01c92167adaccc91"},
+    {"float degenerate", "pairs, narrow", "2c9f4cfd297cab9f", "262b2e46a36a8409",
+     "b6314bdb4cebccbb"},
+    {"float degenerate", "pairs of two", "2c9f4cfd297cab9f", "349f5d151fb6a08e",
+     "6a4b0f80282b4b7b"},
+    {"float degenerate", "pairs of two, narrow", "2c9f4cfd297cab9f", "4dad52d56222d51b",
+     "01c92167adaccc91"},
     {"float figure", "inside", "e4483db60bc3bf09", "bab04e0860aa9e6f", "-"},
     {"float figure", "signed distance", "e4483db60bc3bf09", "b329765350116b16", "-"},
     {"float figure", "signed distance within", "e4483db60bc3bf09", "dee1ccbcd6661ba6", "-"},
@@ -466,35 +476,47 @@ constexpr Known known[] = {
     {"double far figure", "closest", "41d36e138069cf73", "834513982578a296", "-"},
     {"double far figure", "closest within", "41d36e138069cf73", "43f9a6665c5ca8c0", "-"},
     {"double far figure", "lines touch", "41d36e138069cf73", "a27c6eec3220db17", "-"},
-    {"double far figure", "lines touch all", "41d36e138069cf73", "7af301a7c8a92c2b", "a9e0e7dcad4833fe"},
+    {"double far figure", "lines touch all", "41d36e138069cf73", "7af301a7c8a92c2b",
+     "a9e0e7dcad4833fe"},
     {"double far figure", "balls touch", "41d36e138069cf73", "2138133b975136e7", "-"},
-    {"double far figure", "balls touch all", "41d36e138069cf73", "2ecc150fb8604a48", "399d5ba8b2a55c24"},
+    {"double far figure", "balls touch all", "41d36e138069cf73", "2ecc150fb8604a48",
+     "399d5ba8b2a55c24"},
     {"double far figure", "sweep", "41d36e138069cf73", "1091bffa33e48a29", "-"},
     {"double far figure", "pairs", "41d36e138069cf73", "8f00c1098b6172b6", "bd0b59e21abcd197"},
-    {"double far figure", "pairs of two", "41d36e138069cf73", "4c5f919aefb32582", "03df6bbe3415a02b"},
-    {"double far figure", "pairs of two, narrow", "41d36e138069cf73", "87e0bbdbfbcc8822", "865599b1785d130c"},
+    {"double far figure", "pairs of two", "41d36e138069cf73", "4c5f919aefb32582",
+     "03df6bbe3415a02b"},
+    {"double far figure", "pairs of two, narrow", "41d36e138069cf73", "87e0bbdbfbcc8822",
+     "865599b1785d130c"},
     {"double lattice", "closest", "ea7ad16bf61c839d", "65b53d39e972d062", "-"},
     {"double lattice", "closest within", "ea7ad16bf61c839d", "618726327a414b9c", "-"},
     {"double lattice", "lines touch", "ea7ad16bf61c839d", "17108db94e54ec81", "-"},
-    {"double lattice", "lines touch all", "ea7ad16bf61c839d", "d1884834b638c729", "44ce4e35fe00d7b3"},
+    {"double lattice", "lines touch all", "ea7ad16bf61c839d", "d1884834b638c729",
+     "44ce4e35fe00d7b3"},
     {"double lattice", "balls touch", "ea7ad16bf61c839d", "31904db16da6ab3e", "-"},
-    {"double lattice", "balls touch all", "ea7ad16bf61c839d", "92c169c125595f2e", "c648212e0191f02f"},
+    {"double lattice", "balls touch all", "ea7ad16bf61c839d", "92c169c125595f2e",
+     "c648212e0191f02f"},
     {"double lattice", "sweep", "ea7ad16bf61c839d", "24aacee9bf1a8549", "-"},
     {"double lattice", "pairs", "ea7ad16bf61c839d", "5d16afaa1d823fc6", "29f7bde5b5c111c3"},
     {"double lattice", "pairs, narrow", "ea7ad16bf61c839d", "32551db34cefd2c4", "317a5bd22bdac283"},
     {"double lattice", "pairs of two", "ea7ad16bf61c839d", "b7268852fe008606", "1a2de254eb37afe7"},
-    {"double lattice", "pairs of two, narrow", "ea7ad16bf61c839d", "c39650cebc167fe0", "8347f90d324e24f2"},
+    {"double lattice", "pairs of two, narrow", "ea7ad16bf61c839d", "c39650cebc167fe0",
+     "8347f90d324e24f2"},
     {"double degenerate", "closest", "49b7f407944a03b0", "2b14b44a529e140e", "-"},
     {"double degenerate", "closest within", "49b7f407944a03b0", "de6c3be6f2879a5b", "-"},
     {"double degenerate", "lines touch", "49b7f407944a03b0", "c1e2a013ef251469", "-"},
-    {"double degenerate", "lines touch all", "49b7f407944a03b0", "5c391cd521ed8069", "4e0c2242b5616ad3"},
+    {"double degenerate", "lines touch all", "49b7f407944a03b0", "5c391cd521ed8069",
+     "4e0c2242b5616ad3"},
     {"double degenerate", "balls touch", "49b7f407944a03b0", "7fdb4b44e6a72574", "-"},
-    {"double degenerate", "balls touch all", "49b7f407944a03b0", "8572becb7717c912", "4fec6690063bfe7b"},
+    {"double degenerate", "balls touch all", "49b7f407944a03b0", "8572becb7717c912",
+     "4fec6690063bfe7b"},
     {"double degenerate", "sweep", "49b7f407944a03b0", "d971f65be62bc5d1", "-"},
     {"double degenerate", "pairs", "49b7f407944a03b0", "85984f831e947b44", "35f3ced7ffc23568"},
-    {"double degenerate", "pairs, narrow", "49b7f407944a03b0", "262b2e46a36a8409", "b6314bdb4cebccbb"},
-    {"double degenerate", "pairs of two", "49b7f407944a03b0", "349f5d151fb6a08e", "6a4b0f80282b4b7b"},
-    {"double degenerate", "pairs of two, narrow", "49b7f407944a03b0", "4dad52d56222d51b", "01c92167adaccc91"},
+    {"double degenerate", "pairs, narrow", "49b7f407944a03b0", "262b2e46a36a8409",
+     "b6314bdb4cebccbb"},
+    {"double degenerate", "pairs of two", "49b7f407944a03b0", "349f5d151fb6a08e",
+     "6a4b0f80282b4b7b"},
+    {"double degenerate", "pairs of two, narrow", "49b7f407944a03b0", "4dad52d56222d51b",
+     "01c92167adaccc91"},
     {"double far figure", "inside", "41d36e138069cf73", "bab04e0860aa9e6f", "-"},
     {"double far figure", "signed distance", "41d36e138069cf73", "5368d6e6c02e57ff", "-"},
     {"double far figure", "signed distance within", "41d36e138069cf73", "6d0cb727b282e008", "-"},
@@ -504,8 +526,8 @@ constexpr Known known[] = {
     {"double torn figure", "inside", "bb4d752d30350d03", "a86c3934465f1e14", "-"},
 };
 
-/// Sums of angles differ in their last bits between trees and machines. Insides of the torn figure do
-/// not, since no query is where that could decide.
+/// Sums of angles differ in their last bits between trees and machines. Insides of the torn figure
+/// do not, since no query is where that could decide.
 template <class Calls>
 void expect_clear_insides() {
     const Asked<Calls> asked("torn figure");
@@ -524,9 +546,7 @@ TEST(QueryDigestInput, TornFigureHasClearInsides) {
 
 class QueryDigest : public testing::TestWithParam<Known> {};
 
-TEST_P(QueryDigest, IsKnown) {
-    expect_known(GetParam(), ask(GetParam().scene, GetParam().query));
-}
+TEST_P(QueryDigest, IsKnown) { expect_known(GetParam(), ask(GetParam().scene, GetParam().query)); }
 
 INSTANTIATE_TEST_SUITE_P(Meshes, QueryDigest, testing::ValuesIn(known),
                          [](const auto& row) { return name_of(row.param); });

@@ -37,8 +37,7 @@ Mesh small_builtin(const char* spec) { return load_scene(spec).mesh; }
 
 MeshD thinned(MeshD mesh, std::size_t step) {
     std::vector<Triangle> kept;
-    for (std::size_t i = 0; i < mesh.triangles.size(); i += step)
-        kept.push_back(mesh.triangles[i]);
+    for (std::size_t i = 0; i < mesh.triangles.size(); i += step) kept.push_back(mesh.triangles[i]);
     mesh.triangles = std::move(kept);
     return mesh;
 }
@@ -47,8 +46,7 @@ MeshD across(const std::vector<AabbD>& boxes) {
     MeshD mesh;
     for (const AabbD& box : boxes) {
         const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-        mesh.vertices.insert(mesh.vertices.end(),
-                             {box.lo, {box.hi.x, box.lo.y, box.hi.z}, box.hi});
+        mesh.vertices.insert(mesh.vertices.end(), {box.lo, {box.hi.x, box.lo.y, box.hi.z}, box.hi});
         mesh.triangles.push_back({first, first + 1, first + 2});
     }
     return mesh;

@@ -1,5 +1,6 @@
 // What digests ask with: made of whole numbers and of sums, products, quotients and square roots,
-// which every machine rounds alike. No sines, no powers: libraries differ in the last bits of these.
+// which every machine rounds alike. No sines, no powers: libraries differ in the last bits of
+// these.
 #pragma once
 
 #include <raydix/double.h>

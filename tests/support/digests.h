@@ -22,8 +22,7 @@ namespace raydix::test {
 class Packed {
 public:
     template <class Number>
-        requires std::is_arithmetic_v<Number>
-    Packed& add(Number number) {
+    requires std::is_arithmetic_v<Number> Packed& add(Number number) {
         return append(&number, sizeof(number));
     }
     Packed& add(Vec3 p) { return add(p.x).add(p.y).add(p.z); }

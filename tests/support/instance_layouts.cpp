@@ -193,6 +193,32 @@ Vec3d mapped(const MapRows& m, Vec3d p) {
     return {row(0), row(1), row(2)};
 }
 
+/// Squares and boxes far from their own 0, placed side by side: rays that go in are rounded to what
+/// floats can tell there, which decides at the sides, and boxes of instances must have room for it.
+Layout offset() {
+    constexpr Vec3d middle{3000, -2000, 1000};
+    std::vector<Vec3d> corners;
+    for (const double z : {-1.0, 1.0})
+        for (const double y : {-1.0, 1.0})
+            for (const double x : {-1.0, 1.0}) corners.push_back(middle + Vec3d{x, y, z});
+    const std::vector<Triangle> square{{0, 1, 3}, {0, 3, 2}};
+    std::vector<Triangle> cube = square;
+    for (const Triangle& t :
+         {Triangle{4, 7, 5}, Triangle{4, 6, 7}, Triangle{0, 5, 1}, Triangle{0, 4, 5},
+          Triangle{2, 3, 7}, Triangle{2, 7, 6}, Triangle{0, 2, 6}, Triangle{0, 6, 4},
+          Triangle{1, 5, 7}, Triangle{1, 7, 3}})
+        cube.push_back(t);
+    Layout layout{{{"", corners, square}, {"", corners, cube}}};
+    MapMaker maker(seed);
+    for (std::size_t i = 0; i < 32; ++i) {
+        const Rows3 rows = i % 4 == 0 ? diagonal(1, 1, 1) : maker.turn();
+        const Vec3d at = maker.in_cube(8);
+        layout.groups[0].push_back(
+            {false, i % 2, placed(rows, at - mapped(placed(rows, {0, 0, 0}), middle))});
+    }
+    return layout;
+}
+
 }  // namespace
 
 std::vector<ShownMesh> shown_meshes(const Layout& layout) {
@@ -246,6 +272,7 @@ Layout layout_named(const std::string& name) {
     if (name == "nested") return nested(false);
     if (name == "masks") return nested(true);
     if (name == "deep") return deep();
+    if (name == "offset") return offset();
     throw std::invalid_argument("no layout " + name);
 }
 

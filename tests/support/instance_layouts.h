@@ -42,9 +42,9 @@ std::vector<ShownMesh> shown_meshes(const Layout& layout);
 /// Some triangles of each mesh shown, where they stand in the scene: what rays aim at.
 MeshD some_triangles(const Layout& layout, std::size_t count);
 
-/// "grid", "mirrored", "stretched", "sheared", "ties", "nested", "deep", "masks", and "far": the
-/// grid at a place where floats have steps of half a metre. Made without any rounding that machines
-/// do differently.
+/// "grid", "mirrored", "stretched", "sheared", "ties", "nested", "deep", "masks", "offset", and
+/// "far": the grid at a place where floats have steps of half a metre. Made without any rounding
+/// that machines do differently.
 Layout layout_named(const std::string& name);
 
 }  // namespace raydix::test

@@ -137,8 +137,8 @@ Question float_question(const std::string& name, const std::string& query) {
                 for (const SimdPath path : {SimdPath::automatic, SimdPath::single, SimdPath::packet,
                                             SimdPath::stream, SimdPath::sorted}) {
                     with_isa.path = path;
-                    add(fmt::format("{}, {}, {}, {} threads", wide.name, isa,
-                                    simd_path_name(path), options.threads),
+                    add(fmt::format("{}, {}, {}, {} threads", wide.name, isa, simd_path_name(path),
+                                    options.threads),
                         [=, tree = &wide.tree] {
                             return all ? all_answer(trace_all(*tree, trees->rays, with_isa))
                                        : any(*tree, trees->rays, with_isa);
@@ -154,7 +154,8 @@ Question float_question(const std::string& name, const std::string& query) {
     add("one by one", [=] { return any_one_by_one(trees->binary[1].second, trees->rays); });
     add("one by one, wide", [=] { return any_one_by_one(trees->wide[0].tree, trees->rays); });
     add("closest", [=] { return any_of_closest(trace(trees->wide[0].tree, trees->rays)); });
-    add("closest in the k-d tree", [=] { return any_of_closest(kd_trace(trees->kd, trees->rays)); });
+    add("closest in the k-d tree",
+        [=] { return any_of_closest(kd_trace(trees->kd, trees->rays)); });
     return question;
 }
 
@@ -182,9 +183,7 @@ struct DoubleTrees {
         for (const RayD& ray : rays) hits.push_back(closest_hit(trees[1].second, ray));
         return closest_answer(hits);
     }
-    [[nodiscard]] std::vector<HitD> brute_force() const {
-        return trace_brute_force(mesh, rays);
-    }
+    [[nodiscard]] std::vector<HitD> brute_force() const { return trace_brute_force(mesh, rays); }
 };
 
 Question double_question(const std::string& name, const std::string& query) {
@@ -239,9 +238,7 @@ constexpr Known known[] = {
 
 class MeshDigest : public testing::TestWithParam<Known> {};
 
-TEST_P(MeshDigest, IsKnown) {
-    expect_known(GetParam(), ask(GetParam().scene, GetParam().query));
-}
+TEST_P(MeshDigest, IsKnown) { expect_known(GetParam(), ask(GetParam().scene, GetParam().query)); }
 
 INSTANTIATE_TEST_SUITE_P(Meshes, MeshDigest, testing::ValuesIn(known),
                          [](const auto& row) { return name_of(row.param); });

@@ -141,8 +141,7 @@ struct Shapes {
             boxes = boxes_of(rods);
             intersect = intersect_capsules(rods);
         } else {
-            for (std::size_t i = 0; i < shape_count; ++i)
-                points.push_back(Calls::point(place()));
+            for (std::size_t i = 0; i < shape_count; ++i) points.push_back(Calls::point(place()));
             boxes = boxes_of(points, Number{0.0625});
             intersect = intersect_points(points, Number{0.0625});
         }
