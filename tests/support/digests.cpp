@@ -10,6 +10,8 @@
 #include <cctype>
 #include <ostream>
 
+#include "support/support.h"
+
 namespace raydix::test {
 namespace {
 
@@ -46,10 +48,12 @@ void PrintTo(const Known& known, std::ostream* out) { *out << known.scene << ", 
 void expect_known(const Known& known, const Question& question) {
     ASSERT_FALSE(question.ways.empty());
     const std::string input = question.input.digest();
-    EXPECT_EQ(input, known.input) << "the input: nothing else can be compared";
+    EXPECT_EQ(input, known.input) << "the input; of rays, those that are made from hits too";
     const Digits wanted{known.values, known.where};
     std::vector<Digits> found;
-    for (const Way& way : question.ways) {
+    const std::size_t step = thorough > 1 ? 1 : 3;  // where everything is slow, some of the ways
+    for (std::size_t i = 0; i < question.ways.size(); i += step) {
+        const Way& way = question.ways[i];
         const Answer answer = way.answer();
         found.push_back({answer.values.digest(), answer.where.digest()});
         EXPECT_GE(answer.found, question.least_found) << way.name << ": too few for a test";

@@ -82,8 +82,8 @@ struct Known {
 std::string name_of(const Known& known);
 void PrintTo(const Known& known, std::ostream* out);
 
-/// Asks in all ways and expects the row's digests of each. If all agree on others, the new row is
-/// printed as it would stand in the table.
+/// Asks in all ways, under sanitizers and emulation in every third, and expects the row's digests
+/// of each. If all agree on others, the new row is printed as it would stand in the table.
 void expect_known(const Known& known, const Question& question);
 
 }  // namespace raydix::test
