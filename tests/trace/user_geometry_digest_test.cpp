@@ -1,0 +1,328 @@
+// Rays through geometry of the caller's own, in float and in double, against digests kept here:
+// functions written in this test and those of the library.
+#include <gtest/gtest.h>
+#include <raydix/user_geometry.h>
+#include <raydix/user_geometry_d.h>
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <string>
+
+#include "base/double3.h"
+#include "support/digest_inputs.h"
+#include "support/digests.h"
+#include "support/double_scenes.h"
+
+namespace raydix::test {
+namespace {
+
+constexpr std::uint64_t seed = 12;
+constexpr std::size_t ray_count = 4000, rays_to_hits = 500, shape_count = 300;
+
+/// Today's calls in float.
+struct FloatCalls {
+    using Number = float;
+    using Point = Vec3;
+    using Box = Aabb;
+    using AnyRay = Ray;
+    using AnyHit = Hit;
+    using Ball = Sphere;
+    using Rod = Capsule;
+    using Intersect = IntersectPrimitive;
+
+    static Point point(Vec3d p) { return Double3(p).rounded(); }
+    static AabbD wide(const Box& box) {
+        return {{box.lo.x, box.lo.y, box.lo.z}, {box.hi.x, box.hi.y, box.hi.z}};
+    }
+    static std::vector<Ray> rays(const std::vector<RayD>& rays) { return in_float(rays); }
+};
+
+/// Today's calls in double.
+struct DoubleCalls {
+    using Number = double;
+    using Point = Vec3d;
+    using Box = AabbD;
+    using AnyRay = RayD;
+    using AnyHit = HitD;
+    using Ball = SphereD;
+    using Rod = CapsuleD;
+    using Intersect = IntersectPrimitiveD;
+
+    static Point point(Vec3d p) { return p; }
+    static AabbD wide(const Box& box) { return box; }
+    static std::vector<RayD> rays(const std::vector<RayD>& rays) { return rays; }
+};
+
+/// The first of two places along the ray that its limits let through.
+template <class AnyRay, class AnyHit>
+bool first_within(const AnyRay& ray, double near, double far, AnyHit& hit) {
+    using Number = decltype(hit.t);
+    hit.t = static_cast<Number>(near);
+    if (!(hit.t >= ray.tmin)) hit.t = static_cast<Number>(far);
+    return hit.t >= ray.tmin && hit.t <= ray.tmax;
+}
+
+/// A sphere's surface; u and v are the point's offsets from the center in x and y.
+template <class Ball, class AnyRay, class AnyHit>
+bool hits_ball(const Ball& ball, const AnyRay& ray, AnyHit& hit) {
+    const Double3 d(ray.direction), o = Double3(ray.origin) - Double3(ball.center);
+    const double a = dot(d, d), b = dot(o, d), radius = ball.radius;
+    const double c = b * b - a * (dot(o, o) - radius * radius);
+    if (!(c >= 0.0)) return false;
+    const double root = std::sqrt(c);
+    if (!first_within(ray, (-b - root) / a, (root - b) / a, hit)) return false;
+    using Number = decltype(hit.t);
+    hit.u = static_cast<Number>(o.x + hit.t * d.x);
+    hit.v = static_cast<Number>(o.y + hit.t * d.y);
+    return true;
+}
+
+/// A box's surface; u is the axis of the side that is entered.
+template <class Box, class AnyRay, class AnyHit>
+bool hits_box(const Box& box, const AnyRay& ray, AnyHit& hit) {
+    double enter = -std::numeric_limits<double>::infinity(), leave = -enter;
+    int side = 0;
+    const auto cut = [&](int axis, double lo, double hi, double o, double d) {
+        if (d == 0.0) {
+            if (o < lo || o > hi) leave = -std::numeric_limits<double>::infinity();
+            return;
+        }
+        const double one = (lo - o) / d, other = (hi - o) / d;
+        if (std::min(one, other) > enter) enter = std::min(one, other), side = axis;
+        leave = std::min(leave, std::max(one, other));
+    };
+    cut(0, box.lo.x, box.hi.x, ray.origin.x, ray.direction.x);
+    cut(1, box.lo.y, box.hi.y, ray.origin.y, ray.direction.y);
+    cut(2, box.lo.z, box.hi.z, ray.origin.z, ray.direction.z);
+    if (!(enter <= leave) || !first_within(ray, enter, leave, hit)) return false;
+    using Number = decltype(hit.t);
+    hit.u = static_cast<Number>(side);
+    hit.v = 0;
+    return true;
+}
+
+/// Shapes, the boxes around them and the function that knows them. The shapes stay where they are.
+template <class Calls>
+struct Shapes {
+    using Number = typename Calls::Number;
+
+    std::vector<typename Calls::Ball> balls;
+    std::vector<typename Calls::Rod> rods;
+    std::vector<typename Calls::Point> points;
+    std::vector<typename Calls::Box> boxes;
+    typename Calls::Intersect intersect;
+
+    explicit Shapes(const std::string& name) : random_(seed) {
+        if (name.starts_with("far")) middle_ = utm_place;
+        if (name == "my spheres") {
+            make_balls();
+            boxes = boxes_of(balls);
+            intersect = [this](std::uint32_t prim, const auto& ray, auto& hit) {
+                return hits_ball(balls[prim], ray, hit);
+            };
+        } else if (name.ends_with("spheres")) {
+            make_balls();
+            boxes = boxes_of(balls);
+            intersect = intersect_spheres(balls);
+        } else if (name == "my boxes") {
+            make_boxes();
+            intersect = [this](std::uint32_t prim, const auto& ray, auto& hit) {
+                return hits_box(boxes[prim], ray, hit);
+            };
+        } else if (name.ends_with("capsules")) {
+            for (std::size_t i = 0; i < shape_count; ++i) {
+                const Vec3d a = place(), along = 0.2 * in_cube();
+                const Vec3d b = i % 9 == 0 ? a : a + along;
+                rods.push_back({Calls::point(a), Calls::point(b), radius()});
+            }
+            boxes = boxes_of(rods);
+            intersect = intersect_capsules(rods);
+        } else {
+            for (std::size_t i = 0; i < shape_count; ++i) points.push_back(Calls::point(place()));
+            boxes = boxes_of(points, Number{0.0625});
+            intersect = intersect_points(points, Number{0.0625});
+        }
+    }
+    Shapes(const Shapes&) = delete;
+
+private:
+    Vec3d in_cube() { return random_.in({{-1, -1, -1}, {1, 1, 1}}); }
+    Vec3d place() { return middle_ + in_cube(); }
+    Number radius() { return static_cast<Number>(random_.between(0.01, 0.2)); }
+    /// Every tenth is the one before it: they tie.
+    void make_balls() {
+        for (std::size_t i = 0; i < shape_count; ++i) {
+            const Vec3d center = place();
+            balls.push_back({Calls::point(center), radius()});
+            if (i % 10 == 9) balls[i] = balls[i - 1];
+        }
+    }
+    /// Corners on a lattice, so that sides lie in the same planes; some are flat.
+    void make_boxes() {
+        const auto whole = [&] { return 0.125 * (static_cast<double>(random_.below(17)) - 8); };
+        const auto size = [&] { return 0.125 * static_cast<double>(random_.below(4)); };
+        for (std::size_t i = 0; i < shape_count; ++i) {
+            const Vec3d lo{whole(), whole(), whole()}, by{size(), size(), size()};
+            boxes.push_back({Calls::point(lo), Calls::point(lo + by)});
+        }
+    }
+
+    RandomD random_;
+    Vec3d middle_{0, 0, 0};
+};
+
+template <class Calls>
+class Traced {
+public:
+    using Tree = decltype(build_bvh(std::vector<typename Calls::Box>{}));
+    using Hits = std::vector<typename Calls::AnyHit>;
+
+    explicit Traced(const std::string& name) : shapes_(name) {
+        std::vector<AabbD> wide;
+        for (const auto& box : shapes_.boxes) wide.push_back(Calls::wide(box));
+        rays_ = Calls::rays(digest_rays(across(wide), ray_count, seed));
+        Hits hits(rays_.size());
+        trace(tree(Builder::karras), shapes_.intersect, rays_, hits);
+        add_rays_to_hits(rays_, hits, rays_to_hits);
+    }
+
+    [[nodiscard]] Packed input() const {
+        Packed packed;
+        for (const auto& box : shapes_.boxes) packed.add(box.lo).add(box.hi);
+        return packed.add_all(rays_);
+    }
+    [[nodiscard]] std::size_t rays() const { return rays_.size(); }
+    [[nodiscard]] Tree tree(Builder builder) const {
+        return build_bvh(shapes_.boxes, {.builder = builder});
+    }
+
+    [[nodiscard]] Answer closest(const Tree& tree, int threads) const {
+        Hits hits(rays_.size());
+        trace(tree, shapes_.intersect, rays_, hits, {.threads = threads});
+        return answer(hits);
+    }
+    [[nodiscard]] Answer any(const Tree& tree, int threads) const {
+        std::vector<std::uint8_t> occluded(rays_.size());
+        trace_any(tree, shapes_.intersect, rays_, occluded, {.threads = threads});
+        return answer_any(occluded);
+    }
+    [[nodiscard]] Answer closest_one_by_one(const Tree& tree) const {
+        Hits hits;
+        for (const auto& ray : rays_) hits.push_back(closest_hit(tree, shapes_.intersect, ray));
+        return answer(hits);
+    }
+    [[nodiscard]] Answer any_one_by_one(const Tree& tree) const {
+        std::vector<std::uint8_t> occluded;
+        for (const auto& ray : rays_) occluded.push_back(any_hit(tree, shapes_.intersect, ray));
+        return answer_any(occluded);
+    }
+    /// Without any tree.
+    [[nodiscard]] Hits each_shape() const {
+        Hits best(rays_.size());
+        for (std::size_t i = 0; i < rays_.size(); ++i)
+            for (std::uint32_t prim = 0; prim < shapes_.boxes.size(); ++prim) {
+                typename Calls::AnyHit hit;
+                if (!shapes_.intersect(prim, rays_[i], hit)) continue;
+                hit.t += 0;  // no -0
+                hit.prim = prim;
+                if (hit.t < best[i].t) best[i] = hit;
+            }
+        return best;
+    }
+
+    static Answer answer(const Hits& hits) {
+        Answer out;
+        for (const auto& hit : hits) {
+            out.values.add_hit(hit);
+            out.found += hit.hit();
+        }
+        return out;
+    }
+    static Answer answer_any(const std::vector<std::uint8_t>& occluded) {
+        Answer out;
+        out.values.add_all(occluded);
+        for (const std::uint8_t hit : occluded) out.found += hit;
+        return out;
+    }
+
+private:
+    Shapes<Calls> shapes_;
+    std::vector<typename Calls::AnyRay> rays_;
+};
+
+template <class Calls>
+Question question_of(const std::string& shapes, bool any) {
+    const auto traced = std::make_shared<Traced<Calls>>(shapes);
+    Question question{traced->input(), traced->rays() / 5, {}};
+    const auto add = [&](std::string name, auto answer) {
+        question.ways.push_back({std::move(name), answer});
+    };
+    for (const Builder builder :
+         {Builder::karras, Builder::ploc, Builder::binned, Builder::sweep}) {
+        const auto tree = std::make_shared<typename Traced<Calls>::Tree>(traced->tree(builder));
+        for (const int threads : {1, 2})
+            add(fmt::format("{}, {} threads", builder_name(builder), threads), [=] {
+                return any ? traced->any(*tree, threads) : traced->closest(*tree, threads);
+            });
+        add(fmt::format("{}, one by one", builder_name(builder)), [=] {
+            return any ? traced->any_one_by_one(*tree) : traced->closest_one_by_one(*tree);
+        });
+    }
+    add("each shape", [=] {
+        const auto hits = traced->each_shape();
+        if (!any) return traced->answer(hits);
+        std::vector<std::uint8_t> occluded;
+        for (const auto& hit : hits) occluded.push_back(hit.hit());
+        return traced->answer_any(occluded);
+    });
+    return question;
+}
+
+Question ask(const std::string& scene, const std::string& query) {
+    const std::string shapes = scene.substr(scene.find(' ') + 1);
+    const bool any = query == "any";
+    return scene.starts_with("float") ? question_of<FloatCalls>(shapes, any)
+                                      : question_of<DoubleCalls>(shapes, any);
+}
+
+constexpr Known known[] = {
+    {"float my spheres", "closest", "f68ca44b75aab741", "3d613b1c6f0ab3a6", "-"},
+    {"float my spheres", "any", "f68ca44b75aab741", "afec706aadf8bf83", "-"},
+    {"float my boxes", "closest", "529b8816e9bf117e", "78e837b82382bb01", "-"},
+    {"float my boxes", "any", "529b8816e9bf117e", "09a2c4b81fc949a0", "-"},
+    {"float spheres", "closest", "f1ab8e7f797749f3", "ad25415d37bc6cc4", "-"},
+    {"float spheres", "any", "f1ab8e7f797749f3", "c858a13c5b1de10f", "-"},
+    {"float capsules", "closest", "3c347b597722dc27", "8883dfe811a67489", "-"},
+    {"float capsules", "any", "3c347b597722dc27", "21b5dab8559486de", "-"},
+    {"float points", "closest", "ca9a73573deb81ee", "42dfa668cd768c21", "-"},
+    {"float points", "any", "ca9a73573deb81ee", "4f2a9e0292ffddbe", "-"},
+    {"double my spheres", "closest", "4047b239554c90ae", "1c68b5bfa1e4600c", "-"},
+    {"double my spheres", "any", "4047b239554c90ae", "6807a8efdcc98a84", "-"},
+    {"double my boxes", "closest", "77a237d5b82e7456", "8c2224da89e2567b", "-"},
+    {"double my boxes", "any", "77a237d5b82e7456", "6046d11ce0465b0a", "-"},
+    {"double spheres", "closest", "585bafb7addfacdc", "7526893892c63c19", "-"},
+    {"double spheres", "any", "585bafb7addfacdc", "7757079903aa040a", "-"},
+    {"double capsules", "closest", "9dd29347250d1367", "030b06689adddec3", "-"},
+    {"double capsules", "any", "9dd29347250d1367", "bfbe416327d24c58", "-"},
+    {"double far spheres", "closest", "16e09c9e8d351786", "eec678006f6de956", "-"},
+    {"double far spheres", "any", "16e09c9e8d351786", "e13fdc3f43649e47", "-"},
+    {"double far capsules", "closest", "b5a5b411ba696727", "a5ac1ffc9cb03ea3", "-"},
+    {"double far capsules", "any", "b5a5b411ba696727", "3ac7e6bdac5bcef4", "-"},
+    {"double points", "closest", "cab69b260e866345", "0eb54a55a405d5b2", "-"},
+    {"double points", "any", "cab69b260e866345", "77ed39d7b306f7d0", "-"},
+};
+
+class UserGeometryDigest : public testing::TestWithParam<Known> {};
+
+TEST_P(UserGeometryDigest, IsKnown) {
+    expect_known(GetParam(), ask(GetParam().scene, GetParam().query));
+}
+
+INSTANTIATE_TEST_SUITE_P(Shapes, UserGeometryDigest, testing::ValuesIn(known),
+                         [](const auto& row) { return name_of(row.param); });
+
+}  // namespace
+}  // namespace raydix::test
