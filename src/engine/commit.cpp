@@ -98,6 +98,7 @@ private:
         out->mask = group.mask;
         if (const MeshTree* const old = kept(group)) {
             out->tree = old->tree, out->first = old->first, out->triangles = old->triangles;
+            out->view = old->view;
             return out;
         }
         WideBvh built;
@@ -117,6 +118,9 @@ private:
         }
         ++report_.trees_built;
         out->tree = std::make_shared<const WideBvh>(std::move(built));
+        TriangleBlock none;
+        out->view = view_of(out->tree->arrays(), none);
+        out->view.room = nullptr;
         return out;
     }
 

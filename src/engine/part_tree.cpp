@@ -56,6 +56,9 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
     out.arrays.stats.max_depth = wide.max_depth;
     out.part.resize(parts.size());
     for (std::size_t k = 0; k < parts.size(); ++k) out.part[k] = parts[bvh.order()[k]];
+    TriangleBlock none;
+    out.view = view_of(out.arrays, none);
+    out.view.room = nullptr;
     double error = 0;
     for (const std::uint32_t part : parts) error = std::max(error, extents[part].error);
     out.growth.rate = std::nextafterf(static_cast<float>(error + float_rounding), infinity);

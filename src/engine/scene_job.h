@@ -16,9 +16,17 @@
 
 namespace raydix {
 
-/// A ray in the space of a scene, in double.
+/// A ray in the space of a scene, in double. Its direction is near unit length, by a power of two.
+/// The fourth component of each has no meaning.
 struct SceneLine {
-    double origin[3], direction[3];
+    alignas(32) double origin[4];
+    alignas(32) double direction[4];
+    double scale;  // t of the caller's ray = scale * t here
+
+    /// t of the caller's ray.
+    [[nodiscard]] float units(float t) const {
+        return scale == 1.0 ? t : static_cast<float>(double{t} / scale);
+    }
 };
 
 /// Where a ray of a level comes from.

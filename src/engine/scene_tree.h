@@ -21,6 +21,7 @@ namespace raydix {
 /// One tree over the triangles of one mesh or of several, which follow each other by id.
 struct MeshTree {
     std::shared_ptr<const WideBvh> tree;
+    WideView view{};                 // without room for a compact tree's blocks
     std::vector<std::uint32_t> ids;  // [meshes] ascending
     std::vector<std::uint32_t>
         first;               // [meshes]: the first triangle of each in the tree's counting
@@ -66,7 +67,8 @@ struct PlacedScene {
 /// A wide tree whose leaves hold one part each. Parts are numbered: mesh trees first, then
 /// instances.
 struct PartTree {
-    WideBvh::Arrays arrays;           // nodes and bounds alone
+    WideBvh::Arrays arrays;  // nodes and bounds alone
+    WideView view{};
     std::vector<std::uint32_t> part;  // by the place that leaves name
     PadGrowth growth;
 

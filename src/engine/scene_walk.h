@@ -35,36 +35,220 @@ HWY_INLINE void grow_pads(const WideView& tree, PadGrowth growth, SingleFrame& f
     set_starts(tree, origin, hn::Load(f4, frame.inverse), whole, frame);
 }
 
+/// A hit of a mesh takes the place of the best one if it is the less of the two; `reach` is how far
+/// the ray goes then. Whether it does.
+template <bool any>
+HWY_INLINE bool keep(const MeshTree& mesh, std::uint32_t number, double scale, const Hit& hit,
+                     SceneHit& best, float& reach) {
+    if constexpr (any) {
+        best.prim = 0;
+        reach = -1.0f;
+        return true;
+    }
+    SceneHit found{hit, no_primitive, number};
+    if (scale != 1.0) found.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
+    if (best.hit() && found.t > best.t) return false;
+    mesh.name(found);
+    const auto key = [](const SceneHit& h) {
+        return std::tuple(h.t, h.instance, h.geometry, h.prim);
+    };
+    if (best.hit() && !(key(found) < key(best))) return false;
+    best = found;
+    // What differs in the line may be equal in the caller's units where those are subnormal: it
+    // must be found too.
+    reach =
+        found.t < std::numeric_limits<float>::min() ? std::nextafterf(found.t, infinity) : found.t;
+    return true;
+}
+
+HWY_INLINE bool near_unit_length(double longest) { return longest > 0x1p-3 && longest < 0x1p3; }
+
+/// The caller's ray.
+HWY_INLINE SceneLine line_of(const Ray& ray) {
+    const Double3 o(ray.origin), d(ray.direction);
+    SceneLine line{{o.x, o.y, o.z, 0}, {d.x, d.y, d.z, 0}, 1.0};
+    const Vec3 way = ray.direction;
+    const double longest = max_of(max_of(std::fabs(way.x), std::fabs(way.y)), std::fabs(way.z));
+    if (!near_unit_length(longest)) {
+        line.scale = direction_scale(longest);
+        for (int a = 0; a < 3; ++a) line.direction[a] *= line.scale;
+    }
+    return line;
+}
+
+/// Through the inverse of an instance: ((x + y) + z) + move, nothing fused.
+HWY_INLINE void enter(const SceneLine& from, const PlacedScene& placed, SceneLine& to) {
+    const hn::CappedTag<double, 4> d;
+    for (std::size_t l = 0; l < 4; l += hn::MaxLanes(d)) {
+        const auto x = hn::Load(d, placed.columns[0] + l), y = hn::Load(d, placed.columns[1] + l),
+                   z = hn::Load(d, placed.columns[2] + l);
+        const auto turned = [&](const double* v) {
+            return hn::Add(hn::Add(hn::Mul(x, hn::Set(d, v[0])), hn::Mul(y, hn::Set(d, v[1]))),
+                           hn::Mul(z, hn::Set(d, v[2])));
+        };
+        hn::Store(hn::Add(turned(from.origin), hn::Load(d, placed.columns[3] + l)), d,
+                  to.origin + l);
+        hn::Store(turned(from.direction), d, to.direction + l);
+    }
+    const double longest = max_of(max_of(std::fabs(to.direction[0]), std::fabs(to.direction[1])),
+                                  std::fabs(to.direction[2]));
+    to.scale = from.scale;
+    if (!near_unit_length(longest)) {
+        const double by = direction_scale(longest);
+        for (int a = 0; a < 3; ++a) to.direction[a] *= by;
+        to.scale *= by;
+    }
+}
+
+/// As floats; a fourth one has no meaning.
+template <class D = hn::CappedTag<double, 4>>
+HWY_INLINE V4 rounded(const double* from) {
+    const D d;
+    if constexpr (hn::MaxLanes(d) == 4) {
+        return hn::DemoteTo(f4, hn::Load(d, from));
+    } else {
+        alignas(16) float out[4];
+        for (int a = 0; a < 4; ++a) out[a] = static_cast<float>(from[a]);
+        return hn::Load(f4, out);
+    }
+}
+
+/// One ray through a scene.
+template <bool any>
+class SceneRay {
+public:
+    SceneRay(SceneJob& job, std::uint32_t id)
+        : job_(job),
+          tmin_(job.limits[id].tmin),
+          reach_(job.limits[id].reach),
+          mask_(job.limits[id].mask),
+          best_(job.hits[id]) {}
+
+    /// Further than this it does not go, in the caller's units.
+    [[nodiscard]] float reach() const { return reach_; }
+    void store(std::uint32_t id) const {
+        job_.limits[id].reach = reach_;
+        job_.hits[id] = best_;
+    }
+
+    void walk(const SceneTree& scene, std::size_t depth, std::uint32_t number,
+              const SceneLine& line) {
+        if (const MeshTree* const mesh = scene.only_mesh()) {
+            hit_mesh(*mesh, depth, number, line);
+            return;
+        }
+        StackMemory& stack = job_.level(depth).parts_stack;
+        for (const PartTree* const tree : {&scene.near, &scene.wild}) {
+            if (tree->empty()) continue;
+            SingleFrame frame;
+            if (!fill(tree->view, line, frame)) return;
+            grow_pads(tree->view, tree->growth, frame);
+            stack.reserve(tree->arrays.stats.max_depth);
+            Parts parts{*this, scene, *tree, depth, number, line};
+            SimdCounts counts;
+            SingleRay<wanted, false, false, false, Parts>(tree->view, frame, stack.view(), counts,
+                                                          &parts, 0)
+                .trace(0, {frame.tmax});
+        }
+    }
+
+    /// Part `part` of a scene.
+    HWY_INLINE void visit(const SceneTree& scene, std::uint32_t part, std::size_t depth,
+                          std::uint32_t number, const SceneLine& line) {
+        const std::size_t meshes = scene.meshes.size();
+        if (part < meshes) {
+            hit_mesh(*scene.meshes[part], depth, number, line);
+            return;
+        }
+        const PlacedScene& placed = scene.instances[part - meshes];
+        if ((placed.mask & mask_) == 0) return;
+        SceneLine inside;
+        enter(line, placed, inside);
+        walk(*placed.scene, depth + 1, number + placed.number, inside);
+    }
+
+private:
+    static constexpr Wanted wanted = any ? Wanted::any : Wanted::closest;
+
+    struct Parts {
+        SceneRay& ray;
+        const SceneTree& scene;
+        const PartTree& tree;
+        std::size_t depth;
+        std::uint32_t number;
+        const SceneLine& line;
+
+        float visit_one(std::uint32_t leaf, std::uint32_t) {
+            ray.visit(scene, tree.part[leaf], depth, number, line);
+            return min_of(line.units(ray.reach_), std::numeric_limits<float>::max());
+        }
+    };
+
+    /// False if floats do not hold the ray, or it ends before it begins.
+    HWY_INLINE bool fill(const WideView& view, const SceneLine& line, SingleFrame& frame) const {
+        const V4 origin = rounded(line.origin), way = rounded(line.direction);
+        const V4 most = hn::Set(f4, std::numeric_limits<float>::max());
+        const float tmin = line.units(tmin_), tmax = line.units(reach_);
+        if ((bits_of(f4, hn::And(hn::Le(hn::Abs(origin), most), hn::Le(hn::Abs(way), most))) & 7) !=
+                7 ||
+            !(tmin <= tmax && tmax >= 0.0f))
+            return false;
+        alignas(16) float components[4];
+        hn::Store(way, f4, components);
+        fill_usual_frame(view, origin, way, components, tmin, tmax, frame);
+        return true;
+    }
+
+    HWY_INLINE void hit_mesh(const MeshTree& mesh, std::size_t depth, std::uint32_t number,
+                             const SceneLine& line) {
+        if (mesh.tree->empty() || (mesh.mask & mask_) == 0) return;
+        SingleFrame frame;
+        if (!fill(mesh.view, line, frame)) return;
+        StackMemory& stack = job_.level(depth).mesh_stack;
+        stack.reserve(mesh.tree->stats().max_depth);
+        SimdCounts counts;
+        WideBest best;
+        if (mesh.view.is_compact) {
+            TriangleBlock room{};
+            WideView view = mesh.view;
+            view.room = &room;
+            best = SingleRay<wanted, true, true>(view, frame, stack.view(), counts)
+                       .trace(0, {frame.tmax});
+        } else {
+            best = SingleRay<wanted, false, false>(mesh.view, frame, stack.view(), counts)
+                       .trace(0, {frame.tmax});
+        }
+        if (best.found()) take(mesh, number, line, {best.t, best.prim, best.u, best.v});
+    }
+
+    HWY_INLINE void take(const MeshTree& mesh, std::uint32_t number, const SceneLine& line,
+                         const Hit& hit) {
+        keep<any>(mesh, number, line.scale, hit, best_, reach_);
+    }
+
+    SceneJob& job_;
+    const float tmin_;
+    float reach_;
+    const std::uint32_t mask_;
+    SceneHit best_;
+};
+
 template <bool any>
 class SceneWalk {
 public:
     explicit SceneWalk(SceneJob& job) : job_(job) {}
 
     void run() {
-        SceneLevel& first = job_.level(0);
-        first.begin(job_.n, false);
         job_.hits.assign(job_.n, {});
         job_.limits.resize(job_.n);
         job_.invalid = 0;
-        const auto place = [&](std::size_t k) { return job_.order == nullptr ? k : job_.order[k]; };
-        constexpr std::size_t ahead = 16;
-        for (std::size_t k = 0; k < job_.n; ++k) {
-            if (job_.order != nullptr)
-                hwy::Prefetch(job_.rays + place(std::min(k + ahead, job_.n - 1)));
-            const std::size_t i = place(k);
-            const Ray& ray = job_.rays[i];
-            job_.limits[k] = {ray.tmin, ray.tmax,
-                              job_.masks == nullptr ? job_.mask : job_.masks[i]};
-            if (is_valid(ray))
-                add_first(first, ray, static_cast<std::uint32_t>(k));
-            else
-                ++job_.invalid;
-        }
-        walk(0, *job_.tree, 0);
+        if (job_.single)
+            one_by_one();
+        else
+            together();
     }
 
 private:
-    static constexpr Wanted wanted = any ? Wanted::any : Wanted::closest;
     /// Fewer rays than this go one by one.
     static constexpr std::uint32_t least_together = 6;
 
@@ -75,6 +259,41 @@ private:
         std::uint32_t number;  // of the path of instances; 0: none
     };
 
+    [[nodiscard]] std::size_t place_of(std::size_t k) const {
+        return job_.order == nullptr ? k : job_.order[k];
+    }
+    /// Ray k of the job; null if it is invalid.
+    HWY_INLINE const Ray* start(std::size_t k) {
+        constexpr std::size_t ahead = 16;
+        if (job_.order != nullptr)
+            hwy::Prefetch(job_.rays + place_of(std::min(k + ahead, job_.n - 1)));
+        const std::size_t i = place_of(k);
+        const Ray& ray = job_.rays[i];
+        job_.limits[k] = {ray.tmin, ray.tmax, job_.masks == nullptr ? job_.mask : job_.masks[i]};
+        if (is_valid(ray)) return &ray;
+        ++job_.invalid;
+        return nullptr;
+    }
+
+    void one_by_one() {
+        for (std::size_t k = 0; k < job_.n; ++k) {
+            const Ray* const ray = start(k);
+            if (ray == nullptr) continue;
+            const auto id = static_cast<std::uint32_t>(k);
+            SceneRay<any> one(job_, id);
+            one.walk(*job_.tree, 0, 0, HWY_NAMESPACE::line_of(*ray));
+            one.store(id);
+        }
+    }
+    void together() {
+        SceneLevel& first = job_.level(0);
+        first.begin(job_.n, false);
+        for (std::size_t k = 0; k < job_.n; ++k)
+            if (const Ray* const ray = start(k))
+                add_first(first, *ray, static_cast<std::uint32_t>(k));
+        walk(0, *job_.tree, 0);
+    }
+
     /// What takes rays on at the leaves of a tree over parts (single.h).
     class Parts {
     public:
@@ -82,7 +301,11 @@ private:
             : walk_(walk), level_(walk.job_.level(place.depth)), place_(place), tree_(tree) {}
 
         float visit_one(std::uint32_t leaf, std::uint32_t ray) {
-            walk_.visit_one(place_, tree_.part[leaf], ray);
+            const std::uint32_t id = level_.sources[ray].id;
+            SceneRay<any> one(walk_.job_, id);
+            one.visit(place_.scene, tree_.part[leaf], place_.depth, place_.number,
+                      walk_.line_of(place_, level_, ray));
+            one.store(id);
             return reach(ray);
         }
         void visit(std::uint32_t leaf, const std::uint32_t* rays, std::uint32_t count) {
@@ -109,10 +332,6 @@ private:
         return min_of(reach, std::numeric_limits<float>::max());
     }
 
-    [[nodiscard]] static bool near_unit_length(double longest) {
-        return longest > 0x1p-3 && longest < 0x1p3;
-    }
-
     /// A ray as the caller has it becomes the last one of a level.
     HWY_INLINE void add_first(SceneLevel& level, const Ray& ray, std::uint32_t id) {
         level.rays[level.count] = ray;
@@ -134,54 +353,30 @@ private:
     /// Ray `ray` of one level, in double.
     [[nodiscard]] HWY_INLINE SceneLine line_of(const Place& place, const SceneLevel& level,
                                                std::uint32_t ray) const {
-        if (place.depth != 0) return level.lines[ray];
-        const Ray& exact = level.rays[ray];
-        return {{exact.origin.x, exact.origin.y, exact.origin.z},
-                {exact.direction.x, exact.direction.y, exact.direction.z}};
+        if (place.depth != 0 && !place.scene.instances.empty()) return level.lines[ray];
+        // Floats have all of it: the caller's, or that of a scene that holds no instances.
+        const Double3 o(level.rays[ray].origin), d(level.rays[ray].direction);
+        return {{o.x, o.y, o.z, 0}, {d.x, d.y, d.z, 0}, level.sources[ray].scale};
     }
 
-    /// A ray goes through the inverse of an instance, in double: ((x + y) + z) + move, nothing
-    /// fused. It becomes the last one of the level inside, unless it can hit nothing there.
-    HWY_INLINE void enter(const SceneLine& from, const SceneRaySource& source,
-                          const PlacedScene& placed, SceneLevel& to) {
-        using D = hn::CappedTag<double, 4>;
-        const D d;
-        alignas(32) double origin[4], direction[4];
-        for (std::size_t l = 0; l < 4; l += hn::MaxLanes(d)) {
-            const auto x = hn::Load(d, placed.columns[0] + l),
-                       y = hn::Load(d, placed.columns[1] + l),
-                       z = hn::Load(d, placed.columns[2] + l);
-            const auto turned = [&](const double* v) {
-                return hn::Add(hn::Add(hn::Mul(x, hn::Set(d, v[0])), hn::Mul(y, hn::Set(d, v[1]))),
-                               hn::Mul(z, hn::Set(d, v[2])));
-            };
-            hn::Store(hn::Add(turned(from.origin), hn::Load(d, placed.columns[3] + l)), d,
-                      origin + l);
-            hn::Store(turned(from.direction), d, direction + l);
-        }
-        const double longest = max_of(max_of(std::fabs(direction[0]), std::fabs(direction[1])),
-                                      std::fabs(direction[2]));
-        double scale = source.scale;
-        if (!near_unit_length(longest)) {
-            const double by = direction_scale(longest);
-            for (int a = 0; a < 3; ++a) direction[a] *= by;
-            scale *= by;
-        }
-        const SceneJob::Limits& limits = job_.limits[source.id];
+    /// A ray goes through the inverse of an instance. It becomes the last one of the level inside,
+    /// unless it can hit nothing there.
+    HWY_INLINE void add(const SceneLine& from, std::uint32_t id, const PlacedScene& placed,
+                        SceneLevel& to) {
+        SceneLine line;
+        enter(from, placed, line);
+        const SceneJob::Limits& limits = job_.limits[id];
         Ray& ray = to.rays[to.count];
-        ray.origin = {static_cast<float>(origin[0]), static_cast<float>(origin[1]),
-                      static_cast<float>(origin[2])};
-        ray.direction = {static_cast<float>(direction[0]), static_cast<float>(direction[1]),
-                         static_cast<float>(direction[2])};
-        ray.tmin = in_units_of(scale, limits.tmin);
-        ray.tmax = in_units_of(scale, limits.reach);
+        alignas(16) float origin[4], direction[4];
+        hn::Store(rounded(line.origin), f4, origin);
+        hn::Store(rounded(line.direction), f4, direction);
+        ray.origin = {origin[0], origin[1], origin[2]};
+        ray.direction = {direction[0], direction[1], direction[2]};
+        ray.tmin = line.units(limits.tmin);
+        ray.tmax = line.units(limits.reach);
         if (!is_valid(ray)) return;
-        if (!placed.scene->instances.empty()) {
-            SceneLine& line = to.lines[to.count];
-            for (int a = 0; a < 3; ++a)
-                line.origin[a] = origin[a], line.direction[a] = direction[a];
-        }
-        to.sources[to.count++] = {scale, source.id};
+        if (!placed.scene->instances.empty()) to.lines[to.count] = line;
+        to.sources[to.count++] = {line.scale, id};
     }
 
     /// All rays of the level of `place`.
@@ -189,7 +384,7 @@ private:
         const Place place{scene, depth, number};
         SceneLevel& level = job_.level(depth);
         const auto count = static_cast<std::uint32_t>(level.count);
-        if (count < least_together || job_.single) {
+        if (count < least_together) {
             for (std::uint32_t ray = 0; ray < count; ++ray) walk_one(place, ray);
         } else if (const MeshTree* const mesh = scene.only_mesh()) {
             visit_mesh(place, *mesh, nullptr, count);
@@ -200,41 +395,19 @@ private:
     }
 
     void walk_one(const Place& place, std::uint32_t ray) {
-        if (const MeshTree* const mesh = place.scene.only_mesh()) {
-            visit_mesh_with_one(place, *mesh, ray);
-            return;
-        }
-        SceneLevel& level = job_.level(place.depth);
-        TriangleBlock room;  // no leaf holds triangles
-        SimdCounts counts;
-        for (const PartTree* const tree : {&place.scene.near, &place.scene.wild}) {
-            if (tree->empty()) continue;
-            const WideView view = view_of(tree->arrays, room);
-            SingleFrame frame;
-            if (!fill_frame(view, level.rays[ray], frame)) return;
-            grow_pads(view, tree->growth, frame);
-            level.parts_stack.reserve(tree->arrays.stats.max_depth);
-            Parts parts(*this, place, *tree);
-            SingleRay<wanted, false, false, false, Parts>(view, frame, level.parts_stack.view(),
-                                                          counts, &parts, ray)
-                .trace(0, {frame.tmax});
-        }
+        const SceneLevel& level = job_.level(place.depth);
+        const std::uint32_t id = level.sources[ray].id;
+        SceneRay<any> one(job_, id);
+        one.walk(place.scene, place.depth, place.number, line_of(place, level, ray));
+        one.store(id);
     }
 
     HWY_NOINLINE void walk_parts(const Place& place, const PartTree& tree) {
         SceneLevel& level = job_.level(place.depth);
         level.parts_stack.reserve(tree.arrays.stats.max_depth);
-        TriangleBlock room;  // no leaf holds triangles
-        const SimdJob rays{view_of(tree.arrays, room),
-                           level.rays.data(),
-                           nullptr,
-                           level.count,
-                           {},
-                           nullptr,
-                           level.parts_stack.view(),
-                           {},
-                           &level.parts_memory,
-                           false};
+        const SimdJob rays{
+            tree.view, level.rays.data(),        nullptr, level.count,         {},
+            nullptr,   level.parts_stack.view(), {},      &level.parts_memory, false};
         Parts parts(*this, place, tree);
         SimdCounts counts;
         RaySorter sorter;
@@ -250,23 +423,6 @@ private:
         }
     }
 
-    void visit_one(const Place& place, std::uint32_t part, std::uint32_t ray) {
-        const std::size_t meshes = place.scene.meshes.size();
-        if (part < meshes) {
-            visit_mesh_with_one(place, *place.scene.meshes[part], ray);
-            return;
-        }
-        const PlacedScene& placed = place.scene.instances[part - meshes];
-        const SceneLevel& outside = job_.level(place.depth);
-        const SceneRaySource& source = outside.sources[ray];
-        if ((placed.mask & job_.limits[source.id].mask) == 0) return;
-        SceneLevel& inside = job_.level(place.depth + 1);
-        inside.begin(1, !placed.scene->instances.empty());
-        enter(line_of(place, outside, ray), source, placed, inside);
-        if (inside.count != 0)
-            walk_one({*placed.scene, place.depth + 1, place.number + placed.number}, 0);
-    }
-
     void visit(const Place& place, std::uint32_t part, const std::uint32_t* rays,
                std::uint32_t count) {
         const std::size_t meshes = place.scene.meshes.size();
@@ -279,30 +435,11 @@ private:
         SceneLevel& inside = job_.level(place.depth + 1);
         inside.begin(count, !placed.scene->instances.empty());
         for (std::uint32_t k = 0; k < count; ++k) {
-            const SceneRaySource& source = outside.sources[rays[k]];
-            if ((placed.mask & job_.limits[source.id].mask) != 0)
-                enter(line_of(place, outside, rays[k]), source, placed, inside);
+            const std::uint32_t id = outside.sources[rays[k]].id;
+            if ((placed.mask & job_.limits[id].mask) != 0)
+                add(line_of(place, outside, rays[k]), id, placed, inside);
         }
         walk(place.depth + 1, *placed.scene, place.number + placed.number);
-    }
-
-    void visit_mesh_with_one(const Place& place, const MeshTree& mesh, std::uint32_t ray) {
-        SceneLevel& level = job_.level(place.depth);
-        if (mesh.tree->empty() || (mesh.mask & job_.limits[level.sources[ray].id].mask) == 0) return;
-        level.mesh_stack.reserve(mesh.tree->stats().max_depth);
-        const WideBvh::Arrays& arrays = mesh.tree->arrays();
-        SimdCounts counts;
-        TriangleBlock room;
-        Hit hit;
-        if (arrays.stats.compact) {
-            room = {};
-            hit = find_one<any, true, true>(view_of(arrays, room), level.rays[ray],
-                                            level.mesh_stack.view(), counts);
-        } else {
-            hit = find_one<any, false, false>(view_of(arrays, room), level.rays[ray],
-                                              level.mesh_stack.view(), counts);
-        }
-        if (hit.hit()) take(level, mesh, place.number, ray, hit);
     }
 
     /// `rays` null: all of the level.
@@ -310,11 +447,6 @@ private:
                     std::uint32_t count) {
         if (mesh.tree->empty()) return;
         SceneLevel& level = job_.level(place.depth);
-        if (count < least_together) {
-            for (std::uint32_t k = 0; k < count; ++k)
-                visit_mesh_with_one(place, mesh, rays == nullptr ? k : rays[k]);
-            return;
-        }
         if (mesh.mask != ~std::uint32_t{0}) {
             level.seen.clear();
             for (std::uint32_t k = 0; k < count; ++k) {
@@ -330,7 +462,9 @@ private:
         if (any && level.occluded.size() < level.count) level.occluded.resize(level.count);
         if (!any && level.hits.size() < level.count) level.hits.resize(level.count);
         TriangleBlock room{};
-        const SimdJob job{view_of(mesh.tree->arrays(), room),
+        WideView view = mesh.view;
+        view.room = &room;
+        const SimdJob job{view,
                           level.rays.data(),
                           rays,
                           count,
@@ -341,7 +475,9 @@ private:
                           &level.mesh_memory,
                           false};
         SimdCounts counts;
-        (job_.packets ? job_.kernels->packets : job_.kernels->streams)(job, counts);
+        (count < least_together ? job_.kernels->single
+         : job_.packets         ? job_.kernels->packets
+                                : job_.kernels->streams)(job, counts);
         if (counts.hits == 0) return;
         for (std::uint32_t k = 0; k < count; ++k) {
             const std::uint32_t ray = rays == nullptr ? k : rays[k];
@@ -356,27 +492,9 @@ private:
     HWY_INLINE void take(SceneLevel& level, const MeshTree& mesh, std::uint32_t number,
                          std::uint32_t ray, const Hit& hit) {
         const SceneRaySource& source = level.sources[ray];
-        SceneHit& best = job_.hits[source.id];
-        float& reach = job_.limits[source.id].reach;
-        if constexpr (any) {
-            best.prim = 0;
-            reach = level.rays[ray].tmax = -1.0f;
-            return;
-        }
-        SceneHit found{hit, no_primitive, number};
-        found.t = static_cast<float>(double{hit.t} * source.scale) + 0.0f;
-        if (best.hit() && found.t > best.t) return;
-        mesh.name(found);
-        const auto key = [](const SceneHit& h) {
-            return std::tuple(h.t, h.instance, h.geometry, h.prim);
-        };
-        if (best.hit() && !(key(found) < key(best))) return;
-        best = found;
-        // What differs in the line may be equal in the caller's units where those are subnormal: it
-        // must be found too.
-        reach = found.t < std::numeric_limits<float>::min() ? std::nextafterf(found.t, infinity)
-                                                            : found.t;
-        shorten(level, ray);
+        if (keep<any>(mesh, number, source.scale, hit, job_.hits[source.id],
+                      job_.limits[source.id].reach))
+            shorten(level, ray);
     }
 
     SceneJob& job_;

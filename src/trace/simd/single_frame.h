@@ -102,6 +102,31 @@ HWY_INLINE V4 load_axes(const float* from) {
 #endif
 }
 
+/// A valid ray whose direction is near unit length; `components`: the direction once more.
+HWY_INLINE void fill_usual_frame(const WideView& tree, V4 place, V4 way, const float* components,
+                                 float tmin, float tmax, SingleFrame& out) {
+    const hn::RebindToSigned<F4> i4;
+    const std::uint32_t negatives = bits_of(i4, hn::Lt(hn::BitCast(i4, way), hn::Zero(i4))) & 7;
+    const float ax = std::fabs(components[0]), ay = std::fabs(components[1]),
+                az = std::fabs(components[2]);
+    const float longest = max_of(max_of(ax, ay), az);
+    const std::uint32_t kz = az == longest ? 2 : ay == longest ? 1 : 0;
+    out.kind = ray_classes[negatives + 8 * kz];
+    const V4 origin = hn::Add(place, hn::Zero(f4));  // -0 becomes +0
+    const V4 inverse = limited(hn::Div(hn::Set(f4, 1.0f), way)),
+             pad = pad_of(tree, origin, way, kz);
+    hn::Store(origin, f4, out.origin);
+    hn::Store(way, f4, out.direction);
+    hn::Store(inverse, f4, out.inverse);
+    hn::Store(pad, f4, out.near_pad);
+    set_starts(tree, origin, inverse, pad, out);
+    out.shear[0] = components[out.kind.kx] / components[kz];
+    out.shear[1] = components[out.kind.ky] / components[kz];
+    out.tmin = tmin > 0.0f ? tmin : 0.0f;
+    out.tmax = min_of(tmax, std::numeric_limits<float>::max());
+    out.t_scale = 1.0f;
+}
+
 /// False if the ray is invalid. The same numbers as make_frame's for all valid rays.
 HWY_INLINE bool fill_frame(const WideView& tree, const Ray& ray, SingleFrame& out) {
     const V4 place = load_axes(&ray.origin.x), way = load_axes(&ray.direction.x);
@@ -118,24 +143,7 @@ HWY_INLINE bool fill_frame(const WideView& tree, const Ray& ray, SingleFrame& ou
         fill_odd_frame(tree, ray, out);
         return true;
     }
-    const hn::RebindToSigned<F4> i4;
-    const std::uint32_t negatives = bits_of(i4, hn::Lt(hn::BitCast(i4, way), hn::Zero(i4))) & 7;
-    const std::uint32_t kz = az == longest ? 2 : ay == longest ? 1 : 0;
-    out.kind = ray_classes[negatives + 8 * kz];
-    const V4 origin = hn::Add(place, hn::Zero(f4));  // -0 becomes +0
-    const V4 inverse = limited(hn::Div(hn::Set(f4, 1.0f), way)),
-             pad = pad_of(tree, origin, way, kz);
-    const float* const components = &ray.direction.x;
-    hn::Store(origin, f4, out.origin);
-    hn::Store(way, f4, out.direction);
-    hn::Store(inverse, f4, out.inverse);
-    hn::Store(pad, f4, out.near_pad);
-    set_starts(tree, origin, inverse, pad, out);
-    out.shear[0] = components[out.kind.kx] / components[kz];
-    out.shear[1] = components[out.kind.ky] / components[kz];
-    out.tmin = ray.tmin > 0.0f ? ray.tmin : 0.0f;
-    out.tmax = min_of(ray.tmax, std::numeric_limits<float>::max());
-    out.t_scale = 1.0f;
+    fill_usual_frame(tree, place, way, &ray.direction.x, ray.tmin, ray.tmax, out);
     return true;
 }
 
