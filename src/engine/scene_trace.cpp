@@ -82,7 +82,11 @@ JobCounts trace_job(const SceneTree& tree, const Way& way, const Batch& batch,
 TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
     const std::size_t n = batch.rays.size();
     SimdPath path = batch.options.path;
-    if (path == SimdPath::automatic) path = choose_path(tree.extent.box, batch.rays);
+    if (path == SimdPath::automatic) {
+        path = choose_path(tree.extent.box, batch.rays);
+        // Rays that go apart meet parts in lists too short to pay.
+        if (path == SimdPath::sorted) path = SimdPath::single;
+    }
     const bool sorted =
         path == SimdPath::sorted && n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
     const Way way{&kernels_for(batch.options.isa), &scene_kernels_for(batch.options.isa),

@@ -178,7 +178,7 @@ private:
         std::uint32_t number;
         const SceneLine& line;
 
-        float visit_one(std::uint32_t leaf, std::uint32_t) {
+        HWY_NOINLINE float visit_one(std::uint32_t leaf, std::uint32_t) {
             ray.visit(scene, tree.part[leaf], depth, number, line);
             return min_of(line.units(ray.reach_), std::numeric_limits<float>::max());
         }
