@@ -91,8 +91,7 @@ TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
         path == SimdPath::sorted && n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
     const Way way{&kernels_for(batch.options.isa), &scene_kernels_for(batch.options.isa),
                   path == SimdPath::packet, path == SimdPath::single};
-    const std::size_t job_size = getenv("JS") ? static_cast<std::size_t>(atol(getenv("JS")))
-                                              : rays_per_job(n, SimdPath::stream);
+    const std::size_t job_size = rays_per_job(n, SimdPath::stream);
     std::vector<JobCounts> parts((n + job_size - 1) / job_size);
     with_threads(batch.options.threads, [&] {
         std::vector<std::uint32_t> order;
