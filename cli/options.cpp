@@ -72,12 +72,12 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
                                     "with 30 bits; default: the highest)"))
         ->check(CLI::Range(0, 21))
         ->type_name("LEVEL");
-    command
-        .add_option("--layout", options.layout,
-                    "Memory layout that is traced: of simd wide8, wide4 or compact, which is wide8 "
-                    "with shared "
-                    "vertices; cwbvh: build only")
-        ->check(CLI::IsMember({"binary", "wide4", "wide8", "compact", "cwbvh"}))
+    options.layout_option =
+        command
+            .add_option("--layout", options.layout,
+                        "Memory layout that is traced: of simd wide8, wide4 or compact, which is "
+                        "wide8 with shared vertices; cwbvh: build only")
+            ->check(CLI::IsMember({"binary", "wide4", "wide8", "compact", "cwbvh"}))
         ->capture_default_str()
         ->group(group);
     command
@@ -116,6 +116,14 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
     for (const char* name : {"--builder", "--quality", "--reinsertion-rounds", "--fit",
                              "--sah-node", "--sah-primitive", "--epo"})
         options.of_a_bvh.push_back(command.get_option(name));
+}
+
+bool TreeOptions::leaves_build_open() const {
+    return std::ranges::all_of(of_the_build, [](const CLI::Option* o) { return o->count() == 0; });
+}
+
+void TreeOptions::prefer_balanced() {
+    if (tree == "bvh" && device == "cpu" && leaves_build_open()) quality = "balanced";
 }
 
 BuildOptions TreeOptions::build_options(const CommonOptions& common) const {

@@ -35,11 +35,16 @@ struct TreeOptions {
     std::string cameras_file;
     SahConstants sah;
     std::optional<double> epo_sample;
+    const CLI::Option* layout_option = nullptr;
     std::vector<const CLI::Option*>
         of_the_build,  // those that a finished tree cannot follow any more
         of_a_bvh;      // those that mean nothing to other trees
 
     [[nodiscard]] BuildOptions build_options(const CommonOptions& common) const;
+    /// Of the options that say how a tree is built, the user gave none.
+    [[nodiscard]] bool leaves_build_open() const;
+    /// Without a word on it, rays on the cpu go through a tree of quality balanced.
+    void prefer_balanced();
 };
 void add_tree_options(CLI::App& command, TreeOptions& options);
 

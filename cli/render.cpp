@@ -41,10 +41,11 @@ Camera chosen_camera(const RenderCommand& options, const Model& scene) {
     return camera;
 }
 
-void run_render(const RenderCommand& options) {
+void run_render(RenderCommand options) {
     refuse_build_options(options.scene, options.tree);
     refuse_device(options.tree);
     const bool of_tree = is_tree_view(options.view);
+    if (!of_tree) options.tree.prefer_balanced();
     if (!of_tree) refuse_tree_view_options(options.tree_view);
     const TreeScene tree_scene =
         of_tree ? load_tree_scene(options.scene, options.view, options.tree_view, options.tree,

@@ -330,6 +330,7 @@ void explain_warps(const TraceCommand& options, const Bvh& bvh) {
 
 /// What the options say about the device, before any work. The tree is built on the cpu.
 TraceCommand with_device(TraceCommand options, Mode mode) {
+    options.tree.prefer_balanced();
     options.kernel = chosen_cpu_kernel(options.kernel, options.tree, options.wide);
     if (options.kernel != "simd") refuse_layout(options.tree);
     const std::string device = options.tree.device;
@@ -350,7 +351,7 @@ TraceCommand with_device(TraceCommand options, Mode mode) {
 
 void run_trace(const TraceCommand& given) {
     const Mode mode = mode_of(given);
-    const TraceCommand options = with_device(given, mode);
+    TraceCommand options = with_device(given, mode);
     if (!options.hits_file.empty() && mode == Mode::any)
         throw CLI::ValidationError("--hits",
                                    "any-hit rays only answer yes or no; use --mode closest or all");
@@ -359,6 +360,7 @@ void run_trace(const TraceCommand& given) {
     on_cpu.device = "cpu";
     const KdTraced traced = load_kdtree_traced(options.scene, on_cpu, options.common);
     const bool through_kdtree = traced.kdtree.has_value();
+    if (through_kdtree && given.kernel.empty()) options.kernel = default_kernel("cpu");
     if (options.max_result_bytes != 0 && mode != Mode::all)
         throw CLI::ValidationError("--max-result-bytes", "belongs to --mode all");
     if (through_kdtree && mode == Mode::all)
@@ -472,8 +474,8 @@ void add_trace_command(CLI::App& app) {
     command
         ->add_option(
             "--kernel", options->kernel,
-            "Traversal kernel (default: scalar on the cpu, speculative_while_while on cuda "
-            "and sim)")
+            "Traversal kernel (default: simd on the cpu, scalar for a kdtree or --layout binary, "
+            "speculative_while_while on cuda and sim)")
         ->check(CLI::IsMember(trace_kernel_names()));
     command->add_option("--machine", options->machine, "Simulated machine of --device sim")
         ->capture_default_str();

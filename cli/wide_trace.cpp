@@ -37,7 +37,9 @@ bool is_wide_layout(const std::string& layout) {
 std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
                               const WideTraceOptions& options) {
     const bool wide = is_wide_layout(tree.layout);
-    const bool simd = kernel == "simd" || (kernel.empty() && wide && tree.device == "cpu");
+    const bool open = tree.layout_option->count() == 0 && tree.tree == "bvh";
+    const bool simd =
+        kernel == "simd" || (kernel.empty() && (wide || open) && tree.device == "cpu");
     if (!simd) {
         if (wide && !kernel.empty())
             throw CLI::ValidationError(
