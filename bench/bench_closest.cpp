@@ -20,10 +20,10 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <random>
 #include <thread>
 
 #include "base/math.h"
+#include "closest_queries.h"
 #include "work_times.h"
 
 namespace {
@@ -110,37 +110,6 @@ private:
     Surface surface_;
 };
 
-float unit(std::mt19937_64& random) { return static_cast<float>(random() >> 40) * 0x1p-24f; }
-
-/// About a hundredth of the diagonal off points of the surface.
-std::vector<Vec3> near_queries(const Peers& peers, std::uint32_t n) {
-    std::mt19937_64 random(1);
-    const Aabb box = peers.bvh().bounds();
-    const Vec3 size = box.hi - box.lo;
-    const float reach = 0.01f * std::sqrt(dot(size, size));
-    std::vector<Vec3> queries(n);
-    for (Vec3& query : queries) {
-        const Triangle& t = peers.mesh().triangles[random() % peers.mesh().triangles.size()];
-        const float x = unit(random), y = unit(random);
-        const Vec3 off{x - 0.5f, y - 0.5f, unit(random) - 0.5f};
-        query = peers.mesh().vertices[t[0]] + 2 * reach * off;
-    }
-    return queries;
-}
-
-/// In a box `scale` times as large as the mesh's, about the same center.
-std::vector<Vec3> queries_around(const Peers& peers, std::uint32_t n, float scale) {
-    std::mt19937_64 random(2);
-    const Aabb box = peers.bvh().bounds();
-    const Vec3 size = box.hi - box.lo, center = 0.5f * (box.lo + box.hi);
-    std::vector<Vec3> queries(n);
-    for (Vec3& query : queries) {
-        const float x = unit(random) - 0.5f, y = unit(random) - 0.5f, z = unit(random) - 0.5f;
-        query = center + scale * Vec3{x * size.x, y * size.y, z * size.z};
-    }
-    return queries;
-}
-
 /// Batches over all threads, and one call a query on one thread; CGAL has single calls only.
 struct Contest {
     const char *question, *where;
@@ -153,16 +122,23 @@ public:
     explicit ClosestStudy(const Options& options) : options_(options), peers_(options) {}
 
     void run() {
-        closest("near", near_queries(peers_, options_.queries));
-        closest("around", queries_around(peers_, options_.queries, 1));
-        closest("far", queries_around(peers_, options_.queries, 4));
+        closest("near", near(options_.queries));
+        closest("around", around(options_.queries, 1));
+        closest("far", around(options_.queries, 4));
         const std::unique_ptr<InsideTest> test = peers_.inside_test();
         if (test == nullptr) return;
-        inside("near", *test, near_queries(peers_, options_.queries));
-        inside("around", *test, queries_around(peers_, options_.queries, 1));
+        inside("near", *test, near(options_.queries));
+        inside("around", *test, around(options_.queries, 1));
     }
 
 private:
+    [[nodiscard]] std::vector<Vec3> near(std::uint32_t n) const {
+        return bench::near_queries(peers_.mesh(), peers_.bvh().bounds(), n, 1);
+    }
+    [[nodiscard]] std::vector<Vec3> around(std::uint32_t n, float scale) const {
+        return bench::queries_around(peers_.bvh().bounds(), n, scale, 2);
+    }
+
     void closest(const char* where, const std::vector<Vec3>& queries) const {
         const Bvh& bvh = peers_.bvh();
         std::vector<ClosestPoint> found(queries.size());

@@ -12,6 +12,7 @@
 #include "cli/program.h"
 #include "cli/simulation.h"
 #include "cpu_report.h"
+#include "embree_api.h"
 
 namespace raydix::bench {
 namespace {

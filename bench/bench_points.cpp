@@ -7,11 +7,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <functional>
 #include <numeric>
 #include <random>
 
+#include "bench_clock.h"
 #include "cli/output.h"
 #include "cli/program.h"
 #include "point_peer.h"
@@ -33,12 +33,6 @@ struct PointBench {
     std::string clock = "wall";
 };
 
-double seconds_of(clockid_t clock) {
-    timespec now{};
-    clock_gettime(clock, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 /// One question: ours and the peers', in turns.
 struct Contest {
     std::string question;
@@ -51,7 +45,7 @@ public:
     explicit PointStudy(const PointBench& options)
         : options_(options),
           threads_(options.common.threads > 0 ? options.common.threads : machine_info().cores),
-          clock_(options.clock == "cpu" ? CLOCK_PROCESS_CPUTIME_ID : CLOCK_MONOTONIC) {}
+          clock_(clock_from(options.clock)) {}
 
     void run() {
         Json document = cli::new_document("bench points");
@@ -274,10 +268,7 @@ void add_options(CLI::App& app, PointBench& options) {
     app.add_option("--rounds", options.rounds, "Timed rounds after a warm-up")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
-    app.add_option("--clock", options.clock,
-                   "wall, or cpu: of all threads together, for a machine that others use too")
-        ->check(CLI::IsMember({"wall", "cpu"}))
-        ->capture_default_str();
+    add_clock_option(app, options.clock);
     cli::add_common_options(app, options.common);
 }
 

@@ -10,6 +10,7 @@
 #include "embree_trace.h"
 #include "embree_tree.h"
 #include "exec/parallel.h"
+#include "one_by_one.h"
 
 namespace raydix::bench {
 namespace {
@@ -71,23 +72,19 @@ public:
     std::vector<Mode> modes() const override {
         std::vector<Mode> modes;
         const RTCScene scene = scene_.scene();
-        for (const int width : {1, 8, 16})
-            for (const bool coherent : {true, false}) {
-                const EmbreeMode mode{width, coherent};
-                modes.push_back(
-                    {.name = fmt::format("{}-wide {}", width, coherent ? "coherent" : "incoherent"),
-                     .single = width == 1,
-                     .closest =
-                         [=](std::span<const Ray> rays, std::span<Hit> hits, int threads) {
-                             with_threads(threads, [&] { trace_embree(scene, mode, rays, hits); });
-                         },
-                     .any =
-                         [=](std::span<const Ray> rays, std::span<std::uint8_t> found,
-                             int threads) {
-                             with_threads(threads,
-                                          [&] { trace_any_embree(scene, mode, rays, found); });
-                         }});
-            }
+        for (const EmbreeMode mode : embree_modes) {
+            modes.push_back(
+                {.name = mode.name(),
+                 .single = mode.single(),
+                 .closest =
+                     [=](std::span<const Ray> rays, std::span<Hit> hits, int threads) {
+                         with_threads(threads, [&] { trace_embree(scene, mode, rays, hits); });
+                     },
+                 .any =
+                     [=](std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) {
+                         with_threads(threads, [&] { trace_any_embree(scene, mode, rays, found); });
+                     }});
+        }
         return modes;
     }
 
@@ -161,28 +158,19 @@ private:
                     }};
     }
 
-    /// The loop is the one that Embree's rays go through.
     Mode single_mode() const {
         const WideBvh* tree = &wide_;
-        const auto loop = [](std::size_t rays, int threads, const auto& one) {
-            with_threads(threads, [&] {
-                for_each_block(rays, rays_of_a_block,
-                               [&](std::size_t, std::size_t begin, std::size_t end) {
-                                   for (std::size_t i = begin; i < end; ++i) one(i);
-                               });
-            });
-        };
         return {.name = "single",
                 .single = true,
                 .closest =
                     [=](std::span<const Ray> rays, std::span<Hit> hits, int threads) {
-                        loop(rays.size(), threads,
-                             [&](std::size_t i) { hits[i] = closest_hit(*tree, rays[i]); });
+                        one_by_one(rays.size(), threads,
+                                   [&](std::size_t i) { hits[i] = closest_hit(*tree, rays[i]); });
                     },
                 .any =
                     [=](std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) {
-                        loop(rays.size(), threads,
-                             [&](std::size_t i) { found[i] = any_hit(*tree, rays[i]); });
+                        one_by_one(rays.size(), threads,
+                                   [&](std::size_t i) { found[i] = any_hit(*tree, rays[i]); });
                     }};
     }
 
@@ -210,18 +198,6 @@ std::unique_ptr<Peer> make_peer(const PeerName& name, const Mesh& mesh, const Cp
                                 int threads) {
     if (name.ours()) return std::make_unique<RaydixPeer>(name.kind(), mesh, options, threads);
     return std::make_unique<EmbreePeer>(name.kind(), mesh, options, threads);
-}
-
-std::string embree_version() {
-    const RTCDevice device = rtcNewDevice("threads=1");
-    const auto part = [device](RTCDeviceProperty property) {
-        return rtcGetDeviceProperty(device, property);
-    };
-    const std::string version = fmt::format("{}.{}.{}", part(RTC_DEVICE_PROPERTY_VERSION_MAJOR),
-                                            part(RTC_DEVICE_PROPERTY_VERSION_MINOR),
-                                            part(RTC_DEVICE_PROPERTY_VERSION_PATCH));
-    rtcReleaseDevice(device);
-    return version;
 }
 
 }  // namespace raydix::bench

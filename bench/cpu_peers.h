@@ -60,7 +60,4 @@ struct PeerName {
 [[nodiscard]] std::unique_ptr<Peer> make_peer(const PeerName& name, const Mesh& mesh,
                                               const CpuBench& options, int threads);
 
-/// "3.13.5", of the library that runs.
-[[nodiscard]] std::string embree_version();
-
 }  // namespace raydix::bench

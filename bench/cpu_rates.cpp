@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <stdexcept>
 
 #include "cli/output.h"
+#include "hit_distance.h"
 #include "measure/stopwatch.h"
 
 namespace raydix::bench {
@@ -29,14 +29,6 @@ void send(const Mode& mode, bool any, std::span<const Ray> rays, Answers& answer
         mode.any(rays, answers.found, threads);
     else
         mode.closest(rays, answers.hits, threads);
-}
-
-/// Float32 coordinates carry no more digits than their size allows, so a distance is compared by
-/// the greater of itself and the origin's largest coordinate.
-bool far_apart(const Ray& ray, float t, float u, double tolerance) {
-    const auto& o = ray.origin;
-    const double scale = std::max({std::abs(o.x), std::abs(o.y), std::abs(o.z), std::abs(t)});
-    return std::abs(double(t) - double(u)) > tolerance * scale;
 }
 
 Differences differences_of(std::span<const Ray> rays, const Answers& ours, const Answers& theirs,

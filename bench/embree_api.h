@@ -2,6 +2,8 @@
 // RAYDIX_EMBREE_MAJOR comes from CMake, which knows the library that is linked.
 #pragma once
 
+#include <string>
+
 #if RAYDIX_EMBREE_MAJOR >= 4
 #include <embree4/rtcore.h>
 #else
@@ -75,5 +77,18 @@ inline void occluded(const int* valid, RTCScene scene, EmbreeQuery& query, RTCRa
 }
 
 #endif
+
+/// "3.13.5", of the library that runs.
+inline std::string embree_version() {
+    const RTCDevice device = rtcNewDevice("threads=1");
+    const auto part = [device](RTCDeviceProperty property) {
+        return std::to_string(rtcGetDeviceProperty(device, property));
+    };
+    const std::string version = part(RTC_DEVICE_PROPERTY_VERSION_MAJOR) + "." +
+                                part(RTC_DEVICE_PROPERTY_VERSION_MINOR) + "." +
+                                part(RTC_DEVICE_PROPERTY_VERSION_PATCH);
+    rtcReleaseDevice(device);
+    return version;
+}
 
 }  // namespace raydix::bench

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <type_traits>
 #ifdef __SSE2__
 #include <emmintrin.h>
@@ -17,15 +18,21 @@
 #include "base/float4.h"
 #include "embree_api.h"
 #include "exec/parallel.h"
+#include "one_by_one.h"
 
 namespace raydix::bench {
 
 struct EmbreeMode {
     int width = 1;  // rays a call: 1, 8 or 16
     bool coherent = false;
-};
 
-inline constexpr std::size_t rays_of_a_block = 1024;
+    [[nodiscard]] bool single() const { return width == 1; }
+    [[nodiscard]] std::string name() const {
+        return std::to_string(width) + (coherent ? "-wide coherent" : "-wide incoherent");
+    }
+};
+inline constexpr EmbreeMode embree_modes[] = {{1, true},  {1, false}, {8, true},
+                                              {8, false}, {16, true}, {16, false}};
 
 namespace detail {
 
@@ -107,9 +114,20 @@ void set_rays(Rays& to, const Ray* rays, std::size_t count) {
     }
 }
 
-/// The scene holds one geometry, number 0: the geometry ids are masks of the rays that missed.
-template <class RayHits>
-void get_hits(const RayHits& from, Hit* hits, std::size_t count) {
+/// Hits of scenes that hold more than one mesh have places for these; of others, nothing.
+template <class Out>
+void set_place(Out& hit, unsigned geometry, unsigned instance) {
+    if constexpr (requires { hit.instance; }) {
+        const bool missed = geometry == RTC_INVALID_GEOMETRY_ID;
+        hit.geometry = geometry;
+        hit.instance = missed ? no_primitive : instance;
+    }
+}
+
+/// The geometry ids are masks of the rays that missed: 0, the one geometry of a scene, or all ones.
+/// Out: Hit, or what begins like it.
+template <class RayHits, class Out>
+void get_hits(const RayHits& from, Out* hits, std::size_t count) {
     static_assert(RTC_INVALID_GEOMETRY_ID == ~0u && no_primitive == ~0u);
     std::size_t k = 0;
     for (; k + 4 <= count; k += 4) {
@@ -126,16 +144,19 @@ void get_hits(const RayHits& from, Hit* hits, std::size_t count) {
         prim.store(&hits[k + 1].t);
         u.store(&hits[k + 2].t);
         v.store(&hits[k + 3].t);
+        for (std::size_t i = k; i < k + 4; ++i)
+            set_place(hits[i], from.hit.geomID[i], from.hit.instID[0][i]);
     }
     for (; k < count; ++k) {
         const bool missed = from.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID;
-        hits[k] = missed ? Hit{}
-                         : Hit{from.ray.tfar[k], from.hit.primID[k], from.hit.u[k], from.hit.v[k]};
+        hits[k] = missed ? Out{}
+                         : Out{from.ray.tfar[k], from.hit.primID[k], from.hit.u[k], from.hit.v[k]};
+        set_place(hits[k], from.hit.geomID[k], from.hit.instID[0][k]);
     }
 }
 
-template <int Width>
-void closest_block(RTCScene scene, bool coherent, std::span<const Ray> rays, Hit* hits) {
+template <int Width, class Out>
+void closest_block(RTCScene scene, bool coherent, std::span<const Ray> rays, Out* hits) {
     EmbreeQuery query(coherent);
     typename EmbreeTypes<Width>::RayHits packet{};
     alignas(64) int valid[Width];
@@ -153,8 +174,9 @@ void closest_block(RTCScene scene, bool coherent, std::span<const Ray> rays, Hit
             intersect(valid, scene, query, packet);
             const RTCHit& hit = packet.hit;
             hits[i] = hit.geomID != RTC_INVALID_GEOMETRY_ID
-                          ? Hit{packet.ray.tfar, hit.primID, hit.u, hit.v}
-                          : Hit{};
+                          ? Out{packet.ray.tfar, hit.primID, hit.u, hit.v}
+                          : Out{};
+            set_place(hits[i], hit.geomID, hit.instID[0]);
         } else {
             set_rays(packet.ray, &rays[i], count);
             std::fill_n(packet.hit.geomID, Width, RTC_INVALID_GEOMETRY_ID);
@@ -205,8 +227,9 @@ void for_each_ray_block(int width, std::size_t rays, const Block& block) {
 }  // namespace detail
 
 /// On the threads of the calling context (with_threads). rays [n] -> hits [n].
-inline void trace_embree(RTCScene scene, EmbreeMode mode, std::span<const Ray> rays,
-                         std::span<Hit> hits) {
+template <class Out = Hit>
+void trace_embree(RTCScene scene, EmbreeMode mode, std::span<const Ray> rays,
+                  std::span<std::type_identity_t<Out>> hits) {
     detail::for_each_ray_block(
         mode.width, rays.size(), [&](auto width, std::size_t begin, std::size_t end) {
             detail::closest_block<width()>(scene, mode.coherent, rays.subspan(begin, end - begin),

@@ -298,6 +298,7 @@ void add_bench_command(CLI::App& app) {
     bench->require_subcommand(1);
     add_traversal_suite(*bench);
     add_cpu_suite(*bench);
+    add_scene_suite(*bench);
     add_points_suite(*bench);
     auto options = std::make_shared<HierarchyBench>();
     CLI::App* command = bench->add_subcommand(

@@ -103,6 +103,8 @@ void add_bench_command(CLI::App& app);
 void add_traversal_suite(CLI::App& bench);
 /// bench cpu
 void add_cpu_suite(CLI::App& bench);
+/// bench scene
+void add_scene_suite(CLI::App& bench);
 /// bench points
 void add_points_suite(CLI::App& bench);
 void add_report_command(CLI::App& app);

@@ -1,0 +1,321 @@
+#include "scene_subjects.h"
+
+#include <raydix/closest.h>
+#include <raydix/double.h>
+#include <raydix/instances.h>
+#include <raydix/trace.h>
+#include <raydix/user_geometry.h>
+#include <raydix/wide.h>
+
+#include "one_by_one.h"
+
+namespace raydix::bench {
+namespace {
+
+PlacedHit placed(const Hit& hit) {
+    if (!hit.hit()) return {};
+    return {hit.t, hit.prim, hit.u, hit.v, 0, 0};
+}
+
+BuildOptions build_options(const SubjectOptions& options) {
+    BuildOptions build = build_options_for(options.quality);
+    build.threads = options.threads;
+    return build;
+}
+
+/// Rays as they are.
+struct FloatRays {
+    using Ray = raydix::Ray;
+    using Hit = raydix::Hit;
+    static std::span<const Ray> given(std::span<const Ray> rays) { return rays; }
+};
+
+/// The library's own calls on one kind of scene. Calls: given(rays) makes the rays that the calls
+/// take; closest(rays, hits, threads), any(rays, found, threads), closest_one(ray), any_one(ray);
+/// placed(hit).
+template <class Calls>
+class OurRays : public RaySide {
+public:
+    template <class... Arguments>
+    OurRays(const SubjectOptions& options, Arguments&&... arguments)
+        : threads_(options.threads), calls_(std::forward<Arguments>(arguments)...) {}
+
+    void take(std::span<const raydix::Ray> rays) override {
+        rays_ = calls_.given(rays);
+        hits_.resize(rays.size());
+        found_.resize(rays.size());
+    }
+    std::vector<SideMode> modes() override {
+        SideMode batch{.side = "raydix", .name = "batch", .ours = true};
+        batch.closest = [this] { calls_.closest(rays_, hits_, threads_); };
+        batch.any = [this] { calls_.any(rays_, found_, threads_); };
+        SideMode single{.side = "raydix", .name = "single", .ours = true, .single = true};
+        single.closest = [this] {
+            one_by_one(rays_.size(), threads_,
+                       [&](std::size_t i) { hits_[i] = calls_.closest_one(rays_[i]); });
+        };
+        single.any = [this] {
+            one_by_one(rays_.size(), threads_,
+                       [&](std::size_t i) { found_[i] = calls_.any_one(rays_[i]); });
+        };
+        return {batch, single};
+    }
+    PlacedHit hit(std::size_t ray) const override { return calls_.placed(hits_[ray]); }
+    bool found(std::size_t ray) const override { return found_[ray] != 0; }
+
+    Calls& calls() { return calls_; }
+
+private:
+    int threads_;
+    Calls calls_;
+    decltype(std::declval<Calls>().given({})) rays_;
+    std::vector<typename Calls::Hit> hits_;
+    std::vector<std::uint8_t> found_;
+};
+
+struct MeshCalls : FloatRays {
+    WideBvh tree;
+
+    MeshCalls(const Mesh& mesh, const SubjectOptions& options)
+        : tree(build_wide_bvh(mesh, build_options(options))) {}
+    void closest(std::span<const Ray> rays, std::span<Hit> hits, int threads) const {
+        trace(tree, rays, hits, {.threads = threads});
+    }
+    void any(std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) const {
+        trace_any(tree, rays, found, {.threads = threads});
+    }
+    [[nodiscard]] Hit closest_one(const Ray& ray) const { return closest_hit(tree, ray); }
+    [[nodiscard]] bool any_one(const Ray& ray) const { return any_hit(tree, ray); }
+    [[nodiscard]] PlacedHit placed(const Hit& hit) const { return bench::placed(hit); }
+};
+
+Vec3d widened(Vec3 p) { return {p.x, p.y, p.z}; }
+
+struct DoubleCalls {
+    using Hit = HitD;
+    BvhD tree;
+
+    DoubleCalls(const Mesh& mesh, const SubjectOptions& options) {
+        MeshD wide;
+        for (const Vec3 v : mesh.vertices) wide.vertices.push_back(widened(v));
+        wide.triangles = mesh.triangles;
+        tree = build_bvh(wide, build_options(options));
+    }
+    static std::vector<RayD> given(std::span<const Ray> rays) {
+        std::vector<RayD> wide;
+        for (const Ray& ray : rays)
+            wide.push_back({widened(ray.origin), ray.tmin, widened(ray.direction), ray.tmax});
+        return wide;
+    }
+    void closest(std::span<const RayD> rays, std::span<HitD> hits, int threads) const {
+        trace(tree, rays, hits, {.threads = threads});
+    }
+    void any(std::span<const RayD> rays, std::span<std::uint8_t> found, int threads) const {
+        trace_any(tree, rays, found, {.threads = threads});
+    }
+    [[nodiscard]] HitD closest_one(const RayD& ray) const { return closest_hit(tree, ray); }
+    [[nodiscard]] bool any_one(const RayD& ray) const { return any_hit(tree, ray); }
+    [[nodiscard]] PlacedHit placed(const HitD& hit) const {
+        if (!hit.hit()) return {};
+        return {float(hit.t), hit.prim, float(hit.u), float(hit.v), 0, 0};
+    }
+};
+
+struct BoxCalls : FloatRays {
+    Bvh boxes;
+    IntersectPrimitive intersect;
+
+    BoxCalls(std::span<const Aabb> all, IntersectPrimitive function, const SubjectOptions& options)
+        : boxes(build_bvh(all, build_options(options))), intersect(std::move(function)) {}
+    void closest(std::span<const Ray> rays, std::span<Hit> hits, int threads) const {
+        trace(boxes, intersect, rays, hits, {.threads = threads});
+    }
+    void any(std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) const {
+        trace_any(boxes, intersect, rays, found, {.threads = threads});
+    }
+    [[nodiscard]] Hit closest_one(const Ray& ray) const {
+        return closest_hit(boxes, intersect, ray);
+    }
+    [[nodiscard]] bool any_one(const Ray& ray) const { return any_hit(boxes, intersect, ray); }
+    [[nodiscard]] PlacedHit placed(const Hit& hit) const { return bench::placed(hit); }
+};
+
+Transform transform_of(const Affine& affine) {
+    Transform transform;
+    for (std::size_t r = 0; r < 3; ++r)
+        for (std::size_t c = 0; c < 4; ++c) transform.m[r][c] = affine[4 * r + c];
+    return transform;
+}
+
+struct InstanceCalls : FloatRays {
+    using Hit = InstanceHit;
+    std::vector<Bvh> objects;  // the scene refers to them
+    std::vector<std::uint32_t> groups;
+    std::vector<std::vector<Placement>> placements;
+    std::vector<std::vector<std::uint32_t>> first_leaves;
+    InstancedScene scene;
+
+    InstanceCalls(const PlacedScene& contents, const SubjectOptions& options)
+        : placements(contents.groups), first_leaves(first_leaves_of(contents)) {
+        for (const SharedMesh& mesh : contents.meshes)
+            objects.push_back(build_bvh(*mesh, build_options(options)));
+        std::vector<std::uint32_t> meshes;
+        for (const Bvh& object : objects) meshes.push_back(scene.add_object(object));
+        groups.push_back(InstancedScene::scene);
+        while (groups.size() < placements.size()) groups.push_back(scene.add_group());
+        for (std::size_t g = 0; g < groups.size(); ++g)
+            for (const Placement& p : placements[g])
+                scene.add_instance(groups[g], {.object = (p.is_group ? groups : meshes)[p.thing],
+                                               .transform = transform_of(p.to_parent)});
+        scene.build(options.threads);
+    }
+    void closest(std::span<const Ray> rays, std::span<Hit> hits, int threads) const {
+        trace(scene, rays, hits, {.threads = threads});
+    }
+    void any(std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) const {
+        trace_any(scene, rays, found, {.threads = threads});
+    }
+    [[nodiscard]] Hit closest_one(const Ray& ray) const { return closest_hit(scene, ray); }
+    /// There is no call for one ray and any hit: the closest one says as much.
+    [[nodiscard]] bool any_one(const Ray& ray) const { return closest_hit(scene, ray).hit.hit(); }
+    [[nodiscard]] PlacedHit placed(const Hit& hit) const {
+        if (!hit.hit.hit()) return {};
+        std::uint32_t leaf = 0;
+        std::size_t group = 0;
+        for (const std::uint32_t place : hit.path) {
+            leaf += first_leaves[group][place];
+            const Placement& next = placements[group][place];
+            if (!next.is_group) break;
+            group = next.thing;
+        }
+        return {hit.hit.t, hit.hit.prim, hit.hit.u, hit.hit.v, 0, leaf};
+    }
+};
+
+class OurAllHits : public AllHitsSide {
+public:
+    OurAllHits(const Mesh& mesh, const SubjectOptions& options)
+        : threads_(options.threads), tree_(build_wide_bvh(mesh, build_options(options))) {}
+
+    void take(std::span<const Ray> rays) override { rays_ = rays; }
+    std::vector<SideMode> modes() override {
+        SideMode batch{.side = "raydix", .name = "batch", .ours = true};
+        batch.closest = [this] { all_ = trace_all(tree_, rays_, {.threads = threads_}); };
+        return {batch};
+    }
+    std::vector<float> distances(std::size_t ray) const override {
+        std::vector<float> row;
+        for (std::uint64_t k = all_.offsets[ray]; k < all_.offsets[ray + 1]; ++k)
+            row.push_back(all_.hits[k].t);
+        return row;
+    }
+
+private:
+    int threads_;
+    WideBvh tree_;
+    std::span<const Ray> rays_;
+    AllHits all_;
+};
+
+class OurClosestPoints : public ClosestSide {
+public:
+    OurClosestPoints(const Mesh& mesh, const SubjectOptions& options)
+        : threads_(options.threads), tree_(build_bvh(mesh, build_options(options))) {}
+
+    void take(std::span<const Vec3> queries) override {
+        queries_ = queries;
+        found_.resize(queries.size());
+    }
+    std::vector<SideMode> modes() override {
+        SideMode batch{.side = "raydix", .name = "batch", .ours = true};
+        batch.closest = [this] { closest_points(tree_, queries_, found_, {.threads = threads_}); };
+        SideMode single{.side = "raydix", .name = "single", .ours = true, .single = true};
+        single.closest = [this] {
+            one_by_one(queries_.size(), threads_,
+                       [&](std::size_t i) { found_[i] = closest_point(tree_, queries_[i]); });
+        };
+        return {batch, single};
+    }
+    float distance(std::size_t query) const override { return found_[query].distance; }
+
+private:
+    int threads_;
+    Bvh tree_;
+    std::span<const Vec3> queries_;
+    std::vector<ClosestPoint> found_;
+};
+
+class OurMovingInstances : public MovingSide {
+public:
+    OurMovingInstances(const PlacedScene& scene, const SubjectOptions& options)
+        : threads_(options.threads), rays_(options, scene, options) {}
+
+    std::string name() const override { return "raydix"; }
+    void move(std::span<const Affine> to_world) override {
+        InstancedScene& scene = rays_.calls().scene;
+        for (std::uint32_t i = 0; i < to_world.size(); ++i) {
+            Instance instance = scene.instance(InstancedScene::scene, i);
+            instance.transform = transform_of(to_world[i]);
+            scene.set_instance(InstancedScene::scene, i, instance);
+        }
+    }
+    void commit() override { rays_.calls().scene.build(threads_); }
+    RaySide& rays() override { return rays_; }
+
+private:
+    int threads_;
+    OurRays<InstanceCalls> rays_;
+};
+
+}  // namespace
+
+std::unique_ptr<RaySide> our_mesh(const Mesh& mesh, const SubjectOptions& options) {
+    return std::make_unique<OurRays<MeshCalls>>(options, mesh, options);
+}
+
+std::unique_ptr<RaySide> our_double_mesh(const Mesh& mesh, const SubjectOptions& options) {
+    return std::make_unique<OurRays<DoubleCalls>>(options, mesh, options);
+}
+
+std::unique_ptr<RaySide> our_instances(const PlacedScene& scene, const SubjectOptions& options) {
+    return std::make_unique<OurRays<InstanceCalls>>(options, scene, options);
+}
+
+std::unique_ptr<RaySide> our_spheres(std::span<const Sphere> spheres,
+                                     const SubjectOptions& options) {
+    return std::make_unique<OurRays<BoxCalls>>(options, boxes_of(spheres),
+                                               intersect_spheres(spheres), options);
+}
+
+std::unique_ptr<RaySide> our_discs(std::span<const Disc> discs, const SubjectOptions& options) {
+    std::vector<Aabb> boxes;
+    for (const Disc& disc : discs) boxes.push_back(box_of(disc));
+    const auto intersect = [discs](std::uint32_t prim, const Ray& ray, Hit& hit) {
+        return raydix_bench_hit_disc(discs.data(), prim, &ray.origin.x, &ray.direction.x, ray.tmin,
+                                     ray.tmax, &hit.t) != 0;
+    };
+    return std::make_unique<OurRays<BoxCalls>>(options, boxes, intersect, options);
+}
+
+// The library has neither filters nor a scene of several meshes without instances.
+std::unique_ptr<RaySide> our_filtered_mesh(const Mesh&, AcceptPrimitive, const SubjectOptions&) {
+    return nullptr;
+}
+std::unique_ptr<RaySide> our_fixed_scene(const std::vector<SharedMesh>&, const SubjectOptions&) {
+    return nullptr;
+}
+
+std::unique_ptr<AllHitsSide> our_all_hits(const Mesh& mesh, const SubjectOptions& options) {
+    return std::make_unique<OurAllHits>(mesh, options);
+}
+
+std::unique_ptr<ClosestSide> our_closest_points(const Mesh& mesh, const SubjectOptions& options) {
+    return std::make_unique<OurClosestPoints>(mesh, options);
+}
+
+std::unique_ptr<MovingSide> our_moving_instances(const PlacedScene& scene,
+                                                 const SubjectOptions& options) {
+    return std::make_unique<OurMovingInstances>(scene, options);
+}
+
+}  // namespace raydix::bench
