@@ -45,7 +45,7 @@ inline Vec3 albedo(Vec3 p) {
 class Hall {
 public:
     Hall()
-        : scene(raydix::load_scene("builtin:atrium?triangles=150000")),
+        : scene(raydix::load_model("builtin:atrium?triangles=150000")),
           tree_(raydix::build_bvh(scene.mesh)) {}
 
     [[nodiscard]] Point point_of(std::uint32_t prim, float u, float v) const {
@@ -83,7 +83,7 @@ public:
         return light;
     }
 
-    raydix::Scene scene;
+    raydix::Model scene;
     Spotlight lamp;
 
 private:

@@ -279,7 +279,7 @@ class Pipeline(ProgramTest):
 
     def test_pictures_of_every_view(self):
         scene = "builtin:figure?triangles=5000"
-        self.succeed("build", scene, "-o", "figure.rdx", "--repeat", "1")
+        self.succeed("build", scene, "--quality", "balanced", "-o", "figure.rdx", "--repeat", "1")
         seen = set()
         for view in ("shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps"):
             self.succeed("render", "figure.rdx", "--view", view, "--size", "40x30", "--samples", "16", "-o", "a.png")
