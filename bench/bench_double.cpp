@@ -157,7 +157,7 @@ Json bench_sweeps(const Trees& trees, std::span<const raydix::Ray> rays, const O
 /// each of them.
 template <class Scene, class Instance, class Tree>
 Scene crowd(const Tree& tree, double step, int threads) {
-    Model scene;
+    Scene scene;
     const std::uint32_t object = scene.add_object(tree);
     for (std::uint32_t k = 0; k < crowd_size; ++k) {
         Instance instance{.object = object};
