@@ -87,7 +87,7 @@ public:
     Accuracy(const Options& options, const std::string& name) : options_(options) {
         cli::TreeOptions tree;
         tree.cameras_file = options.cameras_file;
-        input_ = {cli::load_scene_with_cameras(name, tree, options.common), {}};
+        input_ = {cli::load_model_with_cameras(name, tree, options.common), {}};
         Mesh& mesh = input_.scene.mesh;
         mesh.vertices.reserve(mesh.vertices.size() + 1);  // Embree reads 16 bytes a vertex
         input_.bvh = build_bvh(mesh, {.builder = Builder::ploc});

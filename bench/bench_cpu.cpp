@@ -71,7 +71,7 @@ private:
     SceneFigures study(const std::string& name) {
         cli::TreeOptions tree;
         tree.cameras_file = options_.cameras_file;
-        cli::SceneTree input{cli::load_scene_with_cameras(name, tree, options_.common), {}};
+        cli::SceneTree input{cli::load_model_with_cameras(name, tree, options_.common), {}};
         Mesh& mesh = input.scene.mesh;
         if (mesh.triangles.empty()) throw InputError(name + ": holds no triangles");
         mesh.vertices.reserve(mesh.vertices.size() + 1);

@@ -152,7 +152,7 @@ Aabb bounds_of(const PlacedScene& scene, std::uint32_t group) {
 }
 
 SharedMesh load_shared_mesh(const std::string& scene, std::uint64_t seed) {
-    Scene loaded = load_model(scene, seed);
+    Model loaded = load_model(scene, seed);
     loaded.mesh.name = loaded.name;
     return with_room(std::move(loaded.mesh));
 }
