@@ -2,7 +2,7 @@
 
 #include <raydix/closest.h>
 #include <raydix/double.h>
-#include <raydix/instances.h>
+#include <raydix/scene.h>
 #include <raydix/trace.h>
 #include <raydix/user_geometry.h>
 #include <raydix/wide.h>
@@ -147,28 +147,11 @@ Transform transform_of(const Affine& affine) {
     return transform;
 }
 
-struct InstanceCalls : FloatRays {
-    using Hit = InstanceHit;
-    std::vector<Bvh> objects;  // the scene refers to them
-    std::vector<std::uint32_t> groups;
-    std::vector<std::vector<Placement>> placements;
-    std::vector<std::vector<std::uint32_t>> first_leaves;
-    InstancedScene scene;
+/// Rays through a Scene.
+struct SceneCalls : FloatRays {
+    using Hit = SceneHit;
+    Scene scene;
 
-    InstanceCalls(const PlacedScene& contents, const SubjectOptions& options)
-        : placements(contents.groups), first_leaves(first_leaves_of(contents)) {
-        for (const SharedMesh& mesh : contents.meshes)
-            objects.push_back(build_bvh(*mesh, build_options(options)));
-        std::vector<std::uint32_t> meshes;
-        for (const Bvh& object : objects) meshes.push_back(scene.add_object(object));
-        groups.push_back(InstancedScene::scene);
-        while (groups.size() < placements.size()) groups.push_back(scene.add_group());
-        for (std::size_t g = 0; g < groups.size(); ++g)
-            for (const Placement& p : placements[g])
-                scene.add_instance(groups[g], {.object = (p.is_group ? groups : meshes)[p.thing],
-                                               .transform = transform_of(p.to_parent)});
-        scene.build(options.threads);
-    }
     void closest(std::span<const Ray> rays, std::span<Hit> hits, int threads) const {
         trace(scene, rays, hits, {.threads = threads});
     }
@@ -176,19 +159,64 @@ struct InstanceCalls : FloatRays {
         trace_any(scene, rays, found, {.threads = threads});
     }
     [[nodiscard]] Hit closest_one(const Ray& ray) const { return closest_hit(scene, ray); }
-    /// There is no call for one ray and any hit: the closest one says as much.
-    [[nodiscard]] bool any_one(const Ray& ray) const { return closest_hit(scene, ray).hit.hit(); }
+    [[nodiscard]] bool any_one(const Ray& ray) const { return any_hit(scene, ray); }
+
+protected:
+    static SceneOptions scene_options(const SubjectOptions& options) {
+        return {.quality = options.quality, .threads = options.threads};
+    }
+};
+
+struct InstanceCalls : SceneCalls {
+    std::vector<std::vector<Placement>> placements;
+    std::vector<std::vector<std::uint32_t>> first_leaves;
+    std::vector<Scene> meshes, groups;  // groups[0] stays empty: it is `scene`
+
+    InstanceCalls(const PlacedScene& contents, const SubjectOptions& options)
+        : placements(contents.groups), first_leaves(first_leaves_of(contents)) {
+        for (const SharedMesh& mesh : contents.meshes) {
+            meshes.emplace_back().share(*mesh);
+            meshes.back().commit(scene_options(options));
+        }
+        groups.resize(placements.size());
+        // Groups come after those that show them.
+        for (std::size_t g = placements.size(); g-- > 0;) {
+            Scene& into = g == 0 ? scene : groups[g];
+            for (const Placement& p : placements[g])
+                into.add((p.is_group ? groups : meshes)[p.thing], transform_of(p.to_parent));
+            into.commit(scene_options(options));
+        }
+    }
     [[nodiscard]] PlacedHit placed(const Hit& hit) const {
-        if (!hit.hit.hit()) return {};
+        if (!hit.hit()) return {};
         std::uint32_t leaf = 0;
         std::size_t group = 0;
-        for (const std::uint32_t place : hit.path) {
+        for (const std::uint32_t place : scene.path(hit.instance)) {
             leaf += first_leaves[group][place];
             const Placement& next = placements[group][place];
             if (!next.is_group) break;
             group = next.thing;
         }
-        return {hit.hit.t, hit.hit.prim, hit.hit.u, hit.hit.v, 0, leaf};
+        return {hit.t, hit.prim, hit.u, hit.v, 0, leaf};
+    }
+};
+
+/// Meshes as geometries of one scene. Hits name triangles as in the meshes behind each other.
+struct FixedCalls : SceneCalls {
+    std::vector<std::uint32_t> first;
+
+    FixedCalls(const std::vector<SharedMesh>& meshes, const SubjectOptions& options) {
+        std::uint32_t next = 0;
+        for (const SharedMesh& mesh : meshes) {
+            scene.share(*mesh);
+            first.push_back(next);
+            next += static_cast<std::uint32_t>(mesh->triangles.size());
+        }
+        scene.commit(scene_options(options));
+    }
+    [[nodiscard]] PlacedHit placed(const Hit& hit) const {
+        if (!hit.hit()) return {};
+        return {hit.t, first[hit.geometry] + hit.prim, hit.u, hit.v, 0, 0};
     }
 };
 
@@ -248,21 +276,22 @@ private:
 class OurMovingInstances : public MovingSide {
 public:
     OurMovingInstances(const PlacedScene& scene, const SubjectOptions& options)
-        : threads_(options.threads), rays_(options, scene, options) {}
+        : quality_(options.quality), threads_(options.threads), rays_(options, scene, options) {}
 
     std::string name() const override { return "raydix"; }
     void move(std::span<const Affine> to_world) override {
-        InstancedScene& scene = rays_.calls().scene;
-        for (std::uint32_t i = 0; i < to_world.size(); ++i) {
-            Instance instance = scene.instance(InstancedScene::scene, i);
-            instance.transform = transform_of(to_world[i]);
-            scene.set_instance(InstancedScene::scene, i, instance);
-        }
+        Scene& scene = rays_.calls().scene;
+        for (std::uint32_t i = 0; i < to_world.size(); ++i)
+            scene.set_transform(i, transform_of(to_world[i]));
     }
-    void commit() override { rays_.calls().scene.build(threads_); }
+    void commit() override {
+        rays_.calls().scene.commit(
+            {.quality = quality_, .usage = Usage::moving, .threads = threads_});
+    }
     RaySide& rays() override { return rays_; }
 
 private:
+    Quality quality_;
     int threads_;
     OurRays<InstanceCalls> rays_;
 };
@@ -297,12 +326,13 @@ std::unique_ptr<RaySide> our_discs(std::span<const Disc> discs, const SubjectOpt
     return std::make_unique<OurRays<BoxCalls>>(options, boxes, intersect, options);
 }
 
-// The library has neither filters nor a scene of several meshes without instances.
+// The library has no filters.
 std::unique_ptr<RaySide> our_filtered_mesh(const Mesh&, AcceptPrimitive, const SubjectOptions&) {
     return nullptr;
 }
-std::unique_ptr<RaySide> our_fixed_scene(const std::vector<SharedMesh>&, const SubjectOptions&) {
-    return nullptr;
+std::unique_ptr<RaySide> our_fixed_scene(const std::vector<SharedMesh>& meshes,
+                                         const SubjectOptions& options) {
+    return std::make_unique<OurRays<FixedCalls>>(options, meshes, options);
 }
 
 std::unique_ptr<AllHitsSide> our_all_hits(const Mesh& mesh, const SubjectOptions& options) {

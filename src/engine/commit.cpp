@@ -137,39 +137,55 @@ private:
     }
 
     void place_instances() {
+        std::vector<const Geometry*> placed;  // by place among the instances
         for (const auto& [id, geometry] : state_.geometries) {
             if (!geometry.is_instance()) continue;
-            const std::string name = "instance " + std::to_string(id);
+            const auto name = [named = id] { return "instance " + std::to_string(named); };
             const auto& inner = geometry.scene->tree;
             if (inner == nullptr)
-                throw InputError(name + ": the scene that it places was never committed");
+                throw InputError(name() + ": the scene that it places was never committed");
             if (inner->levels >= Scene::max_levels)
-                throw InputError(name + ": more than " + std::to_string(Scene::max_levels) +
+                throw InputError(name() + ": more than " + std::to_string(Scene::max_levels) +
                                  " levels of instances");
             tree_->levels = std::max(tree_->levels, inner->levels + 1);
             const auto number = static_cast<std::uint32_t>(tree_->paths + 1);
             tree_->paths += 1 + inner->paths;
             if (tree_->paths > no_primitive - 1)
-                throw InputError(name + ": more than 2^32 - 2 paths through instances");
+                throw InputError(name() + ": more than 2^32 - 2 paths through instances");
             tree_->instances.emplace_back(geometry.inverse, inner, id, geometry.mask, number);
-            const Extent extent =
-                image_of(affine_of(geometry.transform), geometry.inverse, inner->extent);
-            if (!extent.empty() && !(in_range(extent.box.lo) && in_range(extent.box.hi)))
-                throw InputError(name + ": it reaches beyond 1e12, or is not finite");
-            extents_.push_back(extent);
-            if (!extent.empty()) tree_->bounds = unite(tree_->bounds, extent.box);
+            placed.push_back(&geometry);
+        }
+        const std::size_t meshes = extents_.size();
+        extents_.resize(meshes + placed.size());
+        for_each_index(
+            placed.size(),
+            [&](std::size_t i) {
+                extents_[meshes + i] =
+                    image_of(affine_of(placed[i]->transform), placed[i]->inverse,
+                             tree_->instances[i].scene->extent);
+            },
+            256);
+        for (std::size_t i = 0; i < placed.size(); ++i) {
+            const Extent& extent = extents_[meshes + i];
+            if (extent.empty()) continue;
+            if (!(in_range(extent.box.lo) && in_range(extent.box.hi)))
+                throw InputError("instance " + std::to_string(tree_->instances[i].id) +
+                                 ": it reaches beyond 1e12, or is not finite");
+            tree_->bounds = unite(tree_->bounds, extent.box);
         }
     }
 
     void build_tops() {
         for (const Extent& extent : extents_) tree_->extent = unite(tree_->extent, extent);
         if (tree_->only_mesh() != nullptr) return;
+        const Quality quality =
+            options_.usage == Usage::moving ? Quality::fast : options_.quality;
         std::vector<std::uint32_t> near, wild;
         for (std::uint32_t part = 0; part < extents_.size(); ++part)
             if (!extents_[part].empty())
                 (extents_[part].error <= wild_error ? near : wild).push_back(part);
-        build_part_tree(near, extents_, tree_->near);
-        build_part_tree(wild, extents_, tree_->wild);
+        build_part_tree(near, extents_, quality, tree_->near);
+        build_part_tree(wild, extents_, quality, tree_->wild);
         report_.bytes +=
             (tree_->near.arrays.nodes.size() + tree_->wild.arrays.nodes.size()) * sizeof(WideNode) +
             tree_->instances.size() * sizeof(PlacedScene);

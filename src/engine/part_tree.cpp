@@ -11,10 +11,13 @@ namespace {
 /// part, twice as much with what is to spare.
 constexpr double float_rounding = 0x1p-22;
 
-Bvh binary_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents) {
+Bvh binary_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
+                Quality quality) {
     std::vector<Aabb> boxes(parts.size());
     for (std::size_t k = 0; k < parts.size(); ++k) boxes[k] = extents[parts[k]].box;
-    BuildOptions options = build_options_for(Quality::balanced);
+    // Boxes cannot be split.
+    BuildOptions options =
+        build_options_for(quality == Quality::fast ? Quality::fast : Quality::balanced);
     options.max_leaf = 1;
     return build_bvh(std::span<const Aabb>(boxes), options);
 }
@@ -27,10 +30,10 @@ std::uint32_t word_of(const BvhNode& child) {
 }  // namespace
 
 void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
-                     PartTree& out) {
+                     Quality quality, PartTree& out) {
     out.part.clear();
     if (parts.empty()) return;
-    const Bvh bvh = binary_tree(parts, extents);
+    const Bvh bvh = binary_tree(parts, extents, quality);
     const WideTree wide = collapse_to_wide(bvh, {.width = quantised_width, .max_leaf = 1});
     out.arrays.set_bounds(bvh.bounds());
     out.arrays.nodes.reset(wide.node_count());

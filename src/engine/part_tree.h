@@ -11,6 +11,6 @@ namespace raydix {
 /// `parts`: those that the tree holds, not empty and in the range of coordinates; extents [all
 /// parts].
 void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
-                     PartTree& out);
+                     Quality quality, PartTree& out);
 
 }  // namespace raydix

@@ -6,9 +6,12 @@
 #include <raydix/wide.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <string>
+#include <thread>
 #include <tuple>
 #include <vector>
 
@@ -243,6 +246,257 @@ TEST(Scene, ShearedInstancesLoseNoHits) {
                 << "shear " << shear << ", world " << k;
         }
     EXPECT_GT(hits, 300u * test::thorough);
+}
+
+Mesh one_triangle(float z) {
+    Mesh mesh;
+    mesh.vertices = {{0, 0, z}, {1, 0, z}, {0, 1, z}};
+    mesh.triangles = {{0, 1, 2}};
+    return mesh;
+}
+
+Transform moved(float x, float y, float z) {
+    Transform t;
+    t.m[0][3] = x, t.m[1][3] = y, t.m[2][3] = z;
+    return t;
+}
+
+constexpr Ray down{{0.25f, 0.25f, 10}, 0, {0, 0, -1}};
+
+TEST(Scene, OfOneMeshGivesTheHitsOfItsTree) {
+    const Mesh mesh = test::random_soup(2000, 5);
+    Random random(6);
+    const std::vector<Ray> rays = random_rays(random, 3000);
+    const Scene scene(mesh);
+    const std::vector<Hit> expected = trace(build_wide_bvh(mesh), rays);
+    const std::vector<SceneHit> hits = trace(scene, rays);
+    std::size_t found = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        SceneHit wanted{expected[i], no_primitive, 0};
+        if (expected[i].hit()) wanted.geometry = 0, ++found;
+        EXPECT_TRUE(same(hits[i], wanted)) << i;
+        EXPECT_TRUE(same(closest_hit(scene, rays[i]), wanted)) << i;
+    }
+    EXPECT_GT(found, 100u);
+}
+
+TEST(Scene, TiesGoToTheLeastInstanceThenGeometryThenTriangle) {
+    Mesh twice = one_triangle(0);
+    twice.triangles.push_back(twice.triangles[0]);
+    Scene inner(twice), scene;
+    scene.add(inner, Transform{});
+    EXPECT_EQ(scene.commit().paths, 1u);
+    EXPECT_TRUE(same(closest_hit(scene, down), {{10, 0, 0.25f, 0.25f}, 0, 1}));
+    scene.add(one_triangle(0));
+    scene.add(one_triangle(0));
+    scene.commit();
+    EXPECT_TRUE(same(closest_hit(scene, down), {{10, 0, 0.25f, 0.25f}, 1, 0}));
+    for (const Usage usage : {Usage::fixed, Usage::moving}) {
+        scene.commit({.usage = usage});
+        const std::vector<SceneHit> hits = trace(scene, std::vector<Ray>(100, down));
+        for (const SceneHit& hit : hits) EXPECT_EQ(hit.geometry, 1u);
+    }
+}
+
+TEST(Scene, PathsAreCountedDepthFirst) {
+    Scene mesh(one_triangle(0)), pair, scene;
+    pair.add(mesh, moved(0, 0, 0), {.id = 3});
+    pair.add(mesh, moved(2, 0, 0));  // id 0
+    pair.commit();
+    scene.add(pair, moved(0, 0, 0), {.id = 7});
+    scene.add(pair, moved(10, 0, 0));
+    EXPECT_EQ(scene.commit().paths, 6u);
+    const auto at = [&](float x) { return closest_hit(scene, {{x + 0.25f, 0.25f, 1}, 0, {0, 0, -1}}); };
+    EXPECT_EQ(at(12).instance, 2u);
+    EXPECT_EQ(at(10).instance, 3u);
+    EXPECT_EQ(at(2).instance, 5u);
+    EXPECT_EQ(at(0).instance, 6u);
+    EXPECT_EQ(scene.path(0), std::vector<std::uint32_t>{});
+    EXPECT_EQ(scene.path(1), std::vector<std::uint32_t>{0});
+    EXPECT_EQ(scene.path(2), (std::vector<std::uint32_t>{0, 0}));
+    EXPECT_EQ(scene.path(3), (std::vector<std::uint32_t>{0, 3}));
+    EXPECT_EQ(scene.path(6), (std::vector<std::uint32_t>{7, 3}));
+    EXPECT_THROW(static_cast<void>(scene.path(7)), InputError);
+}
+
+TEST(Scene, ChangesInAnyOrderEqualASceneMadeAfresh) {
+    for (std::uint64_t seed = 0; seed < 3 * test::thorough; ++seed) {
+        Random random(seed);
+        const auto first = random_world(random, {1, 5, 0});
+        const std::vector<Ray> rays = random_rays(random, 100);
+        World world;
+        world.scene = std::move(first->scene);
+        world.items = first->items;
+        for (int step = 0; step < 6; ++step) {
+            for (int change = 0; change < 3; ++change) {
+                const std::uint32_t what = random.below(5);
+                if (what == 0 || world.items.empty()) {
+                    World::Item item{0, random.mask(), test::random_soup(20, random.below(99), 0.6f),
+                                     {}, {}};
+                    item.id = world.scene.add(item.mesh, {.mask = item.mask, .id = {}});
+                    world.items.push_back(item);
+                    std::ranges::sort(world.items, {}, &World::Item::id);
+                    continue;
+                }
+                const std::size_t place = random.below(static_cast<std::uint32_t>(world.items.size()));
+                World::Item& item = world.items[place];
+                if (what == 1) {
+                    world.scene.remove(item.id);
+                    EXPECT_FALSE(world.scene.contains(item.id));
+                    world.items.erase(world.items.begin() + static_cast<std::ptrdiff_t>(place));
+                } else if (what == 2) {
+                    world.scene.set_mask(item.id, item.mask = random.mask());
+                } else if (item.inside) {
+                    world.scene.set_transform(item.id, item.transform = random.transform(4, 0));
+                } else {
+                    world.scene.update(item.id, item.mesh = test::random_soup(30, random.below(99), 0.6f));
+                }
+            }
+            EXPECT_FALSE(world.scene.committed());
+            SceneOptions options;
+            options.usage = step % 2 == 0 ? Usage::moving : Usage::fixed;
+            world.scene.commit(options);
+            EXPECT_TRUE(world.scene.committed());
+            EXPECT_EQ(world.scene.size(), world.items.size());
+            EXPECT_EQ(differences(world, rays, std::vector<std::uint32_t>(rays.size(), all)), 0u)
+                << "seed " << seed << ", step " << step;
+        }
+    }
+}
+
+TEST(Scene, MovingMeshesAreBuiltOnlyWhenTheyChange) {
+    Scene scene;
+    for (int k = 0; k < 5; ++k) scene.add(test::random_soup(50, static_cast<std::uint64_t>(k)));
+    const SceneOptions moving{.usage = Usage::moving};
+    EXPECT_EQ(scene.commit(moving).trees_built, 5u);
+    EXPECT_EQ(scene.commit(moving).trees_built, 0u);
+    scene.update(3, test::random_soup(60, 9));
+    scene.set_mask(1, 7);
+    EXPECT_EQ(scene.commit(moving).trees_built, 1u);
+    // Four meshes share a tree now; the one of another mask keeps its own.
+    EXPECT_EQ(scene.commit({.usage = Usage::fixed}).trees_built, 1u);
+}
+
+TEST(Scene, NothingToHit) {
+    Scene empty;
+    EXPECT_THROW(static_cast<void>(closest_hit(empty, down)), InputError);
+    empty.commit();
+    EXPECT_FALSE(closest_hit(empty, down).hit());
+    EXPECT_GT(empty.bounds().lo.x, empty.bounds().hi.x);
+    Scene scene;
+    scene.add(empty, Transform{});
+    scene.add(Mesh{});
+    scene.add(one_triangle(0), {.mask = 0, .id = {}});
+    scene.commit();
+    for (const SceneHit& hit : trace(scene, std::vector<Ray>(50, down))) EXPECT_FALSE(hit.hit());
+    EXPECT_TRUE(trace(scene, std::vector<Ray>{}).empty());
+}
+
+TEST(Scene, RefusesWhatItCannotHold) {
+    Scene scene, other;
+    const auto message = [](const auto& call) { return test::message_of(call); };
+    EXPECT_EQ(scene.add(one_triangle(0)), 0u);
+    EXPECT_EQ(scene.add(one_triangle(0), {.id = 5}), 5u);
+    EXPECT_EQ(scene.add(one_triangle(0)), 1u);
+    EXPECT_EQ(message([&] { scene.add(one_triangle(0), {.id = 5}); }),
+              "geometry 5: this id was given before");
+    scene.remove(1);
+    EXPECT_EQ(message([&] { scene.add(one_triangle(0), {.id = 1}); }),
+              "geometry 1: this id was given before");
+    EXPECT_EQ(message([&] { scene.remove(1); }), "there is no geometry 1");
+    Mesh bad = one_triangle(0);
+    bad.triangles.push_back({0, 1, 3});
+    EXPECT_EQ(message([&] { scene.add(bad); }),
+              "geometry 2: triangle 1 has an index past the 3 vertices");
+    bad.triangles.clear();
+    EXPECT_EQ(message([&] { scene.add(bad); }), "geometry 2: vertices without triangles");
+    Transform flat;
+    flat.m[2][2] = 0;
+    EXPECT_EQ(message([&] { scene.add(other, flat); }),
+              "instance 2: its transform is singular or not finite, so rays cannot go through it");
+    EXPECT_EQ(message([&] { scene.add(scene, Transform{}); }),
+              "instance 2: the scene would hold itself");
+    EXPECT_EQ(scene.add(other, Transform{}), 2u);
+    EXPECT_EQ(message([&] { other.add(scene, Transform{}); }),
+              "instance 0: the scene would hold itself");
+    EXPECT_EQ(message([&] { scene.commit(); }),
+              "instance 2: the scene that it places was never committed");
+    EXPECT_EQ(message([&] { scene.update(2, one_triangle(0)); }),
+              "geometry 2 is an instance, not a mesh");
+    EXPECT_EQ(message([&] { scene.set_transform(0, Transform{}); }),
+              "geometry 0 is a mesh, not an instance");
+    EXPECT_EQ(message([&] { static_cast<void>(trace(scene, std::vector<Ray>(2))); }),
+              "scene: it was never committed");
+    const Scene one(one_triangle(0));
+    const std::vector<std::uint32_t> masks(3);
+    EXPECT_EQ(message([&] { static_cast<void>(trace(one, std::vector<Ray>(2), {.masks = masks})); }),
+              "trace: 2 rays, but 3 masks");
+}
+
+TEST(Scene, LimitsOfNesting) {
+    Scene leaf(one_triangle(0));
+    std::vector<Scene> scenes;
+    scenes.emplace_back().add(leaf, Transform{});
+    scenes.back().commit();
+    for (std::uint32_t k = 1; k < Scene::max_levels; ++k) {
+        Scene next;
+        next.add(scenes.back(), Transform{});
+        next.commit();
+        scenes.push_back(std::move(next));
+    }
+    EXPECT_EQ(closest_hit(scenes.back(), down).instance, Scene::max_levels);
+    EXPECT_EQ(trace(scenes.back(), std::vector<Ray>(40, down))[7].instance, Scene::max_levels);
+    Scene deeper;
+    deeper.add(scenes.back(), Transform{});
+    EXPECT_THROW(deeper.commit(), InputError);
+    // Ten times as many paths a level, of one triangle.
+    std::vector<Scene> tens;
+    tens.push_back(Scene(one_triangle(0)));
+    std::string said;
+    for (int level = 0; level < 10 && said.empty(); ++level) {
+        Scene next;
+        for (int k = 0; k < 10; ++k) next.add(tens.back(), moved(static_cast<float>(k), 0, 0));
+        try {
+            next.commit();
+        } catch (const InputError& error) {
+            said = error.what();
+        }
+        tens.push_back(std::move(next));
+    }
+    EXPECT_EQ(said, "instance 3: more than 2^32 - 2 paths through instances");
+}
+
+TEST(Scene, TracesWhileAnotherIsCommitted) {
+    const Mesh mesh = test::random_soup(300, 4);
+    Scene object(mesh), old;
+    for (int k = 0; k < 20; ++k) old.add(object, moved(static_cast<float>(k), 0, 0));
+    old.commit();
+    Random random(8);
+    const std::vector<Ray> rays = random_rays(random, 500);
+    const std::vector<SceneHit> expected = trace(old, rays);
+    std::atomic<std::size_t> wrong = 0;
+    std::atomic<bool> done = false;
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 2; ++t)
+        threads.emplace_back([&] {
+            do {
+                const std::vector<SceneHit> hits = trace(old, rays, {.threads = 1});
+                for (std::size_t i = 0; i < rays.size(); ++i) {
+                    wrong += !same(hits[i], expected[i]);
+                    wrong += i % 7 == 0 && !same(closest_hit(old, rays[i]), expected[i]);
+                }
+            } while (!done);
+        });
+    for (int round = 0; round < 5; ++round) {
+        Scene next;
+        for (int k = 0; k < 20; ++k) next.add(object, moved(0, static_cast<float>(k + round), 0));
+        next.add(mesh);
+        next.commit();
+        EXPECT_GT(trace(next, rays, {.threads = 1}).size(), 0u);
+    }
+    done = true;
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(wrong, 0u);
 }
 
 }  // namespace
