@@ -1,8 +1,8 @@
 #include "scene_contents.h"
 
 #include <raydix/error.h>
-#include <raydix/rays.h>
 #include <raydix/model.h>
+#include <raydix/rays.h>
 
 #include <algorithm>
 #include <cmath>

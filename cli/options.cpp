@@ -78,8 +78,8 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
                         "Memory layout that is traced: of simd wide8, wide4 or compact, which is "
                         "wide8 with shared vertices; cwbvh: build only")
             ->check(CLI::IsMember({"binary", "wide4", "wide8", "compact", "cwbvh"}))
-        ->capture_default_str()
-        ->group(group);
+            ->capture_default_str()
+            ->group(group);
     command
         .add_option("--device", options.device,
                     "Where to build (cpu, cuda) and trace (cpu, cuda, sim)")

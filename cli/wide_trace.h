@@ -22,8 +22,8 @@ void add_wide_trace_options(CLI::App& command, WideTraceOptions& options);
 /// wide4, wide8 and compact.
 [[nodiscard]] bool is_wide_layout(const std::string& layout);
 
-/// On the cpu rays go through a bvh by simd, unless --kernel or --layout say otherwise. --kernel simd
-/// goes with a wide layout and either of them is enough. Usage errors: one without the other,
+/// On the cpu rays go through a bvh by simd, unless --kernel or --layout say otherwise. --kernel
+/// simd goes with a wide layout and either of them is enough. Usage errors: one without the other,
 /// options of simd for another kernel.
 std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
                               const WideTraceOptions& options);

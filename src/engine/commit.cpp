@@ -138,6 +138,7 @@ private:
 
     void place_instances() {
         std::vector<const Geometry*> placed;  // by place among the instances
+        tree_->instances.reserve(state_.geometries.size());
         for (const auto& [id, geometry] : state_.geometries) {
             if (!geometry.is_instance()) continue;
             const auto name = [named = id] { return "instance " + std::to_string(named); };
@@ -160,9 +161,8 @@ private:
         for_each_index(
             placed.size(),
             [&](std::size_t i) {
-                extents_[meshes + i] =
-                    image_of(affine_of(placed[i]->transform), placed[i]->inverse,
-                             tree_->instances[i].scene->extent);
+                extents_[meshes + i] = image_of(affine_of(placed[i]->transform), placed[i]->errors,
+                                                tree_->instances[i].scene->extent);
             },
             256);
         for (std::size_t i = 0; i < placed.size(); ++i) {
@@ -178,8 +178,7 @@ private:
     void build_tops() {
         for (const Extent& extent : extents_) tree_->extent = unite(tree_->extent, extent);
         if (tree_->only_mesh() != nullptr) return;
-        const Quality quality =
-            options_.usage == Usage::moving ? Quality::fast : options_.quality;
+        const Quality quality = options_.usage == Usage::moving ? Quality::fast : options_.quality;
         std::vector<std::uint32_t> near, wild;
         for (std::uint32_t part = 0; part < extents_.size(); ++part)
             if (!extents_[part].empty())

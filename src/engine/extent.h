@@ -32,22 +32,19 @@ inline double largest_coordinate(const Aabb& box) {
     return most;
 }
 
-/// The box that reaches `by` farther, rounded outward.
-inline Aabb grown(Double3 lo, Double3 hi, double by) {
-    const auto down = [&](double x) {
-        const double exact = x - by;
-        const auto rounded = static_cast<float>(exact);
-        return double{rounded} <= exact ? rounded : std::nextafterf(rounded, -infinity);
-    };
-    return {{down(lo.x), down(lo.y), down(lo.z)}, {-down(-hi.x), -down(-hi.y), -down(-hi.z)}};
+/// The box that reaches `by` farther at least, as floats. `most`: its largest coordinate.
+inline Aabb grown(Double3 lo, Double3 hi, double most, double by) {
+    by += 0x1p-23 * (most + by);  // what floats round
+    const Double3 side{by, by, by};
+    return {(lo - side).rounded(), (hi + side).rounded()};
 }
 
 /// Rays at triangles: the line is rounded to float, and its point at t is within the pads of
 /// slab.h of the triangle.
 inline Extent extent_of_mesh(const Aabb& box) {
     if (!(box.lo.x <= box.hi.x)) return {};
-    return {grown(Double3(box.lo), Double3(box.hi),
-                  0x1p-22 * largest_coordinate(box) + double{min_diagonal}),
+    const double most = largest_coordinate(box);
+    return {grown(Double3(box.lo), Double3(box.hi), most, 0x1p-22 * most + double{min_diagonal}),
             0x1p-18};
 }
 
@@ -65,31 +62,34 @@ inline double norm_of(const Affine& a) {
     return std::max({sum(a.x), sum(a.y), sum(a.z)});
 }
 
-/// How far the computed inverse may be off in scale: its determinant is a sum of three products
-/// that may cancel.
-inline double determinant_error(const Affine& a) {
+/// How errors grow on the way through a map and its computed inverse.
+struct MapErrors {
+    double condition = 1;  // |L| |L^-1|
+    double rounding = 0;   // of the inverse, and of lines through it
+};
+/// The determinant is a sum of three products that may cancel: the inverse may be off in scale.
+inline MapErrors errors_of(const Affine& a, const Affine& inverse) {
     const double size = length(a.x) * length(a.y) * length(a.z);
-    return 0x1p-49 * size / std::fabs(dot(a.x, cross(a.y, a.z)));
+    const double determinant = std::fabs(dot(a.x, cross(a.y, a.z)));
+    const double condition = norm_of(a) * norm_of(inverse);
+    return {condition, 0x1p-48 * condition + 0x1p-49 * size / determinant};
 }
 
-/// Of what a map makes of `inner`; `inverse` is the way in.
-inline Extent image_of(const Affine& a, const Affine& inverse, const Extent& inner) {
+/// Of what a map makes of `inner`.
+inline Extent image_of(const Affine& a, const MapErrors& errors, const Extent& inner) {
     if (inner.empty()) return {};
-    const double condition = norm_of(a) * norm_of(inverse);
-    const double rounding = 0x1p-48 * condition + determinant_error(a);
     const Double3 lo(inner.box.lo), hi(inner.box.hi);
     const Double3 middle = (lo + hi) * 0.5, half = (hi - lo) * 0.5;
     const auto reach = [&](Double3 row) {
         return std::fabs(row.x) * half.x + std::fabs(row.y) * half.y + std::fabs(row.z) * half.z;
     };
     const Double3 center = a.point(middle), by{reach(a.x), reach(a.y), reach(a.z)};
-    const Double3 outer_lo = center - by, outer_hi = center + by;
-    const double most =
-        std::max({std::fabs(outer_lo.x), std::fabs(outer_lo.y), std::fabs(outer_lo.z),
-                  std::fabs(outer_hi.x), std::fabs(outer_hi.y), std::fabs(outer_hi.z)}) +
-        std::max({std::fabs(a.move.x), std::fabs(a.move.y), std::fabs(a.move.z)});
-    return {grown(outer_lo, outer_hi, (rounding + 0x1p-40) * most + double{min_diagonal}),
-            condition * inner.error + rounding};
+    const double most = std::max(
+        {std::fabs(center.x) + by.x, std::fabs(center.y) + by.y, std::fabs(center.z) + by.z});
+    const double moved = std::max({std::fabs(a.move.x), std::fabs(a.move.y), std::fabs(a.move.z)});
+    return {grown(center - by, center + by, most,
+                  (errors.rounding + 0x1p-40) * (most + moved) + double{min_diagonal}),
+            errors.condition * inner.error + errors.rounding};
 }
 
 }  // namespace raydix

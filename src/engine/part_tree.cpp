@@ -40,14 +40,17 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
     for (std::uint32_t w = 0; w < wide.node_count(); ++w) {
         WideNode& node = out.arrays.nodes[w];
         // The smallest box in slot 0, as in trees of triangles.
-        std::array<BvhNode, quantised_width> children{};
+        std::array<BvhNode, quantised_width> children;
+        std::array<double, quantised_width> areas;
         std::size_t count = 0;
-        for (const BvhNode& child : wide.node(w))
-            if (!WideTree::is_unused(child)) children[count++] = child;
-        std::stable_sort(children.begin(), children.begin() + count,
-                         [](const BvhNode& a, const BvhNode& b) {
-                             return half_area({a.lo, a.hi}) < half_area({b.lo, b.hi});
-                         });
+        for (const BvhNode& child : wide.node(w)) {
+            if (WideTree::is_unused(child)) continue;
+            const double area = half_area({child.lo, child.hi});
+            std::size_t at = count++;
+            for (; at > 0 && areas[at - 1] > area; --at)
+                areas[at] = areas[at - 1], children[at] = children[at - 1];
+            areas[at] = area, children[at] = child;
+        }
         SlotBoxes boxes;
         std::fill_n(node.child, quantised_width, wide_no_child);
         for (std::size_t s = 0; s < count; ++s) {

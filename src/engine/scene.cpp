@@ -80,12 +80,14 @@ std::uint32_t add_mesh(State& state, const MeshView& mesh, const GeometryOptions
     return insert(state, id, std::move(geometry));
 }
 
-Affine checked_inverse(std::uint32_t id, const Transform& transform) {
+void place(std::uint32_t id, const Transform& transform, State::Geometry& geometry) {
     const std::optional<Affine> inverse = inverse_of(affine_of(transform));
     if (!inverse)
         throw InputError("instance " + std::to_string(id) +
                          ": its transform is singular or not finite, so rays cannot go through it");
-    return *inverse;
+    geometry.transform = transform;
+    geometry.inverse = *inverse;
+    geometry.errors = errors_of(affine_of(transform), *inverse);
 }
 
 }  // namespace
@@ -143,8 +145,7 @@ std::uint32_t Scene::add(const Scene& scene, const Transform& transform,
         throw InputError("instance " + std::to_string(id) + ": the scene would hold itself");
     State::Geometry geometry;
     geometry.mask = options.mask;
-    geometry.transform = transform;
-    geometry.inverse = checked_inverse(id, transform);
+    place(id, transform, geometry);
     geometry.scene = scene.state_;
     return insert(*state_, id, std::move(geometry));
 }
@@ -166,8 +167,7 @@ void Scene::update(std::uint32_t id, const MeshView& mesh) {
 void Scene::set_transform(std::uint32_t id, const Transform& transform) {
     State::Geometry& geometry = state_->at(id);
     if (!geometry.is_instance()) throw InputError(name_of(id) + " is a mesh, not an instance");
-    geometry.inverse = checked_inverse(id, transform);
-    geometry.transform = transform;
+    place(id, transform, geometry);
     state_->changed = true;
 }
 

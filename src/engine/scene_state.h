@@ -23,6 +23,7 @@ struct Scene::State {
         std::shared_ptr<const State> scene;
         Transform transform;
         Affine inverse;
+        MapErrors errors;
 
         std::uint32_t mask = 0xFFFFFFFFu;
         bool changed = true;  // its triangles, since the last commit

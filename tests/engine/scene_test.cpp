@@ -306,7 +306,9 @@ TEST(Scene, PathsAreCountedDepthFirst) {
     scene.add(pair, moved(0, 0, 0), {.id = 7});
     scene.add(pair, moved(10, 0, 0));
     EXPECT_EQ(scene.commit().paths, 6u);
-    const auto at = [&](float x) { return closest_hit(scene, {{x + 0.25f, 0.25f, 1}, 0, {0, 0, -1}}); };
+    const auto at = [&](float x) {
+        return closest_hit(scene, {{x + 0.25f, 0.25f, 1}, 0, {0, 0, -1}});
+    };
     EXPECT_EQ(at(12).instance, 2u);
     EXPECT_EQ(at(10).instance, 3u);
     EXPECT_EQ(at(2).instance, 5u);
@@ -331,14 +333,15 @@ TEST(Scene, ChangesInAnyOrderEqualASceneMadeAfresh) {
             for (int change = 0; change < 3; ++change) {
                 const std::uint32_t what = random.below(5);
                 if (what == 0 || world.items.empty()) {
-                    World::Item item{0, random.mask(), test::random_soup(20, random.below(99), 0.6f),
-                                     {}, {}};
+                    World::Item item{
+                        0, random.mask(), test::random_soup(20, random.below(99), 0.6f), {}, {}};
                     item.id = world.scene.add(item.mesh, {.mask = item.mask, .id = {}});
                     world.items.push_back(item);
                     std::ranges::sort(world.items, {}, &World::Item::id);
                     continue;
                 }
-                const std::size_t place = random.below(static_cast<std::uint32_t>(world.items.size()));
+                const std::size_t place =
+                    random.below(static_cast<std::uint32_t>(world.items.size()));
                 World::Item& item = world.items[place];
                 if (what == 1) {
                     world.scene.remove(item.id);
@@ -349,7 +352,8 @@ TEST(Scene, ChangesInAnyOrderEqualASceneMadeAfresh) {
                 } else if (item.inside) {
                     world.scene.set_transform(item.id, item.transform = random.transform(4, 0));
                 } else {
-                    world.scene.update(item.id, item.mesh = test::random_soup(30, random.below(99), 0.6f));
+                    world.scene.update(item.id,
+                                       item.mesh = test::random_soup(30, random.below(99), 0.6f));
                 }
             }
             EXPECT_FALSE(world.scene.committed());
@@ -429,8 +433,9 @@ TEST(Scene, RefusesWhatItCannotHold) {
               "scene: it was never committed");
     const Scene one(one_triangle(0));
     const std::vector<std::uint32_t> masks(3);
-    EXPECT_EQ(message([&] { static_cast<void>(trace(one, std::vector<Ray>(2), {.masks = masks})); }),
-              "trace: 2 rays, but 3 masks");
+    EXPECT_EQ(
+        message([&] { static_cast<void>(trace(one, std::vector<Ray>(2), {.masks = masks})); }),
+        "trace: 2 rays, but 3 masks");
 }
 
 TEST(Scene, LimitsOfNesting) {
