@@ -15,6 +15,8 @@ using Geometry = SceneAccess::State::Geometry;
 
 /// Parts whose error is larger stand in a tree of their own.
 constexpr double wild_error = 0x1p-12;
+/// Instances of instances are placed in the outermost scene up to so many parts.
+constexpr std::size_t most_placed = std::size_t{1} << 15;
 
 /// Meshes that one tree holds.
 struct Group {
@@ -77,7 +79,7 @@ public:
         for (const Group& group : groups_of(state_, options_.usage))
             tree_->meshes.push_back(mesh_tree(group));
         for (const auto& mesh : tree_->meshes) {
-            extents_.push_back(extent_of_mesh(mesh->tree->arrays().bounds));
+            tree_->extents.push_back(extent_of_mesh(mesh->tree->arrays().bounds));
             report_.meshes += mesh->ids.size();
             report_.triangles += mesh->triangles;
             report_.bytes += mesh->tree->stats().bytes;
@@ -85,7 +87,8 @@ public:
                 tree_->bounds = unite(tree_->bounds, mesh->tree->arrays().bounds);
         }
         place_instances();
-        build_tops();
+        build_tops(*tree_);
+        keep_own_meshes();
         report_.instances = tree_->instances.size();
         report_.paths = tree_->paths;
         return std::move(tree_);
@@ -137,8 +140,6 @@ private:
     }
 
     void place_instances() {
-        std::vector<const Geometry*> placed;  // by place among the instances
-        tree_->instances.reserve(state_.geometries.size());
         for (const auto& [id, geometry] : state_.geometries) {
             if (!geometry.is_instance()) continue;
             const auto name = [named = id] { return "instance " + std::to_string(named); };
@@ -153,48 +154,97 @@ private:
             tree_->paths += 1 + inner->paths;
             if (tree_->paths > no_primitive - 1)
                 throw InputError(name() + ": more than 2^32 - 2 paths through instances");
-            tree_->instances.emplace_back(geometry.inverse, inner, id, geometry.mask, number);
-            placed.push_back(&geometry);
+            tree_->instances.push_back({id, number, inner});
+            place(geometry, id, number, inner);
         }
-        const std::size_t meshes = extents_.size();
-        extents_.resize(meshes + placed.size());
+        set_extents();
+    }
+
+    /// Where the box of a placed scene comes from.
+    struct Source {
+        const Geometry* geometry;
+        std::uint32_t id;
+        const Extent* inner;
+    };
+
+    void place(const Geometry& geometry, std::uint32_t id, std::uint32_t number,
+               const std::shared_ptr<const SceneTree>& inner) {
+        const WayIn way(geometry.inverse, geometry.mask);
+        if (inner->instances.empty() ||
+            tree_->placed.size() + inner->placed.size() + 1 > most_placed) {
+            tree_->placed.push_back({way, number, 0, 0, inner});
+            sources_.push_back({&geometry, id, &inner->extent});
+            return;
+        }
+        if (inner->own_meshes != nullptr) {
+            tree_->placed.push_back({way, number, 0, 0, inner->own_meshes});
+            sources_.push_back({&geometry, id, &inner->own_meshes->extent});
+        }
+        for (std::size_t k = 0; k < inner->placed.size(); ++k) {
+            const PlacedScene& below = inner->placed[k];
+            const auto first = static_cast<std::uint32_t>(tree_->ways.size());
+            tree_->ways.push_back(below.way);
+            for (std::uint32_t w = 0; w < below.more; ++w)
+                tree_->ways.push_back(inner->ways[below.first + w]);
+            tree_->placed.push_back(
+                {way, number + below.number, first, below.more + 1, below.scene});
+            sources_.push_back({&geometry, id, &inner->extents[inner->meshes.size() + k]});
+        }
+    }
+
+    void set_extents() {
+        const std::size_t meshes = tree_->extents.size();
+        tree_->extents.resize(meshes + sources_.size());
         for_each_index(
-            placed.size(),
+            sources_.size(),
             [&](std::size_t i) {
-                extents_[meshes + i] = image_of(affine_of(placed[i]->transform), placed[i]->errors,
-                                                tree_->instances[i].scene->extent);
+                const Geometry& geometry = *sources_[i].geometry;
+                tree_->extents[meshes + i] =
+                    image_of(affine_of(geometry.transform), geometry.errors, *sources_[i].inner);
             },
             256);
-        for (std::size_t i = 0; i < placed.size(); ++i) {
-            const Extent& extent = extents_[meshes + i];
+        for (std::size_t i = 0; i < sources_.size(); ++i) {
+            const Extent& extent = tree_->extents[meshes + i];
             if (extent.empty()) continue;
             if (!(in_range(extent.box.lo) && in_range(extent.box.hi)))
-                throw InputError("instance " + std::to_string(tree_->instances[i].id) +
+                throw InputError("instance " + std::to_string(sources_[i].id) +
                                  ": it reaches beyond 1e12, or is not finite");
             tree_->bounds = unite(tree_->bounds, extent.box);
         }
     }
 
-    void build_tops() {
-        for (const Extent& extent : extents_) tree_->extent = unite(tree_->extent, extent);
-        if (tree_->only_mesh() != nullptr) return;
+    /// The meshes alone, for scenes that place this one.
+    void keep_own_meshes() {
+        if (tree_->instances.empty() || tree_->meshes.empty()) return;
+        auto own = std::make_shared<SceneTree>();
+        own->meshes = tree_->meshes;
+        own->extents.assign(
+            tree_->extents.begin(),
+            tree_->extents.begin() + static_cast<std::ptrdiff_t>(tree_->meshes.size()));
+        build_tops(*own);
+        tree_->own_meshes = std::move(own);
+    }
+
+    void build_tops(SceneTree& tree) {
+        for (const Extent& extent : tree.extents) tree.extent = unite(tree.extent, extent);
+        if (tree.only_mesh() != nullptr) return;
         const Quality quality = options_.usage == Usage::moving ? Quality::fast : options_.quality;
         std::vector<std::uint32_t> near, wild;
-        for (std::uint32_t part = 0; part < extents_.size(); ++part)
-            if (!extents_[part].empty())
-                (extents_[part].error <= wild_error ? near : wild).push_back(part);
-        build_part_tree(near, extents_, quality, tree_->near);
-        build_part_tree(wild, extents_, quality, tree_->wild);
+        for (std::uint32_t part = 0; part < tree.extents.size(); ++part)
+            if (!tree.extents[part].empty())
+                (tree.extents[part].error <= wild_error ? near : wild).push_back(part);
+        build_part_tree(near, tree.extents, quality, tree.near);
+        build_part_tree(wild, tree.extents, quality, tree.wild);
         report_.bytes +=
-            (tree_->near.arrays.nodes.size() + tree_->wild.arrays.nodes.size()) * sizeof(WideNode) +
-            tree_->instances.size() * sizeof(PlacedScene);
+            (tree.near.arrays.nodes.size() + tree.wild.arrays.nodes.size()) * sizeof(WideNode) +
+            tree.placed.size() * sizeof(PlacedScene) + tree.ways.size() * sizeof(WayIn);
     }
 
     const SceneAccess::State& state_;
     const SceneOptions& options_;
     CommitReport& report_;
     std::shared_ptr<SceneTree> tree_ = std::make_shared<SceneTree>();
-    std::vector<Extent> extents_;  // [mesh trees + instances]
+    std::vector<Source> sources_;  // [placed scenes]
 };
 
 }  // namespace

@@ -208,11 +208,11 @@ std::vector<std::uint32_t> Scene::path(std::uint32_t number) const {
             throw InputError("there is no path " + std::to_string(number) + " of instances");
         const auto after = std::upper_bound(
             tree->instances.begin(), tree->instances.end(), left,
-            [](std::uint32_t value, const PlacedScene& placed) { return value < placed.number; });
-        const PlacedScene& placed = *(after - 1);
-        ids.push_back(placed.id);
-        left -= placed.number;
-        tree = placed.scene.get();
+            [](std::uint32_t value, const InstanceName& name) { return value < name.number; });
+        const InstanceName& name = *(after - 1);
+        ids.push_back(name.id);
+        left -= name.number;
+        tree = name.scene.get();
     }
     return ids;
 }

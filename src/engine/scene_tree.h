@@ -44,28 +44,37 @@ struct MeshTree {
 
 struct SceneTree;
 
-struct PlacedScene {
-    // The way in, by columns: of x, y and z, and the move.
+/// The way into an instance: the inverse of its transform by columns, of x, y and z, and the move.
+struct WayIn {
     alignas(32) double columns[4][4];
-    std::shared_ptr<const SceneTree> scene;
-    std::uint32_t id;
     std::uint32_t mask;
-    std::uint32_t number;  // of the path that ends here
 
-    PlacedScene(const Affine& inverse, std::shared_ptr<const SceneTree> placed,
-                std::uint32_t own_id, std::uint32_t own_mask, std::uint32_t own_number)
+    WayIn(const Affine& inverse, std::uint32_t seen_by)
         : columns{{inverse.x.x, inverse.y.x, inverse.z.x, 0},
                   {inverse.x.y, inverse.y.y, inverse.z.y, 0},
                   {inverse.x.z, inverse.y.z, inverse.z.z, 0},
                   {inverse.move.x, inverse.move.y, inverse.move.z, 0}},
-          scene(std::move(placed)),
-          id(own_id),
-          mask(own_mask),
-          number(own_number) {}
+          mask(seen_by) {}
 };
 
-/// A wide tree whose leaves hold one part each. Parts are numbered: mesh trees first, then
-/// instances.
+/// A scene that rays enter by one instance, or by several in turn: what stands in instances of
+/// instances is placed in the outermost scene, so that rays need not go through the trees between.
+struct PlacedScene {
+    WayIn way;
+    std::uint32_t number;       // of the path that ends here
+    std::uint32_t first, more;  // further ways in SceneTree::ways, from the outside inward
+    std::shared_ptr<const SceneTree> scene;
+};
+
+/// An instance as the scene's owner knows it.
+struct InstanceName {
+    std::uint32_t id;
+    std::uint32_t number;  // of the path that ends here
+    std::shared_ptr<const SceneTree> scene;
+};
+
+/// A wide tree whose leaves hold one part each. Parts are numbered: mesh trees first, then placed
+/// scenes.
 struct PartTree {
     WideBvh::Arrays arrays;  // nodes and bounds alone
     WideView view{};
@@ -77,7 +86,12 @@ struct PartTree {
 
 struct SceneTree {
     std::vector<std::shared_ptr<const MeshTree>> meshes;
-    std::vector<PlacedScene> instances;  // by ascending id
+    std::vector<InstanceName> instances;  // by ascending id
+    std::vector<PlacedScene> placed;
+    std::vector<WayIn> ways;
+    std::vector<Extent> extents;  // [meshes + placed]
+    /// The meshes without the instances, where there are both.
+    std::shared_ptr<const SceneTree> own_meshes;
     /// Over all parts that are not empty: instances whose maps keep errors small, and those that
     /// do not, whose boxes must widen so much that they would spoil a common tree.
     PartTree near, wild;

@@ -76,19 +76,20 @@ HWY_INLINE SceneLine line_of(const Ray& ray) {
     return line;
 }
 
-/// Through the inverse of an instance: ((x + y) + z) + move, nothing fused.
-HWY_INLINE void enter(const SceneLine& from, const PlacedScene& placed, SceneLine& to) {
+/// Through the inverse of an instance: ((x + y) + z) + move, nothing fused. `from` may be `to`.
+HWY_INLINE void enter(const SceneLine& from, const WayIn& way, SceneLine& to) {
     const hn::CappedTag<double, 4> d;
+    const double o[3] = {from.origin[0], from.origin[1], from.origin[2]},
+                 v[3] = {from.direction[0], from.direction[1], from.direction[2]};
     for (std::size_t l = 0; l < 4; l += hn::MaxLanes(d)) {
-        const auto x = hn::Load(d, placed.columns[0] + l), y = hn::Load(d, placed.columns[1] + l),
-                   z = hn::Load(d, placed.columns[2] + l);
-        const auto turned = [&](const double* v) {
-            return hn::Add(hn::Add(hn::Mul(x, hn::Set(d, v[0])), hn::Mul(y, hn::Set(d, v[1]))),
-                           hn::Mul(z, hn::Set(d, v[2])));
+        const auto x = hn::Load(d, way.columns[0] + l), y = hn::Load(d, way.columns[1] + l),
+                   z = hn::Load(d, way.columns[2] + l);
+        const auto turned = [&](const double* by) {
+            return hn::Add(hn::Add(hn::Mul(x, hn::Set(d, by[0])), hn::Mul(y, hn::Set(d, by[1]))),
+                           hn::Mul(z, hn::Set(d, by[2])));
         };
-        hn::Store(hn::Add(turned(from.origin), hn::Load(d, placed.columns[3] + l)), d,
-                  to.origin + l);
-        hn::Store(turned(from.direction), d, to.direction + l);
+        hn::Store(hn::Add(turned(o), hn::Load(d, way.columns[3] + l)), d, to.origin + l);
+        hn::Store(turned(v), d, to.direction + l);
     }
     const double longest = max_of(max_of(std::fabs(to.direction[0]), std::fabs(to.direction[1])),
                                   std::fabs(to.direction[2]));
@@ -98,6 +99,21 @@ HWY_INLINE void enter(const SceneLine& from, const PlacedScene& placed, SceneLin
         for (int a = 0; a < 3; ++a) to.direction[a] *= by;
         to.scale *= by;
     }
+}
+
+/// Into a placed scene, by all of its instances in turn.
+HWY_INLINE void enter(const SceneLine& from, const SceneTree& scene, const PlacedScene& placed,
+                      SceneLine& to) {
+    enter(from, placed.way, to);
+    for (std::uint32_t k = 0; k < placed.more; ++k) enter(to, scene.ways[placed.first + k], to);
+}
+
+/// Whether rays of a mask see all instances on the way.
+HWY_INLINE bool sees(std::uint32_t mask, const SceneTree& scene, const PlacedScene& placed) {
+    bool seen = (placed.way.mask & mask) != 0;
+    for (std::uint32_t k = 0; k < placed.more; ++k)
+        seen = seen && (scene.ways[placed.first + k].mask & mask) != 0;
+    return seen;
 }
 
 /// As floats; a fourth one has no meaning.
@@ -160,10 +176,10 @@ public:
             hit_mesh(*scene.meshes[part], depth, number, line);
             return;
         }
-        const PlacedScene& placed = scene.instances[part - meshes];
-        if ((placed.mask & mask_) == 0) return;
+        const PlacedScene& placed = scene.placed[part - meshes];
+        if (!sees(mask_, scene, placed)) return;
         SceneLine inside;
-        enter(line, placed, inside);
+        enter(line, scene, placed, inside);
         walk(*placed.scene, depth + 1, number + placed.number, inside);
     }
 
@@ -361,10 +377,10 @@ private:
 
     /// A ray goes through the inverse of an instance. It becomes the last one of the level inside,
     /// unless it can hit nothing there.
-    HWY_INLINE void add(const SceneLine& from, std::uint32_t id, const PlacedScene& placed,
-                        SceneLevel& to) {
+    HWY_INLINE void add(const SceneLine& from, std::uint32_t id, const SceneTree& scene,
+                        const PlacedScene& placed, SceneLevel& to) {
         SceneLine line;
-        enter(from, placed, line);
+        enter(from, scene, placed, line);
         const SceneJob::Limits& limits = job_.limits[id];
         Ray& ray = to.rays[to.count];
         alignas(16) float origin[4], direction[4];
@@ -430,14 +446,14 @@ private:
             visit_mesh(place, *place.scene.meshes[part], rays, count);
             return;
         }
-        const PlacedScene& placed = place.scene.instances[part - meshes];
+        const PlacedScene& placed = place.scene.placed[part - meshes];
         const SceneLevel& outside = job_.level(place.depth);
         SceneLevel& inside = job_.level(place.depth + 1);
         inside.begin(count, !placed.scene->instances.empty());
         for (std::uint32_t k = 0; k < count; ++k) {
             const std::uint32_t id = outside.sources[rays[k]].id;
-            if ((placed.mask & job_.limits[id].mask) != 0)
-                add(line_of(place, outside, rays[k]), id, placed, inside);
+            if (sees(job_.limits[id].mask, place.scene, placed))
+                add(line_of(place, outside, rays[k]), id, place.scene, placed, inside);
         }
         walk(place.depth + 1, *placed.scene, place.number + placed.number);
     }

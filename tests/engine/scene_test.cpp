@@ -462,7 +462,14 @@ TEST(Scene, LimitsOfNesting) {
         Scene next;
         for (int k = 0; k < 10; ++k) next.add(tens.back(), moved(static_cast<float>(k), 0, 0));
         try {
-            next.commit();
+            const std::uint64_t paths = next.commit().paths;
+            const auto number_at = [&](float x) {
+                return closest_hit(next, {{x + 0.25f, 0.25f, 1}, 0, {0, 0, -1}}).instance;
+            };
+            EXPECT_EQ(number_at(0), static_cast<std::uint32_t>(level + 1));
+            EXPECT_EQ(number_at(9 * static_cast<float>(level + 1)), paths);
+            const std::vector<Ray> rays(40, Ray{{0.25f, 0.25f, 1}, 0, {0, 0, -1}});
+            EXPECT_EQ(trace(next, rays)[11].instance, static_cast<std::uint32_t>(level + 1));
         } catch (const InputError& error) {
             said = error.what();
         }
