@@ -125,6 +125,8 @@ struct SceneTraceOptions {
     int threads = 0;                            // 0 to 1,024; 0: all the machine has
     SimdPath path = SimdPath::automatic;        // hits do not depend on it
     std::string isa = {};                       // one of simd_instruction_sets(); empty: the best
+    /// trace_all only: bounds the peak of the call. 0: half of what is left (result_limit.h).
+    std::uint64_t max_result_bytes = 0;
 };
 
 /// Closest hit of each ray: the least (t, instance, geometry, prim) over all triangles that the
@@ -138,6 +140,21 @@ TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<Scene
 /// Whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n].
 TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const SceneTraceOptions& options = {});
+
+/// All hits of all rays: those of ray i are hits[offsets[i]] .. hits[offsets[i + 1]], sorted by (t,
+/// instance, geometry, prim).
+struct SceneAllHits {
+    std::vector<std::uint64_t> offsets;  // [rays + 1]
+    std::vector<SceneHit> hits;
+    TraceCounts counts;
+};
+
+/// Each triangle at most once on every path. Edges are half open (exact sign, then a top-left
+/// rule), so that the number of crossings of a closed mesh is right for rays through edges and
+/// vertices too. Throws ResultTooLarge, an InputError, if the call would take more than
+/// options.max_result_bytes.
+[[nodiscard]] SceneAllHits trace_all(const Scene& scene, std::span<const Ray> rays,
+                                     const SceneTraceOptions& options = {});
 
 /// One ray, on the caller's thread.
 [[nodiscard]] SceneHit closest_hit(const Scene& scene, const Ray& ray,

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/scene_tree.h"
+#include "exec/result_budget.h"
 #include "trace/simd/simd_kernels.h"
 #include "trace/simd/wide_batch.h"
 
@@ -73,6 +74,9 @@ struct SceneJob {
     bool single = false;                   // one ray after the other
 
     std::vector<SceneHit> hits;  // [n], by k
+    // Of all hits: those of each ray behind those of the one before, sorted; how many [n].
+    BudgetVector<SceneHit>* found = nullptr;
+    std::uint64_t* hit_counts = nullptr;
     std::uint64_t invalid = 0;
 
     struct Limits {
@@ -91,6 +95,7 @@ struct SceneJob {
 struct SceneKernels {
     std::string_view isa;
     void (*trace)(SceneJob& job);
+    void (*all_hits)(SceneJob& job);
 };
 
 /// Empty: the best. The names are those of simd_kernels().

@@ -18,7 +18,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-SceneKernels scene_kernels(std::string_view isa) { return {isa, trace_scene}; }
+SceneKernels scene_kernels(std::string_view isa) { return {isa, trace_scene, all_scene_hits}; }
 
 }  // namespace raydix::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

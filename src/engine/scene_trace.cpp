@@ -12,6 +12,7 @@
 #include "engine/scene_state.h"
 #include "exec/parallel.h"
 #include "rays/place_order.h"
+#include "trace/all_hits.h"
 #include "trace/batch.h"
 #include "trace/ray_frame.h"
 #include "trace/simd/wide_batch.h"
@@ -40,6 +41,19 @@ struct Batch {
 struct JobCounts {
     std::uint64_t hits = 0, invalid = 0;
 };
+
+TraceCounts sum_of(const std::vector<JobCounts>& parts, std::size_t rays) {
+    TraceCounts sum;
+    sum.rays = rays;
+    for (const JobCounts& part : parts) sum.hits += part.hits, sum.invalid_rays += part.invalid;
+    return sum;
+}
+
+void check_masks(std::size_t rays, const SceneTraceOptions& options) {
+    if (!options.masks.empty() && options.masks.size() != rays)
+        throw InputError("trace: " + std::to_string(rays) + " rays, but " +
+                         std::to_string(options.masks.size()) + " masks");
+}
 
 /// The job of each thread: its memory stays from batch to batch.
 SceneJob& job_of_this_thread() {
@@ -100,10 +114,7 @@ TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
             parts[job] = trace_job(tree, way, batch, order, begin, end);
         });
     });
-    TraceCounts sum;
-    sum.rays = n;
-    for (const JobCounts& part : parts) sum.hits += part.hits, sum.invalid_rays += part.invalid;
-    return sum;
+    return sum_of(parts, n);
 }
 
 /// One tree for all: the kernels write where the answers go.
@@ -128,9 +139,7 @@ TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
     const SceneTree& tree = *SceneAccess::tree(scene);
     const SceneTraceOptions& options = batch.options;
     check_enum("path", options.path, SimdPath::sorted);
-    if (!options.masks.empty() && options.masks.size() != batch.rays.size())
-        throw InputError("trace: " + std::to_string(batch.rays.size()) + " rays, but " +
-                         std::to_string(options.masks.size()) + " masks");
+    check_masks(batch.rays.size(), options);
     static_cast<void>(kernels_for(options.isa));
     const MeshTree* const mesh = tree.only_mesh();
     const std::uint32_t all = ~std::uint32_t{0};
@@ -185,6 +194,37 @@ TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const SceneTraceOptions& options) {
     check_sizes(rays.size(), occluded.size());
     return trace_batch(scene, {rays, nullptr, occluded.data(), options});
+}
+
+SceneAllHits trace_all(const Scene& scene, std::span<const Ray> rays,
+                       const SceneTraceOptions& options) {
+    const SceneTree& tree = *SceneAccess::tree(scene);
+    check_masks(rays.size(), options);
+    static_cast<void>(kernels_for(options.isa));
+    constexpr std::size_t block_size = 1024;
+    HitBlocks<SceneAllHits> found(rays.size(), block_size, options.max_result_bytes);
+    std::vector<JobCounts> parts((rays.size() + block_size - 1) / block_size);
+    const SceneKernels& kernels = scene_kernels_for(options.isa);
+    SceneAllHits all;
+    with_threads(options.threads, [&] {
+        for_each_block(
+            rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
+                SceneJob& job = job_of_this_thread();
+                job.tree = &tree;
+                job.rays = rays.data() + begin;
+                job.n = end - begin;
+                job.mask = options.mask;
+                job.masks = options.masks.empty() ? nullptr : options.masks.data() + begin;
+                job.found = &found.hits(block);
+                job.hit_counts = found.hit_counts() + begin;
+                kernels.all_hits(job);
+                parts[block] = {found.hits(block).size(), job.invalid};
+                found.finish(block);
+            });
+        all = found.join();
+    });
+    all.counts = sum_of(parts, rays.size());
+    return all;
 }
 
 SceneHit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {

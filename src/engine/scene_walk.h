@@ -10,6 +10,7 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <limits>
 #include <tuple>
 
@@ -35,6 +36,25 @@ HWY_INLINE void grow_pads(const WideView& tree, PadGrowth growth, SingleFrame& f
     set_starts(tree, origin, hn::Load(f4, frame.inverse), whole, frame);
 }
 
+/// Where hits stand in order: at equal t the least instance, geometry and triangle.
+HWY_INLINE auto order_of(const SceneHit& hit) {
+    return std::tuple(hit.t, hit.instance, hit.geometry, hit.prim);
+}
+
+/// Sorts what one ray hit, hits[before] on. A triangle that is in several leaves was found more
+/// than once, with the same t: the others go.
+inline void finish_scene_ray(BudgetVector<SceneHit>& hits, std::size_t before) {
+    const auto first = hits.begin() + static_cast<std::ptrdiff_t>(before);
+    std::sort(first, hits.end(),
+              [](const SceneHit& a, const SceneHit& b) { return order_of(a) < order_of(b); });
+    hits.erase(std::unique(first, hits.end(),
+                           [](const SceneHit& a, const SceneHit& b) {
+                               return a.instance == b.instance && a.geometry == b.geometry &&
+                                      a.prim == b.prim;
+                           }),
+               hits.end());
+}
+
 /// A hit of a mesh takes the place of the best one if it is the less of the two; `reach` is how far
 /// the ray goes then. Whether it does.
 template <bool any>
@@ -49,10 +69,7 @@ HWY_INLINE bool keep(const MeshTree& mesh, std::uint32_t number, double scale, c
     if (scale != 1.0) found.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
     if (best.hit() && found.t > best.t) return false;
     mesh.name(found);
-    const auto key = [](const SceneHit& h) {
-        return std::tuple(h.t, h.instance, h.geometry, h.prim);
-    };
-    if (best.hit() && !(key(found) < key(best))) return false;
+    if (best.hit() && !(order_of(found) < order_of(best))) return false;
     best = found;
     // What differs in the line may be equal in the caller's units where those are subnormal: it
     // must be found too.
@@ -130,7 +147,7 @@ HWY_INLINE V4 rounded(const double* from) {
 }
 
 /// One ray through a scene.
-template <bool any>
+template <Wanted wanted>
 class SceneRay {
 public:
     SceneRay(SceneJob& job, std::uint32_t id)
@@ -140,8 +157,6 @@ public:
           mask_(job.limits[id].mask),
           best_(job.hits[id]) {}
 
-    /// Further than this it does not go, in the caller's units.
-    [[nodiscard]] float reach() const { return reach_; }
     void store(std::uint32_t id) const {
         job_.limits[id].reach = reach_;
         job_.hits[id] = best_;
@@ -184,8 +199,6 @@ public:
     }
 
 private:
-    static constexpr Wanted wanted = any ? Wanted::any : Wanted::closest;
-
     struct Parts {
         SceneRay& ray;
         const SceneTree& scene;
@@ -222,24 +235,38 @@ private:
         if (!fill(mesh.view, line, frame)) return;
         StackMemory& stack = job_.level(depth).mesh_stack;
         stack.reserve(mesh.tree->stats().max_depth);
-        SimdCounts counts;
-        WideBest best;
         if (mesh.view.is_compact) {
             TriangleBlock room{};
             WideView view = mesh.view;
             view.room = &room;
-            best = SingleRay<wanted, true, true>(view, frame, stack.view(), counts)
-                       .trace(0, {frame.tmax});
+            search<true>(mesh, view, frame, stack.view(), number, line.scale);
         } else {
-            best = SingleRay<wanted, false, false>(mesh.view, frame, stack.view(), counts)
-                       .trace(0, {frame.tmax});
+            search<false>(mesh, mesh.view, frame, stack.view(), number, line.scale);
         }
-        if (best.found()) take(mesh, number, line, {best.t, best.prim, best.u, best.v});
     }
 
-    HWY_INLINE void take(const MeshTree& mesh, std::uint32_t number, const SceneLine& line,
-                         const Hit& hit) {
-        keep<any>(mesh, number, line.scale, hit, best_, reach_);
+    template <bool compact>
+    HWY_INLINE void search(const MeshTree& mesh, const WideView& view, const SingleFrame& frame,
+                           const WideStackView& stack, std::uint32_t number, double scale) {
+        SimdCounts counts;
+        if constexpr (wanted == Wanted::all) {
+            const std::size_t before = job_.found->size();
+            SingleRay<wanted, compact, compact, false, NoParts, SceneHit>(view, frame, stack,
+                                                                          counts)
+                .trace_all(*job_.found);
+            for (std::size_t k = before; k < job_.found->size(); ++k) {
+                SceneHit& hit = (*job_.found)[k];
+                hit.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
+                hit.instance = number;
+                mesh.name(hit);
+            }
+        } else {
+            const WideBest best = SingleRay<wanted, compact, compact>(view, frame, stack, counts)
+                                      .trace(0, {frame.tmax});
+            if (best.found())
+                keep<wanted == Wanted::any>(mesh, number, scale,
+                                            {best.t, best.prim, best.u, best.v}, best_, reach_);
+        }
     }
 
     SceneJob& job_;
@@ -265,6 +292,7 @@ public:
     }
 
 private:
+    using One = SceneRay<any ? Wanted::any : Wanted::closest>;
     /// Fewer rays than this go one by one.
     static constexpr std::uint32_t least_together = 6;
 
@@ -296,7 +324,7 @@ private:
             const Ray* const ray = start(k);
             if (ray == nullptr) continue;
             const auto id = static_cast<std::uint32_t>(k);
-            SceneRay<any> one(job_, id);
+            One one(job_, id);
             one.walk(*job_.tree, 0, 0, HWY_NAMESPACE::line_of(*ray));
             one.store(id);
         }
@@ -318,7 +346,7 @@ private:
 
         float visit_one(std::uint32_t leaf, std::uint32_t ray) {
             const std::uint32_t id = level_.sources[ray].id;
-            SceneRay<any> one(walk_.job_, id);
+            One one(walk_.job_, id);
             one.visit(place_.scene, tree_.part[leaf], place_.depth, place_.number,
                       walk_.line_of(place_, level_, ray));
             one.store(id);
@@ -413,7 +441,7 @@ private:
     void walk_one(const Place& place, std::uint32_t ray) {
         const SceneLevel& level = job_.level(place.depth);
         const std::uint32_t id = level.sources[ray].id;
-        SceneRay<any> one(job_, id);
+        One one(job_, id);
         one.walk(place.scene, place.depth, place.number, line_of(place, level, ray));
         one.store(id);
     }
@@ -515,6 +543,25 @@ private:
 
     SceneJob& job_;
 };
+
+/// All hits of the rays of a job, one ray after the other.
+inline void all_scene_hits(SceneJob& job) {
+    job.hits.assign(1, {});
+    job.limits.resize(1);
+    job.invalid = 0;
+    for (std::size_t k = 0; k < job.n; ++k) {
+        const Ray& ray = job.rays[k];
+        const std::size_t before = job.found->size();
+        job.limits[0] = {ray.tmin, ray.tmax, job.masks == nullptr ? job.mask : job.masks[k]};
+        if (is_valid(ray)) {
+            SceneRay<Wanted::all>(job, 0).walk(*job.tree, 0, 0, line_of(ray));
+            finish_scene_ray(*job.found, before);
+        } else {
+            ++job.invalid;
+        }
+        job.hit_counts[k] = job.found->size() - before;
+    }
+}
 
 inline void trace_scene(SceneJob& job) {
     if (job.any)

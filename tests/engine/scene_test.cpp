@@ -1,6 +1,7 @@
 // Scenes against every mesh on every path on its own, and against scenes made afresh.
 #include <gtest/gtest.h>
 #include <raydix/error.h>
+#include <raydix/result_limit.h>
 #include <raydix/scene.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
@@ -8,6 +9,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <string>
@@ -246,6 +248,84 @@ TEST(Scene, ShearedInstancesLoseNoHits) {
                 << "shear " << shear << ", world " << k;
         }
     EXPECT_GT(hits, 300u * test::thorough);
+}
+
+/// All hits of every mesh on every path, ends as the rays have them.
+std::vector<std::vector<SceneHit>> look_for_all(const World& world, std::span<const Ray> rays,
+                                                std::uint32_t mask) {
+    std::vector<std::vector<SceneHit>> rows(rays.size());
+    const std::function<void(const World&, const std::vector<WideRayLine>&, std::uint32_t)> visit =
+        [&](const World& at, const std::vector<WideRayLine>& lines, std::uint32_t number) {
+            std::uint32_t next = number + 1;
+            for (const World::Item& item : at.items) {
+                const bool seen = (item.mask & mask) != 0;
+                if (item.inside) {
+                    const Affine inverse = *inverse_of(affine_of(item.transform));
+                    std::vector<WideRayLine> inner;
+                    for (const WideRayLine& line : lines) inner.push_back(line.into(inverse));
+                    if (seen) visit(*item.inside, inner, next);
+                    next += 1 + static_cast<std::uint32_t>(item.inside->paths());
+                    continue;
+                }
+                if (!seen || item.mesh.triangles.empty()) continue;
+                std::vector<Ray> entering;
+                for (std::size_t i = 0; i < rays.size(); ++i)
+                    entering.push_back(lines[i].rounded(rays[i].tmin, rays[i].tmax));
+                const AllHits hits = trace_all(build_bvh(item.mesh), entering, {.threads = 1});
+                for (std::size_t i = 0; i < rays.size(); ++i)
+                    for (std::uint64_t k = hits.offsets[i]; k < hits.offsets[i + 1]; ++k)
+                        rows[i].push_back({hits.hits[k], item.id, number});
+            }
+        };
+    std::vector<WideRayLine> lines;
+    for (const Ray& ray : rays) lines.push_back({Double3(ray.origin), Double3(ray.direction)});
+    visit(world, lines, 0);
+    for (auto& row : rows)
+        std::ranges::sort(row, {}, [](const SceneHit& h) {
+            return std::tuple(h.t, h.instance, h.geometry, h.prim);
+        });
+    return rows;
+}
+
+TEST(Scene, AllHitsAreThoseOfEveryMeshOnEveryPath) {
+    std::size_t found = 0;
+    for (std::uint64_t seed = 0; seed < test::thorough; ++seed) {
+        Random random(1000 + seed);
+        Recipe recipe{static_cast<std::uint32_t>(seed % 4), 4, 0};
+        recipe.options.quality = seed % 2 == 0 ? Quality::balanced : Quality::high;
+        recipe.options.compact = seed % 3 == 0;
+        const auto world = random_world(random, recipe);
+        const std::vector<Ray> rays = random_rays(random, 150);
+        const std::uint32_t mask = seed % 5 == 0 ? 2u : all;
+        const auto rows = look_for_all(*world, rays, mask);
+        for (const std::string& isa : simd_instruction_sets()) {
+            SceneTraceOptions options;
+            options.mask = mask, options.isa = isa,
+            options.threads = 1 + static_cast<int>(seed % 2);
+            const SceneAllHits hits = trace_all(world->scene, rays, options);
+            ASSERT_EQ(hits.offsets.size(), rays.size() + 1);
+            EXPECT_EQ(hits.counts.hits, hits.hits.size());
+            for (std::size_t i = 0; i < rays.size(); ++i) {
+                const auto first = hits.hits.begin() + static_cast<std::ptrdiff_t>(hits.offsets[i]);
+                const std::vector<SceneHit> row(
+                    first, hits.hits.begin() + static_cast<std::ptrdiff_t>(hits.offsets[i + 1]));
+                EXPECT_TRUE(std::ranges::equal(row, rows[i], same))
+                    << "seed " << seed << ", ray " << i;
+                found += row.size();
+            }
+        }
+    }
+    EXPECT_GT(found, 100u * test::thorough);
+}
+
+TEST(Scene, AllHitsKeepToTheirMemory) {
+    Scene object(test::random_soup(200, 3, 2.0f)), scene;
+    for (int k = 0; k < 50; ++k) scene.add(object, Transform{});
+    scene.commit();
+    const std::vector<Ray> rays(1000, Ray{{0.4f, 0.4f, 9}, 0, {0, 0.01f, -1}});
+    SceneTraceOptions options;
+    options.max_result_bytes = 100000;
+    EXPECT_THROW(static_cast<void>(trace_all(scene, rays, options)), ResultTooLarge);
 }
 
 Mesh one_triangle(float z) {

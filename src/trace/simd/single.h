@@ -32,8 +32,10 @@ enum class Wanted { closest, any, all };
 ///   float reach(std::uint32_t ray)
 struct NoParts {};
 
-/// `guessing`: rays that follow each other take much the same way.
-template <Wanted wanted, bool counting, bool compact, bool guessing = false, class Parts = NoParts>
+/// `guessing`: rays that follow each other take much the same way. Row: what all hits are kept as,
+/// a Hit and perhaps more.
+template <Wanted wanted, bool counting, bool compact, bool guessing = false, class Parts = NoParts,
+          class Row = Hit>
 class SingleRay {
 public:
     /// `parts` and the ray's place in the job: unless leaves hold triangles.
@@ -48,7 +50,7 @@ public:
     }
 
     /// All hits, in no order, behind those in `hits`.
-    void trace_all(BudgetVector<Hit>& hits) {
+    void trace_all(BudgetVector<Row>& hits) {
         all_ = &hits;
         trace(0, {frame_.tmax});
     }
@@ -260,8 +262,12 @@ private:
                  ++lane) {
                 TriangleHit hit;
                 if (intersect_triangle<EdgeRule::half_open>(ray, triangle_of(block, lane), best_.t,
-                                                            hit))
-                    all_->push_back({hit.t * frame_.t_scale, block.prim[lane], hit.u, hit.v});
+                                                            hit)) {
+                    Row row;
+                    static_cast<Hit&>(row) = {hit.t * frame_.t_scale, block.prim[lane], hit.u,
+                                              hit.v};
+                    all_->push_back(row);
+                }
             }
             return false;
         }
@@ -327,7 +333,7 @@ private:
     Parts* const parts_;
     const std::uint32_t place_;
     WideBest best_{};
-    BudgetVector<Hit>* all_ = nullptr;
+    BudgetVector<Row>* all_ = nullptr;
     std::uint32_t near_at_[3], far_at_[3];  // where planes are, from a node's boxes on
 };
 
