@@ -193,10 +193,9 @@ private:
         const std::vector<SharedMesh> pieces = make_pieces(options_.pieces, 5000, seed_);
         const SharedMesh one = merged(pieces);
         const auto ours = our_fixed_scene(pieces, sides_);
-        Question about{.workload = "fixed",
-                       .scene = std::to_string(pieces.size()) + " figures",
-                       .primitives = one->triangles.size()};
-        if (ours == nullptr) about.missing = "no scene of several meshes";
+        const Question about{.workload = "fixed",
+                             .scene = std::to_string(pieces.size()) + " figures",
+                             .primitives = one->triangles.size()};
         RaySides peers;
         peers.push_back(as_peer(our_mesh(*one, sides_), "raydix merged"));
         ask_all(about, make_rays(bounds_of(*one), size_, seed_), ours.get(), peers);

@@ -21,7 +21,7 @@ QUESTIONS = {
     "fixed": KINDS,
 }
 ALONE = ("plants", "spheres", "user", "fixed")  # of contents of their own, not of each scene
-MISSING = ("filters", "fixed")
+MISSING = ("filters",)
 
 
 class WithoutEmbree(ProgramTest):
