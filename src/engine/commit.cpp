@@ -102,6 +102,7 @@ private:
         if (const MeshTree* const old = kept(group)) {
             out->tree = old->tree, out->first = old->first, out->triangles = old->triangles;
             out->view = old->view;
+            out->make_buckets();
             return out;
         }
         WideBvh built;
@@ -120,6 +121,7 @@ private:
             builder.build(mesh, build, built, wide);
         }
         ++report_.trees_built;
+        out->make_buckets();
         out->tree = std::make_shared<const WideBvh>(std::move(built));
         TriangleBlock none;
         out->view = view_of(out->tree->arrays(), none);

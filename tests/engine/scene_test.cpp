@@ -448,6 +448,30 @@ TEST(Scene, ChangesInAnyOrderEqualASceneMadeAfresh) {
     }
 }
 
+TEST(Scene, HitsNameMeshesOfAnySize) {
+    Scene scene;
+    std::vector<std::pair<std::uint32_t, std::size_t>> wanted;
+    for (std::size_t k = 0; k < 60; ++k) {
+        const std::size_t triangles = k == 20 ? 5000 : k % 7 == 3 ? 0 : 1 + k % 3;
+        Mesh mesh;
+        for (std::size_t i = 0; i < triangles; ++i) {
+            const auto x = static_cast<float>(2 * wanted.size());
+            const auto v = static_cast<std::uint32_t>(mesh.vertices.size());
+            mesh.vertices.insert(mesh.vertices.end(), {{x, 0, 0}, {x + 1, 0, 0}, {x, 1, 0}});
+            mesh.triangles.push_back({v, v + 1, v + 2});
+            wanted.emplace_back(static_cast<std::uint32_t>(k), i);
+        }
+        scene.add(mesh);
+    }
+    scene.commit();
+    for (std::size_t k = 0; k < wanted.size(); ++k) {
+        const SceneHit hit =
+            closest_hit(scene, {{static_cast<float>(2 * k) + 0.25f, 0.25f, 1}, 0, {0, 0, -1}});
+        EXPECT_EQ(hit.geometry, wanted[k].first) << k;
+        EXPECT_EQ(hit.prim, wanted[k].second) << k;
+    }
+}
+
 TEST(Scene, MovingMeshesAreBuiltOnlyWhenTheyChange) {
     Scene scene;
     for (int k = 0; k < 5; ++k) scene.add(test::random_soup(50, static_cast<std::uint64_t>(k)));
