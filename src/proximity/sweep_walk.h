@@ -53,6 +53,16 @@ struct SweepTree : TriangleTree {
     }
 };
 
+/// The floats as they are. The vectorizer of GCC 12 drops a rounding to float that is promoted
+/// again behind it (-O3, straight-line code), so that bits would depend on the level of
+/// optimization.
+inline Vec3 kept(Vec3 p) {
+#if defined(__GNUC__) && !defined(__clang__)
+    asm("" : "+m"(p));
+#endif
+    return p;
+}
+
 /// A valid sweep among the nodes and triangles of a tree.
 class SweepFrame {
 public:
@@ -71,7 +81,7 @@ public:
         const double t = nodes_.enter(node.lo, node.hi);
         return t == never ? infinity : static_cast<float>(t * (1.0 - 1e-12));
     }
-    [[nodiscard]] Vec3 center(float t) const { return path_.at(t).rounded(); }
+    [[nodiscard]] Vec3 center(float t) const { return kept(path_.at(t).rounded()); }
     [[nodiscard]] float in_units_of_caller(float t) const { return t + 0.0f; }  // -0 becomes +0
 
 private:
