@@ -160,17 +160,19 @@ Json measure_rays(const raydix::DeviceCwbvhTree& tree, const std::vector<raydix:
                   const std::vector<raydix::Hit>& wanted, int repeat) {
     const auto n = static_cast<std::uint32_t>(rays.size());
     const raydix::DeviceBuffer<raydix::Ray> input{std::span(rays)};
-    raydix::DeviceBuffer<raydix::Hit> output(n);
+    raydix::DeviceBuffer<raydix::TreeHit> output(n);
     raydix::DeviceBuffer<std::byte> scratch(256);
     const std::span<std::byte> lent(scratch.data(), scratch.size());
     Json rates{{"count", n}};
     for (const auto& [name, kernel] :
          {std::pair("cwbvh", raydix::CwbvhKernel::cwbvh),
           std::pair("persistent_cwbvh", raydix::CwbvhKernel::persistent_cwbvh)}) {
-        std::vector<raydix::Hit> hits(n);
+        std::vector<raydix::TreeHit> hits(n);
         trace_on_device(tree, input.data(), n, output.data(), kernel, lent, nullptr);
         output.download(hits);
-        if (std::memcmp(hits.data(), wanted.data(), n * sizeof(raydix::Hit)) != 0)
+        if (!std::ranges::equal(hits, wanted, [](const auto& a, const auto& b) {
+                return std::memcmp(&a, &b, sizeof(raydix::TreeHit)) == 0;
+            }))
             throw std::runtime_error(std::string(name) + " finds other hits than the CPU");
         std::vector<double> mrays;
         for (int i = 0; i < repeat; ++i)

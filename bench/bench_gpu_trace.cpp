@@ -60,13 +60,13 @@ std::vector<raydix::Ray> make_rays(const Options& options, const raydix::Model& 
 struct Launch {
     std::vector<raydix::Ray> rays;
     bool any_hit;
-    std::vector<raydix::Hit> expected;
+    std::vector<raydix::TreeHit> expected;
     raydix::DeviceBuffer<raydix::Ray> device_rays;
-    raydix::DeviceBuffer<raydix::Hit> device_hits;
+    raydix::DeviceBuffer<raydix::TreeHit> device_hits;
 };
 
 void check_hits(const Launch& launch, raydix::WarpKernel kernel) {
-    std::vector<raydix::Hit> hits(launch.rays.size());
+    std::vector<raydix::TreeHit> hits(launch.rays.size());
     launch.device_hits.download(hits);
     for (std::size_t i = 0; i < hits.size(); ++i) {
         const bool same = launch.any_hit

@@ -22,7 +22,8 @@ std::vector<std::string> split(const std::string& text) {
     return parts;
 }
 
-std::uint64_t count_different(std::span<const Hit> a, std::span<const Hit> b, bool any_hit) {
+std::uint64_t count_different(std::span<const TreeHit> a, std::span<const TreeHit> b,
+                              bool any_hit) {
     std::uint64_t different = 0;
     for (std::size_t i = 0; i < a.size(); ++i)
         different += any_hit ? a[i].hit() != b[i].hit()
@@ -35,9 +36,9 @@ std::uint64_t count_different(std::span<const Hit> a, std::span<const Hit> b, bo
 void add_unit(const WarpTree& tree, const RayUnit& unit, std::vector<SimulateOptions> runs,
               std::vector<SimulationRow>& rows, const CommonOptions& common) {
     for (SimulateOptions& run : runs) run.part_of_launch = unit.part;
-    std::vector<std::vector<Hit>> hits;
+    std::vector<std::vector<TreeHit>> hits;
     const std::vector<Simulation> figures = simulate(tree, unit.rays, runs, &hits, common.threads);
-    std::vector<Hit> expected(unit.rays.size());
+    std::vector<TreeHit> expected(unit.rays.size());
     trace_reference(tree, unit.rays, expected, runs.front().any_hit, common.threads);
     for (std::size_t k = 0; k < rows.size(); ++k) {
         rows[k].sum.add(figures[k]);

@@ -4,6 +4,7 @@
 #include <raydix/trace.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 
 #include "simulation.h"
@@ -75,13 +76,15 @@ WarpTracer::Times WarpTracer::run_on_device(std::span<const Ray> rays, std::vect
                                               static_cast<std::uint32_t>(rays.size()), options));
     hits_.reset(rays.size());
     rays_.reset(rays.size());
+    found_.resize(rays.size());
     const auto start = std::chrono::steady_clock::now();
     rays_.upload(rays);
     const DeviceTraceMs ms = time_trace_on_device(*device_tree_, {rays_.data(), rays.size()},
                                                   {hits_.data(), hits.size()}, options,
                                                   {scratch_.data(), scratch_.size()}, nullptr);
-    hits_.download(hits);
+    hits_.download(found_);
     const std::chrono::duration<double> all = std::chrono::steady_clock::now() - start;
+    std::ranges::transform(found_, hits.begin(), hit_of_tree);
     if (counted) {
         std::uint32_t invalid = 0;
         device_invalid_.download({&invalid, 1});
@@ -91,11 +94,11 @@ WarpTracer::Times WarpTracer::run_on_device(std::span<const Ray> rays, std::vect
 }
 
 void WarpTracer::run_simulated(std::span<const Ray> rays, std::vector<Hit>& hits) {
-    std::vector<std::vector<Hit>> found;
+    std::vector<std::vector<TreeHit>> found;
     const std::vector<Simulation> figures =
         simulate(tree_, rays, {&simulate_, 1}, &found, settings_.threads);
     figures_.add(figures.front());
-    hits = std::move(found.front());
+    std::ranges::transform(found.front(), hits.begin(), hit_of_tree);
     // The simulator leaves invalid rays out without a word.
     std::vector<Hit> unused(rays.size());
     invalid_ += trace(Bvh(), rays, unused, {.threads = settings_.threads}).invalid_rays;

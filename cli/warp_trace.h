@@ -55,7 +55,8 @@ private:
     Simulation figures_;
     std::optional<DeviceWarpTree> device_tree_;
     DeviceBuffer<Ray> rays_;
-    DeviceBuffer<Hit> hits_;
+    DeviceBuffer<TreeHit> hits_;
+    std::vector<TreeHit> found_;
     DeviceBuffer<std::uint32_t> device_invalid_;
     DeviceBuffer<std::byte> scratch_;
     std::uint64_t invalid_ = 0;

@@ -106,7 +106,7 @@ static std::string hit_text(const AnyHit& hit) {
                             double(hit.u), double(hit.v))
                      : std::string("a miss");
 }
-std::string text_of(const Hit& hit) { return hit_text(hit); }
+std::string text_of(const TreeHit& hit) { return hit_text(hit); }
 std::string text_of(const HitD& hit) { return hit_text(hit); }
 
 template <class AnyMesh>

@@ -138,7 +138,7 @@ private:
                                     .threads = 1,
                                     .path = static_cast<SimdPath>(random.below(5)),
                                     .isa = sets[random.below(sets.size())]};
-        const std::vector<SceneHit> hits = trace(scene, rays_, way);
+        const std::vector<Hit> hits = trace(scene, rays_, way);
         std::vector<std::uint8_t> any(rays_.size());
         trace_any(scene, rays_, any, way);
         for (std::size_t i = 0; i < rays_.size(); ++i) {
@@ -152,14 +152,14 @@ private:
                    {hits[i], hits[i].geometry}, wanted[i]);
             expect((any[i] != 0) == hit, "any of a Scene", i, {hits[i]}, wanted[i]);
             if (i % 8 != 0) continue;
-            const SceneHit single = closest_hit(scene, rays_[i], masks_[i]);
+            const Hit single = closest_hit(scene, rays_[i], masks_[i]);
             expect(same_as_scene(scene, single, wanted[i]), "single closest of a Scene", i,
                    {single, single.geometry}, wanted[i]);
             expect(any_hit(scene, rays_[i], masks_[i]) == hit, "single any of a Scene", i, {single},
                    wanted[i]);
         }
     }
-    static bool same_as_scene(const Scene& scene, const SceneHit& a, const InstanceHit& b) {
+    static bool same_as_scene(const Scene& scene, const Hit& a, const InstanceHit& b) {
         if (a.t != b.hit.t || a.prim != b.hit.prim || a.u != b.hit.u || a.v != b.hit.v)
             return false;
         std::array<std::uint32_t, InstanceHit::max_levels> path = InstanceHit::unused();

@@ -37,13 +37,13 @@ void compare_kernels(Case& c, const TestMesh& made) {
         runs.push_back({.kernel = kernel,
                         .machine = machine_model("gtx285"),
                         .width = c.random.one_of(widths)});
-    std::vector<Hit> wanted(rays.size());
+    std::vector<TreeHit> wanted(rays.size());
     trace_reference(tree, rays, wanted, false, 1);
-    std::vector<std::vector<Hit>> hits;
+    std::vector<std::vector<TreeHit>> hits;
     (void)simulate(tree, rays, runs, &hits, 1);
     for (std::size_t k = 0; k < runs.size(); ++k)
         for (std::size_t i = 0; i < rays.size(); ++i)
-            c.expect(std::memcmp(&hits[k][i], &wanted[i], sizeof(Hit)) == 0, "simulator/hits",
+            c.expect(std::memcmp(&hits[k][i], &wanted[i], sizeof(wanted[i])) == 0, "simulator/hits",
                      text("hit by %s", std::string(warp_kernel_name(runs[k].kernel)).c_str()), [&] {
                          return text("    width %d, family %s\n    ", runs[k].width,
                                      family_name(made.family)) +

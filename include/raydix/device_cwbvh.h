@@ -44,8 +44,9 @@ enum class CwbvhKernel : std::uint32_t {
 /// device_cwbvh_scratch_bytes, in use until the stream is past the call. Asynchronous: nothing is
 /// allocated and nothing waited for. Invalid rays are misses and not counted. Throws InputError,
 /// BackendUnavailable, DeviceError.
-void trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count, Hit* hits,
-                     CwbvhKernel kernel, std::span<std::byte> scratch, Stream stream);
+void trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count,
+                     TreeHit* hits, CwbvhKernel kernel, std::span<std::byte> scratch,
+                     Stream stream);
 void trace_any_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count,
                          std::uint8_t* occluded, CwbvhKernel kernel, std::span<std::byte> scratch,
                          Stream stream);
@@ -53,7 +54,7 @@ void trace_any_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint
 /// The same, but waits for the end and returns the milliseconds of the kernel as the device saw
 /// them (CUDA events). For measurements.
 [[nodiscard]] double time_trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays,
-                                          std::uint32_t count, Hit* hits, CwbvhKernel kernel,
+                                          std::uint32_t count, TreeHit* hits, CwbvhKernel kernel,
                                           std::span<std::byte> scratch, Stream stream);
 [[nodiscard]] double time_trace_any_on_device(const DeviceCwbvhTree& tree, const Ray* rays,
                                               std::uint32_t count, std::uint8_t* occluded,

@@ -60,7 +60,7 @@ struct DeviceTraceOptions {
 /// or more, in use until the stream is past the launches. Throws InputError, BackendUnavailable,
 /// DeviceError.
 void trace_warps_on_device(const DeviceWarpTree& tree, std::span<const Ray> rays,
-                           std::span<Hit> hits, const DeviceTraceOptions& options,
+                           std::span<TreeHit> hits, const DeviceTraceOptions& options,
                            std::span<std::byte> scratch, Stream stream);
 
 /// Milliseconds as the device saw them (CUDA events).
@@ -70,7 +70,7 @@ struct DeviceTraceMs {
 };
 /// The same, but waits for the end. For measurements.
 DeviceTraceMs time_trace_on_device(const DeviceWarpTree& tree, std::span<const Ray> rays,
-                                   std::span<Hit> hits, const DeviceTraceOptions& options,
+                                   std::span<TreeHit> hits, const DeviceTraceOptions& options,
                                    std::span<std::byte> scratch, Stream stream);
 
 }  // namespace raydix

@@ -26,7 +26,7 @@ struct Instance {
 struct InstanceHit {
     static constexpr std::size_t max_levels = 8;
 
-    Hit hit;
+    TreeHit hit;
     std::uint32_t object = no_primitive;
     std::array<std::uint32_t, max_levels> path = unused();
 

@@ -52,8 +52,14 @@ struct SecondaryOptions {
 [[nodiscard]] std::vector<Ray> load_rays(const std::filesystem::path& file);
 void save_rays(const std::filesystem::path& file, std::span<const Ray> rays);
 
-/// NumPy files of shape (N,) with fields t, prim, u, v.
-void save_hits(const std::filesystem::path& file, std::span<const Hit> hits);
+enum class HitFields : std::uint32_t {
+    tree = 0,   // t, prim, u, v
+    scene = 1,  // geometry and instance behind them
+};
+
+/// NumPy files of shape (N,) with named fields.
+void save_hits(const std::filesystem::path& file, std::span<const Hit> hits,
+               HitFields fields = HitFields::tree);
 
 /// A NumPy file of shape (N + 1,) uint64: where the hits of each of N rays begin, and the end.
 void save_offsets(const std::filesystem::path& file, std::span<const std::uint64_t> offsets);

@@ -54,15 +54,6 @@ struct CommitReport {
     std::uint64_t paths = 0;                  // instances, counted on every way to them
 };
 
-/// Where a ray hits: triangle `prim` of mesh `geometry`, weights u of its second corner and v of
-/// its third. `instance` 0: the mesh belongs to the scene itself. Else it is the number of the path
-/// of instances that lead to it: paths count from 1, depth first, ascending id
-/// (Scene::path). A miss has t infinity and prim no_primitive.
-struct SceneHit : Hit {
-    std::uint32_t geometry = no_primitive;
-    std::uint32_t instance = 0;
-};
-
 /// Meshes, and instances of other scenes, which may hold instances themselves. Changes take effect
 /// with `commit`; until then rays meet what the last one saw. Any number of threads may trace a
 /// scene at once; changes and commits need it for themselves.
@@ -133,10 +124,10 @@ struct SceneTraceOptions {
 /// watertight test accepts (Woop, Benthin, Wald 2013; edges belong to both triangles). Rays go
 /// through each instance's inverse in double and are rounded once, where the mesh is. rays [n] ->
 /// hits [n]. Throws InputError: sizes that differ, a scene that was never committed.
-TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<SceneHit> hits,
+TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<Hit> hits,
                   const SceneTraceOptions& options = {});
-[[nodiscard]] std::vector<SceneHit> trace(const Scene& scene, std::span<const Ray> rays,
-                                          const SceneTraceOptions& options = {});
+[[nodiscard]] std::vector<Hit> trace(const Scene& scene, std::span<const Ray> rays,
+                                     const SceneTraceOptions& options = {});
 /// Whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n].
 TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const SceneTraceOptions& options = {});
@@ -145,7 +136,7 @@ TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
 /// instance, geometry, prim).
 struct SceneAllHits {
     std::vector<std::uint64_t> offsets;  // [rays + 1]
-    std::vector<SceneHit> hits;
+    std::vector<Hit> hits;
     TraceCounts counts;
 };
 
@@ -157,8 +148,7 @@ struct SceneAllHits {
                                      const SceneTraceOptions& options = {});
 
 /// One ray, on the caller's thread.
-[[nodiscard]] SceneHit closest_hit(const Scene& scene, const Ray& ray,
-                                   std::uint32_t mask = 0xFFFFFFFFu);
+[[nodiscard]] Hit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask = 0xFFFFFFFFu);
 [[nodiscard]] bool any_hit(const Scene& scene, const Ray& ray, std::uint32_t mask = 0xFFFFFFFFu);
 
 }  // namespace raydix

@@ -59,7 +59,7 @@ private:
 /// The scalar reference: closest hits with Woop's triangle test, one ray at a time. Not the
 /// library's watertight test: hits may differ from trace() at edges and in the last bits.
 /// rays [n] -> hits [n].
-void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<Hit> hits,
+void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<TreeHit> hits,
                      bool any_hit = false, int threads = 0);
 
 /// Native instructions that one issue of an operation takes.
@@ -145,7 +145,7 @@ struct SimulatedRates {
 /// unknown width, a machine without a cost for an operation, a rate that is not positive.
 [[nodiscard]] std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays,
                                                std::span<const SimulateOptions> runs,
-                                               std::vector<std::vector<Hit>>* hits = nullptr,
+                                               std::vector<std::vector<TreeHit>>* hits = nullptr,
                                                int threads = 0);
 
 }  // namespace raydix

@@ -43,15 +43,31 @@ struct Ray {
 };
 static_assert(sizeof(Ray) == 32);
 
-/// The point hit is (1-u-v)*v0 + u*v1 + v*v2 of triangle `prim`, at `t` along the ray.
-struct Hit {
+/// What a ray hits in one tree: the point (1-u-v)*v0 + u*v1 + v*v2 of triangle `prim`, at `t` along
+/// the ray. A miss has t infinity and prim no_primitive.
+struct TreeHit {
     float t = infinity;
     std::uint32_t prim = no_primitive;
     float u = 0.0f, v = 0.0f;
 
     [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
 };
-static_assert(sizeof(Hit) == 16);
+static_assert(sizeof(TreeHit) == 16);
+
+/// A hit and where in a scene it is: `prim` counts within `geometry`. `instance` 0: the geometry
+/// belongs to the scene itself. Else it is the number of the path of instances that lead to it:
+/// paths count from 1, depth first, ascending id (Scene::path). What is traced through one tree
+/// alone has geometry 0; a miss has no_primitive.
+struct Hit : TreeHit {
+    std::uint32_t geometry = no_primitive;
+    std::uint32_t instance = 0;
+};
+static_assert(sizeof(Hit) == 24);
+
+/// A hit of the only geometry there is.
+[[nodiscard]] constexpr Hit hit_of_tree(const TreeHit& hit) {
+    return {hit, hit.hit() ? 0 : no_primitive, 0};
+}
 
 /// As Ray and Hit, in double.
 struct RayD {

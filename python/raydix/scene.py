@@ -223,8 +223,11 @@ class Scene(SceneViews):
         if self.device == "cuda":
             return self._on_cuda().intersect(rays, directions, tmin, tmax, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
-        hits = np.empty(lead + (4,), self.dtype)
-        self._core.intersect(*args, hits if hits.ndim == 2 else hits.reshape(-1, 4), self.threads)
+        columns = 6 if self.dtype == FLOAT32 else 4  # geometry and instance behind the four
+        hits = np.empty((*lead, columns), self.dtype)
+        self._core.intersect(
+            *args, hits if hits.ndim == 2 else hits.reshape(-1, columns), self.threads
+        )
         return self._hits(hits)
 
     def occluded(

@@ -33,7 +33,7 @@ class DeviceScene {
 public:
     explicit DeviceScene(SceneTrees& scene) : tree_(copy_of(scene)) {}
 
-    void trace(const Ray* rays, std::size_t count, Hit* hits, Stream stream) const {
+    void trace(const Ray* rays, std::size_t count, TreeHit* hits, Stream stream) const {
         trace_on_device(tree_.tree(), rays, checked(count), hits, CwbvhKernel::cwbvh, {}, stream);
     }
     void trace_any(const Ray* rays, std::size_t count, std::uint8_t* occluded,
@@ -67,7 +67,7 @@ Stream stream_of(std::uintptr_t handle) { return reinterpret_cast<Stream>(handle
 /// Rays on the device -> t, prim, u, v there, four views of one array; nothing is waited for.
 DeviceHits intersect_there(const DeviceScene& self, const DeviceRays& rays, std::uintptr_t stream) {
     const std::size_t count = rays.shape(0);
-    auto hits = std::make_unique<DeviceBuffer<Hit>>(count);
+    auto hits = std::make_unique<DeviceBuffer<TreeHit>>(count);
     self.trace(aligned_rays(rays), count, hits->data(), stream_of(stream));
     float* const floats = reinterpret_cast<float*>(hits->data());
     const nb::capsule owner = owner_of(std::move(hits));
@@ -93,12 +93,12 @@ DeviceArray<std::uint8_t> occluded_there(const DeviceScene& self, const DeviceRa
 
 void intersect_here(const DeviceScene& self, const RaysIn& rays, const HitsOut& out) {
     const auto given = rows<Ray>(rays);
-    const auto results = rows_out<Hit>(out);
+    const auto results = rows_out<TreeHit>(out);
     if (results.size() != given.size())
         throw nb::value_error("a result has another length than its queries");
     in_pieces(given.size(), [&](std::size_t begin, std::size_t end) {
         const DeviceBuffer<Ray> there(given.subspan(begin, end - begin));
-        const DeviceBuffer<Hit> hits(end - begin);
+        const DeviceBuffer<TreeHit> hits(end - begin);
         self.trace(there.data(), end - begin, hits.data(), nullptr);
         hits.download(results.subspan(begin, end - begin));
     });

@@ -51,7 +51,10 @@ struct PlacedHit {
     Hit hit;
     std::uint32_t object, instance;
 };
-static_assert(sizeof(PlacedHit<Hit>) == 6 * sizeof(float));
+template <class Names>
+using HitOf =
+    std::conditional_t<std::is_same_v<typename Names::Scalar, float>, TreeHit, typename Names::Hit>;
+static_assert(sizeof(PlacedHit<TreeHit>) == 6 * sizeof(float));
 static_assert(sizeof(PlacedHit<HitD>) == 5 * sizeof(double));
 
 /// The objects' trees must outlive this: the binding keeps them.
@@ -181,7 +184,7 @@ void move(PlacedScenes<Names>& self, const TransformRows<Names>& transforms, int
 template <class Names, class Rays>
 Array2<typename Names::Scalar> intersect(PlacedScenes<Names>& self, Rays& rays, std::uint32_t mask,
                                          int threads) {
-    Buffer<PlacedHit<typename Names::Hit>> hits(rays.size());
+    Buffer<PlacedHit<HitOf<Names>>> hits(rays.size());
     const InstanceTraceOptions options{.mask = mask, .threads = threads_for(threads)};
     self.read_in_pieces(rays.size(), [&](const auto& scene, std::size_t begin, std::size_t end) {
         const auto found = trace(scene, rays.piece(begin, end), options);

@@ -63,10 +63,12 @@ template <class Scene>
 using PointRows = In<Scalar<Scene>, nb::shape<-1, 3>>;
 template <class Scene>
 using ValuesOut = Out<Scalar<Scene>, nb::ndim<1>>;
-/// Rows of structs in scalars; a whole number takes the room of one: t, prim, u, v of hits.
+/// Rows of structs in scalars; a whole number takes the room of one: t, prim, u, v of hits, in
+/// float geometry and instance too.
 template <class Scene>
-using HitRows = Out<Scalar<Scene>, nb::shape<-1, 4>>;
-static_assert(sizeof(Hit) == 4 * sizeof(float) && sizeof(HitD) == 4 * sizeof(double));
+using HitRows =
+    Out<Scalar<Scene>, nb::shape<-1, sizeof(typename Scene::Types::Hit) / sizeof(Scalar<Scene>)>>;
+static_assert(sizeof(Hit) == 6 * sizeof(float) && sizeof(HitD) == 4 * sizeof(double));
 /// x, y, z, distance, prim, u, v of closest points.
 template <class Scene>
 using PlaceRows = Out<Scalar<Scene>, nb::shape<-1, 7>>;

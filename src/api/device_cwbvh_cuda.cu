@@ -57,9 +57,9 @@ void store_misses(const Launch& launch, const kernels::StoreOccluded& store) {
     RAYDIX_CUDA_TRY(cudaMemsetAsync(store.occluded, 0, launch.count, launch.stream));
 }
 
-__global__ void fill_misses(Hit* hits, std::uint32_t count) {
+__global__ void fill_misses(TreeHit* hits, std::uint32_t count) {
     const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
-    if (i < count) hits[i] = Hit{};
+    if (i < count) hits[i] = TreeHit{};
 }
 
 void store_misses(const Launch& launch, const kernels::StoreHit& store) {
@@ -113,8 +113,9 @@ cudaStream_t cuda(Stream stream) { return static_cast<cudaStream_t>(stream); }
 
 }  // namespace
 
-void trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count, Hit* hits,
-                     CwbvhKernel kernel, std::span<std::byte> scratch, Stream stream) {
+void trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count,
+                     TreeHit* hits, CwbvhKernel kernel, std::span<std::byte> scratch,
+                     Stream stream) {
     launch_rays<false>({tree, rays, count, kernel, scratch, cuda(stream)}, kernels::StoreHit{hits});
 }
 
@@ -126,7 +127,7 @@ void trace_any_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint
 }
 
 double time_trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count,
-                            Hit* hits, CwbvhKernel kernel, std::span<std::byte> scratch,
+                            TreeHit* hits, CwbvhKernel kernel, std::span<std::byte> scratch,
                             Stream stream) {
     return time_rays<false>({tree, rays, count, kernel, scratch, cuda(stream)},
                             kernels::StoreHit{hits});

@@ -13,7 +13,7 @@ namespace {
 
 }  // namespace
 
-void trace_on_device(const DeviceCwbvhTree&, const Ray*, std::uint32_t, Hit*, CwbvhKernel,
+void trace_on_device(const DeviceCwbvhTree&, const Ray*, std::uint32_t, TreeHit*, CwbvhKernel,
                      std::span<std::byte>, Stream) {
     unavailable();
 }
@@ -21,8 +21,8 @@ void trace_any_on_device(const DeviceCwbvhTree&, const Ray*, std::uint32_t, std:
                          CwbvhKernel, std::span<std::byte>, Stream) {
     unavailable();
 }
-double time_trace_on_device(const DeviceCwbvhTree&, const Ray*, std::uint32_t, Hit*, CwbvhKernel,
-                            std::span<std::byte>, Stream) {
+double time_trace_on_device(const DeviceCwbvhTree&, const Ray*, std::uint32_t, TreeHit*,
+                            CwbvhKernel, std::span<std::byte>, Stream) {
     unavailable();
 }
 double time_trace_any_on_device(const DeviceCwbvhTree&, const Ray*, std::uint32_t, std::uint8_t*,

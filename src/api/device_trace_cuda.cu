@@ -18,9 +18,9 @@ namespace {
 
 /// A tree without triangles.
 struct MissAll {
-    Hit* hits;  // [n], out
+    TreeHit* hits;  // [n], out
     RAYDIX_HD void operator()(std::uint32_t i) const {
-        hits[i] = Hit{infinity, no_primitive, 0, 0};
+        hits[i] = TreeHit{infinity, no_primitive, 0, 0};
     }
 };
 
@@ -43,7 +43,7 @@ CudaLauncher plain_launcher(Stream stream, std::byte* line) {
     return {static_cast<cudaStream_t>(stream), line, CudaLauncher::reserved_bytes};
 }
 
-void check_memory(std::span<const Ray> rays, std::span<Hit> hits, std::span<std::byte> scratch,
+void check_memory(std::span<const Ray> rays, std::span<TreeHit> hits, std::span<std::byte> scratch,
                   std::size_t needed) {
     const auto aligned = [](const void* at, std::uintptr_t to) {
         return reinterpret_cast<std::uintptr_t>(at) % to == 0;
@@ -63,7 +63,7 @@ void check_memory(std::span<const Ray> rays, std::span<Hit> hits, std::span<std:
 
 /// `mark(k)` is called before (0) and behind (1) the traversal kernel.
 template <class Mark>
-void trace_launches(const DeviceWarpTree& tree, std::span<const Ray> rays, std::span<Hit> hits,
+void trace_launches(const DeviceWarpTree& tree, std::span<const Ray> rays, std::span<TreeHit> hits,
                     const DeviceTraceOptions& options, std::span<std::byte> scratch, Stream stream,
                     const Mark& mark) {
     if (rays.size() >= 0x7FFFFFFFu) throw InputError("2^31 rays or more in one launch");
@@ -150,13 +150,13 @@ DeviceWarpTree::DeviceWarpTree(const DeviceTree& tree, Stream stream)
 }
 
 void trace_warps_on_device(const DeviceWarpTree& tree, std::span<const Ray> rays,
-                           std::span<Hit> hits, const DeviceTraceOptions& options,
+                           std::span<TreeHit> hits, const DeviceTraceOptions& options,
                            std::span<std::byte> scratch, Stream stream) {
     trace_launches(tree, rays, hits, options, scratch, stream, [](int) {});
 }
 
 DeviceTraceMs time_trace_on_device(const DeviceWarpTree& tree, std::span<const Ray> rays,
-                                   std::span<Hit> hits, const DeviceTraceOptions& options,
+                                   std::span<TreeHit> hits, const DeviceTraceOptions& options,
                                    std::span<std::byte> scratch, Stream stream) {
     Event start, before, behind, end;
     start.record(stream);

@@ -18,11 +18,11 @@ namespace {
 
 DeviceWarpTree::DeviceWarpTree(const WarpTree&, Stream) { unavailable(); }
 DeviceWarpTree::DeviceWarpTree(const DeviceTree&, Stream) { unavailable(); }
-void trace_warps_on_device(const DeviceWarpTree&, std::span<const Ray>, std::span<Hit>,
+void trace_warps_on_device(const DeviceWarpTree&, std::span<const Ray>, std::span<TreeHit>,
                            const DeviceTraceOptions&, std::span<std::byte>, Stream) {
     unavailable();
 }
-DeviceTraceMs time_trace_on_device(const DeviceWarpTree&, std::span<const Ray>, std::span<Hit>,
+DeviceTraceMs time_trace_on_device(const DeviceWarpTree&, std::span<const Ray>, std::span<TreeHit>,
                                    const DeviceTraceOptions&, std::span<std::byte>, Stream) {
     unavailable();
 }

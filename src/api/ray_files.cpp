@@ -3,6 +3,7 @@
 
 #include <cstring>
 
+#include "base/options.h"
 #include "scene/npy.h"
 
 namespace raydix {
@@ -26,8 +27,12 @@ void save_rays(const std::filesystem::path& file, std::span<const Ray> rays) {
     save_npy_bytes(file, "<f4", shape, std::as_bytes(rays));
 }
 
-void save_hits(const std::filesystem::path& file, std::span<const Hit> hits) {
-    save_npy(file, hits);
+void save_hits(const std::filesystem::path& file, std::span<const Hit> hits, HitFields fields) {
+    check_enum("fields", fields, HitFields::scene);
+    if (fields == HitFields::scene)
+        save_npy(file, hits);
+    else
+        save_npy(file, std::span<const TreeHit>(std::vector<TreeHit>(hits.begin(), hits.end())));
 }
 
 void save_offsets(const std::filesystem::path& file, std::span<const std::uint64_t> offsets) {

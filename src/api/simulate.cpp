@@ -138,13 +138,13 @@ std::uint64_t WarpTree::bytes() const {
            arrays_->triangles.size() * sizeof(WoopTriangle) + arrays_->ids.size() * 4;
 }
 
-void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<Hit> hits,
+void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<TreeHit> hits,
                      bool any_hit, int threads) {
     if (rays.size() != hits.size())
         throw InputError("trace_reference: " + std::to_string(rays.size()) +
                          " rays, but room for " + std::to_string(hits.size()) + " hits");
     check_threads(threads);
-    std::fill(hits.begin(), hits.end(), Hit{});
+    std::fill(hits.begin(), hits.end(), TreeHit{});
     if (tree.empty()) return;
     const PreparedRays prepared(rays);
     const WarpJob job{
@@ -212,15 +212,15 @@ SimulatedRates simulated_rates(const Simulation& s, const SimulateOptions& optio
 
 std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays,
                                  std::span<const SimulateOptions> runs,
-                                 std::vector<std::vector<Hit>>* hits, int threads) {
+                                 std::vector<std::vector<TreeHit>>* hits, int threads) {
     for (const SimulateOptions& options : runs) {
         check_options(options);
         static_cast<void>(op_costs(options.machine, options.kernel));
     }
     if (rays.size() >= 0x7FFFFFFFu) throw InputError("simulate: 2^31 rays or more in one launch");
     std::vector<Simulation> figures(runs.size());
-    std::vector<std::vector<Hit>> own;
-    std::vector<std::vector<Hit>>& found = hits != nullptr ? *hits : own;
+    std::vector<std::vector<TreeHit>> own;
+    std::vector<std::vector<TreeHit>>& found = hits != nullptr ? *hits : own;
     found.resize(runs.size());
     const PreparedRays prepared(rays);
     const WarpTree::Arrays& arrays = tree.arrays();
@@ -232,13 +232,13 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
         for_each_index(
             runs.size(),
             [&](std::size_t k) {
-                found[k].assign(rays.size(), Hit{});
+                found[k].assign(rays.size(), TreeHit{});
                 figures[k] = tree.empty()
                                  ? without_tree(runs[k], rays.size())
                                  : simulate_launch(scene_of(tree), tree.max_depth() + 1,
                                                    prepared.rays(), found[k], runs[k], memory);
                 prepared.rescale(found[k]);
-                if (hits == nullptr) std::vector<Hit>().swap(found[k]);
+                if (hits == nullptr) std::vector<TreeHit>().swap(found[k]);
             },
             1);
     });

@@ -45,7 +45,7 @@ struct SceneLevel {
     // Of scenes that hold instances, below the first level: what floats do not have of the rays.
     std::vector<SceneLine> lines;
     // Of the jobs that triangles get.
-    std::vector<Hit> hits;
+    std::vector<TreeHit> hits;
     std::vector<std::uint8_t> occluded;
     std::vector<std::uint32_t> seen;  // those of a list that may see something
     StreamMemory parts_memory, mesh_memory;
@@ -73,9 +73,9 @@ struct SceneJob {
     bool packets = false;                  // neighbours are alike: triangles take packets of them
     bool single = false;                   // one ray after the other
 
-    std::vector<SceneHit> hits;  // [n], by k
+    std::vector<Hit> hits;  // [n], by k
     // Of all hits: those of each ray behind those of the one before, sorted; how many [n].
-    BudgetVector<SceneHit>* found = nullptr;
+    BudgetVector<Hit>* found = nullptr;
     std::uint64_t* hit_counts = nullptr;
     std::uint64_t invalid = 0;
 

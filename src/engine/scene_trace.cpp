@@ -23,14 +23,14 @@ namespace {
 /// Rays and where their answers go: hits, or else occluded.
 struct Batch {
     std::span<const Ray> rays;
-    SceneHit* hits;
+    Hit* hits;
     std::uint8_t* occluded;
     const SceneTraceOptions& options;
 
     [[nodiscard]] std::uint32_t mask(std::size_t i) const {
         return options.masks.empty() ? options.mask : options.masks[i];
     }
-    void set(std::size_t i, const SceneHit& hit) const {
+    void set(std::size_t i, const Hit& hit) const {
         if (hits != nullptr)
             hits[i] = hit;
         else
@@ -123,12 +123,12 @@ TraceCounts trace_mesh(const MeshTree& mesh, const Batch& batch) {
     options.threads = batch.options.threads;
     options.path = batch.options.path;
     options.isa = batch.options.isa;
-    const HitRows rows{batch.hits, sizeof(SceneHit)};
+    const HitRows rows{batch.hits, sizeof(Hit)};
     return trace_rows(*mesh.tree, batch.rays, rows, batch.occluded, options,
                       [&](const std::uint32_t* order, std::size_t begin, std::size_t end) {
                           if (batch.hits == nullptr) return;
                           for (std::size_t k = begin; k < end; ++k) {
-                              SceneHit& hit = batch.hits[order == nullptr ? k : order[k]];
+                              Hit& hit = batch.hits[order == nullptr ? k : order[k]];
                               hit.geometry = no_primitive, hit.instance = 0;
                               if (hit.hit()) mesh.name(hit);
                           }
@@ -149,16 +149,16 @@ TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
     return sees_all ? trace_mesh(*mesh, batch) : trace_scene(tree, batch);
 }
 
-SceneHit trace_one(const Scene& scene, const Ray& ray, std::uint32_t mask, bool any) {
+Hit trace_one(const Scene& scene, const Ray& ray, std::uint32_t mask, bool any) {
     const SceneTree& tree = *SceneAccess::tree(scene);
     if (const MeshTree* const mesh = tree.only_mesh()) {
-        SceneHit hit;
+        Hit hit;
         if ((mesh->mask & mask) == 0) return hit;
         if (any) {
             hit.prim = any_hit(*mesh->tree, ray) ? 0 : no_primitive;
             return hit;
         }
-        static_cast<Hit&>(hit) = closest_hit(*mesh->tree, ray);
+        hit = closest_hit(*mesh->tree, ray);
         if (hit.hit()) mesh->name(hit);
         return hit;
     }
@@ -177,15 +177,15 @@ SceneHit trace_one(const Scene& scene, const Ray& ray, std::uint32_t mask, bool 
 
 }  // namespace
 
-TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<SceneHit> hits,
+TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<Hit> hits,
                   const SceneTraceOptions& options) {
     check_sizes(rays.size(), hits.size());
     return trace_batch(scene, {rays, hits.data(), nullptr, options});
 }
 
-std::vector<SceneHit> trace(const Scene& scene, std::span<const Ray> rays,
-                            const SceneTraceOptions& options) {
-    std::vector<SceneHit> hits(rays.size());
+std::vector<Hit> trace(const Scene& scene, std::span<const Ray> rays,
+                       const SceneTraceOptions& options) {
+    std::vector<Hit> hits(rays.size());
     trace(scene, rays, hits, options);
     return hits;
 }
@@ -227,7 +227,7 @@ SceneAllHits trace_all(const Scene& scene, std::span<const Ray> rays,
     return all;
 }
 
-SceneHit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
+Hit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
     return trace_one(scene, ray, mask, false);
 }
 

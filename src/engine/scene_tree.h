@@ -55,7 +55,7 @@ struct MeshTree {
         return static_cast<std::size_t>(std::upper_bound(begin, end, prim) - first.begin()) - 1;
     }
     /// Gives a hit of the tree its mesh.
-    void name(SceneHit& hit) const {
+    void name(Hit& hit) const {
         const std::size_t m = first.size() == 1 ? 0 : mesh_of(hit.prim);
         hit.geometry = ids[m];
         hit.prim -= first[m];

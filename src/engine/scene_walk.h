@@ -37,18 +37,18 @@ HWY_INLINE void grow_pads(const WideView& tree, PadGrowth growth, SingleFrame& f
 }
 
 /// Where hits stand in order: at equal t the least instance, geometry and triangle.
-HWY_INLINE auto order_of(const SceneHit& hit) {
+HWY_INLINE auto order_of(const Hit& hit) {
     return std::tuple(hit.t, hit.instance, hit.geometry, hit.prim);
 }
 
 /// Sorts what one ray hit, hits[before] on. A triangle that is in several leaves was found more
 /// than once, with the same t: the others go.
-inline void finish_scene_ray(BudgetVector<SceneHit>& hits, std::size_t before) {
+inline void finish_scene_ray(BudgetVector<Hit>& hits, std::size_t before) {
     const auto first = hits.begin() + static_cast<std::ptrdiff_t>(before);
     std::sort(first, hits.end(),
-              [](const SceneHit& a, const SceneHit& b) { return order_of(a) < order_of(b); });
+              [](const Hit& a, const Hit& b) { return order_of(a) < order_of(b); });
     hits.erase(std::unique(first, hits.end(),
-                           [](const SceneHit& a, const SceneHit& b) {
+                           [](const Hit& a, const Hit& b) {
                                return a.instance == b.instance && a.geometry == b.geometry &&
                                       a.prim == b.prim;
                            }),
@@ -58,14 +58,14 @@ inline void finish_scene_ray(BudgetVector<SceneHit>& hits, std::size_t before) {
 /// A hit of a mesh takes the place of the best one if it is the less of the two; `reach` is how far
 /// the ray goes then. Whether it does.
 template <bool any>
-HWY_INLINE bool keep(const MeshTree& mesh, std::uint32_t number, double scale, const Hit& hit,
-                     SceneHit& best, float& reach) {
+HWY_INLINE bool keep(const MeshTree& mesh, std::uint32_t number, double scale, const TreeHit& hit,
+                     Hit& best, float& reach) {
     if constexpr (any) {
         best.prim = 0;
         reach = -1.0f;
         return true;
     }
-    SceneHit found{hit, no_primitive, number};
+    Hit found{hit, no_primitive, number};
     if (scale != 1.0) found.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
     if (best.hit() && found.t > best.t) return false;
     mesh.name(found);
@@ -251,11 +251,10 @@ private:
         SimdCounts counts;
         if constexpr (wanted == Wanted::all) {
             const std::size_t before = job_.found->size();
-            SingleRay<wanted, compact, compact, false, NoParts, SceneHit>(view, frame, stack,
-                                                                          counts)
+            SingleRay<wanted, compact, compact, false, NoParts, Hit>(view, frame, stack, counts)
                 .trace_all(*job_.found);
             for (std::size_t k = before; k < job_.found->size(); ++k) {
-                SceneHit& hit = (*job_.found)[k];
+                Hit& hit = (*job_.found)[k];
                 hit.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
                 hit.instance = number;
                 mesh.name(hit);
@@ -273,7 +272,7 @@ private:
     const float tmin_;
     float reach_;
     const std::uint32_t mask_;
-    SceneHit best_;
+    Hit best_;
 };
 
 template <bool any>
@@ -534,7 +533,7 @@ private:
     }
 
     HWY_INLINE void take(SceneLevel& level, const MeshTree& mesh, std::uint32_t number,
-                         std::uint32_t ray, const Hit& hit) {
+                         std::uint32_t ray, const TreeHit& hit) {
         const SceneRaySource& source = level.sources[ray];
         if (keep<any>(mesh, number, source.scale, hit, job_.hits[source.id],
                       job_.limits[source.id].reach))

@@ -182,8 +182,14 @@ void save_npy(const std::filesystem::path& file, std::span<const std::uint64_t> 
               std::size_t columns) {
     save_values(file, "<u8", values, columns);
 }
-void save_npy(const std::filesystem::path& file, std::span<const Hit> hits) {
+void save_npy(const std::filesystem::path& file, std::span<const TreeHit> hits) {
     save_values(file, "[('t', '<f4'), ('prim', '<u4'), ('u', '<f4'), ('v', '<f4')]", hits, 0);
+}
+void save_npy(const std::filesystem::path& file, std::span<const Hit> hits) {
+    save_values(file,
+                "[('t', '<f4'), ('prim', '<u4'), ('u', '<f4'), ('v', '<f4'), "
+                "('geometry', '<u4'), ('instance', '<u4')]",
+                hits, 0);
 }
 
 }  // namespace raydix

@@ -43,7 +43,10 @@ void save_npy(const std::filesystem::path& file, std::span<const std::uint32_t> 
 void save_npy(const std::filesystem::path& file, std::span<const std::uint64_t> values,
               std::size_t columns = 0);
 
-/// Shape (N,), dtype [('t','<f4'),('prim','<u4'),('u','<f4'),('v','<f4')].
+/// Shape (N,), dtype [('t','<f4'),('prim','<u4'),('u','<f4'),('v','<f4')]; of Hit
+/// ('geometry','<u4'),
+/// ('instance','<u4') behind them.
+void save_npy(const std::filesystem::path& file, std::span<const TreeHit> hits);
 void save_npy(const std::filesystem::path& file, std::span<const Hit> hits);
 
 }  // namespace raydix

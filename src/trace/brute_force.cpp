@@ -25,12 +25,13 @@ void closest_of_all(const Source& source, std::uint32_t count, const AnyRay& ray
         BasicTriangleHit<Scalar> hit;
         if (!intersect_triangle<EdgeRule::closed>(frame, source.corners(i), best.t, hit)) continue;
         // Ids ascend, so that an equal t never replaces an earlier hit.
-        if (hit.t < best.t || !best.hit()) best = {hit.t, i, hit.u, hit.v};
+        if (hit.t < best.t || !best.hit()) best = AnyHit{hit.t, i, hit.u, hit.v};
     }
-    if (best.hit())
-        best.t *= frame.t_scale;
-    else
+    if (!best.hit())
         best = {};
+    else
+        best.t *= frame.t_scale;
+    if constexpr (std::is_same_v<AnyHit, Hit>) best = hit_of_tree(best);
 }
 
 template <class AnyHit, class Source, class View, class AnyRay>

@@ -35,7 +35,7 @@ TraceCounts trace_block(const CwbvhView& view, const Cwbvh& tree, std::span<cons
     counts.rays = rays.size();
     Steps steps;
     for (std::size_t i = 0; i < rays.size(); ++i) {
-        Hit hit;
+        TreeHit hit;
         if (!is_valid(rays[i])) {
             ++counts.invalid_rays;
         } else if (!tree.empty()) {
@@ -77,8 +77,9 @@ TraceCounts trace_batch(const Cwbvh& tree, std::span<const Ray> rays, const Trac
 TraceCounts trace(const Cwbvh& tree, std::span<const Ray> rays, std::span<Hit> hits,
                   const TraceOptions& options) {
     check_sizes(rays.size(), hits.size());
-    return trace_batch<false>(tree, rays, options,
-                              [&](std::size_t i, const Hit& hit) { hits[i] = hit; });
+    return trace_batch<false>(tree, rays, options, [&](std::size_t i, const TreeHit& hit) {
+        hits[i] = hit_of_tree(hit);
+    });
 }
 
 std::vector<Hit> trace(const Cwbvh& tree, std::span<const Ray> rays, const TraceOptions& options) {
@@ -90,7 +91,7 @@ std::vector<Hit> trace(const Cwbvh& tree, std::span<const Ray> rays, const Trace
 TraceCounts trace_any(const Cwbvh& tree, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size());
-    return trace_batch<true>(tree, rays, options, [&](std::size_t i, const Hit& hit) {
+    return trace_batch<true>(tree, rays, options, [&](std::size_t i, const TreeHit& hit) {
         occluded[i] = hit.hit() ? 1 : 0;
     });
 }

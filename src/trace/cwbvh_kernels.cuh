@@ -14,12 +14,14 @@ inline constexpr unsigned all_lanes = 0xFFFFFFFFu;
 inline constexpr int least_active_lanes = 20;
 
 struct StoreHit {
-    Hit* hits;
-    __device__ void operator()(std::uint32_t i, const Hit& hit) const { hits[i] = hit; }
+    TreeHit* hits;
+    __device__ void operator()(std::uint32_t i, const TreeHit& hit) const { hits[i] = hit; }
 };
 struct StoreOccluded {
     std::uint8_t* occluded;
-    __device__ void operator()(std::uint32_t i, const Hit& hit) const { occluded[i] = hit.hit(); }
+    __device__ void operator()(std::uint32_t i, const TreeHit& hit) const {
+        occluded[i] = hit.hit();
+    }
 };
 
 __device__ inline Ray load_ray(const Ray* ray) {
@@ -33,7 +35,7 @@ __global__ void __launch_bounds__(128)
     cwbvh_rays(CwbvhView tree, const Ray* rays, std::uint32_t count, Store store) {
     const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
     if (i >= count) return;
-    Hit hit;
+    TreeHit hit;
     const Ray given = load_ray(rays + i);
     if (is_valid(given)) {
         CwbvhGroup stack[stack_entries];
@@ -83,7 +85,7 @@ __global__ void __launch_bounds__(128)
                     top = stack;
                     at_work = true;
                 } else {
-                    store(index, Hit{});
+                    store(index, TreeHit{});
                 }
             }
             more = __all_sync(all_lanes, at_work || index < count) != 0;

@@ -262,8 +262,9 @@ RAYDIX_HD CwbvhBest walk_cwbvh(const CwbvhView& tree, const CwbvhRay& ray, Cwbvh
     }
 }
 
-RAYDIX_HD inline Hit public_hit(const CwbvhBest& best, const RayFrame& ray) {
-    return best.prim == no_primitive ? Hit{} : Hit{best.t * ray.t_scale, best.prim, best.u, best.v};
+RAYDIX_HD inline TreeHit public_hit(const CwbvhBest& best, const RayFrame& ray) {
+    return best.prim == no_primitive ? TreeHit{}
+                                     : TreeHit{best.t * ray.t_scale, best.prim, best.u, best.v};
 }
 
 }  // namespace raydix

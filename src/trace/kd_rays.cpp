@@ -24,7 +24,7 @@ void count_test(Steps& steps) {
 template <class Steps>
 bool find_closest(const KdTreeView& tree, const LeafTriangle* triangles, const RayFrame& ray,
                   KdStack<KdRayPart>& stack, Steps& steps, Hit& result) {
-    Hit best{ray.tmax, no_primitive, 0.0f, 0.0f};
+    TreeHit best{ray.tmax, no_primitive, 0.0f, 0.0f};
     const auto leaf = [&](const KdNode& node) {
         for (std::uint32_t i = node.first; i < node.first + node.count(); ++i) {
             TriangleHit hit;
@@ -37,8 +37,8 @@ bool find_closest(const KdTreeView& tree, const LeafTriangle* triangles, const R
         return false;
     };
     walk_kd_tree(tree, ray, stack, steps, leaf, [&] { return best.t; });
-    result = best.hit() ? best : Hit{};
-    if (best.hit()) result.t *= ray.t_scale;
+    best.t *= ray.t_scale;
+    result = best.hit() ? hit_of_tree(best) : Hit{};
     return best.hit();
 }
 

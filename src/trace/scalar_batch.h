@@ -20,10 +20,19 @@ namespace raydix {
 
 inline constexpr std::size_t rays_per_block = 1024;
 
+/// AnyHit: Hit or HitD.
+template <class AnyHit, class Scalar>
+AnyHit hit_in_tree(Scalar t, std::uint32_t prim, Scalar u, Scalar v) {
+    if constexpr (std::is_same_v<AnyHit, Hit>)
+        return hit_of_tree({t, prim, u, v});
+    else
+        return {t, prim, u, v};
+}
+
 template <class AnyHit, class Scalar>
 AnyHit public_hit(const BasicClosestHit<Scalar>& best, const BasicRayFrame<Scalar>& ray) {
     if (best.prim == no_primitive) return {};
-    return {best.t * ray.t_scale, best.prim, best.u, best.v};
+    return hit_in_tree<AnyHit>(best.t * ray.t_scale, best.prim, best.u, best.v);
 }
 
 /// Calls one(i, frame, stack, steps) -> number of hits for each valid ray and miss(i) for each
@@ -100,7 +109,8 @@ All all_batch(const Tree& tree, std::span<const AnyRay> rays, std::uint64_t max_
             auto& block = found.hits(i / rays_per_block);
             const std::size_t before = block.size();
             find_all(tree, ray, stack, steps, [&](auto t, std::uint32_t k, auto u, auto v) {
-                block.push_back({t, tree.order[k], u, v});
+                block.push_back(
+                    hit_in_tree<typename decltype(All::hits)::value_type>(t, tree.order[k], u, v));
             });
             finish_ray(block, before);
             return hit_counts[i] = block.size() - before;

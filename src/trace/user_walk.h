@@ -69,7 +69,9 @@ public:
                        return min_of(best.t / frame.t_scale * Tree::reach_factor,
                                      std::numeric_limits<Scalar>::max());
                    });
-        return best.hit() ? best : AnyHit{};
+        if (!best.hit()) return {};
+        if constexpr (std::is_same_v<AnyHit, Hit>) best.geometry = 0;
+        return best;
     }
 
 private:

@@ -206,8 +206,8 @@ std::vector<Threads> traces(Inputs& in) {
         {"trace instances double",
          [&in](int n) { (void)trace(in.instances_d, in.rays_d, {.threads = n}); }},
         {"trace_reference",
-         [&in, hits](int n) {
-             auto to = hits();
+         [&in](int n) {
+             std::vector<TreeHit> to(in.rays.size());
              trace_reference(in.warp, in.rays, to, false, n);
          }},
         {"simulate", [&in](int n) { (void)simulate(in.warp, in.rays, {}, nullptr, n); }},

@@ -29,7 +29,7 @@ protected:
 };
 
 struct Results {
-    std::vector<Hit> hits;
+    std::vector<TreeHit> hits;
     std::vector<std::uint8_t> occluded;
 };
 
@@ -37,8 +37,9 @@ struct Results {
 Results results_of(const DeviceCwbvhTree& tree, std::span<const Ray> rays, CwbvhKernel kernel) {
     const auto n = static_cast<std::uint32_t>(rays.size());
     const DeviceBuffer<Ray> input(rays);
-    Results results{std::vector<Hit>(n + 1, Hit{7, 7, 7, 7}), std::vector<std::uint8_t>(n + 1, 77)};
-    DeviceBuffer<Hit> hits{std::span<const Hit>(results.hits)};
+    Results results{std::vector<TreeHit>(n + 1, TreeHit{7, 7, 7, 7}),
+                    std::vector<std::uint8_t>(n + 1, 77)};
+    DeviceBuffer<TreeHit> hits{std::span<const TreeHit>(results.hits)};
     DeviceBuffer<std::uint8_t> occluded{std::span<const std::uint8_t>(results.occluded)};
     DeviceBuffer<std::byte> scratch(256);
     const std::span<std::byte> lent(scratch.data(), device_cwbvh_scratch_bytes(kernel));
@@ -62,7 +63,7 @@ void compare(const std::string& what, const Bvh& bvh, std::span<const Ray> rays)
         const Results results = results_of(device.tree(), rays, kernel);
         std::uint64_t different = 0, wrong = 0;
         for (std::size_t i = 0; i < rays.size(); ++i) {
-            different += std::memcmp(&results.hits[i], &wanted[i], sizeof(Hit)) != 0;
+            different += std::memcmp(&results.hits[i], &wanted[i], sizeof(TreeHit)) != 0;
             wrong += (results.occluded[i] != 0) != wanted[i].hit();
         }
         EXPECT_EQ(different, 0u);

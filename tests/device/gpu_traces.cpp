@@ -29,7 +29,7 @@ protected:
 };
 
 struct Traced {
-    std::vector<Hit> hits;
+    std::vector<TreeHit> hits;
     std::uint32_t invalid = 0;
 };
 
@@ -38,8 +38,8 @@ Traced trace_there(const DeviceWarpTree& tree, std::span<const Ray> rays, WarpKe
     constexpr std::size_t guard = 4096;
     const std::uint32_t none = 0;
     const DeviceBuffer<Ray> from(rays);
-    const std::vector<Hit> garbage(rays.size(), Hit{-5.0f, 3, 2.0f, 1.0f});
-    const DeviceBuffer<Hit> to{std::span<const Hit>(garbage)};
+    const std::vector<TreeHit> garbage(rays.size(), TreeHit{-5.0f, 3, 2.0f, 1.0f});
+    const DeviceBuffer<TreeHit> to{std::span<const TreeHit>(garbage)};
     const DeviceBuffer<std::uint32_t> invalid{std::span(&none, 1)};
     const DeviceTraceOptions options{
         .kernel = kernel, .any_hit = any_hit, .invalid_rays = invalid.data()};
@@ -62,7 +62,7 @@ Traced trace_there(const DeviceWarpTree& tree, std::span<const Ray> rays, WarpKe
 void compare(const std::string& what, const WarpTree& host, const DeviceWarpTree& tree,
              std::span<const Ray> rays) {
     for (const bool any_hit : {false, true}) {
-        std::vector<Hit> expected(rays.size());
+        std::vector<TreeHit> expected(rays.size());
         trace_reference(host, rays, expected, any_hit);
         for (const WarpKernel kernel : warp_kernels()) {
             SCOPED_TRACE(what + ", " + std::string(warp_kernel_name(kernel)) +
@@ -70,8 +70,9 @@ void compare(const std::string& what, const WarpTree& host, const DeviceWarpTree
             const Traced traced = trace_there(tree, rays, kernel, any_hit);
             std::size_t different = 0;
             for (std::size_t i = 0; i < rays.size(); ++i)
-                different += any_hit ? traced.hits[i].hit() != expected[i].hit()
-                                     : std::memcmp(&traced.hits[i], &expected[i], sizeof(Hit)) != 0;
+                different += any_hit
+                                 ? traced.hits[i].hit() != expected[i].hit()
+                                 : std::memcmp(&traced.hits[i], &expected[i], sizeof(TreeHit)) != 0;
             EXPECT_EQ(different, 0u) << "of " << rays.size();
         }
     }
@@ -128,7 +129,7 @@ TEST_F(GpuTrace, WhatDoesNotFitIsRefused) {
     const Model scene = scene_of(random_soup(100, 8), "soup");
     const DeviceWarpTree tree(WarpTree(build_bvh(scene.mesh, {})));
     const DeviceBuffer<Ray> rays(64);
-    const DeviceBuffer<Hit> hits(64);
+    const DeviceBuffer<TreeHit> hits(64);
     const DeviceTraceOptions options;
     const std::size_t bytes = device_trace_scratch_bytes(tree, 64, options);
     const DeviceBuffer<std::byte> scratch(bytes);

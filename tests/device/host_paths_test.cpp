@@ -238,7 +238,7 @@ TEST(HostPaths, Rays) {
     for (std::uint32_t i = 0; i < rays.size(); ++i) {
         AnswerRay{rays.data(), corners.data(), static_cast<std::uint32_t>(corners.size()), &root,
                   answers.data()}(i);
-        ASSERT_TRUE(same_bits(answers[i].closest, hits[i])) << i;
+        ASSERT_TRUE(same_bits<TreeHit>(answers[i].closest, hits[i])) << i;
         ASSERT_EQ(answers[i].crossings, all.offsets[i + 1] - all.offsets[i]) << i;
         found += hits[i].hit();
     }

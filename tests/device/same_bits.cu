@@ -195,7 +195,7 @@ bool compare_rays(const Mesh& mesh, const Aabb& bounds, const std::vector<Ray>& 
     const std::vector<BvhNode> root{{bounds.lo, 0, bounds.hi, 0}};
     const DeviceArray<BvhNode> device_root(root);
     const auto n = static_cast<std::uint32_t>(rays.size());
-    std::vector<RayAnswer> host(rays.size(), RayAnswer{Hit{}, 0, {0.0f, 0.0f}});
+    std::vector<RayAnswer> host(rays.size(), RayAnswer{TreeHit{}, 0, {0.0f, 0.0f}});
     const DeviceArray<RayAnswer> device(host);
     const DeviceArray<Ray> device_rays(rays);
     const DeviceArray<LeafTriangle> device_corners(corners);

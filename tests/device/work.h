@@ -18,7 +18,7 @@ namespace raydix::device_test {
 /// What closest and half-open tests say of a ray against all triangles, and its interval in their
 /// box.
 struct RayAnswer {
-    Hit closest;              // t in the caller's units
+    TreeHit closest;          // t in the caller's units
     std::uint32_t crossings;  // half-open hits
     SlabInterval box;         // of the padded box around all triangles
 };
@@ -32,7 +32,7 @@ struct AnswerRay {
     RayAnswer* answers;
 
     RAYDIX_HD void operator()(std::uint32_t i) const {
-        RayAnswer answer{Hit{}, 0, {0.0f, 0.0f}};
+        RayAnswer answer{TreeHit{}, 0, {0.0f, 0.0f}};
         if (is_valid(rays[i])) {
             const RayFrame frame = make_frame(rays[i]);
             answer.box = intersect_slabs(make_slab_frame(frame, {root->lo, root->hi}), &root->lo.x,

@@ -70,7 +70,7 @@ struct World {
 };
 
 struct Sight {
-    std::vector<SceneHit> hits;
+    std::vector<Hit> hits;
     std::vector<std::uint32_t> masks;
 };
 
@@ -96,9 +96,9 @@ void look(const World& world, const std::vector<WideRayLine>& lines, const std::
         const std::vector<Hit> hits = trace_brute_force(item.mesh, entering, 1);
         for (std::size_t i = 0; i < rays.size(); ++i) {
             if (!seen[i] || !hits[i].hit()) continue;
-            const SceneHit found{hits[i], item.id, number};
-            SceneHit& best = sight.hits[i];
-            const auto key = [](const SceneHit& h) {
+            const Hit found{hits[i], item.id, number};
+            Hit& best = sight.hits[i];
+            const auto key = [](const Hit& h) {
                 return std::tuple(h.t, h.instance, h.geometry, h.prim);
             };
             if (!best.hit() || key(found) < key(best)) best = found;
@@ -107,14 +107,14 @@ void look(const World& world, const std::vector<WideRayLine>& lines, const std::
 }
 
 Sight look(const World& world, std::span<const Ray> rays, std::vector<std::uint32_t> masks) {
-    Sight sight{std::vector<SceneHit>(rays.size()), std::move(masks)};
+    Sight sight{std::vector<Hit>(rays.size()), std::move(masks)};
     std::vector<WideRayLine> lines;
     for (const Ray& ray : rays) lines.push_back({Double3(ray.origin), Double3(ray.direction)});
     look(world, lines, std::vector<bool>(rays.size(), true), rays, 0, sight);
     return sight;
 }
 
-bool same(const SceneHit& a, const SceneHit& b) {
+bool same(const Hit& a, const Hit& b) {
     return a.t == b.t && a.prim == b.prim && a.u == b.u && a.v == b.v && a.geometry == b.geometry &&
            a.instance == b.instance;
 }
@@ -168,7 +168,7 @@ std::vector<Ray> random_rays(Random& random, std::size_t count) {
 }
 
 /// Rays that end, or begin, where they hit: the bounds of boxes decide.
-std::vector<Ray> rays_to_hits(std::span<const Ray> rays, std::span<const SceneHit> hits) {
+std::vector<Ray> rays_to_hits(std::span<const Ray> rays, std::span<const Hit> hits) {
     std::vector<Ray> out;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         if (!hits[i].hit()) continue;
@@ -193,7 +193,7 @@ std::size_t differences(const World& world, std::span<const Ray> rays,
             SceneTraceOptions options;
             options.masks = masks, options.isa = isa, options.path = path;
             options.threads = 1 + static_cast<int>(path) % 2;
-            const std::vector<SceneHit> hits = trace(world.scene, rays, options);
+            const std::vector<Hit> hits = trace(world.scene, rays, options);
             std::vector<std::uint8_t> occluded(rays.size(), 7);
             trace_any(world.scene, rays, occluded, options);
             for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -216,7 +216,7 @@ std::size_t differences_with_ends(const World& world, Random& random, std::size_
     for (std::size_t i = 0; i < rays.size(); ++i) masks.push_back(random.mask());
     std::size_t wrong = differences(world, rays, masks);
     const Sight sight = look(world, rays, std::vector<std::uint32_t>(rays.size(), all));
-    for (const SceneHit& hit : sight.hits) hit_count += hit.hit();
+    for (const Hit& hit : sight.hits) hit_count += hit.hit();
     const std::vector<Ray> ends = rays_to_hits(rays, sight.hits);
     return wrong + differences(world, ends, std::vector<std::uint32_t>(ends.size(), all));
 }
@@ -251,9 +251,9 @@ TEST(Scene, ShearedInstancesLoseNoHits) {
 }
 
 /// All hits of every mesh on every path, ends as the rays have them.
-std::vector<std::vector<SceneHit>> look_for_all(const World& world, std::span<const Ray> rays,
-                                                std::uint32_t mask) {
-    std::vector<std::vector<SceneHit>> rows(rays.size());
+std::vector<std::vector<Hit>> look_for_all(const World& world, std::span<const Ray> rays,
+                                           std::uint32_t mask) {
+    std::vector<std::vector<Hit>> rows(rays.size());
     const std::function<void(const World&, const std::vector<WideRayLine>&, std::uint32_t)> visit =
         [&](const World& at, const std::vector<WideRayLine>& lines, std::uint32_t number) {
             std::uint32_t next = number + 1;
@@ -281,9 +281,8 @@ std::vector<std::vector<SceneHit>> look_for_all(const World& world, std::span<co
     for (const Ray& ray : rays) lines.push_back({Double3(ray.origin), Double3(ray.direction)});
     visit(world, lines, 0);
     for (auto& row : rows)
-        std::ranges::sort(row, {}, [](const SceneHit& h) {
-            return std::tuple(h.t, h.instance, h.geometry, h.prim);
-        });
+        std::ranges::sort(
+            row, {}, [](const Hit& h) { return std::tuple(h.t, h.instance, h.geometry, h.prim); });
     return rows;
 }
 
@@ -307,7 +306,7 @@ TEST(Scene, AllHitsAreThoseOfEveryMeshOnEveryPath) {
             EXPECT_EQ(hits.counts.hits, hits.hits.size());
             for (std::size_t i = 0; i < rays.size(); ++i) {
                 const auto first = hits.hits.begin() + static_cast<std::ptrdiff_t>(hits.offsets[i]);
-                const std::vector<SceneHit> row(
+                const std::vector<Hit> row(
                     first, hits.hits.begin() + static_cast<std::ptrdiff_t>(hits.offsets[i + 1]));
                 EXPECT_TRUE(std::ranges::equal(row, rows[i], same))
                     << "seed " << seed << ", ray " << i;
@@ -349,10 +348,10 @@ TEST(Scene, OfOneMeshGivesTheHitsOfItsTree) {
     const std::vector<Ray> rays = random_rays(random, 3000);
     const Scene scene(mesh);
     const std::vector<Hit> expected = trace(build_wide_bvh(mesh), rays);
-    const std::vector<SceneHit> hits = trace(scene, rays);
+    const std::vector<Hit> hits = trace(scene, rays);
     std::size_t found = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
-        SceneHit wanted{expected[i], no_primitive, 0};
+        Hit wanted{expected[i], no_primitive, 0};
         if (expected[i].hit()) wanted.geometry = 0, ++found;
         EXPECT_TRUE(same(hits[i], wanted)) << i;
         EXPECT_TRUE(same(closest_hit(scene, rays[i]), wanted)) << i;
@@ -373,8 +372,8 @@ TEST(Scene, TiesGoToTheLeastInstanceThenGeometryThenTriangle) {
     EXPECT_TRUE(same(closest_hit(scene, down), {{10, 0, 0.25f, 0.25f}, 1, 0}));
     for (const Usage usage : {Usage::fixed, Usage::moving}) {
         scene.commit({.usage = usage});
-        const std::vector<SceneHit> hits = trace(scene, std::vector<Ray>(100, down));
-        for (const SceneHit& hit : hits) EXPECT_EQ(hit.geometry, 1u);
+        const std::vector<Hit> hits = trace(scene, std::vector<Ray>(100, down));
+        for (const Hit& hit : hits) EXPECT_EQ(hit.geometry, 1u);
     }
 }
 
@@ -465,7 +464,7 @@ TEST(Scene, HitsNameMeshesOfAnySize) {
     }
     scene.commit();
     for (std::size_t k = 0; k < wanted.size(); ++k) {
-        const SceneHit hit =
+        const Hit hit =
             closest_hit(scene, {{static_cast<float>(2 * k) + 0.25f, 0.25f, 1}, 0, {0, 0, -1}});
         EXPECT_EQ(hit.geometry, wanted[k].first) << k;
         EXPECT_EQ(hit.prim, wanted[k].second) << k;
@@ -496,7 +495,7 @@ TEST(Scene, NothingToHit) {
     scene.add(Mesh{});
     scene.add(one_triangle(0), {.mask = 0, .id = {}});
     scene.commit();
-    for (const SceneHit& hit : trace(scene, std::vector<Ray>(50, down))) EXPECT_FALSE(hit.hit());
+    for (const Hit& hit : trace(scene, std::vector<Ray>(50, down))) EXPECT_FALSE(hit.hit());
     EXPECT_TRUE(trace(scene, std::vector<Ray>{}).empty());
 }
 
@@ -589,14 +588,14 @@ TEST(Scene, TracesWhileAnotherIsCommitted) {
     old.commit();
     Random random(8);
     const std::vector<Ray> rays = random_rays(random, 500);
-    const std::vector<SceneHit> expected = trace(old, rays);
+    const std::vector<Hit> expected = trace(old, rays);
     std::atomic<std::size_t> wrong = 0;
     std::atomic<bool> done = false;
     std::vector<std::thread> threads;
     for (int t = 0; t < 2; ++t)
         threads.emplace_back([&] {
             do {
-                const std::vector<SceneHit> hits = trace(old, rays, {.threads = 1});
+                const std::vector<Hit> hits = trace(old, rays, {.threads = 1});
                 for (std::size_t i = 0; i < rays.size(); ++i) {
                     wrong += !same(hits[i], expected[i]);
                     wrong += i % 7 == 0 && !same(closest_hit(old, rays[i]), expected[i]);

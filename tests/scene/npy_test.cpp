@@ -83,8 +83,8 @@ TEST(Npy, rays_come_back) {
 
 TEST(Npy, hits_are_structured) {
     const TempFolder folder;
-    const std::vector<Hit> hits{{1.5f, 7, 0.25f, 0.5f}, {}};
-    save_npy(folder.path() / "hits.npy", std::span<const Hit>(hits));
+    const std::vector<TreeHit> hits{{1.5f, 7, 0.25f, 0.5f}, {}};
+    save_npy(folder.path() / "hits.npy", std::span<const TreeHit>(hits));
     const std::string bytes = file_text(folder.path() / "hits.npy");
     ASSERT_EQ(bytes.size() % 64, 32u);
     EXPECT_NE(bytes.find("{'descr': [('t', '<f4'), ('prim', '<u4'), ('u', '<f4'), ('v', '<f4')], "

@@ -184,7 +184,7 @@ void run_launch(const WarpJob& job, std::uint32_t stack_entries) {
 void compare_with_reference(const WarpTree& tree, std::span<const Ray> rays, WarpKernel kernel,
                             bool any_hit) {
     SCOPED_TRACE(std::string(warp_kernel_name(kernel)) + (any_hit ? ", any" : ", closest"));
-    std::vector<Hit> expected(rays.size()), hits(rays.size(), Hit{-1.0f, 7, 7.0f, 7.0f});
+    std::vector<TreeHit> expected(rays.size()), hits(rays.size(), TreeHit{-1.0f, 7, 7.0f, 7.0f});
     trace_reference(tree, rays, expected, any_hit);
     const PreparedRays prepared(rays);
     std::uint32_t next = 0;
@@ -203,7 +203,7 @@ void compare_with_reference(const WarpTree& tree, std::span<const Ray> rays, War
         if (any_hit)
             ASSERT_EQ(hits[i].hit(), expected[i].hit()) << "ray " << i;
         else
-            ASSERT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(Hit)), 0) << "ray " << i;
+            ASSERT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(TreeHit)), 0) << "ray " << i;
     }
 }
 

@@ -123,7 +123,7 @@ Hit LineTree::closest(const Ray& ray) const {
             return;
         if (hit.t > nearest || (hit.t == nearest && best.hit() && i > best.prim)) return;
         nearest = hit.t;
-        best = {hit.t * frame.t_scale, i, hit.u, hit.v};
+        best = hit_of_tree({hit.t * frame.t_scale, i, hit.u, hit.v});
     });
     return best;
 }
@@ -136,7 +136,7 @@ std::vector<Hit> LineTree::all(const Ray& ray) const {
     visit_candidates(ray, [&](std::uint32_t i) {
         TriangleHit hit;
         if (intersect_triangle<EdgeRule::half_open>(frame, corners_of(source, i), frame.tmax, hit))
-            hits.push_back({hit.t * frame.t_scale, i, hit.u, hit.v});
+            hits.push_back(hit_of_tree({hit.t * frame.t_scale, i, hit.u, hit.v}));
     });
     std::ranges::sort(hits, [](const Hit& a, const Hit& b) {
         return a.t < b.t || (a.t == b.t && a.prim < b.prim);

@@ -29,6 +29,10 @@ template <class T>
 std::string digest(const std::vector<T>& values) {
     return digest(std::span<const T>(values));
 }
+/// Of t, prim, u and v alone.
+std::string digest(const std::vector<Hit>& hits) {
+    return digest(std::vector<TreeHit>(hits.begin(), hits.end()));
+}
 
 struct Digests {
     const char* scene;

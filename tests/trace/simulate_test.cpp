@@ -51,7 +51,7 @@ TEST(Simulate, CountsOfWhileWhileByPencil) {
     for (int k = 0; k < 8; ++k) rays.push_back(down(0.9f, 0.9f));
     for (int k = 0; k < 16; ++k) rays.push_back(down(5, 5));
     const std::vector<SimulateOptions> runs{options_for(WarpKernel::while_while)};
-    std::vector<std::vector<Hit>> hits;
+    std::vector<std::vector<TreeHit>> hits;
     const Simulation s = simulate(tree, rays, runs, &hits).front();
     EXPECT_EQ(s.hits, 8u);
     expect_count(s, Op::start_ray, 1, 32);
@@ -233,7 +233,7 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
     OpCosts costs;
     costs.fill(1);
     for (const WarpKernel name : warp_kernels()) {
-        std::vector<std::vector<Hit>> hits;
+        std::vector<std::vector<TreeHit>> hits;
         std::vector<std::uint64_t> issued;
         for (const SimulatorIsa isa : {SimulatorIsa::base, SimulatorIsa::v3}) {
             const SimulatedKernel& kernel = *simulated_kernel(name, false, 32, isa);
@@ -253,7 +253,7 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
             issued.push_back(tally.issued);
         }
         EXPECT_EQ(issued[0], issued[1]) << warp_kernel_name(name);
-        EXPECT_EQ(std::memcmp(hits[0].data(), hits[1].data(), 640 * sizeof(Hit)), 0)
+        EXPECT_EQ(std::memcmp(hits[0].data(), hits[1].data(), 640 * sizeof(TreeHit)), 0)
             << warp_kernel_name(name);
     }
 }
@@ -266,7 +266,7 @@ TEST(Simulate, PoolsLoseAndRepeatNoRayWhateverTheDelays) {
     for (std::size_t i = 0; i < some.size(); i += 3) some[i].tmax = 0.0f;  // very short lives
     const PreparedRays rays(some);
     const auto count = static_cast<std::uint32_t>(some.size());
-    std::vector<Hit> expected(count);
+    std::vector<TreeHit> expected(count);
     trace_reference(tree, some, expected);
     const std::vector<SimulateOptions> reference_run{options_for(WarpKernel::while_while)};
     const std::uint64_t visits =
@@ -281,7 +281,7 @@ TEST(Simulate, PoolsLoseAndRepeatNoRayWhateverTheDelays) {
         const SimulatedKernel& kernel = *simulated_kernel(name, false, 8);
         constexpr int warps = 6;
         std::vector<WarpTally> tallies(warps);
-        std::vector<Hit> hits(count, Hit{-5.0f, 7u, 0, 0});
+        std::vector<TreeHit> hits(count, TreeHit{-5.0f, 7u, 0, 0});
         std::uint32_t next = 0;
         const WarpJob job{{arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
                           {rays.rays().data(), hits.data(), count, &next}};
@@ -307,7 +307,7 @@ TEST(Simulate, PoolsLoseAndRepeatNoRayWhateverTheDelays) {
             EXPECT_EQ(visited, visits) << "a ray was lost or traced twice";
         }
         for (std::uint32_t i = 0; i < count; ++i)
-            ASSERT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(Hit)), 0) << i;
+            ASSERT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(TreeHit)), 0) << i;
     }
 }
 
@@ -316,13 +316,13 @@ TEST(Simulate, EmptyTreesAndNoRays) {
     std::vector<SimulateOptions> runs;
     for (const WarpKernel kernel : warp_kernels()) runs.push_back(options_for(kernel));
     const std::vector<Ray> rays(3, down(0, 0));
-    std::vector<std::vector<Hit>> hits;
+    std::vector<std::vector<TreeHit>> hits;
     for (const Simulation& s : simulate(nothing, rays, runs, &hits)) {
         EXPECT_EQ(s.rays, 3u);
         EXPECT_EQ(s.hits, 0u);
     }
     for (const auto& row : hits)
-        for (const Hit& hit : row) EXPECT_FALSE(hit.hit());
+        for (const TreeHit& hit : row) EXPECT_FALSE(hit.hit());
     const WarpTree tree(build_bvh(two_triangles()));
     for (const Simulation& s : simulate(tree, {}, runs)) EXPECT_EQ(s.rays, 0u);
 }

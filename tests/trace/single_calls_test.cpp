@@ -50,10 +50,11 @@ TEST(SingleCalls, FindTheSameWhateverCameBefore) {
                     CallHistory history;
                     history.agreeing = agreeing;
                     const WideStackView stack{words.data(), entries.data()};
-                    const Hit hit = kernels.closest(tree.arrays(), view.rays[i], stack, history);
+                    const Hit hit =
+                        hit_of_tree(kernels.closest(tree.arrays(), view.rays[i], stack, history));
                     coherent += history.is_coherent();
                     different += !same_bits(hit, view.hits[i]);
-                    const Hit any = kernels.any(tree.arrays(), view.rays[i], stack, history);
+                    const TreeHit any = kernels.any(tree.arrays(), view.rays[i], stack, history);
                     different += any.hit() != view.hits[i].hit();
                 }
                 EXPECT_EQ(different, 0u);

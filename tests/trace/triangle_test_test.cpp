@@ -25,7 +25,7 @@ std::optional<Hit> shoot(const Ray& ray, const LeafTriangle& triangle) {
     const RayFrame frame = make_frame(ray);
     TriangleHit hit;
     if (!intersect_triangle<rule>(frame, triangle, frame.tmax, hit)) return std::nullopt;
-    return Hit{hit.t * frame.t_scale, 0, hit.u, hit.v};
+    return hit_of_tree({hit.t * frame.t_scale, 0, hit.u, hit.v});
 }
 
 Vec3 turned(Vec3 p, int axis) {  // z goes to `axis`, the winding stays

@@ -40,10 +40,10 @@ void expect_hits_of_the_reference(const Model& scene, std::size_t count, int max
     const Bvh bvh = build_bvh(scene.mesh, {.builder = Builder::ploc, .max_leaf = max_leaf});
     const WarpTree tree(bvh);
     for (const bool any_hit : {false, true}) {
-        std::vector<Hit> expected(rays.size());
+        std::vector<TreeHit> expected(rays.size());
         trace_reference(tree, rays, expected, any_hit);
         const std::vector<SimulateOptions> runs = every_run(any_hit);
-        std::vector<std::vector<Hit>> hits;
+        std::vector<std::vector<TreeHit>> hits;
         const std::vector<Simulation> figures = simulate(tree, rays, runs, &hits);
         for (std::size_t k = 0; k < runs.size(); ++k) {
             SCOPED_TRACE(std::string(warp_kernel_name(runs[k].kernel)) + " width " +
@@ -51,7 +51,7 @@ void expect_hits_of_the_reference(const Model& scene, std::size_t count, int max
             std::size_t different = 0;
             for (std::size_t i = 0; i < rays.size(); ++i)
                 different += any_hit ? hits[k][i].hit() != expected[i].hit()
-                                     : std::memcmp(&hits[k][i], &expected[i], sizeof(Hit)) != 0;
+                                     : std::memcmp(&hits[k][i], &expected[i], sizeof(TreeHit)) != 0;
             EXPECT_EQ(different, 0u);
             EXPECT_EQ(figures[k].rays, rays.size());
         }

@@ -36,7 +36,7 @@ Hit closest(const Bvh& bvh, const WideTree& tree, const Ray& given, WideStack& s
         return false;
     };
     walk_wide(tree, bvh.bounds(), ray, stack, steps, leaf, [&] { return best.t; });
-    return best.hit() ? Hit{best.t * ray.t_scale, best.prim, best.u, best.v} : Hit{};
+    return best.hit() ? hit_of_tree({best.t * ray.t_scale, best.prim, best.u, best.v}) : Hit{};
 }
 
 void expect_like_scalar(const Model& scene, const BuildOptions& options) {

@@ -248,7 +248,7 @@ HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, cons
     }
     for (; k < p.count; ++k)
         *job.hits.at(static_cast<std::size_t>(index[k])) =
-            p.prim[k] != no_primitive ? Hit{p.t[k], p.prim[k], p.u[k], p.v[k]} : Hit{};
+            p.prim[k] != no_primitive ? TreeHit{p.t[k], p.prim[k], p.u[k], p.v[k]} : TreeHit{};
 }
 
 /// The rays of a job in packets.
@@ -405,7 +405,7 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
                 job.occluded[*index] = hit;
             else
                 *job.hits.at(static_cast<std::size_t>(*index)) =
-                    hit ? Hit{ray.t, ray.prim, found->u, found->v} : Hit{};
+                    hit ? TreeHit{ray.t, ray.prim, found->u, found->v} : TreeHit{};
             ++found, ++index;
         }
     }

@@ -21,11 +21,11 @@ struct SimdCounts {
 
 /// Where hits go: `bytes` apart, as they are at the beginning of larger structs. null: none.
 struct HitRows {
-    Hit* first = nullptr;
-    std::size_t bytes = sizeof(Hit);
+    TreeHit* first = nullptr;
+    std::size_t bytes = sizeof(TreeHit);
 
-    [[nodiscard]] Hit* at(std::size_t i) const {
-        return reinterpret_cast<Hit*>(reinterpret_cast<char*>(first) + bytes * i);
+    [[nodiscard]] TreeHit* at(std::size_t i) const {
+        return reinterpret_cast<TreeHit*>(reinterpret_cast<char*>(first) + bytes * i);
     }
     explicit operator bool() const { return first != nullptr; }
 };
@@ -45,8 +45,8 @@ struct SimdJob {
     bool counting;
 };
 
-using OneRay = Hit(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,
-                   CallHistory& history);
+using OneRay = TreeHit(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,
+                       CallHistory& history);
 
 struct SimdKernels {
     std::string_view isa;

@@ -33,9 +33,9 @@ enum class Wanted { closest, any, all };
 struct NoParts {};
 
 /// `guessing`: rays that follow each other take much the same way. Row: what all hits are kept as,
-/// a Hit and perhaps more.
+/// a TreeHit and perhaps more.
 template <Wanted wanted, bool counting, bool compact, bool guessing = false, class Parts = NoParts,
-          class Row = Hit>
+          class Row = TreeHit>
 class SingleRay {
 public:
     /// `parts` and the ray's place in the job: unless leaves hold triangles.
@@ -264,8 +264,8 @@ private:
                 if (intersect_triangle<EdgeRule::half_open>(ray, triangle_of(block, lane), best_.t,
                                                             hit)) {
                     Row row;
-                    static_cast<Hit&>(row) = {hit.t * frame_.t_scale, block.prim[lane], hit.u,
-                                              hit.v};
+                    static_cast<TreeHit&>(row) = {hit.t * frame_.t_scale, block.prim[lane], hit.u,
+                                                  hit.v};
                     all_->push_back(row);
                 }
             }
@@ -359,8 +359,8 @@ HWY_INLINE WideBest search(const WideView& tree, const SingleFrame& frame,
 
 /// A miss if the ray is invalid; for any hit only `prim` has a meaning.
 template <bool any, bool counting, bool compact>
-HWY_INLINE Hit find_one(const WideView& tree, const Ray& ray, const WideStackView& stack,
-                        SimdCounts& counts, CallHistory* history = nullptr) {
+HWY_INLINE TreeHit find_one(const WideView& tree, const Ray& ray, const WideStackView& stack,
+                            SimdCounts& counts, CallHistory* history = nullptr) {
     SingleFrame frame;
     if (!fill_frame(tree, ray, frame)) {
         ++counts.invalid;
@@ -376,7 +376,7 @@ HWY_INLINE Hit find_one(const WideView& tree, const Ray& ray, const WideStackVie
 
 template <bool any, bool counting, bool compact>
 void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
-    const Hit hit = find_one<any, counting, compact>(job.tree, job.rays[i], job.stack, counts);
+    const TreeHit hit = find_one<any, counting, compact>(job.tree, job.rays[i], job.stack, counts);
     if constexpr (any)
         job.occluded[i] = hit.hit() ? 1 : 0;
     else
@@ -399,8 +399,10 @@ void trace_all_of(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t* h
         if (!fill_frame(job.tree, job.rays[i], frame)) {
             ++counts.invalid;
         } else {
-            SingleRay<Wanted::all, counting, compact>(job.tree, frame, job.stack, counts)
+            SingleRay<Wanted::all, counting, compact, false, NoParts, Hit>(job.tree, frame,
+                                                                           job.stack, counts)
                 .trace_all(found);
+            for (std::size_t k = before; k < found.size(); ++k) found[k].geometry = 0;
             finish_ray(found, before);
         }
         hit_counts[i] = found.size() - before;
@@ -435,8 +437,8 @@ inline void single(const SimdJob& job, SimdCounts& counts) {
 }
 
 template <bool any>
-Hit one(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,
-        CallHistory& history) {
+TreeHit one(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,
+            CallHistory& history) {
     SimdCounts counts;
     TriangleBlock room;
     if (!arrays.stats.compact)

@@ -135,6 +135,14 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
     return sum_of(parts, rays.size(), options.counters);
 }
 
+HitRows rows_of(std::span<Hit> hits) { return {hits.data(), sizeof(Hit)}; }
+
+/// Kernels write what one tree knows of a hit: the rest, where there is only one geometry.
+void place_in_tree(Hit& hit) {
+    hit.geometry = hit.hit() ? 0 : no_primitive;
+    hit.instance = 0;
+}
+
 /// Largest jobs, one after the other, in the caller's floating-point environment.
 void trace_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
                           std::uint8_t* occluded) {
@@ -167,7 +175,11 @@ TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit>
     check_sizes(rays.size(), hits.size());
     check_call(options);
     static_cast<void>(kernels_for(options.isa));
-    if (!tree.empty()) return trace_batch(tree, rays, {hits.data()}, nullptr, options);
+    const RowsDone place = [&](const std::uint32_t* order, std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k)
+            place_in_tree(hits[order == nullptr ? k : order[k]]);
+    };
+    if (!tree.empty()) return trace_batch(tree, rays, rows_of(hits), nullptr, options, &place);
     std::ranges::fill(hits, Hit{});
     return miss_all(rays);
 }
@@ -191,10 +203,12 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
 
 void closest_here(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit> hits) {
     check_sizes(rays.size(), hits.size());
-    if (tree.empty())
+    if (tree.empty()) {
         std::ranges::fill(hits, Hit{});
-    else
-        trace_on_this_thread(tree, rays, {hits.data()}, nullptr);
+        return;
+    }
+    trace_on_this_thread(tree, rays, rows_of(hits), nullptr);
+    std::ranges::for_each(hits, place_in_tree);
 }
 
 void occluded_here(const WideBvh& tree, std::span<const Ray> rays,
@@ -294,7 +308,7 @@ namespace {
 thread_local CallHistory call_history;
 
 /// In a plain environment.
-Hit trace_one_ray(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
+TreeHit trace_one_ray(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
     constexpr std::size_t inside = 512;
     if (wide_stack_capacity(tree.stats().max_depth) > inside) {
         StackMemory stack(tree.stats().max_depth);
@@ -305,7 +319,7 @@ Hit trace_one_ray(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
     return kernel(tree.arrays(), ray, {words, entries}, call_history);
 }
 
-Hit one_ray(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
+TreeHit one_ray(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
     if (FloatEnvironment::is_plain()) return trace_one_ray(kernel, tree, ray);
     const FloatEnvironment plain;
     return trace_one_ray(kernel, tree, ray);
@@ -315,7 +329,7 @@ Hit one_ray(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
 
 Hit closest_hit(const WideBvh& tree, const Ray& ray) {
     static OneRay* const kernel = simd_kernels().front().closest;
-    return tree.empty() ? Hit{} : one_ray(kernel, tree, ray);
+    return tree.empty() ? Hit{} : hit_of_tree(one_ray(kernel, tree, ray));
 }
 
 bool any_hit(const WideBvh& tree, const Ray& ray) {

@@ -57,7 +57,7 @@ RAYDIX_HD static inline bool has_ray(const Lane& l) { return l.ray != no_ray; }
 /// The rays of one launch and where their hits go. On a device both are aligned to 16 bytes.
 struct RayLaunch {
     const Ray* rays;  // [count]
-    Hit* hits;        // [count], out
+    TreeHit* hits;    // [count], out
     std::uint32_t count;
     std::uint32_t* next;  // the pool's counter, of kernels that fetch; starts at 0
 };

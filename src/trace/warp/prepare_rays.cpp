@@ -16,7 +16,7 @@ PreparedRays::PreparedRays(std::span<const Ray> rays) : rays_(rays.begin(), rays
     }
 }
 
-void PreparedRays::rescale(std::span<Hit> hits) const {
+void PreparedRays::rescale(std::span<TreeHit> hits) const {
     for (const Scale& scale : scaled_) hits[scale.ray].t *= scale.t_scale;
 }
 

@@ -47,10 +47,10 @@ struct PrepareRay {
     }
 };
 
-/// Hit i back to the caller's units.
+/// TreeHit i back to the caller's units.
 struct RescaleHit {
     const Ray* rays;  // [n], the caller's
-    Hit* hits;        // [n], in and out
+    TreeHit* hits;    // [n], in and out
     RAYDIX_HD void operator()(std::uint32_t i) const {
         const Ray ray = rays[i];
         if (!is_valid(ray)) return;
@@ -67,7 +67,7 @@ public:
     [[nodiscard]] std::span<const Ray> rays() const { return rays_; }
     [[nodiscard]] std::uint64_t invalid() const { return invalid_; }
     /// t of `hits` back to the units of the caller's directions.
-    void rescale(std::span<Hit> hits) const;
+    void rescale(std::span<TreeHit> hits) const;
 
 private:
     std::vector<Ray> rays_;

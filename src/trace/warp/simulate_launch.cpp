@@ -223,7 +223,7 @@ OpCosts op_costs(const MachineModel& machine, WarpKernel kernel) {
 }
 
 Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
-                           std::span<const Ray> rays, std::span<Hit> hits,
+                           std::span<const Ray> rays, std::span<TreeHit> hits,
                            const SimulateOptions& options, std::span<const MemoryRange> memory) {
     std::uint32_t next = 0;
     LaunchRun run{
@@ -252,7 +252,7 @@ Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
     for (const OperationFigure& op : figures.operations)
         figures.lane_instructions += op.lanes * op.instructions;
     figures.hits = static_cast<std::uint64_t>(
-        std::count_if(hits.begin(), hits.end(), [](const Hit& hit) { return hit.hit(); }));
+        std::count_if(hits.begin(), hits.end(), [](const TreeHit& hit) { return hit.hit(); }));
     if (run.memory) {
         figures.l1_transactions = run.memory->l1_transactions();
         figures.l2_bytes = run.memory->l2_bytes();

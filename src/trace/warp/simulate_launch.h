@@ -19,7 +19,7 @@ namespace raydix {
 /// rays [n], prepared (prepare_rays.h), fewer than 2^31 -> hits [n]. `stack_entries`: at least the
 /// tree's depth. `memory`: the scene's arrays, for the memory model.
 [[nodiscard]] Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
-                                         std::span<const Ray> rays, std::span<Hit> hits,
+                                         std::span<const Ray> rays, std::span<TreeHit> hits,
                                          const SimulateOptions& options,
                                          std::span<const MemoryRange> memory);
 

@@ -71,7 +71,7 @@ RAYDIX_HD static inline Ray load_ray(const Ray* ray) {
     return *ray;
 #endif
 }
-RAYDIX_HD static inline void write_hit(Hit* to, const Hit& hit) {
+RAYDIX_HD static inline void write_hit(TreeHit* to, const TreeHit& hit) {
 #if defined(__CUDA_ARCH__)
     *reinterpret_cast<float4*>(to) = make_float4(hit.t, __uint_as_float(hit.prim), hit.u, hit.v);
 #else
@@ -103,7 +103,7 @@ RAYDIX_HD static inline void start_ray(Lane& l, const RayLaunch& launch, std::ui
 
 RAYDIX_HD static inline void store_hit(Lane& l, const RayLaunch& launch) {
     if (l.ray != no_ray)
-        launch.hits[l.ray] = Hit{l.prim == no_primitive ? infinity : l.t, l.prim, l.u, l.v};
+        launch.hits[l.ray] = TreeHit{l.prim == no_primitive ? infinity : l.t, l.prim, l.u, l.v};
     l.ray = no_ray;
 }
 
