@@ -26,8 +26,9 @@ struct Transform {
 
 /// What happens to a scene after its first commit.
 enum class Usage : std::uint32_t {
-    fixed = 0,   // little: meshes share trees, and a change of one builds its tree again
-    moving = 1,  // much: a tree a mesh; a commit builds only those of meshes that changed
+    fixed = 0,  // little: meshes share trees, and a change of one builds its tree again
+    moving =
+        1,  // much: a tree a mesh; a commit refits those of meshes that changed, or builds them
 };
 
 struct SceneOptions {
@@ -35,6 +36,11 @@ struct SceneOptions {
     Usage usage = Usage::fixed;
     bool compact = false;  // the small layout (WideBvhOptions::compact)
     int threads = 0;       // 0 to 1,024; 0: all the machine has. Hits do not depend on it
+    /// Usage::moving: the tree of a mesh whose vertices moved is kept, its boxes fitted again,
+    /// while its SAH is at most so many times that at its build. Below 1 nothing is refitted, nor
+    /// are compact trees and those that hold parts of triangles (quality high), nor where triangles
+    /// come, go or lose their area.
+    double refit_limit = 1.5;
 };
 
 /// Of a geometry. Rays see it if mask & their mask is not 0, and the same holds for each instance
@@ -50,8 +56,10 @@ struct CommitReport {
     std::uint64_t meshes = 0, instances = 0;  // of the scene itself
     std::uint64_t triangles = 0;              // of its meshes
     std::uint64_t trees_built = 0;            // of triangles; those that did not change are kept
-    std::uint64_t bytes = 0;                  // what rays read of the scene itself
-    std::uint64_t paths = 0;                  // instances, counted on every way to them
+    std::uint64_t trees_refitted = 0;
+    double sah_ratio = 1;     // SAH now / at the build, the largest of those that could be refitted
+    std::uint64_t bytes = 0;  // what rays read of the scene itself
+    std::uint64_t paths = 0;  // instances, counted on every way to them
 };
 
 /// Meshes, and instances of other scenes, which may hold instances themselves. Changes take effect

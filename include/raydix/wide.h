@@ -62,6 +62,7 @@ public:
 
 private:
     friend class WideBvhBuilder;
+    friend struct WideBvhAccess;
     std::unique_ptr<Arrays> arrays_;
 };
 

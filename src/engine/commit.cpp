@@ -3,10 +3,12 @@
 #include <raydix/error.h>
 
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "engine/part_tree.h"
 #include "exec/parallel.h"
+#include "layout/wide_refit.h"
 
 namespace raydix {
 namespace {
@@ -102,9 +104,11 @@ private:
         if (const MeshTree* const old = kept(group)) {
             out->tree = old->tree, out->first = old->first, out->triangles = old->triangles;
             out->view = old->view;
+            out->sah_at_build = old->sah_at_build;
             out->make_buckets();
             return out;
         }
+        if (refit(group, *out)) return out;
         WideBvh built;
         WideBvhBuilder builder;
         BuildOptions build = build_options_for(options_.quality);
@@ -121,24 +125,54 @@ private:
             builder.build(mesh, build, built, wide);
         }
         ++report_.trees_built;
-        out->make_buckets();
-        out->tree = std::make_shared<const WideBvh>(std::move(built));
-        TriangleBlock none;
-        out->view = view_of(out->tree->arrays(), none);
-        out->view.room = nullptr;
+        out->sah_at_build = built.stats().sah;
+        finish(std::move(built), *out);
         return out;
     }
 
-    /// The tree that the last commit made of the same triangles in the same way.
-    [[nodiscard]] const MeshTree* kept(const Group& group) const {
+    static void finish(WideBvh tree, MeshTree& out) {
+        out.make_buckets();
+        out.tree = std::make_shared<const WideBvh>(std::move(tree));
+        TriangleBlock none;
+        out.view = view_of(out.tree->arrays(), none);
+        out.view.room = nullptr;
+    }
+
+    /// The tree that the last commit made of the same meshes in the same way.
+    [[nodiscard]] const MeshTree* last_of(const Group& group) const {
         if (state_.tree == nullptr || options_.quality != state_.tree_options.quality ||
             options_.compact != state_.tree_options.compact)
             return nullptr;
-        for (const std::uint32_t id : group.ids)
-            if (state_.geometries.at(id).changed) return nullptr;
         for (const auto& mesh : state_.tree->meshes)
             if (mesh->ids == group.ids) return mesh.get();
         return nullptr;
+    }
+    /// The same if nothing of them changed.
+    [[nodiscard]] const MeshTree* kept(const Group& group) const {
+        for (const std::uint32_t id : group.ids)
+            if (state_.geometries.at(id).changed) return nullptr;
+        return last_of(group);
+    }
+
+    /// The last tree around one mesh whose vertices moved, if it is still good enough.
+    bool refit(const Group& group, MeshTree& out) {
+        if (options_.usage != Usage::moving || options_.refit_limit < 1) return false;
+        const MeshTree* const old = last_of(group);
+        if (old == nullptr) return false;
+        const MeshView& mesh = state_.geometries.at(group.ids.front()).mesh;
+        std::optional<WideBvh> tree =
+            group.ids.size() == 1 ? refit_wide(*old->tree, mesh) : std::nullopt;
+        if (!tree) return false;
+        const double now = tree->stats().sah, then = old->sah_at_build;
+        const double ratio = now > 0 && then > 0 ? now / then : 1.0;
+        report_.sah_ratio = std::max(report_.sah_ratio, ratio);
+        if (ratio > options_.refit_limit) return false;
+        ++report_.trees_refitted;
+        out.first = {0};
+        out.triangles = mesh.triangles.size();
+        out.sah_at_build = then;
+        finish(std::move(*tree), out);
+        return true;
     }
 
     void place_instances() {

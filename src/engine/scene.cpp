@@ -179,6 +179,9 @@ void Scene::set_mask(std::uint32_t id, std::uint32_t mask) {
 CommitReport Scene::commit(const SceneOptions& options) {
     check_enum("quality", options.quality, Quality::high);
     check_enum("usage", options.usage, Usage::moving);
+    if (!(options.refit_limit >= 0))
+        throw InputError("refit_limit: expected 0 or more, given " +
+                         std::to_string(options.refit_limit));
     const auto start = std::chrono::steady_clock::now();
     CommitReport report;
     std::shared_ptr<const SceneTree> tree = make_scene_tree(*state_, options, report);

@@ -120,6 +120,14 @@ struct WideBvh::Arrays {
     }
 };
 
+struct WideBvhAccess {
+    static WideBvh tree_of(std::unique_ptr<WideBvh::Arrays> arrays) {
+        WideBvh tree;
+        tree.arrays_ = std::move(arrays);
+        return tree;
+    }
+};
+
 /// Fills the boxes of a node.
 void set_boxes_about(Vec3 middle, const SlotBoxes& boxes, WideNode& node);
 

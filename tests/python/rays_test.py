@@ -185,9 +185,9 @@ def test_invalid_rays_miss():
     assert scene.occluded(rays).tolist() == [False] * 5 + [True]
     single = [scene.intersect(ray)["prim"] != raydix.MISSING for ray in rays]
     assert single == [False] * 5 + [True]
-    assert scene._core.intersect(rays, np.empty((6, 4), "f4"), 0) == (1, 5)
+    assert scene._core.intersect(rays, np.empty((6, 6), "f4"), 0) == (1, 5)
     assert [
-        scene._core.intersect(rays[i : i + 1], np.empty((1, 4), "f4"), 0) for i in range(6)
+        scene._core.intersect(rays[i : i + 1], np.empty((1, 6), "f4"), 0) for i in range(6)
     ] == [(0, 1)] * 5 + [(1, 0)]
 
 
