@@ -164,9 +164,9 @@ private:
     const std::uint32_t triangles_;
     std::vector<std::uint32_t> by_depth_;
     std::vector<std::size_t> level_;
-    std::vector<SlotBoxes> boxes_;        // [nodes]
-    std::vector<Aabb> around_;            // [nodes]
-    std::vector<double> leaf_area_;       // [nodes], times the triangles
+    std::vector<SlotBoxes> boxes_;       // [nodes]
+    std::vector<Aabb> around_;           // [nodes]
+    std::vector<double> leaf_area_;      // [nodes], times the triangles
     std::vector<std::uint8_t> in_tree_;  // [triangles]
 };
 
