@@ -25,7 +25,8 @@ void closest_of_all(const Source& source, std::uint32_t count, const AnyRay& ray
         BasicTriangleHit<Scalar> hit;
         if (!intersect_triangle<EdgeRule::closed>(frame, source.corners(i), best.t, hit)) continue;
         // Ids ascend, so that an equal t never replaces an earlier hit.
-        if (hit.t < best.t || !best.hit()) best = AnyHit{hit.t, i, hit.u, hit.v};
+        if (hit.t < best.t || !best.hit())
+            best.t = hit.t, best.prim = i, best.u = hit.u, best.v = hit.v;
     }
     if (!best.hit())
         best = {};

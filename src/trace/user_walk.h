@@ -46,7 +46,8 @@ public:
     AnyHit run(AnyRay ray, TraceCounts& counts) {
         const auto frame = frame_with_room(make_frame(ray));
         ray.tmin = max_of(ray.tmin, Scalar(0)) + Scalar(0);  // -0 becomes +0
-        AnyHit best{ray.tmax};
+        AnyHit best;
+        best.t = ray.tmax;
         NoSteps steps;
         const auto leaf = [&](const BvhNode& node) {
             for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
@@ -58,7 +59,7 @@ public:
                     !(hit.t >= ray.tmin && hit.t <= min_of(best.t, farthest)))
                     continue;
                 if (hit.t == best.t && prim > best.prim) continue;
-                best = {hit.t + Scalar(0), prim, hit.u, hit.v};
+                best.t = hit.t + Scalar(0), best.prim = prim, best.u = hit.u, best.v = hit.v;
                 ray.tmax = best.t;
                 if (any_) return true;
             }
