@@ -149,7 +149,7 @@ Transform transform_of(const Affine& affine) {
 
 /// Rays through a Scene.
 struct SceneCalls : FloatRays {
-    using Hit = Hit;
+    using Hit = raydix::Hit;
     Scene scene;
 
     void closest(std::span<const Ray> rays, std::span<Hit> hits, int threads) const {

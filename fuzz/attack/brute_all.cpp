@@ -6,17 +6,11 @@
 
 #include "primitives/double_sources.h"
 #include "primitives/sources.h"
+#include "trace/batch.h"
 #include "trace/triangle_test.h"
 
 namespace raydix::attack {
 namespace {
-
-void add(std::vector<Hit>& hits, float t, std::uint32_t prim, float u, float v) {
-    hits.push_back(hit_of_tree({t, prim, u, v}));
-}
-void add(std::vector<HitD>& hits, double t, std::uint32_t prim, double u, double v) {
-    hits.push_back({t, prim, u, v});
-}
 
 template <class All, class Source, class View, class AnyRay>
 All all_of(const View& mesh, std::span<const AnyRay> rays) {
@@ -34,7 +28,8 @@ All all_of(const View& mesh, std::span<const AnyRay> rays) {
                 BasicTriangleHit<Scalar> hit;
                 if (source.box(i, box) && intersect_triangle<EdgeRule::half_open>(
                                               frame, source.corners(i), frame.tmax, hit))
-                    add(all.hits, hit.t * frame.t_scale, i, hit.u, hit.v);
+                    all.hits.push_back(hit_in_tree<typename decltype(All::hits)::value_type>(
+                        hit.t * frame.t_scale, i, hit.u, hit.v));
             }
             std::sort(all.hits.begin() + first, all.hits.end(), [](const auto& a, const auto& b) {
                 return a.t != b.t ? a.t < b.t : a.prim < b.prim;

@@ -26,9 +26,8 @@ struct Transform {
 
 /// What happens to a scene after its first commit.
 enum class Usage : std::uint32_t {
-    fixed = 0,  // little: meshes share trees, and a change of one builds its tree again
-    moving =
-        1,  // much: a tree a mesh; a commit refits those of meshes that changed, or builds them
+    fixed = 0,   // little: meshes share trees, and a change of one builds its tree again
+    moving = 1,  // much: a tree a mesh; a commit refits or builds those of meshes that changed
 };
 
 struct SceneOptions {
@@ -36,10 +35,10 @@ struct SceneOptions {
     Usage usage = Usage::fixed;
     bool compact = false;  // the small layout (WideBvhOptions::compact)
     int threads = 0;       // 0 to 1,024; 0: all the machine has. Hits do not depend on it
-    /// Usage::moving: the tree of a mesh whose vertices moved is kept, its boxes fitted again,
-    /// while its SAH is at most so many times that at its build. Below 1 nothing is refitted, nor
-    /// are compact trees and those that hold parts of triangles (quality high), nor where triangles
-    /// come, go or lose their area.
+    /// Usage::moving: a mesh whose vertices moved keeps its tree, with boxes fitted again, while
+    /// the tree's SAH is at most so many times that at its build. Below 1: it is always built
+    /// again. So are compact trees, those that hold parts of triangles (quality high), and those of
+    /// meshes where a triangle comes, goes, gets an area or loses it.
     double refit_limit = 1.5;
 };
 
@@ -56,8 +55,9 @@ struct CommitReport {
     std::uint64_t meshes = 0, instances = 0;  // of the scene itself
     std::uint64_t triangles = 0;              // of its meshes
     std::uint64_t trees_built = 0;            // of triangles; those that did not change are kept
-    std::uint64_t trees_refitted = 0;
-    double sah_ratio = 1;     // SAH now / at the build, the largest of those that could be refitted
+    std::uint64_t trees_refitted = 0;         // instead
+    double sah_ratio = 1;     // the largest SAH after a refit / at the build; above refit_limit:
+                              // that tree was built again
     std::uint64_t bytes = 0;  // what rays read of the scene itself
     std::uint64_t paths = 0;  // instances, counted on every way to them
 };
@@ -140,20 +140,13 @@ TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<Hit> 
 TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const SceneTraceOptions& options = {});
 
-/// All hits of all rays: those of ray i are hits[offsets[i]] .. hits[offsets[i + 1]], sorted by (t,
-/// instance, geometry, prim).
-struct SceneAllHits {
-    std::vector<std::uint64_t> offsets;  // [rays + 1]
-    std::vector<Hit> hits;
-    TraceCounts counts;
-};
-
-/// Each triangle at most once on every path. Edges are half open (exact sign, then a top-left
+/// All hits of all rays, those of one ray sorted by (t, instance, geometry, prim). Each triangle at
+/// most once on every path. Edges are half open (exact sign, then a top-left
 /// rule), so that the number of crossings of a closed mesh is right for rays through edges and
 /// vertices too. Throws ResultTooLarge, an InputError, if the call would take more than
 /// options.max_result_bytes.
-[[nodiscard]] SceneAllHits trace_all(const Scene& scene, std::span<const Ray> rays,
-                                     const SceneTraceOptions& options = {});
+[[nodiscard]] AllHits trace_all(const Scene& scene, std::span<const Ray> rays,
+                                const SceneTraceOptions& options = {});
 
 /// One ray, on the caller's thread.
 [[nodiscard]] Hit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask = 0xFFFFFFFFu);

@@ -175,7 +175,7 @@ class Scene(SceneViews):
         return f"<raydix.Scene{name}: {counts}{double}>"
 
     def _hits(self, hits: np.ndarray) -> dict[str, np.ndarray]:
-        """The columns of hits (..., 4): "prim" is a uint32 in the room of a scalar."""
+        """The first four columns of hits: "prim" is a uint32 in the room of a scalar."""
         prim = self.dtype.itemsize // UINT32.itemsize
         return {
             "t": hits[..., 0],

@@ -196,16 +196,15 @@ TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
     return trace_batch(scene, {rays, nullptr, occluded.data(), options});
 }
 
-SceneAllHits trace_all(const Scene& scene, std::span<const Ray> rays,
-                       const SceneTraceOptions& options) {
+AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTraceOptions& options) {
     const SceneTree& tree = *SceneAccess::tree(scene);
     check_masks(rays.size(), options);
     static_cast<void>(kernels_for(options.isa));
     constexpr std::size_t block_size = 1024;
-    HitBlocks<SceneAllHits> found(rays.size(), block_size, options.max_result_bytes);
+    HitBlocks<AllHits> found(rays.size(), block_size, options.max_result_bytes);
     std::vector<JobCounts> parts((rays.size() + block_size - 1) / block_size);
     const SceneKernels& kernels = scene_kernels_for(options.isa);
-    SceneAllHits all;
+    AllHits all;
     with_threads(options.threads, [&] {
         for_each_block(
             rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {

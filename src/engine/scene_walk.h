@@ -251,8 +251,7 @@ private:
         SimdCounts counts;
         if constexpr (wanted == Wanted::all) {
             const std::size_t before = job_.found->size();
-            SingleRay<wanted, compact, compact, false, NoParts, Hit>(view, frame, stack, counts)
-                .trace_all(*job_.found);
+            SingleRay<wanted, compact, compact>(view, frame, stack, counts).trace_all(*job_.found);
             for (std::size_t k = before; k < job_.found->size(); ++k) {
                 Hit& hit = (*job_.found)[k];
                 hit.t = static_cast<float>(double{hit.t} * scale) + 0.0f;

@@ -5,7 +5,9 @@
 #include <raydix/trace.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
+#include <type_traits>
 
 #include "base/options.h"
 
@@ -22,6 +24,15 @@ inline void check_sizes(std::size_t rays, std::size_t results) {
 inline void check_options(const TraceOptions& options) {
     check_enum("kernel", options.kernel, TraceKernel::simd);
     check_enum("path", options.path, SimdPath::sorted);
+}
+
+/// AnyHit: Hit or HitD.
+template <class AnyHit, class Scalar>
+AnyHit hit_in_tree(Scalar t, std::uint32_t prim, Scalar u, Scalar v) {
+    if constexpr (std::is_same_v<AnyHit, Hit>)
+        return hit_of_tree({t, prim, u, v});
+    else
+        return {t, prim, u, v};
 }
 
 inline void add(TraceCounts& sum, const TraceCounts& part) {

@@ -20,15 +20,6 @@ namespace raydix {
 
 inline constexpr std::size_t rays_per_block = 1024;
 
-/// AnyHit: Hit or HitD.
-template <class AnyHit, class Scalar>
-AnyHit hit_in_tree(Scalar t, std::uint32_t prim, Scalar u, Scalar v) {
-    if constexpr (std::is_same_v<AnyHit, Hit>)
-        return hit_of_tree({t, prim, u, v});
-    else
-        return {t, prim, u, v};
-}
-
 template <class AnyHit, class Scalar>
 AnyHit public_hit(const BasicClosestHit<Scalar>& best, const BasicRayFrame<Scalar>& ray) {
     if (best.prim == no_primitive) return {};

@@ -59,7 +59,7 @@ public:
                     !(hit.t >= ray.tmin && hit.t <= min_of(best.t, farthest)))
                     continue;
                 if (hit.t == best.t && prim > best.prim) continue;
-                best.t = hit.t + Scalar(0), best.prim = prim, best.u = hit.u, best.v = hit.v;
+                best = hit_in_tree<AnyHit>(hit.t + Scalar(0), prim, hit.u, hit.v);
                 ray.tmax = best.t;
                 if (any_) return true;
             }
@@ -70,9 +70,7 @@ public:
                        return min_of(best.t / frame.t_scale * Tree::reach_factor,
                                      std::numeric_limits<Scalar>::max());
                    });
-        if (!best.hit()) return {};
-        if constexpr (std::is_same_v<AnyHit, Hit>) best.geometry = 0;
-        return best;
+        return best.hit() ? best : AnyHit{};
     }
 
 private:

@@ -301,7 +301,7 @@ TEST(Scene, AllHitsAreThoseOfEveryMeshOnEveryPath) {
             SceneTraceOptions options;
             options.mask = mask, options.isa = isa,
             options.threads = 1 + static_cast<int>(seed % 2);
-            const SceneAllHits hits = trace_all(world->scene, rays, options);
+            const AllHits hits = trace_all(world->scene, rays, options);
             ASSERT_EQ(hits.offsets.size(), rays.size() + 1);
             EXPECT_EQ(hits.counts.hits, hits.hits.size());
             for (std::size_t i = 0; i < rays.size(); ++i) {

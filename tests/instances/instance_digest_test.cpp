@@ -29,7 +29,7 @@ constexpr std::size_t ray_count = 1000, rays_to_hits = 150;
 struct FloatCalls {
     using Tree = Bvh;
     using Scene = InstancedScene;
-    using Hit = InstanceHit;
+    using SceneHit = InstanceHit;
     using AnyRay = Ray;
     using Inverse = Affine;
 
@@ -59,7 +59,7 @@ struct FloatCalls {
 struct DoubleCalls {
     using Tree = BvhD;
     using Scene = InstancedSceneD;
-    using Hit = InstanceHitD;
+    using SceneHit = InstanceHitD;
     using AnyRay = RayD;
     using Inverse = InverseD;
 
@@ -108,9 +108,9 @@ template <class Calls>
 class Traced {
 public:
     using AnyRay = typename Calls::AnyRay;
-    using Hit = typename Calls::Hit;
-    using Hits = std::vector<Hit>;
-    using Path = decltype(Hit::path);
+    using SceneHit = typename Calls::SceneHit;
+    using Hits = std::vector<SceneHit>;
+    using Path = decltype(SceneHit::path);
 
     explicit Traced(const std::string& name) : layout_(layout_named(name)) {
         for (ShownMesh& shown : shown_meshes(layout_)) {
@@ -126,8 +126,8 @@ public:
         rays_ = Calls::rays(digest_rays(some_triangles(layout_, 20), ray_count, seed));
         see_by_masks();
         const auto built = scene(Builder::karras);
-        std::vector<decltype(Hit::hit)> hits;
-        for (const Hit& hit : trace(built->scene, rays_, {.masks = masks_}))
+        std::vector<decltype(SceneHit::hit)> hits;
+        for (const SceneHit& hit : trace(built->scene, rays_, {.masks = masks_}))
             hits.push_back(hit.hit);
         add_rays_to_hits(rays_, hits, rays_to_hits);
         see_by_masks();
@@ -178,7 +178,7 @@ public:
         const auto trees = Calls::trees(layout_, Builder::karras);
         Hits hits;
         for (std::size_t i = 0; i < rays_.size(); ++i) {
-            Hit best;
+            SceneHit best;
             for (const Alone& alone : alone_) {
                 if (!alone.seen_by(masks_[i])) continue;
                 const auto hit =
@@ -201,7 +201,7 @@ public:
 
     [[nodiscard]] Answer answer(const Hits& hits) const {
         Answer out;
-        for (const Hit& hit : hits) {
+        for (const SceneHit& hit : hits) {
             out.values.add_hit(hit.hit);
             const std::uint32_t geometry = hit.hit.hit() ? 0 : no_primitive,
                                 instance = hit.hit.hit() ? numbers_.at(hit.path) : no_primitive;

@@ -45,7 +45,7 @@ std::vector<Hit> all_by_hand(const Mesh& mesh, const Ray& ray) {
         TriangleHit hit;
         const LeafTriangle triangle{source.corner(i, 0), source.corner(i, 1), source.corner(i, 2)};
         if (intersect_triangle<EdgeRule::half_open>(frame, triangle, frame.tmax, hit))
-            hits.push_back({hit.t * frame.t_scale, i, hit.u, hit.v});
+            hits.push_back(hit_of_tree({hit.t * frame.t_scale, i, hit.u, hit.v}));
     }
     std::ranges::stable_sort(hits, {}, &Hit::t);  // ids ascend already
     return hits;

@@ -32,10 +32,8 @@ enum class Wanted { closest, any, all };
 ///   float reach(std::uint32_t ray)
 struct NoParts {};
 
-/// `guessing`: rays that follow each other take much the same way. Row: what all hits are kept as,
-/// a TreeHit and perhaps more.
-template <Wanted wanted, bool counting, bool compact, bool guessing = false, class Parts = NoParts,
-          class Row = TreeHit>
+/// `guessing`: rays that follow each other take much the same way.
+template <Wanted wanted, bool counting, bool compact, bool guessing = false, class Parts = NoParts>
 class SingleRay {
 public:
     /// `parts` and the ray's place in the job: unless leaves hold triangles.
@@ -50,7 +48,7 @@ public:
     }
 
     /// All hits, in no order, behind those in `hits`.
-    void trace_all(BudgetVector<Row>& hits) {
+    void trace_all(BudgetVector<Hit>& hits) {
         all_ = &hits;
         trace(0, {frame_.tmax});
     }
@@ -263,10 +261,8 @@ private:
                 TriangleHit hit;
                 if (intersect_triangle<EdgeRule::half_open>(ray, triangle_of(block, lane), best_.t,
                                                             hit)) {
-                    Row row;
-                    static_cast<TreeHit&>(row) = {hit.t * frame_.t_scale, block.prim[lane], hit.u,
-                                                  hit.v};
-                    all_->push_back(row);
+                    all_->push_back(
+                        hit_of_tree({hit.t * frame_.t_scale, block.prim[lane], hit.u, hit.v}));
                 }
             }
             return false;
@@ -333,7 +329,7 @@ private:
     Parts* const parts_;
     const std::uint32_t place_;
     WideBest best_{};
-    BudgetVector<Row>* all_ = nullptr;
+    BudgetVector<Hit>* all_ = nullptr;
     std::uint32_t near_at_[3], far_at_[3];  // where planes are, from a node's boxes on
 };
 
@@ -399,10 +395,8 @@ void trace_all_of(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t* h
         if (!fill_frame(job.tree, job.rays[i], frame)) {
             ++counts.invalid;
         } else {
-            SingleRay<Wanted::all, counting, compact, false, NoParts, Hit>(job.tree, frame,
-                                                                           job.stack, counts)
+            SingleRay<Wanted::all, counting, compact>(job.tree, frame, job.stack, counts)
                 .trace_all(found);
-            for (std::size_t k = before; k < found.size(); ++k) found[k].geometry = 0;
             finish_ray(found, before);
         }
         hit_counts[i] = found.size() - before;
