@@ -61,6 +61,9 @@ enum class HitFields : std::uint32_t {
 void save_hits(const std::filesystem::path& file, std::span<const Hit> hits,
                HitFields fields = HitFields::tree);
 
+/// A NumPy file of shape (N,) uint8: what trace_any says of each ray.
+void save_occluded(const std::filesystem::path& file, std::span<const std::uint8_t> occluded);
+
 /// A NumPy file of shape (N + 1,) uint64: where the hits of each of N rays begin, and the end.
 void save_offsets(const std::filesystem::path& file, std::span<const std::uint64_t> offsets);
 

@@ -123,7 +123,6 @@ Scene::Scene(const MeshView& mesh, const SceneOptions& options) : Scene() {
     commit(options);
 }
 Scene::Scene(const Mesh& mesh, const SceneOptions& options) : Scene(MeshView(mesh), options) {}
-Scene::Scene(const Model& model, const SceneOptions& options) : Scene(model.mesh, options) {}
 Scene::~Scene() = default;
 Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
