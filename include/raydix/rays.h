@@ -4,6 +4,7 @@
 
 #include <raydix/bvh.h>
 #include <raydix/camera.h>
+#include <raydix/scene.h>
 #include <raydix/types.h>
 
 #include <cstdint>
@@ -43,6 +44,13 @@ struct SecondaryOptions {
 /// pixels [n] -> [hits * samples] rays. The same for every thread count. Throws InputError: sizes
 /// that differ, an option out of range, a hit on a primitive that the tree does not hold.
 [[nodiscard]] std::vector<Ray> make_secondary_rays(const Bvh& bvh, std::span<const Ray> rays,
+                                                   std::span<const Hit> hits,
+                                                   std::span<const std::uint32_t> pixels,
+                                                   const SecondaryOptions& options);
+/// The same from hits of a scene, as its last commit left it; for a scene of one mesh the same
+/// rays. Normals are those of raydix/surface.h, turned toward the ray. Also throws if the scene was
+/// never committed, or does not have the path or the mesh of a hit.
+[[nodiscard]] std::vector<Ray> make_secondary_rays(const Scene& scene, std::span<const Ray> rays,
                                                    std::span<const Hit> hits,
                                                    std::span<const std::uint32_t> pixels,
                                                    const SecondaryOptions& options);
