@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/scene_state.h"
@@ -58,8 +59,8 @@ public:
 private:
     struct Node {
         std::vector<std::uint32_t> children;
-        std::uint32_t size = 1;  // with all nodes below it, which follow it
-        bool shows = false;      // triangles
+        std::uint32_t size = 1;              // with all nodes below it, which follow it
+        bool shows = false;                  // triangles
         std::shared_ptr<const Scene> scene;  // of a node that shows something
     };
 
@@ -103,7 +104,7 @@ private:
 
     /// One scene for all nodes that show the same meshes.
     std::shared_ptr<const Scene> meshes_of(const ModelNode& node) {
-        std::shared_ptr<const Scene>& shared = by_meshes_[node.first_mesh];
+        std::shared_ptr<const Scene>& shared = by_meshes_[{node.first_mesh, node.mesh_count}];
         if (shared == nullptr) {
             auto scene = std::make_shared<Scene>();
             for (std::uint32_t i = 0; i < node.mesh_count; ++i)
@@ -147,7 +148,8 @@ private:
     const SceneOptions& options_;
     std::vector<Node> nodes_;
     Scene empty_;
-    std::map<std::uint32_t, std::shared_ptr<const Scene>> by_meshes_;
+    // By the first mesh and how many there are.
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::shared_ptr<const Scene>> by_meshes_;
 };
 
 }  // namespace
