@@ -8,10 +8,12 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <utility>
 #include <vector>
 
 #include "engine/extent.h"
+#include "engine/support.h"
 #include "instances/affine.h"
 #include "layout/wide_bvh.h"
 #include "trace/simd/wide_ray.h"
@@ -111,6 +113,7 @@ struct SceneTree {
     std::vector<PlacedScene> placed;
     std::vector<WayIn> ways;
     std::vector<Extent> extents;  // [meshes + placed]
+    std::vector<Image> images;    // [placed]
     /// The meshes without the instances, where there are both.
     std::shared_ptr<const SceneTree> own_meshes;
     /// Over all parts that are not empty: instances whose maps keep errors small, and those that
@@ -120,6 +123,14 @@ struct SceneTree {
     Aabb bounds = empty_box();  // without what rays may miss it by
     std::uint64_t paths = 0;
     std::uint32_t levels = 0;  // of instances, below this scene
+
+    /// Made when the first instance asks for it.
+    [[nodiscard]] const Support& support() const {
+        std::call_once(support_asked, [&] { support_known = support_of(*this); });
+        return support_known;
+    }
+    mutable std::once_flag support_asked;
+    mutable Support support_known;
 
     /// The only mesh tree, if rays need nothing else.
     [[nodiscard]] const MeshTree* only_mesh() const {
