@@ -212,6 +212,7 @@ private:
             const SceneTree* const scene = placed.scene.get();
             sources_.push_back(
                 {&geometry, id, image, scene, scene->extent.empty() ? nullptr : &scene->support()});
+            if (!scene->extent.empty()) placed.mesh = scene->only_mesh();
             tree_->placed.push_back(std::move(placed));
         };
         if (inner->instances.empty() ||
@@ -271,6 +272,9 @@ private:
 
     void build_tops(SceneTree& tree) {
         for (const Extent& extent : tree.extents) tree.extent = unite(tree.extent, extent);
+        for (const auto& mesh : tree.meshes)
+            tree.stack_size =
+                std::max(tree.stack_size, wide_stack_capacity(mesh->tree->stats().max_depth));
         if (tree.only_mesh() != nullptr) return;
         const Quality quality = options_.usage == Usage::moving ? Quality::fast : options_.quality;
         std::vector<std::uint32_t> near, wild;
@@ -279,6 +283,10 @@ private:
                 (tree.extents[part].error <= wild_error ? near : wild).push_back(part);
         build_part_tree(near, tree.extents, quality, tree.near);
         build_part_tree(wild, tree.extents, quality, tree.wild);
+        for (const PlacedScene& placed : tree.placed)
+            tree.stack_size = std::max(tree.stack_size, placed.scene->stack_size);
+        tree.stack_size += wide_stack_capacity(
+            std::max(tree.near.arrays.stats.max_depth, tree.wild.arrays.stats.max_depth));
         report_.bytes +=
             (tree.near.arrays.nodes.size() + tree.wild.arrays.nodes.size()) * sizeof(WideNode) +
             tree.placed.size() * sizeof(PlacedScene) + tree.ways.size() * sizeof(WayIn);

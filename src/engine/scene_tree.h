@@ -87,6 +87,7 @@ struct PlacedScene {
     std::uint32_t number;       // of the path that ends here
     std::uint32_t first, more;  // further ways in SceneTree::ways, from the outside inward
     std::shared_ptr<const SceneTree> scene;
+    const MeshTree* mesh = nullptr;  // all that is in `scene`, if it is one that is not empty
 };
 
 /// An instance as the scene's owner knows it.
@@ -122,7 +123,8 @@ struct SceneTree {
     Extent extent;
     Aabb bounds = empty_box();  // without what rays may miss it by
     std::uint64_t paths = 0;
-    std::uint32_t levels = 0;  // of instances, below this scene
+    std::uint32_t levels = 0;    // of instances, below this scene
+    std::size_t stack_size = 0;  // of a ray that goes alone: children still to visit, on all levels
 
     /// Made when the first instance asks for it.
     [[nodiscard]] const Support& support() const {
