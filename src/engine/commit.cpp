@@ -5,9 +5,11 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <unordered_map>
 
 #include "engine/part_tree.h"
 #include "exec/parallel.h"
+#include "exec/progress.h"
 #include "layout/wide_refit.h"
 
 namespace raydix {
@@ -75,11 +77,15 @@ Mesh merged(const SceneAccess::State& state, const Group& group,
 class Commit {
 public:
     Commit(const SceneAccess::State& state, const SceneOptions& options, CommitReport& report)
-        : state_(state), options_(options), report_(report) {}
+        : state_(state), options_(options), report_(report) {
+        if (state.tree == nullptr || options.quality != state.tree_quality ||
+            options.compact != state.tree_compact)
+            return;
+        for (const auto& mesh : state.tree->meshes) last_[mesh->ids.front()] = mesh.get();
+    }
 
     std::shared_ptr<const SceneTree> run() {
-        for (const Group& group : groups_of(state_, options_.usage))
-            tree_->meshes.push_back(mesh_tree(group));
+        build_meshes();
         for (const auto& mesh : tree_->meshes) {
             tree_->extents.push_back(extent_of_mesh(mesh->tree->arrays().bounds));
             report_.meshes += mesh->ids.size();
@@ -92,6 +98,8 @@ public:
             if (!geometry.is_instance())
                 tree_->mesh_names.push_back({id, geometry.mesh, geometry.own});
         place_instances();
+        progress_at(done_ / work_);
+        const ProgressStage top(done_ / work_, 1);
         build_tops(*tree_);
         keep_own_meshes();
         report_.instances = tree_->instances.size();
@@ -100,6 +108,35 @@ public:
     }
 
 private:
+    void build_meshes() {
+        const std::vector<Group> groups = groups_of(state_, options_.usage);
+        for (const Group& group : groups) work_ += work_of(group);
+        work_ += static_cast<double>(groups.size()) + instance_work();
+        for (const Group& group : groups) {
+            const double after = done_ + work_of(group);
+            const ProgressStage stage(done_ / work_, after / work_);
+            tree_->meshes.push_back(mesh_tree(group));
+            progress_at(1);
+            done_ = after;
+        }
+    }
+
+    /// In triangles, for what is told of progress; a part of the tree over all counts as one.
+    [[nodiscard]] double work_of(const Group& group) const {
+        if (kept(group) != nullptr) return 0;
+        std::size_t triangles = 0;
+        for (const std::uint32_t id : group.ids)
+            triangles += state_.geometries.at(id).mesh.triangles.size();
+        return static_cast<double>(triangles);
+    }
+    [[nodiscard]] double instance_work() const {
+        double parts = 0;
+        for (const auto& [id, geometry] : state_.geometries)
+            if (geometry.is_instance() && geometry.scene->tree != nullptr)
+                parts += 1 + static_cast<double>(geometry.scene->tree->placed.size());
+        return parts;
+    }
+
     std::shared_ptr<const MeshTree> mesh_tree(const Group& group) {
         auto out = std::make_shared<MeshTree>();
         out->ids = group.ids;
@@ -143,12 +180,8 @@ private:
 
     /// The tree that the last commit made of the same meshes in the same way.
     [[nodiscard]] const MeshTree* last_of(const Group& group) const {
-        if (state_.tree == nullptr || options_.quality != state_.tree_options.quality ||
-            options_.compact != state_.tree_options.compact)
-            return nullptr;
-        for (const auto& mesh : state_.tree->meshes)
-            if (mesh->ids == group.ids) return mesh.get();
-        return nullptr;
+        const auto found = last_.find(group.ids.front());
+        return found != last_.end() && found->second->ids == group.ids ? found->second : nullptr;
     }
     /// The same if nothing of them changed.
     [[nodiscard]] const MeshTree* kept(const Group& group) const {
@@ -299,7 +332,9 @@ private:
     const SceneOptions& options_;
     CommitReport& report_;
     std::shared_ptr<SceneTree> tree_ = std::make_shared<SceneTree>();
-    std::vector<Source> sources_;  // [placed scenes]
+    std::vector<Source> sources_;                              // [placed scenes]
+    std::unordered_map<std::uint32_t, const MeshTree*> last_;  // by their first mesh
+    double work_ = 0, done_ = 0;
 };
 
 }  // namespace
@@ -308,7 +343,10 @@ std::shared_ptr<const SceneTree> make_scene_tree(const SceneAccess::State& state
                                                  const SceneOptions& options,
                                                  CommitReport& report) {
     std::shared_ptr<const SceneTree> out;
+    ProgressListener listener(options.progress);
+    const ProgressStage stage({options.progress ? &listener : nullptr, 0, 1});
     with_threads(options.threads, [&] { out = Commit(state, options, report).run(); });
+    listener.finish();
     return out;
 }
 
