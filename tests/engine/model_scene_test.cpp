@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "instances/affine.h"
@@ -228,6 +230,31 @@ TEST(ModelScene, SaysWhichNodeItCannotPlace) {
               "cannot go through it (Model::flatten, --flatten makes one mesh of it)");
     model.flatten();
     EXPECT_EQ(Scene(model).bounds().hi.x, 1.0f);
+}
+
+TEST(ModelScene, TellsHowFarItIs) {
+    Random random(8);
+    Model model;
+    model.name = "three";
+    for (int k = 0; k < 3; ++k) {
+        model.meshes.push_back(some_mesh(random, 20000));
+        ModelNode node;
+        node.first_mesh = static_cast<std::uint32_t>(k), node.mesh_count = 1;
+        model.nodes.push_back(node);
+    }
+    std::vector<double> parts;
+    SceneOptions options;
+    options.progress = [&](double part) { parts.push_back(part); };
+    static_cast<void>(Scene(model, options));
+    ASSERT_GT(parts.size(), 6u);
+    EXPECT_TRUE(std::ranges::is_sorted(parts));
+    EXPECT_GT(std::ranges::count_if(parts, [](double p) { return p > 0.34 && p < 0.66; }), 0);
+    EXPECT_EQ(parts.back(), 1.0);
+    // What the callback throws ends it.
+    options.progress = [](double part) {
+        if (part > 0.5) throw std::runtime_error("enough");
+    };
+    EXPECT_THROW(static_cast<void>(Scene(model, options)), std::runtime_error);
 }
 
 TEST(ModelScene, RefusesNodesOutOfOrder) {

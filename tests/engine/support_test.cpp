@@ -28,7 +28,7 @@ Double3 random_direction(std::mt19937& random) {
 const SceneTree& tree_of(const Scene& scene) { return *SceneAccess::tree(scene); }
 
 TEST(Support, ReachesAsFarAsTheMeshAndLittleFarther) {
-    const Mesh mesh = load_model("builtin:figure?triangles=5000", 5).mesh;
+    const Mesh mesh = load_model("builtin:figure?triangles=5000", 5).mesh();
     for (const bool compact : {false, true})
         for (const Usage usage : {Usage::fixed, Usage::moving}) {
             Scene scene;
@@ -77,7 +77,7 @@ TEST(Support, IsExactAlongAxesAndForBoxes) {
 }
 
 TEST(Support, BoxesOfNestedInstancesHoldTheirVertices) {
-    const Mesh mesh = load_model("builtin:figure?triangles=5000", 3).mesh;
+    const Mesh mesh = load_model("builtin:figure?triangles=5000", 3).mesh();
     std::mt19937 random(13);
     std::uniform_real_distribution<float> entry(-1.0f, 1.0f);
     const auto transform = [&] {
