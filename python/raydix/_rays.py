@@ -101,6 +101,8 @@ def ray_masks(
     scene: Any, mask: Any, masks: Any, lead: tuple[int, ...]
 ) -> tuple[int, np.ndarray | None]:
     """The mask of all rays, or one for each: (n,) uint32."""
+    if masks is None and mask is ALL:
+        return ALL, None
     if masks is None:
         wanted = whole(mask, "mask", 0, ALL)
         if wanted != ALL:

@@ -32,7 +32,7 @@ USAGES = ("fixed", "moving")
 
 def one_of(value: Any, name: str, known: Any) -> str:
     if value not in known:
-        raise ValueError(f"{name}: expected one of {', '.join(known)}, given {value!r}")
+        raise ValueError(f"{name}: expected one of {', '.join(map(str, known))}, given {value!r}")
     return value
 
 

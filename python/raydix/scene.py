@@ -21,6 +21,7 @@ from ._arrays import (
     require_float32,
     rows,
     thread_count,
+    whole,
 )
 from ._rays import hit_columns, ray_batch, ray_masks
 from .cameras import Camera
@@ -39,10 +40,10 @@ class Scene(SceneContents, SceneViews):
     Parameters
     ----------
     vertices :
-        None: an empty scene. Shape (V, 3), float32 or float64; or, with `faces` left out, the path of a file (.ply, .obj,
-        .stl, .gltf, .glb, .off, each also with .gz, .xz or .zst), the name of a built-in scene
-        ("builtin:atrium?triangles=10000"), or an object with the attributes `vertices` and `faces`,
-        such as a `trimesh.Trimesh`.
+        None: an empty scene. Shape (V, 3), float32 or float64; or, with `faces` left out, the path
+        of a file (.ply, .obj, .stl, .gltf, .glb, .off, each also with .gz, .xz or .zst), the name
+        of a built-in scene ("builtin:atrium?triangles=10000"), or an object with the attributes
+        `vertices` and `faces`, such as a `trimesh.Trimesh`.
     faces :
         Shape (F, 3), whole numbers: three vertex indices for each triangle.
     quality :
@@ -138,8 +139,11 @@ class Scene(SceneContents, SceneViews):
         ):
             if is_asked:
                 require_float32(self, what)
-        rounds = asked_rounds if reinsertion_rounds is None else reinsertion_rounds
-        options: tuple = (asked_builder, rounds, bits, max_leaf, strict, threads)
+        if reinsertion_rounds is not None:
+            asked_rounds = whole(reinsertion_rounds, "reinsertion_rounds", 0, 255)
+        leaf = whole(max_leaf, "max_leaf", 1, 255)
+        one_of(bits, "bits", (30, 63))
+        options: tuple = (asked_builder, asked_rounds, bits, leaf, bool(strict), threads)
         if self.dtype == FLOAT32:
             options += (quality, usage, bool(compact))
         self._core: Any = self._make(vertices, faces, options)
@@ -188,8 +192,8 @@ class Scene(SceneContents, SceneViews):
 
     @property
     def vertices(self) -> np.ndarray:
-        """Shape (V, 3) in `dtype`, a read-only view of the copy that the last commit saw. It stays as
-        it is when the scene changes."""
+        """Shape (V, 3) in `dtype`, a read-only view of the copy that the last commit saw. It
+        stays as it is when the scene changes."""
         return self._core.vertices
 
     @property
@@ -244,13 +248,16 @@ class Scene(SceneContents, SceneViews):
         Returns
         -------
         dict of arrays with the leading shape of the rays: "t" (the scene's type; infinity: nothing
-        was hit), "prim" (uint32, the position in the mesh's `faces`; 0xFFFFFFFF: nothing), "u" and "v"
-        (the scene's type): the point is (1-u-v)*v0 + u*v1 + v*v2; "geometry" (uint32, the mesh's id
-        in its scene; 0xFFFFFFFF: nothing) and "instance" (uint32; 0: the scene's own geometry, else
-        a number for `path`). All are views of one array. "t" is in units of the ray's direction,
-        through instances too. At equal t the lower "instance" wins, then "geometry", then "prim".
-        Rays through an edge hit at least one of its triangles (Woop,
-        Benthin, Wald 2013). Rays with NaN, a zero direction or tmin > tmax miss.
+        was hit), "prim" (uint32, the position in the mesh's `faces`; 0xFFFFFFFF: nothing), "u" and
+        "v" (the scene's type): the point is (1-u-v)*v0 + u*v1 + v*v2; "geometry" (uint32, the
+        mesh's id in its scene; 0xFFFFFFFF: nothing) and "instance" (uint32; 0: a geometry of the
+        scene itself, else a number for `path`). "t" is in units of the ray's direction, through
+        instances too. At equal t the lower "instance" wins, then "geometry", then "prim". Rays
+        through an edge hit at least one of its triangles (Woop, Benthin, Wald 2013). Rays with NaN,
+        a zero direction or tmin > tmax miss. In float32 all are views of one array.
+
+        With rays that lie on a GPU, "geometry" and "instance" are left out: device="cuda" takes
+        scenes of one mesh, without masks. BackendUnavailable otherwise.
         """
         if self.device == "cuda":
             return self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)
@@ -324,8 +331,8 @@ class Scene(SceneContents, SceneViews):
 
         Returns a dict: "offsets" (uint64, one more than there are rays); those of ray i, counted in
         C order, stand at offsets[i] to offsets[i + 1] of the arrays of `intersect`, sorted by (t,
-        instance, geometry, prim). Each triangle counts once a ray and path; an edge belongs to one of
-        its two triangles, so that crossings of a closed mesh are counted exactly.
+        instance, geometry, prim). Each triangle counts once a ray and path; an edge belongs to one
+        of its two triangles, so that crossings of a closed mesh are counted exactly.
         `max_result_bytes` bounds the peak memory of the call, the arrays included; 0: half of what
         is left. InputError if it would take more: no hit is ever dropped.
         """
@@ -339,11 +346,11 @@ class Scene(SceneContents, SceneViews):
     ) -> dict[str, np.ndarray]:
         """The point of the mesh that is closest to each query.
 
-        `points`: shape (..., 3), converted to the scene's type. Beyond `max_distance`
-        (its square decides, rounded) nothing is found. Returns a dict of arrays with the leading shape of the queries: "point" (..., 3),
-        "distance", "u" and "v" in the scene's type, "prim" uint32. At equal distances the lower
-        "prim" wins; nothing found: infinity and 0xFFFFFFFF. ValueError for a negative or NaN
-        `max_distance`.
+        `points`: shape (..., 3), converted to the scene's type. Beyond `max_distance` (its square
+        decides, rounded) nothing is found. Returns a dict of arrays with the leading shape of the
+        queries: "point" (..., 3), "distance", "u" and "v" in the scene's type, "prim" uint32. At
+        equal distances the lower "prim" wins; nothing found: infinity and 0xFFFFFFFF. ValueError
+        for a negative or NaN `max_distance`.
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
         places = np.empty((len(asked), 7), self.dtype)
@@ -454,8 +461,9 @@ class Scene(SceneContents, SceneViews):
         the trees keep their hierarchies, their boxes are fitted again. Where only rays are asked,
         `update` and `commit(usage="moving")` do without the binary tree.
 
-        Returns "sah", "sah_at_build" and their "ratio", of the binary tree: from about 1.5 on a new Scene is usually
-        worth its time. InputError, the scene unchanged: triangles that were valid are so no more,
+        Returns "sah", "sah_at_build" and their "ratio", of the binary tree: from about 1.5 on a new
+        Scene is usually worth its time. InputError, the scene unchanged: triangles that were valid
+        are so no more,
         or the other way round; a tree with parts of triangles (builders split and sbvh, quality
         "high"); other changes without a commit. Waits for queries of other threads.
         """

@@ -60,7 +60,9 @@ class World:
             what = np.float64(what)
             for path, instance, geometry, masks, vertices, faces in inner:
                 moved = vertices @ what[:, :3].T + what[:, 3]
-                found.append(([id, *path], first + instance, geometry, [mask, *masks], moved, faces))
+                found.append(
+                    ([id, *path], first + instance, geometry, [mask, *masks], moved, faces)
+                )
         return found, paths
 
     def hits(self, rays, masks):
@@ -255,7 +257,8 @@ def test_answers_are_of_the_last_commit():
 
 def test_ids_and_what_there_is():
     scene = raydix.Scene(*BOX)
-    assert len(scene) == 1 and 0 in scene and 1 not in scene and "0" not in scene and -1 not in scene
+    assert len(scene) == 1 and 0 in scene
+    assert 1 not in scene and "0" not in scene and -1 not in scene
     assert scene.add(*BOX, id=7) == 7 and scene.add(*BOX) == 1
     assert list(scene) == [0, 1, 7] and "3 geometries" in repr(scene)
     scene.remove(1)
@@ -265,8 +268,12 @@ def test_ids_and_what_there_is():
     for id in (0, 1, 2, 7):
         with pytest.raises(raydix.InputError, match=f"geometry {id}: this id was given before"):
             scene.add(*BOX, id=id)
-    for call in (lambda: scene.remove(1), lambda: scene.set_mask(1, 2), lambda: scene.update(1, BOX[0]),
-                 lambda: scene.set_transform(1, np.eye(4))):  # fmt: skip
+    for call in (
+        lambda: scene.remove(1),
+        lambda: scene.set_mask(1, 2),
+        lambda: scene.update(1, BOX[0]),
+        lambda: scene.set_transform(1, np.eye(4)),
+    ):
         with pytest.raises(raydix.InputError, match="there is no geometry 1"):
             call()
 
@@ -436,8 +443,11 @@ def test_queries_of_one_mesh_name_what_stands_in_the_way(rng):
         "render": lambda s: s.render(size=(8, 8)),
         "secondary_rays": lambda s: s.secondary_rays(np.zeros((1, 8), np.float32)),
     }
-    for scene, text in ((placed, "geometry 0 is an instance"), (pair, "geometry 1 is a second mesh"),
-                        (both, "geometry 3 is an instance")):  # fmt: skip
+    for scene, text in (
+        (placed, "geometry 0 is an instance"),
+        (pair, "geometry 1 is a second mesh"),
+        (both, "geometry 3 is an instance"),
+    ):
         for name, call in calls.items():
             with pytest.raises(raydix.InputError, match=f"^{name.strip()}: {text}.*one mesh"):
                 call(scene)
@@ -462,7 +472,11 @@ def test_errors_of_changes(rng):
     wrong_transforms = {
         "expected shape": (np.eye(3), np.zeros((2, 2, 3, 4)), np.zeros(12)),
         "last row": (np.ones((4, 4)),),
-        "singular or not finite": (np.zeros((3, 4)), np.full((3, 4), np.nan), np.eye(4) * [1, 1, 0, 1]),
+        "singular or not finite": (
+            np.zeros((3, 4)),
+            np.full((3, 4), np.nan),
+            np.eye(4) * [1, 1, 0, 1],
+        ),
     }
     for text, values in wrong_transforms.items():
         for value in values:
@@ -577,7 +591,8 @@ def test_float64_scenes_are_one_mesh():
         "mask": lambda: scene.occluded(DOWN, mask=1),
         "masks": lambda: scene.count(DOWN, masks=1),
     }.items():
-        with pytest.raises(NotImplementedError, match="^" + name.strip() + ": not there .* float64"):
+        text = f"^{name.strip()}: not there .* float64"
+        with pytest.raises(NotImplementedError, match=text):
             call()
     with pytest.raises(raydix.InputError, match="mask"):
         scene._core.occluded(np.zeros((1, 8)), np.zeros(1, bool), 1)
@@ -653,9 +668,9 @@ scene = raydix.Scene(vertices, faces)
 copied = held()
 scene.occluded(np.zeros((100, 8), np.float32))
 traced = held()
-wide = scene.commit()["bytes"]
+arrays, wide = vertices.nbytes + faces.nbytes, scene.commit()["bytes"]
 binary = scene.stats()["bytes"]
-print(copied - start, traced - copied, held() - traced, vertices.nbytes + faces.nbytes, wide, binary)
+print(copied - start, traced - copied, held() - traced, arrays, wide, binary)
 """
 
 
@@ -690,3 +705,13 @@ scene.commit()
 print(refused[0])
 """)
     assert out[0] == "commit:" and "handler" in out
+
+
+def test_hits_of_trees_are_given_a_geometry():
+    """Rows of four, as a GPU gives them: t, prim, u, v."""
+    rows = np.zeros((2, 3, 4), np.float32)
+    rows.view(np.uint32)[..., 1] = [[0, raydix.MISSING, 5]] * 2
+    columns = raydix._rays.hit_columns(rows, 7)
+    assert columns["prim"].tolist() == [[0, raydix.MISSING, 5]] * 2
+    assert columns["geometry"].tolist() == [[7, raydix.MISSING, 7]] * 2
+    assert not columns["instance"].any() and columns["instance"].dtype == np.uint32
