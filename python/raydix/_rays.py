@@ -122,12 +122,26 @@ def ray_masks(
 def hit_columns(hits: np.ndarray, geometry: int | None = None) -> dict[str, np.ndarray]:
     """Rows of hits, as the core writes them, as columns. Where they have no room for geometry and
     instance, they are of one mesh, `geometry`."""
-    words = hits.dtype.itemsize // UINT32.itemsize  # a whole number in the room of a scalar
     ids = hits.view(UINT32)
-    found = {"t": hits[..., 0], "prim": ids[..., words], "u": hits[..., 2], "v": hits[..., 3]}
-    if hits.shape[-1] == 4:
-        named = np.full(hits.shape[:-1], MISSING, UINT32)
-        if geometry is not None:
-            named[found["prim"] != MISSING] = geometry
-        return {**found, "geometry": named, "instance": np.zeros(hits.shape[:-1], UINT32)}
-    return {**found, "geometry": ids[..., 4 * words], "instance": ids[..., 4 * words + 1]}
+    words = ids.shape[-1] // hits.shape[-1]  # a whole number in the room of a scalar
+    if hits.shape[-1] != 4:
+        return {
+            "t": hits[..., 0],
+            "prim": ids[..., words],
+            "u": hits[..., 2],
+            "v": hits[..., 3],
+            "geometry": ids[..., 4 * words],
+            "instance": ids[..., 4 * words + 1],
+        }
+    prim = ids[..., words]
+    named = np.full(prim.shape, MISSING, UINT32)
+    if geometry is not None:
+        named[prim != MISSING] = geometry
+    return {
+        "t": hits[..., 0],
+        "prim": prim,
+        "u": hits[..., 2],
+        "v": hits[..., 3],
+        "geometry": named,
+        "instance": np.zeros(prim.shape, UINT32),
+    }
