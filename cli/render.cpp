@@ -137,6 +137,7 @@ void add_render_command(CLI::App& app) {
         ->check(finite_number(false));
     add_tree_view_options(*command, options->tree_view);
     add_tree_options(*command, options->tree);
+    add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options] { run_render(*options); });
 }

@@ -4,6 +4,7 @@
 
 #include <raydix/double.h>
 #include <raydix/instances.h>
+#include <raydix/transform.h>
 #include <raydix/types.h>
 
 #include <array>
@@ -13,11 +14,6 @@
 #include <vector>
 
 namespace raydix {
-
-/// As Transform.
-struct TransformD {
-    std::array<std::array<double, 4>, 3> m{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-};
 
 /// As Instance; `object` is an id that InstancedSceneD gave.
 struct InstanceD {

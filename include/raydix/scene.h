@@ -4,9 +4,9 @@
 #include <raydix/bvh.h>
 #include <raydix/mesh.h>
 #include <raydix/trace.h>
+#include <raydix/transform.h>
 #include <raydix/types.h>
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -17,12 +17,6 @@
 namespace raydix {
 
 struct Model;
-
-/// Affine: x' = m[0][0]*x + m[0][1]*y + m[0][2]*z + m[0][3], and so on; from the space of what is
-/// placed to that of what it stands in. It may mirror and shear, but not flatten.
-struct Transform {
-    std::array<std::array<float, 4>, 3> m{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-};
 
 /// What happens to a scene after its first commit.
 enum class Usage : std::uint32_t {

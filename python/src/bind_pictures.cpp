@@ -46,12 +46,13 @@ nb::dict load(const std::string& spec, std::uint64_t seed) {
     Model scene;
     {
         const nb::gil_scoped_release unlocked;
-        scene = load_model(spec, seed);
+        scene = load_flat_model(spec, seed);
     }
     nb::dict fields;
     fields["name"] = scene.name;
-    fields["vertices"] = hand_over_rows<float>(std::move(scene.mesh.vertices));
-    fields["faces"] = hand_over_rows<std::uint32_t>(std::move(scene.mesh.triangles));
+    Mesh mesh = std::move(scene).mesh();
+    fields["vertices"] = hand_over_rows<float>(std::move(mesh.vertices));
+    fields["faces"] = hand_over_rows<std::uint32_t>(std::move(mesh.triangles));
     nb::list cameras;
     for (const Camera& camera : scene.cameras.cameras) cameras.append(camera_figures(camera));
     fields["cameras"] = cameras;
@@ -107,12 +108,11 @@ Array2<float> secondary_rays(SceneTrees& scene, const RaysIn& rays, const std::s
     {
         const nb::gil_scoped_release unlocked;
         const auto lock = scene.read();
-        const Bvh& bvh = scene.bvh("secondary_rays");
         const std::vector<Hit> hits =
             trace(scene.traced(), primary, {.threads = threads_for(threads)});
         std::vector<std::uint32_t> pixels(primary.size());
         for (std::uint32_t i = 0; i < pixels.size(); ++i) pixels[i] = i;
-        secondary = make_secondary_rays(bvh, primary, hits, pixels, options);
+        secondary = make_secondary_rays(scene.traced(), primary, hits, pixels, options);
     }
     return hand_over_rows<float>(std::move(secondary));
 }
@@ -147,7 +147,7 @@ PictureOut render_scene(SceneTrees& scene, const CameraFields& camera, const std
     {
         const nb::gil_scoped_release unlocked;
         const auto lock = scene.read();
-        picture = render(scene.bvh("render"), camera_of(camera), options);
+        picture = render(scene.traced(), camera_of(camera), options);
     }
     return picture_array(std::move(picture));
 }

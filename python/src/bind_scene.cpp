@@ -12,6 +12,7 @@
 #include <raydix/error.h>
 #include <raydix/overlap.h>
 #include <raydix/pairs.h>
+#include <raydix/surface.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
 
@@ -212,6 +213,29 @@ Counts count_hits(Scene& scene, Rays& rays, const Out<std::uint32_t, nb::ndim<1>
     };
     read_in_pieces(scene, rays.size(), count, first_listed);
     return counts;
+}
+
+using PointsOut = Out<float, nb::shape<-1, 3>>;
+using HitsIn = In<float, nb::shape<-1, 6>>;
+
+void positions_of(SceneTrees& scene, const HitsIn& hits, const PointsOut& out, int threads) {
+    const auto given = rows<Hit>(hits);
+    const auto points = rows_out<Vec3>(out);
+    require_length(points.size(), given.size());
+    read_in_pieces(scene, given.size(), [&](std::size_t begin, std::size_t end) {
+        positions(scene.traced(), given.subspan(begin, end - begin),
+                  points.subspan(begin, end - begin), threads_for(threads));
+    });
+}
+
+void normals_of(SceneTrees& scene, const HitsIn& hits, const PointsOut& out, int threads) {
+    const auto given = rows<Hit>(hits);
+    const auto found = rows_out<Vec3>(out);
+    require_length(found.size(), given.size());
+    read_in_pieces(scene, given.size(), [&](std::size_t begin, std::size_t end) {
+        normals(scene.traced(), given.subspan(begin, end - begin),
+                found.subspan(begin, end - begin), threads_for(threads));
+    });
 }
 
 template <class Scene>
@@ -528,7 +552,13 @@ void bind_scene(nb::module_& module) {
                                  "A scene in float; raydix.Scene is what to use.");
     bind_changes(scene);
     bind_asking(scene);
-    scene.def("wide_stats", &wide_stats).def("info", &mesh_info).def("check", &check_trees);
+    scene.def("wide_stats", &wide_stats)
+        .def("info", &mesh_info)
+        .def("check", &check_trees)
+        .def("positions", &positions_of, nb::arg("hits").noconvert(), nb::arg("points").noconvert(),
+             nb::arg("threads") = 0)
+        .def("normals", &normals_of, nb::arg("hits").noconvert(), nb::arg("normals").noconvert(),
+             nb::arg("threads") = 0);
     nb::class_<SceneTreesD> mesh(module, "SceneTreesD",
                                  "A mesh in double and its tree; raydix.Scene is what to use.");
     bind_changes(mesh);

@@ -94,20 +94,19 @@ nb::tuple load(const std::string& spec, std::uint64_t seed, const std::string& b
     const BuildOptions trees =
         build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads);
     const SceneOptions commits = scene_options(quality, usage, compact, threads);
-    Model model;
+    std::string name;
+    std::vector<Camera> shown;
     std::shared_ptr<SceneTrees> scene;
     {
         const nb::gil_scoped_release unlocked;
-        using Arrays = SceneTrees::Arrays;
-        model = load_model(spec, seed);
-        scene = std::make_shared<SceneTrees>(
-            Arrays{std::make_shared<const Arrays::Vertices>(std::move(model.mesh.vertices)),
-                   std::make_shared<const Arrays::Triangles>(std::move(model.mesh.triangles))},
-            trees, commits);
+        Model model = load_model(spec, seed);
+        name = model.name;
+        shown = std::move(model.cameras.cameras);
+        scene = std::make_shared<SceneTrees>(std::move(model), trees, commits);
     }
     nb::list cameras;
-    for (const Camera& camera : model.cameras.cameras) cameras.append(camera_figures(camera));
-    return nb::make_tuple(scene, model.name, cameras);
+    for (const Camera& camera : shown) cameras.append(camera_figures(camera));
+    return nb::make_tuple(scene, name, cameras);
 }
 
 std::vector<std::uint32_t> add_instances(SceneTrees& self, std::shared_ptr<SceneTrees> scene,

@@ -54,15 +54,43 @@ SceneTrees::SceneTrees(Arrays mesh, const BuildOptions& trees, const SceneOption
     look_for_mesh();
 }
 
-void SceneTrees::check_strict(const std::string& name, const Arrays& mesh) const {
+SceneTrees::SceneTrees(Model model, const BuildOptions& trees, const SceneOptions& commits)
+    : SceneTrees(trees, commits) {
+    if (model.nodes.empty()) {
+        if (model.meshes.empty()) model.meshes.emplace_back();
+        Kept kept;
+        for (Mesh& mesh : model.meshes) {
+            const Arrays arrays{
+                std::make_shared<const Arrays::Vertices>(std::move(mesh.vertices)),
+                std::make_shared<const Arrays::Triangles>(std::move(mesh.triangles))};
+            kept.meshes.push_back(arrays);
+            static_cast<void>(add(arrays, {}));
+        }
+        kept_ = std::make_shared<const Kept>(std::move(kept));
+        unsettled_ = true;
+    } else {
+        for (const Mesh& mesh : model.meshes) check_strict("mesh " + mesh.name, mesh);
+        SceneOptions options = commits;
+        options.threads = threads_for(options.threads);
+        scene_ = Scene(model, options);
+        // Its geometries are the nodes that stand in the world. Ids of nodes follow those of
+        // meshes.
+        for (std::size_t k = 0; k < model.nodes.size(); ++k) {
+            const auto id = static_cast<std::uint32_t>(model.meshes.size() + k);
+            if (scene_.contains(id)) geometries_[id] = {true, 0xFFFFFFFFu, {}, nullptr};
+        }
+    }
+    look_for_mesh();
+}
+
+void SceneTrees::check_strict(const std::string& name, const MeshView& mesh) const {
     if (!options_.strict) return;
     const auto left_out = [&](std::size_t triangles) {
-        return inspect({*mesh.vertices, std::span(*mesh.triangles).first(triangles)})
-            .left_out_triangles;
+        return inspect({mesh.vertices, mesh.triangles.first(triangles)}).left_out_triangles;
     };
-    const std::uint64_t all = left_out(mesh.triangles->size());
+    const std::uint64_t all = left_out(mesh.triangles.size());
     if (all == 0) return;
-    std::size_t none = 0, some = mesh.triangles->size();
+    std::size_t none = 0, some = mesh.triangles.size();
     while (some - none > 1) {
         const std::size_t middle = none + (some - none) / 2;
         (left_out(middle) == 0 ? none : some) = middle;
@@ -87,10 +115,10 @@ void SceneTrees::settle() {
 std::uint32_t SceneTrees::add(Arrays mesh, const GeometryOptions& options) {
     const Writing lock("add", queue_, use_);
     settle();
-    check_strict("mesh", mesh);
+    check_strict("mesh", mesh.view());
     const std::lock_guard all(structure());
     const std::uint32_t id = scene_.share(mesh.view(), options);
-    geometries_[id] = {std::move(mesh), nullptr, {}, options.mask};
+    geometries_[id] = {false, options.mask, std::move(mesh), nullptr};
     return id;
 }
 
@@ -107,7 +135,7 @@ std::vector<std::uint32_t> SceneTrees::add(std::shared_ptr<SceneTrees> scene,
         for (std::size_t i = 0; i < transforms.size(); ++i) {
             const std::uint32_t mask = masks[masks.size() == 1 ? 0 : i];
             ids.push_back(scene_.add(scene->scene_, transforms[i], {mask, id}));
-            geometries_[ids.back()] = {{}, scene, transforms[i], mask};
+            geometries_[ids.back()] = {true, mask, {}, scene};
             id.reset();
         }
     } catch (...) {
@@ -132,13 +160,13 @@ void SceneTrees::update(std::uint32_t id, std::vector<Vec3> vertices,
                         std::optional<std::vector<Triangle>> triangles) {
     const Writing lock("update", queue_, use_);
     Geometry& geometry = at(id);
-    if (geometry.scene != nullptr) throw InputError(name_of(id) + " is an instance, not a mesh");
+    if (geometry.is_instance) throw InputError(name_of(id) + " is an instance, not a mesh");
     settle();
     Arrays mesh{std::make_shared<const Arrays::Vertices>(std::move(vertices)),
                 geometry.mesh.triangles};
     if (triangles)
         mesh.triangles = std::make_shared<const Arrays::Triangles>(std::move(*triangles));
-    check_strict(name_of(id), mesh);
+    check_strict(name_of(id), mesh.view());
     scene_.update(id, mesh.view());
     geometry.mesh = std::move(mesh);
 }
@@ -147,21 +175,23 @@ void SceneTrees::set_transforms(std::span<const std::uint32_t> ids,
                                 std::span<const Transform> transforms) {
     require_one_each("transforms", transforms.size(), ids.size());
     const Writing lock("set_transform", queue_, use_);
+    check_places(ids, transforms);
     settle();
-    std::size_t done = 0;
-    std::vector<Transform> before;
-    try {
-        for (; done < ids.size(); ++done) {
-            Geometry& geometry = at(ids[done]);
-            scene_.set_transform(ids[done], transforms[done]);
-            before.push_back(std::exchange(geometry.transform, transforms[done]));
-        }
-    } catch (...) {
-        while (done-- > 0) {
-            scene_.set_transform(ids[done], before[done]);
-            at(ids[done]).transform = before[done];
-        }
-        throw;
+    for (std::size_t i = 0; i < ids.size(); ++i) scene_.set_transform(ids[i], transforms[i]);
+}
+
+/// Throws what Scene::set_transform would.
+void SceneTrees::check_places(std::span<const std::uint32_t> ids,
+                              std::span<const Transform> transforms) {
+    Scene tried;
+    const Scene nothing;
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+        if (!at(ids[i]).is_instance)
+            throw InputError(name_of(ids[i]) + " is a mesh, not an instance");
+        if (tried.contains(ids[i]))
+            tried.set_transform(ids[i], transforms[i]);
+        else
+            tried.add(nothing, transforms[i], {.id = ids[i]});
     }
 }
 
@@ -191,9 +221,9 @@ CommitReport SceneTrees::commit(const SceneOptions& options) {
     auto kept = std::make_shared<Kept>();
     std::set<SceneTrees*> placed;
     for (const auto& [id, geometry] : geometries_) {
-        if (geometry.scene == nullptr) {
+        if (!geometry.is_instance) {
             kept->meshes.push_back(geometry.mesh);
-        } else if (placed.insert(geometry.scene.get()).second) {
+        } else if (geometry.scene != nullptr && placed.insert(geometry.scene.get()).second) {
             below.emplace_back(geometry.scene->use_);
             const std::lock_guard build(geometry.scene->build_);
             geometry.scene->settle();
@@ -214,17 +244,17 @@ void SceneTrees::look_for_mesh() {
     mesh_mask_ = 0;
     why_no_mesh_.clear();
     Arrays found;
-    if (geometries_.size() == 1 && geometries_.begin()->second.scene == nullptr) {
+    if (geometries_.size() == 1 && !geometries_.begin()->second.is_instance) {
         mesh_id_ = geometries_.begin()->first;
         mesh_mask_ = geometries_.begin()->second.mask;
         found = geometries_.begin()->second.mesh;
     } else if (!geometries_.empty()) {
-        const auto is_instance = [](const auto& entry) { return entry.second.scene != nullptr; };
+        const auto is_instance = [](const auto& entry) { return entry.second.is_instance; };
         const auto instance = std::ranges::find_if(geometries_, is_instance);
         const auto& named =
             instance == geometries_.end() ? *std::next(geometries_.begin()) : *instance;
         why_no_mesh_ = name_of(named.first) +
-                       (named.second.scene != nullptr ? " is an instance" : " is a second mesh") +
+                       (named.second.is_instance ? " is an instance" : " is a second mesh") +
                        ", and this call takes a scene of one mesh: Scene(vertices, faces)";
     }
     if (why_no_mesh_.empty() && found == mesh("")) return;

@@ -5,6 +5,7 @@
 #include <raydix/bvh.h>
 #include <raydix/double.h>
 #include <raydix/mesh.h>
+#include <raydix/model.h>
 #include <raydix/refit.h>
 #include <raydix/scene.h>
 #include <raydix/solid.h>
@@ -141,6 +142,9 @@ public:
     /// One mesh with id 0, committed: its wide tree is made when a ray or a change needs it.
     /// Throws InputError: an index past the vertices, with `trees.strict` a triangle left out.
     SceneTrees(Arrays mesh, const BuildOptions& trees, const SceneOptions& commits);
+    /// What a file holds, committed: with ids as raydix::Scene gives them. One mesh, or several
+    /// without nodes, wait for their first ray or change as above.
+    SceneTrees(Model model, const BuildOptions& trees, const SceneOptions& commits);
 
     // Changes: as those of raydix::Scene.
     std::uint32_t add(Arrays mesh, const GeometryOptions& options);
@@ -191,13 +195,14 @@ private:
         std::vector<std::shared_ptr<const Kept>> below;
     };
     struct Geometry {
-        Arrays mesh;
-        std::shared_ptr<SceneTrees> scene;  // of an instance
-        Transform transform;
+        bool is_instance;
         std::uint32_t mask;
+        Arrays mesh;
+        std::shared_ptr<SceneTrees> scene;  // of an instance; null if it comes from a file
     };
 
-    void check_strict(const std::string& name, const Arrays& mesh) const;
+    void check_strict(const std::string& name, const MeshView& mesh) const;
+    void check_places(std::span<const std::uint32_t> ids, std::span<const Transform> transforms);
     Geometry& at(std::uint32_t id);
     /// While writing, or with `build_` locked: the first commit of a scene that was made from a
     /// mesh.

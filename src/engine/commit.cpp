@@ -88,6 +88,9 @@ public:
             if (!mesh->tree->empty())
                 tree_->bounds = unite(tree_->bounds, mesh->tree->arrays().bounds);
         }
+        for (const auto& [id, geometry] : state_.geometries)
+            if (!geometry.is_instance())
+                tree_->mesh_names.push_back({id, geometry.mesh, geometry.own});
         place_instances();
         build_tops(*tree_);
         keep_own_meshes();
@@ -190,7 +193,7 @@ private:
             tree_->paths += 1 + inner->paths;
             if (tree_->paths > no_primitive - 1)
                 throw InputError(name() + ": more than 2^32 - 2 paths through instances");
-            tree_->instances.push_back({id, number, inner});
+            tree_->instances.push_back({id, number, geometry.transform, inner});
             place(geometry, id, number, inner);
         }
         set_extents();

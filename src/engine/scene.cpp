@@ -32,14 +32,12 @@ void check_mesh(const std::string& name, const MeshView& mesh) {
 void set_mesh(State::Geometry& geometry, const MeshView& mesh, bool shared) {
     geometry.shared = shared;
     geometry.changed = true;
-    if (shared) {
-        geometry.vertices.clear(), geometry.triangles.clear();
-        geometry.mesh = mesh;
-        return;
-    }
-    geometry.vertices.assign(mesh.vertices.begin(), mesh.vertices.end());
-    geometry.triangles.assign(mesh.triangles.begin(), mesh.triangles.end());
-    geometry.mesh = {geometry.vertices, geometry.triangles};
+    geometry.own =
+        shared ? nullptr
+               : std::make_shared<const Mesh>(Mesh{{},
+                                                   {mesh.vertices.begin(), mesh.vertices.end()},
+                                                   {mesh.triangles.begin(), mesh.triangles.end()}});
+    geometry.mesh = shared ? mesh : MeshView(*geometry.own);
 }
 
 std::uint32_t new_id(const State& state, const std::optional<std::uint32_t>& wanted) {
@@ -57,10 +55,7 @@ std::uint32_t new_id(const State& state, const std::optional<std::uint32_t>& wan
 
 /// The geometry is complete: nothing can fail from here on but for want of memory.
 std::uint32_t insert(State& state, std::uint32_t id, State::Geometry geometry) {
-    const auto [place, fresh] = state.geometries.emplace(id, std::move(geometry));
-    // The arrays moved, and with them where they begin, perhaps.
-    State::Geometry& own = place->second;
-    if (!own.shared && !own.is_instance()) own.mesh = {own.vertices, own.triangles};
+    state.geometries.emplace(id, std::move(geometry));
     state.taken.insert(id);
     while (!state.taken.empty() && *state.taken.begin() == state.next_id) {
         state.taken.erase(state.taken.begin());
@@ -123,7 +118,6 @@ Scene::Scene(const MeshView& mesh, const SceneOptions& options) : Scene() {
     commit(options);
 }
 Scene::Scene(const Mesh& mesh, const SceneOptions& options) : Scene(MeshView(mesh), options) {}
-Scene::Scene(const Model& model, const SceneOptions& options) : Scene(model.mesh, options) {}
 Scene::~Scene() = default;
 Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;

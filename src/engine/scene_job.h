@@ -77,6 +77,7 @@ struct SceneJob {
     // Of all hits: those of each ray behind those of the one before, sorted; how many [n].
     BudgetVector<Hit>* found = nullptr;
     std::uint64_t* hit_counts = nullptr;
+    std::uint32_t* visits = nullptr;  // of steps: the nodes that each ray visits [n]
     std::uint64_t invalid = 0;
 
     struct Limits {
@@ -96,6 +97,7 @@ struct SceneKernels {
     std::string_view isa;
     void (*trace)(SceneJob& job);
     void (*all_hits)(SceneJob& job);
+    void (*steps)(SceneJob& job);
 };
 
 /// Empty: the best. The names are those of simd_kernels().

@@ -14,10 +14,10 @@ namespace raydix {
 
 struct Scene::State {
     struct Geometry {
-        // A mesh; its arrays are the scene's own unless they are shared.
+        // A mesh; its arrays are the scene's own unless they are shared. Commits hold on to the
+        // own ones.
         MeshView mesh;
-        std::vector<Vec3> vertices;
-        std::vector<Triangle> triangles;
+        std::shared_ptr<const Mesh> own;
         bool shared = false;
         // An instance, if there is a scene.
         std::shared_ptr<const State> scene;

@@ -91,7 +91,15 @@ struct PlacedScene {
 struct InstanceName {
     std::uint32_t id;
     std::uint32_t number;  // of the path that ends here
+    Transform transform;
     std::shared_ptr<const SceneTree> scene;
+};
+
+/// A mesh as the scene's owner knows it: the triangles that hits name.
+struct MeshName {
+    std::uint32_t id;
+    MeshView mesh;
+    std::shared_ptr<const Mesh> own;  // its arrays; null if they are the caller's
 };
 
 /// A wide tree whose leaves hold one part each. Parts are numbered: mesh trees first, then placed
@@ -108,6 +116,7 @@ struct PartTree {
 struct SceneTree {
     std::vector<std::shared_ptr<const MeshTree>> meshes;
     std::vector<InstanceName> instances;  // by ascending id
+    std::vector<MeshName> mesh_names;     // by ascending id
     std::vector<PlacedScene> placed;
     std::vector<WayIn> ways;
     std::vector<Extent> extents;  // [meshes + placed]

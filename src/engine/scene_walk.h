@@ -146,8 +146,8 @@ HWY_INLINE V4 rounded(const double* from) {
     }
 }
 
-/// One ray through a scene.
-template <Wanted wanted>
+/// One ray through a scene; counting: the nodes that it visits too.
+template <Wanted wanted, bool counting = false>
 class SceneRay {
 public:
     SceneRay(SceneJob& job, std::uint32_t id)
@@ -161,6 +161,7 @@ public:
         job_.limits[id].reach = reach_;
         job_.hits[id] = best_;
     }
+    [[nodiscard]] std::uint64_t visits() const { return visits_; }
 
     void walk(const SceneTree& scene, std::size_t depth, std::uint32_t number,
               const SceneLine& line) {
@@ -177,9 +178,10 @@ public:
             stack.reserve(tree->arrays.stats.max_depth);
             Parts parts{*this, scene, *tree, depth, number, line};
             SimdCounts counts;
-            SingleRay<wanted, false, false, false, Parts>(tree->view, frame, stack.view(), counts,
-                                                          &parts, 0)
+            SingleRay<wanted, counting, false, false, Parts>(tree->view, frame, stack.view(),
+                                                             counts, &parts, 0)
                 .trace(0, {frame.tmax});
+            if constexpr (counting) visits_ += counts.visits;
         }
     }
 
@@ -248,10 +250,11 @@ private:
     template <bool compact>
     HWY_INLINE void search(const MeshTree& mesh, const WideView& view, const SingleFrame& frame,
                            const WideStackView& stack, std::uint32_t number, double scale) {
+        constexpr bool counted = compact || counting;
         SimdCounts counts;
         if constexpr (wanted == Wanted::all) {
             const std::size_t before = job_.found->size();
-            SingleRay<wanted, compact, compact>(view, frame, stack, counts).trace_all(*job_.found);
+            SingleRay<wanted, counted, compact>(view, frame, stack, counts).trace_all(*job_.found);
             for (std::size_t k = before; k < job_.found->size(); ++k) {
                 Hit& hit = (*job_.found)[k];
                 hit.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
@@ -259,12 +262,13 @@ private:
                 mesh.name(hit);
             }
         } else {
-            const WideBest best = SingleRay<wanted, compact, compact>(view, frame, stack, counts)
+            const WideBest best = SingleRay<wanted, counted, compact>(view, frame, stack, counts)
                                       .trace(0, {frame.tmax});
             if (best.found())
                 keep<wanted == Wanted::any>(mesh, number, scale,
                                             {best.t, best.prim, best.u, best.v}, best_, reach_);
         }
+        if constexpr (counting) visits_ += counts.visits;
     }
 
     SceneJob& job_;
@@ -272,6 +276,7 @@ private:
     float reach_;
     const std::uint32_t mask_;
     Hit best_;
+    std::uint64_t visits_ = 0;
 };
 
 template <bool any>
@@ -558,6 +563,21 @@ inline void all_scene_hits(SceneJob& job) {
             ++job.invalid;
         }
         job.hit_counts[k] = job.found->size() - before;
+    }
+}
+
+/// Closest hits, one ray after the other: how many nodes each visits, those over parts included.
+inline void count_scene_steps(SceneJob& job) {
+    job.hits.assign(1, {});
+    job.limits.resize(1);
+    for (std::size_t k = 0; k < job.n; ++k) {
+        const Ray& ray = job.rays[k];
+        job.limits[0] = {ray.tmin, ray.tmax, job.mask};
+        job.visits[k] = 0;
+        if (!is_valid(ray)) continue;
+        SceneRay<Wanted::closest, true> one(job, 0);
+        one.walk(*job.tree, 0, 0, line_of(ray));
+        job.visits[k] = static_cast<std::uint32_t>(one.visits());
     }
 }
 
