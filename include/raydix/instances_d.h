@@ -14,11 +14,6 @@
 
 namespace raydix {
 
-/// As Transform.
-struct TransformD {
-    std::array<std::array<double, 4>, 3> m{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-};
-
 /// As Instance; `object` is an id that InstancedSceneD gave.
 struct InstanceD {
     std::uint32_t object = 0;
@@ -30,7 +25,7 @@ struct InstanceD {
 struct InstanceHitD {
     static constexpr std::size_t max_levels = InstanceHit::max_levels;
 
-    HitD hit;
+    TreeHitD hit;
     std::uint32_t object = no_primitive;
     std::array<std::uint32_t, max_levels> path = InstanceHit::unused();
 

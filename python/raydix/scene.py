@@ -223,7 +223,7 @@ class Scene(SceneViews):
         if self.device == "cuda":
             return self._on_cuda().intersect(rays, directions, tmin, tmax, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
-        columns = 6 if self.dtype == FLOAT32 else 4  # geometry and instance behind the four
+        columns = 6 if self.dtype == FLOAT32 else 5  # geometry and instance behind the four
         hits = np.empty((*lead, columns), self.dtype)
         self._core.intersect(
             *args, hits if hits.ndim == 2 else hits.reshape(-1, columns), self.threads

@@ -52,10 +52,9 @@ struct PlacedHit {
     std::uint32_t object, instance;
 };
 template <class Names>
-using HitOf =
-    std::conditional_t<std::is_same_v<typename Names::Scalar, float>, TreeHit, typename Names::Hit>;
+using HitOf = std::conditional_t<std::is_same_v<typename Names::Scalar, float>, TreeHit, TreeHitD>;
 static_assert(sizeof(PlacedHit<TreeHit>) == 6 * sizeof(float));
-static_assert(sizeof(PlacedHit<HitD>) == 5 * sizeof(double));
+static_assert(sizeof(PlacedHit<TreeHitD>) == 5 * sizeof(double));
 
 /// The objects' trees must outlive this: the binding keeps them.
 template <class Names>
