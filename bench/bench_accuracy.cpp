@@ -88,7 +88,7 @@ public:
         cli::TreeOptions tree;
         tree.cameras_file = options.cameras_file;
         input_ = {cli::load_model_with_cameras(name, tree, options.common), {}};
-        Mesh& mesh = input_.scene.mesh;
+        Mesh& mesh = input_.scene.mesh();
         mesh.vertices.reserve(mesh.vertices.size() + 1);  // Embree reads 16 bytes a vertex
         input_.bvh = build_bvh(mesh, {.builder = Builder::ploc});
         wide_ = WideBvh(input_.bvh);
@@ -113,7 +113,7 @@ public:
             const Hit* const hits[] = {&ours[i], &theirs[0][i], &theirs[1][i]};
             if (!ours[i].hit() || hits[1]->prim != ours[i].prim || hits[2]->prim != ours[i].prim)
                 continue;
-            const Exact exact = exact_hit(input_.scene.mesh, ours[i].prim, rays[i]);
+            const Exact exact = exact_hit(input_.scene.mesh(), ours[i].prim, rays[i]);
             for (std::size_t k = 0; k < 3; ++k) {
                 all[k].add(*hits[k], exact);
                 if (exact.sine < options_.grazing) grazing[k].add(*hits[k], exact);

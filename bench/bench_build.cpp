@@ -88,22 +88,22 @@ Json run_embree(const raydix::Mesh& mesh, const Options& options) {
 #endif
 
 Json run(const Options& options) {
-    raydix::Model scene = raydix::load_model(options.scene);
-    scene.mesh.vertices.reserve(scene.mesh.vertices.size() +
-                                1);  // Embree reads past the last vertex
+    raydix::Model scene = raydix::load_flat_model(options.scene);
+    scene.mesh().vertices.reserve(scene.mesh().vertices.size() +
+                                  1);  // Embree reads past the last vertex
     Json result;
     if (options.peer == "raydix") {
-        result = run_raydix(scene.mesh, options);
+        result = run_raydix(scene.mesh(), options);
 #ifdef RAYDIX_EMBREE_MAJOR
     } else if (options.peer == "embree") {
-        result = run_embree(scene.mesh, options);
+        result = run_embree(scene.mesh(), options);
 #endif
     } else {
         throw raydix::InputError("no such peer in this program: " + options.peer);
     }
     result["peer"] = options.peer;
     result["scene"] = scene.name;
-    result["triangles"] = scene.mesh.triangles.size();
+    result["triangles"] = scene.mesh().triangles.size();
     result["threads"] = options.threads;
     result["bits"] = options.bits;
     result["cpu"] = raydix::machine_info().cpu;

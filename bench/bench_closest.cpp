@@ -71,7 +71,7 @@ typename Kernel::Point_3 cgal_point(Vec3 p) {
 class Peers {
 public:
     explicit Peers(const Options& options)
-        : mesh_(load_model(options.scene).mesh),
+        : mesh_(load_flat_model(options.scene).mesh()),
           bvh_(build_bvh(
               mesh_, {.builder = builder_from_name(options.builder), .threads = options.threads})) {
         for (const Triangle& t : mesh_.triangles)

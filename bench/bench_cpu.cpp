@@ -72,7 +72,7 @@ private:
         cli::TreeOptions tree;
         tree.cameras_file = options_.cameras_file;
         cli::SceneTree input{cli::load_model_with_cameras(name, tree, options_.common), {}};
-        Mesh& mesh = input.scene.mesh;
+        Mesh& mesh = input.scene.mesh();
         if (mesh.triangles.empty()) throw InputError(name + ": holds no triangles");
         mesh.vertices.reserve(mesh.vertices.size() + 1);
         SceneFigures figures{.scene = input.scene.name,
@@ -93,7 +93,7 @@ private:
     void trace_all(const cli::SceneTree& input, SceneFigures& figures) const {
         std::vector<std::unique_ptr<Peer>> peers;
         for (const PeerName& name : names_) {
-            peers.push_back(make_peer(name, input.scene.mesh, options_, threads_));
+            peers.push_back(make_peer(name, input.scene.mesh(), options_, threads_));
             peers.back()->prepare();
             peers.back()->build();
         }

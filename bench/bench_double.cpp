@@ -59,8 +59,8 @@ struct Trees {
     raydix::BvhD in_double;
 
     Trees(const raydix::Model& scene, const Options& options)
-        : mesh(scene.mesh),
-          wide{"", {}, scene.mesh.triangles},
+        : mesh(scene.mesh()),
+          wide{"", {}, scene.mesh().triangles},
           build{.builder = raydix::builder_from_name(options.builder), .threads = options.threads},
           in_float(build_bvh(mesh, build)) {
         for (const Vec3& v : mesh.vertices) wide.vertices.push_back(widened(v));
@@ -202,7 +202,7 @@ Json bench_instances(const Trees& trees, std::span<const raydix::Ray> rays,
 
 void run(const Options& options) {
     for (const std::string& name : options.scenes) {
-        const raydix::Model scene = raydix::load_model(name, options.seed);
+        const raydix::Model scene = raydix::load_flat_model(name, options.seed);
         const Trees trees(scene, options);
         std::vector<std::uint32_t> pixels;
         const auto primary =

@@ -186,7 +186,7 @@ Json measure_rays(const raydix::DeviceCwbvhTree& tree, const std::vector<raydix:
 
 Json measure_cwbvh(const raydix::Model& scene, int repeat) {
     const raydix::Bvh bvh =
-        build_bvh(scene.mesh, {.builder = raydix::Builder::ploc, .max_leaf = 1});
+        build_bvh(scene.mesh(), {.builder = raydix::Builder::ploc, .max_leaf = 1});
     const raydix::Cwbvh tree(bvh);
     const raydix::DeviceCwbvh device(tree);
     std::vector<std::uint32_t> pixels;
@@ -206,8 +206,8 @@ void run(const Options& options) {
     const std::string device = raydix::device_name();
     const double copy_rate = raydix::measure_device_copy(options.copy_bytes, options.repeat);
     for (const std::string& name : options.scenes) {
-        const raydix::Model scene = raydix::load_model(name, options.seed);
-        const DeviceInput input(scene.mesh);
+        const raydix::Model scene = raydix::load_flat_model(name, options.seed);
+        const DeviceInput input(scene.mesh());
         const auto print = [&](const Json& row) {
             Json line{{"bench", "gpu_build"},
                       {"device", device},
@@ -216,7 +216,7 @@ void run(const Options& options) {
                       {"copy_bytes_per_s", copy_rate},
                       {"scene", name},
                       {"seed", options.seed},
-                      {"triangles", scene.mesh.triangles.size()}};
+                      {"triangles", scene.mesh().triangles.size()}};
             line.update(row);
             fmt::print("{}\n", line.dump());
         };
@@ -224,20 +224,21 @@ void run(const Options& options) {
                   {"device", device},
                   {"scene", name},
                   {"seed", options.seed},
-                  {"triangles", scene.mesh.triangles.size()}};
+                  {"triangles", scene.mesh().triangles.size()}};
         rays.update(measure_cwbvh(scene, options.repeat));
         fmt::print("{}\n", rays.dump());
         for (const int bits : options.bits)
             for (const int max_leaf : options.max_leaf)
                 for (const std::string& tree : options.trees) {
                     if (tree == "kdtree")
-                        print(measure_kdtree(input, scene.mesh,
+                        print(measure_kdtree(input, scene.mesh(),
                                              {.bits = bits, .max_leaf = max_leaf}, options.repeat));
                     else if (tree == "octree")
-                        print(measure_octree(input, scene.mesh,
+                        print(measure_octree(input, scene.mesh(),
                                              {.bits = bits, .max_leaf = max_leaf}, options.repeat));
                     else
-                        run_builders(options, input, scene.mesh, bits, max_leaf, copy_rate, print);
+                        run_builders(options, input, scene.mesh(), bits, max_leaf, copy_rate,
+                                     print);
                 }
     }
 }

@@ -106,11 +106,11 @@ Json measure(const raydix::DeviceWarpTree& tree, const Launch& launch, raydix::W
 void run(const Options& options) {
     const std::string device = raydix::device_name();
     for (const std::string& name : options.scenes) {
-        const raydix::Model scene = raydix::load_model(name, options.seed);
+        const raydix::Model scene = raydix::load_flat_model(name, options.seed);
         raydix::BuildOptions build;
         build.builder = raydix::builder_from_name(options.builder);
         build.max_leaf = options.max_leaf;
-        const raydix::Bvh bvh = build_bvh(scene.mesh, build);
+        const raydix::Bvh bvh = build_bvh(scene.mesh(), build);
         const raydix::WarpTree host(bvh);
         const raydix::DeviceWarpTree tree(host);
         for (const std::string& kind : options.kinds) {
@@ -129,7 +129,7 @@ void run(const Options& options) {
                           {"compiler", __VERSION__},
                           {"scene", scene.name},
                           {"seed", options.seed},
-                          {"triangles", scene.mesh.triangles.size()},
+                          {"triangles", scene.mesh().triangles.size()},
                           {"builder", options.builder},
                           {"max_leaf", options.max_leaf},
                           {"rays", kind}};

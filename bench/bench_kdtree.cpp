@@ -98,9 +98,9 @@ KdTreeOptions tree_options(const Options& options) {
 
 /// Points of the set in random order, and in the order of the tree's leaves.
 void bench_nearest(const Options& options) {
-    const Model scene = load_model(options.points, options.seed);
-    if (!scene.mesh.is_point_cloud()) throw InputError(options.points + ": not a set of points");
-    const KdTree tree = build_kdtree(scene.mesh, tree_options(options));
+    const Model scene = load_flat_model(options.points, options.seed);
+    if (!scene.mesh().is_point_cloud()) throw InputError(options.points + ": not a set of points");
+    const KdTree tree = build_kdtree(scene.mesh(), tree_options(options));
     std::vector<std::uint32_t> positions(tree.order().size());
     std::iota(positions.begin(), positions.end(), 0u);
     std::shuffle(positions.begin(), positions.end(), std::mt19937_64(options.seed));
@@ -113,7 +113,7 @@ void bench_nearest(const Options& options) {
     std::vector<KdNeighbor> found(random.size() * options.k);
     const KdQueryCounts counts =
         kd_nearest(tree, random, options.k, found, {.threads = options.threads, .counters = true});
-    compare_some_rows(scene.mesh.vertices, random, found, options.k);
+    compare_some_rows(scene.mesh().vertices, random, found, options.k);
     const auto run = [&](const std::vector<Vec3>& queries) {
         return [&] { kd_nearest(tree, queries, options.k, found, {.threads = options.threads}); };
     };
@@ -160,9 +160,9 @@ void bench_rays_of(const std::string& kind, const Options& options, const Model&
 }
 
 void bench_rays(const Options& options) {
-    const Model scene = load_model(options.scene, options.seed);
-    const KdTree tree = build_kdtree(scene.mesh, tree_options(options));
-    const Bvh bvh = build_bvh(scene.mesh, {.bits = options.bits, .threads = options.threads});
+    const Model scene = load_flat_model(options.scene, options.seed);
+    const KdTree tree = build_kdtree(scene.mesh(), tree_options(options));
+    const Bvh bvh = build_bvh(scene.mesh(), {.bits = options.bits, .threads = options.threads});
     std::vector<std::uint32_t> pixels;
     const std::vector<Ray> primary = make_primary_rays(scene.cameras.cameras[0], 512, 384, &pixels);
     bench_rays_of("primary", options, scene, tree, bvh, primary);

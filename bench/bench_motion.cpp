@@ -140,7 +140,7 @@ Json head(const char* question, const Options& options) {
 }
 
 void run_refit(const Options& options) {
-    Mesh still = load_model(options.scene).mesh;
+    Mesh still = load_flat_model(options.scene).mesh();
     still.vertices.push_back({});  // Embree reads 16 bytes a vertex
     Mesh mesh = still;
     const MeshView view(std::span(mesh.vertices).first(mesh.vertices.size() - 1), mesh.triangles);
@@ -173,7 +173,7 @@ void run_refit(const Options& options) {
 }
 
 void run_instances(const Options& options) {
-    const Bvh object = build_bvh(load_model("builtin:figure?triangles=5000").mesh);
+    const Bvh object = build_bvh(load_flat_model("builtin:figure?triangles=5000").mesh());
     InstancedScene scene;
     const std::uint32_t id = scene.add_object(object);
     std::mt19937_64 random(1);

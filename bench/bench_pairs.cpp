@@ -67,7 +67,7 @@ std::vector<PrimitivePair> cgal_pairs(const Mesh& mesh, bool narrow, int cutoff)
 }
 
 void run(const Options& options) {
-    const Mesh mesh = load_model(options.scene).mesh;
+    const Mesh mesh = load_flat_model(options.scene).mesh();
     const BuildOptions build{.builder = builder_from_name(options.builder),
                              .max_leaf = options.max_leaf,
                              .threads = options.threads};

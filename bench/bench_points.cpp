@@ -62,8 +62,8 @@ public:
 
 private:
     Json study(const std::string& name) {
-        const Model scene = load_model(name, options_.common.seed);
-        const std::vector<Vec3>& points = scene.mesh.vertices;
+        const Model scene = load_flat_model(name, options_.common.seed);
+        const std::vector<Vec3>& points = scene.mesh().vertices;
         const Points index = build_points(points, {.strict = true, .threads = threads_});
         if (index.empty()) throw InputError("holds no points");
         const std::vector<Vec3> random = shuffled(points), ordered = along_curve(random);

@@ -125,17 +125,17 @@ void print_table(const Json& result) {
 }
 
 Json run(const std::string& scene_name, const Options& options) {
-    raydix::Model scene = raydix::load_model(scene_name);
-    scene.mesh.vertices.reserve(scene.mesh.vertices.size() + 1);  // Embree reads past the last
+    raydix::Model scene = raydix::load_flat_model(scene_name);
+    scene.mesh().vertices.reserve(scene.mesh().vertices.size() + 1);  // Embree reads past the last
     std::map<std::string, Peer> peers;
     std::map<std::string, raydix::BvhBuilder> builders;
-    raydix::bench::EmbreeTree tree(scene.mesh, options.threads, options.max_leaf);
-    raydix::bench::EmbreeScene embree(scene.mesh, {options.threads, RTC_BUILD_QUALITY_MEDIUM});
+    raydix::bench::EmbreeTree tree(scene.mesh(), options.threads, options.max_leaf);
+    raydix::bench::EmbreeScene embree(scene.mesh(), {options.threads, RTC_BUILD_QUALITY_MEDIUM});
     std::optional<raydix::bench::EmbreeTree> high_tree;
     std::optional<raydix::bench::EmbreeScene> high_scene;
     if (options.high) {
-        high_tree.emplace(scene.mesh, options.threads, options.max_leaf, RTC_BUILD_QUALITY_HIGH);
-        high_scene.emplace(scene.mesh,
+        high_tree.emplace(scene.mesh(), options.threads, options.max_leaf, RTC_BUILD_QUALITY_HIGH);
+        high_scene.emplace(scene.mesh(),
                            raydix::bench::EmbreeOptions{options.threads, RTC_BUILD_QUALITY_HIGH});
     }
     Times scene_ms, high_scene_ms;
@@ -151,7 +151,7 @@ Json run(const std::string& scene_name, const Options& options) {
             build.threads = options.threads;
             build.max_leaf = options.max_leaf;
             watch.lap();
-            builders[name].build(scene.mesh, build, peers[name].bvh);
+            builders[name].build(scene.mesh(), build, peers[name].bvh);
             note(peers[name].build_ms);
         }
         tree.refill();
@@ -172,13 +172,13 @@ Json run(const std::string& scene_name, const Options& options) {
         high_scene->commit();
         note(high_scene_ms);
     }
-    if (options.high) peers["embree_tree_high"].bvh = high_tree->as_bvh(scene.mesh);
-    peers["embree_tree"].bvh = tree.as_bvh(scene.mesh);
+    if (options.high) peers["embree_tree_high"].bvh = high_tree->as_bvh(scene.mesh());
+    peers["embree_tree"].bvh = tree.as_bvh(scene.mesh());
     if (options.trace && !scene.cameras.cameras.empty())
         trace_all(peers, make_rays(scene, peers["embree_tree"].bvh, options), options);
 
     Json result = {{"scene", scene.name},
-                   {"triangles", scene.mesh.triangles.size()},
+                   {"triangles", scene.mesh().triangles.size()},
                    {"threads", options.threads},
                    {"rounds", options.rounds},
                    {"max_leaf", options.max_leaf},

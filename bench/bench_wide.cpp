@@ -129,10 +129,10 @@ Json tree_json(const raydix::Bvh& bvh, const raydix::Cwbvh& cwbvh, int repeat) {
 
 void run(const Options& options) {
     for (const std::string& name : options.scenes) {
-        const raydix::Model scene = raydix::load_model(name, options.seed);
+        const raydix::Model scene = raydix::load_flat_model(name, options.seed);
         for (const std::string& builder : options.builders) {
             const raydix::Bvh bvh = build_bvh(
-                scene.mesh,
+                scene.mesh(),
                 {.builder = raydix::builder_from_name(builder), .max_leaf = options.max_leaf});
             const raydix::Cwbvh cwbvh(bvh);
             std::vector<std::uint32_t> pixels;
@@ -149,7 +149,7 @@ void run(const Options& options) {
                       {"compiler", __VERSION__},
                       {"scene", name},
                       {"seed", options.seed},
-                      {"triangles", scene.mesh.triangles.size()},
+                      {"triangles", scene.mesh().triangles.size()},
                       {"builder", builder},
                       {"max_leaf", options.max_leaf},
                       {"repeat", options.repeat}};

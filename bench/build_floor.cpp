@@ -73,7 +73,7 @@ double triad_gb_per_s() {
 }
 
 Json run(const std::string& spec, int threads) {
-    const Mesh mesh = load_model(spec).mesh;
+    const Mesh mesh = load_flat_model(spec).mesh();
     const std::size_t n = mesh.triangles.size();
     const TriangleSource source{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()};
     std::vector<Aabb> boxes(n), gathered(n);

@@ -61,9 +61,9 @@ std::vector<PeerBuilds> measure_builds(const std::string& scene, const CpuBench&
 }
 
 void print_builds_of_one_peer(const CpuBench& options) {
-    Model scene = load_model(options.scenes.front(), options.common.seed);
-    scene.mesh.vertices.reserve(scene.mesh.vertices.size() + 1);
-    const auto peer = make_peer({options.build_of}, scene.mesh, options, options.common.threads);
+    Model scene = load_flat_model(options.scenes.front(), options.common.seed);
+    scene.mesh().vertices.reserve(scene.mesh().vertices.size() + 1);
+    const auto peer = make_peer({options.build_of}, scene.mesh(), options, options.common.threads);
     Json result{{"fresh_ms", nullptr}, {"kept_ms", Json::array()}, {"layout_ms", Json::array()}};
     for (int k = 0; k < builds_of_a_process; ++k) {
         peer->prepare();

@@ -152,9 +152,9 @@ Aabb bounds_of(const PlacedScene& scene, std::uint32_t group) {
 }
 
 SharedMesh load_shared_mesh(const std::string& scene, std::uint64_t seed) {
-    Model loaded = load_model(scene, seed);
-    loaded.mesh.name = loaded.name;
-    return with_room(std::move(loaded.mesh));
+    Model loaded = load_flat_model(scene, seed);
+    loaded.mesh().name = loaded.name;
+    return with_room(std::move(loaded).mesh());
 }
 
 SharedMesh make_plant(std::uint64_t triangles, std::uint64_t seed) {

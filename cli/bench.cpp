@@ -112,12 +112,13 @@ public:
         if (options_.common.prints_tables()) print_machines();
         for (const int bits : options_.bits) {
             for (const std::string& name : options_.scenes) {
-                const Model scene = load_model(name, options_.common.seed);
+                const Model scene = load_flat_model(name, options_.common.seed);
                 study(scene, bits, false);
                 about(scene.name, [&] { time_builds(scene, bits); });
             }
             for (const std::uint64_t n : options_.sizes)
-                study(load_model(fmt::format("builtin:soup?triangles={}", n), options_.common.seed),
+                study(load_flat_model(fmt::format("builtin:soup?triangles={}", n),
+                                      options_.common.seed),
                       bits, true);
         }
     }
@@ -177,7 +178,7 @@ private:
                                          .fit = variant.fit,
                                          .threads = threads};
                 const HierarchyRun run = about(scene.name, [&] {
-                    return study_hierarchy(scene.mesh, build, options_.repeat);
+                    return study_hierarchy(scene.mesh(), build, options_.repeat);
                 });
                 note(scene, variant, run, threads, size_series);
                 if (variant.builder == Builder::garanzha) levels = run.items_per_level;
@@ -210,7 +211,7 @@ private:
                                          .bits = bits,
                                          .max_leaf = options_.max_leaf,
                                          .threads = threads};
-                const std::vector<BuildMs> times = rebuilds(scene.mesh, build);
+                const std::vector<BuildMs> times = rebuilds(scene.mesh(), build);
                 Json entry{{"scene", scene.name},
                            {"builder", name},
                            {"bits", bits},

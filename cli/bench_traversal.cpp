@@ -192,7 +192,7 @@ private:
         const WarpTree tree(input.bvh);
         if (options_.common.prints_tables())
             fmt::print("\n{}: {} triangles, {} nodes, SAH {:.1f}, depth {}\n", scene,
-                       grouped(input.scene.mesh.triangles.size()), grouped(stats.nodes),
+                       grouped(input.scene.mesh().triangles.size()), grouped(stats.nodes),
                        stats.sah.value_or(0.0), stats.max_depth);
         const RayLaunches launches(options_.launches, input, options_.common);
         for (const RayKind kind : kinds_from(options_.rays)) {

@@ -130,7 +130,7 @@ void run_build(const BuildCommand& options) {
     const TimedBuilds timed = about(options.scene, [&] {
         const auto build =
             options.tree.device == "cuda" ? build_repeatedly_on_device : build_repeatedly;
-        return build(scene.mesh, options.tree.build_options(options.common), options.repeat);
+        return build(scene.mesh(), options.tree.build_options(options.common), options.repeat);
     });
     const TreeStats stats = tree_stats(timed.bvh, stats_options(options.tree, options.common));
     Json build = build_json(timed.bvh, stats, timed.fresh);
@@ -139,12 +139,12 @@ void run_build(const BuildCommand& options) {
     build["kept_ms"] = spread_json(totals(timed.kept));
     if (options.tree.layout == "cwbvh") add_cwbvh(build, timed.bvh, options.common);
     if (is_wide_layout(options.tree.layout))
-        add_wide_builds(build, scene.mesh, options.tree.build_options(options.common),
+        add_wide_builds(build, scene.mesh(), options.tree.build_options(options.common),
                         options.tree.layout, options.repeat);
     document["build"] = build;
     if (options.common.prints_tables()) {
         fmt::print("{}: {} triangles, {} vertices, loaded in {:.1f} ms\n", scene.name,
-                   grouped(scene.mesh.triangles.size()), grouped(scene.mesh.vertices.size()),
+                   grouped(scene.mesh().triangles.size()), grouped(scene.mesh().vertices.size()),
                    scene.load_ms);
         print_build_table(build, timed);
         print_tree_table(timed.bvh, stats);
@@ -182,7 +182,7 @@ void run_check(const CheckCommand& options) {
     } else {
         refuse_build_options(options.scene, options.tree);
         const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
-        report = check(input.bvh, input.scene.mesh);
+        report = check(input.bvh, input.scene.mesh());
     }
     document["check"] = {{"ok", report.ok},
                          {"broken", report.ok ? Json(nullptr) : Json(report.broken)},
@@ -210,6 +210,7 @@ void add_build_command(CLI::App& app) {
     command->add_option("-o,--output", options->out_file, "Save the tree with its geometry")
         ->type_name("FILE.rdx");
     add_tree_options(*command, options->tree);
+    add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options] { run_build(*options); });
 }
@@ -226,6 +227,7 @@ void add_check_command(CLI::App& app) {
             ->type_name("A B");
     scene->excludes(same);
     add_tree_options(*command, options->tree);
+    add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options, scene, same] {
         if (scene->count() + same->count() == 0) throw CLI::RequiredError("SCENE or --same A B");

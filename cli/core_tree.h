@@ -91,7 +91,7 @@ void run_core_build(const std::string& scene_name, const TreeOptions& tree_optio
     document["scene"] = scene_json(scene);
     document["load_ms"] = scene.load_ms;
     const auto builds = about(scene_name, [&] {
-        return build_core<Kind>(scene.mesh, options, tree_options.device, repeat);
+        return build_core<Kind>(scene.mesh(), options, tree_options.device, repeat);
     });
     Json build = core_build_json<Kind>(builds.tree, builds.ms);
     build["device"] = tree_options.device;
@@ -101,7 +101,7 @@ void run_core_build(const std::string& scene_name, const TreeOptions& tree_optio
     document["build"] = build;
     if (common.prints_tables()) {
         fmt::print("{}: {} triangles, {} vertices, loaded in {:.1f} ms\n", scene.name,
-                   grouped(scene.mesh.triangles.size()), grouped(scene.mesh.vertices.size()),
+                   grouped(scene.mesh().triangles.size()), grouped(scene.mesh().vertices.size()),
                    scene.load_ms);
         print_stages(document["build"], builds.ms.size());
         print_core_head(figures);
@@ -117,8 +117,8 @@ void run_core_check(const std::string& scene_name, const TreeOptions& tree_optio
     Json document = new_document("check");
     const Model scene = load_model_with_cameras(scene_name, tree_options, common);
     const CheckReport report = about(scene_name, [&] {
-        return Kind::check(build_core<Kind>(scene.mesh, options, tree_options.device, 0).tree,
-                           scene.mesh);
+        return Kind::check(build_core<Kind>(scene.mesh(), options, tree_options.device, 0).tree,
+                           scene.mesh());
     });
     document["check"] = {{"ok", report.ok},
                          {"broken", report.ok ? Json(nullptr) : Json(report.broken)},

@@ -43,7 +43,7 @@ void run_info(const InfoOptions& options) {
         input = load_scene_tree(options.scene, options.tree, options.common);
     else
         input.scene = load_model_with_cameras(options.scene, options.tree, options.common);
-    const MeshInfo info = inspect(input.scene.mesh);
+    const MeshInfo info = inspect(input.scene.mesh());
     document["scene"] = scene_json(input.scene);
     document["scene"].update(mesh_info_json(info));
     document["load_ms"] = input.scene.load_ms;

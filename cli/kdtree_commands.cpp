@@ -85,7 +85,7 @@ KdTraced load_kdtree_traced(const std::string& scene_name, const TreeOptions& tr
     const KdTreeOptions options = kdtree_options(tree, common);
     KdTraced traced;
     traced.input.scene = load_model_with_cameras(scene_name, tree, common);
-    const Mesh& mesh = traced.input.scene.mesh;
+    const Mesh& mesh = traced.input.scene.mesh();
     traced.kdtree = about(scene_name, [&] { return build_kdtree(mesh, options); });
     traced.input.bvh = build_bvh(mesh, {.strict = tree.strict, .threads = common.threads});
     return traced;

@@ -1,13 +1,16 @@
 // The shared options, and scenes and trees from what the user named.
 #include "options.h"
 
+#include <fmt/format.h>
 #include <raydix/rdx.h>
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 
 #include "device_scene.h"
+#include "output.h"
 
 namespace raydix::cli {
 
@@ -33,6 +36,11 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
     command.add_option("--seed", options.seed, "Seed of built-in scenes and sampling")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
+}
+
+void add_flatten_option(CLI::App& command, CommonOptions& options) {
+    command.add_flag("--flatten", options.flatten,
+                     "Make one mesh of the scene's meshes and nodes: prim counts through");
 }
 
 void add_tree_options(CLI::App& command, TreeOptions& options) {
@@ -74,9 +82,10 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->type_name("LEVEL");
     options.layout_option =
         command
-            .add_option("--layout", options.layout,
-                        "Memory layout that is traced: of simd wide8, wide4 or compact, which is "
-                        "wide8 with shared vertices; cwbvh: build only")
+            .add_option(
+                "--layout", options.layout,
+                "Memory layout that is traced: of the engine wide8, wide4 or compact, which is "
+                "wide8 with shared vertices; cwbvh: build only")
             ->check(CLI::IsMember({"binary", "wide4", "wide8", "compact", "cwbvh"}))
             ->capture_default_str()
             ->group(group);
@@ -147,6 +156,18 @@ BuildOptions TreeOptions::build_options(const CommonOptions& common) const {
     return result;
 }
 
+void flatten(Model& scene, const CommonOptions& common) {
+    if (scene.is_flat()) return;
+    if (!common.flatten && common.prints_tables())
+        fmt::print("{}: its {} and {} are taken as one mesh (--flatten)\n", scene.name,
+                   counted(scene.meshes.size(), "mesh", "meshes"),
+                   counted(scene.nodes.size(), "node", "nodes"));
+    const auto start = std::chrono::steady_clock::now();
+    scene.flatten();
+    scene.load_ms +=
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
 bool is_rdx(const std::string& scene) { return scene.ends_with(".rdx"); }
 
 namespace {
@@ -157,10 +178,17 @@ void override_cameras(Model& scene, const TreeOptions& tree) {
 
 }  // namespace
 
-Model load_model_with_cameras(const std::string& name, const TreeOptions& tree,
-                              const CommonOptions& common) {
+Model load_structured_model(const std::string& name, const TreeOptions& tree,
+                            const CommonOptions& common) {
     Model scene = is_rdx(name) ? load_rdx(name).scene : load_model(name, common.seed);
     override_cameras(scene, tree);
+    return scene;
+}
+
+Model load_model_with_cameras(const std::string& name, const TreeOptions& tree,
+                              const CommonOptions& common) {
+    Model scene = load_structured_model(name, tree, common);
+    flatten(scene, common);
     return scene;
 }
 
@@ -201,11 +229,16 @@ SceneTree load_scene_tree(const std::string& name, const TreeOptions& tree,
         override_cameras(file.scene, tree);
         return {std::move(file.scene), std::move(file.bvh)};
     }
-    SceneTree result{load_model_with_cameras(name, tree, common), {}};
+    return tree_of(load_model_with_cameras(name, tree, common), name, tree, common);
+}
+
+SceneTree tree_of(Model scene, const std::string& name, const TreeOptions& tree,
+                  const CommonOptions& common) {
+    SceneTree result{std::move(scene), {}};
     result.bvh = about(name, [&] {
         const BuildOptions options = tree.build_options(common);
-        return tree.device == "cuda" ? DeviceScene(result.scene.mesh, options).build().bvh
-                                     : build_bvh(result.scene.mesh, options);
+        return tree.device == "cuda" ? DeviceScene(result.scene.mesh(), options).build().bvh
+                                     : build_bvh(result.scene.mesh(), options);
     });
     return result;
 }

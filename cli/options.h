@@ -19,11 +19,14 @@ struct CommonOptions {
     int threads = 0;
     bool quiet = false;
     std::uint64_t seed = 1;
+    bool flatten = false;  // one mesh was asked for
 
     /// Tables for people go to standard output unless JSON does.
     [[nodiscard]] bool prints_tables() const { return !quiet && json_file != "-"; }
 };
 void add_common_options(CLI::App& command, CommonOptions& options);
+/// Of commands that read scenes of several meshes and nodes (glTF).
+void add_flatten_option(CLI::App& command, CommonOptions& options);
 
 /// How a tree is to be built, in every command that needs one.
 struct TreeOptions {
@@ -54,6 +57,12 @@ struct SceneTree {
     Bvh bvh;
 };
 [[nodiscard]] bool is_rdx(const std::string& scene);
+/// For work on one mesh. Says so unless --flatten did.
+void flatten(Model& scene, const CommonOptions& common);
+/// As the file has it.
+[[nodiscard]] Model load_structured_model(const std::string& scene, const TreeOptions& tree,
+                                          const CommonOptions& common);
+/// The same flat.
 [[nodiscard]] Model load_model_with_cameras(const std::string& scene, const TreeOptions& tree,
                                             const CommonOptions& common);
 /// A .rdx file brings its tree: options that ask for another one are a usage error, never ignored.
@@ -66,6 +75,9 @@ void refuse_layout(const TreeOptions& tree);
 void refuse_device(const TreeOptions& tree);
 [[nodiscard]] SceneTree load_scene_tree(const std::string& scene, const TreeOptions& tree,
                                         const CommonOptions& common);
+/// Of a flat model. `name`: as the user gave it.
+[[nodiscard]] SceneTree tree_of(Model scene, const std::string& name, const TreeOptions& tree,
+                                const CommonOptions& common);
 
 /// For add_option(...)->check: a finite number above 0, or from 0 on.
 [[nodiscard]] CLI::Validator finite_number(bool zero_too);

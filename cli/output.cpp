@@ -54,11 +54,15 @@ Json new_document(const std::string& command) {
 }
 
 Json scene_json(const Model& scene) {
-    const Mesh& mesh = scene.mesh;
+    std::size_t triangles = 0, vertices = 0;
+    for (const Mesh& mesh : scene.meshes)
+        triangles += mesh.triangles.size(), vertices += mesh.vertices.size();
     return {{"name", scene.name},
-            {"triangles", mesh.triangles.size()},
-            {"points", mesh.is_point_cloud() ? mesh.vertices.size() : 0},
-            {"vertices", mesh.vertices.size()},
+            {"triangles", triangles},
+            {"points", triangles == 0 ? vertices : 0},
+            {"vertices", vertices},
+            {"geometries", scene.meshes.size()},
+            {"instances", scene.nodes.size()},
             {"cameras", scene.cameras.cameras.size()}};
 }
 
@@ -214,6 +218,10 @@ int threads_at_work(int asked) {
 std::string grouped(std::uint64_t n) {
     if (n < 1000) return std::to_string(n);
     return fmt::format("{},{:03}", grouped(n / 1000), n % 1000);
+}
+
+std::string counted(std::uint64_t n, const char* one, const char* many) {
+    return grouped(n) + " " + (n == 1 ? one : many);
 }
 
 }  // namespace raydix::cli

@@ -61,5 +61,7 @@ private:
 
 /// 12345678 -> "12,345,678".
 [[nodiscard]] std::string grouped(std::uint64_t n);
+/// "1 node", "2 nodes".
+[[nodiscard]] std::string counted(std::uint64_t n, const char* one, const char* many);
 
 }  // namespace raydix::cli

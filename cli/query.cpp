@@ -108,7 +108,9 @@ void print_query(const Json& query) {
 }
 
 Model load_query_scene(const std::string& scene, const CommonOptions& common) {
-    return is_rdx(scene) ? load_rdx(scene).scene : load_model(scene, common.seed);
+    Model model = is_rdx(scene) ? load_rdx(scene).scene : load_model(scene, common.seed);
+    flatten(model, common);
+    return model;
 }
 
 void add_query_command(CLI::App& app) {
@@ -145,6 +147,7 @@ void add_query_command(CLI::App& app) {
         ->check(CLI::Range(0, 1000))
         ->capture_default_str();
     add_result_limit(*command, options->max_result_bytes);
+    add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options] { run_query(*options); });
 }

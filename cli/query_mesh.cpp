@@ -24,9 +24,9 @@ SceneTree load_tree(const std::string& scene, const QueryCommand& options) {
         RdxFile file = load_rdx(scene);
         return {std::move(file.scene), std::move(file.bvh)};
     }
-    SceneTree loaded{load_model(scene, options.common.seed), {}};
+    SceneTree loaded{load_query_scene(scene, options.common), {}};
     loaded.bvh = about(scene, [&] {
-        return build_bvh(loaded.scene.mesh,
+        return build_bvh(loaded.scene.mesh(),
                          {.builder = options.builder.empty() ? Builder::ploc
                                                              : builder_from_name(options.builder),
                           .strict = options.strict,

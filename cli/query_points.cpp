@@ -131,9 +131,9 @@ void print_index(const Points& index) {
 }  // namespace
 
 std::vector<Vec3> load_queries(const QueryCommand& options, const Model& scene) {
-    if (options.queries_file.empty()) return scene.mesh.vertices;
+    if (options.queries_file.empty()) return scene.mesh().vertices;
     if (is_npy(options.queries_file)) return rows_of<Vec3>(options.queries_file);
-    return load_query_scene(options.queries_file, options.common).mesh.vertices;
+    return load_query_scene(options.queries_file, options.common).mesh().vertices;
 }
 
 void run_point_query(const QueryCommand& options) {
@@ -141,9 +141,9 @@ void run_point_query(const QueryCommand& options) {
         throw CLI::ValidationError("--box", "needs --queries, a (Q, 6) .npy file of boxes");
     const Model scene = load_query_scene(options.scene, options.common);
     const Points index = about(options.scene, [&] {
-        return build_points(scene.mesh.vertices, {.tree = points_tree_from_name(options.tree),
-                                                  .strict = options.strict,
-                                                  .threads = options.common.threads});
+        return build_points(scene.mesh().vertices, {.tree = points_tree_from_name(options.tree),
+                                                    .strict = options.strict,
+                                                    .threads = options.common.threads});
     });
     Json document = new_document("query");
     document["scene"] = scene_json(scene);

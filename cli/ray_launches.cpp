@@ -15,11 +15,10 @@ constexpr std::size_t least_run = 2048;  // 64 warps of 32
 
 }  // namespace
 
-float chosen_ao_radius(float given, const SceneTree& input) {
+float chosen_ao_radius(float given, const Model& scene, const Aabb& box) {
     if (given > 0) return given;
-    if (input.scene.cameras.ao_radius > 0) return input.scene.cameras.ao_radius;
-    if (input.bvh.empty()) return 0.0f;
-    const Aabb box = input.bvh.bounds();
+    if (scene.cameras.ao_radius > 0) return scene.cameras.ao_radius;
+    if (!(box.lo.x <= box.hi.x)) return 0.0f;
     return 0.05f * std::hypot(box.hi.x - box.lo.x, box.hi.y - box.lo.y, box.hi.z - box.lo.z);
 }
 
@@ -73,7 +72,7 @@ RayLaunches::RayLaunches(const LaunchOptions& options, const SceneTree& input,
     : options_(options),
       input_(input),
       common_(common),
-      ao_radius_(chosen_ao_radius(options.ao_radius, input)) {
+      ao_radius_(chosen_ao_radius(options.ao_radius, input.scene, input.bvh.bounds())) {
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}
                           : parse_size(options.size_text);

@@ -67,6 +67,6 @@ private:
 /// --camera: all of the scene's, or one.
 [[nodiscard]] std::vector<Camera> chosen_cameras(const std::string& which, const Model& scene);
 /// Given, of cameras.json, or 5 % of the box diagonal, in this order.
-[[nodiscard]] float chosen_ao_radius(float given, const SceneTree& input);
+[[nodiscard]] float chosen_ao_radius(float given, const Model& scene, const Aabb& bounds);
 
 }  // namespace raydix::cli

@@ -45,11 +45,11 @@ void render_views(const std::string& name, const ReportCommand& options, Size si
                   ReportInput& input) {
     const std::string spec = scene_spec(name, options.scene_folder);
     try {
-        const Model scene = load_model(spec, options.common.seed);
+        const Model scene = load_flat_model(spec, options.common.seed);
         BuildOptions build;
         build.builder = Builder::ploc;
         build.threads = options.common.threads;
-        const Bvh bvh = build_bvh(scene.mesh, build);
+        const Bvh bvh = build_bvh(scene.mesh(), build);
         RenderOptions render_options;
         render_options.width = size.width;
         render_options.height = size.height;

@@ -112,6 +112,7 @@ void add_simulate_command(CLI::App& app) {
     options->tree.builder = "split";
     options->tree.max_leaf = 8;
     add_tree_options(*command, options->tree);
+    add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options] { run_simulate(*options); });
 }

@@ -13,6 +13,7 @@
 #include "kdtree_commands.h"
 #include "output.h"
 #include "ray_launches.h"
+#include "scene_trace.h"
 #include "simulation.h"
 #include "warp_trace.h"
 #include "wide_trace.h"
@@ -53,6 +54,7 @@ struct Batch {
     const KdTree* kdtree;                // traced instead of the bvh if not null
     WarpTracer* warps;                   // traces instead of the CPU if not null
     WideTracer* wide;                    // traces instead of the bvh if not null
+    const SceneTracer* scene;            // the same; there is no bvh then
     std::vector<Hit> hits;               // of the last run, closest and all
     std::vector<std::uint64_t> offsets;  // of the last run, all
     std::vector<std::uint8_t> occluded;
@@ -65,13 +67,38 @@ struct Batch {
             occluded.resize(rays.size());
             if (kdtree != nullptr) return kd_trace_any(*kdtree, rays, occluded, options);
             if (wide != nullptr) return wide->any(rays, occluded, options);
+            if (scene != nullptr) return scene->any(rays, occluded);
             return trace_any(bvh, rays, occluded, options);
         }
         if (mode == Mode::all) return run_all(rays, options);
         hits.resize(rays.size());
         if (kdtree != nullptr) return kd_trace(*kdtree, rays, hits, options);
         if (wide != nullptr) return wide->closest(rays, hits, options);
+        if (scene != nullptr) return scene->closest(rays, hits);
         return trace(bvh, rays, hits, options);
+    }
+
+    [[nodiscard]] Aabb bounds() const {
+        return scene != nullptr ? scene->scene().bounds() : bvh.bounds();
+    }
+    /// What secondary rays start from.
+    [[nodiscard]] std::vector<Hit> primary_hits(std::span<const Ray> rays) const {
+        std::vector<Hit> found(rays.size());
+        const TraceOptions options{.threads = common.threads};
+        if (scene != nullptr)
+            scene->closest(rays, found);
+        else if (wide != nullptr)
+            wide->closest(rays, found, options);
+        else
+            trace(bvh, rays, found, options);
+        return found;
+    }
+    [[nodiscard]] std::vector<Ray> secondary_rays(std::span<const Ray> rays,
+                                                  std::span<const Hit> found,
+                                                  std::span<const std::uint32_t> pixels,
+                                                  const SecondaryOptions& options) const {
+        return scene != nullptr ? make_secondary_rays(scene->scene(), rays, found, pixels, options)
+                                : make_secondary_rays(bvh, rays, found, pixels, options);
     }
 
 private:
@@ -82,8 +109,9 @@ private:
             throw ResultTooLarge("all hits", result_limit, false, result_limit);
         options.max_result_bytes = result_limit - kept_bytes;
         try {
-            AllHits all =
-                wide != nullptr ? wide->all(rays, options) : trace_all(bvh, rays, options);
+            AllHits all = scene != nullptr  ? scene->all(rays, options.max_result_bytes)
+                          : wide != nullptr ? wide->all(rays, options)
+                                            : trace_all(bvh, rays, options);
             hits = std::move(all.hits);
             offsets = std::move(all.offsets);
             return all.counts;
@@ -101,7 +129,11 @@ void measure_warps(Batch& batch, std::span<const Ray> rays, int repeat, Tally& t
     warps.run(rays, batch.hits, true);
     tally.counts.rays += rays.size();
     tally.counts.invalid_rays = warps.invalid_rays();
-    for (const Hit& hit : batch.hits) tally.counts.hits += hit.hit();
+    batch.occluded.clear();
+    for (const Hit& hit : batch.hits) {
+        tally.counts.hits += hit.hit();
+        batch.occluded.push_back(hit.hit());
+    }
     if (warps.is_simulated()) return;
     if (!tally.warm) warps.run(rays, batch.hits, false);
     tally.warm = true;
@@ -138,6 +170,7 @@ struct Kept {
     std::vector<Ray> rays;
     std::vector<Hit> hits;
     std::vector<std::uint64_t> offsets{0};  // all hits: where those of each ray begin
+    std::vector<std::uint8_t> occluded;     // any hits
 
     [[nodiscard]] std::uint64_t bytes() const {
         return hits.capacity() * sizeof(Hit) + offsets.capacity() * sizeof(std::uint64_t);
@@ -172,14 +205,19 @@ void keep(const TraceCommand& options, std::span<const Ray> rays, Batch& batch, 
     if (!options.rays_file.empty()) kept.rays.insert(kept.rays.end(), rays.begin(), rays.end());
     if (options.hits_file.empty()) return;
     if (batch.mode == Mode::all) return keep_all_hits(batch, kept);
+    if (batch.mode == Mode::any) {
+        kept.occluded.insert(kept.occluded.end(), batch.occluded.begin(), batch.occluded.end());
+        return;
+    }
     kept.hits.insert(kept.hits.end(), batch.hits.begin(), batch.hits.end());
 }
 
 /// hits.npy; all hits also have hits.offsets.npy beside it.
-void save_kept(const TraceCommand& options, Mode mode, const Kept& kept) {
+void save_kept(const TraceCommand& options, Mode mode, const Kept& kept, HitFields fields) {
     if (!options.rays_file.empty()) save_rays(options.rays_file, kept.rays);
     if (options.hits_file.empty()) return;
-    save_hits(options.hits_file, kept.hits);
+    if (mode == Mode::any) return save_occluded(options.hits_file, kept.occluded);
+    save_hits(options.hits_file, kept.hits, fields);
     if (mode == Mode::all)
         save_offsets(std::filesystem::path(options.hits_file).replace_extension(".offsets.npy"),
                      kept.offsets);
@@ -202,12 +240,11 @@ void trace_camera(const TraceCommand& options, const SceneTree& input, const Cam
         keep(options, primary, batch, kept);
         return progress(1.0);
     }
-    const std::vector<Hit> hits =
-        trace(input.bvh, primary, TraceOptions{.threads = options.common.threads});
+    const std::vector<Hit> hits = batch.primary_hits(primary);
     SecondaryOptions secondary;
     secondary.kind = kind;
     secondary.samples = options.samples;
-    secondary.ao_radius = chosen_ao_radius(options.ao_radius, input);
+    secondary.ao_radius = chosen_ao_radius(options.ao_radius, input.scene, batch.bounds());
     secondary.seed = options.common.seed;
     secondary.threads = options.common.threads;
     const std::size_t step =
@@ -219,8 +256,8 @@ void trace_camera(const TraceCommand& options, const SceneTree& input, const Cam
             found += hits[end].hit();
         const std::span<const Ray> part = std::span(primary).subspan(begin, end - begin);
         const std::vector<Ray> rays =
-            make_secondary_rays(input.bvh, part, std::span(hits).subspan(begin, part.size()),
-                                std::span(pixels).subspan(begin, part.size()), secondary);
+            batch.secondary_rays(part, std::span(hits).subspan(begin, part.size()),
+                                 std::span(pixels).subspan(begin, part.size()), secondary);
         if (!rays.empty()) measure(batch, rays, options.repeat, tally);
         if (!rays.empty()) keep(options, rays, batch, kept);
         begin = end;
@@ -237,9 +274,9 @@ Json rates_json(const Tally& tally, const std::vector<double>& all_seconds) {
 }
 
 Json trace_json(const TraceCommand& options, const std::string& mode, const Tally& tally,
-                const WarpTracer* warps) {
+                const WarpTracer* warps, bool counts_visits) {
     const auto per_ray = [&](std::uint64_t n) {
-        return tally.counts.rays && warps == nullptr
+        return tally.counts.rays && counts_visits
                    ? Json(static_cast<double>(n) / static_cast<double>(tally.counts.rays))
                    : Json(nullptr);
     };
@@ -290,12 +327,15 @@ void print_trace(const Json& trace) {
     const auto count = trace["count"].get<std::uint64_t>();
     if (count == 0) return fmt::print("{:<18} {:>12}\n", trace["rays"].get<std::string>(), "none");
     const Json& rate = trace["mrays_per_s"];
-    fmt::print("{:<18} {:>12} {:>12} {:>9.2f} {:>9.2f} {:>9.2f} {:>11.1f} {:>14.2f}\n",
+    const auto per_ray = [&](const char* field, int digits) {
+        return trace[field].is_null() ? std::string("-")
+                                      : fmt::format("{:.{}f}", trace[field].get<double>(), digits);
+    };
+    fmt::print("{:<18} {:>12} {:>12} {:>9.2f} {:>9.2f} {:>9.2f} {:>11} {:>14}\n",
                trace["rays"].get<std::string>(), grouped(count),
                grouped(trace["hits"].get<std::uint64_t>()), rate["median"].get<double>(),
                rate["min"].get<double>(), rate["max"].get<double>(),
-               trace["node_visits_per_ray"].get<double>(),
-               trace["triangle_tests_per_ray"].get<double>());
+               per_ray("node_visits_per_ray", 1), per_ray("triangle_tests_per_ray", 2));
     if (const auto invalid = trace["invalid_rays"].get<std::uint64_t>())
         fmt::print("{} rays are invalid and count as misses\n", grouped(invalid));
 }
@@ -332,7 +372,7 @@ void explain_warps(const TraceCommand& options, const Bvh& bvh) {
 TraceCommand with_device(TraceCommand options, Mode mode) {
     options.tree.prefer_balanced();
     options.kernel = chosen_cpu_kernel(options.kernel, options.tree, options.wide);
-    if (options.kernel != "simd") refuse_layout(options.tree);
+    if (options.kernel != "engine") refuse_layout(options.tree);
     const std::string device = options.tree.device;
     if (options.kernel.empty()) options.kernel = default_kernel(device);
     check_kernel(options.kernel, device);
@@ -349,16 +389,27 @@ TraceCommand with_device(TraceCommand options, Mode mode) {
     return options;
 }
 
+/// A scene of several meshes or nodes stays one, if the options allow it.
+KdTraced load_traced(const TraceCommand& options, const TreeOptions& on_cpu,
+                     std::optional<SceneTracer>& scene) {
+    const bool keeps = options.kernel == "engine" && !is_rdx(options.scene) &&
+                       serves_a_scene(options.tree, options.common);
+    if (!keeps) return load_kdtree_traced(options.scene, on_cpu, options.common);
+    Model model = load_structured_model(options.scene, on_cpu, options.common);
+    if (model.is_flat())
+        return {tree_of(std::move(model), options.scene, on_cpu, options.common), {}};
+    scene.emplace(model, options.tree, options.wide, options.common);
+    return {{std::move(model), {}}, {}};
+}
+
 void run_trace(const TraceCommand& given) {
     const Mode mode = mode_of(given);
     TraceCommand options = with_device(given, mode);
-    if (!options.hits_file.empty() && mode == Mode::any)
-        throw CLI::ValidationError("--hits",
-                                   "any-hit rays only answer yes or no; use --mode closest or all");
     refuse_build_options(options.scene, options.tree);
     TreeOptions on_cpu = options.tree;
     on_cpu.device = "cpu";
-    const KdTraced traced = load_kdtree_traced(options.scene, on_cpu, options.common);
+    std::optional<SceneTracer> scene;
+    const KdTraced traced = load_traced(options, on_cpu, scene);
     const bool through_kdtree = traced.kdtree.has_value();
     if (through_kdtree && given.kernel.empty()) options.kernel = default_kernel("cpu");
     if (options.max_result_bytes != 0 && mode != Mode::all)
@@ -378,7 +429,7 @@ void run_trace(const TraceCommand& given) {
                                                mode == Mode::any, options.common.threads});
         });
     std::optional<WideTracer> wide;
-    if (options.kernel == "simd")
+    if (options.kernel == "engine" && !scene)
         about(options.scene,
               [&] { wide.emplace(input.bvh, options.tree.layout, options.wide, options.common); });
     Batch batch{input.bvh,
@@ -387,6 +438,7 @@ void run_trace(const TraceCommand& given) {
                 through_kdtree ? &*traced.kdtree : nullptr,
                 warps ? &*warps : nullptr,
                 wide ? &*wide : nullptr,
+                scene ? &*scene : nullptr,
                 {},
                 {},
                 {},
@@ -397,8 +449,9 @@ void run_trace(const TraceCommand& given) {
         batch.result_limit = usual_result_bytes();
     Tally tally;
     Kept kept;
-    if (!through_kdtree && !warps && !wide) explain(options, input.bvh);
+    if (!through_kdtree && !warps && !wide && !scene) explain(options, input.bvh);
     if (wide && options.explain) wide->explain_tree(options.common);
+    if (scene && options.explain) scene->explain(options.common);
     if (warps) explain_warps(options, input.bvh);
     if (through_kdtree && options.explain) explain_kdtree(*traced.kdtree, options.common);
     Progress progress("tracing", options.common);
@@ -418,27 +471,30 @@ void run_trace(const TraceCommand& given) {
                              });
             });
     }
-    save_kept(options, mode, kept);
+    save_kept(options, mode, kept, scene ? HitFields::scene : HitFields::tree);
     Json document = new_document("trace");
     document["scene"] = scene_json(input.scene);
     document["load_ms"] = input.scene.load_ms;
     const std::vector<BuildMs> builds =
         is_rdx(options.scene) ? std::vector<BuildMs>{} : std::vector{input.bvh.build_ms()};
     document["build"] =
-        through_kdtree
+        scene ? scene->build_json()
+        : through_kdtree
             ? kdtree_json(*traced.kdtree, {traced.kdtree->build_ms()})
             : build_json(input.bvh,
                          tree_stats(input.bvh, stats_options(options.tree, options.common)),
                          builds);
     if (wide) add_wide(document["build"], wide->tree());
-    document["trace"] = Json::array({trace_json(options, mode_text(mode), tally, batch.warps)});
+    document["trace"] =
+        Json::array({trace_json(options, mode_text(mode), tally, batch.warps, !warps && !scene)});
     if (wide) {
         document["trace"][0]["isa"] = wide->isa();
         document["trace"][0]["paths"] = wide->paths_json();
         if (options.explain) wide->explain_paths(options.common);
     }
+    if (scene) document["trace"][0]["isa"] = scene->isa();
     if (options.rays == "ao") {
-        const float radius = chosen_ao_radius(options.ao_radius, input);
+        const float radius = chosen_ao_radius(options.ao_radius, input.scene, batch.bounds());
         document["trace"][0]["ao_radius"] = radius;
         if (options.common.prints_tables()) fmt::print("ao radius {:g}\n", radius);
     }
@@ -474,7 +530,7 @@ void add_trace_command(CLI::App& app) {
     command
         ->add_option(
             "--kernel", options->kernel,
-            "Traversal kernel (default: simd on the cpu, scalar for a kdtree or --layout binary, "
+            "Traversal kernel (default: engine on the cpu, scalar for a kdtree or --layout binary, "
             "speculative_while_while on cuda and sim)")
         ->check(CLI::IsMember(trace_kernel_names()));
     command->add_option("--machine", options->machine, "Simulated machine of --device sim")
@@ -496,14 +552,17 @@ void add_trace_command(CLI::App& app) {
         ->check(CLI::Range(1, 10000))
         ->capture_default_str();
     command
-        ->add_option("--hits", options->hits_file,
-                     "Save the hits as a structured array; for all hits also FILE.offsets.npy")
+        ->add_option(
+            "--hits", options->hits_file,
+            "Save the hits as a structured array (of any hits: 1 or 0 a ray); for all hits "
+            "also FILE.offsets.npy")
         ->type_name("FILE.npy");
     command->add_option("--save-rays", options->rays_file, "Save the rays")->type_name("FILE.npy");
     command->add_flag("--explain", options->explain, "Say which layout and which code ran");
     add_result_limit(*command, options->max_result_bytes);
     add_wide_trace_options(*command, options->wide);
     add_tree_options(*command, options->tree);
+    add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options] { run_trace(*options); });
 }

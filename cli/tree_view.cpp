@@ -41,7 +41,7 @@ TreeScene load_octree_scene(const std::string& name, LevelRange levels, const Tr
     shown.max_level.reset();
     TreeScene scene{load_scene_tree(name, shown, common), {}};
     const Octree octree =
-        about(name, [&] { return build_octree(scene.input.scene.mesh, options); });
+        about(name, [&] { return build_octree(scene.input.scene.mesh(), options); });
     scene.boxes = level_boxes(octree, levels);
     return scene;
 }

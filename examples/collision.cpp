@@ -105,7 +105,7 @@ class Scene {
 public:
     explicit Scene(int triangles)
         : cat_at_rest_(
-              raydix::load_model("builtin:figure?triangles=" + std::to_string(triangles)).mesh),
+              raydix::load_model("builtin:figure?triangles=" + std::to_string(triangles)).mesh()),
           box_(raydix::inspect(cat_at_rest_).bounds),
           triangles_(triangles),
           cat(cat_at_rest_),

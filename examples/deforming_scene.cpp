@@ -34,7 +34,8 @@ double ms_since(std::chrono::steady_clock::time_point start) {
 class MovingScene {
 public:
     explicit MovingScene(int triangles)
-        : rest_(raydix::load_model("builtin:figure?triangles=" + std::to_string(triangles)).mesh) {
+        : rest_(
+              raydix::load_model("builtin:figure?triangles=" + std::to_string(triangles)).mesh()) {
         box_ = raydix::inspect(rest_).bounds;
         cat_vertices_ = rest_.vertices.size(), cat_triangles_ = rest_.triangles.size();
         const auto first = static_cast<std::uint32_t>(cat_vertices_);

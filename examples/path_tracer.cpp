@@ -46,7 +46,7 @@ Vec3 on_ball(int row, int column) {
 }
 
 World make_world() {
-    World world{raydix::load_model("builtin:figure?triangles=100000").mesh};
+    World world{raydix::load_model("builtin:figure?triangles=100000").mesh()};
     world.floor = world.mesh.triangles.size();
     const float y = raydix::inspect(world.mesh).bounds.lo.y;
     world.add({{-6, y, -6}, {-6, y, 6}, {6, y, 6}, {6, y, -6}});

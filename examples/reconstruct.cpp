@@ -142,7 +142,7 @@ int run(const std::string& source, const std::filesystem::path& folder, std::uin
     const Vec3 up = source == "cat" ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
     const bool known = source == "cat";
     constexpr float noise = 0.002f;
-    const raydix::Mesh truth = known ? raydix::load_model("builtin:figure?triangles=40000").mesh
+    const raydix::Mesh truth = known ? raydix::load_model("builtin:figure?triangles=40000").mesh()
                                      : raydix::load_mesh(source);
     const Cloud cloud(known ? sample(truth, level < 8 ? 60'000 : 240'000, noise) : truth.vertices);
     const Contour contour(cloud.points, level,

@@ -46,19 +46,20 @@ class Hall {
 public:
     Hall()
         : scene(raydix::load_model("builtin:atrium?triangles=150000")),
-          tree_(raydix::build_bvh(scene.mesh)) {}
+          tree_(raydix::build_bvh(scene.mesh())) {}
 
     [[nodiscard]] Point point_of(std::uint32_t prim, float u, float v) const {
-        const raydix::Triangle& t = scene.mesh.triangles[prim];
-        const auto& vertices = scene.mesh.vertices;
+        const raydix::Triangle& t = scene.mesh().triangles[prim];
+        const auto& vertices = scene.mesh().vertices;
         const Vec3 a = vertices[t[0]], b = vertices[t[1]] - a, c = vertices[t[2]] - a;
         return {a + u * b + v * c, unit(cross(b, c))};
     }
     [[nodiscard]] Vec3 normal_of(std::uint32_t prim) const { return point_of(prim, 0, 0).normal; }
     [[nodiscard]] double area_of(std::uint32_t prim) const {
-        const raydix::Triangle& t = scene.mesh.triangles[prim];
-        const Vec3 a = scene.mesh.vertices[t[0]];
-        return 0.5 * length(cross(scene.mesh.vertices[t[1]] - a, scene.mesh.vertices[t[2]] - a));
+        const raydix::Triangle& t = scene.mesh().triangles[prim];
+        const Vec3 a = scene.mesh().vertices[t[0]];
+        return 0.5 *
+               length(cross(scene.mesh().vertices[t[1]] - a, scene.mesh().vertices[t[2]] - a));
     }
     [[nodiscard]] std::vector<raydix::Hit> trace(std::span<const Ray> rays) const {
         return raydix::trace(tree_, rays);
@@ -146,9 +147,9 @@ private:
     /// Points spread evenly by area, about six a voxel.
     std::vector<Point> spread(const Hall& hall, int level) {
         double all = 0, done = 0;
-        const auto count = static_cast<std::uint32_t>(hall.scene.mesh.triangles.size());
+        const auto count = static_cast<std::uint32_t>(hall.scene.mesh().triangles.size());
         for (std::uint32_t i = 0; i < count; ++i) all += hall.area_of(i);
-        const raydix::Aabb box = raydix::inspect(hall.scene.mesh).bounds;
+        const raydix::Aabb box = raydix::inspect(hall.scene.mesh()).bounds;
         const double side = double{box.hi.x - box.lo.x} * std::exp2(-level);
         area_ = static_cast<float>(side * side / 6);
         std::vector<Point> points;
@@ -188,7 +189,7 @@ private:
 
     /// How often paths that bounce through the hall, from its cameras on, meet each triangle.
     static std::vector<SideCount> count_seen_sides(const Hall& hall) {
-        std::vector<SideCount> seen(hall.scene.mesh.triangles.size());
+        std::vector<SideCount> seen(hall.scene.mesh().triangles.size());
         Random random(5);
         for (const raydix::Camera& camera : hall.scene.cameras.cameras) {
             std::vector<Ray> paths = raydix::make_primary_rays(camera, 256, 192);

@@ -96,7 +96,7 @@ def any_rays(rng, vertices, faces, count):
     return rays.astype(vertices.dtype)
 
 
-def sure_hits(vertices, faces, rays):
+def sure_hits(vertices, faces, rays, through_instances=False):
     """(t, sure to be hit, may be hit), each (rays, triangles), in float64; `sure` and `may` differ where rounding of the
     scene's type could decide."""
     eps = 64 * float(np.finfo(vertices.dtype).eps)
@@ -115,6 +115,8 @@ def sure_hits(vertices, faces, rays):
         longest = np.maximum(np.linalg.norm(e1, axis=1), np.linalg.norm(e2, axis=1))[None]
         # How far off the line may be for rounding, in weights of the triangle, seen along the ray.
         reach = np.linalg.norm(s, axis=2) + longest
+        if through_instances:  # the ray is rounded once more, where the mesh is
+            reach = reach + np.linalg.norm(o, axis=2) + np.abs(vertices).max(initial=0)
         slack = eps * reach * longest * length / np.abs(det) * (1 + longest ** 2 / np.linalg.norm(normal, axis=2))
         t_slack = eps * reach * longest * longest / np.abs(det) + eps * np.abs(t)
         known = np.isfinite(slack) & np.isfinite(t_slack)
@@ -132,8 +134,11 @@ def attack_rays(rng, tally):
     vertices, faces = any_mesh(rng, precision)
     rays = any_rays(rng, vertices, faces, 120)
     t, sure, may, t_slack = sure_hits(vertices, faces, rays)
-    scenes = [raydix.Scene(vertices, faces, precision=precision, builder=builder, max_leaf=int(rng.integers(1, 9)), threads=1)
-              for builder in raydix.builders()]
+    scenes = []
+    for i, builder in enumerate(raydix.builders()):
+        # Rays in float32 go through a tree that the quality decides, in float64 through that of the builder.
+        wide = {"quality": ("fast", "balanced", "high")[i % 3], "compact": i % 2 == 1} if precision is np.float32 else {}
+        scenes.append(raydix.Scene(vertices, faces, precision=precision, builder=builder, max_leaf=int(rng.integers(1, 9)), threads=1, **wide))
     first = scenes[0].intersect(rays)
     for scene, builder in zip(scenes, raydix.builders()):
         hits = scene.intersect(rays)
@@ -278,19 +283,23 @@ def attack_instances(rng, tally):
     for place in transforms:
         place[:, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0] * rng.uniform(0.5, 2)
         place[:, 3] = rng.uniform(-2, 2, 3)
-    vertices = vertices.astype(np.float64)
-    scene = raydix.Scene(vertices, faces, precision=np.float64, threads=1)
-    many = raydix.Instances([scene], transforms, threads=1)
-    world = np.concatenate([vertices @ place[:, :3].T + place[:, 3] for place in transforms])
+    vertices, transforms = vertices.astype(np.float32), transforms.astype(np.float32)
+    many = raydix.Scene(threads=1)
+    many.add(raydix.Scene(vertices, faces, threads=1), transforms)
+    many.commit()
+    world = np.concatenate([vertices.astype(float) @ place[:, :3].T + place[:, 3] for place in transforms.astype(float)])
+    world = world.astype(np.float32)
     all_faces = np.concatenate([faces + len(vertices) * k for k in range(places)])
     rays = any_rays(rng, world, all_faces, 100)
-    t, sure, may, t_slack = sure_hits(world, all_faces, rays)
+    t, sure, may, t_slack = sure_hits(world, all_faces, rays, through_instances=True)
     hits = many.intersect(rays)
     hit = hits["prim"] != MISSING
     tally.expect(many.occluded(rays) == hit, "instances", "occluded differs from intersect")
     tally.expect(hit | ~sure.any(axis=1), "instances", "a sure hit is lost")
+    tally.expect(np.diff(many.all_hits(rays)["offsets"].astype(np.int64)) == many.count(rays), "instances", "count differs from all_hits")
+    tally.expect(all(many.path(number) == [number - 1] for number in np.unique(hits["instance"][hit]).tolist()), "instances", "path")
     rows = np.flatnonzero(hit)
-    which = hits["instance"][rows].astype(int) * len(faces) + hits["prim"][rows]
+    which = (hits["instance"][rows].astype(int) - 1) * len(faces) + hits["prim"][rows]
     tally.expect(may[rows, which], "instances", "a hit that cannot be")
     with np.errstate(invalid="ignore"):
         nearer = sure[rows] & (t[rows] + 16 * t_slack[rows] < hits["t"][rows, None])

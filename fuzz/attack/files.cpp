@@ -99,7 +99,7 @@ void load_mutated(Case& c, const Bytes& bytes, const BuildOptions& options) {
                  [&] { return "    " + report.broken + "\n    " + text_of(options) + "\n"; });
         (void)tree_stats(file.bvh, {.with_hash = false, .threads = 1});
         if (file.bvh.kind() != PrimitiveKind::triangles) return;
-        const std::vector<Ray> rays = make_rays(c.random, file.scene.mesh, 8);
+        const std::vector<Ray> rays = make_rays(c.random, file.scene.mesh(), 8);
         (void)trace(file.bvh, rays, {.threads = 1});
         (void)trace(WideBvh(file.bvh, {.threads = 1}), rays, {.threads = 1});
     } catch (const InputError& error) {
@@ -118,7 +118,7 @@ static void attack_files(Case& c) {
     const ScratchFile file;
     Model scene;
     scene.name = "attack";
-    scene.mesh = made.mesh;
+    scene.meshes = {made.mesh};
     save_rdx(file.path(), tree, scene);
     {
         const RdxFile back = load_rdx(file.path());

@@ -128,7 +128,7 @@ private:
         for (const TestMesh& made : meshes_) {
             if (made.mesh.triangles.empty()) return;
             Model model;
-            model.mesh = made.mesh;
+            model.meshes = {made.mesh};
             scenes.emplace_back(model, options);
         }
         for (const auto& shown : shown_) {

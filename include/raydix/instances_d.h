@@ -4,6 +4,7 @@
 
 #include <raydix/double.h>
 #include <raydix/instances.h>
+#include <raydix/transform.h>
 #include <raydix/types.h>
 
 #include <array>

@@ -3,6 +3,7 @@
 
 #include <raydix/bvh.h>
 #include <raydix/camera.h>
+#include <raydix/scene.h>
 #include <raydix/types.h>
 
 #include <cstdint>
@@ -43,8 +44,16 @@ struct RenderOptions {
 /// one bounce; `steps`: node visits as a heat map. Deterministic for every thread count. Where a
 /// ray hits nothing: sky for `shaded` and `diffuse`, white for `ao`, black for `normal`, `depth`
 /// and `primitive`. Four primary rays per pixel in the views that gather light, one through its
-/// centre in the others. Throws InputError: a tree of boxes or points, a camera that shows nothing,
-/// options out of range.
+/// centre in the others. The scene is shown as its last commit left it, instances in the world; a
+/// geometry or instance without any bit in its mask is not seen. `primitive`: a triangle has a
+/// colour for each instance that shows it. `steps`: nodes on the way of a ray that goes alone,
+/// which may differ between instruction sets. Throws InputError: a scene that was never committed,
+/// a camera that shows nothing, options out of range.
+[[nodiscard]] Picture render(const Scene& scene, const Camera& camera,
+                             const RenderOptions& options = {});
+/// The same of one tree over triangles; all views but `steps`, which counts nodes of this tree,
+/// show what those of a scene of the one mesh show. Throws InputError for a tree of boxes or
+/// points.
 [[nodiscard]] Picture render(const Bvh& bvh, const Camera& camera,
                              const RenderOptions& options = {});
 

@@ -37,6 +37,7 @@
 #include <raydix/shapes.h>           // IWYU pragma: export
 #include <raydix/simulate.h>         // IWYU pragma: export
 #include <raydix/solid.h>            // IWYU pragma: export
+#include <raydix/surface.h>          // IWYU pragma: export
 #include <raydix/trace.h>            // IWYU pragma: export
 #include <raydix/tree_view.h>        // IWYU pragma: export
 #include <raydix/types.h>            // IWYU pragma: export

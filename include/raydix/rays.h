@@ -4,6 +4,7 @@
 
 #include <raydix/bvh.h>
 #include <raydix/camera.h>
+#include <raydix/scene.h>
 #include <raydix/types.h>
 
 #include <cstdint>
@@ -46,6 +47,13 @@ struct SecondaryOptions {
                                                    std::span<const Hit> hits,
                                                    std::span<const std::uint32_t> pixels,
                                                    const SecondaryOptions& options);
+/// The same from hits of a scene, as its last commit left it; for a scene of one mesh the same
+/// rays. Normals are those of raydix/surface.h, turned toward the ray. Also throws if the scene was
+/// never committed, or does not have the path or the mesh of a hit.
+[[nodiscard]] std::vector<Ray> make_secondary_rays(const Scene& scene, std::span<const Ray> rays,
+                                                   std::span<const Hit> hits,
+                                                   std::span<const std::uint32_t> pixels,
+                                                   const SecondaryOptions& options);
 
 /// NumPy files of shape (N, 8) float32: ox oy oz tmin dx dy dz tmax. Throws InputError that names
 /// the file.
@@ -60,6 +68,9 @@ enum class HitFields : std::uint32_t {
 /// NumPy files of shape (N,) with named fields.
 void save_hits(const std::filesystem::path& file, std::span<const Hit> hits,
                HitFields fields = HitFields::tree);
+
+/// A NumPy file of shape (N,) uint8: what trace_any says of each ray.
+void save_occluded(const std::filesystem::path& file, std::span<const std::uint8_t> occluded);
 
 /// A NumPy file of shape (N + 1,) uint64: where the hits of each of N rays begin, and the end.
 void save_offsets(const std::filesystem::path& file, std::span<const std::uint64_t> offsets);

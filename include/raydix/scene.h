@@ -5,9 +5,9 @@
 #include <raydix/bvh.h>
 #include <raydix/mesh.h>
 #include <raydix/trace.h>
+#include <raydix/transform.h>
 #include <raydix/types.h>
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -19,17 +19,6 @@
 namespace raydix {
 
 struct Model;
-
-/// Affine: x' = m[0][0]*x + m[0][1]*y + m[0][2]*z + m[0][3], and so on; from the space of what is
-/// placed to that of what it stands in. It may mirror and shear, but not flatten.
-struct Transform {
-    std::array<std::array<float, 4>, 3> m{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-};
-
-/// The same in double.
-struct TransformD {
-    std::array<std::array<double, 4>, 3> m{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-};
 
 /// What scenes of a number type take and give.
 template <class Scalar>

@@ -17,7 +17,6 @@ from ._core import (
 )
 from .cameras import Camera
 from .devices import Device, devices
-from .instances import Instances
 from .pictures import save_picture, to_png, to_srgb
 from .points import Points, load_points
 from .scene import Scene
@@ -32,7 +31,6 @@ __all__ = [
     "Device",
     "DeviceError",
     "InputError",
-    "Instances",
     "KdTree",
     "Octree",
     "Points",

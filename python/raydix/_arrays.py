@@ -16,6 +16,8 @@ FLOAT64 = np.dtype(np.float64)
 UINT32 = np.dtype(np.uint32)
 MISSING = 0xFFFFFFFF
 """Stands for "nothing" in arrays of indices: no triangle was hit, no point is near."""
+ALL = 0xFFFFFFFF
+"""The mask that has a bit in common with every other one but 0."""
 
 # DLPack's numbers of devices whose memory the processor can read.
 _READABLE_DEVICES = (1, 3, 13)
@@ -127,6 +129,18 @@ def whole(value: Any, name: str, least: int, most: int) -> int:
     if not least <= found <= most:
         raise ValueError(expected)
     return found
+
+
+def uint32s(value: Any, name: str) -> np.ndarray:
+    """Whole numbers from 0 to 2**32 - 1, of any shape."""
+    array = to_numpy(value, name)
+    if array.size == 0:
+        return np.zeros(array.shape, UINT32)
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"{name}: expected whole numbers, given {describe(array)}")
+    if array.min() < 0 or array.max() > ALL:
+        raise ValueError(f"{name}: expected 0 to {ALL}, given {array.min()} to {array.max()}")
+    return cast(array, UINT32)
 
 
 def thread_count(value: Any) -> int:

@@ -6,7 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from ._arrays import FLOAT32, FLOAT64, describe, floats, to_numpy
+from ._arrays import (
+    ALL,
+    FLOAT32,
+    FLOAT64,
+    MISSING,
+    UINT32,
+    describe,
+    floats,
+    require_float32,
+    to_numpy,
+    uint32s,
+    whole,
+)
 
 
 def _limit(value: Any, name: str, lead: tuple[int, ...]) -> Any:
@@ -83,3 +95,53 @@ def ray_batch(
         return (rays if rays.ndim == 2 else rays.reshape(-1, 8),), rays.shape[:-1]
     rays = floats(rays, "rays", (8,))
     return _columns(rays[..., :3], rays[..., 4:7], rays[..., 3], rays[..., 7])
+
+
+def ray_masks(
+    scene: Any, mask: Any, masks: Any, lead: tuple[int, ...]
+) -> tuple[int, np.ndarray | None]:
+    """The mask of all rays, or one for each: (n,) uint32."""
+    if masks is None and mask is ALL:
+        return ALL, None
+    if masks is None:
+        wanted = whole(mask, "mask", 0, ALL)
+        if wanted != ALL:
+            require_float32(scene, "mask")
+        return wanted, None
+    if mask != ALL:
+        raise ValueError("mask, masks: expected one of them, given both")
+    require_float32(scene, "masks")
+    each = uint32s(masks, "masks")
+    try:
+        each = np.broadcast_to(each, lead)
+    except ValueError:
+        raise ValueError(f"masks: expected shape {lead}, given {describe(each)}") from None
+    return ALL, np.ascontiguousarray(each).reshape(-1)
+
+
+def hit_columns(hits: np.ndarray, geometry: int | None = None) -> dict[str, np.ndarray]:
+    """Rows of hits, as the core writes them, as columns. Where they have no room for geometry and
+    instance, they are of one mesh, `geometry`."""
+    ids = hits.view(UINT32)
+    words = ids.shape[-1] // hits.shape[-1]  # a whole number in the room of a scalar
+    if hits.shape[-1] != 4:
+        return {
+            "t": hits[..., 0],
+            "prim": ids[..., words],
+            "u": hits[..., 2],
+            "v": hits[..., 3],
+            "geometry": ids[..., 4 * words],
+            "instance": ids[..., 4 * words + 1],
+        }
+    prim = ids[..., words]
+    named = np.full(prim.shape, MISSING, UINT32)
+    if geometry is not None:
+        named[prim != MISSING] = geometry
+    return {
+        "t": hits[..., 0],
+        "prim": prim,
+        "u": hits[..., 2],
+        "v": hits[..., 3],
+        "geometry": named,
+        "instance": np.zeros(prim.shape, UINT32),
+    }

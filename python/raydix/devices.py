@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._arrays import FLOAT32, UINT32, cast
-from ._rays import ray_batch
+from ._arrays import ALL, FLOAT32, cast
+from ._rays import hit_columns, ray_batch
 
 _CUDA = 2  # DLPack's number
 
@@ -64,11 +64,17 @@ def _packed(rays: Any, directions: Any, tmin: Any, tmax: Any) -> tuple[np.ndarra
     return cast(packed, FLOAT32), lead
 
 
+def _without_masks(mask: Any, masks: Any) -> None:
+    if masks is not None or mask != ALL:
+        raise _core.BackendUnavailable("mask: rays on a GPU have none")
+
+
 class CudaRays:
     """The two calls of a Scene that run on a GPU."""
 
     def __init__(self, core: Any) -> None:
         self._core = _core.DeviceScene(core)
+        self._geometry = core.mesh_id()
 
     def _there(
         self, rays: Any, directions: Any, tmin: Any, tmax: Any
@@ -83,8 +89,16 @@ class CudaRays:
         return rays.reshape(-1, 8), shape[:-1]
 
     def intersect(
-        self, rays: Any, directions: Any, tmin: Any, tmax: Any, stream: int
+        self,
+        rays: Any,
+        directions: Any,
+        tmin: Any,
+        tmax: Any,
+        mask: Any,
+        masks: Any,
+        stream: int,
     ) -> dict[str, Any]:
+        _without_masks(mask, masks)
         if on_cuda(rays):
             flat, lead = self._there(rays, directions, tmin, tmax)
             columns = self._core.intersect_there(flat, stream)
@@ -95,14 +109,19 @@ class CudaRays:
         packed, lead = _packed(rays, directions, tmin, tmax)
         hits = np.empty(lead + (4,), FLOAT32)
         self._core.intersect_here(packed, hits.reshape(-1, 4))
-        return {
-            "t": hits[..., 0],
-            "prim": hits.view(UINT32)[..., 1],
-            "u": hits[..., 2],
-            "v": hits[..., 3],
-        }
+        return hit_columns(hits, self._geometry)
 
-    def occluded(self, rays: Any, directions: Any, tmin: Any, tmax: Any, stream: int) -> Any:
+    def occluded(
+        self,
+        rays: Any,
+        directions: Any,
+        tmin: Any,
+        tmax: Any,
+        mask: Any,
+        masks: Any,
+        stream: int,
+    ) -> Any:
+        _without_masks(mask, masks)
         if on_cuda(rays):
             flat, lead = self._there(rays, directions, tmin, tmax)
             return _like(self._core.occluded_there(flat, stream), rays, lead)

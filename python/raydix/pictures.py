@@ -23,20 +23,24 @@ class SceneViews:
     _core: Any
     dtype: np.dtype
     _cameras: list[Camera]
+    _fitted: Camera | None  # until the scene changes
     threads: int
     name: str
 
     @property
     def cameras(self) -> list[Camera]:
         """Those that came with the file or the built-in scene, else one that sees all of the
-        mesh."""
+        scene."""
         require_float32(self, "cameras")
-        if not self._cameras:
-            lo, hi = self._core.info()["bounds"]
+        if self._cameras:
+            return list(self._cameras)
+        if self._fitted is None:
+            is_mesh = self._core.is_mesh()
+            lo, hi = self._core.info()["bounds"] if is_mesh else self._core.bounds()
             if not lo[0] <= hi[0]:
                 return [Camera()]
-            self._cameras = [Camera(**_core.fit_camera(lo, hi, 45.0))]
-        return list(self._cameras)
+            self._fitted = Camera(**_core.fit_camera(lo, hi, 45.0))
+        return [self._fitted]
 
     def _camera(self, camera: Camera | int | None) -> Camera:
         if isinstance(camera, Camera):
@@ -110,7 +114,7 @@ class SceneViews:
 
     def _repr_html_(self) -> str | None:
         """Statistics and a small picture, for notebooks, which show `repr` for None."""
-        if self.dtype != FLOAT32:
+        if self.dtype != FLOAT32 or not self._core.is_mesh():
             return None
         info, wide = self._core.info(), self._core.wide_stats()
         lines = [

@@ -1,4 +1,4 @@
-"""Meshes: rays, closest points, inside and outside, overlaps."""
+"""Scenes: rays, closest points, inside and outside, overlaps."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from . import _core
 from ._arrays import (
+    ALL,
     FLOAT32,
     FLOAT64,
     UINT32,
@@ -20,42 +21,49 @@ from ._arrays import (
     require_float32,
     rows,
     thread_count,
+    whole,
 )
-from ._rays import ray_batch
+from ._rays import hit_columns, ray_batch, ray_masks
 from .cameras import Camera
+from .contents import QUALITIES, USAGES, SceneContents, mesh_of, one_of
 from .devices import CudaRays
-from .instances import Instances
 from .pictures import SceneViews
 
-QUALITIES = {"fast": ("apetrei", 0), "balanced": ("ploc", 2), "high": ("sbvh", 4)}
-"""Which builder and how many rounds of reinsertion each quality stands for."""
 
+class Scene(SceneContents, SceneViews):
+    """What rays are traced through: triangle meshes, and instances of other scenes. A scene of one
+    mesh answers queries with points and other meshes too.
 
-class Scene(SceneViews):
-    """A triangle mesh that can be asked with rays, points and other meshes.
+    `Scene(vertices, faces)` is one mesh with id 0, committed. `Scene()` is empty: `add` fills it,
+    `commit` takes what was added and changed in, and queries answer from the last commit.
 
     Parameters
     ----------
     vertices :
-        Shape (V, 3), float32 or float64; or, with `faces` left out, the path of a file (.ply, .obj,
-        .stl, .gltf, .glb, .off, each also with .gz, .xz or .zst), the name of a built-in scene
-        ("builtin:atrium?triangles=10000"), or an object with the attributes `vertices` and `faces`,
-        such as a `trimesh.Trimesh`.
+        None: an empty scene. Shape (V, 3), float32 or float64; or, with `faces` left out, the path
+        of a file (.ply, .obj, .stl, .gltf, .glb, .off, each also with .gz, .xz or .zst), the name
+        of a built-in scene ("builtin:atrium?triangles=10000"), or an object with the attributes
+        `vertices` and `faces`, such as a `trimesh.Trimesh`.
     faces :
         Shape (F, 3), whole numbers: three vertex indices for each triangle.
     quality :
-        What the tree is for: "fast" is built each frame, "balanced" once for some million rays,
+        What trees are for: "fast" is built each frame, "balanced" once for some million rays,
         "high" once for many.
     builder :
-        The name of a builder, instead of `quality`: see `raydix.builders`.
+        The name of a builder for the binary tree, instead of that of `quality`: see
+        `raydix.builders`. All queries but rays ask that tree; rays go through a wide one, which
+        `quality` alone decides.
     reinsertion_rounds :
-        So often, at most 255, large subtrees are moved to better places after the build; None: what
-        `quality` asks for (2 for "balanced", 4 for "high", else 0), and 0 where `builder` is given.
+        Of the binary tree: rounds of reinsertion after the build, 0 to 255. Each moves large
+        subtrees to cheaper places. None: what `quality` asks for (2 for "balanced", 4 for "high",
+        else 0), and 0 where `builder` is given.
     max_leaf, bits :
-        Primitives in a leaf at most, and bits of the Morton codes (30 or 63).
+        Of the binary tree: triangles in a leaf at most, and bits of the Morton codes (30 or 63).
     strict :
         Triangles with a NaN, an infinite or a huge (beyond 1e12) vertex raise InputError; otherwise
         they are left out.
+    usage, compact :
+        As in `commit`.
     threads :
         Threads for builds and queries; 0: all the machine has. No result depends on it.
     device :
@@ -70,15 +78,24 @@ class Scene(SceneViews):
 
     Notes
     -----
-    The arrays are copied: changing them later does not change the scene; `refit` does. With
+    The arrays are copied: changing them later does not change the scene; `update` does. With
     precision "float32", coordinates given as float64, NumPy's usual type, are rounded once, here,
-    and every answer is about the rounded mesh. Trees are built when a query first needs them. Any
-    number of threads may ask at once. Triangles whose box has a diagonal above 0 and
+    and every answer is about the rounded mesh. The trees of `Scene(vertices, faces)` are built when
+    a query first needs them: the wide one for rays or a change, the binary one for other queries.
+    Any number of threads may ask at once. Triangles whose box has a diagonal above 0 and
     below 1e-12 are left out, as those that are not finite.
 
-    With precision "float64" these raise NotImplementedError: device="cuda", `render`, `cameras`,
-    `primary_rays`, `secondary_rays`, `info`, `wide_stats` and `raydix.simulate`; files raise
-    ValueError, because they are read in float32. Numbers other than 0 below 2**-500 count as 0.
+    Queries with points and other meshes (`closest_point`, `signed_distance`, `contains`,
+    `winding_number`, `overlaps`, `touched_by`), `refit`, `vertices`, `faces`, `render`,
+    `secondary_rays`, `stats`, `wide_stats`, `info`, `closure`, `check` and `raydix.simulate` need a
+    scene of one mesh and nothing else: InputError names the geometry that stands in the way.
+    Masks have no effect on them.
+
+    With precision "float64" a scene is one mesh, and these raise NotImplementedError: `Scene()`,
+    `add`, `update`, `remove`, `set_transform`, `set_mask`, `commit`, `path`, masks, compact=True,
+    usage="moving", device="cuda", `render`, `cameras`, `primary_rays`, `secondary_rays`, `info`,
+    `wide_stats` and `raydix.simulate`; files raise ValueError, because they are read in float32.
+    Numbers other than 0 below 2**-500 count as 0.
 
     Raises ValueError (InputError is one) and TypeError that name the argument, what was expected
     and what was given.
@@ -86,7 +103,7 @@ class Scene(SceneViews):
 
     def __init__(
         self,
-        vertices: ArrayLike | str | os.PathLike | Any,
+        vertices: ArrayLike | str | os.PathLike | Any = None,
         faces: ArrayLike | None = None,
         *,
         quality: str = "balanced",
@@ -98,9 +115,11 @@ class Scene(SceneViews):
         threads: int = 0,
         device: str = "cpu",
         precision: DTypeLike = None,
+        usage: str = "fixed",
+        compact: bool = False,
     ) -> None:
-        if quality not in QUALITIES:
-            raise ValueError(f"quality: expected one of {', '.join(QUALITIES)}, given {quality!r}")
+        one_of(quality, "quality", QUALITIES)
+        one_of(usage, "usage", USAGES)
         asked_builder, asked_rounds = (builder, 0) if builder else QUALITIES[quality]
         if device not in ("cpu", "cuda"):
             raise ValueError(f"device: expected 'cpu' or 'cuda', given {device!r}")
@@ -110,44 +129,61 @@ class Scene(SceneViews):
         self.device = device
         self.name = ""
         self._cameras: list[Camera] = []
+        self._fitted: Camera | None = None
         self._cuda: CudaRays | None = None
-        if device == "cuda":
-            require_float32(self, "device='cuda'")
+        for is_asked, what in (
+            (device == "cuda", "device='cuda'"),
+            (usage != "fixed", f"usage={usage!r}"),
+            (compact, "compact=True"),
+            (vertices is None, "an empty scene"),
+        ):
+            if is_asked:
+                require_float32(self, what)
+        if reinsertion_rounds is not None:
+            asked_rounds = whole(reinsertion_rounds, "reinsertion_rounds", 0, 255)
+        leaf = whole(max_leaf, "max_leaf", 1, 255)
+        one_of(bits, "bits", (30, 63))
+        options: tuple = (asked_builder, asked_rounds, bits, leaf, bool(strict), threads)
+        if self.dtype == FLOAT32:
+            options += (quality, usage, bool(compact))
+        self._core: Any = self._make(vertices, faces, options)
+
+    def _make(self, vertices: Any, faces: Any, options: tuple) -> Any:
+        """The core of an empty scene, of a file, a built-in scene, or a mesh."""
+        if vertices is None:
+            if faces is not None:
+                raise TypeError("vertices: expected shape (V, 3) for these faces, given None")
+            return _core.SceneTrees(*options)
         if faces is None:
-            vertices, faces = self._from_source(vertices)
+            if isinstance(vertices, (str, os.PathLike)):
+                if self.dtype == FLOAT32:
+                    core, self.name, cameras = _core.SceneTrees.load(
+                        os.fspath(vertices), 1, *options
+                    )
+                    self._cameras = [Camera(**camera) for camera in cameras]
+                    return core
+                vertices, faces = self._built_in(os.fspath(vertices))
+            else:
+                vertices, faces = mesh_of(vertices)
         corners = mesh_vertices(vertices, dtype=self.dtype)
         triangles = mesh_faces(faces, len(corners))
         trees = _core.SceneTrees if self.dtype == FLOAT32 else _core.SceneTreesD
-        self._core: Any = trees(
-            corners,
-            triangles,
-            asked_builder,
-            asked_rounds if reinsertion_rounds is None else reinsertion_rounds,
-            bits,
-            max_leaf,
-            strict,
-            threads,
-        )
+        return trees(corners, triangles, *options)
 
-    def _from_source(self, source: Any) -> tuple[Any, Any]:
-        """Vertices and faces of a file, a built-in scene or another library's mesh."""
-        if isinstance(source, (str, os.PathLike)):
-            if self.dtype != FLOAT32 and not str(source).startswith("builtin:"):
-                raise ValueError(
-                    f"precision: files are read in float32, given 'float64' and the path {source}; "
-                    "give vertices and faces as another library has read them"
-                )
-            loaded = _core.load_scene(os.fspath(source), 1)
-            self.name = loaded["name"]
-            self._cameras = [Camera(**camera) for camera in loaded["cameras"]]
-            return loaded["vertices"], loaded["faces"]
-        if hasattr(source, "vertices") and hasattr(source, "faces"):
-            return source.vertices, source.faces
-        raise TypeError(
-            "vertices: expected a path, a mesh with .vertices and .faces, "
-            "or an array together with faces, "
-            f"given {type(source).__name__} alone"
-        )
+    def _built_in(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """The mesh of a built-in scene for one in float64."""
+        if not name.startswith("builtin:"):
+            raise ValueError(
+                f"precision: files are read in float32, given 'float64' and the path {name}; "
+                "give vertices and faces as another library has read them"
+            )
+        loaded = _core.load_scene(name, 1)
+        self.name = loaded["name"]
+        return loaded["vertices"], loaded["faces"]
+
+    def _forget(self) -> None:
+        """What was made of the last commit."""
+        self._cuda = self._fitted = None
 
     def _on_cuda(self) -> CudaRays:
         if self._cuda is None:
@@ -156,33 +192,24 @@ class Scene(SceneViews):
 
     @property
     def vertices(self) -> np.ndarray:
-        """Shape (V, 3) in `dtype`, a read-only view of the scene's copy; `refit` replaces it."""
+        """Shape (V, 3) in `dtype`, a read-only view of the copy that the last commit saw. It
+        stays as it is when the scene changes."""
         return self._core.vertices
 
     @property
     def faces(self) -> np.ndarray:
-        """Shape (F, 3) uint32, a read-only view of the scene's copy."""
+        """Shape (F, 3) uint32, as `vertices`."""
         return self._core.faces
-
-    def __len__(self) -> int:
-        """Triangles, degenerate ones and those left out included."""
-        return len(self._core.faces)
 
     def __repr__(self) -> str:
         name = f" {self.name!r}" if self.name else ""
         double = "" if self.dtype == FLOAT32 else ", float64"
-        counts = f"{len(self):,} triangles, {len(self.vertices):,} vertices"
-        return f"<raydix.Scene{name}: {counts}{double}>"
-
-    def _hits(self, hits: np.ndarray) -> dict[str, np.ndarray]:
-        """The first four columns of hits: "prim" is a uint32 in the room of a scalar."""
-        prim = self.dtype.itemsize // UINT32.itemsize
-        return {
-            "t": hits[..., 0],
-            "prim": hits.view(UINT32)[..., prim],
-            "u": hits[..., 2],
-            "v": hits[..., 3],
-        }
+        if self.committed and self._core.is_mesh():
+            counts = f"{len(self.faces):,} triangles, {len(self.vertices):,} vertices"
+        else:
+            counts = f"{len(self):,} geometr{'y' if len(self) == 1 else 'ies'}"
+        changed = "" if self.committed else ", changes without a commit"
+        return f"<raydix.Scene{name}: {counts}{double}{changed}>"
 
     def intersect(
         self,
@@ -191,6 +218,8 @@ class Scene(SceneViews):
         *,
         tmin: Any = None,
         tmax: Any = None,
+        mask: int = ALL,
+        masks: ArrayLike | None = None,
         stream: int = 0,
     ) -> dict[str, np.ndarray]:
         """The closest hit of each ray.
@@ -207,6 +236,10 @@ class Scene(SceneViews):
         tmin, tmax :
             Numbers or arrays, 0 and infinity if left out: hits outside of [tmin, tmax] do not
             count. Not with (..., 8).
+        mask, masks :
+            32 bits of all rays, or of each ray, an array that fits their leading shape. A ray sees
+            a geometry if its mask & the geometry's is not 0, and the same holds for each instance
+            on the way to it.
         stream :
             Only with device="cuda" and rays that lie on the GPU, float32 of shape (..., 8): the
             CUDA stream to run on, as a number (`cupy.cuda.get_current_stream().ptr`). Results are
@@ -215,20 +248,27 @@ class Scene(SceneViews):
         Returns
         -------
         dict of arrays with the leading shape of the rays: "t" (the scene's type; infinity: nothing
-        was hit), "prim" (uint32, the position in `faces`; 0xFFFFFFFF: nothing), "u" and "v" (the
-        scene's type): the point is (1-u-v)*v0 + u*v1 + v*v2. All four are views of one array. At
-        equal t the lower "prim" wins. Rays through an edge hit at least one of its triangles (Woop,
-        Benthin, Wald 2013). Rays with NaN, a zero direction or tmin > tmax miss.
+        was hit), "prim" (uint32, the position in the mesh's `faces`; 0xFFFFFFFF: nothing), "u" and
+        "v" (the scene's type): the point is (1-u-v)*v0 + u*v1 + v*v2; "geometry" (uint32, the
+        mesh's id in its scene; 0xFFFFFFFF: nothing) and "instance" (uint32; 0: a geometry of the
+        scene itself, else a number for `path`). "t" is in units of the ray's direction, through
+        instances too. At equal t the lower "instance" wins, then "geometry", then "prim". Rays
+        through an edge hit at least one of its triangles (Woop, Benthin, Wald 2013). Rays with NaN,
+        a zero direction or tmin > tmax miss. All are views of one array.
+
+        With rays that lie on a GPU, "geometry" and "instance" are left out: device="cuda" takes
+        scenes of one mesh, without masks. BackendUnavailable otherwise.
         """
         if self.device == "cuda":
-            return self._on_cuda().intersect(rays, directions, tmin, tmax, stream)
+            return self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
-        columns = 6 if self.dtype == FLOAT32 else 5  # geometry and instance behind the four
+        seen = ray_masks(self, mask, masks, lead)
+        columns = 6 if self.dtype == FLOAT32 else 5
         hits = np.empty((*lead, columns), self.dtype)
         self._core.intersect(
-            *args, hits if hits.ndim == 2 else hits.reshape(-1, columns), self.threads
+            *args, hits if hits.ndim == 2 else hits.reshape(-1, columns), *seen, self.threads
         )
-        return self._hits(hits)
+        return hit_columns(hits, 0)
 
     def occluded(
         self,
@@ -237,6 +277,8 @@ class Scene(SceneViews):
         *,
         tmin: Any = None,
         tmax: Any = None,
+        mask: int = ALL,
+        masks: ArrayLike | None = None,
         stream: int = 0,
     ) -> np.ndarray:
         """Whether each ray hits anything at all: bool, with the leading shape of the rays. Rays as
@@ -245,10 +287,11 @@ class Scene(SceneViews):
         For rays that lie on a GPU: uint8, 1 or 0, there.
         """
         if self.device == "cuda":
-            return self._on_cuda().occluded(rays, directions, tmin, tmax, stream)
+            return self._on_cuda().occluded(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
+        seen = ray_masks(self, mask, masks, lead)
         flags = np.empty(lead, np.bool_)
-        self._core.occluded(*args, flags.reshape(-1), self.threads)
+        self._core.occluded(*args, flags.reshape(-1), *seen, self.threads)
         return flags
 
     def count(
@@ -258,6 +301,8 @@ class Scene(SceneViews):
         *,
         tmin: Any = None,
         tmax: Any = None,
+        mask: int = ALL,
+        masks: ArrayLike | None = None,
     ) -> np.ndarray:
         """How many triangles each ray hits: uint32, with the leading shape of the rays. Rays as in
         `intersect`.
@@ -266,8 +311,9 @@ class Scene(SceneViews):
         start outside, through edges and vertices too.
         """
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
+        seen = ray_masks(self, mask, masks, lead)
         counts = np.empty(lead, UINT32)
-        self._core.count(*args, counts.reshape(-1), self.threads)
+        self._core.count(*args, counts.reshape(-1), *seen, self.threads)
         return counts
 
     def all_hits(
@@ -277,31 +323,34 @@ class Scene(SceneViews):
         *,
         tmin: Any = None,
         tmax: Any = None,
+        mask: int = ALL,
+        masks: ArrayLike | None = None,
         max_result_bytes: int = 0,
     ) -> dict[str, np.ndarray]:
         """Every hit of every ray, from one traversal. Rays as in `intersect`.
 
         Returns a dict: "offsets" (uint64, one more than there are rays); those of ray i, counted in
-        C order, stand at offsets[i] to offsets[i + 1] of "t", "prim", "u", "v", which are as in
-        `intersect`, sorted by (t, prim). Each triangle counts once a ray; an edge belongs to one of
-        its two triangles, so that crossings of a closed mesh are counted exactly.
+        C order, stand at offsets[i] to offsets[i + 1] of the arrays of `intersect`, sorted by (t,
+        instance, geometry, prim). Each triangle counts once a ray and path; an edge belongs to one
+        of its two triangles, so that crossings of a closed mesh are counted exactly.
         `max_result_bytes` bounds the peak memory of the call, the arrays included; 0: half of what
         is left. InputError if it would take more: no hit is ever dropped.
         """
-        args, _ = ray_batch(rays, directions, tmin, tmax, self.dtype)
-        offsets, hits, _ = self._core.all_hits(*args, max_result_bytes, self.threads)
-        return {"offsets": offsets, **self._hits(hits)}
+        args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
+        seen = ray_masks(self, mask, masks, lead)
+        offsets, hits, _ = self._core.all_hits(*args, max_result_bytes, *seen, self.threads)
+        return {"offsets": offsets, **hit_columns(hits, 0)}
 
     def closest_point(
         self, points: ArrayLike, *, max_distance: float = np.inf
     ) -> dict[str, np.ndarray]:
         """The point of the mesh that is closest to each query.
 
-        `points`: shape (..., 3), converted to the scene's type. Beyond `max_distance`
-        (its square decides, rounded) nothing is found. Returns a dict of arrays with the leading shape of the queries: "point" (..., 3),
-        "distance", "u" and "v" in the scene's type, "prim" uint32. At equal distances the lower
-        "prim" wins; nothing found: infinity and 0xFFFFFFFF. ValueError for a negative or NaN
-        `max_distance`.
+        `points`: shape (..., 3), converted to the scene's type. Beyond `max_distance` (its square
+        decides, rounded) nothing is found. Returns a dict of arrays with the leading shape of the
+        queries: "point" (..., 3), "distance", "u" and "v" in the scene's type, "prim" uint32. At
+        equal distances the lower "prim" wins; nothing found: infinity and 0xFFFFFFFF. ValueError
+        for a negative or NaN `max_distance`.
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
         places = np.empty((len(asked), 7), self.dtype)
@@ -408,26 +457,23 @@ class Scene(SceneViews):
         return {"offsets": offsets, "prim": prims}
 
     def refit(self, vertices: ArrayLike) -> dict[str, float]:
-        """Moves the vertices, shape (V, 3) as before, converted to the scene's type; the tree keeps
-        its hierarchy, its boxes are fitted again.
+        """Moves the vertices, shape (V, 3) as before, converted to the scene's type, and commits;
+        the trees keep their hierarchies, their boxes are fitted again. Where only rays are asked,
+        `update` and `commit(usage="moving")` do without the binary tree.
 
-        Returns "sah", "sah_at_build" and their "ratio": from about 1.5 on a new Scene is usually
-        worth its time. InputError, the scene unchanged: triangles that were valid are so no more,
+        Returns "sah", "sah_at_build" and their "ratio", of the binary tree: from about 1.5 on a new
+        Scene is usually worth its time. InputError, the scene unchanged: triangles that were valid
+        are so no more,
         or the other way round; a tree with parts of triangles (builders split and sbvh, quality
-        "high"). Waits for queries of other threads.
+        "high"); other changes without a commit. Waits for queries of other threads.
         """
         corners = mesh_vertices(vertices, dtype=self.dtype)
         if len(corners) != len(self.vertices):
             raise ValueError(
                 f"vertices: expected shape ({len(self.vertices)}, 3), given {corners.shape}"
             )
-        self._cuda = None
+        self._forget()
         return self._core.refit(corners, self.threads)
-
-    def instances(self, transforms: ArrayLike, *, masks: ArrayLike | None = None) -> Instances:
-        """This scene placed many times: see `raydix.Instances`. `transforms`: shape (M, 3, 4) or
-        (M, 4, 4)."""
-        return Instances([self], transforms, masks=masks)
 
     def info(self) -> dict[str, Any]:
         """Counts, bounds and degenerate elements of the mesh."""
@@ -439,7 +485,8 @@ class Scene(SceneViews):
         return self._core.stats()
 
     def wide_stats(self) -> dict[str, Any]:
-        """Figures of the wide tree that rays go through."""
+        """Figures of the wide tree that rays go through, built for this call as a commit builds
+        it."""
         require_float32(self, "wide_stats")
         return self._core.wide_stats()
 

@@ -5,6 +5,7 @@
 #include <raydix/cwbvh.h>
 #include <raydix/device.h>
 #include <raydix/device_cwbvh.h>
+#include <raydix/error.h>
 
 #include <cstdint>
 #include <memory>
@@ -46,7 +47,14 @@ private:
     static DeviceCwbvh copy_of(SceneTrees& scene) {
         static_cast<void>(device_name());  // before any work: says why there is no device
         const auto lock = scene.read();
-        return DeviceCwbvh(Cwbvh(scene.bvh(), threads_for(scene.options().threads)));
+        if (!scene.is_mesh())
+            throw BackendUnavailable(
+                "device='cuda': takes scenes of one mesh, and this one has instances, several "
+                "meshes or no commit");
+        if (scene.mesh_id() && scene.mesh_mask() != 0xFFFFFFFFu)
+            throw BackendUnavailable(
+                "device='cuda': the mesh has a mask, which rays on a GPU do not know");
+        return DeviceCwbvh(Cwbvh(scene.bvh("device='cuda'"), threads_for(scene.options().threads)));
     }
     static std::uint32_t checked(std::size_t count) {
         if (count > 0xFFFFFFFFu) throw nb::value_error("more than 2^32 - 1 rays in one call");

@@ -23,6 +23,7 @@
 #include "arrays.h"
 #include "batch.h"
 #include "bindings.h"
+#include "figures.h"
 #include "scene_trees.h"
 
 namespace raydix::python {
@@ -32,7 +33,6 @@ using Coordinates = std::tuple<float, float, float>;
 using CameraFields = std::tuple<Coordinates, Coordinates, Coordinates, float, std::string>;
 
 Vec3 vec3(const Coordinates& c) { return {std::get<0>(c), std::get<1>(c), std::get<2>(c)}; }
-Coordinates coordinates(Vec3 v) { return {v.x, v.y, v.z}; }
 
 Camera camera_of(const CameraFields& fields) {
     return {.name = std::get<4>(fields),
@@ -42,28 +42,19 @@ Camera camera_of(const CameraFields& fields) {
             .vfov = std::get<3>(fields)};
 }
 
-nb::dict camera_fields(const Camera& camera) {
-    nb::dict fields;
-    fields["position"] = coordinates(camera.position);
-    fields["target"] = coordinates(camera.target);
-    fields["up"] = coordinates(camera.up);
-    fields["vfov"] = camera.vfov;
-    fields["name"] = camera.name;
-    return fields;
-}
-
 nb::dict load(const std::string& spec, std::uint64_t seed) {
     Model scene;
     {
         const nb::gil_scoped_release unlocked;
-        scene = load_model(spec, seed);
+        scene = load_flat_model(spec, seed);
     }
     nb::dict fields;
     fields["name"] = scene.name;
-    fields["vertices"] = hand_over_rows<float>(std::move(scene.mesh.vertices));
-    fields["faces"] = hand_over_rows<std::uint32_t>(std::move(scene.mesh.triangles));
+    Mesh mesh = std::move(scene).mesh();
+    fields["vertices"] = hand_over_rows<float>(std::move(mesh.vertices));
+    fields["faces"] = hand_over_rows<std::uint32_t>(std::move(mesh.triangles));
     nb::list cameras;
-    for (const Camera& camera : scene.cameras.cameras) cameras.append(camera_fields(camera));
+    for (const Camera& camera : scene.cameras.cameras) cameras.append(camera_figures(camera));
     fields["cameras"] = cameras;
     fields["width"] = scene.cameras.width;
     fields["height"] = scene.cameras.height;
@@ -118,10 +109,10 @@ Array2<float> secondary_rays(SceneTrees& scene, const RaysIn& rays, const std::s
         const nb::gil_scoped_release unlocked;
         const auto lock = scene.read();
         const std::vector<Hit> hits =
-            trace(scene.wide(), primary, {.threads = threads_for(threads)});
+            trace(scene.traced(), primary, {.threads = threads_for(threads)});
         std::vector<std::uint32_t> pixels(primary.size());
         for (std::uint32_t i = 0; i < pixels.size(); ++i) pixels[i] = i;
-        secondary = make_secondary_rays(scene.bvh(), primary, hits, pixels, options);
+        secondary = make_secondary_rays(scene.traced(), primary, hits, pixels, options);
     }
     return hand_over_rows<float>(std::move(secondary));
 }
@@ -156,7 +147,7 @@ PictureOut render_scene(SceneTrees& scene, const CameraFields& camera, const std
     {
         const nb::gil_scoped_release unlocked;
         const auto lock = scene.read();
-        picture = render(scene.bvh(), camera_of(camera), options);
+        picture = render(scene.traced(), camera_of(camera), options);
     }
     return picture_array(std::move(picture));
 }
@@ -182,7 +173,7 @@ nb::bytes png(const PictureIn& pixels, bool tone_map) {
 }
 
 nb::dict fit(const Coordinates& lo, const Coordinates& hi, float vfov) {
-    return camera_fields(fit_camera({vec3(lo), vec3(hi)}, vfov));
+    return camera_figures(fit_camera({vec3(lo), vec3(hi)}, vfov));
 }
 
 }  // namespace

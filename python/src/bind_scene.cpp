@@ -1,6 +1,7 @@
-// Meshes: rays, closest points, inside and outside, overlaps.
+// Scenes asked: rays, closest points, inside and outside, overlaps.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
@@ -11,6 +12,7 @@
 #include <raydix/error.h>
 #include <raydix/overlap.h>
 #include <raydix/pairs.h>
+#include <raydix/surface.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
 
@@ -19,6 +21,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -31,6 +34,7 @@
 #include "figures.h"
 #include "lists.h"
 #include "ray_parts.h"
+#include "scene_changes.h"
 #include "scene_trees.h"
 
 namespace raydix::python {
@@ -38,20 +42,11 @@ namespace {
 
 using Counts = std::pair<std::uint64_t, std::uint64_t>;  // hits or found, invalid
 using FlagsOut = Out<bool, nb::ndim<1>>;
+using Masks = In<std::uint32_t, nb::ndim<1>>;  // of rays
 
 /// Throws what an output of another length deserves: memory past its end is not ours.
 void require_length(std::size_t length, std::size_t wanted) {
     if (length != wanted) throw nb::value_error("a result has another length than its queries");
-}
-
-BuildOptions build_options(const std::string& builder, int reinsertion_rounds, int bits,
-                           int max_leaf, bool strict, int threads) {
-    return {.builder = builder_from_name(builder),
-            .bits = bits,
-            .max_leaf = max_leaf,
-            .strict = strict,
-            .threads = threads,
-            .reinsertion_rounds = reinsertion_rounds};
 }
 
 // What both types of scenes call by the same names.
@@ -74,19 +69,6 @@ template <class Scene>
 using PlaceRows = Out<Scalar<Scene>, nb::shape<-1, 7>>;
 static_assert(sizeof(ClosestPoint) == 7 * sizeof(float) &&
               sizeof(ClosestPointD) == 7 * sizeof(double));
-
-template <class Scene>
-void make_scene(Scene* self, const PointRows<Scene>& vertices, const FacesIn& faces,
-                const std::string& builder, int reinsertion_rounds, int bits, int max_leaf,
-                bool strict, int threads) {
-    const auto corners = rows<Point<Scene>>(vertices);
-    const auto triangles = rows<Triangle>(faces);
-    const BuildOptions options =
-        build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads);
-    const nb::gil_scoped_release unlocked;
-    new (self) Scene({{}, {corners.begin(), corners.end()}, {triangles.begin(), triangles.end()}},
-                     options);
-}
 
 /// As in_pieces, and the trees stay as they are from the first piece to the last.
 template <class Scene, class Body>
@@ -118,24 +100,44 @@ bool is_valid(const RayType& ray) {
            std::max(ray.tmin, decltype(ray.tmin){0}) <= ray.tmax && !std::isnan(ray.tmin);
 }
 
+/// Masks of rays [begin, end), of all or one each.
+RayOptions piece_of(const RayOptions& options, std::size_t begin, std::size_t end) {
+    RayOptions piece = options;
+    if (!options.masks.empty()) piece.masks = options.masks.subspan(begin, end - begin);
+    return piece;
+}
+
+std::uint32_t mask_of(const RayOptions& options, std::size_t ray) {
+    return options.masks.empty() ? options.mask : options.masks[ray];
+}
+
+RayOptions ray_options(std::size_t rays, std::uint32_t mask, const std::optional<Masks>& masks,
+                       int threads) {
+    RayOptions options{.mask = mask, .threads = threads_for(threads)};
+    if (masks) {
+        require_length(masks->shape(0), rays);
+        options.masks = {masks->data(), masks->shape(0)};
+    }
+    return options;
+}
+
 template <class Scene, class Rays>
-Counts intersect(Scene& scene, Rays& rays, const HitRows<Scene>& out, int threads) {
+Counts intersect(Scene& scene, Rays& rays, const HitRows<Scene>& out, const RayOptions& options) {
     const auto hits = rows_out<typename Scene::Types::Hit>(out);
     require_length(hits.size(), rays.size());
-    const TraceOptions options{.threads = threads_for(threads)};
     Counts counts{0, 0};
     read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
         const auto piece = rays.piece(begin, end);
         if (rays.size() <= few_rays) {
             for (std::size_t i = 0; i < piece.size(); ++i) {
-                hits[i] = closest_hit(scene.ray_tree(), piece[i]);
+                hits[i] = scene.closest_hit(piece[i], mask_of(options, i));
                 counts.first += hits[i].hit();
                 counts.second += !is_valid(piece[i]);
             }
             return;
         }
         const TraceCounts met =
-            trace(scene.ray_tree(), piece, hits.subspan(begin, end - begin), options);
+            scene.trace(piece, hits.subspan(begin, end - begin), piece_of(options, begin, end));
         counts.first += met.hits;
         counts.second += met.invalid_rays;
     });
@@ -143,23 +145,22 @@ Counts intersect(Scene& scene, Rays& rays, const HitRows<Scene>& out, int thread
 }
 
 template <class Scene, class Rays>
-Counts occluded(Scene& scene, Rays& rays, const FlagsOut& out, int threads) {
+Counts occluded(Scene& scene, Rays& rays, const FlagsOut& out, const RayOptions& options) {
     const std::span flags(reinterpret_cast<std::uint8_t*>(out.data()), out.shape(0));
     require_length(flags.size(), rays.size());
-    const TraceOptions options{.threads = threads_for(threads)};
     Counts counts{0, 0};
     read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
         const auto piece = rays.piece(begin, end);
         if (rays.size() <= few_rays) {
             for (std::size_t i = 0; i < piece.size(); ++i) {
-                flags[i] = any_hit(scene.ray_tree(), piece[i]);
+                flags[i] = scene.any_hit(piece[i], mask_of(options, i));
                 counts.first += flags[i];
                 counts.second += !is_valid(piece[i]);
             }
             return;
         }
-        const TraceCounts met =
-            trace_any(scene.ray_tree(), piece, flags.subspan(begin, end - begin), options);
+        const TraceCounts met = scene.trace_any(piece, flags.subspan(begin, end - begin),
+                                                piece_of(options, begin, end));
         counts.first += met.hits;
         counts.second += met.invalid_rays;
     });
@@ -167,18 +168,19 @@ Counts occluded(Scene& scene, Rays& rays, const FlagsOut& out, int threads) {
 }
 
 template <class Scene, class Rays>
-nb::tuple all_hits(Scene& scene, Rays& rays, std::uint64_t max_result_bytes, int threads) {
+nb::tuple all_hits(Scene& scene, Rays& rays, std::uint64_t max_result_bytes,
+                   const RayOptions& options) {
     using AllHits = typename Scene::Types::AllHits;
-    TraceOptions options{.threads = threads_for(threads)};
     PieceLimit limit("all_hits", max_result_bytes);
     std::vector<AllHits> pieces;
     std::uint64_t invalid = 0;
     read_in_pieces(
         scene, rays.size(),
         [&](std::size_t begin, std::size_t end) {
+            RayOptions piece = piece_of(options, begin, end);
             pieces.push_back(limit.next([&](std::uint64_t bytes) {
-                options.max_result_bytes = bytes;
-                return trace_all(scene.ray_tree(), rays.piece(begin, end), options);
+                piece.max_result_bytes = bytes;
+                return scene.trace_all(rays.piece(begin, end), piece);
             }));
             limit.hold(piece_bytes(pieces.back(), &AllHits::offsets, &AllHits::hits));
             invalid += pieces.back().counts.invalid_rays;
@@ -192,16 +194,16 @@ nb::tuple all_hits(Scene& scene, Rays& rays, std::uint64_t max_result_bytes, int
 
 template <class Scene, class Rays>
 Counts count_hits(Scene& scene, Rays& rays, const Out<std::uint32_t, nb::ndim<1>>& out,
-                  int threads) {
+                  const RayOptions& options) {
     require_length(out.shape(0), rays.size());
-    const TraceOptions options{.threads = threads_for(threads)};
     Counts counts{0, 0};
     // Smaller pieces: what is counted is first listed.
     const auto count = [&](std::size_t begin, std::size_t end) {
         constexpr std::size_t part = piece_size / 8;
         for (std::size_t first = begin; first < end; first += part) {
             const std::size_t last = std::min(end, first + part);
-            const auto all = trace_all(scene.ray_tree(), rays.piece(first, last), options);
+            const auto all =
+                scene.trace_all(rays.piece(first, last), piece_of(options, first, last));
             for (std::size_t i = first; i < last; ++i)
                 out.data()[i] =
                     static_cast<std::uint32_t>(all.offsets[i - first + 1] - all.offsets[i - first]);
@@ -211,6 +213,29 @@ Counts count_hits(Scene& scene, Rays& rays, const Out<std::uint32_t, nb::ndim<1>
     };
     read_in_pieces(scene, rays.size(), count, first_listed);
     return counts;
+}
+
+using PointsOut = Out<float, nb::shape<-1, 3>>;
+using HitsIn = In<float, nb::shape<-1, 6>>;
+
+void positions_of(SceneTrees& scene, const HitsIn& hits, const PointsOut& out, int threads) {
+    const auto given = rows<Hit>(hits);
+    const auto points = rows_out<Vec3>(out);
+    require_length(points.size(), given.size());
+    read_in_pieces(scene, given.size(), [&](std::size_t begin, std::size_t end) {
+        positions(scene.traced(), given.subspan(begin, end - begin),
+                  points.subspan(begin, end - begin), threads_for(threads));
+    });
+}
+
+void normals_of(SceneTrees& scene, const HitsIn& hits, const PointsOut& out, int threads) {
+    const auto given = rows<Hit>(hits);
+    const auto found = rows_out<Vec3>(out);
+    require_length(found.size(), given.size());
+    read_in_pieces(scene, given.size(), [&](std::size_t begin, std::size_t end) {
+        normals(scene.traced(), given.subspan(begin, end - begin),
+                found.subspan(begin, end - begin), threads_for(threads));
+    });
 }
 
 template <class Scene>
@@ -223,8 +248,9 @@ Counts closest(Scene& scene, const PointRows<Scene>& points, const PlaceRows<Sce
                                                         .threads = threads_for(threads)};
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const ClosestCounts met = closest_points(scene.bvh(), queries.subspan(begin, end - begin),
-                                                 results.subspan(begin, end - begin), options);
+        const ClosestCounts met =
+            closest_points(scene.bvh("closest_point"), queries.subspan(begin, end - begin),
+                           results.subspan(begin, end - begin), options);
         counts.first += met.found;
         counts.second += met.invalid_queries;
     });
@@ -253,9 +279,9 @@ Counts signed_distance(Scene& scene, const PointRows<Scene>& points, const Value
                                                         .threads = threads_for(threads)};
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const ClosestCounts met =
-            signed_distances(scene.solid(rule), queries.subspan(begin, end - begin),
-                             distances.subspan(begin, end - begin), options);
+        const ClosestCounts met = signed_distances(scene.solid(rule, "signed_distance"),
+                                                   queries.subspan(begin, end - begin),
+                                                   distances.subspan(begin, end - begin), options);
         counts.first += met.found;
         counts.second += met.invalid_queries;
     });
@@ -271,8 +297,9 @@ Counts inside(Scene& scene, const PointRows<Scene>& points, const FlagsOut& out,
     const InsideRule rule = inside_rule(rule_name);
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const ClosestCounts met = contains(scene.solid(rule), queries.subspan(begin, end - begin),
-                                           flags.subspan(begin, end - begin), threads_for(threads));
+        const ClosestCounts met =
+            contains(scene.solid(rule, "contains"), queries.subspan(begin, end - begin),
+                     flags.subspan(begin, end - begin), threads_for(threads));
         counts.first += met.found;
         counts.second += met.invalid_queries;
     });
@@ -286,8 +313,9 @@ void winding(Scene& scene, const PointRows<Scene>& points, const Out<double, nb:
     require_length(out.shape(0), queries.size());
     const InsideRule rule = inside_rule(rule_name);
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const std::vector<double> numbers = winding_numbers(
-            scene.solid(rule), queries.subspan(begin, end - begin), threads_for(threads));
+        const std::vector<double> numbers =
+            winding_numbers(scene.solid(rule, "winding_number"),
+                            queries.subspan(begin, end - begin), threads_for(threads));
         std::copy(numbers.begin(), numbers.end(), out.data() + begin);
     });
 }
@@ -300,7 +328,7 @@ nb::tuple closure(Scene& scene) {
     const auto [kind, open_edges, rule] = [&] {
         const nb::gil_scoped_release unlocked;
         const auto lock = scene.read();
-        const auto& solid = scene.solid(InsideRule::automatic);
+        const auto& solid = scene.solid(InsideRule::automatic, "closure");
         return std::tuple(solid.closure(), solid.open_edges(), solid.rule());
     }();
     return nb::make_tuple(closures[static_cast<int>(kind)], open_edges,
@@ -315,10 +343,10 @@ auto with_two(Scene& scene, Scene* other, const Call& call) {
     Reading first_lock, second_lock;
     first_lock = std::min(&scene, last, std::less<>())->read();
     const typename Scene::Types::Bvh* second = nullptr;
-    if (last == &scene) return call(scene.bvh(), second);
+    if (last == &scene) return call(scene.bvh("overlaps"), second);
     second_lock = std::max(&scene, last, std::less<>())->read();
-    second = &other->bvh();
-    return call(scene.bvh(), second);
+    second = &other->bvh("overlaps");
+    return call(scene.bvh("overlaps"), second);
 }
 
 template <class Scene>
@@ -350,28 +378,13 @@ nb::tuple touched(Scene& scene, const Array& shapes, std::uint64_t max_result_by
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
         pieces.push_back(limit.next([&](std::uint64_t bytes) {
             options.max_result_bytes = bytes;
-            return touch_all(scene.bvh(), queries.subspan(begin, end - begin), options);
+            return touch_all(scene.bvh("touched_by"), queries.subspan(begin, end - begin), options);
         }));
         limit.hold(piece_bytes(pieces.back(), &OverlapLists::offsets, &OverlapLists::prims));
     });
     require_room_to_join(limit, pieces, &OverlapLists::offsets, &OverlapLists::prims);
     auto offsets = join_offsets(pieces);
     return nb::make_tuple(offsets, hand_over(join_column(pieces, &OverlapLists::prims)));
-}
-
-template <class Scene>
-nb::dict refit(Scene& scene, const PointRows<Scene>& vertices, int threads) {
-    const auto corners = rows<Point<Scene>>(vertices);
-    RefitQuality quality;
-    {
-        const nb::gil_scoped_release unlocked;
-        quality = scene.refit({corners.begin(), corners.end()}, threads);
-    }
-    nb::dict fields;
-    fields["sah"] = quality.sah;
-    fields["sah_at_build"] = quality.sah_at_build;
-    fields["ratio"] = quality.ratio;
-    return fields;
 }
 
 /// Runs call(scene) without the interpreter's lock and with the trees held.
@@ -383,7 +396,7 @@ auto reading(Scene& scene, const Call& call) {
 }
 
 nb::dict wide_stats(SceneTrees& scene) {
-    return wide_figures(reading(scene, [&] { return scene.wide().stats(); }));
+    return wide_figures(reading(scene, [&] { return scene.wide_stats("wide_stats"); }));
 }
 
 const Bvh& boxes_of(const Bvh& bvh) { return bvh; }
@@ -395,7 +408,7 @@ nb::dict stats(Scene& scene) {
     BuildMs ms;
     std::uint64_t left_out = 0, bytes = 0;
     const TreeStats figures = reading(scene, [&] {
-        const auto& bvh = scene.bvh();
+        const auto& bvh = scene.bvh("stats");
         ms = bvh.build_ms();
         left_out = bvh.left_out();
         bytes = bvh.bytes();
@@ -411,21 +424,24 @@ nb::dict stats(Scene& scene) {
 }
 
 nb::dict mesh_info(SceneTrees& scene) {
-    return mesh_figures(reading(scene, [&] { return inspect(scene.mesh()); }));
+    return mesh_figures(reading(scene, [&] {
+        const auto& mesh = scene.mesh("info");
+        return inspect({*mesh.vertices, *mesh.triangles});
+    }));
 }
 
 std::pair<bool, std::string> check_trees(SceneTrees& scene) {
     const CheckReport report = reading(scene, [&] {
         // The vertices of a scene without triangles are no points.
-        return scene.mesh().triangles.empty() ? check(scene.bvh())
-                                              : check(scene.bvh(), scene.mesh());
+        const MeshView mesh = scene.mesh("check").view();
+        return mesh.triangles.empty() ? check(scene.bvh("check")) : check(scene.bvh("check"), mesh);
     });
     return {report.ok, report.broken};
 }
 
 /// Of the tree of boxes: the library has no check that knows the triangles in double.
 std::pair<bool, std::string> check_boxes(SceneTreesD& scene) {
-    const CheckReport report = reading(scene, [&] { return check(scene.bvh().tree()); });
+    const CheckReport report = reading(scene, [&] { return check(scene.bvh("check").tree()); });
     return {report.ok, report.broken};
 }
 
@@ -435,31 +451,39 @@ void bind_rays(nb::class_<Scene>& scene) {
     using Ray = typename Scene::Types::Ray;
     using Hits = HitRows<Scene>;
     using Counted = Out<std::uint32_t, nb::ndim<1>>;
+    using Each = std::optional<Masks>;
+    const auto mask = nb::arg("mask") = 0xFFFFFFFFu;
+    const auto masks = nb::arg("masks").noconvert() = nb::none();
     const auto threads = nb::arg("threads") = 0;
     def_for_rays<Ray>(
         scene, "intersect",
-        [](Scene& self, auto& rays, const Hits& hits, int n) {
-            return intersect(self, rays, hits, n);
+        [](Scene& self, auto& rays, const Hits& hits, std::uint32_t all, const Each& each, int n) {
+            return intersect(self, rays, hits, ray_options(rays.size(), all, each, n));
         },
-        MoreArguments<const Hits&, int>(), nb::arg("hits").noconvert(), threads);
+        MoreArguments<const Hits&, std::uint32_t, const Each&, int>(), nb::arg("hits").noconvert(),
+        mask, masks, threads);
     def_for_rays<Ray>(
         scene, "occluded",
-        [](Scene& self, auto& rays, const FlagsOut& flags, int n) {
-            return occluded(self, rays, flags, n);
-        },
-        MoreArguments<const FlagsOut&, int>(), nb::arg("flags").noconvert(), threads);
+        [](Scene& self, auto& rays, const FlagsOut& flags, std::uint32_t all, const Each& each,
+           int n) { return occluded(self, rays, flags, ray_options(rays.size(), all, each, n)); },
+        MoreArguments<const FlagsOut&, std::uint32_t, const Each&, int>(),
+        nb::arg("flags").noconvert(), mask, masks, threads);
     def_for_rays<Ray>(
         scene, "count",
-        [](Scene& self, auto& rays, const Counted& counts, int n) {
-            return count_hits(self, rays, counts, n);
+        [](Scene& self, auto& rays, const Counted& counts, std::uint32_t all, const Each& each,
+           int n) {
+            return count_hits(self, rays, counts, ray_options(rays.size(), all, each, n));
         },
-        MoreArguments<const Counted&, int>(), nb::arg("counts").noconvert(), threads);
+        MoreArguments<const Counted&, std::uint32_t, const Each&, int>(),
+        nb::arg("counts").noconvert(), mask, masks, threads);
     def_for_rays<Ray>(
         scene, "all_hits",
-        [](Scene& self, auto& rays, std::uint64_t max_result_bytes, int n) {
-            return all_hits(self, rays, max_result_bytes, n);
+        [](Scene& self, auto& rays, std::uint64_t max_result_bytes, std::uint32_t all,
+           const Each& each, int n) {
+            return all_hits(self, rays, max_result_bytes, ray_options(rays.size(), all, each, n));
         },
-        MoreArguments<std::uint64_t, int>(), nb::arg("max_result_bytes") = 0, threads);
+        MoreArguments<std::uint64_t, std::uint32_t, const Each&, int>(),
+        nb::arg("max_result_bytes") = 0, mask, masks, threads);
 }
 
 template <class Scene>
@@ -487,58 +511,59 @@ void bind_queries(nb::class_<Scene>& scene) {
              nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
         .def("touched_by_segments", &touched<Segment, Scene, Segments>,
              nb::arg("segments").noconvert(), nb::arg("max_result_bytes") = 0,
-             nb::arg("threads") = 0)
-        .def("refit", &refit<Scene>, nb::arg("vertices").noconvert(), nb::arg("threads") = 0);
+             nb::arg("threads") = 0);
 }
 
 /// A view that stays as it is when the scene moves its vertices or goes.
-template <class Scene>
-auto vertices_of(nb::handle_t<Scene> self) {
-    struct Kept {
-        std::shared_ptr<const void> vertices;
-        nb::object scene;
-    };
-    auto kept = std::make_unique<Kept>();
-    auto& trees = nb::cast<Scene&>(self);
-    std::span<const Point<Scene>> vertices;
-    {
-        const nb::gil_scoped_release unlocked;
-        const Reading lock = trees.read();
-        vertices = trees.mesh().vertices;
-        kept->vertices = trees.keep_vertices();
-    }
-    kept->scene = nb::borrow(self);
-    return view_rows<Scalar<Scene>>(vertices, owner_of(std::move(kept)));
+template <class Item, class Row>
+auto view_of(std::shared_ptr<const std::vector<Row>> values) {
+    const std::span<const Row> all(*values);
+    return view_rows<Item>(
+        all,
+        owner_of(std::make_unique<std::shared_ptr<const std::vector<Row>>>(std::move(values))));
 }
 
+/// What both types of scenes answer.
 template <class Scene>
-nb::class_<Scene> bind_trees_of(nb::module_& module, const char* name, const char* doc) {
-    nb::class_<Scene> scene(module, name, doc);
-    scene.def("__init__", &make_scene<Scene>, nb::arg("vertices").noconvert(),
-              nb::arg("faces").noconvert(), nb::arg("builder"), nb::arg("reinsertion_rounds"),
-              nb::arg("bits"), nb::arg("max_leaf"), nb::arg("strict"), nb::arg("threads"));
-    scene.def_prop_ro("vertices", &vertices_of<Scene>, nb::rv_policy::automatic);
-    scene.def_prop_ro("faces", [](nb::handle_t<Scene> self) {
-        const auto& mesh = nb::cast<Scene&>(self).mesh();
-        return view_rows<std::uint32_t>(std::span<const Triangle>(mesh.triangles), self);
-    });
+void bind_asking(nb::class_<Scene>& scene) {
+    scene.def_prop_ro(
+        "vertices",
+        [](Scene& self) {
+            return view_of<Scalar<Scene>>(
+                reading(self, [&] { return self.mesh("vertices").vertices; }));
+        },
+        nb::rv_policy::automatic);
+    scene.def_prop_ro(
+        "faces",
+        [](Scene& self) {
+            return view_of<std::uint32_t>(
+                reading(self, [&] { return self.mesh("faces").triangles; }));
+        },
+        nb::rv_policy::automatic);
     scene.def("stats", &stats<Scene>);
     bind_rays(scene);
     bind_queries(scene);
-    return scene;
 }
 
 }  // namespace
 
 void bind_scene(nb::module_& module) {
-    bind_trees_of<SceneTrees>(module, "SceneTrees",
-                              "A mesh and its trees; raydix.Scene is what to use.")
-        .def("wide_stats", &wide_stats)
+    nb::class_<SceneTrees> scene(module, "SceneTrees",
+                                 "A scene in float; raydix.Scene is what to use.");
+    bind_changes(scene);
+    bind_asking(scene);
+    scene.def("wide_stats", &wide_stats)
         .def("info", &mesh_info)
-        .def("check", &check_trees);
-    bind_trees_of<SceneTreesD>(module, "SceneTreesD",
-                               "A mesh in double and its tree; raydix.Scene is what to use.")
-        .def("check", &check_boxes);
+        .def("check", &check_trees)
+        .def("positions", &positions_of, nb::arg("hits").noconvert(), nb::arg("points").noconvert(),
+             nb::arg("threads") = 0)
+        .def("normals", &normals_of, nb::arg("hits").noconvert(), nb::arg("normals").noconvert(),
+             nb::arg("threads") = 0);
+    nb::class_<SceneTreesD> mesh(module, "SceneTreesD",
+                                 "A mesh in double and its tree; raydix.Scene is what to use.");
+    bind_changes(mesh);
+    bind_asking(mesh);
+    mesh.def("check", &check_boxes);
 }
 
 }  // namespace raydix::python

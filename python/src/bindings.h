@@ -8,7 +8,6 @@ namespace raydix::python {
 void bind_scene(nanobind::module_& module);
 void bind_points(nanobind::module_& module);
 void bind_device(nanobind::module_& module);
-void bind_instances(nanobind::module_& module);
 void bind_pictures(nanobind::module_& module);
 void bind_simulator(nanobind::module_& module);
 void bind_trees(nanobind::module_& module);

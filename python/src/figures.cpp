@@ -62,6 +62,31 @@ nb::dict mesh_figures(const MeshInfo& info) {
     return fields;
 }
 
+nb::dict commit_figures(const CommitReport& report) {
+    nb::dict fields;
+    fields["ms"] = report.ms;
+    fields["meshes"] = report.meshes;
+    fields["instances"] = report.instances;
+    fields["triangles"] = report.triangles;
+    fields["trees_built"] = report.trees_built;
+    fields["trees_refitted"] = report.trees_refitted;
+    fields["sah_ratio"] = report.sah_ratio;
+    fields["bytes"] = report.bytes;
+    fields["paths"] = report.paths;
+    return fields;
+}
+
+nb::dict camera_figures(const Camera& camera) {
+    const auto coordinates = [](Vec3 v) { return nb::make_tuple(v.x, v.y, v.z); };
+    nb::dict fields;
+    fields["position"] = coordinates(camera.position);
+    fields["target"] = coordinates(camera.target);
+    fields["up"] = coordinates(camera.up);
+    fields["vfov"] = camera.vfov;
+    fields["name"] = camera.name;
+    return fields;
+}
+
 nb::dict stage_ms(const BuildMs& ms) {
     nb::dict fields;
     fields["bounds"] = ms.bounds;

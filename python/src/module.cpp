@@ -103,7 +103,6 @@ NB_MODULE(_core, module) {
     bind_scene(module);
     bind_points(module);
     bind_device(module);
-    bind_instances(module);
     bind_pictures(module);
     bind_simulator(module);
     bind_trees(module);

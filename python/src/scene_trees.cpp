@@ -1,9 +1,11 @@
-// Mesh -> trees, when they are needed.
+// Changes and commits of scenes in float32, and rays through them.
 #include "scene_trees.h"
 
 #include <raydix/error.h>
 
-#include <span>
+#include <algorithm>
+#include <limits>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -13,165 +15,334 @@ namespace raydix::python {
 
 namespace {
 
-std::mutex& unless_reading(std::mutex& queue) {
-    if (Reading::held() != 0)
-        throw InputError("refit: this thread is within a query of a scene, in a signal handler");
-    return queue;
+/// Changes of any scene: an instance asks what its scene holds, and that one's scenes in turn.
+std::mutex& structure() {
+    static std::mutex mutex;
+    return mutex;
+}
+
+SceneTraceOptions trace_options(const RayOptions& options) {
+    SceneTraceOptions out;
+    out.mask = options.mask;
+    out.masks = options.masks;
+    out.threads = options.threads;
+    out.max_result_bytes = options.max_result_bytes;
+    return out;
+}
+
+std::string name_of(std::uint32_t id) { return "geometry " + std::to_string(id); }
+
+/// Throws InputError unless there is one for each, or one for all.
+void require_one_each(const char* name, std::size_t given, std::size_t wanted) {
+    if (given != wanted)
+        throw InputError(std::string(name) + ": expected " + std::to_string(wanted) + ", given " +
+                         std::to_string(given));
 }
 
 }  // namespace
 
-Writing::Writing(std::mutex& queue, std::shared_mutex& use)
-    : queue_(unless_reading(queue)), use_(use) {}
-
-template <class Names>
-MeshTrees<Names>::MeshTrees(typename Types::Mesh mesh, const BuildOptions& options)
-    : mesh_(std::move(mesh)), options_(options) {}
-
-template <class Names>
-Reading MeshTrees<Names>::read() const {
-    // Who reads already must not queue up behind a refit that waits for the end of that.
-    if (Reading::held() != 0) return Reading(use_);
-    const std::lock_guard queue(queue_);
-    return Reading(use_);
+SceneTrees::SceneTrees(const BuildOptions& trees, const SceneOptions& commits)
+    : MeshTrees(trees), commits_(commits) {
+    why_no_mesh_ = "the scene was never committed";
 }
 
-template <class Names>
-const typename Names::Bvh& MeshTrees<Names>::bvh_locked() {
-    if (!bvh_) {
-        BuildOptions options = options_;
+SceneTrees::SceneTrees(Arrays mesh, const BuildOptions& trees, const SceneOptions& commits)
+    : SceneTrees(trees, commits) {
+    kept_ = std::make_shared<const Kept>(Kept{{mesh}, {}});
+    static_cast<void>(add(std::move(mesh), {}));
+    unsettled_ = true;
+    look_for_mesh();
+}
+
+SceneTrees::SceneTrees(Model model, const BuildOptions& trees, const SceneOptions& commits)
+    : SceneTrees(trees, commits) {
+    if (model.nodes.empty()) {
+        if (model.meshes.empty()) model.meshes.emplace_back();
+        Kept kept;
+        for (Mesh& mesh : model.meshes) {
+            const Arrays arrays{
+                std::make_shared<const Arrays::Vertices>(std::move(mesh.vertices)),
+                std::make_shared<const Arrays::Triangles>(std::move(mesh.triangles))};
+            kept.meshes.push_back(arrays);
+            static_cast<void>(add(arrays, {}));
+        }
+        kept_ = std::make_shared<const Kept>(std::move(kept));
+        unsettled_ = true;
+    } else {
+        for (const Mesh& mesh : model.meshes) check_strict("mesh " + mesh.name, mesh);
+        SceneOptions options = commits;
         options.threads = threads_for(options.threads);
-        using Points = std::span<const typename Types::Point>;
-        // Without triangles build_bvh would take the vertices as points, and a scene has none.
-        bvh_ = build_bvh(
-            typename Types::MeshView(mesh_.triangles.empty() ? Points() : Points(mesh_.vertices),
-                                     mesh_.triangles),
-            options);
+        scene_ = Scene(model, options);
+        // Its geometries are the nodes that stand in the world. Ids of nodes follow those of
+        // meshes.
+        for (std::size_t k = 0; k < model.nodes.size(); ++k) {
+            const auto id = static_cast<std::uint32_t>(model.meshes.size() + k);
+            if (scene_.contains(id)) geometries_[id] = {true, 0xFFFFFFFFu, {}, nullptr};
+        }
     }
-    return *bvh_;
+    look_for_mesh();
 }
 
-template <class Names>
-const typename Names::Bvh& MeshTrees<Names>::bvh() {
-    const std::lock_guard lock(build_);
-    return bvh_locked();
+void SceneTrees::check_strict(const std::string& name, const MeshView& mesh) const {
+    if (!options_.strict) return;
+    const auto left_out = [&](std::size_t triangles) {
+        return inspect({mesh.vertices, mesh.triangles.first(triangles)}).left_out_triangles;
+    };
+    const std::uint64_t all = left_out(mesh.triangles.size());
+    if (all == 0) return;
+    std::size_t none = 0, some = mesh.triangles.size();
+    while (some - none > 1) {
+        const std::size_t middle = none + (some - none) / 2;
+        (left_out(middle) == 0 ? none : some) = middle;
+    }
+    throw InputError(name + ": triangle " + std::to_string(none) +
+                     " is not finite or out of range, as are " + std::to_string(all - 1) +
+                     " others");
 }
 
-template <class Names>
-const typename Names::Solid& MeshTrees<Names>::solid(InsideRule rule) {
-    const std::lock_guard lock(build_);
-    std::optional<typename Types::Solid>& kept = solids_[static_cast<std::size_t>(rule)];
-    if (!kept)
-        kept.emplace(bvh_locked(),
-                     SolidOptions{.rule = rule, .threads = threads_for(options_.threads)});
-    return *kept;
+SceneTrees::Geometry& SceneTrees::at(std::uint32_t id) {
+    const auto found = geometries_.find(id);
+    if (found == geometries_.end()) throw InputError("there is no " + name_of(id));
+    return found->second;
 }
 
-template <class Names>
-std::shared_ptr<const void> MeshTrees<Names>::keep_vertices() {
-    const std::lock_guard lock(build_);
-    if (!old_vertices_) old_vertices_ = std::make_shared<Vertices>();
-    return old_vertices_;
+void SceneTrees::settle() {
+    if (!unsettled_) return;
+    static_cast<void>(commit_now(commits_));
+    unsettled_ = false;
 }
 
-template <class Names>
-void MeshTrees<Names>::take_vertices(Vertices vertices) {
-    if (old_vertices_ && old_vertices_.use_count() > 1) *old_vertices_ = std::move(mesh_.vertices);
-    old_vertices_.reset();
-    mesh_.vertices = std::move(vertices);
-    for (auto& solid : solids_) solid.reset();
+std::uint32_t SceneTrees::add(Arrays mesh, const GeometryOptions& options) {
+    const Writing lock("add", queue_, use_);
+    settle();
+    check_strict("mesh", mesh.view());
+    const std::lock_guard all(structure());
+    const std::uint32_t id = scene_.share(mesh.view(), options);
+    geometries_[id] = {false, options.mask, std::move(mesh), nullptr};
+    return id;
 }
 
-template <class Names>
-void MeshTrees<Names>::drop_trees() {
-    for (auto& solid : solids_) solid.reset();
-    bvh_.reset();
+std::vector<std::uint32_t> SceneTrees::add(std::shared_ptr<SceneTrees> scene,
+                                           std::span<const Transform> transforms,
+                                           std::span<const std::uint32_t> masks,
+                                           std::optional<std::uint32_t> id) {
+    if (masks.size() != 1) require_one_each("masks", masks.size(), transforms.size());
+    const Writing lock("add", queue_, use_);
+    settle();
+    const std::lock_guard all(structure());
+    std::vector<std::uint32_t> ids;
+    try {
+        for (std::size_t i = 0; i < transforms.size(); ++i) {
+            const std::uint32_t mask = masks[masks.size() == 1 ? 0 : i];
+            ids.push_back(scene_.add(scene->scene_, transforms[i], {mask, id}));
+            geometries_[ids.back()] = {true, mask, {}, scene};
+            id.reset();
+        }
+    } catch (...) {
+        for (const std::uint32_t added : ids) {
+            scene_.remove(added);
+            geometries_.erase(added);
+        }
+        throw;
+    }
+    return ids;
 }
 
-template class MeshTrees<InFloat>;
-template class MeshTrees<InDouble>;
-
-SceneTrees::SceneTrees(Mesh mesh, const BuildOptions& options)
-    : MeshTrees(std::move(mesh), options) {
-    static_cast<void>(inspect(mesh_));
+void SceneTrees::remove(std::uint32_t id) {
+    const Writing lock("remove", queue_, use_);
+    settle();
+    const std::lock_guard all(structure());
+    scene_.remove(id);
+    geometries_.erase(id);
 }
 
-const WideBvh& SceneTrees::wide() {
-    const std::lock_guard lock(build_);
-    if (!wide_) {
-        BuildOptions options = options_;
-        options.threads = threads_for(options.threads);
-        if (bvh_)  // the same bits as from the mesh, and after a refit the only way
-            wide_.emplace(*bvh_, WideBvhOptions{.threads = options.threads});
-        else if (mesh_.triangles.empty())
-            wide_.emplace();
+void SceneTrees::update(std::uint32_t id, std::vector<Vec3> vertices,
+                        std::optional<std::vector<Triangle>> triangles) {
+    const Writing lock("update", queue_, use_);
+    Geometry& geometry = at(id);
+    if (geometry.is_instance) throw InputError(name_of(id) + " is an instance, not a mesh");
+    settle();
+    Arrays mesh{std::make_shared<const Arrays::Vertices>(std::move(vertices)),
+                geometry.mesh.triangles};
+    if (triangles)
+        mesh.triangles = std::make_shared<const Arrays::Triangles>(std::move(*triangles));
+    check_strict(name_of(id), mesh.view());
+    scene_.update(id, mesh.view());
+    geometry.mesh = std::move(mesh);
+}
+
+void SceneTrees::set_transforms(std::span<const std::uint32_t> ids,
+                                std::span<const Transform> transforms) {
+    require_one_each("transforms", transforms.size(), ids.size());
+    const Writing lock("set_transform", queue_, use_);
+    check_places(ids, transforms);
+    settle();
+    for (std::size_t i = 0; i < ids.size(); ++i) scene_.set_transform(ids[i], transforms[i]);
+}
+
+/// Throws what Scene::set_transform would.
+void SceneTrees::check_places(std::span<const std::uint32_t> ids,
+                              std::span<const Transform> transforms) {
+    Scene tried;
+    const Scene nothing;
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+        if (!at(ids[i]).is_instance)
+            throw InputError(name_of(ids[i]) + " is a mesh, not an instance");
+        if (tried.contains(ids[i]))
+            tried.set_transform(ids[i], transforms[i]);
         else
-            wide_.emplace(build_wide_bvh(mesh_, options));
+            tried.add(nothing, transforms[i], {.id = ids[i]});
     }
-    return *wide_;
+}
+
+void SceneTrees::set_masks(std::span<const std::uint32_t> ids,
+                           std::span<const std::uint32_t> masks) {
+    if (masks.size() != 1) require_one_each("masks", masks.size(), ids.size());
+    const Writing lock("set_mask", queue_, use_);
+    for (const std::uint32_t id : ids) static_cast<void>(at(id));
+    settle();
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+        const std::uint32_t mask = masks[masks.size() == 1 ? 0 : i];
+        scene_.set_mask(ids[i], mask);
+        at(ids[i]).mask = mask;
+    }
+}
+
+CommitReport SceneTrees::commit_now(SceneOptions options) {
+    options.threads = threads_for(options.threads);
+    return scene_.commit(options);
+}
+
+CommitReport SceneTrees::commit(const SceneOptions& options) {
+    const Writing lock("commit", queue_, use_);
+    // The scenes that this one places must stay as they are meanwhile. Past their queues: whoever
+    // changes one of them may wait for somebody who waits for this.
+    std::vector<Reading> below;
+    auto kept = std::make_shared<Kept>();
+    std::set<SceneTrees*> placed;
+    for (const auto& [id, geometry] : geometries_) {
+        if (!geometry.is_instance) {
+            kept->meshes.push_back(geometry.mesh);
+        } else if (geometry.scene != nullptr && placed.insert(geometry.scene.get()).second) {
+            below.emplace_back(geometry.scene->use_);
+            const std::lock_guard build(geometry.scene->build_);
+            geometry.scene->settle();
+            kept->below.push_back(geometry.scene->kept_);
+        }
+    }
+    const CommitReport report = commit_now(options);
+    commits_ = options;
+    unsettled_ = false;
+    kept_ = std::move(kept);
+    look_for_mesh();
+    return report;
+}
+
+/// After a commit, or in its place.
+void SceneTrees::look_for_mesh() {
+    mesh_id_.reset();
+    mesh_mask_ = 0;
+    why_no_mesh_.clear();
+    Arrays found;
+    if (geometries_.size() == 1 && !geometries_.begin()->second.is_instance) {
+        mesh_id_ = geometries_.begin()->first;
+        mesh_mask_ = geometries_.begin()->second.mask;
+        found = geometries_.begin()->second.mesh;
+    } else if (!geometries_.empty()) {
+        const auto is_instance = [](const auto& entry) { return entry.second.is_instance; };
+        const auto instance = std::ranges::find_if(geometries_, is_instance);
+        const auto& named =
+            instance == geometries_.end() ? *std::next(geometries_.begin()) : *instance;
+        why_no_mesh_ = name_of(named.first) +
+                       (named.second.is_instance ? " is an instance" : " is a second mesh") +
+                       ", and this call takes a scene of one mesh: Scene(vertices, faces)";
+    }
+    if (why_no_mesh_.empty() && found == mesh("")) return;
+    refitter_.reset();
+    set_mesh(std::move(found));
 }
 
 RefitQuality SceneTrees::refit(std::vector<Vec3> vertices, int threads) {
-    const Writing lock(queue_, use_);
-    if (mesh_.triangles.empty()) {
-        take_vertices(std::move(vertices));
-        return {};
-    }
-    if (!refitter_) refitter_.emplace(bvh_locked());
-    const bool had_nodes = !bvh_locked().empty();
-    ++version_;
+    const Writing lock("refit", queue_, use_);
+    const Arrays moved{std::make_shared<const Arrays::Vertices>(std::move(vertices)),
+                       mesh("refit").triangles};
+    if (!scene_.committed() && !unsettled_)
+        throw InputError("refit: the scene has changed; commit it first");
+    if (!mesh_id_) return {};
     RefitQuality quality;
-    try {
-        quality =
-            refitter_->refit(*bvh_, MeshView(vertices, mesh_.triangles), threads_for(threads));
-    } catch (const InputError&) {
-        // Found late, the tree is gone: the mesh is still there, and makes it again.
-        if (had_nodes && bvh_->empty()) {
-            drop_trees();
-            wide_.reset();
-            refitter_.reset();
+    if (!moved.triangles->empty()) {
+        if (!refitter_) refitter_.emplace(bvh_locked());
+        const bool had_nodes = !bvh_locked().empty();
+        try {
+            quality = refitter_->refit(*bvh_, moved.view(), threads_for(threads));
+        } catch (const InputError&) {
+            // Found late, the tree is gone: the mesh is still there, and makes it again.
+            if (had_nodes && bvh_->empty()) {
+                drop_trees();
+                refitter_.reset();
+            }
+            throw;
         }
-        throw;
     }
-    take_vertices(std::move(vertices));
-    wide_.reset();
+    scene_.update(*mesh_id_, moved.view());
+    if (!unsettled_) {
+        SceneOptions options = commits_;
+        options.usage = Usage::moving;
+        options.refit_limit = std::numeric_limits<double>::infinity();
+        options.threads = threads;
+        static_cast<void>(commit_now(options));
+    }
+    at(*mesh_id_).mesh = moved;
+    kept_ = std::make_shared<const Kept>(Kept{{moved}, {}});
+    move_mesh(moved);
     return quality;
 }
 
-SceneTreesD::SceneTreesD(MeshD mesh, const BuildOptions& options)
-    : MeshTrees(std::move(mesh), options) {
-    for (std::size_t i = 0; i < mesh_.triangles.size(); ++i)
-        for (const std::uint32_t corner : mesh_.triangles[i])
-            if (corner >= mesh_.vertices.size())
-                throw InputError("triangle " + std::to_string(i) + " refers to vertex " +
-                                 std::to_string(corner) + ", but there are " +
-                                 std::to_string(mesh_.vertices.size()));
+bool SceneTrees::committed() {
+    const std::lock_guard lock(build_);
+    return unsettled_ || scene_.committed();
 }
 
-RefitQuality SceneTreesD::refit(std::vector<Vec3d> vertices, int threads) {
-    const Writing lock(queue_, use_);
-    if (mesh_.triangles.empty()) {
-        take_vertices(std::move(vertices));
-        return {};
-    }
-    const bool had_nodes = !bvh_locked().empty();
-    ++version_;
-    RefitQuality quality;
-    try {
-        quality = raydix::refit(*bvh_, MeshViewD(vertices, mesh_.triangles), threads_for(threads));
-    } catch (const InputError&) {
-        if (had_nodes && bvh_->empty()) {  // as in float32
-            drop_trees();
-            sah_at_build_.reset();
-        }
-        throw;
-    }
-    take_vertices(std::move(vertices));
-    // Each refit tells of the tree before it; that before the first is the one that was built.
-    if (!sah_at_build_) sah_at_build_ = quality.sah_at_build;
-    quality.sah_at_build = *sah_at_build_;
-    quality.ratio = quality.sah > 0 && *sah_at_build_ > 0 ? quality.sah / *sah_at_build_ : 1.0;
-    return quality;
+std::vector<std::uint32_t> SceneTrees::ids() const {
+    std::vector<std::uint32_t> all;
+    for (const auto& [id, geometry] : geometries_) all.push_back(id);
+    return all;
+}
+
+const Scene& SceneTrees::traced() {
+    const std::lock_guard lock(build_);
+    settle();
+    return scene_;
+}
+
+WideBvhStats SceneTrees::wide_stats(const char* call) {
+    const Arrays& mesh = this->mesh(call);
+    if (mesh.triangles->empty()) return WideBvh().stats();
+    BuildOptions options = build_options_for(commits_.quality);
+    options.threads = threads_for(commits_.threads);
+    return build_wide_bvh(mesh.view(), options, {.compact = commits_.compact}).stats();
+}
+
+TraceCounts SceneTrees::trace(std::span<const Ray> rays, std::span<Hit> hits,
+                              const RayOptions& options) {
+    return raydix::trace(traced(), rays, hits, trace_options(options));
+}
+
+TraceCounts SceneTrees::trace_any(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+                                  const RayOptions& options) {
+    return raydix::trace_any(traced(), rays, occluded, trace_options(options));
+}
+
+AllHits SceneTrees::trace_all(std::span<const Ray> rays, const RayOptions& options) {
+    return raydix::trace_all(traced(), rays, trace_options(options));
+}
+
+Hit SceneTrees::closest_hit(const Ray& ray, std::uint32_t mask) {
+    return raydix::closest_hit(traced(), ray, mask);
+}
+
+bool SceneTrees::any_hit(const Ray& ray, std::uint32_t mask) {
+    return raydix::any_hit(traced(), ray, mask);
 }
 
 }  // namespace raydix::python

@@ -1,67 +1,36 @@
-// A mesh and the trees over it, each made when a query first needs it. Safe for many threads that
-// ask and one that moves the vertices.
+// Scenes as Python has them: what rays go through, and the trees over a mesh that other queries
+// ask, each made when it is first needed. Safe for many threads that ask and one that changes.
 #pragma once
 
 #include <raydix/bvh.h>
 #include <raydix/double.h>
 #include <raydix/mesh.h>
+#include <raydix/model.h>
 #include <raydix/refit.h>
+#include <raydix/scene.h>
 #include <raydix/solid.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <shared_mutex>
-#include <utility>
+#include <span>
+#include <string>
 #include <vector>
 
+#include "locks.h"
+
 namespace raydix::python {
-
-/// A lock on trees that are read, and the knowledge that this thread has one: Python may run a
-/// signal handler between two pieces of a batch, which may ask a scene again.
-class Reading {
-public:
-    Reading() = default;
-    explicit Reading(std::shared_mutex& use) : lock_(use) { ++held_; }
-    Reading(Reading&& other) noexcept : lock_(std::move(other.lock_)) {}
-    Reading& operator=(Reading&& other) noexcept {
-        Reading moved(std::move(other));
-        lock_.swap(moved.lock_);
-        return *this;
-    }
-    ~Reading() {
-        if (lock_.owns_lock()) --held_;
-    }
-
-    [[nodiscard]] bool owns_lock() const { return lock_.owns_lock(); }
-    /// How many this thread has.
-    [[nodiscard]] static int held() { return held_; }
-
-private:
-    std::shared_lock<std::shared_mutex> lock_;
-    static inline thread_local int held_ = 0;
-};
-
-/// The lock of the one thread that changes trees.
-class Writing {
-public:
-    /// Throws InputError in a signal handler within a query, whose end it would wait for.
-    Writing(std::mutex& queue, std::shared_mutex& use);
-
-private:
-    std::unique_lock<std::mutex> queue_;
-    std::unique_lock<std::shared_mutex> use_;
-};
 
 /// The library's names of things in float32.
 struct InFloat {
     using Scalar = float;
     using Point = Vec3;
-    using Mesh = raydix::Mesh;
     using MeshView = raydix::MeshView;
     using Bvh = raydix::Bvh;
     using Solid = raydix::Solid;
@@ -78,7 +47,6 @@ struct InFloat {
 struct InDouble {
     using Scalar = double;
     using Point = Vec3d;
-    using Mesh = MeshD;
     using MeshView = MeshViewD;
     using Bvh = BvhD;
     using Solid = SolidD;
@@ -91,84 +59,186 @@ struct InDouble {
     using Sphere = SphereD;
 };
 
-/// What scenes of both types have in common. The functions that build take long: call everything
-/// here without the interpreter's lock.
+/// A mesh in memory that stays where it is for as long as somebody looks at it. Never null.
+template <class Names>
+struct MeshArrays {
+    using Vertices = std::vector<typename Names::Point>;
+    using Triangles = std::vector<Triangle>;
+
+    std::shared_ptr<const Vertices> vertices = std::make_shared<const Vertices>();
+    std::shared_ptr<const Triangles> triangles = std::make_shared<const Triangles>();
+
+    /// Without triangles nothing: the library would take the vertices as points.
+    [[nodiscard]] typename Names::MeshView view() const {
+        if (triangles->empty()) return {};
+        return {*vertices, *triangles};
+    }
+    friend bool operator==(const MeshArrays&, const MeshArrays&) = default;
+};
+
+/// What a call with rays has beside them.
+struct RayOptions {
+    std::uint32_t mask = 0xFFFFFFFFu;
+    std::span<const std::uint32_t> masks = {};  // of each ray, instead; or empty
+    int threads = 0;
+    std::uint64_t max_result_bytes = 0;
+};
+
+/// The mesh of a scene that is one, and what answers all queries but rays. The functions that build
+/// take long: call everything here without the interpreter's lock.
 template <class Names>
 class MeshTrees {
 public:
     using Types = Names;
+    using Arrays = MeshArrays<Names>;
 
-    MeshTrees(typename Types::Mesh mesh, const BuildOptions& options);
+    explicit MeshTrees(const BuildOptions& options) : options_(options) {}
 
-    /// Held while trees are read; `refit` waits for those who hold it, and lets no new ones past.
+    /// Held while the scene is asked; changes wait for those who hold it, and let no new ones past.
     /// Taken without the interpreter's lock; of several scenes that of the lowest address first.
     [[nodiscard]] Reading read() const;
 
-    [[nodiscard]] const typename Types::Mesh& mesh() const { return mesh_; }
-    /// What has to be kept, beside this, for as long as the present vertices are looked at: a refit
-    /// leaves their memory there. While reading.
-    [[nodiscard]] std::shared_ptr<const void> keep_vertices();
     [[nodiscard]] const BuildOptions& options() const { return options_; }
 
-    // While reading.
-    [[nodiscard]] const typename Types::Bvh& bvh();
-    [[nodiscard]] const typename Types::Solid& solid(InsideRule rule);
-    /// Changes whenever the tree does.
-    [[nodiscard]] std::uint64_t version() const { return version_; }
+    // While reading. All but the first throw InputError, which names the call, unless the last
+    // commit saw one mesh and nothing else, or nothing at all.
+    [[nodiscard]] bool is_mesh() const { return why_no_mesh_.empty(); }
+    [[nodiscard]] const Arrays& mesh(const char* call) const;
+    [[nodiscard]] const typename Types::Bvh& bvh(const char* call);
+    [[nodiscard]] const typename Types::Solid& solid(InsideRule rule, const char* call);
 
 protected:
-    using Vertices = std::vector<typename Types::Point>;
-
-    const typename Types::Bvh& bvh_locked();
-    /// While writing: what a refit that succeeded ends with.
-    void take_vertices(Vertices vertices);
+    /// While writing: another mesh, whose trees are not there yet.
+    void set_mesh(Arrays mesh);
+    /// The same, but the binary tree has been refitted to it.
+    void move_mesh(Arrays mesh);
     /// While writing: a refit has spoilt the tree, which the mesh will make again.
     void drop_trees();
 
-    typename Types::Mesh mesh_;
+    const typename Types::Bvh& bvh_locked();
+
     BuildOptions options_;
-    mutable std::mutex queue_;  // without it, readers would keep a refit waiting for ever
+    mutable std::mutex queue_;  // without it, readers would keep a change waiting for ever
     mutable std::shared_mutex use_;
     std::mutex build_;  // one thread builds, the others wait
     std::optional<typename Types::Bvh> bvh_;
-    std::uint64_t version_ = 0;
-    std::shared_ptr<Vertices> old_vertices_;  // empty until a refit, and null if nobody looks
+    std::string why_no_mesh_;
+
+private:
+    Arrays mesh_;
     std::array<std::optional<typename Types::Solid>, 4> solids_;  // by rule
 };
 
 extern template class MeshTrees<InFloat>;
 extern template class MeshTrees<InDouble>;
 
-/// In float32.
+/// In float32: raydix::Scene. Changes and commits wait for the queries of other threads; what they
+/// throw leaves all answers as they were.
 class SceneTrees : public MeshTrees<InFloat> {
 public:
-    /// Throws InputError: an index past the vertices.
-    SceneTrees(Mesh mesh, const BuildOptions& options);
+    /// Empty. `trees`: of the binary tree that other queries than rays ask; `commits`: of the first
+    /// commit.
+    SceneTrees(const BuildOptions& trees, const SceneOptions& commits);
+    /// One mesh with id 0, committed: its wide tree is made when a ray or a change needs it.
+    /// Throws InputError: an index past the vertices, with `trees.strict` a triangle left out.
+    SceneTrees(Arrays mesh, const BuildOptions& trees, const SceneOptions& commits);
+    /// What a file holds, committed: with ids as raydix::Scene gives them. One mesh, or several
+    /// without nodes, wait for their first ray or change as above.
+    SceneTrees(Model model, const BuildOptions& trees, const SceneOptions& commits);
 
-    /// While reading. Rays go through the wide tree, all else through the binary one.
-    [[nodiscard]] const WideBvh& wide();
-    [[nodiscard]] const WideBvh& ray_tree() { return wide(); }
-
-    /// Throws InputError as Refitter::refit does, and in a signal handler within a query; answers
-    /// are then as before.
+    // Changes: as those of raydix::Scene.
+    std::uint32_t add(Arrays mesh, const GeometryOptions& options);
+    /// One scene in many places, `masks` one for all or one each. All of them or none; `id` is of
+    /// the first, and others follow with the next ones.
+    std::vector<std::uint32_t> add(std::shared_ptr<SceneTrees> scene,
+                                   std::span<const Transform> transforms,
+                                   std::span<const std::uint32_t> masks,
+                                   std::optional<std::uint32_t> id);
+    void remove(std::uint32_t id);
+    /// Without triangles: those it has.
+    void update(std::uint32_t id, std::vector<Vec3> vertices,
+                std::optional<std::vector<Triangle>> triangles);
+    /// All of them or none.
+    void set_transforms(std::span<const std::uint32_t> ids, std::span<const Transform> transforms);
+    void set_masks(std::span<const std::uint32_t> ids, std::span<const std::uint32_t> masks);
+    CommitReport commit(const SceneOptions& options);
+    /// Moves the vertices of the one mesh that the scene holds, in the binary tree and in the wide
+    /// one. Throws InputError as Refitter::refit does, and if there are changes without a commit.
     RefitQuality refit(std::vector<Vec3> vertices, int threads);
 
+    // While reading.
+    /// Of the last commit.
+    [[nodiscard]] const SceneOptions& commit_options() const { return commits_; }
+    [[nodiscard]] bool committed();
+    [[nodiscard]] bool contains(std::uint32_t id) const { return scene_.contains(id); }
+    [[nodiscard]] std::vector<std::uint32_t> ids() const;
+    /// Of the mesh, if the last commit saw one and nothing else.
+    [[nodiscard]] std::optional<std::uint32_t> mesh_id() const { return mesh_id_; }
+    /// Its mask; 0 if there is none.
+    [[nodiscard]] std::uint32_t mesh_mask() const { return mesh_mask_; }
+    /// As the last commit left it. Throws InputError, as its functions do, if there was none.
+    [[nodiscard]] const Scene& traced();
+    /// The wide tree of the one mesh, made as a commit makes it.
+    [[nodiscard]] WideBvhStats wide_stats(const char* call);
+
+    TraceCounts trace(std::span<const Ray> rays, std::span<Hit> hits, const RayOptions& options);
+    TraceCounts trace_any(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+                          const RayOptions& options);
+    [[nodiscard]] AllHits trace_all(std::span<const Ray> rays, const RayOptions& options);
+    [[nodiscard]] Hit closest_hit(const Ray& ray, std::uint32_t mask);
+    [[nodiscard]] bool any_hit(const Ray& ray, std::uint32_t mask);
+
 private:
-    std::optional<WideBvh> wide_;
+    /// What a commit may still read: meshes of the scene and of those that it places.
+    struct Kept {
+        std::vector<Arrays> meshes;
+        std::vector<std::shared_ptr<const Kept>> below;
+    };
+    struct Geometry {
+        bool is_instance;
+        std::uint32_t mask;
+        Arrays mesh;
+        std::shared_ptr<SceneTrees> scene;  // of an instance; null if it comes from a file
+    };
+
+    void check_strict(const std::string& name, const MeshView& mesh) const;
+    void check_places(std::span<const std::uint32_t> ids, std::span<const Transform> transforms);
+    Geometry& at(std::uint32_t id);
+    /// While writing, or with `build_` locked: the first commit of a scene that was made from a
+    /// mesh.
+    void settle();
+    CommitReport commit_now(SceneOptions options);
+    void look_for_mesh();
+
+    SceneOptions commits_;
+    Scene scene_;
+    bool unsettled_ = false;
+    std::map<std::uint32_t, Geometry> geometries_;
+    std::shared_ptr<const Kept> kept_ = std::make_shared<const Kept>();
+    std::optional<std::uint32_t> mesh_id_;
+    std::uint32_t mesh_mask_ = 0;
     std::optional<Refitter> refitter_;
 };
 
-/// In double. There is one tree, for all queries.
+/// One mesh in double. There is one tree, for all queries.
 class SceneTreesD : public MeshTrees<InDouble> {
 public:
     /// Throws InputError: an index past the vertices.
-    SceneTreesD(MeshD mesh, const BuildOptions& options);
-
-    /// While reading.
-    [[nodiscard]] const BvhD& ray_tree() { return bvh(); }
+    SceneTreesD(Arrays mesh, const BuildOptions& options);
 
     /// As that of SceneTrees; its quality too is relative to the tree as it was built.
     RefitQuality refit(std::vector<Vec3d> vertices, int threads);
+
+    // While reading.
+    [[nodiscard]] bool contains(std::uint32_t id) const { return id == 0; }
+    [[nodiscard]] std::vector<std::uint32_t> ids() const { return {0}; }
+    // Throw InputError for a mask: the mesh has none.
+    TraceCounts trace(std::span<const RayD> rays, std::span<HitD> hits, const RayOptions& options);
+    TraceCounts trace_any(std::span<const RayD> rays, std::span<std::uint8_t> occluded,
+                          const RayOptions& options);
+    [[nodiscard]] AllHitsD trace_all(std::span<const RayD> rays, const RayOptions& options);
+    [[nodiscard]] HitD closest_hit(const RayD& ray, std::uint32_t mask);
+    [[nodiscard]] bool any_hit(const RayD& ray, std::uint32_t mask);
 
 private:
     std::optional<double> sah_at_build_;

@@ -1,4 +1,5 @@
-// A scene by name -> mesh and cameras: a file with the cameras beside it, or a built-in scene.
+// A model by name -> meshes, nodes and cameras: a file with the cameras beside it, or a built-in
+// scene.
 #include <raydix/bvh.h>
 #include <raydix/camera.h>
 #include <raydix/model.h>
@@ -7,9 +8,12 @@
 #include <string_view>
 
 #include "base/math.h"
+#include "exec/parallel.h"
 #include "measure/stopwatch.h"
 #include "primitives/bounds.h"
 #include "scene/builtin.h"
+#include "scene/formats.h"
+#include "scene/model_nodes.h"
 
 namespace raydix {
 namespace {
@@ -21,9 +25,28 @@ void trace_mesh(const Mesh& mesh, std::span<const Ray> rays, std::span<Hit> hits
     trace(build_bvh(mesh), rays, hits);
 }
 
-Aabb finite_bounds(const Mesh& mesh) {
-    const PointSource source{mesh.vertices.data()};
-    return scene_bounds(source, static_cast<std::uint32_t>(mesh.vertices.size())).box;
+/// Around all vertices where the model shows them.
+Aabb finite_bounds(const Model& model) {
+    Aabb box = empty_box();
+    const auto add = [&](const Mesh& mesh, const NodeMap& map) {
+        std::vector<Vec3> world;
+        const std::vector<Vec3>* vertices = &mesh.vertices;
+        if (!map.is_identity()) {
+            world.resize(mesh.vertices.size());
+            for_each_index(world.size(),
+                           [&](std::size_t i) { world[i] = moved(map, false, (*vertices)[i]); });
+            vertices = &world;
+        }
+        const PointSource source{vertices->data()};
+        box = unite(box, scene_bounds(source, static_cast<std::uint32_t>(vertices->size())).box);
+    };
+    if (model.nodes.empty())
+        for (const Mesh& mesh : model.meshes) add(mesh, NodeMap());
+    const std::vector<NodeMap> maps = node_maps(model);
+    for (std::size_t k = 0; k < maps.size(); ++k)
+        for (std::uint32_t i = 0; i < model.nodes[k].mesh_count; ++i)
+            add(model.meshes[model.nodes[k].first_mesh + i], maps[k]);
+    return box;
 }
 
 }  // namespace
@@ -35,21 +58,29 @@ Model load_model(const std::string& spec, std::uint64_t seed) {
         BuiltinResult made =
             make_builtin(std::string_view(spec).substr(builtin_prefix.size()), seed, trace_mesh);
         scene.name = spec;
-        scene.mesh = std::move(made.mesh);
+        scene.meshes.push_back(std::move(made.mesh));
         scene.cameras = std::move(made.cameras);
-        scene.mesh.name = spec;
+        scene.mesh().name = spec;
     } else {
         const std::filesystem::path file(spec);
-        scene.mesh = load_mesh(file);
+        scene = load_file(file);
         scene.name = file.filename().string();
         const std::filesystem::path beside = file.parent_path() / "cameras.json";
         if (std::error_code ignored; std::filesystem::exists(beside, ignored))
             scene.cameras = load_cameras(beside);
     }
     if (scene.cameras.cameras.empty())
-        scene.cameras.cameras.push_back(fit_camera(finite_bounds(scene.mesh)));
+        scene.cameras.cameras.push_back(fit_camera(finite_bounds(scene)));
     scene.load_ms = watch.lap();
     return scene;
+}
+
+Model load_flat_model(const std::string& spec, std::uint64_t seed) {
+    Stopwatch watch;
+    Model model = load_model(spec, seed);
+    model.flatten();
+    model.load_ms = watch.lap();
+    return model;
 }
 
 }  // namespace raydix

@@ -35,6 +35,11 @@ void save_hits(const std::filesystem::path& file, std::span<const Hit> hits, Hit
         save_npy(file, std::span<const TreeHit>(std::vector<TreeHit>(hits.begin(), hits.end())));
 }
 
+void save_occluded(const std::filesystem::path& file, std::span<const std::uint8_t> occluded) {
+    const std::uint64_t shape[] = {occluded.size()};
+    save_npy_bytes(file, "|u1", shape, std::as_bytes(occluded));
+}
+
 void save_offsets(const std::filesystem::path& file, std::span<const std::uint64_t> offsets) {
     save_npy(file, offsets);
 }

@@ -32,7 +32,8 @@ public:
         RdxFile result;
         read_scene(result.scene);
         read_tree(result.bvh);
-        if (const Fault fault = content_fault(result.bvh, result.scene.mesh, result.scene.cameras))
+        if (const Fault fault =
+                content_fault(result.bvh, result.scene.mesh(), result.scene.cameras))
             throw InputError(fmt::format("{}: {}", file_, *fault));
         return result;
     }
@@ -128,8 +129,8 @@ private:
     void read_scene(Model& scene) const {
         const auto vertex_view = view<Vec3>(vertices);
         const auto triangle_view = view<Triangle>(triangles);
-        scene.mesh.vertices.assign(vertex_view.begin(), vertex_view.end());
-        scene.mesh.triangles.assign(triangle_view.begin(), triangle_view.end());
+        scene.mesh().vertices.assign(vertex_view.begin(), vertex_view.end());
+        scene.mesh().triangles.assign(triangle_view.begin(), triangle_view.end());
         scene.cameras.width = info_.picture_width;
         scene.cameras.height = info_.picture_height;
         scene.cameras.ao_radius = info_.ao_radius;
@@ -144,7 +145,7 @@ private:
             return std::string(name.begin(), name.end());
         };
         scene.name = next_name(info_.scene_name_bytes);
-        scene.mesh.name = next_name(info_.mesh_name_bytes);
+        scene.mesh().name = next_name(info_.mesh_name_bytes);
         for (const Camera& c : view<Camera>(cameras))
             scene.cameras.cameras.push_back(
                 {next_name(c.name_bytes), c.position, c.target, c.up, c.vfov});

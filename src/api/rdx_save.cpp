@@ -30,7 +30,7 @@ std::uint32_t length_of(const std::string& name) { return static_cast<std::uint3
 
 Fault name_fault(const Model& scene) {
     const auto too_long = [](const std::string& name) { return name.size() > UINT32_MAX; };
-    const bool any = too_long(scene.name) || too_long(scene.mesh.name) ||
+    const bool any = too_long(scene.name) || too_long(scene.mesh().name) ||
                      std::ranges::any_of(scene.cameras.cameras, too_long, &Camera::name);
     if (!any) return {};
     return fmt::format("names: one has more than {} bytes", UINT32_MAX);
@@ -50,7 +50,7 @@ rdx::Info make_info(const Bvh& bvh, const Model& scene) {
             .picture_height = scene.cameras.height,
             .ao_radius = scene.cameras.ao_radius,
             .scene_name_bytes = length_of(scene.name),
-            .mesh_name_bytes = length_of(scene.mesh.name),
+            .mesh_name_bytes = length_of(scene.mesh().name),
             .input_count = bvh.input_count(),
             .left_out = bvh.left_out()};
 }
@@ -62,7 +62,7 @@ struct Packed {
     std::string names;
 
     Packed(const Bvh& bvh, const Model& scene)
-        : info(make_info(bvh, scene)), names(scene.name + scene.mesh.name) {
+        : info(make_info(bvh, scene)), names(scene.name + scene.mesh().name) {
         for (const Camera& c : scene.cameras.cameras) {
             cameras.push_back({c.position, c.target, c.up, c.vfov, length_of(c.name)});
             names += c.name;
@@ -135,10 +135,10 @@ void write(const std::filesystem::path& file, const rdx::Header& header, const C
 void save_rdx(const std::filesystem::path& file, const Bvh& bvh, const Model& scene) {
     if (!rdx::supported) throw BackendUnavailable(std::string(rdx::unsupported_text));
     Fault fault = name_fault(scene);
-    if (!fault) fault = rdx::content_fault(bvh, scene.mesh, scene.cameras);
+    if (!fault) fault = rdx::content_fault(bvh, scene.mesh(), scene.cameras);
     if (fault) input_error(printable(file), "not written", *fault);
     const Packed packed(bvh, scene);
-    const Contents contents = contents_of(packed, bvh, scene.mesh);
+    const Contents contents = contents_of(packed, bvh, scene.mesh());
     write(file, make_header(contents), contents);
 }
 

@@ -1,5 +1,5 @@
-// Tree and camera -> picture: the screen in tiles along its Morton order, each tile on one thread,
-// one batch of rays per step of a view. What a tile holds stays in that core's caches.
+// Tree or scene, and camera -> picture: the screen in tiles along its Morton order, each tile on
+// one thread, one batch of rays per step of a view. What a tile holds stays in that core's caches.
 #include <raydix/error.h>
 #include <raydix/picture.h>
 
@@ -7,7 +7,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <optional>
 #include <string>
 
 #include "api/render_light.h"
@@ -15,9 +14,9 @@
 #include "base/math.h"
 #include "base/options.h"
 #include "exec/progress.h"
+#include "rays/sampling.h"
 #include "rays/screen_order.h"
 #include "report/colour_map.h"
-#include "trace/scalar.h"
 
 namespace raydix {
 namespace {
@@ -46,34 +45,46 @@ void check_options(const RenderOptions& options) {
 /// Light of `shaded` comes from the sun and an even sky, and is smooth with few rays.
 int default_samples(View view) { return view == View::ao ? 64 : view == View::diffuse ? 32 : 16; }
 
-/// Making a wide tree takes about as long as tracing so many rays per triangle without it.
-constexpr std::uint64_t rays_per_triangle = 1;
+/// Rays of each pixel.
+struct PixelRays {
+    std::uint32_t primary, secondary;
+};
 
-RenderScene make_scene(const Bvh& bvh, const Camera& camera, const RenderOptions& options,
-                       std::optional<WideBvh>& wide) {
-    const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
+PixelRays pixel_rays(const RenderOptions& options) {
+    if (!gathers_light(options.view)) return {1, 0};
     const int asked = options.samples > 0 ? options.samples : default_samples(options.view);
-    const std::uint32_t samples =
-        gathers_light(options.view) ? static_cast<std::uint32_t>(asked) : 0;
-    const std::uint32_t per_pixel = samples >= 4 ? 4 : 1;
-    const std::uint64_t rays =
-        std::uint64_t{options.width} * options.height * (per_pixel + samples);
-    if (options.view != View::steps && rays > bvh.order().size() * rays_per_triangle)
-        wide.emplace(bvh);
-    const Aabb box = bvh.empty() ? Aabb{{0, 0, 0}, {0, 0, 0}} : bvh.bounds();
-    return {bvh,
-            wide ? &*wide : nullptr,
+    const auto samples = static_cast<std::uint32_t>(asked);
+    return {samples >= 4 ? 4u : 1u, samples};
+}
+
+std::uint64_t rays_of(const RenderOptions& options) {
+    const PixelRays per_pixel = pixel_rays(options);
+    return std::uint64_t{options.width} * options.height *
+           (per_pixel.primary + per_pixel.secondary);
+}
+
+RenderScene make_scene(const Tracer& tracer, const Surface& surface, const CameraFrame& frame,
+                       Vec3 camera_up, const RenderOptions& options) {
+    const PixelRays per_pixel = pixel_rays(options);
+    const Aabb box = surface.empty() ? Aabb{{0, 0, 0}, {0, 0, 0}} : surface.bounds();
+    return {tracer,
+            surface,
             options,
             frame,
-            PrimitiveLookup(bvh),
-            make_lights(bvh, frame, camera.up),
+            make_lights(tracer, frame, camera_up),
             step_back_distance(box),
-            bvh.empty() ? 1.0f : ao_radius_or_default(bvh, options.ao_radius),
-            per_pixel,
-            (samples + per_pixel - 1) / per_pixel};
+            surface.empty() ? 1.0f : ao_radius_or_default(box, options.ao_radius),
+            per_pixel.primary,
+            (per_pixel.secondary + per_pixel.primary - 1) / per_pixel.primary};
 }
 
 Vec3 grey(float value) { return {value, value, value}; }
+
+/// One number for each triangle; its own in a scene of one mesh.
+std::uint32_t number_of(const Hit& hit) {
+    if (hit.geometry == 0 && hit.instance == 0) return hit.prim;
+    return hit.prim ^ static_cast<std::uint32_t>(hash_of(hit.instance, hit.geometry));
+}
 
 /// Normal, depth and primitive: one value per pixel, from its hit alone. Depth stays a distance
 /// along the view for now.
@@ -81,14 +92,12 @@ Vec3 surface_value(const RenderScene& scene, const Ray& ray, const Hit& hit) {
     if (!hit.hit()) return scene.options.view == View::depth ? grey(infinity) : grey(0.0f);
     switch (scene.options.view) {
         case View::primitive:
-            return id_colour(hit.prim);
+            return id_colour(number_of(hit));
         case View::depth:
             return grey(
                 static_cast<float>(hit.t * dot(Double3(ray.direction), scene.frame.forward)));
-        default: {
-            const LeafTriangle& t = scene.lookup.triangle(hit.prim);
-            return 0.5f * (normal_toward(t.v0, t.v1, t.v2, ray.direction) + grey(1.0f));
-        }
+        default:
+            return 0.5f * (normal_toward(scene.surface.normal(hit), ray.direction) + grey(1.0f));
     }
 }
 
@@ -115,12 +124,10 @@ std::vector<Ray> primary_rays(const RenderScene& scene, std::span<const std::uin
 /// Node visits of each pixel's ray, as a count for now.
 std::vector<Vec3> step_counts(const RenderScene& scene, std::span<const std::uint32_t> pixels) {
     const std::vector<Ray> rays = primary_rays(scene, pixels);
-    std::vector<Hit> hits(rays.size());
-    std::vector<RaySteps> steps(rays.size());
-    trace_steps(scene.bvh, rays, hits, steps, 0);
+    std::vector<std::uint32_t> visits(rays.size());
+    scene.tracer.count_steps(rays, visits);
     std::vector<Vec3> counts(rays.size());
-    for (std::size_t i = 0; i < counts.size(); ++i)
-        counts[i] = grey(static_cast<float>(steps[i].node_visits));
+    for (std::size_t i = 0; i < counts.size(); ++i) counts[i] = grey(static_cast<float>(visits[i]));
     return counts;
 }
 
@@ -190,6 +197,23 @@ void render_tiles(const RenderScene& scene, Picture& picture) {
     listener.finish();
 }
 
+/// `take` calls picture_of(tracer, surface) once.
+template <class Take>
+Picture render_frame(const Camera& camera, const RenderOptions& options, const Take& take) {
+    const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
+    Picture picture{options.width, options.height, {}};
+    with_threads(options.threads, [&] {
+        take([&](const Tracer& tracer, const Surface& surface) {
+            const RenderScene scene = make_scene(tracer, surface, frame, camera.up, options);
+            picture.pixels.resize(std::size_t{options.width} * options.height);
+            render_tiles(scene, picture);
+        });
+    });
+    if (options.view == View::depth) scale_depth(picture);
+    if (options.view == View::steps) colour_steps(picture);
+    return picture;
+}
+
 }  // namespace
 
 std::vector<SurfacePoint> points_of_hits(const RenderScene& scene, std::span<const Ray> rays,
@@ -198,7 +222,7 @@ std::vector<SurfacePoint> points_of_hits(const RenderScene& scene, std::span<con
     std::vector<SurfacePoint> points(positions.size());
     for (std::size_t k = 0; k < positions.size(); ++k) {
         const std::uint32_t i = positions[k];
-        points[k] = surface_point(scene.lookup, rays[i], hits[i], 0, scene.step_back);
+        points[k] = surface_point(scene.surface, rays[i], hits[i], 0, scene.step_back);
     }
     return points;
 }
@@ -207,7 +231,7 @@ PrimarySamples trace_primary(const RenderScene& scene, std::span<const std::uint
     PrimarySamples primary;
     primary.rays = primary_rays(scene, pixels);
     primary.hits.resize(primary.rays.size());
-    scene.closest(primary.rays, primary.hits);
+    scene.tracer.closest(primary.rays, primary.hits);
     primary.hit_positions = positions_of_hits(primary.hits);
     primary.points = points_of_hits(scene, primary.rays, primary.hits, primary.hit_positions);
     for (std::size_t k = 0; k < primary.points.size(); ++k) {
@@ -234,16 +258,17 @@ View view_from_name(std::string_view name) {
 Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& options) {
     check_options(options);
     require_triangles(bvh, "render");
-    Picture picture{options.width, options.height, {}};
-    with_threads(options.threads, [&] {
-        std::optional<WideBvh> wide;
-        const RenderScene scene = make_scene(bvh, camera, options, wide);
-        picture.pixels.resize(std::size_t{options.width} * options.height);
-        render_tiles(scene, picture);
+    return render_frame(camera, options, [&](const auto& picture_of) {
+        const std::uint64_t rays = options.view == View::steps ? 0 : rays_of(options);
+        picture_of(BvhTracer(bvh, rays), BvhSurface(bvh));
     });
-    if (options.view == View::depth) scale_depth(picture);
-    if (options.view == View::steps) colour_steps(picture);
-    return picture;
+}
+
+Picture render(const Scene& scene, const Camera& camera, const RenderOptions& options) {
+    check_options(options);
+    return render_frame(camera, options, [&](const auto& picture_of) {
+        picture_of(SceneTracer(scene), SceneSurface(scene));
+    });
 }
 
 }  // namespace raydix

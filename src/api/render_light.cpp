@@ -50,7 +50,7 @@ std::vector<std::uint8_t> lit_points(const RenderScene& scene, std::span<const S
         facing.push_back(static_cast<std::uint32_t>(i));
     }
     std::vector<std::uint8_t> occluded(rays.size()), lit(points.size(), 0);
-    scene.occluded(rays, occluded);
+    scene.tracer.occluded(rays, occluded);
     for (std::size_t k = 0; k < rays.size(); ++k) lit[facing[k]] = !occluded[k];
     return lit;
 }
@@ -104,7 +104,7 @@ std::vector<Ray> hemisphere_rays(const RenderScene& scene, std::span<const Surfa
 std::vector<float> open_parts(const RenderScene& scene, std::span<const SurfacePoint> points) {
     const std::vector<Ray> rays = hemisphere_rays(scene, points, scene.ao_radius);
     std::vector<std::uint8_t> occluded(rays.size());
-    scene.occluded(rays, occluded);
+    scene.tracer.occluded(rays, occluded);
     const std::uint32_t per_point = scene.samples_per_ray;
     std::vector<float> open(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -120,7 +120,7 @@ std::vector<float> open_parts(const RenderScene& scene, std::span<const SurfaceP
 std::vector<Vec3> bounced_light(const RenderScene& scene, std::span<const SurfacePoint> points) {
     const std::vector<Ray> rays = hemisphere_rays(scene, points, infinity);
     std::vector<Hit> hits(rays.size());
-    scene.closest(rays, hits);
+    scene.tracer.closest(rays, hits);
     const std::vector<std::uint32_t> positions = positions_of_hits(hits);
     const std::vector<SurfacePoint> seen = points_of_hits(scene, rays, hits, positions);
     const std::vector<Vec3> light_on_seen = direct_light(scene, seen, SeenBy::reflection);
@@ -156,7 +156,7 @@ std::vector<Vec3> fill_samples(const RenderScene& scene, const PrimarySamples& p
 }
 
 /// Looks around from `place` along fixed directions.
-float enclosed_part(const Bvh& bvh, Vec3 place) {
+float enclosed_part(const Tracer& tracer, Vec3 place) {
     constexpr std::uint32_t looks = 512;
     std::vector<Ray> rays(looks);
     for (std::uint32_t k = 0; k < looks; ++k) {
@@ -165,14 +165,14 @@ float enclosed_part(const Bvh& bvh, Vec3 place) {
         rays[k] = {place, 0.0f, direction, infinity};
     }
     std::vector<std::uint8_t> occluded(looks);
-    trace_any(bvh, rays, occluded);
+    tracer.occluded(rays, occluded);
     return static_cast<float>(std::count(occluded.begin(), occluded.end(), std::uint8_t{1})) /
            looks;
 }
 
 }  // namespace
 
-Lights make_lights(const Bvh& bvh, const CameraFrame& frame, Vec3 camera_up) {
+Lights make_lights(const Tracer& tracer, const CameraFrame& frame, Vec3 camera_up) {
     const float component[3] = {camera_up.x, camera_up.y, camera_up.z};
     int axis = 0;
     for (int k = 1; k < 3; ++k)
@@ -187,7 +187,7 @@ Lights make_lights(const Bvh& bvh, const CameraFrame& frame, Vec3 camera_up) {
     const Double3 backward = cross(up, left);
     const Double3 sun = up * 0.75 + left * 0.62 + backward * 0.38;
     return {up.rounded(), normalized(sun).rounded(), frame.position,
-            enclosed_part(bvh, frame.position)};
+            enclosed_part(tracer, frame.position)};
 }
 
 Vec3 sky_colour(const Lights& lights, Vec3 direction) {

@@ -8,7 +8,7 @@
 namespace raydix {
 
 /// Lights for a camera: "up" is taken from it, since files do not say which way their scene stands.
-[[nodiscard]] Lights make_lights(const Bvh& bvh, const CameraFrame& frame, Vec3 camera_up);
+[[nodiscard]] Lights make_lights(const Tracer& tracer, const CameraFrame& frame, Vec3 camera_up);
 
 /// What a ray of this unit direction sees where it hits nothing.
 [[nodiscard]] Vec3 sky_colour(const Lights& lights, Vec3 direction);

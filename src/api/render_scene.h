@@ -1,19 +1,16 @@
-// What every view of a picture works with: the tree, the camera, and one tile of the screen at a
-// time.
+// What every view of a picture works with: what it is taken of, the camera, and one tile of the
+// screen at a time.
 #pragma once
 
 #include <raydix/picture.h>
-#include <raydix/trace.h>
-#include <raydix/wide.h>
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "api/primitive_lookup.h"
+#include "api/render_tracers.h"
 #include "api/surface_points.h"
 #include "rays/camera_frame.h"
-#include "trace/simd/trace_here.h"
 
 namespace raydix {
 
@@ -26,29 +23,15 @@ struct Lights {
 };
 
 struct RenderScene {
-    const Bvh& bvh;
-    const WideBvh* wide;  // traced instead if there is one: the same hits, in less time
+    const Tracer& tracer;
+    const Surface& surface;
     const RenderOptions& options;
     CameraFrame frame;
-    PrimitiveLookup lookup;
     Lights lights;
     double step_back;  // of secondary origins
     float ao_radius;
     std::uint32_t rays_per_pixel;   // primary ones: 1, or 4 where edges are smoothed
     std::uint32_t samples_per_ray;  // secondary rays from each primary hit
-
-    void closest(std::span<const Ray> rays, std::span<Hit> hits) const {
-        if (wide != nullptr)
-            closest_here(*wide, rays, hits);
-        else
-            static_cast<void>(trace(bvh, rays, hits));
-    }
-    void occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const {
-        if (wide != nullptr)
-            occluded_here(*wide, rays, found);
-        else
-            static_cast<void>(trace_any(bvh, rays, found));
-    }
 };
 
 /// Primary rays and their closest hits, those of a pixel in a row: [pixels * rays_per_pixel].

@@ -3,7 +3,6 @@
 #include <raydix/error.h>
 #include <raydix/rays.h>
 
-#include <atomic>
 #include <string>
 
 #include "api/surface_points.h"
@@ -17,9 +16,8 @@ namespace {
 
 constexpr int max_samples = 1024;
 
-void check_arguments(const Bvh& bvh, std::span<const Ray> rays, std::span<const Hit> hits,
+void check_arguments(std::span<const Ray> rays, std::span<const Hit> hits,
                      std::span<const std::uint32_t> pixels, const SecondaryOptions& options) {
-    require_triangles(bvh, "make_secondary_rays");
     if (hits.size() != rays.size() || pixels.size() != rays.size())
         throw InputError("make_secondary_rays: " + std::to_string(rays.size()) + " rays, " +
                          std::to_string(hits.size()) + " hits and " +
@@ -35,35 +33,23 @@ void check_arguments(const Bvh& bvh, std::span<const Ray> rays, std::span<const 
         throw InputError("make_secondary_rays: 2^32 rays or more in one call; give fewer hits");
 }
 
-void check_hits(const PrimitiveLookup& lookup, std::span<const Hit> hits) {
-    std::atomic<std::size_t> first_bad{hits.size()};
-    for_each_index(hits.size(), [&](std::size_t i) {
-        if (!hits[i].hit() || lookup.contains(hits[i].prim)) return;
-        std::size_t least = first_bad.load(std::memory_order_relaxed);
-        while (i < least && !first_bad.compare_exchange_weak(least, i, std::memory_order_relaxed)) {
-        }
-    });
-    if (const std::size_t bad = first_bad.load(); bad < hits.size())
-        throw InputError("hit " + std::to_string(bad) + ": the tree holds no triangle " +
-                         std::to_string(hits[bad].prim));
-}
-
-std::vector<Ray> make_rays(const Bvh& bvh, std::span<const Ray> rays, std::span<const Hit> hits,
-                           std::span<const std::uint32_t> pixels, const SecondaryOptions& options) {
-    const PrimitiveLookup lookup(bvh);
-    check_hits(lookup, hits);
-    const double step_back = step_back_part * diagonal_of(bvh.bounds());
+std::vector<Ray> make_rays(const Surface& surface, std::span<const Ray> rays,
+                           std::span<const Hit> hits, std::span<const std::uint32_t> pixels,
+                           const SecondaryOptions& options) {
+    surface.check(hits);
+    const double step_back = step_back_part * diagonal_of(surface.bounds());
     const std::vector<std::uint32_t> positions = positions_of_hits(hits);
     std::vector<SurfacePoint> points(positions.size());
     for_each_index(points.size(), [&](std::size_t k) {
         const std::uint32_t i = positions[k];
-        points[k] = surface_point(lookup, rays[i], hits[i], pixels[i], step_back);
+        points[k] = surface_point(surface, rays[i], hits[i], pixels[i], step_back);
     });
 
     HemisphereOptions hemisphere;
     hemisphere.samples = static_cast<std::uint32_t>(options.samples);
     hemisphere.seed = options.seed;
-    if (options.kind == RayKind::ao) hemisphere.tmax = ao_radius_or_default(bvh, options.ao_radius);
+    if (options.kind == RayKind::ao)
+        hemisphere.tmax = ao_radius_or_default(surface.bounds(), options.ao_radius);
     std::vector<Ray> secondary(points.size() * hemisphere.samples);
     make_hemisphere_rays(points, hemisphere, secondary);
     if (options.kind == RayKind::diffuse_shuffled) {
@@ -94,9 +80,23 @@ std::vector<Ray> make_secondary_rays(const Bvh& bvh, std::span<const Ray> rays,
                                      std::span<const Hit> hits,
                                      std::span<const std::uint32_t> pixels,
                                      const SecondaryOptions& options) {
-    check_arguments(bvh, rays, hits, pixels, options);
+    require_triangles(bvh, "make_secondary_rays");
+    check_arguments(rays, hits, pixels, options);
     std::vector<Ray> secondary;
-    with_threads(options.threads, [&] { secondary = make_rays(bvh, rays, hits, pixels, options); });
+    with_threads(options.threads,
+                 [&] { secondary = make_rays(BvhSurface(bvh), rays, hits, pixels, options); });
+    return secondary;
+}
+
+std::vector<Ray> make_secondary_rays(const Scene& scene, std::span<const Ray> rays,
+                                     std::span<const Hit> hits,
+                                     std::span<const std::uint32_t> pixels,
+                                     const SecondaryOptions& options) {
+    const SceneSurface surface(scene);
+    check_arguments(rays, hits, pixels, options);
+    std::vector<Ray> secondary;
+    with_threads(options.threads,
+                 [&] { secondary = make_rays(surface, rays, hits, pixels, options); });
     return secondary;
 }
 

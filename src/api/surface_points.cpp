@@ -7,9 +7,39 @@
 #include <cmath>
 #include <string>
 
-#include "base/double3.h"
+#include "base/math.h"
+#include "engine/hit_points.h"
+#include "engine/scene_state.h"
+#include "exec/search.h"
 
 namespace raydix {
+
+Aabb BvhSurface::bounds() const { return bvh_.empty() ? empty_box() : bvh_.bounds(); }
+
+Double3 BvhSurface::normal(const Hit& hit) const {
+    const LeafTriangle& t = lookup_.triangle(hit.prim);
+    return normal_of(t.v0, t.v1, t.v2);
+}
+
+void BvhSurface::check(std::span<const Hit> hits) const {
+    const std::size_t bad = first_index_where(hits.size(), [&](std::size_t i) {
+        return hits[i].hit() && !lookup_.contains(hits[i].prim);
+    });
+    if (bad < hits.size())
+        throw InputError("hit " + std::to_string(bad) + ": the tree holds no triangle " +
+                         std::to_string(hits[bad].prim));
+}
+
+SceneSurface::SceneSurface(const Scene& scene) : tree_(SceneAccess::tree(scene)) {}
+
+Aabb SceneSurface::bounds() const { return tree_->bounds; }
+
+Double3 SceneSurface::normal(const Hit& hit) const {
+    HitTriangle triangle;
+    return find_triangle(*tree_, hit, triangle) ? triangle.normal() : Double3();
+}
+
+void SceneSurface::check(std::span<const Hit> hits) const { check_hits(*tree_, hits); }
 
 void require_triangles(const Bvh& bvh, std::string_view call) {
     if (bvh.empty() || bvh.kind() == PrimitiveKind::triangles) return;
@@ -17,10 +47,10 @@ void require_triangles(const Bvh& bvh, std::string_view call) {
                      (bvh.kind() == PrimitiveKind::boxes ? "boxes" : "points"));
 }
 
-float ao_radius_or_default(const Bvh& bvh, float given) {
+float ao_radius_or_default(const Aabb& box, float given) {
     if (!(given >= 0.0f))
         throw InputError("ao_radius is " + std::to_string(given) + "; it must not be negative");
-    return given > 0.0f ? given : static_cast<float>(ao_radius_part * diagonal_of(bvh.bounds()));
+    return given > 0.0f ? given : static_cast<float>(ao_radius_part * diagonal_of(box));
 }
 
 double step_back_distance(const Aabb& box) {
@@ -38,10 +68,9 @@ std::vector<std::uint32_t> positions_of_hits(std::span<const Hit> hits) {
     return positions;
 }
 
-SurfacePoint surface_point(const PrimitiveLookup& lookup, const Ray& ray, const Hit& hit,
+SurfacePoint surface_point(const Surface& surface, const Ray& ray, const Hit& hit,
                            std::uint32_t pixel, double step_back) {
-    const LeafTriangle& t = lookup.triangle(hit.prim);
-    return {point_before(ray, hit.t, step_back), normal_toward(t.v0, t.v1, t.v2, ray.direction),
+    return {point_before(ray, hit.t, step_back), normal_toward(surface.normal(hit), ray.direction),
             pixel, 0};
 }
 

@@ -64,6 +64,9 @@ public:
             if (!mesh->tree->empty())
                 tree_->bounds = unite(tree_->bounds, mesh->tree->arrays().bounds);
         }
+        for (const auto& [id, geometry] : state_.geometries)
+            if (!geometry.is_instance())
+                tree_->mesh_names.push_back({id, geometry.mesh, geometry.own});
         place_instances();
         const ProgressStage top(meshes.part_done(), 1);
         progress_at(0);
@@ -89,7 +92,7 @@ private:
             if (!geometry.is_instance()) continue;
             const auto& inner = geometry.scene->tree;
             const std::uint32_t number = number_instance(*tree_, id, inner);
-            tree_->instances.push_back({id, number, inner});
+            tree_->instances.push_back({id, number, geometry.transform, inner});
             place(geometry, id, number, inner);
         }
         set_extents();
@@ -99,48 +102,57 @@ private:
     struct Source {
         const Geometry* geometry;
         std::uint32_t id;
-        const Extent* inner;
+        const Image* inner;      // null: the scene itself
+        const SceneTree* scene;  // what is placed
+        const Support* support;  // its own; null if it is empty
     };
 
     void place(const Geometry& geometry, std::uint32_t id, std::uint32_t number,
                const std::shared_ptr<const SceneTree>& inner) {
         const WayIn way(geometry.inverse, geometry.mask);
+        const auto add = [&](PlacedScene placed, const Image* image) {
+            const SceneTree* const scene = placed.scene.get();
+            sources_.push_back(
+                {&geometry, id, image, scene, scene->extent.empty() ? nullptr : &scene->support()});
+            if (!scene->extent.empty()) placed.mesh = scene->only_mesh();
+            tree_->placed.push_back(std::move(placed));
+        };
         if (inner->instances.empty() ||
             tree_->placed.size() + inner->placed.size() + 1 > most_placed) {
-            tree_->placed.push_back({way, number, 0, 0, inner});
-            sources_.push_back({&geometry, id, &inner->extent});
+            add({way, number, 0, 0, inner}, nullptr);
             return;
         }
-        if (inner->own_meshes != nullptr) {
-            tree_->placed.push_back({way, number, 0, 0, inner->own_meshes});
-            sources_.push_back({&geometry, id, &inner->own_meshes->extent});
-        }
+        if (inner->own_meshes != nullptr) add({way, number, 0, 0, inner->own_meshes}, nullptr);
         for (std::size_t k = 0; k < inner->placed.size(); ++k) {
             const PlacedScene& below = inner->placed[k];
             const auto first = static_cast<std::uint32_t>(tree_->ways.size());
             tree_->ways.push_back(below.way);
             for (std::uint32_t w = 0; w < below.more; ++w)
                 tree_->ways.push_back(inner->ways[below.first + w]);
-            tree_->placed.push_back(
-                {way, number + below.number, first, below.more + 1, below.scene});
-            sources_.push_back({&geometry, id, &inner->extents[inner->meshes.size() + k]});
+            add({way, number + below.number, first, below.more + 1, below.scene},
+                &inner->images[k]);
         }
     }
 
     void set_extents() {
         const std::size_t meshes = tree_->extents.size();
         tree_->extents.resize(meshes + sources_.size());
+        tree_->images.resize(sources_.size());
         for_each_index(
             sources_.size(),
             [&](std::size_t i) {
-                const Geometry& geometry = *sources_[i].geometry;
-                tree_->extents[meshes + i] =
-                    image_of(affine_of(geometry.transform), geometry.errors, *sources_[i].inner);
+                const Source& source = sources_[i];
+                const Geometry& geometry = *source.geometry;
+                Image& image = tree_->images[i];
+                image = image_of(affine_of(geometry.transform), geometry.errors,
+                                 source.inner ? *source.inner : image_of(source.scene->extent));
+                if (source.support != nullptr)
+                    tree_->extents[meshes + i] = extent_of(image, *source.support);
             },
             256);
         for (std::size_t i = 0; i < sources_.size(); ++i) {
             const Extent& extent = tree_->extents[meshes + i];
-            if (extent.empty()) continue;
+            if (sources_[i].support == nullptr) continue;
             if (!(in_range(extent.box.lo) && in_range(extent.box.hi))) refuse_reach(sources_[i].id);
             tree_->bounds = unite(tree_->bounds, extent.box);
         }
@@ -160,6 +172,9 @@ private:
 
     void build_tops(SceneTree& tree) {
         for (const Extent& extent : tree.extents) tree.extent = unite(tree.extent, extent);
+        for (const auto& mesh : tree.meshes)
+            tree.stack_size =
+                std::max(tree.stack_size, wide_stack_capacity(mesh->tree->stats().max_depth));
         if (tree.only_mesh() != nullptr) return;
         const Quality quality = quality_of_parts(options_);
         std::vector<std::uint32_t> near, wild;
@@ -168,6 +183,10 @@ private:
                 (tree.extents[part].error <= wild_error ? near : wild).push_back(part);
         build_part_tree(near, tree.extents, quality, tree.near);
         build_part_tree(wild, tree.extents, quality, tree.wild);
+        for (const PlacedScene& placed : tree.placed)
+            tree.stack_size = std::max(tree.stack_size, placed.scene->stack_size);
+        tree.stack_size += wide_stack_capacity(
+            std::max(tree.near.arrays.stats.max_depth, tree.wild.arrays.stats.max_depth));
         report_.bytes +=
             (tree.near.arrays.nodes.size() + tree.wild.arrays.nodes.size()) * sizeof(WideNode) +
             tree.placed.size() * sizeof(PlacedScene) + tree.ways.size() * sizeof(WayIn);

@@ -1,6 +1,5 @@
 // Scene: ids, changes and commits; the work is in commit.cpp and scene_trace.cpp.
 #include <raydix/error.h>
-#include <raydix/model.h>
 #include <raydix/scene.h>
 
 #include <algorithm>
@@ -19,19 +18,6 @@ namespace raydix {
 namespace {
 
 std::string name_of(std::uint32_t id) { return "geometry " + std::to_string(id); }
-
-/// A model's mesh in the numbers of a scene.
-template <class Scalar>
-decltype(auto) mesh_as(const Mesh& mesh) {
-    if constexpr (std::is_same_v<Scalar, float>) {
-        return (mesh);
-    } else {
-        MeshD wide{mesh.name, {}, mesh.triangles};
-        wide.vertices.reserve(mesh.vertices.size());
-        for (const Vec3 v : mesh.vertices) wide.vertices.push_back({v.x, v.y, v.z});
-        return wide;
-    }
-}
 
 template <class AnyMeshView>
 void check_mesh(const std::string& name, const AnyMeshView& mesh) {
@@ -158,9 +144,6 @@ BasicScene<Scalar>::BasicScene(const MeshView& mesh, const SceneOptions& options
 template <class Scalar>
 BasicScene<Scalar>::BasicScene(const Mesh& mesh, const SceneOptions& options)
     : BasicScene(MeshView(mesh), options) {}
-template <class Scalar>
-BasicScene<Scalar>::BasicScene(const Model& model, const SceneOptions& options)
-    : BasicScene(mesh_as<Scalar>(model.mesh), options) {}
 template <class Scalar>
 BasicScene<Scalar>::~BasicScene() = default;
 template <class Scalar>

@@ -77,6 +77,7 @@ struct SceneJob {
     // Of all hits: those of each ray behind those of the one before, sorted; how many [n].
     BudgetVector<Hit>* found = nullptr;
     std::uint64_t* hit_counts = nullptr;
+    std::uint32_t* visits = nullptr;  // of steps: the nodes that each ray visits [n]
     std::uint64_t invalid = 0;
 
     struct Limits {
@@ -84,6 +85,7 @@ struct SceneJob {
         std::uint32_t mask;
     };
     std::vector<Limits> limits;  // [n]
+    StackMemory single_stack;    // of rays that go alone, for all levels
     std::vector<std::unique_ptr<SceneLevel>> levels;
 
     [[nodiscard]] SceneLevel& level(std::size_t depth) {
@@ -96,6 +98,13 @@ struct SceneKernels {
     std::string_view isa;
     void (*trace)(SceneJob& job);
     void (*all_hits)(SceneJob& job);
+    void (*steps)(SceneJob& job);
+    /// A valid ray; `stack` has room for SceneTree::stack_size. For any hit only prim has a
+    /// meaning.
+    using OneRayOfScene = Hit(const SceneTree& scene, const Ray& ray, std::uint32_t mask,
+                              const WideStackView& stack);
+    OneRayOfScene* closest;
+    OneRayOfScene* any;
 };
 
 /// Empty: the best. The names are those of simd_kernels().

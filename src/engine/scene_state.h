@@ -38,7 +38,8 @@ struct SceneKind<double> {
 template <class Scalar>
 struct BasicScene<Scalar>::State {
     struct Geometry : SceneKind<Scalar>::WayBack {
-        // A mesh; its arrays are the scene's own unless they are shared.
+        // A mesh; its arrays are the scene's own unless they are shared. Commits hold on to the
+        // own ones.
         MeshView mesh;
         std::shared_ptr<const Mesh> own;
         bool shared = false;

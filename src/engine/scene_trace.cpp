@@ -10,11 +10,13 @@
 #include "engine/scene_batch.h"
 #include "engine/scene_job.h"
 #include "engine/scene_state.h"
+#include "engine/trace_here.h"
 #include "exec/parallel.h"
 #include "rays/place_order.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
 #include "trace/ray_frame.h"
+#include "trace/simd/trace_here.h"
 #include "trace/simd/wide_batch.h"
 
 namespace raydix {
@@ -76,18 +78,24 @@ JobCounts trace_job(const SceneTree& tree, const Way& way, const Batch& batch,
     return counts;
 }
 
+SimdPath path_of(const SceneTree& tree, const Batch& batch) {
+    if (batch.options.path != SimdPath::automatic) return batch.options.path;
+    const SimdPath path = choose_path(tree.extent.box, batch.rays);
+    // Rays that go apart meet parts in lists too short to pay.
+    return path == SimdPath::sorted ? SimdPath::single : path;
+}
+
+Way way_of(SimdPath path, const std::string& isa) {
+    return {&kernels_for(isa), &scene_kernels_for(isa), path == SimdPath::packet,
+            path == SimdPath::single};
+}
+
 TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
     const std::size_t n = batch.rays.size();
-    SimdPath path = batch.options.path;
-    if (path == SimdPath::automatic) {
-        path = choose_path(tree.extent.box, batch.rays);
-        // Rays that go apart meet parts in lists too short to pay.
-        if (path == SimdPath::sorted) path = SimdPath::single;
-    }
+    const SimdPath path = path_of(tree, batch);
     const bool sorted =
         path == SimdPath::sorted && n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
-    const Way way{&kernels_for(batch.options.isa), &scene_kernels_for(batch.options.isa),
-                  path == SimdPath::packet, path == SimdPath::single};
+    const Way way = way_of(path, batch.options.isa);
     const std::size_t job_size = rays_per_job(n, SimdPath::stream);
     std::vector<JobCounts> parts((n + job_size - 1) / job_size);
     with_threads(batch.options.threads, [&] {
@@ -118,6 +126,22 @@ TraceCounts trace_mesh(const MeshTree& mesh, const Batch& batch) {
                       });
 }
 
+/// All rays see all masks.
+void trace_on_this_thread(const SceneTree& tree, std::span<const Ray> rays, Hit* hits,
+                          std::uint8_t* occluded) {
+    const SceneTraceOptions options;
+    const Batch batch{rays, hits, occluded, options};
+    const Way way = way_of(path_of(tree, batch), options.isa);
+    for (std::size_t begin = 0; begin < rays.size(); begin += max_job_rays)
+        trace_job(tree, way, batch, {}, begin, std::min(begin + max_job_rays, rays.size()));
+}
+
+/// The only mesh tree, if it can be seen.
+const MeshTree* visible_mesh(const SceneTree& tree) {
+    const MeshTree* const mesh = tree.only_mesh();
+    return mesh != nullptr && mesh->mask != 0 ? mesh : nullptr;
+}
+
 TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
     const SceneTree& tree = *SceneAccess::tree(scene);
     const SceneTraceOptions& options = batch.options;
@@ -146,16 +170,15 @@ Hit trace_one(const Scene& scene, const Ray& ray, std::uint32_t mask, bool any) 
         return hit;
     }
     if (!is_valid(ray)) return {};
-    const FloatEnvironment plain;
     static const SceneKernels& kernels = scene_kernels_for({});
-    SceneJob& job = job_of_this_thread();
-    job.tree = &tree;
-    job.kernels = &simd_kernels().front();
-    job.rays = &ray, job.order = nullptr, job.n = 1;
-    job.mask = mask, job.masks = nullptr;
-    job.any = any, job.packets = false, job.single = true;
-    kernels.trace(job);
-    return job.hits[0];
+    StackMemory& stack = job_of_this_thread().single_stack;
+    stack.reserve_words(tree.stack_size);
+    const auto answer = [&] {
+        return (any ? kernels.any : kernels.closest)(tree, ray, mask, stack.view());
+    };
+    if (FloatEnvironment::is_plain()) return answer();
+    const FloatEnvironment plain;
+    return answer();
 }
 
 }  // namespace
@@ -177,6 +200,38 @@ TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const SceneTraceOptions& options) {
     check_sizes(rays.size(), occluded.size());
     return trace_batch(scene, {rays, nullptr, occluded.data(), options});
+}
+
+void closest_here(const SceneTree& scene, std::span<const Ray> rays, std::span<Hit> hits) {
+    check_sizes(rays.size(), hits.size());
+    if (const MeshTree* const mesh = visible_mesh(scene)) {
+        closest_here(*mesh->tree, rays, hits);
+        for (Hit& hit : hits)
+            if (hit.hit()) mesh->name(hit);
+    } else {
+        trace_on_this_thread(scene, rays, hits.data(), nullptr);
+    }
+}
+
+void occluded_here(const SceneTree& scene, std::span<const Ray> rays,
+                   std::span<std::uint8_t> occluded) {
+    check_sizes(rays.size(), occluded.size());
+    if (const MeshTree* const mesh = visible_mesh(scene))
+        occluded_here(*mesh->tree, rays, occluded);
+    else
+        trace_on_this_thread(scene, rays, nullptr, occluded.data());
+}
+
+void count_steps_here(const SceneTree& scene, std::span<const Ray> rays,
+                      std::span<std::uint32_t> visits) {
+    check_sizes(rays.size(), visits.size());
+    SceneJob& job = job_of_this_thread();
+    job.tree = &scene;
+    job.rays = rays.data();
+    job.n = rays.size();
+    job.mask = ~std::uint32_t{0};
+    job.visits = visits.data();
+    scene_kernels_for({}).steps(job);
 }
 
 AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTraceOptions& options) {

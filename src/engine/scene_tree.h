@@ -7,11 +7,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <utility>
 #include <vector>
 
 #include "engine/extent.h"
-#include "engine/mesh_names.h"
+#include "engine/grouped_meshes.h"
+#include "engine/support.h"
 #include "instances/affine.h"
 #include "layout/wide_bvh.h"
 #include "trace/simd/wide_ray.h"
@@ -19,7 +21,7 @@
 namespace raydix {
 
 /// One tree over the triangles of one mesh or of several, which follow each other by id.
-struct MeshTree : MeshNames {
+struct MeshTree : GroupedMeshes {
     std::shared_ptr<const WideBvh> tree;
     WideView view{};  // without room for a compact tree's blocks
 };
@@ -46,13 +48,22 @@ struct PlacedScene {
     std::uint32_t number;       // of the path that ends here
     std::uint32_t first, more;  // further ways in SceneTree::ways, from the outside inward
     std::shared_ptr<const SceneTree> scene;
+    const MeshTree* mesh = nullptr;  // all that is in `scene`, if it is one that is not empty
 };
 
 /// An instance as the scene's owner knows it.
 struct InstanceName {
     std::uint32_t id;
     std::uint32_t number;  // of the path that ends here
+    Transform transform;
     std::shared_ptr<const SceneTree> scene;
+};
+
+/// A mesh as the scene's owner knows it: the triangles that hits name.
+struct MeshName {
+    std::uint32_t id;
+    MeshView mesh;
+    std::shared_ptr<const Mesh> own;  // its arrays; null if they are the caller's
 };
 
 /// A wide tree whose leaves hold one part each. Parts are numbered: mesh trees first, then placed
@@ -69,9 +80,11 @@ struct PartTree {
 struct SceneTree {
     std::vector<std::shared_ptr<const MeshTree>> meshes;
     std::vector<InstanceName> instances;  // by ascending id
+    std::vector<MeshName> mesh_names;     // by ascending id
     std::vector<PlacedScene> placed;
     std::vector<WayIn> ways;
     std::vector<Extent> extents;  // [meshes + placed]
+    std::vector<Image> images;    // [placed]
     /// The meshes without the instances, where there are both.
     std::shared_ptr<const SceneTree> own_meshes;
     /// Over all parts that are not empty: instances whose maps keep errors small, and those that
@@ -80,7 +93,16 @@ struct SceneTree {
     Extent extent;
     Aabb bounds = empty_box();  // without what rays may miss it by
     std::uint64_t paths = 0;
-    std::uint32_t levels = 0;  // of instances, below this scene
+    std::uint32_t levels = 0;    // of instances, below this scene
+    std::size_t stack_size = 0;  // of a ray that goes alone: children still to visit, on all levels
+
+    /// Made when the first instance asks for it.
+    [[nodiscard]] const Support& support() const {
+        std::call_once(support_asked, [&] { support_known = support_of(*this); });
+        return support_known;
+    }
+    mutable std::once_flag support_asked;
+    mutable Support support_known;
 
     /// The only mesh tree, if rays need nothing else.
     [[nodiscard]] const MeshTree* only_mesh() const {

@@ -9,13 +9,13 @@
 #include <memory>
 #include <vector>
 
-#include "engine/mesh_names.h"
+#include "engine/grouped_meshes.h"
 #include "instances/affine_double.h"
 #include "instances/instance_tree_double.h"
 
 namespace raydix {
 
-struct MeshTreeD : MeshNames {
+struct MeshTreeD : GroupedMeshes {
     std::shared_ptr<const BvhD> tree;
 };
 

@@ -31,9 +31,13 @@ TangentFrame turned_frame(Vec3 unit_normal, double angle) {
 
 }  // namespace
 
-Vec3 normal_toward(Vec3 v0, Vec3 v1, Vec3 v2, Vec3 direction) {
-    const Double3 corner(v0), against = Double3(direction) * -1.0;
-    const Double3 normal = cross(Double3(v1) - corner, Double3(v2) - corner);
+Double3 normal_of(Vec3 v0, Vec3 v1, Vec3 v2) {
+    const Double3 corner(v0);
+    return cross(Double3(v1) - corner, Double3(v2) - corner);
+}
+
+Vec3 normal_toward(Double3 normal, Vec3 direction) {
+    const Double3 against = Double3(direction) * -1.0;
     if (!(length(normal) > 0.0)) return normalized(against).rounded();
     return normalized(dot(normal, against) < 0.0 ? normal * -1.0 : normal).rounded();
 }

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <span>
 
+#include "base/double3.h"
+
 namespace raydix {
 
 /// Where secondary rays start.
@@ -24,9 +26,11 @@ inline constexpr double step_back_part = 3e-6;
 /// Protocol: AO radius where none is given, as a part of the diagonal.
 inline constexpr double ao_radius_part = 0.05;
 
-/// Unit normal of triangle (v0, v1, v2), turned against `direction`. A triangle without a normal
-/// gives -direction.
-[[nodiscard]] Vec3 normal_toward(Vec3 v0, Vec3 v1, Vec3 v2, Vec3 direction);
+/// Geometric, by the right-hand rule, of any length; 0 without area.
+[[nodiscard]] Double3 normal_of(Vec3 v0, Vec3 v1, Vec3 v2);
+
+/// A normal of any length, of unit length and turned against `direction`; -direction instead of 0.
+[[nodiscard]] Vec3 normal_toward(Double3 normal, Vec3 direction);
 
 /// The point at `t` along the ray, moved back toward its origin by the distance `step_back`.
 [[nodiscard]] Vec3 point_before(const Ray& ray, float t, double step_back);

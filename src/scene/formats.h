@@ -1,9 +1,10 @@
-// One reader per format: bytes -> mesh. Each throws InputError and holds no more than the bytes
-// justify. The policy of each format is in docs/scenes.md.
+// One reader per format: bytes -> mesh, or model. Each throws InputError and holds no more than the
+// bytes justify. The policy of each format is in docs/scenes.md.
 #pragma once
 
 #include <raydix/camera.h>
 #include <raydix/mesh.h>
+#include <raydix/model.h>
 
 #include <functional>
 
@@ -21,8 +22,11 @@ namespace raydix {
 /// Opens a file that a glTF document names by a path relative to itself.
 using OpenExternal = std::function<ByteSource(const std::filesystem::path& relative)>;
 
-/// Takes .gltf and .glb alike; the first four bytes tell which.
-[[nodiscard]] Mesh load_gltf(ByteSource& in, const OpenExternal& open_external);
+/// Takes .gltf and .glb alike; the first four bytes tell which. Without name and cameras.
+[[nodiscard]] Model load_gltf(ByteSource& in, const OpenExternal& open_external);
+
+/// A file by its extension. Without cameras; the name is made printable.
+[[nodiscard]] Model load_file(const std::filesystem::path& file);
 
 [[nodiscard]] CameraSet read_cameras(ByteSource& in);
 

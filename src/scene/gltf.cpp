@@ -1,7 +1,8 @@
-// glTF 2.0 scene -> one mesh: node by node in document order, each primitive with its node's
-// transform. Triangles, strips and fans; points give vertices; lines give nothing.
+// glTF 2.0 scene -> a model: primitives in document order, and the nodes that place them.
+// Triangles, strips and fans; points give vertices; lines give nothing.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <numeric>
 
@@ -15,50 +16,23 @@ using nlohmann::json;
 
 namespace {
 
-/// Columns of the linear part, then the translation.
-struct Affine {
-    std::array<std::array<double, 3>, 4> columns{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}}};
-
-    friend bool operator==(const Affine&, const Affine&) = default;
-
-    [[nodiscard]] std::array<double, 3> apply(double x, double y, double z, double w) const {
-        std::array<double, 3> out;
-        for (std::size_t r = 0; r < 3; ++r)
-            out[r] = columns[0][r] * x + columns[1][r] * y + columns[2][r] * z + columns[3][r] * w;
-        return out;
-    }
-    /// this after `inner`
-    [[nodiscard]] Affine times(const Affine& inner) const {
-        Affine product;
-        for (std::size_t c = 0; c < 4; ++c)
-            product.columns[c] = apply(inner.columns[c][0], inner.columns[c][1],
-                                       inner.columns[c][2], c == 3 ? 1.0 : 0.0);
-        return product;
-    }
-    [[nodiscard]] bool mirrors() const {
-        const auto& [a, b, c, origin] = columns;
-        return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
-                   a[2] * (b[0] * c[1] - b[1] * c[0]) <
-               0;
-    }
-};
-
 class SceneWalk {
 public:
     explicit SceneWalk(GltfDocument& document) : document_(document), in_(document.source()) {}
 
-    Mesh read() {
+    Model read() {
+        number_primitives();
         struct Visit {
             std::uint64_t node;
-            Affine parent;
+            std::uint32_t parent;
         };
         std::vector<Visit> todo;
-        const auto push = [&](const std::vector<std::uint64_t>& nodes, const Affine& parent) {
+        const auto push = [&](const std::vector<std::uint64_t>& nodes, std::uint32_t parent) {
             for (auto node = nodes.rbegin(); node != nodes.rend(); ++node)
                 todo.push_back({*node, parent});
         };
         std::vector<bool> visited(static_cast<std::size_t>(document_.list_size("nodes")));
-        push(root_nodes(), {});
+        push(root_nodes(), ModelNode::none);
         while (!todo.empty()) {
             const Visit visit = todo.back();
             todo.pop_back();
@@ -66,12 +40,12 @@ public:
             if (visited[static_cast<std::size_t>(visit.node)])
                 document_.fail("nodes", visit.node, "is reached twice");
             visited[static_cast<std::size_t>(visit.node)] = true;
-            const Affine transform = visit.parent.times(node_transform(visit.node));
-            const auto mesh = find_whole(in_, node, "mesh", fmt::format("nodes {}", visit.node));
-            if (mesh) add_mesh(*mesh, transform);
-            push(node_list(node, "children", fmt::format("nodes {}", visit.node)), transform);
+            const auto place = static_cast<std::uint32_t>(model_.nodes.size());
+            add_node(visit.node, node, visit.parent);
+            push(node_list(node, "children", fmt::format("nodes {}", visit.node)), place);
         }
-        return std::move(mesh_);
+        drop_plain_node();
+        return std::move(model_);
     }
 
 private:
@@ -123,40 +97,98 @@ private:
         return fallback;
     }
 
-    [[nodiscard]] Affine node_transform(std::uint64_t node) const {
-        Affine transform;
+    [[nodiscard]] TransformD node_transform(std::uint64_t node) const {
+        TransformD transform;
         if (document_.item("nodes", node).contains("matrix")) {
             const auto m = numbers<16>(node, "matrix", {});
             for (std::size_t c = 0; c < 4; ++c)
-                for (std::size_t r = 0; r < 3; ++r) transform.columns[c][r] = m[4 * c + r];
+                for (std::size_t r = 0; r < 3; ++r) transform.m[r][c] = m[4 * c + r];
             return transform;
         }
         const auto [x, y, z, w] = numbers<4>(node, "rotation", {0, 0, 0, 1});
         const auto scale = numbers<3>(node, "scale", {1, 1, 1});
-        transform.columns = {{{1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)},
-                              {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)},
-                              {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)},
-                              numbers<3>(node, "translation", {0, 0, 0})}};
-        for (std::size_t c = 0; c < 3; ++c)
-            for (double& value : transform.columns[c]) value *= scale[c];
+        const auto move = numbers<3>(node, "translation", {0, 0, 0});
+        transform.m = {{{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
+                        {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
+                        {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}}};
+        for (std::size_t r = 0; r < 3; ++r) {
+            for (std::size_t c = 0; c < 3; ++c) transform.m[r][c] *= scale[c];
+            transform.m[r][3] = move[r];
+        }
         return transform;
     }
 
-    void add_mesh(std::uint64_t mesh, const Affine& transform) {
+    /// Room for the primitives of all meshes, those that no node shows included: their places are
+    /// their ids.
+    void number_primitives() {
+        const std::uint64_t meshes = document_.list_size("meshes");
+        std::uint64_t count = 0;
+        for (std::uint64_t mesh = 0; mesh < meshes; ++mesh) {
+            first_primitive_.push_back(static_cast<std::uint32_t>(count));
+            const json& entry = document_.item("meshes", mesh);
+            const auto primitives = entry.find("primitives");
+            if (primitives != entry.end() && primitives->is_array()) count += primitives->size();
+        }
+        loaded_.resize(static_cast<std::size_t>(meshes));
+        model_.meshes.resize(static_cast<std::size_t>(count));
+    }
+
+    void add_node(std::uint64_t index, const json& node, std::uint32_t parent) {
+        ModelNode place;
+        place.parent = parent;
+        place.transform = node_transform(index);
+        const auto name = node.find("name");
+        if (name != node.end() && name->is_string()) place.name = name->get<std::string>();
+        if (const auto mesh = find_whole(in_, node, "mesh", fmt::format("nodes {}", index))) {
+            place.mesh_count = load_mesh(*mesh);
+            place.first_mesh = first_primitive_[static_cast<std::size_t>(*mesh)];
+        }
+        model_.nodes.push_back(std::move(place));
+    }
+
+    /// One mesh that stands where it is needs no node.
+    void drop_plain_node() {
+        if (model_.nodes.size() == 1 && model_.meshes.size() == 1 &&
+            model_.nodes[0].mesh_count == 1 && model_.nodes[0].transform.m == TransformD{}.m)
+            model_.nodes.clear();
+    }
+
+    /// Reads the primitives of a mesh once. Returns how many it has.
+    std::uint32_t load_mesh(std::uint64_t mesh) {
         const json& entry = document_.item("meshes", mesh);
         const auto primitives = entry.find("primitives");
         if (primitives == entry.end() || !primitives->is_array())
             document_.fail("meshes", mesh, "has no list of primitives");
-        first_vertex_.clear();
+        const auto count = static_cast<std::uint32_t>(primitives->size());
+        if (loaded_[static_cast<std::size_t>(mesh)]) return count;
+        loaded_[static_cast<std::size_t>(mesh)] = true;
+        count_users(*primitives);
+        positions_.clear();
+        std::uint32_t place = first_primitive_[static_cast<std::size_t>(mesh)];
         for (const json& primitive : *primitives) {
             if (!primitive.is_object())
                 document_.fail("meshes", mesh, "a primitive is not an object");
-            add_primitive(mesh, primitive, transform);
-            check_growth(mesh);
+            add_primitive(mesh, primitive, model_.meshes[place]);
+            check_growth(mesh, model_.meshes[place]);
+            ++place;
+        }
+        return count;
+    }
+
+    /// How many primitives name each accessor of positions.
+    void count_users(const json& primitives) {
+        users_.clear();
+        for (const json& primitive : primitives) {
+            if (!primitive.is_object()) continue;
+            const auto attributes = primitive.find("attributes");
+            if (attributes == primitive.end() || !attributes->is_object()) continue;
+            const auto position = attributes->find("POSITION");
+            if (position != attributes->end() && position->is_number_unsigned())
+                ++users_[position->get<std::uint64_t>()];
         }
     }
 
-    void add_primitive(std::uint64_t mesh, const json& primitive, const Affine& transform) {
+    void add_primitive(std::uint64_t mesh, const json& primitive, Mesh& out) {
         const std::string element = fmt::format("meshes {}", mesh);
         constexpr std::uint64_t points = 0, triangles = 4, fan = 6;
         const std::uint64_t mode = find_whole(in_, primitive, "mode", element).value_or(triangles);
@@ -167,49 +199,53 @@ private:
             in_.fail(element, "a primitive without attributes");
         const auto position = find_whole(in_, *attributes, "POSITION", element);
         if (!position) return;  // the specification has readers skip such a primitive
-        const VertexRange range = add_positions(*position, transform);
-        if (mode == points) return;
-        std::vector<std::uint32_t> order(static_cast<std::size_t>(range.count));
-        if (const auto accessor = find_whole(in_, primitive, "indices", element))
+        const std::vector<Vec3>& vertices = positions_of(*position);
+        if (mode == points) {
+            out.vertices = vertices;
+            return;
+        }
+        std::vector<std::uint32_t> order;
+        if (const auto accessor = find_whole(in_, primitive, "indices", element)) {
             order = document_.indices(*accessor);
-        else
+        } else {
+            order.resize(vertices.size());
             std::iota(order.begin(), order.end(), 0u);
-        for (std::uint32_t& index : order) {
-            if (index >= range.count)
-                in_.fail(element, fmt::format("index {} of {} vertices", index, range.count));
-            index += range.first;
         }
-        add_triangles(element, mode, order, transform.mirrors());
+        for (const std::uint32_t index : order)
+            if (index >= vertices.size())
+                in_.fail(element, fmt::format("index {} of {} vertices", index, vertices.size()));
+        if (users_[*position] > 1)
+            keep_used(vertices, order, out.vertices);
+        else
+            out.vertices = vertices;
+        add_triangles(element, mode, order, out);
     }
 
-    struct VertexRange {
-        std::uint32_t first = 0;
-        std::uint64_t count = 0;
-    };
-
-    /// Primitives of one mesh often share their positions: these are added once per node.
-    VertexRange add_positions(std::uint64_t accessor, const Affine& transform) {
-        const auto found = first_vertex_.find(accessor);
-        if (found != first_vertex_.end()) return found->second;
-        const std::vector<Vec3> points = document_.positions(accessor);
-        check_mesh_size(in_, mesh_.vertices.size() + points.size(), 0);
-        const VertexRange range{static_cast<std::uint32_t>(mesh_.vertices.size()), points.size()};
-        const bool moves =
-            transform != Affine{};  // if not, Inf must stay Inf and not become 0 * Inf
-        for (const Vec3& p : points) {
-            const auto q = transform.apply(double(p.x), double(p.y), double(p.z), 1.0);
-            add_vertex(in_, mesh_,
-                       moves ? Vec3{static_cast<float>(q[0]), static_cast<float>(q[1]),
-                                    static_cast<float>(q[2])}
-                             : p);
-        }
-        first_vertex_.emplace(accessor, range);
-        return range;
+    /// Primitives of one mesh often share their positions.
+    const std::vector<Vec3>& positions_of(std::uint64_t accessor) {
+        const auto found = positions_.find(accessor);
+        if (found != positions_.end()) return found->second;
+        std::vector<Vec3> points = document_.positions(accessor);
+        check_mesh_size(in_, points.size(), 0);
+        for (Vec3& p : points) p = without_negative_zero(p);
+        return positions_.emplace(accessor, std::move(points)).first->second;
     }
 
-    /// A mirroring transform would turn the triangles inside out: two corners change places.
+    /// The vertices that `order` names, in their order; `order` then names places among these.
+    static void keep_used(const std::vector<Vec3>& vertices, std::vector<std::uint32_t>& order,
+                          std::vector<Vec3>& used) {
+        std::vector<std::uint32_t> names(order);
+        std::sort(names.begin(), names.end());
+        names.erase(std::unique(names.begin(), names.end()), names.end());
+        used.reserve(names.size());
+        for (const std::uint32_t name : names) used.push_back(vertices[name]);
+        for (std::uint32_t& index : order)
+            index = static_cast<std::uint32_t>(std::lower_bound(names.begin(), names.end(), index) -
+                                               names.begin());
+    }
+
     void add_triangles(const std::string& element, std::uint64_t mode,
-                       const std::vector<std::uint32_t>& order, bool mirrors) {
+                       const std::vector<std::uint32_t>& order, Mesh& out) {
         constexpr std::uint64_t triangles = 4, strip = 5;
         if (mode == triangles && order.size() % 3 != 0)
             in_.fail(element, fmt::format("{} indices are not whole triangles", order.size()));
@@ -218,29 +254,33 @@ private:
             const std::size_t odd = mode == strip ? i % 2 : 0;
             Triangle triangle{order[i], order[i + 1 + odd], order[i + 2 - odd]};
             if (mode > strip) triangle = {order[i + 1], order[i + 2], order[0]};
-            if (mirrors) std::swap(triangle[1], triangle[2]);
-            add_triangle(in_, mesh_, triangle);
+            add_triangle(in_, out, triangle);
         }
     }
 
-    /// Many nodes may show one mesh; the whole must stay in proportion to the file nevertheless.
-    void check_growth(std::uint64_t mesh) const {
-        const std::uint64_t bytes =
-            mesh_.vertices.size() * sizeof(Vec3) + mesh_.triangles.size() * sizeof(Triangle);
-        if (bytes > expansion_limit(document_.bytes()))
+    /// Many primitives may name the same bytes; the whole must stay in proportion to the file
+    /// nevertheless.
+    void check_growth(std::uint64_t mesh, const Mesh& added) {
+        held_ += added.vertices.size() * sizeof(Vec3) + added.triangles.size() * sizeof(Triangle);
+        if (held_ > expansion_limit(document_.bytes()))
             document_.fail("meshes", mesh,
                            "its copies take more than 1000 times the size of the file");
     }
 
     GltfDocument& document_;
     const ByteSource& in_;
-    Mesh mesh_;
-    std::map<std::uint64_t, VertexRange> first_vertex_;  // of the current node, by accessor
+    Model model_;
+    std::uint64_t held_ = 0;                      // bytes of the meshes
+    std::vector<std::uint32_t> first_primitive_;  // [meshes of the document]
+    std::vector<bool> loaded_;                    // [meshes of the document]
+    // Of the current mesh, by accessor.
+    std::map<std::uint64_t, std::vector<Vec3>> positions_;
+    std::map<std::uint64_t, std::uint32_t> users_;
 };
 
 }  // namespace
 
-Mesh load_gltf(ByteSource& in, const OpenExternal& open_external) {
+Model load_gltf(ByteSource& in, const OpenExternal& open_external) {
     GltfDocument document(in, open_external);
     return SceneWalk(document).read();
 }

@@ -169,8 +169,8 @@ TEST(DeviceBuild, EachBuiltinScene) {
                 SCOPED_TRACE(scene.name + ": " + told(options) + ", seed " +
                              std::to_string(++seed));
                 ShuffledLauncher shuffled(seed);
-                expect_same_tree(launched_build(shuffled, MeshView(scene.mesh), options),
-                                 MeshView(scene.mesh), options);
+                expect_same_tree(launched_build(shuffled, MeshView(scene.mesh()), options),
+                                 MeshView(scene.mesh()), options);
             }
     }
 }

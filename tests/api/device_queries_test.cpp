@@ -161,7 +161,7 @@ void expect_closest(const std::string& name, const Mesh& mesh, std::size_t count
 
 TEST(DeviceQueries, ClosestPointsAreThoseOfTheHost) {
     for (const Model& scene : builtin_triangle_scenes(100 * thorough))
-        expect_closest(scene.name, scene.mesh, 10 * thorough);
+        expect_closest(scene.name, scene.mesh(), 10 * thorough);
     expect_closest("lattice", lattice_mesh(20 * thorough, 5, seed), 20 * thorough);
     for (const std::size_t n : {0u, 1u, 2u, 5u})
         expect_closest(std::to_string(n) + " triangles", random_soup(n, n + 1), 20);

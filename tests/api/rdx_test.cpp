@@ -43,7 +43,7 @@ std::size_t files_in(const std::filesystem::path& folder) {
 Model make_scene(std::size_t triangles) {
     Model scene;
     scene.name = "soup \xff.ply";  // names are bytes
-    scene.mesh = random_soup(triangles, 31);
+    scene.mesh() = random_soup(triangles, 31);
     scene.cameras = {640, 480, 0.5f, {{"front", {0, 0, 3}, {0, 0, 0}, {0, 1, 0}, 30}, {}}};
     return scene;
 }
@@ -84,7 +84,7 @@ TEST_F(Rdx, BytesDoNotDependOnTheThreads) {
          {Builder::karras, Builder::lauterbach, Builder::garanzha, Builder::apetrei, Builder::ploc,
           Builder::hploc, Builder::binned}) {
         const auto bytes_with = [&](int threads) {
-            return saved(folder_, build_bvh(scene.mesh, {.builder = builder, .threads = threads}),
+            return saved(folder_, build_bvh(scene.mesh(), {.builder = builder, .threads = threads}),
                          scene);
         };
         const Bytes one = bytes_with(1);
@@ -98,10 +98,10 @@ TEST_F(Rdx, RoundTripOfTriangles) {
     for (const std::size_t n : {0u, 1u, 2u, 3u, 5u, 4000u}) {
         Model scene = make_scene(n);
         if (n > 5) {
-            scene.mesh.vertices[33].x = std::numeric_limits<float>::quiet_NaN();
-            scene.mesh.vertices[66] = {-0.0f, 0.5f, -0.0f};
+            scene.mesh().vertices[33].x = std::numeric_limits<float>::quiet_NaN();
+            scene.mesh().vertices[66] = {-0.0f, 0.5f, -0.0f};
         }
-        const Bvh bvh = build_bvh(scene.mesh, {.bits = 30, .max_leaf = 3, .strict = false});
+        const Bvh bvh = build_bvh(scene.mesh(), {.bits = 30, .max_leaf = 3, .strict = false});
         save_rdx(folder_.path() / "a.rdx", bvh, scene);
         EXPECT_EQ(files_in(folder_.path()), 1u) << "no temporary file stays";
         const RdxFile loaded = load_rdx(folder_.path() / "a.rdx");
@@ -111,12 +111,12 @@ TEST_F(Rdx, RoundTripOfTriangles) {
         EXPECT_EQ(loaded.bvh.left_out(), bvh.left_out());
         EXPECT_EQ(loaded.bvh.peak_bytes(), 0u);
         EXPECT_EQ(loaded.scene.name, scene.name);
-        EXPECT_EQ(loaded.scene.mesh.name, "soup");
-        EXPECT_EQ(loaded.scene.mesh.triangles, scene.mesh.triangles);
-        ASSERT_EQ(loaded.scene.mesh.vertices.size(), scene.mesh.vertices.size());
+        EXPECT_EQ(loaded.scene.mesh().name, "soup");
+        EXPECT_EQ(loaded.scene.mesh().triangles, scene.mesh().triangles);
+        ASSERT_EQ(loaded.scene.mesh().vertices.size(), scene.mesh().vertices.size());
         if (n != 0) {
-            EXPECT_EQ(std::memcmp(loaded.scene.mesh.vertices.data(), scene.mesh.vertices.data(),
-                                  scene.mesh.vertices.size() * sizeof(Vec3)),
+            EXPECT_EQ(std::memcmp(loaded.scene.mesh().vertices.data(), scene.mesh().vertices.data(),
+                                  scene.mesh().vertices.size() * sizeof(Vec3)),
                       0)
                 << "as given, NaN and -0 included";
         }
@@ -133,7 +133,7 @@ TEST_F(Rdx, RoundTripOfTriangles) {
 
 TEST_F(Rdx, TracesOfALoadedTreeAreTheSame) {
     const Model scene = make_scene(3000);
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     save_rdx(folder_.path() / "a.rdx", bvh, scene);
     const RdxFile loaded = load_rdx(folder_.path() / "a.rdx");
     std::mt19937_64 random(41);
@@ -148,9 +148,9 @@ TEST_F(Rdx, TracesOfALoadedTreeAreTheSame) {
 
 TEST_F(Rdx, RoundTripOfPointsAndBoxes) {
     Model cloud = make_scene(100);
-    cloud.mesh.triangles.clear();
-    cloud.mesh.vertices[7].y = infinity;
-    const Bvh points = build_bvh(cloud.mesh);
+    cloud.mesh().triangles.clear();
+    cloud.mesh().vertices[7].y = infinity;
+    const Bvh points = build_bvh(cloud.mesh());
     save_rdx(folder_.path() / "points.rdx", points, cloud);
     EXPECT_EQ(check_same(load_rdx(folder_.path() / "points.rdx").bvh, points).broken, "");
 
@@ -166,13 +166,13 @@ TEST_F(Rdx, RoundTripOfPointsAndBoxes) {
 TEST_F(Rdx, ALoadedTreeCanBeRebuiltAndSavedOverItself) {
     const Model scene = make_scene(1000);
     const auto file = folder_.path() / "a.rdx";
-    save_rdx(file, build_bvh(scene.mesh), scene);
+    save_rdx(file, build_bvh(scene.mesh()), scene);
     RdxFile loaded = load_rdx(file);
     save_rdx(file, loaded.bvh, loaded.scene);
-    EXPECT_EQ(check(loaded.bvh, loaded.scene.mesh).broken, "") << "the old file is still mapped";
-    BvhBuilder().build(loaded.scene.mesh, {.max_leaf = 2},
+    EXPECT_EQ(check(loaded.bvh, loaded.scene.mesh()).broken, "") << "the old file is still mapped";
+    BvhBuilder().build(loaded.scene.mesh(), {.max_leaf = 2},
                        loaded.bvh);  // must not write to the mapping
-    EXPECT_EQ(check(loaded.bvh, loaded.scene.mesh).broken, "");
+    EXPECT_EQ(check(loaded.bvh, loaded.scene.mesh()).broken, "");
     EXPECT_EQ(load_rdx(file).bvh.options().max_leaf, 4);
 }
 
@@ -200,7 +200,7 @@ TEST_F(Rdx, FilesThatCannotBeRead) {
 
 TEST_F(Rdx, SavingThatFailsLeavesNothing) {
     const Model scene = make_scene(50);
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     EXPECT_THROW(save_rdx(folder_.path() / "no" / "such.rdx", bvh, scene), InputError);
     std::filesystem::create_directory(folder_.path() / "taken.rdx");
     EXPECT_THROW(save_rdx(folder_.path() / "taken.rdx", bvh, scene), InputError);
@@ -214,9 +214,9 @@ TEST_F(Rdx, SavingThatFailsLeavesNothing) {
 TEST_F(Rdx, FullDiskLeavesTheOldFile) {
     const Model small = make_scene(10), large = make_scene(5000);
     const auto file = folder_.path() / "a.rdx";
-    save_rdx(file, build_bvh(small.mesh), small);
+    save_rdx(file, build_bvh(small.mesh()), small);
     const Bytes before = read_bytes(file);
-    const Bvh bvh = build_bvh(large.mesh);
+    const Bvh bvh = build_bvh(large.mesh());
     rlimit old{};
     getrlimit(RLIMIT_FSIZE, &old);
     const auto handler = std::signal(SIGXFSZ, SIG_IGN);
@@ -231,7 +231,7 @@ TEST_F(Rdx, FullDiskLeavesTheOldFile) {
 
 TEST_F(Rdx, EveryTruncationIsRefused) {
     const Model scene = make_scene(60);
-    const Bytes whole = saved(folder_, build_bvh(scene.mesh), scene);
+    const Bytes whole = saved(folder_, build_bvh(scene.mesh()), scene);
     ASSERT_EQ(verdict(whole), "");
     std::vector<std::size_t> cuts{0, 1, 8, 63, 383, 384, whole.size() - 1};
     for (const rdx::Section& s : header_of(whole).sections) {
@@ -257,7 +257,7 @@ TEST_F(Rdx, EveryTruncationIsRefused) {
 
 TEST_F(Rdx, EveryByteIsGuarded) {
     const Model scene = make_scene(20);
-    const Bytes whole = saved(folder_, build_bvh(scene.mesh), scene);
+    const Bytes whole = saved(folder_, build_bvh(scene.mesh()), scene);
     std::mt19937_64 random(5);
     for (std::size_t i = 0; i < whole.size(); ++i) {
         Bytes altered = whole;
@@ -268,7 +268,7 @@ TEST_F(Rdx, EveryByteIsGuarded) {
 
 TEST_F(Rdx, FlipsUnderRightChecksumsAreSurvived) {
     const Model scene = make_scene(40);
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     const Bytes whole = saved(folder_, bvh, scene);
     std::mt19937_64 random(6);
     std::size_t accepted = 0;
@@ -393,7 +393,7 @@ std::vector<Lie> lies_in_header() {
 TEST_F(Rdx, LiesUnderRightChecksumsAreNamed) {
     Model scene = make_scene(100);
     scene.cameras.cameras[1].name = "x";
-    const Bytes whole = saved(folder_, build_bvh(scene.mesh, {.max_leaf = 2}), scene);
+    const Bytes whole = saved(folder_, build_bvh(scene.mesh(), {.max_leaf = 2}), scene);
     for (const auto& group : {lies_in_content(), lies_in_header()}) {
         for (const Lie& lie : group) {
             Liar liar(whole);
@@ -409,7 +409,7 @@ TEST_F(Rdx, LiesUnderRightChecksumsAreNamed) {
 
 TEST_F(Rdx, WrongVersionIsSaid) {
     const Model scene = make_scene(3);
-    Bytes bytes = saved(folder_, build_bvh(scene.mesh), scene);
+    Bytes bytes = saved(folder_, build_bvh(scene.mesh()), scene);
     rdx::Header header = header_of(bytes);
     header.version = 2;
     header.checksum = rdx::checksum_of(header);
@@ -419,7 +419,7 @@ TEST_F(Rdx, WrongVersionIsSaid) {
 
 TEST_F(Rdx, SectionsAreAligned) {
     const Model scene = make_scene(77);
-    const Bytes bytes = saved(folder_, build_bvh(scene.mesh), scene);
+    const Bytes bytes = saved(folder_, build_bvh(scene.mesh()), scene);
     for (const rdx::Section& s : header_of(bytes).sections) EXPECT_EQ(s.offset % 64, 0u);
     const RdxFile loaded = load_rdx(folder_.path() / "scene.rdx");
     EXPECT_EQ(reinterpret_cast<std::uintptr_t>(loaded.bvh.nodes().data()) % 64, 0u);

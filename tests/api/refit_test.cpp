@@ -61,7 +61,7 @@ bool same_hits(const std::vector<Hit>& a, const std::vector<Hit>& b) {
 }
 
 TEST(Refit, GivesTheHitsOfANewTree) {
-    const Mesh mesh = load_model("builtin:figure?triangles=20000").mesh;
+    const Mesh mesh = load_model("builtin:figure?triangles=20000").mesh();
     for (const char* builder : whole_builders)
         for (const int threads : {1, 2, 7}) {
             Bvh bvh = build_bvh(mesh, {.builder = builder_from_name(builder)});
@@ -162,7 +162,7 @@ TEST(Refit, IsSavedAndLoadedAsWhatItIs) {
             Bvh bvh = build_bvh(mesh, options);
             EXPECT_FALSE(bvh.refitted());
             Model scene;
-            scene.mesh = now;
+            scene.mesh() = now;
             refit(bvh, now);
             ASSERT_EQ(message_of([&] { save_rdx(file, bvh, scene); }), "no error") << builder;
             const RdxFile loaded = load_rdx(file);
@@ -175,7 +175,7 @@ TEST(Refit, IsSavedAndLoadedAsWhatItIs) {
             BvhBuilder().build(mesh, options, bvh);
             EXPECT_FALSE(bvh.refitted());
             EXPECT_EQ(tree_hash(bvh), tree_hash(build_bvh(mesh, options)));
-            scene.mesh = mesh;
+            scene.mesh() = mesh;
             save_rdx(file, bvh, scene);
             EXPECT_FALSE(load_rdx(file).bvh.refitted());
         }
@@ -211,7 +211,7 @@ TEST(Refit, ATreeFromAFileGetsMemoryOfItsOwn) {
     const test::TempFolder folder;
     const Mesh mesh = test::random_soup(2000, seed), now = deformed(mesh, 0.5f);
     Model scene;
-    scene.mesh = mesh;
+    scene.mesh() = mesh;
     const auto file = folder.path() / "tree.rdx";
     save_rdx(file, build_bvh(mesh), scene);
     auto loaded = load_rdx(file);
@@ -257,7 +257,7 @@ TEST(Refit, RefusesWhatDoesNotFit) {
     EXPECT_TRUE(emptied.empty());
     EXPECT_FALSE(closest_point(emptied, {0, 0, 0}).found());
     // Parts of triangles.
-    const Mesh large = load_model("builtin:atrium?triangles=20000").mesh;
+    const Mesh large = load_model("builtin:atrium?triangles=20000").mesh();
     for (const Builder builder : {Builder::split, Builder::sbvh}) {
         Bvh split = build_bvh(large, {.builder = builder});
         ASSERT_TRUE(split.has_split_primitives());

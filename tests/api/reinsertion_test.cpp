@@ -39,9 +39,9 @@ protected:
 TEST_P(Reinserted, TreesAreValidAndCostNoMore) {
     int cheaper = 0;
     for (const Model& scene : builtin_triangle_scenes(3000)) {
-        const Bvh plain = build_bvh(scene.mesh, options(0));
-        const Bvh tree = build_bvh(scene.mesh, options(8));
-        const CheckReport valid = check(tree, scene.mesh);
+        const Bvh plain = build_bvh(scene.mesh(), options(0));
+        const Bvh tree = build_bvh(scene.mesh(), options(8));
+        const CheckReport valid = check(tree, scene.mesh());
         EXPECT_TRUE(valid.ok) << scene.name << ": " << valid.broken;
         const TreeStats before = tree_stats(plain), after = tree_stats(tree);
         EXPECT_EQ(after.references, before.references) << scene.name;
@@ -62,11 +62,11 @@ TEST_P(Reinserted, TreeDoesNotDependOnThreads) {
 
 TEST_P(Reinserted, HitsAreThoseOfBruteForce) {
     for (const Model& scene : builtin_triangle_scenes(2000)) {
-        const Bvh tree = build_bvh(scene.mesh, options(5));
+        const Bvh tree = build_bvh(scene.mesh(), options(5));
         const std::vector<Ray> rays = make_mixed_rays(scene, 100 * thorough, seed);
-        const std::vector<Hit> expected = trace_brute_force(scene.mesh, rays);
+        const std::vector<Hit> expected = trace_brute_force(scene.mesh(), rays);
         const std::vector<Hit> hits = trace(tree, rays);
-        const std::vector<Hit> wide = trace(build_wide_bvh(scene.mesh, options(5)), rays);
+        const std::vector<Hit> wide = trace(build_wide_bvh(scene.mesh(), options(5)), rays);
         for (std::size_t i = 0; i < rays.size(); ++i) {
             ASSERT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(Hit)), 0)
                 << scene.name << ", ray " << i << ", seed " << seed;
@@ -109,7 +109,7 @@ TEST_P(Reinserted, FewBrokenHugeAndEqualTriangles) {
 
 TEST_P(Reinserted, FilesKeepTheNumberOfRounds) {
     const Model scene = scene_of(random_soup(500, seed, 0.2f), "soup");
-    const Bvh tree = build_bvh(scene.mesh, options(7));
+    const Bvh tree = build_bvh(scene.mesh(), options(7));
     const auto file = std::filesystem::path(testing::TempDir()) /
                       ("reinserted-" + std::string(builder_name(GetParam())) + ".rdx");
     save_rdx(file, tree, scene);
@@ -147,8 +147,8 @@ TEST(ReinsertionOption, WideTreesFromMeshesAreThoseFromBinaryTrees) {
         for (const Model& scene : builtin_triangle_scenes(3000)) {
             BuildOptions options = build_options_for(Quality::high);
             options.builder = builder;
-            const WideBvh direct = build_wide_bvh(scene.mesh, options);
-            const WideBvh from_binary(build_bvh(scene.mesh, options));
+            const WideBvh direct = build_wide_bvh(scene.mesh(), options);
+            const WideBvh from_binary(build_bvh(scene.mesh(), options));
             EXPECT_EQ(direct.stats().nodes, from_binary.stats().nodes) << scene.name;
             EXPECT_EQ(direct.stats().bytes, from_binary.stats().bytes) << scene.name;
             EXPECT_EQ(direct.stats().sah, from_binary.stats().sah) << scene.name;

@@ -65,8 +65,9 @@ TEST(SecondaryRays, StartBeforeEveryHitAndLeaveItsSurface) {
     for (std::size_t i = 0; i < batch.hits.size(); ++i) {
         if (!batch.hits[i].hit()) continue;
         const Triangle& t = batch.mesh.triangles[batch.hits[i].prim];
-        const Vec3 normal = normal_toward(batch.mesh.vertices[t[0]], batch.mesh.vertices[t[1]],
-                                          batch.mesh.vertices[t[2]], batch.rays[i].direction);
+        const auto& v = batch.mesh.vertices;
+        const Vec3 normal =
+            normal_toward(normal_of(v[t[0]], v[t[1]], v[t[2]]), batch.rays[i].direction);
         const Double3 at =
             Double3(batch.rays[i].origin) + Double3(batch.rays[i].direction) * batch.hits[i].t;
         for (int k = 0; k < 32; ++k, ++next) {

@@ -123,8 +123,8 @@ constexpr RayD down{{0.25, 0.25, 10}, 0, {0, 0, -1}};
 
 TEST(DoubleScene, OfOneMeshGivesTheHitsOfItsTree) {
     Model model;
-    model.mesh = random_soup(1000, 5, 0.2f);
-    const MeshD mesh = in_double(model.mesh);
+    model.meshes = {random_soup(1000, 5, 0.2f)};
+    const MeshD mesh = in_double(model.mesh());
     RandomWorlds random(6);
     const std::vector<RayD> rays = random.rays(2000, {0.5, 0.5, 0.5});
     const BvhD tree = build_bvh(mesh);

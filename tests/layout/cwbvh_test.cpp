@@ -192,7 +192,7 @@ TEST(Cwbvh, DecodesToTheTreeItWasMadeFrom) {
     for (const Builder builder : {Builder::karras, Builder::ploc, Builder::binned})
         for (const int leaf : {1, 3, 4, 255})
             expect_decodes(random_soup(3000, 9), {.builder = builder, .max_leaf = leaf});
-    for (const Model& scene : builtin_triangle_scenes(5000)) expect_decodes(scene.mesh);
+    for (const Model& scene : builtin_triangle_scenes(5000)) expect_decodes(scene.mesh());
 }
 
 TEST(Cwbvh, HugeTinyFarFlatAndEqualTriangles) {
@@ -216,7 +216,7 @@ TEST(Cwbvh, HugeTinyFarFlatAndEqualTriangles) {
 }
 
 TEST(Cwbvh, SameBitsForEveryThreadCount) {
-    const Bvh bvh = build_bvh(load_model("builtin:figure?triangles=20000").mesh);
+    const Bvh bvh = build_bvh(load_model("builtin:figure?triangles=20000").mesh());
     const Cwbvh one(bvh, 1);
     for (const int threads : {2, 5, 0}) {
         const Cwbvh other(bvh, threads);
@@ -230,7 +230,7 @@ TEST(Cwbvh, SameBitsForEveryThreadCount) {
 }
 
 TEST(Cwbvh, StatisticsAddUp) {
-    const Bvh bvh = build_bvh(load_model("builtin:atrium?triangles=20000").mesh, {.max_leaf = 1});
+    const Bvh bvh = build_bvh(load_model("builtin:atrium?triangles=20000").mesh(), {.max_leaf = 1});
     const CwbvhStats stats = Cwbvh(bvh).stats();
     EXPECT_EQ(stats.inner_children, stats.nodes - 1);
     EXPECT_LE(stats.references, 3 * stats.leaf_children);

@@ -210,7 +210,7 @@ TEST(WideBuild, GivesTheTreeThatTheBinaryOneGives) {
 }
 
 TEST(WideBuild, CompactTreesShareVertices) {
-    const Mesh mesh = load_model("builtin:figure?triangles=20000").mesh;
+    const Mesh mesh = load_model("builtin:figure?triangles=20000").mesh();
     const BuildOptions options = build_options_for(Quality::balanced);
     const WideBvhOptions layout{.compact = true};
     const WideBvh tree = build_wide_bvh(mesh, options, layout),

@@ -185,7 +185,7 @@ TEST(WideCollapse, DeepTreesNeedNoRecursion) {
 }
 
 TEST(WideCollapse, SameTreeForEveryThreadCount) {
-    const Bvh bvh = build_bvh(load_model("builtin:atrium?triangles=20000").mesh);
+    const Bvh bvh = build_bvh(load_model("builtin:atrium?triangles=20000").mesh());
     for (const int width : {4, 8}) {
         const WideOptions options{.width = width};
         const auto tree_with = [&](int threads) {
@@ -204,7 +204,7 @@ TEST(WideCollapse, SameTreeForEveryThreadCount) {
 }
 
 TEST(WideCollapse, WiderTreesCostLessAndHoldFewerNodes) {
-    const Bvh bvh = build_bvh(load_model("builtin:grove?triangles=20000").mesh, {.max_leaf = 1});
+    const Bvh bvh = build_bvh(load_model("builtin:grove?triangles=20000").mesh(), {.max_leaf = 1});
     const WideOptions four{.width = 4}, eight{.width = 8};
     const WideTree tree4 = collapse_to_wide(bvh, four), tree8 = collapse_to_wide(bvh, eight);
     EXPECT_LT(tree8.node_count(), tree4.node_count());

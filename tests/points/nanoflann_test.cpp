@@ -42,7 +42,7 @@ TYPED_TEST(Nanoflann, TheSameDistancesAndNumbers) {
     const std::string count = std::to_string(1000 * thorough);
     for (const char* kind : {"uniform", "clustered"}) {
         const Model scene = load_model("builtin:" + std::string(kind) + "?points=" + count, 3);
-        const auto points = points_as<TypeParam>(scene.mesh.vertices);
+        const auto points = points_as<TypeParam>(scene.mesh().vertices);
         const TypeParam index = build_points(points);
         const Cloud<TypeParam> cloud{points};
         Tree tree(TypeParam::dimension, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(10));

@@ -115,7 +115,8 @@ void expect_same(const std::string& name, const Mesh& mesh, const std::vector<Ve
 
 TEST(Closest, IsBruteForceBitForBit) {
     for (const Model& scene : test::builtin_triangle_scenes(1000))
-        expect_same(scene.name, scene.mesh, queries_around(scene.mesh, 150 * test::thorough, seed));
+        expect_same(scene.name, scene.mesh(),
+                    queries_around(scene.mesh(), 150 * test::thorough, seed));
     expect_same("soup", test::random_soup(1000, seed),
                 queries_around(test::random_soup(1000, seed), 3000, seed));
     const Mesh odd = slivers_and_giants(seed);

@@ -135,7 +135,7 @@ struct Pair {
     MeshD away;
 };
 Pair figure_pair() {
-    Pair pair{load_model("builtin:figure?triangles=10000").mesh, {}};
+    Pair pair{load_model("builtin:figure?triangles=10000").mesh(), {}};
     for (Vec3& v : pair.home.vertices) {
         const auto snap = [](float x) { return std::round(x * 0x1p18f) * 0x1p-18f; };
         v = {snap(v.x), snap(v.y), snap(v.z)};
@@ -204,7 +204,7 @@ TEST(DoubleQueries, InsideFarAwayAsAtHome) {
 
 /// A ball drawn out along a diagonal: where the builder cuts, each triangle still counts once.
 TEST(DoubleQueries, SolidsFromTreesOfParts) {
-    MeshD mesh = in_double(load_model("builtin:figure?triangles=10000").mesh);
+    MeshD mesh = in_double(load_model("builtin:figure?triangles=10000").mesh());
     for (Vec3d& p : mesh.vertices)
         p = Vec3d{p.x + 20 * p.y, p.y + 15 * p.z, p.z + 20 * p.x} + utm_place;
     const auto first = static_cast<std::uint32_t>(mesh.vertices.size());

@@ -135,7 +135,7 @@ TEST(Solid, SignsAreRightAtTheSharpEdgesOfASpikyCone) {
 }
 
 TEST(Solid, AFigureFarAwayAgreesWithItselfAlongOtherAxes) {
-    Mesh mesh = load_model("builtin:figure?triangles=20000").mesh;
+    Mesh mesh = load_model("builtin:figure?triangles=20000").mesh();
     for (Vec3& p : mesh.vertices) p = 37.5f * p + Vec3{1e5f, -1e5f, 1e5f};
     // Rounding may have closed faces to lines or folded them: the surface is still closed.
     const Bvh bvh = build_bvh(mesh);
@@ -235,7 +235,7 @@ TEST(Solid, NeighboursThatTurnAgainstEachOtherAreCountedByParity) {
 }
 
 TEST(Solid, MeshesWithHolesGoByTheGeneralizedWindingNumber) {
-    Mesh mesh = load_model("builtin:figure?triangles=20000").mesh;
+    Mesh mesh = load_model("builtin:figure?triangles=20000").mesh();
     Random random(seed);
     for (int hole = 0; hole < 40; ++hole)
         mesh.triangles.erase(mesh.triangles.begin() +

@@ -1,4 +1,4 @@
-"""Scene: closest points, inside and outside, overlaps, refit, instances, where meshes come from."""
+"""Scene: closest points, inside and outside, overlaps, refit, where meshes come from."""
 
 import numpy as np
 import pytest
@@ -186,16 +186,15 @@ def test_check_knows_refitted_trees(rng, builder, precision):
 def test_a_refused_refit_changes_no_answer(rng, precision):
     vertices, faces = support.random_triangles(rng, 200)
     scene = raydix.Scene(vertices, faces, precision=precision)
-    placed = scene.instances(np.eye(4)[None])
     rays, points = support.random_rays(rng, 300), rng.uniform(-1, 1, (50, 3))
-    wanted = scene.count(rays), placed.occluded(rays), scene.closest_point(points)["distance"]
+    wanted = scene.count(rays), scene.occluded(rays), scene.closest_point(points)["distance"]
     small = vertices.copy()  # valid numbers, found too small when the boxes are made
     small[faces[7]] = [[0, 0, 0], [1e-13, 0, 0], [0, 1e-13, 0]]
     for bad in (small, np.where(np.arange(len(vertices))[:, None] == 5, np.nan, vertices)):
         with pytest.raises(raydix.InputError):
             scene.refit(bad)
         np.testing.assert_array_equal(scene.count(rays), wanted[0])
-        np.testing.assert_array_equal(placed.occluded(rays), wanted[1])
+        np.testing.assert_array_equal(scene.occluded(rays), wanted[1])
         np.testing.assert_array_equal(scene.closest_point(points)["distance"], wanted[2])
         scene.check()
     assert scene.refit(vertices)["ratio"] == pytest.approx(1)
@@ -236,18 +235,17 @@ def test_numbers_of_threads():
 
 def test_errors_name_the_argument():
     scene, cloud = raydix.Scene(*BOX), raydix.Points(BOX[0])
-    one = np.eye(4)[None]
-    placed = scene.instances(one)
     calls = {
         "k": lambda wrong: cloud.knn(BOX[0], wrong),
         "r": lambda wrong: cloud.radius(BOX[0], wrong),
         "r ": lambda wrong: cloud.count(BOX[0], wrong),
         "r  ": lambda wrong: cloud.pairs(wrong),
         "max_distance": lambda wrong: scene.closest_point(BOX[0], max_distance=wrong),
-        "mask": lambda wrong: placed.occluded(np.zeros((1, 8)), mask=wrong),
+        "mask": lambda wrong: scene.occluded(np.zeros((1, 8)), mask=wrong),
         "other": lambda wrong: scene.overlaps(wrong),
-        "scenes": lambda wrong: raydix.Instances(wrong, one),
-        "scenes ": lambda wrong: raydix.Instances([wrong], one),
+        "id": lambda wrong: scene.add(*BOX, id=wrong),
+        "number": lambda wrong: scene.path(wrong),
+        "refit_limit": lambda wrong: scene.commit(refit_limit=wrong),
         "threads": lambda wrong: raydix.Scene(*BOX, threads=wrong),
     }
     for name, call in calls.items():
@@ -257,73 +255,6 @@ def test_errors_name_the_argument():
         for wrong in (np.nan, np.inf, 1.5, -1, 2**40):
             with pytest.raises(ValueError, match=f"^{name}: expected a whole number, .* given"):
                 call(wrong)
-    with pytest.raises(ValueError, match="^scenes: expected one or more for 1 transforms"):
-        raydix.Instances([], one)
-
-
-def test_instances_equal_moved_copies(rng):
-    vertices, faces = support.random_triangles(rng, 100)
-    base = raydix.Scene(vertices, faces)
-    shifts = np.array([[0, 0, 0], [4, 0, 0], [0, 8, 0]], np.float32)
-    transforms = np.tile(np.eye(4), (3, 1, 1))
-    transforms[:, :3, 3] = shifts
-    placed = base.instances(transforms)
-    assert len(placed) == 3
-    rays = support.random_rays(rng, 300)
-    rays[:, :3] += shifts[np.arange(300) % 3]
-    hits = placed.intersect(rays)
-    merged = raydix.Scene(
-        np.concatenate([vertices + s for s in shifts]),
-        np.concatenate([faces + 300 * i for i in range(3)]),
-    )
-    wanted = merged.intersect(rays)
-    found = wanted["prim"] != raydix.MISSING
-    agree = np.where(
-        found,
-        hits["instance"] * 100 + hits["prim"] == wanted["prim"],
-        hits["prim"] == raydix.MISSING,
-    )
-    assert (
-        found.sum() > 50 and agree.mean() > 0.99
-    )  # rays are rounded on their way into the object's space
-    np.testing.assert_array_equal(placed.occluded(rays), hits["prim"] != raydix.MISSING)
-    base.refit(vertices + np.float32(100))
-    assert not placed.occluded(rays).any()  # it saw that its object moved
-    placed.move(transforms[:, :3] - np.array([0, 0, 0, 100]))
-    assert (placed.occluded(rays) == found).mean() > 0.99
-    with pytest.raises(ValueError, match="transforms: expected 3, as many as there are places, given 2"):
-        placed.move(transforms[:2])
-    before, bad = placed.occluded(rays), transforms.copy()
-    bad[1, 0, 0] = np.nan
-    with pytest.raises(raydix.InputError, match="instance 1"):
-        placed.move(bad)
-    np.testing.assert_array_equal(placed.occluded(rays), before)
-    for wrong in ([0, 1, 2**32], [0, 0, -1]):
-        with pytest.raises(ValueError, match="masks: expected 0 to 4294967295"):
-            base.instances(transforms, masks=wrong)
-    with pytest.raises(raydix.InputError):
-        base.instances(np.zeros((1, 3, 4)))
-    with pytest.raises(ValueError, match=r"transforms: expected shape \(M, 3, 4\)"):
-        base.instances(np.eye(3))
-
-
-def test_instances_name_their_scenes():
-    near, far = raydix.Scene(*BOX), raydix.Scene(*BOX)
-    transforms = np.tile(np.eye(4), (3, 1, 1))
-    transforms[1:, 0, 3] = 10, 20
-    placed = raydix.Instances([near, far], transforms, [1, 0, 1])
-    hits = placed.intersect([[x, 0, 9, 0, 0, -1] for x in (0, 10, 20, 30)])
-    assert hits["object"].tolist() == [1, 0, 1, raydix.MISSING]
-    assert hits["instance"].tolist() == [0, 1, 2, raydix.MISSING]
-
-
-def test_masks_hide_instances():
-    base = raydix.Scene(*BOX)
-    placed = base.instances(np.eye(4)[None], masks=[2])
-    ray = [0, 0, 9, 0, 0, -1]
-    assert (
-        placed.occluded(ray) and placed.occluded(ray, mask=3) and not placed.occluded(ray, mask=1)
-    )
 
 
 def test_where_meshes_come_from(tmp_path, figure):
@@ -334,10 +265,10 @@ def test_where_meshes_come_from(tmp_path, figure):
     )
     from_file = raydix.Scene(file)
     assert (
-        len(from_file) == 12 and from_file.name == "box.obj" and "12 triangles" in repr(from_file)
+        len(from_file.faces) == 12 and from_file.name == "box.obj" and "12 triangles" in repr(from_file)
     )
     np.testing.assert_array_equal(from_file.vertices, BOX[0].astype(np.float32))
-    assert len(figure) > 10_000 and len(figure.cameras) >= 1
+    assert len(figure.faces) > 10_000 and len(figure.cameras) >= 1
     copy = raydix.Scene(figure)  # has .vertices and .faces, as a trimesh.Trimesh has
     np.testing.assert_array_equal(copy.faces, figure.faces)
     with pytest.raises(raydix.InputError, match="nowhere.ply"):

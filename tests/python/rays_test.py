@@ -40,9 +40,10 @@ def test_reinsertion_rounds(rng):
     for field in wanted:
         np.testing.assert_array_equal(hits[field], wanted[field])
     assert raydix.Scene(vertices, faces, quality="high").stats()["reinsertion_rounds"] == 4
-    for rounds in (-1, 256):
-        with pytest.raises(ValueError, match="reinsertion_rounds"):
-            raydix.Scene(vertices, faces, reinsertion_rounds=rounds).intersect(rays)
+    for options in ({"reinsertion_rounds": -1}, {"reinsertion_rounds": 256}, {"max_leaf": 0},
+                    {"max_leaf": 256}, {"bits": 31}):  # fmt: skip
+        with pytest.raises(ValueError, match=f"^{next(iter(options))}: expected"):
+            raydix.Scene(vertices, faces, **options)
 
 
 def test_occluded_count_and_all_hits_equal_brute_force(random_scene):
@@ -185,9 +186,9 @@ def test_invalid_rays_miss():
     assert scene.occluded(rays).tolist() == [False] * 5 + [True]
     single = [scene.intersect(ray)["prim"] != raydix.MISSING for ray in rays]
     assert single == [False] * 5 + [True]
-    assert scene._core.intersect(rays, np.empty((6, 6), "f4"), 0) == (1, 5)
+    assert scene._core.intersect(rays, np.empty((6, 6), "f4")) == (1, 5)
     assert [
-        scene._core.intersect(rays[i : i + 1], np.empty((1, 6), "f4"), 0) for i in range(6)
+        scene._core.intersect(rays[i : i + 1], np.empty((1, 6), "f4")) for i in range(6)
     ] == [(0, 1)] * 5 + [(1, 0)]
 
 

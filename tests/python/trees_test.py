@@ -142,7 +142,7 @@ def test_pictures(figure, tmp_path):
 
 def test_notebooks_see_a_table_and_a_picture(figure):
     shown = figure._repr_html_()
-    assert f"{len(figure):,}" in shown and "data:image/png;base64," in shown and "nodes" in shown
+    assert f"{len(figure.faces):,}" in shown and "data:image/png;base64," in shown and "nodes" in shown
     assert "data:image" not in raydix.Scene([], [])._repr_html_()
 
 

@@ -96,12 +96,14 @@ TEST(HemisphereRays, AreTheSameForEveryThreadCount) {
 
 TEST(SurfaceNormal, TurnsTowardTheRay) {
     const Vec3 a{0, 0, 0}, b{2, 0, 0}, c{0, 3, 0};
-    EXPECT_EQ(normal_toward(a, b, c, {0, 0, -1}).z, 1.0f);
-    EXPECT_EQ(normal_toward(a, b, c, {0, 0, 1}).z, -1.0f);
-    EXPECT_EQ(normal_toward(a, c, b, {0.5f, 0, -1}).z, 1.0f);
-    EXPECT_EQ(normal_toward(a, a, b, {0, -2, 0}).y, 1.0f);  // no area: against the ray
+    EXPECT_EQ(normal_of(a, b, c).z, 6.0);
+    EXPECT_EQ(normal_toward(normal_of(a, b, c), {0, 0, -1}).z, 1.0f);
+    EXPECT_EQ(normal_toward(normal_of(a, b, c), {0, 0, 1}).z, -1.0f);
+    EXPECT_EQ(normal_toward(normal_of(a, c, b), {0.5f, 0, -1}).z, 1.0f);
+    EXPECT_EQ(normal_toward(normal_of(a, a, b), {0, -2, 0}).y, 1.0f);  // no area: against the ray
     // Far too small for float32 products.
-    EXPECT_EQ(normal_toward({0, 0, 0}, {1e-30f, 0, 0}, {0, 1e-30f, 0}, {0, 0, -1}).z, 1.0f);
+    const Double3 small = normal_of({0, 0, 0}, {1e-30f, 0, 0}, {0, 1e-30f, 0});
+    EXPECT_EQ(normal_toward(small, {0, 0, -1}).z, 1.0f);
 }
 
 TEST(SurfacePointBefore, StepsBackByADistanceNotByT) {

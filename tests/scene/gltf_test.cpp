@@ -56,13 +56,84 @@ TEST(Gltf, modes) {
     EXPECT_EQ(error(with_mode(7)), "sample: meshes 0: mode 7 is unknown");
 }
 
-TEST(Gltf, meshes_follow_each_other_and_share_positions) {
+TEST(Gltf, meshes_follow_each_other) {
     const Mesh mesh = load_document(document(R"({"mesh":0},{"mesh":0,"translation":[0,0,1]})",
                                              quad_primitive + "," + quad_primitive));
-    EXPECT_EQ(mesh.vertices.size(), 8u);
+    EXPECT_EQ(mesh.vertices.size(), 16u);
     ASSERT_EQ(mesh.triangles.size(), 8u);
-    EXPECT_EQ(mesh.triangles[2], mesh.triangles[0]);
-    EXPECT_EQ(mesh.triangles[4], (Triangle{4, 5, 6}));
+    EXPECT_EQ(mesh.triangles[2], (Triangle{4, 5, 6}));
+    EXPECT_EQ(mesh.triangles[4], (Triangle{8, 9, 10}));
+}
+
+Model load_model_document(const std::string& text) {
+    ByteSource in = ByteSource::from_memory(text, "sample");
+    static const std::string external = gltf_buffer();
+    return load_gltf(in, [](const std::filesystem::path&) {
+        return ByteSource::from_memory(external, "external");
+    });
+}
+
+TEST(Gltf, keeps_primitives_and_nodes) {
+    const std::string lines = R"({"attributes":{"POSITION":0},"mode":1})";
+    const Model model = load_model_document(
+        R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[3,0]}],"nodes":[)"
+        R"({"name":"a","children":[2,1],"translation":[1,2,3]},{"mesh":1},)"
+        R"({"mesh":2,"scale":[2,2,2]},{"mesh":1},{"mesh":0}],"meshes":[{"primitives":[)" +
+        quad_primitive + "]},{\"primitives\":[" + quad_primitive + "," + lines + "," +
+        quad_primitive + "]},{\"primitives\":[" + quad_primitive +
+        R"(]}],"accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},)"
+        R"({"bufferView":1,"componentType":5121,"count":6,"type":"SCALAR"}],)"
+        R"("bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":6}],)"
+        R"("buffers":[{"uri":"quad.bin","byteLength":54}]})");
+    // Primitives count through, those of lines and of meshes that nobody shows included.
+    ASSERT_EQ(model.meshes.size(), 5u);
+    EXPECT_TRUE(model.meshes[0].triangles.empty());  // not shown, so not read
+    EXPECT_EQ(model.meshes[1].triangles.size(), 2u);
+    EXPECT_TRUE(model.meshes[2].vertices.empty());
+    EXPECT_EQ(model.meshes[3].triangles.size(), 2u);
+    EXPECT_EQ(model.meshes[4].triangles.size(), 2u);
+    // 3; 0 and below it 2 and 1, as the lists have them.
+    ASSERT_EQ(model.nodes.size(), 4u);
+    const std::uint32_t parents[] = {ModelNode::none, ModelNode::none, 1, 1};
+    const std::uint32_t first[] = {1, 0, 4, 1}, count[] = {3, 0, 1, 3};
+    for (std::size_t k = 0; k < 4; ++k) {
+        EXPECT_EQ(model.nodes[k].parent, parents[k]);
+        EXPECT_EQ(model.nodes[k].first_mesh, first[k]);
+        EXPECT_EQ(model.nodes[k].mesh_count, count[k]);
+    }
+    EXPECT_EQ(model.nodes[1].name, "a");
+    EXPECT_EQ(model.nodes[1].transform.m[2][3], 3.0);
+    EXPECT_EQ(model.nodes[2].transform.m[1][1], 2.0);
+}
+
+TEST(Gltf, one_mesh_that_does_not_move_needs_no_node) {
+    const Model plain = load_model_document(document(R"({"mesh":0})", quad_primitive));
+    EXPECT_TRUE(plain.is_flat());
+    EXPECT_EQ(plain.mesh().triangles.size(), 2u);
+    for (const char* nodes : {R"({"mesh":0,"translation":[0,0,1]})", R"({"mesh":0},{"mesh":0})"})
+        EXPECT_FALSE(load_model_document(document(nodes, quad_primitive)).is_flat());
+    EXPECT_FALSE(
+        load_model_document(document(R"({"mesh":0})", quad_primitive + "," + quad_primitive))
+            .is_flat());
+}
+
+TEST(Gltf, primitives_that_share_positions_take_what_they_use) {
+    // One triangle of the quad by three of its six indices, and all four vertices.
+    const std::string three = R"({"attributes":{"POSITION":0},"indices":2})";
+    std::string text = document(R"({"mesh":0})", three + "," + quad_primitive);
+    const std::string more = R"({"bufferView":1,"componentType":5121,"count":6,"type":"SCALAR"})";
+    const std::size_t at = text.find(more);
+    text.insert(
+        at + more.size(),
+        R"(,{"bufferView":1,"byteOffset":3,"componentType":5121,"count":3,"type":"SCALAR"})");
+    const Model model = load_model_document(text);
+    ASSERT_EQ(model.meshes.size(), 2u);
+    ASSERT_EQ(model.meshes[0].vertices.size(), 3u);
+    EXPECT_EQ(model.meshes[0].triangles, (std::vector<Triangle>{{0, 1, 2}}));
+    EXPECT_EQ(model.meshes[1].vertices.size(), 4u);
+    // The second triangle of the quad is {0, 2, 3}.
+    EXPECT_TRUE(model.meshes[0].vertices[1] == model.meshes[1].vertices[2]);
+    EXPECT_TRUE(model.meshes[0].vertices[2] == model.meshes[1].vertices[3]);
 }
 
 TEST(Gltf, scene_choice) {
@@ -157,7 +228,7 @@ TEST(Gltf, copies_stay_in_proportion) {
         R"("bufferViews":[{"buffer":0,"byteLength":240000}],"buffers":[{"byteLength":240000,"uri":"data:;base64,)" +
         positions + "\"}]}";
     EXPECT_EQ(error(text),
-              "sample: meshes 0: its copies take more than 1000 times the size of the file");
+              "sample: as one mesh: its copies take more than 1000 times the memory of the meshes");
 }
 
 }  // namespace

@@ -147,12 +147,15 @@ inline std::string glb() {
            binary;
 }
 
-/// External files of a glTF document all hold the quad.
+/// One mesh of all nodes. External files of a glTF document all hold the quad.
 inline Mesh load_gltf_sample(ByteSource& in) {
     static const std::string external = gltf_buffer();
-    return load_gltf(in, [](const std::filesystem::path&) {
+    Model model = load_gltf(in, [](const std::filesystem::path&) {
         return ByteSource::from_memory(external, "external");
     });
+    model.name = "sample";
+    model.flatten();
+    return std::move(model).mesh();
 }
 
 struct Sample {

@@ -33,7 +33,7 @@ std::vector<Ray> in_float(const std::vector<RayD>& rays) {
     return out;
 }
 
-Mesh small_builtin(const char* spec) { return load_model(spec).mesh; }
+Mesh small_builtin(const char* spec) { return load_model(spec).mesh(); }
 
 MeshD thinned(MeshD mesh, std::size_t step) {
     std::vector<Triangle> kept;

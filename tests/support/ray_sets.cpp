@@ -14,7 +14,7 @@ namespace {
 class Maker {
 public:
     Maker(const Model& scene, std::uint64_t seed)
-        : mesh_(scene.mesh), box_(inspect(scene.mesh).bounds), random_(seed) {
+        : mesh_(scene.mesh()), box_(inspect(scene.mesh()).bounds), random_(seed) {
         const Vec3 size = box_.hi - box_.lo;
         longest_ = std::max({size.x, size.y, size.z, 1e-12f});
     }

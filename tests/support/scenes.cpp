@@ -27,7 +27,7 @@ Model scene_of(Mesh mesh, std::string name) {
     Model scene;
     scene.name = std::move(name);
     scene.cameras.cameras.push_back(fit_camera(inspect(mesh).bounds));
-    scene.mesh = std::move(mesh);
+    scene.mesh() = std::move(mesh);
     return scene;
 }
 

@@ -50,7 +50,7 @@ void expect_like_scalar(const std::string& what, const Bvh& bvh, const Cwbvh& tr
 }
 
 void expect_like_scalar(const Model& scene, std::size_t rays, const BuildOptions& options = {}) {
-    const Bvh bvh = build_bvh(scene.mesh, options);
+    const Bvh bvh = build_bvh(scene.mesh(), options);
     expect_like_scalar(scene.name, bvh, Cwbvh(bvh), make_mixed_rays(scene, rays, seed));
 }
 
@@ -94,7 +94,7 @@ TEST(CwbvhTrace, FewTriangles) {
 
 TEST(CwbvhTrace, NastyRays) {
     const Model scene = scene_of(random_soup(500, 3, 0.5f), "soup");
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     const Cwbvh tree(bvh);
     const float nan = std::nanf(""), most = std::numeric_limits<float>::max();
     std::vector<Ray> rays{{{0, 0, 0}, 0, {0, 0, 0}, infinity},
@@ -140,7 +140,7 @@ TEST(CwbvhTrace, NastyMeshes) {
     for (const Mesh& mesh : {laced, with_points, twice, piled, flat}) {
         const Bvh bvh = build_bvh(mesh);
         Model whole = scene_of(soup, "soup");
-        whole.mesh.triangles = {soup.triangles.begin(), soup.triangles.begin() + 400};
+        whole.mesh().triangles = {soup.triangles.begin(), soup.triangles.begin() + 400};
         expect_like_scalar("nasty mesh", bvh, Cwbvh(bvh), make_mixed_rays(whole, 20'000, seed));
     }
 }
@@ -148,10 +148,10 @@ TEST(CwbvhTrace, NastyMeshes) {
 /// As a builder that splits triangles leaves it: several references to one triangle.
 TEST(CwbvhTrace, DuplicatedReferences) {
     const Model scene = scene_of(random_soup(1000, 5, 0.3f), "soup");
-    const auto n = static_cast<std::uint32_t>(scene.mesh.triangles.size());
-    Mesh doubled = scene.mesh;
-    doubled.triangles.insert(doubled.triangles.end(), scene.mesh.triangles.begin(),
-                             scene.mesh.triangles.end());
+    const auto n = static_cast<std::uint32_t>(scene.mesh().triangles.size());
+    Mesh doubled = scene.mesh();
+    doubled.triangles.insert(doubled.triangles.end(), scene.mesh().triangles.begin(),
+                             scene.mesh().triangles.end());
     Bvh bvh = build_bvh(doubled);
     for (std::uint32_t& prim : BvhAccess{bvh}.order().span()) prim %= n;
     BvhAccess{bvh}.input_count() = n;
@@ -160,13 +160,13 @@ TEST(CwbvhTrace, DuplicatedReferences) {
     EXPECT_EQ(tree.stats().triangles, n);
     const auto rays = make_mixed_rays(scene, 20'000, seed);
     EXPECT_TRUE(
-        std::ranges::equal(trace(tree, rays), trace(build_bvh(scene.mesh), rays), same_bits));
+        std::ranges::equal(trace(tree, rays), trace(build_bvh(scene.mesh()), rays), same_bits));
 }
 
 TEST(CwbvhTrace, SameCountsForEveryThreadCount) {
     const Model scene = load_model("builtin:atrium?triangles=10000");
     const auto rays = make_mixed_rays(scene, 1000 * thorough, seed);
-    const Cwbvh tree(build_bvh(scene.mesh));
+    const Cwbvh tree(build_bvh(scene.mesh()));
     std::vector<Hit> wanted(rays.size()), hits(rays.size());
     const TraceCounts one = trace(tree, rays, wanted, {.threads = 1, .counters = true});
     for (const int threads : {2, 7, 0}) {

@@ -68,15 +68,15 @@ TEST_P(Digest, SceneRaysTreesAndHits) {
     const Digests& wanted = GetParam();
     const Model scene = load_model(wanted.scene);
     const auto rays = make_mixed_rays(scene, ray_count, seed);
-    EXPECT_EQ(digest(scene.mesh.vertices), wanted.vertices);
+    EXPECT_EQ(digest(scene.mesh().vertices), wanted.vertices);
     EXPECT_EQ(digest(rays), wanted.rays);
-    EXPECT_EQ(tree_digest(scene.mesh, Builder::karras), wanted.lbvh);
-    EXPECT_EQ(tree_digest(scene.mesh, Builder::apetrei), wanted.lbvh);
-    EXPECT_EQ(tree_digest(scene.mesh, Builder::ploc), wanted.ploc);
-    EXPECT_EQ(tree_digest(scene.mesh, Builder::binned), wanted.binned);
-    EXPECT_EQ(tree_digest(scene.mesh, Builder::sbvh), wanted.sbvh);
+    EXPECT_EQ(tree_digest(scene.mesh(), Builder::karras), wanted.lbvh);
+    EXPECT_EQ(tree_digest(scene.mesh(), Builder::apetrei), wanted.lbvh);
+    EXPECT_EQ(tree_digest(scene.mesh(), Builder::ploc), wanted.ploc);
+    EXPECT_EQ(tree_digest(scene.mesh(), Builder::binned), wanted.binned);
+    EXPECT_EQ(tree_digest(scene.mesh(), Builder::sbvh), wanted.sbvh);
 
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     EXPECT_EQ(digest(trace(bvh, rays)), wanted.closest) << "scalar";
     const WideBvh wide(bvh);
     for (const std::string& isa : simd_instruction_sets()) {

@@ -175,7 +175,7 @@ TEST(DoubleTrace, PartsOfTrianglesChangeNoBit) {
 
 TEST(DoubleTrace, BuiltinScenesLikeEveryTriangle) {
     for (const Model& scene : builtin_triangle_scenes(10'000)) {
-        const MeshD mesh = in_double(scene.mesh, 1.0, utm_place);
+        const MeshD mesh = in_double(scene.mesh(), 1.0, utm_place);
         const std::vector<RayD> rays = mixed_rays(mesh, 50 * thorough, seed);
         const std::vector<HitD> hits = trace(build_bvh(mesh), rays);
         EXPECT_GT(count_hits(hits), 0u);
@@ -261,7 +261,7 @@ MeshD gridded(const Mesh& mesh, double scale) {
 }
 
 TEST(DoubleTrace, MovedSceneGivesTheSameHitsWhereFloatFails) {
-    const MeshD home = gridded(load_model("builtin:figure?triangles=20000").mesh, 1.0);
+    const MeshD home = gridded(load_model("builtin:figure?triangles=20000").mesh(), 1.0);
     MeshD away = home;
     for (Vec3d& v : away.vertices) v = v + utm_place;
     std::vector<RayD> rays = mixed_rays(home, 5000 * thorough, seed), moved_rays;

@@ -21,7 +21,7 @@ struct Closed {
 };
 
 Closed closed_figure(double scale, Vec3d move) {
-    const Mesh home = load_model("builtin:figure?triangles=20000").mesh;
+    const Mesh home = load_model("builtin:figure?triangles=20000").mesh();
     const Bvh bvh = build_bvh(home);
     const Solid solid(bvh);
     Random random(seed);

@@ -82,12 +82,12 @@ void expect_all_agrees(const Bvh& bvh, const LineTree& brute_force, std::span<co
 }
 
 void expect_like_brute_force(const Model& scene, std::size_t ray_count) {
-    ASSERT_FALSE(scene.mesh.triangles.empty()) << scene.name;
-    const Bvh bvh = build_bvh(scene.mesh);
-    const LineTree line_tree(scene.mesh);
+    ASSERT_FALSE(scene.mesh().triangles.empty()) << scene.name;
+    const Bvh bvh = build_bvh(scene.mesh());
+    const LineTree line_tree(scene.mesh());
     const std::vector<Ray> rays = make_mixed_rays(scene, ray_count, seed);
     const std::vector<Hit> ours = trace(bvh, rays);
-    const std::string name = scene.name + ", " + std::to_string(scene.mesh.triangles.size()) +
+    const std::string name = scene.name + ", " + std::to_string(scene.mesh().triangles.size()) +
                              " triangles, against float brute force";
     expect_same_hits(name, rays, ours, line_tree.closest(rays));
     expect_any_agrees(bvh, rays, ours);
@@ -101,10 +101,11 @@ TEST(Hits, LineTreeAgreesWithEveryTriangle) {
     for (const Model& scene : {scene_of(random_soup(700, 3), "soup of 700"),
                                scene_of(lattice_mesh(300, 5, 9), "lattice of 300"),
                                load_model("builtin:figure?triangles=10000")}) {
-        const bool small = scene.mesh.triangles.size() < 1000;
+        const bool small = scene.mesh().triangles.size() < 1000;
         const auto rays = make_mixed_rays(scene, (small ? 2000 : 100) * thorough, seed);
         expect_same_hits(scene.name + ", line tree against trace_brute_force", rays,
-                         LineTree(scene.mesh).closest(rays), trace_brute_force(scene.mesh, rays));
+                         LineTree(scene.mesh()).closest(rays),
+                         trace_brute_force(scene.mesh(), rays));
     }
 }
 
@@ -112,7 +113,7 @@ TEST(Hits, SoupAgainstEveryTriangle) {
     const Model scene = scene_of(random_soup(2000, 12, 0.3f), "soup of 2000");
     const auto rays = make_mixed_rays(scene, 10'000 * thorough, seed);
     expect_same_hits(scene.name + " against trace_brute_force", rays,
-                     trace(build_bvh(scene.mesh), rays), trace_brute_force(scene.mesh, rays));
+                     trace(build_bvh(scene.mesh()), rays), trace_brute_force(scene.mesh(), rays));
 }
 
 constexpr std::size_t million = thorough == 1 ? 20'000 : 1'000'000;
@@ -144,7 +145,7 @@ std::vector<Hit> hits_with(const Mesh& mesh, std::span<const Ray> rays, const Bu
 TEST(Hits, FaultResultsDifferByThreadCount) {
     const Model scene = load_model("builtin:atrium?triangles=10000");
     const auto rays = make_mixed_rays(scene, 5000 * thorough, seed);
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     const auto wanted = trace(bvh, rays, {.threads = 1});
     const AllHits all_wanted = trace_all(bvh, rays, {.threads = 1});
     for (const int threads : {1, 2, 7, 0}) {
@@ -159,11 +160,11 @@ TEST(Hits, LeafSizeAndCodeBitsChangeNoBit) {
     for (const Model& scene : {load_model("builtin:grove?triangles=10000"),
                                scene_of(lattice_mesh(3000, 12, 8), "lattice")}) {
         const auto rays = make_mixed_rays(scene, 5000 * thorough, seed);
-        const auto wanted = hits_with(scene.mesh, rays, {}, 1);
+        const auto wanted = hits_with(scene.mesh(), rays, {}, 1);
         for (const int bits : {30, 63})
             for (const int max_leaf : {1, 4, 255})
                 EXPECT_TRUE(std::ranges::equal(
-                    hits_with(scene.mesh, rays, {.bits = bits, .max_leaf = max_leaf}, 2), wanted,
+                    hits_with(scene.mesh(), rays, {.bits = bits, .max_leaf = max_leaf}, 2), wanted,
                     same_bits))
                     << scene.name << ", " << bits << " bits, max_leaf " << max_leaf;
     }
@@ -172,7 +173,7 @@ TEST(Hits, LeafSizeAndCodeBitsChangeNoBit) {
 TEST(Hits, OneByOneAndWithCountersAsInBatches) {
     const Model scene = scene_of(random_soup(500, 6, 0.4f), "soup");
     const auto rays = make_mixed_rays(scene, 3000, seed);
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     const auto wanted = trace(bvh, rays);
     std::vector<Hit> counted(rays.size());
     const TraceCounts counts = trace(bvh, rays, counted, {.counters = true});
@@ -188,9 +189,9 @@ TEST(Hits, OneByOneAndWithCountersAsInBatches) {
 TEST(Hits, OrderOfTrianglesDecidesOnlyTheNames) {
     Model scene = scene_of(random_soup(2000, 7), "soup");
     const auto rays = make_mixed_rays(scene, 50'000, seed);
-    const auto wanted = trace(build_bvh(scene.mesh), rays);
-    std::ranges::reverse(scene.mesh.triangles);
-    const auto turned = trace(build_bvh(scene.mesh), rays);
+    const auto wanted = trace(build_bvh(scene.mesh()), rays);
+    std::ranges::reverse(scene.mesh().triangles);
+    const auto turned = trace(build_bvh(scene.mesh()), rays);
     std::uint64_t renamed = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         ASSERT_EQ(turned[i].t, wanted[i].t) << i;

@@ -40,20 +40,20 @@ void expect_same(const std::string& what, const KdTree& tree, std::span<const Ra
 
 void expect_like_brute_force(const Model& scene, std::size_t ray_count) {
     const auto rays = make_mixed_rays(scene, ray_count, seed);
-    const auto wanted = LineTree(scene.mesh).closest(rays);
+    const auto wanted = LineTree(scene.mesh()).closest(rays);
     for (const int max_leaf : {1, 8})
         for (const int bits : {30, 63})
             expect_same(scene.name + ", bits " + std::to_string(bits) + ", max_leaf " +
                             std::to_string(max_leaf),
-                        build_kdtree(scene.mesh, {.bits = bits, .max_leaf = max_leaf}), rays,
+                        build_kdtree(scene.mesh(), {.bits = bits, .max_leaf = max_leaf}), rays,
                         wanted);
 }
 
 TEST(KdRays, SoupAgainstEveryTriangle) {
     const Model scene = scene_of(random_soup(2000, 12, 0.3f), "soup of 2000");
     const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
-    expect_same(scene.name + " against trace_brute_force", build_kdtree(scene.mesh), rays,
-                trace_brute_force(scene.mesh, rays));
+    expect_same(scene.name + " against trace_brute_force", build_kdtree(scene.mesh()), rays,
+                trace_brute_force(scene.mesh(), rays));
 }
 
 TEST(KdRays, SoupsLikeBruteForce) {
@@ -78,13 +78,13 @@ TEST(KdRays, SharedBunnyLikeTheBvh) {
     RAYDIX_SKIP_WITHOUT(file);
     const Model scene = load_model(file.string());
     const auto rays = make_mixed_rays(scene, 25'000 * thorough, seed);
-    expect_same("bunny", build_kdtree(scene.mesh), rays, trace(build_bvh(scene.mesh), rays));
+    expect_same("bunny", build_kdtree(scene.mesh()), rays, trace(build_bvh(scene.mesh()), rays));
 }
 
 TEST(KdRays, ThreadsAndCountersChangeNothing) {
     const Model scene = load_model("builtin:grove?triangles=10000");
     const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
-    const KdTree tree = build_kdtree(scene.mesh);
+    const KdTree tree = build_kdtree(scene.mesh());
     const auto wanted = kd_trace(tree, rays, {.threads = 1});
     TraceCounts first;
     for (const int threads : {1, 2, 7}) {
@@ -105,7 +105,7 @@ TEST(KdRays, DescendInsteadOfLookingAtEverything) {
     const Model scene = load_model("builtin:figure?triangles=20000");
     const auto rays = make_primary_rays(scene.cameras.cameras[0], 64, 48);
     std::vector<Hit> hits(rays.size());
-    const TraceCounts counts = kd_trace(build_kdtree(scene.mesh), rays, hits, {.counters = true});
+    const TraceCounts counts = kd_trace(build_kdtree(scene.mesh()), rays, hits, {.counters = true});
     EXPECT_GT(counts.hits, rays.size() / 20);
     EXPECT_LT(counts.triangle_tests, 200 * rays.size());
     EXPECT_LT(counts.node_visits, 300 * rays.size());

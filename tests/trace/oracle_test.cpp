@@ -39,8 +39,8 @@ void add(Tally& sum, const Tally& part) {
 template <class Other>
 void expect_like(const Model& scene, const std::string& peer, std::size_t rays_per_set,
                  const Other& other) {
-    ASSERT_FALSE(scene.mesh.triangles.empty()) << scene.name;
-    const Bvh bvh = build_bvh(scene.mesh);
+    ASSERT_FALSE(scene.mesh().triangles.empty()) << scene.name;
+    const Bvh bvh = build_bvh(scene.mesh());
     Tally sum;
     for (int k = 0; k < static_cast<int>(RaySet::count); ++k) {
         const auto set = static_cast<RaySet>(k);
@@ -48,7 +48,7 @@ void expect_like(const Model& scene, const std::string& peer, std::size_t rays_p
         if (set == RaySet::any_length) continue;
         const auto rays = make_rays(scene, set, rays_per_set, seed);
         const std::vector<Hit> ours = trace(bvh, rays), theirs = other(rays);
-        const Tally tally = compare(scene.mesh, rays, ours, theirs);
+        const Tally tally = compare(scene.mesh(), rays, ours, theirs);
         EXPECT_EQ(tally.wrong, 0u) << scene.name << ", " << name_of(set) << "\n"
                                    << tally.first_wrong;
         EXPECT_GT(tally.hits, 0u) << scene.name << ", " << name_of(set);
@@ -65,13 +65,14 @@ void expect_like_double(const Model& scene, std::size_t rays_per_set) {
     expect_like(scene, "double", rays_per_set, [&](std::span<const Ray> rays) {
         std::vector<Hit> hits(rays.size());
         for_each_index(
-            rays.size(), [&](std::size_t i) { hits[i] = oracle_closest(scene.mesh, rays[i]); }, 16);
+            rays.size(), [&](std::size_t i) { hits[i] = oracle_closest(scene.mesh(), rays[i]); },
+            16);
         return hits;
     });
 }
 
 void expect_like_embree(const Model& scene, std::size_t rays_per_set) {
-    const EmbreeOracle embree(scene.mesh);
+    const EmbreeOracle embree(scene.mesh());
     expect_like(scene, "Embree", rays_per_set,
                 [&](std::span<const Ray> rays) { return embree.closest(rays); });
 }
@@ -92,12 +93,12 @@ TEST(Oracle, KnowsARightAngledTriangle) {
 TEST(Oracle, FindsPlantedFaults) {
     const Model scene = scene_of(random_soup(300, 5, 0.5f), "soup");
     const auto rays = make_rays(scene, RaySet::through_box, 2000, seed);
-    const auto good = trace(build_bvh(scene.mesh), rays);
+    const auto good = trace(build_bvh(scene.mesh()), rays);
     const auto wrong_after = [&](auto&& spoil) {
         auto bad = good;
         for (std::size_t i = 0; i < bad.size(); i += 10)
             if (bad[i].hit()) spoil(bad[i]);
-        return compare(scene.mesh, rays, bad, good).wrong;
+        return compare(scene.mesh(), rays, bad, good).wrong;
     };
     EXPECT_EQ(wrong_after([](Hit&) {}), 0u);
     EXPECT_GT(wrong_after([](Hit& hit) { hit = Hit{}; }), 50u) << "lost hits";
@@ -138,10 +139,10 @@ TEST_P(SharedSceneHits, LikeFloatBruteForce) {
     const auto file = shared_scene(GetParam());
     RAYDIX_SKIP_WITHOUT(file);
     const Model scene = load_model(file.string());
-    ASSERT_FALSE(scene.mesh.triangles.empty());
+    ASSERT_FALSE(scene.mesh().triangles.empty());
     const auto rays = make_mixed_rays(scene, 50'000 * thorough, seed);
-    const std::vector<Hit> ours = trace(build_bvh(scene.mesh), rays);
-    const std::vector<Hit> wanted = LineTree(scene.mesh).closest(rays);
+    const std::vector<Hit> ours = trace(build_bvh(scene.mesh()), rays);
+    const std::vector<Hit> wanted = LineTree(scene.mesh()).closest(rays);
     std::uint64_t hits = 0, different = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         hits += wanted[i].hit();
@@ -150,7 +151,7 @@ TEST_P(SharedSceneHits, LikeFloatBruteForce) {
         std::cout << "  ray " << i << ": ours " << ours[i].prim << " at " << ours[i].t
                   << ", wanted " << wanted[i].prim << " at " << wanted[i].t << "\n";
     }
-    std::cout << scene.name << ", " << scene.mesh.triangles.size()
+    std::cout << scene.name << ", " << scene.mesh().triangles.size()
               << " triangles, against float brute force: " << rays.size() << " rays, " << hits
               << " hits, " << rays.size() - different << " exact, 0 ties, " << different
               << " wrong (seed " << seed << ")\n";

@@ -38,7 +38,7 @@ struct ManyRays {
 };
 ManyRays many_rays(RayKind kind) {
     const Model scene = load_model("builtin:atrium?triangles=20000", 5);
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     std::vector<std::uint32_t> pixels;
     const auto primary = make_primary_rays(scene.cameras.cameras.at(0), 160, 120, &pixels);
     ManyRays out{WideBvh(bvh), make_secondary_rays(bvh, primary, trace(bvh, primary), pixels,

@@ -88,7 +88,7 @@ void expect_like_scalar(const std::string& what, const Bvh& bvh, std::span<const
 }
 
 void expect_like_scalar(const Model& scene, std::size_t rays, const BuildOptions& options = {}) {
-    expect_like_scalar(scene.name, build_bvh(scene.mesh, options),
+    expect_like_scalar(scene.name, build_bvh(scene.mesh(), options),
                        make_mixed_rays(scene, rays, seed));
 }
 
@@ -194,7 +194,7 @@ TEST(Simd, LimitsBesideTheHit) {
 /// Around the sizes of vectors, packets and jobs.
 TEST(Simd, BatchesOfEverySize) {
     const Model scene = scene_of(random_soup(2000, 9, 0.2f), "soup");
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     const auto rays = make_mixed_rays(scene, 40'000, seed);
     for (const std::size_t n :
          {0u, 1u, 2u, 3u, 4u, 5u, 15u, 16u, 17u, 63u, 64u, 65u, 1023u, 1024u, 1025u, 40'000u})
@@ -234,7 +234,7 @@ TEST(Simd, NastyRays) {
         if (k % 11 == 0) ray.tmax = unit();
         rays.push_back(ray);
     }
-    expect_like_scalar("nasty rays", build_bvh(scene.mesh), rays);
+    expect_like_scalar("nasty rays", build_bvh(scene.mesh()), rays);
 }
 
 TEST(Simd, NastyMeshes) {
@@ -253,7 +253,7 @@ TEST(Simd, NastyMeshes) {
     for (Vec3& v : flat.vertices) v.z = -0.25f;
     for (const Mesh& mesh : {laced, with_points, twice, piled, flat}) {
         Model whole = scene_of(soup, "soup");
-        whole.mesh.triangles = {soup.triangles.begin(), soup.triangles.begin() + 400};
+        whole.mesh().triangles = {soup.triangles.begin(), soup.triangles.begin() + 400};
         expect_like_scalar("nasty mesh", build_bvh(mesh), make_mixed_rays(whole, 10'000, seed));
     }
     Mesh none = soup;  // all without area: a tree without leaves
@@ -295,17 +295,17 @@ TEST(Simd, DeepTreesWithAllRaysEverywhere) {
 /// As a builder that splits triangles leaves it: several references to one triangle.
 TEST(Simd, DuplicatedReferences) {
     const Model scene = scene_of(random_soup(1000, 5, 0.3f), "soup");
-    const auto n = static_cast<std::uint32_t>(scene.mesh.triangles.size());
-    Mesh doubled = scene.mesh;
-    doubled.triangles.insert(doubled.triangles.end(), scene.mesh.triangles.begin(),
-                             scene.mesh.triangles.end());
+    const auto n = static_cast<std::uint32_t>(scene.mesh().triangles.size());
+    Mesh doubled = scene.mesh();
+    doubled.triangles.insert(doubled.triangles.end(), scene.mesh().triangles.begin(),
+                             scene.mesh().triangles.end());
     Bvh bvh = build_bvh(doubled);
     for (std::uint32_t& prim : BvhAccess{bvh}.order().span()) prim %= n;
     BvhAccess{bvh}.input_count() = n;
     const WideBvh tree(bvh);
     EXPECT_EQ(tree.stats().references, 2 * n);
     const auto rays = make_mixed_rays(scene, 20'000, seed);
-    const Bvh plain = build_bvh(scene.mesh);
+    const Bvh plain = build_bvh(scene.mesh());
     for (const SimdPath path : paths)
         EXPECT_TRUE(
             std::ranges::equal(trace(tree, rays, {.path = path}), trace(plain, rays), same_bits));
@@ -316,7 +316,7 @@ TEST(Simd, DuplicatedReferences) {
 
 TEST(Simd, AllHitsLikeScalar) {
     for (const Model& scene : builtin_triangle_scenes(5'000)) {
-        const Bvh bvh = build_bvh(scene.mesh);
+        const Bvh bvh = build_bvh(scene.mesh());
         const WideBvh tree(bvh);
         const auto rays = make_mixed_rays(scene, 1000 * thorough, seed);
         const AllHits wanted = trace_all(bvh, rays);
@@ -334,7 +334,7 @@ TEST(Simd, AllHitsLikeScalar) {
 
 TEST(Simd, OneRayLikeBatches) {
     const Model scene = load_model("builtin:atrium?triangles=10000");
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     const WideBvh tree(bvh);
     const auto rays = make_mixed_rays(scene, 2000, seed);
     const auto wanted = trace(bvh, rays);
@@ -385,7 +385,7 @@ TEST(Simd, OneRayOfACallerThatFlushesDenormals) {
 TEST(Simd, SameCountsForEveryThreadCount) {
     const Model scene = load_model("builtin:atrium?triangles=10000");
     const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
-    const WideBvh tree(build_bvh(scene.mesh));
+    const WideBvh tree(build_bvh(scene.mesh()));
     for (const SimdPath path : paths) {
         std::vector<Hit> wanted(rays.size()), hits(rays.size());
         const TraceCounts one =
@@ -402,7 +402,7 @@ TEST(Simd, SameCountsForEveryThreadCount) {
 
 TEST(Simd, EachPathWhereItBelongs) {
     const Model scene = load_model("builtin:atrium?triangles=20000");
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     const WideBvh tree(bvh);
     std::vector<std::uint32_t> pixels;
     const auto primary = make_primary_rays(scene.cameras.cameras.at(0), 256, 192, &pixels);
@@ -422,7 +422,7 @@ TEST(Simd, EachPathWhereItBelongs) {
 /// Fewer nodes than `scalar` enters, since each has up to eight children.
 TEST(Simd, EntersFewerNodesThanScalar) {
     const Model scene = load_model("builtin:atrium?triangles=20000");
-    const Bvh bvh = build_bvh(scene.mesh);
+    const Bvh bvh = build_bvh(scene.mesh());
     const auto rays = make_mixed_rays(scene, 10'000, seed);
     std::vector<Hit> hits(rays.size());
     const TraceCounts binary = trace(bvh, rays, hits, {.counters = true});

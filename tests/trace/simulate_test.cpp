@@ -99,7 +99,7 @@ TEST(Simulate, BothChildrenMeanOnePush) {
 
 TEST(Simulate, ADoubledCostMovesWhatUsesItOnly) {
     const Model scene = scene_of(random_soup(500, 3, 0.1f), "soup");
-    const WarpTree tree(build_bvh(scene.mesh));
+    const WarpTree tree(build_bvh(scene.mesh()));
     const std::vector<Ray> rays = make_mixed_rays(scene, 640, 3);
     std::vector<SimulateOptions> runs;
     for (const WarpKernel kernel : {WarpKernel::while_while, WarpKernel::persistent_packet})
@@ -125,7 +125,7 @@ TEST(Simulate, ADoubledCostMovesWhatUsesItOnly) {
 
 TEST(Simulate, OneLaneHasFullEfficiencyAndWidthsAgree) {
     const Model scene = scene_of(random_soup(2000, 9, 0.1f), "soup");
-    const WarpTree tree(build_bvh(scene.mesh));
+    const WarpTree tree(build_bvh(scene.mesh()));
     const std::vector<Ray> rays = make_mixed_rays(scene, 64 * 20, 3);
     for (const WarpKernel kernel : {WarpKernel::while_while, WarpKernel::if_if}) {
         std::vector<SimulateOptions> runs;
@@ -186,7 +186,7 @@ bool same(const Simulation& a, const Simulation& b) {
 
 TEST(Simulate, FiguresDoNotDependOnThreads) {
     const Model scene = scene_of(random_soup(3000, 4, 0.1f), "soup");
-    const WarpTree tree(build_bvh(scene.mesh));
+    const WarpTree tree(build_bvh(scene.mesh()));
     const std::vector<Ray> rays = make_mixed_rays(scene, 1000 * thorough, 8);
     std::vector<SimulateOptions> runs;
     for (const WarpKernel kernel : warp_kernels())
@@ -204,7 +204,7 @@ TEST(Simulate, FiguresDoNotDependOnThreads) {
 
 TEST(Simulate, PersistentFormsDifferByTheirFetchesOnly) {
     const Model scene = scene_of(random_soup(2000, 4, 0.1f), "soup");
-    const WarpTree tree(build_bvh(scene.mesh));
+    const WarpTree tree(build_bvh(scene.mesh()));
     const std::vector<Ray> rays = make_mixed_rays(scene, 64 * 32, 8);
     std::vector<SimulateOptions> runs{options_for(WarpKernel::while_while),
                                       options_for(WarpKernel::persistent_while_while)};
@@ -227,7 +227,7 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
     if (simulated_kernel(WarpKernel::packet, false, 32, SimulatorIsa::v3) == nullptr)
         GTEST_SKIP() << "no AVX2 and FMA here";
     const Model scene = scene_of(random_soup(1000, 4, 0.1f), "soup");
-    const WarpTree tree(build_bvh(scene.mesh));
+    const WarpTree tree(build_bvh(scene.mesh()));
     const PreparedRays rays(make_mixed_rays(scene, 640, 8));
     const auto& arrays = tree.arrays();
     OpCosts costs;
@@ -261,7 +261,7 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
 /// Warps on real threads that wait at random between turns, on one pool.
 TEST(Simulate, PoolsLoseAndRepeatNoRayWhateverTheDelays) {
     const Model scene = scene_of(random_soup(1000, 4, 0.1f), "soup");
-    const WarpTree tree(build_bvh(scene.mesh));
+    const WarpTree tree(build_bvh(scene.mesh()));
     std::vector<Ray> some = make_mixed_rays(scene, 977, 8);
     for (std::size_t i = 0; i < some.size(); i += 3) some[i].tmax = 0.0f;  // very short lives
     const PreparedRays rays(some);

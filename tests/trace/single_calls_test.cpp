@@ -27,7 +27,7 @@ struct View {
 View atrium_view(std::uint32_t size) {
     View view;
     const Model scene = load_model("builtin:atrium?triangles=20000", 4);
-    view.bvh = build_bvh(scene.mesh, {.builder = Builder::ploc});
+    view.bvh = build_bvh(scene.mesh(), {.builder = Builder::ploc});
     view.rays = make_primary_rays(scene.cameras.cameras.at(0), size, size);
     view.hits = trace(view.bvh, view.rays);
     return view;

@@ -37,7 +37,7 @@ std::vector<SimulateOptions> every_run(bool any_hit) {
 
 void expect_hits_of_the_reference(const Model& scene, std::size_t count, int max_leaf) {
     const std::vector<Ray> rays = make_mixed_rays(scene, count, 7);
-    const Bvh bvh = build_bvh(scene.mesh, {.builder = Builder::ploc, .max_leaf = max_leaf});
+    const Bvh bvh = build_bvh(scene.mesh(), {.builder = Builder::ploc, .max_leaf = max_leaf});
     const WarpTree tree(bvh);
     for (const bool any_hit : {false, true}) {
         std::vector<TreeHit> expected(rays.size());

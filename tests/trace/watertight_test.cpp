@@ -75,7 +75,7 @@ bool is_inside(const Bvh& bvh, Vec3 p) {
 /// have room for that.
 const Solid& large_figure() {
     static const Solid solid = [] {
-        Solid s{load_model("builtin:figure?triangles=20000").mesh, {}};
+        Solid s{load_model("builtin:figure?triangles=20000").mesh(), {}};
         for (Vec3& v : s.mesh.vertices) v = 1000.0f * v;
         const Bvh bvh = build_bvh(s.mesh);
         const Aabb box = bvh.bounds();

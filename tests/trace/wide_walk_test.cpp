@@ -40,7 +40,7 @@ Hit closest(const Bvh& bvh, const WideTree& tree, const Ray& given, WideStack& s
 }
 
 void expect_like_scalar(const Model& scene, const BuildOptions& options) {
-    const Bvh bvh = build_bvh(scene.mesh, options);
+    const Bvh bvh = build_bvh(scene.mesh(), options);
     const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
     std::vector<Hit> wanted(rays.size());
     const TraceCounts scalar = trace(bvh, rays, wanted, {.counters = true});

@@ -62,9 +62,9 @@ TEST_P(Clusters, GivesTheTreeOfTheDefinition) {
 
 TEST_P(Clusters, TreeDoesNotDependOnThreads) {
     for (const Model& scene : builtin_triangle_scenes(thorough * 2000)) {
-        const std::string one = tree_hash(build_bvh(scene.mesh, options(4, 1)));
+        const std::string one = tree_hash(build_bvh(scene.mesh(), options(4, 1)));
         for (const int threads : {2, 7})
-            EXPECT_EQ(tree_hash(build_bvh(scene.mesh, options(4, threads))), one)
+            EXPECT_EQ(tree_hash(build_bvh(scene.mesh(), options(4, threads))), one)
                 << scene.name << ", " << threads << " threads";
     }
 }
@@ -84,12 +84,12 @@ TEST_P(Clusters, RebuildingIntoKeptMemoryGivesTheSameTree) {
 TEST_P(Clusters, HitsAreThoseOfBruteForce) {
     constexpr std::uint64_t seed = 7;
     for (const Model& scene : builtin_triangle_scenes(2000)) {
-        const Bvh tree = build_bvh(scene.mesh, options());
-        const CheckReport valid = check(tree, scene.mesh);
+        const Bvh tree = build_bvh(scene.mesh(), options());
+        const CheckReport valid = check(tree, scene.mesh());
         ASSERT_TRUE(valid.ok) << scene.name << ": " << valid.broken;
         const std::vector<Ray> rays = make_mixed_rays(scene, 100 * thorough, seed);
         const std::vector<Hit> hits = trace(tree, rays);
-        const std::vector<Hit> expected = trace_brute_force(scene.mesh, rays);
+        const std::vector<Hit> expected = trace_brute_force(scene.mesh(), rays);
         for (std::size_t i = 0; i < rays.size(); ++i)
             ASSERT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(Hit)), 0)
                 << scene.name << ", ray " << i << ", seed " << seed;
@@ -99,7 +99,7 @@ TEST_P(Clusters, HitsAreThoseOfBruteForce) {
 TEST_P(Clusters, SahIsBetterThanThatOfTheRadixTree) {
     for (const Model& scene : builtin_triangle_scenes(thorough * 2000)) {
         const auto sah = [&](Builder builder) {
-            return *tree_stats(build_bvh(scene.mesh, options_of(builder))).sah;
+            return *tree_stats(build_bvh(scene.mesh(), options_of(builder))).sah;
         };
         EXPECT_LT(sah(GetParam()), sah(Builder::karras)) << scene.name;
     }
@@ -160,16 +160,17 @@ TEST_P(Clusters, DeepTreesAreTracedSavedAndLoaded) {
         mesh.triangles.push_back({first, first + 1, first + 2});
     }
     const Model scene = scene_of(std::move(mesh), "chain");
-    const Bvh tree = build_bvh(scene.mesh, options(1));
+    const Bvh tree = build_bvh(scene.mesh(), options(1));
     // From the top down, such boxes are divided evenly.
     const std::uint32_t least_depth = GetParam() == Builder::ploc    ? 96
                                       : GetParam() == Builder::hploc ? 32
                                                                      : 1;
     EXPECT_GT(tree.max_depth(), least_depth);
-    const CheckReport valid = check(tree, scene.mesh);
+    const CheckReport valid = check(tree, scene.mesh());
     ASSERT_TRUE(valid.ok) << valid.broken;
     const std::vector<Ray> rays = make_mixed_rays(scene, 2000, 3);
-    const std::vector<Hit> hits = trace(tree, rays), expected = trace_brute_force(scene.mesh, rays);
+    const std::vector<Hit> hits = trace(tree, rays),
+                           expected = trace_brute_force(scene.mesh(), rays);
     ASSERT_EQ(std::memcmp(hits.data(), expected.data(), hits.size() * sizeof(Hit)), 0);
 
     const TempFolder folder;

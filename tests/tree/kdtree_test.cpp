@@ -69,7 +69,7 @@ TEST(KdTree, TrianglesLikeTheReference) {
     bad.vertices[600] = {-0.0f, 0.25f, -0.0f};
     compare_all("soup with invalid ones", bad);
     for (const Model& scene : builtin_triangle_scenes(500 * thorough))
-        compare_all(scene.name, scene.mesh);
+        compare_all(scene.name, scene.mesh());
 }
 
 TEST(KdTree, SharedBunnyLikeTheReference) {

@@ -167,7 +167,7 @@ TEST(Sweep, GivesTheTreeOfTheDefinition) {
 TEST(Sweep, IsNoWorseThanBinned) {
     for (const Model& scene : builtin_triangle_scenes(thorough * 2000)) {
         const auto sah = [&](Builder builder) {
-            return *tree_stats(build_bvh(scene.mesh, options_of(builder))).sah;
+            return *tree_stats(build_bvh(scene.mesh(), options_of(builder))).sah;
         };
         EXPECT_LE(sah(Builder::sweep), 1.005 * sah(Builder::binned)) << scene.name;
     }
@@ -198,9 +198,9 @@ TEST_P(SahTrees, DoNotDependOnThreads) {
     std::vector<Model> scenes = builtin_triangle_scenes(thorough * 1000);
     scenes.push_back(sticks(thorough * 1000));
     for (const Model& scene : scenes) {
-        const std::string one = tree_hash(build_bvh(scene.mesh, options(4, 1)));
+        const std::string one = tree_hash(build_bvh(scene.mesh(), options(4, 1)));
         for (const int threads : {2, 7})
-            EXPECT_EQ(tree_hash(build_bvh(scene.mesh, options(4, threads))), one)
+            EXPECT_EQ(tree_hash(build_bvh(scene.mesh(), options(4, threads))), one)
                 << scene.name << ", " << threads << " threads";
     }
 }
@@ -209,7 +209,7 @@ TEST_P(SahTrees, RebuildingIntoKeptMemoryGivesTheSameTree) {
     BvhBuilder builder;
     Bvh tree;
     for (const std::size_t n : {3000, 40, 4, 20'000, 8}) {
-        const Mesh mesh = sticks(n).mesh;
+        const Mesh mesh = sticks(n).mesh();
         builder.build(mesh, options(), tree);
         const CheckReport same = check_same(tree, build_bvh(mesh, options()));
         EXPECT_TRUE(same.ok) << n << " triangles: " << same.broken;
@@ -220,14 +220,14 @@ TEST_P(SahTrees, HitsAreThoseOfBruteForce) {
     std::vector<Model> scenes = builtin_triangle_scenes(2000);
     scenes.push_back(sticks(2000));
     scenes.push_back(scene_of(lattice_mesh(500, 6, seed), "lattice"));
-    scenes.push_back(scene_of(moved(sticks(500).mesh, {1e5f, -1e5f, 3e4f}), "far"));
+    scenes.push_back(scene_of(moved(sticks(500).mesh(), {1e5f, -1e5f, 3e4f}), "far"));
     for (const Model& scene : scenes) {
-        const Bvh tree = build_bvh(scene.mesh, options());
-        const CheckReport valid = check(tree, scene.mesh);
+        const Bvh tree = build_bvh(scene.mesh(), options());
+        const CheckReport valid = check(tree, scene.mesh());
         ASSERT_TRUE(valid.ok) << scene.name << ": " << valid.broken;
         const std::vector<Ray> rays = make_mixed_rays(scene, 100 * thorough, seed);
         const std::vector<Hit> hits = trace(tree, rays);
-        const std::vector<Hit> expected = trace_brute_force(scene.mesh, rays);
+        const std::vector<Hit> expected = trace_brute_force(scene.mesh(), rays);
         std::vector<std::uint8_t> occluded(rays.size());
         trace_any(tree, rays, occluded);
         for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -236,7 +236,8 @@ TEST_P(SahTrees, HitsAreThoseOfBruteForce) {
             ASSERT_EQ(occluded[i] != 0, expected[i].hit()) << scene.name << ", ray " << i;
         }
         // A triangle that a ray meets in several leaves is one hit.
-        const AllHits all = trace_all(tree, rays), wanted = trace_all(build_bvh(scene.mesh), rays);
+        const AllHits all = trace_all(tree, rays),
+                      wanted = trace_all(build_bvh(scene.mesh()), rays);
         EXPECT_EQ(all.offsets, wanted.offsets) << scene.name;
         ASSERT_EQ(all.hits.size(), wanted.hits.size());
         EXPECT_EQ(std::memcmp(all.hits.data(), wanted.hits.data(), all.hits.size() * sizeof(Hit)),
@@ -247,7 +248,7 @@ TEST_P(SahTrees, HitsAreThoseOfBruteForce) {
 }
 
 TEST_P(SahTrees, NoRayLeavesAClosedSurface) {
-    Mesh mesh = load_model("builtin:figure?triangles=20000").mesh;
+    Mesh mesh = load_model("builtin:figure?triangles=20000").mesh();
     const Aabb box = build_bvh(mesh).bounds();
     const Vec3 center = 0.5f * (box.lo + box.hi);
     // Stretched, so that its triangles are long and lie across.
@@ -272,7 +273,7 @@ TEST_P(SahTrees, NoRayLeavesAClosedSurface) {
 
 TEST_P(SahTrees, EachPointOfATriangleIsInALeafThatHoldsIt) {
     const Model scene = sticks(2000);
-    const Bvh tree = build_bvh(scene.mesh, options());
+    const Bvh tree = build_bvh(scene.mesh(), options());
     std::map<std::uint32_t, std::vector<Aabb>> boxes;
     for (const BvhNode& node : tree.nodes())
         for (std::uint32_t k = 0; k < node.count; ++k)
@@ -281,12 +282,14 @@ TEST_P(SahTrees, EachPointOfATriangleIsInALeafThatHoldsIt) {
     const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
     std::size_t outside = 0;
     for (int i = 0; i < 100'000; ++i) {
-        const auto id = static_cast<std::uint32_t>(random() % scene.mesh.triangles.size());
-        const Triangle& t = scene.mesh.triangles[id];
+        const auto id = static_cast<std::uint32_t>(random() % scene.mesh().triangles.size());
+        const Triangle& t = scene.mesh().triangles[id];
         double u = unit(), v = unit();
         if (u + v > 1) u = 1 - u, v = 1 - v;
         const auto at = [&](std::size_t k) {
-            const auto c = [&](std::size_t j) { return double((&scene.mesh.vertices[t[j]].x)[k]); };
+            const auto c = [&](std::size_t j) {
+                return double((&scene.mesh().vertices[t[j]].x)[k]);
+            };
             return (1 - u - v) * c(0) + u * c(1) + v * c(2);
         };
         outside += std::ranges::none_of(boxes[id], [&](const Aabb& b) {
@@ -300,10 +303,10 @@ TEST_P(SahTrees, EachPointOfATriangleIsInALeafThatHoldsIt) {
 
 TEST_P(SahTrees, AreSavedAndLoaded) {
     const Model scene = sticks(500);
-    const Bvh tree = build_bvh(scene.mesh, options());
+    const Bvh tree = build_bvh(scene.mesh(), options());
     EXPECT_EQ(tree.has_split_primitives(), GetParam() != Builder::sweep);
     EXPECT_EQ(tree_stats(tree).references, tree.order().size());
-    EXPECT_LE(tree.order().size(), 2 * scene.mesh.triangles.size());
+    EXPECT_LE(tree.order().size(), 2 * scene.mesh().triangles.size());
     EXPECT_GT(tree.peak_bytes(), tree.bytes());
     const TempFolder folder;
     save_rdx(folder.path() / "sticks.rdx", tree, scene);
@@ -355,7 +358,7 @@ INSTANTIATE_TEST_SUITE_P(Builders, SahTrees,
 TEST(SplitTrees, AreBetterThanSweepOverSticks) {
     const Model scene = sticks(20'000);
     const auto sah = [&](Builder builder) {
-        return *tree_stats(build_bvh(scene.mesh, options_of(builder))).sah;
+        return *tree_stats(build_bvh(scene.mesh(), options_of(builder))).sah;
     };
     const double sweep = sah(Builder::sweep);
     EXPECT_LT(sah(Builder::split), 0.9 * sweep);
@@ -365,7 +368,7 @@ TEST(SplitTrees, AreBetterThanSweepOverSticks) {
 TEST(SplitTrees, CheckFindsWhatIsWrong) {
     const Model scene = sticks(500);
     const auto broken = [&](const auto& damage) {
-        Bvh tree = build_bvh(scene.mesh, options_of(Builder::sbvh));
+        Bvh tree = build_bvh(scene.mesh(), options_of(Builder::sbvh));
         damage(BvhAccess{tree});
         return check(tree).broken;
     };

@@ -9,7 +9,7 @@
 namespace raydix {
 
 /// One mesh or several, which follow each other by id.
-struct MeshNames {
+struct GroupedMeshes {
     std::vector<std::uint32_t> ids;  // [meshes] ascending
     std::vector<std::uint32_t>
         first;  // [meshes]: the first triangle of each in the tree's counting

@@ -1,4 +1,4 @@
-// File name -> reader by extension -> mesh.
+// File name -> reader by extension -> model.
 #include <raydix/error.h>
 #include <raydix/model.h>
 
@@ -6,6 +6,7 @@
 #include <cctype>
 #include <new>
 #include <stdexcept>
+#include <utility>
 
 #include "base/float_env.h"
 #include "scene/formats.h"
@@ -19,20 +20,26 @@ std::string lower(std::string text) {
     return text;
 }
 
-Mesh load_gltf_file(ByteSource& in, const std::filesystem::path& file) {
+Model load_gltf_file(ByteSource& in, const std::filesystem::path& file) {
     return load_gltf(in, [folder = file.parent_path()](const std::filesystem::path& relative) {
         return ByteSource::from_file(folder / relative, Packing::none);
     });
 }
 
-Mesh load_by_extension(ByteSource& in, const std::filesystem::path& file,
-                       const std::string& extension) {
-    if (extension == ".ply") return load_ply(in);
-    if (extension == ".obj") return load_obj(in);
-    if (extension == ".stl") return load_stl(in);
-    if (extension == ".off") return load_off(in);
-    if (extension == ".xyz") return load_xyz(in);
-    if (extension == ".npy") return load_npy_points(in);
+Model model_of(Mesh mesh) {
+    Model model;
+    model.meshes.push_back(std::move(mesh));
+    return model;
+}
+
+Model load_by_extension(ByteSource& in, const std::filesystem::path& file,
+                        const std::string& extension) {
+    if (extension == ".ply") return model_of(load_ply(in));
+    if (extension == ".obj") return model_of(load_obj(in));
+    if (extension == ".stl") return model_of(load_stl(in));
+    if (extension == ".off") return model_of(load_off(in));
+    if (extension == ".xyz") return model_of(load_xyz(in));
+    if (extension == ".npy") return model_of(load_npy_points(in));
     if (extension == ".gltf" || extension == ".glb") return load_gltf_file(in, file);
     in.fail(
         "file name",
@@ -41,21 +48,28 @@ Mesh load_by_extension(ByteSource& in, const std::filesystem::path& file,
 
 }  // namespace
 
-Mesh load_mesh(const std::filesystem::path& file) {
+Model load_file(const std::filesystem::path& file) {
     const FloatEnvironment exact;
     const Packing packing = packing_of(file);
     const std::filesystem::path plain = packing == Packing::none ? file : file.stem();
     ByteSource in = ByteSource::from_file(file, packing);
     try {
-        Mesh mesh = load_by_extension(in, file, lower(plain.extension().string()));
+        Model model = load_by_extension(in, file, lower(plain.extension().string()));
         in.finish();
-        mesh.name = printable(file.filename());
-        return mesh;
+        model.name = printable(file.filename());
+        for (Mesh& mesh : model.meshes) mesh.name = model.name;
+        return model;
     } catch (const std::bad_alloc&) {
         in.fail("mesh", "needs more memory than there is");
     } catch (const std::length_error&) {
         in.fail("mesh", "needs more memory than there is");
     }
+}
+
+Mesh load_mesh(const std::filesystem::path& file) {
+    Model model = load_file(file);
+    model.flatten();
+    return std::move(model).mesh();
 }
 
 }  // namespace raydix

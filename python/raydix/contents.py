@@ -1,0 +1,264 @@
+"""What a Scene holds: meshes and instances of other scenes, their changes and commits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._arrays import (
+    ALL,
+    FLOAT32,
+    MISSING,
+    UINT32,
+    cast,
+    describe,
+    mesh_faces,
+    mesh_vertices,
+    number,
+    require_float32,
+    thread_count,
+    to_numpy,
+    uint32s,
+    whole,
+)
+
+QUALITIES = {"fast": ("apetrei", 0), "balanced": ("ploc", 2), "high": ("sbvh", 4)}
+"""Which builder and how many rounds of reinsertion each quality stands for."""
+USAGES = ("fixed", "moving")
+
+
+def one_of(value: Any, name: str, known: Any) -> str:
+    if value not in known:
+        raise ValueError(f"{name}: expected one of {', '.join(map(str, known))}, given {value!r}")
+    return value
+
+
+def mesh_of(source: Any) -> tuple[Any, Any]:
+    """Vertices and faces of another library's mesh."""
+    if hasattr(source, "vertices") and hasattr(source, "faces"):
+        return source.vertices, source.faces
+    raise TypeError(
+        "vertices: expected a path, a mesh with .vertices and .faces, "
+        "or an array together with faces, "
+        f"given {type(source).__name__} alone"
+    )
+
+
+def _transforms(value: Any) -> tuple[np.ndarray, bool]:
+    """(M, 12) float32, and whether there was one alone."""
+    array = to_numpy(value, "transform")
+    expected = "transform: expected shape (3, 4), (4, 4), (M, 3, 4) or (M, 4, 4)"
+    if array.dtype.kind not in "iuf":
+        raise TypeError(f"{expected} float32 or float64, given {describe(array)}")
+    if array.ndim not in (2, 3) or array.shape[-2:] not in ((3, 4), (4, 4)):
+        raise ValueError(f"{expected}, given {describe(array)}")
+    if array.shape[-2] == 4 and not (array[..., 3, :] == (0, 0, 0, 1)).all():
+        raise ValueError("transform: expected affine ones, with (0, 0, 0, 1) in the last row")
+    return cast(array[..., :3, :], FLOAT32).reshape(-1, 12), array.ndim == 2
+
+
+def _one_or_many(value: Any, name: str) -> np.ndarray:
+    """A whole number, or several: (n,) uint32."""
+    if np.ndim(value) == 0:
+        return np.array([whole(value, name, 0, ALL)], UINT32)
+    array = uint32s(value, name)
+    if array.ndim != 1:
+        raise ValueError(f"{name}: expected a whole number or shape (M,), given {describe(array)}")
+    return array
+
+
+class SceneContents:
+    """What a Scene holds."""
+
+    _core: Any
+    dtype: np.dtype
+
+    def _forget(self) -> None: ...
+
+    @overload
+    def add(
+        self, vertices: ArrayLike, faces: ArrayLike, /, *, mask: int = ALL, id: int | None = None
+    ) -> int: ...
+    @overload
+    def add(
+        self,
+        scene: SceneContents,
+        transform: ArrayLike,
+        /,
+        *,
+        mask: ArrayLike = ALL,
+        id: int | None = None,
+    ) -> int | np.ndarray: ...
+    @overload
+    def add(self, source: Any, /, *, mask: int = ALL, id: int | None = None) -> int: ...
+    def add(
+        self, source: Any, where: Any = None, /, *, mask: Any = ALL, id: int | None = None
+    ) -> Any:
+        """Adds a geometry: `add(vertices, faces)` a mesh, `add(scene, transform)` an instance of
+        another scene. Rays meet it after the next `commit`.
+
+        A mesh is given as for `Scene`, as arrays or as an object with `vertices` and `faces`, and
+        copied. An instance shows the other scene as its last commit left it when this scene is
+        committed.
+
+        Parameters
+        ----------
+        transform :
+            Shape (3, 4) or (4, 4), affine, from the other scene's space to this one's; rounded to
+            float32. It may mirror and shear, but not flatten. Shape (M, 3, 4) or (M, 4, 4) places
+            the scene M times.
+        mask :
+            32 bits. A ray sees the geometry if mask & its own mask is not 0. For M transforms also
+            shape (M,).
+        id :
+            The geometry's number; None: the next one. Ids count from 0, and none is given twice.
+
+        Returns
+        -------
+        The id; for M transforms M ids, shape (M,) uint32.
+
+        Raises InputError: an index past the vertices, an id that was used before, a transform that
+        is singular or not finite, a scene that would hold itself. Of M transforms, all are added or
+        none.
+        """
+        require_float32(self, "add")
+        wanted = None if id is None else whole(id, "id", 0, ALL)
+        if not isinstance(source, SceneContents):
+            vertices, faces = (source, where) if where is not None else mesh_of(source)
+            corners = mesh_vertices(vertices)
+            triangles = mesh_faces(faces, len(corners))
+            return self._core.add_mesh(corners, triangles, whole(mask, "mask", 0, ALL), wanted)
+        require_float32(source, "add")
+        if where is None:
+            raise TypeError("transform: expected shape (3, 4) or (4, 4), given None")
+        rows, one = _transforms(where)
+        if wanted is not None and not one:
+            raise ValueError(f"id: expected None for {len(rows)} transforms, given {id!r}")
+        masks = _one_or_many(mask, "mask")
+        if len(masks) != 1 and (one or len(masks) != len(rows)):
+            raise ValueError(f"mask: expected one or {len(rows)}, given {len(masks)}")
+        ids = self._core.add_instances(source._core, rows, masks, wanted)
+        return ids[0] if one else np.array(ids, UINT32)
+
+    def update(self, id: int, vertices: ArrayLike, faces: ArrayLike | None = None) -> None:
+        """Gives a mesh other vertices, shape (V, 3), and other `faces`, or those that it has. Rays
+        meet them after the next `commit`. The arrays are copied.
+
+        InputError: no such geometry, an instance, an index past the vertices.
+        """
+        require_float32(self, "update")
+        corners = mesh_vertices(vertices)
+        triangles = None if faces is None else mesh_faces(faces, len(corners))
+        self._core.update(whole(id, "id", 0, ALL), corners, triangles)
+
+    def remove(self, id: int) -> None:
+        """Takes a geometry out, from the next `commit` on. Its id is not given again."""
+        require_float32(self, "remove")
+        self._core.remove(whole(id, "id", 0, ALL))
+
+    def set_transform(self, id: ArrayLike, transform: ArrayLike) -> None:
+        """Moves an instance, from the next `commit` on: `transform` as in `add`. Or several: ids of
+        shape (M,), transforms of shape (M, 3, 4) or (M, 4, 4).
+
+        InputError: no such geometry, a mesh, a transform that is singular or not finite; then none
+        of them has moved.
+        """
+        require_float32(self, "set_transform")
+        rows, _ = _transforms(transform)
+        ids = _one_or_many(id, "id")
+        if len(ids) != len(rows):
+            raise ValueError(f"transform: expected {len(ids)}, one for each id, given {len(rows)}")
+        self._core.set_transforms(ids, rows)
+
+    def set_mask(self, id: ArrayLike, mask: ArrayLike) -> None:
+        """Gives a geometry another mask, from the next `commit` on. Or several: ids of shape (M,),
+        one mask for all or shape (M,)."""
+        require_float32(self, "set_mask")
+        ids, masks = _one_or_many(id, "id"), _one_or_many(mask, "mask")
+        if len(masks) not in (1, len(ids)):
+            raise ValueError(f"mask: expected one or {len(ids)}, given {len(masks)}")
+        self._core.set_masks(ids, masks)
+
+    def commit(
+        self,
+        *,
+        quality: str | None = None,
+        usage: str | None = None,
+        compact: bool | None = None,
+        refit_limit: float | None = None,
+        threads: int | None = None,
+    ) -> dict[str, Any]:
+        """Takes all changes in: from now on, queries see them. Waits for queries of other threads.
+
+        Each option that is None is as in the commit before, and for the first as `Scene` was given.
+
+        Parameters
+        ----------
+        quality :
+            "fast", "balanced" or "high": of the trees that rays go through.
+        usage :
+            "fixed": meshes share trees, and a change of one builds its tree again. "moving": a tree
+            for each mesh; only those of meshes that changed are built or refitted.
+        compact :
+            The small layout of trees: half the bytes or less, for somewhat slower rays.
+        refit_limit :
+            With "moving": a mesh whose vertices moved keeps its tree, with boxes fitted again,
+            while the tree's SAH (surface area heuristic) is at most so many times that at its
+            build; 1.5 at first. Below 1, trees are always built again. So are compact trees and
+            those of quality "high" with parts of triangles.
+        threads :
+            As in `Scene`. Hits do not depend on it.
+
+        Returns
+        -------
+        dict: "ms"; "meshes", "instances" and "triangles" of the scene itself; "trees_built",
+        "trees_refitted"; "sah_ratio", the largest SAH after a refit over that at the build;
+        "bytes" that rays read of the scene itself; "paths", instances counted on every way to them.
+
+        InputError, the last commit still stands: an instance of a scene that was never committed, a
+        scene that reaches beyond 1e12, more than 32 levels of instances or 2**32 - 2 paths.
+        """
+        require_float32(self, "commit")
+        report = self._core.commit(
+            quality if quality is None else one_of(quality, "quality", QUALITIES),
+            usage if usage is None else one_of(usage, "usage", USAGES),
+            None if compact is None else bool(compact),
+            None if refit_limit is None else number(refit_limit, "refit_limit"),
+            None if threads is None else thread_count(threads),
+        )
+        self._forget()
+        return report
+
+    @property
+    def committed(self) -> bool:
+        """Whether nothing has changed since the last commit."""
+        return self.dtype != FLOAT32 or self._core.committed()
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Of the last commit: the corners of a box around all triangles, shape (2, 3) in `dtype`;
+        the first is above the second where there are none. It is the smallest one around meshes;
+        around instances it is that of their scenes' moved boxes."""
+        return np.array(self._core.bounds(), self.dtype)
+
+    def path(self, number: int) -> list[int]:
+        """Where a hit is: the ids of the instances that lead to it, the outermost first. `number`:
+        its "instance". Empty for 0, a geometry of the scene itself. InputError if the last commit
+        has no such path."""
+        require_float32(self, "path")
+        return self._core.path(whole(number, "number", 0, MISSING))
+
+    def __len__(self) -> int:
+        """How many geometries there are, changes without a commit included."""
+        return len(self._core)
+
+    def __iter__(self) -> Iterator[int]:
+        """The ids of the geometries, ascending."""
+        return iter(self._core.ids())
+
+    def __contains__(self, id: Any) -> bool:
+        """Whether there is a geometry with this id."""
+        return isinstance(id, (int, np.integer)) and 0 <= id <= ALL and int(id) in self._core

@@ -1,0 +1,47 @@
+// Locks on what many threads ask and one changes.
+#pragma once
+
+#include <mutex>
+#include <shared_mutex>
+#include <utility>
+
+namespace raydix::python {
+
+/// A lock on a scene that is read, and the knowledge that this thread has one: Python may run a
+/// signal handler between two pieces of a batch, which may ask a scene again.
+class Reading {
+public:
+    Reading() = default;
+    explicit Reading(std::shared_mutex& use) : lock_(use) { ++held_; }
+    Reading(Reading&& other) noexcept : lock_(std::move(other.lock_)) {}
+    Reading& operator=(Reading&& other) noexcept {
+        Reading moved(std::move(other));
+        lock_.swap(moved.lock_);
+        return *this;
+    }
+    ~Reading() {
+        if (lock_.owns_lock()) --held_;
+    }
+
+    [[nodiscard]] bool owns_lock() const { return lock_.owns_lock(); }
+    /// How many this thread has.
+    [[nodiscard]] static int held() { return held_; }
+
+private:
+    std::shared_lock<std::shared_mutex> lock_;
+    static inline thread_local int held_ = 0;
+};
+
+/// The lock of the one thread that changes a scene.
+class Writing {
+public:
+    /// Throws InputError, which names the call, in a signal handler within a query, whose end it
+    /// would wait for.
+    Writing(const char* call, std::mutex& queue, std::shared_mutex& use);
+
+private:
+    std::unique_lock<std::mutex> queue_;
+    std::unique_lock<std::shared_mutex> use_;
+};
+
+}  // namespace raydix::python

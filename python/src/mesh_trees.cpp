@@ -1,0 +1,165 @@
+// A mesh -> what answers closest points, inside tests, overlaps: when it is needed.
+#include <raydix/error.h>
+
+#include <string>
+#include <utility>
+
+#include "batch.h"
+#include "scene_trees.h"
+
+namespace raydix::python {
+
+namespace {
+
+std::mutex& unless_reading(const char* call, std::mutex& queue) {
+    if (Reading::held() != 0)
+        throw InputError(std::string(call) +
+                         ": this thread is within a query of a scene, in a signal handler");
+    return queue;
+}
+
+}  // namespace
+
+Writing::Writing(const char* call, std::mutex& queue, std::shared_mutex& use)
+    : queue_(unless_reading(call, queue)), use_(use) {}
+
+template <class Names>
+Reading MeshTrees<Names>::read() const {
+    // Who reads already must not queue up behind a change that waits for the end of that.
+    if (Reading::held() != 0) return Reading(use_);
+    const std::lock_guard queue(queue_);
+    return Reading(use_);
+}
+
+template <class Names>
+const MeshArrays<Names>& MeshTrees<Names>::mesh(const char* call) const {
+    if (!why_no_mesh_.empty()) throw InputError(std::string(call) + ": " + why_no_mesh_);
+    return mesh_;
+}
+
+template <class Names>
+const typename Names::Bvh& MeshTrees<Names>::bvh_locked() {
+    if (!bvh_) {
+        BuildOptions options = options_;
+        options.threads = threads_for(options.threads);
+        bvh_ = build_bvh(mesh_.view(), options);
+    }
+    return *bvh_;
+}
+
+template <class Names>
+const typename Names::Bvh& MeshTrees<Names>::bvh(const char* call) {
+    static_cast<void>(mesh(call));
+    const std::lock_guard lock(build_);
+    return bvh_locked();
+}
+
+template <class Names>
+const typename Names::Solid& MeshTrees<Names>::solid(InsideRule rule, const char* call) {
+    static_cast<void>(mesh(call));
+    const std::lock_guard lock(build_);
+    std::optional<typename Types::Solid>& kept = solids_[static_cast<std::size_t>(rule)];
+    if (!kept)
+        kept.emplace(bvh_locked(),
+                     SolidOptions{.rule = rule, .threads = threads_for(options_.threads)});
+    return *kept;
+}
+
+template <class Names>
+void MeshTrees<Names>::set_mesh(Arrays mesh) {
+    drop_trees();
+    mesh_ = std::move(mesh);
+}
+
+template <class Names>
+void MeshTrees<Names>::move_mesh(Arrays mesh) {
+    mesh_ = std::move(mesh);
+    for (auto& solid : solids_) solid.reset();
+}
+
+template <class Names>
+void MeshTrees<Names>::drop_trees() {
+    for (auto& solid : solids_) solid.reset();
+    bvh_.reset();
+}
+
+template class MeshTrees<InFloat>;
+template class MeshTrees<InDouble>;
+
+SceneTreesD::SceneTreesD(Arrays mesh, const BuildOptions& options) : MeshTrees(options) {
+    const auto& triangles = *mesh.triangles;
+    for (std::size_t i = 0; i < triangles.size(); ++i)
+        for (const std::uint32_t corner : triangles[i])
+            if (corner >= mesh.vertices->size())
+                throw InputError("triangle " + std::to_string(i) + " refers to vertex " +
+                                 std::to_string(corner) + ", but there are " +
+                                 std::to_string(mesh.vertices->size()));
+    set_mesh(std::move(mesh));
+}
+
+RefitQuality SceneTreesD::refit(std::vector<Vec3d> vertices, int threads) {
+    const Writing lock("refit", queue_, use_);
+    const Arrays moved{std::make_shared<const Arrays::Vertices>(std::move(vertices)),
+                       mesh("refit").triangles};
+    if (moved.triangles->empty()) {
+        set_mesh(moved);
+        return {};
+    }
+    const bool had_nodes = !bvh_locked().empty();
+    RefitQuality quality;
+    try {
+        quality = raydix::refit(*bvh_, moved.view(), threads_for(threads));
+    } catch (const InputError&) {
+        // Found late, the tree is gone: the mesh is still there, and makes it again.
+        if (had_nodes && bvh_->empty()) {
+            drop_trees();
+            sah_at_build_.reset();
+        }
+        throw;
+    }
+    move_mesh(moved);
+    // Each refit tells of the tree before it; that before the first is the one that was built.
+    if (!sah_at_build_) sah_at_build_ = quality.sah_at_build;
+    quality.sah_at_build = *sah_at_build_;
+    quality.ratio = quality.sah > 0 && *sah_at_build_ > 0 ? quality.sah / *sah_at_build_ : 1.0;
+    return quality;
+}
+
+namespace {
+
+TraceOptions without_masks(const RayOptions& options) {
+    if (options.mask != 0xFFFFFFFFu || !options.masks.empty())
+        throw InputError("mask: not there for a mesh in double");
+    TraceOptions out;
+    out.threads = options.threads;
+    out.max_result_bytes = options.max_result_bytes;
+    return out;
+}
+
+}  // namespace
+
+TraceCounts SceneTreesD::trace(std::span<const RayD> rays, std::span<HitD> hits,
+                               const RayOptions& options) {
+    return raydix::trace(bvh("intersect"), rays, hits, without_masks(options));
+}
+
+TraceCounts SceneTreesD::trace_any(std::span<const RayD> rays, std::span<std::uint8_t> occluded,
+                                   const RayOptions& options) {
+    return raydix::trace_any(bvh("occluded"), rays, occluded, without_masks(options));
+}
+
+AllHitsD SceneTreesD::trace_all(std::span<const RayD> rays, const RayOptions& options) {
+    return raydix::trace_all(bvh("all_hits"), rays, without_masks(options));
+}
+
+HitD SceneTreesD::closest_hit(const RayD& ray, std::uint32_t mask) {
+    static_cast<void>(without_masks({.mask = mask}));
+    return raydix::closest_hit(bvh("intersect"), ray);
+}
+
+bool SceneTreesD::any_hit(const RayD& ray, std::uint32_t mask) {
+    static_cast<void>(without_masks({.mask = mask}));
+    return raydix::any_hit(bvh("occluded"), ray);
+}
+
+}  // namespace raydix::python

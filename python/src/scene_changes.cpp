@@ -1,0 +1,304 @@
+// Scenes made, changed and committed.
+#include "scene_changes.h"
+
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+#include <raydix/camera.h>
+#include <raydix/error.h>
+#include <raydix/model.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arrays.h"
+#include "batch.h"
+#include "figures.h"
+
+namespace raydix::python {
+namespace {
+
+using Ids = In<std::uint32_t, nb::ndim<1>>;
+using TransformRows = In<float, nb::shape<-1, 12>>;
+static_assert(sizeof(Transform) == 12 * sizeof(float));
+template <class Scene>
+using PointRows = In<typename Scene::Types::Scalar, nb::shape<-1, 3>>;
+
+BuildOptions build_options(const std::string& builder, int reinsertion_rounds, int bits,
+                           int max_leaf, bool strict, int threads) {
+    return {.builder = builder_from_name(builder),
+            .bits = bits,
+            .max_leaf = max_leaf,
+            .strict = strict,
+            .threads = threads,
+            .reinsertion_rounds = reinsertion_rounds};
+}
+
+template <class Value, std::size_t count>
+Value value_of(const char* what, const std::string& name,
+               const std::pair<const char*, Value> (&known)[count]) {
+    std::string all;
+    for (const auto& [known_name, value] : known) {
+        if (name == known_name) return value;
+        all += (all.empty() ? "" : ", ") + std::string(known_name);
+    }
+    throw InputError(std::string(what) + ": expected one of " + all + ", given \"" + name + "\"");
+}
+
+Quality quality_of(const std::string& name) {
+    return value_of<Quality>(
+        "quality", name,
+        {{"fast", Quality::fast}, {"balanced", Quality::balanced}, {"high", Quality::high}});
+}
+
+Usage usage_of(const std::string& name) {
+    return value_of<Usage>("usage", name, {{"fixed", Usage::fixed}, {"moving", Usage::moving}});
+}
+
+SceneOptions scene_options(const std::string& quality, const std::string& usage, bool compact,
+                           int threads) {
+    return {.quality = quality_of(quality),
+            .usage = usage_of(usage),
+            .compact = compact,
+            .threads = threads};
+}
+
+/// The caller's arrays, copied.
+template <class Names, class Points>
+MeshArrays<Names> copy_of(const Points& vertices, const FacesIn& faces) {
+    using Arrays = MeshArrays<Names>;
+    const auto corners = rows<typename Names::Point>(vertices);
+    const auto triangles = rows<Triangle>(faces);
+    return {std::make_shared<const typename Arrays::Vertices>(corners.begin(), corners.end()),
+            std::make_shared<const typename Arrays::Triangles>(triangles.begin(), triangles.end())};
+}
+
+template <class Scene, class... Options>
+void make_of_mesh(Scene* self, const PointRows<Scene>& vertices, const FacesIn& faces,
+                  const Options&... options) {
+    const nb::gil_scoped_release unlocked;
+    new (self) Scene(copy_of<typename Scene::Types>(vertices, faces), options...);
+}
+
+/// What a file holds, and what belongs to it.
+nb::tuple load(const std::string& spec, std::uint64_t seed, const std::string& builder,
+               int reinsertion_rounds, int bits, int max_leaf, bool strict, int threads,
+               const std::string& quality, const std::string& usage, bool compact) {
+    const BuildOptions trees =
+        build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads);
+    const SceneOptions commits = scene_options(quality, usage, compact, threads);
+    std::string name;
+    std::vector<Camera> shown;
+    std::shared_ptr<SceneTrees> scene;
+    {
+        const nb::gil_scoped_release unlocked;
+        Model model = load_model(spec, seed);
+        name = model.name;
+        shown = std::move(model.cameras.cameras);
+        scene = std::make_shared<SceneTrees>(std::move(model), trees, commits);
+    }
+    nb::list cameras;
+    for (const Camera& camera : shown) cameras.append(camera_figures(camera));
+    return nb::make_tuple(scene, name, cameras);
+}
+
+std::vector<std::uint32_t> add_instances(SceneTrees& self, std::shared_ptr<SceneTrees> scene,
+                                         const TransformRows& transforms, const Ids& masks,
+                                         std::optional<std::uint32_t> id) {
+    const auto places = rows<Transform>(transforms);
+    const nb::gil_scoped_release unlocked;
+    return self.add(std::move(scene), places, {masks.data(), masks.shape(0)}, id);
+}
+
+std::uint32_t add_mesh(SceneTrees& self, const PointRows<SceneTrees>& vertices,
+                       const FacesIn& faces, std::uint32_t mask, std::optional<std::uint32_t> id) {
+    const nb::gil_scoped_release unlocked;
+    return self.add(copy_of<InFloat>(vertices, faces), {mask, id});
+}
+
+void update(SceneTrees& self, std::uint32_t id, const PointRows<SceneTrees>& vertices,
+            const std::optional<FacesIn>& faces) {
+    const auto corners = rows<Vec3>(vertices);
+    const nb::gil_scoped_release unlocked;
+    std::optional<std::vector<Triangle>> triangles;
+    if (faces) {
+        const auto given = rows<Triangle>(*faces);
+        triangles.emplace(given.begin(), given.end());
+    }
+    self.update(id, {corners.begin(), corners.end()}, std::move(triangles));
+}
+
+void set_transforms(SceneTrees& self, const Ids& ids, const TransformRows& transforms) {
+    const auto places = rows<Transform>(transforms);
+    const nb::gil_scoped_release unlocked;
+    self.set_transforms({ids.data(), ids.shape(0)}, places);
+}
+
+void set_masks(SceneTrees& self, const Ids& ids, const Ids& masks) {
+    const nb::gil_scoped_release unlocked;
+    self.set_masks({ids.data(), ids.shape(0)}, {masks.data(), masks.shape(0)});
+}
+
+/// What is left out stays as in the last commit.
+nb::dict commit(SceneTrees& self, const std::optional<std::string>& quality,
+                const std::optional<std::string>& usage, std::optional<bool> compact,
+                std::optional<double> refit_limit, std::optional<int> threads) {
+    CommitReport report;
+    {
+        const nb::gil_scoped_release unlocked;
+        SceneOptions options = [&] {
+            const Reading lock = self.read();
+            return self.commit_options();
+        }();
+        if (quality) options.quality = quality_of(*quality);
+        if (usage) options.usage = usage_of(*usage);
+        options.compact = compact.value_or(options.compact);
+        options.refit_limit = refit_limit.value_or(options.refit_limit);
+        options.threads = threads.value_or(options.threads);
+        report = self.commit(options);
+    }
+    return commit_figures(report);
+}
+
+template <class Scene>
+nb::dict refit(Scene& scene, const PointRows<Scene>& vertices, int threads) {
+    const auto corners = rows<typename Scene::Types::Point>(vertices);
+    RefitQuality quality;
+    {
+        const nb::gil_scoped_release unlocked;
+        quality = scene.refit({corners.begin(), corners.end()}, threads);
+    }
+    nb::dict fields;
+    fields["sah"] = quality.sah;
+    fields["sah_at_build"] = quality.sah_at_build;
+    fields["ratio"] = quality.ratio;
+    return fields;
+}
+
+/// call() without the interpreter's lock, while the scene stays as it is.
+template <class Scene, class Call>
+auto while_reading(Scene& scene, const Call& call) {
+    const nb::gil_scoped_release unlocked;
+    const Reading lock = scene.read();
+    return call();
+}
+
+/// What a scene of either type says of itself.
+template <class Scene>
+void bind_contents(nb::class_<Scene>& scene) {
+    scene.def("ids", [](Scene& self) { return while_reading(self, [&] { return self.ids(); }); })
+        .def("__len__",
+             [](Scene& self) { return while_reading(self, [&] { return self.ids().size(); }); })
+        .def("__contains__",
+             [](Scene& self, std::uint32_t id) {
+                 return while_reading(self, [&] { return self.contains(id); });
+             })
+        .def("is_mesh",
+             [](Scene& self) { return while_reading(self, [&] { return self.is_mesh(); }); });
+}
+
+void bind_commits(nb::class_<SceneTrees>& scene) {
+    scene
+        .def("mesh_id",
+             [](SceneTrees& self) { return while_reading(self, [&] { return self.mesh_id(); }); })
+        .def("committed",
+             [](SceneTrees& self) { return while_reading(self, [&] { return self.committed(); }); })
+        .def("bounds",
+             [](SceneTrees& self) {
+                 return corners(while_reading(self, [&] { return self.traced().bounds(); }));
+             })
+        .def(
+            "path",
+            [](SceneTrees& self, std::uint32_t number) {
+                return while_reading(self, [&] { return self.traced().path(number); });
+            },
+            nb::arg("number"));
+}
+
+}  // namespace
+
+void bind_changes(nb::class_<SceneTrees>& scene) {
+    scene.def(
+        "__init__",
+        [](SceneTrees* self, const std::string& builder, int reinsertion_rounds, int bits,
+           int max_leaf, bool strict, int threads, const std::string& quality,
+           const std::string& usage, bool compact) {
+            new (self) SceneTrees(
+                build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads),
+                scene_options(quality, usage, compact, threads));
+        },
+        nb::arg("builder"), nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
+        nb::arg("strict"), nb::arg("threads"), nb::arg("quality"), nb::arg("usage"),
+        nb::arg("compact"));
+    scene.def(
+        "__init__",
+        [](SceneTrees* self, const PointRows<SceneTrees>& vertices, const FacesIn& faces,
+           const std::string& builder, int reinsertion_rounds, int bits, int max_leaf, bool strict,
+           int threads, const std::string& quality, const std::string& usage, bool compact) {
+            make_of_mesh(
+                self, vertices, faces,
+                build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads),
+                scene_options(quality, usage, compact, threads));
+        },
+        nb::arg("vertices").noconvert(), nb::arg("faces").noconvert(), nb::arg("builder"),
+        nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"), nb::arg("strict"),
+        nb::arg("threads"), nb::arg("quality"), nb::arg("usage"), nb::arg("compact"));
+    scene
+        .def_static("load", &load, nb::arg("spec"), nb::arg("seed"), nb::arg("builder"),
+                    nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
+                    nb::arg("strict"), nb::arg("threads"), nb::arg("quality"), nb::arg("usage"),
+                    nb::arg("compact"), "The scene, its name, and its cameras' fields.")
+        .def("add_mesh", &add_mesh, nb::arg("vertices").noconvert(), nb::arg("faces").noconvert(),
+             nb::arg("mask"), nb::arg("id").none())
+        .def("add_instances", &add_instances, nb::arg("scene"), nb::arg("transforms").noconvert(),
+             nb::arg("masks").noconvert(), nb::arg("id").none())
+        .def(
+            "remove",
+            [](SceneTrees& self, std::uint32_t id) {
+                const nb::gil_scoped_release unlocked;
+                self.remove(id);
+            },
+            nb::arg("id"))
+        .def("update", &update, nb::arg("id"), nb::arg("vertices").noconvert(),
+             nb::arg("faces").noconvert().none())
+        .def("set_transforms", &set_transforms, nb::arg("ids").noconvert(),
+             nb::arg("transforms").noconvert())
+        .def("set_masks", &set_masks, nb::arg("ids").noconvert(), nb::arg("masks").noconvert())
+        .def("commit", &commit, nb::arg("quality").none(), nb::arg("usage").none(),
+             nb::arg("compact").none(), nb::arg("refit_limit").none(), nb::arg("threads").none())
+        .def("refit", &refit<SceneTrees>, nb::arg("vertices").noconvert(), nb::arg("threads") = 0);
+    bind_contents(scene);
+    bind_commits(scene);
+}
+
+void bind_changes(nb::class_<SceneTreesD>& scene) {
+    scene
+        .def(
+            "__init__",
+            [](SceneTreesD* self, const PointRows<SceneTreesD>& vertices, const FacesIn& faces,
+               const std::string& builder, int reinsertion_rounds, int bits, int max_leaf,
+               bool strict, int threads) {
+                make_of_mesh(
+                    self, vertices, faces,
+                    build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads));
+            },
+            nb::arg("vertices").noconvert(), nb::arg("faces").noconvert(), nb::arg("builder"),
+            nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"), nb::arg("strict"),
+            nb::arg("threads"))
+        .def("refit", &refit<SceneTreesD>, nb::arg("vertices").noconvert(), nb::arg("threads") = 0)
+        .def("bounds", [](SceneTreesD& self) {
+            const AabbD box = while_reading(self, [&] { return self.bvh("bounds").bounds(); });
+            return nb::make_tuple(nb::make_tuple(box.lo.x, box.lo.y, box.lo.z),
+                                  nb::make_tuple(box.hi.x, box.hi.y, box.hi.z));
+        });
+    bind_contents(scene);
+}
+
+}  // namespace raydix::python

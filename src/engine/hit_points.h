@@ -1,0 +1,32 @@
+// Hits of a scene -> the triangles that they lie on, and their points and normals in the world.
+#pragma once
+
+#include <raydix/types.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "base/double3.h"
+#include "engine/scene_tree.h"
+
+namespace raydix {
+
+/// The triangle of a hit in the space of its mesh, and the way from there to the world.
+struct HitTriangle {
+    Double3 corners[3];
+    std::uint32_t levels = 0;                    // of instances
+    const InstanceName* way[Scene::max_levels];  // [levels], the outermost first
+
+    [[nodiscard]] Double3 point(double u, double v) const;
+    /// Of any length; 0 if there is no area.
+    [[nodiscard]] Double3 normal() const;
+};
+
+/// False: there is no such path, mesh or triangle. The hit is no miss.
+[[nodiscard]] bool find_triangle(const SceneTree& scene, const Hit& hit, HitTriangle& triangle);
+
+/// Throws InputError that names the first hit without a triangle, if there is one.
+void check_hits(const SceneTree& scene, std::span<const Hit> hits);
+
+}  // namespace raydix
