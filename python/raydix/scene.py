@@ -254,7 +254,7 @@ class Scene(SceneContents, SceneViews):
         scene itself, else a number for `path`). "t" is in units of the ray's direction, through
         instances too. At equal t the lower "instance" wins, then "geometry", then "prim". Rays
         through an edge hit at least one of its triangles (Woop, Benthin, Wald 2013). Rays with NaN,
-        a zero direction or tmin > tmax miss. In float32 all are views of one array.
+        a zero direction or tmin > tmax miss. All are views of one array.
 
         With rays that lie on a GPU, "geometry" and "instance" are left out: device="cuda" takes
         scenes of one mesh, without masks. BackendUnavailable otherwise.
@@ -263,7 +263,7 @@ class Scene(SceneContents, SceneViews):
             return self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(self, mask, masks, lead)
-        columns = 6 if self.dtype == FLOAT32 else 4
+        columns = 6 if self.dtype == FLOAT32 else 5
         hits = np.empty((*lead, columns), self.dtype)
         self._core.intersect(
             *args, hits if hits.ndim == 2 else hits.reshape(-1, columns), *seen, self.threads

@@ -58,12 +58,12 @@ template <class Scene>
 using PointRows = In<Scalar<Scene>, nb::shape<-1, 3>>;
 template <class Scene>
 using ValuesOut = Out<Scalar<Scene>, nb::ndim<1>>;
-/// Rows of structs in scalars; a whole number takes the room of one: t, prim, u, v of hits, in
-/// float geometry and instance too.
+/// Rows of structs in scalars; a whole number takes the room of one: t, prim, u, v of hits, then
+/// geometry and instance: in double both in the room of one.
 template <class Scene>
 using HitRows =
     Out<Scalar<Scene>, nb::shape<-1, sizeof(typename Scene::Types::Hit) / sizeof(Scalar<Scene>)>>;
-static_assert(sizeof(Hit) == 6 * sizeof(float) && sizeof(HitD) == 4 * sizeof(double));
+static_assert(sizeof(Hit) == 6 * sizeof(float) && sizeof(HitD) == 5 * sizeof(double));
 /// x, y, z, distance, prim, u, v of closest points.
 template <class Scene>
 using PlaceRows = Out<Scalar<Scene>, nb::shape<-1, 7>>;

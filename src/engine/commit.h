@@ -6,9 +6,12 @@
 namespace raydix {
 
 /// Trees of triangles that did not change since `state.tree` was made are kept. `state` stays as it
-/// is. Throws InputError as Scene::commit says.
+/// is. Throws InputError as BasicScene::commit says, and what options.progress throws.
 [[nodiscard]] std::shared_ptr<const SceneTree> make_scene_tree(const SceneAccess::State& state,
                                                                const SceneOptions& options,
                                                                CommitReport& report);
+[[nodiscard]] std::shared_ptr<const SceneTreeD> make_scene_tree(const SceneAccessD::State& state,
+                                                                const SceneOptions& options,
+                                                                CommitReport& report);
 
 }  // namespace raydix
