@@ -82,9 +82,10 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->type_name("LEVEL");
     options.layout_option =
         command
-            .add_option("--layout", options.layout,
-                        "Memory layout that is traced: of simd wide8, wide4 or compact, which is "
-                        "wide8 with shared vertices; cwbvh: build only")
+            .add_option(
+                "--layout", options.layout,
+                "Memory layout that is traced: of the engine wide8, wide4 or compact, which is "
+                "wide8 with shared vertices; cwbvh: build only")
             ->check(CLI::IsMember({"binary", "wide4", "wide8", "compact", "cwbvh"}))
             ->capture_default_str()
             ->group(group);

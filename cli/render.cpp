@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "output.h"
+#include "scene_trace.h"
 #include "tree_view.h"
 
 namespace raydix::cli {
@@ -41,16 +42,27 @@ Camera chosen_camera(const RenderCommand& options, const Model& scene) {
     return camera;
 }
 
+/// Without a binary tree, unless the options ask for one.
+SceneTree load_shown(const RenderCommand& options, std::optional<Scene>& scene) {
+    if (is_rdx(options.scene) || !serves_a_scene(options.tree, options.common))
+        return load_scene_tree(options.scene, options.tree, options.common);
+    Model model = load_structured_model(options.scene, options.tree, options.common);
+    about(options.scene,
+          [&] { scene.emplace(model, scene_options(options.tree, options.common)); });
+    return {std::move(model), {}};
+}
+
 void run_render(RenderCommand options) {
     refuse_build_options(options.scene, options.tree);
     refuse_device(options.tree);
     const bool of_tree = is_tree_view(options.view);
     if (!of_tree) options.tree.prefer_balanced();
     if (!of_tree) refuse_tree_view_options(options.tree_view);
+    std::optional<Scene> scene;
     const TreeScene tree_scene =
         of_tree ? load_tree_scene(options.scene, options.view, options.tree_view, options.tree,
                                   options.common)
-                : TreeScene{load_scene_tree(options.scene, options.tree, options.common), {}};
+                : TreeScene{load_shown(options, scene), {}};
     const SceneTree& input = tree_scene.input;
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}
@@ -70,8 +82,9 @@ void run_render(RenderCommand options) {
     const auto start = std::chrono::steady_clock::now();
     const Picture picture = about(options.scene, [&] {
         if (options.view == "slice") return draw_slice(tree_scene, options.tree_view, size);
-        return of_tree ? render_tree(input.bvh, camera, tree_scene.boxes, render_options)
-                       : render(input.bvh, camera, render_options);
+        if (of_tree) return render_tree(input.bvh, camera, tree_scene.boxes, render_options);
+        return scene ? render(*scene, camera, render_options)
+                     : render(input.bvh, camera, render_options);
     });
     const double ms =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();

@@ -8,14 +8,24 @@
 
 namespace raydix::cli {
 
-bool SceneTracer::serves(const TreeOptions& tree, const CommonOptions& common) {
+bool serves_a_scene(const TreeOptions& tree, const CommonOptions& common) {
     const auto given = [](const CLI::Option* option) { return option->count() != 0; };
-    const bool of_one_tree =
-        std::ranges::any_of(tree.of_the_build, [&](const CLI::Option* option) {
-            return given(option) && option->get_name() != "--quality";
-        });
+    const bool of_one_tree = std::ranges::any_of(tree.of_the_build, [&](const CLI::Option* option) {
+        return given(option) && option->get_name() != "--quality";
+    });
     return !common.flatten && tree.tree == "bvh" && tree.device == "cpu" && !of_one_tree &&
-           !tree.epo_sample && (tree.layout == "wide8" || tree.layout == "compact");
+           !tree.epo_sample &&
+           (!given(tree.layout_option) || tree.layout == "wide8" || tree.layout == "compact");
+}
+
+SceneOptions scene_options(const TreeOptions& tree, const CommonOptions& common) {
+    SceneOptions options;
+    options.quality = tree.quality == "fast"   ? Quality::fast
+                      : tree.quality == "high" ? Quality::high
+                                               : Quality::balanced;
+    options.compact = tree.layout == "compact";
+    options.threads = common.threads;
+    return options;
 }
 
 SceneTracer::SceneTracer(const Model& model, const TreeOptions& tree,
@@ -26,13 +36,7 @@ SceneTracer::SceneTracer(const Model& model, const TreeOptions& tree,
       compact_(tree.layout == "compact"),
       threads_(common.threads) {
     const auto start = std::chrono::steady_clock::now();
-    SceneOptions scene;
-    scene.quality = quality_ == "fast"   ? Quality::fast
-                    : quality_ == "high" ? Quality::high
-                                         : Quality::balanced;
-    scene.compact = compact_;
-    scene.threads = threads_;
-    scene_ = Scene(model, scene);
+    scene_ = Scene(model, scene_options(tree, common));
     ms_ =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }

@@ -11,11 +11,12 @@
 
 namespace raydix::cli {
 
+/// Whether what the options ask for can be had without one mesh and its binary tree.
+[[nodiscard]] bool serves_a_scene(const TreeOptions& tree, const CommonOptions& common);
+[[nodiscard]] SceneOptions scene_options(const TreeOptions& tree, const CommonOptions& common);
+
 class SceneTracer {
 public:
-    /// Whether what the options ask for can be had without making one mesh and one binary tree.
-    [[nodiscard]] static bool serves(const TreeOptions& tree, const CommonOptions& common);
-
     SceneTracer(const Model& model, const TreeOptions& tree, const WideTraceOptions& options,
                 const CommonOptions& common);
     TraceCounts closest(std::span<const Ray> rays, std::span<Hit> hits) const;

@@ -372,7 +372,7 @@ void explain_warps(const TraceCommand& options, const Bvh& bvh) {
 TraceCommand with_device(TraceCommand options, Mode mode) {
     options.tree.prefer_balanced();
     options.kernel = chosen_cpu_kernel(options.kernel, options.tree, options.wide);
-    if (options.kernel != "simd") refuse_layout(options.tree);
+    if (options.kernel != "engine") refuse_layout(options.tree);
     const std::string device = options.tree.device;
     if (options.kernel.empty()) options.kernel = default_kernel(device);
     check_kernel(options.kernel, device);
@@ -392,8 +392,8 @@ TraceCommand with_device(TraceCommand options, Mode mode) {
 /// A scene of several meshes or nodes stays one, if the options allow it.
 KdTraced load_traced(const TraceCommand& options, const TreeOptions& on_cpu,
                      std::optional<SceneTracer>& scene) {
-    const bool keeps = options.kernel == "simd" && !is_rdx(options.scene) &&
-                       SceneTracer::serves(options.tree, options.common);
+    const bool keeps = options.kernel == "engine" && !is_rdx(options.scene) &&
+                       serves_a_scene(options.tree, options.common);
     if (!keeps) return load_kdtree_traced(options.scene, on_cpu, options.common);
     Model model = load_structured_model(options.scene, on_cpu, options.common);
     if (model.is_flat())
@@ -429,7 +429,7 @@ void run_trace(const TraceCommand& given) {
                                                mode == Mode::any, options.common.threads});
         });
     std::optional<WideTracer> wide;
-    if (options.kernel == "simd" && !scene)
+    if (options.kernel == "engine" && !scene)
         about(options.scene,
               [&] { wide.emplace(input.bvh, options.tree.layout, options.wide, options.common); });
     Batch batch{input.bvh,
@@ -530,7 +530,7 @@ void add_trace_command(CLI::App& app) {
     command
         ->add_option(
             "--kernel", options->kernel,
-            "Traversal kernel (default: simd on the cpu, scalar for a kdtree or --layout binary, "
+            "Traversal kernel (default: engine on the cpu, scalar for a kdtree or --layout binary, "
             "speculative_while_while on cuda and sim)")
         ->check(CLI::IsMember(trace_kernel_names()));
     command->add_option("--machine", options->machine, "Simulated machine of --device sim")

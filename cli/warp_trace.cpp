@@ -27,7 +27,7 @@ std::vector<std::string> warp_kernel_names() {
 }  // namespace
 
 std::vector<std::string> trace_kernel_names() {
-    std::vector<std::string> names{"scalar", "simd"};
+    std::vector<std::string> names{"engine", "scalar", "simd"};
     for (std::string& name : warp_kernel_names()) names.push_back(std::move(name));
     return names;
 }
@@ -37,11 +37,11 @@ std::string default_kernel(const std::string& device) {
 }
 
 void check_kernel(const std::string& kernel, const std::string& device) {
-    const bool of_cpu = kernel == "scalar" || kernel == "simd";
+    const bool of_cpu = kernel == "scalar" || kernel == "engine";
     if (of_cpu == (device == "cpu")) return;
     throw CLI::ValidationError("--kernel",
                                kernel + " does not run on device " + device +
-                                   "; cpu goes with scalar and simd, cuda and sim go with " +
+                                   "; cpu goes with engine and scalar, cuda and sim go with " +
                                    joined(warp_kernel_names()));
 }
 

@@ -8,12 +8,12 @@ namespace raydix::cli {
 
 void add_wide_trace_options(CLI::App& command, WideTraceOptions& options) {
     options.path_option =
-        command.add_option("--path", options.path, "How simd takes a batch through the tree")
+        command.add_option("--path", options.path, "How the engine takes a batch through the tree")
             ->check(CLI::IsMember({"automatic", "single", "packet", "stream", "sorted"}))
             ->capture_default_str();
     options.isa_option = command
                              .add_option("--isa", options.isa,
-                                         "Instruction set of simd (default: the best of the "
+                                         "Instruction set of the engine (default: the best of the "
                                          "processor)")
                              ->check(CLI::IsMember(simd_instruction_sets()));
 }
@@ -38,23 +38,24 @@ std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
                               const WideTraceOptions& options) {
     const bool wide = is_wide_layout(tree.layout);
     const bool open = tree.layout_option->count() == 0 && tree.tree == "bvh";
-    const bool simd =
-        kernel == "simd" || (kernel.empty() && (wide || open) && tree.device == "cpu");
-    if (!simd) {
+    const bool engine = kernel == "engine" || kernel == "simd" ||
+                        (kernel.empty() && (wide || open) && tree.device == "cpu");
+    if (!engine) {
         if (wide && !kernel.empty())
             throw CLI::ValidationError(
-                "--layout", tree.layout + " goes with --kernel simd, not with " + kernel);
+                "--layout", tree.layout + " goes with --kernel engine, not with " + kernel);
         for (const CLI::Option* option : {options.path_option, options.isa_option})
             if (option->count() != 0)
-                throw CLI::ValidationError(option->get_name(), "belongs to --kernel simd");
+                throw CLI::ValidationError(option->get_name(), "belongs to --kernel engine");
         return kernel;
     }
     if (tree.tree != "bvh")
-        throw CLI::ValidationError("--kernel", "simd traces a bvh, not a " + tree.tree);
+        throw CLI::ValidationError("--kernel", "the engine traces a bvh, not a " + tree.tree);
     if (tree.layout == "cwbvh")
-        throw CLI::ValidationError("--layout", "cwbvh does not go with --kernel simd, wide8 does");
+        throw CLI::ValidationError("--layout",
+                                   "cwbvh does not go with --kernel engine, wide8 does");
     if (!wide) tree.layout = "wide8";
-    return "simd";
+    return "engine";
 }
 
 WideTracer::WideTracer(const Bvh& bvh, const std::string& layout, const WideTraceOptions& options,
@@ -100,7 +101,7 @@ void WideTracer::explain_tree(const CommonOptions& common) const {
     if (!common.prints_tables()) return;
     const WideBvhStats& s = tree_.stats();
     fmt::print(
-        "kernel simd: {} layout, nodes of up to {} children with boxes of {}, blocks of 4 "
+        "kernel engine: {} layout, nodes of up to {} children with boxes of {}, blocks of 4 "
         "triangles{}, {} code, paths chosen by batch ({})\n",
         layout_name(s), s.width, s.compact ? "8 bits an axis" : "floats",
         s.compact ? " with shared vertices" : "", isa_, simd_path_name(path_));

@@ -1,4 +1,4 @@
-// The kernel simd: what trace and build say about wide trees.
+// The engine on one tree: what trace and build say about wide trees.
 #pragma once
 
 #include <raydix/wide.h>
@@ -22,9 +22,9 @@ void add_wide_trace_options(CLI::App& command, WideTraceOptions& options);
 /// wide4, wide8 and compact.
 [[nodiscard]] bool is_wide_layout(const std::string& layout);
 
-/// On the cpu rays go through a bvh by simd, unless --kernel or --layout say otherwise. --kernel
-/// simd goes with a wide layout and either of them is enough. Usage errors: one without the other,
-/// options of simd for another kernel.
+/// On the cpu rays go through a bvh by the engine, unless --kernel or --layout say otherwise.
+/// --kernel engine (simd is an old name of it) goes with a wide layout and either of them is
+/// enough. Usage errors: one without the other, options of the engine for another kernel.
 std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
                               const WideTraceOptions& options);
 

@@ -8,6 +8,7 @@
 #include <raydix/types.h>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -34,6 +35,10 @@ struct SceneOptions {
     /// again. So are compact trees, those that hold parts of triangles (quality high), and those of
     /// meshes where a triangle comes, goes, gets an area or loses it.
     double refit_limit = 1.5;
+    /// Called with the part of the commit that is done, 0..1 and at last 1, on any thread, one at a
+    /// time, while others build; it may trace the scene. What it throws ends the commit, the scene
+    /// as it was, and it is not called again.
+    std::function<void(double)> progress = {};
 };
 
 /// Of a geometry. Rays see it if mask & their mask is not 0, and the same holds for each instance

@@ -13,6 +13,7 @@
 #include "exec/host_launcher.h"
 #include "exec/memory.h"
 #include "exec/parallel.h"
+#include "exec/progress.h"
 #include "keys/host_encode.h"
 #include "layout/leaf_order.h"
 #include "measure/stopwatch.h"
@@ -109,6 +110,7 @@ struct BuildRun {
         tree.input_count() = n;
         tree.left_out() = bounds.left_out;
         ms.bounds = stage.lap();
+        progress_at(0.03);
         if (valid == 0) return make_empty();
 
         if (in_one_pass(valid)) {
@@ -119,6 +121,7 @@ struct BuildRun {
             return;
         }
         if (sweeps(options.builder)) {
+            const ProgressStage rest(0.03, 1);
             build_by_sweeps(source, n, valid, bounds.box, scratch.sweeps, scratch.top, tree, copies,
                             ms);
             ms.total = total.lap();
@@ -129,6 +132,7 @@ struct BuildRun {
         const Grid grid = make_grid(bounds.box, CodeFormat<Key>::axis_bits);
         host_encode(source, grid, valid == n, n, codes.data());
         ms.codes = stage.lap();
+        progress_at(0.06);
 
         // Primitives that are left out have the highest key: they sort to the end and are cut off
         // there.
@@ -137,9 +141,11 @@ struct BuildRun {
         sort_keys(codes, tree.order().span(), key_bits, sort_scratch_of<Key>(scratch));
         tree.order().reset(valid);
         ms.sort = stage.lap();
+        progress_at(0.2);
 
         const std::span<const Key> keys = codes.first(valid);
         if (grows_clusters(options.builder)) {
+            const ProgressStage rest(0.2, 1);
             build_clusters(source, keys, scratch.clusters, scratch.top, scratch.take_clusters, tree,
                            copies, ms);
             ms.total = total.lap();
@@ -150,12 +156,15 @@ struct BuildRun {
         tree.inner_count() = build_hierarchy(options.builder, keys, options.max_leaf, tree.nodes(),
                                              scratch.hierarchy);
         ms.hierarchy = stage.lap();
+        progress_at(0.4);
 
         copy_to_leaf_order(source, tree.order().view(), copies);
         ms.layout = stage.lap();
+        progress_at(0.6);
 
         fit();
         ms.fit = stage.lap();
+        progress_at(0.75);
         reinsert(ms);
         ms.total = total.lap();
         tree.build_ms() = ms;
@@ -215,8 +224,10 @@ private:
         prefixes.end_at(valid);
         tree.order().reset(valid);
         ms.sort = stage.lap();
+        progress_at(0.4);
         copies.reset(valid);
         const CopyWithBox<Source, Copy> leaf_box{source, tree.order().view(), copies.data()};
+        const ProgressStage climb(0.4, 0.75);
         const ApetreiTree built =
             build_apetrei_cpu(prefixes, options.max_leaf, leaf_box, tree.nodes(), scratch.apetrei);
         tree.inner_count() = built.inner;
@@ -228,6 +239,7 @@ private:
     void reinsert(BuildMs& ms) {
         if (options.reinsertion_rounds == 0) return;
         Stopwatch stage;
+        const ProgressStage rest(0.75, 1);
         const bool changed =
             reinsert_finished(tree.nodes(), tree.order(), tree.max_depth(),
                               top_options(options.reinsertion_rounds), scratch.top);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "api/bvh_builder_access.h"
+#include "exec/progress.h"
 #include "layout/leaf_order.h"
 #include "measure/stopwatch.h"
 #include "primitives/host_box.h"
@@ -63,9 +64,11 @@ void build_clusters(const Source& source, std::span<const Key> keys, ClusterScra
                     scratch.flat[k] = has_zero_area(copy_primitive(source, ids[k])) ? 1 : 0;
         }
     });
+    progress_at(0.1);
     const auto max_leaf = static_cast<std::uint32_t>(tree.options().max_leaf);
     Buffer<ClusterNode>& nodes = scratch.ploc.nodes;
     ClusterRef root = [&] {
+        const ProgressStage growing(0.1, 0.55);
         switch (tree.options().builder) {
             case Builder::hploc:
                 return build_hploc(keys, ids, static_cast<std::uint32_t>(tree.input_count()), boxes,
@@ -78,10 +81,15 @@ void build_clusters(const Source& source, std::span<const Key> keys, ClusterScra
                                   std::as_writable_bytes(copies.span()));
         }
     }();
-    if (const int rounds = tree.options().reinsertion_rounds; rounds > 0)
+    progress_at(0.55);
+    if (const int rounds = tree.options().reinsertion_rounds; rounds > 0) {
+        const ProgressStage reinsertion(0.55, 0.65);
         root = reinsert_clusters({nodes.data(), root, boxes, ids}, nodes.data(), max_leaf,
                                  top_options(rounds), top_scratch);
+    }
     ms.hierarchy = stage.lap();
+    const ProgressStage rest(0.65, 1);
+    progress_at(0);
 
     const ClusterTree clusters{scratch.ploc.nodes.data(), root, boxes, ids};
     if constexpr (triangles)
@@ -93,6 +101,7 @@ void build_clusters(const Source& source, std::span<const Key> keys, ClusterScra
         }
     tree.inner_count() = place_clusters(clusters, tree.nodes(), tree.order(), tree.max_depth());
     ms.fit = stage.lap();
+    progress_at(0.5);
     copy_to_leaf_order(source, tree.order().view(), copies);
     ms.layout = stage.lap();
 }

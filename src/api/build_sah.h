@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "exec/progress.h"
 #include "layout/leaf_order.h"
 #include "measure/stopwatch.h"
 #include "primitives/host_box.h"
@@ -99,6 +100,7 @@ inline void sort_and_build(const SahInput& input, SweepScratch& scratch, const B
     ms.codes = stage.lap();
     sort_references(input.references, scratch);
     ms.sort = stage.lap();
+    progress_at(0.3);
     tree.inner_count() =
         build_sah(input, scratch.sah, tree.nodes(), tree.order(), tree.max_depth());
     ms.hierarchy = stage.lap();
@@ -135,6 +137,8 @@ void build_by_sweeps(const Source& source, std::uint32_t n, std::uint32_t valid,
         make_references(source, n, valid, spatial_spare(valid, cut_input.options),
                         scratch.sbvh.references);
         ms.codes = stage.lap();
+        const ProgressStage cutting(0.02, 0.85);
+        progress_at(0);
         tree.inner_count() =
             build_sbvh(cut_input, scratch.sbvh, tree.nodes(), tree.order(), tree.max_depth());
         ms.hierarchy = stage.lap();
@@ -146,10 +150,13 @@ void build_by_sweeps(const Source& source, std::uint32_t n, std::uint32_t valid,
         }
         sort_and_build(input, scratch, tree, ms, stage);
     }
+    progress_at(0.85);
     if (const int rounds = tree.options().reinsertion_rounds; rounds > 0) {
+        const ProgressStage reinsertion(0.85, 0.95);
         reinsert_finished(tree.nodes(), tree.order(), tree.max_depth(), top_options(rounds),
                           top_scratch);
         ms.hierarchy += stage.lap();
+        progress_at(1);
     }
     copy_to_leaf_order(source, tree.order().view(), copies);
     ms.layout = stage.lap();

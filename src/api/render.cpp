@@ -7,13 +7,13 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <mutex>
 #include <string>
 
 #include "api/render_light.h"
 #include "api/render_scene.h"
 #include "base/math.h"
 #include "base/options.h"
+#include "exec/progress.h"
 #include "rays/sampling.h"
 #include "rays/screen_order.h"
 #include "report/colour_map.h"
@@ -171,30 +171,6 @@ void colour_steps(Picture& picture) {
     for (Vec3& p : picture.pixels) p = heat_colour(p.x / top);
 }
 
-/// Tells the caller how far the picture is, one tile at a time.
-class PictureProgress {
-public:
-    PictureProgress(const RenderOptions& options, std::size_t pixels)
-        : options_(options), pixels_(pixels) {}
-    void add(std::size_t pixels) {
-        if (!options_.progress) return;
-        isolated([&] {
-            const std::scoped_lock lock(telling_);
-            done_ += pixels;
-            if (ended_) return;
-            ended_ = true;  // unless the call comes back
-            options_.progress(static_cast<double>(done_) / static_cast<double>(pixels_));
-            ended_ = false;
-        });
-    }
-
-private:
-    const RenderOptions& options_;
-    std::size_t pixels_, done_ = 0;
-    bool ended_ = false;
-    std::mutex telling_;
-};
-
 /// Fills these pixels of `picture`; a pixel is the mean of its samples.
 void render_tile(const RenderScene& scene, std::span<const std::uint32_t> pixels,
                  Picture& picture) {
@@ -212,11 +188,13 @@ void render_tiles(const RenderScene& scene, Picture& picture) {
     const std::vector<std::uint32_t> order = pixels_in_morton_order(picture.width, picture.height);
     const std::size_t per_pixel = scene.rays_per_pixel * (scene.samples_per_ray + 1);
     const std::size_t tile = std::bit_floor(std::max<std::size_t>(16, tile_rays / per_pixel));
-    PictureProgress progress(scene.options, order.size());
+    ProgressListener listener(scene.options.progress);
+    const ProgressCounter progress({&listener, 0, 1}, static_cast<double>(order.size()));
     for_each_block(order.size(), tile, [&](std::size_t, std::size_t begin, std::size_t end) {
         render_tile(scene, std::span(order).subspan(begin, end - begin), picture);
-        progress.add(end - begin);
+        progress.add(static_cast<double>(end - begin));
     });
+    listener.finish();
 }
 
 /// `take` calls picture_of(tracer, surface) once.

@@ -8,6 +8,7 @@
 #include "base/float_env.h"
 #include "base/options.h"
 #include "exec/parallel.h"
+#include "exec/progress.h"
 #include "layout/cluster_view.h"
 #include "layout/wide_bvh.h"
 #include "layout/wide_collapse.h"
@@ -93,7 +94,12 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
                     lay_out([&] { make_wide_layout(view, collapse, arrays, scratch_->wide); });
                 });
         } else {
-            scratch_->builder.build(mesh, options, bvh);
+            {
+                const ProgressStage binary(0, 0.75);
+                scratch_->builder.build(mesh, options, bvh);
+            }
+            const ProgressStage rest(0.75, 1);
+            progress_at(0);
             if (!bvh.empty())
                 with_threads(options.threads, [&] {
                     lay_out([&] { make_wide_layout(bvh, collapse, arrays, scratch_->wide); });

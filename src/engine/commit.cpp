@@ -5,9 +5,11 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <unordered_map>
 
 #include "engine/part_tree.h"
 #include "exec/parallel.h"
+#include "exec/progress.h"
 #include "layout/wide_refit.h"
 
 namespace raydix {
@@ -75,11 +77,15 @@ Mesh merged(const SceneAccess::State& state, const Group& group,
 class Commit {
 public:
     Commit(const SceneAccess::State& state, const SceneOptions& options, CommitReport& report)
-        : state_(state), options_(options), report_(report) {}
+        : state_(state), options_(options), report_(report) {
+        if (state.tree == nullptr || options.quality != state.tree_quality ||
+            options.compact != state.tree_compact)
+            return;
+        for (const auto& mesh : state.tree->meshes) last_[mesh->ids.front()] = mesh.get();
+    }
 
     std::shared_ptr<const SceneTree> run() {
-        for (const Group& group : groups_of(state_, options_.usage))
-            tree_->meshes.push_back(mesh_tree(group));
+        build_meshes();
         for (const auto& mesh : tree_->meshes) {
             tree_->extents.push_back(extent_of_mesh(mesh->tree->arrays().bounds));
             report_.meshes += mesh->ids.size();
@@ -92,6 +98,8 @@ public:
             if (!geometry.is_instance())
                 tree_->mesh_names.push_back({id, geometry.mesh, geometry.own});
         place_instances();
+        progress_at(done_ / work_);
+        const ProgressStage top(done_ / work_, 1);
         build_tops(*tree_);
         keep_own_meshes();
         report_.instances = tree_->instances.size();
@@ -100,6 +108,35 @@ public:
     }
 
 private:
+    void build_meshes() {
+        const std::vector<Group> groups = groups_of(state_, options_.usage);
+        for (const Group& group : groups) work_ += work_of(group);
+        work_ += static_cast<double>(groups.size()) + instance_work();
+        for (const Group& group : groups) {
+            const double after = done_ + work_of(group);
+            const ProgressStage stage(done_ / work_, after / work_);
+            tree_->meshes.push_back(mesh_tree(group));
+            progress_at(1);
+            done_ = after;
+        }
+    }
+
+    /// In triangles, for what is told of progress; a part of the tree over all counts as one.
+    [[nodiscard]] double work_of(const Group& group) const {
+        if (kept(group) != nullptr) return 0;
+        std::size_t triangles = 0;
+        for (const std::uint32_t id : group.ids)
+            triangles += state_.geometries.at(id).mesh.triangles.size();
+        return static_cast<double>(triangles);
+    }
+    [[nodiscard]] double instance_work() const {
+        double parts = 0;
+        for (const auto& [id, geometry] : state_.geometries)
+            if (geometry.is_instance() && geometry.scene->tree != nullptr)
+                parts += 1 + static_cast<double>(geometry.scene->tree->placed.size());
+        return parts;
+    }
+
     std::shared_ptr<const MeshTree> mesh_tree(const Group& group) {
         auto out = std::make_shared<MeshTree>();
         out->ids = group.ids;
@@ -143,12 +180,8 @@ private:
 
     /// The tree that the last commit made of the same meshes in the same way.
     [[nodiscard]] const MeshTree* last_of(const Group& group) const {
-        if (state_.tree == nullptr || options_.quality != state_.tree_options.quality ||
-            options_.compact != state_.tree_options.compact)
-            return nullptr;
-        for (const auto& mesh : state_.tree->meshes)
-            if (mesh->ids == group.ids) return mesh.get();
-        return nullptr;
+        const auto found = last_.find(group.ids.front());
+        return found != last_.end() && found->second->ids == group.ids ? found->second : nullptr;
     }
     /// The same if nothing of them changed.
     [[nodiscard]] const MeshTree* kept(const Group& group) const {
@@ -203,48 +236,57 @@ private:
     struct Source {
         const Geometry* geometry;
         std::uint32_t id;
-        const Extent* inner;
+        const Image* inner;      // null: the scene itself
+        const SceneTree* scene;  // what is placed
+        const Support* support;  // its own; null if it is empty
     };
 
     void place(const Geometry& geometry, std::uint32_t id, std::uint32_t number,
                const std::shared_ptr<const SceneTree>& inner) {
         const WayIn way(geometry.inverse, geometry.mask);
+        const auto add = [&](PlacedScene placed, const Image* image) {
+            const SceneTree* const scene = placed.scene.get();
+            sources_.push_back(
+                {&geometry, id, image, scene, scene->extent.empty() ? nullptr : &scene->support()});
+            if (!scene->extent.empty()) placed.mesh = scene->only_mesh();
+            tree_->placed.push_back(std::move(placed));
+        };
         if (inner->instances.empty() ||
             tree_->placed.size() + inner->placed.size() + 1 > most_placed) {
-            tree_->placed.push_back({way, number, 0, 0, inner});
-            sources_.push_back({&geometry, id, &inner->extent});
+            add({way, number, 0, 0, inner}, nullptr);
             return;
         }
-        if (inner->own_meshes != nullptr) {
-            tree_->placed.push_back({way, number, 0, 0, inner->own_meshes});
-            sources_.push_back({&geometry, id, &inner->own_meshes->extent});
-        }
+        if (inner->own_meshes != nullptr) add({way, number, 0, 0, inner->own_meshes}, nullptr);
         for (std::size_t k = 0; k < inner->placed.size(); ++k) {
             const PlacedScene& below = inner->placed[k];
             const auto first = static_cast<std::uint32_t>(tree_->ways.size());
             tree_->ways.push_back(below.way);
             for (std::uint32_t w = 0; w < below.more; ++w)
                 tree_->ways.push_back(inner->ways[below.first + w]);
-            tree_->placed.push_back(
-                {way, number + below.number, first, below.more + 1, below.scene});
-            sources_.push_back({&geometry, id, &inner->extents[inner->meshes.size() + k]});
+            add({way, number + below.number, first, below.more + 1, below.scene},
+                &inner->images[k]);
         }
     }
 
     void set_extents() {
         const std::size_t meshes = tree_->extents.size();
         tree_->extents.resize(meshes + sources_.size());
+        tree_->images.resize(sources_.size());
         for_each_index(
             sources_.size(),
             [&](std::size_t i) {
-                const Geometry& geometry = *sources_[i].geometry;
-                tree_->extents[meshes + i] =
-                    image_of(affine_of(geometry.transform), geometry.errors, *sources_[i].inner);
+                const Source& source = sources_[i];
+                const Geometry& geometry = *source.geometry;
+                Image& image = tree_->images[i];
+                image = image_of(affine_of(geometry.transform), geometry.errors,
+                                 source.inner ? *source.inner : image_of(source.scene->extent));
+                if (source.support != nullptr)
+                    tree_->extents[meshes + i] = extent_of(image, *source.support);
             },
             256);
         for (std::size_t i = 0; i < sources_.size(); ++i) {
             const Extent& extent = tree_->extents[meshes + i];
-            if (extent.empty()) continue;
+            if (sources_[i].support == nullptr) continue;
             if (!(in_range(extent.box.lo) && in_range(extent.box.hi)))
                 throw InputError("instance " + std::to_string(sources_[i].id) +
                                  ": it reaches beyond 1e12, or is not finite");
@@ -266,6 +308,9 @@ private:
 
     void build_tops(SceneTree& tree) {
         for (const Extent& extent : tree.extents) tree.extent = unite(tree.extent, extent);
+        for (const auto& mesh : tree.meshes)
+            tree.stack_size =
+                std::max(tree.stack_size, wide_stack_capacity(mesh->tree->stats().max_depth));
         if (tree.only_mesh() != nullptr) return;
         const Quality quality = options_.usage == Usage::moving ? Quality::fast : options_.quality;
         std::vector<std::uint32_t> near, wild;
@@ -274,6 +319,10 @@ private:
                 (tree.extents[part].error <= wild_error ? near : wild).push_back(part);
         build_part_tree(near, tree.extents, quality, tree.near);
         build_part_tree(wild, tree.extents, quality, tree.wild);
+        for (const PlacedScene& placed : tree.placed)
+            tree.stack_size = std::max(tree.stack_size, placed.scene->stack_size);
+        tree.stack_size += wide_stack_capacity(
+            std::max(tree.near.arrays.stats.max_depth, tree.wild.arrays.stats.max_depth));
         report_.bytes +=
             (tree.near.arrays.nodes.size() + tree.wild.arrays.nodes.size()) * sizeof(WideNode) +
             tree.placed.size() * sizeof(PlacedScene) + tree.ways.size() * sizeof(WayIn);
@@ -283,7 +332,9 @@ private:
     const SceneOptions& options_;
     CommitReport& report_;
     std::shared_ptr<SceneTree> tree_ = std::make_shared<SceneTree>();
-    std::vector<Source> sources_;  // [placed scenes]
+    std::vector<Source> sources_;                              // [placed scenes]
+    std::unordered_map<std::uint32_t, const MeshTree*> last_;  // by their first mesh
+    double work_ = 0, done_ = 0;
 };
 
 }  // namespace
@@ -292,7 +343,10 @@ std::shared_ptr<const SceneTree> make_scene_tree(const SceneAccess::State& state
                                                  const SceneOptions& options,
                                                  CommitReport& report) {
     std::shared_ptr<const SceneTree> out;
+    ProgressListener listener(options.progress);
+    const ProgressStage stage({options.progress ? &listener : nullptr, 0, 1});
     with_threads(options.threads, [&] { out = Commit(state, options, report).run(); });
+    listener.finish();
     return out;
 }
 

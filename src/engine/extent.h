@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "base/math.h"
+#include "engine/support.h"
 #include "instances/affine.h"
 
 namespace raydix {
@@ -40,11 +41,13 @@ inline Aabb grown(Double3 lo, Double3 hi, double most, double by) {
 }
 
 /// Rays at triangles: the line is rounded to float, and its point at t is within the pads of
-/// slab.h of the triangle.
+/// slab.h of the triangle. What of that does not grow with D:
+inline double mesh_pad(const Aabb& box) {
+    return 0x1p-22 * largest_coordinate(box) + double{min_diagonal};
+}
 inline Extent extent_of_mesh(const Aabb& box) {
     if (!(box.lo.x <= box.hi.x)) return {};
-    const double most = largest_coordinate(box);
-    return {grown(Double3(box.lo), Double3(box.hi), most, 0x1p-22 * most + double{min_diagonal}),
+    return {grown(Double3(box.lo), Double3(box.hi), largest_coordinate(box), mesh_pad(box)),
             0x1p-18};
 }
 
@@ -75,21 +78,39 @@ inline MapErrors errors_of(const Affine& a, const Affine& inverse) {
     return {condition, 0x1p-48 * condition + 0x1p-49 * size / determinant};
 }
 
-/// Of what a map makes of `inner`.
-inline Extent image_of(const Affine& a, const MapErrors& errors, const Extent& inner) {
-    if (inner.empty()) return {};
-    const Double3 lo(inner.box.lo), hi(inner.box.hi);
-    const Double3 middle = (lo + hi) * 0.5, half = (hi - lo) * 0.5;
-    const auto reach = [&](Double3 row) {
-        return std::fabs(row.x) * half.x + std::fabs(row.y) * half.y + std::fabs(row.z) * half.z;
-    };
-    const Double3 center = a.point(middle), by{reach(a.x), reach(a.y), reach(a.z)};
-    const double most = std::max(
-        {std::fabs(center.x) + by.x, std::fabs(center.y) + by.y, std::fabs(center.z) + by.z});
+/// A scene that stands in another one, however many instances lead to it.
+struct Image {
+    Affine map;        // from its space to that of the other scene
+    double size = 0;   // at least the largest coordinate of the image
+    double slack = 0;  // how far rays may miss the image, by components, but for what grows with D
+    double error = 0;  // as in Extent
+};
+
+/// Of a scene without instances in its own space.
+inline Image image_of(const Extent& scene) {
+    return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {}}, largest_coordinate(scene.box), 0, scene.error};
+}
+
+/// One instance farther out.
+inline Image image_of(const Affine& a, const MapErrors& errors, const Image& inner) {
+    const Affine& m = inner.map;
+    const auto row = [&](Double3 r) { return m.x * r.x + m.y * r.y + m.z * r.z; };
+    const double norm = norm_of(a);
     const double moved = std::max({std::fabs(a.move.x), std::fabs(a.move.y), std::fabs(a.move.z)});
-    return {grown(center - by, center + by, most,
-                  (errors.rounding + 0x1p-40) * (most + moved) + double{min_diagonal}),
+    const double size = norm * inner.size + moved;
+    return {{row(a.x), row(a.y), row(a.z), a.point(m.move)},
+            size,
+            norm * inner.slack + (errors.rounding + 0x1p-40) * 2.0 * size + double{min_diagonal},
             errors.condition * inner.error + errors.rounding};
+}
+
+/// `support` is that of the scene.
+inline Extent extent_of(const Image& image, const Support& support) {
+    const Affine& m = image.map;
+    const Reach x = support.along(m.x), y = support.along(m.y), z = support.along(m.z);
+    const Double3 lo = m.move - Double3{x.against, y.against, z.against},
+                  hi = m.move + Double3{x.along, y.along, z.along};
+    return {grown(lo, hi, image.size, image.slack), image.error};
 }
 
 }  // namespace raydix

@@ -6,9 +6,11 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/scene_state.h"
+#include "exec/progress.h"
 
 namespace raydix {
 namespace {
@@ -31,9 +33,11 @@ void add_mesh(Scene& scene, const Model& model, std::uint32_t i) {
 class NodeScenes {
 public:
     NodeScenes(const Model& model, const SceneOptions& options)
-        : model_(model), options_(options), nodes_(model.nodes.size()) {
+        : model_(model), quiet_(options), listener_(options.progress), nodes_(model.nodes.size()) {
+        quiet_.progress = nullptr;
         check_order();
-        empty_.commit(options_);
+        for (const Mesh& mesh : model.meshes) triangles_ += mesh.triangles.size();
+        empty_.commit(quiet_);
         for (std::size_t k = nodes_.size(); k-- > 0;) {
             Node& node = nodes_[k];
             const ModelNode& given = model_.nodes[k];
@@ -50,16 +54,18 @@ public:
     }
 
     /// Places the nodes that stand in the world.
-    void place(Scene& world) const {
+    void place(Scene& world) {
         for (std::size_t k = 0; k < nodes_.size(); ++k)
             if (model_.nodes[k].parent == ModelNode::none) add_node(world, k);
+        world.commit(quiet_);
+        listener_.finish();
     }
 
 private:
     struct Node {
         std::vector<std::uint32_t> children;
-        std::uint32_t size = 1;  // with all nodes below it, which follow it
-        bool shows = false;      // triangles
+        std::uint32_t size = 1;              // with all nodes below it, which follow it
+        bool shows = false;                  // triangles
         std::shared_ptr<const Scene> scene;  // of a node that shows something
     };
 
@@ -87,7 +93,7 @@ private:
         auto scene = std::make_shared<Scene>();
         if (given.mesh_count != 0) take_meshes(*meshes_of(given), *scene);
         for (const std::uint32_t child : nodes_[k].children) add_node(*scene, child);
-        scene->commit(options_);
+        scene->commit(quiet_);
         return scene;
     }
 
@@ -97,18 +103,28 @@ private:
         Scene scene;
         for (std::uint32_t below = 1; below < nodes_[k].size; ++below)
             scene.add(empty_, {}, {.id = id_of(k + below)});
-        scene.commit(options_);
+        scene.commit(quiet_);
         return scene;
     }
 
     /// One scene for all nodes that show the same meshes.
     std::shared_ptr<const Scene> meshes_of(const ModelNode& node) {
-        std::shared_ptr<const Scene>& shared = by_meshes_[node.first_mesh];
+        std::shared_ptr<const Scene>& shared = by_meshes_[{node.first_mesh, node.mesh_count}];
         if (shared == nullptr) {
             auto scene = std::make_shared<Scene>();
-            for (std::uint32_t i = 0; i < node.mesh_count; ++i)
+            std::uint64_t triangles = 0;
+            for (std::uint32_t i = 0; i < node.mesh_count; ++i) {
                 add_mesh(*scene, model_, node.first_mesh + i);
-            scene->commit(options_);
+                triangles += model_.meshes[node.first_mesh + i].triangles.size();
+            }
+            SceneOptions options = quiet_;
+            options.progress = [&](double part) {
+                listener_.reach((static_cast<double>(done_) +
+                                 part * static_cast<double>(triangles)) /
+                                static_cast<double>(triangles_));
+            };
+            scene->commit(options);
+            done_ += triangles;
             shared = std::move(scene);
         }
         return shared;
@@ -121,7 +137,8 @@ private:
         state.geometries = source.geometries;
         for (const auto& [id, geometry] : state.geometries) state.taken.insert(id);
         state.tree = source.tree;
-        state.tree_options = source.tree_options;
+        state.tree_quality = source.tree_quality;
+        state.tree_compact = source.tree_compact;
     }
 
     [[nodiscard]] std::uint32_t id_of(std::size_t k) const {
@@ -144,10 +161,13 @@ private:
     }
 
     const Model& model_;
-    const SceneOptions& options_;
+    SceneOptions quiet_;  // without progress
+    ProgressListener listener_;
+    std::uint64_t triangles_ = 0, done_ = 0;  // of all meshes, of those with a tree
     std::vector<Node> nodes_;
     Scene empty_;
-    std::map<std::uint32_t, std::shared_ptr<const Scene>> by_meshes_;
+    // By the first mesh and how many there are.
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::shared_ptr<const Scene>> by_meshes_;
 };
 
 }  // namespace
@@ -159,11 +179,12 @@ Scene::Scene(const Model& model, const SceneOptions& options) : Scene() {
         return;
     }
     try {
-        if (model.nodes.empty())
+        if (model.nodes.empty()) {
             for (std::uint32_t i = 0; i < model.meshes.size(); ++i) add_mesh(*this, model, i);
-        else
+            commit(options);
+        } else {
             NodeScenes(model, options).place(*this);
-        commit(options);
+        }
     } catch (const InputError& error) {
         throw InputError(model.name + ": " + error.what() +
                          " (Model::flatten, --flatten makes one mesh of it)");

@@ -180,7 +180,8 @@ CommitReport Scene::commit(const SceneOptions& options) {
     CommitReport report;
     std::shared_ptr<const SceneTree> tree = make_scene_tree(*state_, options, report);
     state_->tree = std::move(tree);
-    state_->tree_options = options;
+    state_->tree_quality = options.quality;
+    state_->tree_compact = options.compact;
     for (auto& [id, geometry] : state_->geometries) geometry.changed = false;
     state_->changed = false;
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;

@@ -85,6 +85,7 @@ struct SceneJob {
         std::uint32_t mask;
     };
     std::vector<Limits> limits;  // [n]
+    StackMemory single_stack;    // of rays that go alone, for all levels
     std::vector<std::unique_ptr<SceneLevel>> levels;
 
     [[nodiscard]] SceneLevel& level(std::size_t depth) {
@@ -98,6 +99,12 @@ struct SceneKernels {
     void (*trace)(SceneJob& job);
     void (*all_hits)(SceneJob& job);
     void (*steps)(SceneJob& job);
+    /// A valid ray; `stack` has room for SceneTree::stack_size. For any hit only prim has a
+    /// meaning.
+    using OneRayOfScene = Hit(const SceneTree& scene, const Ray& ray, std::uint32_t mask,
+                              const WideStackView& stack);
+    OneRayOfScene* closest;
+    OneRayOfScene* any;
 };
 
 /// Empty: the best. The names are those of simd_kernels().

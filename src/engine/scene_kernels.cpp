@@ -19,7 +19,12 @@ HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
 SceneKernels scene_kernels(std::string_view isa) {
-    return {isa, trace_scene, all_scene_hits, count_scene_steps};
+    return {isa,
+            trace_scene,
+            all_scene_hits,
+            count_scene_steps,
+            hit_of_scene<false>,
+            hit_of_scene<true>};
 }
 
 }  // namespace raydix::HWY_NAMESPACE

@@ -187,16 +187,15 @@ Hit trace_one(const Scene& scene, const Ray& ray, std::uint32_t mask, bool any) 
         return hit;
     }
     if (!is_valid(ray)) return {};
-    const FloatEnvironment plain;
     static const SceneKernels& kernels = scene_kernels_for({});
-    SceneJob& job = job_of_this_thread();
-    job.tree = &tree;
-    job.kernels = &simd_kernels().front();
-    job.rays = &ray, job.order = nullptr, job.n = 1;
-    job.mask = mask, job.masks = nullptr;
-    job.any = any, job.packets = false, job.single = true;
-    kernels.trace(job);
-    return job.hits[0];
+    StackMemory& stack = job_of_this_thread().single_stack;
+    stack.reserve_words(tree.stack_size);
+    const auto answer = [&] {
+        return (any ? kernels.any : kernels.closest)(tree, ray, mask, stack.view());
+    };
+    if (FloatEnvironment::is_plain()) return answer();
+    const FloatEnvironment plain;
+    return answer();
 }
 
 }  // namespace

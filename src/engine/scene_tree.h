@@ -8,10 +8,12 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <utility>
 #include <vector>
 
 #include "engine/extent.h"
+#include "engine/support.h"
 #include "instances/affine.h"
 #include "layout/wide_bvh.h"
 #include "trace/simd/wide_ray.h"
@@ -85,6 +87,7 @@ struct PlacedScene {
     std::uint32_t number;       // of the path that ends here
     std::uint32_t first, more;  // further ways in SceneTree::ways, from the outside inward
     std::shared_ptr<const SceneTree> scene;
+    const MeshTree* mesh = nullptr;  // all that is in `scene`, if it is one that is not empty
 };
 
 /// An instance as the scene's owner knows it.
@@ -120,6 +123,7 @@ struct SceneTree {
     std::vector<PlacedScene> placed;
     std::vector<WayIn> ways;
     std::vector<Extent> extents;  // [meshes + placed]
+    std::vector<Image> images;    // [placed]
     /// The meshes without the instances, where there are both.
     std::shared_ptr<const SceneTree> own_meshes;
     /// Over all parts that are not empty: instances whose maps keep errors small, and those that
@@ -128,7 +132,16 @@ struct SceneTree {
     Extent extent;
     Aabb bounds = empty_box();  // without what rays may miss it by
     std::uint64_t paths = 0;
-    std::uint32_t levels = 0;  // of instances, below this scene
+    std::uint32_t levels = 0;    // of instances, below this scene
+    std::size_t stack_size = 0;  // of a ray that goes alone: children still to visit, on all levels
+
+    /// Made when the first instance asks for it.
+    [[nodiscard]] const Support& support() const {
+        std::call_once(support_asked, [&] { support_known = support_of(*this); });
+        return support_known;
+    }
+    mutable std::once_flag support_asked;
+    mutable Support support_known;
 
     /// The only mesh tree, if rays need nothing else.
     [[nodiscard]] const MeshTree* only_mesh() const {

@@ -150,54 +150,50 @@ HWY_INLINE V4 rounded(const double* from) {
 template <Wanted wanted, bool counting = false>
 class SceneRay {
 public:
-    SceneRay(SceneJob& job, std::uint32_t id)
-        : job_(job),
-          tmin_(job.limits[id].tmin),
-          reach_(job.limits[id].reach),
-          mask_(job.limits[id].mask),
-          best_(job.hits[id]) {}
+    /// `stack` has room for SceneTree::stack_size; `best` is what was found before; `found` is for
+    /// all hits.
+    SceneRay(const SceneJob::Limits& limits, const Hit& best, const WideStackView& stack,
+             BudgetVector<Hit>* found = nullptr)
+        : tmin_(limits.tmin),
+          reach_(limits.reach),
+          mask_(limits.mask),
+          best_(best),
+          stack_(stack),
+          found_(found) {}
 
-    void store(std::uint32_t id) const {
-        job_.limits[id].reach = reach_;
-        job_.hits[id] = best_;
+    [[nodiscard]] const Hit& best() const { return best_; }
+    void store(SceneJob& job, std::uint32_t id) const {
+        job.limits[id].reach = reach_;
+        job.hits[id] = best_;
     }
     [[nodiscard]] std::uint64_t visits() const { return visits_; }
 
-    void walk(const SceneTree& scene, std::size_t depth, std::uint32_t number,
-              const SceneLine& line) {
+    void walk(const SceneTree& scene, std::uint32_t number, const SceneLine& line) {
         if (const MeshTree* const mesh = scene.only_mesh()) {
-            hit_mesh(*mesh, depth, number, line);
+            if (!mesh->tree->empty()) hit_mesh(*mesh, number, line);
             return;
         }
-        StackMemory& stack = job_.level(depth).parts_stack;
-        for (const PartTree* const tree : {&scene.near, &scene.wild}) {
-            if (tree->empty()) continue;
-            SingleFrame frame;
-            if (!fill(tree->view, line, frame)) return;
-            grow_pads(tree->view, tree->growth, frame);
-            stack.reserve(tree->arrays.stats.max_depth);
-            Parts parts{*this, scene, *tree, depth, number, line};
-            SimdCounts counts;
-            SingleRay<wanted, counting, false, false, Parts>(tree->view, frame, stack.view(),
-                                                             counts, &parts, 0)
-                .trace(0, {frame.tmax});
-            if constexpr (counting) visits_ += counts.visits;
-        }
+        for (const PartTree* const tree : {&scene.near, &scene.wild})
+            if (!tree->empty()) walk_parts(scene, *tree, number, line);
     }
 
     /// Part `part` of a scene.
-    HWY_INLINE void visit(const SceneTree& scene, std::uint32_t part, std::size_t depth,
-                          std::uint32_t number, const SceneLine& line) {
+    HWY_INLINE void visit(const SceneTree& scene, std::uint32_t part, std::uint32_t number,
+                          const SceneLine& line) {
         const std::size_t meshes = scene.meshes.size();
         if (part < meshes) {
-            hit_mesh(*scene.meshes[part], depth, number, line);
+            hit_mesh(*scene.meshes[part], number, line);
             return;
         }
         const PlacedScene& placed = scene.placed[part - meshes];
         if (!sees(mask_, scene, placed)) return;
         SceneLine inside;
         enter(line, scene, placed, inside);
-        walk(*placed.scene, depth + 1, number + placed.number, inside);
+        number += placed.number;
+        if (placed.mesh != nullptr)
+            hit_mesh(*placed.mesh, number, inside);
+        else
+            walk(*placed.scene, number, inside);
     }
 
 private:
@@ -205,15 +201,30 @@ private:
         SceneRay& ray;
         const SceneTree& scene;
         const PartTree& tree;
-        std::size_t depth;
         std::uint32_t number;
         const SceneLine& line;
 
         HWY_NOINLINE float visit_one(std::uint32_t leaf, std::uint32_t) {
-            ray.visit(scene, tree.part[leaf], depth, number, line);
+            ray.visit(scene, tree.part[leaf], number, line);
             return min_of(line.units(ray.reach_), std::numeric_limits<float>::max());
         }
     };
+
+    HWY_NOINLINE void walk_parts(const SceneTree& scene, const PartTree& tree, std::uint32_t number,
+                                 const SceneLine& line) {
+        SingleFrame frame;
+        if (!fill(tree.view, line, frame)) return;
+        grow_pads(tree.view, tree.growth, frame);
+        const WideStackView stack = stack_;
+        const std::size_t taken = wide_stack_capacity(tree.arrays.stats.max_depth);
+        stack_ = {stack.words + taken, stack.entries + taken};
+        Parts parts{*this, scene, tree, number, line};
+        SimdCounts counts;
+        SingleRay<wanted, counting, false, false, Parts>(tree.view, frame, stack, counts, &parts, 0)
+            .trace(0, {frame.tmax});
+        if constexpr (counting) visits_ += counts.visits;
+        stack_ = stack;
+    }
 
     /// False if floats do not hold the ray, or it ends before it begins.
     HWY_INLINE bool fill(const WideView& view, const SceneLine& line, SingleFrame& frame) const {
@@ -230,39 +241,37 @@ private:
         return true;
     }
 
-    HWY_INLINE void hit_mesh(const MeshTree& mesh, std::size_t depth, std::uint32_t number,
-                             const SceneLine& line) {
-        if (mesh.tree->empty() || (mesh.mask & mask_) == 0) return;
+    /// Of a mesh that is not empty.
+    HWY_INLINE void hit_mesh(const MeshTree& mesh, std::uint32_t number, const SceneLine& line) {
+        if ((mesh.mask & mask_) == 0) return;
         SingleFrame frame;
         if (!fill(mesh.view, line, frame)) return;
-        StackMemory& stack = job_.level(depth).mesh_stack;
-        stack.reserve(mesh.tree->stats().max_depth);
         if (mesh.view.is_compact) {
             TriangleBlock room{};
             WideView view = mesh.view;
             view.room = &room;
-            search<true>(mesh, view, frame, stack.view(), number, line.scale);
+            search<true>(mesh, view, frame, number, line.scale);
         } else {
-            search<false>(mesh, mesh.view, frame, stack.view(), number, line.scale);
+            search<false>(mesh, mesh.view, frame, number, line.scale);
         }
     }
 
     template <bool compact>
     HWY_INLINE void search(const MeshTree& mesh, const WideView& view, const SingleFrame& frame,
-                           const WideStackView& stack, std::uint32_t number, double scale) {
+                           std::uint32_t number, double scale) {
         constexpr bool counted = compact || counting;
         SimdCounts counts;
         if constexpr (wanted == Wanted::all) {
-            const std::size_t before = job_.found->size();
-            SingleRay<wanted, counted, compact>(view, frame, stack, counts).trace_all(*job_.found);
-            for (std::size_t k = before; k < job_.found->size(); ++k) {
-                Hit& hit = (*job_.found)[k];
+            const std::size_t before = found_->size();
+            SingleRay<wanted, counted, compact>(view, frame, stack_, counts).trace_all(*found_);
+            for (std::size_t k = before; k < found_->size(); ++k) {
+                Hit& hit = (*found_)[k];
                 hit.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
                 hit.instance = number;
                 mesh.name(hit);
             }
         } else {
-            const WideBest best = SingleRay<wanted, counted, compact>(view, frame, stack, counts)
+            const WideBest best = SingleRay<wanted, counted, compact>(view, frame, stack_, counts)
                                       .trace(0, {frame.tmax});
             if (best.found())
                 keep<wanted == Wanted::any>(mesh, number, scale,
@@ -271,12 +280,13 @@ private:
         if constexpr (counting) visits_ += counts.visits;
     }
 
-    SceneJob& job_;
     const float tmin_;
     float reach_;
     const std::uint32_t mask_;
     Hit best_;
     std::uint64_t visits_ = 0;
+    WideStackView stack_;  // from where it is free
+    BudgetVector<Hit>* const found_;
 };
 
 template <bool any>
@@ -288,6 +298,7 @@ public:
         job_.hits.assign(job_.n, {});
         job_.limits.resize(job_.n);
         job_.invalid = 0;
+        job_.single_stack.reserve_words(job_.tree->stack_size);
         if (job_.single)
             one_by_one();
         else
@@ -327,9 +338,9 @@ private:
             const Ray* const ray = start(k);
             if (ray == nullptr) continue;
             const auto id = static_cast<std::uint32_t>(k);
-            One one(job_, id);
-            one.walk(*job_.tree, 0, 0, HWY_NAMESPACE::line_of(*ray));
-            one.store(id);
+            One one(job_.limits[k], job_.hits[k], job_.single_stack.view());
+            one.walk(*job_.tree, 0, HWY_NAMESPACE::line_of(*ray));
+            one.store(job_, id);
         }
     }
     void together() {
@@ -349,10 +360,11 @@ private:
 
         float visit_one(std::uint32_t leaf, std::uint32_t ray) {
             const std::uint32_t id = level_.sources[ray].id;
-            One one(walk_.job_, id);
-            one.visit(place_.scene, tree_.part[leaf], place_.depth, place_.number,
+            SceneJob& job = walk_.job_;
+            One one(job.limits[id], job.hits[id], job.single_stack.view());
+            one.visit(place_.scene, tree_.part[leaf], place_.number,
                       walk_.line_of(place_, level_, ray));
-            one.store(id);
+            one.store(job, id);
             return reach(ray);
         }
         void visit(std::uint32_t leaf, const std::uint32_t* rays, std::uint32_t count) {
@@ -444,9 +456,9 @@ private:
     void walk_one(const Place& place, std::uint32_t ray) {
         const SceneLevel& level = job_.level(place.depth);
         const std::uint32_t id = level.sources[ray].id;
-        One one(job_, id);
-        one.walk(place.scene, place.depth, place.number, line_of(place, level, ray));
-        one.store(id);
+        One one(job_.limits[id], job_.hits[id], job_.single_stack.view());
+        one.walk(place.scene, place.number, line_of(place, level, ray));
+        one.store(job_, id);
     }
 
     HWY_NOINLINE void walk_parts(const Place& place, const PartTree& tree) {
@@ -549,15 +561,16 @@ private:
 
 /// All hits of the rays of a job, one ray after the other.
 inline void all_scene_hits(SceneJob& job) {
-    job.hits.assign(1, {});
-    job.limits.resize(1);
     job.invalid = 0;
+    job.single_stack.reserve_words(job.tree->stack_size);
     for (std::size_t k = 0; k < job.n; ++k) {
         const Ray& ray = job.rays[k];
         const std::size_t before = job.found->size();
-        job.limits[0] = {ray.tmin, ray.tmax, job.masks == nullptr ? job.mask : job.masks[k]};
         if (is_valid(ray)) {
-            SceneRay<Wanted::all>(job, 0).walk(*job.tree, 0, 0, line_of(ray));
+            SceneRay<Wanted::all>(
+                {ray.tmin, ray.tmax, job.masks == nullptr ? job.mask : job.masks[k]}, {},
+                job.single_stack.view(), job.found)
+                .walk(*job.tree, 0, line_of(ray));
             finish_scene_ray(*job.found, before);
         } else {
             ++job.invalid;
@@ -568,17 +581,25 @@ inline void all_scene_hits(SceneJob& job) {
 
 /// Closest hits, one ray after the other: how many nodes each visits, those over parts included.
 inline void count_scene_steps(SceneJob& job) {
-    job.hits.assign(1, {});
-    job.limits.resize(1);
+    job.single_stack.reserve_words(job.tree->stack_size);
     for (std::size_t k = 0; k < job.n; ++k) {
         const Ray& ray = job.rays[k];
-        job.limits[0] = {ray.tmin, ray.tmax, job.mask};
         job.visits[k] = 0;
         if (!is_valid(ray)) continue;
-        SceneRay<Wanted::closest, true> one(job, 0);
-        one.walk(*job.tree, 0, 0, line_of(ray));
+        SceneRay<Wanted::closest, true> one({ray.tmin, ray.tmax, job.mask}, {},
+                                            job.single_stack.view());
+        one.walk(*job.tree, 0, line_of(ray));
         job.visits[k] = static_cast<std::uint32_t>(one.visits());
     }
+}
+
+/// A valid ray alone; for any hit only prim has a meaning.
+template <bool any>
+Hit hit_of_scene(const SceneTree& scene, const Ray& ray, std::uint32_t mask,
+                 const WideStackView& stack) {
+    SceneRay<any ? Wanted::any : Wanted::closest> one({ray.tmin, ray.tmax, mask}, {}, stack);
+    one.walk(scene, 0, line_of(ray));
+    return one.best();
 }
 
 inline void trace_scene(SceneJob& job) {

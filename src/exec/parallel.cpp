@@ -12,6 +12,7 @@
 
 #include "base/float_env.h"
 #include "base/options.h"
+#include "exec/progress.h"
 
 namespace raydix {
 
@@ -27,7 +28,11 @@ void with_threads(int threads, const std::function<void()>& body) {
     const std::size_t most =
         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     tbb::task_arena arena(static_cast<int>(std::min(static_cast<std::size_t>(threads), most)));
-    arena.execute(body);
+    const ProgressSpan progress = progress_span();
+    arena.execute([&] {
+        const ProgressStage same(progress);
+        body();
+    });
 }
 
 void isolated(const std::function<void()>& body) { tbb::this_task_arena::isolate(body); }

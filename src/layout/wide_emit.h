@@ -11,7 +11,9 @@
 #include <vector>
 
 #include "base/math.h"
+#include "exec/large_pages.h"
 #include "exec/parallel.h"
+#include "exec/progress.h"
 #include "layout/wide_part_writer.h"
 
 namespace raydix {
@@ -61,6 +63,7 @@ private:
     /// From the first one on, each thread the next, so that few wait for their places.
     void write_parts(PartPlacer& placer) const {
         std::atomic<std::size_t> next = 0;
+        const ProgressCounter progress(static_cast<double>(roots_.size()));
         const auto threads = std::min(roots_.size(), static_cast<std::size_t>(thread_count()));
         for_each_index(
             threads,
@@ -73,6 +76,12 @@ private:
                     writer.write(collapse, roots_[k].depth);
                     writer.write_triangles();
                     placer.place(k, std::move(part));
+                    try {
+                        progress.add(1);
+                    } catch (...) {
+                        next = roots_.size();  // the other threads end too
+                        throw;
+                    }
                 }
             },
             1);
@@ -121,6 +130,7 @@ private:
                     vertex = numbers[vertex];
                 }
         out.vertices.reset(used.size());
+        prefer_large_pages(out.vertices);
         for_each_index(used.size(),
                        [&](std::size_t k) { out.vertices[k] = view_.vertex(used[k]); });
     }

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "exec/large_pages.h"
 #include "exec/parallel.h"
 #include "layout/wide_bvh.h"
 #include "primitives/bounds.h"
@@ -32,6 +33,8 @@ public:
         out->stats = from_.stats;
         out->nodes.reset(from_.nodes.size());
         out->blocks.reset(from_.blocks.size());
+        prefer_large_pages(out->nodes);
+        prefer_large_pages(out->blocks);
         std::copy(from_.blocks.view().begin(), from_.blocks.view().end(), out->blocks.data());
         boxes_.resize(from_.nodes.size());
         around_.resize(from_.nodes.size());

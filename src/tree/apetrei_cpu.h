@@ -20,6 +20,7 @@
 
 #include "base/check.h"
 #include "base/float3.h"
+#include "exec/progress.h"
 #include "tree/kept_splits.h"
 #include "tree/neighbour_prefixes.h"
 
@@ -171,9 +172,11 @@ ApetreiTree build_apetrei_cpu(const NeighbourPrefixes& prefixes, int max_leaf,
     const std::size_t runs = (n + run_length - 1) / run_length;
     scratch.pieces.reset(runs * Run::most_pieces);
     scratch.piece_counts.reset(runs);
+    const ProgressCounter progress(static_cast<double>(runs));
     for_each_block(n, run_length, [&](std::size_t run, std::size_t begin, std::size_t end) {
         scratch.piece_counts[run] =
             climb_run(begin, end, scratch.pieces.data() + run * Run::most_pieces);
+        progress.add(1);
     });
     Climb climb(nodes.data());
     std::size_t top = 0;

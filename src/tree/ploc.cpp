@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "exec/parallel.h"
+#include "exec/progress.h"
 #include "tree/nearest_cluster.h"
 
 namespace raydix {
@@ -44,7 +45,11 @@ public:
         const BoxLanes* boxes = &scratch_.primitives;
         const ClusterRef* refs = nullptr;  // of the first round: the places themselves
         bool slow = false;
+        const double all = count_;
         for (std::size_t to = 0; count_ > 1; to = 1 - to) {
+            // A round takes as long as its list; most leave half of it.
+            const double left = count_ / all;
+            const ProgressStage round(1 - left, 1 - 0.5 * left);
             const std::uint32_t merges = choose_partners(*boxes, slow);
             const std::uint32_t rest = count_ - merges;
             ClusterList& next = list_for(to, rest);
@@ -93,6 +98,7 @@ private:
         std::int8_t* partners = scratch_.partners.data();
         const std::size_t blocks = (count_ + partner_block - 1) / partner_block;
         scratch_.block_sums.reset(blocks);
+        const ProgressCounter progress(count_, 0, 0.5);
         for_each_block(
             count_, partner_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
                 if (pair_neighbours) {
@@ -104,6 +110,7 @@ private:
                 }
                 scratch_.block_sums[b] = static_cast<std::uint32_t>(
                     std::count_if(partners + begin, partners + end, [](auto p) { return p > 0; }));
+                progress.add(static_cast<double>(end - begin));
             });
         std::uint32_t before = 0;
         for (std::size_t b = 0; b < blocks; ++b) {
@@ -117,6 +124,7 @@ private:
     /// Writes a node per pair that merges, and the list of what is left, in order. A merged cluster
     /// takes the left place.
     void merge_partners(const From& from, ClusterList& next) {
+        const ProgressCounter progress(count_, 0.5, 1);
         for_each_block(count_, partner_block,
                        [&](std::size_t b, std::size_t begin, std::size_t end) {
                            const Survivors block = find_survivors(static_cast<std::uint32_t>(begin),
@@ -128,6 +136,7 @@ private:
                                static_cast<std::uint32_t>(begin) - node_base + crossing(begin);
                            copy_survivors(from, block, next, at);
                            merge_pairs(from, block, next, {nodes_ + node_base, at});
+                           progress.add(static_cast<double>(end - begin));
                        });
     }
 

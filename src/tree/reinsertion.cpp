@@ -6,6 +6,7 @@
 #include <bit>
 
 #include "exec/parallel.h"
+#include "exec/progress.h"
 #include "exec/scan.h"
 #include "tree/top_tree.h"
 
@@ -40,6 +41,8 @@ public:
         link();
         double area = measure();
         for (int round = 0; round < options_.rounds; ++round) {
+            const ProgressStage stage(round / static_cast<double>(options_.rounds),
+                                      (round + 1) / static_cast<double>(options_.rounds));
             search(pick_candidates());
             const std::span<Insertion> moves = resolve_conflicts();
             if (moves.empty()) break;
@@ -131,9 +134,13 @@ private:
 
     void search(std::span<const std::uint32_t> candidates) {
         s_.found.reset(candidates.size());
+        const ProgressCounter progress(static_cast<double>(candidates.size()), 0, 0.8);
         for_each_range(candidates.size(), search_grain, [&](std::size_t begin, std::size_t end) {
             InsertionSearch search(tree_, options_.most_visits);
-            for (std::size_t i = begin; i < end; ++i) s_.found[i] = search.find(candidates[i]);
+            for (std::size_t i = begin; i < end; ++i) {
+                s_.found[i] = search.find(candidates[i]);
+                if (i % search_grain == 0) progress.add(search_grain);
+            }
         });
     }
 

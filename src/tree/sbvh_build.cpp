@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <optional>
 
 #include "exec/parallel.h"
+#include "exec/progress.h"
 #include "tree/sah_reference.h"
 
 namespace raydix {
@@ -14,6 +16,9 @@ namespace {
 /// that no node above them becomes one.
 constexpr std::uint32_t task_references = 8192;
 static_assert(task_references > 255);
+
+/// Levels below the top, for what is told of progress.
+constexpr double task_levels = 13;
 
 /// A subtree that one thread builds.
 class SbvhSubtree {
@@ -116,9 +121,12 @@ public:
         top_.push_back({});
         lists_.push_back({s_.references.data(), s_.spare.data(), in_.references,
                           static_cast<std::uint32_t>(room - in_.references), 0});
-        split_top();
+        const double top_levels =
+            std::max(std::log2(double(in_.references) / task_references), 0.0);
+        const ProgressCounter progress(in_.references * (top_levels + task_levels));
+        split_top(progress);
         s_.subtrees.reset(room);
-        build_tasks();
+        build_tasks(progress);
         place_subtrees(top_, s_.subtrees, nodes, order);
         max_depth = top_[0].sum.height;
         return top_[0].sum.inner;
@@ -132,15 +140,18 @@ private:
     }
 
     /// Level by level; all nodes of a level at once.
-    void split_top() {
+    void split_top(const ProgressCounter& progress) {
         for (std::size_t first = 0; first < top_.size();) {
             const std::size_t last = top_.size();
             std::vector<std::optional<SbvhChildren>> found(last - first);
             for_each_range(found.size(), 1, [&](std::size_t begin, std::size_t end) {
                 SbvhDivider divider = divider_;
                 for (std::size_t i = begin; i < end; ++i)
-                    if (lists_[first + i].count > task_references)
+                    if (const std::uint32_t count = lists_[first + i].count;
+                        count > task_references) {
                         found[i] = divider.divide(lists_[first + i]);
+                        progress.add(count);
+                    }
             });
             for (const auto& children : found) {
                 if (children) {
@@ -158,7 +169,7 @@ private:
         }
     }
 
-    void build_tasks() {
+    void build_tasks(const ProgressCounter& progress) {
         std::vector<std::uint32_t> tasks;
         for (std::uint32_t i = 0; i < top_.size(); ++i)
             if (top_[i].left == 0) tasks.push_back(i);
@@ -167,6 +178,7 @@ private:
             for (std::size_t t = begin; t < end; ++t) {
                 SahTopNode& task = top_[tasks[t]];
                 task.sum = build.run(lists_[tasks[t]], s_.subtrees.of(task), task.node);
+                progress.add(task_levels * lists_[tasks[t]].count);
             }
         });
     }

@@ -48,7 +48,7 @@ class KdTree(ProgramTest):
             self.assertGreater(ours["hits"], 0)
             for field in ("count", "hits", "invalid_rays", "mode"):
                 self.assertEqual(ours[field], theirs[field])
-            self.assertEqual([ours["kernel"], theirs["kernel"]], ["scalar", "simd"])
+            self.assertEqual([ours["kernel"], theirs["kernel"]], ["scalar", "engine"])
             self.assertGreater(ours["node_visits_per_ray"], 1)
             self.assertGreater(ours["triangle_tests_per_ray"], 0)
         ao = [self.document("trace", SOUP, "--rays", "ao", "--size", "64x48", "--samples", "2", "--repeat", "1", "--tree",

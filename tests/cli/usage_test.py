@@ -65,8 +65,7 @@ class Usage(ProgramTest):
             self.fail_with_usage("build", SMALL, *bad)
         for bad in (["--rays", "secondary"], ["--mode", "some"], ["--kernel", "x"], ["--camera", "first"],
                     ["--size", "640"], ["--size", "0x480"], ["--size", "640x480x3"], ["--samples", "0"],
-                    ["--ao-radius", "0"], ["--ao-radius", "nan"], ["--ao-radius", "x"],
-                    ["--mode", "any", "--hits", "h.npy"], ["--rays", "ao", "--hits", "h.npy"]):
+                    ["--ao-radius", "0"], ["--ao-radius", "nan"], ["--ao-radius", "x"]):
             self.fail_with_usage("trace", SMALL, *bad)
         for bad in (["--view", "inside"], ["--eye", "1", "2"], ["--fov", "0"], ["--fov", "180"], ["--camera", "-1"],
                     ["--size", "big"], ["--samples", "-1"]):

@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "instances/affine.h"
@@ -50,7 +52,7 @@ TransformD some_map(Random& random) {
     TransformD t;
     do {
         for (auto& row : t.m) {
-            for (std::size_t k = 0; k < 3; ++k) row[k] = double(random.between(-1.3f, 1.3f)) / 3;
+            for (std::size_t k = 0; k < 3; ++k) row[k] = double(random.between(-2.6f, 2.6f)) / 3;
             row[3] = double(random.between(-2, 2)) / 3;
         }
     } while (!inverse_of(affine_of(rounded(t))));
@@ -87,11 +89,10 @@ private:
 
 std::vector<Ray> some_rays(Random& random, std::size_t n) {
     std::vector<Ray> rays(n);
-    for (Ray& ray : rays)
-        ray = {{random.between(-3, 3), random.between(-3, 3), random.between(-3, 3)},
-               0,
-               {random.between(-1, 1), random.between(-1, 1), random.between(-1, 1)},
-               infinity};
+    for (Ray& ray : rays) {
+        const Vec3 from = random.in(-3, 3), to = random.in(-1, 1);
+        ray = {from, 0, {to.x - from.x, to.y - from.y, to.z - from.z}, infinity};
+    }
     return rays;
 }
 
@@ -139,16 +140,15 @@ TEST(ModelScene, NodesAreInstancesAndMeshesGeometries) {
                             hits[i].u == wanted[i].u && hits[i].v == wanted[i].v &&
                             hits[i].geometry == wanted[i].geometry &&
                             hits[i].instance == wanted[i].instance)
-                    << "round " << round << ", ray " << i << ": node " << hits[i].instance
-                    << ", wanted " << wanted[i].instance;
+                    << "round " << round << ", ray " << i << ": path " << hits[i].instance << " at "
+                    << hits[i].t << ", wanted " << wanted[i].instance << " at " << wanted[i].t;
                 if (!hits[i].hit()) continue;
                 ++found;
                 // The nodes on the way, by what their ids say.
                 std::vector<std::uint32_t> way;
                 for (std::uint32_t at = hits[i].instance - 1; at != ModelNode::none;
                      at = model.nodes[at].parent)
-                    way.insert(way.begin(),
-                               static_cast<std::uint32_t>(model.meshes.size()) + at);
+                    way.insert(way.begin(), static_cast<std::uint32_t>(model.meshes.size()) + at);
                 ASSERT_EQ(scene.path(hits[i].instance), way);
                 deep += way.size() > 2;
             }
@@ -173,11 +173,12 @@ TEST(ModelScene, FlattenedHitsAreThoseOfTheNodesButForRounding) {
             first.emplace_back(model.meshes.size());
             for (std::uint32_t m = 0; m < node.mesh_count; ++m) {
                 first.back()[node.first_mesh + m] = triangles;
-                triangles += static_cast<std::uint32_t>(
-                    model.meshes[node.first_mesh + m].triangles.size());
+                triangles +=
+                    static_cast<std::uint32_t>(model.meshes[node.first_mesh + m].triangles.size());
             }
         }
         ASSERT_EQ(flat.mesh().triangles.size(), triangles);
+        if (triangles == 0) continue;
         const std::vector<Ray> rays = some_rays(random, 300);
         const std::vector<Hit> hits = trace(Scene(model), rays);
         const std::vector<Hit> of_flat = trace(Scene(flat), rays);
@@ -229,6 +230,31 @@ TEST(ModelScene, SaysWhichNodeItCannotPlace) {
               "cannot go through it (Model::flatten, --flatten makes one mesh of it)");
     model.flatten();
     EXPECT_EQ(Scene(model).bounds().hi.x, 1.0f);
+}
+
+TEST(ModelScene, TellsHowFarItIs) {
+    Random random(8);
+    Model model;
+    model.name = "three";
+    for (int k = 0; k < 3; ++k) {
+        model.meshes.push_back(some_mesh(random, 20000));
+        ModelNode node;
+        node.first_mesh = static_cast<std::uint32_t>(k), node.mesh_count = 1;
+        model.nodes.push_back(node);
+    }
+    std::vector<double> parts;
+    SceneOptions options;
+    options.progress = [&](double part) { parts.push_back(part); };
+    static_cast<void>(Scene(model, options));
+    ASSERT_GT(parts.size(), 6u);
+    EXPECT_TRUE(std::ranges::is_sorted(parts));
+    EXPECT_GT(std::ranges::count_if(parts, [](double p) { return p > 0.34 && p < 0.66; }), 0);
+    EXPECT_EQ(parts.back(), 1.0);
+    // What the callback throws ends it.
+    options.progress = [](double part) {
+        if (part > 0.5) throw std::runtime_error("enough");
+    };
+    EXPECT_THROW(static_cast<void>(Scene(model, options)), std::runtime_error);
 }
 
 TEST(ModelScene, RefusesNodesOutOfOrder) {

@@ -97,7 +97,7 @@ TEST(TraceHere, CountsTheNodesOfOneTree) {
 }
 
 TEST(TraceHere, CountsNodesAboveTheTreesToo) {
-    const std::vector<Ray> rays = rays_of(Kind::stream, 500);
+    const std::vector<Ray> rays = rays_of(Kind::stream, 5000);
     Scene alone(test::random_soup(300, 4, 0.3f)), below, above;
     below.add(alone, Transform{});
     below.commit();

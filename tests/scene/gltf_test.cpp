@@ -98,7 +98,7 @@ TEST(Gltf, keeps_primitives_and_nodes) {
     const std::uint32_t first[] = {1, 0, 4, 1}, count[] = {3, 0, 1, 3};
     for (std::size_t k = 0; k < 4; ++k) {
         EXPECT_EQ(model.nodes[k].parent, parents[k]);
-        if (count[k] != 0) EXPECT_EQ(model.nodes[k].first_mesh, first[k]);
+        EXPECT_EQ(model.nodes[k].first_mesh, first[k]);
         EXPECT_EQ(model.nodes[k].mesh_count, count[k]);
     }
     EXPECT_EQ(model.nodes[1].name, "a");

@@ -26,8 +26,8 @@ class StackMemory {
 public:
     explicit StackMemory(std::uint32_t max_depth) { reserve(max_depth); }
     StackMemory() = default;
-    void reserve(std::uint32_t max_depth) {
-        const std::size_t n = wide_stack_capacity(max_depth);
+    void reserve(std::uint32_t max_depth) { reserve_words(wide_stack_capacity(max_depth)); }
+    void reserve_words(std::size_t n) {
         if (n <= words_.size()) return;
         words_.resize(n), entries_.resize(n), active_.resize(n);
     }
