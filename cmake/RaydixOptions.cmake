@@ -14,6 +14,10 @@ if(RAYDIX_SANITIZE)
         $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=${RAYDIX_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all>)
     # GCC's documentation of -fsanitize: with it, the analysis of uninitialised values reports places that are not.
     target_compile_options(raydix_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+    if(RAYDIX_SANITIZE MATCHES "undefined" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+        target_compile_options(raydix_options INTERFACE
+            $<$<COMPILE_LANGUAGE:CXX>:-fsanitize-ignorelist=${CMAKE_CURRENT_LIST_DIR}/sanitizers_ignored.txt>)
+    endif()
     target_link_options(raydix_options INTERFACE -fsanitize=${RAYDIX_SANITIZE})
     target_compile_definitions(raydix_options INTERFACE RAYDIX_CHECKS=1 RAYDIX_SANITIZED=1)
 elseif(CMAKE_BUILD_TYPE STREQUAL "Debug")

@@ -42,7 +42,7 @@ using Doubles = double __attribute__((vector_size(lanes * sizeof(double))));
 using Bytes = std::uint8_t __attribute__((vector_size(lanes)));
 using Masks = std::int64_t __attribute__((vector_size(lanes * sizeof(std::int64_t))));
 
-RAYDIX_INLINE void store_bytes(Doubles values, std::uint8_t* out) {
+RAYDIX_INLINE void store_bytes(const Doubles& values, std::uint8_t* out) {
     const Ints whole = __builtin_convertvector(values, Ints);
     const Bytes bytes = __builtin_convertvector(whole, Bytes);
     std::memcpy(out, &bytes, sizeof(bytes));

@@ -51,7 +51,7 @@ void expect_brute_force(const std::string& name, const std::vector<Aabb>& boxes,
         for (std::uint32_t prim = 0; prim < boxes.size(); ++prim) {
             Hit hit;
             if (!is_empty(boxes[prim]) && intersect(prim, rays[i], hit) && hit.t < expected[i].t)
-                expected[i] = {hit.t, prim, hit.u, hit.v};
+                expected[i] = hit_of_tree({hit.t, prim, hit.u, hit.v});
         }
         hits += expected[i].hit();
     }

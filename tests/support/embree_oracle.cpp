@@ -78,7 +78,8 @@ std::vector<Hit> EmbreeOracle::closest(std::span<const Ray> rays) const {
         rtcInitIntersectContext(&context);
         rtcIntersect1(state_->scene, &context, &query);
         if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID)
-            hits[i] = {query.ray.tfar, state_->prims[query.hit.primID], query.hit.u, query.hit.v};
+            hits[i] = hit_of_tree(
+                {query.ray.tfar, state_->prims[query.hit.primID], query.hit.u, query.hit.v});
     }
     return hits;
 }

@@ -143,7 +143,8 @@ Hit oracle_closest(const MeshView& mesh, const Ray& ray) {
         if (!hit.inside() || hit.t < std::max(0.0f, ray.tmin) || hit.t > nearest) continue;
         if (hit.t == nearest && best.hit()) continue;
         nearest = hit.t;
-        best = {static_cast<float>(hit.t), i, static_cast<float>(hit.u), static_cast<float>(hit.v)};
+        best = hit_of_tree(
+            {static_cast<float>(hit.t), i, static_cast<float>(hit.u), static_cast<float>(hit.v)});
     }
     return best;
 }
