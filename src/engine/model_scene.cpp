@@ -140,9 +140,9 @@ private:
             }
             SceneOptions options = quiet_;
             options.progress = [&](double part) {
-                listener_.reach((static_cast<double>(done_) +
-                                 part * static_cast<double>(triangles)) /
-                                static_cast<double>(triangles_));
+                listener_.reach(
+                    (static_cast<double>(done_) + part * static_cast<double>(triangles)) /
+                    static_cast<double>(triangles_));
             };
             scene->commit(options);
             done_ += triangles;
