@@ -55,7 +55,7 @@ public:
             progress_at(1);
             done = after;
         }
-        done_ = work > 0 ? done / work : 0;
+        done_ = work > 0 ? done / work : 1;
         for (const auto& tree : trees) {
             report_.meshes += tree->ids.size();
             report_.triangles += tree->triangles;

@@ -142,6 +142,25 @@ TEST(DoubleScene, OfOneMeshGivesTheHitsOfItsTree) {
     }
 }
 
+TEST(DoubleScene, NodesOfModelsAreNotRounded) {
+    Model model;
+    model.meshes = {in_float(one_triangle(0))};
+    model.nodes.resize(2);
+    model.nodes[0].transform = moved(far_away, 0, 0);
+    model.nodes[1].transform = moved(1e-6, 0, 0);
+    model.nodes[1].parent = 0;
+    model.nodes[1].mesh_count = 1;
+    const SceneD scene(model);
+    const auto at = [&](double x) {
+        return closest_hit(scene, {{far_away + x, 0.25, 1}, 0, {0, 0, -1}});
+    };
+    EXPECT_FALSE(at(5e-7).hit());
+    const HitD hit = at(2e-6);
+    EXPECT_EQ(hit.t, 1);
+    EXPECT_EQ(hit.geometry, 0u);
+    EXPECT_EQ(scene.path(hit.instance), (std::vector<std::uint32_t>{1, 2}));
+}
+
 TEST(DoubleScene, PlacesFarFromTheOriginCostNoDigits) {
     // A step of 1e-6 at 1e7, which floats would round to none.
     MeshD step = one_triangle(far_away);
