@@ -1,0 +1,181 @@
+"""Scenes: what they refuse, and what they say then."""
+
+import numpy as np
+import pytest
+from worlds import BOX, DOWN, same_hits
+
+import raydix
+
+
+def test_queries_of_one_mesh_name_what_stands_in_the_way(rng):
+    mesh = raydix.Scene(*BOX)
+    placed, pair = raydix.Scene(), raydix.Scene(*BOX)
+    placed.add(mesh, np.eye(4))
+    placed.commit()
+    pair.add(*BOX)
+    pair.commit()
+    both = raydix.Scene(*BOX)
+    both.add(mesh, np.eye(4), id=3)
+    both.commit()
+    points = np.zeros((3, 3))
+    calls = {
+        "closest_point": lambda s: s.closest_point(points),
+        "signed_distance": lambda s: s.signed_distance(points),
+        "contains": lambda s: s.contains(points),
+        "winding_number": lambda s: s.winding_number(points),
+        "overlaps": lambda s: s.overlaps(),
+        "overlaps ": lambda s: mesh.overlaps(s),
+        "overlaps  ": lambda s: s.count_overlaps(mesh),
+        "touched_by": lambda s: s.touched_by(spheres=[[0, 0, 0, 1]]),
+        "closure": lambda s: s.closure(),
+        "stats": lambda s: s.stats(),
+        "wide_stats": lambda s: s.wide_stats(),
+        "info": lambda s: s.info(),
+        "check": lambda s: s.check(),
+        "refit": lambda s: s._core.refit(BOX[0].astype(np.float32)),
+        "vertices": lambda s: s.vertices,
+        "faces": lambda s: s.faces,
+    }
+    for scene, text in (
+        (placed, "geometry 0 is an instance"),
+        (pair, "geometry 1 is a second mesh"),
+        (both, "geometry 3 is an instance"),
+    ):
+        for name, call in calls.items():
+            with pytest.raises(raydix.InputError, match=f"^{name.strip()}: {text}.*one mesh"):
+                call(scene)
+        assert "geometr" in repr(scene)
+        assert "geometries" in scene._repr_html_() and "data:image" in scene._repr_html_()
+        rays = scene.primary_rays(size=(32, 32))["rays"]
+        seen = int(scene.occluded(rays).sum())
+        assert seen > 0 and scene.secondary_rays(rays, samples=2).shape == (2 * seen, 8)
+        picture = scene.render(view="normal", size=(32, 32))
+        assert (picture.max(axis=2) > 0).sum() == seen
+    pair.remove(0)
+    pair.commit()  # one mesh, with id 1
+    assert pair.contains([0, 0, 0]) and pair.intersect(DOWN)["geometry"] == 1
+    both.remove(0)
+    with pytest.raises(raydix.InputError, match="the scene would hold itself"):
+        mesh.add(both, np.eye(4))
+    with pytest.raises(raydix.InputError, match="the scene would hold itself"):
+        both.add(both, np.eye(4))
+
+
+def test_errors_of_changes(rng):
+    scene, leaf = raydix.Scene(*BOX), raydix.Scene(*BOX)
+    instance = scene.add(leaf, np.eye(4))
+    scene.commit()
+    before = scene.intersect(DOWN)
+    wrong_transforms = {
+        "expected shape": (np.eye(3), np.zeros((2, 2, 3, 4)), np.zeros(12)),
+        "last row": (np.ones((4, 4)),),
+        "singular or not finite": (
+            np.zeros((3, 4)),
+            np.full((3, 4), np.nan),
+            np.eye(4) * [1, 1, 0, 1],
+        ),
+    }
+    for text, values in wrong_transforms.items():
+        for value in values:
+            for call in (lambda v: scene.add(leaf, v), lambda v: scene.set_transform(instance, v)):
+                with pytest.raises(ValueError, match=text):
+                    call(value)
+    for wrong in ("ab", None, np.array(["a"])):
+        with pytest.raises(TypeError, match="transform: expected"):
+            scene.add(leaf, wrong)
+    with pytest.raises(TypeError, match="given int alone"):
+        scene.add(3)
+    with pytest.raises(TypeError, match="faces"):
+        scene.add(BOX[0], np.eye(4))
+    for id in (-1, 2**32, 1.5):
+        with pytest.raises(ValueError, match="id: expected a whole number"):
+            scene.remove(id)
+    for mask in (-1, 2**32, np.nan):
+        for call in (lambda m: scene.add(*BOX, mask=m), lambda m: scene.set_mask(0, m),
+                     lambda m: scene.intersect(DOWN, mask=m)):  # fmt: skip
+            with pytest.raises(ValueError, match="mask: expected a whole number"):
+                call(mask)
+    rays = np.tile(DOWN, (10, 1))
+    for masks, error in ((np.zeros(9, int), ValueError), (-np.ones(10, int), ValueError),
+                         (np.zeros(10), TypeError), ("three", TypeError)):  # fmt: skip
+        with pytest.raises(error, match="masks: expected"):
+            scene.intersect(rays, masks=masks)
+    with pytest.raises(ValueError, match="mask, masks: expected one of them"):
+        scene.intersect(rays, mask=1, masks=np.ones(10, int))
+    with pytest.raises(raydix.InputError, match="is an instance, not a mesh"):
+        scene.update(instance, BOX[0])
+    with pytest.raises(raydix.InputError, match="is a mesh, not an instance"):
+        scene.set_transform(0, np.eye(4))
+    with pytest.raises(raydix.InputError, match="index past the 4 vertices"):
+        scene.update(0, BOX[0][:4])
+    with pytest.raises(ValueError, match=r"faces: face 0 is \[0, 0, 9\]"):
+        scene.update(0, BOX[0], [[0, 0, 9]])
+    with pytest.raises(ValueError, match="expected None for 2 transforms"):
+        scene.add(leaf, np.tile(np.eye(4), (2, 1, 1)), id=9)
+    with pytest.raises(ValueError, match="mask: expected one or 2, given 3"):
+        scene.add(leaf, np.tile(np.eye(4), (2, 1, 1)), mask=[1, 2, 3])
+    with pytest.raises(ValueError, match="transform: expected 1, one for each id, given 2"):
+        scene.set_transform(instance, np.tile(np.eye(4), (2, 1, 1)))
+    for options in ({"quality": "best"}, {"usage": "often"}, {"refit_limit": -1}, {"threads": -1},
+                    {"refit_limit": np.nan}):  # fmt: skip
+        with pytest.raises(ValueError, match=f"{next(iter(options))}: expected"):
+            scene.commit(**options)
+    with pytest.raises(ValueError, match="usage: expected one of fixed, moving, given 'often'"):
+        raydix.Scene(usage="often")
+    with pytest.raises(TypeError, match="vertices: expected"):
+        raydix.Scene(faces=BOX[1])
+    assert list(scene) == [0, instance] and scene.committed
+    same_hits(scene.intersect(DOWN), before)
+    far = raydix.Scene()
+    far.add(leaf, np.eye(4) * [1e12, 1, 1, 1])
+    with pytest.raises(raydix.InputError, match="instance 0: it reaches beyond"):
+        far.commit()
+    with pytest.raises(raydix.InputError, match="never committed"):
+        far.intersect(DOWN)
+
+
+def test_strict_scenes():
+    bad = np.concatenate([BOX[0], [[np.nan, 0, 0]]])
+    faces = np.concatenate([BOX[1], [[8, 0, 1], [0, 1, 2], [8, 8, 8]]])
+    scene = raydix.Scene(strict=True)
+    for call in (lambda: scene.add(bad, faces), lambda: raydix.Scene(bad, faces, strict=True)):
+        with pytest.raises(raydix.InputError, match="triangle 12 is not finite .* as are 1 others"):
+            call()
+    id = scene.add(*BOX)
+    with pytest.raises(raydix.InputError, match="geometry 0: triangle 12"):
+        scene.update(id, bad, faces)
+    assert len(scene) == 1 and raydix.Scene(bad, faces).commit()["triangles"] == 15
+
+
+def test_float64_scenes_are_one_mesh():
+    scene = raydix.Scene(*BOX, precision="float64")
+    hits = scene.intersect([DOWN, [9, 9, 9, 0, 0, -1]])
+    assert hits["geometry"].tolist() == [0, raydix.MISSING] and hits["instance"].tolist() == [0, 0]
+    assert hits["geometry"].dtype == hits["instance"].dtype == np.uint32
+    assert scene.intersect(DOWN)["geometry"].shape == ()
+    assert scene.all_hits(DOWN)["geometry"].tolist() == [0, 0]
+    assert len(scene) == 1 and list(scene) == [0] and 0 in scene and 1 not in scene
+    assert scene.committed and scene.bounds.tolist() == [[-1, -2, -3], [1, 2, 3]]
+    other = raydix.Scene()
+    for name, call in {
+        "an empty scene": lambda: raydix.Scene(precision="float64"),
+        "usage='moving'": lambda: raydix.Scene(*BOX, precision="float64", usage="moving"),
+        "compact=True": lambda: raydix.Scene(*BOX, precision="float64", compact=True),
+        "add": lambda: scene.add(*BOX),
+        "add ": lambda: other.add(scene, np.eye(4)),
+        "update": lambda: scene.update(0, BOX[0]),
+        "remove": lambda: scene.remove(0),
+        "set_transform": lambda: scene.set_transform(0, np.eye(4)),
+        "set_mask": lambda: scene.set_mask(0, 1),
+        "commit": scene.commit,
+        "path": lambda: scene.path(0),
+        "mask": lambda: scene.occluded(DOWN, mask=1),
+        "masks": lambda: scene.count(DOWN, masks=1),
+        "positions": lambda: scene.positions(hits),
+        "normals": lambda: scene.normals(hits),
+    }.items():
+        text = f"^{name.strip()}: not there .* float64"
+        with pytest.raises(NotImplementedError, match=text):
+            call()
+    with pytest.raises(raydix.InputError, match="mask"):
+        scene._core.occluded(np.zeros((1, 8)), np.zeros(1, bool), 1)
