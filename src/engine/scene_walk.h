@@ -301,7 +301,7 @@ private:
     [[nodiscard]] std::size_t place_of(std::size_t k) const {
         return job_.order == nullptr ? k : job_.order[k];
     }
-    /// Ray k of the job; null if it is invalid.
+    /// Ray k of the job; null if it is invalid, or its mask lets it see nothing.
     HWY_INLINE const Ray* start(std::size_t k) {
         constexpr std::size_t ahead = 16;
         if (job_.order != nullptr)
@@ -309,7 +309,7 @@ private:
         const std::size_t i = place_of(k);
         const Ray& ray = job_.rays[i];
         job_.limits[k] = {ray.tmin, ray.tmax, job_.masks == nullptr ? job_.mask : job_.masks[i]};
-        if (is_valid(ray)) return &ray;
+        if (is_valid(ray)) return job_.limits[k].mask != 0 ? &ray : nullptr;
         ++job_.invalid;
         return nullptr;
     }
