@@ -117,9 +117,9 @@ std::vector<Threads> builds(Inputs& in) {
              (void)build_many(std::span(&view, 1), {.threads = n});
          }},
         {"build_many of none",
-         [&in](int n) { (void)build_many(std::span<const MeshView>(), {.threads = n}); }},
+         [](int n) { (void)build_many(std::span<const MeshView>(), {.threads = n}); }},
         {"build_many double",
-         [&in](int n) { (void)build_many(std::span<const MeshViewD>(), {.threads = n}); }},
+         [](int n) { (void)build_many(std::span<const MeshViewD>(), {.threads = n}); }},
         {"build_wide_bvh",
          [&in](int n) { (void)build_wide_bvh(in.mesh, {.builder = Builder::ploc, .threads = n}); }},
         {"WideBvh", [&in](int n) { (void)WideBvh(in.bvh, {.threads = n}); }},
@@ -137,9 +137,9 @@ std::vector<Threads> builds(Inputs& in) {
         {"InstancedScene", [&in](int n) { in.instances.build(n); }},
         {"InstancedSceneD", [&in](int n) { in.instances_d.build(n); }},
         {"tree_stats", [&in](int n) { (void)tree_stats(in.bvh, {.threads = n}); }},
-        {"measure_this_machine", [&in](int n) { (void)measure_this_machine(n); }},
+        {"measure_this_machine", [](int n) { (void)measure_this_machine(n); }},
         {"study_hierarchy", [&in](int n) { (void)study_hierarchy(in.mesh, {.threads = n}, 1); }},
-        {"device_node_capacity", [&in](int n) { (void)device_node_capacity(5u, {.threads = n}); }},
+        {"device_node_capacity", [](int n) { (void)device_node_capacity(5u, {.threads = n}); }},
     };
 }
 
