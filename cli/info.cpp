@@ -14,8 +14,11 @@ struct InfoOptions {
     std::string scene;
 };
 
-void print_info(const Model& scene, const MeshInfo& info) {
+void print_info(const Model& scene, const MeshInfo& info, std::size_t meshes, std::size_t nodes) {
     fmt::print("scene        {}\n", scene.name);
+    if (nodes != 0)
+        fmt::print("structure    {} in {}; below: as one mesh\n",
+                   counted(meshes, "mesh", "meshes"), counted(nodes, "node", "nodes"));
     fmt::print("triangles    {}\n", grouped(info.triangles));
     fmt::print("vertices     {}\n", grouped(info.vertices));
     if (info.points) fmt::print("points       {}\n", grouped(info.points));
@@ -42,12 +45,19 @@ void run_info(const InfoOptions& options) {
     if (is_rdx(options.scene))
         input = load_scene_tree(options.scene, options.tree, options.common);
     else
-        input.scene = load_model_with_cameras(options.scene, options.tree, options.common);
-    const MeshInfo info = inspect(input.scene.mesh());
+        input.scene = load_structured_model(options.scene, options.tree, options.common);
     document["scene"] = scene_json(input.scene);
+    // All else is of what its nodes show, as one mesh.
+    const std::size_t meshes = input.scene.meshes.size(), nodes = input.scene.nodes.size();
+    input.scene.flatten();
+    const MeshInfo info = inspect(input.scene.mesh());
+    for (const auto& [field, count] : {std::pair{"triangles", info.triangles},
+                                       {"vertices", info.vertices},
+                                       {"points", info.points}})
+        document["scene"][field] = count;
     document["scene"].update(mesh_info_json(info));
     document["load_ms"] = input.scene.load_ms;
-    if (options.common.prints_tables()) print_info(input.scene, info);
+    if (options.common.prints_tables()) print_info(input.scene, info, meshes, nodes);
     if (is_rdx(options.scene)) {
         const TreeStats stats = tree_stats(input.bvh, stats_options(options.tree, options.common));
         document["build"] = build_json(input.bvh, stats, {});

@@ -25,7 +25,8 @@ std::vector<std::string> warp_kernel_names() {
 }
 
 void set_hits(const std::vector<TreeHit>& found, std::vector<Hit>& hits) {
-    std::ranges::transform(found, hits.begin(), [](const TreeHit& hit) { return hit_of_tree(hit); });
+    std::ranges::transform(found, hits.begin(),
+                           [](const TreeHit& hit) { return hit_of_tree(hit); });
 }
 
 }  // namespace

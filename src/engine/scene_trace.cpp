@@ -136,10 +136,11 @@ void trace_on_this_thread(const SceneTree& tree, std::span<const Ray> rays, Hit*
         trace_job(tree, way, batch, {}, begin, std::min(begin + max_job_rays, rays.size()));
 }
 
-/// The only mesh tree, if it can be seen.
-const MeshTree* visible_mesh(const SceneTree& tree) {
+/// The only mesh tree, if all rays can see it.
+const MeshTree* visible_mesh(const SceneTree& tree, const SceneTraceOptions& options = {}) {
     const MeshTree* const mesh = tree.only_mesh();
-    return mesh != nullptr && mesh->mask != 0 ? mesh : nullptr;
+    const bool seen = mesh != nullptr && options.masks.empty() && (mesh->mask & options.mask) != 0;
+    return seen ? mesh : nullptr;
 }
 
 TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
@@ -148,12 +149,8 @@ TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
     check_enum("path", options.path, SimdPath::sorted);
     check_masks(batch.rays.size(), options);
     static_cast<void>(kernels_for(options.isa));
-    const MeshTree* const mesh = tree.only_mesh();
-    const std::uint32_t all = ~std::uint32_t{0};
-    const bool sees_all =
-        mesh != nullptr && options.masks.empty() &&
-        (mesh->mask == all ? options.mask != 0 : (mesh->mask & options.mask) != 0);
-    return sees_all ? trace_mesh(*mesh, batch) : trace_scene(tree, batch);
+    const MeshTree* const mesh = visible_mesh(tree, options);
+    return mesh != nullptr ? trace_mesh(*mesh, batch) : trace_scene(tree, batch);
 }
 
 Hit trace_one(const Scene& scene, const Ray& ray, std::uint32_t mask, bool any) {
@@ -179,6 +176,20 @@ Hit trace_one(const Scene& scene, const Ray& ray, std::uint32_t mask, bool any) 
     if (FloatEnvironment::is_plain()) return answer();
     const FloatEnvironment plain;
     return answer();
+}
+
+/// The order by triangles of the tree is that by geometry and triangle.
+AllHits all_hits_of(const MeshTree& mesh, std::span<const Ray> rays,
+                    const SceneTraceOptions& options) {
+    TraceOptions of_tree;
+    of_tree.threads = options.threads;
+    of_tree.isa = options.isa;
+    of_tree.max_result_bytes = options.max_result_bytes;
+    AllHits all = trace_all(*mesh.tree, rays, of_tree);
+    with_threads(options.threads, [&] {
+        for_each_index(all.hits.size(), [&](std::size_t i) { mesh.name(all.hits[i]); });
+    });
+    return all;
 }
 
 }  // namespace
@@ -238,6 +249,8 @@ AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTrac
     const SceneTree& tree = *SceneAccess::tree(scene);
     check_masks(rays.size(), options);
     static_cast<void>(kernels_for(options.isa));
+    if (const MeshTree* const mesh = visible_mesh(tree, options))
+        return all_hits_of(*mesh, rays, options);
     constexpr std::size_t block_size = 1024;
     HitBlocks<AllHits> found(rays.size(), block_size, options.max_result_bytes);
     std::vector<JobCounts> parts((rays.size() + block_size - 1) / block_size);

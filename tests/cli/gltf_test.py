@@ -86,6 +86,11 @@ class Gltf(ProgramTest):
                 self.assertNotIn(note, self.succeed(*command, "--flatten").out)
         self.assertNotIn(note, self.succeed("trace", self.scene, "--size", "8x8").out)
 
+    def test_info_counts_both(self):
+        info = self.document("info", self.scene)["scene"]
+        self.assertEqual([info[name] for name in ("geometries", "instances", "triangles", "vertices")], [3, 3, 8, 16])
+        self.assertIn("3 meshes in 3 nodes", self.succeed("info", self.scene).out)
+
     def test_any_hits_are_bytes(self):
         for options in ((), ("--flatten",), ("--kernel", "scalar")):
             self.trace("--mode", "any", *options)
