@@ -110,7 +110,7 @@ Error hollow_sphere(std::size_t photons, std::uint32_t k) {
     });
     std::vector<Vec3> places, normals, wanted;
     for (std::uint32_t i = 0; i < sphere.mesh.triangles.size(); i += 37) {
-        const Hit middle{0, i, 1.0f / 3, 1.0f / 3};
+        const Hit middle = raydix::hit_of_tree({0, i, 1.0f / 3, 1.0f / 3});
         places.push_back(sphere.place(middle));
         normals.push_back(-1.0f * unit(places.back()));
         const Vec3 white = sphere.albedo(i), one{1, 1, 1}, rest = one - white;

@@ -146,9 +146,8 @@ public:
 private:
     /// Points spread evenly by area, about six a voxel.
     std::vector<Point> spread(const Hall& hall, int level) {
-        double all = 0, done = 0;
+        double done = 0;
         const auto count = static_cast<std::uint32_t>(hall.scene.mesh().triangles.size());
-        for (std::uint32_t i = 0; i < count; ++i) all += hall.area_of(i);
         const raydix::Aabb box = raydix::inspect(hall.scene.mesh()).bounds;
         const double side = double{box.hi.x - box.lo.x} * std::exp2(-level);
         area_ = static_cast<float>(side * side / 6);

@@ -113,7 +113,7 @@ TEST(KdRays, DescendInsteadOfLookingAtEverything) {
 
 TEST(KdRays, InvalidRaysAndEmptyTreesMiss) {
     const std::vector<Ray> rays{{{0, 0, 0}, 0, {0, 0, 0}, 1}, {{0, 0, 5}, 0, {0, 0, -1}, infinity}};
-    std::vector<Hit> hits(2, Hit{1, 7, 0, 0});
+    std::vector<Hit> hits(2, hit_of_tree({1, 7, 0, 0}));
     const TraceCounts counts = kd_trace(build_kdtree(Mesh{}), rays, hits);
     EXPECT_EQ(counts.invalid_rays, 1u);
     EXPECT_EQ(counts.hits, 0u);

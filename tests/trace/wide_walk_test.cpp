@@ -25,13 +25,13 @@ Hit closest(const Bvh& bvh, const WideTree& tree, const Ray& given, WideStack& s
             CountedVisits& steps) {
     if (!is_valid(given)) return {};
     const RayFrame ray = make_frame(given);
-    Hit best{ray.tmax, no_primitive, 0, 0};
+    Hit best = hit_of_tree({ray.tmax, no_primitive, 0, 0});
     const auto leaf = [&](const BvhNode& child) {
         for (std::uint32_t k = child.first; k < child.first + child.count; ++k) {
             TriangleHit hit;
             if (intersect_triangle<EdgeRule::closed>(ray, bvh.triangles()[k], best.t, hit) &&
                 (hit.t < best.t || bvh.order()[k] < best.prim))
-                best = {hit.t, bvh.order()[k], hit.u, hit.v};
+                best = hit_of_tree({hit.t, bvh.order()[k], hit.u, hit.v});
         }
         return false;
     };

@@ -176,10 +176,10 @@ TEST(OctreeCheck, TrianglesStandAtTheCentresOfTheirBoxes) {
     const Octree octree = build_octree(mesh);
     EXPECT_EQ(octree.kind(), PrimitiveKind::triangles);
     for (std::size_t k = 0; k < octree.order().size(); ++k) {
-        const auto [a, b, c] = mesh.triangles[octree.order()[k]];
+        const Triangle& t = mesh.triangles[octree.order()[k]];
         const auto middle = [&](float Vec3::*axis) {
             const auto [lo, hi] = std::minmax(
-                {mesh.vertices[a].*axis, mesh.vertices[b].*axis, mesh.vertices[c].*axis});
+                {mesh.vertices[t[0]].*axis, mesh.vertices[t[1]].*axis, mesh.vertices[t[2]].*axis});
             return 0.5f * (lo + hi);
         };
         EXPECT_EQ(octree.points()[k].x, middle(&Vec3::x));
