@@ -17,8 +17,8 @@ struct InfoOptions {
 void print_info(const Model& scene, const MeshInfo& info, std::size_t meshes, std::size_t nodes) {
     fmt::print("scene        {}\n", scene.name);
     if (nodes != 0)
-        fmt::print("structure    {} in {}; below: as one mesh\n",
-                   counted(meshes, "mesh", "meshes"), counted(nodes, "node", "nodes"));
+        fmt::print("structure    {} in {}; below: as one mesh\n", counted(meshes, "mesh", "meshes"),
+                   counted(nodes, "node", "nodes"));
     fmt::print("triangles    {}\n", grouped(info.triangles));
     fmt::print("vertices     {}\n", grouped(info.vertices));
     if (info.points) fmt::print("points       {}\n", grouped(info.points));

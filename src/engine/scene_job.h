@@ -18,7 +18,7 @@
 namespace raydix {
 
 /// A ray in the space of a scene, in double. Its direction is near unit length, by a power of two.
-/// The fourth component of each has no meaning.
+/// The fourth component of each is 0.
 struct SceneLine {
     alignas(32) double origin[4];
     alignas(32) double direction[4];

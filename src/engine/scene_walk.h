@@ -22,20 +22,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-/// Boxes of parts widen once more.
-HWY_INLINE void grow_pads(const WideView& tree, PadGrowth growth, SingleFrame& frame) {
-    const V4 origin = hn::Load(f4, frame.origin);
-    alignas(16) float far[4];
-    hn::Store(hn::Max(hn::Abs(hn::Sub(hn::Load(f4, tree.lo), origin)),
-                      hn::Abs(hn::Sub(hn::Load(f4, tree.hi), origin))),
-              f4, far);
-    const float grown = growth.rate * max_of(max_of(far[0], far[1]), far[2]) + growth.least;
-    const V4 pad = hn::Load(f4, frame.near_pad);
-    const V4 whole = hn::CopySign(hn::Add(hn::Abs(pad), hn::Set(f4, grown)), pad);
-    hn::Store(whole, f4, frame.near_pad);
-    set_starts(tree, origin, hn::Load(f4, frame.inverse), whole, frame);
-}
-
 /// A hit of a mesh takes the place of the best one if it is the less of the two; `reach` is how far
 /// the ray goes then. Whether it does.
 template <bool any>
@@ -59,26 +45,73 @@ HWY_INLINE bool keep(const MeshTree& mesh, std::uint32_t number, double scale, c
     return true;
 }
 
+using D4 = hn::CappedTag<double, 4>;
+
+/// As floats.
+template <class D = D4>
+HWY_INLINE V4 rounded(const double* from) {
+    const D d;
+    if constexpr (hn::MaxLanes(d) == 4) {
+        return hn::DemoteTo(f4, hn::Load(d, from));
+    } else {
+        alignas(16) float out[4];
+        for (int a = 0; a < 4; ++a) out[a] = static_cast<float>(from[a]);
+        return hn::Load(f4, out);
+    }
+}
+
 HWY_INLINE bool near_unit_length(double longest) { return longest > 0x1p-3 && longest < 0x1p3; }
+/// False also for some whose longest component is 2^-3 or 2^3 but for a rounding, and for NaN.
+HWY_INLINE bool near_unit_length(V4 way) {
+    const V4 size = hn::Abs(way);
+    return (bits_of(f4, hn::Lt(size, hn::Set(f4, 0x1p3f))) & 7) == 7 &&
+           (bits_of(f4, hn::Gt(size, hn::Set(f4, 0x1p-3f))) & 7) != 0;
+}
+
+/// Brings a line's direction near unit length.
+inline HWY_NOINLINE void rescale(SceneLine& line) {
+    const double longest =
+        max_of(max_of(std::fabs(line.direction[0]), std::fabs(line.direction[1])),
+               std::fabs(line.direction[2]));
+    if (near_unit_length(longest)) return;
+    const double by = direction_scale(longest);
+    for (int a = 0; a < 3; ++a) line.direction[a] *= by;
+    line.scale *= by;
+}
+
+/// Floats that hold a ray, in double.
+template <class D = D4>
+HWY_INLINE void widen(V4 from, double* to) {
+    const D d;
+    if constexpr (hn::MaxLanes(d) == 4) {
+        hn::Store(hn::PromoteTo(d, from), d, to);
+    } else {
+        alignas(16) float axes[4];
+        hn::Store(from, f4, axes);
+        for (int a = 0; a < 4; ++a) to[a] = double{axes[a]};
+    }
+}
+HWY_INLINE void set_line(const Ray& ray, double scale, SceneLine& line) {
+    const auto axes = hn::FirstN(f4, 3);
+    widen(hn::IfThenElseZero(axes, load_axes(&ray.origin.x)), line.origin);
+    widen(hn::IfThenElseZero(axes, load_axes(&ray.direction.x)), line.direction);
+    line.scale = scale;
+}
 
 /// The caller's ray.
 HWY_INLINE SceneLine line_of(const Ray& ray) {
-    const Double3 o(ray.origin), d(ray.direction);
-    SceneLine line{{o.x, o.y, o.z, 0}, {d.x, d.y, d.z, 0}, 1.0};
-    const Vec3 way = ray.direction;
-    const double longest = max_of(max_of(std::fabs(way.x), std::fabs(way.y)), std::fabs(way.z));
-    if (!near_unit_length(longest)) {
-        line.scale = direction_scale(longest);
-        for (int a = 0; a < 3; ++a) line.direction[a] *= line.scale;
-    }
+    SceneLine line;
+    set_line(ray, 1.0, line);
+    if (!near_unit_length(load_axes(&ray.direction.x))) rescale(line);
     return line;
 }
 
 /// Through the inverse of an instance: ((x + y) + z) + move, nothing fused. `from` may be `to`.
 HWY_INLINE void enter(const SceneLine& from, const WayIn& way, SceneLine& to) {
-    const hn::CappedTag<double, 4> d;
+    const D4 d;
     const double o[3] = {from.origin[0], from.origin[1], from.origin[2]},
                  v[3] = {from.direction[0], from.direction[1], from.direction[2]};
+    to.scale = from.scale;
     for (std::size_t l = 0; l < 4; l += hn::MaxLanes(d)) {
         const auto x = hn::Load(d, way.columns[0] + l), y = hn::Load(d, way.columns[1] + l),
                    z = hn::Load(d, way.columns[2] + l);
@@ -89,14 +122,7 @@ HWY_INLINE void enter(const SceneLine& from, const WayIn& way, SceneLine& to) {
         hn::Store(hn::Add(turned(o), hn::Load(d, way.columns[3] + l)), d, to.origin + l);
         hn::Store(turned(v), d, to.direction + l);
     }
-    const double longest = max_of(max_of(std::fabs(to.direction[0]), std::fabs(to.direction[1])),
-                                  std::fabs(to.direction[2]));
-    to.scale = from.scale;
-    if (!near_unit_length(longest)) {
-        const double by = direction_scale(longest);
-        for (int a = 0; a < 3; ++a) to.direction[a] *= by;
-        to.scale *= by;
-    }
+    if (!near_unit_length(rounded(to.direction))) rescale(to);
 }
 
 /// Into a placed scene, by all of its instances in turn.
@@ -114,17 +140,45 @@ HWY_INLINE bool sees(std::uint32_t mask, const SceneTree& scene, const PlacedSce
     return seen;
 }
 
-/// As floats; a fourth one has no meaning.
-template <class D = hn::CappedTag<double, 4>>
-HWY_INLINE V4 rounded(const double* from) {
-    const D d;
-    if constexpr (hn::MaxLanes(d) == 4) {
-        return hn::DemoteTo(f4, hn::Load(d, from));
-    } else {
-        alignas(16) float out[4];
-        for (int a = 0; a < 4; ++a) out[a] = static_cast<float>(from[a]);
-        return hn::Load(f4, out);
-    }
+/// The largest lane of four, in all of them.
+HWY_INLINE V4 largest(V4 v) {
+    const V4 pairs = hn::Max(v, hn::Shuffle2301(v));
+    return hn::Max(pairs, hn::Shuffle1032(pairs));
+}
+
+/// What boxes and triangles need of a ray near unit length, as fill_usual_frame has it but for pads
+/// that are a little larger. A fourth component of both is 0. False if floats do not hold the ray.
+HWY_INLINE bool fill_scene_frame(const WideView& tree, V4 place, V4 way, PadGrowth growth,
+                                 SingleFrame& out) {
+    const V4 most = hn::Set(f4, std::numeric_limits<float>::max());
+    if ((bits_of(f4, hn::And(hn::Le(hn::Abs(place), most), hn::Le(hn::Abs(way), most))) & 7) != 7)
+        return false;
+    const hn::RebindToSigned<F4> i4;
+    const std::uint32_t negatives = bits_of(i4, hn::Lt(hn::BitCast(i4, way), hn::Zero(i4))) & 7;
+    const V4 size = hn::Abs(way);
+    const std::uint32_t longest = bits_of(f4, hn::Eq(size, largest(size))) & 7;
+    const auto kz = static_cast<std::uint32_t>(std::bit_width(longest)) - 1;
+    out.kind = ray_classes[negatives + 8 * kz];
+    const V4 origin = hn::Add(place, hn::Zero(f4));  // -0 becomes +0
+    const V4 inverse = limited(hn::Div(hn::Set(f4, 1.0f), way));
+    const V4 reach = hn::Max(hn::Abs(hn::Sub(hn::Load(f4, tree.lo), origin)),
+                             hn::Abs(hn::Sub(hn::Load(f4, tree.hi), origin)));
+    const V4 farthest = largest(reach);
+    constexpr float rate = wide_pad_factor * slab_pad;
+    const V4 pad = hn::Add(
+        hn::MulAdd(farthest, hn::Set(f4, rate + growth.rate), hn::Mul(reach, hn::Set(f4, rate))),
+        hn::Set(f4, least_slab_pad + growth.least));
+    const V4 near_pad = hn::CopySignToAbs(pad, hn::Neg(way));
+    hn::Store(origin, f4, out.origin);
+    hn::Store(way, f4, out.direction);
+    hn::Store(inverse, f4, out.inverse);
+    hn::Store(near_pad, f4, out.near_pad);
+    set_starts(tree, origin, inverse, near_pad, out);
+    alignas(16) float shears[4];
+    hn::Store(hn::Div(way, hn::Set(f4, out.direction[kz])), f4, shears);
+    out.shear[0] = shears[out.kind.kx], out.shear[1] = shears[out.kind.ky];
+    out.t_scale = 1.0f;
+    return true;
 }
 
 /// One ray through a scene; counting: the nodes that it visits too.
@@ -134,13 +188,14 @@ public:
     /// `stack` has room for SceneTree::stack_size; `best` is what was found before; `found` is for
     /// all hits.
     SceneRay(const SceneJob::Limits& limits, const Hit& best, const WideStackView& stack,
-             BudgetVector<Hit>* found = nullptr)
+             BudgetVector<Hit>* found = nullptr, bool nearest_first = true)
         : tmin_(limits.tmin),
           reach_(limits.reach),
           mask_(limits.mask),
           best_(best),
           stack_(stack),
-          found_(found) {}
+          found_(found),
+          nearest_first_(nearest_first) {}
 
     [[nodiscard]] const Hit& best() const { return best_; }
     void store(SceneJob& job, std::uint32_t id) const {
@@ -184,6 +239,7 @@ private:
         const PartTree& tree;
         std::uint32_t number;
         const SceneLine& line;
+        bool nearest_first;
 
         HWY_NOINLINE float visit_one(std::uint32_t leaf, std::uint32_t) {
             ray.visit(scene, tree.part[leaf], number, line);
@@ -194,12 +250,11 @@ private:
     HWY_NOINLINE void walk_parts(const SceneTree& scene, const PartTree& tree, std::uint32_t number,
                                  const SceneLine& line) {
         SingleFrame frame;
-        if (!fill(tree.view, line, frame)) return;
-        grow_pads(tree.view, tree.growth, frame);
+        if (!fill(tree.view, line, tree.growth, frame)) return;
         const WideStackView stack = stack_;
         const std::size_t taken = wide_stack_capacity(tree.arrays.stats.max_depth);
         stack_ = {stack.words + taken, stack.entries + taken};
-        Parts parts{*this, scene, tree, number, line};
+        Parts parts{*this, scene, tree, number, line, nearest_first_};
         SimdCounts counts;
         SingleRay<wanted, counting, false, false, Parts>(tree.view, frame, stack, counts, &parts, 0)
             .trace(0, {frame.tmax});
@@ -208,25 +263,20 @@ private:
     }
 
     /// False if floats do not hold the ray, or it ends before it begins.
-    HWY_INLINE bool fill(const WideView& view, const SceneLine& line, SingleFrame& frame) const {
-        const V4 origin = rounded(line.origin), way = rounded(line.direction);
-        const V4 most = hn::Set(f4, std::numeric_limits<float>::max());
+    HWY_INLINE bool fill(const WideView& view, const SceneLine& line, PadGrowth growth,
+                         SingleFrame& frame) const {
         const float tmin = line.units(tmin_), tmax = line.units(reach_);
-        if ((bits_of(f4, hn::And(hn::Le(hn::Abs(origin), most), hn::Le(hn::Abs(way), most))) & 7) !=
-                7 ||
-            !(tmin <= tmax && tmax >= 0.0f))
-            return false;
-        alignas(16) float components[4];
-        hn::Store(way, f4, components);
-        fill_usual_frame(view, origin, way, components, tmin, tmax, frame);
-        return true;
+        if (!(tmin <= tmax && tmax >= 0.0f)) return false;
+        frame.tmin = tmin > 0.0f ? tmin : 0.0f;
+        frame.tmax = min_of(tmax, std::numeric_limits<float>::max());
+        return fill_scene_frame(view, rounded(line.origin), rounded(line.direction), growth, frame);
     }
 
     /// Of a mesh that is not empty.
     HWY_INLINE void hit_mesh(const MeshTree& mesh, std::uint32_t number, const SceneLine& line) {
         if ((mesh.mask & mask_) == 0) return;
         SingleFrame frame;
-        if (!fill(mesh.view, line, frame)) return;
+        if (!fill(mesh.view, line, {}, frame)) return;
         if (mesh.view.is_compact) {
             TriangleBlock room{};
             WideView view = mesh.view;
@@ -268,6 +318,7 @@ private:
     std::uint64_t visits_ = 0;
     WideStackView stack_;  // from where it is free
     BudgetVector<Hit>* const found_;
+    const bool nearest_first_;  // see single.h
 };
 
 template <bool any>
@@ -289,7 +340,7 @@ public:
 private:
     using One = SceneRay<any ? Wanted::any : Wanted::closest>;
     /// Fewer rays than this go one by one.
-    static constexpr std::uint32_t least_together = 6;
+    static constexpr std::uint32_t least_together = 12;
 
     /// A scene, where its rays are, and what leads to it.
     struct Place {
@@ -319,7 +370,8 @@ private:
             const Ray* const ray = start(k);
             if (ray == nullptr) continue;
             const auto id = static_cast<std::uint32_t>(k);
-            One one(job_.limits[k], job_.hits[k], job_.single_stack.view());
+            // Rays of a batch that come here go anywhere.
+            One one(job_.limits[k], job_.hits[k], job_.single_stack.view(), nullptr, false);
             one.walk(*job_.tree, 0, HWY_NAMESPACE::line_of(*ray));
             one.store(job_, id);
         }
@@ -349,9 +401,14 @@ private:
             return reach(ray);
         }
         void visit(std::uint32_t leaf, const std::uint32_t* rays, std::uint32_t count) {
-            walk_.visit(place_, tree_.part[leaf], rays, count);
+            if (count < least_together) {
+                for (std::uint32_t k = 0; k < count; ++k) visit_one(leaf, rays[k]);
+            } else {
+                walk_.visit(place_, tree_.part[leaf], rays, count);
+            }
         }
         float reach(std::uint32_t ray) { return walk_.shorten(level_, ray); }
+        static constexpr bool nearest_first = true;
 
     private:
         SceneWalk& walk_;
@@ -395,8 +452,9 @@ private:
                                                std::uint32_t ray) const {
         if (place.depth != 0 && !place.scene.instances.empty()) return level.lines[ray];
         // Floats have all of it: the caller's, or that of a scene that holds no instances.
-        const Double3 o(level.rays[ray].origin), d(level.rays[ray].direction);
-        return {{o.x, o.y, o.z, 0}, {d.x, d.y, d.z, 0}, level.sources[ray].scale};
+        SceneLine line;
+        set_line(level.rays[ray], level.sources[ray].scale, line);
+        return line;
     }
 
     /// A ray goes through the inverse of an instance. It becomes the last one of the level inside,

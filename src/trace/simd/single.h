@@ -30,6 +30,9 @@ enum class Wanted { closest, any, all };
 ///       ray `ray` of the job into the part; how far it goes from now on
 ///   void visit(std::uint32_t part, const std::uint32_t* rays, std::uint32_t count)
 ///   float reach(std::uint32_t ray)
+///   bool nearest_first
+///       for any hit: whether the nearest child is the next one, not the largest. It ends rays soon
+///       that begin close to something.
 struct NoParts {};
 
 /// `guessing`: rays that follow each other take much the same way.
@@ -124,6 +127,9 @@ private:
         }
     }
 
+    static constexpr bool may_take_nearest =
+        wanted == Wanted::any && !std::is_same_v<Parts, NoParts>;
+
     /// Whether missing children must be looked for. Their boxes in a plain node are inside out, so
     /// that no ray meets them unless something overflows; in a compact one pads may turn them.
     static constexpr bool always_careful = compact;
@@ -173,7 +179,8 @@ private:
         for (std::size_t l = 0; l < 8; l += lanes8) {
             test_boxes(node, rates, l, entry, exit);
             met |= bits_of_le(entry, exit) << l;
-            if constexpr (wanted == Wanted::closest) hn::Store(entry, f8, entries + l);
+            if constexpr (wanted == Wanted::closest || may_take_nearest)
+                hn::Store(entry, f8, entries + l);
         }
         if (always_careful || frame_.careful) met &= used_slots(node);
         if (met == 0) return false;
@@ -182,9 +189,27 @@ private:
         } else if constexpr (wanted == Wanted::closest) {
             push_sorted(node.child, entries, met, top, word);
         } else {
+            if constexpr (may_take_nearest) {
+                if (parts_->nearest_first) {
+                    const std::size_t nearest = nearest_of(entries, met);
+                    push_by_area(node.child, met & ~(1u << nearest), top, word);
+                    stack_.words[top++] = word;
+                    word = node.child[nearest];
+                    return true;
+                }
+            }
             push_by_area(node.child, met, top, word);
         }
         return true;
+    }
+
+    static HWY_INLINE std::size_t nearest_of(const float* entries, std::uint32_t met) {
+        auto s = static_cast<std::size_t>(std::countr_zero(met));
+        for (std::uint32_t left = met & (met - 1); left != 0; left &= left - 1) {
+            const auto other = static_cast<std::size_t>(std::countr_zero(left));
+            s = entries[other] < entries[s] ? other : s;
+        }
+        return s;
     }
 
     /// Two children or more, in the order of their slots.

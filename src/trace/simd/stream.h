@@ -159,7 +159,7 @@ private:
         const auto& node = tree_.template node<compact>(entry.word);
         const Planes planes = planes_of(node);
         std::uint32_t children[8], child_count;  // the farthest first
-        if constexpr (any) {
+        if constexpr (any && !has_parts) {       // parts: see single.h
             child_count = order_by_area(used_slots(node), children);
         } else {
             HWY_ALIGN float entries[8];
