@@ -7,6 +7,7 @@
 #include <string>
 #include <unordered_map>
 
+#include "engine/merge.h"
 #include "engine/part_tree.h"
 #include "exec/parallel.h"
 #include "exec/progress.h"
@@ -44,36 +45,6 @@ std::vector<Group> groups_of(const SceneAccess::State& state, Usage usage) {
     return groups;
 }
 
-/// The meshes behind each other.
-Mesh merged(const SceneAccess::State& state, const Group& group,
-            std::vector<std::uint32_t>& first) {
-    std::size_t vertices = 0, triangles = 0;
-    for (const std::uint32_t id : group.ids) {
-        const MeshView& mesh = state.geometries.at(id).mesh;
-        first.push_back(static_cast<std::uint32_t>(triangles));
-        vertices += mesh.vertices.size();
-        triangles += mesh.triangles.size();
-    }
-    if (std::max(vertices, triangles) >= no_primitive)
-        throw InputError("scene: " + std::to_string(triangles) + " triangles of " +
-                         std::to_string(vertices) + " vertices are too many for one tree");
-    Mesh out;
-    out.vertices.resize(vertices);
-    out.triangles.resize(triangles);
-    std::size_t vertex = 0;
-    for (std::size_t k = 0; k < group.ids.size(); ++k) {
-        const MeshView& mesh = state.geometries.at(group.ids[k]).mesh;
-        std::copy(mesh.vertices.begin(), mesh.vertices.end(), out.vertices.begin() + vertex);
-        const auto offset = static_cast<std::uint32_t>(vertex);
-        for_each_index(mesh.triangles.size(), [&](std::size_t i) {
-            const Triangle& t = mesh.triangles[i];
-            out.triangles[first[k] + i] = {t[0] + offset, t[1] + offset, t[2] + offset};
-        });
-        vertex += mesh.vertices.size();
-    }
-    return out;
-}
-
 class Commit {
 public:
     Commit(const SceneAccess::State& state, const SceneOptions& options, CommitReport& report)
@@ -96,7 +67,7 @@ public:
         }
         for (const auto& [id, geometry] : state_.geometries)
             if (!geometry.is_instance())
-                tree_->mesh_names.push_back({id, geometry.mesh, geometry.own});
+                tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
         place_instances();
         progress_at(done_ / work_);
         const ProgressStage top(done_ / work_, 1);
@@ -160,7 +131,10 @@ private:
             out->triangles = mesh.triangles.size();
             builder.build(mesh, build, built, wide);
         } else {
-            const Mesh mesh = merged(state_, group, out->first);
+            std::vector<MeshView> meshes;
+            for (const std::uint32_t id : group.ids)
+                meshes.push_back(state_.geometries.at(id).mesh);
+            const Mesh mesh = merged(meshes, out->first);
             out->triangles = mesh.triangles.size();
             builder.build(mesh, build, built, wide);
         }
