@@ -73,14 +73,14 @@ void compare(const std::string& what, const Bvh& bvh, std::span<const Ray> rays)
 
 TEST_F(GpuCwbvh, LikeScalar) {
     for (const Model& scene : builtin_triangle_scenes(200'000))
-        compare(scene.name, build_bvh(scene.mesh), make_mixed_rays(scene, 1'000'000, seed));
+        compare(scene.name, build_bvh(scene.mesh()), make_mixed_rays(scene, 1'000'000, seed));
     for (const float scale : {1e-9f, 1.0f, 1e12f}) {
         const Model scene = scene_of(scaled(random_soup(2000, 4), scale), "soup");
-        compare("soup times " + std::to_string(scale), build_bvh(scene.mesh),
+        compare("soup times " + std::to_string(scale), build_bvh(scene.mesh()),
                 make_mixed_rays(scene, 200'000, seed));
     }
     const Model lattice = scene_of(lattice_mesh(2000, 20, 5), "lattice");
-    compare("lattice", build_bvh(lattice.mesh), make_mixed_rays(lattice, 200'000, seed));
+    compare("lattice", build_bvh(lattice.mesh()), make_mixed_rays(lattice, 200'000, seed));
 }
 
 TEST_F(GpuCwbvh, FewTrianglesAndFewRays) {
@@ -105,7 +105,7 @@ TEST_F(GpuCwbvh, InvalidRaysMiss) {
         if (i % 7 == 0) rays[i].origin.y = std::nanf("");
         if (i / 1000 % 2 == 0) rays[i].tmin = infinity;
     }
-    compare("invalid rays", build_bvh(scene.mesh), rays);
+    compare("invalid rays", build_bvh(scene.mesh()), rays);
 }
 
 TEST_F(GpuCwbvh, RefusesWhatItCannotDo) {
