@@ -1,6 +1,6 @@
 // Scenes where trees know neither geometries nor instances: on an NVIDIA GPU (device_trace.h,
-// device_cwbvh.h) and in the warp simulator (simulate.h). A tree is made over all meshes as one, and
-// its hits are named afterwards, on the host or where they lie.
+// device_cwbvh.h) and in the warp simulator (simulate.h). A tree is made over all meshes as one,
+// and its hits are named afterwards, on the host or where they lie.
 //
 //   const MergedMeshes merged = merge_meshes(scene);
 //   const DeviceCwbvh tree{Cwbvh(build_bvh(merged.mesh, build_options_for(Quality::balanced)))};

@@ -13,8 +13,9 @@ void name_hits_on_device(const DeviceMeshNames& names, std::span<const TreeHit> 
     check_name_hits(found.size(), hits.size());
     if (found.size() >= 0x80000000u) throw InputError("2^31 hits or more in one launch");
     CudaLauncher launcher(static_cast<cudaStream_t>(stream), nullptr, CudaLauncher::reserved_bytes);
-    launcher.launch("scene.name", static_cast<std::uint32_t>(found.size()),
-                    NameHit{{names.first(), names.ids(), names.count()}, found.data(), hits.data()});
+    launcher.launch(
+        "scene.name", static_cast<std::uint32_t>(found.size()),
+        NameHit{{names.first(), names.ids(), names.count()}, found.data(), hits.data()});
 }
 
 }  // namespace raydix

@@ -65,8 +65,8 @@ void expect_named(const MeshNames& names, const std::vector<TreeHit>& found,
 std::size_t compare(const std::string& what, const Scene& scene, std::size_t ray_count) {
     const MergedMeshes whole = merge_meshes(scene, all);
     std::vector<Ray> rays = make_mixed_rays(
-        scene_of(whole.mesh.triangles.empty() ? random_soup(3, 1) : whole.mesh, what),
-        ray_count, seed);
+        scene_of(whole.mesh.triangles.empty() ? random_soup(3, 1) : whole.mesh, what), ray_count,
+        seed);
     if (rays.size() > 2) rays[1].direction = {0, 0, 0};
     std::size_t hits = 0;
     for (const std::uint32_t mask : {all, 1u, 6u, 0u}) {
@@ -109,7 +109,8 @@ TEST(DeviceScene, HitsAreThoseOfTheScene) {
     for (std::uint32_t i = 0; i < 300; ++i)
         many.push_back({random_soup(i % 5, i + 1, 0.3f), {.mask = i % 3 == 0 ? 1 : all}});
     hits += compare("many", committed(many), 4000);
-    hits += compare("far out", committed({{scaled(lattice, 1e11f)}, {scaled(lattice, -1e11f)}}), 400);
+    hits +=
+        compare("far out", committed({{scaled(lattice, 1e11f)}, {scaled(lattice, -1e11f)}}), 400);
     std::cout << hits << " hits compared\n";
     EXPECT_GT(hits, 5000u);
 }
@@ -137,8 +138,8 @@ TEST(DeviceScene, SimulatedHitsNameTheirTriangles) {
     for (std::uint32_t i = 0; i < 12; ++i) items.push_back({random_soup(50, i + 1, 0.3f)});
     const Scene scene = committed(items);
     const MergedMeshes merged = merge_meshes(scene);
-    const std::vector<Ray> rays = make_rays(scene_of(merged.mesh, "soups"),
-                                            RaySet::through_box, 2000, seed);
+    const std::vector<Ray> rays =
+        make_rays(scene_of(merged.mesh, "soups"), RaySet::through_box, 2000, seed);
     const WarpTree tree(build_bvh(merged.mesh));
     const SimulateOptions run{.kernel = WarpKernel::speculative_while_while,
                               .machine = machine_model("h200")};
