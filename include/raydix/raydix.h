@@ -11,6 +11,7 @@
 #include <raydix/device.h>           // IWYU pragma: export
 #include <raydix/device_cwbvh.h>     // IWYU pragma: export
 #include <raydix/device_queries.h>   // IWYU pragma: export
+#include <raydix/device_scene.h>     // IWYU pragma: export
 #include <raydix/device_trace.h>     // IWYU pragma: export
 #include <raydix/device_trees.h>     // IWYU pragma: export
 #include <raydix/double.h>           // IWYU pragma: export

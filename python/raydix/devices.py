@@ -74,7 +74,6 @@ class CudaRays:
 
     def __init__(self, core: Any) -> None:
         self._core = _core.DeviceScene(core)
-        self._geometry = core.mesh_id()
 
     def _there(
         self, rays: Any, directions: Any, tmin: Any, tmax: Any
@@ -102,14 +101,14 @@ class CudaRays:
         if on_cuda(rays):
             flat, lead = self._there(rays, directions, tmin, tmax)
             columns = self._core.intersect_there(flat, stream)
-            names = ("t", "prim", "u", "v")
+            names = ("t", "prim", "u", "v", "geometry", "instance")
             return {
                 name: _like(column, rays, lead) for name, column in zip(names, columns, strict=True)
             }
         packed, lead = _packed(rays, directions, tmin, tmax)
-        hits = np.empty(lead + (4,), FLOAT32)
-        self._core.intersect_here(packed, hits.reshape(-1, 4))
-        return hit_columns(hits, self._geometry)
+        hits = np.empty(lead + (6,), FLOAT32)
+        self._core.intersect_here(packed, hits.reshape(-1, 6))
+        return hit_columns(hits)
 
     def occluded(
         self,

@@ -71,6 +71,7 @@ class Scene(SceneContents, SceneViews):
     device :
         "cpu", or "cuda" for an NVIDIA GPU: `intersect` and `occluded` then run there and take
         arrays of CuPy, PyTorch and others that lie there. All other queries run on the processor.
+        Meshes are traced there, instances are not.
     precision :
         "float32" (also None), or "float64": coordinates as they are given, and all answers computed
         and returned in float64. For meshes far from the origin (float32 has steps of half a metre
@@ -95,8 +96,9 @@ class Scene(SceneContents, SceneViews):
 
     With precision "float64" a scene is one mesh, and these raise NotImplementedError: `Scene()`,
     `add`, `update`, `remove`, `set_transform`, `set_mask`, `commit`, `path`, masks, compact=True,
-    usage="moving", device="cuda", `positions`, `normals`, `render`, `cameras`, `primary_rays`, `secondary_rays`, `info`,
-    `wide_stats` and `raydix.simulate`; files raise ValueError, because they are read in float32.
+    usage="moving", `positions`, `normals`, `render`, `cameras`, `primary_rays`, `secondary_rays`,
+    `info`, `wide_stats` and `raydix.simulate`; device="cuda" raises BackendUnavailable; files raise
+    ValueError, because they are read in float32.
     Numbers other than 0 below 2**-500 count as 0.
 
     Raises ValueError (InputError is one) and TypeError that name the argument, what was expected
@@ -133,8 +135,9 @@ class Scene(SceneContents, SceneViews):
         self._cameras: list[Camera] = []
         self._fitted: Camera | None = None
         self._cuda: CudaRays | None = None
+        if device == "cuda" and self.dtype != FLOAT32:
+            raise _core.BackendUnavailable("device='cuda': scenes in float64 are not traced there")
         for is_asked, what in (
-            (device == "cuda", "device='cuda'"),
             (usage != "fixed", f"usage={usage!r}"),
             (compact, "compact=True"),
             (vertices is None, "an empty scene"),
@@ -258,8 +261,8 @@ class Scene(SceneContents, SceneViews):
         through an edge hit at least one of its triangles (Woop, Benthin, Wald 2013). Rays with NaN,
         a zero direction or tmin > tmax miss. All are views of one array.
 
-        With rays that lie on a GPU, "geometry" and "instance" are left out: device="cuda" takes
-        scenes of one mesh, without masks. BackendUnavailable otherwise.
+        With device="cuda" all rays have the mask of 32 bits set, and hits are the same. Scenes with
+        instances, `mask` and `masks` raise BackendUnavailable there.
         """
         if self.device == "cuda":
             return self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)

@@ -26,7 +26,7 @@ using Out = nb::ndarray<T, Shape, nb::c_contig, nb::device::cpu>;
 using PointsIn = In<float, nb::shape<-1, 3>>;
 using FacesIn = In<std::uint32_t, nb::shape<-1, 3>>;
 using RaysIn = In<float, nb::shape<-1, 8>>;
-using HitsOut = Out<float, nb::shape<-1, 4>>;
+using HitsOut = Out<float, nb::shape<-1, 6>>;
 
 /// The rows of an array as structs of the same size.
 template <class Row, class Array>

@@ -5,6 +5,7 @@
 #include <raydix/cwbvh.h>
 #include <raydix/device.h>
 #include <raydix/device_cwbvh.h>
+#include <raydix/device_scene.h>
 #include <raydix/error.h>
 
 #include <cstdint>
@@ -24,18 +25,46 @@ namespace {
 using DeviceRays = nb::ndarray<const float, nb::shape<-1, 8>, nb::c_contig, nb::device::cuda>;
 template <class T>
 using DeviceArray = nb::ndarray<T, nb::ndim<1>, nb::device::cuda>;
-using DeviceHits = std::tuple<DeviceArray<float>, DeviceArray<std::uint32_t>, DeviceArray<float>,
-                              DeviceArray<float>>;
+/// t, prim, u, v, geometry, instance
+using DeviceHits =
+    std::tuple<DeviceArray<float>, DeviceArray<std::uint32_t>, DeviceArray<float>,
+               DeviceArray<float>, DeviceArray<std::uint32_t>, DeviceArray<std::uint32_t>>;
 using FlagsOut = Out<bool, nb::ndim<1>>;
 
-/// A compressed wide tree in device memory, made from the scene's binary one. It stays as it is
-/// when the scene is refitted.
+/// Hits in device memory, before and after they are named.
+struct HitsThere {
+    DeviceBuffer<TreeHit> found;
+    DeviceBuffer<Hit> hits;
+
+    explicit HitsThere(std::size_t count) : found(count), hits(count) {}
+};
+
+/// A compressed wide tree in device memory over all meshes of the scene. It stays as it is when the
+/// scene is refitted.
 class DeviceScene {
 public:
-    explicit DeviceScene(SceneTrees& scene) : tree_(copy_of(scene)) {}
+    explicit DeviceScene(SceneTrees& scene) {
+        const auto lock = scene.read();
+        // The binary tree of one mesh is the scene's own. Rays see it unless its mask is 0.
+        const bool one = scene.is_mesh() && scene.mesh_mask() != 0;
+        MergedMeshes merged;
+        if (one)
+            merged.names = {{0}, {*scene.mesh_id()}};
+        else
+            merged = merge_meshes(scene.traced());
+        static_cast<void>(device_name());  // before more work: says why there is no device
+        BuildOptions options = scene.options();
+        options.threads = threads_for(options.threads);
+        tree_ = DeviceCwbvh(one ? Cwbvh(scene.bvh("device='cuda'"), options.threads)
+                                : Cwbvh(build_bvh(merged.mesh, options), options.threads));
+        names_ = DeviceMeshNames(merged.names);
+    }
 
-    void trace(const Ray* rays, std::size_t count, TreeHit* hits, Stream stream) const {
-        trace_on_device(tree_.tree(), rays, checked(count), hits, CwbvhKernel::cwbvh, {}, stream);
+    /// Nothing is waited for.
+    void trace(const Ray* rays, std::size_t count, const HitsThere& out, Stream stream) const {
+        trace_on_device(tree_.tree(), rays, checked(count), out.found.data(), CwbvhKernel::cwbvh,
+                        {}, stream);
+        name_hits_on_device(names_, {out.found.data(), count}, {out.hits.data(), count}, stream);
     }
     void trace_any(const Ray* rays, std::size_t count, std::uint8_t* occluded,
                    Stream stream) const {
@@ -44,24 +73,13 @@ public:
     }
 
 private:
-    static DeviceCwbvh copy_of(SceneTrees& scene) {
-        static_cast<void>(device_name());  // before any work: says why there is no device
-        const auto lock = scene.read();
-        if (!scene.is_mesh())
-            throw BackendUnavailable(
-                "device='cuda': takes scenes of one mesh, and this one has instances, several "
-                "meshes or no commit");
-        if (scene.mesh_id() && scene.mesh_mask() != 0xFFFFFFFFu)
-            throw BackendUnavailable(
-                "device='cuda': the mesh has a mask, which rays on a GPU do not know");
-        return DeviceCwbvh(Cwbvh(scene.bvh("device='cuda'"), threads_for(scene.options().threads)));
-    }
     static std::uint32_t checked(std::size_t count) {
         if (count > 0xFFFFFFFFu) throw nb::value_error("more than 2^32 - 1 rays in one call");
         return static_cast<std::uint32_t>(count);
     }
 
     DeviceCwbvh tree_;
+    DeviceMeshNames names_;
 };
 
 const Ray* aligned_rays(const DeviceRays& rays) {
@@ -72,20 +90,21 @@ const Ray* aligned_rays(const DeviceRays& rays) {
 
 Stream stream_of(std::uintptr_t handle) { return reinterpret_cast<Stream>(handle); }
 
-/// Rays on the device -> t, prim, u, v there, four views of one array; nothing is waited for.
+/// Rays on the device -> the columns of their hits there, views of one array; nothing is waited
+/// for, so that the hits before they were named are kept with it.
 DeviceHits intersect_there(const DeviceScene& self, const DeviceRays& rays, std::uintptr_t stream) {
     const std::size_t count = rays.shape(0);
-    auto hits = std::make_unique<DeviceBuffer<TreeHit>>(count);
-    self.trace(aligned_rays(rays), count, hits->data(), stream_of(stream));
-    float* const floats = reinterpret_cast<float*>(hits->data());
+    auto hits = std::make_unique<HitsThere>(count);
+    self.trace(aligned_rays(rays), count, *hits, stream_of(stream));
+    float* const floats = reinterpret_cast<float*>(hits->hits.data());
     const nb::capsule owner = owner_of(std::move(hits));
     const int device = rays.device_id();
     const auto column = [&]<class T>(T* data) {
-        return DeviceArray<T>(data, {count}, owner, {4}, nb::dtype<T>(), nb::device::cuda::value,
+        return DeviceArray<T>(data, {count}, owner, {6}, nb::dtype<T>(), nb::device::cuda::value,
                               device);
     };
-    return {column(floats), column(reinterpret_cast<std::uint32_t*>(floats + 1)),
-            column(floats + 2), column(floats + 3)};
+    const auto ids = [&](int k) { return column(reinterpret_cast<std::uint32_t*>(floats + k)); };
+    return {column(floats), ids(1), column(floats + 2), column(floats + 3), ids(4), ids(5)};
 }
 
 DeviceArray<std::uint8_t> occluded_there(const DeviceScene& self, const DeviceRays& rays,
@@ -101,14 +120,14 @@ DeviceArray<std::uint8_t> occluded_there(const DeviceScene& self, const DeviceRa
 
 void intersect_here(const DeviceScene& self, const RaysIn& rays, const HitsOut& out) {
     const auto given = rows<Ray>(rays);
-    const auto results = rows_out<TreeHit>(out);
+    const auto results = rows_out<Hit>(out);
     if (results.size() != given.size())
         throw nb::value_error("a result has another length than its queries");
     in_pieces(given.size(), [&](std::size_t begin, std::size_t end) {
         const DeviceBuffer<Ray> there(given.subspan(begin, end - begin));
-        const DeviceBuffer<TreeHit> hits(end - begin);
-        self.trace(there.data(), end - begin, hits.data(), nullptr);
-        hits.download(results.subspan(begin, end - begin));
+        const HitsThere hits(end - begin);
+        self.trace(there.data(), end - begin, hits, nullptr);
+        hits.hits.download(results.subspan(begin, end - begin));
     });
 }
 

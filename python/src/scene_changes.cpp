@@ -207,8 +207,6 @@ void bind_contents(nb::class_<Scene>& scene) {
 
 void bind_commits(nb::class_<SceneTrees>& scene) {
     scene
-        .def("mesh_id",
-             [](SceneTrees& self) { return while_reading(self, [&] { return self.mesh_id(); }); })
         .def("committed",
              [](SceneTrees& self) { return while_reading(self, [&] { return self.committed(); }); })
         .def("bounds",

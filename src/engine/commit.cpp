@@ -66,7 +66,7 @@ public:
         }
         for (const auto& [id, geometry] : state_.geometries)
             if (!geometry.is_instance())
-                tree_->mesh_names.push_back({id, geometry.mesh, geometry.own});
+                tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
         place_instances();
         const ProgressStage top(meshes.part_done(), 1);
         progress_at(0);

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/merge.h"
 #include "engine/scene_state.h"
 #include "exec/parallel.h"
 #include "exec/progress.h"
@@ -128,7 +129,9 @@ private:
                 out->triangles = mesh.triangles.size();
                 Maker::build(mesh, options_, *out);
             } else {
-                const Mesh mesh = merged(group, out->first);
+                std::vector<MeshView> meshes;
+                for (const std::uint32_t id : group.ids) meshes.push_back(mesh_of(id));
+                const Mesh mesh = merged<Mesh, MeshView>(meshes, out->first);
                 out->triangles = mesh.triangles.size();
                 Maker::build(mesh, options_, *out);
             }
@@ -155,36 +158,6 @@ private:
         out.first = {0};
         out.triangles = mesh.triangles.size();
         return true;
-    }
-
-    /// The meshes behind each other.
-    [[nodiscard]] Mesh merged(const Group& group, std::vector<std::uint32_t>& first) const {
-        std::size_t vertices = 0, triangles = 0;
-        for (const std::uint32_t id : group.ids) {
-            const MeshView& mesh = mesh_of(id);
-            first.push_back(static_cast<std::uint32_t>(triangles));
-            vertices += mesh.vertices.size();
-            triangles += mesh.triangles.size();
-        }
-        if (std::max(vertices, triangles) >= no_primitive)
-            throw InputError("scene: " + std::to_string(triangles) + " triangles of " +
-                             std::to_string(vertices) + " vertices are too many for one tree");
-        Mesh out;
-        out.vertices.resize(vertices);
-        out.triangles.resize(triangles);
-        std::size_t vertex = 0;
-        for (std::size_t k = 0; k < group.ids.size(); ++k) {
-            const MeshView& mesh = mesh_of(group.ids[k]);
-            std::copy(mesh.vertices.begin(), mesh.vertices.end(),
-                      out.vertices.begin() + static_cast<std::ptrdiff_t>(vertex));
-            const auto offset = static_cast<std::uint32_t>(vertex);
-            for_each_index(mesh.triangles.size(), [&](std::size_t i) {
-                const Triangle& t = mesh.triangles[i];
-                out.triangles[first[k] + i] = {t[0] + offset, t[1] + offset, t[2] + offset};
-            });
-            vertex += mesh.vertices.size();
-        }
-        return out;
     }
 
     const State& state_;

@@ -61,7 +61,7 @@ struct InstanceName {
 
 /// A mesh as the scene's owner knows it: the triangles that hits name.
 struct MeshName {
-    std::uint32_t id;
+    std::uint32_t id, mask;
     MeshView mesh;
     std::shared_ptr<const Mesh> own;  // its arrays; null if they are the caller's
 };

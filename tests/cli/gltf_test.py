@@ -77,6 +77,13 @@ class Gltf(ProgramTest):
                 self.assertEqual([hit[1] for hit in hits], FLAT_PRIMS)
                 self.assertEqual([hit[0] for hit in hits][:5], [wanted[0] for _, wanted in RAYS[:5]])
 
+    def test_devices_take_one_mesh(self):
+        self.assertIn("its 3 meshes and 3 nodes are taken as one mesh (--flatten)",
+                      self.succeed("trace", self.scene, "--device", "sim", "--size", "8x8").out)
+        for options in ((), ("--flatten",)):
+            self.trace("--device", "sim", *options)
+            self.assertEqual([hit[1] for hit in read_hits(self.hits)], FLAT_PRIMS)
+
     def test_what_takes_one_mesh_says_so(self):
         note = "scene.gltf: its 3 meshes and 3 nodes are taken as one mesh (--flatten)"
         for command in (("build", self.scene), ("trace", self.scene, "--kernel", "scalar", "--size", "8x8"),

@@ -157,9 +157,9 @@ TEST_F(GpuBuild, FewPrimitives) {
 }
 
 TEST_F(GpuBuild, EachBuiltinScene) {
-    for (const Model& scene : builtin_triangle_scenes(200'000)) compare(scene.name, scene.mesh);
+    for (const Model& scene : builtin_triangle_scenes(200'000)) compare(scene.name, scene.mesh());
     const Model lidar = load_model("builtin:lidar");
-    compare(lidar.name, lidar.mesh);
+    compare(lidar.name, lidar.mesh());
 }
 
 TEST_F(GpuBuild, DegenerateInput) {

@@ -73,14 +73,14 @@ void compare(const std::string& what, const Bvh& bvh, std::span<const Ray> rays)
 
 TEST_F(GpuCwbvh, LikeScalar) {
     for (const Model& scene : builtin_triangle_scenes(200'000))
-        compare(scene.name, build_bvh(scene.mesh), make_mixed_rays(scene, 1'000'000, seed));
+        compare(scene.name, build_bvh(scene.mesh()), make_mixed_rays(scene, 1'000'000, seed));
     for (const float scale : {1e-9f, 1.0f, 1e12f}) {
         const Model scene = scene_of(scaled(random_soup(2000, 4), scale), "soup");
-        compare("soup times " + std::to_string(scale), build_bvh(scene.mesh),
+        compare("soup times " + std::to_string(scale), build_bvh(scene.mesh()),
                 make_mixed_rays(scene, 200'000, seed));
     }
     const Model lattice = scene_of(lattice_mesh(2000, 20, 5), "lattice");
-    compare("lattice", build_bvh(lattice.mesh), make_mixed_rays(lattice, 200'000, seed));
+    compare("lattice", build_bvh(lattice.mesh()), make_mixed_rays(lattice, 200'000, seed));
 }
 
 TEST_F(GpuCwbvh, FewTrianglesAndFewRays) {
@@ -105,7 +105,42 @@ TEST_F(GpuCwbvh, InvalidRaysMiss) {
         if (i % 7 == 0) rays[i].origin.y = std::nanf("");
         if (i / 1000 % 2 == 0) rays[i].tmin = infinity;
     }
-    compare("invalid rays", build_bvh(scene.mesh), rays);
+    compare("invalid rays", build_bvh(scene.mesh()), rays);
+}
+
+/// Meshes of a scene as one, hits named where they lie.
+TEST_F(GpuCwbvh, ScenesOfMeshes) {
+    Scene scene;
+    for (std::uint32_t i = 0; i < 500; ++i)
+        scene.add(random_soup(i % 7 * 20, i + 1, 0.1f), {.mask = i % 5 == 0 ? 2u : 0xFFFFFFFFu});
+    scene.add(lattice_mesh(2000, 20, 5));
+    scene.add(lattice_mesh(2000, 20, 5));
+    scene.commit();
+    const auto rays = make_mixed_rays(scene_of(merge_meshes(scene).mesh, "meshes"), 500'000, seed);
+    const DeviceBuffer<Ray> there{std::span<const Ray>(rays)};
+    const auto n = static_cast<std::uint32_t>(rays.size());
+    for (const std::uint32_t mask : {0xFFFFFFFFu, 1u, 0u}) {
+        SCOPED_TRACE("mask " + std::to_string(mask));
+        const MergedMeshes merged = merge_meshes(scene, mask);
+        const DeviceCwbvh tree{Cwbvh(build_bvh(merged.mesh))};
+        const DeviceMeshNames names(merged.names);
+        const DeviceBuffer<TreeHit> found(n);
+        std::vector<Hit> hits(n + 1);
+        hits.back().prim = 7;
+        const DeviceBuffer<Hit> named{std::span<const Hit>(hits)};
+        trace_on_device(tree.tree(), there.data(), n, found.data(), CwbvhKernel::cwbvh, {},
+                        nullptr);
+        name_hits_on_device(names, {found.data(), n}, {named.data(), n}, nullptr);
+        named.download(hits);
+        const std::vector<Hit> wanted = trace(scene, rays, {.mask = mask});
+        std::uint64_t different = 0;
+        for (std::size_t i = 0; i < n; ++i)
+            different += std::memcmp(&hits[i], &wanted[i], sizeof(Hit)) != 0;
+        EXPECT_EQ(different, 0u);
+        EXPECT_EQ(hits.back().prim, 7u);
+    }
+    const DeviceBuffer<TreeHit> two(2);
+    EXPECT_THROW(name_hits_on_device({}, {two.data(), 2}, {}, nullptr), InputError);
 }
 
 TEST_F(GpuCwbvh, RefusesWhatItCannotDo) {

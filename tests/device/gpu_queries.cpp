@@ -150,7 +150,7 @@ void compare_closest(const std::string& name, const Mesh& mesh, std::size_t coun
 
 TEST_F(GpuQueries, ClosestPointsLikeTheHost) {
     for (const Model& scene : builtin_triangle_scenes(100'000))
-        compare_closest(scene.name, scene.mesh, 100'000);
+        compare_closest(scene.name, scene.mesh(), 100'000);
     compare_closest("lattice", lattice_mesh(2000, 8, seed), 50'000);
 }
 

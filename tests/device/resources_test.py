@@ -42,6 +42,7 @@ STACK_BYTES |= {"FindNearest": 96 * 16, "CountWithin": 96 * 16, "FillWithin": 96
 EXPECTED["device_queries_cuda.cu"] = {
     "FindNearest": 32, "CountWithin": 32, "FillWithin": 32, "FindClosest": 96, "CountPartners": 136,
     "FillPartners": 136, "ClearOffset": 32, "ClearUnusedValues": 32, "SaveLastValue": 32, "AddLastValue": 32, "SetWord": 32}
+EXPECTED["device_scene_cuda.cu"] = dict.fromkeys(("NameHit", "ClearUnusedValues", "SaveLastValue", "AddLastValue", "SetWord"), 32)
 # 64: half of an sm_90 multiprocessor's threads at once; 72: 28 of its 64 warps.
 # The second half of the triangle test is in double.
 EXPECTED["device_cwbvh_cuda.cu"] = {"cwbvh_rays": 104, "persistent_cwbvh_rays": 96, "fill_misses": 16}

@@ -197,6 +197,38 @@ def test_devices():
     np.testing.assert_array_equal(scene.occluded(rays), [True, False])
 
 
+def test_scenes_on_devices():
+    """Of several meshes: the same hits there. What they cannot trace is named, with and without a
+    device."""
+    box = support.box_mesh([0, 0, 0], [1, 1, 1])
+    scenes = [raydix.Scene(device=device) for device in ("cpu", "cuda")]
+    for scene in scenes:
+        for id, shift, mask in ((1, 0, 1), (2, 0, 2), (18, 3, 0xFFFFFFFF), (30, 6, 0)):
+            scene.add(box[0] + np.float32([shift, 0, 0]), box[1], mask=mask, id=id)
+        scene.commit()
+    cpu, cuda = scenes
+    rays = np.float32([[x, 0.4, 9, 0, 0, 0, -1, np.inf] for x in (0.5, 3.5, 6.5, 20)])
+    wanted = cpu.intersect(rays)
+    assert wanted["geometry"].tolist() == [1, 18, raydix.MISSING, raydix.MISSING]
+    if raydix.devices()[1].available:
+        for field, values in cuda.intersect(rays).items():
+            np.testing.assert_array_equal(values, wanted[field])
+        np.testing.assert_array_equal(cuda.occluded(rays), [True, True, False, False])
+        with pytest.raises(raydix.BackendUnavailable, match="mask: rays on a GPU have none"):
+            cuda.intersect(rays, mask=1)
+    else:
+        with pytest.raises(raydix.BackendUnavailable, match="CUDA"):
+            cuda.intersect(rays)
+    cuda.add(cpu, np.eye(4), id=70)
+    cuda.commit()
+    for call in (cuda.intersect, cuda.occluded):
+        with pytest.raises(raydix.BackendUnavailable, match="geometry 70 is an instance"):
+            call(rays)
+    never = raydix.Scene(device="cuda")
+    with pytest.raises(raydix.InputError, match="never committed"):
+        never.intersect(rays)
+
+
 def test_stubs_say_what_the_module_has(tmp_path):
     if importlib.util.find_spec("nanobind") is None:
         pytest.skip("nanobind is not installed, which makes the stubs")
