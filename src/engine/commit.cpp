@@ -19,8 +19,6 @@ using Geometry = SceneAccess::State::Geometry;
 
 /// Parts whose error is larger stand in a tree of their own.
 constexpr double wild_error = 0x1p-12;
-/// Instances of instances are placed in the outermost scene up to so many parts.
-constexpr std::size_t most_placed = std::size_t{1} << 15;
 
 /// Meshes that one tree holds.
 struct Group {
@@ -76,8 +74,11 @@ Mesh merged(const SceneAccess::State& state, const Group& group,
 
 class Commit {
 public:
-    Commit(const SceneAccess::State& state, const SceneOptions& options, CommitReport& report)
-        : state_(state), options_(options), report_(report) {
+    Commit(const SceneAccess::State& state, const SceneOptions& options, CommitReport& report,
+           std::size_t most_placed)
+        : state_(state), options_(options), report_(report), most_placed_(most_placed) {
+        tree_->quality = options.quality;
+        tree_->usage = options.usage;
         if (state.tree == nullptr || options.quality != state.tree_quality ||
             options.compact != state.tree_compact)
             return;
@@ -96,7 +97,7 @@ public:
         }
         for (const auto& [id, geometry] : state_.geometries)
             if (!geometry.is_instance())
-                tree_->mesh_names.push_back({id, geometry.mesh, geometry.own});
+                tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
         place_instances();
         progress_at(done_ / work_);
         const ProgressStage top(done_ / work_, 1);
@@ -226,7 +227,7 @@ private:
             tree_->paths += 1 + inner->paths;
             if (tree_->paths > no_primitive - 1)
                 throw InputError(name() + ": more than 2^32 - 2 paths through instances");
-            tree_->instances.push_back({id, number, geometry.transform, inner});
+            tree_->instances.push_back({id, geometry.mask, number, geometry.transform, inner});
             place(geometry, id, number, inner);
         }
         set_extents();
@@ -252,7 +253,7 @@ private:
             tree_->placed.push_back(std::move(placed));
         };
         if (inner->instances.empty() ||
-            tree_->placed.size() + inner->placed.size() + 1 > most_placed) {
+            tree_->placed.size() + inner->placed.size() + 1 > most_placed_) {
             add({way, number, 0, 0, inner}, nullptr);
             return;
         }
@@ -331,6 +332,7 @@ private:
     const SceneAccess::State& state_;
     const SceneOptions& options_;
     CommitReport& report_;
+    const std::size_t most_placed_;
     std::shared_ptr<SceneTree> tree_ = std::make_shared<SceneTree>();
     std::vector<Source> sources_;                              // [placed scenes]
     std::unordered_map<std::uint32_t, const MeshTree*> last_;  // by their first mesh
@@ -341,11 +343,11 @@ private:
 
 std::shared_ptr<const SceneTree> make_scene_tree(const SceneAccess::State& state,
                                                  const SceneOptions& options,
-                                                 CommitReport& report) {
+                                                 CommitReport& report, std::size_t most_placed) {
     std::shared_ptr<const SceneTree> out;
     ProgressListener listener(options.progress);
     const ProgressStage stage({options.progress ? &listener : nullptr, 0, 1});
-    with_threads(options.threads, [&] { out = Commit(state, options, report).run(); });
+    with_threads(options.threads, [&] { out = Commit(state, options, report, most_placed).run(); });
     listener.finish();
     return out;
 }

@@ -5,10 +5,15 @@
 
 namespace raydix {
 
+/// Instances of instances are placed in the outermost scene up to so many parts.
+inline constexpr std::size_t usually_placed = std::size_t{1} << 15;
+
 /// Trees of triangles that did not change since `state.tree` was made are kept. `state` stays as it
 /// is. Throws InputError as Scene::commit says.
 [[nodiscard]] std::shared_ptr<const SceneTree> make_scene_tree(const SceneAccess::State& state,
                                                                const SceneOptions& options,
-                                                               CommitReport& report);
+                                                               CommitReport& report,
+                                                               std::size_t most_placed =
+                                                                   usually_placed);
 
 }  // namespace raydix

@@ -32,12 +32,13 @@ void check_mesh(const std::string& name, const MeshView& mesh) {
 void set_mesh(State::Geometry& geometry, const MeshView& mesh, bool shared) {
     geometry.shared = shared;
     geometry.changed = true;
-    geometry.own =
+    const auto own =
         shared ? nullptr
                : std::make_shared<const Mesh>(Mesh{{},
                                                    {mesh.vertices.begin(), mesh.vertices.end()},
                                                    {mesh.triangles.begin(), mesh.triangles.end()}});
-    geometry.mesh = shared ? mesh : MeshView(*geometry.own);
+    geometry.own = own;
+    geometry.mesh = shared ? mesh : MeshView(*own);
 }
 
 std::uint32_t new_id(const State& state, const std::optional<std::uint32_t>& wanted) {
@@ -75,7 +76,10 @@ std::uint32_t add_mesh(State& state, const MeshView& mesh, const GeometryOptions
     return insert(state, id, std::move(geometry));
 }
 
-void place(std::uint32_t id, const Transform& transform, State::Geometry& geometry) {
+}  // namespace
+
+void SceneAccess::place(std::uint32_t id, const Transform& transform,
+                        State::Geometry& geometry) {
     const std::optional<Affine> inverse = inverse_of(affine_of(transform));
     if (!inverse)
         throw InputError("instance " + std::to_string(id) +
@@ -84,8 +88,6 @@ void place(std::uint32_t id, const Transform& transform, State::Geometry& geomet
     geometry.inverse = *inverse;
     geometry.errors = errors_of(affine_of(transform), *inverse);
 }
-
-}  // namespace
 
 State::Geometry& State::at(std::uint32_t id) {
     const auto found = geometries.find(id);
@@ -139,7 +141,7 @@ std::uint32_t Scene::add(const Scene& scene, const Transform& transform,
         throw InputError("instance " + std::to_string(id) + ": the scene would hold itself");
     State::Geometry geometry;
     geometry.mask = options.mask;
-    place(id, transform, geometry);
+    SceneAccess::place(id, transform, geometry);
     geometry.scene = scene.state_;
     return insert(*state_, id, std::move(geometry));
 }
@@ -161,7 +163,7 @@ void Scene::update(std::uint32_t id, const MeshView& mesh) {
 void Scene::set_transform(std::uint32_t id, const Transform& transform) {
     State::Geometry& geometry = state_->at(id);
     if (!geometry.is_instance()) throw InputError(name_of(id) + " is a mesh, not an instance");
-    place(id, transform, geometry);
+    SceneAccess::place(id, transform, geometry);
     state_->changed = true;
 }
 
