@@ -28,7 +28,7 @@ MAY_INCLUDE = {
     # primitives, tree: a tree in double over instances is made as one over triangles
     "instances": {"base", "exec", "primitives", "tree", "trace"},
     # what rays of a user go through: trees of triangles, and instances over them
-    "engine": {"base", "exec", "layout", "rays", "trace", "instances"},
+    "engine": {"base", "exec", "tree", "layout", "rays", "trace", "instances"},
     "measure": {"base", "exec"},  # exec: the number of threads is a property of the machine
     "report": {"base", "exec", "measure"},
     "api": {"*"},

@@ -107,7 +107,7 @@ static std::string hit_text(const AnyHit& hit) {
                      : std::string("a miss");
 }
 std::string text_of(const TreeHit& hit) { return hit_text(hit); }
-std::string text_of(const HitD& hit) { return hit_text(hit); }
+std::string text_of(const TreeHitD& hit) { return hit_text(hit); }
 
 template <class AnyMesh>
 static std::string mesh_text(const AnyMesh& mesh) {

@@ -86,7 +86,7 @@ std::string text_of(Vec3d p);
 std::string text_of(const Ray& ray);
 std::string text_of(const RayD& ray);
 std::string text_of(const TreeHit& hit);
-std::string text_of(const HitD& hit);
+std::string text_of(const TreeHitD& hit);
 /// Up to eight triangles, then how many more there are.
 std::string text_of(const Mesh& mesh);
 std::string text_of(const MeshD& mesh);

@@ -3,6 +3,7 @@
 #include <raydix/error.h>
 #include <raydix/instances.h>
 #include <raydix/instances_d.h>
+#include <raydix/model.h>
 #include <raydix/scene.h>
 #include <raydix/wide.h>
 
@@ -22,6 +23,7 @@ struct FloatScenes {
     using Affine = Transform;
     using AnyRay = Ray;
     using AnyHit = InstanceHit;
+    using Whole = raydix::Scene;
     static std::vector<Ray> rays(const std::vector<Ray>& made) { return made; }
 };
 struct DoubleScenes {
@@ -31,6 +33,7 @@ struct DoubleScenes {
     using Affine = TransformD;
     using AnyRay = RayD;
     using AnyHit = InstanceHitD;
+    using Whole = SceneD;
     static std::vector<RayD> rays(const std::vector<Ray>& made) {
         std::vector<RayD> wider;
         for (const Ray& ray : made) wider.push_back(to_double(ray));
@@ -97,7 +100,7 @@ public:
                 expect(same(closest_hit(scene_, rays_[i], masks_[i]), wanted[i]), "single closest",
                        i, hits[i], wanted[i]);
         }
-        if constexpr (std::is_same_v<Kit, FloatScenes>) run_scene(wanted);
+        run_scene(wanted);
     }
 
 private:
@@ -114,52 +117,57 @@ private:
     }
 
     /// The same instances in a Scene, each way through it.
-    void run_scene(const std::vector<InstanceHit>& wanted) {
+    void run_scene(const std::vector<typename Kit::AnyHit>& wanted) {
         Random& random = case_.random;
-        std::vector<Scene> scenes;
+        using Whole = typename Kit::Whole;
+        std::vector<Whole> scenes;
         const SceneOptions options{.quality = static_cast<Quality>(random.below(3)),
                                    .usage = static_cast<Usage>(random.below(2)),
                                    .compact = random.chance(0.3),
                                    .threads = 1};
         for (const TestMesh& made : meshes_) {
             if (made.mesh.triangles.empty()) return;
-            scenes.emplace_back(made.mesh, options);
+            Model model;
+            model.meshes = {made.mesh};
+            scenes.emplace_back(model, options);
         }
         for (const auto& shown : shown_) {
-            Scene scene;
-            for (const Instance& placed : shown)
+            Whole scene;
+            for (const auto& placed : shown)
                 scene.add(scenes[placed.object], placed.transform, {.mask = placed.mask, .id = {}});
             scene.commit(options);
             scenes.push_back(std::move(scene));
         }
-        const Scene& scene = scenes.back();
+        const Whole& scene = scenes.back();
         const std::vector<std::string> sets = simd_instruction_sets();
         const SceneTraceOptions way{.masks = masks_,
                                     .threads = 1,
                                     .path = static_cast<SimdPath>(random.below(5)),
                                     .isa = sets[random.below(sets.size())]};
-        const std::vector<Hit> hits = trace(scene, rays_, way);
+        const auto hits = trace(scene, rays_, way);
         std::vector<std::uint8_t> any(rays_.size());
         trace_any(scene, rays_, any, way);
         for (std::size_t i = 0; i < rays_.size(); ++i) {
             const bool hit = wanted[i].hit.hit();
             // Of longer or shorter directions InstancedScene rounds some components to subnormal
             // numbers, or t to infinity, and a Scene does not.
-            const Vec3 d = rays_[i].direction;
-            const float longest = std::max({std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)});
-            if (!(longest > 0x1p-60f && longest < 0x1p60f)) continue;
+            const auto d = rays_[i].direction;
+            const double longest = std::max({std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)});
+            if (!(longest > 0x1p-60 && longest < 0x1p60)) continue;
             expect(same_as_scene(scene, hits[i], wanted[i]), "closest of a Scene", i,
                    {hits[i], hits[i].geometry}, wanted[i]);
             expect((any[i] != 0) == hit, "any of a Scene", i, {hits[i]}, wanted[i]);
             if (i % 8 != 0) continue;
-            const Hit single = closest_hit(scene, rays_[i], masks_[i]);
+            const auto single = closest_hit(scene, rays_[i], masks_[i]);
             expect(same_as_scene(scene, single, wanted[i]), "single closest of a Scene", i,
                    {single, single.geometry}, wanted[i]);
             expect(any_hit(scene, rays_[i], masks_[i]) == hit, "single any of a Scene", i, {single},
                    wanted[i]);
         }
     }
-    static bool same_as_scene(const Scene& scene, const Hit& a, const InstanceHit& b) {
+    template <class AnyHit>
+    static bool same_as_scene(const typename Kit::Whole& scene, const AnyHit& a,
+                              const typename Kit::AnyHit& b) {
         if (a.t != b.hit.t || a.prim != b.hit.prim || a.u != b.hit.u || a.v != b.hit.v)
             return false;
         std::array<std::uint32_t, InstanceHit::max_levels> path = InstanceHit::unused();
@@ -175,7 +183,7 @@ private:
         for (std::size_t i = 0; i < objects.size(); ++i) paths_of[i].push_back({});
         // Groups show what was made before, the scene itself last.
         const std::uint32_t count = random.below(3);
-        std::vector<std::vector<Instance>>& shown = shown_;
+        auto& shown = shown_;
         for (std::uint32_t g = 0; g <= count; ++g) {
             const std::uint32_t group = g == count ? Kit::Scene::scene : scene_.add_group();
             std::vector<Path<Kit>> paths;
@@ -188,11 +196,8 @@ private:
                 placed.transform = any_transform<typename Kit::Affine>(random);
                 placed.mask = random.chance(0.5) ? 0xFFFFFFFFu : random.below(8);
                 const std::uint32_t place = scene_.add_instance(group, placed);
-                if constexpr (std::is_same_v<Kit, FloatScenes>) {
-                    Instance numbered = placed;
-                    numbered.object = what;
-                    shown.back().push_back(numbered);
-                }
+                shown.back().push_back(placed);
+                shown.back().back().object = what;
                 for (const Path<Kit>& below : paths_of[what]) {
                     Path<Kit> path;
                     path.steps.push_back(placed);
@@ -271,7 +276,7 @@ private:
     std::vector<TestMesh> meshes_;
     std::vector<Bvh> trees_;
     typename Kit::Scene scene_;
-    std::vector<std::vector<Instance>> shown_;  // by groups; objects are counted from 0
+    std::vector<std::vector<typename Kit::Placed>> shown_;  // by groups; objects are counted from 0
     std::vector<Path<Kit>> paths_;
     std::vector<typename Kit::AnyRay> rays_;
     std::vector<std::uint32_t> masks_;

@@ -11,6 +11,7 @@
 
 #include <raydix/bvh.h>
 #include <raydix/closest.h>
+#include <raydix/mesh.h>
 #include <raydix/overlap.h>
 #include <raydix/pairs.h>
 #include <raydix/refit.h>
@@ -26,24 +27,6 @@
 #include <vector>
 
 namespace raydix {
-
-/// As Mesh.
-struct MeshD {
-    std::string name;
-    std::vector<Vec3d> vertices;
-    std::vector<Triangle> triangles;
-};
-
-/// As MeshView: [vertices], [triangles], kept alive by the caller during the call.
-struct MeshViewD {
-    std::span<const Vec3d> vertices;
-    std::span<const Triangle> triangles;
-
-    MeshViewD() = default;
-    MeshViewD(std::span<const Vec3d> v, std::span<const Triangle> t) : vertices(v), triangles(t) {}
-    MeshViewD(const MeshD& mesh)
-        : vertices(mesh.vertices), triangles(mesh.triangles) {}  // NOLINT: meant to be implicit
-};
 
 struct LeafTriangleD {
     Vec3d v0, v1, v2;
@@ -112,12 +95,6 @@ TraceCounts trace(const BvhD& bvh, std::span<const RayD> rays, std::span<HitD> h
 TraceCounts trace_any(const BvhD& bvh, std::span<const RayD> rays, std::span<std::uint8_t> occluded,
                       const TraceOptions& options = {});
 
-/// As AllHits.
-struct AllHitsD {
-    std::vector<std::uint64_t> offsets;  // [rays + 1]
-    std::vector<HitD> hits;
-    TraceCounts counts;
-};
 [[nodiscard]] AllHitsD trace_all(const BvhD& bvh, std::span<const RayD> rays,
                                  const TraceOptions& options = {});
 

@@ -26,7 +26,7 @@ struct InstanceD {
 struct InstanceHitD {
     static constexpr std::size_t max_levels = InstanceHit::max_levels;
 
-    HitD hit;
+    TreeHitD hit;
     std::uint32_t object = no_primitive;
     std::array<std::uint32_t, max_levels> path = InstanceHit::unused();
 

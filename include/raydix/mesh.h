@@ -31,6 +31,24 @@ struct MeshView {
         : vertices(mesh.vertices), triangles(mesh.triangles) {}  // NOLINT: meant to be implicit
 };
 
+/// As Mesh, in double.
+struct MeshD {
+    std::string name;
+    std::vector<Vec3d> vertices;
+    std::vector<Triangle> triangles;
+};
+
+/// As MeshView: [vertices], [triangles], kept alive by the caller during the call.
+struct MeshViewD {
+    std::span<const Vec3d> vertices;
+    std::span<const Triangle> triangles;
+
+    MeshViewD() = default;
+    MeshViewD(std::span<const Vec3d> v, std::span<const Triangle> t) : vertices(v), triangles(t) {}
+    MeshViewD(const MeshD& mesh)
+        : vertices(mesh.vertices), triangles(mesh.triangles) {}  // NOLINT: meant to be implicit
+};
+
 /// What `inspect` counts. Coordinates beyond 1e12 and boxes with a diagonal in (0, 1e-12) are
 /// "out of range"; builders treat them like non-finite ones and leave them out.
 struct MeshInfo {

@@ -1,4 +1,5 @@
-// What rays are traced through: triangle meshes, and instances of other scenes.
+// What rays are traced through: triangle meshes, and instances of other scenes; in float and in
+// double.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -19,6 +20,30 @@ namespace raydix {
 
 struct Model;
 
+/// What scenes of a number type take and give.
+template <class Scalar>
+struct SceneTypes;
+template <>
+struct SceneTypes<float> {
+    using Transform = raydix::Transform;
+    using Mesh = raydix::Mesh;
+    using MeshView = raydix::MeshView;
+    using Box = Aabb;
+    using Ray = raydix::Ray;
+    using Hit = raydix::Hit;
+    using AllHits = raydix::AllHits;
+};
+template <>
+struct SceneTypes<double> {
+    using Transform = TransformD;
+    using Mesh = MeshD;
+    using MeshView = MeshViewD;
+    using Box = AabbD;
+    using Ray = RayD;
+    using Hit = HitD;
+    using AllHits = AllHitsD;
+};
+
 /// What happens to a scene after its first commit.
 enum class Usage : std::uint32_t {
     fixed = 0,   // little: meshes share trees, and a change of one builds its tree again
@@ -28,7 +53,7 @@ enum class Usage : std::uint32_t {
 struct SceneOptions {
     Quality quality = Quality::balanced;
     Usage usage = Usage::fixed;
-    bool compact = false;  // the small layout (WideBvhOptions::compact)
+    bool compact = false;  // the small layout (WideBvhOptions::compact); no effect in double
     int threads = 0;       // 0 to 1,024; 0: all the machine has. Hits do not depend on it
     /// Usage::moving: a mesh whose vertices moved keeps its tree, with boxes fitted again, while
     /// the tree's SAH is at most so many times that at its build. Below 1: it is always built
@@ -63,20 +88,28 @@ struct CommitReport {
 
 /// Meshes, and instances of other scenes, which may hold instances themselves. Changes take effect
 /// with `commit`; until then rays meet what the last one saw. Any number of threads may trace a
-/// scene at once; changes and commits need it for themselves.
-class Scene {
+/// scene at once; changes and commits need it for themselves. Scalar: float or double, of all
+/// coordinates; a scene holds instances of scenes of its own type.
+template <class Scalar>
+class BasicScene {
 public:
+    using Types = SceneTypes<Scalar>;
+    using Mesh = typename Types::Mesh;
+    using MeshView = typename Types::MeshView;
+    using Transform = typename Types::Transform;
+    using Box = typename Types::Box;
+
     /// Levels of instances, at most.
     static constexpr std::uint32_t max_levels = 32;
 
-    Scene();
+    BasicScene();
     /// One mesh with id 0, committed.
-    explicit Scene(const MeshView& mesh, const SceneOptions& options = {});
-    explicit Scene(const Mesh& mesh, const SceneOptions& options = {});
-    explicit Scene(const Model& model, const SceneOptions& options = {});
-    ~Scene();
-    Scene(Scene&&) noexcept;
-    Scene& operator=(Scene&&) noexcept;
+    explicit BasicScene(const MeshView& mesh, const SceneOptions& options = {});
+    explicit BasicScene(const Mesh& mesh, const SceneOptions& options = {});
+    explicit BasicScene(const Model& model, const SceneOptions& options = {});
+    ~BasicScene();
+    BasicScene(BasicScene&&) noexcept;
+    BasicScene& operator=(BasicScene&&) noexcept;
 
     /// Adds a mesh, of which the scene keeps a copy. Returns its id: 0, 1, 2, ... in the order of
     /// calls. Throws InputError: an index past the vertices, vertices without triangles, an id that
@@ -88,7 +121,7 @@ public:
     std::uint32_t share(const MeshView& mesh, const GeometryOptions& options = {});
     /// Places another scene: as its last commit left it when this one is committed. Throws
     /// InputError: a transform that is singular or not finite, a scene that would hold itself.
-    std::uint32_t add(const Scene& scene, const Transform& transform,
+    std::uint32_t add(const BasicScene& scene, const Transform& transform,
                       const GeometryOptions& options = {});
     /// The id is not given again. Throws InputError if there is no such geometry; so do all below.
     void remove(std::uint32_t id);
@@ -106,37 +139,52 @@ public:
     [[nodiscard]] std::uint32_t size() const;  // geometries
     [[nodiscard]] bool contains(std::uint32_t id) const;
     /// Of the last commit: around all triangles; lo > hi if there are none.
-    [[nodiscard]] Aabb bounds() const;
+    [[nodiscard]] Box bounds() const;
     /// Of the last commit: the ids of the instances on path `number` of a hit, the outermost first.
     /// Empty for 0. Throws InputError if there is no such path.
     [[nodiscard]] std::vector<std::uint32_t> path(std::uint32_t number) const;
 
 private:
-    friend struct SceneAccess;
+    template <class>
+    friend struct BasicSceneAccess;
     struct State;
     std::shared_ptr<State> state_;
 };
+extern template class BasicScene<float>;
+extern template class BasicScene<double>;
+using Scene = BasicScene<float>;
+/// In double: its meshes are traced as trees of <raydix/double.h> are, with the same bits. Rays go
+/// one after the other, through trees with two children a node.
+using SceneD = BasicScene<double>;
 
 struct SceneTraceOptions {
     std::uint32_t mask = 0xFFFFFFFFu;           // of all rays
     std::span<const std::uint32_t> masks = {};  // of each ray, [rays], instead; or empty
     int threads = 0;                            // 0 to 1,024; 0: all the machine has
     SimdPath path = SimdPath::automatic;        // hits do not depend on it
-    std::string isa = {};                       // one of simd_instruction_sets(); empty: the best
+    std::string isa = {};  // one of simd_instruction_sets(); empty: the best. In double both are
+                           // checked, and no more
     /// trace_all only: bounds the peak of the call. 0: half of what is left (result_limit.h).
     std::uint64_t max_result_bytes = 0;
 };
 
 /// Closest hit of each ray: the least (t, instance, geometry, prim) over all triangles that the
 /// watertight test accepts (Woop, Benthin, Wald 2013; edges belong to both triangles). Rays go
-/// through each instance's inverse in double and are rounded once, where the mesh is. rays [n] ->
+/// through each instance's inverse in double and are rounded once, where the mesh is; in double the
+/// translation comes first, so that a place far from the origin costs no digits. rays [n] ->
 /// hits [n]. Throws InputError: sizes that differ, a scene that was never committed.
 TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<Hit> hits,
                   const SceneTraceOptions& options = {});
+TraceCounts trace(const SceneD& scene, std::span<const RayD> rays, std::span<HitD> hits,
+                  const SceneTraceOptions& options = {});
 [[nodiscard]] std::vector<Hit> trace(const Scene& scene, std::span<const Ray> rays,
                                      const SceneTraceOptions& options = {});
+[[nodiscard]] std::vector<HitD> trace(const SceneD& scene, std::span<const RayD> rays,
+                                      const SceneTraceOptions& options = {});
 /// Whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n].
 TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
+                      std::span<std::uint8_t> occluded, const SceneTraceOptions& options = {});
+TraceCounts trace_any(const SceneD& scene, std::span<const RayD> rays,
                       std::span<std::uint8_t> occluded, const SceneTraceOptions& options = {});
 
 /// All hits of all rays, those of one ray sorted by (t, instance, geometry, prim). Each triangle at
@@ -146,9 +194,14 @@ TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
 /// options.max_result_bytes.
 [[nodiscard]] AllHits trace_all(const Scene& scene, std::span<const Ray> rays,
                                 const SceneTraceOptions& options = {});
+[[nodiscard]] AllHitsD trace_all(const SceneD& scene, std::span<const RayD> rays,
+                                 const SceneTraceOptions& options = {});
 
 /// One ray, on the caller's thread.
 [[nodiscard]] Hit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask = 0xFFFFFFFFu);
+[[nodiscard]] HitD closest_hit(const SceneD& scene, const RayD& ray,
+                               std::uint32_t mask = 0xFFFFFFFFu);
 [[nodiscard]] bool any_hit(const Scene& scene, const Ray& ray, std::uint32_t mask = 0xFFFFFFFFu);
+[[nodiscard]] bool any_hit(const SceneD& scene, const RayD& ray, std::uint32_t mask = 0xFFFFFFFFu);
 
 }  // namespace raydix

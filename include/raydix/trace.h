@@ -68,6 +68,13 @@ struct AllHits {
     TraceCounts counts;
 };
 
+/// As AllHits, in double.
+struct AllHitsD {
+    std::vector<std::uint64_t> offsets;  // [rays + 1]
+    std::vector<HitD> hits;
+    TraceCounts counts;
+};
+
 /// Each triangle at most once per ray. Edges are half open (exact sign, then a top-left rule), so
 /// that the number of crossings of a closed mesh is right for rays through edges and vertices too.
 /// Throws ResultTooLarge, an InputError, if the call would take more than

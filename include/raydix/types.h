@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstdint>
 #include <limits>
 
@@ -69,7 +70,7 @@ static_assert(sizeof(Hit) == 24);
     return {hit, hit.hit() ? 0 : no_primitive, 0};
 }
 
-/// As Ray and Hit, in double.
+/// As Ray, TreeHit and Hit, in double.
 struct RayD {
     Vec3d origin;
     double tmin = 0.0;
@@ -78,13 +79,28 @@ struct RayD {
 };
 static_assert(sizeof(RayD) == 64);
 
-struct HitD {
+struct TreeHitD {
     double t = std::numeric_limits<double>::infinity();
     std::uint32_t prim = no_primitive;
     double u = 0.0, v = 0.0;
 
     [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
+    friend constexpr bool operator==(const TreeHitD&, const TreeHitD&) = default;
+};
+static_assert(sizeof(TreeHitD) == 32);
+
+struct HitD : TreeHitD {
+    std::uint32_t geometry = no_primitive;
+    std::uint32_t instance = 0;
+
     friend constexpr bool operator==(const HitD&, const HitD&) = default;
 };
+static_assert(sizeof(HitD) == 40);
+
+/// The same in double. Braces alone mean a TreeHit.
+template <std::derived_from<TreeHitD> AnyHit>
+[[nodiscard]] constexpr HitD hit_of_tree(const AnyHit& hit) {
+    return {hit, hit.hit() ? 0 : no_primitive, 0};
+}
 
 }  // namespace raydix

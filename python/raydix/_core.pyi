@@ -85,6 +85,8 @@ class SceneTrees:
     @property
     def faces(self) -> Annotated[NDArray[numpy.uint32], dict(shape=(None, None), writable=False)]: ...
 
+    hit_columns: int = 6
+
     def stats(self) -> dict: ...
 
     @overload
@@ -135,6 +137,10 @@ class SceneTrees:
 
     def check(self) -> tuple[bool, str]: ...
 
+    def positions(self, hits: Annotated[NDArray[numpy.float32], dict(shape=(None, 6), order='C', device='cpu', writable=False)], points: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu')], threads: int = 0) -> None: ...
+
+    def normals(self, hits: Annotated[NDArray[numpy.float32], dict(shape=(None, 6), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu')], threads: int = 0) -> None: ...
+
 class SceneTreesD:
     """A mesh in double and its tree; raydix.Scene is what to use."""
 
@@ -157,6 +163,8 @@ class SceneTreesD:
 
     @property
     def faces(self) -> Annotated[NDArray[numpy.uint32], dict(shape=(None, None), writable=False)]: ...
+
+    hit_columns: int = 4
 
     def stats(self) -> dict: ...
 

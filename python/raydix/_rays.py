@@ -97,6 +97,9 @@ def ray_batch(
     return _columns(rays[..., :3], rays[..., 4:7], rays[..., 3], rays[..., 7])
 
 
+_COLUMNS = ("t", "prim", "u", "v", "geometry", "instance")
+
+
 def ray_masks(
     scene: Any, mask: Any, masks: Any, lead: tuple[int, ...]
 ) -> tuple[int, np.ndarray | None]:
@@ -145,3 +148,18 @@ def hit_columns(hits: np.ndarray, geometry: int | None = None) -> dict[str, np.n
         "geometry": named,
         "instance": np.zeros(prim.shape, UINT32),
     }
+
+
+def hit_rows(hits: Any) -> np.ndarray:
+    """Columns of hits in float32 as rows, (..., 6): what `hit_columns` takes apart."""
+    try:
+        columns = [np.asarray(hits[name]) for name in _COLUMNS]
+        rows = np.empty((*columns[0].shape, len(_COLUMNS)), FLOAT32)
+        ids = rows.view(UINT32)
+        for i, column in enumerate(columns):
+            (ids if column.dtype == UINT32 else rows)[..., i] = column
+    except (KeyError, IndexError, TypeError, ValueError):
+        raise TypeError(
+            f"hits: expected a dict of arrays {', '.join(_COLUMNS)}, as of Scene.intersect"
+        ) from None
+    return rows

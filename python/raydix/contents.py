@@ -192,6 +192,7 @@ class SceneContents:
         threads: int | None = None,
     ) -> dict[str, Any]:
         """Takes all changes in: from now on, queries see them. Waits for queries of other threads.
+        Ctrl-C ends it and leaves the scene as it was.
 
         Each option that is None is as in the commit before, and for the first as `Scene` was given.
 

@@ -112,38 +112,47 @@ class SceneViews:
             self._core, primary, kind, samples, ao_radius, seed, self.threads
         )
 
-    def _repr_html_(self) -> str | None:
-        """Statistics and a small picture, for notebooks, which show `repr` for None."""
-        if self.dtype != FLOAT32 or not self._core.is_mesh():
-            return None
+    def _facts(self) -> tuple[list[tuple[str, str]], Any]:
+        """What a notebook shows in a table, and the corners of the box around what can be seen."""
+        if not self._core.is_mesh():
+            box = self._core.bounds()
+            return [("geometries", f"{len(self._core):,}"), ("bounds", _corners(box))], box
         info, wide = self._core.info(), self._core.wide_stats()
-        lines = [
+        tree = f"{wide['nodes']:,} nodes, depth {wide['max_depth']}, {wide['bytes'] / 1e6:.2f} MB"
+        return [
             ("triangles", f"{info['triangles']:,}"),
             ("vertices", f"{info['vertices']:,}"),
             ("left out", f"{info['left_out_triangles']:,}"),
             ("without area", f"{info['zero_area_triangles']:,}"),
-            (
-                "bounds",
-                " to ".join(str(tuple(round(c, 4) for c in corner)) for corner in info["bounds"]),
-            ),
-            (
-                "tree",
-                f"{wide['nodes']:,} nodes, depth {wide['max_depth']}, {wide['bytes'] / 1e6:.2f} MB",
-            ),
+            ("bounds", _corners(info["bounds"])),
+            ("tree", tree),
             ("built in", f"{wide['ms']:.1f} ms"),
-        ]
+        ], self._core.bounds()
+
+    def _repr_html_(self) -> str | None:
+        """Statistics and a small picture, for notebooks, which show `repr` for None."""
+        if self.dtype != FLOAT32:
+            return None
+        try:
+            lines, (lo, hi) = self._facts()
+        except _core.InputError:  # it was never committed
+            return None
         cells = "".join(
             f"<tr><th style='text-align:left'>{k}</th><td>{html.escape(v)}</td></tr>"
             for k, v in lines
         )
         picture = ""
-        if info["triangles"] > info["left_out_triangles"]:
+        if lo[0] <= hi[0]:
             png = to_png(self.render(size=(240, 180), samples=4))
             data = base64.b64encode(png).decode()
             picture = f"<img width=240 height=180 src='data:image/png;base64,{data}'>"
         title = html.escape(self.name or "raydix.Scene")
         shown = f"{picture}<table>{cells}</table>"
         return f"<div><b>{title}</b><div style='display:flex;gap:1em'>{shown}</div></div>"
+
+
+def _corners(box: Any) -> str:
+    return " to ".join(str(tuple(round(c, 4) for c in corner)) for corner in box)
 
 
 def _picture(value: ArrayLike) -> np.ndarray:

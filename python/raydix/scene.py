@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from ._arrays import (
     thread_count,
     whole,
 )
-from ._rays import hit_columns, ray_batch, ray_masks
+from ._rays import hit_columns, hit_rows, ray_batch, ray_masks
 from .cameras import Camera
 from .contents import QUALITIES, USAGES, SceneContents, mesh_of, one_of
 from .devices import CudaRays
@@ -34,7 +35,8 @@ class Scene(SceneContents, SceneViews):
     """What rays are traced through: triangle meshes, and instances of other scenes. A scene of one
     mesh answers queries with points and other meshes too.
 
-    `Scene(vertices, faces)` is one mesh with id 0, committed. `Scene()` is empty: `add` fills it,
+    `Scene(vertices, faces)` is one mesh with id 0, committed. So is a file; one of glTF with nodes
+    or several primitives has an instance for each node, or a mesh for each primitive. `Scene()` is empty: `add` fills it,
     `commit` takes what was added and changed in, and queries answer from the last commit.
 
     Parameters
@@ -86,14 +88,14 @@ class Scene(SceneContents, SceneViews):
     below 1e-12 are left out, as those that are not finite.
 
     Queries with points and other meshes (`closest_point`, `signed_distance`, `contains`,
-    `winding_number`, `overlaps`, `touched_by`), `refit`, `vertices`, `faces`, `render`,
-    `secondary_rays`, `stats`, `wide_stats`, `info`, `closure`, `check` and `raydix.simulate` need a
-    scene of one mesh and nothing else: InputError names the geometry that stands in the way.
-    Masks have no effect on them.
+    `winding_number`, `overlaps`, `touched_by`), `refit`, `vertices`, `faces`, `stats`,
+    `wide_stats`, `info`, `closure`, `check` and `raydix.simulate` need a scene of one mesh and
+    nothing else: InputError names the geometry that stands in the way. Masks have no effect on
+    them.
 
     With precision "float64" a scene is one mesh, and these raise NotImplementedError: `Scene()`,
     `add`, `update`, `remove`, `set_transform`, `set_mask`, `commit`, `path`, masks, compact=True,
-    usage="moving", device="cuda", `render`, `cameras`, `primary_rays`, `secondary_rays`, `info`,
+    usage="moving", device="cuda", `positions`, `normals`, `render`, `cameras`, `primary_rays`, `secondary_rays`, `info`,
     `wide_stats` and `raydix.simulate`; files raise ValueError, because they are read in float32.
     Numbers other than 0 below 2**-500 count as 0.
 
@@ -254,7 +256,7 @@ class Scene(SceneContents, SceneViews):
         scene itself, else a number for `path`). "t" is in units of the ray's direction, through
         instances too. At equal t the lower "instance" wins, then "geometry", then "prim". Rays
         through an edge hit at least one of its triangles (Woop, Benthin, Wald 2013). Rays with NaN,
-        a zero direction or tmin > tmax miss. In float32 all are views of one array.
+        a zero direction or tmin > tmax miss. All are views of one array.
 
         With rays that lie on a GPU, "geometry" and "instance" are left out: device="cuda" takes
         scenes of one mesh, without masks. BackendUnavailable otherwise.
@@ -263,7 +265,7 @@ class Scene(SceneContents, SceneViews):
             return self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(self, mask, masks, lead)
-        columns = 6 if self.dtype == FLOAT32 else 4
+        columns = self._core.hit_columns
         hits = np.empty((*lead, columns), self.dtype)
         self._core.intersect(
             *args, hits if hits.ndim == 2 else hits.reshape(-1, columns), *seen, self.threads
@@ -340,6 +342,28 @@ class Scene(SceneContents, SceneViews):
         seen = ray_masks(self, mask, masks, lead)
         offsets, hits, _ = self._core.all_hits(*args, max_result_bytes, *seen, self.threads)
         return {"offsets": offsets, **hit_columns(hits, 0)}
+
+    def positions(self, hits: Mapping[str, Any]) -> np.ndarray:
+        """Where hits are: shape (..., 3) float32, in this scene's space, through all instances.
+
+        `hits`: a dict as `intersect` and `all_hits` return it, of this scene as it is committed
+        now. Computed in float64 from the triangle, u and v, rounded once. NaN for those that hit
+        nothing. InputError: a path, geometry or triangle that the last commit does not have.
+        """
+        return self._of_hits(hits, "positions")
+
+    def normals(self, hits: Mapping[str, Any]) -> np.ndarray:
+        """The geometric normal at each hit: shape (..., 3) float32, of unit length, in this scene's
+        space. Counter-clockwise corners face the viewer; the outside of a mesh stays outside where
+        an instance mirrors it. `hits`, NaN and errors as in `positions`."""
+        return self._of_hits(hits, "normals")
+
+    def _of_hits(self, hits: Mapping[str, Any], what: str) -> np.ndarray:
+        require_float32(self, what)
+        given = hit_rows(hits)
+        found = np.empty((*given.shape[:-1], 3), FLOAT32)
+        getattr(self._core, what)(given.reshape(-1, 6), found.reshape(-1, 3), self.threads)
+        return found
 
     def closest_point(
         self, points: ArrayLike, *, max_distance: float = np.inf

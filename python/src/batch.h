@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <functional>
+#include <thread>
 
 namespace raydix::python {
 
@@ -16,6 +18,16 @@ inline constexpr std::size_t piece_size = std::size_t{1} << 20;
 /// Runs Python's signal handlers, if this is the thread that may; throws what they raise.
 inline void hear_signals() {
     if (PyErr_CheckSignals() != 0) throw nanobind::python_error();
+}
+
+/// What the library may call with its progress, from any thread and without the interpreter's lock:
+/// the one that calls this now hears signals.
+[[nodiscard]] inline std::function<void(double)> hear_signals_on_this_thread() {
+    return [caller = std::this_thread::get_id()](double) {
+        if (std::this_thread::get_id() != caller) return;
+        const nanobind::gil_scoped_acquire locked;
+        hear_signals();
+    };
 }
 
 /// Calls body(begin, end) for pieces of [0, n) in order, without the interpreter's lock. Called

@@ -15,7 +15,6 @@
 #include <cstdint>
 #include <memory>
 #include <string>
-#include <thread>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -137,12 +136,7 @@ PictureOut render_scene(SceneTrees& scene, const CameraFields& camera, const std
     options.ao_radius = ao_radius;
     options.seed = seed;
     options.threads = threads_for(threads);
-    const auto caller = std::this_thread::get_id();
-    options.progress = [caller](double) {
-        if (std::this_thread::get_id() != caller) return;  // only this one may hear signals
-        const nb::gil_scoped_acquire locked;
-        hear_signals();
-    };
+    options.progress = hear_signals_on_this_thread();
     Picture picture;
     {
         const nb::gil_scoped_release unlocked;

@@ -58,12 +58,13 @@ template <class Scene>
 using PointRows = In<Scalar<Scene>, nb::shape<-1, 3>>;
 template <class Scene>
 using ValuesOut = Out<Scalar<Scene>, nb::ndim<1>>;
-/// Rows of structs in scalars; a whole number takes the room of one: t, prim, u, v of hits, in
-/// float geometry and instance too.
+/// Hits as rows of scalars, of which a whole number takes the room of one: t, prim, u, v, geometry,
+/// instance; in double the last two share the room of one.
 template <class Scene>
-using HitRows =
-    Out<Scalar<Scene>, nb::shape<-1, sizeof(typename Scene::Types::Hit) / sizeof(Scalar<Scene>)>>;
-static_assert(sizeof(Hit) == 6 * sizeof(float) && sizeof(HitD) == 4 * sizeof(double));
+constexpr std::size_t hit_columns = sizeof(typename Scene::Types::Hit) / sizeof(Scalar<Scene>);
+static_assert(sizeof(Hit) == 6 * sizeof(float) && sizeof(HitD) == 5 * sizeof(double));
+template <class Scene>
+using HitRows = Out<Scalar<Scene>, nb::shape<-1, hit_columns<Scene>>>;
 /// x, y, z, distance, prim, u, v of closest points.
 template <class Scene>
 using PlaceRows = Out<Scalar<Scene>, nb::shape<-1, 7>>;
@@ -540,6 +541,7 @@ void bind_asking(nb::class_<Scene>& scene) {
                 reading(self, [&] { return self.mesh("faces").triangles; }));
         },
         nb::rv_policy::automatic);
+    scene.attr("hit_columns") = static_cast<int>(hit_columns<Scene>);
     scene.def("stats", &stats<Scene>);
     bind_rays(scene);
     bind_queries(scene);

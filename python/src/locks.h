@@ -35,13 +35,20 @@ private:
 /// The lock of the one thread that changes a scene.
 class Writing {
 public:
-    /// Throws InputError, which names the call, in a signal handler within a query, whose end it
-    /// would wait for.
+    /// Throws InputError, which names the call, in a signal handler within a query or a change,
+    /// whose end it would wait for.
     Writing(const char* call, std::mutex& queue, std::shared_mutex& use);
+    Writing(const Writing&) = delete;
+    Writing& operator=(const Writing&) = delete;
+    ~Writing() { is_held_ = false; }
+
+    /// Throws InputError if this thread has one: Python may run a signal handler in a commit.
+    static void require_none(const char* call);
 
 private:
     std::unique_lock<std::mutex> queue_;
     std::unique_lock<std::shared_mutex> use_;
+    static inline thread_local bool is_held_ = false;
 };
 
 }  // namespace raydix::python

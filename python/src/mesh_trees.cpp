@@ -12,6 +12,7 @@ namespace raydix::python {
 namespace {
 
 std::mutex& unless_reading(const char* call, std::mutex& queue) {
+    Writing::require_none(call);
     if (Reading::held() != 0)
         throw InputError(std::string(call) +
                          ": this thread is within a query of a scene, in a signal handler");
@@ -21,10 +22,19 @@ std::mutex& unless_reading(const char* call, std::mutex& queue) {
 }  // namespace
 
 Writing::Writing(const char* call, std::mutex& queue, std::shared_mutex& use)
-    : queue_(unless_reading(call, queue)), use_(use) {}
+    : queue_(unless_reading(call, queue)), use_(use) {
+    is_held_ = true;
+}
+
+void Writing::require_none(const char* call) {
+    if (is_held_)
+        throw InputError(std::string(call) +
+                         ": this thread is within a change of a scene, in a signal handler");
+}
 
 template <class Names>
 Reading MeshTrees<Names>::read() const {
+    Writing::require_none("scene");
     // Who reads already must not queue up behind a change that waits for the end of that.
     if (Reading::held() != 0) return Reading(use_);
     const std::lock_guard queue(queue_);

@@ -162,6 +162,7 @@ nb::dict commit(SceneTrees& self, const std::optional<std::string>& quality,
         options.compact = compact.value_or(options.compact);
         options.refit_limit = refit_limit.value_or(options.refit_limit);
         options.threads = threads.value_or(options.threads);
+        options.progress = hear_signals_on_this_thread();
         report = self.commit(options);
     }
     return commit_figures(report);

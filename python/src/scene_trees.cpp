@@ -232,6 +232,7 @@ CommitReport SceneTrees::commit(const SceneOptions& options) {
     }
     const CommitReport report = commit_now(options);
     commits_ = options;
+    commits_.progress = nullptr;
     unsettled_ = false;
     kept_ = std::move(kept);
     look_for_mesh();

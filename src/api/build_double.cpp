@@ -10,6 +10,7 @@
 #include "api/double_builds.h"
 #include "api/refit_checks.h"
 #include "exec/parallel.h"
+#include "exec/progress.h"
 #include "measure/stopwatch.h"
 #include "primitives/double_sources.h"
 #include "tree/bvh_access.h"
@@ -52,8 +53,12 @@ void build(const MeshViewD& mesh, const BuildOptions& options, BvhBuilderD& buil
     over_boxes.strict = false;
     const std::span<const Aabb> boxes = local_boxes(source, n, tree, builder.boxes);
     const double before = stage.lap();
-    BvhBuilderAccess::build_around(builder.nodes, boxes, {mesh, tree.center(), tree.scale()},
-                                   over_boxes, tree.tree());
+    {
+        const ProgressStage nodes(0.1, 0.9);
+        progress_at(0);
+        BvhBuilderAccess::build_around(builder.nodes, boxes, {mesh, tree.center(), tree.scale()},
+                                       over_boxes, tree.tree());
+    }
     if (!builder.keeps_scratch) builder = {};
     stage.lap();
     copy_corners(tree, source);

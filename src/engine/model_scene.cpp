@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -15,23 +16,43 @@
 namespace raydix {
 namespace {
 
-Transform rounded(const TransformD& t) {
-    Transform out;
+/// A node's transform and a mesh in the numbers of a scene.
+template <class Scalar>
+typename SceneTypes<Scalar>::Transform transform_as(const TransformD& t) {
+    typename SceneTypes<Scalar>::Transform out;
     for (std::size_t r = 0; r < 3; ++r)
-        for (std::size_t c = 0; c < 4; ++c) out.m[r][c] = static_cast<float>(t.m[r][c]);
+        for (std::size_t c = 0; c < 4; ++c) out.m[r][c] = static_cast<Scalar>(t.m[r][c]);
     return out;
+}
+template <class Scalar>
+decltype(auto) mesh_as(const Mesh& mesh) {
+    if constexpr (std::is_same_v<Scalar, float>) {
+        return (mesh);
+    } else {
+        MeshD wide{mesh.name, {}, mesh.triangles};
+        wide.vertices.reserve(mesh.vertices.size());
+        for (const Vec3 v : mesh.vertices) wide.vertices.push_back({v.x, v.y, v.z});
+        return wide;
+    }
 }
 
 /// Points and empty meshes have an id, and rays do not meet them.
-void add_mesh(Scene& scene, const Model& model, std::uint32_t i) {
+template <class Scalar>
+void add_mesh(BasicScene<Scalar>& scene, const Model& model, std::uint32_t i) {
     const Mesh& mesh = model.meshes[i];
-    scene.add(mesh.triangles.empty() ? MeshView() : MeshView(mesh), {.id = i});
+    if (mesh.triangles.empty())
+        scene.add(typename SceneTypes<Scalar>::MeshView(), {.id = i});
+    else
+        scene.add(mesh_as<Scalar>(mesh), {.id = i});
 }
 
 /// Scenes of nodes, made from the last node to the first, so that those below a node are there when
 /// it is made. Ids of nodes follow those of meshes; in depth-first order they ascend.
+template <class Scalar>
 class NodeScenes {
 public:
+    using Scene = BasicScene<Scalar>;
+
     NodeScenes(const Model& model, const SceneOptions& options)
         : model_(model), quiet_(options), listener_(options.progress), nodes_(model.nodes.size()) {
         quiet_.progress = nullptr;
@@ -119,9 +140,9 @@ private:
             }
             SceneOptions options = quiet_;
             options.progress = [&](double part) {
-                listener_.reach((static_cast<double>(done_) +
-                                 part * static_cast<double>(triangles)) /
-                                static_cast<double>(triangles_));
+                listener_.reach(
+                    (static_cast<double>(done_) + part * static_cast<double>(triangles)) /
+                    static_cast<double>(triangles_));
             };
             scene->commit(options);
             done_ += triangles;
@@ -132,8 +153,9 @@ private:
 
     /// With their arrays and their tree, which the next commit keeps.
     static void take_meshes(const Scene& from, Scene& to) {
-        const SceneAccess::State& source = *SceneAccess::shared_state(from);
-        SceneAccess::State& state = SceneAccess::state(to);
+        using Access = BasicSceneAccess<Scalar>;
+        const typename Access::State& source = *Access::shared_state(from);
+        typename Access::State& state = Access::state(to);
         state.geometries = source.geometries;
         for (const auto& [id, geometry] : state.geometries) state.taken.insert(id);
         state.tree = source.tree;
@@ -152,7 +174,7 @@ private:
             return;
         }
         try {
-            scene.add(*nodes_[k].scene, rounded(node.transform), {.id = id_of(k)});
+            scene.add(*nodes_[k].scene, transform_as<Scalar>(node.transform), {.id = id_of(k)});
         } catch (const InputError& error) {
             throw InputError("node " + std::to_string(k) +
                              (node.name.empty() ? "" : " (" + node.name + ")") + ": " +
@@ -172,9 +194,10 @@ private:
 
 }  // namespace
 
-Scene::Scene(const Model& model, const SceneOptions& options) : Scene() {
+template <class Scalar>
+BasicScene<Scalar>::BasicScene(const Model& model, const SceneOptions& options) : BasicScene() {
     if (model.is_flat()) {
-        add(model.mesh());
+        add(mesh_as<Scalar>(model.mesh()));
         commit(options);
         return;
     }
@@ -183,12 +206,15 @@ Scene::Scene(const Model& model, const SceneOptions& options) : Scene() {
             for (std::uint32_t i = 0; i < model.meshes.size(); ++i) add_mesh(*this, model, i);
             commit(options);
         } else {
-            NodeScenes(model, options).place(*this);
+            NodeScenes<Scalar>(model, options).place(*this);
         }
     } catch (const InputError& error) {
         throw InputError(model.name + ": " + error.what() +
                          " (Model::flatten, --flatten makes one mesh of it)");
     }
 }
+
+template BasicScene<float>::BasicScene(const Model&, const SceneOptions&);
+template BasicScene<double>::BasicScene(const Model&, const SceneOptions&);
 
 }  // namespace raydix

@@ -1,11 +1,14 @@
 // Scene: ids, changes and commits; the work is in commit.cpp and scene_trace.cpp.
 #include <raydix/error.h>
-#include <raydix/model.h>
 #include <raydix/scene.h>
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 #include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "base/options.h"
 #include "engine/commit.h"
@@ -14,11 +17,10 @@
 namespace raydix {
 namespace {
 
-using State = SceneAccess::State;
-
 std::string name_of(std::uint32_t id) { return "geometry " + std::to_string(id); }
 
-void check_mesh(const std::string& name, const MeshView& mesh) {
+template <class AnyMeshView>
+void check_mesh(const std::string& name, const AnyMeshView& mesh) {
     if (mesh.triangles.empty() && !mesh.vertices.empty())
         throw InputError(name + ": vertices without triangles");
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
@@ -29,7 +31,9 @@ void check_mesh(const std::string& name, const MeshView& mesh) {
     }
 }
 
-void set_mesh(State::Geometry& geometry, const MeshView& mesh, bool shared) {
+template <class Geometry, class AnyMeshView>
+void set_mesh(Geometry& geometry, const AnyMeshView& mesh, bool shared) {
+    using Mesh = std::conditional_t<std::is_same_v<AnyMeshView, MeshView>, raydix::Mesh, MeshD>;
     geometry.shared = shared;
     geometry.changed = true;
     const auto own =
@@ -38,9 +42,10 @@ void set_mesh(State::Geometry& geometry, const MeshView& mesh, bool shared) {
                                                    {mesh.vertices.begin(), mesh.vertices.end()},
                                                    {mesh.triangles.begin(), mesh.triangles.end()}});
     geometry.own = own;
-    geometry.mesh = shared ? mesh : MeshView(*own);
+    geometry.mesh = shared ? mesh : AnyMeshView(*own);
 }
 
+template <class State>
 std::uint32_t new_id(const State& state, const std::optional<std::uint32_t>& wanted) {
     if (wanted) {
         if (*wanted < state.next_id || state.taken.contains(*wanted))
@@ -55,7 +60,8 @@ std::uint32_t new_id(const State& state, const std::optional<std::uint32_t>& wan
 }
 
 /// The geometry is complete: nothing can fail from here on but for want of memory.
-std::uint32_t insert(State& state, std::uint32_t id, State::Geometry geometry) {
+template <class State>
+std::uint32_t insert(State& state, std::uint32_t id, typename State::Geometry geometry) {
     state.geometries.emplace(id, std::move(geometry));
     state.taken.insert(id);
     while (!state.taken.empty() && *state.taken.begin() == state.next_id) {
@@ -66,36 +72,40 @@ std::uint32_t insert(State& state, std::uint32_t id, State::Geometry geometry) {
     return id;
 }
 
-std::uint32_t add_mesh(State& state, const MeshView& mesh, const GeometryOptions& options,
+template <class State, class AnyMeshView>
+std::uint32_t add_mesh(State& state, const AnyMeshView& mesh, const GeometryOptions& options,
                        bool shared) {
     const std::uint32_t id = new_id(state, options.id);
     check_mesh(name_of(id), mesh);
-    State::Geometry geometry;
+    typename State::Geometry geometry;
     geometry.mask = options.mask;
     set_mesh(geometry, mesh, shared);
     return insert(state, id, std::move(geometry));
 }
 
-}  // namespace
-
-void SceneAccess::place(std::uint32_t id, const Transform& transform,
-                        State::Geometry& geometry) {
-    const std::optional<Affine> inverse = inverse_of(affine_of(transform));
-    if (!inverse)
-        throw InputError("instance " + std::to_string(id) +
-                         ": its transform is singular or not finite, so rays cannot go through it");
-    geometry.transform = transform;
-    geometry.inverse = *inverse;
-    geometry.errors = errors_of(affine_of(transform), *inverse);
+std::optional<SceneKind<float>::WayBack> way_back(const Transform& transform) {
+    const Affine there = affine_of(transform);
+    const std::optional<Affine> inverse = inverse_of(there);
+    if (!inverse) return {};
+    return SceneKind<float>::WayBack{*inverse, errors_of(there, *inverse)};
+}
+std::optional<SceneKind<double>::WayBack> way_back(const TransformD& transform) {
+    const std::optional<InverseD> inverse = inverse_of(affine_of(transform));
+    if (!inverse) return {};
+    return SceneKind<double>::WayBack{*inverse};
 }
 
-State::Geometry& State::at(std::uint32_t id) {
+}  // namespace
+
+template <class Scalar>
+auto BasicScene<Scalar>::State::at(std::uint32_t id) -> Geometry& {
     const auto found = geometries.find(id);
     if (found == geometries.end()) throw InputError("there is no " + name_of(id));
     return found->second;
 }
 
-bool State::holds(const State* other) const {
+template <class Scalar>
+bool BasicScene<Scalar>::State::holds(const State* other) const {
     std::set<const State*> known{this};
     std::vector<const State*> waiting{this};
     while (!waiting.empty()) {
@@ -109,70 +119,99 @@ bool State::holds(const State* other) const {
     return false;
 }
 
-const std::shared_ptr<const SceneTree>& SceneAccess::tree(const Scene& scene) {
+template <class Scalar>
+auto BasicSceneAccess<Scalar>::tree(const Scene& scene) -> const std::shared_ptr<const Tree>& {
     if (scene.state_->tree == nullptr) throw InputError("scene: it was never committed");
     return scene.state_->tree;
 }
 
-Scene::Scene() : state_(std::make_shared<State>()) {}
-Scene::Scene(const MeshView& mesh, const SceneOptions& options) : Scene() {
+template <class Scalar>
+void BasicSceneAccess<Scalar>::place(std::uint32_t id,
+                                     const typename SceneTypes<Scalar>::Transform& transform,
+                                     typename State::Geometry& geometry) {
+    const auto back = way_back(transform);
+    if (!back)
+        throw InputError("instance " + std::to_string(id) +
+                         ": its transform is singular or not finite, so rays cannot go through it");
+    geometry.transform = transform;
+    static_cast<typename SceneKind<Scalar>::WayBack&>(geometry) = *back;
+}
+
+template <class Scalar>
+BasicScene<Scalar>::BasicScene() : state_(std::make_shared<State>()) {}
+template <class Scalar>
+BasicScene<Scalar>::BasicScene(const MeshView& mesh, const SceneOptions& options) : BasicScene() {
     add(mesh);
     commit(options);
 }
-Scene::Scene(const Mesh& mesh, const SceneOptions& options) : Scene(MeshView(mesh), options) {}
-Scene::~Scene() = default;
-Scene::Scene(Scene&&) noexcept = default;
-Scene& Scene::operator=(Scene&&) noexcept = default;
+template <class Scalar>
+BasicScene<Scalar>::BasicScene(const Mesh& mesh, const SceneOptions& options)
+    : BasicScene(MeshView(mesh), options) {}
+template <class Scalar>
+BasicScene<Scalar>::~BasicScene() = default;
+template <class Scalar>
+BasicScene<Scalar>::BasicScene(BasicScene&&) noexcept = default;
+template <class Scalar>
+BasicScene<Scalar>& BasicScene<Scalar>::operator=(BasicScene&&) noexcept = default;
 
-std::uint32_t Scene::add(const MeshView& mesh, const GeometryOptions& options) {
+template <class Scalar>
+std::uint32_t BasicScene<Scalar>::add(const MeshView& mesh, const GeometryOptions& options) {
     return add_mesh(*state_, mesh, options, false);
 }
-std::uint32_t Scene::add(const Mesh& mesh, const GeometryOptions& options) {
+template <class Scalar>
+std::uint32_t BasicScene<Scalar>::add(const Mesh& mesh, const GeometryOptions& options) {
     return add(MeshView(mesh), options);
 }
-std::uint32_t Scene::share(const MeshView& mesh, const GeometryOptions& options) {
+template <class Scalar>
+std::uint32_t BasicScene<Scalar>::share(const MeshView& mesh, const GeometryOptions& options) {
     return add_mesh(*state_, mesh, options, true);
 }
 
-std::uint32_t Scene::add(const Scene& scene, const Transform& transform,
-                         const GeometryOptions& options) {
+template <class Scalar>
+std::uint32_t BasicScene<Scalar>::add(const BasicScene& scene, const Transform& transform,
+                                      const GeometryOptions& options) {
     const std::uint32_t id = new_id(*state_, options.id);
     if (scene.state_->holds(state_.get()))
         throw InputError("instance " + std::to_string(id) + ": the scene would hold itself");
-    State::Geometry geometry;
+    typename State::Geometry geometry;
     geometry.mask = options.mask;
-    SceneAccess::place(id, transform, geometry);
+    BasicSceneAccess<Scalar>::place(id, transform, geometry);
     geometry.scene = scene.state_;
     return insert(*state_, id, std::move(geometry));
 }
 
-void Scene::remove(std::uint32_t id) {
+template <class Scalar>
+void BasicScene<Scalar>::remove(std::uint32_t id) {
     static_cast<void>(state_->at(id));
     state_->geometries.erase(id);
     state_->changed = true;
 }
 
-void Scene::update(std::uint32_t id, const MeshView& mesh) {
-    State::Geometry& geometry = state_->at(id);
+template <class Scalar>
+void BasicScene<Scalar>::update(std::uint32_t id, const MeshView& mesh) {
+    auto& geometry = state_->at(id);
     if (geometry.is_instance()) throw InputError(name_of(id) + " is an instance, not a mesh");
     check_mesh(name_of(id), mesh);
     set_mesh(geometry, mesh, geometry.shared);
     state_->changed = true;
 }
 
-void Scene::set_transform(std::uint32_t id, const Transform& transform) {
-    State::Geometry& geometry = state_->at(id);
+template <class Scalar>
+void BasicScene<Scalar>::set_transform(std::uint32_t id, const Transform& transform) {
+    auto& geometry = state_->at(id);
     if (!geometry.is_instance()) throw InputError(name_of(id) + " is a mesh, not an instance");
-    SceneAccess::place(id, transform, geometry);
+    BasicSceneAccess<Scalar>::place(id, transform, geometry);
     state_->changed = true;
 }
 
-void Scene::set_mask(std::uint32_t id, std::uint32_t mask) {
+template <class Scalar>
+void BasicScene<Scalar>::set_mask(std::uint32_t id, std::uint32_t mask) {
     state_->at(id).mask = mask;
     state_->changed = true;
 }
 
-CommitReport Scene::commit(const SceneOptions& options) {
+template <class Scalar>
+CommitReport BasicScene<Scalar>::commit(const SceneOptions& options) {
     check_enum("quality", options.quality, Quality::high);
     check_enum("usage", options.usage, Usage::moving);
     if (!(options.refit_limit >= 0))
@@ -180,7 +219,7 @@ CommitReport Scene::commit(const SceneOptions& options) {
                          std::to_string(options.refit_limit));
     const auto start = std::chrono::steady_clock::now();
     CommitReport report;
-    std::shared_ptr<const SceneTree> tree = make_scene_tree(*state_, options, report);
+    auto tree = make_scene_tree(*state_, options, report);
     state_->tree = std::move(tree);
     state_->tree_quality = options.quality;
     state_->tree_compact = options.compact;
@@ -191,30 +230,45 @@ CommitReport Scene::commit(const SceneOptions& options) {
     return report;
 }
 
-bool Scene::committed() const { return !state_->changed; }
-std::uint32_t Scene::size() const { return static_cast<std::uint32_t>(state_->geometries.size()); }
-bool Scene::contains(std::uint32_t id) const { return state_->geometries.contains(id); }
-
-Aabb Scene::bounds() const {
-    const SceneTree& tree = *SceneAccess::tree(*this);
-    return tree.bounds;
+template <class Scalar>
+bool BasicScene<Scalar>::committed() const {
+    return !state_->changed;
+}
+template <class Scalar>
+std::uint32_t BasicScene<Scalar>::size() const {
+    return static_cast<std::uint32_t>(state_->geometries.size());
+}
+template <class Scalar>
+bool BasicScene<Scalar>::contains(std::uint32_t id) const {
+    return state_->geometries.contains(id);
 }
 
-std::vector<std::uint32_t> Scene::path(std::uint32_t number) const {
-    const SceneTree* tree = SceneAccess::tree(*this).get();
+template <class Scalar>
+typename SceneTypes<Scalar>::Box BasicScene<Scalar>::bounds() const {
+    return BasicSceneAccess<Scalar>::tree(*this)->bounds;
+}
+
+template <class Scalar>
+std::vector<std::uint32_t> BasicScene<Scalar>::path(std::uint32_t number) const {
+    const auto* tree = BasicSceneAccess<Scalar>::tree(*this).get();
     std::vector<std::uint32_t> ids;
     for (std::uint32_t left = number; left != 0;) {
         if (left > tree->paths)
             throw InputError("there is no path " + std::to_string(number) + " of instances");
         const auto after = std::upper_bound(
             tree->instances.begin(), tree->instances.end(), left,
-            [](std::uint32_t value, const InstanceName& name) { return value < name.number; });
-        const InstanceName& name = *(after - 1);
+            [](std::uint32_t value, const auto& name) { return value < name.number; });
+        const auto& name = *(after - 1);
         ids.push_back(name.id);
         left -= name.number;
         tree = name.scene.get();
     }
     return ids;
 }
+
+template class BasicScene<float>;
+template class BasicScene<double>;
+template struct BasicSceneAccess<float>;
+template struct BasicSceneAccess<double>;
 
 }  // namespace raydix

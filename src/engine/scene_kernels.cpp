@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "engine/hit_order.h"
 #include "engine/scene_job.h"
 
 #undef HWY_TARGET_INCLUDE

@@ -1,4 +1,4 @@
-// The inside of a Scene: what was added, and what the last commit made of it.
+// The inside of a scene: what was added, and what the last commit made of it.
 #pragma once
 
 #include <raydix/scene.h>
@@ -10,11 +10,35 @@
 #include <vector>
 
 #include "engine/scene_tree.h"
+#include "engine/scene_tree_double.h"
 
 namespace raydix {
 
-struct Scene::State {
-    struct Geometry {
+/// What scenes of a number type are made of inside. WayBack: what is known of the inverse of an
+/// instance's transform.
+template <class Scalar>
+struct SceneKind;
+template <>
+struct SceneKind<float> {
+    using MeshTree = raydix::MeshTree;
+    using Tree = SceneTree;
+    struct WayBack {
+        Affine inverse;
+        MapErrors errors;
+    };
+};
+template <>
+struct SceneKind<double> {
+    using MeshTree = MeshTreeD;
+    using Tree = SceneTreeD;
+    struct WayBack {
+        InverseD inverse;
+    };
+};
+
+template <class Scalar>
+struct BasicScene<Scalar>::State {
+    struct Geometry : SceneKind<Scalar>::WayBack {
         // A mesh; its arrays are the scene's own unless they are shared. Commits hold on to the
         // own ones.
         MeshView mesh;
@@ -23,8 +47,6 @@ struct Scene::State {
         // An instance, if there is a scene.
         std::shared_ptr<const State> scene;
         Transform transform;
-        Affine inverse;
-        MapErrors errors;
 
         std::uint32_t mask = 0xFFFFFFFFu;
         bool changed = true;  // its triangles, since the last commit
@@ -36,8 +58,8 @@ struct Scene::State {
     std::uint64_t next_id = 0;      // all below were given once
     std::set<std::uint32_t> taken;  // those above, chosen by the caller
     bool changed = true;
-    std::shared_ptr<const SceneTree> tree;  // null before the first commit
-    Quality tree_quality{};                 // what it was made with
+    std::shared_ptr<const typename SceneKind<Scalar>::Tree> tree;  // null before the first commit
+    Quality tree_quality{};                                        // what it was made with
     bool tree_compact = false;
 
     [[nodiscard]] Geometry& at(std::uint32_t id);
@@ -45,8 +67,11 @@ struct Scene::State {
     [[nodiscard]] bool holds(const State* other) const;
 };
 
-struct SceneAccess {
-    using State = Scene::State;
+template <class Scalar>
+struct BasicSceneAccess {
+    using Scene = BasicScene<Scalar>;
+    using State = typename Scene::State;
+    using Tree = typename SceneKind<Scalar>::Tree;
     static State& state(Scene& scene) { return *scene.state_; }
     static Scene scene_of(std::shared_ptr<State> state) {
         Scene scene;
@@ -55,9 +80,12 @@ struct SceneAccess {
     }
     static const std::shared_ptr<State>& shared_state(const Scene& scene) { return scene.state_; }
     /// Throws InputError if there is none.
-    static const std::shared_ptr<const SceneTree>& tree(const Scene& scene);
+    static const std::shared_ptr<const Tree>& tree(const Scene& scene);
     /// Gives an instance its transform. Throws InputError if that is singular or not finite.
-    static void place(std::uint32_t id, const Transform& transform, State::Geometry& geometry);
+    static void place(std::uint32_t id, const typename SceneTypes<Scalar>::Transform& transform,
+                      typename State::Geometry& geometry);
 };
+using SceneAccess = BasicSceneAccess<float>;
+using SceneAccessD = BasicSceneAccess<double>;
 
 }  // namespace raydix

@@ -1,5 +1,4 @@
 // Batches and single rays through scenes.
-#include <raydix/error.h>
 #include <raydix/scene.h>
 
 #include <algorithm>
@@ -8,6 +7,7 @@
 
 #include "base/float_env.h"
 #include "base/options.h"
+#include "engine/scene_batch.h"
 #include "engine/scene_job.h"
 #include "engine/scene_state.h"
 #include "engine/trace_here.h"
@@ -39,23 +39,6 @@ struct Batch {
             occluded[i] = hit.hit();
     }
 };
-
-struct JobCounts {
-    std::uint64_t hits = 0, invalid = 0;
-};
-
-TraceCounts sum_of(const std::vector<JobCounts>& parts, std::size_t rays) {
-    TraceCounts sum;
-    sum.rays = rays;
-    for (const JobCounts& part : parts) sum.hits += part.hits, sum.invalid_rays += part.invalid;
-    return sum;
-}
-
-void check_masks(std::size_t rays, const SceneTraceOptions& options) {
-    if (!options.masks.empty() && options.masks.size() != rays)
-        throw InputError("trace: " + std::to_string(rays) + " rays, but " +
-                         std::to_string(options.masks.size()) + " masks");
-}
 
 /// The job of each thread: its memory stays from batch to batch.
 SceneJob& job_of_this_thread() {

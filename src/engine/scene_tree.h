@@ -5,7 +5,6 @@
 #include <raydix/scene.h>
 #include <raydix/wide.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "engine/extent.h"
+#include "engine/grouped_meshes.h"
 #include "engine/support.h"
 #include "instances/affine.h"
 #include "layout/wide_bvh.h"
@@ -21,48 +21,9 @@
 namespace raydix {
 
 /// One tree over the triangles of one mesh or of several, which follow each other by id.
-struct MeshTree {
+struct MeshTree : GroupedMeshes {
     std::shared_ptr<const WideBvh> tree;
-    WideView view{};                 // without room for a compact tree's blocks
-    std::vector<std::uint32_t> ids;  // [meshes] ascending
-    std::vector<std::uint32_t>
-        first;  // [meshes]: the first triangle of each in the tree's counting
-    // bucket[i]: the mesh of triangle i << shift; one more, the last mesh, behind them.
-    std::vector<std::uint32_t> bucket;
-    std::uint32_t shift = 0;
-    std::uint32_t mask = 0;  // of all of them
-    std::uint64_t triangles = 0;
-    double sah_at_build = 0;  // of the tree that this one was refitted from, or of itself
-
-    /// When `first` and `triangles` are known: about two buckets a mesh.
-    void make_buckets() {
-        while ((triangles >> shift) > 2 * first.size()) ++shift;
-        bucket.clear();
-        for (std::uint64_t prim = 0; prim < triangles; prim += std::uint64_t{1} << shift)
-            bucket.push_back(static_cast<std::uint32_t>(
-                std::upper_bound(first.begin(), first.end(), prim) - first.begin() - 1));
-        bucket.push_back(static_cast<std::uint32_t>(first.size() - 1));
-    }
-
-    /// Triangle `prim` of the tree: the mesh that it belongs to, by its place.
-    [[nodiscard]] std::size_t mesh_of(std::uint32_t prim) const {
-        const std::uint32_t b = prim >> shift;
-        std::size_t m = bucket[b];
-        const std::size_t last = bucket[b + 1];
-        if (last - m <= 2) {
-            while (m < last && first[m + 1] <= prim) ++m;
-            return m;
-        }
-        const auto begin = first.begin() + static_cast<std::ptrdiff_t>(m) + 1,
-                   end = first.begin() + static_cast<std::ptrdiff_t>(last) + 1;
-        return static_cast<std::size_t>(std::upper_bound(begin, end, prim) - first.begin()) - 1;
-    }
-    /// Gives a hit of the tree its mesh.
-    void name(Hit& hit) const {
-        const std::size_t m = first.size() == 1 ? 0 : mesh_of(hit.prim);
-        hit.geometry = ids[m];
-        hit.prim -= first[m];
-    }
+    WideView view{};  // without room for a compact tree's blocks
 };
 
 struct SceneTree;

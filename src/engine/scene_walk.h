@@ -12,8 +12,8 @@
 
 #include <algorithm>
 #include <limits>
-#include <tuple>
 
+#include "engine/hit_order.h"
 #include "engine/scene_job.h"
 #include "trace/simd/packets.h"
 #include "trace/simd/single.h"
@@ -34,25 +34,6 @@ HWY_INLINE void grow_pads(const WideView& tree, PadGrowth growth, SingleFrame& f
     const V4 whole = hn::CopySign(hn::Add(hn::Abs(pad), hn::Set(f4, grown)), pad);
     hn::Store(whole, f4, frame.near_pad);
     set_starts(tree, origin, hn::Load(f4, frame.inverse), whole, frame);
-}
-
-/// Where hits stand in order: at equal t the least instance, geometry and triangle.
-HWY_INLINE auto order_of(const Hit& hit) {
-    return std::tuple(hit.t, hit.instance, hit.geometry, hit.prim);
-}
-
-/// Sorts what one ray hit, hits[before] on. A triangle that is in several leaves was found more
-/// than once, with the same t: the others go.
-inline void finish_scene_ray(BudgetVector<Hit>& hits, std::size_t before) {
-    const auto first = hits.begin() + static_cast<std::ptrdiff_t>(before);
-    std::sort(first, hits.end(),
-              [](const Hit& a, const Hit& b) { return order_of(a) < order_of(b); });
-    hits.erase(std::unique(first, hits.end(),
-                           [](const Hit& a, const Hit& b) {
-                               return a.instance == b.instance && a.geometry == b.geometry &&
-                                      a.prim == b.prim;
-                           }),
-               hits.end());
 }
 
 /// A hit of a mesh takes the place of the best one if it is the less of the two; `reach` is how far

@@ -31,7 +31,9 @@ void ProgressListener::finish() {
 
 const ProgressSpan& progress_span() { return present_span; }
 
-ProgressStage::ProgressStage(const ProgressSpan& span) : before_(present_span) { present_span = span; }
+ProgressStage::ProgressStage(const ProgressSpan& span) : before_(present_span) {
+    present_span = span;
+}
 ProgressStage::~ProgressStage() { present_span = before_; }
 
 }  // namespace raydix

@@ -18,8 +18,8 @@ public:
     /// `tell` must outlive this; empty: nobody listens.
     explicit ProgressListener(const std::function<void(double)>& tell) : tell_(tell) {}
 
-    /// `part` of the whole is done. Others of less may still come, and are not told; nor is 1, which
-    /// is for `finish`.
+    /// `part` of the whole is done. Others of less may still come, and are not told; nor is 1,
+    /// which is for `finish`.
     void reach(double part) {
         if (tell_ && part < 1 && part >= due_.load(std::memory_order_relaxed)) tell(part);
     }

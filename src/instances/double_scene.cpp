@@ -1,22 +1,10 @@
-// InstancedSceneD: see scene_groups.h. Boxes of instances in double -> float boxes around a center
-// -> a float tree, as for triangles in double.
+// InstancedSceneD: see scene_groups.h.
 #include "instances/double_scene.h"
 
 #include <raydix/error.h>
 
-#include <algorithm>
-
-#include "primitives/double_sources.h"
-#include "tree/around_center.h"
-#include "tree/median_center.h"
-
 namespace raydix {
 namespace {
-
-/// Of rays and triangles: at t the ray is as near to the triangle as slab.h says, twice over.
-constexpr double triangle_error = 0x1p-46;
-
-constexpr AabbD nothing{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
 
 AabbD in_double(const Aabb& box) {
     return {{box.lo.x, box.lo.y, box.lo.z}, {box.hi.x, box.hi.y, box.hi.z}};
@@ -24,40 +12,11 @@ AabbD in_double(const Aabb& box) {
 
 }  // namespace
 
-DoubleInstances::Tree::Tree() : around{nothing, 0.0} {}
-
 ExtentD DoubleInstances::extent_of(const SceneMeshD& mesh) {
     if (mesh.bvh != nullptr)
-        return {mesh.bvh->empty() ? nothing : mesh.bvh->bounds(), triangle_error};
-    return {mesh.of_floats->empty() ? nothing : in_double(mesh.of_floats->bounds()),
-            triangle_error};
-}
-
-bool DoubleInstances::in_range(const ExtentD& extent) {
-    return raydix::in_range(extent.box.lo) && raydix::in_range(extent.box.hi);
-}
-
-void DoubleInstances::build(BvhBuilder& builder, Tree& tree) {
-    tree.around = {nothing, 0.0};
-    for (const ExtentD& extent : tree.extents) {
-        if (is_empty(extent)) continue;
-        tree.around.box = {min_of(tree.around.box.lo, extent.box.lo),
-                           max_of(tree.around.box.hi, extent.box.hi)};
-        tree.around.error = std::max(tree.around.error, extent.error);
-    }
-    const auto box_at = [&](std::size_t i, AabbD& box) {
-        box = tree.extents[i].box;
-        return !is_empty(tree.extents[i]);
-    };
-    const Vec3d center = median_center(tree.extents.size(), box_at, tree.around.box);
-    tree.space = {center, scale_around(center, tree.around.box)};
-    tree.boxes.resize(tree.extents.size());
-    for_each_index(tree.extents.size(), [&](std::size_t i) {
-        AabbD box;
-        tree.boxes[i] = box_at(i, box) ? box_around_center(box, tree.space.center, tree.space.scale)
-                                       : empty_box();
-    });
-    builder.build(tree.boxes, {.builder = Builder::apetrei, .max_leaf = 1}, tree.bvh);
+        return extent_of_triangles(mesh.bvh->empty() ? nothing_d : mesh.bvh->bounds());
+    return extent_of_triangles(mesh.of_floats->empty() ? nothing_d
+                                                       : in_double(mesh.of_floats->bounds()));
 }
 
 InstancedSceneD::InstancedSceneD() : state_(std::make_unique<State>()) {}

@@ -4,11 +4,10 @@
 #include <raydix/instances_d.h>
 
 #include <optional>
-#include <vector>
 
 #include "instances/affine_double.h"
+#include "instances/instance_tree_double.h"
 #include "instances/scene_groups.h"
-#include "trace/double_tree.h"
 
 namespace raydix {
 
@@ -23,16 +22,7 @@ struct DoubleInstances {
     using Mesh = SceneMeshD;
     using Inverse = InverseD;
     using Extent = ExtentD;
-    /// Float nodes around a center, as those of BvhD.
-    struct Tree {
-        std::vector<ExtentD> extents;
-        std::vector<Aabb> boxes;
-        Bvh bvh;
-        TreeSpace space{{0.0, 0.0, 0.0}, 1.0};
-        ExtentD around;
-
-        Tree();
-    };
+    using Tree = InstanceTreeD;
 
     static std::optional<InverseD> inverse_of(const InstanceD& instance) {
         return raydix::inverse_of(affine_of(instance.transform));
@@ -43,9 +33,11 @@ struct DoubleInstances {
                          const ExtentD& extent) {
         return image_of(affine_of(instance.transform), inverse, extent);
     }
-    static bool is_empty(const ExtentD& extent) { return extent.box.lo.x > extent.box.hi.x; }
-    static bool in_range(const ExtentD& extent);
-    static void build(BvhBuilder& builder, Tree& tree);
+    static bool is_empty(const ExtentD& extent) { return raydix::is_empty(extent); }
+    static bool in_range(const ExtentD& extent) { return raydix::in_range(extent); }
+    static void build(BvhBuilder& builder, Tree& tree) {
+        tree.build(builder, {.builder = Builder::apetrei});
+    }
 };
 
 struct InstancedSceneD::State : SceneGroups<DoubleInstances> {};

@@ -4,6 +4,7 @@
 
 #include "base/float_env.h"
 #include "instances/double_scene.h"
+#include "instances/instance_tree_double.h"
 #include "instances/ray_batch.h"
 #include "trace/grown_boxes.h"
 #include "trace/tree_hits.h"
@@ -43,39 +44,6 @@ struct WidenedTree {
     [[nodiscard]] const RayFrameD& local(const RayFrameD& ray) const { return ray; }
 };
 
-/// When a ray enters the nodes of a group's tree: not later than it hits anything in them, in units
-/// of `frame`.
-class GroupNodes {
-public:
-    GroupNodes(const DoubleInstances::Tree& tree, const RayD& ray, const RayFrameD& frame)
-        : boxes_(path_of(tree.space, ray, frame), room(tree, tree.space.local(frame.origin))) {}
-
-    [[nodiscard]] double enter(const BvhNode& node) const {
-        return boxes_.enter(node.lo, node.hi) * (1.0 - 1e-12);
-    }
-
-private:
-    static Path path_of(const TreeSpace& space, const RayD& ray, const RayFrameD& frame) {
-        return {Double3(space.local(frame.origin)),
-                Double3((frame.t_scale * space.scale) * ray.direction), frame.tmin, frame.tmax};
-    }
-    /// What ExtentD has it, and the roundings of the origin and of differences from it.
-    static double room(const DoubleInstances::Tree& tree, Vec3d origin) {
-        const BvhNode& root = tree.bvh.nodes()[0];
-        const auto largest = [](double x, double y, double z) { return max_of(max_of(x, y), z); };
-        const auto reach = [](float lo, float hi, double o) {
-            return max_of(std::fabs(lo - o), std::fabs(hi - o));
-        };
-        const double far =
-            largest(reach(root.lo.x, root.hi.x, origin.x), reach(root.lo.y, root.hi.y, origin.y),
-                    reach(root.lo.z, root.hi.z, origin.z));
-        const double from = largest(std::fabs(origin.x), std::fabs(origin.y), std::fabs(origin.z));
-        return tree.around.error * far + 0x1p-49 * (far + from);
-    }
-
-    GrownBoxes boxes_;
-};
-
 class InstanceWalkD {
 public:
     InstanceWalkD(const State& state, std::uint32_t mask, bool any)
@@ -96,7 +64,7 @@ private:
         if (tree.empty() || !is_valid(ray)) return;
         WalkStackD stack(tree.max_depth());
         const RayFrameD frame = make_frame(ray);
-        const GroupNodes nodes(group.tree, ray, frame);
+        const InstanceNodesD nodes(group.tree, ray, frame);
         const auto leaf = [&](const BvhNode& node) {
             for (std::uint32_t k = node.first; k < node.first + node.count; ++k)
                 if (enter(group, tree.order()[k], line, level)) return true;
@@ -137,7 +105,7 @@ private:
         }
         const BasicClosestHit<double> found = find_closest(tree, frame, stack, steps);
         if (found.prim == no_primitive) return;
-        const HitD hit{found.t * frame.t_scale + 0.0, found.prim, found.u, found.v};
+        const TreeHitD hit{found.t * frame.t_scale + 0.0, found.prim, found.u, found.v};
         // At equal t the lower path wins; within one instance find_closest has chosen.
         if (hit.t < best_.hit.t || !best_.hit.hit() || path_ < best_.path)
             best_ = {hit, object, path_};

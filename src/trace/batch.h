@@ -32,7 +32,7 @@ AnyHit hit_in_tree(Scalar t, std::uint32_t prim, Scalar u, Scalar v) {
     if constexpr (std::is_same_v<AnyHit, Hit>)
         return hit_of_tree({t, prim, u, v});
     else
-        return {t, prim, u, v};
+        return hit_of_tree(TreeHitD{t, prim, u, v});
 }
 
 inline void add(TraceCounts& sum, const TraceCounts& part) {

@@ -32,7 +32,7 @@ void closest_of_all(const Source& source, std::uint32_t count, const AnyRay& ray
         best = {};
     else
         best.t *= frame.t_scale;
-    if constexpr (std::is_same_v<AnyHit, Hit>) best = hit_of_tree(best);
+    best = hit_of_tree(best);
 }
 
 template <class AnyHit, class Source, class View, class AnyRay>

@@ -474,7 +474,7 @@ TEST(HitPoints, KeepNormalsThroughAllLevels) {
     scenes.emplace_back(triangle_at(0));
     for (std::uint32_t level = 0; level < Scene::max_levels; ++level) {
         Transform t;
-        const float by = level % 2 == 0 ? 1e11f : 1e-11f;
+        const float by = 1e-6f;
         for (std::size_t k = 0; k < 3; ++k) t.m[k][k] = by;
         t.m[2][2] = -by;
         Scene outer;

@@ -65,7 +65,7 @@ void expect_brute_force(const std::string& name, const std::vector<AabbD>& boxes
             HitD hit;
             if (boxes[prim].lo.x <= boxes[prim].hi.x && intersect(prim, rays[i], hit) &&
                 hit.t < expected[i].t)
-                expected[i] = {hit.t, prim, hit.u, hit.v};
+                expected[i] = hit_of_tree(TreeHitD{hit.t, prim, hit.u, hit.v});
         }
         hits += expected[i].hit();
     }

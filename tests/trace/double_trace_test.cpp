@@ -44,7 +44,7 @@ std::vector<HitD> every_hit(const MeshD& mesh, const RayD& ray) {
         BasicTriangleHit<double> hit;
         if (source.box(i, box) &&
             intersect_triangle<EdgeRule::half_open>(frame, source.corners(i), frame.tmax, hit))
-            hits.push_back({hit.t * frame.t_scale, i, hit.u, hit.v});
+            hits.push_back(hit_of_tree(TreeHitD{hit.t * frame.t_scale, i, hit.u, hit.v}));
     }
     std::ranges::sort(hits, {}, [](const HitD& h) { return std::pair(h.t, h.prim); });
     return hits;
@@ -300,11 +300,12 @@ TEST(DoubleTrace, DegenerateScenes) {
     EXPECT_FALSE(closest_hit(BvhD(), ray).hit());
     EXPECT_FALSE(closest_hit(build_bvh(MeshD{}), ray).hit());
     MeshD mesh{"", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
-    EXPECT_EQ(closest_hit(build_bvh(mesh), ray), (HitD{0.5, 0, 0.25, 0.25}));
+    EXPECT_EQ(closest_hit(build_bvh(mesh), ray), hit_of_tree(TreeHitD{0.5, 0, 0.25, 0.25}));
     mesh.triangles.assign(1000, Triangle{0, 1, 2});
     for (const Builder builder : all_builders) {
         const BvhD bvh = build_bvh(mesh, {.builder = builder});
-        EXPECT_EQ(closest_hit(bvh, ray), (HitD{0.5, 0, 0.25, 0.25})) << builder_name(builder);
+        EXPECT_EQ(closest_hit(bvh, ray), hit_of_tree(TreeHitD{0.5, 0, 0.25, 0.25}))
+            << builder_name(builder);
         EXPECT_EQ(trace_all(bvh, std::span(&ray, 1)).hits.size(), 1000u);
     }
     mesh.triangles = {{0, 0, 1}, {1, 1, 1}, {0, 1, 2}};  // a segment, a point

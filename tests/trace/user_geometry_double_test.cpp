@@ -36,7 +36,8 @@ TEST(UserGeometryDouble, IsWhatTheFunctionSays) {
     };
     const BoxBvhD bvh = build_bvh(boxes, {.max_leaf = 1});
     const RayD ray{{far - 10, 0, 0}, 0, {2, 0, 0}};
-    EXPECT_EQ(closest_hit(bvh, wall, ray), (HitD{6.0, 2, 0.25, 0.0})) << "the lower id wins";
+    EXPECT_EQ(closest_hit(bvh, wall, ray), hit_of_tree(TreeHitD{6.0, 2, 0.25, 0.0}))
+        << "the lower id wins";
     EXPECT_GT(calls.load(), 0);
     const auto limited = [&](double tmin, double tmax) {
         return closest_hit(bvh, wall, {ray.origin, tmin, ray.direction, tmax});
@@ -91,7 +92,7 @@ TEST(UserGeometryDouble, FewBoxes) {
         for (const std::size_t n : {1u, 2u, 50u}) {
             const std::vector<AabbD> equal(n, {{5, 5, 5}, {5, 5, 5}});
             const BoxBvhD bvh = build_bvh(equal, {.builder = builder});
-            EXPECT_EQ(closest_hit(bvh, at_one, ray), (HitD{1.0, 0, 0.0, 0.0}));
+            EXPECT_EQ(closest_hit(bvh, at_one, ray), hit_of_tree(TreeHitD{1.0, 0, 0.0, 0.0}));
         }
     }
 }
@@ -187,7 +188,7 @@ TEST(UserGeometryDouble, NodesAreEnteredAsEarlyAsPromised) {
             for (std::uint32_t prim = 0; prim < boxes.size(); ++prim) {
                 HitD hit;
                 if (intersect(prim, rays[i], hit) && hit.t < wanted[i].t)
-                    wanted[i] = {hit.t, prim, hit.u, hit.v};
+                    wanted[i] = hit_of_tree(TreeHitD{hit.t, prim, hit.u, hit.v});
             }
             hits += wanted[i].hit();
         }

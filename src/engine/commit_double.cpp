@@ -1,0 +1,111 @@
+// Commits in double: as commit.cpp, with the trees of <raydix/double.h> and one over the parts.
+#include <raydix/error.h>
+
+#include <optional>
+#include <utility>
+
+#include "engine/commit.h"
+#include "engine/mesh_commit.h"
+#include "tree/copy.h"
+
+namespace raydix {
+namespace {
+
+/// Trees of triangles in double (mesh_commit.h).
+struct BinaryMaker {
+    static void build(const MeshViewD& mesh, const SceneOptions& options, MeshTreeD& out) {
+        BuildOptions build = build_options_for(options.quality);
+        build.threads = options.threads;
+        out.tree = std::make_shared<const BvhD>(build_bvh(mesh, build));
+        out.sah_at_build = 0;  // the first refit finds it
+    }
+    static void keep(const MeshTreeD& old, MeshTreeD& out) { out.tree = old.tree; }
+    static std::optional<double> refit(const MeshTreeD& old, const MeshViewD& mesh,
+                                       const SceneOptions& options, MeshTreeD& out) {
+        if (old.tree->empty() || old.tree->tree().has_split_primitives() ||
+            old.tree->tree().input_count() != mesh.triangles.size())
+            return {};
+        BvhD tree = copy_of(*old.tree);
+        try {
+            const RefitQuality quality = raydix::refit(tree, mesh, options.threads);
+            out.tree = std::make_shared<const BvhD>(std::move(tree));
+            if (out.sah_at_build == 0) out.sah_at_build = quality.sah_at_build;
+            return quality.sah;
+        } catch (const InputError&) {
+            return {};  // triangles came, or went
+        }
+    }
+};
+
+void unite_with(AabbD& box, const AabbD& other) {
+    box = {min_of(box.lo, other.lo), max_of(box.hi, other.hi)};
+}
+
+class CommitD {
+public:
+    CommitD(const SceneAccessD::State& state, const SceneOptions& options, CommitReport& report)
+        : state_(state), options_(options), report_(report) {}
+
+    std::shared_ptr<const SceneTreeD> run() {
+        std::size_t instances = 0;
+        for (const auto& [id, geometry] : state_.geometries) instances += geometry.is_instance();
+        MeshCommit<double, BinaryMaker> meshes(state_, options_, report_);
+        tree_->meshes = meshes.run(static_cast<double>(instances));
+        for (const auto& mesh : tree_->meshes) add_extent(*mesh->tree);
+        place_instances();
+        const ProgressStage top(meshes.part_done(), 1);
+        progress_at(0);
+        build_top();
+        report_.instances = tree_->instances.size();
+        report_.paths = tree_->paths;
+        return std::move(tree_);
+    }
+
+private:
+    void add_extent(const BvhD& mesh) {
+        tree_->parts.extents.push_back(
+            extent_of_triangles(mesh.empty() ? nothing_d : mesh.bounds()));
+        report_.bytes += mesh.bytes();
+        if (!mesh.empty()) unite_with(tree_->bounds, mesh.bounds());
+    }
+
+    void place_instances() {
+        for (const auto& [id, geometry] : state_.geometries) {
+            if (!geometry.is_instance()) continue;
+            const auto& inner = geometry.scene->tree;
+            const std::uint32_t number = number_instance(*tree_, id, inner);
+            tree_->instances.push_back({id, number, geometry.mask, geometry.inverse, inner});
+            const ExtentD& around = inner->parts.around;
+            ExtentD extent{nothing_d, 0.0};
+            if (!is_empty(around))
+                extent = image_of(affine_of(geometry.transform), geometry.inverse, around);
+            tree_->parts.extents.push_back(extent);
+            if (is_empty(around)) continue;
+            if (!in_range(extent)) refuse_reach(id);
+            unite_with(tree_->bounds, extent.box);
+        }
+    }
+
+    void build_top() {
+        BvhBuilder builder;
+        tree_->parts.build(builder, build_options_for(quality_of_parts(options_)));
+        if (tree_->only_mesh() == nullptr)
+            report_.bytes += tree_->parts.bvh.nodes().size_bytes() +
+                             tree_->instances.size() * sizeof(PlacedSceneD);
+    }
+
+    const SceneAccessD::State& state_;
+    const SceneOptions& options_;
+    CommitReport& report_;
+    std::shared_ptr<SceneTreeD> tree_ = std::make_shared<SceneTreeD>();
+};
+
+}  // namespace
+
+std::shared_ptr<const SceneTreeD> make_scene_tree(const SceneAccessD::State& state,
+                                                  const SceneOptions& options,
+                                                  CommitReport& report) {
+    return run_commit(options, [&] { return CommitD(state, options, report).run(); });
+}
+
+}  // namespace raydix

@@ -1,0 +1,225 @@
+// Random scenes in double, and a judge that looks at every mesh on every path.
+#pragma once
+
+#include <raydix/double.h>
+#include <raydix/scene.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <tuple>
+#include <vector>
+
+#include "instances/affine_double.h"
+#include "support/double_scenes.h"
+
+namespace raydix::test {
+
+inline constexpr std::uint32_t every_mask = 0xFFFFFFFFu;
+
+/// A scene and what is in it.
+struct WorldD {
+    struct Item {
+        std::uint32_t id = 0, mask = every_mask;
+        MeshD mesh;
+        TransformD transform;
+        std::shared_ptr<const WorldD> inside;  // of an instance
+    };
+    std::vector<Item> items;  // by ascending id
+    SceneD scene;
+    Vec3d home{0, 0, 0};  // what is in it is around there
+
+    [[nodiscard]] std::uint64_t paths() const {
+        std::uint64_t sum = 0;
+        for (const Item& item : items)
+            if (item.inside) sum += 1 + item.inside->paths();
+        return sum;
+    }
+};
+
+struct RecipeD {
+    std::uint32_t levels, items;
+    double shear = 0, distance = 0;  // of homes from the origin
+    SceneOptions options = {};
+};
+
+class RandomWorlds : public RandomD {
+public:
+    using RandomD::RandomD;
+    std::uint32_t under(std::uint32_t n) { return static_cast<std::uint32_t>(below(n)); }
+    std::uint32_t mask() { return below(3) == 0 ? 1u << below(3) : every_mask; }
+    Vec3d around(Vec3d at, double reach) {
+        return at + in({{-reach, -reach, -reach}, {reach, reach, reach}});
+    }
+    MeshD soup(std::uint32_t most, Vec3d home) {
+        return in_double_at(random_soup_d(1 + under(most), below(1000), 0.6), home);
+    }
+    /// Turned, stretched, mirrored or not, stretched once more by up to `shear`; `home` comes to
+    /// lie near `to`.
+    TransformD transform(Vec3d home, Vec3d to, double reach, double shear) {
+        for (;;) {
+            TransformD t;
+            for (auto& row : t.m)
+                for (std::size_t k = 0; k < 3; ++k) row[k] = between(-1, 1);
+            if (shear > 1) {
+                const std::uint32_t into = under(3), from = (into + 1 + under(2)) % 3;
+                for (std::size_t k = 0; k < 3; ++k)
+                    t.m[into][k] += between(-shear, shear) * t.m[from][k];
+            }
+            const Vec3d at = around(to, reach);
+            const double wanted[3] = {at.x, at.y, at.z};
+            for (std::size_t a = 0; a < 3; ++a)
+                t.m[a][3] =
+                    wanted[a] - (t.m[a][0] * home.x + t.m[a][1] * home.y + t.m[a][2] * home.z);
+            if (inverse_of(affine_of(t))) return t;
+        }
+    }
+    std::shared_ptr<WorldD> world(const RecipeD& recipe, std::uint32_t level = 0) {
+        auto world = std::make_shared<WorldD>();
+        if (level == 0 || below(2) == 0)
+            world->home = {recipe.distance, -0.7 * recipe.distance, 0.1 * recipe.distance};
+        std::vector<std::shared_ptr<WorldD>> inner;
+        if (level < recipe.levels)
+            for (int k = 0; k < 2; ++k) inner.push_back(this->world(recipe, level + 1));
+        std::uint32_t id = 0;
+        for (std::uint32_t k = 0; k < recipe.items; ++k, ++id) {
+            WorldD::Item item{id, mask(), {}, {}, {}};
+            if (below(4) == 0) item.id = id += 1 + under(5);
+            const GeometryOptions options{item.mask, item.id};
+            if (!inner.empty() && below(3) != 0) {
+                item.inside = inner[below(2)];
+                item.transform =
+                    transform(item.inside->home, world->home, level == 0 ? 4 : 2, recipe.shear);
+                world->scene.add(item.inside->scene, item.transform, options);
+            } else {
+                if (below(8) != 0) item.mesh = soup(40, world->home);
+                world->scene.add(item.mesh, options);
+            }
+            world->items.push_back(std::move(item));
+        }
+        world->scene.commit(recipe.options);
+        return world;
+    }
+    std::vector<RayD> rays(std::size_t count, Vec3d home) {
+        constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+        std::vector<RayD> out;
+        for (std::size_t i = 0; i < count; ++i) {
+            const Vec3d from = around(home, i % 3 == 0 ? 6 : 2.5),
+                        to = around(home, i % 2 == 0 ? 1 : 3);
+            RayD ray{from, 0, (i % 11 == 0 ? 100.0 : 1.0) * (to - from)};
+            if (i % 5 == 0) ray.tmax = between(0.2, 1.0);
+            if (i % 7 == 0) ray.tmin = between(0.0, 0.5);
+            if (i % 97 == 0) ray.direction = {0, 0, 0};
+            if (i % 89 == 0) ray.origin.x = nan;
+            out.push_back(ray);
+        }
+        return out;
+    }
+
+private:
+    static MeshD in_double_at(MeshD mesh, Vec3d home) {
+        for (Vec3d& v : mesh.vertices) v = v + home;
+        return mesh;
+    }
+};
+
+inline auto key_of(const HitD& hit) {
+    return std::tuple(hit.t, hit.instance, hit.geometry, hit.prim);
+}
+
+/// Calls meet(item, rays as they come in, number of the path) for each mesh on each path that
+/// `mask` sees.
+template <class Meet>
+void for_each_mesh(const WorldD& world, std::span<const RayD> rays, std::uint32_t mask,
+                   const Meet& meet) {
+    const std::function<void(const WorldD&, const std::vector<LineD>&, std::uint32_t)> visit =
+        [&](const WorldD& at, const std::vector<LineD>& lines, std::uint32_t number) {
+            std::uint32_t next = number + 1;
+            for (const WorldD::Item& item : at.items) {
+                const bool seen = (item.mask & mask) != 0;
+                if (item.inside) {
+                    const InverseD inverse = *inverse_of(affine_of(item.transform));
+                    std::vector<LineD> inner;
+                    for (const LineD& line : lines) inner.push_back(line.into(inverse));
+                    if (seen) visit(*item.inside, inner, next);
+                    next += 1 + static_cast<std::uint32_t>(item.inside->paths());
+                } else if (seen) {
+                    std::vector<RayD> entering;
+                    for (std::size_t i = 0; i < rays.size(); ++i)
+                        entering.push_back(lines[i].ray(rays[i].tmin, rays[i].tmax));
+                    meet(item, entering, number);
+                }
+            }
+        };
+    visit(world, std::vector<LineD>(rays.begin(), rays.end()), 0);
+}
+
+/// The least hit of each ray.
+inline std::vector<HitD> look(const WorldD& world, std::span<const RayD> rays, std::uint32_t mask) {
+    std::vector<HitD> best(rays.size());
+    for_each_mesh(
+        world, rays, mask,
+        [&](const WorldD::Item& item, const std::vector<RayD>& entering, std::uint32_t number) {
+            const std::vector<HitD> hits = trace_brute_force(item.mesh, entering, 1);
+            for (std::size_t i = 0; i < rays.size(); ++i) {
+                if (!hits[i].hit()) continue;
+                const HitD found{hits[i], item.id, number};
+                if (!best[i].hit() || key_of(found) < key_of(best[i])) best[i] = found;
+            }
+        });
+    return best;
+}
+
+/// All hits of each ray, in order.
+inline std::vector<std::vector<HitD>> look_for_all(const WorldD& world, std::span<const RayD> rays,
+                                                   std::uint32_t mask) {
+    std::vector<std::vector<HitD>> rows(rays.size());
+    for_each_mesh(
+        world, rays, mask,
+        [&](const WorldD::Item& item, const std::vector<RayD>& entering, std::uint32_t number) {
+            if (item.mesh.triangles.empty()) return;
+            const AllHitsD all = trace_all(build_bvh(item.mesh), entering, {.threads = 1});
+            for (std::size_t i = 0; i < rays.size(); ++i)
+                for (std::uint64_t k = all.offsets[i]; k < all.offsets[i + 1]; ++k)
+                    rows[i].push_back({all.hits[k], item.id, number});
+        });
+    for (auto& row : rows) std::ranges::sort(row, {}, key_of);
+    return rows;
+}
+
+/// How many answers differ from those of the judge. Rays take masks of their own in turn.
+inline std::size_t differences(const WorldD& world, std::span<const RayD> rays,
+                               const std::vector<std::uint32_t>& masks) {
+    std::vector<HitD> wanted(rays.size());
+    std::vector<std::uint32_t> distinct = masks;
+    std::ranges::sort(distinct);
+    distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+    for (const std::uint32_t mask : distinct) {
+        const std::vector<HitD> seen = look(world, rays, mask);
+        for (std::size_t i = 0; i < rays.size(); ++i)
+            if (masks[i] == mask) wanted[i] = seen[i];
+    }
+    std::size_t wrong = 0;
+    for (const int threads : {1, 2}) {
+        SceneTraceOptions options;
+        options.masks = masks, options.threads = threads;
+        const std::vector<HitD> hits = trace(world.scene, rays, options);
+        std::vector<std::uint8_t> occluded(rays.size(), 7);
+        const TraceCounts counts = trace_any(world.scene, rays, occluded, options);
+        wrong += counts.hits !=
+                 static_cast<std::uint64_t>(std::ranges::count(occluded, std::uint8_t{1}));
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            wrong += hits[i] != wanted[i];
+            wrong += occluded[i] != (wanted[i].hit() ? 1 : 0);
+        }
+    }
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        wrong += closest_hit(world.scene, rays[i], masks[i]) != wanted[i];
+        wrong += any_hit(world.scene, rays[i], masks[i]) != wanted[i].hit();
+    }
+    return wrong;
+}
+
+}  // namespace raydix::test
