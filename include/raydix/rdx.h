@@ -7,6 +7,7 @@
 #include <raydix/model.h>
 #include <raydix/scene.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -34,11 +35,23 @@ struct RdxFile {
 void save_rdx(const std::filesystem::path& file, const Scene& scene, const std::string& name = {},
               const CameraSet& cameras = {});
 
+/// What a file of a scene holds, each thing counted once.
+struct RdxCounts {
+    std::uint64_t scenes = 0;     // the whole and those that stand in it
+    std::uint64_t instances = 0;  // of all of them
+    std::uint64_t meshes = 0;     // that have triangles
+    std::uint64_t vertices = 0, triangles = 0;
+    std::uint64_t nodes = 0;  // of trees of triangles
+    std::uint64_t bytes = 0;  // of the file
+};
+
 struct RdxScene {
     Scene scene;  // committed. Its meshes and their trees view the mapped file, which stays mapped
                   // as long as one of them is in use: processes that load it share its memory
+    SceneOptions options;  // quality, usage and compact as its last commit had them
     std::string name;
     CameraSet cameras;
+    RdxCounts counts;
     double load_ms = 0;
 };
 

@@ -9,8 +9,8 @@ namespace raydix::rdx {
 
 std::string NameReader::next(std::uint32_t bytes) {
     if (bytes > rest_.size())
-        sections_.fail("names", fmt::format("a name of {} bytes, but {} are left", bytes,
-                                            rest_.size()));
+        sections_.fail("names",
+                       fmt::format("a name of {} bytes, but {} are left", bytes, rest_.size()));
     const std::span<const char> name = rest_.first(bytes);
     rest_ = rest_.subspan(bytes);
     return {name.begin(), name.end()};

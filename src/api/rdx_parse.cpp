@@ -52,8 +52,8 @@ private:
         const std::uint32_t expected = primitive_bytes(static_cast<PrimitiveKind>(info_.kind));
         if (sections_[primitives].element_bytes != expected)
             sections_.fail("primitives",
-                 fmt::format("elements of {} bytes, those of kind {} have {}",
-                             sections_[primitives].element_bytes, info_.kind, expected));
+                           fmt::format("elements of {} bytes, those of kind {} have {}",
+                                       sections_[primitives].element_bytes, info_.kind, expected));
     }
 
     void read_scene(Model& scene) const {

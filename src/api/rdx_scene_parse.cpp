@@ -2,7 +2,7 @@
 // (rdx_sections.h), all the rest by scene_of.
 #include <raydix/error.h>
 
-#include <utility>
+#include <algorithm>
 
 #include "api/rdx_faults.h"
 #include "api/rdx_names.h"
@@ -47,6 +47,18 @@ RdxScene parse_scene(const std::string& file, std::span<const std::byte> bytes,
     } catch (const InputError& error) {
         throw InputError(file + ": " + error.what());
     }
+    const StoredScene& whole = arrays.scenes.back();
+    out.options.quality = static_cast<Quality>(whole.quality);
+    out.options.usage = static_cast<Usage>(whole.usage);
+    out.options.compact = whole.compact != 0;
+    out.counts = {.scenes = arrays.scenes.size(),
+                  .instances = static_cast<std::uint64_t>(
+                      std::ranges::count(arrays.geometries, 1u, &StoredGeometry::is_instance)),
+                  .meshes = arrays.meshes.size(),
+                  .vertices = arrays.vertices.size(),
+                  .triangles = arrays.triangles.size(),
+                  .nodes = arrays.nodes.size() + arrays.compact_nodes.size(),
+                  .bytes = bytes.size()};
     return out;
 }
 

@@ -55,8 +55,7 @@ void Sections::read_header(std::uint32_t wanted) {
                            : "this file holds a tree, not a scene (load_rdx)");
     const std::size_t whole = header_bytes(kinds_.size());
     if (bytes_.size() < whole)
-        fail("header",
-             fmt::format("the file has {} bytes, a header has {}", bytes_.size(), whole));
+        fail("header", fmt::format("the file has {} bytes, a header has {}", bytes_.size(), whole));
     HeaderStart start;
     std::memcpy(&start, bytes_.data(), sizeof(start));
     if (start.file_bytes != bytes_.size())

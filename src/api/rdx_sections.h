@@ -32,9 +32,8 @@ struct SectionKind {
 class Sections {
 public:
     /// Throws InputError("FILE: SECTION: reason").
-    Sections(const std::string& file, std::span<const std::byte> bytes,
-             std::shared_ptr<void> owner, std::uint32_t wanted,
-             std::span<const SectionKind> kinds);
+    Sections(const std::string& file, std::span<const std::byte> bytes, std::shared_ptr<void> owner,
+             std::uint32_t wanted, std::span<const SectionKind> kinds);
 
     [[noreturn]] void fail(std::string_view section, const std::string& reason) const;
 

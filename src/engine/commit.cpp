@@ -205,10 +205,9 @@ private:
 }  // namespace
 
 std::shared_ptr<const SceneTree> make_scene_tree(const SceneAccess::State& state,
-                                                 const SceneOptions& options,
-                                                 CommitReport& report, std::size_t most_placed) {
-    return run_commit(options,
-                      [&] { return Commit(state, options, report, most_placed).run(); });
+                                                 const SceneOptions& options, CommitReport& report,
+                                                 std::size_t most_placed) {
+    return run_commit(options, [&] { return Commit(state, options, report, most_placed).run(); });
 }
 
 }  // namespace raydix

@@ -125,9 +125,9 @@ private:
             arrays->stats.sah = tree.sah;
             arrays->stats.widening = tree.widening;
             tree_of_.insert(tree_of_.end(), own.size(), trees_.size());
-            trees_.push_back({std::make_shared<const WideBvh>(
-                                  WideBvhAccess::tree_of(std::move(arrays))),
-                              tree.sah_at_build, first});
+            trees_.push_back(
+                {std::make_shared<const WideBvh>(WideBvhAccess::tree_of(std::move(arrays))),
+                 tree.sah_at_build, first});
             first += tree.meshes;
         }
         nodes.finish();
@@ -185,8 +185,8 @@ private:
         if (stored.is_instance > 1) fail("geometries", name + " is of an unknown kind");
         if (stored.is_instance == 1) {
             if (stored.number >= scene)
-                fail("geometries", name + " shows " + name_of(stored.number) +
-                                       ", which is not before it");
+                fail("geometries",
+                     name + " shows " + name_of(stored.number) + ", which is not before it");
             out.scene = scenes_[stored.number];
             used_.resize(in_.scenes.size());
             used_[stored.number] = true;
@@ -274,8 +274,7 @@ private:
         if (in_.next_id > no_primitive)
             fail("info", "the next id is " + std::to_string(in_.next_id));
         for (std::size_t k = 0; k < ids.size(); ++k)
-            if (ids[k] == no_primitive ||
-                (k == 0 ? ids[k] <= in_.next_id : ids[k] <= ids[k - 1]))
+            if (ids[k] == no_primitive || (k == 0 ? ids[k] <= in_.next_id : ids[k] <= ids[k - 1]))
                 fail("taken", "id " + std::to_string(ids[k]) + " is out of order");
         state.next_id = in_.next_id;
         state.taken = std::set<std::uint32_t>(ids.begin(), ids.end());

@@ -92,7 +92,7 @@ struct SceneTree {
     PartTree near, wild;
     Extent extent;
     Aabb bounds = empty_box();  // without what rays may miss it by
-    Quality quality{};  // what it was made with
+    Quality quality{};          // what it was made with
     Usage usage{};
     std::uint64_t paths = 0;
     std::uint32_t levels = 0;    // of instances, below this scene

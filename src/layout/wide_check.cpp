@@ -110,11 +110,7 @@ class WideCheck {
 public:
     WideCheck(std::span<const Node> nodes, std::span<const Block> blocks,
               const WideBvh::Arrays& arrays, std::span<const MeshView> meshes)
-        : nodes_(nodes),
-          blocks_(blocks),
-          arrays_(arrays),
-          row_(meshes),
-          boxes_{arrays.middle} {}
+        : nodes_(nodes), blocks_(blocks), arrays_(arrays), row_(meshes), boxes_{arrays.middle} {}
 
     Fault run(WideBvhStats& stats) {
         if (Fault fault = check_bounds()) return fault;
@@ -152,8 +148,7 @@ private:
                 if (word <= w || word >= nodes_.size())
                     return node_name(w) + " has node " + std::to_string(word) + " of " +
                            std::to_string(nodes_.size()) + " as a child";
-                if (named[word]++ != 0)
-                    return node_name(word) + " is a child of two";
+                if (named[word]++ != 0) return node_name(word) + " is a child of two";
                 depth[word] = depth[w] + 1;
             }
         }
@@ -243,8 +238,8 @@ private:
     Fault check_triangles() {
         std::vector<std::uint8_t> uses(row_.count());
         const std::size_t bad = first_index_where(nodes_.size(), [&](std::size_t w) {
-            return !for_each_place(nodes_[w],
-                                   [&](std::size_t, std::uint32_t place) { return is_copy(place); });
+            return !for_each_place(
+                nodes_[w], [&](std::size_t, std::uint32_t place) { return is_copy(place); });
         });
         if (bad < nodes_.size())
             return "blocks: a leaf of node " + std::to_string(bad) +
@@ -273,8 +268,8 @@ private:
     Fault check_boxes() {
         const std::size_t beside = first_index_where(nodes_.size(), [&](std::size_t w) {
             return !for_each_place(nodes_[w], [&](std::size_t s, std::uint32_t place) {
-                const Aabb box = box_of_triangle(
-                    corners(blocks_[place / block_lanes], place % block_lanes));
+                const Aabb box =
+                    box_of_triangle(corners(blocks_[place / block_lanes], place % block_lanes));
                 return is_within(box, arrays_.bounds) &&
                        (split_ || boxes_.contains(nodes_[w], s, box));
             });
@@ -282,8 +277,7 @@ private:
         if (beside < nodes_.size())
             return node_name(beside) + " has a leaf with a triangle beside its box";
         const std::size_t bad = first_outer();
-        if (bad < nodes_.size())
-            return node_name(bad) + " has a child that reaches beyond its box";
+        if (bad < nodes_.size()) return node_name(bad) + " has a child that reaches beyond its box";
         return {};
     }
     static bool is_within(const Aabb& box, const Aabb& all) {
@@ -365,8 +359,7 @@ Fault wide_fault(const WideBvh::Arrays& arrays, std::span<const MeshView> meshes
                  WideBvhStats& stats) {
     stats.compact = arrays.stats.compact;
     if (stats.compact) {
-        if (!std::ranges::all_of(arrays.vertices.view(),
-                                 [](Vec3 v) { return in_range(v); }))
+        if (!std::ranges::all_of(arrays.vertices.view(), [](Vec3 v) { return in_range(v); }))
             return "corners: one is not finite or beyond 1e12";
         return WideCheck<CompactNode, CompactBlock>(arrays.compact_nodes.view(),
                                                     arrays.compact_blocks.view(), arrays, meshes)

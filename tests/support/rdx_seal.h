@@ -20,9 +20,8 @@ inline void seal_rdx(std::span<std::byte> file) {
     if (start.version != rdx::scene_version) start.version = rdx::version;
     start.file_bytes = file.size();
     std::memcpy(file.data(), &start, sizeof(start));
-    const std::size_t count = start.version == rdx::version
-                                  ? std::size_t{rdx::section_count}
-                                  : std::size_t{rdx::scene_section_count};
+    const std::size_t count = start.version == rdx::version ? std::size_t{rdx::section_count}
+                                                            : std::size_t{rdx::scene_section_count};
     const std::size_t whole = sizeof(start) + count * sizeof(rdx::Section);
     if (file.size() < whole) return;
     for (std::size_t id = 0; id < count; ++id) {
