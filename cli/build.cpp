@@ -7,11 +7,13 @@
 
 #include <chrono>
 #include <memory>
+#include <utility>
 
 #include "device_scene.h"
 #include "kdtree_commands.h"
 #include "octree_commands.h"
 #include "output.h"
+#include "scene_file.h"
 #include "wide_trace.h"
 
 namespace raydix::cli {
@@ -120,11 +122,19 @@ void run_core_tree(const BuildCommand& options) {
 
 void run_build(const BuildCommand& options) {
     if (options.tree.tree != "bvh") refuse_layout(options.tree);
-    if (options.tree.layout != "binary" && !options.out_file.empty())
-        throw CLI::ValidationError("--output", ".rdx files hold the binary layout");
+    if (options.tree.layout != "binary" && !wants_scene_layout(options.tree) &&
+        !options.out_file.empty())
+        throw CLI::ValidationError("--output",
+                                   ".rdx files hold the binary layout, or scenes of wide8 or "
+                                   "compact, not " +
+                                       options.tree.layout);
     if (options.tree.tree != "bvh") return run_core_tree(options);
+    Model scene = load_structured_model(options.scene, options.tree, options.common);
+    if (!options.out_file.empty() && saves_a_scene(scene, options.tree, options.common))
+        return build_scene_file(std::move(scene), options.scene, options.out_file, options.repeat,
+                                options.tree, options.common);
+    flatten(scene, options.common);
     Json document = new_document("build");
-    const Model scene = load_model_with_cameras(options.scene, options.tree, options.common);
     document["scene"] = scene_json(scene);
     document["load_ms"] = scene.load_ms;
     const TimedBuilds timed = about(options.scene, [&] {
@@ -179,6 +189,11 @@ void run_check(const CheckCommand& options) {
         const SceneTree b = load_scene_tree(options.same[1], options.tree, options.common);
         report = check_same(a.bvh, b.bvh);
         what = options.same[0] + " and " + options.same[1];
+    } else if (is_scene_file(options.scene)) {
+        const RdxScene file = load_scene_file(options.scene, options.tree, options.common);
+        report.ok = true;  // it is not loaded else
+        report.nodes = file.counts.nodes;
+        report.primitives = file.counts.triangles;
     } else {
         refuse_build_options(options.scene, options.tree);
         const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
@@ -207,7 +222,10 @@ void add_build_command(CLI::App& app) {
     command->add_option("--repeat", options->repeat, "Builds to time after a warm-up")
         ->check(CLI::Range(1, 10000))
         ->capture_default_str();
-    command->add_option("-o,--output", options->out_file, "Save the tree with its geometry")
+    command
+        ->add_option("-o,--output", options->out_file,
+                     "Save the tree with its geometry; of a scene of several meshes or nodes, or "
+                     "with --layout wide8 or compact, the whole scene")
         ->type_name("FILE.rdx");
     add_tree_options(*command, options->tree);
     add_flatten_option(*command, options->common);

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "output.h"
+#include "scene_file.h"
 
 namespace raydix::cli {
 namespace {
@@ -41,6 +42,13 @@ void print_info(const Model& scene, const MeshInfo& info, std::size_t meshes, st
 
 void run_info(const InfoOptions& options) {
     Json document = new_document("info");
+    if (is_scene_file(options.scene)) {
+        const RdxScene file = load_scene_file(options.scene, options.tree, options.common);
+        document["scene"] = scene_file_json(file);
+        document["load_ms"] = file.load_ms;
+        if (options.common.prints_tables()) print_scene_file(file);
+        return write_json(document, options.common);
+    }
     SceneTree input;
     if (is_rdx(options.scene))
         input = load_scene_tree(options.scene, options.tree, options.common);

@@ -2,7 +2,6 @@
 #include "options.h"
 
 #include <fmt/format.h>
-#include <raydix/rdx.h>
 
 #include <algorithm>
 #include <charconv>
@@ -170,6 +169,16 @@ void flatten(Model& scene, const CommonOptions& common) {
 
 bool is_rdx(const std::string& scene) { return scene.ends_with(".rdx"); }
 
+bool is_scene_file(const std::string& scene) { return is_rdx(scene) && holds_scene(scene); }
+
+RdxFile load_tree_file(const std::string& file) {
+    if (holds_scene(file))
+        throw InputError(file +
+                         ": it holds a scene, and this needs one tree or mesh; trace, render, "
+                         "check and info take it");
+    return load_rdx(file);
+}
+
 namespace {
 
 void override_cameras(Model& scene, const TreeOptions& tree) {
@@ -180,7 +189,7 @@ void override_cameras(Model& scene, const TreeOptions& tree) {
 
 Model load_structured_model(const std::string& name, const TreeOptions& tree,
                             const CommonOptions& common) {
-    Model scene = is_rdx(name) ? load_rdx(name).scene : load_model(name, common.seed);
+    Model scene = is_rdx(name) ? load_tree_file(name).scene : load_model(name, common.seed);
     override_cameras(scene, tree);
     return scene;
 }
@@ -225,7 +234,7 @@ SceneTree load_scene_tree(const std::string& name, const TreeOptions& tree,
     if (tree.tree != "bvh")
         throw CLI::ValidationError("--tree", tree.tree + " does not serve here, only bvh");
     if (is_rdx(name)) {
-        RdxFile file = load_rdx(name);
+        RdxFile file = load_tree_file(name);
         override_cameras(file.scene, tree);
         return {std::move(file.scene), std::move(file.bvh)};
     }

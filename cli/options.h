@@ -5,6 +5,7 @@
 #include <raydix/bvh.h>
 #include <raydix/error.h>
 #include <raydix/model.h>
+#include <raydix/rdx.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -57,6 +58,10 @@ struct SceneTree {
     Bvh bvh;
 };
 [[nodiscard]] bool is_rdx(const std::string& scene);
+/// An .rdx file that holds a scene (scene_file.h).
+[[nodiscard]] bool is_scene_file(const std::string& scene);
+/// Of an .rdx file that holds a tree. Throws InputError: one that holds a scene.
+[[nodiscard]] RdxFile load_tree_file(const std::string& file);
 /// For work on one mesh. Says so unless --flatten did.
 void flatten(Model& scene, const CommonOptions& common);
 /// As the file has it.

@@ -2,7 +2,6 @@
 #include "query.h"
 
 #include <fmt/format.h>
-#include <raydix/rdx.h>
 
 #include <memory>
 
@@ -108,7 +107,7 @@ void print_query(const Json& query) {
 }
 
 Model load_query_scene(const std::string& scene, const CommonOptions& common) {
-    Model model = is_rdx(scene) ? load_rdx(scene).scene : load_model(scene, common.seed);
+    Model model = is_rdx(scene) ? load_tree_file(scene).scene : load_model(scene, common.seed);
     flatten(model, common);
     return model;
 }

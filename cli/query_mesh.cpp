@@ -4,7 +4,6 @@
 #include <raydix/arrays.h>
 #include <raydix/closest.h>
 #include <raydix/pairs.h>
-#include <raydix/rdx.h>
 #include <raydix/solid.h>
 
 #include <optional>
@@ -21,7 +20,7 @@ SceneTree load_tree(const std::string& scene, const QueryCommand& options) {
         for (const auto& [given, name] : {std::pair{!options.builder.empty(), "--builder"},
                                           std::pair{options.strict, "--strict"}})
             if (given) throw CLI::ValidationError(name, "has no part in " + scene + ", a tree");
-        RdxFile file = load_rdx(scene);
+        RdxFile file = load_tree_file(scene);
         return {std::move(file.scene), std::move(file.bvh)};
     }
     SceneTree loaded{load_query_scene(scene, options.common), {}};

@@ -5,8 +5,10 @@
 
 #include <chrono>
 #include <memory>
+#include <utility>
 
 #include "output.h"
+#include "scene_file.h"
 #include "scene_trace.h"
 #include "tree_view.h"
 
@@ -43,7 +45,14 @@ Camera chosen_camera(const RenderCommand& options, const Model& scene) {
 }
 
 /// Without a binary tree, unless the options ask for one.
-SceneTree load_shown(const RenderCommand& options, std::optional<Scene>& scene) {
+SceneTree load_shown(const RenderCommand& options, std::optional<Scene>& scene, Json& about_it) {
+    if (is_scene_file(options.scene)) {
+        RdxScene file = load_scene_file(options.scene, options.tree, options.common);
+        about_it = scene_file_json(file);
+        Model model = model_of(file);
+        scene.emplace(std::move(file.scene));
+        return {std::move(model), {}};
+    }
     if (is_rdx(options.scene) || !serves_a_scene(options.tree, options.common))
         return load_scene_tree(options.scene, options.tree, options.common);
     Model model = load_structured_model(options.scene, options.tree, options.common);
@@ -59,10 +68,11 @@ void run_render(RenderCommand options) {
     if (!of_tree) options.tree.prefer_balanced();
     if (!of_tree) refuse_tree_view_options(options.tree_view);
     std::optional<Scene> scene;
+    Json about_scene;  // of a file that holds one
     const TreeScene tree_scene =
         of_tree ? load_tree_scene(options.scene, options.view, options.tree_view, options.tree,
                                   options.common)
-                : TreeScene{load_shown(options, scene), {}};
+                : TreeScene{load_shown(options, scene, about_scene), {}};
     const SceneTree& input = tree_scene.input;
     const Size size = options.size_text.empty()
                           ? Size{input.scene.cameras.width, input.scene.cameras.height}
@@ -96,7 +106,7 @@ void run_render(RenderCommand options) {
         fmt::print("{} ({} x {}, {}, {:.0f} ms)\n", options.out_file, size.width, size.height,
                    options.view, ms);
     Json document = new_document("render");
-    document["scene"] = scene_json(input.scene);
+    document["scene"] = about_scene.is_null() ? scene_json(input.scene) : about_scene;
     document["load_ms"] = input.scene.load_ms;
     document["render"] = {{"file", options.out_file}, {"view", options.view},
                           {"width", size.width},      {"height", size.height},

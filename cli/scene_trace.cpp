@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
+
+#include "scene_file.h"
 
 namespace raydix::cli {
 
@@ -28,17 +31,28 @@ SceneOptions scene_options(const TreeOptions& tree, const CommonOptions& common)
     return options;
 }
 
+SceneTracer::SceneTracer(const WideTraceOptions& options, const CommonOptions& common)
+    : isa_(options.isa.empty() ? simd_instruction_sets().front() : options.isa),
+      path_(simd_path_from_name(options.path)),
+      threads_(common.threads) {}
+
 SceneTracer::SceneTracer(const Model& model, const TreeOptions& tree,
                          const WideTraceOptions& options, const CommonOptions& common)
-    : quality_(tree.quality.empty() ? "balanced" : tree.quality),
-      isa_(options.isa.empty() ? simd_instruction_sets().front() : options.isa),
-      path_(simd_path_from_name(options.path)),
-      compact_(tree.layout == "compact"),
-      threads_(common.threads) {
+    : SceneTracer(options, common) {
+    made_with_ = scene_options(tree, common);
+    scene_json_ = cli::scene_json(model);
     const auto start = std::chrono::steady_clock::now();
-    scene_ = Scene(model, scene_options(tree, common));
+    scene_ = Scene(model, made_with_);
     ms_ =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+SceneTracer::SceneTracer(RdxScene file, const WideTraceOptions& options,
+                         const CommonOptions& common)
+    : SceneTracer(options, common) {
+    made_with_ = file.options;
+    scene_json_ = scene_file_json(file);
+    scene_ = std::move(file.scene);
 }
 
 SceneTraceOptions SceneTracer::trace_options() const {
@@ -65,11 +79,16 @@ AllHits SceneTracer::all(std::span<const Ray> rays, std::uint64_t max_result_byt
 
 Json SceneTracer::build_json() const {
     return {{"tree", "bvh"},
-            {"quality", quality_},
-            {"layout", compact_ ? "compact" : "wide8"},
+            {"quality", quality_name(made_with_.quality)},
+            {"layout", made_with_.compact ? "compact" : "wide8"},
             {"device", "cpu"},
             {"threads", threads_at_work(threads_)},
-            {"ms", {{"total", ms_}}}};
+            {"ms", ms_ ? Json{{"total", *ms_}} : Json(nullptr)}};
+}
+
+HitFields SceneTracer::hit_fields() const {
+    const bool one_mesh = scene_json_["geometries"] == 1 && scene_json_["instances"] == 0;
+    return one_mesh ? HitFields::tree : HitFields::scene;
 }
 
 void SceneTracer::explain(const CommonOptions& common) const {
@@ -77,7 +96,7 @@ void SceneTracer::explain(const CommonOptions& common) const {
     fmt::print(
         "kernel engine: {} layout, nodes of up to 8 children, a tree for the meshes of each node "
         "and one over the nodes, {} code, paths chosen by batch ({})\n",
-        compact_ ? "compact" : "wide8", isa_, simd_path_name(path_));
+        made_with_.compact ? "compact" : "wide8", isa_, simd_path_name(path_));
 }
 
 }  // namespace raydix::cli

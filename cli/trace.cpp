@@ -13,6 +13,7 @@
 #include "kdtree_commands.h"
 #include "output.h"
 #include "ray_launches.h"
+#include "scene_file.h"
 #include "scene_trace.h"
 #include "simulation.h"
 #include "warp_trace.h"
@@ -392,6 +393,16 @@ TraceCommand with_device(TraceCommand options, Mode mode) {
 /// A scene of several meshes or nodes stays one, if the options allow it.
 KdTraced load_traced(const TraceCommand& options, const TreeOptions& on_cpu,
                      std::optional<SceneTracer>& scene) {
+    if (is_scene_file(options.scene)) {
+        if (options.kernel != "engine")
+            throw CLI::ValidationError("--kernel", options.kernel + " needs one binary tree; " +
+                                                       options.scene +
+                                                       " holds a scene, which the engine traces");
+        RdxScene file = load_scene_file(options.scene, options.tree, options.common);
+        Model model = model_of(file);
+        scene.emplace(std::move(file), options.wide, options.common);
+        return {{std::move(model), {}}, {}};
+    }
     const bool keeps = options.kernel == "engine" && !is_rdx(options.scene) &&
                        serves_a_scene(options.tree, options.common);
     if (!keeps) return load_kdtree_traced(options.scene, on_cpu, options.common);
@@ -471,9 +482,9 @@ void run_trace(const TraceCommand& given) {
                              });
             });
     }
-    save_kept(options, mode, kept, scene ? HitFields::scene : HitFields::tree);
+    save_kept(options, mode, kept, scene ? scene->hit_fields() : HitFields::tree);
     Json document = new_document("trace");
-    document["scene"] = scene_json(input.scene);
+    document["scene"] = scene ? scene->scene_json() : scene_json(input.scene);
     document["load_ms"] = input.scene.load_ms;
     const std::vector<BuildMs> builds =
         is_rdx(options.scene) ? std::vector<BuildMs>{} : std::vector{input.bvh.build_ms()};

@@ -196,7 +196,7 @@ FAULTS = [
           "nearest neighbours: a query meets all equal points", "trace"),
     Fault("src/trace/kd_nearest.cpp", "(a.d2 == b.d2 && a.point < b.point)", "(a.d2 == b.d2 && a.point > b.point)",
           "nearest neighbours: ties go to the higher id", "trace"),
-    Fault("src/api/rdx_parse.cpp", "if (section.count > room / section.element_bytes)",
+    Fault("src/api/rdx_sections.cpp", "if (section.count > room / section.element_bytes)",
           "if (section.count * section.element_bytes > room)",
           ".rdx: a number of elements that wraps around is believed", "api"),
     Fault("src/tree/octree.h", "radix.point_count(radix.chain_above(slot))", "radix.point_count(radix.parent_slot(slot))",

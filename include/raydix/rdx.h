@@ -1,11 +1,15 @@
-// .rdx files: a tree with its geometry.
+// .rdx files: a tree with its geometry, or a whole scene.
 #pragma once
 
 #include <raydix/bvh.h>
+#include <raydix/camera.h>
 #include <raydix/mesh.h>
 #include <raydix/model.h>
+#include <raydix/scene.h>
 
+#include <cstdint>
 #include <filesystem>
+#include <string>
 
 namespace raydix {
 
@@ -23,5 +27,40 @@ struct RdxFile {
 /// geometry in O(n) before anything is used: a right checksum proves nothing. Throws InputError:
 /// "FILE: SECTION: reason".
 [[nodiscard]] RdxFile load_rdx(const std::filesystem::path& file);
+
+/// Saves a scene as its last commit left it, with all scenes that it shows, each of them once, and
+/// with the vertices and triangles of its meshes. Of ids it keeps which were given. Throws
+/// InputError: changes that no commit has taken in, shared arrays that changed since the commit, a
+/// file that cannot be written.
+void save_rdx(const std::filesystem::path& file, const Scene& scene, const std::string& name = {},
+              const CameraSet& cameras = {});
+
+/// What a file of a scene holds, each thing counted once.
+struct RdxCounts {
+    std::uint64_t scenes = 0;     // the whole and those that stand in it
+    std::uint64_t instances = 0;  // of all of them
+    std::uint64_t meshes = 0;     // that have triangles
+    std::uint64_t vertices = 0, triangles = 0;
+    std::uint64_t nodes = 0;  // of trees of triangles
+    std::uint64_t bytes = 0;  // of the file
+};
+
+struct RdxScene {
+    Scene scene;  // committed. Its meshes and their trees view the mapped file, which stays mapped
+                  // as long as one of them is in use: processes that load it share its memory
+    SceneOptions options;  // quality, usage and compact as its last commit had them
+    std::string name;
+    CameraSet cameras;
+    RdxCounts counts;
+    double load_ms = 0;
+};
+
+/// Maps a file that holds a scene and validates it as load_rdx does. Rays have the hits of the
+/// scene that was saved, bit for bit. Throws InputError: "FILE: SECTION: reason".
+[[nodiscard]] RdxScene load_rdx_scene(const std::filesystem::path& file);
+
+/// Whether an .rdx file holds a scene (load_rdx_scene), not a tree (load_rdx). Reads its header
+/// alone. Throws InputError if it is no .rdx file.
+[[nodiscard]] bool holds_scene(const std::filesystem::path& file);
 
 }  // namespace raydix

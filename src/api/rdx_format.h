@@ -1,5 +1,6 @@
-// The layout of .rdx files, version 1 (docs/rdx-format.md): one header with a table of sections,
-// then the sections, each at the next multiple of 64 bytes. Little-endian throughout.
+// The layout of .rdx files (docs/rdx-format.md): one header with a table of sections, then the
+// sections, each at the next multiple of 64 bytes. Little-endian throughout. Version 1 holds a
+// tree, version 2 a scene (rdx_scene_format.h).
 #pragma once
 
 #include <raydix/bvh.h>
@@ -10,15 +11,16 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
+#include <type_traits>
 
 namespace raydix::rdx {
 
 /// The first byte is no ASCII, and a transfer that alters line ends breaks the rest.
 inline constexpr std::array<unsigned char, 8> magic{0x89, 'r', 'd', 'x', '\r', '\n', 0x1a, '\n'};
-inline constexpr std::uint32_t version = 1;
+inline constexpr std::uint32_t version = 1, scene_version = 2;
 inline constexpr std::size_t alignment = 64;
 
-/// In the order of the file.
+/// Of version 1, in the order of the file.
 enum SectionId : std::uint32_t {
     info,        // one Info
     nodes,       // BvhNode [2 * inner_count + 2], or none
@@ -30,8 +32,6 @@ enum SectionId : std::uint32_t {
     names,       // bytes: scene, mesh, then each camera, without separators
     section_count
 };
-inline constexpr std::array<std::string_view, section_count> section_names{
-    "info", "nodes", "order", "primitives", "vertices", "triangles", "cameras", "names"};
 
 using Checksum = std::array<unsigned char, 16>;
 
@@ -44,16 +44,22 @@ struct Section {
 };
 static_assert(sizeof(Section) == 40);
 
-struct Header {
+/// What every version begins with; the table of sections follows.
+struct HeaderStart {
     std::array<unsigned char, 8> magic;
     std::uint32_t version;
     std::uint32_t section_count;
     std::uint64_t file_bytes;
-    Checksum checksum;  // XXH3-128 of the whole header with zeros here
+    Checksum checksum;  // XXH3-128 of the whole header, its table included, with zeros here
     std::array<unsigned char, 24> reserved;
+};
+static_assert(sizeof(HeaderStart) == 64);
+
+/// Of version 1.
+struct Header : HeaderStart {
     std::array<Section, rdx::section_count> sections;
 };
-static_assert(sizeof(Header) == 384 && sizeof(Header) % alignment == 0);
+static_assert(sizeof(Header) == 384 && std::is_trivially_copyable_v<Header>);
 
 /// Of Info::flags.
 inline constexpr std::uint32_t strict_flag = 1, refitted_flag = 2;
@@ -94,8 +100,10 @@ static_assert(sizeof(Camera) == 44);
 }
 
 [[nodiscard]] Checksum checksum_of(std::span<const std::byte> bytes);
-/// Of a header, whatever its own checksum field holds.
-[[nodiscard]] Checksum checksum_of(const Header& header);
+/// Of bytes that lie in several places.
+[[nodiscard]] Checksum checksum_of(std::span<const std::span<const std::byte>> pieces);
+/// Of a header with its table, whatever its own checksum field holds.
+[[nodiscard]] Checksum header_checksum(std::span<const std::byte> header);
 
 /// The arrays are written and mapped as they lie in memory.
 inline constexpr bool supported = std::endian::native == std::endian::little;

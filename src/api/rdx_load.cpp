@@ -1,26 +1,46 @@
-// .rdx file -> scene and a tree that views the mapped file.
+// .rdx file -> scene and a tree, or a Scene, that view the mapped file.
 #include <raydix/rdx.h>
 
 #include <system_error>
 
 #include "api/rdx_parse.h"
+#include "api/rdx_sections.h"
 #include "exec/mapped_file.h"
 #include "measure/stopwatch.h"
 #include "scene/input_error.h"
 
 namespace raydix {
+namespace {
 
-RdxFile load_rdx(const std::filesystem::path& file) {
-    Stopwatch watch;
-    MappedFile mapped;
+MappedFile mapped(const std::filesystem::path& file) {
     try {
-        mapped = map_file(file);
+        return map_file(file);
     } catch (const std::system_error& error) {
         input_error(printable(file), "file", error.what());
     }
-    RdxFile result = rdx::parse(printable(file), mapped.bytes, mapped.owner);
+}
+
+}  // namespace
+
+RdxFile load_rdx(const std::filesystem::path& file) {
+    Stopwatch watch;
+    const MappedFile whole = mapped(file);
+    RdxFile result = rdx::parse(printable(file), whole.bytes, whole.owner);
     result.scene.load_ms = watch.lap();
     return result;
+}
+
+RdxScene load_rdx_scene(const std::filesystem::path& file) {
+    Stopwatch watch;
+    const MappedFile whole = mapped(file);
+    RdxScene result = rdx::parse_scene(printable(file), whole.bytes, whole.owner);
+    result.load_ms = watch.lap();
+    return result;
+}
+
+bool holds_scene(const std::filesystem::path& file) {
+    const MappedFile whole = mapped(file);
+    return rdx::version_of(printable(file), whole.bytes) == rdx::scene_version;
 }
 
 }  // namespace raydix

@@ -1,4 +1,4 @@
-// The bytes of an .rdx file -> scene and tree, wherever the bytes come from.
+// The bytes of an .rdx file -> scene and tree, or a Scene, wherever the bytes come from.
 #pragma once
 
 #include <raydix/rdx.h>
@@ -15,5 +15,9 @@ namespace raydix::rdx {
 /// `file` as FILE.
 [[nodiscard]] RdxFile parse(const std::string& file, std::span<const std::byte> bytes,
                             const std::shared_ptr<void>& owner);
+
+/// The same for files of scenes (version 2).
+[[nodiscard]] RdxScene parse_scene(const std::string& file, std::span<const std::byte> bytes,
+                                   const std::shared_ptr<void>& owner);
 
 }  // namespace raydix::rdx

@@ -15,8 +15,6 @@ using Geometry = SceneAccess::State::Geometry;
 
 /// Parts whose error is larger stand in a tree of their own.
 constexpr double wild_error = 0x1p-12;
-/// Instances of instances are placed in the outermost scene up to so many parts.
-constexpr std::size_t most_placed = std::size_t{1} << 15;
 
 /// Trees of triangles in float (mesh_commit.h).
 struct WideMaker {
@@ -52,8 +50,12 @@ private:
 
 class Commit {
 public:
-    Commit(const SceneAccess::State& state, const SceneOptions& options, CommitReport& report)
-        : state_(state), options_(options), report_(report) {}
+    Commit(const SceneAccess::State& state, const SceneOptions& options, CommitReport& report,
+           std::size_t most_placed)
+        : state_(state), options_(options), report_(report), most_placed_(most_placed) {
+        tree_->quality = options.quality;
+        tree_->usage = options.usage;
+    }
 
     std::shared_ptr<const SceneTree> run() {
         MeshCommit<float, WideMaker> meshes(state_, options_, report_);
@@ -92,7 +94,7 @@ private:
             if (!geometry.is_instance()) continue;
             const auto& inner = geometry.scene->tree;
             const std::uint32_t number = number_instance(*tree_, id, inner);
-            tree_->instances.push_back({id, number, geometry.transform, inner});
+            tree_->instances.push_back({id, geometry.mask, number, geometry.transform, inner});
             place(geometry, id, number, inner);
         }
         set_extents();
@@ -118,7 +120,7 @@ private:
             tree_->placed.push_back(std::move(placed));
         };
         if (inner->instances.empty() ||
-            tree_->placed.size() + inner->placed.size() + 1 > most_placed) {
+            tree_->placed.size() + inner->placed.size() + 1 > most_placed_) {
             add({way, number, 0, 0, inner}, nullptr);
             return;
         }
@@ -195,6 +197,7 @@ private:
     const SceneAccess::State& state_;
     const SceneOptions& options_;
     CommitReport& report_;
+    const std::size_t most_placed_;
     std::shared_ptr<SceneTree> tree_ = std::make_shared<SceneTree>();
     std::vector<Source> sources_;  // [placed scenes]
 };
@@ -202,9 +205,9 @@ private:
 }  // namespace
 
 std::shared_ptr<const SceneTree> make_scene_tree(const SceneAccess::State& state,
-                                                 const SceneOptions& options,
-                                                 CommitReport& report) {
-    return run_commit(options, [&] { return Commit(state, options, report).run(); });
+                                                 const SceneOptions& options, CommitReport& report,
+                                                 std::size_t most_placed) {
+    return run_commit(options, [&] { return Commit(state, options, report, most_placed).run(); });
 }
 
 }  // namespace raydix

@@ -33,15 +33,16 @@ void check_mesh(const std::string& name, const AnyMeshView& mesh) {
 
 template <class Geometry, class AnyMeshView>
 void set_mesh(Geometry& geometry, const AnyMeshView& mesh, bool shared) {
-    using Mesh = std::remove_const_t<typename decltype(geometry.own)::element_type>;
+    using Mesh = std::conditional_t<std::is_same_v<AnyMeshView, MeshView>, raydix::Mesh, MeshD>;
     geometry.shared = shared;
     geometry.changed = true;
-    geometry.own =
+    const auto own =
         shared ? nullptr
                : std::make_shared<const Mesh>(Mesh{{},
                                                    {mesh.vertices.begin(), mesh.vertices.end()},
                                                    {mesh.triangles.begin(), mesh.triangles.end()}});
-    geometry.mesh = shared ? mesh : AnyMeshView(*geometry.own);
+    geometry.own = own;
+    geometry.mesh = shared ? mesh : AnyMeshView(*own);
 }
 
 template <class State>
@@ -94,16 +95,6 @@ std::optional<SceneKind<double>::WayBack> way_back(const TransformD& transform) 
     return SceneKind<double>::WayBack{*inverse};
 }
 
-template <class Geometry, class AnyTransform>
-void place(std::uint32_t id, const AnyTransform& transform, Geometry& geometry) {
-    const auto back = way_back(transform);
-    if (!back)
-        throw InputError("instance " + std::to_string(id) +
-                         ": its transform is singular or not finite, so rays cannot go through it");
-    geometry.transform = transform;
-    static_cast<std::remove_cv_t<std::remove_reference_t<decltype(*back)>>&>(geometry) = *back;
-}
-
 }  // namespace
 
 template <class Scalar>
@@ -132,6 +123,18 @@ template <class Scalar>
 auto BasicSceneAccess<Scalar>::tree(const Scene& scene) -> const std::shared_ptr<const Tree>& {
     if (scene.state_->tree == nullptr) throw InputError("scene: it was never committed");
     return scene.state_->tree;
+}
+
+template <class Scalar>
+void BasicSceneAccess<Scalar>::place(std::uint32_t id,
+                                     const typename SceneTypes<Scalar>::Transform& transform,
+                                     typename State::Geometry& geometry) {
+    const auto back = way_back(transform);
+    if (!back)
+        throw InputError("instance " + std::to_string(id) +
+                         ": its transform is singular or not finite, so rays cannot go through it");
+    geometry.transform = transform;
+    static_cast<typename SceneKind<Scalar>::WayBack&>(geometry) = *back;
 }
 
 template <class Scalar>
@@ -172,7 +175,7 @@ std::uint32_t BasicScene<Scalar>::add(const BasicScene& scene, const Transform& 
         throw InputError("instance " + std::to_string(id) + ": the scene would hold itself");
     typename State::Geometry geometry;
     geometry.mask = options.mask;
-    place(id, transform, geometry);
+    BasicSceneAccess<Scalar>::place(id, transform, geometry);
     geometry.scene = scene.state_;
     return insert(*state_, id, std::move(geometry));
 }
@@ -197,7 +200,7 @@ template <class Scalar>
 void BasicScene<Scalar>::set_transform(std::uint32_t id, const Transform& transform) {
     auto& geometry = state_->at(id);
     if (!geometry.is_instance()) throw InputError(name_of(id) + " is a mesh, not an instance");
-    place(id, transform, geometry);
+    BasicSceneAccess<Scalar>::place(id, transform, geometry);
     state_->changed = true;
 }
 

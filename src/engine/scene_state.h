@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "engine/scene_tree.h"
@@ -41,7 +42,7 @@ struct BasicScene<Scalar>::State {
         // A mesh; its arrays are the scene's own unless they are shared. Commits hold on to the
         // own ones.
         MeshView mesh;
-        std::shared_ptr<const Mesh> own;
+        std::shared_ptr<const void> own;
         bool shared = false;
         // An instance, if there is a scene.
         std::shared_ptr<const State> scene;
@@ -72,9 +73,17 @@ struct BasicSceneAccess {
     using State = typename Scene::State;
     using Tree = typename SceneKind<Scalar>::Tree;
     static State& state(Scene& scene) { return *scene.state_; }
+    static Scene scene_of(std::shared_ptr<State> state) {
+        Scene scene;
+        scene.state_ = std::move(state);
+        return scene;
+    }
     static const std::shared_ptr<State>& shared_state(const Scene& scene) { return scene.state_; }
     /// Throws InputError if there is none.
     static const std::shared_ptr<const Tree>& tree(const Scene& scene);
+    /// Gives an instance its transform. Throws InputError if that is singular or not finite.
+    static void place(std::uint32_t id, const typename SceneTypes<Scalar>::Transform& transform,
+                      typename State::Geometry& geometry);
 };
 using SceneAccess = BasicSceneAccess<float>;
 using SceneAccessD = BasicSceneAccess<double>;

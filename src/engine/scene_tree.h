@@ -53,7 +53,7 @@ struct PlacedScene {
 
 /// An instance as the scene's owner knows it.
 struct InstanceName {
-    std::uint32_t id;
+    std::uint32_t id, mask;
     std::uint32_t number;  // of the path that ends here
     Transform transform;
     std::shared_ptr<const SceneTree> scene;
@@ -63,7 +63,7 @@ struct InstanceName {
 struct MeshName {
     std::uint32_t id, mask;
     MeshView mesh;
-    std::shared_ptr<const Mesh> own;  // its arrays; null if they are the caller's
+    std::shared_ptr<const void> own;  // its arrays; null if they are the caller's
 };
 
 /// A wide tree whose leaves hold one part each. Parts are numbered: mesh trees first, then placed
@@ -92,6 +92,8 @@ struct SceneTree {
     PartTree near, wild;
     Extent extent;
     Aabb bounds = empty_box();  // without what rays may miss it by
+    Quality quality{};          // what it was made with
+    Usage usage{};
     std::uint64_t paths = 0;
     std::uint32_t levels = 0;    // of instances, below this scene
     std::size_t stack_size = 0;  // of a ray that goes alone: children still to visit, on all levels

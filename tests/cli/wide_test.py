@@ -37,7 +37,7 @@ class Wide(ProgramTest):
         for layout in LAYOUTS:
             self.fail_with_usage("trace", SCENE, "--layout", layout, "--kernel", "scalar", names=["--layout", layout])
             self.fail_with_usage("render", SCENE, "-o", "p.png", "--layout", layout, names=["--layout"])
-            self.fail_with_usage("build", SCENE, "--layout", layout, "-o", "t.rdx", names=["--output"])
+        self.fail_with_usage("build", SCENE, "--layout", "wide4", "-o", "t.rdx", names=["--output"])
 
 
 if __name__ == "__main__":

@@ -4,27 +4,39 @@
 
 #include <cstring>
 #include <span>
+#include <vector>
 
 #include "api/rdx_format.h"
+#include "api/rdx_scene_format.h"
 
 namespace raydix::test {
 
-/// `file` holds a header at least. Sections that do not fit keep their checksum.
+/// `file` holds a HeaderStart at least. Any version but that of scenes becomes that of trees.
+/// Sections that do not fit keep their checksum.
 inline void seal_rdx(std::span<std::byte> file) {
-    rdx::Header header;
-    std::memcpy(&header, file.data(), sizeof(header));
-    header.magic = rdx::magic;
-    header.version = rdx::version;
-    header.file_bytes = file.size();
-    for (rdx::Section& section : header.sections) {
+    rdx::HeaderStart start;
+    std::memcpy(&start, file.data(), sizeof(start));
+    start.magic = rdx::magic;
+    if (start.version != rdx::scene_version) start.version = rdx::version;
+    start.file_bytes = file.size();
+    std::memcpy(file.data(), &start, sizeof(start));
+    const std::size_t count = start.version == rdx::version ? std::size_t{rdx::section_count}
+                                                            : std::size_t{rdx::scene_section_count};
+    const std::size_t whole = sizeof(start) + count * sizeof(rdx::Section);
+    if (file.size() < whole) return;
+    for (std::size_t id = 0; id < count; ++id) {
+        std::byte* const place = file.data() + sizeof(start) + id * sizeof(rdx::Section);
+        rdx::Section section;
+        std::memcpy(&section, place, sizeof(section));
         if (section.offset > file.size() || section.element_bytes == 0) continue;
         const std::uint64_t room = file.size() - section.offset;
         if (section.count > room / section.element_bytes) continue;
-        section.checksum =
-            rdx::checksum_of(file.subspan(section.offset, section.count * section.element_bytes));
+        section.checksum = rdx::checksum_of(std::span<const std::byte>(
+            file.subspan(section.offset, section.count * section.element_bytes)));
+        std::memcpy(place, &section, sizeof(section));
     }
-    header.checksum = rdx::checksum_of(header);
-    std::memcpy(file.data(), &header, sizeof(header));
+    start.checksum = rdx::header_checksum(file.first(whole));
+    std::memcpy(file.data(), &start, sizeof(start));
 }
 
 }  // namespace raydix::test

@@ -1,0 +1,105 @@
+// A scene -> tables.
+#include "engine/scene_tables.h"
+
+#include <raydix/error.h>
+
+#include <algorithm>
+#include <unordered_map>
+#include <utility>
+
+#include "engine/scene_state.h"
+#include "exec/parallel.h"
+#include "layout/wide_check.h"
+
+namespace raydix {
+namespace {
+
+class TableWriter {
+public:
+    /// As its last commit left it. Returns its number.
+    std::uint32_t add(const SceneTree& scene) {
+        const auto known = scenes_.find(&scene);
+        if (known != scenes_.end()) return known->second;
+        std::vector<StoredGeometry> geometries;
+        for (const InstanceName& instance : scene.instances)
+            geometries.push_back(
+                {instance.id, instance.mask, 1, add(*instance.scene), instance.transform});
+        for (const MeshName& mesh : scene.mesh_names)
+            geometries.push_back({mesh.id, mesh.mask, 0, stored_none, no_transform()});
+        std::ranges::sort(geometries, {}, &StoredGeometry::id);
+        bool compact = false;
+        for (const auto& mesh : scene.meshes) {
+            compact = compact || mesh->tree->stats().compact;
+            number_meshes(scene, *mesh, geometries);
+        }
+        const auto number = static_cast<std::uint32_t>(out_.scenes.size());
+        out_.scenes.push_back({static_cast<std::uint32_t>(geometries.size()),
+                               static_cast<std::uint32_t>(scene.quality),
+                               static_cast<std::uint32_t>(scene.usage), compact ? 1u : 0u});
+        out_.geometries.insert(out_.geometries.end(), geometries.begin(), geometries.end());
+        scenes_[&scene] = number;
+        return number;
+    }
+
+    SceneTables finish() { return std::move(out_); }
+
+private:
+    void number_meshes(const SceneTree& scene, const MeshTree& mesh,
+                       std::vector<StoredGeometry>& geometries) {
+        std::uint32_t number = first_mesh(scene, mesh);
+        for (const std::uint32_t id : mesh.ids)
+            std::ranges::lower_bound(geometries, id, {}, &StoredGeometry::id)->number = number++;
+    }
+
+    /// The number of a tree's first mesh. Scenes that share a tree share its meshes.
+    std::uint32_t first_mesh(const SceneTree& scene, const MeshTree& mesh) {
+        const auto [known, is_new] =
+            trees_.emplace(mesh.tree.get(), static_cast<std::uint32_t>(out_.meshes.size()));
+        if (!is_new) return known->second;
+        const std::size_t first = out_.views.size();
+        for (const std::uint32_t id : mesh.ids) {
+            const MeshView& view =
+                std::ranges::lower_bound(scene.mesh_names, id, {}, &MeshName::id)->mesh;
+            out_.views.push_back(view);
+            out_.meshes.push_back({view.vertices.size(), view.triangles.size()});
+        }
+        const WideBvh::Arrays& arrays = mesh.tree->arrays();
+        WideBvhStats stats;
+        if (const Fault fault =
+                wide_fault(arrays, std::span<const MeshView>(out_.views).subspan(first), stats))
+            throw InputError(*fault);
+        const bool compact = arrays.stats.compact;
+        out_.trees.push_back({static_cast<std::uint32_t>(mesh.ids.size()), compact ? 1u : 0u,
+                              compact ? arrays.compact_nodes.size() : arrays.nodes.size(),
+                              compact ? arrays.compact_blocks.size() : arrays.blocks.size(),
+                              arrays.vertices.size(), arrays.bounds, arrays.stats.sah,
+                              mesh.sah_at_build, arrays.stats.widening});
+        out_.wide.push_back(mesh.tree.get());
+        return known->second;
+    }
+
+    SceneTables out_;
+    std::unordered_map<const SceneTree*, std::uint32_t> scenes_;
+    std::unordered_map<const WideBvh*, std::uint32_t> trees_;  // their first meshes
+};
+
+}  // namespace
+
+SceneTables tables_of(const Scene& scene) {
+    const SceneTree& tree = *SceneAccess::tree(scene);
+    const SceneAccess::State& state = *SceneAccess::shared_state(scene);
+    if (state.changed) throw InputError("scenes: it has changes that no commit has taken in");
+    SceneTables out;
+    with_threads(0, [&] {
+        TableWriter writer;
+        writer.add(tree);
+        out = writer.finish();
+    });
+    // Without meshes nothing else says it.
+    out.scenes.back().compact = state.tree_compact ? 1 : 0;
+    out.next_id = state.next_id;
+    out.taken.assign(state.taken.begin(), state.taken.end());
+    return out;
+}
+
+}  // namespace raydix

@@ -1,0 +1,96 @@
+// Scenes in .rdx files, as several tests make and read them.
+#pragma once
+
+#include <raydix/error.h>
+#include <raydix/rdx.h>
+#include <raydix/surface.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "api/rdx_parse.h"
+#include "api/rdx_scene_format.h"
+#include "instances/affine.h"
+#include "support/random.h"
+#include "support/support.h"
+
+namespace raydix::test {
+
+using Bytes = std::vector<std::byte>;
+
+class Dice : public Random {
+public:
+    using Random::Random;
+    Transform transform(float reach) {
+        Transform t;
+        for (auto& row : t.m) {
+            for (std::size_t k = 0; k < 3; ++k) row[k] = between(-1, 1);
+            row[3] = between(-reach, reach);
+        }
+        return inverse_of(affine_of(t)) ? t : transform(reach);
+    }
+    std::uint32_t mask() { return below(3) == 0 ? 1u << below(3) : 0xFFFFFFFFu; }
+};
+
+inline std::vector<Ray> random_rays(Dice& dice, std::size_t count) {
+    std::vector<Ray> rays;
+    for (std::size_t i = 0; i < count; ++i) {
+        const Vec3 from = dice.in(-5, 5), to = dice.in(-1, 1.5f);
+        rays.push_back({from, 0, {to.x - from.x, to.y - from.y, to.z - from.z}});
+    }
+    return rays;
+}
+
+inline Bytes read_bytes(const std::filesystem::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    Bytes bytes(std::filesystem::file_size(file));
+    in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    return bytes;
+}
+
+/// What the reader says to these bytes; "" if it takes them. Rays go through what it took.
+inline std::string verdict(std::span<const std::byte> bytes) {
+    const std::shared_ptr<void> owner = allocate_bytes(bytes.size());
+    const std::span<std::byte> copy(static_cast<std::byte*>(owner.get()), bytes.size());
+    if (!bytes.empty()) std::memcpy(copy.data(), bytes.data(), bytes.size());
+    try {
+        const RdxScene file = rdx::parse_scene("x.rdx", copy, owner);
+        Dice dice(1);
+        const std::vector<Hit> hits = trace(file.scene, random_rays(dice, 20), {.threads = 1});
+        static_cast<void>(positions(file.scene, hits, 1));
+        return "";
+    } catch (const InputError& error) {
+        return error.what();
+    }
+}
+
+inline std::vector<rdx::Section> table_of(std::span<const std::byte> bytes) {
+    std::vector<rdx::Section> table(rdx::scene_section_count);
+    std::memcpy(table.data(), bytes.data() + sizeof(rdx::HeaderStart),
+                table.size() * sizeof(rdx::Section));
+    return table;
+}
+
+inline constexpr std::size_t header_bytes =
+    sizeof(rdx::HeaderStart) + rdx::scene_section_count * sizeof(rdx::Section);
+
+/// A folder with one such file.
+class RdxSceneTest : public ::testing::Test {
+protected:
+    [[nodiscard]] std::filesystem::path file() const { return folder_.path() / "scene.rdx"; }
+    Bytes saved(const Scene& scene) {
+        save_rdx(file(), scene, "a scene", cameras_);
+        return read_bytes(file());
+    }
+
+    TempFolder folder_;
+    const CameraSet cameras_{
+        640, 480, 0.5f, {{"front \xff", {0, 0, 3}, {0, 0, 0}, {0, 1, 0}, 30}, {}}};
+};
+
+}  // namespace raydix::test
