@@ -164,7 +164,7 @@ private:
         path.sees_lamp = mirror ? !path.met_diffuse : !settings_.sample_lamp;
         path.met_diffuse |= !mirror;
         const Vec3 way = mirror ? reflected(ray.direction, unit(place - ball_middle), normal)
-                                : cosine_direction(Frame(normal), path.random(), path.random());
+                                : cosine_direction(Frame(normal), path.random);
         next_rays_.push_back({start, 0, way});
         next_paths_.push_back(path);
     }

@@ -36,8 +36,7 @@ public:
                 const float stay = std::max({white.x, white.y, white.z});
                 if (f.random() >= stay) return false;  // Russian roulette
                 f.power = (1 / stay) * (f.power * white);
-                f.ray = {place + off * normal, 0,
-                         cosine_direction(Frame(normal), f.random(), f.random())};
+                f.ray = {place + off * normal, 0, cosine_direction(Frame(normal), f.random)};
                 return true;
             });
         index_ = raydix::build_points(places_);
@@ -75,8 +74,9 @@ private:
 };
 
 Ray from_lamp(Random& random) {
-    const Vec3 place = lamp_corner + random() * lamp_s + random() * lamp_t;
-    return {place - Vec3{0, off, 0}, 0, cosine_direction(Frame({0, -1, 0}), random(), random())};
+    const float t = random(), s = random();
+    const Vec3 place = lamp_corner + s * lamp_s + t * lamp_t;
+    return {place - Vec3{0, off, 0}, 0, cosine_direction(Frame({0, -1, 0}), random)};
 }
 /// Of what meets the lamp from below.
 Vec3 lamp_radiance(Vec3 way) {
@@ -134,7 +134,7 @@ Error plain_room(std::size_t photons, std::uint32_t k, int paths) {
     for (std::uint32_t i = 0; i < places.size(); ++i)
         for (int n = 0; n < paths; ++n) {
             Random random(i * 1'000'003u + static_cast<std::uint32_t>(n));
-            const Vec3 way = cosine_direction(Frame(normals[i]), random(), random());
+            const Vec3 way = cosine_direction(Frame(normals[i]), random);
             flights.push_back({{places[i] + off * normals[i], 0, way}, {1, 1, 1}, random, i});
         }
     std::vector<Vec3> wanted(places.size(), Vec3{0, 0, 0});
@@ -147,8 +147,7 @@ Error plain_room(std::size_t photons, std::uint32_t k, int paths) {
             }
             if (f.random() >= 0.75f) return false;
             f.power = (1 / 0.75f) * (f.power * room.albedo(hit.prim));
-            f.ray = {place + off * normal, 0,
-                     cosine_direction(Frame(normal), f.random(), f.random())};
+            f.ray = {place + off * normal, 0, cosine_direction(Frame(normal), f.random)};
             return true;
         });
     return compare(map.irradiance(places, normals, k), wanted);

@@ -47,7 +47,7 @@ inline std::vector<Vec3> light_at(const Subject& subject, std::span<const Vec3> 
         const float side = dot(normals[i], sun);
         rays.push_back({from, 0, sun, side > 0 ? raydix::infinity : -1.0f});
         for (int k = 0; k < sky_rays; ++k)
-            rays.push_back({from, 0, cosine_direction(frame, random(), random())});
+            rays.push_back({from, 0, cosine_direction(frame, random)});
     }
     std::vector<std::uint8_t> hidden(rays.size());
     subject.occluded(rays, hidden);

@@ -57,6 +57,12 @@ inline Vec3 cosine_direction(const Frame& frame, float r1, float r2) {
     const float angle = 2.0f * std::numbers::pi_v<float> * r1, radius = std::sqrt(r2);
     return frame(radius * std::cos(angle), radius * std::sin(angle), std::sqrt(1.0f - r2));
 }
+/// The same by two numbers of `random`, in an order that does not depend on the compiler.
+template <class Random>
+Vec3 cosine_direction(const Frame& frame, Random& random) {
+    const float r2 = random(), r1 = random();
+    return cosine_direction(frame, r1, r2);
+}
 
 /// FNV-1a over the bytes of plain values: equal pictures, equal numbers.
 template <class T>

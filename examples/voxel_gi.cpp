@@ -38,8 +38,8 @@ Vec3 gather_thin_cones(const VoxelTree& voxels, const Point& p, std::uint64_t se
     Vec3 sum{0, 0, 0};
     for (int k = 0; k < count; ++k)
         sum += pi / count *
-               voxels.cone(p.place + voxels.finest() * p.normal,
-                           cosine_direction(frame, random(), random()), 0.0f);
+               voxels.cone(p.place + voxels.finest() * p.normal, cosine_direction(frame, random),
+                           0.0f);
     return sum;
 }
 
@@ -49,8 +49,8 @@ Vec3 gather_rays(const Hall& hall, const Point& p, std::uint64_t seed) {
     Random random(seed);
     std::vector<Ray> rays;
     for (int k = 0; k < count; ++k)
-        rays.push_back({p.place + start_off * p.normal, 0,
-                        cosine_direction(Frame(p.normal), random(), random())});
+        rays.push_back(
+            {p.place + start_off * p.normal, 0, cosine_direction(Frame(p.normal), random)});
     std::vector<Point> met;
     std::vector<Vec3> ways;
     for (std::size_t k = 0; const raydix::Hit& hit : hall.trace(rays)) {

@@ -202,7 +202,7 @@ private:
                     ++seen[hits[i].prim][behind];
                     if (behind) p.normal = -1.0f * p.normal;
                     next.push_back({p.place + start_off * p.normal, 0,
-                                    cosine_direction(Frame(p.normal), random(), random())});
+                                    cosine_direction(Frame(p.normal), random)});
                 }
                 paths = std::move(next);
             }

@@ -162,7 +162,7 @@ class SceneTreesD:
     @property
     def faces(self) -> Annotated[NDArray[numpy.uint32], dict(shape=(None, None), writable=False)]: ...
 
-    hit_columns: int = 4
+    hit_columns: int = 5
 
     def stats(self) -> dict: ...
 
