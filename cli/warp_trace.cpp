@@ -84,7 +84,8 @@ WarpTracer::Times WarpTracer::run_on_device(std::span<const Ray> rays, std::vect
                                                   {scratch_.data(), scratch_.size()}, nullptr);
     hits_.download(found_);
     const std::chrono::duration<double> all = std::chrono::steady_clock::now() - start;
-    std::ranges::transform(found_, hits.begin(), hit_of_tree);
+    std::ranges::transform(found_, hits.begin(),
+                           [](const TreeHit& hit) { return hit_of_tree(hit); });
     if (counted) {
         std::uint32_t invalid = 0;
         device_invalid_.download({&invalid, 1});
@@ -98,7 +99,8 @@ void WarpTracer::run_simulated(std::span<const Ray> rays, std::vector<Hit>& hits
     const std::vector<Simulation> figures =
         simulate(tree_, rays, {&simulate_, 1}, &found, settings_.threads);
     figures_.add(figures.front());
-    std::ranges::transform(found.front(), hits.begin(), hit_of_tree);
+    std::ranges::transform(found.front(), hits.begin(),
+                           [](const TreeHit& hit) { return hit_of_tree(hit); });
     // The simulator leaves invalid rays out without a word.
     std::vector<Hit> unused(rays.size());
     invalid_ += trace(Bvh(), rays, unused, {.threads = settings_.threads}).invalid_rays;
