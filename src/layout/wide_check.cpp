@@ -71,7 +71,7 @@ struct Boxes<WideNode> {
         return true;
     }
     [[nodiscard]] bool contains(const WideNode& node, std::size_t s, const Aabb& box) const {
-        SlotBoxes exact;
+        SlotBoxes exact{};
         exact.set(static_cast<int>(s), box);
         WideNode rounded;
         set_boxes_about(middle, exact, rounded);
