@@ -36,8 +36,12 @@ std::uint32_t version_of(const std::string& file, std::span<const std::byte> byt
 
 Sections::Sections(const std::string& file, std::span<const std::byte> bytes,
                    std::shared_ptr<void> owner, std::uint32_t wanted,
-                   std::span<const SectionKind> kinds)
-    : file_(file), bytes_(bytes), owner_(std::move(owner)), kinds_(kinds), table_(kinds.size()) {
+                   std::span<const SectionKind> kinds_wanted)
+    : file_(file),
+      bytes_(bytes),
+      owner_(std::move(owner)),
+      kinds_(kinds_wanted),
+      table_(kinds_wanted.size()) {
     read_header(wanted);
     check_places();
     check_checksums();
