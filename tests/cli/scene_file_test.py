@@ -23,6 +23,7 @@ class SceneFile(ProgramTest):
                                (self.scene, ("--flatten", "--layout", "wide8"))):
             with self.subTest(scene=scene, options=options):
                 built = self.document("build", scene, *options, "--repeat", "1", "-o", "saved.rdx")
+                self.assertLessEqual(built["build"]["ms_spread"]["min"]["total"], built["build"]["ms"]["total"])
                 flat = [option for option in options if option == "--flatten"]
                 made, wanted = self.hits_of(scene, *flat)
                 loaded, hits = self.hits_of("saved.rdx")
