@@ -55,6 +55,7 @@ public:
         : state_(state), options_(options), report_(report), most_placed_(most_placed) {
         tree_->quality = options.quality;
         tree_->usage = options.usage;
+        tree_->compact = options.compact;
     }
 
     std::shared_ptr<const SceneTree> run() {

@@ -44,7 +44,10 @@ void unite_with(AabbD& box, const AabbD& other) {
 class CommitD {
 public:
     CommitD(const SceneAccessD::State& state, const SceneOptions& options, CommitReport& report)
-        : state_(state), options_(options), report_(report) {}
+        : state_(state), options_(options), report_(report) {
+        tree_->quality = options.quality;
+        tree_->compact = options.compact;
+    }
 
     std::shared_ptr<const SceneTreeD> run() {
         std::size_t instances = 0;

@@ -36,8 +36,8 @@ public:
 
     MeshCommit(const State& state, const SceneOptions& options, CommitReport& report)
         : state_(state), options_(options), report_(report) {
-        if (state.tree == nullptr || options.quality != state.tree_quality ||
-            options.compact != state.tree_compact)
+        if (state.tree == nullptr || options.quality != state.tree->quality ||
+            options.compact != state.tree->compact)
             return;
         for (const auto& mesh : state.tree->meshes) last_[mesh->ids.front()] = mesh.get();
     }

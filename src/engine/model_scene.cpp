@@ -159,8 +159,6 @@ private:
         state.geometries = source.geometries;
         for (const auto& [id, geometry] : state.geometries) state.taken.insert(id);
         state.tree = source.tree;
-        state.tree_quality = source.tree_quality;
-        state.tree_compact = source.tree_compact;
     }
 
     [[nodiscard]] std::uint32_t id_of(std::size_t k) const {

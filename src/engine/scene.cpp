@@ -221,8 +221,6 @@ CommitReport BasicScene<Scalar>::commit(const SceneOptions& options) {
     CommitReport report;
     auto tree = make_scene_tree(*state_, options, report);
     state_->tree = std::move(tree);
-    state_->tree_quality = options.quality;
-    state_->tree_compact = options.compact;
     for (auto& [id, geometry] : state_->geometries) geometry.changed = false;
     state_->changed = false;
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;

@@ -161,8 +161,6 @@ private:
         const SceneOptions options{.quality = static_cast<Quality>(stored.quality),
                                    .usage = static_cast<Usage>(stored.usage),
                                    .compact = stored.compact != 0};
-        state->tree_quality = options.quality;
-        state->tree_compact = options.compact;
         state->tree = tree_of_meshes(k, geometries, options);
         CommitReport report;
         try {
@@ -232,6 +230,9 @@ private:
             used_meshes_[geometry.number] = true;
         }
         auto out = std::make_shared<SceneTree>();
+        out->quality = options.quality;
+        out->usage = options.usage;
+        out->compact = options.compact;
         for (auto& [number, mesh] : trees) {
             const Tree& tree = trees_[number];
             if (mesh->ids.size() != in_.trees[number].meshes)

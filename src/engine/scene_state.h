@@ -59,8 +59,6 @@ struct BasicScene<Scalar>::State {
     std::set<std::uint32_t> taken;  // those above, chosen by the caller
     bool changed = true;
     std::shared_ptr<const typename SceneKind<Scalar>::Tree> tree;  // null before the first commit
-    Quality tree_quality{};                                        // what it was made with
-    bool tree_compact = false;
 
     [[nodiscard]] Geometry& at(std::uint32_t id);
     /// Whether rays through this scene may come to `other`.

@@ -27,15 +27,11 @@ public:
         for (const MeshName& mesh : scene.mesh_names)
             geometries.push_back({mesh.id, mesh.mask, 0, stored_none, no_transform()});
         std::ranges::sort(geometries, {}, &StoredGeometry::id);
-        bool compact = false;
-        for (const auto& mesh : scene.meshes) {
-            compact = compact || mesh->tree->stats().compact;
-            number_meshes(scene, *mesh, geometries);
-        }
+        for (const auto& mesh : scene.meshes) number_meshes(scene, *mesh, geometries);
         const auto number = static_cast<std::uint32_t>(out_.scenes.size());
         out_.scenes.push_back({static_cast<std::uint32_t>(geometries.size()),
                                static_cast<std::uint32_t>(scene.quality),
-                               static_cast<std::uint32_t>(scene.usage), compact ? 1u : 0u});
+                               static_cast<std::uint32_t>(scene.usage), scene.compact ? 1u : 0u});
         out_.geometries.insert(out_.geometries.end(), geometries.begin(), geometries.end());
         scenes_[&scene] = number;
         return number;
@@ -95,8 +91,6 @@ SceneTables tables_of(const Scene& scene) {
         writer.add(tree);
         out = writer.finish();
     });
-    // Without meshes nothing else says it.
-    out.scenes.back().compact = state.tree_compact ? 1 : 0;
     out.next_id = state.next_id;
     out.taken.assign(state.taken.begin(), state.taken.end());
     return out;

@@ -94,6 +94,7 @@ struct SceneTree {
     Aabb bounds = empty_box();  // without what rays may miss it by
     Quality quality{};          // what it was made with
     Usage usage{};
+    bool compact = false;
     std::uint64_t paths = 0;
     std::uint32_t levels = 0;    // of instances, below this scene
     std::size_t stack_size = 0;  // of a ray that goes alone: children still to visit, on all levels

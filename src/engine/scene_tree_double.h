@@ -35,6 +35,8 @@ struct SceneTreeD {
     std::vector<PlacedSceneD> instances;  // by ascending id
     InstanceTreeD parts;                  // mesh trees first, then instances
     AabbD bounds = nothing_d;             // without what rays may miss it by
+    Quality quality{};                    // what it was made with
+    bool compact = false;                 // as the commit had it; without effect
     std::uint64_t paths = 0;
     std::uint32_t levels = 0;  // of instances, below this scene
 

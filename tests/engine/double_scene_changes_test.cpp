@@ -20,21 +20,6 @@
 namespace raydix::test {
 namespace {
 
-MeshD one_triangle() {
-    MeshD mesh;
-    mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    mesh.triangles = {{0, 1, 2}};
-    return mesh;
-}
-
-TransformD moved(double x, double y, double z) {
-    TransformD t;
-    t.m[0][3] = x, t.m[1][3] = y, t.m[2][3] = z;
-    return t;
-}
-
-constexpr RayD down{{0.25, 0.25, 10}, 0, {0, 0, -1}};
-
 /// Three changes of any kind.
 void change(RandomWorlds& random, WorldD& world) {
     for (int k = 0; k < 3; ++k) {

@@ -106,21 +106,6 @@ TEST(DoubleScene, AllHitsAreThoseOfEveryMeshOnEveryPath) {
     EXPECT_GT(found, 40u * thorough);
 }
 
-MeshD one_triangle(double z) {
-    MeshD mesh;
-    mesh.vertices = {{0, 0, z}, {1, 0, z}, {0, 1, z}};
-    mesh.triangles = {{0, 1, 2}};
-    return mesh;
-}
-
-TransformD moved(double x, double y, double z) {
-    TransformD t;
-    t.m[0][3] = x, t.m[1][3] = y, t.m[2][3] = z;
-    return t;
-}
-
-constexpr RayD down{{0.25, 0.25, 10}, 0, {0, 0, -1}};
-
 TEST(DoubleScene, OfOneMeshGivesTheHitsOfItsTree) {
     Model model;
     model.meshes = {random_soup(1000, 5, 0.2f)};

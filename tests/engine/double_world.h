@@ -39,6 +39,20 @@ struct WorldD {
     }
 };
 
+inline MeshD one_triangle(double z = 0) {
+    MeshD mesh;
+    mesh.vertices = {{0, 0, z}, {1, 0, z}, {0, 1, z}};
+    mesh.triangles = {{0, 1, 2}};
+    return mesh;
+}
+inline TransformD moved(double x, double y, double z) {
+    TransformD t;
+    t.m[0][3] = x, t.m[1][3] = y, t.m[2][3] = z;
+    return t;
+}
+/// Through that triangle.
+inline constexpr RayD down{{0.25, 0.25, 10}, 0, {0, 0, -1}};
+
 struct RecipeD {
     std::uint32_t levels, items;
     double shear = 0, distance = 0;  // of homes from the origin
