@@ -16,6 +16,7 @@
 #include "trace/all_hits.h"
 #include "trace/batch.h"
 #include "trace/ray_frame.h"
+#include "trace/simd/path_race.h"
 #include "trace/simd/trace_here.h"
 #include "trace/simd/wide_batch.h"
 
@@ -90,19 +91,28 @@ Way way_of(SimdPath path, const std::string& isa) {
             path == SimdPath::single};
 }
 
+/// With fewer jobs than this a trial would cost more than it may gain.
+constexpr std::size_t least_jobs_of_race = 16;
+
 TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
     const std::size_t n = batch.rays.size();
+    const std::string& isa = batch.options.isa;
     const SimdPath path = path_of(tree, batch);
     const bool sorted =
         path == SimdPath::sorted && n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
-    const Way way = way_of(path, batch.options.isa);
     const std::size_t job_size = rays_per_job(n, SimdPath::stream);
     std::vector<JobCounts> parts((n + job_size - 1) / job_size);
+    const bool race = batch.options.path == SimdPath::automatic && path != SimdPath::single &&
+                      parts.size() >= least_jobs_of_race;
+    PathRace paths{path, SimdPath::single};
     with_threads(batch.options.threads, [&] {
         std::vector<std::uint32_t> order;
         if (sorted) order = order_by_place(tree.extent.box, batch.rays);
         for_each_block(n, job_size, [&](std::size_t job, std::size_t begin, std::size_t end) {
-            parts[job] = trace_job(tree, way, batch, order, begin, end);
+            const SimdPath path_here = race ? paths.next() : path;
+            const std::int64_t start = race ? PathRace::thread_ns() : 0;
+            parts[job] = trace_job(tree, way_of(path_here, isa), batch, order, begin, end);
+            if (race) paths.add(path_here, end - begin, PathRace::thread_ns() - start);
         });
     });
     return sum_of(parts, n);

@@ -13,313 +13,14 @@
 #include <algorithm>
 #include <limits>
 
-#include "engine/hit_order.h"
 #include "engine/scene_job.h"
+#include "engine/scene_ray.h"
+#include "engine/scene_turns.h"
 #include "trace/simd/packets.h"
-#include "trace/simd/single.h"
 #include "trace/simd/stream.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
-
-/// A hit of a mesh takes the place of the best one if it is the less of the two; `reach` is how far
-/// the ray goes then. Whether it does.
-template <bool any>
-HWY_INLINE bool keep(const MeshTree& mesh, std::uint32_t number, double scale, const TreeHit& hit,
-                     Hit& best, float& reach) {
-    if constexpr (any) {
-        best.prim = 0;
-        reach = -1.0f;
-        return true;
-    }
-    Hit found{hit, no_primitive, number};
-    if (scale != 1.0) found.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
-    if (best.hit() && found.t > best.t) return false;
-    mesh.name(found);
-    if (best.hit() && !(order_of(found) < order_of(best))) return false;
-    best = found;
-    // What differs in the line may be equal in the caller's units where those are subnormal: it
-    // must be found too.
-    reach =
-        found.t < std::numeric_limits<float>::min() ? std::nextafterf(found.t, infinity) : found.t;
-    return true;
-}
-
-using D4 = hn::CappedTag<double, 4>;
-
-/// As floats.
-template <class D = D4>
-HWY_INLINE V4 rounded(const double* from) {
-    const D d;
-    if constexpr (hn::MaxLanes(d) == 4) {
-        return hn::DemoteTo(f4, hn::Load(d, from));
-    } else {
-        alignas(16) float out[4];
-        for (int a = 0; a < 4; ++a) out[a] = static_cast<float>(from[a]);
-        return hn::Load(f4, out);
-    }
-}
-
-HWY_INLINE bool near_unit_length(double longest) { return longest > 0x1p-3 && longest < 0x1p3; }
-/// False also for some whose longest component is 2^-3 or 2^3 but for a rounding, and for NaN.
-HWY_INLINE bool near_unit_length(V4 way) {
-    const V4 size = hn::Abs(way);
-    return (bits_of(f4, hn::Lt(size, hn::Set(f4, 0x1p3f))) & 7) == 7 &&
-           (bits_of(f4, hn::Gt(size, hn::Set(f4, 0x1p-3f))) & 7) != 0;
-}
-
-/// Brings a line's direction near unit length.
-inline HWY_NOINLINE void rescale(SceneLine& line) {
-    const double longest =
-        max_of(max_of(std::fabs(line.direction[0]), std::fabs(line.direction[1])),
-               std::fabs(line.direction[2]));
-    if (near_unit_length(longest)) return;
-    const double by = direction_scale(longest);
-    for (int a = 0; a < 3; ++a) line.direction[a] *= by;
-    line.scale *= by;
-}
-
-/// Floats that hold a ray, in double.
-template <class D = D4>
-HWY_INLINE void widen(V4 from, double* to) {
-    const D d;
-    if constexpr (hn::MaxLanes(d) == 4) {
-        hn::Store(hn::PromoteTo(d, from), d, to);
-    } else {
-        alignas(16) float axes[4];
-        hn::Store(from, f4, axes);
-        for (int a = 0; a < 4; ++a) to[a] = double{axes[a]};
-    }
-}
-HWY_INLINE void set_line(const Ray& ray, double scale, SceneLine& line) {
-    const auto axes = hn::FirstN(f4, 3);
-    widen(hn::IfThenElseZero(axes, load_axes(&ray.origin.x)), line.origin);
-    widen(hn::IfThenElseZero(axes, load_axes(&ray.direction.x)), line.direction);
-    line.scale = scale;
-}
-
-/// The caller's ray.
-HWY_INLINE SceneLine line_of(const Ray& ray) {
-    SceneLine line;
-    set_line(ray, 1.0, line);
-    if (!near_unit_length(load_axes(&ray.direction.x))) rescale(line);
-    return line;
-}
-
-/// Through the inverse of an instance: ((x + y) + z) + move, nothing fused. `from` may be `to`.
-HWY_INLINE void enter(const SceneLine& from, const WayIn& way, SceneLine& to) {
-    const D4 d;
-    const double o[3] = {from.origin[0], from.origin[1], from.origin[2]},
-                 v[3] = {from.direction[0], from.direction[1], from.direction[2]};
-    to.scale = from.scale;
-    for (std::size_t l = 0; l < 4; l += hn::MaxLanes(d)) {
-        const auto x = hn::Load(d, way.columns[0] + l), y = hn::Load(d, way.columns[1] + l),
-                   z = hn::Load(d, way.columns[2] + l);
-        const auto turned = [&](const double* by) {
-            return hn::Add(hn::Add(hn::Mul(x, hn::Set(d, by[0])), hn::Mul(y, hn::Set(d, by[1]))),
-                           hn::Mul(z, hn::Set(d, by[2])));
-        };
-        hn::Store(hn::Add(turned(o), hn::Load(d, way.columns[3] + l)), d, to.origin + l);
-        hn::Store(turned(v), d, to.direction + l);
-    }
-    if (!near_unit_length(rounded(to.direction))) rescale(to);
-}
-
-/// Into a placed scene, by all of its instances in turn.
-HWY_INLINE void enter(const SceneLine& from, const SceneTree& scene, const PlacedScene& placed,
-                      SceneLine& to) {
-    enter(from, placed.way, to);
-    for (std::uint32_t k = 0; k < placed.more; ++k) enter(to, scene.ways[placed.first + k], to);
-}
-
-/// Whether rays of a mask see all instances on the way.
-HWY_INLINE bool sees(std::uint32_t mask, const SceneTree& scene, const PlacedScene& placed) {
-    bool seen = (placed.way.mask & mask) != 0;
-    for (std::uint32_t k = 0; k < placed.more; ++k)
-        seen = seen && (scene.ways[placed.first + k].mask & mask) != 0;
-    return seen;
-}
-
-/// The largest lane of four, in all of them.
-HWY_INLINE V4 largest(V4 v) {
-    const V4 pairs = hn::Max(v, hn::Shuffle2301(v));
-    return hn::Max(pairs, hn::Shuffle1032(pairs));
-}
-
-/// What boxes and triangles need of a ray near unit length, as fill_usual_frame has it but for pads
-/// that are a little larger. A fourth component of both is 0. False if floats do not hold the ray.
-HWY_INLINE bool fill_scene_frame(const WideView& tree, V4 place, V4 way, PadGrowth growth,
-                                 SingleFrame& out) {
-    const V4 most = hn::Set(f4, std::numeric_limits<float>::max());
-    if ((bits_of(f4, hn::And(hn::Le(hn::Abs(place), most), hn::Le(hn::Abs(way), most))) & 7) != 7)
-        return false;
-    const hn::RebindToSigned<F4> i4;
-    const std::uint32_t negatives = bits_of(i4, hn::Lt(hn::BitCast(i4, way), hn::Zero(i4))) & 7;
-    const V4 size = hn::Abs(way);
-    const std::uint32_t longest = bits_of(f4, hn::Eq(size, largest(size))) & 7;
-    const auto kz = static_cast<std::uint32_t>(std::bit_width(longest)) - 1;
-    out.kind = ray_classes[negatives + 8 * kz];
-    const V4 origin = hn::Add(place, hn::Zero(f4));  // -0 becomes +0
-    const V4 inverse = limited(hn::Div(hn::Set(f4, 1.0f), way));
-    const V4 reach = hn::Max(hn::Abs(hn::Sub(hn::Load(f4, tree.lo), origin)),
-                             hn::Abs(hn::Sub(hn::Load(f4, tree.hi), origin)));
-    const V4 farthest = largest(reach);
-    constexpr float rate = wide_pad_factor * slab_pad;
-    const V4 pad = hn::Add(
-        hn::MulAdd(farthest, hn::Set(f4, rate + growth.rate), hn::Mul(reach, hn::Set(f4, rate))),
-        hn::Set(f4, least_slab_pad + growth.least));
-    const V4 near_pad = hn::CopySignToAbs(pad, hn::Neg(way));
-    hn::Store(origin, f4, out.origin);
-    hn::Store(way, f4, out.direction);
-    hn::Store(inverse, f4, out.inverse);
-    hn::Store(near_pad, f4, out.near_pad);
-    set_starts(tree, origin, inverse, near_pad, out);
-    alignas(16) float shears[4];
-    hn::Store(hn::Div(way, hn::Set(f4, out.direction[kz])), f4, shears);
-    out.shear[0] = shears[out.kind.kx], out.shear[1] = shears[out.kind.ky];
-    out.t_scale = 1.0f;
-    return true;
-}
-
-/// One ray through a scene; counting: the nodes that it visits too.
-template <Wanted wanted, bool counting = false>
-class SceneRay {
-public:
-    /// `stack` has room for SceneTree::stack_size; `best` is what was found before; `found` is for
-    /// all hits.
-    SceneRay(const SceneJob::Limits& limits, const Hit& best, const WideStackView& stack,
-             BudgetVector<Hit>* found = nullptr, bool nearest_first = true)
-        : tmin_(limits.tmin),
-          reach_(limits.reach),
-          mask_(limits.mask),
-          best_(best),
-          stack_(stack),
-          found_(found),
-          nearest_first_(nearest_first) {}
-
-    [[nodiscard]] const Hit& best() const { return best_; }
-    void store(SceneJob& job, std::uint32_t id) const {
-        job.limits[id].reach = reach_;
-        job.hits[id] = best_;
-    }
-    [[nodiscard]] std::uint64_t visits() const { return visits_; }
-
-    void walk(const SceneTree& scene, std::uint32_t number, const SceneLine& line) {
-        if (const MeshTree* const mesh = scene.only_mesh()) {
-            if (!mesh->tree->empty()) hit_mesh(*mesh, number, line);
-            return;
-        }
-        for (const PartTree* const tree : {&scene.near, &scene.wild})
-            if (!tree->empty()) walk_parts(scene, *tree, number, line);
-    }
-
-    /// Part `part` of a scene.
-    HWY_INLINE void visit(const SceneTree& scene, std::uint32_t part, std::uint32_t number,
-                          const SceneLine& line) {
-        const std::size_t meshes = scene.meshes.size();
-        if (part < meshes) {
-            hit_mesh(*scene.meshes[part], number, line);
-            return;
-        }
-        const PlacedScene& placed = scene.placed[part - meshes];
-        if (!sees(mask_, scene, placed)) return;
-        SceneLine inside;
-        enter(line, scene, placed, inside);
-        number += placed.number;
-        if (placed.mesh != nullptr)
-            hit_mesh(*placed.mesh, number, inside);
-        else
-            walk(*placed.scene, number, inside);
-    }
-
-private:
-    struct Parts {
-        SceneRay& ray;
-        const SceneTree& scene;
-        const PartTree& tree;
-        std::uint32_t number;
-        const SceneLine& line;
-        bool nearest_first;
-
-        HWY_NOINLINE float visit_one(std::uint32_t leaf, std::uint32_t) {
-            ray.visit(scene, tree.part[leaf], number, line);
-            return min_of(line.units(ray.reach_), std::numeric_limits<float>::max());
-        }
-    };
-
-    HWY_NOINLINE void walk_parts(const SceneTree& scene, const PartTree& tree, std::uint32_t number,
-                                 const SceneLine& line) {
-        SingleFrame frame;
-        if (!fill(tree.view, line, tree.growth, frame)) return;
-        const WideStackView stack = stack_;
-        const std::size_t taken = wide_stack_capacity(tree.arrays.stats.max_depth);
-        stack_ = {stack.words + taken, stack.entries + taken};
-        Parts parts{*this, scene, tree, number, line, nearest_first_};
-        SimdCounts counts;
-        SingleRay<wanted, counting, false, false, Parts>(tree.view, frame, stack, counts, &parts, 0)
-            .trace(0, {frame.tmax});
-        if constexpr (counting) visits_ += counts.visits;
-        stack_ = stack;
-    }
-
-    /// False if floats do not hold the ray, or it ends before it begins.
-    HWY_INLINE bool fill(const WideView& view, const SceneLine& line, PadGrowth growth,
-                         SingleFrame& frame) const {
-        const float tmin = line.units(tmin_), tmax = line.units(reach_);
-        if (!(tmin <= tmax && tmax >= 0.0f)) return false;
-        frame.tmin = tmin > 0.0f ? tmin : 0.0f;
-        frame.tmax = min_of(tmax, std::numeric_limits<float>::max());
-        return fill_scene_frame(view, rounded(line.origin), rounded(line.direction), growth, frame);
-    }
-
-    /// Of a mesh that is not empty.
-    HWY_INLINE void hit_mesh(const MeshTree& mesh, std::uint32_t number, const SceneLine& line) {
-        if ((mesh.mask & mask_) == 0) return;
-        SingleFrame frame;
-        if (!fill(mesh.view, line, {}, frame)) return;
-        if (mesh.view.is_compact) {
-            TriangleBlock room{};
-            WideView view = mesh.view;
-            view.room = &room;
-            search<true>(mesh, view, frame, number, line.scale);
-        } else {
-            search<false>(mesh, mesh.view, frame, number, line.scale);
-        }
-    }
-
-    template <bool compact>
-    HWY_INLINE void search(const MeshTree& mesh, const WideView& view, const SingleFrame& frame,
-                           std::uint32_t number, double scale) {
-        constexpr bool counted = compact || counting;
-        SimdCounts counts;
-        if constexpr (wanted == Wanted::all) {
-            const std::size_t before = found_->size();
-            SingleRay<wanted, counted, compact>(view, frame, stack_, counts).trace_all(*found_);
-            for (std::size_t k = before; k < found_->size(); ++k) {
-                Hit& hit = (*found_)[k];
-                hit.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
-                hit.instance = number;
-                mesh.name(hit);
-            }
-        } else {
-            const WideBest best = SingleRay<wanted, counted, compact>(view, frame, stack_, counts)
-                                      .trace(0, {frame.tmax});
-            if (best.found())
-                keep<wanted == Wanted::any>(mesh, number, scale,
-                                            {best.t, best.prim, best.u, best.v}, best_, reach_);
-        }
-        if constexpr (counting) visits_ += counts.visits;
-    }
-
-    const float tmin_;
-    float reach_;
-    const std::uint32_t mask_;
-    Hit best_;
-    std::uint64_t visits_ = 0;
-    WideStackView stack_;  // from where it is free
-    BudgetVector<Hit>* const found_;
-    const bool nearest_first_;  // see single.h
-};
 
 template <bool any>
 class SceneWalk {
@@ -366,15 +67,9 @@ private:
     }
 
     void one_by_one() {
-        for (std::size_t k = 0; k < job_.n; ++k) {
-            const Ray* const ray = start(k);
-            if (ray == nullptr) continue;
-            const auto id = static_cast<std::uint32_t>(k);
-            // Rays of a batch that come here go anywhere.
-            One one(job_.limits[k], job_.hits[k], job_.single_stack.view(), nullptr, false);
-            one.walk(*job_.tree, 0, HWY_NAMESPACE::line_of(*ray));
-            one.store(job_, id);
-        }
+        job_.single_stack.reserve_words(job_.tree->stack_size * rays_in_turn);
+        const auto next = [this](std::size_t k) { return start(k); };
+        SceneTurns<any, decltype(next)>(job_, next).trace();
     }
     void together() {
         SceneLevel& first = job_.level(0);
@@ -556,7 +251,8 @@ private:
             count = static_cast<std::uint32_t>(level.seen.size());
             if (count == 0) return;
         }
-        level.mesh_stack.reserve(mesh.tree->stats().max_depth);
+        const std::size_t stack_size = wide_stack_capacity(mesh.tree->stats().max_depth);
+        level.mesh_stack.reserve_words(stack_size * rays_in_turn);
         if (any && level.occluded.size() < level.count) level.occluded.resize(level.count);
         if (!any && level.hits.size() < level.count) level.hits.resize(level.count);
         TriangleBlock room{};
@@ -571,7 +267,8 @@ private:
                           level.mesh_stack.view(),
                           level.mesh_stack.packet_view(),
                           &level.mesh_memory,
-                          false};
+                          false,
+                          stack_size};
         SimdCounts counts;
         (count < least_together ? job_.kernels->single
          : job_.packets         ? job_.kernels->packets

@@ -14,8 +14,9 @@ namespace {
 
 TEST(PathRace, TriesBothAndTakesTheFaster) {
     for (const SimdPath faster : {SimdPath::stream, SimdPath::packet}) {
-        PathRace race;
-        for (std::uint32_t k = 0; k < PathRace::trials; ++k)
+        PathRace race{SimdPath::stream, SimdPath::packet};
+        EXPECT_EQ(race.trials(), 4u);
+        for (std::uint32_t k = 0; k < race.trials(); ++k)
             EXPECT_EQ(race.next(), k % 2 == 0 ? SimdPath::stream : SimdPath::packet);
         EXPECT_EQ(race.next(), SimdPath::stream);  // neither has ended
         // The first of each, with whatever memory was like then, says nothing.

@@ -40,6 +40,14 @@ HWY_INLINE std::uint32_t used_slots(const WideNode& node) {
     return used;
 }
 
+/// The same number. What depends on it is computed, where the compiler would rather jump.
+HWY_INLINE std::size_t without_jump(std::size_t x) {
+#if defined(__GNUC__)
+    asm("" : "+r"(x));
+#endif
+    return x;
+}
+
 /// Asks for the cache lines of a child, node or leaf, that will be visited soon. Without branches:
 /// which of both it is cannot be foreseen.
 template <bool compact>
@@ -58,8 +66,10 @@ RAYDIX_PREFETCHING void ask_for(const WideView& tree, std::uint32_t word) {
         blocks = reinterpret_cast<const char*>(tree.blocks);
     }
     const std::size_t block = ((word & ~wide_leaf_bit) >> 3) / block_lanes;
-    const char* const place =
-        (leaf ? blocks : nodes) + (leaf ? block * sizeof(Block) : std::size_t{word} * sizeof(Node));
+    const auto at_node = reinterpret_cast<std::uintptr_t>(nodes + std::size_t{word} * sizeof(Node)),
+               at_block = reinterpret_cast<std::uintptr_t>(blocks + block * sizeof(Block));
+    const auto* const place = reinterpret_cast<const char*>(
+        at_node ^ ((at_node ^ at_block) & without_jump(std::size_t{0} - std::size_t{leaf})));
     constexpr std::size_t least = std::min(node_lines, block_lines);
     for (std::size_t k = 0; k < least; ++k) hwy::Prefetch(place + k * line);
     // The rest of the larger kind; the first line once more for the other.

@@ -17,6 +17,7 @@
 #include "trace/simd/packet.h"
 #include "trace/simd/packets.h"
 #include "trace/simd/single.h"
+#include "trace/simd/turns.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {

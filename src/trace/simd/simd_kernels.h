@@ -14,6 +14,8 @@
 namespace raydix {
 
 inline constexpr std::size_t max_job_rays = 16384;
+/// So many rays that go alone take turns.
+inline constexpr std::size_t rays_in_turn = 16;
 
 struct SimdCounts {
     std::uint64_t hits = 0, invalid = 0, visits = 0, tests = 0;
@@ -43,6 +45,7 @@ struct SimdJob {
     PacketStackView packet_stack;
     StreamMemory* memory;
     bool counting;
+    std::size_t stack_size = 0;  // of each of rays_in_turn rays that go alone
 };
 
 using OneRay = TreeHit(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,

@@ -63,22 +63,57 @@ public:
         const Rates rates = plain_rates();
         std::uint32_t word = root;
         std::size_t top = 0;
-        for (;;) {
-            if ((word & wide_leaf_bit) == 0) {
-                if (visit(tree_.template node<compact>(word), rates, top, word)) continue;
-            } else if (test_leaf(word)) {
-                return best_;
-            }
-            do {
-                if (top == 0) return best_;
-                --top;
-            } while (wanted == Wanted::closest && !(stack_.entries[top] <= best_.t));
-            word = stack_.words[top];
+        while (step(rates, top, word)) {
         }
+        return best_;
+    }
+
+    /// For rays that take turns: from the root on; false if there is nothing to do.
+    HWY_INLINE bool begin(float tmax) {
+        best_ = {tmax};
+        word_ = 0;
+        top_ = 0;
+        return frame_.tmin <= tmax;
+    }
+    /// Visits the node that is next; whether there is another node or leaf. Few branches: those of
+    /// rays in turn cannot be foreseen.
+    HWY_INLINE bool step_node() {
+        push_evenly(tree_.template node<compact>(word_));
+        return pop(top_, word_);
+    }
+    /// Tests the leaf that is next; whether there is another node or leaf.
+    HWY_INLINE bool step_leaf() { return !test_leaf(word_) && pop(top_, word_); }
+    /// The next one: what a step visits.
+    [[nodiscard]] std::uint32_t next() const { return word_; }
+    HWY_INLINE void ask_for_next() const { ask_for<compact>(tree_, word_); }
+    [[nodiscard]] const WideBest& best() const { return best_; }
+    /// Leaves the leaf that is next behind; the ray goes as far as `reach` from now on.
+    HWY_INLINE bool skip(float reach) {
+        best_.t = reach;
+        return pop(top_, word_);
     }
 
 private:
     using V = hn::Vec<F8>;
+    struct Rates;
+
+    /// Visits the node or leaf `word`, which becomes the next one. False at the end.
+    HWY_INLINE bool step(const Rates& rates, std::size_t& top, std::uint32_t& word) {
+        if ((word & wide_leaf_bit) == 0) {
+            if (visit(tree_.template node<compact>(word), rates, top, word)) return true;
+        } else if (test_leaf(word)) {
+            return false;
+        }
+        return pop(top, word);
+    }
+    HWY_INLINE bool pop(std::size_t& top, std::uint32_t& word) const {
+        do {
+            if (top == 0) return false;
+            --top;
+        } while (wanted == Wanted::closest && !(stack_.entries[top] <= best_.t));
+        word = stack_.words[top];
+        return true;
+    }
 
     /// How a ray's distances follow from planes: plane * rate + start.
     struct Rates {
@@ -210,6 +245,59 @@ private:
             s = entries[other] < entries[s] ? other : s;
         }
         return s;
+    }
+
+    /// All children that the ray meets go onto the stack; the one to visit first is the last.
+    template <class Node>
+    HWY_INLINE void push_evenly(const Node& node) {
+        if constexpr (counting) ++counts_.visits;
+        const Rates plain = plain_rates();
+        const auto& rates = rates_of(node, plain);
+        V entry, exit;
+        HWY_ALIGN float entries[8];
+        std::uint32_t met = 0;
+        for (std::size_t l = 0; l < 8; l += lanes8) {
+            test_boxes(node, rates, l, entry, exit);
+            met |= bits_of_le(entry, exit) << l;
+            hn::Store(entry, f8, entries + l);
+        }
+        if (always_careful || frame_.careful) met &= used_slots(node);
+        // The first two in their order, whether they are there or not.
+        const auto slot = [](std::uint32_t left) {
+            return static_cast<std::size_t>(std::countr_zero(left | 0x80));
+        };
+        const std::uint32_t others = met & (met - 1);
+        const std::size_t first = slot(met), second = slot(others);
+        std::uint32_t* const words = stack_.words + top_;
+        float* const at = stack_.entries + top_;
+        const auto two = static_cast<std::size_t>(others != 0);
+        std::size_t swap = two;
+        if constexpr (wanted == Wanted::closest) {
+            // None is negative.
+            const auto first_at = std::bit_cast<std::int32_t>(entries[first]),
+                       second_at = std::bit_cast<std::int32_t>(entries[second]);
+            swap &= static_cast<std::size_t>(first_at <= second_at);
+        } else {
+            swap = 0;
+        }
+        const std::size_t change = (first ^ second) & without_jump(std::size_t{0} - swap);
+        const std::size_t lower = first ^ change, upper = second ^ change;
+        words[0] = node.child[lower], at[0] = entries[lower];
+        words[1] = node.child[upper], at[1] = entries[upper];
+        top_ += static_cast<std::size_t>(met != 0) + two;
+        for (std::uint32_t left = others & (others - 1); left != 0; left &= left - 1)
+            insert(entries[slot(left)], node.child[slot(left)], words, at);
+    }
+    /// One more child onto the stack, which has two of its siblings from `words` and `at` on.
+    HWY_INLINE void insert(float entry, std::uint32_t child, std::uint32_t* words, float* at) {
+        std::size_t k = static_cast<std::size_t>(stack_.words + top_++ - words);
+        if constexpr (wanted == Wanted::closest) {
+            // Below the last, or in its place.
+            at[k] = at[k - 1], words[k] = words[k - 1];
+            if (entry < at[k]) std::swap(entry, at[k]), std::swap(child, words[k]);
+            for (--k; k > 0 && at[k - 1] < entry; --k) at[k] = at[k - 1], words[k] = words[k - 1];
+        }
+        at[k] = entry, words[k] = child;
     }
 
     /// Two children or more, in the order of their slots.
@@ -355,6 +443,8 @@ private:
     const std::uint32_t place_;
     WideBest best_{};
     BudgetVector<Hit>* all_ = nullptr;
+    std::uint32_t word_ = 0;
+    std::size_t top_ = 0;
     std::uint32_t near_at_[3], far_at_[3];  // where planes are, from a node's boxes on
 };
 
@@ -404,12 +494,6 @@ void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
         *job.hits.at(i) = hit;
 }
 
-template <bool any, bool counting, bool compact>
-void trace_single(const SimdJob& job, SimdCounts& counts) {
-    for (std::size_t k = 0; k < job.n; ++k)
-        trace_one<any, counting, compact>(job, job.order == nullptr ? k : job.order[k], counts);
-}
-
 /// All hits of each ray behind those of the one before; counts.hits of each in hit_counts.
 template <bool counting, bool compact>
 void trace_all_of(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t* hit_counts,
@@ -445,13 +529,6 @@ inline void all_hits(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t
                      SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
         trace_all_of<counting, compact>(job, found, hit_counts, counts);
-    });
-}
-
-inline void single(const SimdJob& job, SimdCounts& counts) {
-    with_constants(job, [&](auto counting, auto compact) {
-        !job.hits ? trace_single<true, counting, compact>(job, counts)
-                  : trace_single<false, counting, compact>(job, counts);
     });
 }
 

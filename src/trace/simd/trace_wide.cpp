@@ -87,7 +87,9 @@ struct Batch {
         run(path, begin, end, counts);
     }
     void run(SimdPath own, std::size_t begin, std::size_t end, SimdCounts& counts) const {
-        StackMemory stack(tree.stats().max_depth);
+        const std::size_t stack_size = wide_stack_capacity(tree.stats().max_depth);
+        StackMemory stack;
+        stack.reserve_words(stack_size * (own == SimdPath::single ? rays_in_turn : 1));
         StreamMemory memory;
         const std::size_t from = order.empty() ? begin : 0;
         TriangleBlock room{};
@@ -100,7 +102,8 @@ struct Batch {
                           stack.view(),
                           stack.packet_view(),
                           &memory,
-                          counters};
+                          counters,
+                          stack_size};
         job_of(kernels, own)(job, counts);
     }
 };
@@ -116,7 +119,9 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
     // Counters are those of one path: they do not depend on times.
     const bool race = options.path == SimdPath::automatic && path != SimdPath::packet &&
                       !options.counters && parts.size() >= least_jobs_of_race;
-    PathRace paths;
+    PathRace paths = path == SimdPath::sorted
+                         ? PathRace{SimdPath::stream, SimdPath::packet, SimdPath::single}
+                         : PathRace{SimdPath::stream, SimdPath::packet};
     with_threads(options.threads, [&] {
         if (path == SimdPath::sorted) batch.order = order_by_place(tree.arrays().bounds, rays);
         for_each_block(

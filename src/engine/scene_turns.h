@@ -1,0 +1,201 @@
+// Rays through a scene that take turns: a node of the tree over parts or of a mesh's, a leaf of
+// triangles, or the way into a part. Included once per instruction set.
+#if defined(RAYDIX_ENGINE_SCENE_TURNS_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef RAYDIX_ENGINE_SCENE_TURNS_H
+#undef RAYDIX_ENGINE_SCENE_TURNS_H
+#else
+#define RAYDIX_ENGINE_SCENE_TURNS_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <array>
+#include <optional>
+#include <type_traits>
+
+#include "engine/scene_ray.h"
+#include "trace/simd/turns.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace raydix::HWY_NAMESPACE {
+
+/// A ray that stands somewhere in a scene.
+template <bool any>
+class StandingRay : SceneRay<any ? Wanted::any : Wanted::closest> {
+    using Walk = SceneRay<any ? Wanted::any : Wanted::closest>;
+    using One = SingleRay<any ? Wanted::any : Wanted::closest, false, false>;
+
+public:
+    /// `scene` and `line` stay where they are; `stack` has room for SceneTree::stack_size.
+    StandingRay(const SceneTree& scene, const SceneLine& line, const SceneJob::Limits& limits,
+                const WideStackView& stack)
+        : Walk(limits, {}, stack, nullptr, false), scene_(scene), line_(line), parts_stack_(stack) {
+        const auto room = [](const PartTree& tree) {
+            return tree.empty() ? 0 : wide_stack_capacity(tree.arrays.stats.max_depth);
+        };
+        const std::size_t taken = std::max(room(scene.near), room(scene.wild));
+        this->stack_ = {stack.words + taken, stack.entries + taken};
+    }
+
+    /// Whether there is anything to do.
+    bool begin() {
+        if (const MeshTree* const mesh = scene_.only_mesh())
+            return !mesh->tree->empty() && enter_mesh(*mesh, 0, line_);
+        return begin_tree(scene_.near) || begin_tree(scene_.wild);
+    }
+
+    using Walk::store;
+
+    [[nodiscard]] TurnKind kind() const {
+        const std::uint32_t leaf = now_->next() >> 31;
+        return static_cast<TurnKind>(leaf + (leaf & static_cast<std::uint32_t>(now_ == &*parts_)));
+    }
+    HWY_INLINE void ask() const {
+        if (kind() == TurnKind::part)
+            ask_for_part();
+        else
+            now_->ask_for_next();
+    }
+    HWY_INLINE bool step(std::integral_constant<TurnKind, TurnKind::node>) {
+        return now_->step_node() || leave();
+    }
+    HWY_INLINE bool step(std::integral_constant<TurnKind, TurnKind::leaf>) {
+        return now_->step_leaf() || leave();
+    }
+    HWY_INLINE bool step(std::integral_constant<TurnKind, TurnKind::part>) {
+        return enter_part(part()) || go_on();
+    }
+
+private:
+    [[nodiscard]] std::uint32_t part() const {
+        return tree_->part[(parts_->next() & ~wide_leaf_bit) >> 3];
+    }
+    HWY_INLINE void ask_for_part() const {
+        const std::size_t meshes = scene_.meshes.size(), k = part();
+        if (k >= meshes) ask_for_all(scene_.placed[k - meshes]);
+    }
+
+    bool begin_tree(const PartTree& tree) {
+        tree_ = &tree;
+        if (tree.empty() || !this->fill(tree.view, line_, tree.growth, parts_frame_)) return false;
+        parts_.emplace(tree.view, parts_frame_, parts_stack_, counts_);
+        now_ = &*parts_, in_mesh_ = false;
+        return now_->begin(parts_frame_.tmax);
+    }
+
+    /// What the ray visits in turns, if it is a mesh; all else at once. Whether it stands in a
+    /// mesh.
+    HWY_NOINLINE bool enter_part(std::uint32_t part) {
+        const std::size_t meshes = scene_.meshes.size();
+        if (part < meshes) return enter_mesh(*scene_.meshes[part], 0, line_);
+        const PlacedScene& placed = scene_.placed[part - meshes];
+        if (!sees(this->mask_, scene_, placed)) return false;
+        SceneLine inside;
+        enter(line_, scene_, placed, inside);
+        if (placed.mesh != nullptr) return enter_mesh(*placed.mesh, placed.number, inside);
+        this->walk(*placed.scene, placed.number, inside);
+        return false;
+    }
+    HWY_INLINE bool enter_mesh(const MeshTree& mesh, std::uint32_t number, const SceneLine& line) {
+        if (mesh.view.is_compact) {
+            this->hit_mesh(mesh, number, line);
+            return false;
+        }
+        if ((mesh.mask & this->mask_) == 0 || !this->fill(mesh.view, line, {}, mesh_frame_))
+            return false;
+        in_ = &mesh, number_ = number, scale_ = line.scale;
+        mesh_.emplace(mesh.view, mesh_frame_, this->stack_, counts_);
+        now_ = &*mesh_, in_mesh_ = true;
+        return now_->begin(mesh_frame_.tmax);
+    }
+
+    /// Nothing is left of the tree that the ray is in. Whether it goes on elsewhere.
+    HWY_NOINLINE bool leave() {
+        if (!in_mesh_) return tree_ == &scene_.near && begin_tree(scene_.wild);
+        if (const WideBest& best = mesh_->best(); best.found())
+            keep<any>(*in_, number_, scale_, {best.t, best.prim, best.u, best.v}, this->best_,
+                      this->reach_);
+        return go_on();
+    }
+    /// From a part, with what was found there.
+    HWY_INLINE bool go_on() {
+        if (tree_ == nullptr || (any && this->reach_ < 0)) return false;
+        now_ = &*parts_, in_mesh_ = false;
+        const float reach = line_.units(this->reach_);
+        if (parts_->skip(min_of(reach, std::numeric_limits<float>::max()))) return true;
+        return tree_ == &scene_.near && begin_tree(scene_.wild);
+    }
+
+    const SceneTree& scene_;
+    const SceneLine& line_;
+    const WideStackView parts_stack_;
+    One* now_ = nullptr;  // one of the two below
+    bool in_mesh_ = false;
+    const PartTree* tree_ = nullptr;  // null: the scene is one mesh
+    SingleFrame parts_frame_, mesh_frame_;
+    std::optional<One> parts_, mesh_;
+    const MeshTree* in_ = nullptr;
+    std::uint32_t number_ = 0;
+    double scale_ = 1;
+    SimdCounts counts_;
+};
+
+/// Rays of a job, into its hits and limits.
+template <bool any, class Start>
+class SceneTurns {
+public:
+    /// start(k): ray k of the job, with its limits; null if it can see nothing.
+    SceneTurns(SceneJob& job, const Start& start) : job_(job), start_(start) {}
+
+    void trace() {
+        std::array<Turn, rays_in_turn> turns;
+        for (std::size_t k = 0; k < turns.size(); ++k) {
+            const WideStackView stack = job_.single_stack.view();
+            const std::size_t at = k * job_.tree->stack_size;
+            turns[k].all = this;
+            turns[k].stack = {stack.words + at, stack.entries + at};
+        }
+        take_turns(turns);
+    }
+
+private:
+    struct Turn {
+        SceneTurns* all;
+        WideStackView stack;
+        SceneLine line;
+        std::optional<StandingRay<any>> ray;
+        std::uint32_t id;
+
+        static constexpr bool has_parts = true;
+        [[nodiscard]] TurnKind kind() const { return ray->kind(); }
+        HWY_INLINE void ask() const { ray->ask(); }
+        template <TurnKind kind>
+        HWY_INLINE bool step(std::integral_constant<TurnKind, kind> what) {
+            if (ray->step(what)) return true;
+            ray->store(all->job_, id);
+            return false;
+        }
+        HWY_NOINLINE bool start() { return all->start(*this); }
+    };
+
+    bool start(Turn& turn) {
+        while (next_ < job_.n) {
+            turn.id = static_cast<std::uint32_t>(next_++);
+            const Ray* const ray = start_(turn.id);
+            if (ray == nullptr) continue;
+            turn.line = HWY_NAMESPACE::line_of(*ray);
+            turn.ray.emplace(*job_.tree, turn.line, job_.limits[turn.id], turn.stack);
+            if (turn.ray->begin()) return true;
+            turn.ray->store(job_, turn.id);
+        }
+        return false;
+    }
+
+    SceneJob& job_;
+    const Start start_;
+    std::size_t next_ = 0;
+};
+
+}  // namespace raydix::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,161 @@
+// Rays through a wide tree that take turns, a node or leaf each: while one waits for memory the
+// others go on. Included once per instruction set.
+#if defined(RAYDIX_SIMD_TURNS_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef RAYDIX_SIMD_TURNS_H
+#undef RAYDIX_SIMD_TURNS_H
+#else
+#define RAYDIX_SIMD_TURNS_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <array>
+#include <optional>
+#include <type_traits>
+#include <utility>
+
+#include "trace/simd/single.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace raydix::HWY_NAMESPACE {
+
+/// What a ray does in its next turn.
+enum class TurnKind { node, leaf, part };
+
+/// Rays that take turns. Turn has:
+///   bool start()                  the next ray; whether there was one
+///   TurnKind kind()               what is next
+///   bool step(constant of kind)   does it; whether the ray goes on
+///   void ask()                    for the memory that it needs next
+template <class Turn, std::size_t n>
+HWY_INLINE void take_turns(std::array<Turn, n>& turns) {
+    // Each kind apart: jumps that depend on it could not be foreseen. So every list takes the ray,
+    // and one of them keeps it.
+    std::array<Turn*, n> nodes, leaves, parts;
+    std::size_t at_nodes = 0, at_leaves = 0, at_parts = 0;
+    const auto add = [&](Turn* turn) {
+        turn->ask();
+        const TurnKind kind = turn->kind();
+        nodes[at_nodes] = turn;
+        leaves[at_leaves] = turn;
+        at_nodes += static_cast<std::size_t>(kind == TurnKind::node);
+        at_leaves += static_cast<std::size_t>(kind == TurnKind::leaf);
+        if constexpr (Turn::has_parts) {
+            parts[at_parts] = turn;
+            at_parts += static_cast<std::size_t>(kind == TurnKind::part);
+        }
+    };
+    for (Turn& turn : turns)
+        if (turn.start()) add(&turn);
+    const auto step_all = [&](std::array<Turn*, n>& list, std::size_t& at, auto kind) {
+        const std::size_t count = std::exchange(at, 0);
+        for (std::size_t k = 0; k < count; ++k) {
+            Turn* const turn = list[k];
+            if (turn->step(kind) || turn->start()) add(turn);
+        }
+    };
+    while (at_nodes + at_leaves + at_parts != 0) {
+        step_all(nodes, at_nodes, std::integral_constant<TurnKind, TurnKind::node>());
+        step_all(leaves, at_leaves, std::integral_constant<TurnKind, TurnKind::leaf>());
+        if constexpr (Turn::has_parts)
+            step_all(parts, at_parts, std::integral_constant<TurnKind, TurnKind::part>());
+    }
+}
+
+template <bool any, bool counting, bool compact>
+class RayTurns {
+public:
+    RayTurns(const SimdJob& job, SimdCounts& counts) : job_(job), counts_(counts) {}
+
+    void trace() {
+        std::array<Turn, rays_in_turn> turns;
+        for (std::size_t k = 0; k < turns.size(); ++k) {
+            turns[k].rays = this;
+            turns[k].stack = {job_.stack.words + k * job_.stack_size,
+                              job_.stack.entries + k * job_.stack_size};
+        }
+        take_turns(turns);
+    }
+
+private:
+    using One = SingleRay<any ? Wanted::any : Wanted::closest, counting, compact>;
+    struct Turn {
+        RayTurns* rays;
+        WideStackView stack;
+        SingleFrame frame;
+        std::optional<One> ray;
+        std::size_t i;  // of the ray in the job
+
+        static constexpr bool has_parts = false;
+        [[nodiscard]] TurnKind kind() const { return static_cast<TurnKind>(ray->next() >> 31); }
+        HWY_INLINE void ask() const { ray->ask_for_next(); }
+        template <TurnKind kind>
+        HWY_INLINE bool step(std::integral_constant<TurnKind, kind>) {
+            const bool on = kind == TurnKind::node ? ray->step_node() : ray->step_leaf();
+            return on || rays->finish(*this);
+        }
+        HWY_NOINLINE bool start() { return rays->start(*this); }
+    };
+
+    HWY_INLINE bool start(Turn& turn) {
+        while (next_ < job_.n) {
+            turn.i = next_++;
+            if (job_.order != nullptr) {
+                turn.i = job_.order[turn.i];
+                ask_for_ray(job_.order[std::min(next_ + ahead, job_.n - 1)]);
+            }
+            if (fill_frame(job_.tree, job_.rays[turn.i], turn.frame)) {
+                turn.ray.emplace(job_.tree, turn.frame, turn.stack, counts_);
+                if (turn.ray->begin(turn.frame.tmax)) return true;
+            } else {
+                ++counts_.invalid;
+            }
+            set(turn.i, {});
+        }
+        return false;
+    }
+    /// In an order of their own rays and hits lie anywhere.
+    HWY_INLINE void ask_for_ray(std::size_t i) const {
+        hwy::Prefetch(job_.rays + i);
+        if constexpr (any)
+            hwy::Prefetch(job_.occluded + i);
+        else
+            hwy::Prefetch(job_.hits.at(i));
+    }
+
+    /// False.
+    HWY_INLINE bool finish(Turn& turn) {
+        const WideBest& best = turn.ray->best();
+        TreeHit hit;
+        if (best.found()) {
+            ++counts_.hits;
+            hit = {best.t * turn.frame.t_scale, best.prim, best.u, best.v};
+        }
+        set(turn.i, hit);
+        return false;
+    }
+    HWY_INLINE void set(std::size_t i, const TreeHit& hit) {
+        if constexpr (any)
+            job_.occluded[i] = hit.hit() ? 1 : 0;
+        else
+            *job_.hits.at(i) = hit;
+    }
+
+    static constexpr std::size_t ahead = 16;
+    const SimdJob& job_;
+    SimdCounts& counts_;
+    std::size_t next_ = 0;
+};
+
+inline void single(const SimdJob& job, SimdCounts& counts) {
+    with_constants(job, [&](auto counting, auto compact) {
+        if (job.hits)
+            RayTurns<false, counting, compact>(job, counts).trace();
+        else
+            RayTurns<true, counting, compact>(job, counts).trace();
+    });
+}
+
+}  // namespace raydix::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
