@@ -59,6 +59,11 @@ public:
     }
 
     std::shared_ptr<const SceneTree> run() {
+        for (const auto& [id, geometry] : state_.geometries)
+            if (geometry.is_instance())
+                instances_.emplace_back(id, &geometry);
+            else
+                tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
         MeshCommit<float, WideMaker> meshes(state_, options_, report_);
         tree_->meshes = meshes.run(instance_work());
         for (const auto& mesh : tree_->meshes) {
@@ -67,9 +72,6 @@ public:
             if (!mesh->tree->empty())
                 tree_->bounds = unite(tree_->bounds, mesh->tree->arrays().bounds);
         }
-        for (const auto& [id, geometry] : state_.geometries)
-            if (!geometry.is_instance())
-                tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
         place_instances();
         const ProgressStage top(meshes.part_done(), 1);
         progress_at(0);
@@ -84,73 +86,92 @@ private:
     /// Parts that instances become.
     [[nodiscard]] double instance_work() const {
         double parts = 0;
-        for (const auto& [id, geometry] : state_.geometries)
-            if (geometry.is_instance() && geometry.scene->tree != nullptr)
-                parts += 1 + static_cast<double>(geometry.scene->tree->placed.size());
+        for (const auto& [id, geometry] : instances_)
+            if (geometry->scene->tree != nullptr)
+                parts += 1 + static_cast<double>(geometry->scene->tree->placed.size());
         return parts;
     }
 
-    void place_instances() {
-        for (const auto& [id, geometry] : state_.geometries) {
-            if (!geometry.is_instance()) continue;
-            const auto& inner = geometry.scene->tree;
-            const std::uint32_t number = number_instance(*tree_, id, inner);
-            tree_->instances.push_back({id, geometry.mask, number, geometry.transform, inner});
-            place(geometry, id, number, inner);
-        }
-        set_extents();
-    }
-
-    /// Where the box of a placed scene comes from.
+    /// A scene to place, and what leads to it.
     struct Source {
         const Geometry* geometry;
         std::uint32_t id;
-        const Image* inner;      // null: the scene itself
-        const SceneTree* scene;  // what is placed
-        const Support* support;  // its own; null if it is empty
+        std::uint32_t number;       // of the path that ends there
+        std::uint32_t first, more;  // further ways in SceneTree::ways
+        const SceneTree* scene;
+        const Image* inner;      // in the scene of the outermost instance; null: that is it
+        const Support* support;  // of the scene; null if it is empty
     };
 
-    void place(const Geometry& geometry, std::uint32_t id, std::uint32_t number,
-               const std::shared_ptr<const SceneTree>& inner) {
-        const WayIn way(geometry.inverse, geometry.mask);
-        const auto add = [&](PlacedScene placed, const Image* image) {
-            const SceneTree* const scene = placed.scene.get();
-            sources_.push_back(
-                {&geometry, id, image, scene, scene->extent.empty() ? nullptr : &scene->support()});
-            if (!scene->extent.empty()) placed.mesh = scene->only_mesh();
-            tree_->placed.push_back(std::move(placed));
-        };
-        if (inner->instances.empty() ||
-            tree_->placed.size() + inner->placed.size() + 1 > most_placed_) {
-            add({way, number, 0, 0, inner}, nullptr);
-            return;
+    void place_instances() {
+        tree_->instances.reserve(instances_.size());
+        sources_.reserve(instances_.size());
+        for (const auto& [id, geometry] : instances_) {
+            const auto& inner = geometry->scene->tree;
+            const std::uint32_t number = number_instance(*tree_, id, inner);
+            tree_->instances.push_back({id, geometry->mask, number, geometry->transform, inner});
+            add_sources({geometry, id, number, 0, 0, inner.get(), nullptr, nullptr});
         }
-        if (inner->own_meshes != nullptr) add({way, number, 0, 0, inner->own_meshes}, nullptr);
-        for (std::size_t k = 0; k < inner->placed.size(); ++k) {
-            const PlacedScene& below = inner->placed[k];
-            const auto first = static_cast<std::uint32_t>(tree_->ways.size());
-            tree_->ways.push_back(below.way);
-            for (std::uint32_t w = 0; w < below.more; ++w)
-                tree_->ways.push_back(inner->ways[below.first + w]);
-            add({way, number + below.number, first, below.more + 1, below.scene},
-                &inner->images[k]);
-        }
+        place_sources();
     }
 
-    void set_extents() {
+    /// All that one instance places, nested instances opened.
+    void add_sources(const Source& whole) {
+        const SceneTree& inner = *whole.scene;
+        if (inner.instances.empty() || sources_.size() + inner.placed.size() + 1 > most_placed_) {
+            add_source(whole);
+            return;
+        }
+        Source part = whole;
+        if (inner.own_meshes != nullptr) {
+            part.scene = inner.own_meshes.get();
+            add_source(part);
+        }
+        for (std::size_t k = 0; k < inner.placed.size(); ++k) {
+            const PlacedScene& below = inner.placed[k];
+            part.number = whole.number + below.number;
+            part.first = static_cast<std::uint32_t>(tree_->ways.size());
+            part.more = below.more + 1;
+            part.scene = below.scene;
+            part.inner = &inner.images[k];
+            tree_->ways.push_back(below.way);
+            for (std::uint32_t w = 0; w < below.more; ++w)
+                tree_->ways.push_back(inner.ways[below.first + w]);
+            add_source(part);
+        }
+    }
+    void add_source(Source source) {
+        // Most instances place what the one before them places.
+        if (!sources_.empty() && sources_.back().scene == source.scene) {
+            source.support = sources_.back().support;
+        } else {
+            source.support = source.scene->extent.empty() ? nullptr : &source.scene->support();
+            tree_->stack_size = std::max(tree_->stack_size, source.scene->stack_size);
+        }
+        sources_.push_back(source);
+    }
+
+    void place_sources() {
         const std::size_t meshes = tree_->extents.size();
         tree_->extents.resize(meshes + sources_.size());
-        tree_->images.resize(sources_.size());
+        tree_->images.reset(sources_.size());
+        tree_->placed.reset(sources_.size());
         for_each_index(
             sources_.size(),
             [&](std::size_t i) {
                 const Source& source = sources_[i];
                 const Geometry& geometry = *source.geometry;
+                const bool empty = source.support == nullptr;
+                tree_->placed[i] = {WayIn(geometry.inverse, geometry.mask),
+                                    source.number,
+                                    source.first,
+                                    source.more,
+                                    source.scene,
+                                    empty ? nullptr : source.scene->only_mesh()};
                 Image& image = tree_->images[i];
                 image = image_of(affine_of(geometry.transform), geometry.errors,
                                  source.inner ? *source.inner : image_of(source.scene->extent));
-                if (source.support != nullptr)
-                    tree_->extents[meshes + i] = extent_of(image, *source.support);
+                if (!empty) tree_->extents[meshes + i] = extent_of(image, *source.support);
             },
             256);
         for (std::size_t i = 0; i < sources_.size(); ++i) {
@@ -186,8 +207,6 @@ private:
                 (tree.extents[part].error <= wild_error ? near : wild).push_back(part);
         build_part_tree(near, tree.extents, quality, tree.near);
         build_part_tree(wild, tree.extents, quality, tree.wild);
-        for (const PlacedScene& placed : tree.placed)
-            tree.stack_size = std::max(tree.stack_size, placed.scene->stack_size);
         tree.stack_size += wide_stack_capacity(
             std::max(tree.near.arrays.stats.max_depth, tree.wild.arrays.stats.max_depth));
         report_.bytes +=
@@ -200,7 +219,8 @@ private:
     CommitReport& report_;
     const std::size_t most_placed_;
     std::shared_ptr<SceneTree> tree_ = std::make_shared<SceneTree>();
-    std::vector<Source> sources_;  // [placed scenes]
+    std::vector<std::pair<std::uint32_t, const Geometry*>> instances_;  // by ascending id
+    std::vector<Source> sources_;                                       // [placed scenes]
 };
 
 }  // namespace

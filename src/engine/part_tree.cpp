@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "exec/parallel.h"
 #include "layout/wide_collapse.h"
 
 namespace raydix {
@@ -27,6 +28,28 @@ std::uint32_t word_of(const BvhNode& child) {
     return wide_leaf_bit | child.first << 3 | (child.count - 1);
 }
 
+void set_node(std::span<const BvhNode> slots, const Vec3& middle, WideNode& node) {
+    // The smallest box in slot 0, as in trees of triangles.
+    std::array<BvhNode, quantised_width> children;
+    std::array<double, quantised_width> areas;
+    std::size_t count = 0;
+    for (const BvhNode& child : slots) {
+        if (WideTree::is_unused(child)) continue;
+        const double area = half_area({child.lo, child.hi});
+        std::size_t at = count++;
+        for (; at > 0 && areas[at - 1] > area; --at)
+            areas[at] = areas[at - 1], children[at] = children[at - 1];
+        areas[at] = area, children[at] = child;
+    }
+    SlotBoxes boxes;
+    std::fill_n(node.child, quantised_width, wide_no_child);
+    for (std::size_t s = 0; s < count; ++s) {
+        boxes.set(static_cast<int>(s), {children[s].lo, children[s].hi});
+        node.child[s] = word_of(children[s]);
+    }
+    set_boxes_about(middle, boxes, node);
+}
+
 }  // namespace
 
 void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
@@ -37,28 +60,13 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
     const WideTree wide = collapse_to_wide(bvh, {.width = quantised_width, .max_leaf = 1});
     out.arrays.set_bounds(bvh.bounds());
     out.arrays.nodes.reset(wide.node_count());
-    for (std::uint32_t w = 0; w < wide.node_count(); ++w) {
-        WideNode& node = out.arrays.nodes[w];
-        // The smallest box in slot 0, as in trees of triangles.
-        std::array<BvhNode, quantised_width> children;
-        std::array<double, quantised_width> areas;
-        std::size_t count = 0;
-        for (const BvhNode& child : wide.node(w)) {
-            if (WideTree::is_unused(child)) continue;
-            const double area = half_area({child.lo, child.hi});
-            std::size_t at = count++;
-            for (; at > 0 && areas[at - 1] > area; --at)
-                areas[at] = areas[at - 1], children[at] = children[at - 1];
-            areas[at] = area, children[at] = child;
-        }
-        SlotBoxes boxes;
-        std::fill_n(node.child, quantised_width, wide_no_child);
-        for (std::size_t s = 0; s < count; ++s) {
-            boxes.set(static_cast<int>(s), {children[s].lo, children[s].hi});
-            node.child[s] = word_of(children[s]);
-        }
-        set_boxes_about(out.arrays.middle, boxes, node);
-    }
+    for_each_index(
+        wide.node_count(),
+        [&](std::size_t w) {
+            set_node(wide.node(static_cast<std::uint32_t>(w)), out.arrays.middle,
+                     out.arrays.nodes[w]);
+        },
+        256);
     out.arrays.stats.max_depth = wide.max_depth;
     out.part.resize(parts.size());
     for (std::size_t k = 0; k < parts.size(); ++k) out.part[k] = parts[bvh.order()[k]];

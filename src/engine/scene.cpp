@@ -221,7 +221,8 @@ CommitReport BasicScene<Scalar>::commit(const SceneOptions& options) {
     CommitReport report;
     auto tree = make_scene_tree(*state_, options, report);
     state_->tree = std::move(tree);
-    for (auto& [id, geometry] : state_->geometries) geometry.changed = false;
+    for (const auto& mesh : state_->tree->meshes)
+        for (const std::uint32_t id : mesh->ids) state_->at(id).changed = false;
     state_->changed = false;
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
     report.ms = ms.count();

@@ -2,6 +2,7 @@
 // Nothing in it changes afterwards, so that any number of threads and of other scenes may use it.
 #pragma once
 
+#include <raydix/buffer.h>
 #include <raydix/scene.h>
 #include <raydix/wide.h>
 
@@ -47,8 +48,8 @@ struct PlacedScene {
     WayIn way;
     std::uint32_t number;       // of the path that ends here
     std::uint32_t first, more;  // further ways in SceneTree::ways, from the outside inward
-    std::shared_ptr<const SceneTree> scene;
-    const MeshTree* mesh = nullptr;  // all that is in `scene`, if it is one that is not empty
+    const SceneTree* scene;     // kept by SceneTree::instances, or by theirs
+    const MeshTree* mesh;       // all that is in `scene`, if it is one that is not empty
 };
 
 /// An instance as the scene's owner knows it.
@@ -81,10 +82,10 @@ struct SceneTree {
     std::vector<std::shared_ptr<const MeshTree>> meshes;
     std::vector<InstanceName> instances;  // by ascending id
     std::vector<MeshName> mesh_names;     // by ascending id
-    std::vector<PlacedScene> placed;
+    Buffer<PlacedScene> placed;
     std::vector<WayIn> ways;
     std::vector<Extent> extents;  // [meshes + placed]
-    std::vector<Image> images;    // [placed]
+    Buffer<Image> images;         // [placed]
     /// The meshes without the instances, where there are both.
     std::shared_ptr<const SceneTree> own_meshes;
     /// Over all parts that are not empty: instances whose maps keep errors small, and those that

@@ -27,7 +27,13 @@ void with_threads(int threads, const std::function<void()>& body) {
     // a warning.
     const std::size_t most =
         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
-    tbb::task_arena arena(static_cast<int>(std::min(static_cast<std::size_t>(threads), most)));
+    const int wanted = static_cast<int>(std::min(static_cast<std::size_t>(threads), most));
+    // Workers take a millisecond to come over to another arena.
+    if (wanted == thread_count()) {
+        body();
+        return;
+    }
+    tbb::task_arena arena(wanted);
     const ProgressSpan progress = progress_span();
     arena.execute([&] {
         const ProgressStage same(progress);

@@ -1,5 +1,5 @@
-// The environment that arithmetic of the library needs, told by arithmetic: against the control
-// register itself.
+// The environment that arithmetic of the library needs, told by arithmetic and by the control
+// register.
 #include "base/float_env.h"
 
 #include <gtest/gtest.h>
@@ -17,6 +17,7 @@ protected:
     void TearDown() override { _mm_setcsr(saved_); }
     static bool is_plain_with(unsigned bits) {
         _mm_setcsr((_mm_getcsr() & ~0xE040u) | bits);
+        EXPECT_EQ(FloatEnvironment::reads_plain(), FloatEnvironment::adds_plainly());
         return FloatEnvironment::is_plain();
     }
 
