@@ -71,7 +71,8 @@ struct SceneJob {
     const std::uint32_t* masks = nullptr;  // [rays] instead; or null
     bool any = false;                      // any hit will do; only prim of a hit has a meaning
     bool packets = false;                  // neighbours are alike: triangles take packets of them
-    bool single = false;                   // one ray after the other
+    bool single = false;                   // rays go alone
+    bool turns = false;                    // if so: some of them in turn
 
     std::vector<Hit> hits;  // [n], by k
     // Of all hits: those of each ray behind those of the one before, sorted; how many [n].

@@ -2,6 +2,7 @@
 #include <raydix/scene.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <vector>
 
@@ -51,7 +52,7 @@ SceneJob& job_of_this_thread() {
 struct Way {
     const SimdKernels* kernels;
     const SceneKernels* scene;
-    bool packets, single;
+    bool packets, single, turns;
 };
 
 /// Rays begin to end - 1, or order[begin] to order[end - 1].
@@ -69,6 +70,7 @@ JobCounts trace_job(const SceneTree& tree, const Way& way, const Batch& batch,
     job.any = batch.hits == nullptr;
     job.packets = way.packets;
     job.single = way.single;
+    job.turns = way.turns;
     way.scene->trace(job);
     JobCounts counts;
     counts.invalid = job.invalid;
@@ -86,9 +88,14 @@ SimdPath path_of(const SceneTree& tree, const Batch& batch) {
     return path == SimdPath::sorted ? SimdPath::single : path;
 }
 
-Way way_of(SimdPath path, const std::string& isa) {
-    return {&kernels_for(isa), &scene_kernels_for(isa), path == SimdPath::packet,
-            path == SimdPath::single};
+/// For a path, and what its jobs may try instead: rays alone, in turns and one after the other.
+std::array<Way, 3> ways_of(SimdPath path, const SceneTraceOptions& options) {
+    Way way{&kernels_for(options.isa), &scene_kernels_for(options.isa), path == SimdPath::packet,
+            path == SimdPath::single, true};
+    std::array<Way, 3> ways{way, way, way};
+    ways[1].single = ways[2].single = true;
+    ways[path == SimdPath::single ? 1 : 2].turns = false;
+    return ways;
 }
 
 /// With fewer jobs than this a trial would cost more than it may gain.
@@ -96,23 +103,23 @@ constexpr std::size_t least_jobs_of_race = 16;
 
 TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
     const std::size_t n = batch.rays.size();
-    const std::string& isa = batch.options.isa;
     const SimdPath path = path_of(tree, batch);
     const bool sorted =
         path == SimdPath::sorted && n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
     const std::size_t job_size = rays_per_job(n, SimdPath::stream);
     std::vector<JobCounts> parts((n + job_size - 1) / job_size);
-    const bool race = batch.options.path == SimdPath::automatic && path != SimdPath::single &&
-                      parts.size() >= least_jobs_of_race;
-    PathRace paths{path, SimdPath::single};
+    const std::array<Way, 3> ways = ways_of(path, batch.options);
+    PathRace paths(path == SimdPath::single ? 2 : 3);
+    const bool race =
+        batch.options.path == SimdPath::automatic && parts.size() >= least_jobs_of_race;
     with_threads(batch.options.threads, [&] {
         std::vector<std::uint32_t> order;
         if (sorted) order = order_by_place(tree.extent.box, batch.rays);
         for_each_block(n, job_size, [&](std::size_t job, std::size_t begin, std::size_t end) {
-            const SimdPath path_here = race ? paths.next() : path;
+            const std::size_t way = race ? paths.next() : 0;
             const std::int64_t start = race ? PathRace::thread_ns() : 0;
-            parts[job] = trace_job(tree, way_of(path_here, isa), batch, order, begin, end);
-            if (race) paths.add(path_here, end - begin, PathRace::thread_ns() - start);
+            parts[job] = trace_job(tree, ways[way], batch, order, begin, end);
+            if (race) paths.add(way, end - begin, PathRace::thread_ns() - start);
         });
     });
     return sum_of(parts, n);
@@ -141,7 +148,7 @@ void trace_on_this_thread(const SceneTree& tree, std::span<const Ray> rays, Hit*
                           std::uint8_t* occluded) {
     const SceneTraceOptions options;
     const Batch batch{rays, hits, occluded, options};
-    const Way way = way_of(path_of(tree, batch), options.isa);
+    const Way way = ways_of(path_of(tree, batch), options).front();
     for (std::size_t begin = 0; begin < rays.size(); begin += max_job_rays)
         trace_job(tree, way, batch, {}, begin, std::min(begin + max_job_rays, rays.size()));
 }

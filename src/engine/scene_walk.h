@@ -67,9 +67,20 @@ private:
     }
 
     void one_by_one() {
-        job_.single_stack.reserve_words(job_.tree->stack_size * rays_in_turn);
-        const auto next = [this](std::size_t k) { return start(k); };
-        SceneTurns<any, decltype(next)>(job_, next).trace();
+        if (job_.turns) {
+            job_.single_stack.reserve_words(job_.tree->stack_size * rays_in_turn);
+            const auto next = [this](std::size_t k) { return start(k); };
+            SceneTurns<any, decltype(next)>(job_, next).trace();
+            return;
+        }
+        for (std::size_t k = 0; k < job_.n; ++k) {
+            const Ray* const ray = start(k);
+            if (ray == nullptr) continue;
+            // Rays of a batch that come here go anywhere.
+            One one(job_.limits[k], job_.hits[k], job_.single_stack.view(), nullptr, false);
+            one.walk(*job_.tree, 0, HWY_NAMESPACE::line_of(*ray));
+            one.store(job_, static_cast<std::uint32_t>(k));
+        }
     }
     void together() {
         SceneLevel& first = job_.level(0);

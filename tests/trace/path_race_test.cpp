@@ -12,24 +12,25 @@
 namespace raydix::test {
 namespace {
 
-TEST(PathRace, TriesBothAndTakesTheFaster) {
-    for (const SimdPath faster : {SimdPath::stream, SimdPath::packet}) {
-        PathRace race{SimdPath::stream, SimdPath::packet};
-        EXPECT_EQ(race.trials(), 4u);
-        for (std::uint32_t k = 0; k < race.trials(); ++k)
-            EXPECT_EQ(race.next(), k % 2 == 0 ? SimdPath::stream : SimdPath::packet);
-        EXPECT_EQ(race.next(), SimdPath::stream);  // neither has ended
-        // The first of each, with whatever memory was like then, says nothing.
-        race.add(SimdPath::stream, 1000, faster == SimdPath::stream ? 900000 : 1);
-        race.add(SimdPath::packet, 1000, faster == SimdPath::packet ? 900000 : 1);
-        EXPECT_EQ(race.next(), SimdPath::stream);
-        race.add(SimdPath::stream, 1000, faster == SimdPath::stream ? 1000 : 3000);
-        race.add(SimdPath::packet, 500, 1000);
-        EXPECT_EQ(race.next(), faster);
-        // The trials were no measure of the jobs that followed.
-        race.add(faster, 10000, 100000);
-        EXPECT_NE(race.next(), faster);
-    }
+TEST(PathRace, TriesAllAndTakesTheFastest) {
+    for (const std::size_t count : {2u, 3u})
+        for (std::size_t faster = 0; faster < count; ++faster) {
+            PathRace race(count);
+            EXPECT_EQ(race.trials(), 2 * count);
+            for (std::uint32_t k = 0; k < race.trials(); ++k) EXPECT_EQ(race.next(), k % count);
+            EXPECT_EQ(race.next(), 0u);  // none has ended
+            // The first of each, with whatever memory was like then, says nothing.
+            for (std::size_t way = 0; way < count; ++way)
+                race.add(way, 1000, faster == way ? 900000 : 1);
+            EXPECT_EQ(race.next(), 0u);
+            for (std::size_t way = 0; way < count; ++way)
+                race.add(way, 500 * (way + 1),
+                         (faster == way ? 500 : 1500) * (static_cast<std::int64_t>(way) + 1));
+            EXPECT_EQ(race.next(), faster);
+            // The trials were no measure of the jobs that followed.
+            race.add(faster, 10000, 100000);
+            EXPECT_NE(race.next(), faster);
+        }
 }
 
 /// Rays of which many jobs are made, and for which streams would be taken, or sorted streams.

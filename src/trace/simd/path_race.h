@@ -1,16 +1,14 @@
-// The path for the jobs of one batch: the one that takes the least time for a ray. It cannot be
-// told from the rays: it depends on how many of them go the same way in the tree and how deep, so
-// on the scene too.
+// The way that the jobs of one batch take: the one that takes the least time for a ray. It cannot
+// be told from the rays: it depends on how many of them go the same way in the tree and how deep,
+// so on the scene too.
 #pragma once
 
-#include <raydix/trace.h>
-
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <ctime>
-#include <initializer_list>
 
 #include "base/math.h"
 
@@ -29,25 +27,23 @@ public:
 #endif
     }
 
-    /// `paths`: at most three; the first one where nothing is known yet.
-    explicit PathRace(std::initializer_list<SimdPath> paths) {
-        for (const SimdPath path : paths) runners_.at(count_++).path = path;
-    }
+    static constexpr std::size_t most = 3;
+    /// Between `count` ways, the first one where nothing is known yet. At most `most`.
+    explicit PathRace(std::size_t count) : count_(std::min(count, most)) {}
 
-    /// The path for the next job: all by turns at first, then the fastest one of all jobs so far.
-    [[nodiscard]] SimdPath next() {
+    /// The way of the next job: all by turns at first, then the fastest one of all jobs so far.
+    [[nodiscard]] std::size_t next() {
         const std::uint32_t job = begun_.fetch_add(1, std::memory_order_relaxed);
-        if (job < trials()) return runners_[job % count_].path;
-        SimdPath best = runners_[0].path;
+        if (job < trials()) return job % count_;
+        std::size_t best = 0;
         double least = infinity;
-        for (const Runner& runner : runners_)
-            if (const double ns = runner.ns_a_ray(); ns < least) least = ns, best = runner.path;
+        for (std::size_t k = 0; k < most; ++k)
+            if (const double ns = runners_[k].ns_a_ray(); ns < least) least = ns, best = k;
         return best;
     }
-    /// A job has ended. The first one of each path does not count: it found memory as it was.
-    void add(SimdPath path, std::size_t rays, std::int64_t ns) {
-        for (Runner& runner : runners_)
-            if (runner.path == path) return runner.add(rays, ns);
+    /// A job has ended. The first one of each way does not count: it found memory as it was.
+    void add(std::size_t way, std::size_t rays, std::int64_t ns) {
+        if (way < most) runners_[way].add(rays, ns);
     }
 
     /// Jobs that are shared out whatever they take.
@@ -55,7 +51,6 @@ public:
 
 private:
     struct Runner {
-        SimdPath path = SimdPath::automatic;  // none
         std::atomic<bool> warm{false};
         std::atomic<std::int64_t> rays{0}, ns{0};
 
@@ -74,8 +69,8 @@ private:
     };
 
     std::atomic<std::uint32_t> begun_{0};
-    std::array<Runner, 3> runners_;
-    std::size_t count_ = 0;
+    std::array<Runner, most> runners_;
+    const std::size_t count_;
 };
 
 }  // namespace raydix

@@ -41,4 +41,20 @@ inline constexpr auto ray_classes = [] {
     return table;
 }();
 
+/// Where the planes that a ray meets first and last are among lo[3][8], hi[3][8] of a node.
+struct PlanePlaces {
+    std::uint32_t near[3], far[3];
+};
+/// [RayClass::negatives]
+inline constexpr auto plane_places = [] {
+    std::array<PlanePlaces, 8> table{};
+    for (std::uint32_t negatives = 0; negatives < 8; ++negatives)
+        for (std::uint32_t axis = 0; axis < 3; ++axis) {
+            const std::uint32_t negative = negatives >> axis & 1;
+            table[negatives].near[axis] = 8 * axis + 24 * negative;
+            table[negatives].far[axis] = 8 * axis + 24 * (1 - negative);
+        }
+    return table;
+}();
+
 }  // namespace raydix

@@ -42,13 +42,13 @@ public:
     /// `parts` and the ray's place in the job: unless leaves hold triangles.
     SingleRay(const WideView& tree, const SingleFrame& frame, const WideStackView& stack,
               SimdCounts& counts, Parts* parts = nullptr, std::uint32_t place = 0)
-        : tree_(tree), frame_(frame), stack_(stack), counts_(counts), parts_(parts), place_(place) {
-        for (int axis = 0; axis < 3; ++axis) {
-            const std::uint32_t negative = frame.kind.negatives >> axis & 1;
-            near_at_[axis] = 8 * static_cast<std::uint32_t>(axis) + 24 * negative;
-            far_at_[axis] = 8 * static_cast<std::uint32_t>(axis) + 24 * (1 - negative);
-        }
-    }
+        : tree_(tree),
+          frame_(frame),
+          stack_(stack),
+          counts_(counts),
+          parts_(parts),
+          place_(place),
+          at_(plane_places[frame.kind.negatives]) {}
 
     /// All hits, in no order, behind those in `hits`.
     void trace_all(BudgetVector<Hit>& hits) {
@@ -156,7 +156,7 @@ private:
         entry = hn::Set(f8, frame_.tmin);
         exit = hn::Set(f8, best_.t);
         for (int axis = 0; axis < 3; ++axis) {
-            const V near = planes(boxes + near_at_[axis]), far = planes(boxes + far_at_[axis]);
+            const V near = planes(boxes + at_.near[axis]), far = planes(boxes + at_.far[axis]);
             entry = hn::Max(hn::MulAdd(near, rates.rate[axis], rates.near[axis]), entry);
             exit = hn::Min(hn::MulAdd(far, rates.rate[axis], rates.far[axis]), exit);
         }
@@ -441,11 +441,11 @@ private:
     SimdCounts& counts_;
     Parts* const parts_;
     const std::uint32_t place_;
+    const PlanePlaces at_;
     WideBest best_{};
     BudgetVector<Hit>* all_ = nullptr;
     std::uint32_t word_ = 0;
     std::size_t top_ = 0;
-    std::uint32_t near_at_[3], far_at_[3];  // where planes are, from a node's boxes on
 };
 
 /// Whether the ray is probably like the next one: so many of the last have been like each other.

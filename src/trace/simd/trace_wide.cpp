@@ -119,18 +119,18 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
     // Counters are those of one path: they do not depend on times.
     const bool race = options.path == SimdPath::automatic && path != SimdPath::packet &&
                       !options.counters && parts.size() >= least_jobs_of_race;
-    PathRace paths = path == SimdPath::sorted
-                         ? PathRace{SimdPath::stream, SimdPath::packet, SimdPath::single}
-                         : PathRace{SimdPath::stream, SimdPath::packet};
+    // Rays that take turns only win where they go anywhere.
+    constexpr SimdPath ways[] = {SimdPath::stream, SimdPath::packet, SimdPath::single};
+    PathRace paths(path == SimdPath::sorted ? 3 : 2);
     with_threads(options.threads, [&] {
         if (path == SimdPath::sorted) batch.order = order_by_place(tree.arrays().bounds, rays);
         for_each_block(
             rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
                 if (race) {
-                    const SimdPath path_here = paths.next();
+                    const std::size_t way = paths.next();
                     const std::int64_t start = PathRace::thread_ns();
-                    batch.run(path_here, begin, end, parts[block]);
-                    paths.add(path_here, end - begin, PathRace::thread_ns() - start);
+                    batch.run(ways[way], begin, end, parts[block]);
+                    paths.add(way, end - begin, PathRace::thread_ns() - start);
                 } else {
                     batch.run(begin, end, parts[block]);
                 }
