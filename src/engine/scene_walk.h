@@ -14,6 +14,7 @@
 #include <limits>
 
 #include "engine/scene_job.h"
+#include "engine/scene_moves.h"
 #include "engine/scene_ray.h"
 #include "engine/scene_turns.h"
 #include "trace/simd/packets.h"
@@ -183,6 +184,39 @@ private:
         to.sources[to.count++] = {line.scale, id};
     }
 
+    HWY_INLINE void add(const Place& place, const PlacedScene& placed, std::uint32_t ray,
+                        SceneLevel& to) {
+        const SceneLevel& from = job_.level(place.depth);
+        const std::uint32_t id = from.sources[ray].id;
+        if (sees(job_.limits[id].mask, place.scene, placed))
+            add(line_of(place, from, ray), id, place.scene, placed, to);
+    }
+    /// At most lanes16 of them.
+    HWY_INLINE void add_vector(const Place& place, const PlacedScene& placed,
+                               const std::uint32_t* rays, std::uint32_t count, SceneLevel& to) {
+        const SceneLevel& from = job_.level(place.depth);
+        HWY_ALIGN std::int32_t index[lanes16];
+        bool as_they_are = true;
+        for (std::uint32_t l = 0; l < lanes16; ++l)
+            index[l] = static_cast<std::int32_t>(rays[std::min(l, count - 1)]);
+        for (std::uint32_t l = 0; l < count; ++l) {
+            const SceneRaySource& source = from.sources[rays[l]];
+            as_they_are = as_they_are && source.scale == 1.0;
+            to.sources[to.count + l] = source;
+        }
+        RayVectors vectors = read_rays(from.rays.data(), index);
+        if (as_they_are && move_rays(place.scene, placed, vectors)) {
+            const auto quad = [first = &to.rays[to.count].origin.x](std::size_t q) {
+                return [=](std::size_t l) { return first + sizeof(Ray) / sizeof(float) * l + q; };
+            };
+            store_quads(vectors.place, quad(0));
+            store_quads(vectors.way, quad(ray_direction));
+            to.count += count;
+        } else {
+            for (std::uint32_t l = 0; l < count; ++l) add(place, placed, rays[l], to);
+        }
+    }
+
     /// All rays of the level of `place`.
     void walk(std::size_t depth, const SceneTree& scene, std::uint32_t number) {
         const Place place{scene, depth, number};
@@ -209,22 +243,49 @@ private:
     HWY_NOINLINE void walk_parts(const Place& place, const PartTree& tree) {
         SceneLevel& level = job_.level(place.depth);
         level.parts_stack.reserve(tree.arrays.stats.max_depth);
-        const SimdJob rays{
-            tree.view, level.rays.data(),        nullptr, level.count,         {},
-            nullptr,   level.parts_stack.view(), {},      &level.parts_memory, false};
+        const SimdJob rays{tree.view,
+                           level.rays.data(),
+                           nullptr,
+                           level.count,
+                           {},
+                           nullptr,
+                           level.parts_stack.view(),
+                           level.parts_stack.packet_view(),
+                           &level.parts_memory,
+                           false};
         Parts parts(*this, place, tree);
-        SimdCounts counts;
         RaySorter sorter;
         sorter.sort(rays);
         for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
             const std::uint32_t count = sorter.count(code);
             if (count == 0) continue;
-            const std::int32_t* const index = sorter.rays(code);
-            const StreamFrame frame = fill_stream(rays, index, count, code, tree.growth);
-            StreamWalk<any, false, false, Parts>(rays.tree, frame, *rays.memory, rays.stack, counts,
-                                                 &parts, index)
+            if (job_.packets)
+                walk_packets(rays, tree, parts, sorter.rays(code), count, code);
+            else
+                walk_stream(rays, tree, parts, sorter.rays(code), count, code);
+        }
+    }
+    void walk_packets(const SimdJob& rays, const PartTree& tree, Parts& parts,
+                      const std::int32_t* index, std::uint32_t count, std::uint32_t code) {
+        Packet packet;
+        SimdCounts counts;
+        for (std::uint32_t at = 0; at < count; at += packet_size) {
+            const std::int32_t* const here = index + at;
+            fill_packet(
+                rays.tree, [&](std::size_t i) { return read_rays(rays.rays, here + i); },
+                std::min<std::uint32_t>(packet_size, count - at), code, packet, tree.growth);
+            PacketWalk<any, false, false, Parts>(rays.tree, packet, here, parts, rays.packet_stack,
+                                                 counts)
                 .trace();
         }
+    }
+    void walk_stream(const SimdJob& rays, const PartTree& tree, Parts& parts,
+                     const std::int32_t* index, std::uint32_t count, std::uint32_t code) {
+        SimdCounts counts;
+        const StreamFrame frame = fill_stream(rays, index, count, code, tree.growth);
+        StreamWalk<any, false, false, Parts>(rays.tree, frame, *rays.memory, rays.stack, counts,
+                                             &parts, index)
+            .trace();
     }
 
     void visit(const Place& place, std::uint32_t part, const std::uint32_t* rays,
@@ -235,13 +296,16 @@ private:
             return;
         }
         const PlacedScene& placed = place.scene.placed[part - meshes];
-        const SceneLevel& outside = job_.level(place.depth);
         SceneLevel& inside = job_.level(place.depth + 1);
-        inside.begin(count, !placed.scene->instances.empty());
-        for (std::uint32_t k = 0; k < count; ++k) {
-            const std::uint32_t id = outside.sources[rays[k]].id;
-            if (sees(job_.limits[id].mask, place.scene, placed))
-                add(line_of(place, outside, rays[k]), id, place.scene, placed, inside);
+        inside.begin(count + lanes16, !placed.scene->instances.empty());
+        // Floats have all of these rays, and are all that is asked for.
+        if (job_.masks == nullptr && place.depth == 0 && placed.scene->instances.empty()) {
+            if (!sees(job_.mask, place.scene, placed)) return;
+            for (std::uint32_t k = 0; k < count; k += lanes16)
+                add_vector(place, placed, rays + k, std::min<std::uint32_t>(lanes16, count - k),
+                           inside);
+        } else {
+            for (std::uint32_t k = 0; k < count; ++k) add(place, placed, rays[k], inside);
         }
         walk(place.depth + 1, *placed.scene, place.number + placed.number);
     }

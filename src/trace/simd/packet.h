@@ -14,6 +14,7 @@
 #include "trace/simd/children.h"
 #include "trace/simd/lanes.h"
 #include "trace/simd/packet_triangles.h"
+#include "trace/simd/single.h"
 #include "trace/simd/wide_ray.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -22,16 +23,58 @@ namespace raydix::HWY_NAMESPACE {
 /// Up to so many rays of a packet go to a node one by one.
 constexpr int few_rays_of_packet = 12;
 
-template <bool any, bool counting, bool compact>
-class PacketWalk {
+/// What a packet does at the leaves of a tree over parts (single.h).
+template <bool any, class Parts>
+class PacketParts {
 public:
-    /// `rays`: what the packet was filled with, rays[index[k]].
+    PacketParts(Packet& packet, const std::int32_t* index, Parts& parts)
+        : p_(packet), index_(index), parts_(parts) {}
+
+    [[nodiscard]] std::uint64_t found() const { return found_; }
+
+    void visit(std::uint32_t part, std::uint64_t active) {
+        std::uint32_t rays[packet_size], count = 0;
+        for (std::uint64_t left = active; left != 0; left &= left - 1)
+            rays[count++] = static_cast<std::uint32_t>(index_[std::countr_zero(left)]);
+        parts_.visit(part, rays, count);
+        const std::uint32_t* ray = rays;
+        for (std::uint64_t left = active; left != 0; left &= left - 1, ++ray) {
+            const auto k = static_cast<std::size_t>(std::countr_zero(left));
+            p_.t[k] = parts_.reach(*ray);
+            if (any && p_.t[k] < 0) found_ |= std::uint64_t{1} << k;
+        }
+    }
+
+private:
+    Packet& p_;
+    const std::int32_t* const index_;
+    Parts& parts_;
+    std::uint64_t found_ = 0;
+};
+
+template <bool any, bool counting, bool compact, class Parts = NoParts>
+class PacketWalk {
+    static constexpr bool has_parts = !std::is_same_v<Parts, NoParts>;
+    using Leaves = std::conditional_t<has_parts, PacketParts<any, Parts>, PacketTriangles<any>>;
+
+public:
+    /// Through triangles. `rays`: what the packet was filled with, rays[index[k]].
     PacketWalk(const WideView& tree, Packet& packet, const Ray* rays, const std::int32_t* index,
+               const PacketStackView& stack, SimdCounts& counts) requires(!has_parts)
+        : PacketWalk(tree, packet, Leaves(packet, rays, index), stack, counts) {}
+    /// Through parts. Ray k of the packet is index[k] to them.
+    PacketWalk(const WideView& tree, Packet& packet, const std::int32_t* index, Parts& parts,
+               const PacketStackView& stack, SimdCounts& counts) requires(has_parts)
+        : PacketWalk(tree, packet, Leaves(packet, index, parts), stack, counts) {}
+
+private:
+    PacketWalk(const WideView& tree, Packet& packet, const Leaves& leaves,
                const PacketStackView& stack, SimdCounts& counts)
-        : tree_(tree), p_(packet), triangles_(packet, rays, index), stack_(stack), counts_(counts) {
+        : tree_(tree), p_(packet), leaves_(leaves), stack_(stack), counts_(counts) {
         for (int axis = 0; axis < 3; ++axis) negative_[axis] = packet.kind.negative(axis);
     }
 
+public:
     void trace() {
         find_reach();
         stack_.words[0] = 0;
@@ -42,19 +85,19 @@ public:
             --top;
             if (!(stack_.entries[top] <= reach_)) continue;
             std::uint64_t active = stack_.active[top];
-            if constexpr (any) active &= ~triangles_.found();
+            if constexpr (any) active &= ~leaves_.found();
             if (active == 0) continue;
             const std::uint32_t word = stack_.words[top];
             if ((word & wide_leaf_bit) != 0) {
                 test_leaf(word, active);
-                if (any && triangles_.found() == all_rays()) return;
+                if (any && leaves_.found() == all_rays()) return;
             } else {
                 top = visit(tree_.template node<compact>(word), active, top);
             }
         }
     }
 
-    [[nodiscard]] std::uint64_t found() const { return triangles_.found(); }
+    [[nodiscard]] std::uint64_t found() const { return leaves_.found(); }
 
 private:
     using V = hn::Vec<F16>;
@@ -200,7 +243,7 @@ private:
         }
         for (std::uint32_t c = 0; c < child_count; ++c) {
             const std::uint32_t s = order[c];
-            ask_for<compact>(tree_, node.child[s]);
+            if constexpr (!has_parts) ask_for<compact>(tree_, node.child[s]);
             stack_.words[top] = node.child[s];
             stack_.entries[top] = entries[s];
             stack_.active[top] = hit[c] & active;
@@ -281,7 +324,7 @@ private:
         const std::uint32_t child_count = order_of(met, entries, order);
         for (std::uint32_t c = 0; c < child_count; ++c) {
             const std::uint32_t s = order[c];
-            ask_for<compact>(tree_, node.child[s]);
+            if constexpr (!has_parts) ask_for<compact>(tree_, node.child[s]);
             stack_.words[top] = node.child[s];
             stack_.entries[top] = entries[s];
             stack_.active[top++] = sets[s];
@@ -296,15 +339,21 @@ private:
 
     void test_leaf(std::uint32_t word, std::uint64_t active) {
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
-        const TriangleBlock& block = tree_.template block<compact>(place);
-        if constexpr (counting)
-            counts_.tests += count * static_cast<std::uint64_t>(std::popcount(active));
-        if (triangles_.test(block, place % block_lanes, count, active) && !any) find_reach();
+        if constexpr (has_parts) {
+            for (std::uint32_t part = place; part < place + count; ++part)
+                leaves_.visit(part, active & ~leaves_.found());
+            if (!any) find_reach();
+        } else {
+            const TriangleBlock& block = tree_.template block<compact>(place);
+            if constexpr (counting)
+                counts_.tests += count * static_cast<std::uint64_t>(std::popcount(active));
+            if (leaves_.test(block, place % block_lanes, count, active) && !any) find_reach();
+        }
     }
 
     const WideView& tree_;
     Packet& p_;
-    PacketTriangles<any> triangles_;
+    Leaves leaves_;
     const PacketStackView stack_;
     SimdCounts& counts_;
     bool negative_[3];

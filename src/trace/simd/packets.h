@@ -80,7 +80,7 @@ inline void largest_pad(const WideView& tree, const float* least, const float* l
 /// `count` repeat others.
 template <class Read>
 HWY_INLINE void fill_packet(const WideView& tree, const Read& read, std::uint32_t count,
-                            std::uint32_t code, Packet& p) {
+                            std::uint32_t code, Packet& p, PadGrowth growth = {}) {
     using V = V16;
     p.count = count;
     p.kind = ray_class_of(code);
@@ -131,7 +131,7 @@ HWY_INLINE void fill_packet(const WideView& tree, const Read& read, std::uint32_
     p.one_origin = true;
     for (int a = 0; a < 3; ++a) p.one_origin = p.one_origin && p.origin_lo[a] == p.origin_hi[a];
     p.least_tmin = hn::GetLane(hn::MinOfLanes(f16, least_tmin));
-    largest_pad(tree, p.origin_lo, p.origin_hi, p.kind.kz, packet_pad_factor, p.pad);
+    largest_pad(tree, p.origin_lo, p.origin_hi, p.kind.kz, packet_pad_factor, p.pad, growth);
     for (int a = 0; a < 3; ++a) {
         const V pad = hn::Set(f16, p.kind.negative(a) ? p.pad[a] : -p.pad[a]);
         for (std::size_t i = 0; i < count; i += lanes16) {
