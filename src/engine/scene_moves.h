@@ -42,10 +42,16 @@ struct HalfOfRays {
         const H h;
         const auto size = [&](int a) { return hn::Abs(weights::rounded(D(), direction[a])); };
         const auto longest = hn::Max(hn::Max(size(0), size(1)), size(2));
-        return hn::AllTrue(h, hn::And(hn::Gt(longest, hn::Set(h, 0x1p-3f)),
-                                      hn::Lt(longest, hn::Set(h, 0x1p3f))));
+        return hn::AllTrue(
+            h, hn::And(hn::Gt(longest, hn::Set(h, 0x1p-3f)), hn::Lt(longest, hn::Set(h, 0x1p3f))));
     }
 };
+
+/// Whether rays of these classes are all valid and near unit length.
+HWY_INLINE bool all_usual(hn::Vec<I16> codes) {
+    const auto odd = hn::Set(I16(), static_cast<std::int32_t>(odd_ray_class));
+    return hn::AllTrue(I16(), hn::Ne(codes, odd));
+}
 
 /// Into a placed scene. False, and nothing, if any of them needs another scale, or can hit nothing
 /// there.
@@ -81,9 +87,7 @@ HWY_INLINE bool move_rays(const SceneTree& scene, const PlacedScene& placed, Ray
         out.place[a] = hn::Load(f16, place[a]);
         out.way[a] = hn::Load(f16, way[a]);
     }
-    const auto odd =
-        hn::Eq(classify(out), hn::Set(I16(), static_cast<std::int32_t>(odd_ray_class)));
-    if (!hn::AllFalse(I16(), odd)) return false;
+    if (!all_usual(classify(out))) return false;
     rays = out;
     return true;
 }

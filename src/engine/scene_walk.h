@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 #include "engine/scene_job.h"
 #include "engine/scene_moves.h"
@@ -85,11 +86,32 @@ private:
     }
     void together() {
         SceneLevel& first = job_.level(0);
-        first.begin(job_.n, false);
-        for (std::size_t k = 0; k < job_.n; ++k)
+        first.begin(job_.n + lanes16, false);
+        std::size_t k = 0;
+        if (job_.order == nullptr && job_.masks == nullptr && job_.mask != 0)
+            for (; k + lanes16 <= job_.n; k += lanes16)
+                if (!start_vector(k, first)) start_each(k, k + lanes16, first);
+        start_each(k, job_.n, first);
+        walk(0, *job_.tree, 0);
+    }
+    void start_each(std::size_t begin, std::size_t end, SceneLevel& first) {
+        for (std::size_t k = begin; k < end; ++k)
             if (const Ray* const ray = start(k))
                 add_first(first, *ray, static_cast<std::uint32_t>(k));
-        walk(0, *job_.tree, 0);
+    }
+    /// Rays k to k + lanes16 - 1, if all of them are valid and near unit length.
+    HWY_INLINE bool start_vector(std::size_t k, SceneLevel& first) {
+        HWY_ALIGN static constexpr std::int32_t index[16] = {0, 1, 2,  3,  4,  5,  6,  7,
+                                                             8, 9, 10, 11, 12, 13, 14, 15};
+        const Ray* const rays = job_.rays + k;
+        if (!all_usual(classify(read_rays(rays, index)))) return false;
+        std::copy_n(rays, lanes16, first.rays.data() + first.count);
+        for (std::size_t l = 0; l < lanes16; ++l) {
+            job_.limits[k + l] = {rays[l].tmin, rays[l].tmax, job_.mask};
+            first.sources[first.count + l] = {1.0, static_cast<std::uint32_t>(k + l)};
+        }
+        first.count += lanes16;
+        return true;
     }
 
     /// What takes rays on at the leaves of a tree over parts (single.h).
@@ -254,8 +276,25 @@ private:
                            &level.parts_memory,
                            false};
         Parts parts(*this, place, tree);
+        std::uint32_t done = 0;
+        if (job_.packets) {
+            // Windows of one class go as they are, as in packets.h.
+            HWY_ALIGN std::int32_t index[packet_size];
+            for (; done + packet_size <= level.count; done += packet_size) {
+                std::iota(index, index + packet_size, static_cast<std::int32_t>(done));
+                const std::uint32_t code = class_of(rays.rays, index);
+                if (code == odd_ray_class) break;
+                walk_packets(rays, tree, parts, index, packet_size, code);
+            }
+        }
+        if (done == level.count) return;
+        level.seen.resize(level.count);
+        std::iota(level.seen.begin(), level.seen.end(), 0u);
+        SimdJob rest = rays;
+        rest.order = level.seen.data() + done;
+        rest.n = level.count - done;
         RaySorter sorter;
-        sorter.sort(rays);
+        sorter.sort(rest);
         for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
             const std::uint32_t count = sorter.count(code);
             if (count == 0) continue;
@@ -264,6 +303,16 @@ private:
             else
                 walk_stream(rays, tree, parts, sorter.rays(code), count, code);
         }
+    }
+    /// Of a packet's rays; odd_ray_class if they differ.
+    static HWY_INLINE std::uint32_t class_of(const Ray* rays, const std::int32_t* index) {
+        const auto first = classify(read_rays(rays, index));
+        const auto code = hn::Set(I16(), hn::GetLane(first));
+        auto same = hn::Eq(first, code);
+        for (std::size_t i = lanes16; i < packet_size; i += lanes16)
+            same = hn::And(same, hn::Eq(classify(read_rays(rays, index + i)), code));
+        return hn::AllTrue(I16(), same) ? static_cast<std::uint32_t>(hn::GetLane(code))
+                                        : odd_ray_class;
     }
     void walk_packets(const SimdJob& rays, const PartTree& tree, Parts& parts,
                       const std::int32_t* index, std::uint32_t count, std::uint32_t code) {
