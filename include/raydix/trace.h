@@ -16,9 +16,9 @@ enum class TraceKernel : std::uint32_t { scalar = 0, simd = 1 };
 
 /// How `simd` takes a batch through a wide tree. The hits do not depend on it.
 enum class SimdPath : std::uint32_t {
-    automatic = 0,  // what the order of the batch suggests; of large batches, packets in place
-                    // of streams, sorted or not, where they take less time
-    single = 1,     // one ray at a time
+    automatic = 0,  // what the order of the batch suggests; large batches try others, and go on
+                    // with the one that takes least time
+    single = 1,     // each ray alone, some of them in turn
     packet = 2,     // 64 neighbours together, with bounds around all of them
     stream = 3,     // thousands together: each node is tested with all rays that reach it
     sorted = 4,     // streams of rays that are neighbours in space, whatever their order
