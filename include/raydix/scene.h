@@ -56,7 +56,8 @@ struct SceneOptions {
     bool compact = false;  // the small layout (WideBvhOptions::compact); no effect in double
     int threads = 0;       // 0 to 1,024; 0: all the machine has. Hits do not depend on it
     /// Usage::moving: a mesh whose vertices moved keeps its tree, with boxes fitted again, while
-    /// the tree's SAH is at most so many times that at its build. Below 1: it is always built
+    /// the tree's SAH is at most so many times that at its build. So does the tree over meshes and
+    /// instances while it holds as many of them. Below 1: it is always built
     /// again. So are compact trees, those that hold parts of triangles (quality high), and those of
     /// meshes where a triangle comes, goes, gets an area or loses it.
     double refit_limit = 1.5;
@@ -80,10 +81,11 @@ struct CommitReport {
     std::uint64_t triangles = 0;              // of its meshes
     std::uint64_t trees_built = 0;            // of triangles; those that did not change are kept
     std::uint64_t trees_refitted = 0;         // instead
-    double sah_ratio = 1;     // the largest SAH after a refit / at the build; above refit_limit:
-                              // that tree was built again
-    std::uint64_t bytes = 0;  // what rays read of the scene itself
-    std::uint64_t paths = 0;  // instances, counted on every way to them
+    double sah_ratio = 1;  // the largest SAH after a refit / at the build; above refit_limit:
+                           // that tree was built again
+    bool parts_refitted = false;  // the tree over meshes and instances, instead of a new one
+    std::uint64_t bytes = 0;      // what rays read of the scene itself
+    std::uint64_t paths = 0;      // instances, counted on every way to them
 };
 
 /// Meshes, and instances of other scenes, which may hold instances themselves. Changes take effect

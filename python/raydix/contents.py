@@ -217,7 +217,8 @@ class SceneContents:
         -------
         dict: "ms"; "meshes", "instances" and "triangles" of the scene itself; "trees_built",
         "trees_refitted"; "sah_ratio", the largest SAH after a refit over that at the build;
-        "bytes" that rays read of the scene itself; "paths", instances counted on every way to them.
+        "parts_refitted", whether the tree over meshes and instances was refitted; "bytes" that
+        rays read of the scene itself; "paths", instances counted on every way to them.
 
         InputError, the last commit still stands: an instance of a scene that was never committed, a
         scene that reaches beyond 1e12, more than 32 levels of instances or 2**32 - 2 paths.

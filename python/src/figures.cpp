@@ -71,6 +71,7 @@ nb::dict commit_figures(const CommitReport& report) {
     fields["trees_built"] = report.trees_built;
     fields["trees_refitted"] = report.trees_refitted;
     fields["sah_ratio"] = report.sah_ratio;
+    fields["parts_refitted"] = report.parts_refitted;
     fields["bytes"] = report.bytes;
     fields["paths"] = report.paths;
     return fields;

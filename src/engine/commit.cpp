@@ -75,7 +75,10 @@ public:
         place_instances();
         const ProgressStage top(meshes.part_done(), 1);
         progress_at(0);
-        build_tops(*tree_);
+        const bool may_refit = options_.usage == Usage::moving && options_.refit_limit >= 1 &&
+                               state_.tree != nullptr && state_.tree->quality == options_.quality &&
+                               state_.tree->usage == options_.usage;
+        build_tops(*tree_, may_refit ? state_.tree.get() : nullptr);
         keep_own_meshes();
         report_.instances = tree_->instances.size();
         report_.paths = tree_->paths;
@@ -190,11 +193,12 @@ private:
         own->extents.assign(
             tree_->extents.begin(),
             tree_->extents.begin() + static_cast<std::ptrdiff_t>(tree_->meshes.size()));
-        build_tops(*own);
+        build_tops(*own, nullptr);
         tree_->own_meshes = std::move(own);
     }
 
-    void build_tops(SceneTree& tree) {
+    /// The trees over parts; `last`: that of the last commit, whose nodes may stay; or null.
+    void build_tops(SceneTree& tree, const SceneTree* last) {
         for (const Extent& extent : tree.extents) tree.extent = unite(tree.extent, extent);
         for (const auto& mesh : tree.meshes)
             tree.stack_size =
@@ -205,8 +209,16 @@ private:
         for (std::uint32_t part = 0; part < tree.extents.size(); ++part)
             if (!tree.extents[part].empty())
                 (tree.extents[part].error <= wild_error ? near : wild).push_back(part);
-        build_part_tree(near, tree.extents, quality, tree.near);
-        build_part_tree(wild, tree.extents, quality, tree.wild);
+        const auto make = [&](const std::vector<std::uint32_t>& parts, PartTree SceneTree::*which) {
+            const PartTree* const old = last == nullptr ? nullptr : &(last->*which);
+            if (old != nullptr &&
+                refit_part_tree(*old, parts, tree.extents, options_.refit_limit, tree.*which))
+                report_.parts_refitted = true;
+            else
+                build_part_tree(parts, tree.extents, quality, tree.*which);
+        };
+        make(near, &SceneTree::near);
+        make(wild, &SceneTree::wild);
         tree.stack_size += wide_stack_capacity(
             std::max(tree.near.arrays.stats.max_depth, tree.wild.arrays.stats.max_depth));
         report_.bytes +=

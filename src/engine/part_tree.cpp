@@ -50,6 +50,78 @@ void set_node(std::span<const BvhNode> slots, const Vec3& middle, WideNode& node
     set_boxes_about(middle, boxes, node);
 }
 
+/// Areas of all children's boxes in those of the root's.
+double cost_of(std::span<const double> areas, const Aabb& bounds) {
+    double sum = 0;
+    for (const double area : areas) sum += area;
+    const double root = half_area(bounds);
+    return root > 0 ? sum / root : 0.0;
+}
+
+double area_of(std::span<const BvhNode> slots) {
+    double sum = 0;
+    for (const BvhNode& child : slots)
+        if (!WideTree::is_unused(child)) sum += half_area({child.lo, child.hi});
+    return sum;
+}
+
+void finish(std::span<const std::uint32_t> parts, std::span<const Extent> extents, PartTree& out) {
+    TriangleBlock none;
+    out.view = view_of(out.arrays, none);
+    out.view.room = nullptr;
+    double error = 0;
+    for (const std::uint32_t part : parts) error = std::max(error, extents[part].error);
+    out.growth.rate = std::nextafterf(static_cast<float>(error + float_rounding), infinity);
+    out.growth.least = static_cast<float>(float_rounding * largest_coordinate(out.arrays.bounds));
+}
+
+/// Whether a tree holds these parts, and no others.
+bool holds(const PartTree& tree, std::span<const std::uint32_t> parts) {
+    if (tree.part.size() != parts.size()) return false;
+    std::vector<bool> held(std::size_t{parts.back()} + 1);
+    for (const std::uint32_t part : tree.part) {
+        if (part > parts.back()) return false;
+        held[part] = true;
+    }
+    return std::ranges::all_of(parts, [&](std::uint32_t part) { return held[part]; });
+}
+
+/// The children of a node of `old` around where the parts are now; `boxes` [nodes] has those of
+/// inner children.
+std::array<BvhNode, quantised_width> slots_of(const PartTree& old, std::size_t w,
+                                              std::span<const Extent> extents,
+                                              const std::vector<Aabb>& boxes) {
+    std::array<BvhNode, quantised_width> slots;
+    for (std::size_t s = 0; s < quantised_width; ++s) {
+        const std::uint32_t word = old.arrays.nodes[w].child[s];
+        if (word == wide_no_child) {
+            const Aabb none = empty_box();
+            slots[s] = {none.lo, WideTree::no_child, none.hi, 0};
+        } else if ((word & wide_leaf_bit) != 0) {
+            const std::uint32_t place = (word & ~wide_leaf_bit) >> 3;
+            const Aabb& box = extents[old.part[place]].box;
+            slots[s] = {box.lo, place, box.hi, 1};
+        } else {
+            slots[s] = {boxes[word].lo, word, boxes[word].hi, 0};
+        }
+    }
+    return slots;
+}
+
+/// Where the levels of a tree begin: its nodes are numbered level by level.
+std::vector<std::size_t> levels_of(const PartTree& tree) {
+    std::vector<std::size_t> begins{0, 1};
+    const std::size_t count = tree.arrays.nodes.size();
+    while (begins.back() < count) {
+        std::size_t end = begins.back();
+        for (std::size_t w = begins[begins.size() - 2]; w < begins.back(); ++w)
+            for (const std::uint32_t word : tree.arrays.nodes[w].child)
+                if ((word & wide_leaf_bit) == 0) end = std::max<std::size_t>(end, word + 1);
+        begins.push_back(end);
+    }
+    return begins;
+}
+
 }  // namespace
 
 void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
@@ -60,23 +132,55 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
     const WideTree wide = collapse_to_wide(bvh, {.width = quantised_width, .max_leaf = 1});
     out.arrays.set_bounds(bvh.bounds());
     out.arrays.nodes.reset(wide.node_count());
+    std::vector<double> areas(wide.node_count());
     for_each_index(
         wide.node_count(),
         [&](std::size_t w) {
-            set_node(wide.node(static_cast<std::uint32_t>(w)), out.arrays.middle,
-                     out.arrays.nodes[w]);
+            const auto slots = wide.node(static_cast<std::uint32_t>(w));
+            set_node(slots, out.arrays.middle, out.arrays.nodes[w]);
+            areas[w] = area_of(slots);
         },
         256);
     out.arrays.stats.max_depth = wide.max_depth;
+    out.cost_at_build = cost_of(areas, out.arrays.bounds);
     out.part.resize(parts.size());
     for (std::size_t k = 0; k < parts.size(); ++k) out.part[k] = parts[bvh.order()[k]];
-    TriangleBlock none;
-    out.view = view_of(out.arrays, none);
-    out.view.room = nullptr;
-    double error = 0;
-    for (const std::uint32_t part : parts) error = std::max(error, extents[part].error);
-    out.growth.rate = std::nextafterf(static_cast<float>(error + float_rounding), infinity);
-    out.growth.least = static_cast<float>(float_rounding * largest_coordinate(out.arrays.bounds));
+    finish(parts, extents, out);
+}
+
+bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,
+                     std::span<const Extent> extents, double limit, PartTree& out) {
+    if (parts.empty() || !holds(old, parts)) return false;
+    const std::size_t count = old.arrays.nodes.size();
+    Aabb bounds = empty_box();
+    for (const std::uint32_t part : parts) bounds = unite(bounds, extents[part].box);
+    out.arrays.set_bounds(bounds);
+    out.arrays.nodes.reset(count);
+    std::vector<Aabb> boxes(count);
+    std::vector<double> areas(count);
+    const std::vector<std::size_t> levels = levels_of(old);
+    for (std::size_t level = levels.size() - 1; level-- > 0;) {
+        const std::size_t begin = levels[level];
+        for_each_index(
+            levels[level + 1] - begin,
+            [&](std::size_t k) {
+                const std::size_t w = begin + k;
+                const auto slots = slots_of(old, w, extents, boxes);
+                Aabb box = empty_box();
+                for (const BvhNode& child : slots) box = unite(box, {child.lo, child.hi});
+                boxes[w] = box;
+                areas[w] = area_of(slots);
+                set_node(slots, out.arrays.middle, out.arrays.nodes[w]);
+            },
+            64);
+    }
+    const double cost = cost_of(areas, bounds);
+    if (!(cost <= limit * old.cost_at_build)) return false;
+    out.cost_at_build = old.cost_at_build;
+    out.arrays.stats.max_depth = old.arrays.stats.max_depth;
+    out.part = old.part;
+    finish(parts, extents, out);
+    return true;
 }
 
 }  // namespace raydix

@@ -74,6 +74,7 @@ struct PartTree {
     WideView view{};
     std::vector<std::uint32_t> part;  // by the place that leaves name
     PadGrowth growth;
+    double cost_at_build = 0;  // areas of all children's boxes in those of the root's
 
     [[nodiscard]] bool empty() const { return part.empty(); }
 };

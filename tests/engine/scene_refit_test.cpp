@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -50,6 +51,83 @@ Mesh sheet(std::uint32_t side, float height, float phase) {
         }
     mesh.triangles.push_back({0, 1, 1});
     return mesh;
+}
+
+Transform placed(test::Random& random, Vec3 at) {
+    Transform t;
+    for (auto& row : t.m)
+        for (int c = 0; c < 3; ++c) row[c] = random.between(-0.2f, 0.2f);
+    for (int a = 0; a < 3; ++a) t.m[a][a] += 0.4f;
+    t.m[0][3] = at.x, t.m[1][3] = at.y, t.m[2][3] = at.z;
+    return t;
+}
+
+TEST(SceneRefit, MovedInstancesRefitTheTreeOverPartsWhileItIsGood) {
+    test::Random random(17);
+    const Scene leaf(sheet(6, 0.3f, 0));
+    const SceneOptions moving{.usage = Usage::moving};
+    constexpr std::uint32_t side = 9, count = side * side * side;
+    const auto home = [&](std::uint32_t k, float by) {
+        const auto at = [&](std::uint32_t n) {
+            return static_cast<float>(n) + random.between(-by, by);
+        };
+        return Vec3{at(k % side), at(k / side % side), at(k / side / side)};
+    };
+    Scene scene;
+    std::map<std::uint32_t, Transform> places;
+    const auto add = [&](Vec3 at) {
+        const Transform place = placed(random, at);
+        places[scene.add(leaf, place)] = place;
+    };
+    const auto move = [&](std::uint32_t id, Vec3 at) {
+        places[id] = placed(random, at);
+        scene.set_transform(id, places[id]);
+    };
+    scene.add(sheet(20, 0.5f, 1));  // a part of its own
+    for (std::uint32_t k = 0; k < count; ++k) add(home(k, 0.2f));
+    std::vector<Ray> rays;
+    for (int i = 0; i < 3000; ++i) {
+        const Vec3 from = random.in(-1, side), to = random.in(-1, side);
+        rays.push_back({from, 0, {to.x - from.x, to.y - from.y, to.z - from.z}});
+    }
+    EXPECT_FALSE(scene.commit(moving).parts_refitted);
+    const auto commit = [&](const SceneOptions& options, bool refitted, const char* what) {
+        SCOPED_TRACE(what);
+        EXPECT_EQ(scene.commit(options).parts_refitted, refitted);
+        Scene fresh;  // the same geometries
+        fresh.add(sheet(20, 0.5f, 1));
+        for (const auto& [id, place] : places) fresh.add(leaf, place, {.id = id});
+        fresh.commit({.usage = Usage::fixed});
+        const std::vector<Hit> hits = trace(scene, rays), wanted = trace(fresh, rays);
+        std::size_t different = 0, found = 0;
+        for (std::size_t i = 0; i < rays.size(); ++i)
+            different += !same(hits[i], wanted[i]), found += hits[i].hit();
+        EXPECT_EQ(different, 0u);
+        EXPECT_GT(found, rays.size() / 2);
+        const Aabb box = scene.bounds(), other = fresh.bounds();
+        EXPECT_EQ(std::memcmp(&box, &other, sizeof box), 0);
+    };
+    commit(moving, true, "nothing moved");
+    for (int turn = 0; turn < 3; ++turn) {
+        for (std::uint32_t k = 0; k < count; ++k) move(k + 1, home(k, 0.4f));
+        commit(moving, true, "a little");
+    }
+    for (std::uint32_t k = 0; k < count; ++k) move(k + 1, random.in(0, side));
+    commit(moving, false, "to other places");
+    SceneOptions other = moving;
+    other.refit_limit = 1e9;
+    for (std::uint32_t k = 0; k < count; ++k) move(k + 1, home(k, 0.2f));
+    commit(other, true, "a limit out of reach");
+    other.refit_limit = 0;
+    commit(other, false, "never");
+    commit({.usage = Usage::fixed}, false, "another usage");
+    commit(moving, false, "and back");
+    add(home(0, 0.2f));
+    commit(moving, false, "one more");
+    scene.remove(5);
+    places.erase(5);
+    commit(moving, false, "one less");
+    commit(moving, true, "as it is");
 }
 
 TEST(SceneRefit, MovedVerticesRefitATreeWhileItIsGood) {
