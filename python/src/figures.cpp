@@ -41,10 +41,18 @@ nb::dict wide_figures(const WideBvhStats& stats) {
     return fields;
 }
 
-nb::tuple corners(const Aabb& box) {
+namespace {
+
+template <class Box>
+nb::tuple corners_of(const Box& box) {
     return nb::make_tuple(nb::make_tuple(box.lo.x, box.lo.y, box.lo.z),
                           nb::make_tuple(box.hi.x, box.hi.y, box.hi.z));
 }
+
+}  // namespace
+
+nb::tuple corners(const Aabb& box) { return corners_of(box); }
+nb::tuple corners(const AabbD& box) { return corners_of(box); }
 
 nb::dict mesh_figures(const MeshInfo& info) {
     nb::dict fields;

@@ -19,5 +19,6 @@ namespace raydix::python {
 [[nodiscard]] nanobind::dict camera_figures(const Camera& camera);
 [[nodiscard]] nanobind::dict stage_ms(const BuildMs& ms);
 [[nodiscard]] nanobind::tuple corners(const Aabb& box);
+[[nodiscard]] nanobind::tuple corners(const AabbD& box);
 
 }  // namespace raydix::python
