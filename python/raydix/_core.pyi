@@ -73,6 +73,12 @@ class SceneTrees:
 
     def path(self, number: int) -> list[int]: ...
 
+    def save_rdx(self, file: str, name: str, cameras: Sequence[tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], float, str]]) -> None: ...
+
+    @staticmethod
+    def load_rdx(file: str, threads: int) -> tuple:
+        """As load, of a .rdx file."""
+
     @staticmethod
     def load(spec: str, seed: int, builder: str, reinsertion_rounds: int, bits: int, max_leaf: int, strict: bool, threads: int, quality: str, usage: str, compact: bool) -> tuple:
         """The scene, its name, and its cameras' fields."""

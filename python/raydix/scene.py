@@ -96,7 +96,7 @@ class Scene(SceneContents, SceneViews):
     them.
 
     With precision "float64" these raise NotImplementedError: compact=True, `positions`, `normals`,
-    `render`, `cameras`, `primary_rays`, `secondary_rays`, `info`, `wide_stats` and
+    `render`, `cameras`, `primary_rays`, `secondary_rays`, `save`, `info`, `wide_stats` and
     `raydix.simulate`. There device="cuda" raises BackendUnavailable; files raise ValueError,
     because they are read in float32. Instances are of scenes in float64 too: others raise
     TypeError. Numbers other than 0 below 2**-500 count as 0.
@@ -493,6 +493,17 @@ class Scene(SceneContents, SceneViews):
         self._forget()
         return self._core.refit(corners, self.threads)
 
+    def save(self, file: str | os.PathLike) -> None:
+        """Writes the scene to a .rdx file, as its last commit left it: its trees, all scenes that
+        it places, each once, with ids and masks, its name and its cameras. `load_scene` reads it.
+
+        A reader never sees half a file. InputError: changes without a commit, a file that cannot be
+        written. NotImplementedError: a scene in float64.
+        """
+        require_float32(self, "save")
+        cameras = [camera._fields() for camera in self._cameras]
+        self._core.save_rdx(os.fspath(file), self.name, cameras)
+
     def info(self) -> dict[str, Any]:
         """Counts, bounds and degenerate elements of the mesh."""
         require_float32(self, "info")
@@ -521,3 +532,19 @@ class Scene(SceneContents, SceneViews):
         ok, broken = self._core.check()
         if not ok:
             raise RuntimeError(broken)
+
+
+def load_scene(file: str | os.PathLike, *, threads: int = 0, device: str = "cpu") -> Scene:
+    """The scene that `Scene.save` wrote, committed: with its name, its cameras, and the options of
+    its last commit. Nothing is built; rays have the same hits.
+
+    The file is checked and mapped: processes that load it share the memory of its trees. It may be
+    deleted, but not changed, while a scene uses it. `threads` and `device` as in `Scene`.
+
+    InputError that names the file and what is wrong with it; so for a .rdx file that holds a tree
+    and no scene.
+    """
+    scene = Scene(threads=threads, device=device)
+    scene._core, scene.name, cameras = _core.SceneTrees.load_rdx(os.fspath(file), scene.threads)
+    scene._cameras = [Camera(**camera) for camera in cameras]
+    return scene

@@ -95,6 +95,16 @@ nb::dict camera_figures(const Camera& camera) {
     return fields;
 }
 
+Vec3 vec3(const Coordinates& c) { return {std::get<0>(c), std::get<1>(c), std::get<2>(c)}; }
+
+Camera camera_of(const CameraFields& fields) {
+    return {.name = std::get<4>(fields),
+            .position = vec3(std::get<0>(fields)),
+            .target = vec3(std::get<1>(fields)),
+            .up = vec3(std::get<2>(fields)),
+            .vfov = std::get<3>(fields)};
+}
+
 nb::dict stage_ms(const BuildMs& ms) {
     nb::dict fields;
     fields["bounds"] = ms.bounds;

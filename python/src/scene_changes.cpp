@@ -5,10 +5,12 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 #include <raydix/camera.h>
 #include <raydix/error.h>
 #include <raydix/model.h>
+#include <raydix/rdx.h>
 
 #include <cstdint>
 #include <functional>
@@ -83,6 +85,21 @@ MeshArrays<Names> copy_of(const Points& vertices, const FacesIn& faces) {
             std::make_shared<const typename Arrays::Triangles>(triangles.begin(), triangles.end())};
 }
 
+/// call() without the interpreter's lock, while the scene stays as it is.
+template <class Scene, class Call>
+auto while_reading(Scene& scene, const Call& call) {
+    const nb::gil_scoped_release unlocked;
+    const Reading lock = scene.read();
+    return call();
+}
+
+nb::tuple named(const std::shared_ptr<SceneTrees>& scene, const std::string& name,
+                const std::vector<Camera>& shown) {
+    nb::list cameras;
+    for (const Camera& camera : shown) cameras.append(camera_figures(camera));
+    return nb::make_tuple(scene, name, cameras);
+}
+
 /// What a file holds, and what belongs to it.
 nb::tuple load(const std::string& spec, std::uint64_t seed, const std::string& builder,
                int reinsertion_rounds, int bits, int max_leaf, bool strict, int threads,
@@ -100,9 +117,32 @@ nb::tuple load(const std::string& spec, std::uint64_t seed, const std::string& b
         shown = std::move(model.cameras.cameras);
         scene = std::make_shared<SceneTrees>(std::move(model), trees, commits);
     }
-    nb::list cameras;
-    for (const Camera& camera : shown) cameras.append(camera_figures(camera));
-    return nb::make_tuple(scene, name, cameras);
+    return named(scene, name, shown);
+}
+
+/// The same of a .rdx file, with the options that it was saved with.
+nb::tuple load_rdx(const std::string& file, int threads) {
+    std::string name;
+    std::vector<Camera> shown;
+    std::shared_ptr<SceneTrees> scene;
+    {
+        const nb::gil_scoped_release unlocked;
+        RdxScene loaded = load_rdx_scene(file);
+        name = loaded.name;
+        shown = std::move(loaded.cameras.cameras);
+        loaded.options.threads = threads;
+        BuildOptions trees = build_options_for(loaded.options.quality);
+        trees.threads = threads;
+        scene = std::make_shared<SceneTrees>(std::move(loaded), trees);
+    }
+    return named(scene, name, shown);
+}
+
+void save_rdx(SceneTrees& self, const std::string& file, const std::string& name,
+              const std::vector<CameraFields>& cameras) {
+    CameraSet shown;
+    for (const CameraFields& camera : cameras) shown.cameras.push_back(camera_of(camera));
+    while_reading(self, [&] { raydix::save_rdx(file, self.traced(), name, shown); });
 }
 
 template <class Scene>
@@ -196,14 +236,6 @@ nb::dict refit(Scene& scene, const PointRows<Scene>& vertices, int threads) {
     fields["sah_at_build"] = quality.sah_at_build;
     fields["ratio"] = quality.ratio;
     return fields;
-}
-
-/// call() without the interpreter's lock, while the scene stays as it is.
-template <class Scene, class Call>
-auto while_reading(Scene& scene, const Call& call) {
-    const nb::gil_scoped_release unlocked;
-    const Reading lock = scene.read();
-    return call();
 }
 
 /// What a scene of either type says of itself.
@@ -302,10 +334,13 @@ template void bind_changes(nb::class_<SceneTrees>& scene);
 template void bind_changes(nb::class_<SceneTreesD>& scene);
 
 void bind_files(nb::class_<SceneTrees>& scene) {
-    scene.def_static("load", &load, nb::arg("spec"), nb::arg("seed"), nb::arg("builder"),
-                     nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
-                     nb::arg("strict"), nb::arg("threads"), nb::arg("quality"), nb::arg("usage"),
-                     nb::arg("compact"), "The scene, its name, and its cameras' fields.");
+    scene.def("save_rdx", &save_rdx, nb::arg("file"), nb::arg("name"), nb::arg("cameras"))
+        .def_static("load_rdx", &load_rdx, nb::arg("file"), nb::arg("threads"),
+                    "As load, of a .rdx file.")
+        .def_static("load", &load, nb::arg("spec"), nb::arg("seed"), nb::arg("builder"),
+                    nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
+                    nb::arg("strict"), nb::arg("threads"), nb::arg("quality"), nb::arg("usage"),
+                    nb::arg("compact"), "The scene, its name, and its cameras' fields.");
 }
 
 }  // namespace raydix::python

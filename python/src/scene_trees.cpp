@@ -110,10 +110,37 @@ BasicSceneTrees<Names>::BasicSceneTrees(
         // meshes.
         for (std::size_t k = 0; k < model.nodes.size(); ++k) {
             const auto id = static_cast<std::uint32_t>(model.meshes.size() + k);
-            if (scene_.contains(id)) geometries_[id] = {true, 0xFFFFFFFFu, {}, nullptr};
+            if (scene_.contains(id)) geometries_[id] = {.is_instance = true};
         }
     }
     look_for_mesh();
+}
+
+template <class Names>
+BasicSceneTrees<Names>::BasicSceneTrees(
+    RdxScene file, const BuildOptions& trees) requires std::same_as<Names, InFloat>
+    : BasicSceneTrees(trees, file.options) {
+    scene_ = std::move(file.scene);
+    for (const std::uint32_t id : scene_.ids()) {
+        const bool is_instance = !scene_.mesh(id).has_value();
+        geometries_[id] = {
+            .is_instance = is_instance, .mask = scene_.mask(id), .is_in_file = !is_instance};
+    }
+    look_for_mesh();
+}
+
+template <class Names>
+const typename BasicSceneTrees<Names>::Arrays& BasicSceneTrees<Names>::arrays_of(
+    std::uint32_t id, Geometry& geometry) {
+    if (geometry.is_in_file) {
+        const auto mesh = *scene_.mesh(id);
+        geometry.mesh = {
+            std::make_shared<const Vertices>(mesh.vertices.begin(), mesh.vertices.end()),
+            std::make_shared<const typename Arrays::Triangles>(mesh.triangles.begin(),
+                                                               mesh.triangles.end())};
+        geometry.is_in_file = false;
+    }
+    return geometry.mesh;
 }
 
 template <class Names>
@@ -143,7 +170,7 @@ std::uint32_t BasicSceneTrees<Names>::add(Arrays mesh, const GeometryOptions& op
     check_strict("mesh", mesh.view());
     const std::lock_guard all(structure());
     const std::uint32_t id = scene_.share(mesh.view(), options);
-    geometries_[id] = {false, options.mask, std::move(mesh), nullptr};
+    geometries_[id] = {.mask = options.mask, .mesh = std::move(mesh)};
     return id;
 }
 
@@ -161,7 +188,7 @@ std::vector<std::uint32_t> BasicSceneTrees<Names>::add(std::shared_ptr<BasicScen
         for (std::size_t i = 0; i < transforms.size(); ++i) {
             const std::uint32_t mask = masks[masks.size() == 1 ? 0 : i];
             ids.push_back(scene_.add(scene->scene_, transforms[i], {mask, id}));
-            geometries_[ids.back()] = {true, mask, {}, scene};
+            geometries_[ids.back()] = {.is_instance = true, .mask = mask, .scene = scene};
             id.reset();
         }
     } catch (...) {
@@ -190,12 +217,14 @@ void BasicSceneTrees<Names>::update(std::uint32_t id, Vertices vertices,
     Geometry& geometry = at(id);
     if (geometry.is_instance) throw InputError(name_of(id) + " is an instance, not a mesh");
     settle();
-    Arrays mesh{std::make_shared<const Vertices>(std::move(vertices)), geometry.mesh.triangles};
+    Arrays mesh{std::make_shared<const Vertices>(std::move(vertices)),
+                arrays_of(id, geometry).triangles};
     if (triangles)
         mesh.triangles = std::make_shared<const typename Arrays::Triangles>(std::move(*triangles));
     check_strict(name_of(id), mesh.view());
     scene_.update(id, mesh.view());
     geometry.mesh = std::move(mesh);
+    geometry.is_in_file = false;
 }
 
 template <class Names>
@@ -281,7 +310,7 @@ void BasicSceneTrees<Names>::look_for_mesh() {
     if (geometries_.size() == 1 && !geometries_.begin()->second.is_instance) {
         mesh_id_ = geometries_.begin()->first;
         mesh_mask_ = geometries_.begin()->second.mask;
-        found = geometries_.begin()->second.mesh;
+        found = arrays_of(*mesh_id_, geometries_.begin()->second);
     } else if (!geometries_.empty()) {
         const auto is_instance = [](const auto& entry) { return entry.second.is_instance; };
         const auto instance = std::ranges::find_if(geometries_, is_instance);

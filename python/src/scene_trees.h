@@ -6,6 +6,7 @@
 #include <raydix/double.h>
 #include <raydix/mesh.h>
 #include <raydix/model.h>
+#include <raydix/rdx.h>
 #include <raydix/refit.h>
 #include <raydix/scene.h>
 #include <raydix/solid.h>
@@ -177,6 +178,8 @@ public:
     /// without nodes, wait for their first ray or change as above.
     BasicSceneTrees(Model model, const BuildOptions& trees,
                     const SceneOptions& commits) requires std::same_as<Names, InFloat>;
+    /// What a .rdx file holds, with the options of its commits.
+    BasicSceneTrees(RdxScene file, const BuildOptions& trees) requires std::same_as<Names, InFloat>;
 
     // Changes: as those of raydix::Scene.
     std::uint32_t add(Arrays mesh, const GeometryOptions& options);
@@ -232,15 +235,19 @@ private:
         std::vector<std::shared_ptr<const Kept>> below;
     };
     struct Geometry {
-        bool is_instance;
-        std::uint32_t mask;
-        Arrays mesh;
-        std::shared_ptr<BasicSceneTrees> scene;  // of an instance; null if it comes from a file
+        bool is_instance = false;
+        std::uint32_t mask = 0xFFFFFFFFu;
+        Arrays mesh = {};  // empty while `is_in_file`
+        std::shared_ptr<BasicSceneTrees> scene =
+            {};                   // of an instance; null if it comes from a file
+        bool is_in_file = false;  // the arrays of the mesh are those that the scene came with
     };
 
     void check_strict(const std::string& name, const typename Names::MeshView& mesh) const;
     void check_places(std::span<const std::uint32_t> ids, std::span<const Transform> transforms);
     Geometry& at(std::uint32_t id);
+    /// Of a mesh: its arrays, copied if they are still those of a file.
+    const Arrays& arrays_of(std::uint32_t id, Geometry& geometry);
     /// While writing, or with `build_` locked: the first commit of a scene that was made from a
     /// mesh.
     void settle();

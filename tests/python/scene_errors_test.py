@@ -172,6 +172,7 @@ def test_what_float64_scenes_lack():
         "compact=True ": lambda: scene.commit(compact=True),
         "positions": lambda: scene.positions(hits),
         "normals": lambda: scene.normals(hits),
+        "save": lambda: scene.save("scene.rdx"),
     }.items():
         text = f"^{name.strip()}: not there .* float64"
         with pytest.raises(NotImplementedError, match=text):
