@@ -108,8 +108,8 @@ class SceneContents:
         ----------
         transform :
             Shape (3, 4) or (4, 4), affine, from the other scene's space to this one's; rounded to
-            the scene's type. It may mirror and shear, but not flatten. Shape (M, 3, 4) or (M, 4, 4) places
-            the scene M times.
+            the scene's type. It may mirror and shear, but not flatten. Shape (M, 3, 4) or (M, 4, 4)
+            places the scene M times.
         mask :
             32 bits. A ray sees the geometry if mask & its own mask is not 0. For M transforms also
             shape (M,).
