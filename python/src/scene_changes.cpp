@@ -115,7 +115,7 @@ nb::tuple load(const std::string& spec, std::uint64_t seed, const std::string& b
         Model model = load_model(spec, seed);
         name = model.name;
         shown = std::move(model.cameras.cameras);
-        scene = std::make_shared<SceneTrees>(std::move(model), trees, commits);
+        scene = SceneFiles::scene_of(std::move(model), trees, commits);
     }
     return named(scene, name, shown);
 }
@@ -133,7 +133,7 @@ nb::tuple load_rdx(const std::string& file, int threads) {
         loaded.options.threads = threads;
         BuildOptions trees = build_options_for(loaded.options.quality);
         trees.threads = threads;
-        scene = std::make_shared<SceneTrees>(std::move(loaded), trees);
+        scene = SceneFiles::scene_of(std::move(loaded), trees);
     }
     return named(scene, name, shown);
 }

@@ -85,51 +85,6 @@ BasicSceneTrees<Names>::BasicSceneTrees(Arrays mesh, const BuildOptions& trees,
 }
 
 template <class Names>
-BasicSceneTrees<Names>::BasicSceneTrees(
-    Model model, const BuildOptions& trees,
-    const SceneOptions& commits) requires std::same_as<Names, InFloat>
-    : BasicSceneTrees(trees, commits) {
-    if (model.nodes.empty()) {
-        if (model.meshes.empty()) model.meshes.emplace_back();
-        Kept kept;
-        for (Mesh& mesh : model.meshes) {
-            const Arrays arrays{
-                std::make_shared<const Vertices>(std::move(mesh.vertices)),
-                std::make_shared<const typename Arrays::Triangles>(std::move(mesh.triangles))};
-            kept.meshes.push_back(arrays);
-            static_cast<void>(add(arrays, {}));
-        }
-        kept_ = std::make_shared<const Kept>(std::move(kept));
-        unsettled_ = true;
-    } else {
-        for (const Mesh& mesh : model.meshes) check_strict("mesh " + mesh.name, mesh);
-        SceneOptions options = commits;
-        options.threads = threads_for(options.threads);
-        scene_ = Scene(model, options);
-        // Its geometries are the nodes that stand in the world. Ids of nodes follow those of
-        // meshes.
-        for (std::size_t k = 0; k < model.nodes.size(); ++k) {
-            const auto id = static_cast<std::uint32_t>(model.meshes.size() + k);
-            if (scene_.contains(id)) geometries_[id] = {.is_instance = true};
-        }
-    }
-    look_for_mesh();
-}
-
-template <class Names>
-BasicSceneTrees<Names>::BasicSceneTrees(
-    RdxScene file, const BuildOptions& trees) requires std::same_as<Names, InFloat>
-    : BasicSceneTrees(trees, file.options) {
-    scene_ = std::move(file.scene);
-    for (const std::uint32_t id : scene_.ids()) {
-        const bool is_instance = !scene_.mesh(id).has_value();
-        geometries_[id] = {
-            .is_instance = is_instance, .mask = scene_.mask(id), .is_in_file = !is_instance};
-    }
-    look_for_mesh();
-}
-
-template <class Names>
 const typename BasicSceneTrees<Names>::Arrays& BasicSceneTrees<Names>::arrays_of(
     std::uint32_t id, Geometry& geometry) {
     if (geometry.is_in_file) {

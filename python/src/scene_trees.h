@@ -13,7 +13,6 @@
 #include <raydix/trace.h>
 
 #include <array>
-#include <concepts>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -174,12 +173,6 @@ public:
     /// One mesh with id 0, committed: its wide tree is made when a ray or a change needs it.
     /// Throws InputError: an index past the vertices, with `trees.strict` a triangle left out.
     BasicSceneTrees(Arrays mesh, const BuildOptions& trees, const SceneOptions& commits);
-    /// What a file holds, committed: with ids as raydix::Scene gives them. One mesh, or several
-    /// without nodes, wait for their first ray or change as above.
-    BasicSceneTrees(Model model, const BuildOptions& trees,
-                    const SceneOptions& commits) requires std::same_as<Names, InFloat>;
-    /// What a .rdx file holds, with the options of its commits.
-    BasicSceneTrees(RdxScene file, const BuildOptions& trees) requires std::same_as<Names, InFloat>;
 
     // Changes: as those of raydix::Scene.
     std::uint32_t add(Arrays mesh, const GeometryOptions& options);
@@ -222,6 +215,7 @@ public:
     [[nodiscard]] bool any_hit(const Ray& ray, std::uint32_t mask);
 
 private:
+    friend struct SceneFiles;
     using MeshTrees<Names>::bvh_;
     using MeshTrees<Names>::build_;
     using MeshTrees<Names>::options_;
@@ -268,5 +262,17 @@ extern template class BasicSceneTrees<InFloat>;
 extern template class BasicSceneTrees<InDouble>;
 using SceneTrees = BasicSceneTrees<InFloat>;
 using SceneTreesD = BasicSceneTrees<InDouble>;
+
+/// Scenes of files, which are in float.
+struct SceneFiles {
+    /// What a file holds, committed: with ids as raydix::Scene gives them. One mesh, or several
+    /// without nodes, wait for their first ray or change as a scene of one mesh does.
+    [[nodiscard]] static std::shared_ptr<SceneTrees> scene_of(Model model,
+                                                              const BuildOptions& trees,
+                                                              const SceneOptions& commits);
+    /// What a .rdx file holds, with the options of its commits.
+    [[nodiscard]] static std::shared_ptr<SceneTrees> scene_of(RdxScene file,
+                                                              const BuildOptions& trees);
+};
 
 }  // namespace raydix::python
