@@ -140,6 +140,12 @@ public:
 
     [[nodiscard]] std::uint32_t size() const;  // geometries
     [[nodiscard]] bool contains(std::uint32_t id) const;
+    [[nodiscard]] std::vector<std::uint32_t> ids() const;  // ascending
+    /// The arrays of a mesh, changes without a commit included: valid until its next change. None
+    /// for an instance. Throws InputError if there is no such geometry.
+    [[nodiscard]] std::optional<MeshView> mesh(std::uint32_t id) const;
+    /// Throws InputError if there is no such geometry.
+    [[nodiscard]] std::uint32_t mask(std::uint32_t id) const;
     /// Of the last commit: around all triangles; lo > hi if there are none.
     [[nodiscard]] Box bounds() const;
     /// Of the last commit: the ids of the instances on path `number` of a hit, the outermost first.

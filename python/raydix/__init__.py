@@ -19,7 +19,7 @@ from .cameras import Camera
 from .devices import Device, devices
 from .pictures import save_picture, to_png, to_srgb
 from .points import Points, load_points
-from .scene import Scene
+from .scene import Scene, load_scene
 from .simulator import simulate
 from .trees import Bvh, KdTree, Octree, bvh, kdtree, octree
 
@@ -42,6 +42,7 @@ __all__ = [
     "kdtree",
     "kernels",
     "load_points",
+    "load_scene",
     "machine",
     "machines",
     "octree",

@@ -168,6 +168,14 @@ def require_float32(scene: Any, what: str) -> None:
         )
 
 
+def require_dtype(scene: Any, dtype: np.dtype, name: str) -> None:
+    """TypeError unless a scene that another one, in `dtype`, is given is in that type too."""
+    if scene.dtype != dtype:
+        raise TypeError(
+            f"{name}: expected a scene in {dtype}, as this one, given one in {scene.dtype}"
+        )
+
+
 def mesh_vertices(value: Any, name: str = "vertices", dtype: np.dtype = FLOAT32) -> np.ndarray:
     """(V, 3) of `dtype`. This is the one place where a mesh's float64 coordinates are rounded."""
     array = floats(value, name, (3,))

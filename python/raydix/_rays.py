@@ -14,7 +14,6 @@ from ._arrays import (
     UINT32,
     describe,
     floats,
-    require_float32,
     to_numpy,
     uint32s,
     whole,
@@ -100,20 +99,14 @@ def ray_batch(
 _COLUMNS = ("t", "prim", "u", "v", "geometry", "instance")
 
 
-def ray_masks(
-    scene: Any, mask: Any, masks: Any, lead: tuple[int, ...]
-) -> tuple[int, np.ndarray | None]:
+def ray_masks(mask: Any, masks: Any, lead: tuple[int, ...]) -> tuple[int, np.ndarray | None]:
     """The mask of all rays, or one for each: (n,) uint32."""
     if masks is None and mask is ALL:
         return ALL, None
     if masks is None:
-        wanted = whole(mask, "mask", 0, ALL)
-        if wanted != ALL:
-            require_float32(scene, "mask")
-        return wanted, None
+        return whole(mask, "mask", 0, ALL), None
     if mask != ALL:
         raise ValueError("mask, masks: expected one of them, given both")
-    require_float32(scene, "masks")
     each = uint32s(masks, "masks")
     try:
         each = np.broadcast_to(each, lead)

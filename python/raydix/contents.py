@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, overload
 
 import numpy as np
@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ._arrays import (
     ALL,
-    FLOAT32,
     MISSING,
     UINT32,
     cast,
@@ -18,6 +17,7 @@ from ._arrays import (
     mesh_faces,
     mesh_vertices,
     number,
+    require_dtype,
     require_float32,
     thread_count,
     to_numpy,
@@ -47,8 +47,8 @@ def mesh_of(source: Any) -> tuple[Any, Any]:
     )
 
 
-def _transforms(value: Any) -> tuple[np.ndarray, bool]:
-    """(M, 12) float32, and whether there was one alone."""
+def _transforms(value: Any, dtype: np.dtype) -> tuple[np.ndarray, bool]:
+    """(M, 12) of `dtype`, and whether there was one alone."""
     array = to_numpy(value, "transform")
     expected = "transform: expected shape (3, 4), (4, 4), (M, 3, 4) or (M, 4, 4)"
     if array.dtype.kind not in "iuf":
@@ -57,7 +57,7 @@ def _transforms(value: Any) -> tuple[np.ndarray, bool]:
         raise ValueError(f"{expected}, given {describe(array)}")
     if array.shape[-2] == 4 and not (array[..., 3, :] == (0, 0, 0, 1)).all():
         raise ValueError("transform: expected affine ones, with (0, 0, 0, 1) in the last row")
-    return cast(array[..., :3, :], FLOAT32).reshape(-1, 12), array.ndim == 2
+    return cast(array[..., :3, :], dtype).reshape(-1, 12), array.ndim == 2
 
 
 def _one_or_many(value: Any, name: str) -> np.ndarray:
@@ -108,8 +108,8 @@ class SceneContents:
         ----------
         transform :
             Shape (3, 4) or (4, 4), affine, from the other scene's space to this one's; rounded to
-            float32. It may mirror and shear, but not flatten. Shape (M, 3, 4) or (M, 4, 4) places
-            the scene M times.
+            the scene's type. It may mirror and shear, but not flatten. Shape (M, 3, 4) or (M, 4, 4)
+            places the scene M times.
         mask :
             32 bits. A ray sees the geometry if mask & its own mask is not 0. For M transforms also
             shape (M,).
@@ -121,20 +121,19 @@ class SceneContents:
         The id; for M transforms M ids, shape (M,) uint32.
 
         Raises InputError: an index past the vertices, an id that was used before, a transform that
-        is singular or not finite, a scene that would hold itself. Of M transforms, all are added or
-        none.
+        is singular or not finite, a scene that would hold itself. TypeError: a scene in another
+        type than this one. Of M transforms, all are added or none.
         """
-        require_float32(self, "add")
         wanted = None if id is None else whole(id, "id", 0, ALL)
         if not isinstance(source, SceneContents):
             vertices, faces = (source, where) if where is not None else mesh_of(source)
-            corners = mesh_vertices(vertices)
+            corners = mesh_vertices(vertices, dtype=self.dtype)
             triangles = mesh_faces(faces, len(corners))
             return self._core.add_mesh(corners, triangles, whole(mask, "mask", 0, ALL), wanted)
-        require_float32(source, "add")
+        require_dtype(source, self.dtype, "scene")
         if where is None:
             raise TypeError("transform: expected shape (3, 4) or (4, 4), given None")
-        rows, one = _transforms(where)
+        rows, one = _transforms(where, self.dtype)
         if wanted is not None and not one:
             raise ValueError(f"id: expected None for {len(rows)} transforms, given {id!r}")
         masks = _one_or_many(mask, "mask")
@@ -149,14 +148,12 @@ class SceneContents:
 
         InputError: no such geometry, an instance, an index past the vertices.
         """
-        require_float32(self, "update")
-        corners = mesh_vertices(vertices)
+        corners = mesh_vertices(vertices, dtype=self.dtype)
         triangles = None if faces is None else mesh_faces(faces, len(corners))
         self._core.update(whole(id, "id", 0, ALL), corners, triangles)
 
     def remove(self, id: int) -> None:
         """Takes a geometry out, from the next `commit` on. Its id is not given again."""
-        require_float32(self, "remove")
         self._core.remove(whole(id, "id", 0, ALL))
 
     def set_transform(self, id: ArrayLike, transform: ArrayLike) -> None:
@@ -166,8 +163,7 @@ class SceneContents:
         InputError: no such geometry, a mesh, a transform that is singular or not finite; then none
         of them has moved.
         """
-        require_float32(self, "set_transform")
-        rows, _ = _transforms(transform)
+        rows, _ = _transforms(transform, self.dtype)
         ids = _one_or_many(id, "id")
         if len(ids) != len(rows):
             raise ValueError(f"transform: expected {len(ids)}, one for each id, given {len(rows)}")
@@ -176,7 +172,6 @@ class SceneContents:
     def set_mask(self, id: ArrayLike, mask: ArrayLike) -> None:
         """Gives a geometry another mask, from the next `commit` on. Or several: ids of shape (M,),
         one mask for all or shape (M,)."""
-        require_float32(self, "set_mask")
         ids, masks = _one_or_many(id, "id"), _one_or_many(mask, "mask")
         if len(masks) not in (1, len(ids)):
             raise ValueError(f"mask: expected one or {len(ids)}, given {len(masks)}")
@@ -190,6 +185,7 @@ class SceneContents:
         compact: bool | None = None,
         refit_limit: float | None = None,
         threads: int | None = None,
+        progress: Callable[[float], Any] | None = None,
     ) -> dict[str, Any]:
         """Takes all changes in: from now on, queries see them. Waits for queries of other threads.
         Ctrl-C ends it and leaves the scene as it was.
@@ -204,7 +200,8 @@ class SceneContents:
             "fixed": meshes share trees, and a change of one builds its tree again. "moving": a tree
             for each mesh; only those of meshes that changed are built or refitted.
         compact :
-            The small layout of trees: half the bytes or less, for somewhat slower rays.
+            The small layout of trees: half the bytes or less, for somewhat slower rays. There is
+            none in float64: True raises NotImplementedError.
         refit_limit :
             With "moving": a mesh whose vertices moved keeps its tree, with boxes fitted again,
             while the tree's SAH (surface area heuristic) is at most so many times that at its
@@ -212,6 +209,10 @@ class SceneContents:
             those of quality "high" with parts of triangles.
         threads :
             As in `Scene`. Hits do not depend on it.
+        progress :
+            Called with the part of the commit that is done, 0 to 1 and at last 1, one call at a
+            time, from any thread. What it raises ends the commit, leaves the scene as it was, and
+            comes out of this call. Scenes that it asks or changes raise InputError.
 
         Returns
         -------
@@ -223,13 +224,17 @@ class SceneContents:
         InputError, the last commit still stands: an instance of a scene that was never committed, a
         scene that reaches beyond 1e12, more than 32 levels of instances or 2**32 - 2 paths.
         """
-        require_float32(self, "commit")
+        if compact:
+            require_float32(self, "compact=True")
+        if progress is not None and not callable(progress):
+            raise TypeError(f"progress: expected a function, given {progress!r}")
         report = self._core.commit(
             quality if quality is None else one_of(quality, "quality", QUALITIES),
             usage if usage is None else one_of(usage, "usage", USAGES),
             None if compact is None else bool(compact),
             None if refit_limit is None else number(refit_limit, "refit_limit"),
             None if threads is None else thread_count(threads),
+            progress,
         )
         self._forget()
         return report
@@ -237,7 +242,7 @@ class SceneContents:
     @property
     def committed(self) -> bool:
         """Whether nothing has changed since the last commit."""
-        return self.dtype != FLOAT32 or self._core.committed()
+        return self._core.committed()
 
     @property
     def bounds(self) -> np.ndarray:
@@ -250,7 +255,6 @@ class SceneContents:
         """Where a hit is: the ids of the instances that lead to it, the outermost first. `number`:
         its "instance". Empty for 0, a geometry of the scene itself. InputError if the last commit
         has no such path."""
-        require_float32(self, "path")
         return self._core.path(whole(number, "number", 0, MISSING))
 
     def __len__(self) -> int:

@@ -19,6 +19,7 @@ from ._arrays import (
     mesh_faces,
     mesh_vertices,
     number,
+    require_dtype,
     require_float32,
     rows,
     thread_count,
@@ -53,8 +54,8 @@ class Scene(SceneContents, SceneViews):
         "high" once for many.
     builder :
         The name of a builder for the binary tree, instead of that of `quality`: see
-        `raydix.builders`. All queries but rays ask that tree; rays go through a wide one, which
-        `quality` alone decides.
+        `raydix.builders`. All queries but rays ask that tree; rays go through another, a wide one
+        in float32, which `quality` alone decides.
     reinsertion_rounds :
         Of the binary tree: rounds of reinsertion after the build, 0 to 255. Each moves large
         subtrees to cheaper places. None: what `quality` asks for (2 for "balanced", 4 for "high",
@@ -84,7 +85,7 @@ class Scene(SceneContents, SceneViews):
     The arrays are copied: changing them later does not change the scene; `update` does. With
     precision "float32", coordinates given as float64, NumPy's usual type, are rounded once, here,
     and every answer is about the rounded mesh. The trees of `Scene(vertices, faces)` are built when
-    a query first needs them: the wide one for rays or a change, the binary one for other queries.
+    a query first needs them: that of rays for rays or a change, the binary one for other queries.
     Any number of threads may ask at once. Triangles whose box has a diagonal above 0 and
     below 1e-12 are left out, as those that are not finite.
 
@@ -94,12 +95,11 @@ class Scene(SceneContents, SceneViews):
     nothing else: InputError names the geometry that stands in the way. Masks have no effect on
     them.
 
-    With precision "float64" a scene is one mesh, and these raise NotImplementedError: `Scene()`,
-    `add`, `update`, `remove`, `set_transform`, `set_mask`, `commit`, `path`, masks, compact=True,
-    usage="moving", `positions`, `normals`, `render`, `cameras`, `primary_rays`, `secondary_rays`,
-    `info`, `wide_stats` and `raydix.simulate`; device="cuda" raises BackendUnavailable; files raise
-    ValueError, because they are read in float32.
-    Numbers other than 0 below 2**-500 count as 0.
+    With precision "float64" these raise NotImplementedError: compact=True, `positions`, `normals`,
+    `render`, `cameras`, `primary_rays`, `secondary_rays`, `save`, `info`, `wide_stats` and
+    `raydix.simulate`. There device="cuda" raises BackendUnavailable; files raise ValueError,
+    because they are read in float32. Instances are of scenes in float64 too: others raise
+    TypeError. Numbers other than 0 below 2**-500 count as 0.
 
     Raises ValueError (InputError is one) and TypeError that name the argument, what was expected
     and what was given.
@@ -137,28 +137,23 @@ class Scene(SceneContents, SceneViews):
         self._cuda: CudaRays | None = None
         if device == "cuda" and self.dtype != FLOAT32:
             raise _core.BackendUnavailable("device='cuda': scenes in float64 are not traced there")
-        for is_asked, what in (
-            (usage != "fixed", f"usage={usage!r}"),
-            (compact, "compact=True"),
-            (vertices is None, "an empty scene"),
-        ):
-            if is_asked:
-                require_float32(self, what)
+        if compact:
+            require_float32(self, "compact=True")
         if reinsertion_rounds is not None:
             asked_rounds = whole(reinsertion_rounds, "reinsertion_rounds", 0, 255)
         leaf = whole(max_leaf, "max_leaf", 1, 255)
         one_of(bits, "bits", (30, 63))
-        options: tuple = (asked_builder, asked_rounds, bits, leaf, bool(strict), threads)
-        if self.dtype == FLOAT32:
-            options += (quality, usage, bool(compact))
+        trees = (asked_builder, asked_rounds, bits, leaf, bool(strict), threads)
+        options = (*trees, quality, usage, bool(compact))
         self._core: Any = self._make(vertices, faces, options)
 
     def _make(self, vertices: Any, faces: Any, options: tuple) -> Any:
         """The core of an empty scene, of a file, a built-in scene, or a mesh."""
+        core_type = _core.SceneTrees if self.dtype == FLOAT32 else _core.SceneTreesD
         if vertices is None:
             if faces is not None:
                 raise TypeError("vertices: expected shape (V, 3) for these faces, given None")
-            return _core.SceneTrees(*options)
+            return core_type(*options)
         if faces is None:
             if isinstance(vertices, (str, os.PathLike)):
                 if self.dtype == FLOAT32:
@@ -172,8 +167,7 @@ class Scene(SceneContents, SceneViews):
                 vertices, faces = mesh_of(vertices)
         corners = mesh_vertices(vertices, dtype=self.dtype)
         triangles = mesh_faces(faces, len(corners))
-        trees = _core.SceneTrees if self.dtype == FLOAT32 else _core.SceneTreesD
-        return trees(corners, triangles, *options)
+        return core_type(corners, triangles, *options)
 
     def _built_in(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """The mesh of a built-in scene for one in float64."""
@@ -267,7 +261,7 @@ class Scene(SceneContents, SceneViews):
         if self.device == "cuda":
             return self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
-        seen = ray_masks(self, mask, masks, lead)
+        seen = ray_masks(mask, masks, lead)
         columns = self._core.hit_columns
         hits = np.empty((*lead, columns), self.dtype)
         self._core.intersect(
@@ -294,7 +288,7 @@ class Scene(SceneContents, SceneViews):
         if self.device == "cuda":
             return self._on_cuda().occluded(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
-        seen = ray_masks(self, mask, masks, lead)
+        seen = ray_masks(mask, masks, lead)
         flags = np.empty(lead, np.bool_)
         self._core.occluded(*args, flags.reshape(-1), *seen, self.threads)
         return flags
@@ -316,7 +310,7 @@ class Scene(SceneContents, SceneViews):
         start outside, through edges and vertices too.
         """
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
-        seen = ray_masks(self, mask, masks, lead)
+        seen = ray_masks(mask, masks, lead)
         counts = np.empty(lead, UINT32)
         self._core.count(*args, counts.reshape(-1), *seen, self.threads)
         return counts
@@ -342,7 +336,7 @@ class Scene(SceneContents, SceneViews):
         is left. InputError if it would take more: no hit is ever dropped.
         """
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
-        seen = ray_masks(self, mask, masks, lead)
+        seen = ray_masks(mask, masks, lead)
         offsets, hits, _ = self._core.all_hits(*args, max_result_bytes, *seen, self.threads)
         return {"offsets": offsets, **hit_columns(hits, 0)}
 
@@ -450,10 +444,7 @@ class Scene(SceneContents, SceneViews):
             return None
         if not isinstance(other, Scene):
             raise TypeError(f"other: expected a Scene, given {other!r}")
-        if other.dtype != self.dtype:
-            raise TypeError(
-                f"other: expected a scene in {self.dtype}, as this one, given one in {other.dtype}"
-            )
+        require_dtype(other, self.dtype, "other")
         return other._core
 
     def count_overlaps(self, other: Scene | None = None, *, narrow: bool = False) -> int:
@@ -502,6 +493,17 @@ class Scene(SceneContents, SceneViews):
         self._forget()
         return self._core.refit(corners, self.threads)
 
+    def save(self, file: str | os.PathLike) -> None:
+        """Writes the scene to a .rdx file, as its last commit left it: its trees, all scenes that
+        it places, each once, with ids and masks, its name and its cameras. `load_scene` reads it.
+
+        A reader never sees half a file. InputError: changes without a commit, a file that cannot be
+        written. NotImplementedError: a scene in float64.
+        """
+        require_float32(self, "save")
+        cameras = [camera._fields() for camera in self._cameras]
+        self._core.save_rdx(os.fspath(file), self.name, cameras)
+
     def info(self) -> dict[str, Any]:
         """Counts, bounds and degenerate elements of the mesh."""
         require_float32(self, "info")
@@ -530,3 +532,19 @@ class Scene(SceneContents, SceneViews):
         ok, broken = self._core.check()
         if not ok:
             raise RuntimeError(broken)
+
+
+def load_scene(file: str | os.PathLike, *, threads: int = 0, device: str = "cpu") -> Scene:
+    """The scene that `Scene.save` wrote, committed: with its name, its cameras, and the options of
+    its last commit. Nothing is built; rays have the same hits.
+
+    The file is checked and mapped: processes that load it share the memory of its trees. It may be
+    deleted, but not changed, while a scene uses it. `threads` and `device` as in `Scene`.
+
+    InputError that names the file and what is wrong with it; so for a .rdx file that holds a tree
+    and no scene.
+    """
+    scene = Scene(threads=threads, device=device)
+    scene._core, scene.name, cameras = _core.SceneTrees.load_rdx(os.fspath(file), scene.threads)
+    scene._cameras = [Camera(**camera) for camera in cameras]
+    return scene

@@ -28,19 +28,6 @@
 namespace raydix::python {
 namespace {
 
-using Coordinates = std::tuple<float, float, float>;
-using CameraFields = std::tuple<Coordinates, Coordinates, Coordinates, float, std::string>;
-
-Vec3 vec3(const Coordinates& c) { return {std::get<0>(c), std::get<1>(c), std::get<2>(c)}; }
-
-Camera camera_of(const CameraFields& fields) {
-    return {.name = std::get<4>(fields),
-            .position = vec3(std::get<0>(fields)),
-            .target = vec3(std::get<1>(fields)),
-            .up = vec3(std::get<2>(fields)),
-            .vfov = std::get<3>(fields)};
-}
-
 nb::dict load(const std::string& spec, std::uint64_t seed) {
     Model scene;
     {

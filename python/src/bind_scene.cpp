@@ -396,8 +396,16 @@ auto reading(Scene& scene, const Call& call) {
     return call();
 }
 
+/// The wide tree of the one mesh, made as a commit makes it.
 nb::dict wide_stats(SceneTrees& scene) {
-    return wide_figures(reading(scene, [&] { return scene.wide_stats("wide_stats"); }));
+    return wide_figures(reading(scene, [&] {
+        const MeshView mesh = scene.mesh("wide_stats").view();
+        if (mesh.triangles.empty()) return WideBvh().stats();
+        const SceneOptions& commits = scene.commit_options();
+        BuildOptions options = build_options_for(commits.quality);
+        options.threads = threads_for(commits.threads);
+        return build_wide_bvh(mesh, options, {.compact = commits.compact}).stats();
+    }));
 }
 
 const Bvh& boxes_of(const Bvh& bvh) { return bvh; }
@@ -553,6 +561,7 @@ void bind_scene(nb::module_& module) {
     nb::class_<SceneTrees> scene(module, "SceneTrees",
                                  "A scene in float; raydix.Scene is what to use.");
     bind_changes(scene);
+    bind_files(scene);
     bind_asking(scene);
     scene.def("wide_stats", &wide_stats)
         .def("info", &mesh_info)
@@ -561,11 +570,11 @@ void bind_scene(nb::module_& module) {
              nb::arg("threads") = 0)
         .def("normals", &normals_of, nb::arg("hits").noconvert(), nb::arg("normals").noconvert(),
              nb::arg("threads") = 0);
-    nb::class_<SceneTreesD> mesh(module, "SceneTreesD",
-                                 "A mesh in double and its tree; raydix.Scene is what to use.");
-    bind_changes(mesh);
-    bind_asking(mesh);
-    mesh.def("check", &check_boxes);
+    nb::class_<SceneTreesD> in_double(module, "SceneTreesD",
+                                      "A scene in double; raydix.Scene is what to use.");
+    bind_changes(in_double);
+    bind_asking(in_double);
+    in_double.def("check", &check_boxes);
 }
 
 }  // namespace raydix::python

@@ -41,10 +41,18 @@ nb::dict wide_figures(const WideBvhStats& stats) {
     return fields;
 }
 
-nb::tuple corners(const Aabb& box) {
+namespace {
+
+template <class Box>
+nb::tuple corners_of(const Box& box) {
     return nb::make_tuple(nb::make_tuple(box.lo.x, box.lo.y, box.lo.z),
                           nb::make_tuple(box.hi.x, box.hi.y, box.hi.z));
 }
+
+}  // namespace
+
+nb::tuple corners(const Aabb& box) { return corners_of(box); }
+nb::tuple corners(const AabbD& box) { return corners_of(box); }
 
 nb::dict mesh_figures(const MeshInfo& info) {
     nb::dict fields;
@@ -86,6 +94,16 @@ nb::dict camera_figures(const Camera& camera) {
     fields["vfov"] = camera.vfov;
     fields["name"] = camera.name;
     return fields;
+}
+
+Vec3 vec3(const Coordinates& c) { return {std::get<0>(c), std::get<1>(c), std::get<2>(c)}; }
+
+Camera camera_of(const CameraFields& fields) {
+    return {.name = std::get<4>(fields),
+            .position = vec3(std::get<0>(fields)),
+            .target = vec3(std::get<1>(fields)),
+            .up = vec3(std::get<2>(fields)),
+            .vfov = std::get<3>(fields)};
 }
 
 nb::dict stage_ms(const BuildMs& ms) {

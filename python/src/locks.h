@@ -42,8 +42,22 @@ public:
     Writing& operator=(const Writing&) = delete;
     ~Writing() { is_held_ = false; }
 
-    /// Throws InputError if this thread has one: Python may run a signal handler in a commit.
+    /// Throws InputError if this thread has one: Python may run a signal handler in a commit, and
+    /// a commit calls its progress function.
     static void require_none(const char* call);
+
+    /// While this lives, its thread counts as one that changes a scene: for one that a commit calls
+    /// Python from, which would wait for ever for the end of that commit.
+    class OnThread {
+    public:
+        OnThread() { is_held_ = true; }
+        OnThread(const OnThread&) = delete;
+        OnThread& operator=(const OnThread&) = delete;
+        ~OnThread() { is_held_ = before_; }
+
+    private:
+        bool before_ = is_held_;
+    };
 
 private:
     std::unique_lock<std::mutex> queue_;

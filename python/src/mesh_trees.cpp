@@ -29,7 +29,8 @@ Writing::Writing(const char* call, std::mutex& queue, std::shared_mutex& use)
 void Writing::require_none(const char* call) {
     if (is_held_)
         throw InputError(std::string(call) +
-                         ": this thread is within a change of a scene, in a signal handler");
+                         ": this thread is within a change of a scene, in a signal handler or a "
+                         "progress function");
 }
 
 template <class Names>
@@ -96,80 +97,13 @@ void MeshTrees<Names>::drop_trees() {
 template class MeshTrees<InFloat>;
 template class MeshTrees<InDouble>;
 
-SceneTreesD::SceneTreesD(Arrays mesh, const BuildOptions& options) : MeshTrees(options) {
-    const auto& triangles = *mesh.triangles;
-    for (std::size_t i = 0; i < triangles.size(); ++i)
-        for (const std::uint32_t corner : triangles[i])
-            if (corner >= mesh.vertices->size())
-                throw InputError("triangle " + std::to_string(i) + " refers to vertex " +
-                                 std::to_string(corner) + ", but there are " +
-                                 std::to_string(mesh.vertices->size()));
-    set_mesh(std::move(mesh));
-}
-
-RefitQuality SceneTreesD::refit(std::vector<Vec3d> vertices, int threads) {
-    const Writing lock("refit", queue_, use_);
-    const Arrays moved{std::make_shared<const Arrays::Vertices>(std::move(vertices)),
-                       mesh("refit").triangles};
-    if (moved.triangles->empty()) {
-        set_mesh(moved);
-        return {};
-    }
-    const bool had_nodes = !bvh_locked().empty();
-    RefitQuality quality;
-    try {
-        quality = raydix::refit(*bvh_, moved.view(), threads_for(threads));
-    } catch (const InputError&) {
-        // Found late, the tree is gone: the mesh is still there, and makes it again.
-        if (had_nodes && bvh_->empty()) {
-            drop_trees();
-            sah_at_build_.reset();
-        }
-        throw;
-    }
-    move_mesh(moved);
+RefitQuality RefitterD::refit(BvhD& bvh, const MeshViewD& mesh, int threads) {
+    RefitQuality quality = raydix::refit(bvh, mesh, threads);
     // Each refit tells of the tree before it; that before the first is the one that was built.
     if (!sah_at_build_) sah_at_build_ = quality.sah_at_build;
     quality.sah_at_build = *sah_at_build_;
     quality.ratio = quality.sah > 0 && *sah_at_build_ > 0 ? quality.sah / *sah_at_build_ : 1.0;
     return quality;
-}
-
-namespace {
-
-TraceOptions without_masks(const RayOptions& options) {
-    if (options.mask != 0xFFFFFFFFu || !options.masks.empty())
-        throw InputError("mask: not there for a mesh in double");
-    TraceOptions out;
-    out.threads = options.threads;
-    out.max_result_bytes = options.max_result_bytes;
-    return out;
-}
-
-}  // namespace
-
-TraceCounts SceneTreesD::trace(std::span<const RayD> rays, std::span<HitD> hits,
-                               const RayOptions& options) {
-    return raydix::trace(bvh("intersect"), rays, hits, without_masks(options));
-}
-
-TraceCounts SceneTreesD::trace_any(std::span<const RayD> rays, std::span<std::uint8_t> occluded,
-                                   const RayOptions& options) {
-    return raydix::trace_any(bvh("occluded"), rays, occluded, without_masks(options));
-}
-
-AllHitsD SceneTreesD::trace_all(std::span<const RayD> rays, const RayOptions& options) {
-    return raydix::trace_all(bvh("all_hits"), rays, without_masks(options));
-}
-
-HitD SceneTreesD::closest_hit(const RayD& ray, std::uint32_t mask) {
-    static_cast<void>(without_masks({.mask = mask}));
-    return raydix::closest_hit(bvh("intersect"), ray);
-}
-
-bool SceneTreesD::any_hit(const RayD& ray, std::uint32_t mask) {
-    static_cast<void>(without_masks({.mask = mask}));
-    return raydix::any_hit(bvh("occluded"), ray);
 }
 
 }  // namespace raydix::python

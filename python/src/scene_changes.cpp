@@ -5,12 +5,15 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 #include <raydix/camera.h>
 #include <raydix/error.h>
 #include <raydix/model.h>
+#include <raydix/rdx.h>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -26,8 +29,10 @@ namespace raydix::python {
 namespace {
 
 using Ids = In<std::uint32_t, nb::ndim<1>>;
-using TransformRows = In<float, nb::shape<-1, 12>>;
+template <class Scene>
+using TransformRows = In<typename Scene::Types::Scalar, nb::shape<-1, 12>>;
 static_assert(sizeof(Transform) == 12 * sizeof(float));
+static_assert(sizeof(TransformD) == 12 * sizeof(double));
 template <class Scene>
 using PointRows = In<typename Scene::Types::Scalar, nb::shape<-1, 3>>;
 
@@ -80,11 +85,19 @@ MeshArrays<Names> copy_of(const Points& vertices, const FacesIn& faces) {
             std::make_shared<const typename Arrays::Triangles>(triangles.begin(), triangles.end())};
 }
 
-template <class Scene, class... Options>
-void make_of_mesh(Scene* self, const PointRows<Scene>& vertices, const FacesIn& faces,
-                  const Options&... options) {
+/// call() without the interpreter's lock, while the scene stays as it is.
+template <class Scene, class Call>
+auto while_reading(Scene& scene, const Call& call) {
     const nb::gil_scoped_release unlocked;
-    new (self) Scene(copy_of<typename Scene::Types>(vertices, faces), options...);
+    const Reading lock = scene.read();
+    return call();
+}
+
+nb::tuple named(const std::shared_ptr<SceneTrees>& scene, const std::string& name,
+                const std::vector<Camera>& shown) {
+    nb::list cameras;
+    for (const Camera& camera : shown) cameras.append(camera_figures(camera));
+    return nb::make_tuple(scene, name, cameras);
 }
 
 /// What a file holds, and what belongs to it.
@@ -102,30 +115,56 @@ nb::tuple load(const std::string& spec, std::uint64_t seed, const std::string& b
         Model model = load_model(spec, seed);
         name = model.name;
         shown = std::move(model.cameras.cameras);
-        scene = std::make_shared<SceneTrees>(std::move(model), trees, commits);
+        scene = SceneFiles::scene_of(std::move(model), trees, commits);
     }
-    nb::list cameras;
-    for (const Camera& camera : shown) cameras.append(camera_figures(camera));
-    return nb::make_tuple(scene, name, cameras);
+    return named(scene, name, shown);
 }
 
-std::vector<std::uint32_t> add_instances(SceneTrees& self, std::shared_ptr<SceneTrees> scene,
-                                         const TransformRows& transforms, const Ids& masks,
+/// The same of a .rdx file, with the options that it was saved with.
+nb::tuple load_rdx(const std::string& file, int threads) {
+    std::string name;
+    std::vector<Camera> shown;
+    std::shared_ptr<SceneTrees> scene;
+    {
+        const nb::gil_scoped_release unlocked;
+        RdxScene loaded = load_rdx_scene(file);
+        name = loaded.name;
+        shown = std::move(loaded.cameras.cameras);
+        loaded.options.threads = threads;
+        BuildOptions trees = build_options_for(loaded.options.quality);
+        trees.threads = threads;
+        scene = SceneFiles::scene_of(std::move(loaded), trees);
+    }
+    return named(scene, name, shown);
+}
+
+void save_rdx(SceneTrees& self, const std::string& file, const std::string& name,
+              const std::vector<CameraFields>& cameras) {
+    CameraSet shown;
+    for (const CameraFields& camera : cameras) shown.cameras.push_back(camera_of(camera));
+    while_reading(self, [&] { raydix::save_rdx(file, self.traced(), name, shown); });
+}
+
+template <class Scene>
+std::vector<std::uint32_t> add_instances(Scene& self, std::shared_ptr<Scene> scene,
+                                         const TransformRows<Scene>& transforms, const Ids& masks,
                                          std::optional<std::uint32_t> id) {
-    const auto places = rows<Transform>(transforms);
+    const auto places = rows<typename Scene::Transform>(transforms);
     const nb::gil_scoped_release unlocked;
     return self.add(std::move(scene), places, {masks.data(), masks.shape(0)}, id);
 }
 
-std::uint32_t add_mesh(SceneTrees& self, const PointRows<SceneTrees>& vertices,
-                       const FacesIn& faces, std::uint32_t mask, std::optional<std::uint32_t> id) {
+template <class Scene>
+std::uint32_t add_mesh(Scene& self, const PointRows<Scene>& vertices, const FacesIn& faces,
+                       std::uint32_t mask, std::optional<std::uint32_t> id) {
     const nb::gil_scoped_release unlocked;
-    return self.add(copy_of<InFloat>(vertices, faces), {mask, id});
+    return self.add(copy_of<typename Scene::Types>(vertices, faces), {mask, id});
 }
 
-void update(SceneTrees& self, std::uint32_t id, const PointRows<SceneTrees>& vertices,
+template <class Scene>
+void update(Scene& self, std::uint32_t id, const PointRows<Scene>& vertices,
             const std::optional<FacesIn>& faces) {
-    const auto corners = rows<Vec3>(vertices);
+    const auto corners = rows<typename Scene::Types::Point>(vertices);
     const nb::gil_scoped_release unlocked;
     std::optional<std::vector<Triangle>> triangles;
     if (faces) {
@@ -135,21 +174,37 @@ void update(SceneTrees& self, std::uint32_t id, const PointRows<SceneTrees>& ver
     self.update(id, {corners.begin(), corners.end()}, std::move(triangles));
 }
 
-void set_transforms(SceneTrees& self, const Ids& ids, const TransformRows& transforms) {
-    const auto places = rows<Transform>(transforms);
+template <class Scene>
+void set_transforms(Scene& self, const Ids& ids, const TransformRows<Scene>& transforms) {
+    const auto places = rows<typename Scene::Transform>(transforms);
     const nb::gil_scoped_release unlocked;
     self.set_transforms({ids.data(), ids.shape(0)}, places);
 }
 
-void set_masks(SceneTrees& self, const Ids& ids, const Ids& masks) {
+template <class Scene>
+void set_masks(Scene& self, const Ids& ids, const Ids& masks) {
     const nb::gil_scoped_release unlocked;
     self.set_masks({ids.data(), ids.shape(0)}, {masks.data(), masks.shape(0)});
 }
 
+/// What a commit calls from any thread, without the interpreter's lock, with the part of it that is
+/// done: signals are heard on this thread, and `told`, if there is one, which outlives the commit.
+std::function<void(double)> tell(const std::optional<nb::callable>& told) {
+    return [hear = hear_signals_on_this_thread(), &told](double part) {
+        hear(part);
+        if (!told) return;
+        const Writing::OnThread changing;
+        const nb::gil_scoped_acquire locked;
+        (*told)(part);
+    };
+}
+
 /// What is left out stays as in the last commit.
-nb::dict commit(SceneTrees& self, const std::optional<std::string>& quality,
+template <class Scene>
+nb::dict commit(Scene& self, const std::optional<std::string>& quality,
                 const std::optional<std::string>& usage, std::optional<bool> compact,
-                std::optional<double> refit_limit, std::optional<int> threads) {
+                std::optional<double> refit_limit, std::optional<int> threads,
+                const std::optional<nb::callable>& progress) {
     CommitReport report;
     {
         const nb::gil_scoped_release unlocked;
@@ -162,7 +217,7 @@ nb::dict commit(SceneTrees& self, const std::optional<std::string>& quality,
         options.compact = compact.value_or(options.compact);
         options.refit_limit = refit_limit.value_or(options.refit_limit);
         options.threads = threads.value_or(options.threads);
-        options.progress = hear_signals_on_this_thread();
+        options.progress = tell(progress);
         report = self.commit(options);
     }
     return commit_figures(report);
@@ -183,14 +238,6 @@ nb::dict refit(Scene& scene, const PointRows<Scene>& vertices, int threads) {
     return fields;
 }
 
-/// call() without the interpreter's lock, while the scene stays as it is.
-template <class Scene, class Call>
-auto while_reading(Scene& scene, const Call& call) {
-    const nb::gil_scoped_release unlocked;
-    const Reading lock = scene.read();
-    return call();
-}
-
 /// What a scene of either type says of itself.
 template <class Scene>
 void bind_contents(nb::class_<Scene>& scene) {
@@ -205,99 +252,95 @@ void bind_contents(nb::class_<Scene>& scene) {
              [](Scene& self) { return while_reading(self, [&] { return self.is_mesh(); }); });
 }
 
-void bind_commits(nb::class_<SceneTrees>& scene) {
+template <class Scene>
+void bind_commits(nb::class_<Scene>& scene) {
     scene
+        .def("commit", &commit<Scene>, nb::arg("quality").none(), nb::arg("usage").none(),
+             nb::arg("compact").none(), nb::arg("refit_limit").none(), nb::arg("threads").none(),
+             nb::arg("progress").none())
+        .def("refit", &refit<Scene>, nb::arg("vertices").noconvert(), nb::arg("threads") = 0)
         .def("committed",
-             [](SceneTrees& self) { return while_reading(self, [&] { return self.committed(); }); })
+             [](Scene& self) { return while_reading(self, [&] { return self.committed(); }); })
         .def("bounds",
-             [](SceneTrees& self) {
+             [](Scene& self) {
                  return corners(while_reading(self, [&] { return self.traced().bounds(); }));
              })
         .def(
             "path",
-            [](SceneTrees& self, std::uint32_t number) {
+            [](Scene& self, std::uint32_t number) {
                 return while_reading(self, [&] { return self.traced().path(number); });
             },
             nb::arg("number"));
 }
 
-}  // namespace
-
-void bind_changes(nb::class_<SceneTrees>& scene) {
+template <class Scene>
+void bind_making(nb::class_<Scene>& scene) {
     scene.def(
         "__init__",
-        [](SceneTrees* self, const std::string& builder, int reinsertion_rounds, int bits,
-           int max_leaf, bool strict, int threads, const std::string& quality,
-           const std::string& usage, bool compact) {
-            new (self) SceneTrees(
-                build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads),
-                scene_options(quality, usage, compact, threads));
+        [](Scene* self, const std::string& builder, int reinsertion_rounds, int bits, int max_leaf,
+           bool strict, int threads, const std::string& quality, const std::string& usage,
+           bool compact) {
+            new (self)
+                Scene(build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads),
+                      scene_options(quality, usage, compact, threads));
         },
         nb::arg("builder"), nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
         nb::arg("strict"), nb::arg("threads"), nb::arg("quality"), nb::arg("usage"),
         nb::arg("compact"));
     scene.def(
         "__init__",
-        [](SceneTrees* self, const PointRows<SceneTrees>& vertices, const FacesIn& faces,
+        [](Scene* self, const PointRows<Scene>& vertices, const FacesIn& faces,
            const std::string& builder, int reinsertion_rounds, int bits, int max_leaf, bool strict,
            int threads, const std::string& quality, const std::string& usage, bool compact) {
-            make_of_mesh(
-                self, vertices, faces,
-                build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads),
-                scene_options(quality, usage, compact, threads));
+            const nb::gil_scoped_release unlocked;
+            new (self)
+                Scene(copy_of<typename Scene::Types>(vertices, faces),
+                      build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads),
+                      scene_options(quality, usage, compact, threads));
         },
         nb::arg("vertices").noconvert(), nb::arg("faces").noconvert(), nb::arg("builder"),
         nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"), nb::arg("strict"),
         nb::arg("threads"), nb::arg("quality"), nb::arg("usage"), nb::arg("compact"));
+}
+
+}  // namespace
+
+template <class Scene>
+void bind_changes(nb::class_<Scene>& scene) {
+    bind_making(scene);
     scene
-        .def_static("load", &load, nb::arg("spec"), nb::arg("seed"), nb::arg("builder"),
-                    nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
-                    nb::arg("strict"), nb::arg("threads"), nb::arg("quality"), nb::arg("usage"),
-                    nb::arg("compact"), "The scene, its name, and its cameras' fields.")
-        .def("add_mesh", &add_mesh, nb::arg("vertices").noconvert(), nb::arg("faces").noconvert(),
-             nb::arg("mask"), nb::arg("id").none())
-        .def("add_instances", &add_instances, nb::arg("scene"), nb::arg("transforms").noconvert(),
-             nb::arg("masks").noconvert(), nb::arg("id").none())
+        .def("add_mesh", &add_mesh<Scene>, nb::arg("vertices").noconvert(),
+             nb::arg("faces").noconvert(), nb::arg("mask"), nb::arg("id").none())
+        .def("add_instances", &add_instances<Scene>, nb::arg("scene"),
+             nb::arg("transforms").noconvert(), nb::arg("masks").noconvert(), nb::arg("id").none())
         .def(
             "remove",
-            [](SceneTrees& self, std::uint32_t id) {
+            [](Scene& self, std::uint32_t id) {
                 const nb::gil_scoped_release unlocked;
                 self.remove(id);
             },
             nb::arg("id"))
-        .def("update", &update, nb::arg("id"), nb::arg("vertices").noconvert(),
+        .def("update", &update<Scene>, nb::arg("id"), nb::arg("vertices").noconvert(),
              nb::arg("faces").noconvert().none())
-        .def("set_transforms", &set_transforms, nb::arg("ids").noconvert(),
+        .def("set_transforms", &set_transforms<Scene>, nb::arg("ids").noconvert(),
              nb::arg("transforms").noconvert())
-        .def("set_masks", &set_masks, nb::arg("ids").noconvert(), nb::arg("masks").noconvert())
-        .def("commit", &commit, nb::arg("quality").none(), nb::arg("usage").none(),
-             nb::arg("compact").none(), nb::arg("refit_limit").none(), nb::arg("threads").none())
-        .def("refit", &refit<SceneTrees>, nb::arg("vertices").noconvert(), nb::arg("threads") = 0);
+        .def("set_masks", &set_masks<Scene>, nb::arg("ids").noconvert(),
+             nb::arg("masks").noconvert());
     bind_contents(scene);
     bind_commits(scene);
 }
 
-void bind_changes(nb::class_<SceneTreesD>& scene) {
-    scene
-        .def(
-            "__init__",
-            [](SceneTreesD* self, const PointRows<SceneTreesD>& vertices, const FacesIn& faces,
-               const std::string& builder, int reinsertion_rounds, int bits, int max_leaf,
-               bool strict, int threads) {
-                make_of_mesh(
-                    self, vertices, faces,
-                    build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads));
-            },
-            nb::arg("vertices").noconvert(), nb::arg("faces").noconvert(), nb::arg("builder"),
-            nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"), nb::arg("strict"),
-            nb::arg("threads"))
-        .def("refit", &refit<SceneTreesD>, nb::arg("vertices").noconvert(), nb::arg("threads") = 0)
-        .def("bounds", [](SceneTreesD& self) {
-            const AabbD box = while_reading(self, [&] { return self.bvh("bounds").bounds(); });
-            return nb::make_tuple(nb::make_tuple(box.lo.x, box.lo.y, box.lo.z),
-                                  nb::make_tuple(box.hi.x, box.hi.y, box.hi.z));
-        });
-    bind_contents(scene);
+template void bind_changes(nb::class_<SceneTrees>& scene);
+template void bind_changes(nb::class_<SceneTreesD>& scene);
+
+void bind_files(nb::class_<SceneTrees>& scene) {
+    scene.def("save_rdx", &save_rdx, nb::arg("file"), nb::arg("name"), nb::arg("cameras"))
+        .def_static("load_rdx", &load_rdx, nb::arg("file"), nb::arg("threads"),
+                    "As load, of a .rdx file.")
+        .def_static("load", &load, nb::arg("spec"), nb::arg("seed"), nb::arg("builder"),
+                    nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
+                    nb::arg("strict"), nb::arg("threads"), nb::arg("quality"), nb::arg("usage"),
+                    nb::arg("compact"), "The scene, its name, and its cameras' fields.");
 }
 
 }  // namespace raydix::python

@@ -7,8 +7,11 @@
 
 namespace raydix::python {
 
-void bind_changes(nanobind::class_<SceneTrees>& scene);
-/// In double there is one mesh, which can move.
-void bind_changes(nanobind::class_<SceneTreesD>& scene);
+template <class Scene>
+void bind_changes(nanobind::class_<Scene>& scene);
+extern template void bind_changes(nanobind::class_<SceneTrees>& scene);
+extern template void bind_changes(nanobind::class_<SceneTreesD>& scene);
+/// Scenes of files are in float32.
+void bind_files(nanobind::class_<SceneTrees>& scene);
 
 }  // namespace raydix::python

@@ -1,4 +1,4 @@
-// Changes and commits of scenes in float32, and rays through them.
+// Changes and commits of scenes, and rays through them.
 #include "scene_trees.h"
 
 #include <raydix/error.h>
@@ -39,52 +39,8 @@ void require_one_each(const char* name, std::size_t given, std::size_t wanted) {
                          std::to_string(given));
 }
 
-}  // namespace
-
-SceneTrees::SceneTrees(const BuildOptions& trees, const SceneOptions& commits)
-    : MeshTrees(trees), commits_(commits) {
-    why_no_mesh_ = "the scene was never committed";
-}
-
-SceneTrees::SceneTrees(Arrays mesh, const BuildOptions& trees, const SceneOptions& commits)
-    : SceneTrees(trees, commits) {
-    kept_ = std::make_shared<const Kept>(Kept{{mesh}, {}});
-    static_cast<void>(add(std::move(mesh), {}));
-    unsettled_ = true;
-    look_for_mesh();
-}
-
-SceneTrees::SceneTrees(Model model, const BuildOptions& trees, const SceneOptions& commits)
-    : SceneTrees(trees, commits) {
-    if (model.nodes.empty()) {
-        if (model.meshes.empty()) model.meshes.emplace_back();
-        Kept kept;
-        for (Mesh& mesh : model.meshes) {
-            const Arrays arrays{
-                std::make_shared<const Arrays::Vertices>(std::move(mesh.vertices)),
-                std::make_shared<const Arrays::Triangles>(std::move(mesh.triangles))};
-            kept.meshes.push_back(arrays);
-            static_cast<void>(add(arrays, {}));
-        }
-        kept_ = std::make_shared<const Kept>(std::move(kept));
-        unsettled_ = true;
-    } else {
-        for (const Mesh& mesh : model.meshes) check_strict("mesh " + mesh.name, mesh);
-        SceneOptions options = commits;
-        options.threads = threads_for(options.threads);
-        scene_ = Scene(model, options);
-        // Its geometries are the nodes that stand in the world. Ids of nodes follow those of
-        // meshes.
-        for (std::size_t k = 0; k < model.nodes.size(); ++k) {
-            const auto id = static_cast<std::uint32_t>(model.meshes.size() + k);
-            if (scene_.contains(id)) geometries_[id] = {true, 0xFFFFFFFFu, {}, nullptr};
-        }
-    }
-    look_for_mesh();
-}
-
-void SceneTrees::check_strict(const std::string& name, const MeshView& mesh) const {
-    if (!options_.strict) return;
+/// Throws InputError that names the mesh and its first triangle that trees leave out.
+void require_all_valid(const std::string& name, const MeshView& mesh, int) {
     const auto left_out = [&](std::size_t triangles) {
         return inspect({mesh.vertices, mesh.triangles.first(triangles)}).left_out_triangles;
     };
@@ -100,32 +56,84 @@ void SceneTrees::check_strict(const std::string& name, const MeshView& mesh) con
                      " others");
 }
 
-SceneTrees::Geometry& SceneTrees::at(std::uint32_t id) {
+/// The same: the library counts them in double only where it builds.
+void require_all_valid(const std::string& name, const MeshViewD& mesh, int threads) {
+    try {
+        static_cast<void>(
+            build_bvh(mesh, {.builder = Builder::apetrei, .strict = true, .threads = threads}));
+    } catch (const InputError& error) {
+        throw InputError(name + ": " + error.what());
+    }
+}
+
+}  // namespace
+
+template <class Names>
+BasicSceneTrees<Names>::BasicSceneTrees(const BuildOptions& trees, const SceneOptions& commits)
+    : MeshTrees<Names>(trees), commits_(commits) {
+    why_no_mesh_ = "the scene was never committed";
+}
+
+template <class Names>
+BasicSceneTrees<Names>::BasicSceneTrees(Arrays mesh, const BuildOptions& trees,
+                                        const SceneOptions& commits)
+    : BasicSceneTrees(trees, commits) {
+    kept_ = std::make_shared<const Kept>(Kept{{mesh}, {}});
+    static_cast<void>(add(std::move(mesh), {}));
+    unsettled_ = true;
+    look_for_mesh();
+}
+
+template <class Names>
+const typename BasicSceneTrees<Names>::Arrays& BasicSceneTrees<Names>::arrays_of(
+    std::uint32_t id, Geometry& geometry) {
+    if (geometry.is_in_file) {
+        const auto mesh = *scene_.mesh(id);
+        geometry.mesh = {
+            std::make_shared<const Vertices>(mesh.vertices.begin(), mesh.vertices.end()),
+            std::make_shared<const typename Arrays::Triangles>(mesh.triangles.begin(),
+                                                               mesh.triangles.end())};
+        geometry.is_in_file = false;
+    }
+    return geometry.mesh;
+}
+
+template <class Names>
+void BasicSceneTrees<Names>::check_strict(const std::string& name,
+                                          const typename Names::MeshView& mesh) const {
+    if (options_.strict) require_all_valid(name, mesh, threads_for(options_.threads));
+}
+
+template <class Names>
+typename BasicSceneTrees<Names>::Geometry& BasicSceneTrees<Names>::at(std::uint32_t id) {
     const auto found = geometries_.find(id);
     if (found == geometries_.end()) throw InputError("there is no " + name_of(id));
     return found->second;
 }
 
-void SceneTrees::settle() {
+template <class Names>
+void BasicSceneTrees<Names>::settle() {
     if (!unsettled_) return;
     static_cast<void>(commit_now(commits_));
     unsettled_ = false;
 }
 
-std::uint32_t SceneTrees::add(Arrays mesh, const GeometryOptions& options) {
+template <class Names>
+std::uint32_t BasicSceneTrees<Names>::add(Arrays mesh, const GeometryOptions& options) {
     const Writing lock("add", queue_, use_);
     settle();
     check_strict("mesh", mesh.view());
     const std::lock_guard all(structure());
     const std::uint32_t id = scene_.share(mesh.view(), options);
-    geometries_[id] = {false, options.mask, std::move(mesh), nullptr};
+    geometries_[id] = {.mask = options.mask, .mesh = std::move(mesh)};
     return id;
 }
 
-std::vector<std::uint32_t> SceneTrees::add(std::shared_ptr<SceneTrees> scene,
-                                           std::span<const Transform> transforms,
-                                           std::span<const std::uint32_t> masks,
-                                           std::optional<std::uint32_t> id) {
+template <class Names>
+std::vector<std::uint32_t> BasicSceneTrees<Names>::add(std::shared_ptr<BasicSceneTrees> scene,
+                                                       std::span<const Transform> transforms,
+                                                       std::span<const std::uint32_t> masks,
+                                                       std::optional<std::uint32_t> id) {
     if (masks.size() != 1) require_one_each("masks", masks.size(), transforms.size());
     const Writing lock("add", queue_, use_);
     settle();
@@ -135,7 +143,7 @@ std::vector<std::uint32_t> SceneTrees::add(std::shared_ptr<SceneTrees> scene,
         for (std::size_t i = 0; i < transforms.size(); ++i) {
             const std::uint32_t mask = masks[masks.size() == 1 ? 0 : i];
             ids.push_back(scene_.add(scene->scene_, transforms[i], {mask, id}));
-            geometries_[ids.back()] = {true, mask, {}, scene};
+            geometries_[ids.back()] = {.is_instance = true, .mask = mask, .scene = scene};
             id.reset();
         }
     } catch (...) {
@@ -148,7 +156,8 @@ std::vector<std::uint32_t> SceneTrees::add(std::shared_ptr<SceneTrees> scene,
     return ids;
 }
 
-void SceneTrees::remove(std::uint32_t id) {
+template <class Names>
+void BasicSceneTrees<Names>::remove(std::uint32_t id) {
     const Writing lock("remove", queue_, use_);
     settle();
     const std::lock_guard all(structure());
@@ -156,23 +165,26 @@ void SceneTrees::remove(std::uint32_t id) {
     geometries_.erase(id);
 }
 
-void SceneTrees::update(std::uint32_t id, std::vector<Vec3> vertices,
-                        std::optional<std::vector<Triangle>> triangles) {
+template <class Names>
+void BasicSceneTrees<Names>::update(std::uint32_t id, Vertices vertices,
+                                    std::optional<std::vector<Triangle>> triangles) {
     const Writing lock("update", queue_, use_);
     Geometry& geometry = at(id);
     if (geometry.is_instance) throw InputError(name_of(id) + " is an instance, not a mesh");
     settle();
-    Arrays mesh{std::make_shared<const Arrays::Vertices>(std::move(vertices)),
-                geometry.mesh.triangles};
+    Arrays mesh{std::make_shared<const Vertices>(std::move(vertices)),
+                arrays_of(id, geometry).triangles};
     if (triangles)
-        mesh.triangles = std::make_shared<const Arrays::Triangles>(std::move(*triangles));
+        mesh.triangles = std::make_shared<const typename Arrays::Triangles>(std::move(*triangles));
     check_strict(name_of(id), mesh.view());
     scene_.update(id, mesh.view());
     geometry.mesh = std::move(mesh);
+    geometry.is_in_file = false;
 }
 
-void SceneTrees::set_transforms(std::span<const std::uint32_t> ids,
-                                std::span<const Transform> transforms) {
+template <class Names>
+void BasicSceneTrees<Names>::set_transforms(std::span<const std::uint32_t> ids,
+                                            std::span<const Transform> transforms) {
     require_one_each("transforms", transforms.size(), ids.size());
     const Writing lock("set_transform", queue_, use_);
     check_places(ids, transforms);
@@ -181,8 +193,9 @@ void SceneTrees::set_transforms(std::span<const std::uint32_t> ids,
 }
 
 /// Throws what Scene::set_transform would.
-void SceneTrees::check_places(std::span<const std::uint32_t> ids,
-                              std::span<const Transform> transforms) {
+template <class Names>
+void BasicSceneTrees<Names>::check_places(std::span<const std::uint32_t> ids,
+                                          std::span<const Transform> transforms) {
     Scene tried;
     const Scene nothing;
     for (std::size_t i = 0; i < ids.size(); ++i) {
@@ -195,8 +208,9 @@ void SceneTrees::check_places(std::span<const std::uint32_t> ids,
     }
 }
 
-void SceneTrees::set_masks(std::span<const std::uint32_t> ids,
-                           std::span<const std::uint32_t> masks) {
+template <class Names>
+void BasicSceneTrees<Names>::set_masks(std::span<const std::uint32_t> ids,
+                                       std::span<const std::uint32_t> masks) {
     if (masks.size() != 1) require_one_each("masks", masks.size(), ids.size());
     const Writing lock("set_mask", queue_, use_);
     for (const std::uint32_t id : ids) static_cast<void>(at(id));
@@ -208,18 +222,20 @@ void SceneTrees::set_masks(std::span<const std::uint32_t> ids,
     }
 }
 
-CommitReport SceneTrees::commit_now(SceneOptions options) {
+template <class Names>
+CommitReport BasicSceneTrees<Names>::commit_now(SceneOptions options) {
     options.threads = threads_for(options.threads);
     return scene_.commit(options);
 }
 
-CommitReport SceneTrees::commit(const SceneOptions& options) {
+template <class Names>
+CommitReport BasicSceneTrees<Names>::commit(const SceneOptions& options) {
     const Writing lock("commit", queue_, use_);
     // The scenes that this one places must stay as they are meanwhile. Past their queues: whoever
     // changes one of them may wait for somebody who waits for this.
     std::vector<Reading> below;
     auto kept = std::make_shared<Kept>();
-    std::set<SceneTrees*> placed;
+    std::set<BasicSceneTrees*> placed;
     for (const auto& [id, geometry] : geometries_) {
         if (!geometry.is_instance) {
             kept->meshes.push_back(geometry.mesh);
@@ -240,7 +256,8 @@ CommitReport SceneTrees::commit(const SceneOptions& options) {
 }
 
 /// After a commit, or in its place.
-void SceneTrees::look_for_mesh() {
+template <class Names>
+void BasicSceneTrees<Names>::look_for_mesh() {
     mesh_id_.reset();
     mesh_mask_ = 0;
     why_no_mesh_.clear();
@@ -248,7 +265,7 @@ void SceneTrees::look_for_mesh() {
     if (geometries_.size() == 1 && !geometries_.begin()->second.is_instance) {
         mesh_id_ = geometries_.begin()->first;
         mesh_mask_ = geometries_.begin()->second.mask;
-        found = geometries_.begin()->second.mesh;
+        found = arrays_of(*mesh_id_, geometries_.begin()->second);
     } else if (!geometries_.empty()) {
         const auto is_instance = [](const auto& entry) { return entry.second.is_instance; };
         const auto instance = std::ranges::find_if(geometries_, is_instance);
@@ -258,28 +275,29 @@ void SceneTrees::look_for_mesh() {
                        (named.second.is_instance ? " is an instance" : " is a second mesh") +
                        ", and this call takes a scene of one mesh: Scene(vertices, faces)";
     }
-    if (why_no_mesh_.empty() && found == mesh("")) return;
+    if (why_no_mesh_.empty() && found == this->mesh("")) return;
     refitter_.reset();
-    set_mesh(std::move(found));
+    this->set_mesh(std::move(found));
 }
 
-RefitQuality SceneTrees::refit(std::vector<Vec3> vertices, int threads) {
+template <class Names>
+RefitQuality BasicSceneTrees<Names>::refit(Vertices vertices, int threads) {
     const Writing lock("refit", queue_, use_);
-    const Arrays moved{std::make_shared<const Arrays::Vertices>(std::move(vertices)),
-                       mesh("refit").triangles};
+    const Arrays moved{std::make_shared<const Vertices>(std::move(vertices)),
+                       this->mesh("refit").triangles};
     if (!scene_.committed() && !unsettled_)
         throw InputError("refit: the scene has changed; commit it first");
     if (!mesh_id_) return {};
     RefitQuality quality;
     if (!moved.triangles->empty()) {
-        if (!refitter_) refitter_.emplace(bvh_locked());
-        const bool had_nodes = !bvh_locked().empty();
+        if (!refitter_) refitter_.emplace(this->bvh_locked());
+        const bool had_nodes = !this->bvh_locked().empty();
         try {
             quality = refitter_->refit(*bvh_, moved.view(), threads_for(threads));
         } catch (const InputError&) {
             // Found late, the tree is gone: the mesh is still there, and makes it again.
             if (had_nodes && bvh_->empty()) {
-                drop_trees();
+                this->drop_trees();
                 refitter_.reset();
             }
             throw;
@@ -295,55 +313,60 @@ RefitQuality SceneTrees::refit(std::vector<Vec3> vertices, int threads) {
     }
     at(*mesh_id_).mesh = moved;
     kept_ = std::make_shared<const Kept>(Kept{{moved}, {}});
-    move_mesh(moved);
+    this->move_mesh(moved);
     return quality;
 }
 
-bool SceneTrees::committed() {
+template <class Names>
+bool BasicSceneTrees<Names>::committed() {
     const std::lock_guard lock(build_);
     return unsettled_ || scene_.committed();
 }
 
-std::vector<std::uint32_t> SceneTrees::ids() const {
+template <class Names>
+std::vector<std::uint32_t> BasicSceneTrees<Names>::ids() const {
     std::vector<std::uint32_t> all;
     for (const auto& [id, geometry] : geometries_) all.push_back(id);
     return all;
 }
 
-const Scene& SceneTrees::traced() {
+template <class Names>
+const typename Names::Scene& BasicSceneTrees<Names>::traced() {
     const std::lock_guard lock(build_);
     settle();
     return scene_;
 }
 
-WideBvhStats SceneTrees::wide_stats(const char* call) {
-    const Arrays& mesh = this->mesh(call);
-    if (mesh.triangles->empty()) return WideBvh().stats();
-    BuildOptions options = build_options_for(commits_.quality);
-    options.threads = threads_for(commits_.threads);
-    return build_wide_bvh(mesh.view(), options, {.compact = commits_.compact}).stats();
-}
-
-TraceCounts SceneTrees::trace(std::span<const Ray> rays, std::span<Hit> hits,
-                              const RayOptions& options) {
+template <class Names>
+TraceCounts BasicSceneTrees<Names>::trace(std::span<const Ray> rays, std::span<Hit> hits,
+                                          const RayOptions& options) {
     return raydix::trace(traced(), rays, hits, trace_options(options));
 }
 
-TraceCounts SceneTrees::trace_any(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
-                                  const RayOptions& options) {
+template <class Names>
+TraceCounts BasicSceneTrees<Names>::trace_any(std::span<const Ray> rays,
+                                              std::span<std::uint8_t> occluded,
+                                              const RayOptions& options) {
     return raydix::trace_any(traced(), rays, occluded, trace_options(options));
 }
 
-AllHits SceneTrees::trace_all(std::span<const Ray> rays, const RayOptions& options) {
+template <class Names>
+typename Names::AllHits BasicSceneTrees<Names>::trace_all(std::span<const Ray> rays,
+                                                          const RayOptions& options) {
     return raydix::trace_all(traced(), rays, trace_options(options));
 }
 
-Hit SceneTrees::closest_hit(const Ray& ray, std::uint32_t mask) {
+template <class Names>
+typename Names::Hit BasicSceneTrees<Names>::closest_hit(const Ray& ray, std::uint32_t mask) {
     return raydix::closest_hit(traced(), ray, mask);
 }
 
-bool SceneTrees::any_hit(const Ray& ray, std::uint32_t mask) {
+template <class Names>
+bool BasicSceneTrees<Names>::any_hit(const Ray& ray, std::uint32_t mask) {
     return raydix::any_hit(traced(), ray, mask);
 }
+
+template class BasicSceneTrees<InFloat>;
+template class BasicSceneTrees<InDouble>;
 
 }  // namespace raydix::python

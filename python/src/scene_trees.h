@@ -6,11 +6,11 @@
 #include <raydix/double.h>
 #include <raydix/mesh.h>
 #include <raydix/model.h>
+#include <raydix/rdx.h>
 #include <raydix/refit.h>
 #include <raydix/scene.h>
 #include <raydix/solid.h>
 #include <raydix/trace.h>
-#include <raydix/wide.h>
 
 #include <array>
 #include <cstdint>
@@ -27,12 +27,29 @@
 
 namespace raydix::python {
 
+/// The quality of trees in double, relative to the first one, as Refitter tells it in float.
+class RefitterD {
+public:
+    /// Takes no notes of the tree yet: the first refit tells how good it was.
+    explicit RefitterD(const BvhD&) {}
+
+    /// As raydix::refit.
+    RefitQuality refit(BvhD& bvh, const MeshViewD& mesh, int threads);
+
+private:
+    std::optional<double> sah_at_build_;
+};
+
 /// The library's names of things in float32.
 struct InFloat {
     using Scalar = float;
     using Point = Vec3;
+    using Box = Aabb;
+    using Transform = raydix::Transform;
+    using Scene = raydix::Scene;
     using MeshView = raydix::MeshView;
     using Bvh = raydix::Bvh;
+    using Refitter = raydix::Refitter;
     using Solid = raydix::Solid;
     using Ray = raydix::Ray;
     using Hit = raydix::Hit;
@@ -47,8 +64,12 @@ struct InFloat {
 struct InDouble {
     using Scalar = double;
     using Point = Vec3d;
+    using Box = AabbD;
+    using Transform = TransformD;
+    using Scene = SceneD;
     using MeshView = MeshViewD;
     using Bvh = BvhD;
+    using Refitter = RefitterD;
     using Solid = SolidD;
     using Ray = RayD;
     using Hit = HitD;
@@ -132,31 +153,38 @@ private:
 extern template class MeshTrees<InFloat>;
 extern template class MeshTrees<InDouble>;
 
-/// In float32: raydix::Scene. Changes and commits wait for the queries of other threads; what they
+/// raydix::Scene or SceneD. Changes and commits wait for the queries of other threads; what they
 /// throw leaves all answers as they were.
-class SceneTrees : public MeshTrees<InFloat> {
+template <class Names>
+class BasicSceneTrees : public MeshTrees<Names> {
 public:
+    using typename MeshTrees<Names>::Types;
+    using typename MeshTrees<Names>::Arrays;
+    using Scene = typename Names::Scene;
+    using Transform = typename Names::Transform;
+    using Vertices = typename Arrays::Vertices;
+    using Ray = typename Names::Ray;
+    using Hit = typename Names::Hit;
+    using AllHits = typename Names::AllHits;
+
     /// Empty. `trees`: of the binary tree that other queries than rays ask; `commits`: of the first
     /// commit.
-    SceneTrees(const BuildOptions& trees, const SceneOptions& commits);
+    BasicSceneTrees(const BuildOptions& trees, const SceneOptions& commits);
     /// One mesh with id 0, committed: its wide tree is made when a ray or a change needs it.
     /// Throws InputError: an index past the vertices, with `trees.strict` a triangle left out.
-    SceneTrees(Arrays mesh, const BuildOptions& trees, const SceneOptions& commits);
-    /// What a file holds, committed: with ids as raydix::Scene gives them. One mesh, or several
-    /// without nodes, wait for their first ray or change as above.
-    SceneTrees(Model model, const BuildOptions& trees, const SceneOptions& commits);
+    BasicSceneTrees(Arrays mesh, const BuildOptions& trees, const SceneOptions& commits);
 
     // Changes: as those of raydix::Scene.
     std::uint32_t add(Arrays mesh, const GeometryOptions& options);
     /// One scene in many places, `masks` one for all or one each. All of them or none; `id` is of
     /// the first, and others follow with the next ones.
-    std::vector<std::uint32_t> add(std::shared_ptr<SceneTrees> scene,
+    std::vector<std::uint32_t> add(std::shared_ptr<BasicSceneTrees> scene,
                                    std::span<const Transform> transforms,
                                    std::span<const std::uint32_t> masks,
                                    std::optional<std::uint32_t> id);
     void remove(std::uint32_t id);
     /// Without triangles: those it has.
-    void update(std::uint32_t id, std::vector<Vec3> vertices,
+    void update(std::uint32_t id, Vertices vertices,
                 std::optional<std::vector<Triangle>> triangles);
     /// All of them or none.
     void set_transforms(std::span<const std::uint32_t> ids, std::span<const Transform> transforms);
@@ -164,7 +192,7 @@ public:
     CommitReport commit(const SceneOptions& options);
     /// Moves the vertices of the one mesh that the scene holds, in the binary tree and in the wide
     /// one. Throws InputError as Refitter::refit does, and if there are changes without a commit.
-    RefitQuality refit(std::vector<Vec3> vertices, int threads);
+    RefitQuality refit(Vertices vertices, int threads);
 
     // While reading.
     /// Of the last commit.
@@ -178,8 +206,6 @@ public:
     [[nodiscard]] std::uint32_t mesh_mask() const { return mesh_mask_; }
     /// As the last commit left it. Throws InputError, as its functions do, if there was none.
     [[nodiscard]] const Scene& traced();
-    /// The wide tree of the one mesh, made as a commit makes it.
-    [[nodiscard]] WideBvhStats wide_stats(const char* call);
 
     TraceCounts trace(std::span<const Ray> rays, std::span<Hit> hits, const RayOptions& options);
     TraceCounts trace_any(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
@@ -189,21 +215,33 @@ public:
     [[nodiscard]] bool any_hit(const Ray& ray, std::uint32_t mask);
 
 private:
+    friend struct SceneFiles;
+    using MeshTrees<Names>::bvh_;
+    using MeshTrees<Names>::build_;
+    using MeshTrees<Names>::options_;
+    using MeshTrees<Names>::queue_;
+    using MeshTrees<Names>::use_;
+    using MeshTrees<Names>::why_no_mesh_;
+
     /// What a commit may still read: meshes of the scene and of those that it places.
     struct Kept {
         std::vector<Arrays> meshes;
         std::vector<std::shared_ptr<const Kept>> below;
     };
     struct Geometry {
-        bool is_instance;
-        std::uint32_t mask;
-        Arrays mesh;
-        std::shared_ptr<SceneTrees> scene;  // of an instance; null if it comes from a file
+        bool is_instance = false;
+        std::uint32_t mask = 0xFFFFFFFFu;
+        Arrays mesh = {};  // empty while `is_in_file`
+        std::shared_ptr<BasicSceneTrees> scene =
+            {};                   // of an instance; null if it comes from a file
+        bool is_in_file = false;  // the arrays of the mesh are those that the scene came with
     };
 
-    void check_strict(const std::string& name, const MeshView& mesh) const;
+    void check_strict(const std::string& name, const typename Names::MeshView& mesh) const;
     void check_places(std::span<const std::uint32_t> ids, std::span<const Transform> transforms);
     Geometry& at(std::uint32_t id);
+    /// Of a mesh: its arrays, copied if they are still those of a file.
+    const Arrays& arrays_of(std::uint32_t id, Geometry& geometry);
     /// While writing, or with `build_` locked: the first commit of a scene that was made from a
     /// mesh.
     void settle();
@@ -217,31 +255,24 @@ private:
     std::shared_ptr<const Kept> kept_ = std::make_shared<const Kept>();
     std::optional<std::uint32_t> mesh_id_;
     std::uint32_t mesh_mask_ = 0;
-    std::optional<Refitter> refitter_;
+    std::optional<typename Names::Refitter> refitter_;
 };
 
-/// One mesh in double. There is one tree, for all queries.
-class SceneTreesD : public MeshTrees<InDouble> {
-public:
-    /// Throws InputError: an index past the vertices.
-    SceneTreesD(Arrays mesh, const BuildOptions& options);
+extern template class BasicSceneTrees<InFloat>;
+extern template class BasicSceneTrees<InDouble>;
+using SceneTrees = BasicSceneTrees<InFloat>;
+using SceneTreesD = BasicSceneTrees<InDouble>;
 
-    /// As that of SceneTrees; its quality too is relative to the tree as it was built.
-    RefitQuality refit(std::vector<Vec3d> vertices, int threads);
-
-    // While reading.
-    [[nodiscard]] bool contains(std::uint32_t id) const { return id == 0; }
-    [[nodiscard]] std::vector<std::uint32_t> ids() const { return {0}; }
-    // Throw InputError for a mask: the mesh has none.
-    TraceCounts trace(std::span<const RayD> rays, std::span<HitD> hits, const RayOptions& options);
-    TraceCounts trace_any(std::span<const RayD> rays, std::span<std::uint8_t> occluded,
-                          const RayOptions& options);
-    [[nodiscard]] AllHitsD trace_all(std::span<const RayD> rays, const RayOptions& options);
-    [[nodiscard]] HitD closest_hit(const RayD& ray, std::uint32_t mask);
-    [[nodiscard]] bool any_hit(const RayD& ray, std::uint32_t mask);
-
-private:
-    std::optional<double> sah_at_build_;
+/// Scenes of files, which are in float.
+struct SceneFiles {
+    /// What a file holds, committed: with ids as raydix::Scene gives them. One mesh, or several
+    /// without nodes, wait for their first ray or change as a scene of one mesh does.
+    [[nodiscard]] static std::shared_ptr<SceneTrees> scene_of(Model model,
+                                                              const BuildOptions& trees,
+                                                              const SceneOptions& commits);
+    /// What a .rdx file holds, with the options of its commits.
+    [[nodiscard]] static std::shared_ptr<SceneTrees> scene_of(RdxScene file,
+                                                              const BuildOptions& trees);
 };
 
 }  // namespace raydix::python

@@ -243,6 +243,26 @@ bool BasicScene<Scalar>::contains(std::uint32_t id) const {
 }
 
 template <class Scalar>
+std::vector<std::uint32_t> BasicScene<Scalar>::ids() const {
+    std::vector<std::uint32_t> all;
+    all.reserve(state_->geometries.size());
+    for (const auto& [id, geometry] : state_->geometries) all.push_back(id);
+    return all;
+}
+
+template <class Scalar>
+auto BasicScene<Scalar>::mesh(std::uint32_t id) const -> std::optional<MeshView> {
+    const auto& geometry = state_->at(id);
+    if (geometry.is_instance()) return {};
+    return geometry.mesh;
+}
+
+template <class Scalar>
+std::uint32_t BasicScene<Scalar>::mask(std::uint32_t id) const {
+    return state_->at(id).mask;
+}
+
+template <class Scalar>
 typename SceneTypes<Scalar>::Box BasicScene<Scalar>::bounds() const {
     return BasicSceneAccess<Scalar>::tree(*this)->bounds;
 }

@@ -471,6 +471,37 @@ TEST(Scene, HitsNameMeshesOfAnySize) {
     }
 }
 
+template <class AnyScene>
+void tells_what_it_holds() {
+    using Mesh = typename AnyScene::Mesh;
+    const Mesh mesh{{}, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+    AnyScene leaf(mesh), scene;
+    EXPECT_TRUE(scene.ids().empty());
+    scene.add(mesh, {.mask = 6, .id = 4'000'000'000u});
+    scene.add(leaf, {}, {.mask = 5, .id = {}});
+    scene.share(mesh);
+    scene.share(mesh);
+    scene.remove(1);
+    EXPECT_EQ(scene.ids(), (std::vector<std::uint32_t>{0, 2, 4'000'000'000u}));
+    EXPECT_EQ(scene.mask(0), 5u);
+    EXPECT_EQ(scene.mask(2), all);
+    EXPECT_EQ(scene.mask(4'000'000'000u), 6u);
+    EXPECT_FALSE(scene.mesh(0).has_value());
+    EXPECT_EQ(scene.mesh(2)->triangles.data(), mesh.triangles.data());
+    EXPECT_NE(scene.mesh(4'000'000'000u)->vertices.data(), mesh.vertices.data());
+    EXPECT_EQ(scene.mesh(4'000'000'000u)->vertices.size(), 3u);
+    EXPECT_TRUE(std::ranges::equal(scene.mesh(4'000'000'000u)->triangles, mesh.triangles));
+    scene.update(2, Mesh{});
+    EXPECT_TRUE(scene.mesh(2)->triangles.empty());
+    EXPECT_THROW(static_cast<void>(scene.mesh(1)), InputError);
+    EXPECT_THROW(static_cast<void>(scene.mask(1)), InputError);
+}
+
+TEST(Scene, TellsWhatItHolds) {
+    tells_what_it_holds<Scene>();
+    tells_what_it_holds<SceneD>();
+}
+
 TEST(Scene, MovingMeshesAreBuiltOnlyWhenTheyChange) {
     Scene scene;
     for (int k = 0; k < 5; ++k) scene.add(test::random_soup(50, static_cast<std::uint64_t>(k)));

@@ -279,8 +279,9 @@ def test_empty_and_degenerate_meshes():
         double(bad, [[0, 1, 2]], strict=True).stats()
     with pytest.raises(ValueError, match="face 0 is"):
         double(np.eye(3), [[0, 1, 3]])
-    with pytest.raises(raydix.InputError, match="triangle 0 refers to vertex 9"):
-        raydix._core.SceneTreesD(np.eye(3), np.uint32([[0, 1, 9]]), "ploc", 0, 63, 4, False, 0)
+    options = ("ploc", 0, 63, 4, False, 0, "balanced", "fixed", False)
+    with pytest.raises(raydix.InputError, match="triangle 0 has an index past the 3 vertices"):
+        raydix._core.SceneTreesD(np.eye(3), np.uint32([[0, 1, 9]]), *options)
 
 
 def test_which_precision():

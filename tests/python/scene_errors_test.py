@@ -147,35 +147,50 @@ def test_strict_scenes():
     assert len(scene) == 1 and raydix.Scene(bad, faces).commit()["triangles"] == 15
 
 
-def test_float64_scenes_are_one_mesh():
+def test_strict_scenes_in_float64():
+    """What a double tree leaves out: float32 would keep the last but one."""
+    bad = np.concatenate([BOX[0], [[np.nan, 0, 0]], 1e-13 * np.eye(3)])
+    faces = np.concatenate([BOX[1], [[9, 10, 11], [8, 0, 1]]])
+    scene = raydix.Scene(strict=True, precision="float64")
+    for call in (
+        lambda: scene.add(bad, faces),
+        lambda: raydix.Scene(bad, faces, strict=True, precision="float64"),
+    ):
+        with pytest.raises(raydix.InputError, match="mesh: triangle 12: not finite .* 1 others"):
+            call()
+    id = scene.add(*BOX)
+    with pytest.raises(raydix.InputError, match="geometry 0: triangle 12"):
+        scene.update(id, bad, faces)
+    assert scene.commit()["triangles"] == 12
+
+
+def test_what_float64_scenes_lack():
     scene = raydix.Scene(*BOX, precision="float64")
     hits = scene.intersect([DOWN, [9, 9, 9, 0, 0, -1]])
-    assert hits["geometry"].tolist() == [0, raydix.MISSING] and hits["instance"].tolist() == [0, 0]
-    assert hits["geometry"].dtype == hits["instance"].dtype == np.uint32
-    assert scene.intersect(DOWN)["geometry"].shape == ()
-    assert scene.all_hits(DOWN)["geometry"].tolist() == [0, 0]
-    assert len(scene) == 1 and list(scene) == [0] and 0 in scene and 1 not in scene
-    assert scene.committed and scene.bounds.tolist() == [[-1, -2, -3], [1, 2, 3]]
-    other = raydix.Scene()
     for name, call in {
-        "an empty scene": lambda: raydix.Scene(precision="float64"),
-        "usage='moving'": lambda: raydix.Scene(*BOX, precision="float64", usage="moving"),
         "compact=True": lambda: raydix.Scene(*BOX, precision="float64", compact=True),
-        "add": lambda: scene.add(*BOX),
-        "add ": lambda: other.add(scene, np.eye(4)),
-        "update": lambda: scene.update(0, BOX[0]),
-        "remove": lambda: scene.remove(0),
-        "set_transform": lambda: scene.set_transform(0, np.eye(4)),
-        "set_mask": lambda: scene.set_mask(0, 1),
-        "commit": scene.commit,
-        "path": lambda: scene.path(0),
-        "mask": lambda: scene.occluded(DOWN, mask=1),
-        "masks": lambda: scene.count(DOWN, masks=1),
+        "compact=True ": lambda: scene.commit(compact=True),
         "positions": lambda: scene.positions(hits),
         "normals": lambda: scene.normals(hits),
+        "save": lambda: scene.save("scene.rdx"),
     }.items():
         text = f"^{name.strip()}: not there .* float64"
         with pytest.raises(NotImplementedError, match=text):
             call()
-    with pytest.raises(raydix.InputError, match="mask"):
-        scene._core.occluded(np.zeros((1, 8)), np.zeros(1, bool), 1)
+    with pytest.raises(raydix.BackendUnavailable, match="device='cuda': scenes in float64"):
+        raydix.Scene(precision="float64", device="cuda")
+
+
+def test_types_of_scenes_do_not_mix():
+    single, double = raydix.Scene(*BOX), raydix.Scene(*BOX, precision="float64")
+    for world, leaf, text in (
+        (single, double, "scene: expected a scene in float32, as this one, given one in float64"),
+        (double, single, "scene: expected a scene in float64, as this one, given one in float32"),
+    ):
+        with pytest.raises(TypeError, match=text):
+            world.add(leaf, np.eye(4))
+        with pytest.raises(TypeError):
+            world._core.add_instances(
+                leaf._core, np.zeros((0, 12), world.dtype), np.zeros(1, np.uint32), None
+            )
+        assert len(world) == 1 and world.committed

@@ -1,11 +1,12 @@
-"""Scenes from files that have nodes."""
+"""Scenes from files that have nodes, and whole scenes in .rdx files."""
 
 import base64
 import json
 
 import numpy as np
 import pytest
-from worlds import BOX
+import support
+from worlds import ALL, BOX, DOWN, random_world, same_hits, transform, triangles
 
 import raydix
 
@@ -77,3 +78,139 @@ def test_files_keep_their_nodes(tmp_path):
     file.write_text(triangle_gltf([{"mesh": 0}, {"mesh": 1, "scale": [1, 1, 3]}], [0, 1]))
     assert len(raydix.Scene(file, strict=True)) == 2
     assert len(raydix.load_points(file)) == 6
+
+
+@pytest.mark.parametrize("options", [{}, {"compact": True}, {"quality": "high"}])
+def test_saved_scenes_have_the_same_hits(rng, tmp_path, options):
+    world = random_world(rng).scene
+    world.name = "a world"
+    world.commit(**options)
+    world.save(tmp_path / "world.rdx")
+    loaded = raydix.load_scene(tmp_path / "world.rdx", threads=1)
+    (tmp_path / "world.rdx").unlink()
+    assert loaded.committed and list(loaded) == list(world) and loaded.name == "a world"
+    assert loaded.threads == 1 and "5 geometries" in repr(loaded)
+    np.testing.assert_array_equal(loaded.bounds, world.bounds)
+    rays = support.random_rays(rng, 500)
+    rays[:, :3] *= 2
+    for mask in (1, 0b1000, ALL):
+        wanted = world.intersect(rays, mask=mask)
+        same_hits(loaded.intersect(rays, mask=mask), wanted)
+        same_hits(loaded.all_hits(rays, mask=mask), world.all_hits(rays, mask=mask))
+    assert (wanted["instance"] > 0).sum() > 20
+    np.testing.assert_array_equal(loaded.positions(wanted), world.positions(wanted))
+    for number in set(wanted["instance"].tolist()):
+        assert loaded.path(number) == world.path(number)
+    with pytest.raises(raydix.InputError, match="geometry 0 is an instance"):
+        loaded.contains([0, 0, 0])
+
+
+def test_loaded_scenes_change_as_those_that_were_saved(rng, tmp_path):
+    """Each change, made to both; the file does not change."""
+    world = random_world(rng).scene
+    world.commit(usage="moving")
+    world.save(tmp_path / "world.rdx")
+    loaded = raydix.load_scene(tmp_path / "world.rdx")
+    rays = support.random_rays(rng, 300)
+    rays[:, :3] *= 2
+    place, vertices, more = transform(rng), triangles(rng, 15)[0], triangles(rng, 8)
+    leaf = raydix.Scene(*triangles(rng, 10))
+    changes = (
+        lambda s: s.set_transform(0, place),
+        lambda s: s.update(1, vertices),  # the triangles are those of the file
+        lambda s: s.set_mask(4, 1),
+        lambda s: s.remove(2),
+        lambda s: s.add(leaf, place),
+        lambda s: s.update(4, *more),
+        lambda s: s.add(*more),
+    )
+    for change in changes:
+        reports = []
+        for scene in (world, loaded):
+            change(scene)
+            reports.append(scene.commit())
+        for name in ("meshes", "instances", "triangles", "paths"):
+            assert reports[0][name] == reports[1][name]
+        assert list(world) == list(loaded)
+        for mask in (1, ALL):
+            same_hits(loaded.intersect(rays, mask=mask), world.intersect(rays, mask=mask))
+    for id in (0, 4):
+        for scene in (world, loaded):
+            with pytest.raises(raydix.InputError, match=f"geometry {id}"):
+                scene.add(leaf, place, id=id)
+    with pytest.raises(raydix.InputError, match="geometry 0 is an instance, not a mesh"):
+        loaded.update(0, vertices)
+    with pytest.raises(raydix.InputError, match="geometry 1 is a mesh, not an instance"):
+        loaded.set_transform(1, place)
+    before = raydix.load_scene(tmp_path / "world.rdx")
+    outer = raydix.Scene()
+    outer.add(before, place)
+    del before
+    outer.commit()
+    assert outer.occluded(rays).any()
+    outer.save(tmp_path / "outer.rdx")  # what it places comes from a file
+    same_hits(raydix.load_scene(tmp_path / "outer.rdx").intersect(rays), outer.intersect(rays))
+
+
+def test_one_mesh_of_a_file_answers_all_queries(rng, tmp_path):
+    vertices, faces = triangles(rng, 200, 0.2)
+    points = rng.uniform(-1, 1, (100, 3))
+    scene = raydix.Scene(vertices, faces)
+    two = raydix.Scene(vertices, faces)
+    two.add(*BOX, id=4_000_000_000)
+    two.commit()
+    for saved, name in ((scene, "one.rdx"), (two, "two.rdx")):
+        saved.save(tmp_path / name)
+    loaded, rest = (raydix.load_scene(tmp_path / name) for name in ("one.rdx", "two.rdx"))
+    with pytest.raises(raydix.InputError, match="geometry 4000000000 is a second mesh"):
+        rest.closest_point(points)
+    assert list(rest) == [0, 4_000_000_000]
+    rest.remove(4_000_000_000)
+    rest.commit()
+    for one in (loaded, rest):
+        np.testing.assert_array_equal(one.vertices, vertices)
+        np.testing.assert_array_equal(one.faces, faces)
+        near, wanted = one.closest_point(points), scene.closest_point(points)
+        same_hits(near, wanted)
+        assert one.stats()["tree_hash"] == scene.stats()["tree_hash"]
+        one.check()
+        moved = raydix.Scene(vertices + np.float32(0.125), faces)
+        one.refit(vertices + np.float32(0.125))
+        rays = support.random_rays(rng, 300)
+        same_hits(one.intersect(rays), moved.intersect(rays))
+        same_hits(one.closest_point(points), moved.closest_point(points))
+    empty = raydix.Scene()
+    empty.commit()
+    empty.save(tmp_path / "empty.rdx")
+    assert not raydix.load_scene(tmp_path / "empty.rdx").occluded(DOWN)
+
+
+def test_cameras_go_with_the_scene(tmp_path):
+    scene = raydix.Scene("builtin:figure?triangles=5000")
+    scene.save(tmp_path / "figure.rdx")
+    loaded = raydix.load_scene(tmp_path / "figure.rdx")
+    assert loaded.cameras == scene.cameras and loaded.name == scene.name
+    np.testing.assert_array_equal(loaded.render(size=(40, 30)), scene.render(size=(40, 30)))
+
+
+def test_files_that_hold_no_scene(tmp_path):
+    scene = raydix.Scene(*BOX)
+    with pytest.raises(raydix.InputError, match="nowhere"):
+        scene.save(tmp_path / "nowhere" / "box.rdx")
+    scene.set_mask(0, 2)
+    with pytest.raises(raydix.InputError, match="commit"):
+        scene.save(tmp_path / "box.rdx")
+    with pytest.raises(raydix.InputError, match="never committed"):
+        raydix.Scene().save(tmp_path / "box.rdx")
+    assert not (tmp_path / "box.rdx").exists()
+    scene.commit()
+    scene.save(tmp_path / "box.rdx")
+    data = bytearray((tmp_path / "box.rdx").read_bytes())
+    for broken in (b"", bytes(data[:100]), bytes(data[:-70]), bytes(data[:64]) + b"x" * 400):
+        (tmp_path / "broken.rdx").write_bytes(broken)
+        with pytest.raises(raydix.InputError, match="broken.rdx"):
+            raydix.load_scene(tmp_path / "broken.rdx")
+    with pytest.raises(raydix.InputError, match="missing.rdx"):
+        raydix.load_scene(tmp_path / "missing.rdx")
+    with pytest.raises(TypeError):
+        raydix.load_scene(3)

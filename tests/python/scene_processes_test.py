@@ -13,10 +13,12 @@ from worlds import ALL, transform, triangles
 import raydix
 
 
-def test_threads_trace_while_others_commit(rng):
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_threads_trace_while_others_commit(rng, precision):
     """Each answer is of one commit, whole; scenes that hold each other do not wait for ever."""
-    leaf = raydix.Scene(*triangles(rng, 300, 0.2))
-    world, top = raydix.Scene(usage="moving"), raydix.Scene()
+    leaf = raydix.Scene(*triangles(rng, 300, 0.2), precision=precision)
+    world = raydix.Scene(usage="moving", precision=precision)
+    top = raydix.Scene(precision=precision)
     id = world.add(leaf, np.eye(4))
     world.add(leaf, transform(rng))
     world.commit()
@@ -40,7 +42,7 @@ def test_threads_trace_while_others_commit(rng):
     def change_top():
         while not done.is_set():
             top.commit()
-            raydix.Scene().add(top, np.eye(4))
+            raydix.Scene(precision=precision).add(top, np.eye(4))
 
     def change_leaf():
         while not done.is_set():

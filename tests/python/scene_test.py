@@ -9,6 +9,8 @@ from worlds import ALL, BOX, DOWN, random_world, same_hits, transform, triangles
 
 import raydix
 
+both_precisions = pytest.mark.parametrize("precision", ["float32", "float64"])
+
 
 @pytest.mark.parametrize("usage", ["fixed", "moving"])
 def test_hits_equal_brute_force(rng, usage):
@@ -65,8 +67,9 @@ def test_hits_equal_brute_force(rng, usage):
         assert (hi - lo < 6 * np.ptp(flat, axis=0)).all()  # boxes of boxes, turned
 
 
-def test_one_mask_or_one_each(rng):
-    world = random_world(rng)
+@both_precisions
+def test_one_mask_or_one_each(rng, precision):
+    world = random_world(rng, precision=precision)
     world.scene.commit()
     rays = support.random_rays(rng, 60)
     rays[:, :3] *= 2
@@ -100,11 +103,13 @@ def test_one_mask_or_one_each(rng):
         )  # fmt: skip
 
 
+@both_precisions
 @pytest.mark.parametrize("rays", [1, 5, 2000])
-def test_rays_of_mask_0_see_nothing(rays):
-    scene, batch = raydix.Scene(*BOX), np.tile(DOWN, (rays, 1))
+def test_rays_of_mask_0_see_nothing(rays, precision):
+    scene, batch = raydix.Scene(*BOX, precision=precision), np.tile(DOWN, (rays, 1))
     assert not scene.occluded(batch, mask=0).any() and scene.occluded(batch).all()
-    scene.add(raydix.Scene(*BOX), np.eye(4) + [[0, 0, 0, 50], [0] * 4, [0] * 4, [0] * 4])
+    leaf = raydix.Scene(*BOX, precision=precision)
+    scene.add(leaf, np.eye(4) + [[0, 0, 0, 50], [0] * 4, [0] * 4, [0] * 4])
     scene.commit()
     for masks in ({"mask": 0}, {"masks": np.zeros(rays, np.uint32)}):
         assert not scene.occluded(batch, **masks).any()
@@ -175,8 +180,9 @@ def test_answers_are_of_the_last_commit():
     assert made.occluded(DOWN) and not made.committed
 
 
-def test_ids_and_what_there_is():
-    scene = raydix.Scene(*BOX)
+@both_precisions
+def test_ids_and_what_there_is(precision):
+    scene = raydix.Scene(*BOX, precision=precision)
     assert len(scene) == 1 and 0 in scene
     assert 1 not in scene and "0" not in scene and -1 not in scene
     assert scene.add(*BOX, id=7) == 7 and scene.add(*BOX) == 1
@@ -207,7 +213,8 @@ def random_change(rng, scene, fresh):
         mesh, mask = triangles(rng, int(rng.integers(0, 30))), int(rng.integers(1, 4))
         fresh[scene.add(*mesh, mask=mask)] = [mask, *mesh]
     elif kind == 1:
-        leaf, place = raydix.Scene(*triangles(rng, 20)), transform(rng)
+        leaf = raydix.Scene(*triangles(rng, 20), precision=scene.dtype)
+        place = transform(rng)
         fresh[scene.add(leaf, place)] = [ALL, leaf, place]
     elif kind == 2 and len(ids) > 2:
         scene.remove(id)
@@ -227,15 +234,16 @@ def random_change(rng, scene, fresh):
         scene.update(id, *fresh[id][1:])
 
 
+@both_precisions
 @pytest.mark.parametrize("usage", ["fixed", "moving"])
-def test_changes_equal_a_fresh_scene(rng, usage):
-    scene, geometries = raydix.Scene(usage=usage), {}
+def test_changes_equal_a_fresh_scene(rng, usage, precision):
+    scene, geometries = raydix.Scene(usage=usage, precision=precision), {}
     rays = support.random_rays(rng, 300)
     for _ in range(40):
         for _ in range(int(rng.integers(1, 4))):
             random_change(rng, scene, geometries)
         scene.commit()
-        fresh = raydix.Scene()
+        fresh = raydix.Scene(precision=precision)
         for id, (mask, *parts) in sorted(geometries.items()):
             fresh.add(*parts, mask=mask, id=id)
         fresh.commit()
@@ -246,9 +254,10 @@ def test_changes_equal_a_fresh_scene(rng, usage):
         np.testing.assert_array_equal(scene.bounds, fresh.bounds)
 
 
-def test_commits_tell_what_they_did(rng):
+@both_precisions
+def test_commits_tell_what_they_did(rng, precision):
     vertices, faces = triangles(rng, 500, 0.1)
-    scene = raydix.Scene(usage="moving")
+    scene = raydix.Scene(usage="moving", precision=precision)
     ids = [scene.add(vertices + np.float32([4 * i, 0, 0]), faces) for i in range(3)]
     report = scene.commit()
     assert set(report) == {"ms", "meshes", "instances", "triangles", "trees_built", "trees_refitted",
@@ -269,10 +278,11 @@ def test_commits_tell_what_they_did(rng):
     assert scene.commit()["trees_built"] == 0
 
 
-def test_scenes_that_are_placed_change(rng):
-    leaf = raydix.Scene()
+@both_precisions
+def test_scenes_that_are_placed_change(rng, precision):
+    leaf = raydix.Scene(precision=precision)
     id = leaf.add(*BOX)
-    world = raydix.Scene()
+    world = raydix.Scene(precision=precision)
     world.add(leaf, np.eye(4))
     with pytest.raises(raydix.InputError, match="instance 0: .* never committed"):
         world.commit()
@@ -295,12 +305,13 @@ def test_scenes_that_are_placed_change(rng):
         world.path(2)
 
 
-def test_many_places_at_once(rng):
+@both_precisions
+def test_many_places_at_once(rng, precision):
     """M transforms in one call are M calls."""
-    leaf = raydix.Scene(*triangles(rng, 30))
+    leaf = raydix.Scene(*triangles(rng, 30), precision=precision)
     places = np.stack([transform(rng, mirror=i % 2 == 0) for i in range(20)])
     masks = rng.integers(1, 4, 20)
-    whole, single = raydix.Scene(), raydix.Scene()
+    whole, single = raydix.Scene(precision=precision), raydix.Scene(precision=precision)
     ids = whole.add(leaf, places, mask=masks)
     assert ids.tolist() == list(range(20)) and ids.dtype == np.uint32
     for place, mask in zip(places, masks, strict=True):
@@ -332,9 +343,10 @@ def test_many_places_at_once(rng):
     assert len(whole.add(leaf, flat[:0])) == 0
 
 
-def test_the_scene_has_its_own_copies(rng):
-    vertices, faces = BOX[0].astype(np.float32), BOX[1].astype(np.uint32)
-    scene = raydix.Scene()
+@both_precisions
+def test_the_scene_has_its_own_copies(rng, precision):
+    vertices, faces = BOX[0].astype(precision), BOX[1].astype(np.uint32)
+    scene = raydix.Scene(precision=precision)
     for _ in range(2):
         scene.add(vertices, faces)
     vertices += 100

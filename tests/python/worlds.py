@@ -74,18 +74,18 @@ def triangles(rng, count, size=0.6):
     return support.random_triangles(rng, count, size)
 
 
-def random_world(rng):
+def random_world(rng, **options):
     """Meshes and instances on three levels, some mirrored, some sheared, some behind masks."""
-    leaf = World()
+    leaf = World(**options)
     leaf.add_mesh(*triangles(rng, 12))
     leaf.add_mesh(*triangles(rng, 9), mask=0b0111, id=4)
     leaf.scene.commit()
-    middle = World()
+    middle = World(**options)
     middle.add_instance(leaf, transform(rng, mirror=True))
     middle.add_mesh(*triangles(rng, 7))
     middle.add_instance(leaf, transform(rng, shear=0.7), mask=0b1101)
     middle.scene.commit()
-    world = World()
+    world = World(**options)
     world.add_instance(middle, transform(rng), mask=0b1110)
     world.add_mesh(*triangles(rng, 15))
     world.add_instance(leaf, transform(rng, mirror=True, shear=-0.4))

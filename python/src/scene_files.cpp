@@ -1,0 +1,50 @@
+// What files hold -> scenes.
+#include <memory>
+#include <utility>
+
+#include "batch.h"
+#include "scene_trees.h"
+
+namespace raydix::python {
+
+std::shared_ptr<SceneTrees> SceneFiles::scene_of(Model model, const BuildOptions& trees,
+                                                 const SceneOptions& commits) {
+    auto scene = std::make_shared<SceneTrees>(trees, commits);
+    if (model.nodes.empty()) {
+        if (model.meshes.empty()) model.meshes.emplace_back();
+        SceneTrees::Kept kept;
+        for (Mesh& mesh : model.meshes) {
+            const SceneTrees::Arrays arrays{
+                std::make_shared<const SceneTrees::Vertices>(std::move(mesh.vertices)),
+                std::make_shared<const SceneTrees::Arrays::Triangles>(std::move(mesh.triangles))};
+            kept.meshes.push_back(arrays);
+            static_cast<void>(scene->add(arrays, {}));
+        }
+        scene->kept_ = std::make_shared<const SceneTrees::Kept>(std::move(kept));
+        scene->unsettled_ = true;
+    } else {
+        for (const Mesh& mesh : model.meshes) scene->check_strict("mesh " + mesh.name, mesh);
+        SceneOptions options = commits;
+        options.threads = threads_for(options.threads);
+        scene->scene_ = Scene(model, options);
+        // Its geometries are the nodes that stand in the world.
+        for (const std::uint32_t id : scene->scene_.ids())
+            scene->geometries_[id] = {.is_instance = true};
+    }
+    scene->look_for_mesh();
+    return scene;
+}
+
+std::shared_ptr<SceneTrees> SceneFiles::scene_of(RdxScene file, const BuildOptions& trees) {
+    auto scene = std::make_shared<SceneTrees>(trees, file.options);
+    scene->scene_ = std::move(file.scene);
+    for (const std::uint32_t id : scene->scene_.ids()) {
+        const bool is_instance = !scene->scene_.mesh(id).has_value();
+        scene->geometries_[id] = {
+            .is_instance = is_instance, .mask = scene->scene_.mask(id), .is_in_file = !is_instance};
+    }
+    scene->look_for_mesh();
+    return scene;
+}
+
+}  // namespace raydix::python
