@@ -77,11 +77,10 @@ void expect_refusal(Case& c, const InputError& error, std::span<const std::strin
     const std::string_view start = "attack.rdx: ";
     const std::string_view rest =
         std::string_view(message).substr(std::min(start.size(), message.size()));
-    const bool named = message.starts_with(start) &&
-                       std::ranges::any_of(sections, [&](std::string_view section) {
-                           return rest.starts_with(section) &&
-                                  rest.substr(section.size()).starts_with(": ");
-                       });
+    const bool named =
+        message.starts_with(start) && std::ranges::any_of(sections, [&](std::string_view section) {
+            return rest.starts_with(section) && rest.substr(section.size()).starts_with(": ");
+        });
     c.expect(named, "files/mutated that were refused", "an error that names no section",
              reproducer);
 }
