@@ -501,7 +501,7 @@ TEST(Scene, MeshesMayReachTheEdgeOfTheRange) {
             Mesh mesh;
             mesh.vertices = {corner(by, by), corner(by + 2e9f, by), corner(by, by + 2e9f)};
             mesh.triangles = {{0, 1, 2}};
-            scene.add(mesh, {.mask = 1u << k});
+            scene.add(mesh, {.mask = 1u << k, .id = {}});
             rays.push_back({{0, 0, 0}, 0, corner(by + 5e8f, by + 5e8f)});
             EXPECT_TRUE(closest_hit(Scene(mesh), rays.back()).hit()) << k;
         }
