@@ -67,10 +67,12 @@ public:
         MeshCommit<float, WideMaker> meshes(state_, options_, report_);
         tree_->meshes = meshes.run(instance_work());
         for (const auto& mesh : tree_->meshes) {
-            tree_->extents.push_back(extent_of_mesh(mesh->tree->arrays().bounds));
             report_.bytes += mesh->tree->stats().bytes;
-            if (!mesh->tree->empty())
-                tree_->bounds = unite(tree_->bounds, mesh->tree->arrays().bounds);
+            tree_->extents.emplace_back();
+            if (mesh->tree->empty()) continue;  // its bounds are zeros
+            const Aabb& bounds = mesh->tree->arrays().bounds;
+            tree_->extents.back() = extent_of_mesh(bounds);
+            tree_->bounds = unite(tree_->bounds, bounds);
         }
         place_instances();
         const ProgressStage top(meshes.part_done(), 1);

@@ -51,7 +51,11 @@ public:
 
     std::shared_ptr<const SceneTreeD> run() {
         std::size_t instances = 0;
-        for (const auto& [id, geometry] : state_.geometries) instances += geometry.is_instance();
+        for (const auto& [id, geometry] : state_.geometries)
+            if (geometry.is_instance())
+                ++instances;
+            else
+                tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
         MeshCommit<double, BinaryMaker> meshes(state_, options_, report_);
         tree_->meshes = meshes.run(static_cast<double>(instances));
         for (const auto& mesh : tree_->meshes) add_extent(*mesh->tree);
@@ -77,7 +81,8 @@ private:
             if (!geometry.is_instance()) continue;
             const auto& inner = geometry.scene->tree;
             const std::uint32_t number = number_instance(*tree_, id, inner);
-            tree_->instances.push_back({id, number, geometry.mask, geometry.inverse, inner});
+            tree_->instances.push_back(
+                {id, number, geometry.mask, geometry.inverse, geometry.transform, inner});
             const ExtentD& around = inner->parts.around;
             ExtentD extent{nothing_d, 0.0};
             if (!is_empty(around))

@@ -12,16 +12,22 @@
 
 namespace raydix {
 
-/// The triangle of a hit in the space of its mesh, and the way from there to the world.
-struct HitTriangle {
+/// The triangle of a hit in the space of its mesh, and the way from there to the world. Tree:
+/// SceneTree or SceneTreeD.
+template <class Tree>
+struct BasicHitTriangle {
+    using Instance = typename decltype(Tree::instances)::value_type;
+
     Double3 corners[3];
-    std::uint32_t levels = 0;                    // of instances
-    const InstanceName* way[Scene::max_levels];  // [levels], the outermost first
+    std::uint32_t levels = 0;                // of instances
+    const Instance* way[Scene::max_levels];  // [levels], the outermost first
 
     [[nodiscard]] Double3 point(double u, double v) const;
     /// Of any length; 0 if there is no area.
     [[nodiscard]] Double3 normal() const;
 };
+
+using HitTriangle = BasicHitTriangle<SceneTree>;
 
 /// False: there is no such path, mesh or triangle. The hit is no miss.
 [[nodiscard]] bool find_triangle(const SceneTree& scene, const Hit& hit, HitTriangle& triangle);

@@ -12,10 +12,24 @@ namespace {
 /// part, twice as much with what is to spare.
 constexpr double float_rounding = 0x1p-22;
 
+/// Builders leave out boxes beyond the range of coordinates. Extents of meshes at its edge reach
+/// less than 2^-21 of it farther: they are built to the edge, and nodes there reach farther again.
+Aabb built_box(const Extent& extent) {
+    constexpr Vec3 edge{max_coordinate, max_coordinate, max_coordinate};
+    return {max_of(extent.box.lo, edge * -1.0f), min_of(extent.box.hi, edge)};
+}
+Aabb reach_of(const Aabb& built) {
+    constexpr float far = max_coordinate * (1.0f + 0x1p-20f);
+    const auto low = [](float x) { return x <= -max_coordinate ? -far : x; };
+    const auto high = [](float x) { return x >= max_coordinate ? far : x; };
+    return {{low(built.lo.x), low(built.lo.y), low(built.lo.z)},
+            {high(built.hi.x), high(built.hi.y), high(built.hi.z)}};
+}
+
 Bvh binary_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
                 Quality quality) {
     std::vector<Aabb> boxes(parts.size());
-    for (std::size_t k = 0; k < parts.size(); ++k) boxes[k] = extents[parts[k]].box;
+    for (std::size_t k = 0; k < parts.size(); ++k) boxes[k] = built_box(extents[parts[k]]);
     // Boxes cannot be split.
     BuildOptions options =
         build_options_for(quality == Quality::fast ? Quality::fast : Quality::balanced);
@@ -44,7 +58,7 @@ void set_node(std::span<const BvhNode> slots, const Vec3& middle, WideNode& node
     SlotBoxes boxes;
     std::fill_n(node.child, quantised_width, wide_no_child);
     for (std::size_t s = 0; s < count; ++s) {
-        boxes.set(static_cast<int>(s), {children[s].lo, children[s].hi});
+        boxes.set(static_cast<int>(s), reach_of({children[s].lo, children[s].hi}));
         node.child[s] = word_of(children[s]);
     }
     set_boxes_about(middle, boxes, node);
@@ -130,7 +144,7 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
     if (parts.empty()) return;
     const Bvh bvh = binary_tree(parts, extents, quality);
     const WideTree wide = collapse_to_wide(bvh, {.width = quantised_width, .max_leaf = 1});
-    out.arrays.set_bounds(bvh.bounds());
+    out.arrays.set_bounds(reach_of(bvh.bounds()));
     out.arrays.nodes.reset(wide.node_count());
     std::vector<double> areas(wide.node_count());
     for_each_index(

@@ -14,6 +14,7 @@
 
 #include "engine/extent.h"
 #include "engine/grouped_meshes.h"
+#include "engine/mesh_name.h"
 #include "engine/support.h"
 #include "instances/affine.h"
 #include "layout/wide_bvh.h"
@@ -58,13 +59,6 @@ struct InstanceName {
     std::uint32_t number;  // of the path that ends here
     Transform transform;
     std::shared_ptr<const SceneTree> scene;
-};
-
-/// A mesh as the scene's owner knows it: the triangles that hits name.
-struct MeshName {
-    std::uint32_t id, mask;
-    MeshView mesh;
-    std::shared_ptr<const void> own;  // its arrays; null if they are the caller's
 };
 
 /// A wide tree whose leaves hold one part each. Parts are numbered: mesh trees first, then placed

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/grouped_meshes.h"
+#include "engine/mesh_name.h"
 #include "instances/affine_double.h"
 #include "instances/instance_tree_double.h"
 
@@ -27,12 +28,14 @@ struct PlacedSceneD {
     std::uint32_t number;  // of the path that ends here
     std::uint32_t mask;
     InverseD inverse;
+    TransformD transform;
     std::shared_ptr<const SceneTreeD> scene;
 };
 
 struct SceneTreeD {
     std::vector<std::shared_ptr<const MeshTreeD>> meshes;
     std::vector<PlacedSceneD> instances;  // by ascending id
+    std::vector<MeshNameD> mesh_names;    // by ascending id
     InstanceTreeD parts;                  // mesh trees first, then instances
     AabbD bounds = nothing_d;             // without what rays may miss it by
     Quality quality{};                    // what it was made with

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "api/shapes.h"
-#include "engine/extent.h"
+#include "engine/long_double_maps.h"
 #include "instances/affine.h"
 #include "support/message.h"
 #include "support/random.h"
@@ -22,68 +22,8 @@
 namespace raydix {
 namespace {
 
-using Real = long double;
-using Column = std::array<Real, 3>;
-
-Column column(Vec3 p) { return {p.x, p.y, p.z}; }
-Column minus(const Column& a, const Column& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Column times(const Column& a, Real by) { return {a[0] * by, a[1] * by, a[2] * by}; }
-Real product(const Column& a, const Column& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Column crossed(const Column& a, const Column& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Column unit(const Column& a) { return times(a, 1 / std::sqrt(product(a, a))); }
-
-/// Rows and a move.
-using Matrix = std::array<std::array<Real, 4>, 3>;
-
-Matrix composed(const Matrix& outer, const Matrix& inner) {
-    Matrix out{};
-    for (std::size_t r = 0; r < 3; ++r)
-        for (std::size_t c = 0; c < 4; ++c) {
-            out[r][c] = c == 3 ? outer[r][3] : 0;
-            for (std::size_t k = 0; k < 3; ++k) out[r][c] += outer[r][k] * inner[k][c];
-        }
-    return out;
-}
-Column mapped(const Matrix& by, const Column& p) {
-    Column out{};
-    for (std::size_t r = 0; r < 3; ++r)
-        out[r] = by[r][0] * p[0] + by[r][1] * p[1] + by[r][2] * p[2] + by[r][3];
-    return out;
-}
-
-/// A map from a mesh to the world; how large the numbers are on the way, and how far it distorts.
-struct Map {
-    Matrix m{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-    Matrix most = m;  // of magnitudes
-    Real condition = 1;
-
-    Map() = default;
-    explicit Map(const Transform& t) {
-        for (std::size_t r = 0; r < 3; ++r)
-            for (std::size_t c = 0; c < 4; ++c)
-                m[r][c] = t.m[r][c], most[r][c] = std::fabs(m[r][c]);
-        const Affine map = affine_of(t);
-        condition = errors_of(map, *inverse_of(map)).condition;
-    }
-    /// First through `inner`, then through this.
-    [[nodiscard]] Map after(const Map& inner) const {
-        Map out;
-        out.m = composed(m, inner.m);
-        out.most = composed(most, inner.most);
-        out.condition = condition * inner.condition;
-        return out;
-    }
-    /// The inverse transpose of a normal, of unit length.
-    [[nodiscard]] Column turned(const Column& normal) const {
-        const auto row = [&](std::size_t r) { return Column{m[r][0], m[r][1], m[r][2]}; };
-        const Column x = crossed(row(1), row(2)), y = crossed(row(2), row(0)),
-                     z = crossed(row(0), row(1));
-        const Real det = product(row(0), x);
-        return unit({product(x, normal) / det, product(y, normal) / det, product(z, normal) / det});
-    }
-};
+using test::Column, test::Real, test::column, test::crossed, test::mapped, test::minus, test::times;
+using Map = test::LongMap;
 
 /// A mesh on a path, as a commit has it.
 struct Placed {
