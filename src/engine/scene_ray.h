@@ -65,13 +65,19 @@ HWY_INLINE bool near_unit_length(V4 way) {
            (bits_of(f4, hn::Gt(size, hn::Set(f4, 0x1p-3f))) & 7) != 0;
 }
 
+/// As direction_scale. As large a one as brings a direction that floats hold near unit length:
+/// distances and short components are then in the range of floats wherever the caller's are.
+inline double line_scale(double longest) {
+    return longest >= 0x1p125 && longest < 0x1p128 ? 0x1p-125 : direction_scale(longest);
+}
+
 /// Brings a line's direction near unit length.
 inline HWY_NOINLINE void rescale(SceneLine& line) {
     const double longest =
         max_of(max_of(std::fabs(line.direction[0]), std::fabs(line.direction[1])),
                std::fabs(line.direction[2]));
     if (near_unit_length(longest)) return;
-    const double by = direction_scale(longest);
+    const double by = line_scale(longest);
     for (int a = 0; a < 3; ++a) line.direction[a] *= by;
     line.scale *= by;
 }

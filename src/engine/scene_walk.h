@@ -169,7 +169,7 @@ private:
     HWY_NOINLINE void rescale(SceneLevel& level, float longest) {
         Ray& ray = level.rays[level.count - 1];
         SceneRaySource& source = level.sources[level.count - 1];
-        source.scale = direction_scale(double{longest});
+        source.scale = line_scale(double{longest});
         const Double3 scaled = Double3(ray.direction) * source.scale;
         ray.direction = scaled.rounded();
         ray.tmin = in_units_of(source.scale, ray.tmin);

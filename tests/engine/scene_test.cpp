@@ -515,59 +515,6 @@ TEST(Scene, MovingMeshesAreBuiltOnlyWhenTheyChange) {
     EXPECT_EQ(scene.commit({.usage = Usage::fixed}).trees_built, 1u);
 }
 
-/// Boxes of parts are a little larger than what is in them, and no mesh is left out for that.
-TEST(Scene, MeshesMayReachTheEdgeOfTheRange) {
-    constexpr float edge = 1e12f;
-    for (const Usage usage : {Usage::fixed, Usage::moving}) {
-        Scene scene;
-        std::vector<Ray> rays;
-        for (std::uint32_t k = 0; k < 12; ++k) {
-            const std::size_t axis = k % 3;
-            const float side = k % 2 == 0 ? edge : -edge, by = 0.01f * edge * float(k + 1);
-            const auto corner = [&](float a, float b) {
-                float c[3];
-                c[axis] = side, c[(axis + 1) % 3] = a, c[(axis + 2) % 3] = b;
-                return Vec3{c[0], c[1], c[2]};
-            };
-            Mesh mesh;
-            mesh.vertices = {corner(by, by), corner(by + 2e9f, by), corner(by, by + 2e9f)};
-            mesh.triangles = {{0, 1, 2}};
-            scene.add(mesh, {.mask = 1u << k, .id = {}});
-            rays.push_back({{0, 0, 0}, 0, corner(by + 5e8f, by + 5e8f)});
-            EXPECT_TRUE(closest_hit(Scene(mesh), rays.back()).hit()) << k;
-        }
-        scene.commit({.usage = usage});
-        const std::vector<Hit> hits = trace(scene, rays);
-        for (std::uint32_t k = 0; k < rays.size(); ++k) EXPECT_EQ(hits[k].geometry, k);
-    }
-}
-
-/// Trees without triangles are nowhere, not at the origin.
-TEST(Scene, MeshesWithoutAreaAreNowhere) {
-    Mesh flat;
-    flat.vertices = {{5, 5, 5}, {6, 6, 6}, {7, 7, 7}};
-    flat.triangles = {{0, 1, 2}};
-    const Mesh far = test::random_soup(5, 3, 0.5f);
-    const Ray through{{0, 0, -1}, 0, {0, 0, 1}};
-    for (const Usage usage : {Usage::fixed, Usage::moving})
-        for (const bool compact : {false, true}) {
-            const SceneOptions options{.usage = usage, .compact = compact};
-            const Scene empty(flat, options);
-            Scene scene;
-            scene.add(flat, {.mask = 1, .id = {}});
-            scene.add(flat, {.mask = 2, .id = {}});
-            scene.add(empty, Transform{});
-            scene.commit(options);
-            EXPECT_FALSE(closest_hit(empty, through).hit());
-            EXPECT_FALSE(any_hit(scene, through));
-            EXPECT_GT(scene.bounds().lo.x, scene.bounds().hi.x);
-            scene.add(far);
-            scene.commit(options);
-            EXPECT_EQ(closest_hit(Scene(far), through).t, closest_hit(scene, through).t);
-            EXPECT_EQ(scene.bounds().lo.x, Scene(far).bounds().lo.x);
-        }
-}
-
 TEST(Scene, NothingToHit) {
     Scene empty;
     EXPECT_THROW(static_cast<void>(closest_hit(empty, down)), InputError);

@@ -1,0 +1,117 @@
+// Scenes at the edges of what they may hold: the range of coordinates, meshes without area, rays
+// that floats only just hold.
+#include <gtest/gtest.h>
+#include <raydix/scene.h>
+#include <raydix/trace.h>
+
+#include <cstring>
+#include <vector>
+
+#include "support/random.h"
+#include "support/support.h"
+
+namespace raydix {
+namespace {
+
+/// Boxes of parts are a little larger than what is in them, and no mesh is left out for that.
+TEST(Scene, MeshesMayReachTheEdgeOfTheRange) {
+    constexpr float edge = 1e12f;
+    for (const Usage usage : {Usage::fixed, Usage::moving}) {
+        Scene scene;
+        std::vector<Ray> rays;
+        for (std::uint32_t k = 0; k < 12; ++k) {
+            const std::size_t axis = k % 3;
+            const float side = k % 2 == 0 ? edge : -edge, by = 0.01f * edge * float(k + 1);
+            const auto corner = [&](float a, float b) {
+                float c[3];
+                c[axis] = side, c[(axis + 1) % 3] = a, c[(axis + 2) % 3] = b;
+                return Vec3{c[0], c[1], c[2]};
+            };
+            Mesh mesh;
+            mesh.vertices = {corner(by, by), corner(by + 2e9f, by), corner(by, by + 2e9f)};
+            mesh.triangles = {{0, 1, 2}};
+            scene.add(mesh, {.mask = 1u << k, .id = {}});
+            rays.push_back({{0, 0, 0}, 0, corner(by + 5e8f, by + 5e8f)});
+            EXPECT_TRUE(closest_hit(Scene(mesh), rays.back()).hit()) << k;
+        }
+        scene.commit({.usage = usage});
+        const std::vector<Hit> hits = trace(scene, rays);
+        for (std::uint32_t k = 0; k < rays.size(); ++k) EXPECT_EQ(hits[k].geometry, k);
+    }
+}
+
+/// Trees without triangles are nowhere, not at the origin.
+TEST(Scene, MeshesWithoutAreaAreNowhere) {
+    Mesh flat;
+    flat.vertices = {{5, 5, 5}, {6, 6, 6}, {7, 7, 7}};
+    flat.triangles = {{0, 1, 2}};
+    const Mesh far = test::random_soup(5, 3, 0.5f);
+    const Ray through{{0, 0, -1}, 0, {0, 0, 1}};
+    for (const Usage usage : {Usage::fixed, Usage::moving})
+        for (const bool compact : {false, true}) {
+            const SceneOptions options{.usage = usage, .compact = compact};
+            const Scene empty(flat, options);
+            Scene scene;
+            scene.add(flat, {.mask = 1, .id = {}});
+            scene.add(flat, {.mask = 2, .id = {}});
+            scene.add(empty, Transform{});
+            scene.commit(options);
+            EXPECT_FALSE(closest_hit(empty, through).hit());
+            EXPECT_FALSE(any_hit(scene, through));
+            EXPECT_GT(scene.bounds().lo.x, scene.bounds().hi.x);
+            scene.add(far);
+            scene.commit(options);
+            EXPECT_EQ(closest_hit(Scene(far), through).t, closest_hit(scene, through).t);
+            EXPECT_EQ(scene.bounds().lo.x, Scene(far).bounds().lo.x);
+        }
+}
+
+/// A direction near the largest float leaves t and its smaller components in the range of floats,
+/// through a tree over parts as through one tree.
+TEST(Scene, DirectionsMayBeAsLongAsFloatsAre) {
+    const Mesh mesh = test::random_soup(60, 8, 0.7f);
+    test::Random random(5);
+    std::vector<Ray> rays;
+    for (int i = 0; i < 2000; ++i) {
+        const Vec3 at = random.in(0, 1), from = random.in(-1, 2);
+        const float far = (i % 2 == 0 ? 1.0f : -1.0f) * random.between(0.5e38f, 3.4e38f);
+        Ray ray{at, 0, {at.x - from.x, at.y - from.y, at.z - from.z}};
+        float* const origin = &ray.origin.x;
+        float* const direction = &ray.direction.x;
+        const std::size_t axis = random.below(3);
+        direction[axis] = -far;  // small components beside it
+        if (i % 3 == 0) origin[axis] = far;
+        rays.push_back(ray);
+    }
+    const std::vector<Hit> wanted = trace_brute_force(mesh, rays);
+    Scene scene, instance;
+    scene.add(mesh);
+    scene.add(Scene(test::random_soup(5, 3)), {{{{1, 0, 0, 9}, {0, 1, 0, 9}, {0, 0, 1, 9}}}});
+    scene.commit();
+    instance.add(Scene(mesh), Transform{});
+    instance.commit();
+    std::size_t found = 0;
+    for (const SimdPath path : {SimdPath::automatic, SimdPath::single, SimdPath::packet,
+                                SimdPath::stream, SimdPath::sorted}) {
+        SceneTraceOptions options;
+        options.path = path;
+        const std::vector<Hit> hits = trace(scene, rays, options),
+                               inside = trace(instance, rays, options);
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            Hit expected = wanted[i];
+            found += expected.hit();
+            ASSERT_EQ(std::memcmp(&hits[i], &expected, sizeof expected), 0) << i;
+            if (expected.hit()) expected.instance = 1;
+            ASSERT_EQ(std::memcmp(&inside[i], &expected, sizeof expected), 0) << i;
+        }
+    }
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const Hit hit = closest_hit(scene, rays[i]);
+        EXPECT_EQ(std::memcmp(&hit, &wanted[i], sizeof hit), 0) << i;
+        EXPECT_EQ(any_hit(instance, rays[i]), wanted[i].hit()) << i;
+    }
+    EXPECT_GT(found, 500u);
+}
+
+}  // namespace
+}  // namespace raydix
