@@ -48,7 +48,7 @@ public:
 
     [[nodiscard]] TurnKind kind() const {
         const std::uint32_t leaf = now_->next() >> 31;
-        return static_cast<TurnKind>(leaf + (leaf & static_cast<std::uint32_t>(now_ == &*parts_)));
+        return static_cast<TurnKind>(leaf + (leaf & static_cast<std::uint32_t>(!in_mesh_)));
     }
     HWY_INLINE void ask() const {
         if (kind() == TurnKind::part)
