@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
-#include <mutex>
 #include <string>
 
 #if __has_include(<unistd.h>)
@@ -104,10 +103,6 @@ std::uint64_t group_memory_left(const fs::path& cgroup, const fs::path& mount) {
 }
 
 std::uint64_t available_memory() {
-    // One reader of the system's files at a time: the thread sanitizer takes memory that one closed
-    // file leaves to the next for a race.
-    static std::mutex reading;
-    const std::lock_guard lock(reading);
     const std::uint64_t left = std::min(system_memory_left("/proc/meminfo"),
                                         group_memory_left("/proc/self/cgroup", "/sys/fs/cgroup"));
     return left == unknown_memory ? physical_memory() : left;
