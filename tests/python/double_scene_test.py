@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import support
-from worlds import ALL, BOX, DOWN, World, random_world, transform, triangles
+from worlds import ALL, BOX, DOWN, World, random_world, same_names, transform, triangles
 
 import raydix
 
@@ -32,12 +32,7 @@ def agrees(world, rays, masks):
     hit = hits["prim"] != raydix.MISSING
     np.testing.assert_allclose(hits["t"], ordered[:, 0], rtol=1e-8)
     clear = hit & (ordered[:, 1] > ordered[:, 0] * (1 + 1e-7))
-    best = names[times.argmin(axis=1)]
-    for i, name in enumerate(("instance", "geometry", "prim")):
-        np.testing.assert_array_equal(hits[name][clear], best[clear, i])
-        assert hits[name].dtype == np.uint32
-    assert set(hits["instance"][~hit]) <= {0}
-    assert set(hits["geometry"][~hit]) <= {raydix.MISSING}
+    same_names(hits, clear, names[times.argmin(axis=1)])
     counts = np.isfinite(times).sum(axis=1)
     np.testing.assert_array_equal(world.scene.occluded(rays, masks=masks), hit)
     np.testing.assert_array_equal(world.scene.count(rays, masks=masks), counts)

@@ -97,3 +97,14 @@ def random_world(rng, **options):
 def same_hits(found, wanted):
     for name, values in wanted.items():
         np.testing.assert_array_equal(found[name], values, err_msg=name)
+
+
+def same_names(hits, clear, best):
+    """The hits that are `clear` name what `best` does: rows of instance, geometry, prim. Misses
+    name nothing."""
+    for i, name in enumerate(("instance", "geometry", "prim")):
+        np.testing.assert_array_equal(hits[name][clear], best[clear, i])
+        assert hits[name].dtype == np.uint32
+    miss = hits["prim"] == raydix.MISSING
+    assert set(hits["instance"][miss]) <= {0}
+    assert set(hits["geometry"][miss]) <= {raydix.MISSING}
