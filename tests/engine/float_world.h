@@ -1,0 +1,230 @@
+// Random scenes in float, and a judge that looks at every mesh on every path.
+#pragma once
+
+#include <raydix/scene.h>
+#include <raydix/trace.h>
+#include <raydix/wide.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "instances/affine.h"
+#include "support/random.h"
+#include "support/support.h"
+
+namespace raydix::test {
+
+inline constexpr std::uint32_t every_mask = 0xFFFFFFFFu;
+
+class RandomScenes : public Random {
+public:
+    using Random::Random;
+    std::uint32_t below(std::uint32_t n) { return static_cast<std::uint32_t>(Random::below(n)); }
+    /// Turned, stretched, mirrored or not, moved; stretched once more by up to `shear`.
+    Transform transform(float reach, float shear) {
+        Transform t;
+        for (auto& row : t.m) {
+            for (std::size_t k = 0; k < 3; ++k) row[k] = between(-1, 1);
+            row[3] = between(-reach, reach);
+        }
+        if (shear > 1) {
+            const std::uint32_t to = below(3), from = (to + 1 + below(2)) % 3;
+            for (std::size_t k = 0; k < 3; ++k) t.m[to][k] += between(-shear, shear) * t.m[from][k];
+        }
+        return inverse_of(affine_of(t)) ? t : transform(reach, shear);
+    }
+    std::uint32_t mask() { return below(3) == 0 ? 1u << below(3) : every_mask; }
+};
+
+/// A scene and what is in it, for a judge that looks at everything.
+struct World {
+    struct Item {
+        std::uint32_t id, mask;
+        Mesh mesh;
+        Transform transform;
+        std::shared_ptr<const World> inside;  // of an instance
+    };
+    std::vector<Item> items;  // by ascending id
+    Scene scene;
+
+    [[nodiscard]] std::uint64_t paths() const {
+        std::uint64_t sum = 0;
+        for (const Item& item : items)
+            if (item.inside) sum += 1 + item.inside->paths();
+        return sum;
+    }
+};
+
+struct Sight {
+    std::vector<Hit> hits;
+    std::vector<std::uint32_t> masks;
+};
+
+/// All of `world`, seen by `lines`; `number`: of the path that leads here.
+inline void look(const World& world, const std::vector<WideRayLine>& lines,
+                 const std::vector<bool>& sees, std::span<const Ray> rays, std::uint32_t number,
+                 Sight& sight) {
+    std::uint32_t next = number + 1;
+    for (const World::Item& item : world.items) {
+        std::vector<bool> seen(rays.size());
+        for (std::size_t i = 0; i < rays.size(); ++i)
+            seen[i] = sees[i] && (item.mask & sight.masks[i]) != 0;
+        if (item.inside) {
+            const Affine inverse = *inverse_of(affine_of(item.transform));
+            std::vector<WideRayLine> inner;
+            for (const WideRayLine& line : lines) inner.push_back(line.into(inverse));
+            look(*item.inside, inner, seen, rays, next, sight);
+            next += 1 + static_cast<std::uint32_t>(item.inside->paths());
+            continue;
+        }
+        std::vector<Ray> entering;
+        for (std::size_t i = 0; i < rays.size(); ++i)
+            entering.push_back(lines[i].rounded(rays[i].tmin, rays[i].tmax));
+        const std::vector<Hit> hits = trace_brute_force(item.mesh, entering, 1);
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            if (!seen[i] || !hits[i].hit()) continue;
+            const Hit found{hits[i], item.id, number};
+            Hit& best = sight.hits[i];
+            const auto key = [](const Hit& h) {
+                return std::tuple(h.t, h.instance, h.geometry, h.prim);
+            };
+            if (!best.hit() || key(found) < key(best)) best = found;
+        }
+    }
+}
+
+inline Sight look(const World& world, std::span<const Ray> rays, std::vector<std::uint32_t> masks) {
+    Sight sight{std::vector<Hit>(rays.size()), std::move(masks)};
+    std::vector<WideRayLine> lines;
+    for (const Ray& ray : rays) lines.push_back({Double3(ray.origin), Double3(ray.direction)});
+    look(world, lines, std::vector<bool>(rays.size(), true), rays, 0, sight);
+    return sight;
+}
+
+inline bool same(const Hit& a, const Hit& b) {
+    return a.t == b.t && a.prim == b.prim && a.u == b.u && a.v == b.v && a.geometry == b.geometry &&
+           a.instance == b.instance;
+}
+
+struct Recipe {
+    std::uint32_t levels, items;
+    float shear;
+    SceneOptions options = {};
+};
+
+inline std::shared_ptr<World> random_world(RandomScenes& random, const Recipe& recipe,
+                                           std::uint32_t level = 0) {
+    auto world = std::make_shared<World>();
+    std::vector<std::shared_ptr<World>> inner;
+    if (level < recipe.levels)
+        for (int k = 0; k < 2; ++k) inner.push_back(random_world(random, recipe, level + 1));
+    std::uint32_t id = 0;
+    for (std::uint32_t k = 0; k < recipe.items; ++k, ++id) {
+        World::Item item{id, random.mask(), {}, {}, {}};
+        if (random.below(4) == 0) item.id = id += 1 + random.below(5);
+        const GeometryOptions options{item.mask, item.id};
+        if (!inner.empty() && random.below(3) != 0) {
+            item.inside = inner[random.below(2)];
+            item.transform = random.transform(level == 0 ? 4.0f : 2.0f, recipe.shear);
+            world->scene.add(item.inside->scene, item.transform, options);
+        } else {
+            item.mesh = random.below(8) == 0
+                            ? Mesh{}
+                            : random_soup(1 + random.below(40), id + 100 * level, 0.6f);
+            world->scene.add(item.mesh, options);
+        }
+        world->items.push_back(std::move(item));
+    }
+    world->scene.commit(recipe.options);
+    return world;
+}
+
+inline std::vector<Ray> random_rays(RandomScenes& random, std::size_t count) {
+    std::vector<Ray> rays;
+    for (std::size_t i = 0; i < count; ++i) {
+        const Vec3 from = i % 3 == 0 ? random.in(-6, 6) : random.in(-2, 3),
+                   to = i % 2 == 0 ? random.in(0, 1) : random.in(-3, 3);
+        const Vec3 way{to.x - from.x, to.y - from.y, to.z - from.z};
+        Ray ray{from, 0, i % 11 == 0 ? Vec3{way.x * 100, way.y * 100, way.z * 100} : way};
+        if (i % 5 == 0) ray.tmax = random.between(0.2f, 1.0f);
+        if (i % 7 == 0) ray.tmin = random.between(0.0f, 0.5f);
+        if (i % 97 == 0) ray.direction = {0, 0, 0};
+        if (i % 89 == 0) ray.origin.x = std::numeric_limits<float>::quiet_NaN();
+        rays.push_back(ray);
+    }
+    return rays;
+}
+
+/// Rays that end, or begin, where they hit: the bounds of boxes decide.
+inline std::vector<Ray> rays_to_hits(std::span<const Ray> rays, std::span<const Hit> hits) {
+    std::vector<Ray> out;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        if (!hits[i].hit()) continue;
+        out.push_back(rays[i]);
+        out.back().tmax = hits[i].t;
+        out.push_back(rays[i]);
+        out.back().tmin = hits[i].t;
+        out.push_back(out.back());
+        out.back().tmax = hits[i].t;
+    }
+    return out;
+}
+
+/// How many answers differ from those of the judge, every way through the scene.
+inline std::size_t differences(const World& world, std::span<const Ray> rays,
+                               const std::vector<std::uint32_t>& masks) {
+    const Sight sight = look(world, rays, masks);
+    std::size_t wrong = 0;
+    for (const std::string& isa : simd_instruction_sets()) {
+        for (const SimdPath path : {SimdPath::automatic, SimdPath::single, SimdPath::packet,
+                                    SimdPath::stream, SimdPath::sorted}) {
+            SceneTraceOptions options;
+            options.masks = masks, options.isa = isa, options.path = path;
+            options.threads = 1 + static_cast<int>(path) % 2;
+            const std::vector<Hit> hits = trace(world.scene, rays, options);
+            std::vector<std::uint8_t> occluded(rays.size(), 7);
+            trace_any(world.scene, rays, occluded, options);
+            for (std::size_t i = 0; i < rays.size(); ++i) {
+                wrong += !same(hits[i], sight.hits[i]);
+                wrong += occluded[i] != (sight.hits[i].hit() ? 1 : 0);
+            }
+        }
+    }
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        wrong += !same(closest_hit(world.scene, rays[i], masks[i]), sight.hits[i]);
+        wrong += any_hit(world.scene, rays[i], masks[i]) != sight.hits[i].hit();
+    }
+    return wrong;
+}
+
+inline std::size_t differences_with_ends(const World& world, RandomScenes& random,
+                                         std::size_t count, std::size_t& hit_count) {
+    const std::vector<Ray> rays = random_rays(random, count);
+    std::vector<std::uint32_t> masks;
+    for (std::size_t i = 0; i < rays.size(); ++i) masks.push_back(i % 16 == 15 ? 0 : random.mask());
+    std::size_t wrong = differences(world, rays, masks);
+    const Sight sight = look(world, rays, std::vector<std::uint32_t>(rays.size(), every_mask));
+    for (const Hit& hit : sight.hits) hit_count += hit.hit();
+    const std::vector<Ray> ends = rays_to_hits(rays, sight.hits);
+    return wrong + differences(world, ends, std::vector<std::uint32_t>(ends.size(), every_mask));
+}
+
+inline Mesh one_triangle(float z) {
+    Mesh mesh;
+    mesh.vertices = {{0, 0, z}, {1, 0, z}, {0, 1, z}};
+    mesh.triangles = {{0, 1, 2}};
+    return mesh;
+}
+inline Transform moved(float x, float y, float z) {
+    Transform t;
+    t.m[0][3] = x, t.m[1][3] = y, t.m[2][3] = z;
+    return t;
+}
+
+}  // namespace raydix::test

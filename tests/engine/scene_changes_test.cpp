@@ -1,0 +1,233 @@
+// Scenes that change: ids, masks, updates and commits against scenes made afresh; what they refuse.
+#include <gtest/gtest.h>
+#include <raydix/error.h>
+#include <raydix/scene.h>
+#include <raydix/trace.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "engine/float_world.h"
+#include "support/message.h"
+#include "support/support.h"
+
+namespace raydix::test {
+namespace {
+
+constexpr Ray down{{0.25f, 0.25f, 10}, 0, {0, 0, -1}};
+
+TEST(SceneChanges, ChangesInAnyOrderEqualASceneMadeAfresh) {
+    for (std::uint64_t seed = 0; seed < 3 * thorough; ++seed) {
+        RandomScenes random(seed);
+        const auto first = random_world(random, {1, 5, 0});
+        const std::vector<Ray> rays = random_rays(random, 100);
+        World world;
+        world.scene = std::move(first->scene);
+        world.items = first->items;
+        for (int step = 0; step < 6; ++step) {
+            for (int change = 0; change < 3; ++change) {
+                const std::uint32_t what = random.below(5);
+                if (what == 0 || world.items.empty()) {
+                    World::Item item{
+                        0, random.mask(), random_soup(20, random.below(99), 0.6f), {}, {}};
+                    item.id = world.scene.add(item.mesh, {.mask = item.mask, .id = {}});
+                    world.items.push_back(item);
+                    std::ranges::sort(world.items, {}, &World::Item::id);
+                    continue;
+                }
+                const std::size_t place =
+                    random.below(static_cast<std::uint32_t>(world.items.size()));
+                World::Item& item = world.items[place];
+                if (what == 1) {
+                    world.scene.remove(item.id);
+                    EXPECT_FALSE(world.scene.contains(item.id));
+                    world.items.erase(world.items.begin() + static_cast<std::ptrdiff_t>(place));
+                } else if (what == 2) {
+                    world.scene.set_mask(item.id, item.mask = random.mask());
+                } else if (item.inside) {
+                    world.scene.set_transform(item.id, item.transform = random.transform(4, 0));
+                } else {
+                    world.scene.update(item.id,
+                                       item.mesh = random_soup(30, random.below(99), 0.6f));
+                }
+            }
+            EXPECT_FALSE(world.scene.committed());
+            SceneOptions options;
+            options.usage = step % 2 == 0 ? Usage::moving : Usage::fixed;
+            world.scene.commit(options);
+            EXPECT_TRUE(world.scene.committed());
+            EXPECT_EQ(world.scene.size(), world.items.size());
+            EXPECT_EQ(differences(world, rays, std::vector<std::uint32_t>(rays.size(), every_mask)),
+                      0u)
+                << "seed " << seed << ", step " << step;
+        }
+    }
+}
+
+template <class AnyScene>
+void tells_what_it_holds() {
+    using Mesh = typename AnyScene::Mesh;
+    const Mesh mesh{{}, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+    AnyScene leaf(mesh), scene;
+    EXPECT_TRUE(scene.ids().empty());
+    scene.add(mesh, {.mask = 6, .id = 4'000'000'000u});
+    scene.add(leaf, {}, {.mask = 5, .id = {}});
+    scene.share(mesh);
+    scene.share(mesh);
+    scene.remove(1);
+    EXPECT_EQ(scene.ids(), (std::vector<std::uint32_t>{0, 2, 4'000'000'000u}));
+    EXPECT_EQ(scene.mask(0), 5u);
+    EXPECT_EQ(scene.mask(2), every_mask);
+    EXPECT_EQ(scene.mask(4'000'000'000u), 6u);
+    EXPECT_FALSE(scene.mesh(0).has_value());
+    EXPECT_EQ(scene.mesh(2)->triangles.data(), mesh.triangles.data());
+    EXPECT_NE(scene.mesh(4'000'000'000u)->vertices.data(), mesh.vertices.data());
+    EXPECT_EQ(scene.mesh(4'000'000'000u)->vertices.size(), 3u);
+    EXPECT_TRUE(std::ranges::equal(scene.mesh(4'000'000'000u)->triangles, mesh.triangles));
+    scene.update(2, Mesh{});
+    EXPECT_TRUE(scene.mesh(2)->triangles.empty());
+    EXPECT_THROW(static_cast<void>(scene.mesh(1)), InputError);
+    EXPECT_THROW(static_cast<void>(scene.mask(1)), InputError);
+}
+
+TEST(SceneChanges, TellsWhatItHolds) {
+    tells_what_it_holds<Scene>();
+    tells_what_it_holds<SceneD>();
+}
+
+TEST(SceneChanges, MovingMeshesAreBuiltOnlyWhenTheyChange) {
+    Scene scene;
+    for (int k = 0; k < 5; ++k) scene.add(random_soup(50, static_cast<std::uint64_t>(k)));
+    const SceneOptions moving{.usage = Usage::moving};
+    EXPECT_EQ(scene.commit(moving).trees_built, 5u);
+    EXPECT_EQ(scene.commit(moving).trees_built, 0u);
+    scene.update(3, random_soup(60, 9));
+    scene.set_mask(1, 7);
+    EXPECT_EQ(scene.commit(moving).trees_built, 1u);
+    // Four meshes share a tree now; the one of another mask keeps its own.
+    EXPECT_EQ(scene.commit({.usage = Usage::fixed}).trees_built, 1u);
+}
+
+TEST(SceneChanges, RefusesWhatItCannotHold) {
+    Scene scene, other;
+    const auto message = [](const auto& call) { return message_of(call); };
+    EXPECT_EQ(scene.add(one_triangle(0)), 0u);
+    EXPECT_EQ(scene.add(one_triangle(0), {.id = 5}), 5u);
+    EXPECT_EQ(scene.add(one_triangle(0)), 1u);
+    EXPECT_EQ(message([&] { scene.add(one_triangle(0), {.id = 5}); }),
+              "geometry 5: this id was given before");
+    scene.remove(1);
+    EXPECT_EQ(message([&] { scene.add(one_triangle(0), {.id = 1}); }),
+              "geometry 1: this id was given before");
+    EXPECT_EQ(message([&] { scene.remove(1); }), "there is no geometry 1");
+    Mesh bad = one_triangle(0);
+    bad.triangles.push_back({0, 1, 3});
+    EXPECT_EQ(message([&] { scene.add(bad); }),
+              "geometry 2: triangle 1 has an index past the 3 vertices");
+    bad.triangles.clear();
+    EXPECT_EQ(message([&] { scene.add(bad); }), "geometry 2: vertices without triangles");
+    Transform flat;
+    flat.m[2][2] = 0;
+    EXPECT_EQ(message([&] { scene.add(other, flat); }),
+              "instance 2: its transform is singular or not finite, so rays cannot go through it");
+    EXPECT_EQ(message([&] { scene.add(scene, Transform{}); }),
+              "instance 2: the scene would hold itself");
+    EXPECT_EQ(scene.add(other, Transform{}), 2u);
+    EXPECT_EQ(message([&] { other.add(scene, Transform{}); }),
+              "instance 0: the scene would hold itself");
+    EXPECT_EQ(message([&] { scene.commit(); }),
+              "instance 2: the scene that it places was never committed");
+    EXPECT_EQ(message([&] { scene.update(2, one_triangle(0)); }),
+              "geometry 2 is an instance, not a mesh");
+    EXPECT_EQ(message([&] { scene.set_transform(0, Transform{}); }),
+              "geometry 0 is a mesh, not an instance");
+    EXPECT_EQ(message([&] { static_cast<void>(trace(scene, std::vector<Ray>(2))); }),
+              "scene: it was never committed");
+    const Scene one(one_triangle(0));
+    const std::vector<std::uint32_t> masks(3);
+    EXPECT_EQ(
+        message([&] { static_cast<void>(trace(one, std::vector<Ray>(2), {.masks = masks})); }),
+        "trace: 2 rays, but 3 masks");
+}
+
+TEST(SceneChanges, LimitsOfNesting) {
+    Scene leaf(one_triangle(0));
+    std::vector<Scene> scenes;
+    scenes.emplace_back().add(leaf, Transform{});
+    scenes.back().commit();
+    for (std::uint32_t k = 1; k < Scene::max_levels; ++k) {
+        Scene next;
+        next.add(scenes.back(), Transform{});
+        next.commit();
+        scenes.push_back(std::move(next));
+    }
+    EXPECT_EQ(closest_hit(scenes.back(), down).instance, Scene::max_levels);
+    EXPECT_EQ(trace(scenes.back(), std::vector<Ray>(40, down))[7].instance, Scene::max_levels);
+    Scene deeper;
+    deeper.add(scenes.back(), Transform{});
+    EXPECT_THROW(deeper.commit(), InputError);
+    // Ten times as many paths a level, of one triangle.
+    std::vector<Scene> tens;
+    tens.push_back(Scene(one_triangle(0)));
+    std::string said;
+    for (int level = 0; level < 10 && said.empty(); ++level) {
+        Scene next;
+        for (int k = 0; k < 10; ++k) next.add(tens.back(), moved(static_cast<float>(k), 0, 0));
+        try {
+            const std::uint64_t paths = next.commit().paths;
+            const auto number_at = [&](float x) {
+                return closest_hit(next, {{x + 0.25f, 0.25f, 1}, 0, {0, 0, -1}}).instance;
+            };
+            EXPECT_EQ(number_at(0), static_cast<std::uint32_t>(level + 1));
+            EXPECT_EQ(number_at(9 * static_cast<float>(level + 1)), paths);
+            const std::vector<Ray> rays(40, Ray{{0.25f, 0.25f, 1}, 0, {0, 0, -1}});
+            EXPECT_EQ(trace(next, rays)[11].instance, static_cast<std::uint32_t>(level + 1));
+        } catch (const InputError& error) {
+            said = error.what();
+        }
+        tens.push_back(std::move(next));
+    }
+    EXPECT_EQ(said, "instance 3: more than 2^32 - 2 paths through instances");
+}
+
+TEST(SceneChanges, TracesWhileAnotherIsCommitted) {
+    const Mesh mesh = random_soup(300, 4);
+    Scene object(mesh), old;
+    for (int k = 0; k < 20; ++k) old.add(object, moved(static_cast<float>(k), 0, 0));
+    old.commit();
+    RandomScenes random(8);
+    const std::vector<Ray> rays = random_rays(random, 500);
+    const std::vector<Hit> expected = trace(old, rays);
+    std::atomic<std::size_t> wrong = 0;
+    std::atomic<bool> done = false;
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 2; ++t)
+        threads.emplace_back([&] {
+            do {
+                const std::vector<Hit> hits = trace(old, rays, {.threads = 1});
+                for (std::size_t i = 0; i < rays.size(); ++i) {
+                    wrong += !same(hits[i], expected[i]);
+                    wrong += i % 7 == 0 && !same(closest_hit(old, rays[i]), expected[i]);
+                }
+            } while (!done);
+        });
+    for (int round = 0; round < 5; ++round) {
+        Scene next;
+        for (int k = 0; k < 20; ++k) next.add(object, moved(0, static_cast<float>(k + round), 0));
+        next.add(mesh);
+        next.commit();
+        EXPECT_GT(trace(next, rays, {.threads = 1}).size(), 0u);
+    }
+    done = true;
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(wrong, 0u);
+}
+
+}  // namespace
+}  // namespace raydix::test
