@@ -1,6 +1,5 @@
 // src/engine/hit_points.cpp in double against maps that are put together in long double.
 #include <gtest/gtest.h>
-#include <raydix/error.h>
 #include <raydix/scene.h>
 #include <raydix/surface.h>
 
@@ -13,7 +12,6 @@
 
 #include "engine/double_world.h"
 #include "engine/long_double_maps.h"
-#include "support/message.h"
 
 namespace raydix {
 namespace {
@@ -187,61 +185,6 @@ TEST(HitPointsD, NormalsNeedOnlyAnArea) {
     }
     EXPECT_TRUE(is_nan(ways[1]));
     EXPECT_NEAR(positions(scene, hits)[1].x, 1.25e-150, 1e-164);
-}
-
-double z_of(const SceneD& scene, const HitD& hit) { return positions(scene, {&hit, 1})[0].z; }
-
-TEST(HitPointsD, AreThoseOfTheLastCommit) {
-    const MeshD shared_before = one_triangle(30), shared_after = one_triangle(31);
-    SceneD inner(one_triangle(1)), scene;
-    const std::uint32_t updated = scene.add(one_triangle(10)), shared = scene.share(shared_before),
-                        instance = scene.add(inner, moved(0, 0, 100));
-    scene.commit();
-    scene.update(updated, one_triangle(11));
-    scene.update(shared, shared_after);
-    scene.set_transform(instance, moved(0, 0, 200));
-    EXPECT_EQ(z_of(scene, hit_at(updated)), 10);
-    EXPECT_EQ(z_of(scene, hit_at(shared)), 30);
-    EXPECT_EQ(z_of(scene, hit_at(0, 1)), 101);
-    scene.commit();
-    EXPECT_EQ(z_of(scene, hit_at(updated)), 11);
-    EXPECT_EQ(z_of(scene, hit_at(shared)), 31);
-    EXPECT_EQ(z_of(scene, hit_at(0, 1)), 201);
-}
-
-TEST(HitPointsD, NamesTheFirstHitThatIsNowhere) {
-    SceneD inner, scene;
-    inner.add(one_triangle(), {.id = 3});
-    inner.commit();
-    scene.add(one_triangle());
-    scene.add(inner, TransformD{});
-    scene.add(MeshD{});
-    scene.commit();
-    std::vector<HitD> hits(9000, hit_at(0));
-    hits[5] = {};
-    const auto message = [&](const HitD& bad) {
-        hits[7000] = hits[8000] = bad;
-        const std::string of_points = test::message_of([&] { (void)positions(scene, hits); });
-        EXPECT_EQ(of_points, test::message_of([&] { (void)normals(scene, hits); }));
-        return of_points;
-    };
-    EXPECT_EQ(message(hit_at(3, 1)), "no error");
-    EXPECT_EQ(message(hit_at(0, 2)), "hit 7000: the scene has no path 2 of instances");
-    EXPECT_EQ(message(hit_at(7)), "hit 7000: the scene has no mesh 7");
-    EXPECT_EQ(message(hit_at(2, 1)), "hit 7000: the scene has no mesh 2 on path 1 of instances");
-    EXPECT_EQ(message(hit_at(2)), "hit 7000: mesh 2 has 0 triangles; there is no triangle 0");
-    EXPECT_EQ(message(hit_at(3, 1, 1)),
-              "hit 7000: mesh 3 on path 1 of instances has 1 triangles; there is no triangle 1");
-    EXPECT_EQ(test::message_of([&] { (void)positions(SceneD(), hits); }),
-              "scene: it was never committed");
-    std::vector<Vec3d> room(3);
-    EXPECT_EQ(test::message_of([&] { positions(scene, hits, room); }),
-              "positions: 9000 hits, but room for 3");
-    EXPECT_EQ(test::message_of([&] { normals(scene, {}, room); }),
-              "normals: 0 hits, but room for 3");
-    EXPECT_NE(test::message_of([&] { (void)normals(scene, {}, -1); }), "no error");
-    EXPECT_TRUE(positions(scene, {}).empty());
-    EXPECT_TRUE(normals(SceneD(MeshD{}), {}).empty());
 }
 
 TEST(HitPointsD, AreTheSameForEveryThreadCount) {

@@ -1,6 +1,5 @@
 // src/engine/hit_points.cpp against maps that are put together in long double.
 #include <gtest/gtest.h>
-#include <raydix/error.h>
 #include <raydix/scene.h>
 #include <raydix/surface.h>
 
@@ -15,7 +14,6 @@
 #include "api/shapes.h"
 #include "engine/long_double_maps.h"
 #include "instances/affine.h"
-#include "support/message.h"
 #include "support/random.h"
 #include "support/support.h"
 
@@ -261,136 +259,6 @@ TEST(HitPoints, MirrorsKeepTheOutsideOutside) {
     EXPECT_LT(mirrored, 32u);
 }
 
-TEST(HitPoints, RightHandRule) {
-    Mesh mesh;
-    mesh.vertices = {{0, 0, 5}, {1, 0, 5}, {0, 1, 5}};
-    mesh.triangles = {{0, 1, 2}, {0, 2, 1}, {0, 1, 1}};
-    const Scene scene(mesh);
-    std::vector<Hit> hits(3);
-    for (std::uint32_t prim = 0; prim < 3; ++prim) {
-        hits[prim].prim = prim, hits[prim].geometry = 0;
-        hits[prim].u = 0.25f, hits[prim].v = 0.5f;
-    }
-    const std::vector<Vec3> ways = normals(scene, hits), points = positions(scene, hits);
-    EXPECT_EQ(ways[0].x, 0);
-    EXPECT_EQ(ways[0].y, 0);
-    EXPECT_EQ(ways[0].z, 1);
-    EXPECT_EQ(ways[1].z, -1);
-    EXPECT_EQ(points[0].x, 0.25f);
-    EXPECT_EQ(points[0].y, 0.5f);
-    EXPECT_EQ(points[0].z, 5);
-    EXPECT_EQ(points[1].x, 0.5f);
-    // No area: a point, but no normal.
-    EXPECT_EQ(points[2].x, 0.75f);
-    EXPECT_TRUE(std::isnan(ways[2].x) && std::isnan(ways[2].y) && std::isnan(ways[2].z));
-}
-
-Hit first_triangle(std::uint32_t geometry, std::uint32_t instance = 0) {
-    Hit hit;
-    hit.prim = 0;
-    hit.geometry = geometry;
-    hit.instance = instance;
-    return hit;
-}
-
-Mesh triangle_at(float x) {
-    Mesh mesh;
-    mesh.vertices = {{x, 0, 0}, {x, 1, 0}, {x, 0, 1}};
-    mesh.triangles = {{0, 1, 2}};
-    return mesh;
-}
-
-float x_of(const Scene& scene, const Hit& hit) { return positions(scene, {&hit, 1})[0].x; }
-
-TEST(HitPoints, AreThoseOfTheLastCommit) {
-    for (const Usage usage : {Usage::fixed, Usage::moving}) {
-        const SceneOptions options{.usage = usage};
-        const Mesh shared_before = triangle_at(30), shared_after = triangle_at(31);
-        Scene inner;
-        inner.add(triangle_at(1));
-        inner.commit(options);
-        Scene scene;
-        const std::uint32_t updated = scene.add(triangle_at(10)),
-                            removed = scene.add(triangle_at(20)),
-                            shared = scene.share(shared_before);
-        Transform moved;
-        moved.m[0][3] = 100;
-        const std::uint32_t instance = scene.add(inner, moved);
-        scene.commit(options);
-
-        scene.update(updated, triangle_at(11));
-        scene.update(updated, triangle_at(12));
-        scene.update(shared, shared_after);
-        scene.remove(removed);
-        moved.m[0][3] = 200;
-        scene.set_transform(instance, moved);
-        const std::uint32_t late = scene.add(triangle_at(50));
-        inner.update(0, triangle_at(2));
-        inner.commit(options);
-
-        EXPECT_EQ(x_of(scene, first_triangle(updated)), 10);
-        EXPECT_EQ(x_of(scene, first_triangle(removed)), 20);
-        EXPECT_EQ(x_of(scene, first_triangle(shared)), 30);
-        EXPECT_EQ(x_of(scene, first_triangle(0, 1)), 101);
-        EXPECT_EQ(x_of(inner, first_triangle(0)), 2);
-        EXPECT_THROW((void)x_of(scene, first_triangle(late)), InputError);
-
-        scene.commit(options);
-        EXPECT_EQ(x_of(scene, first_triangle(updated)), 12);
-        EXPECT_EQ(x_of(scene, first_triangle(shared)), 31);
-        EXPECT_EQ(x_of(scene, first_triangle(0, 1)), 202);
-        EXPECT_EQ(x_of(scene, first_triangle(late)), 50);
-        EXPECT_THROW((void)x_of(scene, first_triangle(removed)), InputError);
-
-        // A scene that is gone lives on where it was placed.
-        { Scene(std::move(inner)); }
-        EXPECT_EQ(x_of(scene, first_triangle(0, 1)), 202);
-    }
-}
-
-TEST(HitPoints, NamesTheFirstHitThatIsNowhere) {
-    Scene inner, scene;
-    inner.add(triangle_at(0), {.id = 3});
-    inner.commit();
-    scene.add(triangle_at(1));
-    scene.add(inner, Transform{});
-    scene.add(Mesh{});
-    scene.commit();
-    std::vector<Hit> hits(20'000, first_triangle(0));
-    hits[5] = {};
-    const auto message = [&](const Hit& bad) {
-        hits[17'000] = hits[19'000] = bad;
-        const std::string of_points = test::message_of([&] { (void)positions(scene, hits); });
-        EXPECT_EQ(of_points, test::message_of([&] { (void)normals(scene, hits); }));
-        return of_points;
-    };
-    EXPECT_EQ(message(first_triangle(0)), "no error");
-    EXPECT_EQ(message(first_triangle(3, 1)), "no error");
-    EXPECT_EQ(message(first_triangle(0, 2)), "hit 17000: the scene has no path 2 of instances");
-    EXPECT_EQ(message(first_triangle(7)), "hit 17000: the scene has no mesh 7");
-    EXPECT_EQ(message(first_triangle(1)), "hit 17000: the scene has no mesh 1");
-    EXPECT_EQ(message(first_triangle(no_primitive)), "hit 17000: the scene has no mesh 4294967295");
-    EXPECT_EQ(message(first_triangle(2, 1)),
-              "hit 17000: the scene has no mesh 2 on path 1 of instances");
-    EXPECT_EQ(message(first_triangle(2)),
-              "hit 17000: mesh 2 has 0 triangles; there is no triangle 0");
-    Hit past = first_triangle(3, 1);
-    past.prim = 1;
-    EXPECT_EQ(message(past),
-              "hit 17000: mesh 3 on path 1 of instances has 1 triangles; there is no triangle 1");
-
-    EXPECT_EQ(test::message_of([&] { (void)positions(Scene(), hits); }),
-              "scene: it was never committed");
-    std::vector<Vec3> room(3);
-    EXPECT_EQ(test::message_of([&] { positions(scene, hits, room); }),
-              "positions: 20000 hits, but room for 3");
-    EXPECT_EQ(test::message_of([&] { normals(scene, {}, room); }),
-              "normals: 0 hits, but room for 3");
-    EXPECT_NE(test::message_of([&] { (void)positions(scene, {}, -1); }), "no error");
-    EXPECT_TRUE(positions(scene, {}).empty());
-    EXPECT_TRUE(normals(Scene(Mesh{}), {}).empty());
-}
-
 TEST(HitPoints, AreTheSameForEveryThreadCount) {
     Random random(5);
     World world = random_world(random, {2, 100});
@@ -411,7 +279,7 @@ TEST(HitPoints, AreTheSameForEveryThreadCount) {
 /// normals were not brought back to unit length on the way.
 TEST(HitPoints, KeepNormalsThroughAllLevels) {
     std::vector<Scene> scenes;
-    scenes.emplace_back(triangle_at(0));
+    scenes.emplace_back(Mesh{{}, {{0, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 1, 2}}});
     for (std::uint32_t level = 0; level < Scene::max_levels; ++level) {
         Transform t;
         const float by = 1e-6f;
@@ -422,7 +290,8 @@ TEST(HitPoints, KeepNormalsThroughAllLevels) {
         outer.commit();
         scenes.push_back(std::move(outer));
     }
-    const Hit hit = first_triangle(0, Scene::max_levels);
+    Hit hit;
+    hit.prim = hit.geometry = 0, hit.instance = Scene::max_levels;
     const Vec3 normal = normals(scenes.back(), {&hit, 1})[0];
     EXPECT_EQ(normal.x, 1);
     EXPECT_EQ(normal.y, 0);
