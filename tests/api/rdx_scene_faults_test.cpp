@@ -1,12 +1,13 @@
 // .rdx files of scenes that were cut, altered or made up are refused with one clear line.
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <functional>
 #include <limits>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "api/rdx_scenes.h"
-#include "support/rdx_seal.h"
 
 namespace raydix::test {
 namespace {
@@ -25,49 +26,17 @@ Scene sample(bool compact) {
 
 TEST_F(RdxSceneFaults, EveryTruncationIsRefused) {
     const Bytes whole = saved(sample(false));
-    ASSERT_EQ(verdict(whole), "");
-    std::vector<std::size_t> cuts{0, 1, 8, 63, header_bytes - 1, header_bytes, whole.size() - 1};
-    for (const rdx::Section& s : table_of(whole)) {
-        const std::size_t end = s.offset + s.count * s.element_bytes;
-        for (const std::size_t cut : {s.offset - 1, s.offset, s.offset + 1, end - 1, end})
-            cuts.push_back(cut);
-    }
-    for (const std::size_t cut : cuts) {
-        if (cut >= whole.size()) continue;
-        const std::span<const std::byte> part(whole.data(), cut);
-        EXPECT_NE(verdict(part).find("header: "), std::string::npos) << cut;
-        if (cut < sizeof(rdx::HeaderStart)) continue;
-        Bytes lying(part.begin(), part.end());
-        seal_rdx(lying);
-        EXPECT_NE(verdict(lying), "") << cut;
-    }
+    expect_cuts_refused(whole, header_bytes, sizeof(rdx::HeaderStart), table_of(whole), verdict);
 }
 
 TEST_F(RdxSceneFaults, EveryByteIsGuarded) {
-    const Bytes whole = saved(Scene(random_soup(3, 2)));
-    Dice dice(5);
-    for (std::size_t i = 0; i < whole.size(); ++i) {
-        Bytes altered = whole;
-        altered[i] ^= std::byte{static_cast<unsigned char>(1 + dice.below(255))};
-        EXPECT_NE(verdict(altered), "") << "byte " << i;
-    }
+    expect_every_byte_guarded(saved(Scene(random_soup(3, 2))), verdict);
 }
 
 TEST_F(RdxSceneFaults, FlipsUnderRightChecksumsAreSurvived) {
-    for (const bool compact : {false, true}) {
-        const Bytes whole = saved(sample(compact));
-        Dice dice(6);
-        std::size_t refused = 0;
-        for (std::size_t round = 0; round < 1500 * thorough; ++round) {
-            Bytes altered = whole;
-            for (std::uint64_t k = 0; k <= dice.below(3); ++k)
-                altered[dice.below(altered.size())] =
-                    std::byte{static_cast<unsigned char>(dice.below(256))};
-            seal_rdx(altered);
-            refused += verdict(altered).empty() ? 0 : 1;
-        }
-        EXPECT_GT(refused, 500 * thorough);
-    }
+    for (const bool compact : {false, true})
+        EXPECT_GT(refused_after_flips(saved(sample(compact)), 1500 * thorough, verdict),
+                  500 * thorough);
 }
 
 /// A file after a change, with right checksums.
@@ -91,10 +60,7 @@ private:
     Bytes bytes_;
 };
 
-struct Lie {
-    const char* told;
-    std::function<void(Liar&)> change;
-};
+using Lie = LieOf<Liar>;
 
 /// The first slot of a node that holds a leaf, or an inner node.
 template <class Node>
@@ -298,17 +264,6 @@ std::vector<Lie> lies_of_compact_trees() {
 
 TEST_F(RdxSceneFaults, LiesUnderRightChecksumsAreNamed) {
     const Bytes plain = saved(sample(false)), compact = saved(sample(true));
-    const auto expect_told = [](const Bytes& whole, const std::vector<Lie>& group) {
-        for (const Lie& lie : group) {
-            Liar liar(whole);
-            ASSERT_EQ(liar.told(), "");
-            lie.change(liar);
-            const std::string told = liar.told();
-            EXPECT_EQ(told.rfind(lie.told, 0), 0u)
-                << "expected " << lie.told << "\n     got " << told;
-            EXPECT_EQ(told.find('\n'), std::string::npos);
-        }
-    };
     expect_told(plain, lies());
     expect_told(compact, lies());
     expect_told(plain, lies_of_plain_trees());

@@ -1,18 +1,17 @@
 // Scenes in .rdx files, as several tests make and read them.
 #pragma once
 
-#include <raydix/error.h>
 #include <raydix/rdx.h>
 #include <raydix/surface.h>
 
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "api/rdx_faults.h"
 #include "api/rdx_parse.h"
 #include "api/rdx_scene_format.h"
 #include "instances/affine.h"
@@ -20,8 +19,6 @@
 #include "support/support.h"
 
 namespace raydix::test {
-
-using Bytes = std::vector<std::byte>;
 
 class Dice : public Random {
 public:
@@ -46,27 +43,14 @@ inline std::vector<Ray> random_rays(Dice& dice, std::size_t count) {
     return rays;
 }
 
-inline Bytes read_bytes(const std::filesystem::path& file) {
-    std::ifstream in(file, std::ios::binary);
-    Bytes bytes(std::filesystem::file_size(file));
-    in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    return bytes;
-}
-
 /// What the reader says to these bytes; "" if it takes them. Rays go through what it took.
 inline std::string verdict(std::span<const std::byte> bytes) {
-    const std::shared_ptr<void> owner = allocate_bytes(bytes.size());
-    const std::span<std::byte> copy(static_cast<std::byte*>(owner.get()), bytes.size());
-    if (!bytes.empty()) std::memcpy(copy.data(), bytes.data(), bytes.size());
-    try {
+    return verdict_of(bytes, [](std::span<std::byte> copy, const std::shared_ptr<void>& owner) {
         const RdxScene file = rdx::parse_scene("x.rdx", copy, owner);
         Dice dice(1);
         const std::vector<Hit> hits = trace(file.scene, random_rays(dice, 20), {.threads = 1});
         static_cast<void>(positions(file.scene, hits, 1));
-        return "";
-    } catch (const InputError& error) {
-        return error.what();
-    }
+    });
 }
 
 inline std::vector<rdx::Section> table_of(std::span<const std::byte> bytes) {

@@ -13,43 +13,18 @@
 #include <tuple>
 #include <vector>
 
+#include "api/pictures.h"
 #include "api/shapes.h"
 #include "base/double3.h"
 #include "instances/affine.h"
-#include "report/tone.h"
 #include "support/message.h"
 #include "support/support.h"
 
 namespace raydix {
 namespace {
 
-const View all_views[] = {View::shaded, View::normal,  View::depth, View::primitive,
-                          View::ao,     View::diffuse, View::steps};
-
-Camera camera_here() { return {"here", {1.5f, 3.0f, 7.5f}, {0.1f, 0.9f, 0}, {0, 1, 0}, 40}; }
-
-RenderOptions options_for(View view, std::uint32_t width = 64, std::uint32_t height = 48) {
-    RenderOptions options;
-    options.view = view;
-    options.width = width;
-    options.height = height;
-    return options;
-}
-
-bool same_pixels(const Picture& a, const Picture& b) {
-    return a.pixels.size() == b.pixels.size() &&
-           std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(Vec3)) == 0;
-}
-
-/// Pixels that differ by more than one level in a channel.
-std::size_t count_different(const Picture& a, const Picture& b) {
-    const auto apart = [](float x, float y) { return std::abs(srgb_byte(x) - srgb_byte(y)) > 1; };
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < a.pixels.size(); ++i)
-        count += apart(a.pixels[i].x, b.pixels[i].x) || apart(a.pixels[i].y, b.pixels[i].y) ||
-                 apart(a.pixels[i].z, b.pixels[i].z);
-    return count;
-}
+using test::all_views, test::camera_before_ball, test::count_different, test::options_for,
+    test::same_pixels;
 
 /// A mesh with -0, a corner that is not finite, and triangles without area beyond all others.
 Mesh awkward_mesh() {
@@ -90,8 +65,8 @@ TEST(RenderScene, OneMeshIsTheSamePictureAsItsTree) {
             for (const View view : all_views) {
                 if (view == View::steps) continue;
                 RenderOptions options = options_for(view, 61, 37);
-                EXPECT_TRUE(same_pixels(render(scene, camera_here(), options),
-                                        render(bvh, camera_here(), options)))
+                EXPECT_TRUE(same_pixels(render(scene, camera_before_ball(), options),
+                                        render(bvh, camera_before_ball(), options)))
                     << view_name(view) << " of " << mesh.triangles.size() << " triangles";
             }
         }
@@ -107,8 +82,8 @@ TEST(RenderScene, SeveralMeshesAreThePictureOfAll) {
         for (const Mesh& part : parts_of(mesh, 7)) scene.add(part);
         scene.commit({.usage = usage});
         for (const View view : {View::shaded, View::normal, View::depth, View::ao, View::diffuse})
-            EXPECT_TRUE(same_pixels(render(scene, camera_here(), options_for(view)),
-                                    render(bvh, camera_here(), options_for(view))))
+            EXPECT_TRUE(same_pixels(render(scene, camera_before_ball(), options_for(view)),
+                                    render(bvh, camera_before_ball(), options_for(view))))
                 << view_name(view);
     }
 }
@@ -166,11 +141,12 @@ TEST(RenderScene, InstancesStandInTheWorld) {
     const Bvh bvh = build_bvh(boxes.flat);
     for (const View view : {View::shaded, View::normal, View::depth, View::ao, View::diffuse}) {
         const RenderOptions options = options_for(view, 128, 96);
-        const Picture picture = render(boxes.scene, camera_here(), options),
-                      wanted = render(bvh, camera_here(), options);
+        const Picture picture = render(boxes.scene, camera_before_ball(), options),
+                      wanted = render(bvh, camera_before_ball(), options);
         EXPECT_LE(count_different(picture, wanted), picture.pixels.size() / 100) << view_name(view);
-        EXPECT_GT(count_different(picture, render(build_bvh(boxes.mesh), camera_here(), options)),
-                  picture.pixels.size() / 20);
+        EXPECT_GT(
+            count_different(picture, render(build_bvh(boxes.mesh), camera_before_ball(), options)),
+            picture.pixels.size() / 20);
     }
 }
 
@@ -188,9 +164,9 @@ TEST(RenderScene, EachTriangleOfEachInstanceHasAColour) {
     for (const float x : {-2.0f, -0.5f, 1.0f}) scene.add(inner, transform_of(1, 1, 1, {x, 0, 0}));
     scene.commit();
     const RenderOptions options = options_for(View::primitive, 256, 192);
-    const Picture picture = render(scene, camera_here(), options);
+    const Picture picture = render(scene, camera_before_ball(), options);
     std::vector<std::uint32_t> pixels;
-    const std::vector<Ray> rays = make_primary_rays(camera_here(), 256, 192, &pixels);
+    const std::vector<Ray> rays = make_primary_rays(camera_before_ball(), 256, 192, &pixels);
     const std::vector<Hit> hits = trace(scene, rays);
     using Colour = std::tuple<float, float, float>;
     using Name = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>;
@@ -214,10 +190,11 @@ TEST(RenderScene, StepsAreLighterWhereThereIsMore) {
     several.commit({.usage = Usage::moving});
     const Scene one(test::ball_and_boxes());
     std::vector<std::uint32_t> pixels;
-    const std::vector<Ray> rays = make_primary_rays(camera_here(), 65, 65, &pixels);
+    const std::vector<Ray> rays = make_primary_rays(camera_before_ball(), 65, 65, &pixels);
     for (const Scene* const scene :
          std::initializer_list<const Scene*>{&boxes.scene, &several, &one}) {
-        const Picture picture = render(*scene, camera_here(), options_for(View::steps, 65, 65));
+        const Picture picture =
+            render(*scene, camera_before_ball(), options_for(View::steps, 65, 65));
         const std::vector<Hit> hits = trace(*scene, rays);
         double light[2] = {0, 0}, count[2] = {0, 0};  // of misses and of hits
         for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -235,10 +212,10 @@ TEST(RenderScene, IsTheSameForEveryThreadCount) {
         RenderOptions options = options_for(view, 61, 37);
         options.samples = 9;
         options.threads = 1;
-        const Picture one = render(boxes.scene, camera_here(), options);
+        const Picture one = render(boxes.scene, camera_before_ball(), options);
         for (const int threads : {2, 7}) {
             options.threads = threads;
-            EXPECT_TRUE(same_pixels(one, render(boxes.scene, camera_here(), options)))
+            EXPECT_TRUE(same_pixels(one, render(boxes.scene, camera_before_ball(), options)))
                 << view_name(view);
         }
     }
@@ -253,10 +230,10 @@ TEST(RenderScene, WhatCannotBeSeenIsNotThere) {
     nothing_inside.add(inner, Transform{});
     nothing_inside.commit();
     for (const View view : all_views) {
-        const Picture sky = render(build_bvh(Mesh{}), camera_here(), options_for(view));
+        const Picture sky = render(build_bvh(Mesh{}), camera_before_ball(), options_for(view));
         for (const Scene* const scene :
              std::initializer_list<const Scene*>{&masked, &empty, &nothing_inside})
-            EXPECT_TRUE(same_pixels(render(*scene, camera_here(), options_for(view)), sky))
+            EXPECT_TRUE(same_pixels(render(*scene, camera_before_ball(), options_for(view)), sky))
                 << view_name(view);
     }
 }
@@ -264,49 +241,52 @@ TEST(RenderScene, WhatCannotBeSeenIsNotThere) {
 TEST(RenderScene, ShowsTheLastCommit) {
     const Mesh mesh = test::ball_and_boxes();
     Scene scene(mesh);
-    const Picture before = render(scene, camera_here(), options_for(View::shaded));
+    const Picture before = render(scene, camera_before_ball(), options_for(View::shaded));
     scene.update(0, moved(mesh, transform_of(1, 0.5f, 1, {0.2f, 0, 0})));
-    EXPECT_TRUE(same_pixels(render(scene, camera_here(), options_for(View::shaded)), before));
+    EXPECT_TRUE(
+        same_pixels(render(scene, camera_before_ball(), options_for(View::shaded)), before));
     scene.commit();
-    EXPECT_GT(count_different(render(scene, camera_here(), options_for(View::shaded)), before),
-              before.pixels.size() / 20);
+    EXPECT_GT(
+        count_different(render(scene, camera_before_ball(), options_for(View::shaded)), before),
+        before.pixels.size() / 20);
 }
 
 TEST(RenderScene, ProgressMayTraceTheSameScene) {
     const Boxes boxes;
     RenderOptions options = options_for(View::ao, 128, 128);
     options.samples = 256;
-    const Picture quiet = render(boxes.scene, camera_here(), options);
-    const std::vector<Ray> rays = make_primary_rays(camera_here(), 64, 64);
+    const Picture quiet = render(boxes.scene, camera_before_ball(), options);
+    const std::vector<Ray> rays = make_primary_rays(camera_before_ball(), 64, 64);
     std::size_t calls = 0;
     double last = 0;
     options.progress = [&](double part) {
         calls += trace(boxes.scene, rays).size() == rays.size();
         last = part;
     };
-    EXPECT_TRUE(same_pixels(render(boxes.scene, camera_here(), options), quiet));
+    EXPECT_TRUE(same_pixels(render(boxes.scene, camera_before_ball(), options), quiet));
     EXPECT_GT(calls, 2u);
     EXPECT_EQ(last, 1.0);
 }
 
 TEST(RenderScene, RefusesWhatItCannotShow) {
-    EXPECT_EQ(test::message_of([] { (void)render(Scene(), camera_here()); }),
+    EXPECT_EQ(test::message_of([] { (void)render(Scene(), camera_before_ball()); }),
               "scene: it was never committed");
     const Scene scene(test::ball_and_boxes());
     RenderOptions options = options_for(View::ao);
     options.samples = 4097;
-    EXPECT_THROW((void)render(scene, camera_here(), options), InputError);
+    EXPECT_THROW((void)render(scene, camera_before_ball(), options), InputError);
     options.samples = 1;
     options.ao_radius = -1;
-    EXPECT_THROW((void)render(scene, camera_here(), options), InputError);
-    EXPECT_THROW((void)render(scene, camera_here(), options_for(View::normal, 0, 5)), InputError);
+    EXPECT_THROW((void)render(scene, camera_before_ball(), options), InputError);
+    EXPECT_THROW((void)render(scene, camera_before_ball(), options_for(View::normal, 0, 5)),
+                 InputError);
 }
 
 /// Hits of the camera's rays.
 struct Seen {
     explicit Seen(const Scene& scene) : hits(trace(scene, rays)) {}
     std::vector<std::uint32_t> pixels;
-    std::vector<Ray> rays = make_primary_rays(camera_here(), 48, 36, &pixels);
+    std::vector<Ray> rays = make_primary_rays(camera_before_ball(), 48, 36, &pixels);
     std::vector<Hit> hits;
 };
 
