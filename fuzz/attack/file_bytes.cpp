@@ -1,27 +1,17 @@
 #include "attack/file_bytes.h"
 
-#include <unistd.h>
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
-#include <system_error>
 
 #include "support/rdx_seal.h"
 
 namespace raydix::attack {
 
-ScratchFile::ScratchFile()
-    : path_(std::filesystem::temp_directory_path() /
-            ("raydix_attack_" + std::to_string(getpid()) + ".rdx")) {}
-
-ScratchFile::~ScratchFile() {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
-}
-
 Bytes ScratchFile::bytes() const {
-    Bytes bytes(std::filesystem::file_size(path_));
-    std::ifstream in(path_, std::ios::binary);
+    Bytes bytes(std::filesystem::file_size(path()));
+    std::ifstream in(path(), std::ios::binary);
     in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     return bytes;
 }

@@ -4,29 +4,22 @@
 #include <raydix/error.h>
 
 #include <cstddef>
-#include <filesystem>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "attack/attack.h"
+#include "support/temp_path.h"
 
 namespace raydix::attack {
 
 using Bytes = std::vector<std::byte>;
 
-/// A file of this process, removed in the end.
-class ScratchFile {
+/// A .rdx file to save to.
+class ScratchFile : public test::TempPath {
 public:
-    ScratchFile();
-    ~ScratchFile();
-    ScratchFile(const ScratchFile&) = delete;
-    ScratchFile& operator=(const ScratchFile&) = delete;
-    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+    ScratchFile() : TempPath("raydix_attack_", ".rdx") {}
     [[nodiscard]] Bytes bytes() const;
-
-private:
-    std::filesystem::path path_;
 };
 
 /// Bytes [begin, end) of a file, not empty.

@@ -1,26 +1,12 @@
 #include "support/support.h"
 
-#include <unistd.h>
-
-#include <atomic>
-
 namespace raydix::test {
 
 std::filesystem::path shared_scene(const std::string& name) {
     return std::filesystem::path(RAYDIX_SHARED_SCENES) / name;
 }
 
-TempFolder::TempFolder() {
-    static std::atomic<int> count{0};
-    path_ = std::filesystem::temp_directory_path() /
-            ("raydix-test-" + std::to_string(getpid()) + "-" + std::to_string(count++));
-    std::filesystem::create_directories(path_);
-}
-
-TempFolder::~TempFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-}
+TempFolder::TempFolder() : TempPath("raydix-test-") { std::filesystem::create_directories(path()); }
 
 Mesh random_soup(std::size_t count, std::uint64_t seed, float size) {
     std::mt19937_64 random(seed);

@@ -11,6 +11,8 @@
 
 #include <raydix/mesh.h>
 
+#include "support/temp_path.h"
+
 namespace raydix::test {
 
 /// A file below the shared scenes folder; `skip_without` skips the test if it is not there.
@@ -21,16 +23,9 @@ std::filesystem::path shared_scene(const std::string& name);
     GTEST_SKIP() << "shared scene not present: " << (path).string()
 
 /// A new, empty folder for one test; removed with the object.
-class TempFolder {
+class TempFolder : public TempPath {
 public:
     TempFolder();
-    ~TempFolder();
-    TempFolder(const TempFolder&) = delete;
-    TempFolder& operator=(const TempFolder&) = delete;
-    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
-private:
-    std::filesystem::path path_;
 };
 
 /// Fewer rays under the sanitizers and on an emulated processor, which slow everything down by an
