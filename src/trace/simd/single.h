@@ -169,6 +169,23 @@ private:
     /// that no ray meets them unless something overflows; in a compact one pads may turn them.
     static constexpr bool always_careful = compact;
 
+    /// A visit of a node: bits of the children that the ray meets, and where it enters each child
+    /// if that is asked for.
+    template <bool with_entries, class Node>
+    HWY_INLINE std::uint32_t meet(const Node& node, const Rates& about, float* entries) {
+        if constexpr (counting) ++counts_.visits;
+        const auto& rates = rates_of(node, about);
+        V entry, exit;
+        std::uint32_t met = 0;
+        for (std::size_t l = 0; l < 8; l += lanes8) {
+            test_boxes(node, rates, l, entry, exit);
+            met |= bits_of_le(entry, exit) << l;
+            if constexpr (with_entries) hn::Store(entry, f8, entries + l);
+        }
+        if (always_careful || frame_.careful) met &= used_slots(node);
+        return met;
+    }
+
     template <std::size_t k>
     static HWY_INLINE std::uint32_t load_child(const std::uint32_t* child) {
         std::uint32_t word = child[k];
@@ -206,18 +223,9 @@ private:
     template <class Node>
     HWY_INLINE bool visit(const Node& node, const Rates& about, std::size_t& top,
                           std::uint32_t& word) {
-        if constexpr (counting) ++counts_.visits;
-        const auto& rates = rates_of(node, about);
-        V entry, exit;
         HWY_ALIGN float entries[8];
-        std::uint32_t met = 0;
-        for (std::size_t l = 0; l < 8; l += lanes8) {
-            test_boxes(node, rates, l, entry, exit);
-            met |= bits_of_le(entry, exit) << l;
-            if constexpr (wanted == Wanted::closest || may_take_nearest)
-                hn::Store(entry, f8, entries + l);
-        }
-        if (always_careful || frame_.careful) met &= used_slots(node);
+        constexpr bool with_entries = wanted == Wanted::closest || may_take_nearest;
+        const std::uint32_t met = meet<with_entries>(node, about, entries);
         if (met == 0) return false;
         if ((met & (met - 1)) == 0) {
             word = choose(node.child, static_cast<std::size_t>(std::countr_zero(met)));
@@ -250,18 +258,8 @@ private:
     /// All children that the ray meets go onto the stack; the one to visit first is the last.
     template <class Node>
     HWY_INLINE void push_evenly(const Node& node) {
-        if constexpr (counting) ++counts_.visits;
-        const Rates plain = plain_rates();
-        const auto& rates = rates_of(node, plain);
-        V entry, exit;
         HWY_ALIGN float entries[8];
-        std::uint32_t met = 0;
-        for (std::size_t l = 0; l < 8; l += lanes8) {
-            test_boxes(node, rates, l, entry, exit);
-            met |= bits_of_le(entry, exit) << l;
-            hn::Store(entry, f8, entries + l);
-        }
-        if (always_careful || frame_.careful) met &= used_slots(node);
+        const std::uint32_t met = meet<true>(node, plain_rates(), entries);
         // The first two in their order, whether they are there or not.
         const auto slot = [](std::uint32_t left) {
             return static_cast<std::size_t>(std::countr_zero(left | 0x80));
