@@ -183,11 +183,11 @@ Hit trace_one(const Scene& scene, const Ray& ray, std::uint32_t mask, bool any) 
         if (hit.hit()) mesh->name(hit);
         return hit;
     }
-    if (!is_valid(ray)) return {};
     static const SceneKernels& kernels = scene_kernels_for({});
     StackMemory& stack = job_of_this_thread().single_stack;
     stack.reserve_words(tree.stack_size);
-    const auto answer = [&] {
+    const auto answer = [&]() -> Hit {
+        if (!is_valid(ray)) return {};
         return (any ? kernels.any : kernels.closest)(tree, ray, mask, stack.view());
     };
     if (FloatEnvironment::is_plain()) return answer();

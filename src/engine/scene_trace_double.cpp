@@ -212,15 +212,15 @@ AllHitsD trace_all(const SceneD& scene, std::span<const RayD> rays,
 
 HitD closest_hit(const SceneD& scene, const RayD& ray, std::uint32_t mask) {
     const SceneTreeD& tree = *SceneAccessD::tree(scene);
-    if (!is_valid(ray)) return {};
     const FloatEnvironment plain;
+    if (!is_valid(ray)) return {};
     return SceneRayD<Wanted::closest>(tree, ray, mask).best();
 }
 
 bool any_hit(const SceneD& scene, const RayD& ray, std::uint32_t mask) {
     const SceneTreeD& tree = *SceneAccessD::tree(scene);
-    if (!is_valid(ray)) return false;
     const FloatEnvironment plain;
+    if (!is_valid(ray)) return false;
     return SceneRayD<Wanted::any>(tree, ray, mask).best().hit();
 }
 

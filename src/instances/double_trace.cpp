@@ -163,8 +163,8 @@ InstanceTraceCounts trace_any(const InstancedSceneD& scene, std::span<const RayD
 
 InstanceHitD closest_hit(const InstancedSceneD& scene, const RayD& ray, std::uint32_t mask) {
     const State& state = built_state(scene);
-    if (!is_valid(ray)) return {};
     const FloatEnvironment plain;
+    if (!is_valid(ray)) return {};
     return InstanceWalkD(state, mask, false).run(ray);
 }
 

@@ -151,8 +151,8 @@ InstanceTraceCounts trace_any(const InstancedScene& scene, std::span<const Ray> 
 
 InstanceHit closest_hit(const InstancedScene& scene, const Ray& ray, std::uint32_t mask) {
     const State& state = built_state(scene);
-    if (!is_valid(ray)) return {};
     const FloatEnvironment plain;
+    if (!is_valid(ray)) return {};
     return InstanceWalk(state, mask, false).run(ray);
 }
 

@@ -192,8 +192,8 @@ OverlapLists all_batch(const AnyBvh& bvh, std::span<const Query> queries,
 template <class AnyBvh, class Query>
 bool touches_one(const AnyBvh& bvh, const Query& query) {
     require_triangles(bvh, what);
-    if (bvh.empty() || !is_valid(query)) return false;
     const FloatEnvironment plain;
+    if (bvh.empty() || !is_valid(query)) return false;
     const auto tree = padded_tree(bvh);
     BasicWalkStack<typename decltype(padded_tree(bvh))::Scalar> stack(tree.max_depth);
     return touches_any(tree, query, stack);

@@ -98,8 +98,8 @@ template <class AnyBvh, class Sweep>
 auto sweep_single(const AnyBvh& bvh, const Sweep& sweep) {
     using Kind = SweepsOf<std::remove_cvref_t<decltype(bvh)>>;
     require_triangles(bvh, what);
-    if (bvh.empty() || !is_valid(sweep)) return typename Kind::Hit{};
     const FloatEnvironment plain;
+    if (bvh.empty() || !is_valid(sweep)) return typename Kind::Hit{};
     BasicWalkStack<typename Kind::Tree::Scalar> stack(bvh.max_depth());
     return sweep_one<Kind>(typename Kind::Tree(bvh), sweep, stack);
 }

@@ -1,12 +1,17 @@
 // Scenes at the edges of what they may hold: the range of coordinates, meshes without area, rays
 // that floats only just hold.
 #include <gtest/gtest.h>
+#include <raydix/bvh.h>
+#include <raydix/instances.h>
+#include <raydix/overlap.h>
 #include <raydix/scene.h>
 #include <raydix/trace.h>
+#include <raydix/wide.h>
 
 #include <cstring>
 #include <vector>
 
+#include "support/float_control.h"
 #include "support/random.h"
 #include "support/support.h"
 
@@ -112,6 +117,39 @@ TEST(Scene, DirectionsMayBeAsLongAsFloatsAre) {
     }
     EXPECT_GT(found, 500u);
 }
+
+#if defined(RAYDIX_FLUSHES_DENORMALS)
+/// A denormal direction is none of zeros, whatever the caller's thread makes of denormals.
+TEST(Scene, OneRayOfACallerThatFlushesDenormals) {
+    const Mesh mesh{{}, {{1, -1, -1}, {1, 1, -1}, {1, 0, 2}}, {{0, 1, 2}}};
+    const MeshD mesh_d{{}, {{1, -1, -1}, {1, 1, -1}, {1, 0, 2}}, {{0, 1, 2}}};
+    const Ray ray{{0, 0, 0}, 0, {1e-38f, 0, 0}};
+    const RayD ray_d{{0, 0, 0}, 0, {1e-308, 0, 0}};
+    const Bvh tree = build_bvh(mesh);
+    const SceneD one_d(mesh_d);
+    Scene one(mesh), two;
+    two.add(mesh);
+    two.add(mesh, {.mask = 2, .id = {}});
+    two.commit();
+    const test::FlushedDenormals flushed;
+    for (const Scene* const scene : {&one, &two}) {
+        EXPECT_TRUE(trace(*scene, {&ray, 1})[0].hit());
+        EXPECT_TRUE(closest_hit(*scene, ray).hit());
+        EXPECT_TRUE(any_hit(*scene, ray));
+    }
+    EXPECT_TRUE(trace(one_d, {&ray_d, 1})[0].hit());
+    EXPECT_TRUE(closest_hit(one_d, ray_d).hit());
+    EXPECT_TRUE(any_hit(one_d, ray_d));
+    InstancedScene placed;
+    placed.add_instance(InstancedScene::scene, {placed.add_object(tree), Transform{}});
+    placed.build();
+    EXPECT_TRUE(closest_hit(placed, ray).hit.hit());
+    EXPECT_TRUE(sweep_sphere(tree, {ray, 0.1f}).hit());
+    const WideBvh nothing(build_bvh(Mesh{}));
+    std::vector<Hit> hits(1);
+    EXPECT_EQ(trace(nothing, {&ray, 1}, hits).invalid_rays, 0u);
+}
+#endif
 
 }  // namespace
 }  // namespace raydix

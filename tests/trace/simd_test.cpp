@@ -11,11 +11,8 @@
 #include <iostream>
 #include <random>
 
-#if defined(__SSE2__)
-#include <xmmintrin.h>
-#endif
-
 #include "layout/wide_bvh.h"
+#include "support/float_control.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"
 #include "support/support.h"
@@ -349,21 +346,7 @@ TEST(Simd, OneRayLikeBatches) {
     EXPECT_FALSE(any_hit(empty, rays[0]));
 }
 
-#if defined(__SSE2__)
-constexpr std::uint64_t flush_denormals = 0x8040;
-std::uint64_t float_control() { return _mm_getcsr(); }
-void set_float_control(std::uint64_t bits) { _mm_setcsr(static_cast<unsigned>(bits)); }
-#elif defined(__aarch64__)
-constexpr std::uint64_t flush_denormals = 1u << 24;
-std::uint64_t float_control() {
-    std::uint64_t bits;
-    asm volatile("mrs %0, fpcr" : "=r"(bits));
-    return bits;
-}
-void set_float_control(std::uint64_t bits) { asm volatile("msr fpcr, %0" : : "r"(bits)); }
-#endif
-
-#if defined(__SSE2__) || defined(__aarch64__)
+#if defined(RAYDIX_FLUSHES_DENORMALS)
 /// Callers may have told their thread to flush denormals; the hits are the same, and so is the
 /// setting afterwards.
 TEST(Simd, OneRayOfACallerThatFlushesDenormals) {
@@ -373,12 +356,11 @@ TEST(Simd, OneRayOfACallerThatFlushesDenormals) {
     for (Ray& ray : rays) ray.direction = 1e-30f * ray.direction;  // t beyond the usual too
     std::vector<Hit> wanted(rays.size()), hits(rays.size());
     for (std::size_t i = 0; i < rays.size(); ++i) wanted[i] = closest_hit(tree, rays[i]);
-    const std::uint64_t before = float_control();
-    set_float_control(before | flush_denormals);
-    for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = closest_hit(tree, rays[i]);
-    const std::uint64_t after = float_control();
-    set_float_control(before);
-    EXPECT_EQ(after & flush_denormals, flush_denormals);
+    {
+        const FlushedDenormals flushed;
+        for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = closest_hit(tree, rays[i]);
+        EXPECT_TRUE(FlushedDenormals::still());
+    }
     EXPECT_TRUE(std::ranges::equal(hits, wanted, same_bits));
     EXPECT_GT(std::ranges::count_if(wanted, [](const Hit& h) { return h.hit(); }), 0);
 }

@@ -168,6 +168,7 @@ void check_call(const TraceOptions& options) {
 
 /// Nothing to hit: all rays miss, but invalid ones still count.
 TraceCounts miss_all(std::span<const Ray> rays) {
+    const FloatEnvironment plain;
     TraceCounts counts;
     counts.rays = rays.size();
     for (const Ray& ray : rays) counts.invalid_rays += !is_valid(ray);
