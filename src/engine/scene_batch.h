@@ -13,6 +13,8 @@ namespace raydix {
 
 struct JobCounts {
     std::uint64_t hits = 0, invalid = 0;
+
+    void operator+=(const JobCounts& more) { hits += more.hits, invalid += more.invalid; }
 };
 
 inline TraceCounts sum_of(const std::vector<JobCounts>& parts, std::size_t rays) {

@@ -109,17 +109,18 @@ TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
     const std::size_t job_size = rays_per_job(n, SimdPath::stream);
     std::vector<JobCounts> parts((n + job_size - 1) / job_size);
     const std::array<Way, 3> ways = ways_of(path, batch.options);
-    PathRace paths(path == SimdPath::single ? 2 : 3);
+    // Where rays go apart only the ways of rays that go alone take part.
+    PathRace paths(path == SimdPath::single ? 2 : 1, path == SimdPath::single ? 0 : 2);
     const bool race =
         batch.options.path == SimdPath::automatic && parts.size() >= least_jobs_of_race;
     with_threads(batch.options.threads, [&] {
         std::vector<std::uint32_t> order;
         if (sorted) order = order_by_place(tree.extent.box, batch.rays);
         for_each_block(n, job_size, [&](std::size_t job, std::size_t begin, std::size_t end) {
-            const std::size_t way = race ? paths.next() : 0;
-            const std::int64_t start = race ? PathRace::thread_ns() : 0;
-            parts[job] = trace_job(tree, ways[way], batch, order, begin, end);
-            if (race) paths.add(way, end - begin, PathRace::thread_ns() - start);
+            const auto trace = [&](std::size_t way, std::size_t from, std::size_t to) {
+                parts[job] += trace_job(tree, ways[way], batch, order, from, to);
+            };
+            race ? paths.run(begin, end, trace) : trace(0, begin, end);
         });
     });
     return sum_of(parts, n);

@@ -263,16 +263,20 @@ public:
     /// Windows of one class go as they are, as those of primary rays are but for the edges of
     /// classes; from the first other one on, rays are sorted by class.
     void trace() {
-        while (job_.n >= packet_size && job_.order == nullptr && trace_window()) leave_behind();
+        while (job_.n > 0 && trace_window()) leave_behind(std::min(job_.n, packet_size));
         if (job_.n > 0) trace_sorted();
     }
 
 private:
-    /// The first 64 rays; false if they are not of one class.
+    /// The first 64 rays, or all; false if they are not of one class.
     HWY_INLINE bool trace_window() {
+        const std::size_t count = std::min(job_.n, packet_size);
+        if (job_.order != nullptr) std::copy_n(job_.order, count, index_);
+        // The last ray again, to fill the vector.
+        for (std::size_t k = count; k % lanes16 != 0; ++k) index_[k] = index_[count - 1];
         RayVectors rays[packet_size / lanes16];
         std::uint32_t code = 0;
-        for (std::size_t i = 0; i < packet_size; i += lanes16) {
+        for (std::size_t i = 0; i < count; i += lanes16) {
             RayVectors& here = rays[i / lanes16];
             here = read_rays(job_.rays, index_ + i);
             const auto codes = classify(here);
@@ -280,16 +284,22 @@ private:
             const auto same = hn::Eq(codes, hn::Set(I16(), static_cast<std::int32_t>(code)));
             if (code == odd_ray_class || !hn::AllTrue(I16(), same)) return false;
         }
-        trace_packet([&](std::size_t i) { return rays[i / lanes16]; }, index_, packet_size, code);
+        trace_packet([&](std::size_t i) { return rays[i / lanes16]; }, index_,
+                     static_cast<std::uint32_t>(count), code);
         return true;
     }
 
-    void leave_behind() {
-        job_.rays += packet_size, job_.n -= packet_size;
+    void leave_behind(std::size_t count) {
+        job_.n -= count;
+        if (job_.order != nullptr) {
+            job_.order += count;
+            return;
+        }
+        job_.rays += count;
         if constexpr (any)
-            job_.occluded += packet_size;
+            job_.occluded += count;
         else
-            job_.hits.first = job_.hits.at(packet_size);
+            job_.hits.first = job_.hits.at(count);
     }
 
     void trace_sorted() {

@@ -121,19 +121,17 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
                       !options.counters && parts.size() >= least_jobs_of_race;
     // Rays that take turns only win where they go anywhere.
     constexpr SimdPath ways[] = {SimdPath::stream, SimdPath::packet, SimdPath::single};
-    PathRace paths(path == SimdPath::sorted ? 3 : 2);
+    PathRace paths(2, path == SimdPath::sorted ? 1 : 0);
     with_threads(options.threads, [&] {
         if (path == SimdPath::sorted) batch.order = order_by_place(tree.arrays().bounds, rays);
         for_each_block(
             rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
-                if (race) {
-                    const std::size_t way = paths.next();
-                    const std::int64_t start = PathRace::thread_ns();
-                    batch.run(ways[way], begin, end, parts[block]);
-                    paths.add(way, end - begin, PathRace::thread_ns() - start);
-                } else {
+                if (race)
+                    paths.run(begin, end, [&](std::size_t way, std::size_t from, std::size_t to) {
+                        batch.run(ways[way], from, to, parts[block]);
+                    });
+                else
                     batch.run(begin, end, parts[block]);
-                }
                 if (done != nullptr)
                     (*done)(batch.order.empty() ? nullptr : batch.order.data(), begin, end);
             });
