@@ -120,7 +120,7 @@ Mesh laced(Mesh mesh, std::size_t k) {
 
 TEST(DeviceBuild, FewPrimitivesValidAndNot) {
     const float nan = std::nanf("");
-    const std::size_t most = thorough == 1 ? 4 : 10;
+    const std::size_t most = thorough == 1 ? 3 : 10;
     for (std::size_t n = 0; n <= most; ++n) {
         const Mesh mesh = random_soup(n, n + 1);
         expect_same_everywhere(std::to_string(n) + " triangles", MeshView(mesh));
@@ -135,22 +135,24 @@ TEST(DeviceBuild, FewPrimitivesValidAndNot) {
 }
 
 TEST(DeviceBuild, Triangles) {
-    const Mesh soup = random_soup(700, 3);
+    constexpr std::size_t count = thorough == 1 ? 300 : 700;
+    const Mesh soup = random_soup(count, 3);
     expect_same_everywhere("soup", MeshView(soup));
     expect_same_everywhere("soup with NaN", MeshView(laced(soup, 5)));
     expect_same_everywhere("nothing valid", MeshView(laced(soup, 1)));
-    expect_same_everywhere("lattice", MeshView(lattice_mesh(700, 3, 9)));
+    expect_same_everywhere("lattice", MeshView(lattice_mesh(count, 3, 9)));
 }
 
 TEST(DeviceBuild, PointsAndBoxes) {
-    std::vector<Vec3> points(300, Vec3{1, 2, 3});
-    for (std::size_t i = 0; i < 200; ++i) points.push_back(random_soup(1, i).vertices[0]);
+    constexpr std::size_t count = thorough == 1 ? 100 : 200;
+    std::vector<Vec3> points(3 * count / 2, Vec3{1, 2, 3});
+    for (std::size_t i = 0; i < count; ++i) points.push_back(random_soup(1, i).vertices[0]);
     points.push_back({-0.0f, 1, -0.0f});
     expect_same_everywhere("points", MeshView(points, {}));
     points[7].x = infinity;
-    points[400].x = 3e12f;
+    points[2 * count].x = 3e12f;
     expect_same_everywhere("points, some left out", MeshView(points, {}));
-    const std::vector<Vec3> equal(1000, Vec3{-0.0f, 0, 5});
+    const std::vector<Vec3> equal(5 * count, Vec3{-0.0f, 0, 5});
     expect_same_everywhere("equal points", MeshView(equal, {}));
 
     std::vector<Aabb> boxes;

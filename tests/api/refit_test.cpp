@@ -64,6 +64,7 @@ TEST(Refit, GivesTheHitsOfANewTree) {
     const Mesh mesh = load_model("builtin:figure?triangles=20000").mesh();
     for (const char* builder : whole_builders)
         for (const int threads : {1, 2, 7}) {
+            if (test::thorough == 1 && threads == 2) continue;
             Bvh bvh = build_bvh(mesh, {.builder = builder_from_name(builder)});
             const std::uint32_t depth = bvh.max_depth();
             const Refitter refitter(bvh);

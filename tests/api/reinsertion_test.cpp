@@ -21,6 +21,7 @@ namespace raydix::test {
 namespace {
 
 constexpr std::uint64_t seed = 20180501;
+constexpr bool few = thorough == 1;
 constexpr Builder builders[] = {
     Builder::karras, Builder::lauterbach, Builder::garanzha, Builder::apetrei, Builder::ploc,
     Builder::hploc,  Builder::binned,     Builder::sweep,    Builder::split,   Builder::sbvh};
@@ -38,7 +39,7 @@ protected:
 
 TEST_P(Reinserted, TreesAreValidAndCostNoMore) {
     int cheaper = 0;
-    for (const Model& scene : builtin_triangle_scenes(3000)) {
+    for (const Model& scene : builtin_triangle_scenes(few ? 1000 : 3000)) {
         const Bvh plain = build_bvh(scene.mesh(), options(0));
         const Bvh tree = build_bvh(scene.mesh(), options(8));
         const CheckReport valid = check(tree, scene.mesh());
@@ -61,7 +62,7 @@ TEST_P(Reinserted, TreeDoesNotDependOnThreads) {
 }
 
 TEST_P(Reinserted, HitsAreThoseOfBruteForce) {
-    for (const Model& scene : builtin_triangle_scenes(2000)) {
+    for (const Model& scene : builtin_triangle_scenes(few ? 500 : 2000)) {
         const Bvh tree = build_bvh(scene.mesh(), options(5));
         const std::vector<Ray> rays = make_mixed_rays(scene, 100 * thorough, seed);
         const std::vector<Hit> expected = trace_brute_force(scene.mesh(), rays);
@@ -144,7 +145,7 @@ TEST(ReinsertionOption, IsAnErrorOutOfRange) {
 
 TEST(ReinsertionOption, WideTreesFromMeshesAreThoseFromBinaryTrees) {
     for (const Builder builder : builders)
-        for (const Model& scene : builtin_triangle_scenes(3000)) {
+        for (const Model& scene : builtin_triangle_scenes(few ? 500 : 3000)) {
             BuildOptions options = build_options_for(Quality::high);
             options.builder = builder;
             const WideBvh direct = build_wide_bvh(scene.mesh(), options);

@@ -7,8 +7,8 @@ import unittest
 sys.dont_write_bytecode = True
 from program import SANITIZED, ProgramTest, main  # noqa: E402
 
-SCENE = "builtin:grove?triangles=20000"
-SMALL = ("--size", "64x48", "--samples", "4")
+SCENE = "builtin:grove?triangles=10000" if SANITIZED else "builtin:grove?triangles=20000"
+SMALL = ("--size", "32x24", "--samples", "2") if SANITIZED else ("--size", "64x48", "--samples", "4")
 KERNELS = {"packet", "while_while", "if_if", "speculative_while_while", "persistent_packet", "persistent_while_while",
            "persistent_if_if", "persistent_speculative_while_while", "ray_replacement", "work_queue", "dynamic_fetch"}
 KINDS = {"primary", "ao", "diffuse", "diffuse_shuffled"}

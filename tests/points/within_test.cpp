@@ -256,7 +256,8 @@ TYPED_TEST(Within, RowsOfOneWalkAndOfTwo) {
     std::vector<Vec3> places(thorough > 1 ? 1000 : 200);  // each room that is tried asks for all
     for (Vec3& p : places) p = {unit(), unit(), unit()};
     const auto points = points_as<TypeParam>(places);
-    const auto queries = points_as<TypeParam>(queries_for(places, 4500, seed + 11));
+    const auto queries =
+        points_as<TypeParam>(queries_for(places, thorough > 1 ? 4500 : 1200, seed + 11));
     const TypeParam index = build_points(points);
     const auto same = [&](const auto& a, const auto& b) {
         return std::ranges::equal(a.offsets.view(), b.offsets.view()) &&

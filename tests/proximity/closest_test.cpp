@@ -118,7 +118,7 @@ TEST(Closest, IsBruteForceBitForBit) {
         expect_same(scene.name, scene.mesh(),
                     queries_around(scene.mesh(), 150 * test::thorough, seed));
     expect_same("soup", test::random_soup(1000, seed),
-                queries_around(test::random_soup(1000, seed), 3000, seed));
+                queries_around(test::random_soup(1000, seed), 150 * test::thorough, seed));
     const Mesh odd = slivers_and_giants(seed);
     expect_same("slivers and giants", odd, queries_around(odd, 100 * test::thorough, seed));
     const Mesh lattice = test::lattice_mesh(500, 4, seed);
