@@ -297,7 +297,9 @@ protected:
         SimdCounts counts;
         if constexpr (wanted == Wanted::all) {
             const std::size_t before = found_->size();
-            SingleRay<wanted, counted, compact>(view, frame, stack_, counts).trace_all(*found_);
+            SingleRay<wanted, counted, compact> ray(view, frame, stack_, counts);
+            ray.collect(*found_);
+            ray.trace(0, {frame.tmax});
             for (std::size_t k = before; k < found_->size(); ++k) {
                 Hit& hit = (*found_)[k];
                 hit.t = static_cast<float>(double{hit.t} * scale) + 0.0f;

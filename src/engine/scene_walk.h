@@ -323,8 +323,8 @@ private:
             fill_packet(
                 rays.tree, [&](std::size_t i) { return read_rays(rays.rays, here + i); },
                 std::min<std::uint32_t>(packet_size, count - at), code, packet, tree.growth);
-            PacketWalk<any, false, false, Parts>(rays.tree, packet, here, parts, rays.packet_stack,
-                                                 counts)
+            PacketWalk<any ? Wanted::any : Wanted::closest, false, false, Parts>(
+                rays.tree, packet, here, parts, rays.packet_stack, counts)
                 .trace();
         }
     }

@@ -28,6 +28,18 @@ inline void finish_ray(BudgetVector<AnyHit>& hits, std::size_t before) {
                hits.end());
 }
 
+/// A hit of ray `place` of a job; hits are by no means in the order of their rays yet.
+inline Hit found_by(std::uint32_t place, const TreeHit& at) {
+    Hit hit = hit_of_tree(at);
+    hit.instance = place;
+    return hit;
+}
+
+/// hits[before] on, each of a ray 0 to rays - 1 (found_by) -> those of one ray behind those of the
+/// one before, as finish_ray has them; how many to hit_counts [rays]. Returns how many in all.
+std::uint64_t group_by_ray(BudgetVector<Hit>& hits, std::size_t before, std::size_t rays,
+                           std::uint64_t* hit_counts);
+
 /// What blocks of rays hit, until all of it is known. All: AllHits or AllHitsD.
 template <class All>
 class HitBlocks {
@@ -43,6 +55,8 @@ public:
 
     /// Hits of the rays b * rays_per_block on, one ray after the other.
     BudgetVector<AnyHit>& hits(std::size_t b) { return found_[b]; }
+    /// Of the block that ray i is in.
+    BudgetVector<AnyHit>& hits_with(std::size_t i) { return found_[i / rays_per_block_]; }
     /// [rays]: how many hits each ray has.
     std::uint64_t* hit_counts() { return all_.offsets.data() + 1; }
     /// The block b is complete.

@@ -323,14 +323,49 @@ TEST(Simd, AllHitsLikeScalar) {
         const auto rays = make_mixed_rays(scene, 1000 * thorough, seed);
         const AllHits wanted = trace_all(bvh, rays);
         EXPECT_GT(wanted.hits.size(), 0u);
-        for (const std::string& isa : simd_instruction_sets()) {
-            const AllHits all = trace_all(tree, rays, {.counters = true, .isa = isa});
-            EXPECT_EQ(all.offsets, wanted.offsets) << isa;
-            EXPECT_TRUE(std::ranges::equal(all.hits, wanted.hits, same_bits)) << isa;
-            EXPECT_EQ(all.counts.hits, wanted.counts.hits);
-            EXPECT_EQ(all.counts.invalid_rays, wanted.counts.invalid_rays);
-            EXPECT_GT(all.counts.node_visits, 0u);
+        for (const std::string& isa : simd_instruction_sets())
+            for (const SimdPath path : {SimdPath::automatic, SimdPath::packet, SimdPath::single})
+                for (const bool counters : {false, true}) {
+                    const AllHits all =
+                        trace_all(tree, rays, {.counters = counters, .path = path, .isa = isa});
+                    EXPECT_EQ(all.offsets, wanted.offsets) << isa;
+                    EXPECT_TRUE(std::ranges::equal(all.hits, wanted.hits, same_bits)) << isa;
+                    EXPECT_EQ(all.counts.hits, wanted.counts.hits);
+                    EXPECT_EQ(all.counts.invalid_rays, wanted.counts.invalid_rays);
+                    EXPECT_EQ(all.counts.node_visits > 0, counters);
+                }
+    }
+}
+
+/// Rays of one class and of several, each through so many triangles that jobs sort their hits in
+/// place; some of them at the same distance.
+TEST(Simd, AllHitsOfManyLayers) {
+    Mesh mesh;
+    for (std::uint32_t k = 0; k < 400; ++k) {
+        const auto z = static_cast<float>(k / 2);  // in pairs
+        for (const Vec3 v : {Vec3{-9, -9, z}, Vec3{27, -9, z}, Vec3{-9, 27, z}})
+            mesh.vertices.push_back(v);
+        mesh.triangles.push_back({3 * k, 3 * k + 1, 3 * k + 2});
+    }
+    const Bvh bvh = build_bvh(mesh);
+    for (const bool mixed : {false, true}) {
+        std::vector<Ray> rays;
+        for (std::uint32_t k = 0; k < 1500; ++k) {
+            const bool up = mixed && k % 3 == 0;
+            const auto x = 0.001f * static_cast<float>(k);
+            rays.push_back(
+                {{x, 0.5f * x, up ? -1.0f : 201.0f}, 0, {0, 0, up ? 1.0f : -1}, infinity});
+            if (k % 7 == 0) rays.back().tmax = 0.5f;  // hits nothing
         }
+        const AllHits wanted = trace_all(bvh, rays);
+        EXPECT_EQ(wanted.hits.size(), 400u * (1500 - 215));
+        for (const bool compact : {false, true})
+            for (const SimdPath path : {SimdPath::packet, SimdPath::single}) {
+                const AllHits all =
+                    trace_all(WideBvh(bvh, {.compact = compact}), rays, {.path = path});
+                EXPECT_EQ(all.offsets, wanted.offsets);
+                EXPECT_TRUE(std::ranges::equal(all.hits, wanted.hits, same_bits));
+            }
     }
 }
 

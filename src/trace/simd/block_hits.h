@@ -16,6 +16,13 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
+/// What of a ray's hits is wanted.
+enum class Wanted { closest, any, all };
+
+constexpr EdgeRule edge_rule(Wanted wanted) {
+    return wanted == Wanted::all ? EdgeRule::half_open : EdgeRule::closed;
+}
+
 /// A corner in the sheared plane, and how far it is from where rays start along their longest axis.
 template <class D>
 struct Sheared {

@@ -24,8 +24,11 @@ namespace raydix::HWY_NAMESPACE {
 constexpr int few_rays_of_packet = 12;
 
 /// What a packet does at the leaves of a tree over parts (single.h).
-template <bool any, class Parts>
+template <Wanted query, class Parts>
 class PacketParts {
+    static constexpr bool any = query == Wanted::any;
+    static_assert(query != Wanted::all);
+
 public:
     PacketParts(Packet& packet, const std::int32_t* index, Parts& parts)
         : p_(packet), index_(index), parts_(parts) {}
@@ -52,16 +55,19 @@ private:
     std::uint64_t found_ = 0;
 };
 
-template <bool any, bool counting, bool compact, class Parts = NoParts>
+template <Wanted query, bool counting, bool compact, class Parts = NoParts>
 class PacketWalk {
+    static constexpr bool any = query == Wanted::any, closest = query == Wanted::closest;
     static constexpr bool has_parts = !std::is_same_v<Parts, NoParts>;
-    using Leaves = std::conditional_t<has_parts, PacketParts<any, Parts>, PacketTriangles<any>>;
+    using Leaves = std::conditional_t<has_parts, PacketParts<query, Parts>, PacketTriangles<query>>;
 
 public:
-    /// Through triangles. `rays`: what the packet was filled with, rays[index[k]].
+    /// Through triangles. `rays`: what the packet was filled with, rays[index[k]]; `all`: as
+    /// PacketTriangles has it.
     PacketWalk(const WideView& tree, Packet& packet, const Ray* rays, const std::int32_t* index,
-               const PacketStackView& stack, SimdCounts& counts) requires(!has_parts)
-        : PacketWalk(tree, packet, Leaves(packet, rays, index), stack, counts) {}
+               const PacketStackView& stack, SimdCounts& counts,
+               BudgetVector<Hit>* all = nullptr) requires(!has_parts)
+        : PacketWalk(tree, packet, Leaves(packet, rays, index, all), stack, counts) {}
     /// Through parts. Ray k of the packet is index[k] to them.
     PacketWalk(const WideView& tree, Packet& packet, const std::int32_t* index, Parts& parts,
                const PacketStackView& stack, SimdCounts& counts) requires(has_parts)
@@ -334,7 +340,7 @@ private:
 
     static HWY_INLINE std::uint32_t order_of(std::uint32_t met, const float* entries,
                                              std::uint32_t* order) {
-        return any ? order_by_area(met, order) : order_by_entry(met, entries, order);
+        return closest ? order_by_entry(met, entries, order) : order_by_area(met, order);
     }
 
     void test_leaf(std::uint32_t word, std::uint64_t active) {
@@ -342,12 +348,12 @@ private:
         if constexpr (has_parts) {
             for (std::uint32_t part = place; part < place + count; ++part)
                 leaves_.visit(part, active & ~leaves_.found());
-            if (!any) find_reach();
+            if (closest) find_reach();
         } else {
             const TriangleBlock& block = tree_.template block<compact>(place);
             if constexpr (counting)
                 counts_.tests += count * static_cast<std::uint64_t>(std::popcount(active));
-            if (leaves_.test(block, place % block_lanes, count, active) && !any) find_reach();
+            if (leaves_.test(block, place % block_lanes, count, active) && closest) find_reach();
         }
     }
 

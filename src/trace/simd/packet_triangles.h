@@ -11,6 +11,7 @@
 
 #include <bit>
 
+#include "trace/all_hits.h"
 #include "trace/simd/block_hits.h"
 #include "trace/simd/lanes.h"
 #include "trace/simd/quads.h"
@@ -46,13 +47,17 @@ struct Packet {
 };
 
 /// Finds the hits of a packet's rays on the triangles of leaves, with the bits of
-/// intersect_triangle; hits go into the packet.
-template <bool any>
+/// intersect_triangle; hits go into the packet, or to `all` if all are wanted.
+template <Wanted query>
 class PacketTriangles {
+    static constexpr bool any = query == Wanted::any;
+
 public:
-    /// `rays`: what the packet was filled with, rays[index[k]].
-    PacketTriangles(Packet& packet, const Ray* rays, const std::int32_t* index)
-        : p_(packet), rays_(rays), index_(index) {}
+    /// `rays`: what the packet was filled with, rays[index[k]]. `all`: in no order, found_by that
+    /// index.
+    PacketTriangles(Packet& packet, const Ray* rays, const std::int32_t* index,
+                    BudgetVector<Hit>* all = nullptr)
+        : p_(packet), rays_(rays), index_(index), all_(all) {}
 
     /// Rays that have hit.
     [[nodiscard]] std::uint64_t found() const { return found_; }
@@ -276,14 +281,19 @@ private:
     /// The whole test for one ray and one triangle.
     HWY_NOINLINE bool test_alone(const TriangleBlock& block, std::uint32_t lane, std::size_t k) {
         TriangleHit hit;
-        return test_exactly(triangle_ray(k), block, lane, p_.t[k], hit) &&
+        return test_exactly<edge_rule(query)>(triangle_ray(k), block, lane, p_.t[k], hit) &&
                take(block, lane, k, hit);
+    }
+    HWY_INLINE void add(std::size_t k, const TreeHit& hit) {
+        all_->push_back(found_by(static_cast<std::uint32_t>(index_[k]), hit));
     }
     /// A hit of ray k that is no farther than the best. Always true.
     HWY_INLINE bool take(const TriangleBlock& block, std::uint32_t lane, std::size_t k,
                          const TriangleHit& hit) {
         found_ |= std::uint64_t{1} << k;
-        if (!any && (hit.t < p_.t[k] || block.prim[lane] < p_.prim[k]))
+        if constexpr (query == Wanted::all)
+            add(k, {hit.t, block.prim[lane], hit.u, hit.v});
+        else if (!any && (hit.t < p_.t[k] || block.prim[lane] < p_.prim[k]))
             p_.t[k] = hit.t, p_.u[k] = hit.u, p_.v[k] = hit.v, p_.prim[k] = block.prim[lane];
         return true;
     }
@@ -388,6 +398,18 @@ private:
         changed = true;
         found_ |= std::uint64_t{candidates | equal} << i;
         if constexpr (any) return open;
+        if constexpr (query == Wanted::all) {
+            HWY_ALIGN float values[3][lanes_d];
+            hn::Store(t, h, values[0]);
+            hn::Store(weights::rounded(d, at.u), h, values[1]);
+            hn::Store(weights::rounded(d, at.v), h, values[2]);
+            for (std::uint32_t left = candidates | equal; left != 0; left &= left - 1) {
+                const auto l = static_cast<std::size_t>(std::countr_zero(left));
+                add(i + l,
+                    {values[0][l], target.block.prim[target.lane], values[1][l], values[2][l]});
+            }
+            return open;
+        }
         const hn::RebindToUnsigned<H> n;
         const auto own = hn::Set(n, target.block.prim[target.lane]), old = hn::Load(n, p_.prim + i);
         // At equal t the lower primitive wins.
@@ -406,6 +428,7 @@ private:
     Packet& p_;
     const Ray* const rays_;
     const std::int32_t* const index_;
+    BudgetVector<Hit>* const all_;
     std::uint64_t found_ = 0;
 };
 

@@ -227,11 +227,11 @@ private:
     HWY_ALIGN std::int32_t order_[max_rays + slack * ray_class_count];
 };
 
-template <bool any>
+template <Wanted query>
 HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, const Packet& p,
                              std::uint64_t found, SimdCounts& counts) {
     counts.hits += static_cast<std::uint64_t>(std::popcount(found));
-    if constexpr (any) {
+    if constexpr (query == Wanted::any) {
         for (std::uint32_t k = 0; k < p.count; ++k) job.occluded[index[k]] = found >> k & 1;
         return;
     }
@@ -252,11 +252,14 @@ HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, cons
 }
 
 /// The rays of a job in packets.
-template <bool any, bool counting, bool compact>
+template <Wanted query, bool counting, bool compact>
 class PacketJob {
+    static constexpr bool any = query == Wanted::any, all = query == Wanted::all;
+
 public:
     PacketJob(const SimdJob& job, SimdCounts& counts)
         : job_(job), counts_(counts), ahead_(job.rays + job.n) {
+        if constexpr (all) before_ = job.all->size();
         std::iota(index_, index_ + packet_size, 0);
     }
 
@@ -296,7 +299,11 @@ private:
             return;
         }
         job_.rays += count;
-        if constexpr (any)
+        if constexpr (all) {
+            counts_.hits += group_by_ray(*job_.all, before_, count, job_.hit_counts);
+            before_ = job_.all->size();
+            job_.hit_counts += count;
+        } else if constexpr (any)
             job_.occluded += count;
         else
             job_.hits.first = job_.hits.at(count);
@@ -315,7 +322,9 @@ private:
         }
         const std::int32_t* const odd = sorter.rays(odd_ray_class);
         for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k)
-            trace_one<any, counting, compact>(job_, static_cast<std::size_t>(odd[k]), counts_);
+            trace_one<query, counting, compact>(job_, static_cast<std::size_t>(odd[k]), counts_);
+        if constexpr (all)
+            counts_.hits += group_by_ray(*job_.all, before_, job_.n, job_.hit_counts);
     }
 
     template <class Read>
@@ -327,22 +336,23 @@ private:
             ahead_ += count;
         }
         fill_packet(job_.tree, read, count, code, packet_);
-        PacketWalk<any, counting, compact> walk(job_.tree, packet_, job_.rays, index,
-                                                job_.packet_stack, counts_);
+        PacketWalk<query, counting, compact> walk(job_.tree, packet_, job_.rays, index,
+                                                  job_.packet_stack, counts_, job_.all);
         walk.trace();
-        store_packet<any>(job_, index, packet_, walk.found(), counts_);
+        if constexpr (!all) store_packet<query>(job_, index, packet_, walk.found(), counts_);
     }
 
-    SimdJob job_;  // what is left of it
+    SimdJob job_;             // what is left of it
+    std::size_t before_ = 0;  // of all hits, those of rays that are left behind
     SimdCounts& counts_;
     const Ray* ahead_;
     HWY_ALIGN std::int32_t index_[packet_size];
     Packet packet_;
 };
 
-template <bool any, bool counting, bool compact>
+template <Wanted query, bool counting, bool compact>
 void trace_packets(const SimdJob& job, SimdCounts& counts) {
-    PacketJob<any, counting, compact>(job, counts).trace();
+    PacketJob<query, counting, compact>(job, counts).trace();
 }
 
 /// Rays index[0, count) of one class as a stream; `index` may be read up to the next multiple of
@@ -421,7 +431,8 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
     }
     const std::int32_t* const odd = sorter.rays(odd_ray_class);
     for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k)
-        trace_one<any, counting, compact>(job, static_cast<std::size_t>(odd[k]), counts);
+        trace_one<any ? Wanted::any : Wanted::closest, counting, compact>(
+            job, static_cast<std::size_t>(odd[k]), counts);
 }
 
 inline void streams(const SimdJob& job, SimdCounts& counts) {
@@ -433,8 +444,11 @@ inline void streams(const SimdJob& job, SimdCounts& counts) {
 
 inline void packets(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
-        !job.hits ? trace_packets<true, counting, compact>(job, counts)
-                  : trace_packets<false, counting, compact>(job, counts);
+        if (job.all != nullptr)
+            trace_packets<Wanted::all, counting, compact>(job, counts);
+        else
+            !job.hits ? trace_packets<Wanted::any, counting, compact>(job, counts)
+                      : trace_packets<Wanted::closest, counting, compact>(job, counts);
     });
 }
 

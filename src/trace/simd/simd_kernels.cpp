@@ -23,7 +23,7 @@ HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
 SimdKernels kernels(std::string_view isa) {
-    return {isa, one<false>, one<true>, single, packets, streams, all_hits};
+    return {isa, one<false>, one<true>, single, packets, streams};
 }
 
 }  // namespace raydix::HWY_NAMESPACE

@@ -46,6 +46,10 @@ struct SimdJob {
     StreamMemory* memory;
     bool counting;
     std::size_t stack_size = 0;  // of each of rays_in_turn rays that go alone
+    /// All hits instead, without an order and not in streams: behind those of earlier rays, sorted
+    /// (all_hits.h); how many each ray has to hit_counts [n].
+    BudgetVector<Hit>* all = nullptr;
+    std::uint64_t* hit_counts = nullptr;
 };
 
 using OneRay = TreeHit(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,
@@ -59,9 +63,6 @@ struct SimdKernels {
     void (*single)(const SimdJob& job, SimdCounts& counts);
     void (*packets)(const SimdJob& job, SimdCounts& counts);
     void (*streams)(const SimdJob& job, SimdCounts& counts);
-    /// Hits of each ray behind those of the one before, sorted; how many to hit_counts [n].
-    void (*all_hits)(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t* hit_counts,
-                     SimdCounts& counts);
 };
 
 /// Best first; those this processor can run.

@@ -23,8 +23,6 @@ namespace raydix::HWY_NAMESPACE {
 
 constexpr std::size_t parts8 = 8 / lanes8;
 
-enum class Wanted { closest, any, all };
-
 /// Leaves hold triangles. Else Parts is what takes the rays on at a leaf, a part of a scene:
 ///   float visit_one(std::uint32_t part, std::uint32_t ray)
 ///       ray `ray` of the job into the part; how far it goes from now on
@@ -39,7 +37,7 @@ struct NoParts {};
 template <Wanted wanted, bool counting, bool compact, bool guessing = false, class Parts = NoParts>
 class SingleRay {
 public:
-    /// `parts` and the ray's place in the job: unless leaves hold triangles.
+    /// `parts`: unless leaves hold triangles. `place`: the ray's, in the job.
     SingleRay(const WideView& tree, const SingleFrame& frame, const WideStackView& stack,
               SimdCounts& counts, Parts* parts = nullptr, std::uint32_t place = 0)
         : tree_(tree),
@@ -50,11 +48,8 @@ public:
           place_(place),
           at_(plane_places[frame.kind.negatives]) {}
 
-    /// All hits, in no order, behind those in `hits`.
-    void trace_all(BudgetVector<Hit>& hits) {
-        all_ = &hits;
-        trace(0, {frame_.tmax});
-    }
+    /// Where all hits go, in no order; the ray's place in the job stands for their instance.
+    void collect(BudgetVector<Hit>& hits) { all_ = &hits; }
 
     /// From a node or leaf on; `best` is what was found before.
     WideBest trace(std::uint32_t root, const WideBest& best) {
@@ -365,19 +360,6 @@ private:
     HWY_INLINE bool test_triangles(std::uint32_t place, std::uint32_t count) {
         const TriangleBlock& block = tree_.template block<compact>(place);
         if constexpr (counting) counts_.tests += count;
-        if constexpr (wanted == Wanted::all) {
-            const TriangleRay ray = frame_.triangle_ray();
-            for (std::uint32_t lane = place % block_lanes; lane < place % block_lanes + count;
-                 ++lane) {
-                TriangleHit hit;
-                if (intersect_triangle<EdgeRule::half_open>(ray, triangle_of(block, lane), best_.t,
-                                                            hit)) {
-                    all_->push_back(
-                        hit_of_tree({hit.t * frame_.t_scale, block.prim[lane], hit.u, hit.v}));
-                }
-            }
-            return false;
-        }
         const std::uint32_t lanes = ((1u << count) - 1) << place % block_lanes;
         return test_lanes(block, lanes);
     }
@@ -425,9 +407,14 @@ private:
             if ((clear >> lane & 1) != 0 && hit_lane(block, lane, frame_.origin, frame_.direction,
                                                      frame_.kind, frame_.tmin, hit)
                     ? !(hit.t >= frame_.tmin && hit.t <= best_.t)
-                    : !test_exactly(frame_.triangle_ray(), block, lane, best_.t, hit))
+                    : !test_exactly<edge_rule(wanted)>(frame_.triangle_ray(), block, lane, best_.t,
+                                                       hit))
                 continue;
-            best_.take(hit.t, block.prim[lane], hit.u, hit.v);
+            if constexpr (wanted == Wanted::all)
+                all_->push_back(
+                    found_by(place_, {hit.t * frame_.t_scale, block.prim[lane], hit.u, hit.v}));
+            else
+                best_.take(hit.t, block.prim[lane], hit.u, hit.v);
             if constexpr (wanted == Wanted::any) return true;
         }
         return false;
@@ -483,32 +470,27 @@ HWY_INLINE TreeHit find_one(const WideView& tree, const Ray& ray, const WideStac
     return {best.t * frame.t_scale, best.prim, best.u, best.v};
 }
 
-template <bool any, bool counting, bool compact>
+/// Ray i of a job; all of its hits go behind job.all, for group_by_ray.
+template <Wanted wanted, bool counting, bool compact>
 void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
+    if constexpr (wanted == Wanted::all) {
+        SingleFrame frame;
+        if (!fill_frame(job.tree, job.rays[i], frame)) {
+            ++counts.invalid;
+            return;
+        }
+        SingleRay<wanted, counting, compact> ray(job.tree, frame, job.stack, counts, nullptr,
+                                                 static_cast<std::uint32_t>(i));
+        ray.collect(*job.all);
+        ray.trace(0, {frame.tmax});
+        return;
+    }
+    constexpr bool any = wanted == Wanted::any;
     const TreeHit hit = find_one<any, counting, compact>(job.tree, job.rays[i], job.stack, counts);
     if constexpr (any)
         job.occluded[i] = hit.hit() ? 1 : 0;
     else
         *job.hits.at(i) = hit;
-}
-
-/// All hits of each ray behind those of the one before; counts.hits of each in hit_counts.
-template <bool counting, bool compact>
-void trace_all_of(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t* hit_counts,
-                  SimdCounts& counts) {
-    for (std::size_t i = 0; i < job.n; ++i) {
-        const std::size_t before = found.size();
-        SingleFrame frame;
-        if (!fill_frame(job.tree, job.rays[i], frame)) {
-            ++counts.invalid;
-        } else {
-            SingleRay<Wanted::all, counting, compact>(job.tree, frame, job.stack, counts)
-                .trace_all(found);
-            finish_ray(found, before);
-        }
-        hit_counts[i] = found.size() - before;
-        counts.hits += hit_counts[i];
-    }
 }
 
 /// Calls run(counting, compact) with what the job wants, as constants. Code for compact trees
@@ -521,13 +503,6 @@ void with_constants(const SimdJob& job, const Run& run) {
         run(Yes(), Yes());
     else
         job.counting ? run(Yes(), No()) : run(No(), No());
-}
-
-inline void all_hits(const SimdJob& job, BudgetVector<Hit>& found, std::uint64_t* hit_counts,
-                     SimdCounts& counts) {
-    with_constants(job, [&](auto counting, auto compact) {
-        trace_all_of<counting, compact>(job, found, hit_counts, counts);
-    });
 }
 
 template <bool any>

@@ -72,7 +72,7 @@ SimdPath path_for(const WideBvh& tree, std::span<const Ray> rays, SimdPath wante
 /// With fewer jobs than this a trial would cost more than it may gain.
 constexpr std::size_t least_jobs_of_race = 16;
 
-/// A batch as its jobs see it: hits, or else occluded.
+/// A batch as its jobs see it: hits, or else occluded, or all hits.
 struct Batch {
     const WideBvh& tree;
     const SimdKernels& kernels;
@@ -82,6 +82,7 @@ struct Batch {
     std::uint8_t* occluded;
     bool counters;
     std::vector<std::uint32_t> order{};  // of the path `sorted`
+    HitBlocks<AllHits>* all = nullptr;
 
     void run(std::size_t begin, std::size_t end, SimdCounts& counts) const {
         run(path, begin, end, counts);
@@ -98,12 +99,14 @@ struct Batch {
                           order.empty() ? nullptr : order.data() + begin,
                           end - begin,
                           hits ? HitRows{hits.at(from), hits.bytes} : HitRows{},
-                          hits ? nullptr : occluded + from,
+                          occluded == nullptr ? nullptr : occluded + from,
                           stack.view(),
                           stack.packet_view(),
                           &memory,
                           counters,
-                          stack_size};
+                          stack_size,
+                          all == nullptr ? nullptr : &all->hits_with(begin),
+                          all == nullptr ? nullptr : all->hit_counts() + begin};
         job_of(kernels, own)(job, counts);
     }
 };
@@ -239,22 +242,24 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
         return all;
     }
     std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
+    const SimdPath path = path_for(tree, rays, options.path);
+    Batch batch{
+        tree,    kernels,         path == SimdPath::packet ? path : SimdPath::single, rays, {},
+        nullptr, options.counters};
+    batch.all = &found;
+    const bool race = options.path == SimdPath::automatic && path != SimdPath::packet &&
+                      !options.counters && parts.size() >= least_jobs_of_race;
+    constexpr SimdPath ways[] = {SimdPath::single, SimdPath::packet};
+    PathRace paths(path == SimdPath::stream ? 2 : 1, path == SimdPath::stream ? 0 : 1);
     with_threads(options.threads, [&] {
         for_each_block(
             rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
-                StackMemory stack(tree.stats().max_depth);
-                TriangleBlock room{};
-                const SimdJob job{view_of(tree.arrays(), room),
-                                  rays.data() + begin,
-                                  nullptr,
-                                  end - begin,
-                                  {},
-                                  nullptr,
-                                  stack.view(),
-                                  {},
-                                  nullptr,
-                                  options.counters};
-                kernels.all_hits(job, found.hits(block), found.hit_counts() + begin, parts[block]);
+                if (race)
+                    paths.run(begin, end, [&](std::size_t way, std::size_t from, std::size_t to) {
+                        batch.run(ways[way], from, to, parts[block]);
+                    });
+                else
+                    batch.run(begin, end, parts[block]);
                 found.finish(block);
             });
         all = found.join();

@@ -62,8 +62,10 @@ HWY_INLINE void take_turns(std::array<Turn, n>& turns) {
     }
 }
 
-template <bool any, bool counting, bool compact>
+template <Wanted query, bool counting, bool compact>
 class RayTurns {
+    static constexpr bool any = query == Wanted::any, all = query == Wanted::all;
+
 public:
     RayTurns(const SimdJob& job, SimdCounts& counts) : job_(job), counts_(counts) {}
 
@@ -74,11 +76,13 @@ public:
             turns[k].stack = {job_.stack.words + k * job_.stack_size,
                               job_.stack.entries + k * job_.stack_size};
         }
+        const std::size_t before = all ? job_.all->size() : 0;
         take_turns(turns);
+        if constexpr (all) counts_.hits += group_by_ray(*job_.all, before, job_.n, job_.hit_counts);
     }
 
 private:
-    using One = SingleRay<any ? Wanted::any : Wanted::closest, counting, compact>;
+    using One = SingleRay<query, counting, compact>;
     struct Turn {
         RayTurns* rays;
         WideStackView stack;
@@ -105,7 +109,9 @@ private:
                 ask_for_ray(job_.order[std::min(next_ + ahead, job_.n - 1)]);
             }
             if (fill_frame(job_.tree, job_.rays[turn.i], turn.frame)) {
-                turn.ray.emplace(job_.tree, turn.frame, turn.stack, counts_);
+                turn.ray.emplace(job_.tree, turn.frame, turn.stack, counts_, nullptr,
+                                 static_cast<std::uint32_t>(turn.i));
+                if constexpr (all) turn.ray->collect(*job_.all);
                 if (turn.ray->begin(turn.frame.tmax)) return true;
             } else {
                 ++counts_.invalid;
@@ -125,6 +131,7 @@ private:
 
     /// False.
     HWY_INLINE bool finish(Turn& turn) {
+        if constexpr (all) return false;
         const WideBest& best = turn.ray->best();
         TreeHit hit;
         if (best.found()) {
@@ -135,6 +142,7 @@ private:
         return false;
     }
     HWY_INLINE void set(std::size_t i, const TreeHit& hit) {
+        if constexpr (all) return;
         if constexpr (any)
             job_.occluded[i] = hit.hit() ? 1 : 0;
         else
@@ -149,10 +157,12 @@ private:
 
 inline void single(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
-        if (job.hits)
-            RayTurns<false, counting, compact>(job, counts).trace();
+        if (job.all != nullptr)
+            RayTurns<Wanted::all, counting, compact>(job, counts).trace();
+        else if (job.hits)
+            RayTurns<Wanted::closest, counting, compact>(job, counts).trace();
         else
-            RayTurns<true, counting, compact>(job, counts).trace();
+            RayTurns<Wanted::any, counting, compact>(job, counts).trace();
     });
 }
 

@@ -137,10 +137,12 @@ inline TriangleRay triangle_ray_of(const RayClass& kind, Vec3 origin, Vec3 direc
             tmin};
 }
 
-/// The whole test: where an edge function is 0 or NaN, or a vector of planes leaves it open.
+/// The whole test: where an edge function is 0 or NaN, or a vector of planes leaves it open. All
+/// hits count an edge that triangles share once.
+template <EdgeRule edges = EdgeRule::closed>
 [[gnu::noinline]] inline bool test_exactly(const TriangleRay& ray, const TriangleBlock& block,
                                            std::uint32_t lane, float tmax, TriangleHit& hit) {
-    return intersect_triangle<EdgeRule::closed>(ray, triangle_of(block, lane), tmax, hit);
+    return intersect_triangle<edges>(ray, triangle_of(block, lane), tmax, hit);
 }
 
 /// The best hit so far, t in the frame's units.
