@@ -147,6 +147,10 @@ Transform transform_of(const Affine& affine) {
     return transform;
 }
 
+SceneOptions scene_options(const SubjectOptions& options) {
+    return {.quality = options.quality, .threads = options.threads};
+}
+
 /// Rays through a Scene.
 struct SceneCalls : FloatRays {
     using Hit = raydix::Hit;
@@ -160,11 +164,6 @@ struct SceneCalls : FloatRays {
     }
     [[nodiscard]] Hit closest_one(const Ray& ray) const { return closest_hit(scene, ray); }
     [[nodiscard]] bool any_one(const Ray& ray) const { return any_hit(scene, ray); }
-
-protected:
-    static SceneOptions scene_options(const SubjectOptions& options) {
-        return {.quality = options.quality, .threads = options.threads};
-    }
 };
 
 struct InstanceCalls : SceneCalls {
@@ -222,13 +221,15 @@ struct FixedCalls : SceneCalls {
 
 class OurAllHits : public AllHitsSide {
 public:
-    OurAllHits(const Mesh& mesh, const SubjectOptions& options)
-        : threads_(options.threads), tree_(build_wide_bvh(mesh, build_options(options))) {}
+    OurAllHits(const Mesh& mesh, const SubjectOptions& options) : threads_(options.threads) {
+        scene_.share(mesh);
+        scene_.commit(scene_options(options));
+    }
 
     void take(std::span<const Ray> rays) override { rays_ = rays; }
     std::vector<SideMode> modes() override {
         SideMode batch{.side = "raydix", .name = "batch", .ours = true};
-        batch.closest = [this] { all_ = trace_all(tree_, rays_, {.threads = threads_}); };
+        batch.closest = [this] { all_ = trace_all(scene_, rays_, {.threads = threads_}); };
         return {batch};
     }
     std::vector<float> distances(std::size_t ray) const override {
@@ -240,7 +241,7 @@ public:
 
 private:
     int threads_;
-    WideBvh tree_;
+    Scene scene_;
     std::span<const Ray> rays_;
     AllHits all_;
 };
