@@ -136,11 +136,15 @@ TraceCounts trace_mesh(const MeshTree& mesh, const Batch& batch) {
     return trace_rows(*mesh.tree, batch.rays, rows, batch.occluded, options,
                       [&](const std::uint32_t* order, std::size_t begin, std::size_t end) {
                           if (batch.hits == nullptr) return;
-                          for (std::size_t k = begin; k < end; ++k) {
-                              Hit& hit = batch.hits[order == nullptr ? k : order[k]];
-                              hit.geometry = no_primitive, hit.instance = 0;
-                              if (hit.hit()) mesh.name(hit);
-                          }
+                          const std::uint32_t first = mesh.ids.front();
+                          if (mesh.ids.size() == 1)
+                              for_each_row(batch.hits, order, begin, end,
+                                           [&](Hit& hit) { place_hit(hit, first); });
+                          else
+                              for_each_row(batch.hits, order, begin, end, [&](Hit& hit) {
+                                  place_hit(hit, first);
+                                  if (hit.hit()) mesh.name(hit);
+                              });
                       });
 }
 
@@ -171,19 +175,8 @@ TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
     return mesh != nullptr ? trace_mesh(*mesh, batch) : trace_scene(tree, batch);
 }
 
-Hit trace_one(const Scene& scene, const Ray& ray, std::uint32_t mask, bool any) {
-    const SceneTree& tree = *SceneAccess::tree(scene);
-    if (const MeshTree* const mesh = tree.only_mesh()) {
-        Hit hit;
-        if ((mesh->mask & mask) == 0) return hit;
-        if (any) {
-            hit.prim = any_hit(*mesh->tree, ray) ? 0 : no_primitive;
-            return hit;
-        }
-        hit = closest_hit(*mesh->tree, ray);
-        if (hit.hit()) mesh->name(hit);
-        return hit;
-    }
+[[gnu::noinline]] Hit trace_parts(const SceneTree& tree, const Ray& ray, std::uint32_t mask,
+                                  bool any) {
     static const SceneKernels& kernels = scene_kernels_for({});
     StackMemory& stack = job_of_this_thread().single_stack;
     stack.reserve_words(tree.stack_size);
@@ -204,6 +197,7 @@ AllHits all_hits_of(const MeshTree& mesh, std::span<const Ray> rays,
     of_tree.isa = options.isa;
     of_tree.max_result_bytes = options.max_result_bytes;
     AllHits all = trace_all(*mesh.tree, rays, of_tree);
+    if (mesh.ids.size() == 1 && mesh.ids.front() == 0) return all;  // as hits of a tree are
     with_threads(options.threads, [&] {
         for_each_index(all.hits.size(), [&](std::size_t i) { mesh.name(all.hits[i]); });
     });
@@ -296,11 +290,24 @@ AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTrac
 }
 
 Hit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
-    return trace_one(scene, ray, mask, false);
+    const SceneTree& tree = *SceneAccess::tree(scene);
+    const MeshTree* const mesh = tree.only_mesh();
+    if (mesh == nullptr) return trace_parts(tree, ray, mask, false);
+    if ((mesh->mask & mask) == 0) return {};
+    Hit hit = closest_hit(*mesh->tree, ray);
+    if (!hit.hit()) return hit;
+    if (mesh->ids.size() == 1)
+        hit.geometry = mesh->ids.front();
+    else
+        mesh->name(hit);
+    return hit;
 }
 
 bool any_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
-    return trace_one(scene, ray, mask, true).hit();
+    const SceneTree& tree = *SceneAccess::tree(scene);
+    const MeshTree* const mesh = tree.only_mesh();
+    if (mesh == nullptr) return trace_parts(tree, ray, mask, true).hit();
+    return (mesh->mask & mask) != 0 && any_hit(*mesh->tree, ray);
 }
 
 }  // namespace raydix

@@ -144,11 +144,7 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
 
 HitRows rows_of(std::span<Hit> hits) { return {hits.data(), sizeof(Hit)}; }
 
-/// Kernels write what one tree knows of a hit: the rest, where there is only one geometry.
-void place_in_tree(Hit& hit) {
-    const std::uint32_t place[2] = {hit.hit() ? 0 : no_primitive, 0};
-    std::memcpy(&hit.geometry, place, sizeof place);  // both in one store
-}
+void place_in_tree(Hit& hit) { place_hit(hit, 0); }
 
 /// Largest jobs, one after the other, in the caller's floating-point environment.
 void trace_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
@@ -184,10 +180,7 @@ TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit>
     check_call(options);
     static_cast<void>(kernels_for(options.isa));
     const RowsDone place = [&](const std::uint32_t* order, std::size_t begin, std::size_t end) {
-        if (order == nullptr)
-            std::ranges::for_each(hits.subspan(begin, end - begin), place_in_tree);
-        else
-            for (std::size_t k = begin; k < end; ++k) place_in_tree(hits[order[k]]);
+        for_each_row(hits.data(), order, begin, end, place_in_tree);
     };
     if (!tree.empty()) return trace_batch(tree, rays, rows_of(hits), nullptr, options, &place);
     std::ranges::fill(hits, Hit{});

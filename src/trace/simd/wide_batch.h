@@ -3,7 +3,9 @@
 
 #include <raydix/wide.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <functional>
 #include <span>
 #include <vector>
@@ -42,10 +44,26 @@ private:
     std::vector<std::uint64_t> active_;
 };
 
+/// Kernels write what one tree knows of a hit: the rest, where all of it is one geometry.
+inline void place_hit(Hit& hit, std::uint32_t geometry) {
+    const std::uint32_t place[2] = {hit.hit() ? geometry : no_primitive, 0};
+    std::memcpy(&hit.geometry, place, sizeof place);  // both in one store
+}
+
 /// The hits of rays order[begin] to order[end - 1], or begin to end - 1 without an order, are
 /// there.
 using RowsDone =
     std::function<void(const std::uint32_t* order, std::size_t begin, std::size_t end)>;
+
+/// Calls place(hit) for the hits that are there.
+template <class Place>
+void for_each_row(Hit* hits, const std::uint32_t* order, std::size_t begin, std::size_t end,
+                  const Place& place) {
+    if (order == nullptr)
+        std::for_each(hits + begin, hits + end, place);
+    else
+        for (std::size_t k = begin; k < end; ++k) place(hits[order[k]]);
+}
 
 /// As trace or, without rows for hits, trace_any; `done` comes once for each ray, on any thread.
 TraceCounts trace_rows(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
