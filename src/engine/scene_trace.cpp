@@ -195,6 +195,7 @@ AllHits all_hits_of(const MeshTree& mesh, std::span<const Ray> rays,
     TraceOptions of_tree;
     of_tree.threads = options.threads;
     of_tree.isa = options.isa;
+    of_tree.path = options.path;
     of_tree.max_result_bytes = options.max_result_bytes;
     AllHits all = trace_all(*mesh.tree, rays, of_tree);
     if (mesh.ids.size() == 1 && mesh.ids.front() == 0) return all;  // as hits of a tree are
