@@ -121,25 +121,6 @@ struct DoubleCalls {
     }
 };
 
-struct BoxCalls : FloatRays {
-    Bvh boxes;
-    IntersectPrimitive intersect;
-
-    BoxCalls(std::span<const Aabb> all, IntersectPrimitive function, const SubjectOptions& options)
-        : boxes(build_bvh(all, build_options(options))), intersect(std::move(function)) {}
-    void closest(std::span<const Ray> rays, std::span<Hit> hits, int threads) const {
-        trace(boxes, intersect, rays, hits, {.threads = threads});
-    }
-    void any(std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) const {
-        trace_any(boxes, intersect, rays, found, {.threads = threads});
-    }
-    [[nodiscard]] Hit closest_one(const Ray& ray) const {
-        return closest_hit(boxes, intersect, ray);
-    }
-    [[nodiscard]] bool any_one(const Ray& ray) const { return any_hit(boxes, intersect, ray); }
-    [[nodiscard]] PlacedHit placed(const Hit& hit) const { return bench::placed(hit); }
-};
-
 Transform transform_of(const Affine& affine) {
     Transform transform;
     for (std::size_t r = 0; r < 3; ++r)
@@ -217,6 +198,44 @@ struct FixedCalls : SceneCalls {
         if (!hit.hit()) return {};
         return {hit.t, first[hit.geometry] + hit.prim, hit.u, hit.v, 0, 0};
     }
+};
+
+/// One mesh, of which a function takes triangles away.
+struct FilteredCalls : SceneCalls {
+    HitFilter filter;
+
+    FilteredCalls(const Mesh& mesh, AcceptPrimitive accept, const SubjectOptions& options)
+        : filter([accept](std::size_t, const Ray&, const Hit& hit) { return accept(hit.prim); }) {
+        scene.share(mesh);
+        scene.commit(scene_options(options));
+    }
+    void closest(std::span<const Ray> rays, std::span<Hit> hits, int threads) const {
+        trace(scene, rays, hits, options(threads));
+    }
+    void any(std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) const {
+        trace_any(scene, rays, found, options(threads));
+    }
+    [[nodiscard]] Hit closest_one(const Ray& ray) const { return closest_hit(scene, ray, filter); }
+    [[nodiscard]] bool any_one(const Ray& ray) const { return any_hit(scene, ray, filter); }
+    [[nodiscard]] PlacedHit placed(const Hit& hit) const { return bench::placed(hit); }
+
+private:
+    [[nodiscard]] SceneTraceOptions options(int threads) const {
+        SceneTraceOptions all;
+        all.threads = threads;
+        all.filter = filter;
+        return all;
+    }
+};
+
+/// One geometry that is no mesh. Shapes: what Scene::add takes.
+template <class Shapes>
+struct ShapeCalls : SceneCalls {
+    ShapeCalls(const Shapes& shapes, const SubjectOptions& options) {
+        scene.add(shapes);
+        scene.commit(scene_options(options));
+    }
+    [[nodiscard]] PlacedHit placed(const Hit& hit) const { return bench::placed(hit); }
 };
 
 class OurAllHits : public AllHitsSide {
@@ -313,8 +332,8 @@ std::unique_ptr<RaySide> our_instances(const PlacedScene& scene, const SubjectOp
 
 std::unique_ptr<RaySide> our_spheres(std::span<const Sphere> spheres,
                                      const SubjectOptions& options) {
-    return std::make_unique<OurRays<BoxCalls>>(options, boxes_of(spheres),
-                                               intersect_spheres(spheres), options);
+    return std::make_unique<OurRays<ShapeCalls<std::span<const Sphere>>>>(options, spheres,
+                                                                          options);
 }
 
 std::unique_ptr<RaySide> our_discs(std::span<const Disc> discs, const SubjectOptions& options) {
@@ -324,12 +343,13 @@ std::unique_ptr<RaySide> our_discs(std::span<const Disc> discs, const SubjectOpt
         return raydix_bench_hit_disc(discs.data(), prim, &ray.origin.x, &ray.direction.x, ray.tmin,
                                      ray.tmax, &hit.t) != 0;
     };
-    return std::make_unique<OurRays<BoxCalls>>(options, boxes, intersect, options);
+    return std::make_unique<OurRays<ShapeCalls<UserGeometry>>>(
+        options, UserGeometry(boxes, intersect), options);
 }
 
-// The library has no filters.
-std::unique_ptr<RaySide> our_filtered_mesh(const Mesh&, AcceptPrimitive, const SubjectOptions&) {
-    return nullptr;
+std::unique_ptr<RaySide> our_filtered_mesh(const Mesh& mesh, AcceptPrimitive accept,
+                                           const SubjectOptions& options) {
+    return std::make_unique<OurRays<FilteredCalls>>(options, mesh, accept, options);
 }
 std::unique_ptr<RaySide> our_fixed_scene(const std::vector<SharedMesh>& meshes,
                                          const SubjectOptions& options) {

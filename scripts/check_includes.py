@@ -27,8 +27,8 @@ MAY_INCLUDE = {
     "proximity": {"base", "exec", "primitives", "sort", "tree", "rays", "trace"},
     # primitives, tree: a tree in double over instances is made as one over triangles
     "instances": {"base", "exec", "primitives", "tree", "trace"},
-    # what rays of a user go through: trees of triangles, and instances over them
-    "engine": {"base", "exec", "tree", "layout", "rays", "trace", "instances"},
+    # what rays of a user go through: trees of triangles and shapes, and instances over them
+    "engine": {"base", "exec", "primitives", "tree", "layout", "rays", "trace", "proximity", "instances"},
     "measure": {"base", "exec"},  # exec: the number of threads is a property of the machine
     "report": {"base", "exec", "measure"},
     "api": {"*"},

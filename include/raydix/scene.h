@@ -1,5 +1,5 @@
-// What rays are traced through: triangle meshes, and instances of other scenes; in float and in
-// double.
+// What rays are traced through: triangle meshes, spheres, capsules, points with a radius, geometry
+// of the caller's own, and instances of other scenes; in float and in double.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -19,6 +19,12 @@
 namespace raydix {
 
 struct Model;
+struct Sphere;
+struct Capsule;
+struct SphereD;
+struct CapsuleD;
+template <class Scalar>
+class BasicUserGeometry;  // <raydix/user_geometry.h>
 
 /// What scenes of a number type take and give.
 template <class Scalar>
@@ -29,7 +35,11 @@ struct SceneTypes<float> {
     using Mesh = raydix::Mesh;
     using MeshView = raydix::MeshView;
     using Box = Aabb;
+    using Point = Vec3;
+    using Sphere = raydix::Sphere;
+    using Capsule = raydix::Capsule;
     using Ray = raydix::Ray;
+    using TreeHit = raydix::TreeHit;
     using Hit = raydix::Hit;
     using AllHits = raydix::AllHits;
 };
@@ -39,7 +49,11 @@ struct SceneTypes<double> {
     using Mesh = MeshD;
     using MeshView = MeshViewD;
     using Box = AabbD;
+    using Point = Vec3d;
+    using Sphere = SphereD;
+    using Capsule = CapsuleD;
     using Ray = RayD;
+    using TreeHit = TreeHitD;
     using Hit = HitD;
     using AllHits = AllHitsD;
 };
@@ -79,8 +93,11 @@ struct CommitReport {
     double ms = 0;
     std::uint64_t meshes = 0, instances = 0;  // of the scene itself
     std::uint64_t triangles = 0;              // of its meshes
-    std::uint64_t trees_built = 0;            // of triangles; those that did not change are kept
-    std::uint64_t trees_refitted = 0;         // instead
+    std::uint64_t shapes = 0;                 // its geometries that are neither
+    std::uint64_t primitives = 0;             // of those
+    std::uint64_t trees_built = 0;     // of triangles and primitives; those that did not change are
+                                       // kept
+    std::uint64_t trees_refitted = 0;  // instead
     double sah_ratio = 1;  // the largest SAH after a refit / at the build; above refit_limit:
                            // that tree was built again
     bool parts_refitted = false;  // the tree over meshes and instances, instead of a new one
@@ -88,10 +105,10 @@ struct CommitReport {
     std::uint64_t paths = 0;      // instances, counted on every way to them
 };
 
-/// Meshes, and instances of other scenes, which may hold instances themselves. Changes take effect
-/// with `commit`; until then rays meet what the last one saw. Any number of threads may trace a
-/// scene at once; changes and commits need it for themselves. Scalar: float or double, of all
-/// coordinates; a scene holds instances of scenes of its own type.
+/// Meshes, shapes, and instances of other scenes, which may hold instances themselves. Changes take
+/// effect with `commit`; until then rays meet what the last one saw. Any number of threads may
+/// trace a scene at once; changes and commits need it for themselves. Scalar: float or double, of
+/// all coordinates; a scene holds instances of scenes of its own type.
 template <class Scalar>
 class BasicScene {
 public:
@@ -100,6 +117,10 @@ public:
     using MeshView = typename Types::MeshView;
     using Transform = typename Types::Transform;
     using Box = typename Types::Box;
+    using Point = typename Types::Point;
+    using Sphere = typename Types::Sphere;
+    using Capsule = typename Types::Capsule;
+    using UserGeometry = BasicUserGeometry<Scalar>;
 
     /// Levels of instances, at most.
     static constexpr std::uint32_t max_levels = 32;
@@ -121,6 +142,19 @@ public:
     /// The same without a copy: the arrays must outlive the scene, or its last commit with this
     /// mesh.
     std::uint32_t share(const MeshView& mesh, const GeometryOptions& options = {});
+    /// Adds spheres, capsules, or points of one radius, of which the scene keeps a copy: `prim`
+    /// counts them. Rays hit their surfaces from both sides; one that starts inside hits where it
+    /// leaves. t is computed in double and rounded once. `u` of a capsule's hit is the place along
+    /// its axis, 0 at a and 1 at b; else u and v are 0. Those that are not finite, have a negative
+    /// radius or reach beyond 1e12 are left out. Throws InputError for an id that was used before,
+    /// and in double, which has none of them yet.
+    std::uint32_t add(std::span<const Sphere> spheres, const GeometryOptions& options = {});
+    std::uint32_t add(std::span<const Capsule> capsules, const GeometryOptions& options = {});
+    std::uint32_t add(std::span<const Point> points, Scalar radius,
+                      const GeometryOptions& options = {});
+    /// Primitives that a function of the caller's intersects. The scene keeps a copy of it and of
+    /// the boxes.
+    std::uint32_t add(const UserGeometry& geometry, const GeometryOptions& options = {});
     /// Places another scene: as its last commit left it when this one is committed. Throws
     /// InputError: a transform that is singular or not finite, a scene that would hold itself.
     std::uint32_t add(const BasicScene& scene, const Transform& transform,
@@ -129,6 +163,11 @@ public:
     void remove(std::uint32_t id);
     /// Other vertices or triangles. A shared mesh stays shared, with these arrays.
     void update(std::uint32_t id, const MeshView& mesh);
+    /// Other shapes of the same kind.
+    void update(std::uint32_t id, std::span<const Sphere> spheres);
+    void update(std::uint32_t id, std::span<const Capsule> capsules);
+    void update(std::uint32_t id, std::span<const Point> points, Scalar radius);
+    void update(std::uint32_t id, const UserGeometry& geometry);
     void set_transform(std::uint32_t id, const Transform& transform);
     void set_mask(std::uint32_t id, std::uint32_t mask);
 
@@ -165,19 +204,29 @@ using Scene = BasicScene<float>;
 /// one after the other, through trees with two children a node.
 using SceneD = BasicScene<double>;
 
+/// Which hits count: alpha tests, the triangle that a ray starts on, masks of one's own. `place`:
+/// of the ray among those of the call, 0 for a single one; `ray`: as the caller gave it. Called
+/// from several threads at once, any number of times for each hit, also for hits that turn out not
+/// to be the closest, in any order; so its answer may depend on its arguments alone. Each triangle
+/// or shape has one hit on a ray: the first within [tmin, tmax]. If that is refused, the next one
+/// is of another. What it throws comes out of the call that traces.
+using HitFilter = std::function<bool(std::size_t place, const Ray& ray, const Hit& hit)>;
+
 struct SceneTraceOptions {
     std::uint32_t mask = 0xFFFFFFFFu;           // of all rays
     std::span<const std::uint32_t> masks = {};  // of each ray, [rays], instead; or empty
     int threads = 0;                            // 0 to 1,024; 0: all the machine has
     SimdPath path = SimdPath::automatic;        // hits do not depend on it
-    std::string isa = {};  // one of simd_instruction_sets(); empty: the best. In double both are
-                           // checked, and no more
+    std::string isa = {};   // one of simd_instruction_sets(); empty: the best. In double both are
+                            // checked, and no more
+    HitFilter filter = {};  // empty: all hits count. In double there are none
     /// trace_all only: bounds the peak of the call. 0: half of what is left (result_limit.h).
     std::uint64_t max_result_bytes = 0;
 };
 
 /// Closest hit of each ray: the least (t, instance, geometry, prim) over all triangles that the
-/// watertight test accepts (Woop, Benthin, Wald 2013; edges belong to both triangles). Rays go
+/// watertight test accepts (Woop, Benthin, Wald 2013; edges belong to both triangles) and all
+/// shapes that it meets. Rays go
 /// through each instance's inverse in double and are rounded once, where the mesh is; in double the
 /// translation comes first, so that a place far from the origin costs no digits. rays [n] ->
 /// hits [n]. Throws InputError: sizes that differ, a scene that was never committed.
@@ -211,5 +260,10 @@ TraceCounts trace_any(const SceneD& scene, std::span<const RayD> rays,
                                std::uint32_t mask = 0xFFFFFFFFu);
 [[nodiscard]] bool any_hit(const Scene& scene, const Ray& ray, std::uint32_t mask = 0xFFFFFFFFu);
 [[nodiscard]] bool any_hit(const SceneD& scene, const RayD& ray, std::uint32_t mask = 0xFFFFFFFFu);
+/// Of the hits that `filter` accepts.
+[[nodiscard]] Hit closest_hit(const Scene& scene, const Ray& ray, const HitFilter& filter,
+                              std::uint32_t mask = 0xFFFFFFFFu);
+[[nodiscard]] bool any_hit(const Scene& scene, const Ray& ray, const HitFilter& filter,
+                           std::uint32_t mask = 0xFFFFFFFFu);
 
 }  // namespace raydix

@@ -27,6 +27,11 @@ void positions(const SceneD& scene, std::span<const HitD> hits, std::span<Vec3d>
 [[nodiscard]] std::vector<Vec3d> positions(const SceneD& scene, std::span<const HitD> hits,
                                            int threads = 0);
 
+/// The same for scenes that hold shapes, with the rays that hit: the point of a shape's hit is
+/// origin + t * direction of its ray. rays [n], hits [n] -> points [n].
+void positions(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
+               std::span<Vec3> points, int threads = 0);
+
 /// The geometric normal at each hit, of unit length. In the mesh's own space it is the direction of
 /// (v1-v0) x (v2-v0): counter-clockwise corners face the viewer. Each instance moves it by the
 /// inverse transpose of its transform, so that the outside of a mesh stays outside where an
@@ -38,6 +43,11 @@ void normals(const Scene& scene, std::span<const Hit> hits, std::span<Vec3> norm
              int threads = 0);
 void normals(const SceneD& scene, std::span<const HitD> hits, std::span<Vec3d> normals,
              int threads = 0);
+/// The same for scenes that hold shapes, with the rays that hit. The normal of a sphere points from
+/// its center to the hit, that of a capsule from the nearest point of its axis; NaN for a radius
+/// of 0. Throws InputError for user geometry too, whose normals its owner knows.
+void normals(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
+             std::span<Vec3> normals, int threads = 0);
 [[nodiscard]] std::vector<Vec3> normals(const Scene& scene, std::span<const Hit> hits,
                                         int threads = 0);
 [[nodiscard]] std::vector<Vec3d> normals(const SceneD& scene, std::span<const HitD> hits,

@@ -115,6 +115,18 @@ def ray_masks(mask: Any, masks: Any, lead: tuple[int, ...]) -> tuple[int, np.nda
     return ALL, np.ascontiguousarray(each).reshape(-1)
 
 
+def ray_rows(rays: Any, directions: Any, lead: tuple[int, ...]) -> np.ndarray:
+    """Rays of any form but their limits as rows (n, 8) float32."""
+    args, shape = ray_batch(rays, directions, None, None)
+    if shape != lead:
+        raise ValueError(f"rays: expected one for each hit, shape {lead}, given {shape}")
+    if len(args) == 1:
+        return args[0]
+    made = np.zeros((len(args[0]), 8), FLOAT32)
+    made[:, :3], made[:, 4:7], made[:, 7] = args[0], args[1], np.inf
+    return made
+
+
 def hit_columns(hits: np.ndarray, geometry: int | None = None) -> dict[str, np.ndarray]:
     """Rows of hits, as the core writes them, as columns. Where they have no room for geometry and
     instance, they are of one mesh, `geometry`."""

@@ -1,4 +1,4 @@
-"""What a Scene holds: meshes and instances of other scenes, their changes and commits."""
+"""What a Scene holds: meshes, spheres, capsules, instances of other scenes; changes, commits."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ._arrays import (
     ALL,
+    FLOAT32,
     MISSING,
     UINT32,
     cast,
@@ -68,6 +69,32 @@ def _one_or_many(value: Any, name: str) -> np.ndarray:
     if array.ndim != 1:
         raise ValueError(f"{name}: expected a whole number or shape (M,), given {describe(array)}")
     return array
+
+
+def _points(value: Any, name: str) -> np.ndarray:
+    array = to_numpy(value, name)
+    expected = f"{name}: expected shape (N, 3)"
+    if array.dtype.kind not in "iuf":
+        raise TypeError(f"{expected} float32 or float64, given {describe(array)}")
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"{expected}, given {describe(array)}")
+    return cast(array, FLOAT32)
+
+
+def _with_radii(radii: Any, *points: np.ndarray) -> np.ndarray:
+    """Rows of points and a radius."""
+    given = to_numpy(radii, "radii")
+    count = len(points[0])
+    expected = f"radii: expected a number or shape ({count},)"
+    if given.dtype.kind not in "iuf":
+        raise TypeError(f"{expected} float32 or float64, given {describe(given)}")
+    if given.shape not in ((), (count,)):
+        raise ValueError(f"{expected}, given {describe(given)}")
+    return np.column_stack((*points, np.broadcast_to(cast(given, FLOAT32), count)))
+
+
+def _mask_and_id(mask: Any, id: Any) -> tuple[int, int | None]:
+    return whole(mask, "mask", 0, ALL), None if id is None else whole(id, "id", 0, ALL)
 
 
 class SceneContents:
@@ -141,6 +168,56 @@ class SceneContents:
             raise ValueError(f"mask: expected one or {len(rows)}, given {len(masks)}")
         ids = self._core.add_instances(source._core, rows, masks, wanted)
         return ids[0] if one else np.array(ids, UINT32)
+
+    def add_spheres(
+        self, centers: ArrayLike, radii: ArrayLike, *, mask: int = ALL, id: int | None = None
+    ) -> int:
+        """Adds spheres as one geometry, of which "prim" of a hit counts: `centers` of shape (N, 3),
+        `radii` of shape (N,), or one number for all. Rays hit them from both sides; one that
+        starts inside hits where it leaves.
+
+        Spheres that are not finite, have a negative radius or reach beyond 1e12 are left out.
+        Copied. `mask`, `id` and the result as in `add`. NotImplementedError in float64.
+        """
+        made = self._spheres(centers, radii)
+        return self._core.add_spheres(made, *_mask_and_id(mask, id))
+
+    def add_capsules(
+        self,
+        starts: ArrayLike,
+        ends: ArrayLike,
+        radii: ArrayLike,
+        *,
+        mask: int = ALL,
+        id: int | None = None,
+    ) -> int:
+        """Adds capsules as one geometry: all points within a radius of a segment. `starts` and
+        `ends` of shape (N, 3). "u" of a hit is the place along the axis, 0 at the start. All else
+        as in `add_spheres`."""
+        made = self._capsules(starts, ends, radii)
+        return self._core.add_capsules(made, *_mask_and_id(mask, id))
+
+    def update_spheres(self, id: int, centers: ArrayLike, radii: ArrayLike) -> None:
+        """Gives a geometry of spheres others, from the next `commit` on. InputError: no such
+        geometry, or another kind of it."""
+        self._core.update_spheres(whole(id, "id", 0, ALL), self._spheres(centers, radii))
+
+    def update_capsules(
+        self, id: int, starts: ArrayLike, ends: ArrayLike, radii: ArrayLike
+    ) -> None:
+        """As `update_spheres`."""
+        self._core.update_capsules(whole(id, "id", 0, ALL), self._capsules(starts, ends, radii))
+
+    def _spheres(self, centers: ArrayLike, radii: ArrayLike) -> np.ndarray:
+        require_float32(self, "spheres")
+        return _with_radii(radii, _points(centers, "centers"))
+
+    def _capsules(self, starts: ArrayLike, ends: ArrayLike, radii: ArrayLike) -> np.ndarray:
+        require_float32(self, "capsules")
+        first, last = _points(starts, "starts"), _points(ends, "ends")
+        if first.shape != last.shape:
+            raise ValueError(f"ends: expected shape {first.shape}, given {describe(last)}")
+        return _with_radii(radii, first, last)
 
     def update(self, id: int, vertices: ArrayLike, faces: ArrayLike | None = None) -> None:
         """Gives a mesh other vertices, shape (V, 3), and other `faces`, or those that it has. Rays
@@ -216,7 +293,8 @@ class SceneContents:
 
         Returns
         -------
-        dict: "ms"; "meshes", "instances" and "triangles" of the scene itself; "trees_built",
+        dict: "ms"; "meshes", "instances" and "triangles" of the scene itself; "shapes", its
+        geometries of spheres and capsules, and "primitives", how many those are; "trees_built",
         "trees_refitted"; "sah_ratio", the largest SAH after a refit over that at the build;
         "parts_refitted", whether the tree over meshes and instances was refitted; "bytes" that
         rays read of the scene itself; "paths", instances counted on every way to them.

@@ -25,7 +25,8 @@ from ._arrays import (
     thread_count,
     whole,
 )
-from ._rays import hit_columns, hit_rows, ray_batch, ray_masks
+from ._filters import hit_filter
+from ._rays import hit_columns, hit_rows, ray_batch, ray_masks, ray_rows
 from .cameras import Camera
 from .contents import QUALITIES, USAGES, SceneContents, mesh_of, one_of
 from .devices import CudaRays
@@ -219,6 +220,8 @@ class Scene(SceneContents, SceneViews):
         tmax: Any = None,
         mask: int = ALL,
         masks: ArrayLike | None = None,
+        keep: ArrayLike | Mapping[Any, ArrayLike] | None = None,
+        skip: ArrayLike | Mapping[str, Any] | None = None,
         stream: int = 0,
     ) -> dict[str, np.ndarray]:
         """The closest hit of each ray.
@@ -239,6 +242,14 @@ class Scene(SceneContents, SceneViews):
             32 bits of all rays, or of each ray, an array that fits their leading shape. A ray sees
             a geometry if its mask & the geometry's is not 0, and the same holds for each instance
             on the way to it.
+        keep :
+            Which primitives rays see, instead of all: bool, shape (primitives,), of geometry 0. Or
+            a dict of such arrays by the geometry's id, or by (instance, id) for what stands in
+            instances; those that it does not name are seen.
+        skip :
+            What each ray leaves out: a dict of arrays "prim", "geometry" and "instance" with the
+            leading shape of the rays, such as the hits that they start from; or an array of
+            positions in the mesh of geometry 0.
         stream :
             Only with device="cuda" and rays that lie on the GPU, float32 of shape (..., 8): the
             CUDA stream to run on, as a number (`cupy.cuda.get_current_stream().ptr`). Results are
@@ -256,16 +267,18 @@ class Scene(SceneContents, SceneViews):
         a zero direction or tmin > tmax miss. All are views of one array.
 
         With device="cuda" all rays have the mask of 32 bits set, and hits are the same. Scenes with
-        instances, `mask` and `masks` raise BackendUnavailable there.
+        instances, `mask`, `masks`, `keep` and `skip` raise BackendUnavailable there.
         """
         if self.device == "cuda":
+            self._refuse_filter(keep, skip)
             return self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
+        only = self._filter(keep, skip, lead)
         columns = self._core.hit_columns
         hits = np.empty((*lead, columns), self.dtype)
         self._core.intersect(
-            *args, hits if hits.ndim == 2 else hits.reshape(-1, columns), *seen, self.threads
+            *args, hits if hits.ndim == 2 else hits.reshape(-1, columns), *seen, self.threads, only
         )
         return hit_columns(hits, 0)
 
@@ -278,6 +291,8 @@ class Scene(SceneContents, SceneViews):
         tmax: Any = None,
         mask: int = ALL,
         masks: ArrayLike | None = None,
+        keep: ArrayLike | Mapping[Any, ArrayLike] | None = None,
+        skip: ArrayLike | Mapping[str, Any] | None = None,
         stream: int = 0,
     ) -> np.ndarray:
         """Whether each ray hits anything at all: bool, with the leading shape of the rays. Rays as
@@ -286,11 +301,13 @@ class Scene(SceneContents, SceneViews):
         For rays that lie on a GPU: uint8, 1 or 0, there.
         """
         if self.device == "cuda":
+            self._refuse_filter(keep, skip)
             return self._on_cuda().occluded(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
+        only = self._filter(keep, skip, lead)
         flags = np.empty(lead, np.bool_)
-        self._core.occluded(*args, flags.reshape(-1), *seen, self.threads)
+        self._core.occluded(*args, flags.reshape(-1), *seen, self.threads, only)
         return flags
 
     def count(
@@ -302,6 +319,8 @@ class Scene(SceneContents, SceneViews):
         tmax: Any = None,
         mask: int = ALL,
         masks: ArrayLike | None = None,
+        keep: ArrayLike | Mapping[Any, ArrayLike] | None = None,
+        skip: ArrayLike | Mapping[str, Any] | None = None,
     ) -> np.ndarray:
         """How many triangles each ray hits: uint32, with the leading shape of the rays. Rays as in
         `intersect`.
@@ -311,8 +330,9 @@ class Scene(SceneContents, SceneViews):
         """
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
+        only = self._filter(keep, skip, lead)
         counts = np.empty(lead, UINT32)
-        self._core.count(*args, counts.reshape(-1), *seen, self.threads)
+        self._core.count(*args, counts.reshape(-1), *seen, self.threads, only)
         return counts
 
     def all_hits(
@@ -324,6 +344,8 @@ class Scene(SceneContents, SceneViews):
         tmax: Any = None,
         mask: int = ALL,
         masks: ArrayLike | None = None,
+        keep: ArrayLike | Mapping[Any, ArrayLike] | None = None,
+        skip: ArrayLike | Mapping[str, Any] | None = None,
         max_result_bytes: int = 0,
     ) -> dict[str, np.ndarray]:
         """Every hit of every ray, from one traversal. Rays as in `intersect`.
@@ -337,29 +359,53 @@ class Scene(SceneContents, SceneViews):
         """
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
-        offsets, hits, _ = self._core.all_hits(*args, max_result_bytes, *seen, self.threads)
+        only = self._filter(keep, skip, lead)
+        offsets, hits, _ = self._core.all_hits(*args, max_result_bytes, *seen, self.threads, only)
         return {"offsets": offsets, **hit_columns(hits, 0)}
 
-    def positions(self, hits: Mapping[str, Any]) -> np.ndarray:
+    def _filter(self, keep: Any, skip: Any, lead: tuple[int, ...]) -> Any:
+        if keep is not None or skip is not None:
+            require_float32(self, "keep, skip")
+        return hit_filter(keep, skip, lead)
+
+    def _refuse_filter(self, keep: Any, skip: Any) -> None:
+        if keep is not None or skip is not None:
+            raise _core.BackendUnavailable("device='cuda': hits are not filtered there")
+
+    def positions(
+        self,
+        hits: Mapping[str, Any],
+        rays: ArrayLike | None = None,
+        directions: ArrayLike | None = None,
+    ) -> np.ndarray:
         """Where hits are: shape (..., 3) float32, in this scene's space, through all instances.
 
         `hits`: a dict as `intersect` and `all_hits` return it, of this scene as it is committed
         now. Computed in float64 from the triangle, u and v, rounded once. NaN for those that hit
         nothing. InputError: a path, geometry or triangle that the last commit does not have.
+        Hits of spheres and capsules need the rays, as `intersect` was given them: their points are
+        origin + t * direction.
         """
-        return self._of_hits(hits, "positions")
+        return self._of_hits(hits, rays, directions, "positions")
 
-    def normals(self, hits: Mapping[str, Any]) -> np.ndarray:
+    def normals(
+        self,
+        hits: Mapping[str, Any],
+        rays: ArrayLike | None = None,
+        directions: ArrayLike | None = None,
+    ) -> np.ndarray:
         """The geometric normal at each hit: shape (..., 3) float32, of unit length, in this scene's
         space. Counter-clockwise corners face the viewer; the outside of a mesh stays outside where
-        an instance mirrors it. `hits`, NaN and errors as in `positions`."""
-        return self._of_hits(hits, "normals")
+        an instance mirrors it. Of spheres and capsules, which need the rays, it points away from
+        the center or axis. `hits`, `rays`, NaN and errors as in `positions`."""
+        return self._of_hits(hits, rays, directions, "normals")
 
-    def _of_hits(self, hits: Mapping[str, Any], what: str) -> np.ndarray:
+    def _of_hits(self, hits: Mapping[str, Any], rays: Any, directions: Any, what: str) -> np.ndarray:
         require_float32(self, what)
         given = hit_rows(hits)
+        with_rays = None if rays is None else ray_rows(rays, directions, given.shape[:-1])
         found = np.empty((*given.shape[:-1], 3), FLOAT32)
-        getattr(self._core, what)(given.reshape(-1, 6), found.reshape(-1, 3), self.threads)
+        getattr(self._core, what)(given.reshape(-1, 6), with_rays, found.reshape(-1, 3), self.threads)
         return found
 
     def closest_point(

@@ -3,6 +3,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/variant.h>
@@ -101,9 +102,10 @@ bool is_valid(const RayType& ray) {
            std::max(ray.tmin, decltype(ray.tmin){0}) <= ray.tmax && !std::isnan(ray.tmin);
 }
 
-/// Masks of rays [begin, end), of all or one each.
+/// Of rays [begin, end).
 RayOptions piece_of(const RayOptions& options, std::size_t begin, std::size_t end) {
     RayOptions piece = options;
+    piece.first += begin;
     if (!options.masks.empty()) piece.masks = options.masks.subspan(begin, end - begin);
     return piece;
 }
@@ -113,8 +115,9 @@ std::uint32_t mask_of(const RayOptions& options, std::size_t ray) {
 }
 
 RayOptions ray_options(std::size_t rays, std::uint32_t mask, const std::optional<Masks>& masks,
-                       int threads) {
-    RayOptions options{.mask = mask, .threads = threads_for(threads)};
+                       int threads, const ArrayFilter* filter) {
+    RayOptions options{.mask = mask, .threads = threads_for(threads), .filter = filter};
+    if (filter != nullptr && !filter->prims.empty()) require_length(filter->prims.size(), rays);
     if (masks) {
         require_length(masks->shape(0), rays);
         options.masks = {masks->data(), masks->shape(0)};
@@ -129,7 +132,7 @@ Counts intersect(Scene& scene, Rays& rays, const HitRows<Scene>& out, const RayO
     Counts counts{0, 0};
     read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
         const auto piece = rays.piece(begin, end);
-        if (rays.size() <= few_rays) {
+        if (rays.size() <= few_rays && options.filter == nullptr) {
             for (std::size_t i = 0; i < piece.size(); ++i) {
                 hits[i] = scene.closest_hit(piece[i], mask_of(options, i));
                 counts.first += hits[i].hit();
@@ -152,7 +155,7 @@ Counts occluded(Scene& scene, Rays& rays, const FlagsOut& out, const RayOptions&
     Counts counts{0, 0};
     read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
         const auto piece = rays.piece(begin, end);
-        if (rays.size() <= few_rays) {
+        if (rays.size() <= few_rays && options.filter == nullptr) {
             for (std::size_t i = 0; i < piece.size(); ++i) {
                 flags[i] = scene.any_hit(piece[i], mask_of(options, i));
                 counts.first += flags[i];
@@ -218,25 +221,39 @@ Counts count_hits(Scene& scene, Rays& rays, const Out<std::uint32_t, nb::ndim<1>
 
 using PointsOut = Out<float, nb::shape<-1, 3>>;
 using HitsIn = In<float, nb::shape<-1, 6>>;
+using RaysIn = std::optional<In<float, nb::shape<-1, 8>>>;
 
-void positions_of(SceneTrees& scene, const HitsIn& hits, const PointsOut& out, int threads) {
+/// call(scene, [rays,] hits, points, threads): points or normals of hits.
+template <class Call>
+void fill_for_hits(SceneTrees& scene, const HitsIn& hits, const RaysIn& with, const PointsOut& out,
+                   int threads, const Call& call) {
     const auto given = rows<Hit>(hits);
     const auto points = rows_out<Vec3>(out);
     require_length(points.size(), given.size());
+    std::span<const Ray> rays;
+    if (with) rays = rows<Ray>(*with);
+    if (with) require_length(rays.size(), given.size());
     read_in_pieces(scene, given.size(), [&](std::size_t begin, std::size_t end) {
-        positions(scene.traced(), given.subspan(begin, end - begin),
-                  points.subspan(begin, end - begin), threads_for(threads));
+        const std::size_t n = end - begin;
+        if (with)
+            call(scene.traced(), rays.subspan(begin, n), given.subspan(begin, n),
+                 points.subspan(begin, n), threads_for(threads));
+        else
+            call(scene.traced(), given.subspan(begin, n), points.subspan(begin, n),
+                 threads_for(threads));
     });
 }
 
-void normals_of(SceneTrees& scene, const HitsIn& hits, const PointsOut& out, int threads) {
-    const auto given = rows<Hit>(hits);
-    const auto found = rows_out<Vec3>(out);
-    require_length(found.size(), given.size());
-    read_in_pieces(scene, given.size(), [&](std::size_t begin, std::size_t end) {
-        normals(scene.traced(), given.subspan(begin, end - begin),
-                found.subspan(begin, end - begin), threads_for(threads));
-    });
+void positions_of(SceneTrees& scene, const HitsIn& hits, const RaysIn& rays, const PointsOut& out,
+                  int threads) {
+    fill_for_hits(scene, hits, rays, out, threads,
+                  [](const auto&... arguments) { positions(arguments...); });
+}
+
+void normals_of(SceneTrees& scene, const HitsIn& hits, const RaysIn& rays, const PointsOut& out,
+                int threads) {
+    fill_for_hits(scene, hits, rays, out, threads,
+                  [](const auto&... arguments) { normals(arguments...); });
 }
 
 template <class Scene>
@@ -454,6 +471,37 @@ std::pair<bool, std::string> check_boxes(SceneTreesD& scene) {
     return {report.ok, report.broken};
 }
 
+/// A filter and the arrays that it views.
+struct FilterOfArrays : ArrayFilter {
+    using Column = In<std::uint32_t, nb::ndim<1>>;
+    using Flags = In<bool, nb::ndim<1>>;
+    std::vector<Column> columns;
+    std::vector<Flags> flags;
+
+    void skip(const Column& of_prims, const Column& of_geometries, const Column& of_instances) {
+        require_length(of_geometries.shape(0), of_prims.shape(0));
+        require_length(of_instances.shape(0), of_prims.shape(0));
+        columns = {of_prims, of_geometries, of_instances};
+        const auto view = [](const Column& column) {
+            return std::span<const std::uint32_t>(column.data(), column.shape(0));
+        };
+        prims = view(of_prims), geometries = view(of_geometries), instances = view(of_instances);
+    }
+    void keep(std::uint32_t instance, std::uint32_t geometry, const Flags& values) {
+        flags.push_back(values);
+        seen[{instance, geometry}] = {values.data(), values.shape(0)};
+    }
+};
+
+void bind_filter(nb::module_& module) {
+    nb::class_<FilterOfArrays>(module, "HitFilter", "Which hits count.")
+        .def(nb::init<>())
+        .def("skip", &FilterOfArrays::skip, nb::arg("prims").noconvert(),
+             nb::arg("geometries").noconvert(), nb::arg("instances").noconvert())
+        .def("keep", &FilterOfArrays::keep, nb::arg("instance"), nb::arg("geometry"),
+             nb::arg("values").noconvert());
+}
+
 /// The four calls with rays, for rays of the library's layout and for columns.
 template <class Scene>
 void bind_rays(nb::class_<Scene>& scene) {
@@ -464,35 +512,42 @@ void bind_rays(nb::class_<Scene>& scene) {
     const auto mask = nb::arg("mask") = 0xFFFFFFFFu;
     const auto masks = nb::arg("masks").noconvert() = nb::none();
     const auto threads = nb::arg("threads") = 0;
+    using Filter = std::shared_ptr<FilterOfArrays>;
+    const auto filter = nb::arg("filter") = nb::none();
     def_for_rays<Ray>(
         scene, "intersect",
-        [](Scene& self, auto& rays, const Hits& hits, std::uint32_t all, const Each& each, int n) {
-            return intersect(self, rays, hits, ray_options(rays.size(), all, each, n));
+        [](Scene& self, auto& rays, const Hits& hits, std::uint32_t all, const Each& each, int n,
+           const Filter& only) {
+            return intersect(self, rays, hits, ray_options(rays.size(), all, each, n, only.get()));
         },
-        MoreArguments<const Hits&, std::uint32_t, const Each&, int>(), nb::arg("hits").noconvert(),
-        mask, masks, threads);
+        MoreArguments<const Hits&, std::uint32_t, const Each&, int, const Filter&>(),
+        nb::arg("hits").noconvert(), mask, masks, threads, filter);
     def_for_rays<Ray>(
         scene, "occluded",
         [](Scene& self, auto& rays, const FlagsOut& flags, std::uint32_t all, const Each& each,
-           int n) { return occluded(self, rays, flags, ray_options(rays.size(), all, each, n)); },
-        MoreArguments<const FlagsOut&, std::uint32_t, const Each&, int>(),
-        nb::arg("flags").noconvert(), mask, masks, threads);
+           int n, const Filter& only) {
+            return occluded(self, rays, flags, ray_options(rays.size(), all, each, n, only.get()));
+        },
+        MoreArguments<const FlagsOut&, std::uint32_t, const Each&, int, const Filter&>(),
+        nb::arg("flags").noconvert(), mask, masks, threads, filter);
     def_for_rays<Ray>(
         scene, "count",
         [](Scene& self, auto& rays, const Counted& counts, std::uint32_t all, const Each& each,
-           int n) {
-            return count_hits(self, rays, counts, ray_options(rays.size(), all, each, n));
+           int n, const Filter& only) {
+            return count_hits(self, rays, counts,
+                              ray_options(rays.size(), all, each, n, only.get()));
         },
-        MoreArguments<const Counted&, std::uint32_t, const Each&, int>(),
-        nb::arg("counts").noconvert(), mask, masks, threads);
+        MoreArguments<const Counted&, std::uint32_t, const Each&, int, const Filter&>(),
+        nb::arg("counts").noconvert(), mask, masks, threads, filter);
     def_for_rays<Ray>(
         scene, "all_hits",
         [](Scene& self, auto& rays, std::uint64_t max_result_bytes, std::uint32_t all,
-           const Each& each, int n) {
-            return all_hits(self, rays, max_result_bytes, ray_options(rays.size(), all, each, n));
+           const Each& each, int n, const Filter& only) {
+            return all_hits(self, rays, max_result_bytes,
+                            ray_options(rays.size(), all, each, n, only.get()));
         },
-        MoreArguments<std::uint64_t, std::uint32_t, const Each&, int>(),
-        nb::arg("max_result_bytes") = 0, mask, masks, threads);
+        MoreArguments<std::uint64_t, std::uint32_t, const Each&, int, const Filter&>(),
+        nb::arg("max_result_bytes") = 0, mask, masks, threads, filter);
 }
 
 template <class Scene>
@@ -558,17 +613,21 @@ void bind_asking(nb::class_<Scene>& scene) {
 }  // namespace
 
 void bind_scene(nb::module_& module) {
+    bind_filter(module);
     nb::class_<SceneTrees> scene(module, "SceneTrees",
                                  "A scene in float; raydix.Scene is what to use.");
     bind_changes(scene);
     bind_files(scene);
+    bind_shapes(scene);
     bind_asking(scene);
     scene.def("wide_stats", &wide_stats)
         .def("info", &mesh_info)
         .def("check", &check_trees)
-        .def("positions", &positions_of, nb::arg("hits").noconvert(), nb::arg("points").noconvert(),
+        .def("positions", &positions_of, nb::arg("hits").noconvert(),
+             nb::arg("rays").noconvert().none(), nb::arg("points").noconvert(),
              nb::arg("threads") = 0)
-        .def("normals", &normals_of, nb::arg("hits").noconvert(), nb::arg("normals").noconvert(),
+        .def("normals", &normals_of, nb::arg("hits").noconvert(),
+             nb::arg("rays").noconvert().none(), nb::arg("normals").noconvert(),
              nb::arg("threads") = 0);
     nb::class_<SceneTreesD> in_double(module, "SceneTreesD",
                                       "A scene in double; raydix.Scene is what to use.");

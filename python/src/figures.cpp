@@ -76,6 +76,8 @@ nb::dict commit_figures(const CommitReport& report) {
     fields["meshes"] = report.meshes;
     fields["instances"] = report.instances;
     fields["triangles"] = report.triangles;
+    fields["shapes"] = report.shapes;
+    fields["primitives"] = report.primitives;
     fields["trees_built"] = report.trees_built;
     fields["trees_refitted"] = report.trees_refitted;
     fields["sah_ratio"] = report.sah_ratio;

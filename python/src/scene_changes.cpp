@@ -333,6 +333,42 @@ void bind_changes(nb::class_<Scene>& scene) {
 template void bind_changes(nb::class_<SceneTrees>& scene);
 template void bind_changes(nb::class_<SceneTreesD>& scene);
 
+namespace {
+
+/// Rows of numbers that are one shape each.
+template <class Shape>
+using ShapeRows = In<float, nb::shape<-1, sizeof(Shape) / sizeof(float)>>;
+
+template <class Shape>
+void bind_shapes(nb::class_<SceneTrees>& scene, const char* add, const char* update) {
+    scene
+        .def(
+            add,
+            [](SceneTrees& self, const ShapeRows<Shape>& shapes, std::uint32_t mask,
+               std::optional<std::uint32_t> id) {
+                const auto all = rows<Shape>(shapes);
+                const nb::gil_scoped_release unlocked;
+                return self.add_shapes(all, {mask, id});
+            },
+            nb::arg("shapes").noconvert(), nb::arg("mask"), nb::arg("id").none())
+        .def(
+            update,
+            [](SceneTrees& self, std::uint32_t id, const ShapeRows<Shape>& shapes) {
+                const auto all = rows<Shape>(shapes);
+                const nb::gil_scoped_release unlocked;
+                self.update_shapes(id, all);
+            },
+            nb::arg("id"), nb::arg("shapes").noconvert());
+}
+
+}  // namespace
+
+void bind_shapes(nb::class_<SceneTrees>& scene) {
+    static_assert(sizeof(Sphere) == 4 * sizeof(float) && sizeof(Capsule) == 7 * sizeof(float));
+    bind_shapes<Sphere>(scene, "add_spheres", "update_spheres");
+    bind_shapes<Capsule>(scene, "add_capsules", "update_capsules");
+}
+
 void bind_files(nb::class_<SceneTrees>& scene) {
     scene.def("save_rdx", &save_rdx, nb::arg("file"), nb::arg("name"), nb::arg("cameras"))
         .def_static("load_rdx", &load_rdx, nb::arg("file"), nb::arg("threads"),

@@ -27,6 +27,11 @@ SceneTraceOptions trace_options(const RayOptions& options) {
     out.masks = options.masks;
     out.threads = options.threads;
     out.max_result_bytes = options.max_result_bytes;
+    if (options.filter != nullptr)
+        out.filter = [filter = options.filter, first = options.first](std::size_t place, const Ray&,
+                                                                      const Hit& hit) {
+            return filter->takes(first + place, hit);
+        };
     return out;
 }
 
@@ -157,6 +162,26 @@ std::vector<std::uint32_t> BasicSceneTrees<Names>::add(std::shared_ptr<BasicScen
 }
 
 template <class Names>
+template <class Shape>
+std::uint32_t BasicSceneTrees<Names>::add_shapes(std::span<const Shape> shapes,
+                                                 const GeometryOptions& options) {
+    const Writing lock("add", queue_, use_);
+    settle();
+    const std::lock_guard all(structure());
+    const std::uint32_t id = scene_.add(shapes, options);
+    geometries_[id] = {.is_shapes = true, .mask = options.mask};
+    return id;
+}
+
+template <class Names>
+template <class Shape>
+void BasicSceneTrees<Names>::update_shapes(std::uint32_t id, std::span<const Shape> shapes) {
+    const Writing lock("update", queue_, use_);
+    settle();
+    scene_.update(id, shapes);
+}
+
+template <class Names>
 void BasicSceneTrees<Names>::remove(std::uint32_t id) {
     const Writing lock("remove", queue_, use_);
     settle();
@@ -171,6 +196,7 @@ void BasicSceneTrees<Names>::update(std::uint32_t id, Vertices vertices,
     const Writing lock("update", queue_, use_);
     Geometry& geometry = at(id);
     if (geometry.is_instance) throw InputError(name_of(id) + " is an instance, not a mesh");
+    if (geometry.is_shapes) throw InputError(name_of(id) + " holds shapes, not a mesh");
     settle();
     Arrays mesh{std::make_shared<const Vertices>(std::move(vertices)),
                 arrays_of(id, geometry).triangles};
@@ -200,7 +226,9 @@ void BasicSceneTrees<Names>::check_places(std::span<const std::uint32_t> ids,
     const Scene nothing;
     for (std::size_t i = 0; i < ids.size(); ++i) {
         if (!at(ids[i]).is_instance)
-            throw InputError(name_of(ids[i]) + " is a mesh, not an instance");
+            throw InputError(name_of(ids[i]) +
+                             (at(ids[i]).is_shapes ? " holds shapes" : " is a mesh") +
+                             ", not an instance");
         if (tried.contains(ids[i]))
             tried.set_transform(ids[i], transforms[i]);
         else
@@ -262,17 +290,20 @@ void BasicSceneTrees<Names>::look_for_mesh() {
     mesh_mask_ = 0;
     why_no_mesh_.clear();
     Arrays found;
-    if (geometries_.size() == 1 && !geometries_.begin()->second.is_instance) {
+    const auto is_mesh = [](const auto& entry) {
+        return !entry.second.is_instance && !entry.second.is_shapes;
+    };
+    if (geometries_.size() == 1 && is_mesh(*geometries_.begin())) {
         mesh_id_ = geometries_.begin()->first;
         mesh_mask_ = geometries_.begin()->second.mask;
         found = arrays_of(*mesh_id_, geometries_.begin()->second);
     } else if (!geometries_.empty()) {
-        const auto is_instance = [](const auto& entry) { return entry.second.is_instance; };
-        const auto instance = std::ranges::find_if(geometries_, is_instance);
-        const auto& named =
-            instance == geometries_.end() ? *std::next(geometries_.begin()) : *instance;
+        const auto other = std::ranges::find_if_not(geometries_, is_mesh);
+        const auto& named = other == geometries_.end() ? *std::next(geometries_.begin()) : *other;
         why_no_mesh_ = name_of(named.first) +
-                       (named.second.is_instance ? " is an instance" : " is a second mesh") +
+                       (named.second.is_instance ? " is an instance"
+                        : named.second.is_shapes ? " holds shapes"
+                                                 : " is a second mesh") +
                        ", and this call takes a scene of one mesh: Scene(vertices, faces)";
     }
     if (why_no_mesh_.empty() && found == this->mesh("")) return;
@@ -368,5 +399,9 @@ bool BasicSceneTrees<Names>::any_hit(const Ray& ray, std::uint32_t mask) {
 
 template class BasicSceneTrees<InFloat>;
 template class BasicSceneTrees<InDouble>;
+template std::uint32_t SceneTrees::add_shapes(std::span<const Sphere>, const GeometryOptions&);
+template std::uint32_t SceneTrees::add_shapes(std::span<const Capsule>, const GeometryOptions&);
+template void SceneTrees::update_shapes(std::uint32_t, std::span<const Sphere>);
+template void SceneTrees::update_shapes(std::uint32_t, std::span<const Capsule>);
 
 }  // namespace raydix::python

@@ -9,6 +9,7 @@
 #include <raydix/rdx.h>
 #include <raydix/refit.h>
 #include <raydix/scene.h>
+#include <raydix/shapes.h>
 #include <raydix/solid.h>
 #include <raydix/trace.h>
 
@@ -23,6 +24,7 @@
 #include <string>
 #include <vector>
 
+#include "array_filter.h"
 #include "locks.h"
 
 namespace raydix::python {
@@ -103,6 +105,8 @@ struct RayOptions {
     std::span<const std::uint32_t> masks = {};  // of each ray, instead; or empty
     int threads = 0;
     std::uint64_t max_result_bytes = 0;
+    const ArrayFilter* filter = nullptr;  // float only; null: all hits count
+    std::size_t first = 0;                // the filter's number of the first ray
 };
 
 /// The mesh of a scene that is one, and what answers all queries but rays. The functions that build
@@ -182,6 +186,11 @@ public:
                                    std::span<const Transform> transforms,
                                    std::span<const std::uint32_t> masks,
                                    std::optional<std::uint32_t> id);
+    /// Spheres or capsules, copied.
+    template <class Shape>
+    std::uint32_t add_shapes(std::span<const Shape> shapes, const GeometryOptions& options);
+    template <class Shape>
+    void update_shapes(std::uint32_t id, std::span<const Shape> shapes);
     void remove(std::uint32_t id);
     /// Without triangles: those it has.
     void update(std::uint32_t id, Vertices vertices,
@@ -230,6 +239,7 @@ private:
     };
     struct Geometry {
         bool is_instance = false;
+        bool is_shapes = false;  // whose arrays the library has
         std::uint32_t mask = 0xFFFFFFFFu;
         Arrays mesh = {};  // empty while `is_in_file`
         std::shared_ptr<BasicSceneTrees> scene =

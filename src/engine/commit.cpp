@@ -5,6 +5,7 @@
 
 #include "engine/mesh_commit.h"
 #include "engine/part_tree.h"
+#include "engine/shape_tree.h"
 #include "exec/parallel.h"
 #include "layout/wide_refit.h"
 
@@ -62,10 +63,10 @@ public:
         for (const auto& [id, geometry] : state_.geometries)
             if (geometry.is_instance())
                 instances_.emplace_back(id, &geometry);
-            else
+            else if (geometry.is_mesh())
                 tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
         MeshCommit<float, WideMaker> meshes(state_, options_, report_);
-        tree_->meshes = meshes.run(instance_work());
+        tree_->meshes = meshes.run(other_work());
         for (const auto& mesh : tree_->meshes) {
             report_.bytes += mesh->tree->stats().bytes;
             tree_->extents.emplace_back();
@@ -74,27 +75,74 @@ public:
             tree_->extents.back() = extent_of_mesh(bounds);
             tree_->bounds = unite(tree_->bounds, bounds);
         }
-        place_instances();
-        const ProgressStage top(meshes.part_done(), 1);
+        const ProgressStage others(meshes.part_done(), 1);
         progress_at(0);
+        const ProgressStage top(make_shapes(), 1);
+        place_instances();
         const bool may_refit = options_.usage == Usage::moving && options_.refit_limit >= 1 &&
                                state_.tree != nullptr && state_.tree->quality == options_.quality &&
                                state_.tree->usage == options_.usage;
         build_tops(*tree_, may_refit ? state_.tree.get() : nullptr);
-        keep_own_meshes();
+        keep_own_parts();
         report_.instances = tree_->instances.size();
         report_.paths = tree_->paths;
         return std::move(tree_);
     }
 
 private:
-    /// Parts that instances become.
-    [[nodiscard]] double instance_work() const {
+    /// Primitives that are no triangles, and parts that instances become.
+    [[nodiscard]] double other_work() const {
         double parts = 0;
+        for (const auto& [id, geometry] : state_.geometries)
+            if (geometry.shapes) parts += static_cast<double>(count_of(*geometry.shapes));
         for (const auto& [id, geometry] : instances_)
             if (geometry->scene->tree != nullptr)
                 parts += 1 + static_cast<double>(geometry->scene->tree->placed.size());
         return parts;
+    }
+
+    /// Returns the part of the work on all that are no triangles that is done then.
+    double make_shapes() {
+        const double work = other_work();
+        double done = 0;
+        for (const auto& [id, geometry] : state_.geometries) {
+            if (!geometry.shapes) continue;
+            const double after = done + static_cast<double>(count_of(*geometry.shapes));
+            const ProgressStage stage(done / work, after / work);
+            const auto shapes = shapes_of(id, geometry);
+            done = after;
+            progress_at(1);
+            tree_->shapes.push_back(shapes);
+            tree_->extents.push_back(shapes->extent);
+            tree_->bounds = unite(tree_->bounds, shapes->bounds);
+            ++report_.shapes;
+            report_.primitives += count_of(*geometry.shapes);
+            report_.bytes += shapes->bytes();
+        }
+        return work > 0 ? done / work : 0;
+    }
+    std::shared_ptr<const ShapeTree> shapes_of(std::uint32_t id, const Geometry& geometry) {
+        const auto old = last_shapes(id);
+        const bool same_way = old != nullptr && state_.tree->quality == options_.quality;
+        if (same_way && !geometry.changed && old->mask == geometry.mask) return old;
+        const bool may_refit =
+            same_way && options_.usage == Usage::moving && options_.refit_limit >= 1;
+        bool refitted = false;
+        try {
+            auto made =
+                make_shape_tree(id, geometry.mask, *geometry.shapes, geometry.own, options_.quality,
+                                may_refit ? old.get() : nullptr, options_.refit_limit, refitted);
+            ++(refitted ? report_.trees_refitted : report_.trees_built);
+            return made;
+        } catch (const InputError& error) {
+            throw InputError("geometry " + std::to_string(id) + ": " + error.what());
+        }
+    }
+    [[nodiscard]] std::shared_ptr<const ShapeTree> last_shapes(std::uint32_t id) const {
+        if (state_.tree == nullptr) return nullptr;
+        const auto& all = state_.tree->shapes;
+        const auto at = std::ranges::lower_bound(all, id, {}, &ShapeTree::id);
+        return at != all.end() && (*at)->id == id ? *at : nullptr;
     }
 
     /// A scene to place, and what leads to it.
@@ -128,8 +176,8 @@ private:
             return;
         }
         Source part = whole;
-        if (inner.own_meshes != nullptr) {
-            part.scene = inner.own_meshes.get();
+        if (inner.own_parts != nullptr) {
+            part.scene = inner.own_parts.get();
             add_source(part);
         }
         for (std::size_t k = 0; k < inner.placed.size(); ++k) {
@@ -157,8 +205,8 @@ private:
     }
 
     void place_sources() {
-        const std::size_t meshes = tree_->extents.size();
-        tree_->extents.resize(meshes + sources_.size());
+        const std::size_t own = tree_->extents.size();
+        tree_->extents.resize(own + sources_.size());
         tree_->images.reset(sources_.size());
         tree_->placed.reset(sources_.size());
         for_each_index(
@@ -176,27 +224,28 @@ private:
                 Image& image = tree_->images[i];
                 image = image_of(affine_of(geometry.transform), geometry.errors,
                                  source.inner ? *source.inner : image_of(source.scene->extent));
-                if (!empty) tree_->extents[meshes + i] = extent_of(image, *source.support);
+                if (!empty) tree_->extents[own + i] = extent_of(image, *source.support);
             },
             256);
         for (std::size_t i = 0; i < sources_.size(); ++i) {
-            const Extent& extent = tree_->extents[meshes + i];
+            const Extent& extent = tree_->extents[own + i];
             if (sources_[i].support == nullptr) continue;
             if (!(in_range(extent.box.lo) && in_range(extent.box.hi))) refuse_reach(sources_[i].id);
             tree_->bounds = unite(tree_->bounds, extent.box);
         }
     }
 
-    /// The meshes alone, for scenes that place this one.
-    void keep_own_meshes() {
-        if (tree_->instances.empty() || tree_->meshes.empty()) return;
+    /// The meshes and shapes alone, for scenes that place this one.
+    void keep_own_parts() {
+        const std::size_t count = tree_->own_part_count();
+        if (tree_->instances.empty() || count == 0) return;
         auto own = std::make_shared<SceneTree>();
         own->meshes = tree_->meshes;
-        own->extents.assign(
-            tree_->extents.begin(),
-            tree_->extents.begin() + static_cast<std::ptrdiff_t>(tree_->meshes.size()));
+        own->shapes = tree_->shapes;
+        own->extents.assign(tree_->extents.begin(),
+                            tree_->extents.begin() + static_cast<std::ptrdiff_t>(count));
         build_tops(*own, nullptr);
-        tree_->own_meshes = std::move(own);
+        tree_->own_parts = std::move(own);
     }
 
     /// The trees over parts; `last`: that of the last commit, whose nodes may stay; or null.
@@ -205,7 +254,10 @@ private:
         for (const auto& mesh : tree.meshes)
             tree.stack_size =
                 std::max(tree.stack_size, wide_stack_capacity(mesh->tree->stats().max_depth));
-        if (tree.only_mesh() != nullptr) return;
+        for (const auto& shapes : tree.shapes)
+            tree.stack_size =
+                std::max(tree.stack_size, wide_stack_capacity(shapes->arrays.stats.max_depth));
+        if (tree.only_mesh() != nullptr || tree.only_shapes() != nullptr) return;
         const Quality quality = quality_of_parts(options_);
         std::vector<std::uint32_t> near, wild;
         for (std::uint32_t part = 0; part < tree.extents.size(); ++part)

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "engine/scene_state.h"
+#include "engine/shape_tree.h"
 #include "exec/search.h"
 #include "instances/affine.h"
 
@@ -72,10 +73,11 @@ Double3 unit_of(Double3 v) {
     return normalized(v);
 }
 
+/// The scene at the end of a hit's path; null if there is no such path.
 template <class Tree, class AnyHit>
-bool find(const Tree& scene, const AnyHit& hit, BasicHitTriangle<Tree>& triangle) {
+const Tree* follow_path(const Tree& scene, const AnyHit& hit, BasicHitTriangle<Tree>& triangle) {
     triangle.levels = 0;
-    if (hit.instance > scene.paths) return false;
+    if (hit.instance > scene.paths) return nullptr;
     const Tree* inner = &scene;
     for (std::uint32_t left = hit.instance; left != 0;) {
         const auto& instance = instance_on(*inner, left);
@@ -83,6 +85,13 @@ bool find(const Tree& scene, const AnyHit& hit, BasicHitTriangle<Tree>& triangle
         left -= instance.number;
         inner = instance.scene.get();
     }
+    return inner;
+}
+
+template <class Tree, class AnyHit>
+bool find(const Tree& scene, const AnyHit& hit, BasicHitTriangle<Tree>& triangle) {
+    const Tree* const inner = follow_path(scene, hit, triangle);
+    if (inner == nullptr) return false;
     const auto* const name = mesh_by_id(*inner, hit.geometry);
     if (name == nullptr || hit.prim >= name->mesh.triangles.size()) return false;
     const Triangle& t = name->mesh.triangles[hit.prim];
@@ -90,12 +99,39 @@ bool find(const Tree& scene, const AnyHit& hit, BasicHitTriangle<Tree>& triangle
     return true;
 }
 
+/// A hit of shapes, and the way to it.
+struct HitShape {
+    HitTriangle way;  // without corners
+    const ShapeTree* shapes = nullptr;
+    std::uint32_t prim = 0;
+};
+
+bool find(const SceneTree& scene, const Hit& hit, HitShape& shape) {
+    const SceneTree* const inner = follow_path(scene, hit, shape.way);
+    if (inner == nullptr) return false;
+    const auto at = std::ranges::lower_bound(inner->shapes, hit.geometry, {}, &ShapeTree::id);
+    if (at == inner->shapes.end() || (*at)->id != hit.geometry) return false;
+    shape.shapes = at->get();
+    shape.prim = hit.prim;
+    return hit.prim < count_of(shape.shapes->shapes);
+}
+
+/// "geometry 3 (spheres)", if the hit is of shapes.
+std::string shapes_of(const SceneTree& scene, const Hit& hit) {
+    HitShape shape;
+    if (!find(scene, hit, shape)) return {};
+    return "geometry " + std::to_string(hit.geometry) + " (" + kind_of(shape.shapes->shapes) + ")";
+}
+std::string shapes_of(const SceneTreeD&, const HitD&) { return {}; }
+
 template <class Tree, class AnyHit>
 [[noreturn]] void refuse(const Tree& scene, const AnyHit& hit, std::size_t at) {
     const std::string start = "hit " + std::to_string(at) + ": ";
     if (hit.instance > scene.paths)
         throw InputError(start + "the scene has no path " + std::to_string(hit.instance) +
                          " of instances");
+    if (const std::string shapes = shapes_of(scene, hit); !shapes.empty())
+        throw InputError(start + shapes + " has no triangles: give the rays too");
     const Tree* inner = &scene;
     for (std::uint32_t left = hit.instance; left != 0;) {
         const auto& instance = instance_on(*inner, left);
@@ -145,6 +181,78 @@ void fill(const BasicScene<Scalar>& scene, std::span<const AnyHit> hits, std::sp
         });
         if (!all_there.load()) check(tree, hits);
     });
+}
+
+/// Of hits whose rays are known: as above; value_of_shape(ray i, hit i, its shape) for shapes.
+template <class Value, class ValueOfShape>
+void fill_by_rays(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
+                  std::span<Vec3> out, int threads, const char* call, const Value& value,
+                  const ValueOfShape& value_of_shape) {
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+    const SceneTree& tree = *SceneAccess::tree(scene);
+    if (hits.size() != out.size() || hits.size() != rays.size())
+        throw InputError(std::string(call) + ": " + std::to_string(rays.size()) + " rays, " +
+                         std::to_string(hits.size()) + " hits and room for " +
+                         std::to_string(out.size()));
+    std::atomic<bool> all_there{true};
+    with_threads(threads, [&] {
+        for_each_range(hits.size(), 4096, [&](std::size_t begin, std::size_t end) {
+            HitTriangle triangle;
+            HitShape shape;
+            for (std::size_t i = begin; i < end; ++i) {
+                if (!hits[i].hit())
+                    out[i] = {nan, nan, nan};
+                else if (find(tree, hits[i], triangle))
+                    value(hits[i], triangle).round_to(out[i]);
+                else if (find(tree, hits[i], shape))
+                    value_of_shape(i, shape).round_to(out[i]);
+                else
+                    all_there.store(false, std::memory_order_relaxed);
+            }
+        });
+        if (all_there.load()) return;
+        for (std::size_t i = 0; i < hits.size(); ++i) {
+            HitTriangle triangle;
+            HitShape shape;
+            if (hits[i].hit() && !find(tree, hits[i], triangle) && !find(tree, hits[i], shape))
+                refuse(tree, hits[i], i);
+        }
+    });
+}
+
+Double3 point_on(const Ray& ray, float t) {
+    return Double3(ray.origin) + Double3(ray.direction) * double{t};
+}
+
+/// From the axis or center of a shape to a point, in the shape's own space. NaN: the caller's own
+/// shapes.
+Double3 away_from(const HitShape& hit, Double3 point) {
+    const Shapes& shapes = hit.shapes->shapes;
+    if (const auto* const spheres = std::get_if<std::span<const Sphere>>(&shapes))
+        return point - Double3((*spheres)[hit.prim].center);
+    if (const auto* const balls = std::get_if<BasicBalls<float>>(&shapes))
+        return point - Double3(balls->centers[hit.prim]);
+    if (const auto* const capsules = std::get_if<std::span<const Capsule>>(&shapes)) {
+        const Capsule& capsule = (*capsules)[hit.prim];
+        const Double3 a(capsule.a), axis = Double3(capsule.b) - a, from = point - a;
+        const double length2 = dot(axis, axis);
+        const double along = length2 > 0 ? std::clamp(dot(from, axis) / length2, 0.0, 1.0) : 0.0;
+        return from - axis * along;
+    }
+    throw InputError("normals: geometry " + std::to_string(hit.shapes->id) +
+                     " is user geometry, whose normals its owner knows");
+}
+
+Double3 normal_of(const HitShape& hit, Double3 point) {
+    const HitTriangle& way = hit.way;
+    for (std::uint32_t level = 0; level < way.levels; ++level) {
+        const Affine inverse = *inverse_of(affine_of(way.way[level]->transform));
+        point = inverse.vector(point) + inverse.move;
+    }
+    Double3 normal = away_from(hit, point);
+    for (std::uint32_t level = way.levels; level-- > 0;)
+        normal = turned(*way.way[level], unit_of(normal));
+    return unit_of(normal);
 }
 
 template <class Scalar, class AnyHit, class Point>
@@ -217,6 +325,24 @@ void normals(const Scene& scene, std::span<const Hit> hits, std::span<Vec3> norm
 void normals(const SceneD& scene, std::span<const HitD> hits, std::span<Vec3d> normals,
              int threads) {
     fill_normals(scene, hits, normals, threads);
+}
+
+void positions(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
+               std::span<Vec3> points, int threads) {
+    fill_by_rays(
+        scene, rays, hits, points, threads, "positions",
+        [](const Hit& hit, const HitTriangle& triangle) { return triangle.point(hit.u, hit.v); },
+        [&](std::size_t i, const HitShape&) { return point_on(rays[i], hits[i].t); });
+}
+
+void normals(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
+             std::span<Vec3> normals, int threads) {
+    fill_by_rays(
+        scene, rays, hits, normals, threads, "normals",
+        [](const Hit&, const HitTriangle& triangle) { return unit_of(triangle.normal()); },
+        [&](std::size_t i, const HitShape& shape) {
+            return normal_of(shape, point_on(rays[i], hits[i].t));
+        });
 }
 
 std::vector<Vec3> normals(const Scene& scene, std::span<const Hit> hits, int threads) {

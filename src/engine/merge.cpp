@@ -8,6 +8,7 @@
 
 #include "engine/name_hit.h"
 #include "engine/scene_state.h"
+#include "engine/shape_tree.h"
 #include "exec/parallel.h"
 
 namespace raydix {
@@ -18,6 +19,11 @@ MergedMeshes merge_meshes(const Scene& scene, std::uint32_t mask) {
         throw BackendUnavailable("geometry " + std::to_string(tree.instances.front().id) +
                                  " is an instance; devices trace meshes alone (Model::flatten "
                                  "makes one mesh of a model)");
+    if (!tree.shapes.empty()) {
+        const ShapeTree& shapes = *tree.shapes.front();
+        throw BackendUnavailable("geometry " + std::to_string(shapes.id) + " holds " +
+                                 kind_of(shapes.shapes) + "; devices trace meshes alone");
+    }
     MergedMeshes out;
     std::vector<MeshView> meshes;
     for (const MeshName& name : tree.mesh_names) {

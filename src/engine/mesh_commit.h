@@ -77,7 +77,7 @@ private:
         std::vector<Group> groups;
         std::map<std::uint32_t, std::size_t> by_mask;
         for (const auto& [id, geometry] : state_.geometries) {
-            if (geometry.is_instance() || geometry.mesh.triangles.empty()) continue;
+            if (!geometry.is_mesh() || geometry.mesh.triangles.empty()) continue;
             const auto found = by_mask.find(geometry.mask);
             if (usage == Usage::fixed && found != by_mask.end()) {
                 groups[found->second].ids.push_back(id);

@@ -4,6 +4,7 @@
 
 #include "exec/parallel.h"
 #include "layout/wide_collapse.h"
+#include "primitives/sources.h"
 
 namespace raydix {
 namespace {
@@ -24,17 +25,6 @@ Aabb reach_of(const Aabb& built) {
     const auto high = [](float x) { return x >= max_coordinate ? far : x; };
     return {{low(built.lo.x), low(built.lo.y), low(built.lo.z)},
             {high(built.hi.x), high(built.hi.y), high(built.hi.z)}};
-}
-
-Bvh binary_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
-                Quality quality) {
-    std::vector<Aabb> boxes(parts.size());
-    for (std::size_t k = 0; k < parts.size(); ++k) boxes[k] = built_box(extents[parts[k]]);
-    // Boxes cannot be split.
-    BuildOptions options =
-        build_options_for(quality == Quality::fast ? Quality::fast : Quality::balanced);
-    options.max_leaf = 1;
-    return build_bvh(std::span<const Aabb>(boxes), options);
 }
 
 std::uint32_t word_of(const BvhNode& child) {
@@ -79,10 +69,14 @@ double area_of(std::span<const BvhNode> slots) {
     return sum;
 }
 
-void finish(std::span<const std::uint32_t> parts, std::span<const Extent> extents, PartTree& out) {
+void set_view(PartTree& out) {
     TriangleBlock none;
     out.view = view_of(out.arrays, none);
     out.view.room = nullptr;
+}
+
+void set_growth(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
+                PartTree& out) {
     double error = 0;
     for (const std::uint32_t part : parts) error = std::max(error, extents[part].error);
     out.growth.rate = std::nextafterf(static_cast<float>(error + float_rounding), infinity);
@@ -100,11 +94,20 @@ bool holds(const PartTree& tree, std::span<const std::uint32_t> parts) {
     return std::ranges::all_of(parts, [&](std::uint32_t part) { return held[part]; });
 }
 
+/// The same for all boxes that builders take.
+bool holds_all_valid(const PartTree& tree, std::span<const Aabb> boxes) {
+    std::vector<std::uint32_t> valid;
+    Aabb box;
+    for (std::uint32_t k = 0; k < boxes.size(); ++k)
+        if (BoxSource{boxes.data()}.box(k, box)) valid.push_back(k);
+    return !valid.empty() && holds(tree, valid);
+}
+
 /// The children of a node of `old` around where the parts are now; `boxes` [nodes] has those of
 /// inner children.
+template <class BoxOf>
 std::array<BvhNode, quantised_width> slots_of(const PartTree& old, std::size_t w,
-                                              std::span<const Extent> extents,
-                                              const std::vector<Aabb>& boxes) {
+                                              const BoxOf& box_of, const std::vector<Aabb>& boxes) {
     std::array<BvhNode, quantised_width> slots;
     for (std::size_t s = 0; s < quantised_width; ++s) {
         const std::uint32_t word = old.arrays.nodes[w].child[s];
@@ -112,9 +115,11 @@ std::array<BvhNode, quantised_width> slots_of(const PartTree& old, std::size_t w
             const Aabb none = empty_box();
             slots[s] = {none.lo, WideTree::no_child, none.hi, 0};
         } else if ((word & wide_leaf_bit) != 0) {
-            const std::uint32_t place = (word & ~wide_leaf_bit) >> 3;
-            const Aabb& box = extents[old.part[place]].box;
-            slots[s] = {box.lo, place, box.hi, 1};
+            const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
+            Aabb box = empty_box();
+            for (std::uint32_t k = place; k < place + count; ++k)
+                box = unite(box, box_of(old.part[k]));
+            slots[s] = {box.lo, place, box.hi, count};
         } else {
             slots[s] = {boxes[word].lo, word, boxes[word].hi, 0};
         }
@@ -136,38 +141,12 @@ std::vector<std::size_t> levels_of(const PartTree& tree) {
     return begins;
 }
 
-}  // namespace
-
-void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
-                     Quality quality, PartTree& out) {
-    out.part.clear();
-    if (parts.empty()) return;
-    const Bvh bvh = binary_tree(parts, extents, quality);
-    const WideTree wide = collapse_to_wide(bvh, {.width = quantised_width, .max_leaf = 1});
-    out.arrays.set_bounds(reach_of(bvh.bounds()));
-    out.arrays.nodes.reset(wide.node_count());
-    std::vector<double> areas(wide.node_count());
-    for_each_index(
-        wide.node_count(),
-        [&](std::size_t w) {
-            const auto slots = wide.node(static_cast<std::uint32_t>(w));
-            set_node(slots, out.arrays.middle, out.arrays.nodes[w]);
-            areas[w] = area_of(slots);
-        },
-        256);
-    out.arrays.stats.max_depth = wide.max_depth;
-    out.cost_at_build = cost_of(areas, out.arrays.bounds);
-    out.part.resize(parts.size());
-    for (std::size_t k = 0; k < parts.size(); ++k) out.part[k] = parts[bvh.order()[k]];
-    finish(parts, extents, out);
-}
-
-bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,
-                     std::span<const Extent> extents, double limit, PartTree& out) {
-    if (parts.empty() || !holds(old, parts)) return false;
+/// box_of(part): where it is now.
+template <class BoxOf>
+bool refit_nodes(const PartTree& old, const BoxOf& box_of, double limit, PartTree& out) {
     const std::size_t count = old.arrays.nodes.size();
     Aabb bounds = empty_box();
-    for (const std::uint32_t part : parts) bounds = unite(bounds, extents[part].box);
+    for (const std::uint32_t part : old.part) bounds = unite(bounds, box_of(part));
     out.arrays.set_bounds(bounds);
     out.arrays.nodes.reset(count);
     std::vector<Aabb> boxes(count);
@@ -179,7 +158,7 @@ bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,
             levels[level + 1] - begin,
             [&](std::size_t k) {
                 const std::size_t w = begin + k;
-                const auto slots = slots_of(old, w, extents, boxes);
+                const auto slots = slots_of(old, w, box_of, boxes);
                 Aabb box = empty_box();
                 for (const BvhNode& child : slots) box = unite(box, {child.lo, child.hi});
                 boxes[w] = box;
@@ -193,8 +172,62 @@ bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,
     out.cost_at_build = old.cost_at_build;
     out.arrays.stats.max_depth = old.arrays.stats.max_depth;
     out.part = old.part;
-    finish(parts, extents, out);
+    set_view(out);
     return true;
+}
+
+}  // namespace
+
+void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
+                     Quality quality, PartTree& out) {
+    std::vector<Aabb> boxes(parts.size());
+    for (std::size_t k = 0; k < parts.size(); ++k) boxes[k] = built_box(extents[parts[k]]);
+    // Boxes cannot be split.
+    const BuildOptions build =
+        build_options_for(quality == Quality::fast ? Quality::fast : Quality::balanced);
+    build_box_tree(boxes, build, {.width = quantised_width, .max_leaf = 1}, out);
+    for (std::uint32_t& part : out.part) part = parts[part];
+    if (!parts.empty()) set_growth(parts, extents, out);
+}
+
+void build_box_tree(std::span<const Aabb> boxes, BuildOptions build, const WideOptions& leaves,
+                    PartTree& out) {
+    out.part.clear();
+    if (boxes.empty()) return;
+    build.max_leaf = 1;  // leaves are made on the way to the wide tree
+    const Bvh bvh = build_bvh(boxes, build);
+    if (bvh.empty()) return;
+    const WideTree wide = collapse_to_wide(bvh, leaves);
+    out.arrays.set_bounds(reach_of(bvh.bounds()));
+    out.arrays.nodes.reset(wide.node_count());
+    std::vector<double> areas(wide.node_count());
+    for_each_index(
+        wide.node_count(),
+        [&](std::size_t w) {
+            const auto slots = wide.node(static_cast<std::uint32_t>(w));
+            set_node(slots, out.arrays.middle, out.arrays.nodes[w]);
+            areas[w] = area_of(slots);
+        },
+        256);
+    out.arrays.stats.max_depth = wide.max_depth;
+    out.cost_at_build = cost_of(areas, out.arrays.bounds);
+    out.part.assign(bvh.order().begin(), bvh.order().end());
+    set_view(out);
+}
+
+bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,
+                     std::span<const Extent> extents, double limit, PartTree& out) {
+    if (parts.empty() || !holds(old, parts)) return false;
+    const auto box_of = [&](std::uint32_t part) { return extents[part].box; };
+    if (!refit_nodes(old, box_of, limit, out)) return false;
+    set_growth(parts, extents, out);
+    return true;
+}
+
+bool refit_box_tree(const PartTree& old, std::span<const Aabb> boxes, double limit, PartTree& out) {
+    if (old.empty() || !holds_all_valid(old, boxes)) return false;
+    return refit_nodes(
+        old, [&](std::uint32_t k) { return boxes[k]; }, limit, out);
 }
 
 }  // namespace raydix

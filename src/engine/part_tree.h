@@ -1,10 +1,11 @@
-// Extents of a scene's parts -> a wide tree over them.
+// Boxes -> a wide tree over them: those of a scene's parts, or of the primitives of a geometry.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
 #include "engine/scene_tree.h"
+#include "layout/wide_collapse.h"
 
 namespace raydix {
 
@@ -17,5 +18,14 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
 /// other parts, or if its cost would be more than `limit` times that at its build.
 [[nodiscard]] bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,
                                    std::span<const Extent> extents, double limit, PartTree& out);
+
+/// Leaves hold the numbers of boxes, as `leaves` says. Boxes that builders leave out are left out.
+/// `out.growth` stays as it is.
+void build_box_tree(std::span<const Aabb> boxes, BuildOptions build, const WideOptions& leaves,
+                    PartTree& out);
+
+/// As refit_part_tree, for new boxes of which the same are valid.
+[[nodiscard]] bool refit_box_tree(const PartTree& old, std::span<const Aabb> boxes, double limit,
+                                  PartTree& out);
 
 }  // namespace raydix

@@ -1,6 +1,9 @@
 // Scene: ids, changes and commits; the work is in commit.cpp and scene_trace.cpp.
+#include <raydix/double.h>
 #include <raydix/error.h>
 #include <raydix/scene.h>
+#include <raydix/user_geometry.h>
+#include <raydix/user_geometry_d.h>
 
 #include <algorithm>
 #include <chrono>
@@ -8,6 +11,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "base/options.h"
@@ -18,6 +22,12 @@ namespace raydix {
 namespace {
 
 std::string name_of(std::uint32_t id) { return "geometry " + std::to_string(id); }
+
+template <class Geometry>
+const char* what_is(const Geometry& geometry) {
+    if (geometry.shapes) return kind_of(*geometry.shapes);
+    return geometry.is_instance() ? "an instance" : "a mesh";
+}
 
 template <class AnyMeshView>
 void check_mesh(const std::string& name, const AnyMeshView& mesh) {
@@ -43,6 +53,34 @@ void set_mesh(Geometry& geometry, const AnyMeshView& mesh, bool shared) {
                                                    {mesh.triangles.begin(), mesh.triangles.end()}});
     geometry.own = own;
     geometry.mesh = shared ? mesh : AnyMeshView(*own);
+}
+
+/// Copies of what is given, as shapes that view them.
+template <class Array>
+auto copied(std::span<const Array> from) {
+    return std::make_shared<const std::vector<Array>>(from.begin(), from.end());
+}
+template <class Geometry, class Scalar>
+void set_shapes(Geometry& geometry, const BasicShapes<Scalar>& shapes) {
+    std::visit(
+        [&](const auto& all) {
+            using All = std::remove_cvref_t<decltype(all)>;
+            if constexpr (std::is_same_v<All, BasicBalls<Scalar>>) {
+                const auto own = copied(all.centers);
+                geometry.own = own;
+                geometry.shapes = BasicBalls<Scalar>{*own, all.radius};
+            } else if constexpr (std::is_same_v<All, BasicUserGeometry<Scalar>>) {
+                const auto own = copied(all.boxes());
+                geometry.own = own;
+                geometry.shapes = all.around(*own);
+            } else {
+                const auto own = copied(all);
+                geometry.own = own;
+                geometry.shapes = All(*own);
+            }
+        },
+        shapes);
+    geometry.changed = true;
 }
 
 template <class State>
@@ -81,6 +119,27 @@ std::uint32_t add_mesh(State& state, const AnyMeshView& mesh, const GeometryOpti
     geometry.mask = options.mask;
     set_mesh(geometry, mesh, shared);
     return insert(state, id, std::move(geometry));
+}
+
+template <class Scalar, class State>
+std::uint32_t add_shapes(State& state, const BasicShapes<Scalar>& shapes,
+                         const GeometryOptions& options) {
+    const std::uint32_t id = new_id(state, options.id);
+    if constexpr (std::is_same_v<Scalar, double>)
+        throw InputError(name_of(id) + ": scenes in double have no " + kind_of(shapes));
+    typename State::Geometry geometry;
+    geometry.mask = options.mask;
+    set_shapes<typename State::Geometry, Scalar>(geometry, shapes);
+    return insert(state, id, std::move(geometry));
+}
+
+template <class Scalar, class State>
+void update_shapes(State& state, std::uint32_t id, const BasicShapes<Scalar>& shapes) {
+    auto& geometry = state.at(id);
+    if (!geometry.shapes || geometry.shapes->index() != shapes.index())
+        throw InputError(name_of(id) + " is " + what_is(geometry) + ", not " + kind_of(shapes));
+    set_shapes<typename State::Geometry, Scalar>(geometry, shapes);
+    state.changed = true;
 }
 
 std::optional<SceneKind<float>::WayBack> way_back(const Transform& transform) {
@@ -168,6 +227,28 @@ std::uint32_t BasicScene<Scalar>::share(const MeshView& mesh, const GeometryOpti
 }
 
 template <class Scalar>
+std::uint32_t BasicScene<Scalar>::add(std::span<const Sphere> spheres,
+                                      const GeometryOptions& options) {
+    return add_shapes<Scalar>(*state_, BasicShapes<Scalar>(spheres), options);
+}
+template <class Scalar>
+std::uint32_t BasicScene<Scalar>::add(std::span<const Capsule> capsules,
+                                      const GeometryOptions& options) {
+    return add_shapes<Scalar>(*state_, BasicShapes<Scalar>(capsules), options);
+}
+template <class Scalar>
+std::uint32_t BasicScene<Scalar>::add(std::span<const Point> points, Scalar radius,
+                                      const GeometryOptions& options) {
+    return add_shapes<Scalar>(*state_, BasicShapes<Scalar>(BasicBalls<Scalar>{points, radius}),
+                              options);
+}
+template <class Scalar>
+std::uint32_t BasicScene<Scalar>::add(const UserGeometry& geometry,
+                                      const GeometryOptions& options) {
+    return add_shapes<Scalar>(*state_, BasicShapes<Scalar>(geometry), options);
+}
+
+template <class Scalar>
 std::uint32_t BasicScene<Scalar>::add(const BasicScene& scene, const Transform& transform,
                                       const GeometryOptions& options) {
     const std::uint32_t id = new_id(*state_, options.id);
@@ -190,16 +271,35 @@ void BasicScene<Scalar>::remove(std::uint32_t id) {
 template <class Scalar>
 void BasicScene<Scalar>::update(std::uint32_t id, const MeshView& mesh) {
     auto& geometry = state_->at(id);
-    if (geometry.is_instance()) throw InputError(name_of(id) + " is an instance, not a mesh");
+    if (!geometry.is_mesh())
+        throw InputError(name_of(id) + " is " + what_is(geometry) + ", not a mesh");
     check_mesh(name_of(id), mesh);
     set_mesh(geometry, mesh, geometry.shared);
     state_->changed = true;
 }
 
 template <class Scalar>
+void BasicScene<Scalar>::update(std::uint32_t id, std::span<const Sphere> spheres) {
+    update_shapes<Scalar>(*state_, id, BasicShapes<Scalar>(spheres));
+}
+template <class Scalar>
+void BasicScene<Scalar>::update(std::uint32_t id, std::span<const Capsule> capsules) {
+    update_shapes<Scalar>(*state_, id, BasicShapes<Scalar>(capsules));
+}
+template <class Scalar>
+void BasicScene<Scalar>::update(std::uint32_t id, std::span<const Point> points, Scalar radius) {
+    update_shapes<Scalar>(*state_, id, BasicShapes<Scalar>(BasicBalls<Scalar>{points, radius}));
+}
+template <class Scalar>
+void BasicScene<Scalar>::update(std::uint32_t id, const UserGeometry& geometry) {
+    update_shapes<Scalar>(*state_, id, BasicShapes<Scalar>(geometry));
+}
+
+template <class Scalar>
 void BasicScene<Scalar>::set_transform(std::uint32_t id, const Transform& transform) {
     auto& geometry = state_->at(id);
-    if (!geometry.is_instance()) throw InputError(name_of(id) + " is a mesh, not an instance");
+    if (!geometry.is_instance())
+        throw InputError(name_of(id) + " is " + what_is(geometry) + ", not an instance");
     BasicSceneAccess<Scalar>::place(id, transform, geometry);
     state_->changed = true;
 }
@@ -221,8 +321,7 @@ CommitReport BasicScene<Scalar>::commit(const SceneOptions& options) {
     CommitReport report;
     auto tree = make_scene_tree(*state_, options, report);
     state_->tree = std::move(tree);
-    for (const auto& mesh : state_->tree->meshes)
-        for (const std::uint32_t id : mesh->ids) state_->at(id).changed = false;
+    for (auto& [id, geometry] : state_->geometries) geometry.changed = false;
     state_->changed = false;
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
     report.ms = ms.count();
@@ -253,7 +352,7 @@ std::vector<std::uint32_t> BasicScene<Scalar>::ids() const {
 template <class Scalar>
 auto BasicScene<Scalar>::mesh(std::uint32_t id) const -> std::optional<MeshView> {
     const auto& geometry = state_->at(id);
-    if (geometry.is_instance()) return {};
+    if (!geometry.is_mesh()) return {};
     return geometry.mesh;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <raydix/scene.h>
+#include <raydix/user_geometry.h>
 
 #include <cstdint>
 #include <memory>
@@ -59,6 +60,33 @@ struct SceneLevel {
     }
 };
 
+/// Rays at a primitive of the caller's, as its function gets them.
+class UserRays {
+public:
+    void clear() { rays_.clear(), places_.clear(), sources_.clear(); }
+    /// `number`: of the ray in its level; `scale`: t of the caller's ray = scale * t of this one.
+    void add(const Ray& ray, double scale, std::uint32_t number, std::size_t place) {
+        rays_.push_back(ray);
+        places_.push_back(place);
+        sources_.push_back({scale, number});
+    }
+    [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(rays_.size()); }
+    [[nodiscard]] std::uint32_t number(std::uint32_t k) const { return sources_[k].id; }
+    [[nodiscard]] double scale(std::uint32_t k) const { return sources_[k].scale; }
+    /// No hits yet.
+    [[nodiscard]] RaysAtPrimitive at_primitive() {
+        hits_.assign(rays_.size(), {});
+        return {rays_.data(), places_.data(), hits_.data(), count()};
+    }
+    [[nodiscard]] const TreeHit& hit(std::uint32_t k) const { return hits_[k]; }
+
+private:
+    std::vector<Ray> rays_;
+    std::vector<std::size_t> places_;
+    std::vector<SceneRaySource> sources_;
+    std::vector<TreeHit> hits_;
+};
+
 /// Memory is kept from job to job. Not for two threads at once.
 struct SceneJob {
     // At most max_job_rays rays, rays[order[k]], or rays[k] without an order.
@@ -67,8 +95,10 @@ struct SceneJob {
     const Ray* rays = nullptr;
     const std::uint32_t* order = nullptr;
     std::size_t n = 0;
+    std::size_t first = 0;  // the place of rays[0] among the caller's
     std::uint32_t mask = 0;
     const std::uint32_t* masks = nullptr;  // [rays] instead; or null
+    const HitFilter* filter = nullptr;     // or null
     bool any = false;                      // any hit will do; only prim of a hit has a meaning
     bool packets = false;                  // neighbours are alike: triangles take packets of them
     bool single = false;                   // rays go alone
@@ -86,9 +116,22 @@ struct SceneJob {
         std::uint32_t mask;
     };
     std::vector<Limits> limits;  // [n]
-    StackMemory single_stack;    // of rays that go alone, for all levels
+    UserRays user_rays;
+    StackMemory single_stack;  // of rays that go alone, for all levels
     std::vector<std::unique_ptr<SceneLevel>> levels;
 
+    /// Of ray k among the caller's.
+    [[nodiscard]] std::size_t place(std::size_t k) const {
+        return first + (order == nullptr ? k : order[k]);
+    }
+    /// Ray k as the caller has it.
+    [[nodiscard]] const Ray& ray(std::size_t k) const {
+        return rays[order == nullptr ? k : order[k]];
+    }
+    /// Whether the filter takes a hit of ray k.
+    [[nodiscard]] bool accepts(std::size_t k, const Hit& hit) const {
+        return (*filter)(place(k), ray(k), hit);
+    }
     [[nodiscard]] SceneLevel& level(std::size_t depth) {
         while (levels.size() <= depth) levels.push_back(std::make_unique<SceneLevel>());
         return *levels[depth];
@@ -100,10 +143,10 @@ struct SceneKernels {
     void (*trace)(SceneJob& job);
     void (*all_hits)(SceneJob& job);
     void (*steps)(SceneJob& job);
-    /// A valid ray; `stack` has room for SceneTree::stack_size. For any hit only prim has a
-    /// meaning.
+    /// A valid ray; `filter` may be null; `stack` has room for SceneTree::stack_size. For any hit
+    /// only prim has a meaning.
     using OneRayOfScene = Hit(const SceneTree& scene, const Ray& ray, std::uint32_t mask,
-                              const WideStackView& stack);
+                              const HitFilter* filter, const WideStackView& stack);
     OneRayOfScene* closest;
     OneRayOfScene* any;
 };

@@ -14,15 +14,26 @@
 
 #include "engine/hit_order.h"
 #include "engine/scene_job.h"
+#include "engine/shape_leaves.h"
 #include "trace/simd/single.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-/// A hit of a mesh takes the place of the best one if it is the less of the two; `reach` is how far
+/// What the scene says of a hit of a tree. Tree: of a mesh or of shapes.
+template <class Tree>
+HWY_INLINE Hit hit_in_scene(const Tree& tree, std::uint32_t number, double scale,
+                            const TreeHit& hit) {
+    Hit found{hit, no_primitive, number};
+    if (scale != 1.0) found.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
+    tree.name(found);
+    return found;
+}
+
+/// A hit of a tree takes the place of the best one if it is the less of the two; `reach` is how far
 /// the ray goes then. Whether it does.
-template <bool any>
-HWY_INLINE bool keep(const MeshTree& mesh, std::uint32_t number, double scale, const TreeHit& hit,
+template <bool any, class Tree>
+HWY_INLINE bool keep(const Tree& tree, std::uint32_t number, double scale, const TreeHit& hit,
                      Hit& best, float& reach) {
     if constexpr (any) {
         best.prim = 0;
@@ -32,7 +43,7 @@ HWY_INLINE bool keep(const MeshTree& mesh, std::uint32_t number, double scale, c
     Hit found{hit, no_primitive, number};
     if (scale != 1.0) found.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
     if (best.hit() && found.t > best.t) return false;
-    mesh.name(found);
+    tree.name(found);
     if (best.hit() && !(order_of(found) < order_of(best))) return false;
     best = found;
     // What differs in the line may be equal in the caller's units where those are subnormal: it
@@ -188,17 +199,22 @@ HWY_INLINE bool fill_scene_frame(const WideView& tree, V4 place, V4 way, PadGrow
 template <Wanted wanted, bool counting = false>
 class SceneRay {
 public:
-    /// `stack` has room for SceneTree::stack_size; `best` is what was found before; `found` is for
-    /// all hits.
-    SceneRay(const SceneJob::Limits& limits, const Hit& best, const WideStackView& stack,
-             BudgetVector<Hit>* found = nullptr, bool nearest_first = true)
-        : tmin_(limits.tmin),
+    /// `place`: among the caller's rays; `stack` has room for SceneTree::stack_size; `best` is what
+    /// was found before; `found` is for all hits.
+    SceneRay(const SceneJob::Limits& limits, std::size_t place, const Hit& best,
+             const WideStackView& stack, BudgetVector<Hit>* found = nullptr,
+             bool nearest_first = true)
+        : place_(place),
+          tmin_(limits.tmin),
           reach_(limits.reach),
           mask_(limits.mask),
           best_(best),
           stack_(stack),
           found_(found),
           nearest_first_(nearest_first) {}
+
+    /// Says which hits count; `ray` is the caller's. Both must outlive the walk.
+    void filter_by(const HitFilter& filter, const Ray& ray) { filter_ = &filter, given_ = &ray; }
 
     [[nodiscard]] const Hit& best() const { return best_; }
     void store(SceneJob& job, std::uint32_t id) const {
@@ -210,6 +226,10 @@ public:
     void walk(const SceneTree& scene, std::uint32_t number, const SceneLine& line) {
         if (const MeshTree* const mesh = scene.only_mesh()) {
             if (!mesh->tree->empty()) hit_mesh(*mesh, number, line);
+            return;
+        }
+        if (const ShapeTree* const shapes = scene.only_shapes()) {
+            if (!shapes->empty()) hit_shapes(*shapes, number, line);
             return;
         }
         for (const PartTree* const tree : {&scene.near, &scene.wild})
@@ -224,7 +244,12 @@ public:
             hit_mesh(*scene.meshes[part], number, line);
             return;
         }
-        const PlacedScene& placed = scene.placed[part - meshes];
+        const std::size_t own = scene.own_part_count();
+        if (part < own) {
+            hit_shapes(*scene.shapes[part - meshes], number, line);
+            return;
+        }
+        const PlacedScene& placed = scene.placed[part - own];
         if (!sees(mask_, scene, placed)) return;
         SceneLine inside;
         enter(line, scene, placed, inside);
@@ -243,8 +268,9 @@ protected:
         std::uint32_t number;
         const SceneLine& line;
         bool nearest_first;
+        static constexpr bool large = false;
 
-        HWY_NOINLINE float visit_one(std::uint32_t leaf, std::uint32_t) {
+        HWY_NOINLINE float visit_one(std::uint32_t leaf, std::uint32_t, std::uint32_t) {
             ray.visit(scene, tree.part[leaf], number, line);
             return min_of(line.units(ray.reach_), std::numeric_limits<float>::max());
         }
@@ -290,6 +316,97 @@ protected:
         }
     }
 
+    /// What the ray does at the leaves of a tree over shapes.
+    struct AtShapes {
+        SceneRay& ray;
+        const ShapeTree& tree;
+        std::uint32_t number;
+        ShapeRay at;
+        static constexpr bool nearest_first = false, large = true;
+
+        RAYDIX_PREFETCHING void ask_for(std::uint32_t word) const { ask_for_shapes(tree, word); }
+        float visit_one(std::uint32_t place, std::uint32_t count, std::uint32_t) {
+            ray.hit_primitives(tree, place, count, number, at);
+            return reach();
+        }
+        [[nodiscard]] float reach() const {
+            return min_of(at.ray.tmax, std::numeric_limits<float>::max());
+        }
+    };
+
+    /// Of shapes that are not empty.
+    HWY_NOINLINE void hit_shapes(const ShapeTree& tree, std::uint32_t number,
+                                 const SceneLine& line) {
+        if ((tree.mask & mask_) == 0) return;
+        SingleFrame frame;
+        if (!fill(tree.view, line, tree.growth, frame)) return;
+        AtShapes shapes{*this, tree, number, shape_ray(line, frame)};
+        SimdCounts counts;
+        SingleRay<wanted, counting, false, false, AtShapes>(tree.view, frame, stack_, counts,
+                                                            &shapes, 0)
+            .trace(0, {frame.tmax});
+        if constexpr (counting) visits_ += counts.visits;
+    }
+    /// `frame` is the line's.
+    HWY_INLINE ShapeRay shape_ray(const SceneLine& line, const SingleFrame& frame) const {
+        const float *const o = frame.origin, *const d = frame.direction;
+        return {
+            {{o[0], o[1], o[2]}, frame.tmin, {d[0], d[1], d[2]}, frame.tmax}, line.scale, place_};
+    }
+
+    /// Those that a leaf names; `at` ends where the best hit is then.
+    HWY_INLINE void hit_primitives(const ShapeTree& tree, std::uint32_t place, std::uint32_t count,
+                                   std::uint32_t number, ShapeRay& at) {
+        if (const UserGeometry* const user = tree.user()) {
+            hit_user(*user, tree, place, count, number, at);
+            return;
+        }
+        hit_leaf(tree, place, count, at,
+                 [&](const TreeHit& hit) { return take(tree, number, at.scale, hit, at); });
+    }
+    /// A hit in units of `scale`. Whether the ray is done.
+    HWY_INLINE bool take(const ShapeTree& tree, std::uint32_t number, double scale,
+                         const TreeHit& hit, ShapeRay& at) {
+        if constexpr (wanted == Wanted::all) {
+            Hit found{hit, tree.id, number};
+            found.t = static_cast<float>(double{hit.t} * scale) + 0.0f;
+            found_->push_back(found);
+            return false;
+        }
+        if constexpr (wants_accepted(wanted))
+            if (!accepts(hit_in_scene(tree, number, scale, hit))) return false;
+        if (keep<wants_any(wanted)>(tree, number, scale, hit, best_, reach_)) at.end_at(reach_);
+        return wants_any(wanted);
+    }
+    [[nodiscard]] bool accepts(const Hit& hit) const { return (*filter_)(place_, *given_, hit); }
+
+    /// Asks the filter about hits of a mesh.
+    struct MeshCheck {
+        const SceneRay& ray;
+        const MeshTree& mesh;
+        std::uint32_t number;
+        double scale;
+
+        static bool accepts(const void* context, const Ray*, const TreeHit& hit) {
+            const auto& check = *static_cast<const MeshCheck*>(context);
+            return check.ray.accepts(hit_in_scene(check.mesh, check.number, check.scale, hit));
+        }
+    };
+    HWY_NOINLINE void hit_user(const UserGeometry& user, const ShapeTree& tree, std::uint32_t place,
+                               std::uint32_t count, std::uint32_t number, ShapeRay& at) {
+        UserRay given(at.ray, at.scale, tmin_, reach_);
+        for (std::uint32_t k = place; k < place + count; ++k) {
+            TreeHit hit;
+            RaysAtPrimitive rays(&given.ray, &at.place, &hit, 1);
+            user.test(tree.part[k], rays);
+            if (!hit.hit()) continue;
+            hit.prim = tree.part[k];
+            if (take(tree, number, given.scale, hit, at)) return;
+            if constexpr (wants_closest(wanted))
+                given.ray.tmax = given.scale == 1.0 ? reach_ : at.ray.tmax;
+        }
+    }
+
     template <bool compact>
     HWY_INLINE void search(const MeshTree& mesh, const WideView& view, const SingleFrame& frame,
                            std::uint32_t number, double scale) {
@@ -307,15 +424,19 @@ protected:
                 mesh.name(hit);
             }
         } else {
-            const WideBest best = SingleRay<wanted, counted, compact>(view, frame, stack_, counts)
-                                      .trace(0, {frame.tmax});
+            SingleRay<wanted, counted, compact> ray(view, frame, stack_, counts);
+            const MeshCheck context{*this, mesh, number, scale};
+            const HitCheck check{&MeshCheck::accepts, &context};
+            if constexpr (wants_accepted(wanted)) ray.check_by(check, nullptr);
+            const WideBest best = ray.trace(0, {frame.tmax});
             if (best.found())
-                keep<wanted == Wanted::any>(mesh, number, scale,
-                                            {best.t, best.prim, best.u, best.v}, best_, reach_);
+                keep<wants_any(wanted)>(mesh, number, scale, {best.t, best.prim, best.u, best.v},
+                                        best_, reach_);
         }
         if constexpr (counting) visits_ += counts.visits;
     }
 
+    const std::size_t place_;
     const float tmin_;
     float reach_;
     const std::uint32_t mask_;
@@ -324,6 +445,8 @@ protected:
     WideStackView stack_;  // from where it is free
     BudgetVector<Hit>* const found_;
     const bool nearest_first_;  // see single.h
+    const HitFilter* filter_ = nullptr;
+    const Ray* given_ = nullptr;
 };
 
 }  // namespace raydix::HWY_NAMESPACE

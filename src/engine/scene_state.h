@@ -5,12 +5,14 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
 
 #include "engine/scene_tree.h"
 #include "engine/scene_tree_double.h"
+#include "engine/shape_tree.h"
 
 namespace raydix {
 
@@ -44,14 +46,17 @@ struct BasicScene<Scalar>::State {
         MeshView mesh;
         std::shared_ptr<const void> own;
         bool shared = false;
+        // Or shapes, views of `own`.
+        std::optional<BasicShapes<Scalar>> shapes;
         // An instance, if there is a scene.
         std::shared_ptr<const State> scene;
         Transform transform;
 
         std::uint32_t mask = 0xFFFFFFFFu;
-        bool changed = true;  // its triangles, since the last commit
+        bool changed = true;  // its triangles or shapes, since the last commit
 
         [[nodiscard]] bool is_instance() const { return scene != nullptr; }
+        [[nodiscard]] bool is_mesh() const { return scene == nullptr && !shapes; }
     };
 
     std::map<std::uint32_t, Geometry> geometries;

@@ -4,10 +4,12 @@
 #include <raydix/error.h>
 
 #include <algorithm>
+#include <string>
 #include <unordered_map>
 #include <utility>
 
 #include "engine/scene_state.h"
+#include "engine/shape_tree.h"
 #include "exec/parallel.h"
 #include "layout/wide_check.h"
 
@@ -20,6 +22,11 @@ public:
     std::uint32_t add(const SceneTree& scene) {
         const auto known = scenes_.find(&scene);
         if (known != scenes_.end()) return known->second;
+        if (!scene.shapes.empty()) {
+            const ShapeTree& shapes = *scene.shapes.front();
+            throw InputError("scenes: geometry " + std::to_string(shapes.id) + " holds " +
+                             kind_of(shapes.shapes) + ", which files have no place for");
+        }
         std::vector<StoredGeometry> geometries;
         for (const InstanceName& instance : scene.instances)
             geometries.push_back(

@@ -42,6 +42,11 @@ struct Batch {
     }
 };
 
+/// Null: all hits count.
+const HitFilter* filter_of(const SceneTraceOptions& options) {
+    return options.filter ? &options.filter : nullptr;
+}
+
 /// The job of each thread: its memory stays from batch to batch.
 SceneJob& job_of_this_thread() {
     thread_local SceneJob job;
@@ -65,8 +70,10 @@ JobCounts trace_job(const SceneTree& tree, const Way& way, const Batch& batch,
     job.rays = batch.rays.data() + from;
     job.order = order.empty() ? nullptr : order.data() + begin;
     job.n = end - begin;
+    job.first = from;
     job.mask = batch.options.mask;
     job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + from;
+    job.filter = filter_of(batch.options);
     job.any = batch.hits == nullptr;
     job.packets = way.packets;
     job.single = way.single;
@@ -126,26 +133,43 @@ TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
     return sum_of(parts, n);
 }
 
+/// Asks a filter about hits of the only mesh tree.
+struct FilterOfMesh {
+    const MeshTree& mesh;
+    const Batch& batch;
+
+    static bool accepts(const void* context, const Ray* ray, const TreeHit& hit) {
+        const auto& [mesh, batch] = *static_cast<const FilterOfMesh*>(context);
+        Hit found{hit, no_primitive, 0};
+        mesh.name(found);
+        return batch.options.filter(static_cast<std::size_t>(ray - batch.rays.data()), *ray, found);
+    }
+};
+
 /// One tree for all: the kernels write where the answers go.
 TraceCounts trace_mesh(const MeshTree& mesh, const Batch& batch) {
+    const FilterOfMesh filter{mesh, batch};
+    const HitCheck check{&FilterOfMesh::accepts, &filter};
     TraceOptions options;
     options.threads = batch.options.threads;
     options.path = batch.options.path;
     options.isa = batch.options.isa;
     const HitRows rows{batch.hits, sizeof(Hit)};
-    return trace_rows(*mesh.tree, batch.rays, rows, batch.occluded, options,
-                      [&](const std::uint32_t* order, std::size_t begin, std::size_t end) {
-                          if (batch.hits == nullptr) return;
-                          const std::uint32_t first = mesh.ids.front();
-                          if (mesh.ids.size() == 1)
-                              for_each_row(batch.hits, order, begin, end,
-                                           [&](Hit& hit) { place_hit(hit, first); });
-                          else
-                              for_each_row(batch.hits, order, begin, end, [&](Hit& hit) {
-                                  place_hit(hit, first);
-                                  if (hit.hit()) mesh.name(hit);
-                              });
-                      });
+    return trace_rows(
+        *mesh.tree, batch.rays, rows, batch.occluded, options,
+        [&](const std::uint32_t* order, std::size_t begin, std::size_t end) {
+            if (batch.hits == nullptr) return;
+            const std::uint32_t first = mesh.ids.front();
+            if (mesh.ids.size() == 1)
+                for_each_row(batch.hits, order, begin, end,
+                             [&](Hit& hit) { place_hit(hit, first); });
+            else
+                for_each_row(batch.hits, order, begin, end, [&](Hit& hit) {
+                    place_hit(hit, first);
+                    if (hit.hit()) mesh.name(hit);
+                });
+        },
+        batch.options.filter ? &check : nullptr);
 }
 
 /// All rays see all masks.
@@ -176,13 +200,13 @@ TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
 }
 
 [[gnu::noinline]] Hit trace_parts(const SceneTree& tree, const Ray& ray, std::uint32_t mask,
-                                  bool any) {
+                                  const HitFilter* filter, bool any) {
     static const SceneKernels& kernels = scene_kernels_for({});
     StackMemory& stack = job_of_this_thread().single_stack;
     stack.reserve_words(tree.stack_size);
     const auto answer = [&]() -> Hit {
         if (!is_valid(ray)) return {};
-        return (any ? kernels.any : kernels.closest)(tree, ray, mask, stack.view());
+        return (any ? kernels.any : kernels.closest)(tree, ray, mask, filter, stack.view());
     };
     if (FloatEnvironment::is_plain()) return answer();
     const FloatEnvironment plain;
@@ -262,7 +286,7 @@ AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTrac
     const SceneTree& tree = *SceneAccess::tree(scene);
     check_masks(rays.size(), options);
     static_cast<void>(kernels_for(options.isa));
-    if (const MeshTree* const mesh = visible_mesh(tree, options))
+    if (const MeshTree* const mesh = visible_mesh(tree, options); mesh && !options.filter)
         return all_hits_of(*mesh, rays, options);
     constexpr std::size_t block_size = 1024;
     HitBlocks<AllHits> found(rays.size(), block_size, options.max_result_bytes);
@@ -275,9 +299,12 @@ AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTrac
                 SceneJob& job = job_of_this_thread();
                 job.tree = &tree;
                 job.rays = rays.data() + begin;
+                job.order = nullptr;
                 job.n = end - begin;
+                job.first = begin;
                 job.mask = options.mask;
                 job.masks = options.masks.empty() ? nullptr : options.masks.data() + begin;
+                job.filter = filter_of(options);
                 job.found = &found.hits(block);
                 job.hit_counts = found.hit_counts() + begin;
                 kernels.all_hits(job);
@@ -290,10 +317,19 @@ AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTrac
     return all;
 }
 
+Hit closest_hit(const Scene& scene, const Ray& ray, const HitFilter& filter, std::uint32_t mask) {
+    return trace_parts(*SceneAccess::tree(scene), ray, mask, filter ? &filter : nullptr, false);
+}
+
+bool any_hit(const Scene& scene, const Ray& ray, const HitFilter& filter, std::uint32_t mask) {
+    return trace_parts(*SceneAccess::tree(scene), ray, mask, filter ? &filter : nullptr, true)
+        .hit();
+}
+
 Hit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
     const SceneTree& tree = *SceneAccess::tree(scene);
     const MeshTree* const mesh = tree.only_mesh();
-    if (mesh == nullptr) return trace_parts(tree, ray, mask, false);
+    if (mesh == nullptr) return trace_parts(tree, ray, mask, nullptr, false);
     if ((mesh->mask & mask) == 0) return {};
     Hit hit = closest_hit(*mesh->tree, ray);
     if (!hit.hit()) return hit;
@@ -307,7 +343,7 @@ Hit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
 bool any_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
     const SceneTree& tree = *SceneAccess::tree(scene);
     const MeshTree* const mesh = tree.only_mesh();
-    if (mesh == nullptr) return trace_parts(tree, ray, mask, true).hit();
+    if (mesh == nullptr) return trace_parts(tree, ray, mask, nullptr, true).hit();
     return (mesh->mask & mask) != 0 && any_hit(*mesh->tree, ray);
 }
 

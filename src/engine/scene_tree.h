@@ -29,6 +29,7 @@ struct MeshTree : GroupedMeshes {
 };
 
 struct SceneTree;
+struct ShapeTree;  // shape_tree.h
 
 /// The way into an instance: the inverse of its transform by columns, of x, y and z, and the move.
 struct WayIn {
@@ -61,8 +62,8 @@ struct InstanceName {
     std::shared_ptr<const SceneTree> scene;
 };
 
-/// A wide tree whose leaves hold one part each. Parts are numbered: mesh trees first, then placed
-/// scenes.
+/// A wide tree over parts, most often with one of them a leaf. The parts of a scene are numbered:
+/// mesh trees first, then trees of shapes, then placed scenes.
 struct PartTree {
     WideBvh::Arrays arrays;  // nodes and bounds alone
     WideView view{};
@@ -75,14 +76,15 @@ struct PartTree {
 
 struct SceneTree {
     std::vector<std::shared_ptr<const MeshTree>> meshes;
-    std::vector<InstanceName> instances;  // by ascending id
-    std::vector<MeshName> mesh_names;     // by ascending id
+    std::vector<std::shared_ptr<const ShapeTree>> shapes;  // by ascending id
+    std::vector<InstanceName> instances;                   // by ascending id
+    std::vector<MeshName> mesh_names;                      // by ascending id
     Buffer<PlacedScene> placed;
     std::vector<WayIn> ways;
-    std::vector<Extent> extents;  // [meshes + placed]
+    std::vector<Extent> extents;  // [parts]
     Buffer<Image> images;         // [placed]
-    /// The meshes without the instances, where there are both.
-    std::shared_ptr<const SceneTree> own_meshes;
+    /// The meshes and shapes without the instances, where there are both.
+    std::shared_ptr<const SceneTree> own_parts;
     /// Over all parts that are not empty: instances whose maps keep errors small, and those that
     /// do not, whose boxes must widen so much that they would spoil a common tree.
     PartTree near, wild;
@@ -105,8 +107,16 @@ struct SceneTree {
 
     /// The only mesh tree, if rays need nothing else.
     [[nodiscard]] const MeshTree* only_mesh() const {
-        return instances.empty() && meshes.size() == 1 ? meshes.front().get() : nullptr;
+        return instances.empty() && shapes.empty() && meshes.size() == 1 ? meshes.front().get()
+                                                                         : nullptr;
     }
+    /// The only tree of shapes, if rays need nothing else.
+    [[nodiscard]] const ShapeTree* only_shapes() const {
+        return instances.empty() && meshes.empty() && shapes.size() == 1 ? shapes.front().get()
+                                                                         : nullptr;
+    }
+    /// Parts before the placed scenes.
+    [[nodiscard]] std::size_t own_part_count() const { return meshes.size() + shapes.size(); }
 };
 
 }  // namespace raydix

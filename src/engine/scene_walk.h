@@ -41,7 +41,8 @@ public:
     }
 
 private:
-    using One = SceneRay<any ? Wanted::any : Wanted::closest>;
+    static constexpr Wanted wanted = any ? Wanted::any : Wanted::closest,
+                            accepted = any ? Wanted::any_accepted : Wanted::closest_accepted;
     /// Fewer rays than this go one by one.
     static constexpr std::uint32_t least_together = 12;
 
@@ -72,16 +73,36 @@ private:
         if (job_.turns) {
             job_.single_stack.reserve_words(job_.tree->stack_size * rays_in_turn);
             const auto next = [this](std::size_t k) { return start(k); };
-            SceneTurns<any, decltype(next)>(job_, next).trace();
+            if (job_.filter == nullptr)
+                SceneTurns<wanted, decltype(next)>(job_, next).trace();
+            else
+                SceneTurns<accepted, decltype(next)>(job_, next).trace();
             return;
         }
         for (std::size_t k = 0; k < job_.n; ++k) {
             const Ray* const ray = start(k);
             if (ray == nullptr) continue;
             // Rays of a batch that come here go anywhere.
-            One one(job_.limits[k], job_.hits[k], job_.single_stack.view(), nullptr, false);
-            one.walk(*job_.tree, 0, HWY_NAMESPACE::line_of(*ray));
-            one.store(job_, static_cast<std::uint32_t>(k));
+            alone(static_cast<std::uint32_t>(k), false,
+                  [&](auto& one) { one.walk(*job_.tree, 0, HWY_NAMESPACE::line_of(*ray)); });
+        }
+    }
+    /// Calls walk(one) for ray `id` of the job.
+    template <class Walk>
+    HWY_INLINE void alone(std::uint32_t id, bool nearest_first, const Walk& walk) {
+        const WideStackView stack = job_.single_stack.view();
+        const SceneJob::Limits& limits = job_.limits[id];
+        if (job_.filter == nullptr) {
+            SceneRay<wanted> one(limits, job_.place(id), job_.hits[id], stack, nullptr,
+                                 nearest_first);
+            walk(one);
+            one.store(job_, id);
+        } else {
+            SceneRay<accepted> one(limits, job_.place(id), job_.hits[id], stack, nullptr,
+                                   nearest_first);
+            one.filter_by(*job_.filter, job_.ray(id));
+            walk(one);
+            one.store(job_, id);
         }
     }
     void together() {
@@ -114,36 +135,113 @@ private:
         return true;
     }
 
-    /// What takes rays on at the leaves of a tree over parts (single.h).
+    /// What takes rays on at the leaves of a tree over parts, one each (single.h).
     class Parts {
     public:
         Parts(SceneWalk& walk, const Place& place, const PartTree& tree)
             : walk_(walk), level_(walk.job_.level(place.depth)), place_(place), tree_(tree) {}
 
-        float visit_one(std::uint32_t leaf, std::uint32_t ray) {
-            const std::uint32_t id = level_.sources[ray].id;
-            SceneJob& job = walk_.job_;
-            One one(job.limits[id], job.hits[id], job.single_stack.view());
-            one.visit(place_.scene, tree_.part[leaf], place_.number,
-                      walk_.line_of(place_, level_, ray));
-            one.store(job, id);
+        float visit_one(std::uint32_t leaf, std::uint32_t, std::uint32_t ray) {
+            walk_.alone(level_.sources[ray].id, true, [&](auto& one) {
+                one.visit(place_.scene, tree_.part[leaf], place_.number,
+                          walk_.line_of(place_, level_, ray));
+            });
             return reach(ray);
         }
-        void visit(std::uint32_t leaf, const std::uint32_t* rays, std::uint32_t count) {
+        void visit(std::uint32_t leaf, std::uint32_t, const std::uint32_t* rays,
+                   std::uint32_t count) {
             if (count < least_together) {
-                for (std::uint32_t k = 0; k < count; ++k) visit_one(leaf, rays[k]);
+                for (std::uint32_t k = 0; k < count; ++k) visit_one(leaf, 1, rays[k]);
             } else {
                 walk_.visit(place_, tree_.part[leaf], rays, count);
             }
         }
         float reach(std::uint32_t ray) { return walk_.shorten(level_, ray); }
-        static constexpr bool nearest_first = true;
+        static constexpr bool nearest_first = true, large = false;
 
     private:
         SceneWalk& walk_;
         SceneLevel& level_;
         const Place& place_;
         const PartTree& tree_;
+    };
+
+    /// The same at the leaves of a tree over shapes.
+    class AtShapes {
+    public:
+        AtShapes(SceneWalk& walk, const Place& place, const ShapeTree& tree)
+            : walk_(walk), level_(walk.job_.level(place.depth)), place_(place), tree_(tree) {}
+
+        float visit_one(std::uint32_t first, std::uint32_t count, std::uint32_t ray) {
+            if (const UserGeometry* const user = tree_.user()) {
+                for (std::uint32_t k = first; k < first + count; ++k) visit_user(*user, k, &ray, 1);
+            } else {
+                ShapeRay at = shape_ray(ray);
+                hit_leaf(tree_, first, count, at, [&](const TreeHit& hit) {
+                    if (!take(ray, hit, at.scale)) return false;
+                    at.end_at(limits(ray).reach);
+                    return any;
+                });
+            }
+            return reach(ray);
+        }
+        void visit(std::uint32_t first, std::uint32_t parts, const std::uint32_t* rays,
+                   std::uint32_t count) {
+            if (const UserGeometry* const user = tree_.user()) {
+                for (std::uint32_t k = first; k < first + parts; ++k)
+                    visit_user(*user, k, rays, count);
+            } else {
+                for (std::uint32_t k = 0; k < count; ++k) visit_one(first, parts, rays[k]);
+            }
+        }
+        float reach(std::uint32_t ray) { return walk_.shorten(level_, ray); }
+        static constexpr bool nearest_first = false, large = true;
+        RAYDIX_PREFETCHING void ask_for(std::uint32_t word) const { ask_for_shapes(tree_, word); }
+
+    private:
+        [[nodiscard]] SceneJob::Limits& limits(std::uint32_t ray) {
+            return walk_.job_.limits[level_.sources[ray].id];
+        }
+        HWY_INLINE ShapeRay shape_ray(std::uint32_t ray) {
+            const SceneRaySource& source = level_.sources[ray];
+            return {level_.rays[ray], source.scale, walk_.job_.place(source.id)};
+        }
+        /// Whether it counts, and is the best.
+        HWY_INLINE bool take(std::uint32_t ray, const TreeHit& hit, double scale) {
+            const std::uint32_t id = level_.sources[ray].id;
+            if (walk_.job_.filter != nullptr &&
+                !walk_.job_.accepts(id, hit_in_scene(tree_, place_.number, scale, hit)))
+                return false;
+            return keep<any>(tree_, place_.number, scale, hit, walk_.job_.hits[id],
+                             walk_.job_.limits[id].reach);
+        }
+        /// The rays of a list that still go on, to one primitive.
+        HWY_NOINLINE void visit_user(const UserGeometry& user, std::uint32_t part,
+                                     const std::uint32_t* rays, std::uint32_t count) {
+            UserRays& all = walk_.job_.user_rays;
+            all.clear();
+            for (std::uint32_t k = 0; k < count; ++k) {
+                const SceneRaySource& source = level_.sources[rays[k]];
+                const SceneJob::Limits& limits = walk_.job_.limits[source.id];
+                const UserRay given(level_.rays[rays[k]], source.scale, limits.tmin, limits.reach);
+                if (given.ray.tmin <= given.ray.tmax)
+                    all.add(given.ray, given.scale, rays[k], walk_.job_.place(source.id));
+            }
+            if (all.count() == 0) return;
+            RaysAtPrimitive at = all.at_primitive();
+            user.test(tree_.part[part], at);
+            for (std::uint32_t k = 0; k < all.count(); ++k) {
+                TreeHit hit = all.hit(k);
+                if (!hit.hit()) continue;
+                hit.prim = tree_.part[part];
+                if (take(all.number(k), hit, all.scale(k))) walk_.shorten(level_, all.number(k));
+            }
+        }
+
+        SceneWalk& walk_;
+        SceneLevel& level_;
+        const Place& place_;
+        const ShapeTree& tree_;
     };
 
     [[nodiscard]] static float in_units_of(double scale, float t) {
@@ -248,60 +346,62 @@ private:
             for (std::uint32_t ray = 0; ray < count; ++ray) walk_one(place, ray);
         } else if (const MeshTree* const mesh = scene.only_mesh()) {
             visit_mesh(place, *mesh, nullptr, count);
+        } else if (const ShapeTree* const shapes = scene.only_shapes()) {
+            visit_shapes(place, *shapes, nullptr, count);
         } else {
-            for (const PartTree* const tree : {&scene.near, &scene.wild})
-                if (!tree->empty()) walk_parts(place, *tree);
+            for (const PartTree* const tree : {&scene.near, &scene.wild}) {
+                if (tree->empty()) continue;
+                Parts parts(*this, place, *tree);
+                walk_tree(place, *tree, parts, level.parts_stack, level.parts_memory, nullptr,
+                          count);
+            }
         }
     }
 
     void walk_one(const Place& place, std::uint32_t ray) {
         const SceneLevel& level = job_.level(place.depth);
-        const std::uint32_t id = level.sources[ray].id;
-        One one(job_.limits[id], job_.hits[id], job_.single_stack.view());
-        one.walk(place.scene, place.number, line_of(place, level, ray));
-        one.store(job_, id);
+        alone(level.sources[ray].id, true,
+              [&](auto& one) { one.walk(place.scene, place.number, line_of(place, level, ray)); });
     }
 
-    HWY_NOINLINE void walk_parts(const Place& place, const PartTree& tree) {
+    /// Rays list[0] to list[count - 1] of a level, or its first `count`, through a tree over parts
+    /// or shapes. The list is not needed once leaves are visited.
+    template <class Leaves>
+    HWY_NOINLINE void walk_tree(const Place& place, const PartTree& tree, Leaves& leaves,
+                                StackMemory& stack, StreamMemory& memory, const std::uint32_t* list,
+                                std::uint32_t count) {
         SceneLevel& level = job_.level(place.depth);
-        level.parts_stack.reserve(tree.arrays.stats.max_depth);
-        const SimdJob rays{tree.view,
-                           level.rays.data(),
-                           nullptr,
-                           level.count,
-                           {},
-                           nullptr,
-                           level.parts_stack.view(),
-                           level.parts_stack.packet_view(),
-                           &level.parts_memory,
-                           false};
-        Parts parts(*this, place, tree);
+        stack.reserve(tree.arrays.stats.max_depth);
+        const SimdJob rays{tree.view,    level.rays.data(),   list,    count, {}, nullptr,
+                           stack.view(), stack.packet_view(), &memory, false};
         std::uint32_t done = 0;
-        if (job_.packets) {
+        if (job_.packets && list == nullptr) {
             // Windows of one class go as they are, as in packets.h.
             HWY_ALIGN std::int32_t index[packet_size];
-            for (; done + packet_size <= level.count; done += packet_size) {
+            for (; done + packet_size <= count; done += packet_size) {
                 std::iota(index, index + packet_size, static_cast<std::int32_t>(done));
                 const std::uint32_t code = class_of(rays.rays, index);
                 if (code == odd_ray_class) break;
-                walk_packets(rays, tree, parts, index, packet_size, code);
+                walk_packets(rays, tree, leaves, index, packet_size, code);
             }
         }
-        if (done == level.count) return;
-        level.seen.resize(level.count);
-        std::iota(level.seen.begin(), level.seen.end(), 0u);
+        if (done == count) return;
         SimdJob rest = rays;
-        rest.order = level.seen.data() + done;
-        rest.n = level.count - done;
+        if (list == nullptr) {
+            level.seen.resize(count);
+            std::iota(level.seen.begin(), level.seen.end(), 0u);
+            rest.order = level.seen.data() + done;
+            rest.n = count - done;
+        }
         RaySorter sorter;
         sorter.sort(rest);
         for (std::uint32_t code = 0; code < odd_ray_class; ++code) {
-            const std::uint32_t count = sorter.count(code);
-            if (count == 0) continue;
+            const std::uint32_t same = sorter.count(code);
+            if (same == 0) continue;
             if (job_.packets)
-                walk_packets(rays, tree, parts, sorter.rays(code), count, code);
+                walk_packets(rays, tree, leaves, sorter.rays(code), same, code);
             else
-                walk_stream(rays, tree, parts, sorter.rays(code), count, code);
+                walk_stream(rays, tree, leaves, sorter.rays(code), same, code);
         }
     }
     /// Of a packet's rays; odd_ray_class if they differ.
@@ -314,7 +414,8 @@ private:
         return hn::AllTrue(I16(), same) ? static_cast<std::uint32_t>(hn::GetLane(code))
                                         : odd_ray_class;
     }
-    void walk_packets(const SimdJob& rays, const PartTree& tree, Parts& parts,
+    template <class Leaves>
+    void walk_packets(const SimdJob& rays, const PartTree& tree, Leaves& leaves,
                       const std::int32_t* index, std::uint32_t count, std::uint32_t code) {
         Packet packet;
         SimdCounts counts;
@@ -323,17 +424,18 @@ private:
             fill_packet(
                 rays.tree, [&](std::size_t i) { return read_rays(rays.rays, here + i); },
                 std::min<std::uint32_t>(packet_size, count - at), code, packet, tree.growth);
-            PacketWalk<any ? Wanted::any : Wanted::closest, false, false, Parts>(
-                rays.tree, packet, here, parts, rays.packet_stack, counts)
+            PacketWalk<any ? Wanted::any : Wanted::closest, false, false, Leaves>(
+                rays.tree, packet, here, leaves, rays.packet_stack, counts)
                 .trace();
         }
     }
-    void walk_stream(const SimdJob& rays, const PartTree& tree, Parts& parts,
+    template <class Leaves>
+    void walk_stream(const SimdJob& rays, const PartTree& tree, Leaves& leaves,
                      const std::int32_t* index, std::uint32_t count, std::uint32_t code) {
         SimdCounts counts;
         const StreamFrame frame = fill_stream(rays, index, count, code, tree.growth);
-        StreamWalk<any, false, false, Parts>(rays.tree, frame, *rays.memory, rays.stack, counts,
-                                             &parts, index)
+        StreamWalk<any, false, false, Leaves>(rays.tree, frame, *rays.memory, rays.stack, counts,
+                                              &leaves, index)
             .trace();
     }
 
@@ -344,7 +446,12 @@ private:
             visit_mesh(place, *place.scene.meshes[part], rays, count);
             return;
         }
-        const PlacedScene& placed = place.scene.placed[part - meshes];
+        const std::size_t own = place.scene.own_part_count();
+        if (part < own) {
+            visit_shapes(place, *place.scene.shapes[part - meshes], rays, count);
+            return;
+        }
+        const PlacedScene& placed = place.scene.placed[part - own];
         SceneLevel& inside = job_.level(place.depth + 1);
         inside.begin(count + lanes16, !placed.scene->instances.empty());
         // Floats have all of these rays, and are all that is asked for.
@@ -359,22 +466,34 @@ private:
         walk(place.depth + 1, *placed.scene, place.number + placed.number);
     }
 
+    /// Leaves out rays that do not see a mask, in a list of the level's; whether any are left.
+    HWY_INLINE bool keep_seeing(SceneLevel& level, std::uint32_t mask, const std::uint32_t*& rays,
+                                std::uint32_t& count) {
+        if (mask == ~std::uint32_t{0}) return count != 0;
+        level.seen.clear();
+        for (std::uint32_t k = 0; k < count; ++k) {
+            const std::uint32_t ray = rays == nullptr ? k : rays[k];
+            if ((mask & job_.limits[level.sources[ray].id].mask) != 0) level.seen.push_back(ray);
+        }
+        rays = level.seen.data();
+        count = static_cast<std::uint32_t>(level.seen.size());
+        return count != 0;
+    }
+
+    /// `rays` null: all of the level.
+    void visit_shapes(const Place& place, const ShapeTree& shapes, const std::uint32_t* rays,
+                      std::uint32_t count) {
+        SceneLevel& level = job_.level(place.depth);
+        if (shapes.empty() || !keep_seeing(level, shapes.mask, rays, count)) return;
+        AtShapes leaves(*this, place, shapes);
+        walk_tree(place, shapes, leaves, level.mesh_stack, level.mesh_memory, rays, count);
+    }
     /// `rays` null: all of the level.
     void visit_mesh(const Place& place, const MeshTree& mesh, const std::uint32_t* rays,
                     std::uint32_t count) {
         if (mesh.tree->empty()) return;
         SceneLevel& level = job_.level(place.depth);
-        if (mesh.mask != ~std::uint32_t{0}) {
-            level.seen.clear();
-            for (std::uint32_t k = 0; k < count; ++k) {
-                const std::uint32_t ray = rays == nullptr ? k : rays[k];
-                if ((mesh.mask & job_.limits[level.sources[ray].id].mask) != 0)
-                    level.seen.push_back(ray);
-            }
-            rays = level.seen.data();
-            count = static_cast<std::uint32_t>(level.seen.size());
-            if (count == 0) return;
-        }
+        if (!keep_seeing(level, mesh.mask, rays, count)) return;
         const std::size_t stack_size = wide_stack_capacity(mesh.tree->stats().max_depth);
         level.mesh_stack.reserve_words(stack_size * rays_in_turn);
         if (any && level.occluded.size() < level.count) level.occluded.resize(level.count);
@@ -382,6 +501,8 @@ private:
         TriangleBlock room{};
         WideView view = mesh.view;
         view.room = &room;
+        const MeshCheck context{*this, level, mesh, place.number};
+        const HitCheck check{&MeshCheck::accepts, &context};
         const SimdJob job{view,
                           level.rays.data(),
                           rays,
@@ -392,11 +513,15 @@ private:
                           level.mesh_stack.packet_view(),
                           &level.mesh_memory,
                           false,
-                          stack_size};
+                          stack_size,
+                          nullptr,
+                          nullptr,
+                          job_.filter == nullptr ? nullptr : &check};
         SimdCounts counts;
-        (count < least_together ? job_.kernels->single
-         : job_.packets         ? job_.kernels->packets
-                                : job_.kernels->streams)(job, counts);
+        // Streams have no checks.
+        (count < least_together                   ? job_.kernels->single
+         : job_.packets || job_.filter != nullptr ? job_.kernels->packets
+                                                  : job_.kernels->streams)(job, counts);
         if (counts.hits == 0) return;
         for (std::uint32_t k = 0; k < count; ++k) {
             const std::uint32_t ray = rays == nullptr ? k : rays[k];
@@ -407,6 +532,22 @@ private:
             }
         }
     }
+
+    /// Asks the filter about hits of a mesh.
+    struct MeshCheck {
+        const SceneWalk& walk;
+        const SceneLevel& level;
+        const MeshTree& mesh;
+        std::uint32_t number;
+
+        static bool accepts(const void* context, const Ray* ray, const TreeHit& hit) {
+            const auto& check = *static_cast<const MeshCheck*>(context);
+            const SceneRaySource& source =
+                check.level.sources[static_cast<std::size_t>(ray - check.level.rays.data())];
+            return check.walk.job_.accepts(
+                source.id, hit_in_scene(check.mesh, check.number, source.scale, hit));
+        }
+    };
 
     HWY_INLINE void take(SceneLevel& level, const MeshTree& mesh, std::uint32_t number,
                          std::uint32_t ray, const TreeHit& hit) {
@@ -428,9 +569,15 @@ inline void all_scene_hits(SceneJob& job) {
         const std::size_t before = job.found->size();
         if (is_valid(ray)) {
             SceneRay<Wanted::all>(
-                {ray.tmin, ray.tmax, job.masks == nullptr ? job.mask : job.masks[k]}, {},
-                job.single_stack.view(), job.found)
+                {ray.tmin, ray.tmax, job.masks == nullptr ? job.mask : job.masks[k]}, job.place(k),
+                {}, job.single_stack.view(), job.found)
                 .walk(*job.tree, 0, line_of(ray));
+            if (job.filter != nullptr) {
+                const auto first = job.found->begin() + static_cast<std::ptrdiff_t>(before);
+                const auto refused = [&](const Hit& hit) { return !job.accepts(k, hit); };
+                job.found->erase(std::remove_if(first, job.found->end(), refused),
+                                 job.found->end());
+            }
             finish_scene_ray(*job.found, before);
         } else {
             ++job.invalid;
@@ -446,7 +593,7 @@ inline void count_scene_steps(SceneJob& job) {
         const Ray& ray = job.rays[k];
         job.visits[k] = 0;
         if (!is_valid(ray)) continue;
-        SceneRay<Wanted::closest, true> one({ray.tmin, ray.tmax, job.mask}, {},
+        SceneRay<Wanted::closest, true> one({ray.tmin, ray.tmax, job.mask}, k, {},
                                             job.single_stack.view());
         one.walk(*job.tree, 0, line_of(ray));
         job.visits[k] = static_cast<std::uint32_t>(one.visits());
@@ -456,8 +603,15 @@ inline void count_scene_steps(SceneJob& job) {
 /// A valid ray alone; for any hit only prim has a meaning.
 template <bool any>
 Hit hit_of_scene(const SceneTree& scene, const Ray& ray, std::uint32_t mask,
-                 const WideStackView& stack) {
-    SceneRay<any ? Wanted::any : Wanted::closest> one({ray.tmin, ray.tmax, mask}, {}, stack);
+                 const HitFilter* filter, const WideStackView& stack) {
+    const SceneJob::Limits limits{ray.tmin, ray.tmax, mask};
+    if (filter != nullptr) {
+        SceneRay<any ? Wanted::any_accepted : Wanted::closest_accepted> one(limits, 0, {}, stack);
+        one.filter_by(*filter, ray);
+        one.walk(scene, 0, line_of(ray));
+        return one.best();
+    }
+    SceneRay<any ? Wanted::any : Wanted::closest> one(limits, 0, {}, stack);
     one.walk(scene, 0, line_of(ray));
     return one.best();
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/scene_tree.h"
+#include "engine/shape_tree.h"
 
 namespace raydix {
 namespace {
@@ -95,27 +96,30 @@ void add_mesh(const MeshTree& mesh, Support& support) {
     });
 }
 
-Support support_of_box(const Aabb& box) {
+void add_box(const Aabb& box, Support& support) {
     const Double3 lo(box.lo), hi(box.hi), middle = (lo + hi) * 0.5, half = (hi - lo) * 0.5;
-    Support out;
-    out.widen([&](Double3 d) {
+    support.widen([&](Double3 d) {
         const double at = dot(d, middle);
         const double by =
             std::fabs(d.x) * half.x + std::fabs(d.y) * half.y + std::fabs(d.z) * half.z;
         return Reach{at + by, by - at};
     });
-    return out;
 }
 
 }  // namespace
 
 Support support_of(const SceneTree& scene) {
-    if (!scene.instances.empty()) return support_of_box(scene.extent.box);
     Support out;
+    if (!scene.instances.empty()) {
+        add_box(scene.extent.box, out);
+        return out;
+    }
     for (const auto& mesh : scene.meshes) {
         if (mesh->tree->empty()) continue;
         mesh->view.is_compact ? add_mesh<true>(*mesh, out) : add_mesh<false>(*mesh, out);
     }
+    for (const auto& shapes : scene.shapes)
+        if (!shapes->empty()) add_box(shapes->extent.box, out);
     return out;
 }
 

@@ -1,8 +1,9 @@
-// Random scenes in float, and a judge that looks at every mesh on every path.
+// Random scenes in float, and a judge that looks at every mesh and shape on every path.
 #pragma once
 
 #include <raydix/scene.h>
 #include <raydix/trace.h>
+#include <raydix/user_geometry.h>
 #include <raydix/wide.h>
 
 #include <algorithm>
@@ -17,6 +18,7 @@
 #include "instances/affine.h"
 #include "support/random.h"
 #include "support/support.h"
+#include "trace/ray_frame.h"
 
 namespace raydix::test {
 
@@ -49,6 +51,8 @@ struct World {
         Mesh mesh;
         Transform transform;
         std::shared_ptr<const World> inside;  // of an instance
+        IntersectPrimitive intersect = {};    // instead of a mesh: shapes
+        std::uint32_t shape_count = 0;
     };
     std::vector<Item> items;  // by ascending id
     Scene scene;
@@ -65,6 +69,22 @@ struct Sight {
     std::vector<Hit> hits;
     std::vector<std::uint32_t> masks;
 };
+
+/// What each shape on its own says.
+inline Hit closest_shape(const World::Item& item, Ray ray) {
+    Hit best;
+    if (!is_valid(ray)) return best;
+    ray.tmin = std::max(ray.tmin, 0.0f);
+    for (std::uint32_t prim = 0; prim < item.shape_count; ++prim) {
+        Hit hit;
+        if (!item.intersect(prim, ray, hit)) continue;
+        hit.t += 0.0f;  // -0 becomes +0
+        if (best.hit() && best.t <= hit.t) continue;
+        best = hit;
+        best.prim = prim;
+    }
+    return best;
+}
 
 /// All of `world`, seen by `lines`; `number`: of the path that leads here.
 inline void look(const World& world, const std::vector<WideRayLine>& lines,
@@ -86,7 +106,12 @@ inline void look(const World& world, const std::vector<WideRayLine>& lines,
         std::vector<Ray> entering;
         for (std::size_t i = 0; i < rays.size(); ++i)
             entering.push_back(lines[i].rounded(rays[i].tmin, rays[i].tmax));
-        const std::vector<Hit> hits = trace_brute_force(item.mesh, entering, 1);
+        std::vector<Hit> hits;
+        if (item.shape_count == 0) {
+            hits = trace_brute_force(item.mesh, entering, 1);
+        } else {
+            for (const Ray& ray : entering) hits.push_back(closest_shape(item, ray));
+        }
         for (std::size_t i = 0; i < rays.size(); ++i) {
             if (!seen[i] || !hits[i].hit()) continue;
             const Hit found{hits[i], item.id, number};
@@ -116,7 +141,87 @@ struct Recipe {
     std::uint32_t levels, items;
     float shear;
     SceneOptions options = {};
+    bool shapes = false;  // among the meshes
 };
+
+/// Where a ray enters or leaves a box: a user's own test. u: the axis of the side.
+inline bool hits_box(const Aabb& box, const Ray& ray, Hit& hit) {
+    constexpr double none = std::numeric_limits<double>::infinity();
+    double enter = -none, leave = none;
+    int side = 0;
+    const auto cut = [&](int axis, double lo, double hi, double o, double d) {
+        if (d == 0.0) {
+            if (o < lo || o > hi) leave = -none;
+            return;
+        }
+        const double one = (lo - o) / d, other = (hi - o) / d;
+        if (std::min(one, other) > enter) enter = std::min(one, other), side = axis;
+        leave = std::min(leave, std::max(one, other));
+    };
+    cut(0, box.lo.x, box.hi.x, ray.origin.x, ray.direction.x);
+    cut(1, box.lo.y, box.hi.y, ray.origin.y, ray.direction.y);
+    cut(2, box.lo.z, box.hi.z, ray.origin.z, ray.direction.z);
+    if (!(enter <= leave)) return false;
+    hit.t = static_cast<float>(enter);
+    if (!(hit.t >= ray.tmin)) hit.t = static_cast<float>(leave);
+    hit.u = static_cast<float>(side), hit.v = 0;
+    return hit.t >= ray.tmin && hit.t <= ray.tmax;
+}
+
+/// Spheres, capsules, points or boxes of a user's own; some twice. Keeps what it is made of.
+inline void add_random_shapes(RandomScenes& random, World& world, World::Item& item,
+                              const GeometryOptions& options) {
+    const std::uint32_t count = 1 + random.below(40);
+    item.shape_count = count;
+    const auto radius = [&] { return random.below(10) == 0 ? 0.0f : random.between(0.01f, 0.3f); };
+    const auto again = [&](std::uint32_t k) { return k % 8 == 7; };
+    switch (random.below(4)) {
+        case 0: {
+            const auto all = std::make_shared<std::vector<Sphere>>();
+            for (std::uint32_t k = 0; k < count; ++k)
+                all->push_back(again(k) ? all->back() : Sphere{random.in(0, 1), radius()});
+            item.intersect = [all](std::uint32_t prim, const Ray& ray, Hit& hit) {
+                return intersect_spheres(*all)(prim, ray, hit);
+            };
+            world.scene.add(std::span<const Sphere>(*all), options);
+            break;
+        }
+        case 1: {
+            const auto all = std::make_shared<std::vector<Capsule>>();
+            for (std::uint32_t k = 0; k < count; ++k)
+                all->push_back(again(k) ? all->back()
+                                        : Capsule{random.in(0, 1), random.in(0, 1), radius()});
+            item.intersect = [all](std::uint32_t prim, const Ray& ray, Hit& hit) {
+                return intersect_capsules(*all)(prim, ray, hit);
+            };
+            world.scene.add(std::span<const Capsule>(*all), options);
+            break;
+        }
+        case 2: {
+            const auto all = std::make_shared<std::vector<Vec3>>();
+            for (std::uint32_t k = 0; k < count; ++k)
+                all->push_back(again(k) ? all->back() : random.in(0, 1));
+            const float one = radius();
+            item.intersect = [all, one](std::uint32_t prim, const Ray& ray, Hit& hit) {
+                return intersect_points(*all, one)(prim, ray, hit);
+            };
+            world.scene.add(std::span<const Vec3>(*all), one, options);
+            break;
+        }
+        default: {
+            const auto all = std::make_shared<std::vector<Aabb>>();
+            for (std::uint32_t k = 0; k < count; ++k) {
+                const Vec3 lo = random.in(0, 1), by = random.in(0, 0.3f);
+                all->push_back(again(k) ? all->back()
+                                        : Aabb{lo, {lo.x + by.x, lo.y + by.y, lo.z + by.z}});
+            }
+            item.intersect = [all](std::uint32_t prim, const Ray& ray, Hit& hit) {
+                return hits_box((*all)[prim], ray, hit);
+            };
+            world.scene.add(UserGeometry(*all, item.intersect), options);
+        }
+    }
+}
 
 inline std::shared_ptr<World> random_world(RandomScenes& random, const Recipe& recipe,
                                            std::uint32_t level = 0) {
@@ -133,6 +238,8 @@ inline std::shared_ptr<World> random_world(RandomScenes& random, const Recipe& r
             item.inside = inner[random.below(2)];
             item.transform = random.transform(level == 0 ? 4.0f : 2.0f, recipe.shear);
             world->scene.add(item.inside->scene, item.transform, options);
+        } else if (recipe.shapes && random.below(3) != 0) {
+            add_random_shapes(random, *world, item, options);
         } else {
             item.mesh = random.below(8) == 0
                             ? Mesh{}

@@ -1,6 +1,7 @@
 // Rays through geometry of the caller's own, in float and in double, against digests kept here:
 // functions written in this test and those of the library.
 #include <gtest/gtest.h>
+#include <raydix/scene.h>
 #include <raydix/user_geometry.h>
 #include <raydix/user_geometry_d.h>
 
@@ -10,6 +11,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <type_traits>
 
 #include "base/double3.h"
 #include "support/digest_inputs.h"
@@ -209,6 +211,36 @@ public:
         trace_any(tree, shapes_.intersect, rays_, occluded, {.threads = threads});
         return answer_any(occluded);
     }
+    /// As a geometry of a scene. In double scenes have no shapes.
+    [[nodiscard]] std::shared_ptr<const Scene> scene(bool as_user_geometry, Quality quality) const {
+        auto scene = std::make_shared<Scene>();
+        if (as_user_geometry)
+            scene->add(UserGeometry(shapes_.boxes, shapes_.intersect));
+        else if (!shapes_.balls.empty())
+            scene->add(std::span<const Sphere>(shapes_.balls));
+        else if (!shapes_.rods.empty())
+            scene->add(std::span<const Capsule>(shapes_.rods));
+        else
+            scene->add(std::span<const Vec3>(shapes_.points), 0.0625f);
+        scene->commit({.quality = quality});
+        return scene;
+    }
+    [[nodiscard]] Answer in_scene(const Scene& scene, bool any, SimdPath path) const {
+        SceneTraceOptions options;
+        options.path = path;
+        if (!any) return answer(trace(scene, rays_, options));
+        std::vector<std::uint8_t> occluded(rays_.size());
+        trace_any(scene, rays_, occluded, options);
+        return answer_any(occluded);
+    }
+    [[nodiscard]] Answer in_scene_one_by_one(const Scene& scene, bool any) const {
+        Hits hits;
+        std::vector<std::uint8_t> occluded;
+        for (const auto& ray : rays_)
+            any ? occluded.push_back(any_hit(scene, ray)) : hits.push_back(closest_hit(scene, ray));
+        return any ? answer_any(occluded) : answer(hits);
+    }
+
     [[nodiscard]] Answer closest_one_by_one(const Tree& tree) const {
         Hits hits;
         for (const auto& ray : rays_) hits.push_back(closest_hit(tree, shapes_.intersect, ray));
@@ -270,6 +302,19 @@ Question question_of(const std::string& shapes, bool any) {
         add(fmt::format("{}, one by one", builder_name(builder)), [=] {
             return any ? traced->any_one_by_one(*tree) : traced->closest_one_by_one(*tree);
         });
+    }
+    if constexpr (std::is_same_v<Calls, FloatCalls>) {
+        for (const bool own_kind : {true, false}) {
+            if (own_kind && shapes.starts_with("my")) continue;
+            const auto scene =
+                traced->scene(!own_kind, own_kind ? Quality::balanced : Quality::fast);
+            const std::string name = own_kind ? "scene" : "scene, user geometry";
+            for (const SimdPath path : {SimdPath::automatic, SimdPath::single, SimdPath::packet,
+                                        SimdPath::stream, SimdPath::sorted})
+                add(fmt::format("{}, {}", name, simd_path_name(path)),
+                    [=] { return traced->in_scene(*scene, any, path); });
+            add(name + ", one by one", [=] { return traced->in_scene_one_by_one(*scene, any); });
+        }
     }
     add("each shape", [=] {
         const auto hits = traced->each_shape();

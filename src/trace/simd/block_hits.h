@@ -16,8 +16,18 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-/// What of a ray's hits is wanted.
-enum class Wanted { closest, any, all };
+/// What of a ray's hits is wanted. Of accepted ones a HitCheck says which count.
+enum class Wanted { closest, any, all, closest_accepted, any_accepted };
+
+constexpr bool wants_closest(Wanted wanted) {
+    return wanted == Wanted::closest || wanted == Wanted::closest_accepted;
+}
+constexpr bool wants_any(Wanted wanted) {
+    return wanted == Wanted::any || wanted == Wanted::any_accepted;
+}
+constexpr bool wants_accepted(Wanted wanted) {
+    return wanted == Wanted::closest_accepted || wanted == Wanted::any_accepted;
+}
 
 constexpr EdgeRule edge_rule(Wanted wanted) {
     return wanted == Wanted::all ? EdgeRule::half_open : EdgeRule::closed;

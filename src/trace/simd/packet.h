@@ -35,11 +35,15 @@ public:
 
     [[nodiscard]] std::uint64_t found() const { return found_; }
 
-    void visit(std::uint32_t part, std::uint64_t active) {
+    HWY_INLINE void ask_for(std::uint32_t word) const {
+        if constexpr (Parts::large) parts_.ask_for(word);
+    }
+
+    void visit(std::uint32_t first, std::uint32_t parts, std::uint64_t active) {
         std::uint32_t rays[packet_size], count = 0;
         for (std::uint64_t left = active; left != 0; left &= left - 1)
             rays[count++] = static_cast<std::uint32_t>(index_[std::countr_zero(left)]);
-        parts_.visit(part, rays, count);
+        parts_.visit(first, parts, rays, count);
         const std::uint32_t* ray = rays;
         for (std::uint64_t left = active; left != 0; left &= left - 1, ++ray) {
             const auto k = static_cast<std::size_t>(std::countr_zero(left));
@@ -57,17 +61,17 @@ private:
 
 template <Wanted query, bool counting, bool compact, class Parts = NoParts>
 class PacketWalk {
-    static constexpr bool any = query == Wanted::any, closest = query == Wanted::closest;
+    static constexpr bool any = wants_any(query), closest = wants_closest(query);
     static constexpr bool has_parts = !std::is_same_v<Parts, NoParts>;
     using Leaves = std::conditional_t<has_parts, PacketParts<query, Parts>, PacketTriangles<query>>;
 
 public:
-    /// Through triangles. `rays`: what the packet was filled with, rays[index[k]]; `all`: as
-    /// PacketTriangles has it.
+    /// Through triangles. `rays`: what the packet was filled with, rays[index[k]]; `all`, `check`:
+    /// as PacketTriangles has them.
     PacketWalk(const WideView& tree, Packet& packet, const Ray* rays, const std::int32_t* index,
-               const PacketStackView& stack, SimdCounts& counts,
-               BudgetVector<Hit>* all = nullptr) requires(!has_parts)
-        : PacketWalk(tree, packet, Leaves(packet, rays, index, all), stack, counts) {}
+               const PacketStackView& stack, SimdCounts& counts, BudgetVector<Hit>* all = nullptr,
+               const HitCheck* check = nullptr) requires(!has_parts)
+        : PacketWalk(tree, packet, Leaves(packet, rays, index, all, check), stack, counts) {}
     /// Through parts. Ray k of the packet is index[k] to them.
     PacketWalk(const WideView& tree, Packet& packet, const std::int32_t* index, Parts& parts,
                const PacketStackView& stack, SimdCounts& counts) requires(has_parts)
@@ -107,6 +111,13 @@ public:
 
 private:
     using V = hn::Vec<F16>;
+
+    HWY_INLINE void ask_for_child(std::uint32_t word) const {
+        if constexpr (has_parts)
+            leaves_.ask_for(word);
+        else
+            ask_for<compact>(tree_, word);
+    }
 
     [[nodiscard]] std::uint64_t all_rays() const {
         return p_.count == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << p_.count) - 1;
@@ -249,7 +260,7 @@ private:
         }
         for (std::uint32_t c = 0; c < child_count; ++c) {
             const std::uint32_t s = order[c];
-            if constexpr (!has_parts) ask_for<compact>(tree_, node.child[s]);
+            ask_for_child(node.child[s]);
             stack_.words[top] = node.child[s];
             stack_.entries[top] = entries[s];
             stack_.active[top] = hit[c] & active;
@@ -330,7 +341,7 @@ private:
         const std::uint32_t child_count = order_of(met, entries, order);
         for (std::uint32_t c = 0; c < child_count; ++c) {
             const std::uint32_t s = order[c];
-            if constexpr (!has_parts) ask_for<compact>(tree_, node.child[s]);
+            ask_for_child(node.child[s]);
             stack_.words[top] = node.child[s];
             stack_.entries[top] = entries[s];
             stack_.active[top++] = sets[s];
@@ -346,8 +357,7 @@ private:
     void test_leaf(std::uint32_t word, std::uint64_t active) {
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
         if constexpr (has_parts) {
-            for (std::uint32_t part = place; part < place + count; ++part)
-                leaves_.visit(part, active & ~leaves_.found());
+            leaves_.visit(place, count, active);
             if (closest) find_reach();
         } else {
             const TriangleBlock& block = tree_.template block<compact>(place);

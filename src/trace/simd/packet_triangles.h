@@ -50,14 +50,16 @@ struct Packet {
 /// intersect_triangle; hits go into the packet, or to `all` if all are wanted.
 template <Wanted query>
 class PacketTriangles {
-    static constexpr bool any = query == Wanted::any;
+    static constexpr bool any = wants_any(query);
+    /// What floats tell of a hit will do.
+    static constexpr bool roughly = query == Wanted::any;
 
 public:
     /// `rays`: what the packet was filled with, rays[index[k]]. `all`: in no order, found_by that
-    /// index.
+    /// index. `check`: of accepted hits.
     PacketTriangles(Packet& packet, const Ray* rays, const std::int32_t* index,
-                    BudgetVector<Hit>* all = nullptr)
-        : p_(packet), rays_(rays), index_(index), all_(all) {}
+                    BudgetVector<Hit>* all = nullptr, const HitCheck* check = nullptr)
+        : p_(packet), rays_(rays), index_(index), all_(all), check_(check) {}
 
     /// Rays that have hit.
     [[nodiscard]] std::uint64_t found() const { return found_; }
@@ -202,7 +204,7 @@ private:
         if (candidates == 0) return false;
         const std::uint32_t clear = bits_of(f16, without_zero(f16, u, v, w));
         bool certain = false;
-        if constexpr (any) {
+        if constexpr (roughly) {
             HWY_ALIGN float tmin[lanes16], reach[lanes16];
             for (std::size_t r = 0; r < rays_a_quad; ++r) {
                 hn::Store(hn::Set(f4, p_.tmin[ray[r]]), f4, tmin + 4 * r);
@@ -287,9 +289,12 @@ private:
     HWY_INLINE void add(std::size_t k, const TreeHit& hit) {
         all_->push_back(found_by(static_cast<std::uint32_t>(index_[k]), hit));
     }
-    /// A hit of ray k that is no farther than the best. Always true.
+    /// A hit of ray k that is no farther than the best. Whether it counts.
     HWY_INLINE bool take(const TriangleBlock& block, std::uint32_t lane, std::size_t k,
                          const TriangleHit& hit) {
+        if constexpr (wants_accepted(query))
+            if (!(*check_)(rays_ + index_[k], {hit.t, block.prim[lane], hit.u, hit.v}))
+                return false;
         found_ |= std::uint64_t{1} << k;
         if constexpr (query == Wanted::all)
             add(k, {hit.t, block.prim[lane], hit.u, hit.v});
@@ -320,7 +325,7 @@ private:
         if (candidates == 0) return false;
         const std::uint32_t clear = bits_of(f16, without_zero(f16, u, v, w));
         bool changed = false;
-        if constexpr (any) {
+        if constexpr (roughly) {
             const AnyHit hit = any_hit(f16,
                                        limits(hn::Load(f16, p_.tmin + i), hn::Load(f16, p_.t + i),
                                               hn::Load(f16, p_.direction[p_.kind.kz] + i)),
@@ -395,18 +400,20 @@ private:
         const std::uint32_t equal = candidates & bits_of(h, hn::Eq(t, reach));
         candidates &= bits_of(h, hn::Lt(t, reach));
         if ((candidates | equal) == 0) return open;
-        changed = true;
-        found_ |= std::uint64_t{candidates | equal} << i;
-        if constexpr (any) return open;
-        if constexpr (query == Wanted::all) {
+        if constexpr (!wants_accepted(query)) {
+            changed = true;
+            found_ |= std::uint64_t{candidates | equal} << i;
+        }
+        if constexpr (roughly) return open;
+        if constexpr (query == Wanted::all || wants_accepted(query)) {
             HWY_ALIGN float values[3][lanes_d];
             hn::Store(t, h, values[0]);
             hn::Store(weights::rounded(d, at.u), h, values[1]);
             hn::Store(weights::rounded(d, at.v), h, values[2]);
             for (std::uint32_t left = candidates | equal; left != 0; left &= left - 1) {
                 const auto l = static_cast<std::size_t>(std::countr_zero(left));
-                add(i + l,
-                    {values[0][l], target.block.prim[target.lane], values[1][l], values[2][l]});
+                changed |= take(target.block, target.lane, i + l,
+                                {values[0][l], values[1][l], values[2][l]});
             }
             return open;
         }
@@ -429,6 +436,7 @@ private:
     const Ray* const rays_;
     const std::int32_t* const index_;
     BudgetVector<Hit>* const all_;
+    const HitCheck* const check_;
     std::uint64_t found_ = 0;
 };
 

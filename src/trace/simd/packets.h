@@ -231,7 +231,7 @@ template <Wanted query>
 HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, const Packet& p,
                              std::uint64_t found, SimdCounts& counts) {
     counts.hits += static_cast<std::uint64_t>(std::popcount(found));
-    if constexpr (query == Wanted::any) {
+    if constexpr (wants_any(query)) {
         for (std::uint32_t k = 0; k < p.count; ++k) job.occluded[index[k]] = found >> k & 1;
         return;
     }
@@ -254,7 +254,7 @@ HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, cons
 /// The rays of a job in packets.
 template <Wanted query, bool counting, bool compact>
 class PacketJob {
-    static constexpr bool any = query == Wanted::any, all = query == Wanted::all;
+    static constexpr bool any = wants_any(query), all = query == Wanted::all;
 
 public:
     PacketJob(const SimdJob& job, SimdCounts& counts)
@@ -337,7 +337,7 @@ private:
         }
         fill_packet(job_.tree, read, count, code, packet_);
         PacketWalk<query, counting, compact> walk(job_.tree, packet_, job_.rays, index,
-                                                  job_.packet_stack, counts_, job_.all);
+                                                  job_.packet_stack, counts_, job_.all, job_.check);
         walk.trace();
         if constexpr (!all) store_packet<query>(job_, index, packet_, walk.found(), counts_);
     }
@@ -446,6 +446,9 @@ inline void packets(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
         if (job.all != nullptr)
             trace_packets<Wanted::all, counting, compact>(job, counts);
+        else if (job.check != nullptr)
+            !job.hits ? trace_packets<Wanted::any_accepted, counting, compact>(job, counts)
+                      : trace_packets<Wanted::closest_accepted, counting, compact>(job, counts);
         else
             !job.hits ? trace_packets<Wanted::any, counting, compact>(job, counts)
                       : trace_packets<Wanted::closest, counting, compact>(job, counts);

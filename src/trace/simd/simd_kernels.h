@@ -50,6 +50,8 @@ struct SimdJob {
     /// (all_hits.h); how many each ray has to hit_counts [n].
     BudgetVector<Hit>* all = nullptr;
     std::uint64_t* hit_counts = nullptr;
+    /// Closest or any of the hits that it accepts; not in streams. null: of all.
+    const HitCheck* check = nullptr;
 };
 
 using OneRay = TreeHit(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,

@@ -23,11 +23,15 @@ namespace raydix::HWY_NAMESPACE {
 
 constexpr std::size_t parts8 = 8 / lanes8;
 
-/// Leaves hold triangles. Else Parts is what takes the rays on at a leaf, a part of a scene:
-///   float visit_one(std::uint32_t part, std::uint32_t ray)
-///       ray `ray` of the job into the part; how far it goes from now on
-///   void visit(std::uint32_t part, const std::uint32_t* rays, std::uint32_t count)
+/// Leaves hold triangles. Else Parts is what takes the rays on at a leaf, which holds the parts
+/// from `first` on:
+///   float visit_one(std::uint32_t first, std::uint32_t parts, std::uint32_t ray)
+///       ray `ray` of the job into them; how far it goes from now on
+///   void visit(std::uint32_t first, std::uint32_t parts, const std::uint32_t* rays,
+///              std::uint32_t count)
 ///   float reach(std::uint32_t ray)
+///   void ask_for(std::uint32_t word), static constexpr bool large
+///       if large: asks for the cache lines of a node or leaf that will be visited soon
 ///   bool nearest_first
 ///       for any hit: whether the nearest child is the next one, not the largest. It ends rays soon
 ///       that begin close to something.
@@ -50,6 +54,8 @@ public:
 
     /// Where all hits go, in no order; the ray's place in the job stands for their instance.
     void collect(BudgetVector<Hit>& hits) { all_ = &hits; }
+    /// Says which hits count.
+    void check_by(const HitCheck& check, const Ray* ray) { check_ = &check, given_ = ray; }
 
     /// From a node or leaf on; `best` is what was found before.
     WideBest trace(std::uint32_t root, const WideBest& best) {
@@ -105,7 +111,7 @@ private:
         do {
             if (top == 0) return false;
             --top;
-        } while (wanted == Wanted::closest && !(stack_.entries[top] <= best_.t));
+        } while (wants_closest(wanted) && !(stack_.entries[top] <= best_.t));
         word = stack_.words[top];
         return true;
     }
@@ -157,8 +163,7 @@ private:
         }
     }
 
-    static constexpr bool may_take_nearest =
-        wanted == Wanted::any && !std::is_same_v<Parts, NoParts>;
+    static constexpr bool may_take_nearest = wants_any(wanted) && !std::is_same_v<Parts, NoParts>;
 
     /// Whether missing children must be looked for. Their boxes in a plain node are inside out, so
     /// that no ray meets them unless something overflows; in a compact one pads may turn them.
@@ -219,12 +224,12 @@ private:
     HWY_INLINE bool visit(const Node& node, const Rates& about, std::size_t& top,
                           std::uint32_t& word) {
         HWY_ALIGN float entries[8];
-        constexpr bool with_entries = wanted == Wanted::closest || may_take_nearest;
+        constexpr bool with_entries = wants_closest(wanted) || may_take_nearest;
         const std::uint32_t met = meet<with_entries>(node, about, entries);
         if (met == 0) return false;
         if ((met & (met - 1)) == 0) {
             word = choose(node.child, static_cast<std::size_t>(std::countr_zero(met)));
-        } else if constexpr (wanted == Wanted::closest) {
+        } else if constexpr (wants_closest(wanted)) {
             push_sorted(node.child, entries, met, top, word);
         } else {
             if constexpr (may_take_nearest) {
@@ -265,7 +270,7 @@ private:
         float* const at = stack_.entries + top_;
         const auto two = static_cast<std::size_t>(others != 0);
         std::size_t swap = two;
-        if constexpr (wanted == Wanted::closest) {
+        if constexpr (wants_closest(wanted)) {
             // None is negative.
             const auto first_at = std::bit_cast<std::int32_t>(entries[first]),
                        second_at = std::bit_cast<std::int32_t>(entries[second]);
@@ -284,7 +289,7 @@ private:
     /// One more child onto the stack, which has two of its siblings from `words` and `at` on.
     HWY_INLINE void insert(float entry, std::uint32_t child, std::uint32_t* words, float* at) {
         std::size_t k = static_cast<std::size_t>(stack_.words + top_++ - words);
-        if constexpr (wanted == Wanted::closest) {
+        if constexpr (wants_closest(wanted)) {
             // Below the last, or in its place.
             at[k] = at[k - 1], words[k] = words[k - 1];
             if (entry < at[k]) std::swap(entry, at[k]), std::swap(child, words[k]);
@@ -307,9 +312,11 @@ private:
         word = choose(child, static_cast<std::size_t>(std::bit_width(met)) - 1);
     }
 
-    /// Trees over parts are small.
     RAYDIX_PREFETCHING void ask_for_child(std::uint32_t word) const {
-        if constexpr (std::is_same_v<Parts, NoParts>) ask_for<compact>(tree_, word);
+        if constexpr (std::is_same_v<Parts, NoParts>)
+            ask_for<compact>(tree_, word);
+        else if constexpr (Parts::large)
+            parts_->ask_for(word);
     }
 
     /// Two children or more, by where the ray enters them.
@@ -347,11 +354,8 @@ private:
     HWY_INLINE bool test_leaf(std::uint32_t word) {
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
         if constexpr (!std::is_same_v<Parts, NoParts>) {
-            for (std::uint32_t part = place; part < place + count; ++part) {
-                best_.t = parts_->visit_one(part, place_);
-                if (wanted == Wanted::any && best_.t < 0) return true;
-            }
-            return false;
+            best_.t = parts_->visit_one(place, count, place_);
+            return wants_any(wanted) && best_.t < 0;
         } else {
             return test_triangles(place, count);
         }
@@ -410,12 +414,15 @@ private:
                     : !test_exactly<edge_rule(wanted)>(frame_.triangle_ray(), block, lane, best_.t,
                                                        hit))
                 continue;
+            if constexpr (wants_accepted(wanted))
+                if (!(*check_)(given_, {hit.t * frame_.t_scale, block.prim[lane], hit.u, hit.v}))
+                    continue;
             if constexpr (wanted == Wanted::all)
                 all_->push_back(
                     found_by(place_, {hit.t * frame_.t_scale, block.prim[lane], hit.u, hit.v}));
             else
                 best_.take(hit.t, block.prim[lane], hit.u, hit.v);
-            if constexpr (wanted == Wanted::any) return true;
+            if constexpr (wants_any(wanted)) return true;
         }
         return false;
     }
@@ -429,6 +436,8 @@ private:
     const PlanePlaces at_;
     WideBest best_{};
     BudgetVector<Hit>* all_ = nullptr;
+    const HitCheck* check_ = nullptr;
+    const Ray* given_ = nullptr;  // to the check
     std::uint32_t word_ = 0;
     std::size_t top_ = 0;
 };
@@ -485,8 +494,23 @@ void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
         ray.trace(0, {frame.tmax});
         return;
     }
-    constexpr bool any = wanted == Wanted::any;
-    const TreeHit hit = find_one<any, counting, compact>(job.tree, job.rays[i], job.stack, counts);
+    constexpr bool any = wants_any(wanted);
+    TreeHit hit;
+    if constexpr (wants_accepted(wanted)) {
+        SingleFrame frame;
+        if (fill_frame(job.tree, job.rays[i], frame)) {
+            SingleRay<wanted, counting, compact> ray(job.tree, frame, job.stack, counts, nullptr,
+                                                     static_cast<std::uint32_t>(i));
+            ray.check_by(*job.check, job.rays + i);
+            const WideBest best = ray.trace(0, {frame.tmax});
+            if (best.found()) hit = {best.t * frame.t_scale, best.prim, best.u, best.v};
+            counts.hits += hit.hit();
+        } else {
+            ++counts.invalid;
+        }
+    } else {
+        hit = find_one<any, counting, compact>(job.tree, job.rays[i], job.stack, counts);
+    }
     if constexpr (any)
         job.occluded[i] = hit.hit() ? 1 : 0;
     else

@@ -222,7 +222,10 @@ private:
             const std::uint32_t* const list = lists + out_begin + c * stride;
             const auto count = static_cast<std::uint32_t>(ends[c] - list);
             if (count == 0) continue;
-            if constexpr (!has_parts) ask_for<compact>(tree_, node.child[children[c]]);
+            if constexpr (!has_parts)
+                ask_for<compact>(tree_, node.child[children[c]]);
+            else if constexpr (Parts::large)
+                parts_->ask_for(node.child[children[c]]);
             std::memmove(lists + free, list, count * sizeof(*lists));
             memory_.stack().push_back({node.child[children[c]], free, count});
             free += count + StreamMemory::slack;
@@ -251,23 +254,21 @@ private:
         }
     }
 
-    /// The rays of a list that may still hit something there go to each part of a leaf.
+    /// The rays of a list that may still hit something there go to the parts of a leaf.
     void visit_parts(const StreamEntry& entry) {
         const std::uint32_t place = (entry.word & ~wide_leaf_bit) >> 3,
                             count = (entry.word & 7) + 1;
         std::vector<std::uint32_t>& going = memory_.going();
-        for (std::uint32_t part = place; part < place + count; ++part) {
-            going.clear();
-            const std::uint32_t* const list = memory_.lists() + entry.begin;
-            for (std::uint32_t k = 0; k < entry.count; ++k)
-                if (entry_of(list[k]) <= rays_[list[k] & ray_bits].t)
-                    going.push_back(static_cast<std::uint32_t>(index_[list[k] & ray_bits]));
-            if (going.empty()) return;
-            parts_->visit(part, going.data(), static_cast<std::uint32_t>(going.size()));
-            for (std::uint32_t k = 0; k < entry.count; ++k) {
-                const std::uint32_t ray = list[k] & ray_bits;
-                rays_[ray].t = parts_->reach(static_cast<std::uint32_t>(index_[ray]));
-            }
+        going.clear();
+        const std::uint32_t* const list = memory_.lists() + entry.begin;
+        for (std::uint32_t k = 0; k < entry.count; ++k)
+            if (entry_of(list[k]) <= rays_[list[k] & ray_bits].t)
+                going.push_back(static_cast<std::uint32_t>(index_[list[k] & ray_bits]));
+        if (going.empty()) return;
+        parts_->visit(place, count, going.data(), static_cast<std::uint32_t>(going.size()));
+        for (std::uint32_t k = 0; k < entry.count; ++k) {
+            const std::uint32_t ray = list[k] & ray_bits;
+            rays_[ray].t = parts_->reach(static_cast<std::uint32_t>(index_[ray]));
         }
     }
 

@@ -83,6 +83,7 @@ struct Batch {
     bool counters;
     std::vector<std::uint32_t> order{};  // of the path `sorted`
     HitBlocks<AllHits>* all = nullptr;
+    const HitCheck* check = nullptr;
 
     void run(std::size_t begin, std::size_t end, SimdCounts& counts) const {
         run(path, begin, end, counts);
@@ -106,10 +107,50 @@ struct Batch {
                           counters,
                           stack_size,
                           all == nullptr ? nullptr : &all->hits_with(begin),
-                          all == nullptr ? nullptr : all->hit_counts() + begin};
+                          all == nullptr ? nullptr : all->hit_counts() + begin,
+                          check};
         job_of(kernels, own)(job, counts);
     }
 };
+
+/// What kernels without streams take, and what they may try instead.
+struct WaysOfTwo {
+    SimdPath ways[2] = {SimdPath::single, SimdPath::packet};
+    bool packets;
+    PathRace race;
+
+    explicit WaysOfTwo(SimdPath path)
+        : packets(path == SimdPath::packet),
+          race(path == SimdPath::stream ? 2 : 1, path == SimdPath::stream ? 0 : 1) {}
+    [[nodiscard]] SimdPath first() const { return packets ? SimdPath::packet : SimdPath::single; }
+};
+
+TraceCounts trace_checked(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
+                          std::uint8_t* occluded, const TraceOptions& options, const RowsDone& done,
+                          const HitCheck& check) {
+    WaysOfTwo two(path_for(tree, rays, options.path));
+    const std::size_t block_size = rays_per_job(rays.size(), two.first());
+    std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
+    Batch batch{tree,     kernels_for(options.isa), two.first(), rays, hits,
+                occluded, options.counters};
+    batch.check = &check;
+    const bool race =
+        options.path == SimdPath::automatic && !two.packets && parts.size() >= least_jobs_of_race;
+    with_threads(options.threads, [&] {
+        for_each_block(rays.size(), block_size,
+                       [&](std::size_t block, std::size_t begin, std::size_t end) {
+                           if (race)
+                               two.race.run(begin, end,
+                                            [&](std::size_t way, std::size_t from, std::size_t to) {
+                                                batch.run(two.ways[way], from, to, parts[block]);
+                                            });
+                           else
+                               batch.run(begin, end, parts[block]);
+                           done(nullptr, begin, end);
+                       });
+    });
+    return sum_of(parts, rays.size(), options.counters);
+}
 
 TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
                         std::uint8_t* occluded, const TraceOptions& options,
@@ -235,26 +276,23 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
         return all;
     }
     std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
-    const SimdPath path = path_for(tree, rays, options.path);
-    Batch batch{
-        tree,    kernels,         path == SimdPath::packet ? path : SimdPath::single, rays, {},
-        nullptr, options.counters};
+    WaysOfTwo two(path_for(tree, rays, options.path));
+    Batch batch{tree, kernels, two.first(), rays, {}, nullptr, options.counters};
     batch.all = &found;
-    const bool race = options.path == SimdPath::automatic && path != SimdPath::packet &&
-                      !options.counters && parts.size() >= least_jobs_of_race;
-    constexpr SimdPath ways[] = {SimdPath::single, SimdPath::packet};
-    PathRace paths(path == SimdPath::stream ? 2 : 1, path == SimdPath::stream ? 0 : 1);
+    const bool race = options.path == SimdPath::automatic && !two.packets && !options.counters &&
+                      parts.size() >= least_jobs_of_race;
     with_threads(options.threads, [&] {
-        for_each_block(
-            rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
-                if (race)
-                    paths.run(begin, end, [&](std::size_t way, std::size_t from, std::size_t to) {
-                        batch.run(ways[way], from, to, parts[block]);
-                    });
-                else
-                    batch.run(begin, end, parts[block]);
-                found.finish(block);
-            });
+        for_each_block(rays.size(), block_size,
+                       [&](std::size_t block, std::size_t begin, std::size_t end) {
+                           if (race)
+                               two.race.run(begin, end,
+                                            [&](std::size_t way, std::size_t from, std::size_t to) {
+                                                batch.run(two.ways[way], from, to, parts[block]);
+                                            });
+                           else
+                               batch.run(begin, end, parts[block]);
+                           found.finish(block);
+                       });
         all = found.join();
     });
     all.counts = sum_of(parts, rays.size(), options.counters);
@@ -262,10 +300,13 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
 }
 
 TraceCounts trace_rows(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
-                       std::uint8_t* occluded, const TraceOptions& options, const RowsDone& done) {
+                       std::uint8_t* occluded, const TraceOptions& options, const RowsDone& done,
+                       const HitCheck* check) {
     check_call(options);
     static_cast<void>(kernels_for(options.isa));
-    if (!tree.empty()) return trace_batch(tree, rays, hits, occluded, options, &done);
+    if (!tree.empty())
+        return check == nullptr ? trace_batch(tree, rays, hits, occluded, options, &done)
+                                : trace_checked(tree, rays, hits, occluded, options, done, *check);
     for (std::size_t i = 0; i < rays.size(); ++i)
         if (hits)
             *hits.at(i) = {};

@@ -64,7 +64,7 @@ HWY_INLINE void take_turns(std::array<Turn, n>& turns) {
 
 template <Wanted query, bool counting, bool compact>
 class RayTurns {
-    static constexpr bool any = query == Wanted::any, all = query == Wanted::all;
+    static constexpr bool any = wants_any(query), all = query == Wanted::all;
 
 public:
     RayTurns(const SimdJob& job, SimdCounts& counts) : job_(job), counts_(counts) {}
@@ -112,6 +112,8 @@ private:
                 turn.ray.emplace(job_.tree, turn.frame, turn.stack, counts_, nullptr,
                                  static_cast<std::uint32_t>(turn.i));
                 if constexpr (all) turn.ray->collect(*job_.all);
+                if constexpr (wants_accepted(query))
+                    turn.ray->check_by(*job_.check, job_.rays + turn.i);
                 if (turn.ray->begin(turn.frame.tmax)) return true;
             } else {
                 ++counts_.invalid;
@@ -159,6 +161,9 @@ inline void single(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
         if (job.all != nullptr)
             RayTurns<Wanted::all, counting, compact>(job, counts).trace();
+        else if (job.check != nullptr)
+            job.hits ? RayTurns<Wanted::closest_accepted, counting, compact>(job, counts).trace()
+                     : RayTurns<Wanted::any_accepted, counting, compact>(job, counts).trace();
         else if (job.hits)
             RayTurns<Wanted::closest, counting, compact>(job, counts).trace();
         else

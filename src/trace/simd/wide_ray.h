@@ -45,6 +45,17 @@ inline void fill_block(const CompactBlock& from, const Vec3* vertices, TriangleB
 #endif
 }
 
+/// Says which hits count, where a caller has a say in that.
+struct HitCheck {
+    /// `ray`: as the job has it; t of the hit is the ray's.
+    bool (*function)(const void* context, const Ray* ray, const TreeHit& hit);
+    const void* context;
+
+    bool operator()(const Ray* ray, const TreeHit& hit) const {
+        return function(context, ray, hit);
+    }
+};
+
 struct WideView {
     const WideNode* nodes;
     const TriangleBlock* blocks;

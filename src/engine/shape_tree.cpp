@@ -1,0 +1,131 @@
+#include "engine/shape_tree.h"
+
+#include <raydix/error.h>
+
+#include <algorithm>
+#include <string>
+#include <type_traits>
+
+#include "exec/parallel.h"
+
+namespace raydix {
+namespace {
+
+/// Leaves name a place and a count in 31 bits.
+constexpr std::size_t most_primitives = std::size_t{1} << 28;
+
+/// How far a user's hit may be from its box, of the distance that the ray has come.
+constexpr double user_slack = 0x1p-17;
+
+std::span<const Sphere> spheres_of(const Shapes& shapes) {
+    const auto* const all = std::get_if<std::span<const Sphere>>(&shapes);
+    return all == nullptr ? std::span<const Sphere>() : *all;
+}
+
+/// A sphere's test is cheap in vectors of eight, those of the others go one by one.
+WideOptions leaves_of(const Shapes& shapes) {
+    WideOptions leaves{.width = quantised_width};
+    const bool vectors = std::holds_alternative<std::span<const Sphere>>(shapes) ||
+                         std::holds_alternative<BasicBalls<float>>(shapes);
+    leaves.max_leaf = vectors ? static_cast<std::uint32_t>(sphere_lanes) : 1;
+    leaves.block = leaves.max_leaf;
+    if (!vectors) leaves.block = 1;
+    return leaves;
+}
+
+/// Boxes of small things all over a place: trees from the top down cost rays 5 to 10 % less than
+/// clusters do, and take as long.
+BuildOptions build_of(Quality quality) {
+    BuildOptions build = build_options_for(quality);
+    if (quality == Quality::balanced) build.builder = Builder::binned;
+    if (quality == Quality::high) build.builder = Builder::sweep;
+    return build;
+}
+
+/// The primitives as leaves name them.
+void copy_primitives(ShapeTree& tree) {
+    const std::size_t n = tree.part.size();
+    const auto copy_spheres = [&](const auto& sphere) {
+        tree.spheres.reset(n + sphere_lanes);
+        for_each_index(n, [&](std::size_t k) { tree.spheres[k] = sphere(tree.part[k]); });
+        std::fill_n(tree.spheres.data() + n, sphere_lanes, Sphere{});
+    };
+    if (const auto* const capsules = std::get_if<std::span<const Capsule>>(&tree.shapes)) {
+        tree.capsules.reset(n);
+        for_each_index(n, [&](std::size_t k) { tree.capsules[k] = (*capsules)[tree.part[k]]; });
+    } else if (const auto* const balls = std::get_if<BasicBalls<float>>(&tree.shapes)) {
+        copy_spheres([&](std::uint32_t k) { return Sphere{balls->centers[k], balls->radius}; });
+    } else if (const auto spheres = spheres_of(tree.shapes); !spheres.empty()) {
+        copy_spheres([&](std::uint32_t k) { return spheres[k]; });
+    }
+}
+
+}  // namespace
+
+std::size_t count_of(const Shapes& shapes) {
+    return std::visit(
+        [](const auto& all) -> std::size_t {
+            using All = std::remove_cvref_t<decltype(all)>;
+            if constexpr (std::is_same_v<All, BasicBalls<float>>)
+                return all.centers.size();
+            else if constexpr (std::is_same_v<All, UserGeometry>)
+                return all.boxes().size();
+            else
+                return all.size();
+        },
+        shapes);
+}
+
+std::vector<Aabb> boxes_of(const Shapes& shapes) {
+    if (count_of(shapes) >= most_primitives)
+        throw InputError(std::to_string(count_of(shapes)) + " " + kind_of(shapes) +
+                         " are too many for one geometry: fewer than 2^28 are allowed");
+    return std::visit(
+        [](const auto& all) -> std::vector<Aabb> {
+            using All = std::remove_cvref_t<decltype(all)>;
+            if constexpr (std::is_same_v<All, BasicBalls<float>>)
+                return boxes_of(all.centers, all.radius);
+            else if constexpr (std::is_same_v<All, UserGeometry>)
+                return {all.boxes().begin(), all.boxes().end()};
+            else
+                return boxes_of(all);
+        },
+        shapes);
+}
+
+std::shared_ptr<const ShapeTree> make_shape_tree(std::uint32_t id, std::uint32_t mask,
+                                                 const Shapes& shapes,
+                                                 std::shared_ptr<const void> own, Quality quality,
+                                                 const ShapeTree* old, double limit,
+                                                 bool& refitted) {
+    auto tree = std::make_shared<ShapeTree>();
+    tree->id = id;
+    tree->mask = mask;
+    tree->shapes = shapes;
+    tree->own = std::move(own);
+    const std::vector<Aabb> boxes = boxes_of(shapes);
+    refitted = old != nullptr && refit_box_tree(*old, boxes, limit, *tree);
+    if (!refitted) build_box_tree(boxes, build_of(quality), leaves_of(shapes), *tree);
+    if (tree->empty()) return tree;
+    copy_primitives(*tree);
+    const auto name_leaves = [&](const auto* first) {
+        tree->leaves = reinterpret_cast<std::uintptr_t>(first);
+        tree->leaf_bytes = sizeof(*first);
+    };
+    if (!tree->spheres.empty())
+        name_leaves(tree->spheres.data());
+    else if (!tree->capsules.empty())
+        name_leaves(tree->capsules.data());
+    else
+        name_leaves(tree->part.data());
+    tree->bounds = tree->arrays.bounds;
+    // A surface's t is that of a point on it, rounded: within the pads of slab.h, as of triangles.
+    tree->extent = extent_of_mesh(tree->bounds);
+    if (tree->user() != nullptr) {
+        tree->growth.rate = static_cast<float>(user_slack);
+        tree->extent.error += 2 * user_slack;
+    }
+    return tree;
+}
+
+}  // namespace raydix

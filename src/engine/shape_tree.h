@@ -1,0 +1,76 @@
+// A geometry of a scene that is not made of triangles: what was added, and the tree over it.
+#pragma once
+
+#include <raydix/scene.h>
+#include <raydix/shapes.h>
+#include <raydix/user_geometry.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "engine/extent.h"
+#include "engine/part_tree.h"
+
+namespace raydix {
+
+/// Points with one radius.
+template <class Scalar>
+struct BasicBalls {
+    std::span<const typename SceneTypes<Scalar>::Point> centers;
+    Scalar radius;
+};
+
+/// What was added; whose the arrays are its owner knows.
+template <class Scalar>
+using BasicShapes = std::variant<std::span<const typename SceneTypes<Scalar>::Sphere>,
+                                 std::span<const typename SceneTypes<Scalar>::Capsule>,
+                                 BasicBalls<Scalar>, BasicUserGeometry<Scalar>>;
+using Shapes = BasicShapes<float>;
+
+/// "spheres", "capsules", "points" or "user geometry".
+template <class AnyShapes>
+[[nodiscard]] const char* kind_of(const AnyShapes& shapes) {
+    constexpr const char* names[] = {"spheres", "capsules", "points", "user geometry"};
+    return names[shapes.index()];
+}
+[[nodiscard]] std::size_t count_of(const Shapes& shapes);
+/// Throws InputError: 2^28 primitives or more.
+[[nodiscard]] std::vector<Aabb> boxes_of(const Shapes& shapes);
+
+/// A tree over the primitives of one geometry. `part` has their numbers.
+struct ShapeTree : PartTree {
+    std::uint32_t id = 0, mask = 0;
+    std::shared_ptr<const void> own;  // what `shapes` views
+    Shapes shapes;
+    // As leaves name them, if that is what they are: one behind the other.
+    Buffer<Sphere> spheres;  // points too; and room for a whole vector behind the last
+    Buffer<Capsule> capsules;
+    std::uintptr_t leaves = 0;   // the address of what leaves name first: primitives, or `part`
+    std::size_t leaf_bytes = 0;  // of each
+    Aabb bounds = empty_box();
+    Extent extent;  // lines in double may miss the bounds by so much
+
+    /// Gives a hit of the tree its geometry.
+    void name(Hit& hit) const { hit.geometry = id; }
+    [[nodiscard]] const UserGeometry* user() const { return std::get_if<UserGeometry>(&shapes); }
+    [[nodiscard]] std::uint64_t bytes() const {
+        return arrays.nodes.size() * sizeof(WideNode) + part.size() * sizeof(part[0]) +
+               spheres.size() * sizeof(Sphere) + capsules.size() * sizeof(Capsule);
+    }
+};
+
+/// Vectors of spheres are read whole.
+inline constexpr std::size_t sphere_lanes = 8;
+
+/// `old`: the tree of the last commit, whose nodes may stay around the same primitives while their
+/// cost is at most `limit` times that at its build; or null. `refitted`: whether they stayed.
+[[nodiscard]] std::shared_ptr<const ShapeTree> make_shape_tree(
+    std::uint32_t id, std::uint32_t mask, const Shapes& shapes, std::shared_ptr<const void> own,
+    Quality quality, const ShapeTree* old, double limit, bool& refitted);
+
+}  // namespace raydix

@@ -1,0 +1,137 @@
+"""Spheres and capsules in scenes, and filters by arrays, against NumPy."""
+
+import numpy as np
+import pytest
+import raydix
+
+
+def _rays(count, seed=1):
+    random = np.random.default_rng(seed)
+    rays = np.empty((count, 6), np.float32)
+    rays[:, :3] = random.uniform(-2, 2, (count, 3))
+    rays[:, 3:] = random.uniform(-1, 1, (count, 3)) - rays[:, :3]
+    return rays
+
+
+def _first_sphere(rays, centers, radii):
+    """The least t of each ray, in double; infinity: none."""
+    o, d = rays[:, None, :3].astype(float) - centers[None], rays[:, None, 3:].astype(float)
+    a, b, c = (d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - radii.astype(float) ** 2
+    with np.errstate(invalid="ignore"):
+        root = np.sqrt(b * b - a * c)
+    near, far = (-b - root) / a, (-b + root) / a
+    t = np.where(near >= 0, near, np.where(far >= 0, far, np.nan))
+    return np.where(np.isnan(t), np.inf, t).min(axis=1)
+
+
+def test_spheres_are_hit_where_they_are():
+    random = np.random.default_rng(2)
+    centers = random.uniform(-1, 1, (200, 3)).astype(np.float32)
+    radii = random.uniform(0.01, 0.2, 200).astype(np.float32)
+    scene = raydix.Scene()
+    assert scene.add_spheres(centers, radii) == 0
+    report = scene.commit()
+    assert report["shapes"] == 1 and report["primitives"] == 200
+    rays = _rays(3000)
+    hits = scene.intersect(rays)
+    expected = _first_sphere(rays, centers, radii)
+    met = hits["prim"] != 0xFFFFFFFF
+    assert (np.isfinite(expected) == met).mean() > 0.999
+    assert np.allclose(hits["t"][met], expected[met], rtol=1e-4)
+    assert (scene.occluded(rays) == met).all()
+    points = scene.positions(hits, rays)[met]
+    outward = (points - centers[hits["prim"][met]]) / radii[hits["prim"][met], None]
+    assert np.allclose(scene.normals(hits, rays)[met], outward, atol=1e-3)
+    assert np.isnan(scene.normals(hits, rays[:, :3], rays[:, 3:])[~met]).all()
+    with pytest.raises(raydix.InputError, match="spheres.*give the rays too"):
+        scene.positions(hits)
+
+
+def test_shapes_mix_with_meshes_and_instances():
+    ball = raydix.Scene()
+    ball.add_spheres([[0, 0, 0]], 1)
+    ball.commit()
+    scene = raydix.Scene()
+    place = np.eye(4)
+    place[:3, 3] = (5, 0, 0)
+    scene.add(ball, place)
+    rod = scene.add_capsules([[0, 0, 0]], [[0, 4, 0]], [0.5])
+    scene.add([[-9, -9, -5], [9, -9, -5], [0, 9, -5]], [[0, 1, 2]])
+    scene.commit()
+    down = [[5, 0, 9, 0, 0, -1], [0, 3, 9, 0, 0, -1], [2, -2, 9, 0, 0, -1]]
+    hits = scene.intersect(down)
+    assert hits["t"].tolist() == [8, 8.5, 14]
+    assert hits["geometry"].tolist() == [0, rod, 2]
+    assert hits["instance"].tolist() == [1, 0, 0]
+    assert hits["u"][1] == 0.75
+    scene.update_capsules(rod, [[0, 0, 0]], [[0, 4, 0]], 1)
+    scene.commit()
+    assert scene.intersect(down)["t"].tolist() == [8, 8, 14]
+    with pytest.raises(raydix.InputError, match="geometry 1 is capsules, not spheres"):
+        scene.update_spheres(rod, [[0, 0, 0]], 1)
+    with pytest.raises(raydix.InputError, match="geometry 1 holds shapes, not a mesh"):
+        scene.update(rod, [[0, 0, 0]] * 3)
+    with pytest.raises(raydix.InputError, match="holds spheres"):
+        ball.save("/tmp/never.rdx")
+    with pytest.raises(raydix.InputError, match="geometry 0 holds shapes"):
+        ball.closest_point([[0, 0, 0]])
+
+
+def test_bad_shapes_are_named():
+    scene = raydix.Scene()
+    with pytest.raises(ValueError, match=r"centers: expected shape \(N, 3\)"):
+        scene.add_spheres([1, 2, 3], 1)
+    with pytest.raises(ValueError, match=r"radii: expected a number or shape \(2,\)"):
+        scene.add_spheres([[0, 0, 0], [1, 1, 1]], [1, 2, 3])
+    with pytest.raises(ValueError, match="ends: expected shape"):
+        scene.add_capsules([[0, 0, 0]], [[0, 0, 0], [1, 1, 1]], 1)
+    with pytest.raises(NotImplementedError):
+        raydix.Scene(precision="float64").add_spheres([[0, 0, 0]], 1)
+
+
+def test_filters_are_filtered_hits():
+    mesh = raydix.Scene("builtin:figure?triangles=2000")
+    box = mesh.bounds
+    rays = _rays(4000)
+    rays[:, :3] = box[0] + (box[1] - box[0]) * (rays[:, :3] + 2) / 4
+    keep = np.random.default_rng(3).random(len(mesh.faces)) < 0.5
+    every = mesh.all_hits(rays)
+    seen = keep[every["prim"]]
+    ray = np.repeat(np.arange(len(rays)), np.diff(every["offsets"]).astype(int))
+    counts = np.bincount(ray[seen], minlength=len(rays))
+    first = np.full(len(rays), 0xFFFFFFFF, np.uint32)
+    for i, prim in zip(ray[seen][::-1], every["prim"][seen][::-1]):
+        first[i] = prim
+    hits = mesh.intersect(rays, keep=keep)
+    assert (hits["prim"] == first).mean() > 0.999  # edges belong to both triangles here
+    assert (mesh.occluded(rays, keep={0: keep}) == (first != 0xFFFFFFFF)).mean() > 0.999
+    assert (mesh.count(rays, keep=keep) == counts).all()
+    assert mesh.all_hits(rays, keep=keep)["prim"].tolist() == every["prim"][seen].tolist()
+    assert (mesh.intersect(rays[:3], keep=keep)["prim"] == hits["prim"][:3]).all()
+
+
+def test_rays_leave_out_what_they_start_from():
+    mesh = raydix.Scene("builtin:figure?triangles=2000")
+    rays = _rays(2000, 5)
+    hits = mesh.intersect(rays)
+    met = hits["prim"] != 0xFFFFFFFF
+    again = mesh.intersect(rays, skip=hits)
+    assert (again["prim"][met] != hits["prim"][met]).all()
+    assert (again["t"][met] >= hits["t"][met]).all()
+    assert (again["prim"] == mesh.intersect(rays, skip=hits["prim"])["prim"]).all()
+    assert (mesh.intersect(rays.reshape(40, 50, 6), skip=hits["prim"].reshape(40, 50))["prim"].ravel()
+            == again["prim"]).all()
+
+
+def test_filters_name_what_is_wrong():
+    mesh = raydix.Scene("builtin:figure?triangles=2000")
+    rays = _rays(2000)
+    with pytest.raises(ValueError, match="skip: expected shape"):
+        mesh.intersect(rays, skip=[1, 2, 3])
+    with pytest.raises(TypeError, match="keep: expected bool"):
+        mesh.intersect(rays, keep=np.zeros(len(mesh.faces)))
+    with pytest.raises(raydix.InputError, match="keep: geometry 0 has primitive"):
+        mesh.intersect(rays, keep=np.ones(1, bool))
+    double = raydix.Scene(mesh.vertices, mesh.faces, precision="float64")
+    with pytest.raises(NotImplementedError):
+        double.intersect(rays, keep=np.ones(len(mesh.faces), bool))
