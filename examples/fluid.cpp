@@ -29,16 +29,13 @@ raydix::Picture picture_of(const Fluid& fluid, std::uint32_t width, float spacin
             for (const float z : {0.0f, tank.z}) balls.push_back({{x, y, z}, 0.004f});
     balls.push_back({{tank.x / 2, -400, tank.z / 2}, 400});
     balls.push_back({{tank.x / 2, 0, -400}, 400});
-    const raydix::Bvh tree = raydix::build_bvh(raydix::boxes_of(balls));
-    const raydix::IntersectPrimitive test = raydix::intersect_spheres(balls);
+    raydix::Scene scene;
+    scene.add(std::span<const raydix::Sphere>(balls));
+    scene.commit();
     Subject subject;
-    subject.trace = [&](std::span<const raydix::Ray> rays) {
-        std::vector<raydix::Hit> hits(rays.size());
-        raydix::trace(tree, test, rays, hits);
-        return hits;
-    };
+    subject.trace = [&](std::span<const raydix::Ray> rays) { return raydix::trace(scene, rays); };
     subject.occluded = [&](std::span<const raydix::Ray> rays, std::span<std::uint8_t> out) {
-        raydix::trace_any(tree, test, rays, out);
+        raydix::trace_any(scene, rays, out);
     };
     subject.surface = [&](const raydix::Hit& hit, Vec3 place) -> Surface {
         const Vec3 normal = unit(place - balls[hit.prim].center);

@@ -1,5 +1,4 @@
-// Shapes that are not triangles: what queries ask with, and what rays can hit through
-// <raydix/user_geometry.h>.
+// Shapes that are not triangles: what queries ask with, and what rays can hit in a Scene.
 #pragma once
 
 #include <raydix/types.h>

@@ -12,6 +12,7 @@
 
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "engine/scene_job.h"
 #include "engine/shape_tree.h"
@@ -79,11 +80,12 @@ HWY_INLINE std::uint32_t may_hit(const Sphere* first, std::uint32_t count, const
         const V room = hn::MulAdd(far, hn::Set(f8, 0x1p-19f), radius);
         const V most = hn::Mul(hn::Mul(room, room), hn::Set(f8, 1.0f + 0x1p-18f));
         const V stay = hn::Mul(room, hn::Set(f8, at.inverse * (1.0f + 0x1p-18f)));
-        // NaN is no reason to leave one out.
+        // NaN is no reason to leave one out, and neither is a product that overflows.
+        const auto known = hn::Le(hn::Abs(along), hn::Set(f8, std::numeric_limits<float>::max()));
         const auto beside = hn::Gt(square, most);
         const auto behind = hn::Lt(hn::Add(t, stay), hn::Set(f8, ray.tmin)),
                    beyond = hn::Gt(hn::Sub(t, stay), hn::Set(f8, ray.tmax));
-        bits |= (~bits_of(f8, hn::Or(beside, hn::Or(behind, beyond)))) << l;
+        bits |= (~bits_of(f8, hn::And(known, hn::Or(beside, hn::Or(behind, beyond))))) << l;
     }
     return bits & ((1u << count) - 1);
 }
