@@ -26,8 +26,8 @@ struct SceneJobD {
     const std::uint32_t* masks = nullptr;  // [rays] instead; or null
     HitD* hits = nullptr;                  // or else
     std::uint8_t* occluded = nullptr;
-    SimdPath path = SimdPath::single;
-    bool turns = false;  // if they go alone: some of them in turn
+    /// In packets and in turns: through one mesh that is not empty; in packets all rays see it.
+    enum class Way { alone, turns, packets } way = Way::alone;
 
     // Of all hits: those of each ray behind those of the one before, sorted; how many [n].
     BudgetVector<HitD>* found = nullptr;

@@ -2,8 +2,10 @@
 #include <raydix/error.h>
 #include <raydix/scene.h>
 
+#include <array>
 #include <vector>
 
+#include "base/double3.h"
 #include "base/float_env.h"
 #include "base/options.h"
 #include "engine/scene_batch.h"
@@ -13,6 +15,7 @@
 #include "trace/all_hits.h"
 #include "trace/batch.h"
 #include "trace/ray_frame.h"
+#include "trace/simd/path_race.h"
 #include "trace/simd/wide_batch.h"
 
 namespace raydix {
@@ -55,17 +58,64 @@ SceneJobD& job_for(const SceneTreeD& tree, const Batch& batch, std::size_t begin
     return job;
 }
 
+using Way = SceneJobD::Way;
+
+/// What the rays of a batch do, and may try instead.
+struct Ways {
+    std::array<Way, 2> way;
+    std::size_t likely;  // of the two
+};
+
+/// choose_path for rays about the center of a tree.
+SimdPath choose_path(const WideTreeD& tree, std::span<const RayD> rays) {
+    constexpr std::size_t window = 64, windows = 32;
+    std::vector<Ray> some;
+    for (std::size_t w = 0; w < windows; ++w) {
+        const std::size_t begin = rays.size() / windows * w;
+        if (begin + window > rays.size()) break;
+        for (const RayD& ray : rays.subspan(begin, window)) {
+            Ray& near = some.emplace_back();
+            Double3(tree.space.local(ray.origin)).round_to(near.origin);
+            Double3(ray.direction).round_to(near.direction);
+        }
+    }
+    return raydix::choose_path(tree.arrays.bounds, some);
+}
+
+Ways ways_of(const SceneTreeD& tree, const Batch& batch) {
+    const MeshTreeD* const mesh = tree.only_mesh();
+    if (mesh == nullptr || mesh->tree->empty()) return {{Way::alone, Way::alone}, 1};
+    const SceneTraceOptions& options = batch.options;
+    const bool may_go_together =
+        mesh->tree->suits_packets && options.masks.empty() && (mesh->mask & options.mask) != 0;
+    if (!may_go_together || options.path == SimdPath::single) return {{Way::turns, Way::turns}, 1};
+    const SimdPath path =
+        options.path == SimdPath::automatic ? choose_path(*mesh->tree, batch.rays) : options.path;
+    if (path == SimdPath::packet) return {{Way::packets, Way::packets}, 1};
+    return {{Way::turns, Way::packets}, path == SimdPath::stream ? 2u : 1u};
+}
+
+/// With fewer jobs than this a trial would cost more than it may gain.
+constexpr std::size_t least_jobs_of_race = 16;
+
 TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
     const SceneTreeD& tree = checked_tree(scene, batch.rays.size(), batch.options);
     const SceneKernelsD& kernels = scene_kernels_double_for(batch.options.isa);
-    const std::size_t n = batch.rays.size(), job_size = rays_per_job(n, SimdPath::single);
+    const std::size_t n = batch.rays.size(), job_size = rays_per_job(n, SimdPath::packet);
     std::vector<JobCounts> parts((n + job_size - 1) / job_size);
+    const Ways ways = ways_of(tree, batch);
+    PathRace race(ways.likely, 2 - ways.likely);
+    const bool races = ways.way[0] != ways.way[1] && batch.options.path == SimdPath::automatic &&
+                       parts.size() >= least_jobs_of_race;
     with_threads(batch.options.threads, [&] {
         for_each_block(n, job_size, [&](std::size_t part, std::size_t begin, std::size_t end) {
-            SceneJobD& job = job_for(tree, batch, begin, end);
-            job.turns = true;
-            kernels.trace(job);
-            parts[part] = {job.hit_count, job.invalid};
+            const auto trace = [&](std::size_t way, std::size_t from, std::size_t to) {
+                SceneJobD& job = job_for(tree, batch, from, to);
+                job.way = ways.way[way];
+                kernels.trace(job);
+                parts[part] += {job.hit_count, job.invalid};
+            };
+            races ? race.run(begin, end, trace) : trace(0, begin, end);
         });
     });
     return sum_of(parts, n);

@@ -13,6 +13,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "engine/mesh_packets_double.h"
 #include "engine/scene_ray_double.h"
 #include "trace/simd/turns.h"
 
@@ -109,28 +110,28 @@ HitD hit_of_scene(const SceneTreeD& scene, const RayD& ray, std::uint32_t mask,
     return one.best();
 }
 
+/// Ray k of a job. The stack has its room.
 template <bool any>
-void trace_alone(SceneJobD& job) {
-    job.stack.reserve_words(job.tree->stack_size);
-    for (std::size_t k = 0; k < job.n; ++k) {
-        const std::size_t place = job.place(k);
-        const RayD& ray = job.rays[place];
-        HitD hit;
-        if (is_valid(ray))
-            hit = hit_of_scene<any>(*job.tree, ray, job.mask_of(place), job.stack.view());
-        else
-            ++job.invalid;
-        job.set(place, hit);
-    }
+void trace_alone(SceneJobD& job, std::size_t k) {
+    const std::size_t place = job.place(k);
+    const RayD& ray = job.rays[place];
+    HitD hit;
+    if (is_valid(ray))
+        hit = hit_of_scene<any>(*job.tree, ray, job.mask_of(place), job.stack.view());
+    else
+        ++job.invalid;
+    job.set(place, hit);
 }
 
 template <bool any>
 void trace_scene_as(SceneJobD& job) {
-    const MeshTreeD* const mesh = job.tree->only_mesh();
-    if (mesh != nullptr && !mesh->tree->empty() && job.turns)
+    job.stack.reserve_words(job.tree->stack_size);
+    if (job.way == SceneJobD::Way::packets)
+        MeshPacketsD<any>(job).trace([&](std::size_t k) { trace_alone<any>(job, k); });
+    else if (job.way == SceneJobD::Way::turns)
         MeshTurnsD<any>(job).trace();
     else
-        trace_alone<any>(job);
+        for (std::size_t k = 0; k < job.n; ++k) trace_alone<any>(job, k);
 }
 
 inline void trace_scene(SceneJobD& job) {

@@ -81,6 +81,33 @@ HWY_INLINE CrossingsD<D> find_crossings(D d, const Sheared<D>& a, const Sheared<
     return {hn::Add(t, hn::Zero(d)), area, candidates & sure & within, candidates & ~sure};
 }
 
+/// The corners of four triangles as a ray sees them.
+HWY_INLINE Sheared<D4> shear_four(const TriangleBlockD& block, std::size_t l, int vertex,
+                                  const RayClass& kind, const TriangleLineD& line) {
+    const auto at = [&](std::uint32_t axis) {
+        return hn::Sub(hn::Load(d4, block.corner[3 * vertex + static_cast<int>(axis)] + l),
+                       hn::Set(d4, line.origin[axis]));
+    };
+    const hn::Vec<D4> z = at(kind.kz);
+    return {hn::Sub(at(kind.kx), hn::Mul(hn::Set(d4, line.shear[0]), z)),
+            hn::Sub(at(kind.ky), hn::Mul(hn::Set(d4, line.shear[1]), z)), z};
+}
+/// Where a ray crosses lanes l on of a block, those in `tested`; v and w: their edge functions.
+HWY_INLINE CrossingsD<D4> cross_four(const TriangleBlockD& block, std::size_t l,
+                                     std::uint32_t tested, const RayClass& kind,
+                                     const TriangleLineD& line, double reach, hn::Vec<D4>& v,
+                                     hn::Vec<D4>& w) {
+    const Sheared<D4> a = shear_four(block, l, 0, kind, line),
+                      b = shear_four(block, l, 1, kind, line),
+                      c = shear_four(block, l, 2, kind, line);
+    const hn::Vec<D4> u = edge(c, b);
+    v = edge(a, c), w = edge(b, a);
+    const std::uint32_t candidates = tested & ~bits_of(d4, astride(d4, u, v, w));
+    if (candidates == 0) return {u, u, 0, 0};
+    return find_crossings(d4, a, b, c, u, v, w, hn::Set(d4, line.per_depth), hn::Set(d4, line.tmin),
+                          hn::Set(d4, reach), candidates);
+}
+
 /// One ray's line at the leaves of a tree (Parts of single.h). Take: for all hits, called with t in
 /// units of the line, prim, u and v.
 template <Wanted wanted, class Take = std::nullptr_t>
@@ -112,25 +139,10 @@ public:
 private:
     using V = hn::Vec<D4>;
 
-    HWY_INLINE Sheared<D4> shear(const TriangleBlockD& block, std::size_t l, int vertex) const {
-        const auto at = [&](std::uint32_t axis) {
-            return hn::Sub(hn::Load(d4, block.corner[3 * vertex + static_cast<int>(axis)] + l),
-                           hn::Set(d4, line_.origin[axis]));
-        };
-        const V z = at(kind_.kz);
-        return {hn::Sub(at(kind_.kx), hn::Mul(hn::Set(d4, line_.shear[0]), z)),
-                hn::Sub(at(kind_.ky), hn::Mul(hn::Set(d4, line_.shear[1]), z)), z};
-    }
-
     /// Lanes l on. True: any hit will do, and there is one.
     HWY_INLINE bool test(const TriangleBlockD& block, std::size_t l, std::uint32_t tested) {
-        const Sheared<D4> a = shear(block, l, 0), b = shear(block, l, 1), c = shear(block, l, 2);
-        const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
-        const std::uint32_t candidates = tested & ~bits_of(d4, astride(d4, u, v, w));
-        if (candidates == 0) return false;
-        const CrossingsD<D4> at =
-            find_crossings(d4, a, b, c, u, v, w, hn::Set(d4, line_.per_depth),
-                           hn::Set(d4, line_.tmin), hn::Set(d4, best_.t), candidates);
+        V v, w;
+        const CrossingsD<D4> at = cross_four(block, l, tested, kind_, line_, best_.t, v, w);
         if (at.hit != 0) {
             if constexpr (wanted == Wanted::any) return true;
             alignas(32) double t[4], over_v[4], over_w[4], area[4];
