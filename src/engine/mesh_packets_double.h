@@ -313,7 +313,9 @@ private:
         auto same = hn::Eq(zero, zero);
         V first[3];
         auto one = same;
-        for (std::size_t i = 0; i < count; i += lanes_d8) {
+        // Floats are read in vectors of their own, up to the end of the last one.
+        const std::size_t filled = (count + lanes16 - 1) / lanes16 * lanes16;
+        for (std::size_t i = 0; i < filled; i += lanes_d8) {
             const auto at = hn::ShiftLeft<3>(hn::Load(I(), index + i));
             const auto read = [&](int c) {
                 return hn::GatherIndex(d8, base, hn::Add(at, hn::Set(I(), c)));
