@@ -1,7 +1,6 @@
 #include "scene_subjects.h"
 
 #include <raydix/closest.h>
-#include <raydix/double.h>
 #include <raydix/scene.h>
 #include <raydix/trace.h>
 #include <raydix/user_geometry.h>
@@ -91,36 +90,6 @@ struct MeshCalls : FloatRays {
 
 Vec3d widened(Vec3 p) { return {p.x, p.y, p.z}; }
 
-struct DoubleCalls {
-    using Hit = HitD;
-    BvhD tree;
-
-    DoubleCalls(const Mesh& mesh, const SubjectOptions& options) {
-        MeshD wide;
-        for (const Vec3 v : mesh.vertices) wide.vertices.push_back(widened(v));
-        wide.triangles = mesh.triangles;
-        tree = build_bvh(wide, build_options(options));
-    }
-    static std::vector<RayD> given(std::span<const Ray> rays) {
-        std::vector<RayD> wide;
-        for (const Ray& ray : rays)
-            wide.push_back({widened(ray.origin), ray.tmin, widened(ray.direction), ray.tmax});
-        return wide;
-    }
-    void closest(std::span<const RayD> rays, std::span<HitD> hits, int threads) const {
-        trace(tree, rays, hits, {.threads = threads});
-    }
-    void any(std::span<const RayD> rays, std::span<std::uint8_t> found, int threads) const {
-        trace_any(tree, rays, found, {.threads = threads});
-    }
-    [[nodiscard]] HitD closest_one(const RayD& ray) const { return closest_hit(tree, ray); }
-    [[nodiscard]] bool any_one(const RayD& ray) const { return any_hit(tree, ray); }
-    [[nodiscard]] PlacedHit placed(const HitD& hit) const {
-        if (!hit.hit()) return {};
-        return {float(hit.t), hit.prim, float(hit.u), float(hit.v), 0, 0};
-    }
-};
-
 Transform transform_of(const Affine& affine) {
     Transform transform;
     for (std::size_t r = 0; r < 3; ++r)
@@ -131,6 +100,38 @@ Transform transform_of(const Affine& affine) {
 SceneOptions scene_options(const SubjectOptions& options) {
     return {.quality = options.quality, .threads = options.threads};
 }
+
+/// A mesh in a SceneD.
+struct DoubleCalls {
+    using Hit = HitD;
+    SceneD scene;
+
+    DoubleCalls(const Mesh& mesh, const SubjectOptions& options) {
+        MeshD wide;
+        for (const Vec3 v : mesh.vertices) wide.vertices.push_back(widened(v));
+        wide.triangles = mesh.triangles;
+        scene.add(wide);
+        scene.commit(scene_options(options));
+    }
+    static std::vector<RayD> given(std::span<const Ray> rays) {
+        std::vector<RayD> wide;
+        for (const Ray& ray : rays)
+            wide.push_back({widened(ray.origin), ray.tmin, widened(ray.direction), ray.tmax});
+        return wide;
+    }
+    void closest(std::span<const RayD> rays, std::span<HitD> hits, int threads) const {
+        trace(scene, rays, hits, {.threads = threads});
+    }
+    void any(std::span<const RayD> rays, std::span<std::uint8_t> found, int threads) const {
+        trace_any(scene, rays, found, {.threads = threads});
+    }
+    [[nodiscard]] HitD closest_one(const RayD& ray) const { return closest_hit(scene, ray); }
+    [[nodiscard]] bool any_one(const RayD& ray) const { return any_hit(scene, ray); }
+    [[nodiscard]] PlacedHit placed(const HitD& hit) const {
+        if (!hit.hit()) return {};
+        return {float(hit.t), hit.prim, float(hit.u), float(hit.v), 0, 0};
+    }
+};
 
 /// Rays through a Scene.
 struct SceneCalls : FloatRays {

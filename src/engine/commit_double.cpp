@@ -1,39 +1,32 @@
-// Commits in double: as commit.cpp, with the trees of <raydix/double.h> and one over the parts.
+// Commits in double: as commit.cpp, with trees of doubles and one over the parts.
 #include <raydix/error.h>
 
+#include <algorithm>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "engine/commit.h"
 #include "engine/mesh_commit.h"
-#include "tree/copy.h"
+#include "engine/part_tree.h"
 
 namespace raydix {
 namespace {
 
 /// Trees of triangles in double (mesh_commit.h).
-struct BinaryMaker {
+struct WideMakerD {
     static void build(const MeshViewD& mesh, const SceneOptions& options, MeshTreeD& out) {
         BuildOptions build = build_options_for(options.quality);
         build.threads = options.threads;
-        out.tree = std::make_shared<const BvhD>(build_bvh(mesh, build));
-        out.sah_at_build = 0;  // the first refit finds it
+        out.tree = build_wide_tree(mesh, build);
+        out.sah_at_build = out.tree->arrays.stats.sah;
     }
     static void keep(const MeshTreeD& old, MeshTreeD& out) { out.tree = old.tree; }
     static std::optional<double> refit(const MeshTreeD& old, const MeshViewD& mesh,
-                                       const SceneOptions& options, MeshTreeD& out) {
-        if (old.tree->empty() || old.tree->tree().has_split_primitives() ||
-            old.tree->tree().input_count() != mesh.triangles.size())
-            return {};
-        BvhD tree = copy_of(*old.tree);
-        try {
-            const RefitQuality quality = raydix::refit(tree, mesh, options.threads);
-            out.tree = std::make_shared<const BvhD>(std::move(tree));
-            if (out.sah_at_build == 0) out.sah_at_build = quality.sah_at_build;
-            return quality.sah;
-        } catch (const InputError&) {
-            return {};  // triangles came, or went
-        }
+                                       const SceneOptions&, MeshTreeD& out) {
+        out.tree = refit_wide_tree(*old.tree, mesh);
+        if (out.tree == nullptr) return {};
+        return out.tree->arrays.stats.sah;
     }
 };
 
@@ -56,7 +49,7 @@ public:
                 ++instances;
             else
                 tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
-        MeshCommit<double, BinaryMaker> meshes(state_, options_, report_);
+        MeshCommit<double, WideMakerD> meshes(state_, options_, report_);
         tree_->meshes = meshes.run(static_cast<double>(instances));
         for (const auto& mesh : tree_->meshes) add_extent(*mesh->tree);
         place_instances();
@@ -69,11 +62,12 @@ public:
     }
 
 private:
-    void add_extent(const BvhD& mesh) {
-        tree_->parts.extents.push_back(
-            extent_of_triangles(mesh.empty() ? nothing_d : mesh.bounds()));
+    void add_extent(const WideTreeD& mesh) {
+        extents_.push_back(extent_of_triangles(mesh.empty() ? nothing_d : mesh.bounds));
         report_.bytes += mesh.bytes();
-        if (!mesh.empty()) unite_with(tree_->bounds, mesh.bounds());
+        tree_->stack_size =
+            std::max(tree_->stack_size, wide_stack_capacity(mesh.arrays.stats.max_depth));
+        if (!mesh.empty()) unite_with(tree_->bounds, mesh.bounds);
     }
 
     void place_instances() {
@@ -87,7 +81,8 @@ private:
             ExtentD extent{nothing_d, 0.0};
             if (!is_empty(around))
                 extent = image_of(affine_of(geometry.transform), geometry.inverse, around);
-            tree_->parts.extents.push_back(extent);
+            extents_.push_back(extent);
+            tree_->stack_size = std::max(tree_->stack_size, inner->stack_size);
             if (is_empty(around)) continue;
             if (!in_range(extent)) refuse_reach(id);
             unite_with(tree_->bounds, extent.box);
@@ -95,16 +90,17 @@ private:
     }
 
     void build_top() {
-        BvhBuilder builder;
-        tree_->parts.build(builder, build_options_for(quality_of_parts(options_)));
+        build_part_tree(extents_, quality_of_parts(options_), tree_->parts);
+        tree_->stack_size += wide_stack_capacity(tree_->parts.arrays.stats.max_depth);
         if (tree_->only_mesh() == nullptr)
-            report_.bytes += tree_->parts.bvh.nodes().size_bytes() +
+            report_.bytes += tree_->parts.arrays.nodes.size() * sizeof(WideNode) +
                              tree_->instances.size() * sizeof(PlacedSceneD);
     }
 
     const SceneAccessD::State& state_;
     const SceneOptions& options_;
     CommitReport& report_;
+    std::vector<ExtentD> extents_;  // [parts]
     std::shared_ptr<SceneTreeD> tree_ = std::make_shared<SceneTreeD>();
 };
 

@@ -5,6 +5,8 @@
 #include "exec/parallel.h"
 #include "layout/wide_collapse.h"
 #include "primitives/sources.h"
+#include "tree/around_center.h"
+#include "tree/median_center.h"
 
 namespace raydix {
 namespace {
@@ -176,29 +178,17 @@ bool refit_nodes(const PartTree& old, const BoxOf& box_of, double limit, PartTre
     return true;
 }
 
-}  // namespace
-
-void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
-                     Quality quality, PartTree& out) {
-    std::vector<Aabb> boxes(parts.size());
-    for (std::size_t k = 0; k < parts.size(); ++k) boxes[k] = built_box(extents[parts[k]]);
-    // Boxes cannot be split.
-    const BuildOptions build =
-        build_options_for(quality == Quality::fast ? Quality::fast : Quality::balanced);
-    build_box_tree(boxes, build, {.width = quantised_width, .max_leaf = 1}, out);
-    for (std::uint32_t& part : out.part) part = parts[part];
-    if (!parts.empty()) set_growth(parts, extents, out);
-}
-
-void build_box_tree(std::span<const Aabb> boxes, BuildOptions build, const WideOptions& leaves,
-                    PartTree& out) {
+/// `middle`: what planes are about, or null for the middle of the bounds.
+void make_box_tree(std::span<const Aabb> boxes, BuildOptions build, const WideOptions& leaves,
+                   const Vec3* middle, PartTree& out) {
     out.part.clear();
     if (boxes.empty()) return;
     build.max_leaf = 1;  // leaves are made on the way to the wide tree
     const Bvh bvh = build_bvh(boxes, build);
     if (bvh.empty()) return;
     const WideTree wide = collapse_to_wide(bvh, leaves);
-    out.arrays.set_bounds(reach_of(bvh.bounds()));
+    const Aabb bounds = reach_of(bvh.bounds());
+    out.arrays.set_bounds(bounds, middle == nullptr ? center_of(bounds) : *middle);
     out.arrays.nodes.reset(wide.node_count());
     std::vector<double> areas(wide.node_count());
     for_each_index(
@@ -213,6 +203,57 @@ void build_box_tree(std::span<const Aabb> boxes, BuildOptions build, const WideO
     out.cost_at_build = cost_of(areas, out.arrays.bounds);
     out.part.assign(bvh.order().begin(), bvh.order().end());
     set_view(out);
+}
+
+/// Boxes cannot be split.
+BuildOptions build_of_parts(Quality quality) {
+    return build_options_for(quality == Quality::fast ? Quality::fast : Quality::balanced);
+}
+constexpr WideOptions leaves_of_parts{.width = quantised_width, .max_leaf = 1};
+
+}  // namespace
+
+void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
+                     Quality quality, PartTree& out) {
+    std::vector<Aabb> boxes(parts.size());
+    for (std::size_t k = 0; k < parts.size(); ++k) boxes[k] = built_box(extents[parts[k]]);
+    build_box_tree(boxes, build_of_parts(quality), leaves_of_parts, out);
+    for (std::uint32_t& part : out.part) part = parts[part];
+    if (!parts.empty()) set_growth(parts, extents, out);
+}
+
+void build_part_tree(std::span<const ExtentD> extents, Quality quality, PartTreeD& out) {
+    out.around = {nothing_d, 0.0};
+    for (const ExtentD& extent : extents) {
+        if (is_empty(extent)) continue;
+        out.around.box = {min_of(out.around.box.lo, extent.box.lo),
+                          max_of(out.around.box.hi, extent.box.hi)};
+        out.around.error = std::max(out.around.error, extent.error);
+    }
+    const auto box_at = [&](std::size_t i, AabbD& box) {
+        box = extents[i].box;
+        return !is_empty(extents[i]);
+    };
+    const Vec3d center = median_center(extents.size(), box_at, out.around.box);
+    out.space = {center, scale_around(center, out.around.box)};
+    std::vector<Aabb> boxes(extents.size());
+    for_each_index(boxes.size(), [&](std::size_t i) {
+        AabbD box;
+        boxes[i] = box_at(i, box)
+                       ? grown_planes(box_around_center(box, out.space.center, out.space.scale))
+                       : empty_box();
+    });
+    PartTree tree;
+    const Vec3 middle{};
+    make_box_tree(boxes, build_of_parts(quality), leaves_of_parts, &middle, tree);
+    out.arrays = std::move(tree.arrays);
+    out.part = std::move(tree.part);
+    out.set_view();
+}
+
+void build_box_tree(std::span<const Aabb> boxes, BuildOptions build, const WideOptions& leaves,
+                    PartTree& out) {
+    make_box_tree(boxes, build, leaves, nullptr, out);
 }
 
 bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,

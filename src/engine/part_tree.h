@@ -5,6 +5,7 @@
 #include <span>
 
 #include "engine/scene_tree.h"
+#include "engine/scene_tree_double.h"
 #include "layout/wide_collapse.h"
 
 namespace raydix {
@@ -18,6 +19,9 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
 /// other parts, or if its cost would be more than `limit` times that at its build.
 [[nodiscard]] bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,
                                    std::span<const Extent> extents, double limit, PartTree& out);
+
+/// In double: [parts], those that are empty are left out and the others must be in range.
+void build_part_tree(std::span<const ExtentD> extents, Quality quality, PartTreeD& out);
 
 /// Leaves hold the numbers of boxes, as `leaves` says. Boxes that builders leave out are left out.
 /// `out.growth` stays as it is.

@@ -15,6 +15,7 @@
 #include "engine/hit_order.h"
 #include "engine/scene_job.h"
 #include "engine/shape_leaves.h"
+#include "trace/simd/lanes_double.h"
 #include "trace/simd/single.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -51,21 +52,6 @@ HWY_INLINE bool keep(const Tree& tree, std::uint32_t number, double scale, const
     reach =
         found.t < std::numeric_limits<float>::min() ? std::nextafterf(found.t, infinity) : found.t;
     return true;
-}
-
-using D4 = hn::CappedTag<double, 4>;
-
-/// As floats.
-template <class D = D4>
-HWY_INLINE V4 rounded(const double* from) {
-    const D d;
-    if constexpr (hn::MaxLanes(d) == 4) {
-        return hn::DemoteTo(f4, hn::Load(d, from));
-    } else {
-        alignas(16) float out[4];
-        for (int a = 0; a < 4; ++a) out[a] = static_cast<float>(from[a]);
-        return hn::Load(f4, out);
-    }
 }
 
 HWY_INLINE bool near_unit_length(double longest) { return longest > 0x1p-3 && longest < 0x1p3; }

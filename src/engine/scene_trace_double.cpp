@@ -1,117 +1,39 @@
-// Rays in double through scenes, one after the other: down the tree over the parts with room for
-// what rounding on the way into instances may move, through the inverse of each instance that is
-// met, and on from there.
+// Batches and single rays in double through scenes.
 #include <raydix/error.h>
 #include <raydix/scene.h>
 
-#include <cmath>
-#include <limits>
+#include <array>
 #include <vector>
 
+#include "base/double3.h"
 #include "base/float_env.h"
 #include "base/options.h"
-#include "engine/hit_order.h"
 #include "engine/scene_batch.h"
+#include "engine/scene_job_double.h"
 #include "engine/scene_state.h"
 #include "exec/parallel.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
+#include "trace/ray_frame.h"
+#include "trace/simd/path_race.h"
 #include "trace/simd/wide_batch.h"
-#include "trace/tree_hits.h"
 
 namespace raydix {
 namespace {
 
-constexpr std::size_t block_size = 512;
-
-enum class Wanted { closest, any, all };
-
-template <Wanted wanted>
-class SceneRayD {
-public:
-    /// The ray must be valid. `found`: of all hits.
-    SceneRayD(const SceneTreeD& scene, const RayD& ray, std::uint32_t mask,
-              BudgetVector<HitD>* found = nullptr)
-        : mask_(mask), tmin_(ray.tmin), reach_(ray.tmax), found_(found) {
-        walk(scene, 0, LineD(ray));
-    }
-
-    [[nodiscard]] const HitD& best() const { return best_; }
-
-private:
-    /// Whether to stop; so do all below.
-    bool walk(const SceneTreeD& scene, std::uint32_t number, const LineD& line) {
-        if (const MeshTreeD* const mesh = scene.only_mesh()) return hit_mesh(*mesh, number, line);
-        const InstanceTreeD& parts = scene.parts;
-        const RayD ray = line.ray(tmin_, reach_);
-        if (parts.bvh.empty() || !is_valid(ray)) return false;
-        WalkStackD stack(parts.bvh.max_depth());
-        const RayFrameD frame = make_frame(ray);
-        const InstanceNodesD nodes(parts, ray, frame);
-        bool stop = false;
-        const auto leaf = [&](const BvhNode& node) {
-            for (std::uint32_t k = node.first; k < node.first + node.count && !stop; ++k)
-                stop = visit(scene, parts.bvh.order()[k], number, line);
-            return stop;
-        };
-        walk_entered(
-            parts.bvh.nodes().data(), stack, [&](const BvhNode& node) { return nodes.enter(node); },
-            leaf, [&] { return reach_ / frame.t_scale; });
-        return stop;
-    }
-
-    bool visit(const SceneTreeD& scene, std::uint32_t part, std::uint32_t number,
-               const LineD& line) {
-        if (part < scene.meshes.size()) return hit_mesh(*scene.meshes[part], number, line);
-        const PlacedSceneD& placed = scene.instances[part - scene.meshes.size()];
-        return (placed.mask & mask_) != 0 &&
-               walk(*placed.scene, number + placed.number, line.into(placed.inverse));
-    }
-
-    bool hit_mesh(const MeshTreeD& mesh, std::uint32_t number, const LineD& line) {
-        if (mesh.tree->empty() || (mesh.mask & mask_) == 0) return false;
-        const RayD ray = line.ray(tmin_, reach_);
-        if (!is_valid(ray)) return false;
-        const TriangleTreeD tree(*mesh.tree);
-        WalkStackD stack(tree.max_depth);
-        const RayFrameD frame = make_frame(ray);
-        NoSteps steps;
-        if constexpr (wanted == Wanted::any) {
-            if (!find_any(tree, frame, stack, steps)) return false;
-            best_.prim = 0;
-            return true;
-        } else if constexpr (wanted == Wanted::all) {
-            find_all(tree, frame, stack, steps, [&](double t, std::uint32_t k, double u, double v) {
-                found_->push_back(named({t + 0.0, tree.order[k], u, v}, mesh, number));
-            });
-        } else {
-            const BasicClosestHit<double> hit = find_closest(tree, frame, stack, steps);
-            if (hit.prim != no_primitive)
-                keep(named({hit.t * frame.t_scale + 0.0, hit.prim, hit.u, hit.v}, mesh, number));
-        }
-        return false;
-    }
-
-    static HitD named(const TreeHitD& in_tree, const MeshTreeD& mesh, std::uint32_t number) {
-        HitD hit{in_tree, no_primitive, number};
-        mesh.name(hit);
-        return hit;
-    }
-
-    void keep(const HitD& hit) {
-        if (best_.hit() && !(order_of(hit) < order_of(best_))) return;
-        best_ = hit;
-        // What differs on the way in may be equal in the caller's units where those are subnormal:
-        // it must be found too.
-        reach_ = hit.t < std::numeric_limits<double>::min() ? std::nextafter(hit.t, 1.0) : hit.t;
-    }
-
-    const std::uint32_t mask_;
-    const double tmin_;
-    double reach_;
-    HitD best_;
-    BudgetVector<HitD>* found_;
+/// Rays and where their answers go: hits, or else occluded.
+struct Batch {
+    std::span<const RayD> rays;
+    HitD* hits;
+    std::uint8_t* occluded;
+    const SceneTraceOptions& options;
 };
+
+/// The job of each thread: its memory stays from batch to batch.
+SceneJobD& job_of_this_thread() {
+    thread_local SceneJobD job;
+    return job;
+}
 
 const SceneTreeD& checked_tree(const SceneD& scene, std::size_t rays,
                                const SceneTraceOptions& options) {
@@ -122,26 +44,96 @@ const SceneTreeD& checked_tree(const SceneD& scene, std::size_t rays,
     return tree;
 }
 
-/// Calls one(block, i, mask) -> number of hits for each valid ray and miss(i) for each other one;
-/// done(b) after those of block b.
-template <class One, class Miss, class Done>
-TraceCounts for_each_ray(std::span<const RayD> rays, const SceneTraceOptions& options,
-                         const One& one, const Miss& miss, const Done& done) {
-    std::vector<JobCounts> parts((rays.size() + block_size - 1) / block_size);
-    for_each_block(
-        rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
-                if (!is_valid(rays[i])) {
-                    ++parts[block].invalid;
-                    miss(i);
-                } else {
-                    parts[block].hits +=
-                        one(block, i, options.masks.empty() ? options.mask : options.masks[i]);
-                }
-            }
-            done(block);
+/// Rays begin to end - 1 of a batch, but for where answers go.
+SceneJobD& job_for(const SceneTreeD& tree, const Batch& batch, std::size_t begin, std::size_t end) {
+    SceneJobD& job = job_of_this_thread();
+    job.tree = &tree;
+    job.rays = batch.rays.data() + begin;
+    job.order = nullptr;
+    job.n = end - begin;
+    job.mask = batch.options.mask;
+    job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + begin;
+    job.hits = batch.hits == nullptr ? nullptr : batch.hits + begin;
+    job.occluded = batch.occluded == nullptr ? nullptr : batch.occluded + begin;
+    return job;
+}
+
+using Way = SceneJobD::Way;
+
+/// What the rays of a batch do, and may try instead.
+struct Ways {
+    std::array<Way, 2> way;
+    std::size_t likely;  // of the two
+};
+
+/// choose_path for rays about the center of a tree.
+SimdPath choose_path(const WideTreeD& tree, std::span<const RayD> rays) {
+    constexpr std::size_t window = 64, windows = 32;
+    std::vector<Ray> some;
+    for (std::size_t w = 0; w < windows; ++w) {
+        const std::size_t begin = rays.size() / windows * w;
+        if (begin + window > rays.size()) break;
+        for (const RayD& ray : rays.subspan(begin, window)) {
+            Ray& near = some.emplace_back();
+            Double3(tree.space.local(ray.origin)).round_to(near.origin);
+            Double3(ray.direction).round_to(near.direction);
+        }
+    }
+    return raydix::choose_path(tree.arrays.bounds, some);
+}
+
+Ways ways_of(const SceneTreeD& tree, const Batch& batch) {
+    const MeshTreeD* const mesh = tree.only_mesh();
+    if (mesh == nullptr || mesh->tree->empty()) return {{Way::alone, Way::alone}, 1};
+    const SceneTraceOptions& options = batch.options;
+    const bool may_go_together =
+        mesh->tree->suits_packets && options.masks.empty() && (mesh->mask & options.mask) != 0;
+    if (!may_go_together || options.path == SimdPath::single) return {{Way::turns, Way::turns}, 1};
+    const SimdPath path =
+        options.path == SimdPath::automatic ? choose_path(*mesh->tree, batch.rays) : options.path;
+    if (path == SimdPath::packet) return {{Way::packets, Way::packets}, 1};
+    return {{Way::turns, Way::packets}, path == SimdPath::stream ? 2u : 1u};
+}
+
+/// With fewer jobs than this a trial would cost more than it may gain.
+constexpr std::size_t least_jobs_of_race = 16;
+
+TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
+    const SceneTreeD& tree = checked_tree(scene, batch.rays.size(), batch.options);
+    const SceneKernelsD& kernels = scene_kernels_double_for(batch.options.isa);
+    const std::size_t n = batch.rays.size(), job_size = rays_per_job(n, SimdPath::packet);
+    std::vector<JobCounts> parts((n + job_size - 1) / job_size);
+    const Ways ways = ways_of(tree, batch);
+    PathRace race(ways.likely, 2 - ways.likely);
+    const bool races = ways.way[0] != ways.way[1] && batch.options.path == SimdPath::automatic &&
+                       parts.size() >= least_jobs_of_race;
+    with_threads(batch.options.threads, [&] {
+        for_each_block(n, job_size, [&](std::size_t part, std::size_t begin, std::size_t end) {
+            const auto trace = [&](std::size_t way, std::size_t from, std::size_t to) {
+                SceneJobD& job = job_for(tree, batch, from, to);
+                job.way = ways.way[way];
+                kernels.trace(job);
+                parts[part] += {job.hit_count, job.invalid};
+            };
+            races ? race.run(begin, end, trace) : trace(0, begin, end);
         });
-    return sum_of(parts, rays.size());
+    });
+    return sum_of(parts, n);
+}
+
+/// For any hit only prim has a meaning.
+HitD trace_one(const SceneD& scene, const RayD& ray, std::uint32_t mask, bool any) {
+    static const SceneKernelsD& kernels = scene_kernels_double_for({});
+    const SceneTreeD& tree = *SceneAccessD::tree(scene);
+    StackMemory& stack = job_of_this_thread().stack;
+    stack.reserve_words(tree.stack_size);
+    const auto answer = [&]() -> HitD {
+        if (!is_valid(ray)) return {};
+        return (any ? kernels.any : kernels.closest)(tree, ray, mask, stack.view());
+    };
+    if (FloatEnvironment::is_plain()) return answer();
+    const FloatEnvironment plain;
+    return answer();
 }
 
 }  // namespace
@@ -149,18 +141,7 @@ TraceCounts for_each_ray(std::span<const RayD> rays, const SceneTraceOptions& op
 TraceCounts trace(const SceneD& scene, std::span<const RayD> rays, std::span<HitD> hits,
                   const SceneTraceOptions& options) {
     check_sizes(rays.size(), hits.size());
-    const SceneTreeD& tree = checked_tree(scene, rays.size(), options);
-    TraceCounts counts;
-    with_threads(options.threads, [&] {
-        counts = for_each_ray(
-            rays, options,
-            [&](std::size_t, std::size_t i, std::uint32_t mask) {
-                hits[i] = SceneRayD<Wanted::closest>(tree, rays[i], mask).best();
-                return std::uint64_t{hits[i].hit()};
-            },
-            [&](std::size_t i) { hits[i] = {}; }, [](std::size_t) {});
-    });
-    return counts;
+    return trace_batch(scene, {rays, hits.data(), nullptr, options});
 }
 
 std::vector<HitD> trace(const SceneD& scene, std::span<const RayD> rays,
@@ -173,55 +154,40 @@ std::vector<HitD> trace(const SceneD& scene, std::span<const RayD> rays,
 TraceCounts trace_any(const SceneD& scene, std::span<const RayD> rays,
                       std::span<std::uint8_t> occluded, const SceneTraceOptions& options) {
     check_sizes(rays.size(), occluded.size());
-    const SceneTreeD& tree = checked_tree(scene, rays.size(), options);
-    TraceCounts counts;
-    with_threads(options.threads, [&] {
-        counts = for_each_ray(
-            rays, options,
-            [&](std::size_t, std::size_t i, std::uint32_t mask) {
-                occluded[i] = SceneRayD<Wanted::any>(tree, rays[i], mask).best().hit();
-                return std::uint64_t{occluded[i]};
-            },
-            [&](std::size_t i) { occluded[i] = 0; }, [](std::size_t) {});
-    });
-    return counts;
+    return trace_batch(scene, {rays, nullptr, occluded.data(), options});
 }
 
 AllHitsD trace_all(const SceneD& scene, std::span<const RayD> rays,
                    const SceneTraceOptions& options) {
     const SceneTreeD& tree = checked_tree(scene, rays.size(), options);
+    const SceneKernelsD& kernels = scene_kernels_double_for(options.isa);
+    const Batch batch{rays, nullptr, nullptr, options};
+    constexpr std::size_t block_size = 512;
     HitBlocks<AllHitsD> found(rays.size(), block_size, options.max_result_bytes);
+    std::vector<JobCounts> parts((rays.size() + block_size - 1) / block_size);
     AllHitsD all;
-    TraceCounts counts;
     with_threads(options.threads, [&] {
-        counts = for_each_ray(
-            rays, options,
-            [&](std::size_t block, std::size_t i, std::uint32_t mask) {
-                BudgetVector<HitD>& hits = found.hits(block);
-                const std::size_t before = hits.size();
-                const SceneRayD<Wanted::all> ray(tree, rays[i], mask, &hits);
-                finish_scene_ray(hits, before);
-                return found.hit_counts()[i] = hits.size() - before;
-            },
-            [](std::size_t) {}, [&](std::size_t block) { found.finish(block); });
+        for_each_block(rays.size(), block_size,
+                       [&](std::size_t block, std::size_t begin, std::size_t end) {
+                           SceneJobD& job = job_for(tree, batch, begin, end);
+                           job.found = &found.hits(block);
+                           job.hit_counts = found.hit_counts() + begin;
+                           kernels.all_hits(job);
+                           parts[block] = {job.hit_count, job.invalid};
+                           found.finish(block);
+                       });
         all = found.join();
     });
-    all.counts = counts;
+    all.counts = sum_of(parts, rays.size());
     return all;
 }
 
 HitD closest_hit(const SceneD& scene, const RayD& ray, std::uint32_t mask) {
-    const SceneTreeD& tree = *SceneAccessD::tree(scene);
-    const FloatEnvironment plain;
-    if (!is_valid(ray)) return {};
-    return SceneRayD<Wanted::closest>(tree, ray, mask).best();
+    return trace_one(scene, ray, mask, false);
 }
 
 bool any_hit(const SceneD& scene, const RayD& ray, std::uint32_t mask) {
-    const SceneTreeD& tree = *SceneAccessD::tree(scene);
-    const FloatEnvironment plain;
-    if (!is_valid(ray)) return false;
-    return SceneRayD<Wanted::any>(tree, ray, mask).best().hit();
+    return trace_one(scene, ray, mask, true).hit();
 }
 
 }  // namespace raydix

@@ -1,23 +1,25 @@
-// What a commit makes of a scene in double, as scene_tree.h in float: trees over triangles with two
-// children a node, and one over those and the instances.
+// What a commit makes of a scene in double, as scene_tree.h in float: wide trees over triangles,
+// and one over those and the instances.
 #pragma once
 
 #include <raydix/double.h>
 #include <raydix/scene.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "engine/grouped_meshes.h"
 #include "engine/mesh_name.h"
+#include "engine/wide_tree_double.h"
 #include "instances/affine_double.h"
 #include "instances/instance_tree_double.h"
 
 namespace raydix {
 
 struct MeshTreeD : GroupedMeshes {
-    std::shared_ptr<const BvhD> tree;
+    std::shared_ptr<const WideTreeD> tree;
 };
 
 struct SceneTreeD;
@@ -32,16 +34,23 @@ struct PlacedSceneD {
     std::shared_ptr<const SceneTreeD> scene;
 };
 
+/// A wide tree over parts, one a leaf: mesh trees first, then instances.
+struct PartTreeD : NodesD {
+    std::vector<std::uint32_t> part;  // by the place that leaves name
+    ExtentD around{nothing_d, 0.0};   // all of them
+};
+
 struct SceneTreeD {
     std::vector<std::shared_ptr<const MeshTreeD>> meshes;
     std::vector<PlacedSceneD> instances;  // by ascending id
     std::vector<MeshNameD> mesh_names;    // by ascending id
-    InstanceTreeD parts;                  // mesh trees first, then instances
-    AabbD bounds = nothing_d;             // without what rays may miss it by
-    Quality quality{};                    // what it was made with
-    bool compact = false;                 // as the commit had it; without effect
+    PartTreeD parts;
+    AabbD bounds = nothing_d;  // without what rays may miss it by
+    Quality quality{};         // what it was made with
+    bool compact = false;      // as the commit had it; without effect
     std::uint64_t paths = 0;
-    std::uint32_t levels = 0;  // of instances, below this scene
+    std::uint32_t levels = 0;    // of instances, below this scene
+    std::size_t stack_size = 0;  // of a ray: children still to visit, on all levels
 
     /// The only mesh tree, if rays need nothing else.
     [[nodiscard]] const MeshTreeD* only_mesh() const {

@@ -36,6 +36,8 @@ public:
     [[nodiscard]] Ref root() const { return 0; }
     [[nodiscard]] bool is_leaf(Ref ref) const { return nodes_[ref].is_leaf(); }
     [[nodiscard]] Aabb box(Ref ref) const { return {nodes_[ref].lo, nodes_[ref].hi}; }
+    /// What planes of wide nodes are about.
+    [[nodiscard]] Vec3 middle() const { return center_of(box(root())); }
     [[nodiscard]] std::array<Ref, 2> children(Ref inner) const {
         const std::uint32_t pair = nodes_[inner].first;
         return {pair, pair + 1};

@@ -40,6 +40,7 @@ public:
         if (is_primitive(ref)) return tree_.primitives.get(ref & ~primitive_cluster);
         return {tree_.nodes[ref].lo, tree_.nodes[ref].hi};
     }
+    [[nodiscard]] Vec3 middle() const { return center_of(box(root())); }
     [[nodiscard]] std::array<Ref, 2> children(Ref inner) const {
         return {tree_.nodes[inner].left, tree_.nodes[inner].right};
     }

@@ -93,9 +93,11 @@ struct WideBvh::Arrays {
     } frame;
     WideBvhStats stats;
 
-    void set_bounds(const Aabb& box) {
+    void set_bounds(const Aabb& box) { set_bounds(box, center_of(box)); }
+    /// `about`: in place of the middle, where planes of nodes are about another point.
+    void set_bounds(const Aabb& box, Vec3 about) {
         bounds = box;
-        middle = center_of(box);
+        middle = about;
         const auto copy = [](const Vec3& from, float* to) {
             to[0] = from.x, to[1] = from.y, to[2] = from.z;
         };

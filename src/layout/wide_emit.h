@@ -41,7 +41,7 @@ public:
         const WideSums sums = placer.finish();
         if (options_.compact) number_vertices(out);
         count_bytes(out);
-        out.set_bounds(view_.box(view_.root()));
+        out.set_bounds(view_.box(view_.root()), view_.middle());
         const double root = half_area(out.bounds);
         out.stats.sah =
             root > 0 ? (sums.node_area + wide_primitive_cost * sums.triangle_area) / root : 0;

@@ -29,7 +29,7 @@ public:
 
     /// Compact nodes and blocks, or plain ones.
     WidePartWriter(const View& view, bool compact, WidePart& out)
-        : view_(view), compact_(compact), middle_(center_of(view.box(view.root()))), out_(out) {}
+        : view_(view), compact_(compact), middle_(view.middle()), out_(out) {}
 
     /// An empty node; returns its number.
     std::uint32_t add_node() {

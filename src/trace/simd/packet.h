@@ -59,11 +59,26 @@ private:
     std::uint64_t found_ = 0;
 };
 
+/// Which class does that: Parts may have one of its own.
+template <Wanted query, class Parts>
+struct LeavesOfPacket {
+    using Type = PacketParts<query, Parts>;
+};
+template <Wanted query, class Parts>
+requires requires { typename Parts::OfPacket; }
+struct LeavesOfPacket<query, Parts> {
+    using Type = typename Parts::OfPacket;
+};
+template <Wanted query>
+struct LeavesOfPacket<query, NoParts> {
+    using Type = PacketTriangles<query>;
+};
+
 template <Wanted query, bool counting, bool compact, class Parts = NoParts>
 class PacketWalk {
     static constexpr bool any = wants_any(query), closest = wants_closest(query);
     static constexpr bool has_parts = !std::is_same_v<Parts, NoParts>;
-    using Leaves = std::conditional_t<has_parts, PacketParts<query, Parts>, PacketTriangles<query>>;
+    using Leaves = typename LeavesOfPacket<query, Parts>::Type;
 
 public:
     /// Through triangles. `rays`: what the packet was filled with, rays[index[k]]; `all`, `check`:
