@@ -93,9 +93,9 @@ std::shared_ptr<const FlatTriangles> make_flats(const MeshTree& mesh,
 
 class NearSceneMaker {
 public:
-    explicit NearSceneMaker(const SceneTree& scene) : scene_(scene) {}
+    NearSceneMaker(const SceneTree& scene, NearScene& out) : scene_(scene), out_(out) {}
 
-    NearScene run() {
+    void run() {
         if (!scene_.extent.empty()) out_.reach = largest_coordinate(scene_.extent.box);
         flat_boxes_.resize(scene_.own_part_count() + scene_.placed.size());
         for (std::size_t m = 0; m < scene_.meshes.size(); ++m) {
@@ -106,7 +106,6 @@ public:
         add_ways();
         build_flats();
         list_shapes();
-        return std::move(out_);
     }
 
 private:
@@ -157,7 +156,7 @@ private:
     }
 
     const SceneTree& scene_;
-    NearScene out_;
+    NearScene& out_;                  // stays where it is: views of its tree point into it
     std::vector<Extent> flat_boxes_;  // [parts]
 };
 
@@ -211,7 +210,9 @@ const NearScene& near_scene_of(const SceneTree& scene) {
     // A thread that waits for loops in it must not take up another query of the same scene.
     std::call_once(scene.near_asked, [&] {
         isolated([&] {
-            scene.near_known = std::make_shared<const NearScene>(NearSceneMaker(scene).run());
+            auto near = std::make_shared<NearScene>();
+            NearSceneMaker(scene, *near).run();
+            scene.near_known = std::move(near);
         });
     });
     return *scene.near_known;

@@ -91,8 +91,9 @@ public:
                 slope += w * w / (square_[k][k] + s);
             }
             const double next = s + (norm / radius_ - 1.0) * norm * norm / slope;
-            if (!(next > s)) break;
-            s = next;
+            const bool still = next > s * (1.0 + 0x1p-50);
+            s = std::max(s, next);
+            if (!still) break;
         }
         Double3 w;
         for (std::size_t k = 0; k < 3; ++k) w = w + axis_[k] * (g[k] / (square_[k][k] + s));

@@ -15,6 +15,7 @@
 #include <tuple>
 #include <vector>
 
+#include "engine/extent.h"
 #include "engine/float_world.h"
 #include "engine/near_shapes.h"
 #include "primitives/exact_overlap.h"
