@@ -215,7 +215,7 @@ TEST(SceneSolid, ABodyMayBeSplitOverGeometriesAndInstances) {
         EXPECT_EQ(winding_numbers(solid, queries), winding_numbers(wanted, queries));
         EXPECT_EQ(signed_distances(solid, queries), signed_distances(wanted, queries));
         EXPECT_TRUE(contains(solid, Vec3{0.5f, 0.5f, 0.5f}));
-        EXPECT_FALSE(contains(solid, Vec3{0.5f, 0.5f, 99}));
+        EXPECT_FALSE(contains(solid, Vec3{0.5f, 0.5f, 999}));
         // Without its first part it is open.
         scene.remove(0);
         EXPECT_EQ(Solid(scene).closure(), Closure::oriented) << "the last commit stands";
