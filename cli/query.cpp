@@ -73,7 +73,7 @@ void add_mesh_options(CLI::App& command, QueryCommand& options) {
         builders.emplace_back(builder_name(static_cast<Builder>(i)));
     command
         .add_option("--builder", options.builder,
-                    "Of the tree over triangles; answers are the same (default: ploc)")
+                    "Asks one mesh through a binary tree of this builder; answers are the same")
         ->check(CLI::IsMember(builders));
 }
 
@@ -131,7 +131,10 @@ void add_query_command(CLI::App& app) {
         ->add_option("--out", options->prefix,
                      "Write PREFIX.indices.npy and PREFIX.distances.npy; --radius and --box also "
                      "PREFIX.offsets.npy; --closest also PREFIX.points.npy and PREFIX.uv.npy; "
-                     "--signed-distance distances alone; --pairs PREFIX.pairs.npy")
+                     "--signed-distance distances alone; --pairs PREFIX.pairs.npy. Of scenes of "
+                     "several geometries or instances --closest also PREFIX.geometries.npy and "
+                     "PREFIX.instances.npy, --pairs PREFIX.pairs-geometries.npy and "
+                     "PREFIX.pairs-instances.npy")
         ->type_name("PREFIX");
     command->add_flag(
         "--sort", options->sort,

@@ -1,6 +1,9 @@
 // raydix query: what all its kinds share. One kind a call; each file query_*.cpp answers some.
 #pragma once
 
+#include <raydix/scene.h>
+#include <raydix/solid.h>
+
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -54,9 +57,31 @@ std::vector<double> timed_repeats(int repeat, const Work& work) {
     return seconds;
 }
 
+/// A scene that keeps its meshes and nodes.
+struct QueriedScene {
+    std::optional<Model> model;  // none: it comes from a .rdx file
+    Scene scene;
+    Json json;
+    double load_ms = 0;
+    std::optional<double> commit_ms;
+    Quality quality = Quality::balanced;
+    bool is_one_mesh = false;
+};
+/// None: an option or the file asks for one binary tree, or there are no triangles.
+[[nodiscard]] std::optional<QueriedScene> load_queried_scene(const std::string& name,
+                                                             const QueryCommand& options);
+
+/// The `solid` object of a document.
+[[nodiscard]] Json solid_json(const Solid& solid);
+[[nodiscard]] QueryFigures answer_signed(const QueryCommand& options, const Solid& solid,
+                                         const std::vector<Vec3>& queries);
+
 /// --knn, --radius and --box: points of a cloud, or the vertices of a mesh.
 void run_point_query(const QueryCommand& options);
 /// --closest, --signed-distance and --pairs: triangles; pairs of points too.
 void run_mesh_query(const QueryCommand& options);
+/// The same of scenes. `other`: of --with, or null.
+void run_scene_query(const QueryCommand& options, const QueriedScene& queried,
+                     const QueriedScene* other);
 
 }  // namespace raydix::cli

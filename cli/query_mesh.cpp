@@ -62,35 +62,11 @@ QueryFigures answer_closest(const QueryCommand& options, const SceneTree& tree) 
     return figures;
 }
 
-const char* closure_name(Closure closure) {
-    return closure == Closure::oriented ? "oriented"
-           : closure == Closure::closed ? "closed"
-                                        : "open";
-}
-const char* rule_name(InsideRule rule) {
-    return rule == InsideRule::crossings ? "crossings"
-           : rule == InsideRule::parity  ? "parity"
-                                         : "winding";
-}
-
-QueryFigures answer_signed(const QueryCommand& options, const SceneTree& tree, Json& document) {
+QueryFigures signed_of_tree(const QueryCommand& options, const SceneTree& tree, Json& document) {
     const std::vector<Vec3> queries = load_queries(options, tree.scene);
     const Solid solid(tree.bvh, {.threads = options.common.threads});
-    document["solid"] = {{"closure", closure_name(solid.closure())},
-                         {"rule", rule_name(solid.rule())},
-                         {"open_edges", solid.open_edges()}};
-    std::vector<float> distances(queries.size());
-    ClosestCounts counts;
-    QueryFigures figures;
-    figures.kind = "signed_distance";
-    figures.seconds = timed_repeats(options.repeat, [&] {
-        counts = signed_distances(solid, queries, distances, {.threads = options.common.threads});
-    });
-    figures.queries = counts.queries;
-    figures.found = counts.found;
-    figures.invalid_queries = counts.invalid_queries;
-    if (!options.prefix.empty()) save_array(options.prefix + ".distances.npy", distances);
-    return figures;
+    document["solid"] = solid_json(solid);
+    return answer_signed(options, solid, queries);
 }
 
 QueryFigures answer_pairs(const QueryCommand& options, const SceneTree& tree) {
@@ -120,7 +96,45 @@ QueryFigures answer_pairs(const QueryCommand& options, const SceneTree& tree) {
 
 }  // namespace
 
+Json solid_json(const Solid& solid) {
+    const auto closure_name = [](Closure closure) {
+        return closure == Closure::oriented ? "oriented"
+               : closure == Closure::closed ? "closed"
+                                            : "open";
+    };
+    const auto rule_name = [](InsideRule rule) {
+        return rule == InsideRule::crossings ? "crossings"
+               : rule == InsideRule::parity  ? "parity"
+                                             : "winding";
+    };
+    return {{"closure", closure_name(solid.closure())},
+            {"rule", rule_name(solid.rule())},
+            {"open_edges", solid.open_edges()}};
+}
+
+QueryFigures answer_signed(const QueryCommand& options, const Solid& solid,
+                           const std::vector<Vec3>& queries) {
+    std::vector<float> distances(queries.size());
+    ClosestCounts counts;
+    QueryFigures figures;
+    figures.kind = "signed_distance";
+    figures.seconds = timed_repeats(options.repeat, [&] {
+        counts = signed_distances(solid, queries, distances, {.threads = options.common.threads});
+    });
+    figures.queries = counts.queries;
+    figures.found = counts.found;
+    figures.invalid_queries = counts.invalid_queries;
+    if (!options.prefix.empty()) save_array(options.prefix + ".distances.npy", distances);
+    return figures;
+}
+
 void run_mesh_query(const QueryCommand& options) {
+    if (const auto queried = load_queried_scene(options.scene, options)) {
+        std::optional<QueriedScene> other;
+        if (!options.with_scene.empty()) other = load_queried_scene(options.with_scene, options);
+        if (options.with_scene.empty() || other)
+            return run_scene_query(options, *queried, other ? &*other : nullptr);
+    }
     Json document = new_document("query");
     const SceneTree tree = load_tree(options.scene, options);
     document["scene"] = scene_json(tree.scene);
@@ -128,7 +142,7 @@ void run_mesh_query(const QueryCommand& options) {
     document["build"] = build_json(tree.bvh, tree_stats(tree.bvh, {.with_hash = false}), {});
     const QueryFigures figures = about(options.scene, [&] {
         return options.closest           ? answer_closest(options, tree)
-               : options.signed_distance ? answer_signed(options, tree, document)
+               : options.signed_distance ? signed_of_tree(options, tree, document)
                                          : answer_pairs(options, tree);
     });
     document["query"] = Json::array({query_json(figures)});

@@ -131,10 +131,12 @@ ClosestCounts closest_points(const BvhD& bvh, std::span<const Vec3d> queries,
 [[nodiscard]] ClosestPointD closest_point(const BvhD& bvh, Vec3d query,
                                           double max_distance = infinity);
 
-/// As Solid, over a tree that must outlive it. Crossings and their signs are exact in double.
+/// As Solid. Crossings and their signs are exact in double.
 class SolidD {
 public:
     explicit SolidD(const BvhD& bvh, const SolidOptions& options = {});
+    explicit SolidD(std::shared_ptr<const BvhD> bvh, const SolidOptions& options = {});
+    explicit SolidD(const BasicScene<double>& scene, const SceneSolidOptions& options = {});
     ~SolidD();
     SolidD(SolidD&&) noexcept;
     SolidD& operator=(SolidD&&) noexcept;

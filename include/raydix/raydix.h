@@ -35,6 +35,8 @@
 #include <raydix/report.h>           // IWYU pragma: export
 #include <raydix/result_limit.h>     // IWYU pragma: export
 #include <raydix/scene.h>            // IWYU pragma: export
+#include <raydix/scene_pairs.h>      // IWYU pragma: export
+#include <raydix/scene_queries.h>    // IWYU pragma: export
 #include <raydix/shapes.h>           // IWYU pragma: export
 #include <raydix/simulate.h>         // IWYU pragma: export
 #include <raydix/solid.h>            // IWYU pragma: export

@@ -12,6 +12,9 @@
 
 namespace raydix {
 
+template <class Scalar>
+class BasicScene;  // <raydix/scene.h>
+
 /// What the edges of a mesh say of it. Corners at the same place are the same corner, whatever
 /// their indices.
 enum class Closure : std::uint32_t {
@@ -36,13 +39,33 @@ struct SolidOptions {
     int threads = 0;  // 0 to 1,024; 0: all the machine has. Results do not depend on it
 };
 
-/// A tree of triangles as the boundary of a body. Refers to the tree, which must outlive it and
-/// stay as it is. Made in O(n log n) once: edges are matched, and for `winding` sums of normals are
-/// made.
+/// Of a scene as a body.
+struct SceneSolidOptions {
+    InsideRule rule = InsideRule::automatic;
+    std::uint32_t mask = 0xFFFFFFFFu;  // as that of a ray: which geometries and instances count
+    /// Bounds what the copy of all triangles, its tree and the solid take while they are made. 0:
+    /// half of what is left (result_limit.h).
+    std::uint64_t max_result_bytes = 0;
+    int threads = 0;  // 0 to 1,024; 0: all the machine has. Results do not depend on it
+};
+
+/// Triangles as the boundary of a body. Made in O(n log n) once: edges are matched, and for
+/// `winding` sums of normals are made.
 class Solid {
 public:
-    /// Throws InputError: a tree that holds boxes or points; more than 1.4e9 triangles.
+    /// Refers to the tree, which must outlive it and stay as it is. Throws InputError: a tree that
+    /// holds boxes or points; more than 1.4e9 triangles.
     explicit Solid(const Bvh& bvh, const SolidOptions& options = {});
+    /// The same, and keeps the tree.
+    explicit Solid(std::shared_ptr<const Bvh> bvh, const SolidOptions& options = {});
+    /// All meshes of the scene's last commit, on every path of instances, as one body: crossings
+    /// are summed, an edge may belong to triangles of several geometries. Makes a tree of its own
+    /// over all triangles, moved to the world in double and rounded once; two corners change places
+    /// where a path mirrors. Refers to nothing of the scene. Throws InputError: a scene that was
+    /// never committed; spheres, capsules, points or user geometry, which it names; more than 1.4e9
+    /// triangles. ResultTooLarge, before anything is made: it would take more than
+    /// options.max_result_bytes.
+    explicit Solid(const BasicScene<float>& scene, const SceneSolidOptions& options = {});
     ~Solid();
     Solid(Solid&&) noexcept;
     Solid& operator=(Solid&&) noexcept;
@@ -52,6 +75,7 @@ public:
     [[nodiscard]] InsideRule rule() const;
     /// Edges that belong to an odd number of triangles.
     [[nodiscard]] std::uint64_t open_edges() const;
+    /// Of a scene: the tree over all of its triangles, numbered by (instance, geometry, prim).
     [[nodiscard]] const Bvh& bvh() const;
 
 private:

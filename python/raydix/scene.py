@@ -14,6 +14,7 @@ from ._arrays import (
     ALL,
     FLOAT32,
     FLOAT64,
+    MISSING,
     UINT32,
     float_type,
     mesh_faces,
@@ -34,8 +35,8 @@ from .pictures import SceneViews
 
 
 class Scene(SceneContents, SceneViews):
-    """What rays are traced through: triangle meshes, and instances of other scenes. A scene of one
-    mesh answers queries with points and other meshes too.
+    """What rays are traced through and queries ask: triangle meshes, spheres, capsules, and
+    instances of other scenes.
 
     `Scene(vertices, faces)` is one mesh with id 0, committed. So is a file; one of glTF with nodes
     or several primitives has an instance for each node, or a mesh for each primitive. `Scene()` is empty: `add` fills it,
@@ -54,9 +55,10 @@ class Scene(SceneContents, SceneViews):
         What trees are for: "fast" is built each frame, "balanced" once for some million rays,
         "high" once for many.
     builder :
-        The name of a builder for the binary tree, instead of that of `quality`: see
-        `raydix.builders`. All queries but rays ask that tree; rays go through another, a wide one
-        in float32, which `quality` alone decides.
+        The name of a builder for the binary tree of one mesh, instead of that of `quality`: see
+        `raydix.builders`. Inside tests, signed distances and overlaps ask that tree, in float64
+        closest points and touches too. Rays and all else go through others, which `quality` alone
+        decides.
     reinsertion_rounds :
         Of the binary tree: rounds of reinsertion after the build, 0 to 255. Each moves large
         subtrees to cheaper places. None: what `quality` asks for (2 for "balanced", 4 for "high",
@@ -90,11 +92,15 @@ class Scene(SceneContents, SceneViews):
     Any number of threads may ask at once. Triangles whose box has a diagonal above 0 and
     below 1e-12 are left out, as those that are not finite.
 
-    Queries with points and other meshes (`closest_point`, `signed_distance`, `contains`,
-    `winding_number`, `overlaps`, `touched_by`), `refit`, `vertices`, `faces`, `stats`,
-    `wide_stats`, `info`, `closure`, `check` and `raydix.simulate` need a scene of one mesh and
-    nothing else: InputError names the geometry that stands in the way. Masks have no effect on
-    them.
+    `signed_distance`, `contains`, `winding_number`, `closure` and `overlaps` take all meshes, on
+    every path of instances, as one mesh in the world: vertices are moved in float64 and rounded
+    once. What that takes is told first: InputError names the bytes if they are more than half of
+    what is left. Spheres and capsules are an InputError that names the geometry. The meshes of a
+    scene of one mesh count whatever its mask is; of others those with mask 0 do not.
+
+    `refit`, `vertices`, `faces`, `stats`, `wide_stats`, `info`, `check` and `raydix.simulate` need
+    a scene of one mesh and nothing else, in float64 `closest_point` and `touched_by` too:
+    InputError names the geometry that stands in the way.
 
     With precision "float64" these raise NotImplementedError: compact=True, `positions`, `normals`,
     `render`, `cameras`, `primary_rays`, `secondary_rays`, `save`, `info`, `wide_stats` and
@@ -411,26 +417,42 @@ class Scene(SceneContents, SceneViews):
     def closest_point(
         self, points: ArrayLike, *, max_distance: float = np.inf
     ) -> dict[str, np.ndarray]:
-        """The point of the mesh that is closest to each query.
+        """The point of the scene that is closest to each query.
 
         `points`: shape (..., 3), converted to the scene's type. Beyond `max_distance` (its square
         decides, rounded) nothing is found. Returns a dict of arrays with the leading shape of the
-        queries: "point" (..., 3), "distance", "u" and "v" in the scene's type, "prim" uint32. At
-        equal distances the lower "prim" wins; nothing found: infinity and 0xFFFFFFFF. ValueError
-        for a negative or NaN `max_distance`.
+        queries: "point" (..., 3), "distance", "u" and "v" in the scene's type; "prim", "geometry"
+        and "instance" as those of a hit. At equal distances the lower (instance, geometry, prim)
+        wins; nothing found: infinity and 0xFFFFFFFF. ValueError for a negative or NaN
+        `max_distance`.
+
+        Triangles of instances are those that their vertices make in the world, moved in float64 and
+        rounded once. Within spheres and capsules the distance is 0.
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
-        places = np.empty((len(asked), 7), self.dtype)
         reach = number(max_distance, "max_distance")
-        self._core.closest(asked, places, reach, self.threads)
-        places = places.reshape(lead + (7,))
-        ids = places.view(UINT32)[..., 4 * (self.dtype.itemsize // UINT32.itemsize)]
+        if self.dtype == FLOAT32:
+            places = np.empty((len(asked), 9), self.dtype)
+            self._core.closest(asked, places, reach, self.threads)
+            places = places.reshape(lead + (9,))
+            ids = places.view(UINT32)
+            prim, geometry, instance = ids[..., 4], ids[..., 5], ids[..., 6]
+        else:
+            places = np.empty((len(asked), 7), self.dtype)
+            self._core.closest(asked, places, reach, self.threads)
+            places = places.reshape(lead + (7,))
+            prim = places.view(UINT32)[..., 8]
+            only = self._core.mesh_id() or 0
+            geometry = np.where(prim == MISSING, UINT32.type(MISSING), UINT32.type(only))
+            instance = np.zeros(lead, UINT32)
         return {
             "point": places[..., :3],
             "distance": places[..., 3],
-            "prim": ids,
-            "u": places[..., 5],
-            "v": places[..., 6],
+            "prim": prim,
+            "geometry": geometry,
+            "instance": instance,
+            "u": places[..., -2],
+            "v": places[..., -1],
         }
 
     def signed_distance(
@@ -474,15 +496,24 @@ class Scene(SceneContents, SceneViews):
 
     def overlaps(
         self, other: Scene | None = None, *, narrow: bool = False, max_result_bytes: int = 0
-    ) -> np.ndarray:
+    ) -> np.ndarray | dict[str, np.ndarray]:
         """All pairs of triangles whose boxes overlap: shape (P, 2) uint32, sorted.
 
         Within this scene (i < j; pairs that share a corner are left out), or between it and `other`
         (i of this one, j of `other`). With `narrow` the triangles themselves must meet, decided
         without rounding. `max_result_bytes` as in `all_hits`: no pair is ever dropped. TypeError
         for scenes of different types.
+
+        If one of the scenes is more than one mesh, a dict of such arrays: "prim", "geometry" and
+        "instance", as those of a hit. Pairs are then sorted by (instance, geometry, prim) of the
+        first, then of the second. The memory of the call holds a copy of all triangles, those of
+        instances on every path. InputError names spheres and capsules.
         """
-        return self._core.overlaps(self._partner(other), narrow, max_result_bytes, self.threads)
+        pairs = self._core.overlaps(self._partner(other), narrow, max_result_bytes, self.threads)
+        if pairs.shape[1] == 2:
+            return pairs
+        columns = pairs.reshape(-1, 2, 3)
+        return {"prim": columns[..., 2], "geometry": columns[..., 1], "instance": columns[..., 0]}
 
     def _partner(self, other: Scene | None) -> Any:
         """The core of a scene that this one can be held against."""
@@ -504,21 +535,28 @@ class Scene(SceneContents, SceneViews):
         segments: ArrayLike | None = None,
         max_result_bytes: int = 0,
     ) -> dict[str, np.ndarray]:
-        """All triangles that each ball (x y z radius, shape (..., 4)) or segment (two points, shape
-        (..., 6)) touches.
+        """All triangles and shapes that each ball (x y z radius, shape (..., 4)) or segment (two
+        points, shape (..., 6)) touches.
 
-        Returns a dict: "offsets" (uint64, one more than queries) and "prim" (uint32, ascending in
-        each row). `max_result_bytes` as in `all_hits`.
+        Returns a dict: "offsets" (uint64, one more than queries); "prim", "geometry" and "instance"
+        as those of a hit, ascending by (instance, geometry, prim) in each row. `max_result_bytes`
+        as in `all_hits`.
         """
         if (spheres is None) == (segments is None):
             raise ValueError("touched_by: expected either spheres or segments")
         if spheres is not None:
             shapes, _ = rows(spheres, "spheres", (4,), self.dtype)
-            offsets, prims = self._core.touched_by_spheres(shapes, max_result_bytes, self.threads)
+            offsets, names = self._core.touched_by_spheres(shapes, max_result_bytes, self.threads)
         else:
             shapes, _ = rows(segments, "segments", (6,), self.dtype)
-            offsets, prims = self._core.touched_by_segments(shapes, max_result_bytes, self.threads)
-        return {"offsets": offsets, "prim": prims}
+            offsets, names = self._core.touched_by_segments(shapes, max_result_bytes, self.threads)
+        prim = names[:, -1]
+        if self.dtype == FLOAT32:
+            geometry, instance = names[:, 1], names[:, 0]
+        else:
+            geometry = np.full(len(prim), self._core.mesh_id() or 0, UINT32)
+            instance = np.zeros(len(prim), UINT32)
+        return {"offsets": offsets, "prim": prim, "geometry": geometry, "instance": instance}
 
     def refit(self, vertices: ArrayLike) -> dict[str, float]:
         """Moves the vertices, shape (V, 3) as before, converted to the scene's type, and commits;

@@ -13,6 +13,7 @@
 #include <raydix/error.h>
 #include <raydix/overlap.h>
 #include <raydix/pairs.h>
+#include <raydix/scene_pairs.h>
 #include <raydix/surface.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
@@ -66,10 +67,13 @@ constexpr std::size_t hit_columns = sizeof(typename Scene::Types::Hit) / sizeof(
 static_assert(sizeof(Hit) == 6 * sizeof(float) && sizeof(HitD) == 5 * sizeof(double));
 template <class Scene>
 using HitRows = Out<Scalar<Scene>, nb::shape<-1, hit_columns<Scene>>>;
-/// x, y, z, distance, prim, u, v of closest points.
+/// Closest points as rows of scalars: x, y, z, distance, prim, geometry, instance, u, v; in double,
+/// where they are of one mesh, without geometry and instance.
 template <class Scene>
-using PlaceRows = Out<Scalar<Scene>, nb::shape<-1, 7>>;
-static_assert(sizeof(ClosestPoint) == 7 * sizeof(float) &&
+using PlaceRows =
+    Out<Scalar<Scene>,
+        nb::shape<-1, sizeof(typename Scene::Types::ClosestPoint) / sizeof(Scalar<Scene>)>>;
+static_assert(sizeof(SceneClosestPoint) == 9 * sizeof(float) &&
               sizeof(ClosestPointD) == 7 * sizeof(double));
 
 /// As in_pieces, and the trees stay as they are from the first piece to the last.
@@ -221,12 +225,12 @@ Counts count_hits(Scene& scene, Rays& rays, const Out<std::uint32_t, nb::ndim<1>
 
 using PointsOut = Out<float, nb::shape<-1, 3>>;
 using HitsIn = In<float, nb::shape<-1, 6>>;
-using RaysIn = std::optional<In<float, nb::shape<-1, 8>>>;
+using MaybeRays = std::optional<RaysIn>;
 
 /// call(scene, [rays,] hits, points, threads): points or normals of hits.
 template <class Call>
-void fill_for_hits(SceneTrees& scene, const HitsIn& hits, const RaysIn& with, const PointsOut& out,
-                   int threads, const Call& call) {
+void fill_for_hits(SceneTrees& scene, const HitsIn& hits, const MaybeRays& with,
+                   const PointsOut& out, int threads, const Call& call) {
     const auto given = rows<Hit>(hits);
     const auto points = rows_out<Vec3>(out);
     require_length(points.size(), given.size());
@@ -244,13 +248,13 @@ void fill_for_hits(SceneTrees& scene, const HitsIn& hits, const RaysIn& with, co
     });
 }
 
-void positions_of(SceneTrees& scene, const HitsIn& hits, const RaysIn& rays, const PointsOut& out,
-                  int threads) {
+void positions_of(SceneTrees& scene, const HitsIn& hits, const MaybeRays& rays,
+                  const PointsOut& out, int threads) {
     fill_for_hits(scene, hits, rays, out, threads,
                   [](const auto&... arguments) { positions(arguments...); });
 }
 
-void normals_of(SceneTrees& scene, const HitsIn& hits, const RaysIn& rays, const PointsOut& out,
+void normals_of(SceneTrees& scene, const HitsIn& hits, const MaybeRays& rays, const PointsOut& out,
                 int threads) {
     fill_for_hits(scene, hits, rays, out, threads,
                   [](const auto&... arguments) { normals(arguments...); });
@@ -262,13 +266,11 @@ Counts closest(Scene& scene, const PointRows<Scene>& points, const PlaceRows<Sce
     const auto queries = rows<Point<Scene>>(points);
     const auto results = rows_out<typename Scene::Types::ClosestPoint>(out);
     require_length(results.size(), queries.size());
-    const typename Scene::Types::ClosestOptions options{.max_distance = max_distance,
-                                                        .threads = threads_for(threads)};
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const ClosestCounts met =
-            closest_points(scene.bvh("closest_point"), queries.subspan(begin, end - begin),
-                           results.subspan(begin, end - begin), options);
+        const ClosestCounts met = scene.closest_points(queries.subspan(begin, end - begin),
+                                                       results.subspan(begin, end - begin),
+                                                       max_distance, threads_for(threads));
         counts.first += met.found;
         counts.second += met.invalid_queries;
     });
@@ -353,56 +355,75 @@ nb::tuple closure(Scene& scene) {
                           rules[static_cast<int>(rule)]);
 }
 
-/// One lock for a scene that is asked about itself: two of the same thread may block each other.
+/// call(whether both are meshes, the other scene or null), without the interpreter's lock. One lock
+/// for a scene that is asked about itself: two of the same thread may block each other.
 template <class Scene, class Call>
 auto with_two(Scene& scene, Scene* other, const Call& call) {
     const nb::gil_scoped_release unlocked;
     Scene* const last = other == nullptr ? &scene : other;
     Reading first_lock, second_lock;
     first_lock = std::min(&scene, last, std::less<>())->read();
-    const typename Scene::Types::Bvh* second = nullptr;
-    if (last == &scene) return call(scene.bvh("overlaps"), second);
+    if (last == &scene) return call(scene.is_mesh(), static_cast<Scene*>(nullptr));
     second_lock = std::max(&scene, last, std::less<>())->read();
-    second = &other->bvh("overlaps");
-    return call(scene.bvh("overlaps"), second);
+    return call(scene.is_mesh() && other->is_mesh(), other);
 }
 
+/// Two columns of meshes; of other scenes six: instance, geometry and prim of the first, and of the
+/// second.
 template <class Scene>
 Array2<std::uint32_t> overlaps(Scene& scene, Scene* other, bool narrow,
                                std::uint64_t max_result_bytes, int threads) {
     const PairOptions options{
         .narrow = narrow, .max_result_bytes = max_result_bytes, .threads = threads_for(threads)};
-    auto pairs = with_two(scene, other, [&](const auto& a, const auto* b) {
-        return b != nullptr ? overlapping_pairs(a, *b, options) : overlapping_pairs(a, options);
+    const ScenePairOptions of_scenes{
+        .narrow = narrow, .max_result_bytes = max_result_bytes, .threads = threads_for(threads)};
+    std::vector<PrimitivePair> pairs;
+    std::optional<ScenePairs> named;
+    with_two(scene, other, [&](bool are_meshes, Scene* b) {
+        if (!are_meshes)
+            named = b != nullptr ? overlapping_pairs(scene.traced(), b->traced(), of_scenes)
+                                 : overlapping_pairs(scene.traced(), of_scenes);
+        else if (b != nullptr)
+            pairs = overlapping_pairs(scene.bvh("overlaps"), b->bvh("overlaps"), options);
+        else
+            pairs = overlapping_pairs(scene.bvh("overlaps"), options);
     });
-    return hand_over_rows<std::uint32_t>(std::move(pairs));
+    return named ? hand_over_rows<std::uint32_t>(std::move(named->pairs))
+                 : hand_over_rows<std::uint32_t>(std::move(pairs));
 }
 
 template <class Scene>
 std::uint64_t count_overlaps(Scene& scene, Scene* other, bool narrow, int threads) {
     const PairOptions options{.narrow = narrow, .threads = threads_for(threads)};
-    return with_two(scene, other, [&](const auto& a, const auto* b) {
-        return b != nullptr ? count_overlapping_pairs(a, *b, options)
-                            : count_overlapping_pairs(a, options);
+    const ScenePairOptions of_scenes{.narrow = narrow, .threads = threads_for(threads)};
+    return with_two(scene, other, [&](bool are_meshes, Scene* b) {
+        if (!are_meshes)
+            return b != nullptr ? count_overlapping_pairs(scene.traced(), b->traced(), of_scenes)
+                                : count_overlapping_pairs(scene.traced(), of_scenes);
+        return b != nullptr ? count_overlapping_pairs(scene.bvh("count_overlaps"),
+                                                      b->bvh("count_overlaps"), options)
+                            : count_overlapping_pairs(scene.bvh("count_overlaps"), options);
     });
 }
 
+/// Offsets, and rows of instance, geometry and prim; in double of prim alone.
 template <class Shape, class Scene, class Array>
 nb::tuple touched(Scene& scene, const Array& shapes, std::uint64_t max_result_bytes, int threads) {
+    using Lists = typename Scene::Types::OverlapLists;
     const auto queries = rows<Shape>(shapes);
-    OverlapOptions options{.threads = threads_for(threads)};
     PieceLimit limit("touched_by", max_result_bytes);
-    std::vector<OverlapLists> pieces;
+    std::vector<Lists> pieces;
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
         pieces.push_back(limit.next([&](std::uint64_t bytes) {
-            options.max_result_bytes = bytes;
-            return touch_all(scene.bvh("touched_by"), queries.subspan(begin, end - begin), options);
+            return scene.touch_all(queries.subspan(begin, end - begin), bytes,
+                                   threads_for(threads));
         }));
-        limit.hold(piece_bytes(pieces.back(), &OverlapLists::offsets, &OverlapLists::prims));
+        limit.hold(piece_bytes(pieces.back(), &Lists::offsets, &Lists::prims));
     });
-    require_room_to_join(limit, pieces, &OverlapLists::offsets, &OverlapLists::prims);
+    require_room_to_join(limit, pieces, &Lists::offsets, &Lists::prims);
     auto offsets = join_offsets(pieces);
-    return nb::make_tuple(offsets, hand_over(join_column(pieces, &OverlapLists::prims)));
+    return nb::make_tuple(offsets,
+                          hand_over_rows<std::uint32_t>(join_column(pieces, &Lists::prims)));
 }
 
 /// Runs call(scene) without the interpreter's lock and with the trees held.
@@ -604,6 +625,7 @@ void bind_asking(nb::class_<Scene>& scene) {
                 reading(self, [&] { return self.mesh("faces").triangles; }));
         },
         nb::rv_policy::automatic);
+    scene.def("mesh_id", [](Scene& self) { return reading(self, [&] { return self.mesh_id(); }); });
     scene.attr("hit_columns") = static_cast<int>(hit_columns<Scene>);
     scene.def("stats", &stats<Scene>);
     bind_rays(scene);

@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "batch.h"
@@ -286,6 +287,7 @@ CommitReport BasicSceneTrees<Names>::commit(const SceneOptions& options) {
 /// After a commit, or in its place.
 template <class Names>
 void BasicSceneTrees<Names>::look_for_mesh() {
+    for (auto& solid : scene_solids_) solid.reset();
     mesh_id_.reset();
     mesh_mask_ = 0;
     why_no_mesh_.clear();
@@ -369,6 +371,51 @@ const typename Names::Scene& BasicSceneTrees<Names>::traced() {
 }
 
 template <class Names>
+ClosestCounts BasicSceneTrees<Names>::closest_points(
+    std::span<const Point> queries, std::span<typename Names::ClosestPoint> results,
+    typename Names::Scalar max_distance, int threads) {
+    if constexpr (std::is_same_v<Names, InFloat>) {
+        return raydix::closest_points(traced(), queries, results,
+                                      {.max_distance = max_distance, .threads = threads});
+    } else {
+        return raydix::closest_points(this->bvh("closest_point in float64"), queries, results,
+                                      {.max_distance = max_distance, .threads = threads});
+    }
+}
+
+template <class Names>
+template <class Shape>
+typename Names::OverlapLists BasicSceneTrees<Names>::touch_all(std::span<const Shape> queries,
+                                                               std::uint64_t max_result_bytes,
+                                                               int threads) {
+    if constexpr (std::is_same_v<Names, InFloat>) {
+        return raydix::touch_all(traced(), queries,
+                                 {.max_result_bytes = max_result_bytes, .threads = threads});
+    } else {
+        return raydix::touch_all(this->bvh("touched_by in float64"), queries,
+                                 {.max_result_bytes = max_result_bytes, .threads = threads});
+    }
+}
+
+template <class Names>
+const typename Names::Solid& BasicSceneTrees<Names>::solid(InsideRule rule, const char* call) {
+    if (this->is_mesh()) return MeshTrees<Names>::solid(rule, call);
+    const std::lock_guard lock(build_);
+    settle();
+    std::optional<typename Names::Solid>& kept = scene_solids_[static_cast<std::size_t>(rule)];
+    if (kept) return *kept;
+    try {
+        kept.emplace(scene_,
+                     SceneSolidOptions{.rule = rule, .threads = threads_for(options_.threads)});
+    } catch (const ResultTooLarge&) {
+        throw;
+    } catch (const InputError& error) {
+        throw InputError(std::string(call) + ": " + error.what());
+    }
+    return *kept;
+}
+
+template <class Names>
 TraceCounts BasicSceneTrees<Names>::trace(std::span<const Ray> rays, std::span<Hit> hits,
                                           const RayOptions& options) {
     return raydix::trace(traced(), rays, hits, trace_options(options));
@@ -399,6 +446,10 @@ bool BasicSceneTrees<Names>::any_hit(const Ray& ray, std::uint32_t mask) {
 
 template class BasicSceneTrees<InFloat>;
 template class BasicSceneTrees<InDouble>;
+template SceneOverlapLists SceneTrees::touch_all(std::span<const Segment>, std::uint64_t, int);
+template SceneOverlapLists SceneTrees::touch_all(std::span<const Sphere>, std::uint64_t, int);
+template OverlapLists SceneTreesD::touch_all(std::span<const SegmentD>, std::uint64_t, int);
+template OverlapLists SceneTreesD::touch_all(std::span<const SphereD>, std::uint64_t, int);
 template std::uint32_t SceneTrees::add_shapes(std::span<const Sphere>, const GeometryOptions&);
 template std::uint32_t SceneTrees::add_shapes(std::span<const Capsule>, const GeometryOptions&);
 template void SceneTrees::update_shapes(std::uint32_t, std::span<const Sphere>);

@@ -9,6 +9,7 @@
 #include <raydix/rdx.h>
 #include <raydix/refit.h>
 #include <raydix/scene.h>
+#include <raydix/scene_queries.h>
 #include <raydix/shapes.h>
 #include <raydix/solid.h>
 #include <raydix/trace.h>
@@ -56,8 +57,9 @@ struct InFloat {
     using Ray = raydix::Ray;
     using Hit = raydix::Hit;
     using AllHits = raydix::AllHits;
-    using ClosestPoint = raydix::ClosestPoint;
+    using ClosestPoint = SceneClosestPoint;
     using ClosestOptions = raydix::ClosestOptions;
+    using OverlapLists = SceneOverlapLists;
     using Segment = raydix::Segment;
     using Sphere = raydix::Sphere;
 };
@@ -78,6 +80,7 @@ struct InDouble {
     using AllHits = AllHitsD;
     using ClosestPoint = ClosestPointD;
     using ClosestOptions = ClosestOptionsD;
+    using OverlapLists = raydix::OverlapLists;
     using Segment = SegmentD;
     using Sphere = SphereD;
 };
@@ -216,6 +219,20 @@ public:
     /// As the last commit left it. Throws InputError, as its functions do, if there was none.
     [[nodiscard]] const Scene& traced();
 
+    // Of scenes of any kind; in double of one mesh, and others throw InputError that names what
+    // stands in the way.
+    using Point = typename Names::Point;
+    ClosestCounts closest_points(std::span<const Point> queries,
+                                 std::span<typename Names::ClosestPoint> results,
+                                 typename Names::Scalar max_distance, int threads);
+    template <class Shape>
+    [[nodiscard]] typename Names::OverlapLists touch_all(std::span<const Shape> queries,
+                                                         std::uint64_t max_result_bytes,
+                                                         int threads);
+    /// All meshes as one body, whatever else there is. Throws InputError, which names the call:
+    /// what raydix::Solid throws.
+    [[nodiscard]] const typename Names::Solid& solid(InsideRule rule, const char* call);
+
     TraceCounts trace(std::span<const Ray> rays, std::span<Hit> hits, const RayOptions& options);
     TraceCounts trace_any(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                           const RayOptions& options);
@@ -266,6 +283,7 @@ private:
     std::optional<std::uint32_t> mesh_id_;
     std::uint32_t mesh_mask_ = 0;
     std::optional<typename Names::Refitter> refitter_;
+    std::array<std::optional<typename Names::Solid>, 4> scene_solids_;  // by rule, if not a mesh's
 };
 
 extern template class BasicSceneTrees<InFloat>;

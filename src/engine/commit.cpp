@@ -30,6 +30,7 @@ struct WideMaker {
     static void keep(const MeshTree& old, MeshTree& out) {
         out.tree = old.tree;
         out.view = old.view;
+        out.flats = old.flats;
     }
     static std::optional<double> refit(const MeshTree& old, const MeshView& mesh,
                                        const SceneOptions&, MeshTree& out) {
@@ -242,6 +243,7 @@ private:
         auto own = std::make_shared<SceneTree>();
         own->meshes = tree_->meshes;
         own->shapes = tree_->shapes;
+        own->mesh_names = tree_->mesh_names;
         own->extents.assign(tree_->extents.begin(),
                             tree_->extents.begin() + static_cast<std::ptrdiff_t>(count));
         build_tops(*own, nullptr);

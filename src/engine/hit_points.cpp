@@ -271,6 +271,16 @@ void fill_normals(const BasicScene<Scalar>& scene, std::span<const AnyHit> hits,
 
 }  // namespace
 
+std::uint32_t follow_path(const SceneTree& scene, std::uint32_t number,
+                          const InstanceName* (&way)[Scene::max_levels]) {
+    Hit hit;
+    hit.instance = number;
+    HitTriangle triangle;
+    if (follow_path(scene, hit, triangle) == nullptr) return 0;
+    std::copy_n(triangle.way, triangle.levels, way);
+    return triangle.levels;
+}
+
 bool find_triangle(const SceneTree& scene, const Hit& hit, HitTriangle& triangle) {
     return find(scene, hit, triangle);
 }

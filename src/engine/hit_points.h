@@ -29,6 +29,10 @@ struct BasicHitTriangle {
 
 using HitTriangle = BasicHitTriangle<SceneTree>;
 
+/// The instances on path `number`, the outermost first; how many.
+std::uint32_t follow_path(const SceneTree& scene, std::uint32_t number,
+                          const InstanceName* (&way)[Scene::max_levels]);
+
 /// False: there is no such path, mesh or triangle. The hit is no miss.
 [[nodiscard]] bool find_triangle(const SceneTree& scene, const Hit& hit, HitTriangle& triangle);
 

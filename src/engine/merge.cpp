@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
+#include "engine/flat_scene.h"
 #include "engine/name_hit.h"
 #include "engine/scene_state.h"
 #include "engine/shape_tree.h"
@@ -24,14 +26,18 @@ MergedMeshes merge_meshes(const Scene& scene, std::uint32_t mask) {
         throw BackendUnavailable("geometry " + std::to_string(shapes.id) + " holds " +
                                  kind_of(shapes.shapes) + "; devices trace meshes alone");
     }
+    FlatScene<float> flat = FlatPlan<float>(scene, mask, "merge_meshes").flatten();
     MergedMeshes out;
-    std::vector<MeshView> meshes;
-    for (const MeshName& name : tree.mesh_names) {
-        if (name.mesh.triangles.empty() || (name.mask & mask) == 0) continue;
-        out.names.ids.push_back(name.id);
-        meshes.push_back(name.mesh);
+    if (flat.own.triangles.empty())
+        out.mesh = {"",
+                    {flat.mesh.vertices.begin(), flat.mesh.vertices.end()},
+                    {flat.mesh.triangles.begin(), flat.mesh.triangles.end()}};
+    else
+        out.mesh = std::move(flat.own);
+    for (const FlatNames::Run& run : flat.names.runs) {
+        out.names.first.push_back(run.first);
+        out.names.ids.push_back(run.geometry);
     }
-    out.mesh = merged<Mesh, MeshView>(meshes, out.names.first);
     return out;
 }
 

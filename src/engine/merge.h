@@ -10,38 +10,44 @@
 #include <string>
 #include <vector>
 
-#include "exec/parallel.h"
+#include "exec/join_copies.h"
 
 namespace raydix {
 
-/// In float or in double. `first`: takes the first triangle of each. Throws InputError: 2^32 - 1
-/// triangles or vertices, or more.
-template <class AnyMesh, class AnyView>
-[[nodiscard]] AnyMesh merged(std::span<const AnyView> meshes, std::vector<std::uint32_t>& first) {
-    std::size_t vertices = 0, triangles = 0;
-    for (const AnyView& mesh : meshes) {
-        first.push_back(static_cast<std::uint32_t>(triangles));
-        vertices += mesh.vertices.size();
-        triangles += mesh.triangles.size();
+/// A mesh that stays where it is, among others.
+template <class AnyView>
+struct MergedCopy {
+    AnyView mesh;
+    std::uint64_t first_vertex, first_triangle;
+
+    [[nodiscard]] static bool mirrors() { return false; }
+    [[nodiscard]] static auto mover() {
+        return [](const auto& vertex) { return vertex; };
     }
+};
+
+/// Throws InputError: 2^32 - 1 triangles or vertices, or more, which trees cannot count.
+inline void require_countable(std::uint64_t triangles, std::uint64_t vertices) {
     if (std::max(vertices, triangles) >= no_primitive)
         throw InputError("scene: " + std::to_string(triangles) + " triangles of " +
                          std::to_string(vertices) + " vertices are too many for one tree");
-    AnyMesh out;
-    out.vertices.resize(vertices);
-    out.triangles.resize(triangles);
-    std::size_t vertex = 0;
-    for (std::size_t k = 0; k < meshes.size(); ++k) {
-        const AnyView& mesh = meshes[k];
-        std::copy(mesh.vertices.begin(), mesh.vertices.end(),
-                  out.vertices.begin() + static_cast<std::ptrdiff_t>(vertex));
-        const auto offset = static_cast<std::uint32_t>(vertex);
-        for_each_index(mesh.triangles.size(), [&](std::size_t i) {
-            const Triangle& t = mesh.triangles[i];
-            out.triangles[first[k] + i] = {t[0] + offset, t[1] + offset, t[2] + offset};
-        });
-        vertex += mesh.vertices.size();
+}
+
+/// In float or in double. `first`: takes the first triangle of each. Throws InputError as
+/// require_countable() does.
+template <class AnyMesh, class AnyView>
+[[nodiscard]] AnyMesh merged(std::span<const AnyView> meshes, std::vector<std::uint32_t>& first) {
+    std::vector<MergedCopy<AnyView>> copies;
+    std::size_t vertices = 0, triangles = 0;
+    for (const AnyView& mesh : meshes) {
+        first.push_back(static_cast<std::uint32_t>(triangles));
+        copies.push_back({mesh, vertices, triangles});
+        vertices += mesh.vertices.size();
+        triangles += mesh.triangles.size();
     }
+    require_countable(triangles, vertices);
+    AnyMesh out;
+    join_copies(std::span<const MergedCopy<AnyView>>(copies), vertices, triangles, out);
     return out;
 }
 

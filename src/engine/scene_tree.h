@@ -22,10 +22,21 @@
 
 namespace raydix {
 
+struct FlatTriangles;  // near_scene.h
+struct NearScene;      // near_scene.h
+
+/// The triangles of a mesh tree that rays never hit, for queries of distance. Made when the first
+/// of them asks (flat_triangles_of); commits that keep the tree keep them.
+struct KeptFlatTriangles {
+    std::once_flag asked;
+    std::shared_ptr<const FlatTriangles> known;  // null: there are none
+};
+
 /// One tree over the triangles of one mesh or of several, which follow each other by id.
 struct MeshTree : GroupedMeshes {
     std::shared_ptr<const WideBvh> tree;
     WideView view{};  // without room for a compact tree's blocks
+    std::shared_ptr<KeptFlatTriangles> flats = std::make_shared<KeptFlatTriangles>();
 };
 
 struct SceneTree;
@@ -104,6 +115,9 @@ struct SceneTree {
     }
     mutable std::once_flag support_asked;
     mutable Support support_known;
+    /// What queries of distance need besides, made when the first of them asks (near_scene_of).
+    mutable std::once_flag near_asked;
+    mutable std::shared_ptr<const NearScene> near_known;
 
     /// The only mesh tree, if rays need nothing else.
     [[nodiscard]] const MeshTree* only_mesh() const {

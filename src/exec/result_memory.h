@@ -25,4 +25,8 @@ inline constexpr std::uint64_t unknown_memory = ~std::uint64_t{0};
     return b != 0 && a > unknown_memory / b ? unknown_memory : a * b;
 }
 
+[[nodiscard]] inline std::uint64_t saturating_sum(std::uint64_t a, std::uint64_t b) {
+    return a > unknown_memory - b ? unknown_memory : a + b;
+}
+
 }  // namespace raydix

@@ -8,6 +8,7 @@
 #include "base/float_env.h"
 #include "exec/result_budget.h"
 #include "proximity/query_batch.h"
+#include "proximity/row_blocks.h"
 #include "proximity/touch_walk.h"
 #include "proximity/whole_tree.h"
 
@@ -95,71 +96,6 @@ OverlapCounts any_batch(const AnyBvh& bvh, std::span<const Query> queries,
     return counts;
 }
 
-/// Rows that are found block by block, until all their lengths are known. They are put in order
-/// when they have their place in the result, so that one that does not fit is refused before; trees
-/// with parts of triangles find an id more than once, and order at once to count.
-class RowBlocks {
-public:
-    RowBlocks(std::size_t queries, bool finds_twice, ResultBudget& budget)
-        : budget_(budget),
-          finds_twice_(finds_twice),
-          found_(budget_lists<std::uint32_t>(block_count(queries), budget)) {
-        budget_.take((queries + 1) * sizeof(std::uint64_t));
-        lists_.offsets.resize(queries + 1, 0);
-    }
-
-    /// The row of query i goes behind those that its block has: each id once.
-    template <class Tree, class Query, class Stack>
-    std::uint64_t add_row(std::size_t block, std::size_t i, const Tree& tree, const Query& query,
-                          Stack& stack) {
-        BudgetVector<std::uint32_t>& ids = found_[block];
-        const std::size_t before = ids.size();
-        for_each_touched(tree, query, stack, [&](std::uint32_t position) {
-            ids.push_back(tree.order[position]);
-            return false;
-        });
-        if (finds_twice_) {
-            const auto row = ids.begin() + static_cast<std::ptrdiff_t>(before);
-            std::sort(row, ids.end());
-            ids.erase(std::unique(row, ids.end()), ids.end());
-        }
-        return lists_.offsets[i + 1] = ids.size() - before;
-    }
-    /// The block is complete. Its place in the result is taken now: too many are known early.
-    void finish(std::size_t block) {
-        pack(found_[block]);
-        budget_.take(found_[block].size() * sizeof(std::uint32_t));
-    }
-
-    /// `order`: the one in which the rows were added.
-    OverlapLists join(std::span<const std::uint32_t> order) {
-        for (std::size_t i = 0; i + 1 < lists_.offsets.size(); ++i)
-            lists_.offsets[i + 1] += lists_.offsets[i];
-        lists_.prims.resize(lists_.offsets.back());
-        for_each_query_block(
-            lists_.offsets.size() - 1, order,
-            [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
-                const BudgetVector<std::uint32_t> ids = std::move(found_[block]);
-                const std::uint32_t* from = ids.data();
-                for (std::size_t k = begin; k < end; ++k) {
-                    const std::uint64_t to = lists_.offsets[at(k)];
-                    const std::uint64_t length = lists_.offsets[at(k) + 1] - to;
-                    std::uint32_t* const row = lists_.prims.data() + to;
-                    std::copy_n(from, length, row);
-                    if (!finds_twice_) std::sort(row, row + length);
-                    from += length;
-                }
-            });
-        return std::move(lists_);
-    }
-
-private:
-    ResultBudget& budget_;
-    bool finds_twice_;
-    BudgetVector<BudgetVector<std::uint32_t>> found_;
-    OverlapLists lists_;
-};
-
 template <class AnyBvh, class Query>
 OverlapLists all_batch(const AnyBvh& bvh, std::span<const Query> queries,
                        const OverlapOptions& options) {
@@ -168,7 +104,7 @@ OverlapLists all_batch(const AnyBvh& bvh, std::span<const Query> queries,
     OverlapLists lists;
     with_threads(options.threads, [&] {
         ResultBudget budget("touch_all", options.max_result_bytes);
-        RowBlocks rows(queries.size(), has_parts(bvh), budget);
+        RowBlocks<OverlapLists> rows(queries.size(), has_parts(bvh), budget);
         // Without room to put the queries in order they are taken as they come.
         std::vector<std::uint32_t> order;
         const std::uint64_t bytes = ordering_bytes<Query> * queries.size();
@@ -180,7 +116,13 @@ OverlapLists all_batch(const AnyBvh& bvh, std::span<const Query> queries,
         const OverlapCounts counts = for_each_query(
             tree, queries, in_order,
             [&](std::size_t block, std::size_t i, auto& stack) {
-                return rows.add_row(block, i, tree, prepared(queries[i]), stack);
+                return rows.add_row(block, i, [&](auto& ids) {
+                    for_each_touched(tree, prepared(queries[i]), stack,
+                                     [&](std::uint32_t position) {
+                                         ids.push_back(tree.order[position]);
+                                         return false;
+                                     });
+                });
             },
             [&](std::size_t block) { rows.finish(block); });
         lists = rows.join(in_order);

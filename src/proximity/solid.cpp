@@ -5,7 +5,9 @@
 #include <raydix/solid.h>
 
 #include <limits>
+#include <memory>
 #include <optional>
+#include <utility>
 
 #include "base/float_env.h"
 #include "base/options.h"
@@ -57,6 +59,7 @@ template <class AnyTree, class AnyBvh>
 struct SolidState {
     using Tree = AnyTree;
     const AnyBvh* bvh;
+    std::shared_ptr<const AnyBvh> kept = {};  // the same, if it is the solid's
     std::optional<AnyBvh> whole;  // where the caller's tree has triangles in several leaves
     std::optional<Inside> inside;
 
@@ -210,12 +213,19 @@ Solid::Solid(const Bvh& bvh, const SolidOptions& options) : state_(std::make_uni
     require_triangles(bvh, "a solid needs");
     with_threads(options.threads, [&] { state_->prepare(bvh, options.rule); });
 }
+Solid::Solid(std::shared_ptr<const Bvh> bvh, const SolidOptions& options) : Solid(*bvh, options) {
+    state_->kept = std::move(bvh);
+}
 Solid::~Solid() = default;
 Solid::Solid(Solid&&) noexcept = default;
 Solid& Solid::operator=(Solid&&) noexcept = default;
 
 SolidD::SolidD(const BvhD& bvh, const SolidOptions& options) : state_(std::make_unique<State>()) {
     with_threads(options.threads, [&] { state_->prepare(bvh, options.rule); });
+}
+SolidD::SolidD(std::shared_ptr<const BvhD> bvh, const SolidOptions& options)
+    : SolidD(*bvh, options) {
+    state_->kept = std::move(bvh);
 }
 SolidD::~SolidD() = default;
 SolidD::SolidD(SolidD&&) noexcept = default;

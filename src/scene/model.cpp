@@ -2,10 +2,11 @@
 #include <raydix/error.h>
 #include <raydix/model.h>
 
+#include <span>
 #include <utility>
 
 #include "base/float_env.h"
-#include "exec/parallel.h"
+#include "exec/join_copies.h"
 #include "scene/byte_source.h"
 #include "scene/mesh_builder.h"
 #include "scene/model_nodes.h"
@@ -30,22 +31,27 @@ public:
     [[nodiscard]] Mesh run() const {
         check_size();
         Mesh out;
-        out.vertices.resize(vertices_);
-        out.triangles.resize(triangles_);
-        for (const Copy& copy : copies_) fill(copy, out);
+        join_copies(std::span<const Copy>(copies_), vertices_, triangles_, out);
         return out;
     }
 
 private:
     struct Copy {
-        const Mesh* mesh;
+        MeshView mesh;
         NodeMap map;
         std::uint64_t first_vertex, first_triangle;
+
+        [[nodiscard]] bool mirrors() const { return map.mirrors(); }
+        [[nodiscard]] auto mover() const {
+            return [this, stays = map.is_identity()](Vec3 vertex) {
+                return moved(map, stays, vertex);
+            };
+        }
     };
 
     void plan(std::size_t mesh, const NodeMap& map) {
         const Mesh& source = model_.meshes.at(mesh);
-        copies_.push_back({&source, map, vertices_, triangles_});
+        copies_.push_back({source, map, vertices_, triangles_});
         vertices_ += source.vertices.size();
         triangles_ += source.triangles.size();
     }
@@ -66,21 +72,6 @@ private:
         else if (triangles_ > max_triangles)
             fault = "more than 2^31 - 1 triangles";
         if (fault != nullptr) throw InputError(model_.name + ": as one mesh: " + fault);
-    }
-
-    static void fill(const Copy& copy, Mesh& out) {
-        const bool stays = copy.map.is_identity(), mirrors = copy.map.mirrors();
-        const std::vector<Vec3>& vertices = copy.mesh->vertices;
-        for_each_index(vertices.size(), [&](std::size_t i) {
-            out.vertices[copy.first_vertex + i] = moved(copy.map, stays, vertices[i]);
-        });
-        const std::vector<Triangle>& triangles = copy.mesh->triangles;
-        const auto first = static_cast<std::uint32_t>(copy.first_vertex);
-        for_each_index(triangles.size(), [&](std::size_t i) {
-            Triangle t = triangles[i];
-            if (mirrors) std::swap(t[1], t[2]);
-            out.triangles[copy.first_triangle + i] = {t[0] + first, t[1] + first, t[2] + first};
-        });
     }
 
     const Model& model_;

@@ -13,6 +13,8 @@ from program import MISS, ProgramTest, main, read_hits, read_npy, write_npy  # n
 RAYS = [((0.75, 0.25, 5), (5.0, 0, 2, 1)), ((0.25, 0.75, 5), (5.0, 1, 2, 1)), ((10.75, 0.25, 5), (4.0, 0, 1, 2)),
         ((9.25, 0.25, 5), (3.0, 0, 2, 3)), ((9.75, 0.75, 5), (3.0, 1, 2, 3)), ((5, 0.5, 5), None)]
 FLAT_PRIMS = [0, 1, 4, 6, 7, MISS]
+# (instance, geometry, prim) of the triangles of the flat mesh.
+FLAT_NAMES = [(1, 2, 0), (1, 2, 1), (2, 0, 0), (2, 0, 1), (2, 1, 0), (2, 1, 1), (3, 2, 0), (3, 2, 1)]
 
 
 def document(nodes=None, scene=(2, 0)):
@@ -87,11 +89,68 @@ class Gltf(ProgramTest):
     def test_what_takes_one_mesh_says_so(self):
         note = "scene.gltf: its 3 meshes and 3 nodes are taken as one mesh (--flatten)"
         for command in (("build", self.scene), ("trace", self.scene, "--kernel", "scalar", "--size", "8x8"),
-                        ("query", self.scene, "--closest", "--queries", self.scene), ("check", self.scene)):
+                        ("query", self.scene, "--closest", "--builder", "ploc"), ("query", self.scene, "--knn", "1"),
+                        ("check", self.scene)):
             with self.subTest(command=command):
                 self.assertIn(note, self.succeed(*command).out)
                 self.assertNotIn(note, self.succeed(*command, "--flatten").out)
         self.assertNotIn(note, self.succeed("trace", self.scene, "--size", "8x8").out)
+
+    def columns(self, *names):
+        """The .npy files of q: rows of whole numbers."""
+        files = []
+        for name in names:
+            descr, shape, data = read_npy(self.folder / f"q.{name}.npy")
+            self.assertEqual(descr, "<u4", name)
+            values = struct.unpack(f"<{len(data) // 4}I", data)
+            files.append(values if len(shape) == 1 else list(zip(*[iter(values)] * 2)))
+        return files
+
+    def test_queries_keep_the_structure(self):
+        """Answers are those of --flatten, ids apart."""
+        queries = str(self.folder / "queries.npy")
+        points = [(0.7, 0.2, 0.5), (0.2, 0.7, -1), (10.5, 0.2, 1.4), (9.2, 0.1, 2.5), (5, 5, 5), (float("nan"), 0, 0)]
+        write_npy(queries, "<f4", (len(points), 3), b"".join(struct.pack("<3f", *p) for p in points))
+        self.succeed("build", self.scene, "--repeat", "1", "-o", "scene.rdx")
+
+        def query(scene, *options):
+            return self.document("query", scene, *options, "--out", "q", "--repeat", "0")
+
+        flat = query(self.scene, "--closest", "--queries", queries, "--flatten")
+        (prims,) = self.columns("indices")
+        places = [(self.folder / f"q.{name}.npy").read_bytes() for name in ("distances", "points")]
+        for scene in (self.scene, str(self.folder / "scene.rdx")):
+            kept = query(scene, "--closest", "--queries", queries)
+            self.assertEqual((kept["scene"]["geometries"], kept["scene"]["instances"]), (3, 3))
+            for field in ("kind", "queries", "found", "invalid_queries"):
+                self.assertEqual(kept["query"][0][field], flat["query"][0][field])
+            names = list(zip(*self.columns("instances", "geometries", "indices")))
+            self.assertEqual(names, [FLAT_NAMES[p] if p != MISS else (0, MISS, MISS) for p in prims])
+            self.assertEqual([(self.folder / f"q.{name}.npy").read_bytes() for name in ("distances", "points")], places)
+        self.assertIn("--queries", self.run_program("query", "scene.rdx", "--closest").err)
+        self.document("query", self.scene, "--closest", "--repeat", "0")  # its own points
+
+        flat = query(self.scene, "--signed-distance", "--queries", queries, "--flatten")
+        distances = (self.folder / "q.distances.npy").read_bytes()
+        kept = query(self.scene, "--signed-distance", "--queries", queries)
+        self.assertEqual((self.folder / "q.distances.npy").read_bytes(), distances)
+        self.assertEqual(kept["solid"], flat["solid"])
+
+        # Two squares, and a third that goes through both.
+        crossed = self.write("crossed.gltf", document(
+            [{"mesh": 0}, {"mesh": 1, "translation": [0.25, 0.25, -0.25], "scale": [1, 2, 1],
+                           "rotation": [0.7071067811865476, 0, 0, 0.7071067811865476]}], [0, 1]))
+        names = [(1, 0, 0), (1, 0, 1), (1, 1, 0), (1, 1, 1), (2, 2, 0), (2, 2, 1)]
+        for first, second, options in ((names, names, (crossed,)), (FLAT_NAMES, names, (self.scene, "--with", crossed))):
+            query(*options, "--pairs", "--flatten")
+            (pairs,) = self.columns("pairs")
+            self.assertGreater(len(pairs), 1)
+            found = query(*options, "--pairs")["query"][0]
+            self.assertEqual((found["queries"], found["found"]), (len(first), len(pairs)))
+            prims, geometries, instances = self.columns("pairs", "pairs-geometries", "pairs-instances")
+            self.assertEqual([tuple(zip(*row)) for row in zip(instances, geometries, prims)],
+                             [(first[i], second[j]) for i, j in pairs])
+        self.fail_with_one_line("query", self.scene, "--pairs", "--max-result-bytes", "100", names=("scene.gltf", "bytes"))
 
     def test_info_counts_both(self):
         info = self.document("info", self.scene)["scene"]

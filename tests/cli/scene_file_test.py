@@ -59,8 +59,8 @@ class SceneFile(ProgramTest):
 
     def test_what_is_refused(self):
         self.succeed("build", self.scene, "--repeat", "1", "-o", "saved.rdx")
-        for command in (("build", "saved.rdx"), ("query", "saved.rdx", "--closest", "--queries", SOUP),
-                        ("query", "saved.rdx", "--knn", "2"), ("simulate", "saved.rdx", "--size", "8x8"),
+        for command in (("build", "saved.rdx"), ("query", "saved.rdx", "--knn", "2"),
+                        ("query", SOUP, "--pairs", "--with", "saved.rdx", "--flatten"), ("simulate", "saved.rdx", "--size", "8x8"),
                         ("check", "--same", "saved.rdx", SOUP),
                         ("render", "saved.rdx", "--view", "tree", "-o", "x.png")):
             self.fail_with_one_line(*command, names=("saved.rdx", "it holds a scene"))

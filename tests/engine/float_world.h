@@ -142,7 +142,28 @@ struct Recipe {
     float shear;
     SceneOptions options = {};
     bool shapes = false;  // among the meshes
+    bool flats = false;   // triangles without area, and some twice, in meshes
 };
+
+/// Triangles that are segments or points, and some that are there already.
+inline void add_flats(RandomScenes& random, Mesh& mesh) {
+    const auto vertices = static_cast<std::uint32_t>(mesh.vertices.size());
+    if (vertices == 0) return;
+    for (std::uint32_t k = random.below(12); k-- > 0;) {
+        const std::uint32_t a = random.below(vertices), b = random.below(vertices);
+        const std::uint32_t kind = random.below(4);
+        if (kind == 0) mesh.triangles.push_back({a, a, b});
+        if (kind == 1) mesh.triangles.push_back({a, a, a});
+        if (kind == 2) mesh.triangles.push_back(mesh.triangles[random.below(3) % vertices / 3]);
+        if (kind == 3) {
+            const Vec3 at = random.in(-1, 2);
+            for (int step = 0; step < 3; ++step)
+                mesh.vertices.push_back({at.x + static_cast<float>(step), at.y, at.z});
+            const auto end = static_cast<std::uint32_t>(mesh.vertices.size());
+            mesh.triangles.push_back({end - 3, end - 1, end - 2});
+        }
+    }
+}
 
 /// Where a ray enters or leaves a box: a user's own test. u: the axis of the side.
 inline bool hits_box(const Aabb& box, const Ray& ray, Hit& hit) {
@@ -244,6 +265,7 @@ inline std::shared_ptr<World> random_world(RandomScenes& random, const Recipe& r
             item.mesh = random.below(8) == 0
                             ? Mesh{}
                             : random_soup(1 + random.below(40), id + 100 * level, 0.6f);
+            if (recipe.flats) add_flats(random, item.mesh);
             world->scene.add(item.mesh, options);
         }
         world->items.push_back(std::move(item));

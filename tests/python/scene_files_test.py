@@ -52,8 +52,12 @@ def test_files_keep_their_nodes(tmp_path):
     assert hits["prim"].tolist() == [0, 0, 0, raydix.MISSING]
     assert [scene.path(int(i))[:1] for i in hits["instance"]] == [[first], [first], [last], []]
     assert len(scene.path(int(hits["instance"][1]))) == 2
-    with pytest.raises(raydix.InputError, match=f"geometry {first} is an instance"):
-        scene.closest_point([0, 0, 0])
+    near = scene.closest_point([[10.2, 0.2, 1], [0.2, 0.2, 2]])
+    assert near["distance"].tolist() == [1, 2] and near["prim"].tolist() == [0, 0]
+    assert near["instance"].tolist() == hits["instance"][[0, 2]].tolist()
+    assert scene.closure()["closure"] == "open"
+    with pytest.raises(raydix.InputError, match=f"faces: geometry {first} is an instance"):
+        scene.faces
     with pytest.raises(raydix.InputError, match="vertices"):
         raydix.Scene(scene)
     scene.set_transform(last, np.eye(4) + [[0] * 4, [0] * 4, [0, 0, 0, 0.5], [0] * 4])
@@ -101,8 +105,15 @@ def test_saved_scenes_have_the_same_hits(rng, tmp_path, options):
     np.testing.assert_array_equal(loaded.positions(wanted), world.positions(wanted))
     for number in set(wanted["instance"].tolist()):
         assert loaded.path(number) == world.path(number)
-    with pytest.raises(raydix.InputError, match="geometry 0 is an instance"):
-        loaded.contains([0, 0, 0])
+    points = rng.uniform(-3, 3, (100, 3))
+    for call in ("closest_point", "touched_by"):
+        asked = {"spheres": np.pad(points, ((0, 0), (0, 1)), constant_values=0.5)}
+        asked = asked if call == "touched_by" else {"points": points}
+        same_hits(getattr(loaded, call)(**asked), getattr(world, call)(**asked))
+    same_hits(loaded.overlaps(narrow=True), world.overlaps(narrow=True))
+    np.testing.assert_array_equal(loaded.signed_distance(points), world.signed_distance(points))
+    with pytest.raises(raydix.InputError, match="faces: geometry 0 is an instance"):
+        loaded.faces
 
 
 def test_loaded_scenes_change_as_those_that_were_saved(rng, tmp_path):
@@ -162,8 +173,9 @@ def test_one_mesh_of_a_file_answers_all_queries(rng, tmp_path):
     for saved, name in ((scene, "one.rdx"), (two, "two.rdx")):
         saved.save(tmp_path / name)
     loaded, rest = (raydix.load_scene(tmp_path / name) for name in ("one.rdx", "two.rdx"))
+    assert (rest.closest_point(points)["geometry"] == 4_000_000_000).any()
     with pytest.raises(raydix.InputError, match="geometry 4000000000 is a second mesh"):
-        rest.closest_point(points)
+        rest.stats()
     assert list(rest) == [0, 4_000_000_000]
     rest.remove(4_000_000_000)
     rest.commit()

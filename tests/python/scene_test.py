@@ -256,7 +256,7 @@ def test_commits_tell_what_they_did(rng, precision):
     ids = [scene.add(vertices + np.float32([4 * i, 0, 0]), faces) for i in range(3)]
     report = scene.commit()
     assert set(report) == {"ms", "meshes", "instances", "triangles", "trees_built", "trees_refitted",
-                           "sah_ratio", "parts_refitted", "bytes", "paths"}  # fmt: skip
+                           "sah_ratio", "parts_refitted", "bytes", "paths", "shapes", "primitives"}  # fmt: skip
     assert report["meshes"] == report["trees_built"] == 3 and report["triangles"] == 1500
     scene.update(ids[1], vertices * np.float32(1.01))
     report = scene.commit()  # still moving

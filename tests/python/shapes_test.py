@@ -47,7 +47,7 @@ def test_spheres_are_hit_where_they_are():
         scene.positions(hits)
 
 
-def test_shapes_mix_with_meshes_and_instances():
+def test_shapes_mix_with_meshes_and_instances(tmp_path):
     ball = raydix.Scene()
     ball.add_spheres([[0, 0, 0]], 1)
     ball.commit()
@@ -72,9 +72,14 @@ def test_shapes_mix_with_meshes_and_instances():
     with pytest.raises(raydix.InputError, match="geometry 1 holds shapes, not a mesh"):
         scene.update(rod, [[0, 0, 0]] * 3)
     with pytest.raises(raydix.InputError, match="holds spheres"):
-        ball.save("/tmp/never.rdx")
-    with pytest.raises(raydix.InputError, match="geometry 0 holds shapes"):
-        ball.closest_point([[0, 0, 0]])
+        ball.save(tmp_path / "never.rdx")
+    with pytest.raises(raydix.InputError, match="vertices: geometry 0 holds shapes"):
+        ball.vertices
+    near = scene.closest_point([[5, 0, 3], [0, 2, 0.5], [3, -2, -4]])
+    assert near["distance"].tolist() == [2, 0, 1]
+    assert near["instance"].tolist() == [1, 0, 0] and near["geometry"].tolist() == [0, rod, 2]
+    touched = scene.touched_by(spheres=[[5, 0, 3, 2], [5, 0, 3, 1.9]])
+    assert touched["offsets"].tolist() == [0, 1, 1] and touched["instance"].tolist() == [1]
 
 
 def test_bad_shapes_are_named():
@@ -90,7 +95,7 @@ def test_bad_shapes_are_named():
 
 
 def test_filters_are_filtered_hits():
-    mesh = raydix.Scene("builtin:figure?triangles=2000")
+    mesh = raydix.Scene("builtin:figure?triangles=5000")
     box = mesh.bounds
     rays = _rays(4000)
     rays[:, :3] = box[0] + (box[1] - box[0]) * (rays[:, :3] + 2) / 4
@@ -111,7 +116,7 @@ def test_filters_are_filtered_hits():
 
 
 def test_rays_leave_out_what_they_start_from():
-    mesh = raydix.Scene("builtin:figure?triangles=2000")
+    mesh = raydix.Scene("builtin:figure?triangles=5000")
     rays = _rays(2000, 5)
     hits = mesh.intersect(rays)
     met = hits["prim"] != 0xFFFFFFFF
@@ -124,7 +129,7 @@ def test_rays_leave_out_what_they_start_from():
 
 
 def test_filters_name_what_is_wrong():
-    mesh = raydix.Scene("builtin:figure?triangles=2000")
+    mesh = raydix.Scene("builtin:figure?triangles=5000")
     rays = _rays(2000)
     with pytest.raises(ValueError, match="skip: expected shape"):
         mesh.intersect(rays, skip=[1, 2, 3])

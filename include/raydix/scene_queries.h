@@ -1,0 +1,134 @@
+// Distance and overlap on scenes: the closest point, what a segment or a sphere touches, where a
+// moving sphere first does. On everything that a scene holds, instances included.
+#pragma once
+
+#include <raydix/closest.h>
+#include <raydix/overlap.h>
+#include <raydix/scene.h>
+#include <raydix/shapes.h>
+#include <raydix/types.h>
+
+#include <compare>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace raydix {
+
+/// All calls of this header answer from the scene's last commit. The triangles of an instance are
+/// those that its vertices make in the world: moved by each transform in turn, the innermost first,
+/// in double, and rounded to float once. So the answers are those of one mesh of all triangles, ids
+/// apart. Triangles without area, which rays never hit, count here as segments or points. Spheres,
+/// capsules and points answer closest points and touch as closed balls and capsules; a query inside
+/// is at distance 0. Where they stand in instances that stretch or shear, their images answer, in
+/// double. All throw InputError: a scene that was never committed, user geometry that the mask
+/// shows (it is named), an instruction set that this processor does not have.
+///
+/// `instance` counts as in hits of rays: 0 is the scene itself, others are for Scene::path.
+
+/// The closest point of a scene to a query. position, distance, u and v are as in ClosestPoint; of
+/// a sphere u and v are 0, of a capsule u is the place along its axis, from 0 at a to 1 at b.
+/// Nothing found: no_primitive and infinity.
+struct SceneClosestPoint {
+    Vec3 position{infinity, infinity, infinity};
+    float distance = infinity;
+    std::uint32_t prim = no_primitive;
+    std::uint32_t geometry = no_primitive;
+    std::uint32_t instance = 0;
+    float u = 0.0f, v = 0.0f;
+
+    [[nodiscard]] constexpr bool found() const { return prim != no_primitive; }
+};
+
+struct SceneClosestOptions {
+    float max_distance = infinity;     // as in ClosestOptions
+    std::uint32_t mask = 0xFFFFFFFFu;  // of all queries, as of rays
+    int threads = 0;       // 0 to 1,024; 0: all the machine has. Results do not depend on it
+    std::string isa = {};  // one of simd_instruction_sets(); empty: the best. Results do not depend
+                           // on it
+};
+
+/// For each query the least (d2, instance, geometry, prim) over all triangles and shapes, d2 as in
+/// closest.h. queries [n] -> results [n]. Any order of queries will do: they are taken along a
+/// Morton curve. Throws InputError also for sizes that differ and for a max_distance that is
+/// negative or NaN.
+ClosestCounts closest_points(const Scene& scene, std::span<const Vec3> queries,
+                             std::span<SceneClosestPoint> results,
+                             const SceneClosestOptions& options = {});
+[[nodiscard]] std::vector<SceneClosestPoint> closest_points(
+    const Scene& scene, std::span<const Vec3> queries, const SceneClosestOptions& options = {});
+/// One query, on the caller's thread.
+[[nodiscard]] SceneClosestPoint closest_point(const Scene& scene, Vec3 query,
+                                              float max_distance = infinity,
+                                              std::uint32_t mask = 0xFFFFFFFFu);
+
+struct SceneOverlapOptions {
+    std::uint32_t mask = 0xFFFFFFFFu;  // of all queries, as of rays
+    /// touch_all only: bounds the peak of the call. 0: half of what is left (result_limit.h).
+    std::uint64_t max_result_bytes = 0;
+    int threads = 0;       // 0 to 1,024; 0: all the machine has. Results do not depend on it
+    std::string isa = {};  // as in SceneClosestOptions
+};
+
+/// Whether each query has a point in common with any triangle or shape: 1 or 0. On triangles as
+/// touch_any of overlap.h. A sphere touches a shape if d2 <= radius * radius with the d2 of
+/// closest_points; a segment is decided in double there. queries [n] -> touched [n]. Throws
+/// InputError also for sizes that differ.
+OverlapCounts touch_any(const Scene& scene, std::span<const Segment> queries,
+                        std::span<std::uint8_t> touched, const SceneOverlapOptions& options = {});
+OverlapCounts touch_any(const Scene& scene, std::span<const Sphere> queries,
+                        std::span<std::uint8_t> touched, const SceneOverlapOptions& options = {});
+[[nodiscard]] bool touches(const Scene& scene, const Segment& segment,
+                           std::uint32_t mask = 0xFFFFFFFFu);
+[[nodiscard]] bool touches(const Scene& scene, const Sphere& sphere,
+                           std::uint32_t mask = 0xFFFFFFFFu);
+
+/// A primitive of a scene: on which path of instances, of which geometry, and its number there.
+/// In this order they ascend.
+struct ScenePrimitive {
+    std::uint32_t instance, geometry, prim;
+
+    friend constexpr auto operator<=>(const ScenePrimitive&, const ScenePrimitive&) = default;
+};
+
+/// All that each query touches: those of query i are prims[offsets[i]] .. prims[offsets[i + 1]],
+/// ascending.
+struct SceneOverlapLists {
+    std::vector<std::uint64_t> offsets;  // [queries + 1]
+    std::vector<ScenePrimitive> prims;
+    OverlapCounts counts;
+};
+
+/// As touch_any, but all of them, each once. None is ever dropped. Throws ResultTooLarge, an
+/// InputError, if the call would take more than options.max_result_bytes.
+[[nodiscard]] SceneOverlapLists touch_all(const Scene& scene, std::span<const Segment> queries,
+                                          const SceneOverlapOptions& options = {});
+[[nodiscard]] SceneOverlapLists touch_all(const Scene& scene, std::span<const Sphere> queries,
+                                          const SceneOverlapOptions& options = {});
+
+/// As SweepHit, and where in a scene it is.
+struct SceneSweepHit {
+    float t = infinity;
+    std::uint32_t prim = no_primitive;
+    std::uint32_t geometry = no_primitive;
+    std::uint32_t instance = 0;
+    Vec3 position{infinity, infinity, infinity};
+    float u = 0.0f, v = 0.0f;
+
+    [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
+};
+
+/// First contacts with triangles: for each sweep the least (t, instance, geometry, prim) of those
+/// with a finite t, as sweep_spheres of overlap.h. A sweep without a radius is a ray through the
+/// triangles as they are in the world. sweeps [n] -> hits [n]. Throws InputError also for sizes
+/// that differ and for spheres, capsules or points that the mask shows (they are named).
+OverlapCounts sweep_spheres(const Scene& scene, std::span<const SphereSweep> sweeps,
+                            std::span<SceneSweepHit> hits, const SceneOverlapOptions& options = {});
+[[nodiscard]] std::vector<SceneSweepHit> sweep_spheres(const Scene& scene,
+                                                       std::span<const SphereSweep> sweeps,
+                                                       const SceneOverlapOptions& options = {});
+[[nodiscard]] SceneSweepHit sweep_sphere(const Scene& scene, const SphereSweep& sweep,
+                                         std::uint32_t mask = 0xFFFFFFFFu);
+
+}  // namespace raydix

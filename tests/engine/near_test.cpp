@@ -1,0 +1,616 @@
+// Distance and overlap on scenes, against a look at every triangle as it is in the world.
+#include <gtest/gtest.h>
+#include <raydix/closest.h>
+#include <raydix/error.h>
+#include <raydix/overlap.h>
+#include <raydix/scene_queries.h>
+#include <raydix/user_geometry.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <thread>
+#include <tuple>
+#include <vector>
+
+#include "engine/extent.h"
+#include "engine/float_world.h"
+#include "engine/near_shapes.h"
+#include "primitives/exact_overlap.h"
+#include "proximity/sweep_walk.h"
+#include "proximity/touch_walk.h"
+#include "support/support.h"
+
+namespace raydix::test {
+namespace {
+
+/// A triangle in the world.
+struct Flattened {
+    LeafTriangle triangle;
+    ScenePrimitive name;
+    std::uint32_t masks[6];  // of all on the way
+    std::size_t mask_count;
+
+    [[nodiscard]] bool seen_by(std::uint32_t mask) const {
+        return std::all_of(masks, masks + mask_count,
+                           [&](std::uint32_t m) { return (m & mask) != 0; });
+    }
+};
+
+Vec3 in_world(Vec3 p, const std::vector<Affine>& maps) {
+    Double3 at = Double3(p) + Double3(0, 0, 0);
+    for (std::size_t k = maps.size(); k-- > 0;) at = maps[k].point(at);
+    return without_negative_zero(at.rounded());
+}
+
+void flatten(const World& world, std::vector<Affine>& maps, std::vector<std::uint32_t>& masks,
+             std::uint32_t number, std::vector<Flattened>& out) {
+    std::uint32_t next = number + 1;
+    for (const World::Item& item : world.items) {
+        masks.push_back(item.mask);
+        if (item.inside) {
+            maps.push_back(affine_of(item.transform));
+            flatten(*item.inside, maps, masks, next, out);
+            maps.pop_back();
+            next += 1 + static_cast<std::uint32_t>(item.inside->paths());
+        }
+        for (std::uint32_t prim = 0; prim < item.mesh.triangles.size(); ++prim) {
+            const Triangle& t = item.mesh.triangles[prim];
+            const auto corner = [&](std::size_t k) {
+                return in_world(item.mesh.vertices[t[k]], maps);
+            };
+            Flattened flat{{corner(0), corner(1), corner(2)}, {number, item.id, prim}, {}, 0};
+            for (const std::uint32_t mask : masks) flat.masks[flat.mask_count++] = mask;
+            out.push_back(flat);
+        }
+        masks.pop_back();
+    }
+}
+
+std::vector<Flattened> flatten(const World& world) {
+    std::vector<Flattened> out;
+    std::vector<Affine> maps;
+    std::vector<std::uint32_t> masks;
+    flatten(world, maps, masks, 0, out);
+    return out;
+}
+
+std::vector<Flattened> seen_by(const std::vector<Flattened>& all, std::uint32_t mask) {
+    std::vector<Flattened> seen;
+    for (const Flattened& flat : all)
+        if (flat.seen_by(mask)) seen.push_back(flat);
+    return seen;
+}
+
+using Answer = std::tuple<float, float, float, float, ScenePrimitive, float, float>;
+Answer answer_of(const SceneClosestPoint& p) {
+    return {p.distance, p.position.x, p.position.y, p.position.z, {p.instance, p.geometry, p.prim},
+            p.u,        p.v};
+}
+
+SceneClosestPoint brute_closest(const std::vector<Flattened>& seen, Vec3 q, float max_distance) {
+    SceneClosestPoint best;
+    if (!is_finite(q)) return best;
+    float d2 = max_distance * max_distance;
+    ScenePrimitive name{no_primitive, no_primitive, no_primitive};
+    for (const Flattened& flat : seen) {
+        const TrianglePoint p = closest_on_triangle(flat.triangle, q);
+        if (!(p.d2 < d2 || (p.d2 == d2 && flat.name < name))) continue;
+        d2 = p.d2, name = flat.name;
+        best = {p.position, std::sqrt(p.d2), name.prim, name.geometry, name.instance, p.u, p.v};
+    }
+    return best;
+}
+
+bool touches(const Flattened& flat, const Sphere& s) {
+    return closest_on_triangle(flat.triangle, s.center).d2 <= s.radius * s.radius;
+}
+bool touches(const Flattened& flat, const Segment& s) {
+    return segment_touches_triangle(s.a, s.b, flat.triangle);
+}
+template <class Query>
+std::vector<ScenePrimitive> brute_touched(const std::vector<Flattened>& seen, const Query& query) {
+    std::vector<ScenePrimitive> names;
+    if (!is_valid(query)) return names;
+    for (const Flattened& flat : seen)
+        if (touches(flat, query)) names.push_back(flat.name);
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+using Contacted = std::tuple<float, ScenePrimitive, float, float, float, float, float>;
+Contacted answer_of(const SceneSweepHit& h) {
+    return {h.t, {h.instance, h.geometry, h.prim}, h.position.x, h.position.y, h.position.z, h.u,
+            h.v};
+}
+
+SceneSweepHit brute_sweep(const std::vector<Flattened>& seen, const SphereSweep& sweep) {
+    SceneSweepHit best;
+    if (!is_valid(sweep)) return best;
+    const RayFrame ray = make_frame(sweep.path);
+    const Path path = path_of(sweep.path);
+    const GrownBoxes boxes(path, sweep.radius);
+    float least = sweep.radius == 0 ? ray.tmax : infinity;
+    const Flattened* found = nullptr;
+    TriangleHit of_ray{};
+    for (const Flattened& flat : seen) {
+        TriangleHit hit{};
+        if (sweep.radius == 0) {
+            if (!intersect_triangle<EdgeRule::closed>(ray, flat.triangle, ray.tmax, hit)) continue;
+        } else {
+            hit.t = first_contact(path, boxes, sweep.radius, flat.triangle);
+            if (!(hit.t < infinity)) continue;
+        }
+        if (!(hit.t < least || (hit.t == least && (!found || flat.name < found->name)))) continue;
+        least = hit.t, found = &flat, of_ray = hit;
+    }
+    if (!found) return best;
+    best = {least, found->name.prim, found->name.geometry, found->name.instance, {}, 0, 0};
+    if (sweep.radius == 0) {
+        best.t = least * ray.t_scale + 0.0f;
+        const Double3 a(found->triangle.v0), b(found->triangle.v1), c(found->triangle.v2);
+        best.position = (a + (b - a) * of_ray.u + (c - a) * of_ray.v).rounded();
+        best.u = of_ray.u, best.v = of_ray.v;
+        return best;
+    }
+    const TrianglePoint at = closest_on_triangle(found->triangle, kept(path.at(least).rounded()));
+    best.t = least + 0.0f;
+    best.position = at.position, best.u = at.u, best.v = at.v;
+    return best;
+}
+
+/// Where something is: on corners, edges and faces, beside them, far away, and nowhere.
+std::vector<Vec3> random_queries(RandomScenes& random, const std::vector<Flattened>& all,
+                                 std::size_t count) {
+    std::vector<Vec3> queries;
+    for (std::size_t i = 0; i < count; ++i) {
+        const Vec3 near = random.in(-3, 3), far = random.in(-1e4f, 1e4f);
+        Vec3 q = i % 7 == 0 ? far : near;
+        if (!all.empty() && i % 3 == 0) {
+            const LeafTriangle& t =
+                all[random.below(static_cast<std::uint32_t>(all.size()))].triangle;
+            q = i % 2 == 0 ? t.v1 : 0.5f * t.v0 + 0.5f * t.v1;
+            if (i % 9 == 0) q = 0.25f * t.v0 + 0.25f * t.v1 + 0.5f * t.v2;
+        }
+        if (i % 61 == 0) q.y = std::numeric_limits<float>::quiet_NaN();
+        if (i % 67 == 0) q = {1e30f, -1e25f, 3e38f};
+        if (i % 71 == 0) q.z = infinity;
+        queries.push_back(q);
+    }
+    return queries;
+}
+
+std::size_t wrong_points(const World& world, const std::vector<Flattened>& all,
+                         const std::vector<Vec3>& queries) {
+    std::size_t wrong = 0;
+    for (const auto& [mask, most] : {std::pair{every_mask, infinity}, std::pair{2u, infinity},
+                                     std::pair{every_mask, 0.25f}, std::pair{5u, 0.0f}}) {
+        const std::vector<Flattened> seen = seen_by(all, mask);
+        std::vector<SceneClosestPoint> expected;
+        for (const Vec3 q : queries) expected.push_back(brute_closest(seen, q, most));
+        for (const std::string& isa : simd_instruction_sets())
+            for (const int threads : {1, 2}) {
+                const auto found = closest_points(
+                    world.scene, queries,
+                    {.max_distance = most, .mask = mask, .threads = threads, .isa = isa});
+                for (std::size_t i = 0; i < queries.size(); ++i)
+                    wrong += answer_of(found[i]) != answer_of(expected[i]);
+            }
+        for (std::size_t i = 0; i < queries.size(); i += 5)
+            wrong += answer_of(closest_point(world.scene, queries[i], most, mask)) !=
+                     answer_of(expected[i]);
+    }
+    return wrong;
+}
+
+template <class Query>
+std::size_t wrong_touches(const World& world, const std::vector<Flattened>& all,
+                          const std::vector<Query>& queries, std::size_t& touched_count) {
+    std::size_t wrong = 0;
+    for (const std::uint32_t mask : {every_mask, 2u}) {
+        const std::vector<Flattened> seen = seen_by(all, mask);
+        for (const std::string& isa : simd_instruction_sets()) {
+            const SceneOverlapOptions options{.mask = mask, .threads = 2, .isa = isa};
+            std::vector<std::uint8_t> touched(queries.size(), 7);
+            touch_any(world.scene, std::span<const Query>(queries), touched, options);
+            const SceneOverlapLists lists =
+                touch_all(world.scene, std::span<const Query>(queries), options);
+            for (std::size_t i = 0; i < queries.size(); ++i) {
+                const auto expected = brute_touched(seen, queries[i]);
+                const std::vector<ScenePrimitive> found(
+                    lists.prims.begin() + static_cast<std::ptrdiff_t>(lists.offsets[i]),
+                    lists.prims.begin() + static_cast<std::ptrdiff_t>(lists.offsets[i + 1]));
+                wrong += found != expected;
+                wrong += touched[i] != (expected.empty() ? 0 : 1);
+                touched_count += expected.size();
+                if (i % 8 == 0)
+                    wrong += raydix::touches(world.scene, queries[i], mask) != !expected.empty();
+            }
+        }
+    }
+    return wrong;
+}
+
+std::size_t wrong_sweeps(const World& world, const std::vector<Flattened>& all,
+                         const std::vector<SphereSweep>& sweeps, std::size_t& hit_count) {
+    std::size_t wrong = 0;
+    for (const std::uint32_t mask : {every_mask, 2u}) {
+        const std::vector<Flattened> seen = seen_by(all, mask);
+        std::vector<SceneSweepHit> expected;
+        for (const SphereSweep& sweep : sweeps) expected.push_back(brute_sweep(seen, sweep));
+        for (const std::string& isa : simd_instruction_sets()) {
+            const auto hits =
+                sweep_spheres(world.scene, sweeps, {.mask = mask, .threads = 2, .isa = isa});
+            for (std::size_t i = 0; i < sweeps.size(); ++i) {
+                wrong += answer_of(hits[i]) != answer_of(expected[i]);
+                hit_count += hits[i].hit();
+            }
+        }
+        for (std::size_t i = 0; i < sweeps.size(); i += 7)
+            wrong +=
+                answer_of(sweep_sphere(world.scene, sweeps[i], mask)) != answer_of(expected[i]);
+    }
+    return wrong;
+}
+
+/// One world of `recipe`, asked everything.
+void expect_no_differences(const World& world, RandomScenes& random, std::size_t& touched,
+                           std::size_t& swept) {
+    const std::vector<Flattened> all = flatten(world);
+    const std::vector<Vec3> queries = random_queries(random, all, 200);
+    EXPECT_EQ(wrong_points(world, all, queries), 0u);
+    std::vector<Sphere> spheres;
+    std::vector<Segment> segments;
+    std::vector<SphereSweep> sweeps;
+    for (std::size_t i = 0; i + 1 < queries.size(); ++i) {
+        const Vec3 a = queries[i], b = queries[i + 1];
+        spheres.push_back({a, i % 4 == 0 ? 0.0f : random.between(0, 0.6f)});
+        segments.push_back({a, i % 5 == 0 ? a : b});
+        sweeps.push_back({{a, i % 6 == 0 ? 0.25f : 0.0f, b - a}, 0.0f});
+        if (i % 3 != 0) sweeps.back().radius = random.between(0.01f, 0.5f);
+        if (i % 4 == 0) sweeps.back().path.tmax = 1.0f;
+        if (i % 11 == 0) sweeps.back().path.direction = 100.0f * sweeps.back().path.direction;
+    }
+    spheres.push_back({{0, 0, 0}, -1});
+    EXPECT_EQ(wrong_touches(world, all, spheres, touched), 0u);
+    EXPECT_EQ(wrong_touches(world, all, segments, touched), 0u);
+    EXPECT_EQ(wrong_sweeps(world, all, sweeps, swept), 0u);
+}
+
+TEST(Near, WorldsAnswerAsTheirTrianglesDo) {
+    std::size_t touched = 0, swept = 0;
+    for (std::uint32_t levels = 0; levels < 4; ++levels)
+        for (int k = 0; k < 4 * static_cast<int>(thorough); ++k) {
+            SCOPED_TRACE("levels " + std::to_string(levels) + ", world " + std::to_string(k));
+            RandomScenes random(9000 + 100 * levels + static_cast<std::uint64_t>(k));
+            Recipe recipe{levels, 1 + random.below(levels == 3 ? 4 : 6),
+                          k % 3 == 0   ? 0.0f
+                          : k % 3 == 1 ? 100.0f
+                                       : 1e4f};
+            recipe.flats = k % 4 != 3;
+            recipe.options.usage = k % 2 == 0 ? Usage::fixed : Usage::moving;
+            recipe.options.compact = k % 5 == 1;
+            recipe.options.quality = k % 4 == 2 ? Quality::high : Quality::balanced;
+            const auto world = random_world(random, recipe);
+            expect_no_differences(*world, random, touched, swept);
+        }
+    EXPECT_GT(touched, 1000u * thorough);
+    EXPECT_GT(swept, 500u * thorough);
+}
+
+/// A world of one mesh.
+World world_of(const Mesh& mesh, const SceneOptions& options = {}) {
+    World world;
+    world.scene.add(mesh);
+    world.items.push_back({0, every_mask, mesh, {}, {}});
+    world.scene.commit(options);
+    return world;
+}
+
+TEST(Near, OneMeshAnswersAsItsBinaryTreeDoes) {
+    RandomScenes random(77);
+    Mesh mesh = random_soup(6000, 5, 0.05f);
+    add_flats(random, mesh);
+    for (const Quality quality : {Quality::fast, Quality::balanced, Quality::high})
+        for (const bool compact : {false, true}) {
+            const World world = world_of(mesh, {.quality = quality, .compact = compact});
+            const Bvh bvh = build_bvh(mesh);
+            std::vector<Vec3> queries;
+            for (int i = 0; i < 5000; ++i) queries.push_back(random.in(-0.5f, 1.5f));
+            const auto expected = closest_points(bvh, queries);
+            const auto found = closest_points(world.scene, queries);
+            std::size_t wrong = 0;
+            for (std::size_t i = 0; i < queries.size(); ++i)
+                wrong += found[i].prim != expected[i].prim ||
+                         found[i].distance != expected[i].distance ||
+                         !(found[i].position == expected[i].position) ||
+                         found[i].u != expected[i].u || found[i].v != expected[i].v ||
+                         found[i].geometry != 0 || found[i].instance != 0;
+            EXPECT_EQ(wrong, 0u);
+        }
+}
+
+TEST(Near, TrianglesWithoutAreaAreFoundWhereThereIsNothingElse) {
+    Mesh mesh;
+    mesh.vertices = {{0, 0, 0}, {2, 0, 0}, {1, 0, 0}, {5, 5, 5}};
+    mesh.triangles = {{0, 1, 2}, {3, 3, 3}};
+    World world = world_of(mesh);
+    const SceneClosestPoint on_segment = closest_point(world.scene, {1.5f, 1, 0});
+    EXPECT_EQ(on_segment.prim, 0u);
+    EXPECT_EQ(on_segment.distance, 1.0f);
+    EXPECT_EQ(on_segment.position.x, 1.5f);
+    EXPECT_EQ(closest_point(world.scene, {5, 5, 6}).prim, 1u);
+    EXPECT_FALSE(closest_hit(world.scene, {{1.5f, 1, 0}, 0, {0, -1, 0}}).hit());
+    EXPECT_TRUE(touches(world.scene, Segment{{1, 1, 0}, {1, -1, 0}}));
+    EXPECT_TRUE(touches(world.scene, Sphere{{5, 5, 6}, 1}));
+    EXPECT_TRUE(sweep_sphere(world.scene, {{{5, 5, 9}, 0, {0, 0, -1}}, 1}).hit());
+
+    // In instances of instances, which rays need not enter at all.
+    Scene inner, outer;
+    inner.add(world.scene, moved(10, 0, 0));
+    inner.commit();
+    outer.add(inner, moved(0, 10, 0));
+    outer.commit();
+    const SceneClosestPoint found = closest_point(outer, {11.5f, 11, 0});
+    EXPECT_EQ(found.prim, 0u);
+    EXPECT_EQ(found.instance, 2u);
+    EXPECT_EQ(found.position.x, 11.5f);
+    EXPECT_EQ(found.position.y, 10.0f);
+}
+
+TEST(Near, EqualDistancesGoToTheLeastName) {
+    // Fans around one corner, in several meshes and instances at the same place.
+    Mesh fan;
+    fan.vertices.push_back({0, 0, 0});
+    for (int k = 0; k < 12; ++k)
+        fan.vertices.push_back(
+            {std::cos(0.5f * static_cast<float>(k)), std::sin(0.5f * static_cast<float>(k)), -1});
+    for (std::uint32_t k = 1; k < 12; ++k) fan.triangles.push_back({0, k, k + 1});
+    Scene inner, scene;
+    inner.add(fan);
+    inner.add(fan, {.mask = 2});
+    inner.commit();
+    scene.add(inner, moved(0, 0, 0));
+    scene.add(fan, {.mask = 1, .id = 4});
+    scene.add(inner, moved(0, 0, 0));
+    scene.add(fan, {.mask = 2, .id = 9});
+    scene.commit({.usage = Usage::moving});
+    const auto name = [](const SceneClosestPoint& p) {
+        return ScenePrimitive{p.instance, p.geometry, p.prim};
+    };
+    const Vec3 above{0, 0, 1};
+    EXPECT_EQ(name(closest_point(scene, above)), (ScenePrimitive{0, 4, 0}));
+    EXPECT_EQ(name(closest_point(scene, above, infinity, 2)), (ScenePrimitive{0, 9, 0}));
+    EXPECT_EQ(name(closest_point(scene, above, infinity, 4)), (ScenePrimitive{1, 0, 0}));
+    EXPECT_EQ(name(closest_point(scene, above, 1.0f)), (ScenePrimitive{0, 4, 0}));
+    EXPECT_FALSE(closest_point(scene, above, std::nextafter(1.0f, 0.0f)).found());
+    const SceneSweepHit hit = sweep_sphere(scene, {{{0, 0, 9}, 0, {0, 0, -1}}, 1});
+    EXPECT_EQ((ScenePrimitive{hit.instance, hit.geometry, hit.prim}), (ScenePrimitive{0, 4, 0}));
+    const std::vector<Sphere> at_corner{{{0, 0, 0}, 0}};
+    EXPECT_EQ(touch_all(scene, std::span<const Sphere>(at_corner)).prims.size(), 6u * 11u);
+}
+
+TEST(Near, EmptyScenesHaveNoPoints) {
+    Scene scene;
+    EXPECT_THROW(static_cast<void>(closest_point(scene, {0, 0, 0})), InputError);
+    EXPECT_THROW(static_cast<void>(touches(scene, Sphere{{0, 0, 0}, 1})), InputError);
+    scene.commit();
+    EXPECT_FALSE(closest_point(scene, {0, 0, 0}).found());
+    EXPECT_FALSE(touches(scene, Sphere{{0, 0, 0}, 1}));
+    EXPECT_FALSE(touches(scene, Segment{{0, 0, 0}, {1, 1, 1}}));
+    EXPECT_FALSE(sweep_sphere(scene, {{{0, 0, 0}, 0, {0, 0, 1}}, 1}).hit());
+    Scene outer;
+    outer.add(scene, moved(1, 0, 0));
+    outer.commit();
+    EXPECT_FALSE(closest_point(outer, {0, 0, 0}).found());
+    const std::vector<Vec3> queries(3000, Vec3{1, 2, 3});
+    EXPECT_EQ(closest_points(outer, queries).size(), queries.size());
+    EXPECT_TRUE(closest_points(outer, std::vector<Vec3>{}).empty());
+}
+
+TEST(Near, CountsAndLimitsAreChecked) {
+    const World world = world_of(random_soup(100, 3));
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const std::vector<Vec3> queries{{0, 0, 0}, {nan, 0, 0}, {0, infinity, 0}, {1, 1, 1}};
+    std::vector<SceneClosestPoint> found(4);
+    const ClosestCounts counts = closest_points(world.scene, queries, found);
+    EXPECT_EQ(counts.queries, 4u);
+    EXPECT_EQ(counts.invalid_queries, 2u);
+    EXPECT_EQ(counts.found, 2u);
+    EXPECT_FALSE(found[1].found());
+    EXPECT_FALSE(closest_point(world.scene, {nan, 0, 0}).found());
+    found.pop_back();
+    EXPECT_THROW(closest_points(world.scene, queries, found), InputError);
+    EXPECT_THROW(static_cast<void>(closest_point(world.scene, {}, -1)), InputError);
+    EXPECT_THROW(static_cast<void>(closest_point(world.scene, {}, nan)), InputError);
+    EXPECT_THROW(static_cast<void>(closest_points(world.scene, queries, {.isa = "none"})),
+                 InputError);
+    const std::vector<Sphere> spheres(1000, Sphere{{0.5f, 0.5f, 0.5f}, 2});
+    EXPECT_THROW(static_cast<void>(touch_all(world.scene, std::span<const Sphere>(spheres),
+                                             {.max_result_bytes = 100000})),
+                 ResultTooLarge);
+}
+
+TEST(Near, TreesFollowUpdates) {
+    RandomScenes random(31);
+    Mesh mesh = random_soup(500, 8, 0.3f);
+    World world;
+    world.scene.add(mesh);
+    world.items.push_back({0, every_mask, mesh, {}, {}});
+    for (int round = 0; round < 4; ++round) {
+        if (round == 2) add_flats(random, mesh);
+        for (Vec3& v : mesh.vertices) v = v + random.in(-0.02f, 0.02f);
+        world.items[0].mesh = mesh;
+        world.scene.update(0, mesh);
+        world.scene.commit({.usage = Usage::moving});
+        std::size_t touched = 0, swept = 0;
+        expect_no_differences(world, random, touched, swept);
+        EXPECT_GT(touched, 0u);
+    }
+}
+
+TEST(Near, ThreadsMayAskFirstTogether) {
+    RandomScenes random(5);
+    const auto world = random_world(random, {.levels = 2, .items = 5, .shear = 0, .flats = true});
+    const std::vector<Flattened> all = flatten(*world);
+    const std::vector<Vec3> queries = random_queries(random, all, 50);
+    std::vector<std::size_t> wrong(4);
+    std::vector<std::thread> threads;
+    for (std::size_t t = 0; t < wrong.size(); ++t)
+        threads.emplace_back([&, t] {
+            for (const Vec3 q : queries)
+                wrong[t] += answer_of(closest_point(world->scene, q)) !=
+                            answer_of(brute_closest(all, q, infinity));
+        });
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(wrong, std::vector<std::size_t>(4, 0));
+}
+
+// ---- Shapes
+
+TEST(NearShapes, SpheresAndCapsulesAreClosedSets) {
+    Scene scene;
+    const std::vector<Sphere> spheres{{{0, 0, 0}, 1}, {{10, 0, 0}, 0}, {{0, 0, 0}, -1}};
+    const std::vector<Capsule> capsules{{{0, 5, 0}, {4, 5, 0}, 1}};
+    const std::vector<Vec3> points{{0, -9, 0}};
+    scene.add(std::span<const Sphere>(spheres));
+    scene.add(std::span<const Capsule>(capsules));
+    scene.add(std::span<const Vec3>(points), 0.5f);
+    scene.commit();
+    const SceneClosestPoint outside = closest_point(scene, {-3, 0, 0});
+    EXPECT_EQ(outside.distance, 2.0f);
+    EXPECT_EQ(outside.position.x, -1.0f);
+    EXPECT_EQ(outside.geometry, 0u);
+    const SceneClosestPoint inside = closest_point(scene, {0.25f, 0.5f, 0});
+    EXPECT_EQ(inside.distance, 0.0f);
+    EXPECT_EQ(inside.position.y, 0.5f);
+    const SceneClosestPoint along = closest_point(scene, {3, 8, 0});
+    EXPECT_EQ(along.geometry, 1u);
+    EXPECT_EQ(along.distance, 2.0f);
+    EXPECT_EQ(along.u, 0.75f);
+    EXPECT_EQ(closest_point(scene, {0, -8, 0}).geometry, 2u);
+    EXPECT_EQ(closest_point(scene, {10, 0.5f, 0}).prim, 1u);
+    EXPECT_TRUE(touches(scene, Segment{{-3, 1, 0}, {3, 1, 0}}));
+    EXPECT_FALSE(touches(scene, Segment{{-3, 1.01f, 0}, {3, 1.01f, 0}}));
+    EXPECT_TRUE(touches(scene, Segment{{2, 5, -9}, {2, 5, 9}}));
+    EXPECT_TRUE(touches(scene, Sphere{{-3, 0, 0}, 2}));
+    EXPECT_FALSE(touches(scene, Sphere{{-3, 0, 0}, 1.99f}));
+}
+
+/// In a world of instances: each shape by itself gives the answer of all.
+TEST(NearShapes, ImagesAnswerAsEachOfThemDoes) {
+    RandomScenes random(12);
+    for (int round = 0; round < 20 * static_cast<int>(thorough); ++round) {
+        std::vector<Capsule> capsules;
+        for (int k = 0; k < 30; ++k) {
+            capsules.push_back({random.in(-1, 1), random.in(-1, 1), random.between(0, 0.3f)});
+            if (k % 3 == 0) capsules.back().b = capsules.back().a;
+        }
+        Scene inner, scene;
+        inner.add(std::span<const Capsule>(capsules));
+        inner.commit();
+        std::vector<Transform> transforms;
+        for (int k = 0; k < 4; ++k) {
+            transforms.push_back(random.transform(3, round % 2 == 0 ? 0.0f : 20.0f));
+            scene.add(inner, transforms.back());
+        }
+        scene.commit();
+        std::vector<Vec3> queries;
+        for (int k = 0; k < 100; ++k) queries.push_back(random.in(-5, 5));
+        const auto found = closest_points(scene, queries);
+        for (std::size_t i = 0; i < queries.size(); ++i) {
+            float best = infinity;
+            for (const Transform& t : transforms)
+                for (const Capsule& capsule : capsules)
+                    best = std::min(best, closest_on_image(affine_of(t), capsule, queries[i]).d2);
+            ASSERT_EQ(found[i].distance, std::sqrt(best)) << "round " << round << ", query " << i;
+        }
+    }
+}
+
+/// The point is in the image, and none in it is much nearer: neither at random nor around it.
+TEST(NearShapes, PointsOfImagesAreTheClosest) {
+    RandomScenes random(13);
+    for (int round = 0; round < 300 * static_cast<int>(thorough); ++round) {
+        const Transform transform = random.transform(2, round % 3 == 0 ? 5.0f : 0.0f);
+        const Affine map = affine_of(transform), inverse = *inverse_of(map);
+        Capsule capsule{random.in(-1, 1), random.in(-1, 1), random.between(0.05f, 0.5f)};
+        if (round % 4 == 0) capsule.b = capsule.a;
+        const Vec3 q = random.in(-4, 4);
+        const ShapePoint p = closest_on_image(map, capsule, q);
+        const auto within = [&](Double3 inside) {
+            const Double3 a(capsule.a), axis = Double3(capsule.b) - a;
+            const double length2 = dot(axis, axis);
+            const double u =
+                length2 > 0 ? std::clamp(dot(inside - a, axis) / length2, 0.0, 1.0) : 0.0;
+            return length(inside - a - axis * u) / capsule.radius;
+        };
+        // The map may flatten to a part of 2^-12 or so: rounding of the point counts as much more.
+        const double stretch = norm_of(inverse);
+        ASSERT_LE(within(inverse.point(Double3(p.position))),
+                  1 + 1e-5 * stretch * (1 + norm_of(map)) / capsule.radius);
+        const double d = std::sqrt(double{p.d2});
+        for (int k = 0; k < 300; ++k) {
+            const double s = random.between(0, 1);
+            Double3 w(random.in(-1, 1));
+            w = w * (double{capsule.radius} / std::max(length(w), 1e-9));
+            if (k % 2 == 0) {
+                // Near the point that was found.
+                const Double3 on_axis =
+                    Double3(capsule.a) + (Double3(capsule.b) - Double3(capsule.a)) * double{p.u};
+                const Double3 off = inverse.point(Double3(p.position)) - on_axis + w * 0.02;
+                w = off * std::min(1.0, double{capsule.radius} / std::max(length(off), 1e-9));
+                const Double3 other = map.point(on_axis + w);
+                ASSERT_GE(length(other - Double3(q)), d - 1e-5);
+            } else {
+                const Double3 on_axis =
+                    Double3(capsule.a) + (Double3(capsule.b) - Double3(capsule.a)) * s;
+                ASSERT_GE(length(map.point(on_axis + w) - Double3(q)), d - 1e-5);
+            }
+        }
+    }
+}
+
+std::string message_of(const auto& call) {
+    try {
+        call();
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return {};
+}
+
+TEST(NearShapes, WhatHasNoAnswerIsNamed) {
+    Scene inner, scene;
+    const std::vector<Sphere> spheres{{{0, 0, 0}, 1}};
+    const std::vector<Aabb> boxes{{{0, 0, 0}, {1, 1, 1}}};
+    inner.add(one_triangle(0));
+    inner.add(std::span<const Sphere>(spheres), {.mask = 6, .id = 3});
+    inner.commit();
+    scene.add(inner, moved(1, 0, 0), {.mask = 3});
+    scene.commit();
+    const SphereSweep sweep{{{0, 0, 9}, 0, {0, 0, -1}}, 1};
+    EXPECT_NE(message_of([&] {
+                  static_cast<void>(sweep_sphere(scene, sweep));
+              }).find("geometry 3 (spheres)"),
+              std::string::npos);
+    EXPECT_TRUE(sweep_sphere(scene, sweep, 1).hit());  // does not see them
+    EXPECT_EQ(closest_point(scene, {1, 0, 5}).geometry, 3u);
+    inner.add(UserGeometry(boxes, [](std::uint32_t, const Ray&, Hit&) { return false; }),
+              {.mask = 2, .id = 8});
+    inner.commit();
+    scene.commit();
+    for (const std::string& message : {message_of([&] {
+                                           static_cast<void>(closest_point(scene, {0, 0, 0}));
+                                       }),
+                                       message_of([&] {
+                                           static_cast<void>(touches(scene, Sphere{{0, 0, 0}, 1}));
+                                       })})
+        EXPECT_NE(message.find("geometry 8 (user geometry)"), std::string::npos) << message;
+    EXPECT_EQ(closest_point(scene, {1, 0, 5}, infinity, 1).geometry, 0u);
+}
+
+}  // namespace
+}  // namespace raydix::test

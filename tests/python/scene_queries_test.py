@@ -1,0 +1,213 @@
+"""Closest points, touches, inside tests and overlaps of whole scenes: those of one mesh of all triangles."""
+
+import numpy as np
+import pytest
+import support
+from worlds import BOX, World, random_world, transform, triangles
+
+import raydix
+
+
+def out_of(world, precision=np.float32):
+    """The world's triangles as one mesh, moved in float64 level by level and rounded once, outsides
+    outside; rows of (instance, geometry, prim)."""
+    vertices, faces, names = [], [], []
+
+    def moved(points, places):
+        points = np.float64(points)
+        for place in reversed(places):
+            m = np.float64(place)
+            points = np.stack(
+                [((points[:, 0] * m[r, 0] + points[:, 1] * m[r, 1]) + points[:, 2] * m[r, 2]) + m[r, 3]
+                 for r in range(3)], axis=1)  # fmt: skip
+        return points.astype(precision)
+
+    def visit(part, places, number):
+        """Returns the number of the last path."""
+        for id in sorted(part.parts):
+            _, what, below = part.parts[id]
+            if isinstance(below, World):
+                continue
+            first = sum(map(len, vertices))
+            vertices.append(moved(np.asarray(what, precision), places) if places else np.asarray(what, precision))
+            turned = np.prod([np.sign(np.linalg.det(np.float64(p)[:, :3])) for p in places]) < 0
+            faces.append(first + (below[:, [0, 2, 1]] if turned else below))
+            names.extend((number, id, prim) for prim in range(len(below)))
+        last = number
+        for id in sorted(part.parts):
+            _, place, below = part.parts[id]
+            if isinstance(below, World):
+                last = visit(below, [*places, place], last + 1)
+        return last
+
+    visit(world, [], 0)
+    return np.concatenate(vertices), np.concatenate(faces), np.array(names, np.uint32)
+
+
+def closed_world(rng, **options):
+    """Boxes in boxes, some mirrored, one split over two geometries."""
+    leaf, middle, world = World(**options), World(**options), World(**options)
+    vertices, faces = BOX
+    leaf.add_mesh(vertices, faces[:5], id=3)
+    leaf.add_mesh(vertices, faces[5:])
+    leaf.scene.commit()
+    middle.add_instance(leaf, transform(rng, mirror=True))
+    middle.add_mesh(vertices * 0.5, faces)
+    middle.scene.commit()
+    world.add_instance(middle, transform(rng, shear=0.5))
+    world.add_mesh(vertices + 1, faces)
+    world.add_instance(middle, transform(rng, mirror=True))
+    world.scene.commit()
+    return world
+
+
+def same_names(found, names, prims):
+    hit = prims != raydix.MISSING
+    for i, name in enumerate(("instance", "geometry", "prim")):
+        assert found[name].dtype == np.uint32
+        np.testing.assert_array_equal(found[name][hit], names[prims[hit], i], err_msg=name)
+    np.testing.assert_array_equal(found["prim"] == raydix.MISSING, ~hit)
+    assert set(found["geometry"][~hit]) <= {raydix.MISSING}
+
+
+def test_closest_points_and_touches(rng):
+    world = random_world(rng)
+    world.scene.commit()
+    vertices, faces, names = out_of(world)
+    flat = raydix.Scene(vertices, faces)
+    points = rng.uniform(-4, 4, (50, 20, 3))
+    points[3, 4, 1] = np.nan
+    near, wanted = world.scene.closest_point(points), flat.closest_point(points)
+    np.testing.assert_array_equal(near["distance"], wanted["distance"])
+    np.testing.assert_array_equal(near["point"], wanted["point"])
+    same_names(near, names, wanted["prim"])
+    assert len(np.unique(near["instance"])) > 4 and set(wanted["geometry"].ravel()) == {0, raydix.MISSING}
+    assert (world.scene.closest_point(points, max_distance=0.2)["prim"] == raydix.MISSING).any()
+    balls = np.concatenate([rng.uniform(-3, 3, (200, 3)), rng.uniform(0, 1, (200, 1))], axis=1)
+    segments = rng.uniform(-3, 3, (300, 6))
+    for asked in ({"spheres": balls}, {"segments": segments}):
+        found, wanted = world.scene.touched_by(**asked), flat.touched_by(**asked)
+        np.testing.assert_array_equal(found["offsets"], wanted["offsets"])
+        same_names(found, names, wanted["prim"])
+        assert len(found["prim"]) > 100
+    with pytest.raises(raydix.InputError, match="max_result_bytes"):
+        world.scene.touched_by(spheres=balls, max_result_bytes=100)
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_all_meshes_are_one_body(rng, precision):
+    world = closed_world(rng, precision=precision)
+    vertices, faces, names = out_of(world, np.dtype(precision))
+    flat = raydix.Scene(vertices, faces, precision=precision)
+    points = rng.uniform(-4, 4, (3000, 3))
+    points[7] = np.inf
+    assert world.scene.closure() == flat.closure() == {
+        "closure": "oriented", "open_edges": 0, "rule": "crossings"}  # fmt: skip
+    inside = world.scene.contains(points)
+    np.testing.assert_array_equal(inside, flat.contains(points))
+    assert 300 < inside.sum() < 2700
+    np.testing.assert_array_equal(
+        world.scene.signed_distance(points), flat.signed_distance(points)
+    )
+    numbers = world.scene.winding_number(points)
+    np.testing.assert_array_equal(numbers, flat.winding_number(points))
+    assert numbers[np.isfinite(numbers)].max() >= 2
+    np.testing.assert_array_equal(
+        world.scene.contains(points, rule="parity"), flat.contains(points, rule="parity")
+    )
+    world.scene.set_mask(1, 0)  # the large box
+    np.testing.assert_array_equal(world.scene.contains(points), inside)
+    world.scene.commit()
+    assert world.scene.contains(points).sum() < inside.sum()
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_overlaps_name_both(rng, precision):
+    world, other = (random_world(rng, precision=precision) for _ in range(2))
+    for each in (world, other):
+        each.scene.commit()
+    (vertices, faces, names), (more, others, other_names) = (
+        out_of(each, np.dtype(precision)) for each in (world, other)
+    )
+    flat, flat_other = (
+        raydix.Scene(v, f, precision=precision) for v, f in ((vertices, faces), (more, others))
+    )
+    for narrow in (False, True):
+        for asked, told, second in (((), (), names), ((other.scene,), (flat_other,), other_names),
+                                    ((flat_other,), (flat_other,), None)):  # fmt: skip
+            found = world.scene.overlaps(*asked, narrow=narrow)
+            wanted = flat.overlaps(*told, narrow=narrow)
+            assert len(wanted) > 20
+            for i, name in enumerate(("instance", "geometry", "prim")):
+                assert found[name].shape == wanted.shape and found[name].dtype == np.uint32
+                np.testing.assert_array_equal(found[name][:, 0], names[wanted[:, 0], i])
+                last = second[wanted[:, 1], i] if second is not None else wanted[:, 1] * (i == 2)
+                np.testing.assert_array_equal(found[name][:, 1], last)
+            assert world.scene.count_overlaps(*asked, narrow=narrow) == len(wanted)
+    with pytest.raises(raydix.InputError, match="max_result_bytes"):
+        world.scene.overlaps(max_result_bytes=1000)
+
+
+def test_shapes_are_named(rng):
+    inner, scene = raydix.Scene(), raydix.Scene(*BOX)
+    inner.add_spheres([[0, 0, 0]], 1, id=4)
+    inner.add(*triangles(rng, 4))
+    inner.commit()
+    scene.add(inner, np.eye(4), id=9)
+    scene.commit()
+    text = r"geometry 4 \(spheres\) on path 1 of instances"
+    for name, call in {
+        "contains": lambda: scene.contains([0, 0, 0]),
+        "signed_distance": lambda: scene.signed_distance([0, 0, 0]),
+        "winding_number": lambda: scene.winding_number([0, 0, 0]),
+        "closure": lambda: scene.closure(),
+        "overlap": lambda: scene.overlaps(),
+        "overlap ": lambda: scene.count_overlaps(raydix.Scene(*BOX)),
+    }.items():
+        with pytest.raises(raydix.InputError, match=f"{name.strip()}.*{text}"):
+            call()
+
+
+def test_nothing_and_what_is_not_committed(rng):
+    empty = raydix.Scene()
+    calls = (lambda s: s.closest_point([0, 0, 0]), lambda s: s.contains([0, 0, 0]),
+             lambda s: s.overlaps(), lambda s: s.touched_by(spheres=[[0, 0, 0, 1]]))  # fmt: skip
+    for call in calls:
+        with pytest.raises(raydix.InputError, match="never committed"):
+            call(empty)
+    hollow = raydix.Scene()
+    hollow.add(np.zeros((0, 3)), np.zeros((0, 3), int))
+    hollow.add(np.zeros((0, 3)), np.zeros((0, 3), int))
+    for scene in (empty, hollow):
+        scene.commit()
+        near = scene.closest_point([0, 0, 0])
+        assert near["prim"] == raydix.MISSING and near["geometry"] == raydix.MISSING
+        assert near["distance"] == np.inf and not scene.contains([0, 0, 0])
+        assert len(scene.touched_by(segments=[[0, 0, 0, 1, 1, 1]])["prim"]) == 0
+        assert scene.count_overlaps() == 0
+    assert len(hollow.overlaps()["prim"]) == 0
+
+
+def test_what_does_not_fit_is_refused_before_it_is_made(rng):
+    scene = raydix.Scene(*triangles(rng, 1000))
+    for _ in range(28):
+        outer = raydix.Scene()
+        outer.add(scene, np.eye(4))
+        outer.add(scene, np.eye(4))
+        outer.commit()
+        scene = outer
+    for call in (lambda: scene.contains([0, 0, 0]), lambda: scene.overlaps()):
+        with pytest.raises(raydix.InputError, match="needs .* bytes"):
+            call()
+
+
+def test_one_mesh_has_its_id(rng):
+    vertices, faces = support.random_triangles(rng, 30, 0.5)
+    for precision in ("float32", "float64"):
+        scene = raydix.Scene(precision=precision)
+        scene.add(vertices, faces, id=5)
+        scene.commit()
+        near = scene.closest_point([[0, 0, 0], [np.nan, 0, 0]])
+        assert near["geometry"].tolist() == [5, raydix.MISSING] and near["instance"].tolist() == [0, 0]
+        touched = scene.touched_by(spheres=[[0, 0, 0, 9]])
+        assert touched["geometry"].tolist() == [5] * 30 and len(scene.overlaps()[0]) == 2
