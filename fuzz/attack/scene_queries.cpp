@@ -149,8 +149,14 @@ private:
             const auto first = static_cast<std::uint32_t>(flat_.vertices.size());
             for (const Vec3 p : held.mesh.mesh.vertices)
                 flat_.vertices.push_back(way.empty() ? p : moved(way, p));
+            // A triangle that its own mesh leaves out is nowhere.
+            const auto nowhere = static_cast<std::uint32_t>(flat_.vertices.size());
+            flat_.vertices.push_back({NAN, NAN, NAN});
+            std::vector<bool> valid(held.mesh.mesh.triangles.size());
+            for (const std::uint32_t t : valid_triangles(held.mesh.mesh)) valid[t] = true;
             for (std::uint32_t i = 0; i < held.mesh.mesh.triangles.size(); ++i) {
                 Triangle t = held.mesh.mesh.triangles[i];
+                if (!valid[i]) t = {nowhere - first, nowhere - first, nowhere - first};
                 if (turned) std::swap(t[1], t[2]);
                 flat_.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
                 names_.push_back({number, held.id, i});
