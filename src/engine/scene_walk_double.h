@@ -106,7 +106,7 @@ template <bool any>
 HitD hit_of_scene(const SceneTreeD& scene, const RayD& ray, std::uint32_t mask,
                   const WideStackView& stack) {
     SceneRayD<any ? Wanted::any : Wanted::closest> one(ray, mask, stack);
-    one.walk(scene, 0, LineD(ray));
+    one.trace(scene, ray);
     return one.best();
 }
 
@@ -151,7 +151,7 @@ inline void all_scene_hits(SceneJobD& job) {
         const std::size_t before = job.found->size();
         if (is_valid(ray)) {
             SceneRayD<Wanted::all>(ray, job.mask_of(k), job.stack.view(), job.found)
-                .walk(*job.tree, 0, LineD(ray));
+                .trace(*job.tree, ray);
             finish_scene_ray(*job.found, before);
         } else {
             ++job.invalid;
