@@ -66,6 +66,11 @@ public:
               BudgetVector<HitD>* found = nullptr)
         : mask_(mask), tmin_(ray.tmin), reach_(ray.tmax), stack_(stack), found_(found) {}
 
+    /// Says which hits count; `place`: of the ray among the caller's. Both must outlive the walk.
+    void filter_by(const HitFilterD& filter, std::size_t place, const RayD& ray) {
+        filter_ = &filter, place_ = place, given_ = &ray;
+    }
+
     [[nodiscard]] const HitD& best() const { return best_; }
 
     /// `ray` is that of the constructor.
@@ -145,7 +150,10 @@ private:
         RayAtTriangles at;
         if (!at.fill(tree, ray)) return;
         const auto take = [&](double t, std::uint32_t prim, double u, double v) {
-            found_->push_back(at.hit_of(mesh, number, t, prim, u, v));
+            const HitD hit = at.hit_of(mesh, number, t, prim, u, v);
+            if constexpr (wants_accepted(wanted)) return (*filter_)(place_, *given_, hit);
+            found_->push_back(hit);
+            return false;
         };
         using Leaves = TriangleLeavesD<wanted, decltype(take)>;
         Leaves leaves(tree, at.line, at.kind, at.distances, at.best, take);
@@ -174,6 +182,9 @@ private:
     HitD best_;
     WideStackView stack_;  // from where it is free
     BudgetVector<HitD>* const found_;
+    const HitFilterD* filter_ = nullptr;
+    std::size_t place_ = 0;
+    const RayD* given_ = nullptr;
 };
 
 }  // namespace raydix::HWY_NAMESPACE

@@ -9,6 +9,7 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <type_traits>
@@ -104,7 +105,13 @@ private:
 /// A valid ray alone; for any hit only prim has a meaning.
 template <bool any>
 HitD hit_of_scene(const SceneTreeD& scene, const RayD& ray, std::uint32_t mask,
-                  const WideStackView& stack) {
+                  const HitFilterD* filter, std::size_t place, const WideStackView& stack) {
+    if (filter != nullptr) {
+        SceneRayD<any ? Wanted::any_accepted : Wanted::closest_accepted> one(ray, mask, stack);
+        one.filter_by(*filter, place, ray);
+        one.trace(scene, ray);
+        return one.best();
+    }
     SceneRayD<any ? Wanted::any : Wanted::closest> one(ray, mask, stack);
     one.trace(scene, ray);
     return one.best();
@@ -117,7 +124,8 @@ void trace_alone(SceneJobD& job, std::size_t k) {
     const RayD& ray = job.rays[place];
     HitD hit;
     if (is_valid(ray))
-        hit = hit_of_scene<any>(*job.tree, ray, job.mask_of(place), job.stack.view());
+        hit = hit_of_scene<any>(*job.tree, ray, job.mask_of(place), job.filter, job.first + place,
+                                job.stack.view());
     else
         ++job.invalid;
     job.set(place, hit);
@@ -152,6 +160,14 @@ inline void all_scene_hits(SceneJobD& job) {
         if (is_valid(ray)) {
             SceneRayD<Wanted::all>(ray, job.mask_of(k), job.stack.view(), job.found)
                 .trace(*job.tree, ray);
+            if (job.filter != nullptr) {
+                const auto first = job.found->begin() + static_cast<std::ptrdiff_t>(before);
+                const auto refused = [&](const HitD& hit) {
+                    return !(*job.filter)(job.first + k, ray, hit);
+                };
+                job.found->erase(std::remove_if(first, job.found->end(), refused),
+                                 job.found->end());
+            }
             finish_scene_ray(*job.found, before);
         } else {
             ++job.invalid;

@@ -136,8 +136,8 @@ HWY_INLINE CrossingsD<D4> cross_four(const TriangleBlockD& block, std::size_t l,
                           hn::Set(d4, reach), candidates);
 }
 
-/// One ray's line at the leaves of a tree (Parts of single.h). Take: for all hits, called with t in
-/// units of the line, prim, u and v.
+/// One ray's line at the leaves of a tree (Parts of single.h). Take: called with t in units of the
+/// line, prim, u and v; for all hits with each, for accepted ones to say whether it is.
 template <Wanted wanted, class Take = std::nullptr_t>
 class TriangleLeavesD {
 public:
@@ -180,7 +180,7 @@ private:
             hn::Store(at.area, d4, area);
             for (std::uint32_t left = at.hit; left != 0; left &= left - 1) {
                 const auto k = static_cast<std::size_t>(std::countr_zero(left));
-                add(block.prim[l + k], t[k], over_v[k], over_w[k], area[k]);
+                if (add(block.prim[l + k], t[k], over_v[k], over_w[k], area[k])) return true;
             }
         }
         return at.open != 0 && test_closely(block, l, at.open);
@@ -195,15 +195,22 @@ private:
                                                        best_.t, hit))
                 continue;
             if constexpr (wanted == Wanted::any) return true;
-            add(block.prim[lane], hit.t, hit.u, hit.v, 1.0);
+            if (add(block.prim[lane], hit.t, hit.u, hit.v, 1.0)) return true;
         }
         return false;
     }
-    HWY_INLINE void add(std::uint32_t prim, double t, double u, double v, double area) {
-        if constexpr (wanted == Wanted::all)
+    /// True: any hit will do, and this one does.
+    HWY_INLINE bool add(std::uint32_t prim, double t, double u, double v, double area) {
+        if constexpr (wanted == Wanted::all) {
             take_(t, prim, u / area, v / area);
-        else if (best_.is_behind(t, prim))
+            return false;
+        } else {
+            if (!best_.is_behind(t, prim)) return false;
+            if constexpr (wants_accepted(wanted))
+                if (!take_(t, prim, u / area, v / area)) return false;
             best_ = {t, prim, u, v, area};
+            return wants_any(wanted);
+        }
     }
 
     const WideTreeD& tree_;
