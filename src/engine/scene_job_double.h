@@ -25,10 +25,10 @@ struct SceneJobD {
     std::size_t first = 0;  // the place of rays[0] among the caller's
     std::uint32_t mask = 0;
     const std::uint32_t* masks = nullptr;  // [rays] instead; or null
-    const HitFilterD* filter = nullptr;    // or null; then rays go alone
+    const HitFilterD* filter = nullptr;    // or null
     HitD* hits = nullptr;                  // or else
     std::uint8_t* occluded = nullptr;
-    /// In packets and in turns: through one mesh that is not empty; in packets all rays see it.
+    /// In packets: through one mesh that is not empty, which all rays see. With a filter: alone.
     enum class Way { alone, turns, packets } way = Way::alone;
 
     // Of all hits: those of each ray behind those of the one before, sorted; how many [n].

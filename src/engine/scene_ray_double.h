@@ -58,6 +58,14 @@ struct RayAtTriangles {
     }
 };
 
+/// Into a placed scene, by all of its instances in turn.
+HWY_INLINE LineD line_into(const LineD& line, const SceneTreeD& scene, const PlacedSceneD& placed) {
+    LineD inside = line.into(placed.way.inverse);
+    for (std::uint32_t k = 0; k < placed.more; ++k)
+        inside = inside.into(scene.ways[placed.first + k].inverse);
+    return inside;
+}
+
 template <Wanted wanted>
 class SceneRayD {
 public:
@@ -81,12 +89,20 @@ public:
             walk(scene, 0, LineD(ray));
     }
 
-private:
+protected:
     void walk(const SceneTreeD& scene, std::uint32_t number, const LineD& line) {
         if (const MeshTreeD* const mesh = scene.only_mesh())
             hit_mesh(*mesh, number, line);
         else if (!scene.parts.empty())
             walk_parts(scene, number, line);
+    }
+
+    /// Whether rays of its mask see all instances on the way.
+    [[nodiscard]] bool sees(const SceneTreeD& scene, const PlacedSceneD& placed) const {
+        bool seen = (placed.way.mask & mask_) != 0;
+        for (std::uint32_t k = 0; k < placed.more; ++k)
+            seen = seen && (scene.ways[placed.first + k].mask & mask_) != 0;
+        return seen;
     }
 
     struct Parts {
@@ -131,13 +147,8 @@ private:
             return;
         }
         const PlacedSceneD& placed = scene.placed[part - scene.meshes.size()];
-        const WayInD* const ways = scene.ways.data() + placed.first;
-        bool seen = (placed.way.mask & mask_) != 0;
-        for (std::uint32_t k = 0; k < placed.more; ++k) seen = seen && (ways[k].mask & mask_) != 0;
-        if (!seen) return;
-        LineD inside = line.into(placed.way.inverse);
-        for (std::uint32_t k = 0; k < placed.more; ++k) inside = inside.into(ways[k].inverse);
-        walk(*placed.scene, number + placed.number, inside);
+        if (sees(scene, placed))
+            walk(*placed.scene, number + placed.number, line_into(line, scene, placed));
     }
 
     void hit_mesh(const MeshTreeD& mesh, std::uint32_t number, const LineD& line) {

@@ -91,9 +91,10 @@ SimdPath choose_path(const WideTreeD& tree, std::span<const RayD> rays) {
 
 Ways ways_of(const SceneTreeD& tree, const Batch& batch) {
     const MeshTreeD* const mesh = tree.only_mesh();
-    if (mesh == nullptr || mesh->tree->empty() || batch.options.filter_d)
-        return {{Way::alone, Way::alone}, 1};
     const SceneTraceOptions& options = batch.options;
+    if (options.filter_d) return {{Way::alone, Way::alone}, 1};
+    // Rays that follow each other through little gain nothing by turns.
+    if (mesh == nullptr || mesh->tree->empty()) return {{Way::turns, Way::alone}, 2};
     const bool may_go_together =
         mesh->tree->suits_packets && options.masks.empty() && (mesh->mask & options.mask) != 0;
     if (!may_go_together || options.path == SimdPath::single) return {{Way::turns, Way::turns}, 1};

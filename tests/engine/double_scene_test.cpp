@@ -141,8 +141,8 @@ TEST(DoubleScene, FiltersSayWhichHitsCount) {
     for (std::uint64_t seed = 0; seed < thorough; ++seed) {
         RandomWorlds random(300 + seed);
         const auto world =
-            random.world({static_cast<std::uint32_t>(seed % 3), 5, 0,
-                          seed % 2 == 0 ? 0 : far_away, options_of(static_cast<int>(seed))});
+            random.world({static_cast<std::uint32_t>(seed % 3), 5, 0, seed % 2 == 0 ? 0 : far_away,
+                          options_of(static_cast<int>(seed))});
         const std::vector<RayD> rays = random.rays(150, world->home);
         const std::vector<HitD> wanted = look_at_taken(*world, rays);
         SceneTraceOptions options;
@@ -163,10 +163,10 @@ TEST(DoubleScene, FiltersSayWhichHitsCount) {
             std::vector<HitD> row;
             std::ranges::copy_if(rows[i], std::back_inserter(row),
                                  [&](const HitD& hit) { return takes(i, hit); });
-            EXPECT_TRUE(std::equal(row.begin(), row.end(),
-                                   all.hits.begin() + static_cast<std::ptrdiff_t>(all.offsets[i]),
-                                   all.hits.begin() +
-                                       static_cast<std::ptrdiff_t>(all.offsets[i + 1])));
+            EXPECT_TRUE(
+                std::equal(row.begin(), row.end(),
+                           all.hits.begin() + static_cast<std::ptrdiff_t>(all.offsets[i]),
+                           all.hits.begin() + static_cast<std::ptrdiff_t>(all.offsets[i + 1])));
             const HitFilterD one = [&](std::size_t place, const RayD&, const HitD& hit) {
                 EXPECT_EQ(place, 0u);
                 return takes(i, hit);
