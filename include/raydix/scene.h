@@ -200,8 +200,8 @@ private:
 extern template class BasicScene<float>;
 extern template class BasicScene<double>;
 using Scene = BasicScene<float>;
-/// In double: its meshes are traced as trees of <raydix/double.h> are, with the same bits. Rays go
-/// one after the other, through trees with two children a node.
+/// In double: hits have the bits of trees of <raydix/double.h>. Rays go through the same wide trees
+/// as in float, and meet the triangles in double.
 using SceneD = BasicScene<double>;
 
 /// Which hits count: alpha tests, the triangle that a ray starts on, masks of one's own. `place`:
@@ -212,14 +212,17 @@ using SceneD = BasicScene<double>;
 /// is of another. What it throws comes out of the call that traces.
 using HitFilter = std::function<bool(std::size_t place, const Ray& ray, const Hit& hit)>;
 
+/// The same in double.
+using HitFilterD = std::function<bool(std::size_t place, const RayD& ray, const HitD& hit)>;
+
 struct SceneTraceOptions {
     std::uint32_t mask = 0xFFFFFFFFu;           // of all rays
     std::span<const std::uint32_t> masks = {};  // of each ray, [rays], instead; or empty
     int threads = 0;                            // 0 to 1,024; 0: all the machine has
     SimdPath path = SimdPath::automatic;        // hits do not depend on it
-    std::string isa = {};   // one of simd_instruction_sets(); empty: the best. In double both are
-                            // checked, and no more
-    HitFilter filter = {};  // empty: all hits count. In double there are none
+    std::string isa = {};                       // one of simd_instruction_sets(); empty: the best
+    HitFilter filter = {};                      // of a Scene; empty: all hits count
+    HitFilterD filter_d = {};                   // of a SceneD
     /// trace_all only: bounds the peak of the call. 0: half of what is left (result_limit.h).
     std::uint64_t max_result_bytes = 0;
 };
@@ -263,7 +266,11 @@ TraceCounts trace_any(const SceneD& scene, std::span<const RayD> rays,
 /// Of the hits that `filter` accepts.
 [[nodiscard]] Hit closest_hit(const Scene& scene, const Ray& ray, const HitFilter& filter,
                               std::uint32_t mask = 0xFFFFFFFFu);
+[[nodiscard]] HitD closest_hit(const SceneD& scene, const RayD& ray, const HitFilterD& filter,
+                               std::uint32_t mask = 0xFFFFFFFFu);
 [[nodiscard]] bool any_hit(const Scene& scene, const Ray& ray, const HitFilter& filter,
+                           std::uint32_t mask = 0xFFFFFFFFu);
+[[nodiscard]] bool any_hit(const SceneD& scene, const RayD& ray, const HitFilterD& filter,
                            std::uint32_t mask = 0xFFFFFFFFu);
 
 }  // namespace raydix

@@ -32,18 +32,17 @@ struct BoxPlace {
 /// Rays from farther away than this, in sizes of the bounds, are not told from their roundings.
 constexpr double farthest_place = 0x1p40;
 
-/// `ray` as make_frame has it. False: all boxes count as met.
-HWY_INLINE bool find_place(const NodesD& tree, const RayFrameD& ray, BoxPlace& out) {
-    const auto scale = hn::Set(d4, tree.space.scale);
-    out.origin[0] = ray.origin.x, out.origin[1] = ray.origin.y, out.origin[2] = ray.origin.z;
-    out.direction[0] = ray.direction.x, out.direction[1] = ray.direction.y,
-    out.direction[2] = ray.direction.z;
-    out.origin[3] = out.direction[3] = 0;
+/// `ray` and its frame. False: all boxes count as met. The fourth component of vectors has no
+/// meaning.
+HWY_INLINE bool find_place(const NodesD& tree, const RayD& ray, const RayFrameD& frame,
+                           BoxPlace& out) {
+    const auto scale = hn::Set(d4, tree.space.scale),
+               along = hn::Set(d4, tree.space.scale * frame.t_scale);
     for (std::size_t l = 0; l < 4; l += lanes_d4) {
-        const auto origin =
-            hn::Mul(scale, hn::Sub(hn::Load(d4, out.origin + l), hn::Load(d4, tree.center + l)));
+        const auto origin = hn::Mul(
+            scale, hn::Sub(hn::LoadU(d4, &ray.origin.x + l), hn::Load(d4, tree.center + l)));
         hn::Store(origin, d4, out.origin + l);
-        hn::Store(hn::Mul(scale, hn::Load(d4, out.direction + l)), d4, out.direction + l);
+        hn::Store(hn::Mul(along, hn::LoadU(d4, &ray.direction.x + l)), d4, out.direction + l);
         hn::Store(hn::Max(hn::Abs(hn::Sub(hn::Load(d4, tree.lo + l), origin)),
                           hn::Abs(hn::Sub(hn::Load(d4, tree.hi + l), origin))),
                   d4, out.far + l);
@@ -52,7 +51,7 @@ HWY_INLINE bool find_place(const NodesD& tree, const RayFrameD& ray, BoxPlace& o
     // NaN too.
     if (!(out.far[0] + out.far[1] + out.far[2] <= farthest_place * tree.size)) return false;
     out.distances = {};
-    const int kz = ray.kz;
+    const int kz = frame.kz;
     double way = out.direction[kz];
     out.longest = std::fabs(way);
     if (!(out.longest > 0x1p-6 && out.longest < 0x1p3)) {
@@ -85,21 +84,21 @@ inline HWY_NOINLINE void fill_blind_frame(SingleFrame& out) {
 
 /// The frame for boxes. `error`: what they hold may be missed by so much of the greatest distance
 /// to the far side of the bounds. False if the ray ends before it comes to them.
-HWY_INLINE bool fill_box_frame(const NodesD& tree, const RayFrameD& ray, double error,
-                               SingleFrame& out, BoxDistances& distances) {
+HWY_INLINE bool fill_box_frame(const NodesD& tree, const RayD& ray, const RayFrameD& frame,
+                               double error, SingleFrame& out, BoxDistances& distances) {
     BoxPlace place;
-    if (!find_place(tree, ray, place)) {
+    if (!find_place(tree, ray, frame, place)) {
         distances = {0, -BoxDistances::most};
         fill_blind_frame(out);
         return true;
     }
     distances = place.distances;
-    out.tmin = distances.below(ray.tmin);
-    out.tmax = distances.above(ray.tmax);
+    out.tmin = distances.below(frame.tmin);
+    out.tmax = distances.above(frame.tmax);
     if (!(out.tmin <= out.tmax)) return false;
     const V4 origin = rounded(place.origin), way = rounded(place.direction);
     // What the test and the ways to the boxes lose, and what instances do.
-    const double common = 0x1p-45 * place.far[ray.kz] + (1.0 + 0x1p-19) * error * place.farthest;
+    const double common = 0x1p-45 * place.far[frame.kz] + (1.0 + 0x1p-19) * error * place.farthest;
     alignas(32) double lost[4];
     for (std::size_t l = 0; l < 4; l += lanes_d4)
         hn::Store(hn::Add(hn::Mul(hn::Load(d4, place.far + l), hn::Set(d4, 0x1p-45)),
@@ -107,7 +106,7 @@ HWY_INLINE bool fill_box_frame(const NodesD& tree, const RayFrameD& ray, double 
                   d4, lost + l);
     const hn::RebindToSigned<F4> i4;
     const std::uint32_t negatives = bits_of(i4, hn::Lt(hn::BitCast(i4, way), hn::Zero(i4))) & 7;
-    out.kind = ray_classes[negatives + 8 * static_cast<std::uint32_t>(ray.kz)];
+    out.kind = ray_classes[negatives + 8 * static_cast<std::uint32_t>(frame.kz)];
     const V4 start = hn::Add(origin, hn::Zero(f4));  // -0 becomes +0
     const V4 inverse = limited(hn::Div(hn::Set(f4, 1.0f), way));
     const V4 pad = hn::Add(hn::Add(hn::Mul(hn::Abs(start), hn::Set(f4, 0x1p-21f)), rounded(lost)),

@@ -55,7 +55,12 @@ public:
         place_instances();
         const ProgressStage top(meshes.part_done(), 1);
         progress_at(0);
-        build_top();
+        build_top(*tree_);
+        keep_own_parts();
+        if (tree_->only_mesh() == nullptr)
+            report_.bytes += tree_->parts.arrays.nodes.size() * sizeof(WideNode) +
+                             tree_->placed.size() * sizeof(PlacedSceneD) +
+                             tree_->ways.size() * sizeof(WayInD);
         report_.instances = tree_->instances.size();
         report_.paths = tree_->paths;
         return std::move(tree_);
@@ -63,10 +68,8 @@ public:
 
 private:
     void add_extent(const WideTreeD& mesh) {
-        extents_.push_back(extent_of_triangles(mesh.empty() ? nothing_d : mesh.bounds));
+        tree_->extents.push_back(extent_of_triangles(mesh.empty() ? nothing_d : mesh.bounds));
         report_.bytes += mesh.bytes();
-        tree_->stack_size =
-            std::max(tree_->stack_size, wide_stack_capacity(mesh.arrays.stats.max_depth));
         if (!mesh.empty()) unite_with(tree_->bounds, mesh.bounds);
     }
 
@@ -76,31 +79,75 @@ private:
             const auto& inner = geometry.scene->tree;
             const std::uint32_t number = number_instance(*tree_, id, inner);
             tree_->instances.push_back(
-                {id, number, geometry.mask, geometry.inverse, geometry.transform, inner});
-            const ExtentD& around = inner->parts.around;
-            ExtentD extent{nothing_d, 0.0};
-            if (!is_empty(around))
-                extent = image_of(affine_of(geometry.transform), geometry.inverse, around);
-            extents_.push_back(extent);
-            tree_->stack_size = std::max(tree_->stack_size, inner->stack_size);
-            if (is_empty(around)) continue;
-            if (!in_range(extent)) refuse_reach(id);
-            unite_with(tree_->bounds, extent.box);
+                {id, geometry.mask, number, geometry.transform, geometry.inverse, inner});
+            const AffineD map = affine_of(geometry.transform);
+            const auto image = [&](const ExtentD& extent) {
+                return is_empty(extent) ? ExtentD{nothing_d, 0.0}
+                                        : image_of(map, geometry.inverse, extent);
+            };
+            place({{geometry.inverse, geometry.mask}, number, 0, 0, inner.get()}, image);
+            const ExtentD whole = image(inner->parts.around);
+            if (is_empty(whole)) continue;
+            if (!in_range(whole)) refuse_reach(id);
+            unite_with(tree_->bounds, whole.box);
         }
     }
 
-    void build_top() {
-        build_part_tree(extents_, quality_of_parts(options_), tree_->parts);
-        tree_->stack_size += wide_stack_capacity(tree_->parts.arrays.stats.max_depth);
-        if (tree_->only_mesh() == nullptr)
-            report_.bytes += tree_->parts.arrays.nodes.size() * sizeof(WideNode) +
-                             tree_->instances.size() * sizeof(PlacedSceneD);
+    /// All that one instance places, nested instances opened. image(extent): from its scene.
+    template <class ImageOf>
+    void place(const PlacedSceneD& whole, const ImageOf& image) {
+        const SceneTreeD& inner = *whole.scene;
+        const auto add = [&](const PlacedSceneD& part, const ExtentD& extent) {
+            tree_->placed.push_back(part);
+            tree_->extents.push_back(image(extent));
+            tree_->stack_size = std::max(tree_->stack_size, part.scene->stack_size);
+        };
+        if (inner.instances.empty() ||
+            tree_->placed.size() + inner.placed.size() + 1 > usually_placed) {
+            add(whole, inner.parts.around);
+            return;
+        }
+        PlacedSceneD part = whole;
+        if (inner.own_parts != nullptr) {
+            part.scene = inner.own_parts.get();
+            add(part, inner.own_parts->parts.around);
+        }
+        for (std::size_t k = 0; k < inner.placed.size(); ++k) {
+            const PlacedSceneD& below = inner.placed[k];
+            part.number = whole.number + below.number;
+            part.first = static_cast<std::uint32_t>(tree_->ways.size());
+            part.more = below.more + 1;
+            part.scene = below.scene;
+            tree_->ways.push_back(below.way);
+            for (std::uint32_t w = 0; w < below.more; ++w)
+                tree_->ways.push_back(inner.ways[below.first + w]);
+            add(part, inner.extents[inner.meshes.size() + k]);
+        }
+    }
+
+    /// The meshes alone, for scenes that place this one.
+    void keep_own_parts() {
+        if (tree_->instances.empty() || tree_->meshes.empty()) return;
+        auto own = std::make_shared<SceneTreeD>();
+        own->meshes = tree_->meshes;
+        own->extents.assign(
+            tree_->extents.begin(),
+            tree_->extents.begin() + static_cast<std::ptrdiff_t>(tree_->meshes.size()));
+        build_top(*own);
+        tree_->own_parts = std::move(own);
+    }
+
+    void build_top(SceneTreeD& tree) {
+        for (const auto& mesh : tree.meshes)
+            tree.stack_size =
+                std::max(tree.stack_size, wide_stack_capacity(mesh->tree->arrays.stats.max_depth));
+        build_part_tree(tree.extents, quality_of_parts(options_), tree.parts);
+        tree.stack_size += wide_stack_capacity(tree.parts.arrays.stats.max_depth);
     }
 
     const SceneAccessD::State& state_;
     const SceneOptions& options_;
     CommitReport& report_;
-    std::vector<ExtentD> extents_;  // [parts]
     std::shared_ptr<SceneTreeD> tree_ = std::make_shared<SceneTreeD>();
 };
 

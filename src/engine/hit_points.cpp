@@ -60,7 +60,7 @@ Double3 turned(const InstanceName& instance, Double3 normal) {
     return dot(map.x, x) < 0.0 ? out * -1.0 : out;
 }
 /// Cofactors of doubles may cancel; the inverse that rays go through is right to the last digits.
-Double3 turned(const PlacedSceneD& instance, Double3 normal) {
+Double3 turned(const InstanceNameD& instance, Double3 normal) {
     const AffineD& inverse = instance.inverse.rows;
     return (inverse.x * normal.x + inverse.y * normal.y) + inverse.z * normal.z;
 }

@@ -190,7 +190,8 @@ private:
             return {hn::Sub(at(0), hn::Mul(shear_x, z)), hn::Sub(at(1), hn::Mul(shear_y, z)), z};
         };
         const Sheared<D8> a = shear(0), b = shear(1), c = shear(2);
-        const V u = edge(c, b), v = edge(a, c), w = edge(b, a);
+        const V u = edge(c, b);
+        V v = edge(a, c), w = edge(b, a);
         const std::uint32_t candidates = wanted & ~bits_of(d8, astride(d8, u, v, w));
         if (candidates == 0) return;
         const CrossingsD<D8> at =
@@ -222,6 +223,31 @@ private:
     std::uint64_t found_ = 0;
 };
 
+/// Components `first` on of rays, four of them, a vector each: origin and tmin, or from 4 on
+/// direction and tmax.
+HWY_INLINE void read_four(const RayD* rays, const std::int64_t* index, std::size_t first,
+                          hn::Vec<D4> (&out)[4]) {
+    const auto load = [&](std::size_t ray, std::size_t component) {
+        return hn::LoadU(d4, &rays[index[ray]].origin.x + first + component);
+    };
+    if constexpr (lanes_d4 == 4) {
+        const auto r0 = load(0, 0), r1 = load(1, 0), r2 = load(2, 0), r3 = load(3, 0);
+        const auto low01 = hn::InterleaveLower(d4, r0, r1), low23 = hn::InterleaveLower(d4, r2, r3),
+                   high01 = hn::InterleaveUpper(d4, r0, r1),
+                   high23 = hn::InterleaveUpper(d4, r2, r3);
+        out[0] = hn::ConcatLowerLower(d4, low23, low01);
+        out[1] = hn::ConcatLowerLower(d4, high23, high01);
+        out[2] = hn::ConcatUpperUpper(d4, low23, low01);
+        out[3] = hn::ConcatUpperUpper(d4, high23, high01);
+    } else {
+        for (std::size_t half = 0; half < 4; half += 2) {
+            const auto a = load(0, half), b = load(1, half);
+            out[half] = hn::InterleaveLower(d4, a, b);
+            out[half + 1] = hn::InterleaveUpper(d4, a, b);
+        }
+    }
+}
+
 /// The rays of a job through its only mesh, which all of them can see, in packets.
 template <bool any>
 class MeshPacketsD {
@@ -251,9 +277,9 @@ public:
     }
 
 private:
-    using V = hn::Vec<D8>;
-    using I = hn::RebindToSigned<D8>;
-    using FH = hn::Rebind<float, D8>;
+    using V = hn::Vec<D4>;
+    using I = hn::RebindToSigned<D4>;
+    using FH = hn::Rebind<float, D4>;
 
     /// The class of a ray; odd_ray_class if packets do not take it.
     [[nodiscard]] std::uint32_t code_of(const RayD& ray) const {
@@ -307,33 +333,29 @@ private:
     HWY_NOINLINE bool fill(const std::int64_t* index, std::size_t count, std::uint32_t code) {
         const RayClass kind = ray_class_of(code);
         const auto kz = kind.kz;
-        const V scale = hn::Set(d8, tree_.space.scale), size = hn::Set(d8, tree_.size),
-                zero = hn::Zero(d8), most = hn::Set(d8, std::numeric_limits<double>::max());
-        const auto* const base = &job_.rays->origin.x;
+        const V scale = hn::Set(d4, tree_.space.scale), size = hn::Set(d4, tree_.size),
+                zero = hn::Zero(d4), most = hn::Set(d4, std::numeric_limits<double>::max());
         auto same = hn::Eq(zero, zero);
         V first[3];
         auto one = same;
         // Floats are read in vectors of their own, up to the end of the last one.
         const std::size_t filled = (count + lanes16 - 1) / lanes16 * lanes16;
-        for (std::size_t i = 0; i < filled; i += lanes_d8) {
-            const auto at = hn::ShiftLeft<3>(hn::Load(I(), index + i));
-            const auto read = [&](int c) {
-                return hn::GatherIndex(d8, base, hn::Add(at, hn::Set(I(), c)));
-            };
-            V local[3], way[3], size_of[3], far = zero;
+        for (std::size_t i = 0; i < filled; i += lanes_d4) {
+            V place[4], way[4], local[3], size_of[3], far = zero;
+            read_four(job_.rays, index + i, 0, place);
+            read_four(job_.rays, index + i, 4, way);
             for (int a = 0; a < 3; ++a) {
-                const V origin = hn::Add(read(a), zero);  // -0 becomes +0
-                hn::Store(origin, d8, lines_.origin[a] + i);
-                if (i == 0) first[a] = hn::Set(d8, lines_.origin[a][0]);
+                const V origin = hn::Add(place[a], zero);  // -0 becomes +0
+                hn::Store(origin, d4, lines_.origin[a] + i);
+                if (i == 0) first[a] = hn::Set(d4, lines_.origin[a][0]);
                 one = hn::And(one, hn::Eq(origin, first[a]));
-                local[a] = hn::Mul(scale, hn::Sub(origin, hn::Set(d8, tree_.center[a])));
-                far = hn::Add(far, hn::Max(hn::Abs(hn::Sub(hn::Set(d8, tree_.lo[a]), local[a])),
-                                           hn::Abs(hn::Sub(hn::Set(d8, tree_.hi[a]), local[a]))));
-                way[a] = read(4 + a);
+                local[a] = hn::Mul(scale, hn::Sub(origin, hn::Set(d4, tree_.center[a])));
+                far = hn::Add(far, hn::Max(hn::Abs(hn::Sub(hn::Set(d4, tree_.lo[a]), local[a])),
+                                           hn::Abs(hn::Sub(hn::Set(d4, tree_.hi[a]), local[a]))));
                 size_of[a] = hn::Abs(way[a]);
                 const auto negative = hn::Lt(hn::BitCast(I(), way[a]), hn::Zero(I()));
                 same = hn::And(same,
-                               hn::RebindMask(d8, kind.negative(a) ? negative : hn::Not(negative)));
+                               hn::RebindMask(d4, kind.negative(a) ? negative : hn::Not(negative)));
             }
             const V longest = size_of[kz];
             for (std::uint32_t a = 0; a < 3; ++a) {
@@ -341,43 +363,46 @@ private:
                 same = hn::And(same,
                                a < kz ? hn::Le(size_of[a], longest) : hn::Lt(size_of[a], longest));
             }
-            const V tmin = read(3), tmax = read(7);
-            same = hn::And(same, hn::And(hn::Gt(longest, hn::Set(d8, 0x1p-3)),
-                                         hn::Lt(longest, hn::Set(d8, 0x1p3))));
+            const V tmin = place[3], tmax = way[3];
+            same = hn::And(same, hn::And(hn::Gt(longest, hn::Set(d4, 0x1p-3)),
+                                         hn::Lt(longest, hn::Set(d4, 0x1p3))));
             same = hn::And(same, hn::And(hn::Le(tmin, tmax), hn::Ge(tmax, zero)));
-            same = hn::And(same, hn::Le(far, hn::Mul(hn::Set(d8, farthest_of_packet), size)));
+            same = hn::And(same, hn::Le(far, hn::Mul(hn::Set(d4, farthest_of_packet), size)));
             const V dz = way[kz];
-            hn::Store(dz, d8, lines_.way + i);
-            hn::Store(hn::Div(hn::Set(d8, 1.0), dz), d8, lines_.per_depth + i);
-            hn::Store(hn::Div(way[kind.kx], dz), d8, lines_.shear[0] + i);
-            hn::Store(hn::Div(way[kind.ky], dz), d8, lines_.shear[1] + i);
+            hn::Store(dz, d4, lines_.way + i);
+            hn::Store(hn::Div(hn::Set(d4, 1.0), dz), d4, lines_.per_depth + i);
+            hn::Store(hn::Div(way[kind.kx], dz), d4, lines_.shear[0] + i);
+            hn::Store(hn::Div(way[kind.ky], dz), d4, lines_.shear[1] + i);
             const V begin = hn::IfThenElseZero(hn::Gt(tmin, zero), tmin), end = hn::Min(tmax, most);
-            hn::Store(begin, d8, lines_.tmin + i);
-            hn::Store(end, d8, lines_.t + i);
+            hn::Store(begin, d4, lines_.tmin + i);
+            hn::Store(end, d4, lines_.t + i);
             // As find_place.
             const V in_boxes = hn::Mul(scale, dz);
             const V ahead = kind.negative(static_cast<int>(kz))
-                                ? hn::Sub(local[kz], hn::Set(d8, tree_.hi[kz]))
-                                : hn::Sub(hn::Set(d8, tree_.lo[kz]), local[kz]);
-            const V start = hn::IfThenElseZero(hn::Gt(ahead, hn::Add(size, size)),
-                                               hn::Div(hn::Sub(ahead, size), hn::Abs(in_boxes)));
-            hn::Store(start, d8, lines_.start + i);
+                                ? hn::Sub(local[kz], hn::Set(d4, tree_.hi[kz]))
+                                : hn::Sub(hn::Set(d4, tree_.lo[kz]), local[kz]);
+            const auto from_afar = hn::Gt(ahead, hn::Add(size, size));
+            V start = zero;
+            if (!hn::AllFalse(d4, from_afar))
+                start =
+                    hn::IfThenElseZero(from_afar, hn::Div(hn::Sub(ahead, size), hn::Abs(in_boxes)));
+            hn::Store(start, d4, lines_.start + i);
             const FH h;
             for (int a = 0; a < 3; ++a) {
                 const V d = hn::Mul(scale, way[a]);
                 hn::Store(hn::DemoteTo(h, d), h, direction_[a] + i);
                 hn::Store(hn::DemoteTo(h, hn::Add(local[a], hn::Mul(start, d))), h, origin_[a] + i);
             }
-            const V limit = hn::Set(d8, BoxDistances::most);
+            const V limit = hn::Set(d4, BoxDistances::most);
             const auto moved = [&](V t, double by, double more) {
                 return hn::Min(
-                    hn::Add(hn::Mul(hn::Sub(t, start), hn::Set(d8, by)), hn::Set(d8, more)), limit);
+                    hn::Add(hn::Mul(hn::Sub(t, start), hn::Set(d4, by)), hn::Set(d4, more)), limit);
             };
             hn::Store(hn::DemoteTo(h, moved(begin, 1.0 - 0x1p-22, -0x1p-140)), h, tmin_ + i);
             hn::Store(hn::DemoteTo(h, moved(end, 1.0 + 0x1p-22, 0x1p-140)), h, tmax_ + i);
         }
-        if (!hn::AllTrue(d8, same)) return false;
-        lines_.one_origin = hn::AllTrue(d8, one);
+        if (!hn::AllTrue(d4, same)) return false;
+        lines_.one_origin = hn::AllTrue(d4, one);
         lines_.kind = kind;
         std::fill_n(lines_.prim, packet_size, no_primitive);
         fill_packet(

@@ -22,11 +22,13 @@ struct SceneJobD {
     const RayD* rays = nullptr;
     const std::uint32_t* order = nullptr;
     std::size_t n = 0;
+    std::size_t first = 0;  // the place of rays[0] among the caller's
     std::uint32_t mask = 0;
     const std::uint32_t* masks = nullptr;  // [rays] instead; or null
+    const HitFilterD* filter = nullptr;    // or null
     HitD* hits = nullptr;                  // or else
     std::uint8_t* occluded = nullptr;
-    /// In packets and in turns: through one mesh that is not empty; in packets all rays see it.
+    /// In packets: through one mesh that is not empty, which all rays see. With a filter: alone.
     enum class Way { alone, turns, packets } way = Way::alone;
 
     // Of all hits: those of each ray behind those of the one before, sorted; how many [n].
@@ -53,9 +55,10 @@ struct SceneKernelsD {
     std::string_view isa;
     void (*trace)(SceneJobD& job);
     void (*all_hits)(SceneJobD& job);
-    /// A valid ray; `stack` has room for SceneTreeD::stack_size. For any hit only prim has a
-    /// meaning.
+    /// A valid ray; `place`: among the caller's; `filter` may be null; `stack` has room for
+    /// SceneTreeD::stack_size. For any hit only prim has a meaning.
     using OneRayOfScene = HitD(const SceneTreeD& scene, const RayD& ray, std::uint32_t mask,
+                               const HitFilterD* filter, std::size_t place,
                                const WideStackView& stack);
     OneRayOfScene* closest;
     OneRayOfScene* any;

@@ -44,7 +44,7 @@ struct RayAtTriangles {
         kind = class_of(frame);
         best = {frame.tmax};
         t_scale = frame.t_scale;
-        return fill_box_frame(tree, frame, 0.0, boxes, distances);
+        return fill_box_frame(tree, ray, frame, 0.0, boxes, distances);
     }
     /// What the scene says of the best hit, which there must be.
     [[nodiscard]] HWY_INLINE HitD hit(const MeshTreeD& mesh, std::uint32_t number) const {
@@ -58,6 +58,14 @@ struct RayAtTriangles {
     }
 };
 
+/// Into a placed scene, by all of its instances in turn.
+HWY_INLINE LineD line_into(const LineD& line, const SceneTreeD& scene, const PlacedSceneD& placed) {
+    LineD inside = line.into(placed.way.inverse);
+    for (std::uint32_t k = 0; k < placed.more; ++k)
+        inside = inside.into(scene.ways[placed.first + k].inverse);
+    return inside;
+}
+
 template <Wanted wanted>
 class SceneRayD {
 public:
@@ -66,8 +74,22 @@ public:
               BudgetVector<HitD>* found = nullptr)
         : mask_(mask), tmin_(ray.tmin), reach_(ray.tmax), stack_(stack), found_(found) {}
 
+    /// Says which hits count; `place`: of the ray among the caller's. Both must outlive the walk.
+    void filter_by(const HitFilterD& filter, std::size_t place, const RayD& ray) {
+        filter_ = &filter, place_ = place, given_ = &ray;
+    }
+
     [[nodiscard]] const HitD& best() const { return best_; }
 
+    /// `ray` is that of the constructor.
+    void trace(const SceneTreeD& scene, const RayD& ray) {
+        if (const MeshTreeD* const mesh = scene.only_mesh())
+            hit_mesh(*mesh, 0, ray);
+        else
+            walk(scene, 0, LineD(ray));
+    }
+
+protected:
     void walk(const SceneTreeD& scene, std::uint32_t number, const LineD& line) {
         if (const MeshTreeD* const mesh = scene.only_mesh())
             hit_mesh(*mesh, number, line);
@@ -75,7 +97,14 @@ public:
             walk_parts(scene, number, line);
     }
 
-private:
+    /// Whether rays of its mask see all instances on the way.
+    [[nodiscard]] bool sees(const SceneTreeD& scene, const PlacedSceneD& placed) const {
+        bool seen = (placed.way.mask & mask_) != 0;
+        for (std::uint32_t k = 0; k < placed.more; ++k)
+            seen = seen && (scene.ways[placed.first + k].mask & mask_) != 0;
+        return seen;
+    }
+
     struct Parts {
         SceneRayD& ray;
         const SceneTreeD& scene;
@@ -98,7 +127,8 @@ private:
         const RayFrameD frame = make_frame(ray);
         SingleFrame boxes;
         BoxDistances distances;
-        if (!fill_box_frame(scene.parts, frame, scene.parts.around.error, boxes, distances)) return;
+        if (!fill_box_frame(scene.parts, ray, frame, scene.parts.around.error, boxes, distances))
+            return;
         const WideStackView stack = stack_;
         const std::size_t taken = wide_stack_capacity(scene.parts.arrays.stats.max_depth);
         stack_ = {stack.words + taken, stack.entries + taken};
@@ -116,19 +146,25 @@ private:
             hit_mesh(*scene.meshes[part], number, line);
             return;
         }
-        const PlacedSceneD& placed = scene.instances[part - scene.meshes.size()];
-        if ((placed.mask & mask_) != 0)
-            walk(*placed.scene, number + placed.number, line.into(placed.inverse));
+        const PlacedSceneD& placed = scene.placed[part - scene.meshes.size()];
+        if (sees(scene, placed))
+            walk(*placed.scene, number + placed.number, line_into(line, scene, placed));
     }
 
-    HWY_NOINLINE void hit_mesh(const MeshTreeD& mesh, std::uint32_t number, const LineD& line) {
+    void hit_mesh(const MeshTreeD& mesh, std::uint32_t number, const LineD& line) {
+        const RayD ray = line.ray(tmin_, reach_);
+        if (is_valid(ray)) hit_mesh(mesh, number, ray);
+    }
+    HWY_NOINLINE void hit_mesh(const MeshTreeD& mesh, std::uint32_t number, const RayD& ray) {
         const WideTreeD& tree = *mesh.tree;
         if (tree.empty() || (mesh.mask & mask_) == 0) return;
-        const RayD ray = line.ray(tmin_, reach_);
         RayAtTriangles at;
-        if (!is_valid(ray) || !at.fill(tree, ray)) return;
+        if (!at.fill(tree, ray)) return;
         const auto take = [&](double t, std::uint32_t prim, double u, double v) {
-            found_->push_back(at.hit_of(mesh, number, t, prim, u, v));
+            const HitD hit = at.hit_of(mesh, number, t, prim, u, v);
+            if constexpr (wants_accepted(wanted)) return (*filter_)(place_, *given_, hit);
+            found_->push_back(hit);
+            return false;
         };
         using Leaves = TriangleLeavesD<wanted, decltype(take)>;
         Leaves leaves(tree, at.line, at.kind, at.distances, at.best, take);
@@ -157,6 +193,9 @@ private:
     HitD best_;
     WideStackView stack_;  // from where it is free
     BudgetVector<HitD>* const found_;
+    const HitFilterD* filter_ = nullptr;
+    std::size_t place_ = 0;
+    const RayD* given_ = nullptr;
 };
 
 }  // namespace raydix::HWY_NAMESPACE

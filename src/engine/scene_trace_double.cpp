@@ -29,6 +29,11 @@ struct Batch {
     const SceneTraceOptions& options;
 };
 
+/// Null: all hits count.
+const HitFilterD* filter_of(const SceneTraceOptions& options) {
+    return options.filter_d ? &options.filter_d : nullptr;
+}
+
 /// The job of each thread: its memory stays from batch to batch.
 SceneJobD& job_of_this_thread() {
     thread_local SceneJobD job;
@@ -50,6 +55,8 @@ SceneJobD& job_for(const SceneTreeD& tree, const Batch& batch, std::size_t begin
     job.tree = &tree;
     job.rays = batch.rays.data() + begin;
     job.order = nullptr;
+    job.first = begin;
+    job.filter = filter_of(batch.options);
     job.n = end - begin;
     job.mask = batch.options.mask;
     job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + begin;
@@ -84,8 +91,10 @@ SimdPath choose_path(const WideTreeD& tree, std::span<const RayD> rays) {
 
 Ways ways_of(const SceneTreeD& tree, const Batch& batch) {
     const MeshTreeD* const mesh = tree.only_mesh();
-    if (mesh == nullptr || mesh->tree->empty()) return {{Way::alone, Way::alone}, 1};
     const SceneTraceOptions& options = batch.options;
+    if (options.filter_d) return {{Way::alone, Way::alone}, 1};
+    // Rays that follow each other through little gain nothing by turns.
+    if (mesh == nullptr || mesh->tree->empty()) return {{Way::turns, Way::alone}, 2};
     const bool may_go_together =
         mesh->tree->suits_packets && options.masks.empty() && (mesh->mask & options.mask) != 0;
     if (!may_go_together || options.path == SimdPath::single) return {{Way::turns, Way::turns}, 1};
@@ -122,14 +131,15 @@ TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
 }
 
 /// For any hit only prim has a meaning.
-HitD trace_one(const SceneD& scene, const RayD& ray, std::uint32_t mask, bool any) {
+HitD trace_one(const SceneD& scene, const RayD& ray, std::uint32_t mask, const HitFilterD* filter,
+               bool any) {
     static const SceneKernelsD& kernels = scene_kernels_double_for({});
     const SceneTreeD& tree = *SceneAccessD::tree(scene);
     StackMemory& stack = job_of_this_thread().stack;
     stack.reserve_words(tree.stack_size);
     const auto answer = [&]() -> HitD {
         if (!is_valid(ray)) return {};
-        return (any ? kernels.any : kernels.closest)(tree, ray, mask, stack.view());
+        return (any ? kernels.any : kernels.closest)(tree, ray, mask, filter, 0, stack.view());
     };
     if (FloatEnvironment::is_plain()) return answer();
     const FloatEnvironment plain;
@@ -183,11 +193,20 @@ AllHitsD trace_all(const SceneD& scene, std::span<const RayD> rays,
 }
 
 HitD closest_hit(const SceneD& scene, const RayD& ray, std::uint32_t mask) {
-    return trace_one(scene, ray, mask, false);
+    return trace_one(scene, ray, mask, nullptr, false);
 }
 
 bool any_hit(const SceneD& scene, const RayD& ray, std::uint32_t mask) {
-    return trace_one(scene, ray, mask, true).hit();
+    return trace_one(scene, ray, mask, nullptr, true).hit();
+}
+
+HitD closest_hit(const SceneD& scene, const RayD& ray, const HitFilterD& filter,
+                 std::uint32_t mask) {
+    return trace_one(scene, ray, mask, filter ? &filter : nullptr, false);
+}
+
+bool any_hit(const SceneD& scene, const RayD& ray, const HitFilterD& filter, std::uint32_t mask) {
+    return trace_one(scene, ray, mask, filter ? &filter : nullptr, true).hit();
 }
 
 }  // namespace raydix

@@ -24,17 +24,30 @@ struct MeshTreeD : GroupedMeshes {
 
 struct SceneTreeD;
 
-/// A scene that rays enter by an instance.
-struct PlacedSceneD {
-    std::uint32_t id;
-    std::uint32_t number;  // of the path that ends here
-    std::uint32_t mask;
+/// The way into an instance.
+struct WayInD {
     InverseD inverse;
+    std::uint32_t mask;
+};
+
+/// A scene that rays enter by one instance, or by several in turn, as PlacedScene of floats.
+struct PlacedSceneD {
+    WayInD way;
+    std::uint32_t number;       // of the path that ends here
+    std::uint32_t first, more;  // further ways in SceneTreeD::ways, from the outside inward
+    const SceneTreeD* scene;    // kept by SceneTreeD::instances, or by theirs
+};
+
+/// An instance as the scene's owner knows it.
+struct InstanceNameD {
+    std::uint32_t id, mask;
+    std::uint32_t number;  // of the path that ends here
     TransformD transform;
+    InverseD inverse;
     std::shared_ptr<const SceneTreeD> scene;
 };
 
-/// A wide tree over parts, one a leaf: mesh trees first, then instances.
+/// A wide tree over parts, one a leaf: mesh trees first, then placed scenes.
 struct PartTreeD : NodesD {
     std::vector<std::uint32_t> part;  // by the place that leaves name
     ExtentD around{nothing_d, 0.0};   // all of them
@@ -42,8 +55,13 @@ struct PartTreeD : NodesD {
 
 struct SceneTreeD {
     std::vector<std::shared_ptr<const MeshTreeD>> meshes;
-    std::vector<PlacedSceneD> instances;  // by ascending id
-    std::vector<MeshNameD> mesh_names;    // by ascending id
+    std::vector<InstanceNameD> instances;  // by ascending id
+    std::vector<MeshNameD> mesh_names;     // by ascending id
+    std::vector<PlacedSceneD> placed;
+    std::vector<WayInD> ways;
+    std::vector<ExtentD> extents;  // [parts]
+    /// The meshes without the instances, where there are both.
+    std::shared_ptr<const SceneTreeD> own_parts;
     PartTreeD parts;
     AabbD bounds = nothing_d;  // without what rays may miss it by
     Quality quality{};         // what it was made with

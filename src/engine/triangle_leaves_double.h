@@ -50,16 +50,31 @@ struct CrossingsD {
     std::uint32_t open;  // intersect_triangle must be asked
 };
 
-/// The second half of the test for lanes that pass inside. u, v and w: the edge functions.
+/// Whether MulSub rounds once.
+constexpr bool fuses = HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3;
+
+/// accurate_product_difference of an edge, but for lanes where both products round to the same,
+/// which `equal` has then.
+template <class D>
+HWY_INLINE hn::Vec<D> accurate_edge(const Sheared<D>& p, const Sheared<D>& q, hn::Mask<D>& equal) {
+    const hn::Vec<D> left = hn::Mul(p.x, q.y), right = hn::Mul(p.y, q.x);
+    equal = hn::Or(equal, hn::Eq(left, right));
+    return hn::Add(hn::Sub(left, right),
+                   hn::Sub(hn::MulSub(p.x, q.y, left), hn::MulSub(p.y, q.x, right)));
+}
+
+/// The second half of the test for lanes that pass inside. u, v and w: the edge functions, once
+/// more and accurately where `EdgesD` has them so.
 template <class D>
 HWY_INLINE CrossingsD<D> find_crossings(D d, const Sheared<D>& a, const Sheared<D>& b,
-                                        const Sheared<D>& c, hn::Vec<D> u, hn::Vec<D> v,
-                                        hn::Vec<D> w, hn::Vec<D> per_depth, hn::Vec<D> tmin,
+                                        const Sheared<D>& c, hn::Vec<D> u, hn::Vec<D>& v,
+                                        hn::Vec<D>& w, hn::Vec<D> per_depth, hn::Vec<D> tmin,
                                         hn::Vec<D> tmax, std::uint32_t candidates) {
     using V = hn::Vec<D>;
     const V za = hn::Mul(a.z, per_depth), zb = hn::Mul(b.z, per_depth),
             zc = hn::Mul(c.z, per_depth);
-    const V area = hn::Add(hn::Add(u, v), w);
+    V area = hn::Add(hn::Add(u, v), w);
+    auto sure = without_zero(d, u, v, w);
     // EdgesD::may_stray
     const auto beside = [](const Sheared<D>& p) { return hn::Max(hn::Abs(p.x), hn::Abs(p.y)); };
     const V m = hn::Max(hn::Max(beside(a), beside(b)), beside(c));
@@ -68,17 +83,30 @@ HWY_INLINE CrossingsD<D> find_crossings(D d, const Sheared<D>& a, const Sheared<
     const auto strays =
         hn::Gt(hn::Mul(hn::Mul(hn::Set(d, 3.0), hn::Mul(m, m)), across),
                hn::Mul(hn::Mul(hn::Set(d, 8.0), hn::Abs(area)), hn::Add(across, z)));
+    if (!fuses) {
+        sure = hn::AndNot(strays, sure);
+    } else if ((bits_of(d, strays) & candidates) != 0) {
+        auto equal = hn::Eq(u, hn::Zero(d));  // those are not sure anyway
+        const V at_a = accurate_edge<D>(c, b, equal), at_b = accurate_edge<D>(a, c, equal),
+                at_c = accurate_edge<D>(b, a, equal);
+        const V sum = hn::Add(hn::Add(at_a, at_b), at_c);
+        const auto unknown = hn::Or(equal, hn::Eq(sum, hn::Zero(d)));
+        sure = hn::AndNot(hn::And(strays, unknown), sure);
+        u = hn::IfThenElse(strays, at_a, u);
+        v = hn::IfThenElse(strays, at_b, v);
+        w = hn::IfThenElse(strays, at_c, w);
+        area = hn::IfThenElse(strays, sum, area);
+    }
     const V crossed =
         hn::Div(hn::Add(hn::Add(hn::Mul(u, za), hn::Mul(v, zb)), hn::Mul(w, zc)), area);
     const V most = hn::Set(d, std::numeric_limits<double>::max());
-    const auto finite = hn::And(hn::Le(hn::Abs(area), most), hn::Le(hn::Abs(crossed), most));
-    const std::uint32_t sure =
-        bits_of(d, hn::And(hn::AndNot(strays, finite), without_zero(d, u, v, w)));
+    sure = hn::And(sure, hn::And(hn::Le(hn::Abs(area), most), hn::Le(hn::Abs(crossed), most)));
     V t = hn::Max(crossed, hn::Min(hn::Min(za, zb), zc));
     t = hn::Min(t, hn::Max(hn::Max(za, zb), zc));
     const std::uint32_t within = bits_of(d, hn::And(hn::Ge(t, tmin), hn::Le(t, tmax)));
     // -0 becomes +0
-    return {hn::Add(t, hn::Zero(d)), area, candidates & sure & within, candidates & ~sure};
+    const std::uint32_t known = bits_of(d, sure);
+    return {hn::Add(t, hn::Zero(d)), area, candidates & known & within, candidates & ~known};
 }
 
 /// The corners of four triangles as a ray sees them.
@@ -108,8 +136,8 @@ HWY_INLINE CrossingsD<D4> cross_four(const TriangleBlockD& block, std::size_t l,
                           hn::Set(d4, reach), candidates);
 }
 
-/// One ray's line at the leaves of a tree (Parts of single.h). Take: for all hits, called with t in
-/// units of the line, prim, u and v.
+/// One ray's line at the leaves of a tree (Parts of single.h). Take: called with t in units of the
+/// line, prim, u and v; for all hits with each, for accepted ones to say whether it is.
 template <Wanted wanted, class Take = std::nullptr_t>
 class TriangleLeavesD {
 public:
@@ -152,7 +180,7 @@ private:
             hn::Store(at.area, d4, area);
             for (std::uint32_t left = at.hit; left != 0; left &= left - 1) {
                 const auto k = static_cast<std::size_t>(std::countr_zero(left));
-                add(block.prim[l + k], t[k], over_v[k], over_w[k], area[k]);
+                if (add(block.prim[l + k], t[k], over_v[k], over_w[k], area[k])) return true;
             }
         }
         return at.open != 0 && test_closely(block, l, at.open);
@@ -167,15 +195,22 @@ private:
                                                        best_.t, hit))
                 continue;
             if constexpr (wanted == Wanted::any) return true;
-            add(block.prim[lane], hit.t, hit.u, hit.v, 1.0);
+            if (add(block.prim[lane], hit.t, hit.u, hit.v, 1.0)) return true;
         }
         return false;
     }
-    HWY_INLINE void add(std::uint32_t prim, double t, double u, double v, double area) {
-        if constexpr (wanted == Wanted::all)
+    /// True: any hit will do, and this one does.
+    HWY_INLINE bool add(std::uint32_t prim, double t, double u, double v, double area) {
+        if constexpr (wanted == Wanted::all) {
             take_(t, prim, u / area, v / area);
-        else if (best_.is_behind(t, prim))
+            return false;
+        } else {
+            if (!best_.is_behind(t, prim)) return false;
+            if constexpr (wants_accepted(wanted))
+                if (!take_(t, prim, u / area, v / area)) return false;
             best_ = {t, prim, u, v, area};
+            return wants_any(wanted);
+        }
     }
 
     const WideTreeD& tree_;

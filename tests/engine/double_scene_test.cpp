@@ -6,6 +6,7 @@
 #include <raydix/scene.h>
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
@@ -104,6 +105,83 @@ TEST(DoubleScene, AllHitsAreThoseOfEveryMeshOnEveryPath) {
         }
     }
     EXPECT_GT(found, 40u * thorough);
+}
+
+/// What the filter of the next test takes.
+bool takes(std::size_t place, const HitD& hit) {
+    return (hit.prim + hit.instance + hit.geometry + place) % 3 != 0;
+}
+
+/// The least hit of ray `i` that it takes: refused triangles have no area.
+std::vector<HitD> look_at_taken(const WorldD& world, std::span<const RayD> rays) {
+    std::vector<HitD> best(rays.size());
+    for_each_mesh(
+        world, rays, every_mask,
+        [&](const WorldD::Item& item, const std::vector<RayD>& entering, std::uint32_t number) {
+            for (std::size_t rest = 0; rest < 3; ++rest) {
+                MeshD mesh = item.mesh;
+                for (std::uint32_t prim = 0; prim < mesh.triangles.size(); ++prim) {
+                    Triangle& t = mesh.triangles[prim];
+                    if (!takes(rest, {TreeHitD{1, prim, 0, 0}, item.id, number}))
+                        t = {t[0], t[0], t[0]};
+                }
+                const std::vector<HitD> hits = trace_brute_force(mesh, entering, 1);
+                for (std::size_t i = rest; i < rays.size(); i += 3) {
+                    const HitD found{hits[i], item.id, number};
+                    if (found.hit() && (!best[i].hit() || key_of(found) < key_of(best[i])))
+                        best[i] = found;
+                }
+            }
+        });
+    return best;
+}
+
+TEST(DoubleScene, FiltersSayWhichHitsCount) {
+    std::size_t found = 0;
+    for (std::uint64_t seed = 0; seed < thorough; ++seed) {
+        RandomWorlds random(300 + seed);
+        const auto world =
+            random.world({static_cast<std::uint32_t>(seed % 3), 5, 0, seed % 2 == 0 ? 0 : far_away,
+                          options_of(static_cast<int>(seed))});
+        const std::vector<RayD> rays = random.rays(150, world->home);
+        const std::vector<HitD> wanted = look_at_taken(*world, rays);
+        SceneTraceOptions options;
+        options.threads = 1 + static_cast<int>(seed % 2);
+        options.filter_d = [&](std::size_t place, const RayD& ray, const HitD& hit) {
+            EXPECT_TRUE(ray.origin == rays[place].origin && ray.tmax == rays[place].tmax);
+            EXPECT_TRUE(hit.t <= ray.tmax && hit.t >= ray.tmin);
+            return takes(place, hit);
+        };
+        EXPECT_EQ(trace(world->scene, rays, options), wanted) << "seed " << seed;
+        std::vector<std::uint8_t> occluded(rays.size());
+        trace_any(world->scene, rays, occluded, options);
+        const AllHitsD all = trace_all(world->scene, rays, options);
+        const auto rows = look_for_all(*world, rays, every_mask);
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            EXPECT_EQ(occluded[i] != 0, wanted[i].hit());
+            found += wanted[i].hit();
+            std::vector<HitD> row;
+            std::ranges::copy_if(rows[i], std::back_inserter(row),
+                                 [&](const HitD& hit) { return takes(i, hit); });
+            EXPECT_TRUE(
+                std::equal(row.begin(), row.end(),
+                           all.hits.begin() + static_cast<std::ptrdiff_t>(all.offsets[i]),
+                           all.hits.begin() + static_cast<std::ptrdiff_t>(all.offsets[i + 1])));
+            const HitFilterD one = [&](std::size_t place, const RayD&, const HitD& hit) {
+                EXPECT_EQ(place, 0u);
+                return takes(i, hit);
+            };
+            EXPECT_EQ(closest_hit(world->scene, rays[i], one), wanted[i]);
+            EXPECT_EQ(any_hit(world->scene, rays[i], one), wanted[i].hit());
+        }
+    }
+    EXPECT_GT(found, 20u * thorough);
+    const SceneD scene(one_triangle());
+    struct Refusal {};
+    SceneTraceOptions options;
+    options.filter_d = [](std::size_t, const RayD&, const HitD&) -> bool { throw Refusal{}; };
+    EXPECT_THROW(static_cast<void>(trace(scene, std::vector<RayD>(3, down), options)), Refusal);
+    EXPECT_EQ(closest_hit(scene, down, HitFilterD()).t, 10);
 }
 
 TEST(DoubleScene, OfOneMeshGivesTheHitsOfItsTree) {
