@@ -464,5 +464,29 @@ TEST(SceneSolid, InDoubleNothingIsRounded) {
     }
 }
 
+TEST(SceneSolid, ATinyMirrorTurnsCornersToo) {
+    const Mesh in_floats = box_mesh({0, 0, 0}, {1, 1, 1});
+    MeshD box{"", {}, in_floats.triangles};
+    for (const Vec3 v : in_floats.vertices) box.vertices.push_back({v.x, v.y, v.z});
+    const SceneD inner(box);
+    constexpr double size = 0x1p-400;  // whose third power is no double
+    SceneD small, scene;
+    for (const double side : {1.0, -1.0}) {
+        TransformD t;
+        t.m[0][0] = side * size, t.m[1][1] = t.m[2][2] = size;
+        t.m[0][3] = side < 0 ? size : 0;
+        small.add(inner, t);
+    }
+    small.commit();
+    TransformD large;
+    for (std::size_t k = 0; k < 3; ++k) large.m[k][k] = 1 / size;
+    scene.add(small, large);
+    scene.commit();
+    const SolidD solid(scene);
+    EXPECT_EQ(solid.closure(), Closure::oriented);
+    const std::vector<Vec3d> queries = {{0.25, 0.375, 0.5}, {-1, 0.5, 0.5}};
+    EXPECT_EQ(winding_numbers(solid, queries), (std::vector<double>{2, 0}));
+}
+
 }  // namespace
 }  // namespace raydix::test
