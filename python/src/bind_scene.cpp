@@ -406,6 +406,52 @@ std::uint64_t count_overlaps(Scene& scene, Scene* other, bool narrow, int thread
     });
 }
 
+template <class Shape, class Scene, class Array>
+Counts touches(Scene& scene, const Array& shapes, const FlagsOut& out, int threads) {
+    const auto queries = rows<Shape>(shapes);
+    const std::span flags(reinterpret_cast<std::uint8_t*>(out.data()), out.shape(0));
+    require_length(flags.size(), queries.size());
+    Counts counts{0, 0};
+    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
+        const OverlapCounts met =
+            scene.touch_any(queries.subspan(begin, end - begin), flags.subspan(begin, end - begin),
+                            threads_for(threads));
+        counts.first += met.found;
+        counts.second += met.invalid_queries;
+    });
+    return counts;
+}
+
+/// Rows of a ray and a radius.
+template <class Scene>
+using SweepRows = In<Scalar<Scene>, nb::shape<-1, 9>>;
+/// t, prim, geometry, instance, x, y, z, u, v; in double without geometry and instance.
+template <class Scene>
+using ContactRows =
+    Out<Scalar<Scene>,
+        nb::shape<-1, sizeof(typename Scene::Types::SweepHit) / sizeof(Scalar<Scene>)>>;
+static_assert(sizeof(SphereSweep) == 9 * sizeof(float) &&
+              sizeof(SceneSweepHit) == 9 * sizeof(float));
+static_assert(sizeof(SphereSweepD) == 9 * sizeof(double) &&
+              sizeof(SweepHitD) == 7 * sizeof(double));
+
+template <class Scene>
+Counts sweeps(Scene& scene, const SweepRows<Scene>& balls, const ContactRows<Scene>& out,
+              int threads) {
+    const auto queries = rows<typename Scene::Types::Sweep>(balls);
+    const auto hits = rows_out<typename Scene::Types::SweepHit>(out);
+    require_length(hits.size(), queries.size());
+    Counts counts{0, 0};
+    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
+        const OverlapCounts met =
+            scene.sweep_spheres(queries.subspan(begin, end - begin),
+                                hits.subspan(begin, end - begin), threads_for(threads));
+        counts.first += met.found;
+        counts.second += met.invalid_queries;
+    });
+    return counts;
+}
+
 /// Offsets, and rows of instance, geometry and prim; in double of prim alone.
 template <class Shape, class Scene, class Array>
 nb::tuple touched(Scene& scene, const Array& shapes, std::uint64_t max_result_bytes, int threads) {
@@ -591,6 +637,12 @@ void bind_queries(nb::class_<Scene>& scene) {
         .def("overlaps", &overlaps<Scene>, nb::arg("other").none(), nb::arg("narrow"),
              nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
         .def("count_overlaps", &count_overlaps<Scene>, nb::arg("other").none(), nb::arg("narrow"),
+             nb::arg("threads") = 0)
+        .def("touches_spheres", &touches<Sphere, Scene, Spheres>, nb::arg("spheres").noconvert(),
+             nb::arg("flags").noconvert(), nb::arg("threads") = 0)
+        .def("touches_segments", &touches<Segment, Scene, Segments>,
+             nb::arg("segments").noconvert(), nb::arg("flags").noconvert(), nb::arg("threads") = 0)
+        .def("sweep", &sweeps<Scene>, nb::arg("sweeps").noconvert(), nb::arg("hits").noconvert(),
              nb::arg("threads") = 0)
         .def("touched_by_spheres", &touched<Sphere, Scene, Spheres>, nb::arg("spheres").noconvert(),
              nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
