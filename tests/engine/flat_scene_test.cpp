@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <raydix/error.h>
 #include <raydix/scene_pairs.h>
+#include <raydix/scene_queries.h>
 #include <raydix/solid.h>
 #include <raydix/user_geometry.h>
 
@@ -269,6 +270,32 @@ TEST(SceneSolid, NothingAndWhatIsNotFinite) {
     EXPECT_TRUE(contains(solid, Vec3{0.5f, 0.5f, 0.5f}));
     EXPECT_FALSE(contains(solid, Vec3{nan_value, 0.5f, 0.5f}));
     EXPECT_EQ(signed_distance(solid, Vec3{nan_value, 0.5f, 0.5f}), infinity);
+}
+
+TEST(FlatScene, ClosestPointsOfTheSceneAreThoseOfTheMesh) {
+    std::size_t turned = 0, found = 0;
+    for_random_worlds([&](const World& world, RandomScenes& random) {
+        const FlatWorld flat = flat_of(world);
+        if (flat.mesh.triangles.empty()) return;
+        const std::vector<Vec3> queries = queries_around(random, 600);
+        const std::vector<ClosestPoint> wanted = closest_points(build_bvh(flat.mesh), queries);
+        const std::vector<SceneClosestPoint> near = closest_points(world.scene, queries);
+        for (std::size_t i = 0; i < queries.size(); ++i) {
+            const ClosestPoint& w = wanted[i];
+            ASSERT_EQ(near[i].distance, w.distance);
+            ASSERT_EQ(near[i].found(), w.found());
+            if (!w.found()) continue;
+            ++found;
+            ASSERT_TRUE(same_bits(near[i].position, w.position));
+            ASSERT_EQ((ScenePrimitive{near[i].instance, near[i].geometry, near[i].prim}),
+                      flat.names[w.prim]);
+            // Weights of corners that changed places do so too.
+            turned += near[i].u != w.u || near[i].v != w.v;
+            ASSERT_TRUE((near[i].u == w.u && near[i].v == w.v) || near[i].instance != 0);
+        }
+    });
+    EXPECT_GT(found, 5000u);
+    EXPECT_GT(turned, 500u);
 }
 
 using Pairs = std::vector<ScenePair>;
