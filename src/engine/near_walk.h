@@ -39,16 +39,28 @@ HWY_INLINE bool walk_near(const NearTree& tree, const NearSpace* space, const Pr
                 word = node.child[std::countr_zero(bits)];
                 continue;
             }
-            // Behind each other by key, the nearest on top.
             stack.make_room();
             NearStack::Entry* const all = stack.entries.data();
+            const auto entry = [&](std::uint32_t slots) -> NearStack::Entry {
+                const auto s = static_cast<std::uint32_t>(std::countr_zero(slots));
+                return {keys[s], node.child[s]};
+            };
+            const std::uint32_t rest = bits & (bits - 1);
+            if (std::has_single_bit(rest)) {
+                const NearStack::Entry a = entry(bits), b = entry(rest);
+                const bool b_first = b.key < a.key;
+                all[stack.top++] = b_first ? a : b;
+                word = b_first ? b.word : a.word;
+                continue;
+            }
+            // Behind each other by key, the nearest on top.
             const std::size_t first = stack.top;
             std::size_t top = first;
             for (; bits != 0; bits &= bits - 1) {
-                const auto s = static_cast<std::uint32_t>(std::countr_zero(bits));
+                const NearStack::Entry next = entry(bits);
                 std::size_t k = top++;
-                for (; k > first && all[k - 1].key < keys[s]; --k) all[k] = all[k - 1];
-                all[k] = {keys[s], node.child[s]};
+                for (; k > first && all[k - 1].key < next.key; --k) all[k] = all[k - 1];
+                all[k] = next;
             }
             stack.top = top;
         }
@@ -78,6 +90,7 @@ public:
             visit_leaf<true>(*guess.view, *guess.mesh, space, guess.number, guess.word);
         else
             visit_leaf<false>(*guess.view, *guess.mesh, space, guess.number, guess.word);
+        visited_ = guess;
     }
 
 private:
@@ -190,6 +203,8 @@ private:
     template <bool compact>
     HWY_INLINE bool visit_leaf(const WideView& view, const MeshTree& mesh, const NearSpace* space,
                                std::uint32_t number, std::uint32_t word) {
+        if (word == visited_.word && &view == visited_.view && number == visited_.number)
+            return false;
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3;
         std::uint32_t lanes = ((2u << (word & 7)) - 1) << place % block_lanes;
         const TriangleBlock* block;
@@ -227,12 +242,13 @@ private:
 
     NearJob& job_;
     Probe& probe_;
+    NearGuess visited_;    // a leaf that is done
     TriangleBlock room_;   // of a compact tree's leaf
     TriangleBlock moved_;  // of an instance's
 };
 
 NearBest closest_in_scene(NearJob& job, Vec3 query, float limit) {
-    ClosestSink sink(limit);
+    ClosestSink sink(query, limit);
     DistanceProbe<ClosestSink> probe(query, sink);
     NearWalk<DistanceProbe<ClosestSink>> walk(job, probe);
     walk.start_at(job.guess);
