@@ -14,13 +14,14 @@
 
 #include "engine/near_job.h"
 #include "engine/near_probes.h"
+#include "trace/simd/children.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
 /// Visits all leaves below the root that matter to the probe: leaf(word) -> whether the search
 /// ends, and so does this.
-template <bool compact, class Probe, class Leaf>
+template <bool compact, bool may_ask, class Probe, class Leaf>
 HWY_INLINE bool walk_near(const NearTree& tree, const NearSpace* space, const Probe& probe,
                           NearStack& stack, const Leaf& leaf) {
     const typename Probe::Frame frame = probe.frame(tree, space);
@@ -50,6 +51,7 @@ HWY_INLINE bool walk_near(const NearTree& tree, const NearSpace* space, const Pr
                 const NearStack::Entry a = entry(bits), b = entry(rest);
                 const bool b_first = b.key < a.key;
                 all[stack.top++] = b_first ? a : b;
+                if constexpr (may_ask) ask_for<compact>(tree.view, all[stack.top - 1].word);
                 word = b_first ? b.word : a.word;
                 continue;
             }
@@ -63,6 +65,8 @@ HWY_INLINE bool walk_near(const NearTree& tree, const NearSpace* space, const Pr
                 all[k] = next;
             }
             stack.top = top;
+            if constexpr (may_ask)
+                if (top - first > 1) ask_for<compact>(tree.view, all[top - 2].word);
         }
         const NearStack::Entry* const all = stack.entries.data();
         do {
@@ -115,13 +119,13 @@ private:
     template <class Visit>
     HWY_INLINE bool walk_parts(const PartTree& tree, const NearSpace* space, const Visit& visit) {
         if (tree.empty()) return false;
-        return walk_near<false>({tree.view, parts_room}, space, probe_, job_.stack,
-                                [&](std::uint32_t word) {
-                                    const std::uint32_t place = (word & ~wide_leaf_bit) >> 3;
-                                    for (std::uint32_t k = place; k <= place + (word & 7); ++k)
-                                        if (visit(tree.part[k])) return true;
-                                    return false;
-                                });
+        return walk_near<false, false>(
+            {tree.view, parts_room}, space, probe_, job_.stack, [&](std::uint32_t word) {
+                const std::uint32_t place = (word & ~wide_leaf_bit) >> 3;
+                for (std::uint32_t k = place; k <= place + (word & 7); ++k)
+                    if (visit(tree.part[k])) return true;
+                return false;
+            });
     }
 
     HWY_NOINLINE bool visit_part(const SceneTree& scene, std::uint32_t part, const NearSpace* space,
@@ -195,10 +199,10 @@ private:
     template <bool compact>
     HWY_NOINLINE bool visit_triangles(const WideView& view, const MeshTree& mesh,
                                       const NearSpace* space, std::uint32_t number) {
-        return walk_near<compact>({view, mesh_room}, space, probe_, job_.stack,
-                                  [&](std::uint32_t word) {
-                                      return visit_leaf<compact>(view, mesh, space, number, word);
-                                  });
+        return walk_near<compact, true>(
+            {view, mesh_room}, space, probe_, job_.stack, [&](std::uint32_t word) {
+                return visit_leaf<compact>(view, mesh, space, number, word);
+            });
     }
     template <bool compact>
     HWY_INLINE bool visit_leaf(const WideView& view, const MeshTree& mesh, const NearSpace* space,
@@ -233,11 +237,11 @@ private:
 
     bool visit_shapes(const ShapeTree& tree, const NearSpace* space, std::uint32_t number) {
         if ((tree.mask & job_.mask) == 0 || tree.empty() || tree.user() != nullptr) return false;
-        return walk_near<false>({tree.view, part_room_of_points}, space, probe_, job_.stack,
-                                [&](std::uint32_t word) {
-                                    return probe_.shapes(tree, (word & ~wide_leaf_bit) >> 3,
-                                                         (word & 7) + 1, space, number);
-                                });
+        return walk_near<false, false>({tree.view, part_room_of_points}, space, probe_, job_.stack,
+                                       [&](std::uint32_t word) {
+                                           return probe_.shapes(tree, (word & ~wide_leaf_bit) >> 3,
+                                                                (word & 7) + 1, space, number);
+                                       });
     }
 
     NearJob& job_;
