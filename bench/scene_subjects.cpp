@@ -1,7 +1,7 @@
 #include "scene_subjects.h"
 
-#include <raydix/closest.h>
 #include <raydix/scene.h>
+#include <raydix/scene_queries.h>
 #include <raydix/trace.h>
 #include <raydix/user_geometry.h>
 #include <raydix/wide.h>
@@ -268,8 +268,10 @@ private:
 
 class OurClosestPoints : public ClosestSide {
 public:
-    OurClosestPoints(const Mesh& mesh, const SubjectOptions& options)
-        : threads_(options.threads), tree_(build_bvh(mesh, build_options(options))) {}
+    OurClosestPoints(const Mesh& mesh, const SubjectOptions& options) : threads_(options.threads) {
+        scene_.share(mesh);
+        scene_.commit(scene_options(options));
+    }
 
     void take(std::span<const Vec3> queries) override {
         queries_ = queries;
@@ -277,11 +279,11 @@ public:
     }
     std::vector<SideMode> modes() override {
         SideMode batch{.side = "raydix", .name = "batch", .ours = true};
-        batch.closest = [this] { closest_points(tree_, queries_, found_, {.threads = threads_}); };
+        batch.closest = [this] { closest_points(scene_, queries_, found_, {.threads = threads_}); };
         SideMode single{.side = "raydix", .name = "single", .ours = true, .single = true};
         single.closest = [this] {
             one_by_one(queries_.size(), threads_,
-                       [&](std::size_t i) { found_[i] = closest_point(tree_, queries_[i]); });
+                       [&](std::size_t i) { found_[i] = closest_point(scene_, queries_[i]); });
         };
         return {batch, single};
     }
@@ -289,9 +291,9 @@ public:
 
 private:
     int threads_;
-    Bvh tree_;
+    Scene scene_;
     std::span<const Vec3> queries_;
-    std::vector<ClosestPoint> found_;
+    std::vector<SceneClosestPoint> found_;
 };
 
 class OurMovingInstances : public MovingSide {

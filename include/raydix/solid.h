@@ -56,7 +56,7 @@ public:
     /// Refers to the tree, which must outlive it and stay as it is. Throws InputError: a tree that
     /// holds boxes or points; more than 1.4e9 triangles.
     explicit Solid(const Bvh& bvh, const SolidOptions& options = {});
-    /// The same, and keeps the tree.
+    /// The same, and keeps the tree, which must not be null.
     explicit Solid(std::shared_ptr<const Bvh> bvh, const SolidOptions& options = {});
     /// All meshes of the scene's last commit, on every path of instances, as one body: crossings
     /// are summed, an edge may belong to triangles of several geometries. Makes a tree of its own

@@ -40,6 +40,11 @@ def _limit(value: Any, name: str, lead: tuple[int, ...]) -> Any:
         ) from None
 
 
+def floats_of(value: Any, name: str, lead: tuple[int, ...]) -> np.ndarray:
+    """A number, or an array that fits the leading shape, as one of that shape."""
+    return np.broadcast_to(_limit(value, name, lead), lead)
+
+
 def _columns(
     origins: np.ndarray, directions: np.ndarray, tmin: Any, tmax: Any
 ) -> tuple[tuple, tuple[int, ...]]:

@@ -27,7 +27,7 @@ from ._arrays import (
     whole,
 )
 from ._filters import hit_filter
-from ._rays import hit_columns, hit_rows, ray_batch, ray_masks, ray_rows
+from ._rays import floats_of, hit_columns, hit_rows, ray_batch, ray_masks, ray_rows
 from .cameras import Camera
 from .contents import QUALITIES, USAGES, SceneContents, mesh_of, one_of
 from .devices import CudaRays
@@ -99,8 +99,8 @@ class Scene(SceneContents, SceneViews):
     scene of one mesh count whatever its mask is; of others those with mask 0 do not.
 
     `refit`, `vertices`, `faces`, `stats`, `wide_stats`, `info`, `check` and `raydix.simulate` need
-    a scene of one mesh and nothing else, in float64 `closest_point` and `touched_by` too:
-    InputError names the geometry that stands in the way.
+    a scene of one mesh and nothing else, in float64 `closest_point`, `touches`, `touched_by` and
+    `sweep_spheres` too: InputError names the geometry that stands in the way.
 
     With precision "float64" these raise NotImplementedError: compact=True, `positions`, `normals`,
     `render`, `cameras`, `primary_rays`, `secondary_rays`, `save`, `info`, `wide_stats` and
@@ -442,9 +442,7 @@ class Scene(SceneContents, SceneViews):
             self._core.closest(asked, places, reach, self.threads)
             places = places.reshape(lead + (7,))
             prim = places.view(UINT32)[..., 8]
-            only = self._core.mesh_id() or 0
-            geometry = np.where(prim == MISSING, UINT32.type(MISSING), UINT32.type(only))
-            instance = np.zeros(lead, UINT32)
+            geometry, instance = self._of_one_mesh(prim)
         return {
             "point": places[..., :3],
             "distance": places[..., 3],
@@ -542,21 +540,85 @@ class Scene(SceneContents, SceneViews):
         as those of a hit, ascending by (instance, geometry, prim) in each row. `max_result_bytes`
         as in `all_hits`.
         """
-        if (spheres is None) == (segments is None):
-            raise ValueError("touched_by: expected either spheres or segments")
-        if spheres is not None:
-            shapes, _ = rows(spheres, "spheres", (4,), self.dtype)
-            offsets, names = self._core.touched_by_spheres(shapes, max_result_bytes, self.threads)
-        else:
-            shapes, _ = rows(segments, "segments", (6,), self.dtype)
-            offsets, names = self._core.touched_by_segments(shapes, max_result_bytes, self.threads)
+        kind, shapes, _ = self._touching(spheres, segments, "touched_by")
+        call = getattr(self._core, f"touched_by_{kind}")
+        offsets, names = call(shapes, max_result_bytes, self.threads)
         prim = names[:, -1]
         if self.dtype == FLOAT32:
             geometry, instance = names[:, 1], names[:, 0]
         else:
-            geometry = np.full(len(prim), self._core.mesh_id() or 0, UINT32)
-            instance = np.zeros(len(prim), UINT32)
+            geometry, instance = self._of_one_mesh(prim)
         return {"offsets": offsets, "prim": prim, "geometry": geometry, "instance": instance}
+
+    def touches(
+        self, *, spheres: ArrayLike | None = None, segments: ArrayLike | None = None
+    ) -> np.ndarray:
+        """Whether each ball or segment, as for `touched_by`, touches anything: bool, with their
+        leading shape."""
+        kind, shapes, lead = self._touching(spheres, segments, "touches")
+        flags = np.empty(lead, np.bool_)
+        getattr(self._core, f"touches_{kind}")(shapes, flags.reshape(-1), self.threads)
+        return flags
+
+    def _touching(self, spheres: Any, segments: Any, call: str) -> tuple[str, np.ndarray, tuple]:
+        """Which of both there is, its rows, and their leading shape."""
+        if (spheres is None) == (segments is None):
+            raise ValueError(f"{call}: expected either spheres or segments")
+        if spheres is not None:
+            return ("spheres", *rows(spheres, "spheres", (4,), self.dtype))
+        return ("segments", *rows(segments, "segments", (6,), self.dtype))
+
+    def _of_one_mesh(self, prim: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Geometry and instance of primitives of the scene's only mesh."""
+        only = UINT32.type(self._core.mesh_id() or 0)
+        return np.where(prim == MISSING, UINT32.type(MISSING), only), np.zeros(prim.shape, UINT32)
+
+    def sweep_spheres(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        radii: ArrayLike,
+        tmin: Any = None,
+        tmax: Any = None,
+    ) -> dict[str, np.ndarray]:
+        """Where balls whose centers move along rays first touch a triangle.
+
+        Rays as in `intersect`; `radii`: a number, or an array that fits their leading shape.
+        Returns a dict of arrays with that shape: "t" of the center at the first contact (infinity:
+        there is none), "point" (..., 3), the point that is touched, "u", "v", and "prim",
+        "geometry" and "instance" as those of a hit. At equal t the lower (instance, geometry, prim)
+        wins. A ball that touches at the start has t = tmin. Those with a negative radius or one
+        that is not finite touch nothing, as rays that are invalid hit nothing. InputError names
+        spheres and capsules, which have no answer.
+        """
+        args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
+        balls = np.empty((len(args[0]), 9), self.dtype)
+        if len(args) == 1:
+            balls[:, :8] = args[0]
+        else:
+            balls[:, :3], balls[:, 4:7], balls[:, 3], balls[:, 7] = (args[i] for i in (0, 1, 2, 3))
+        given = floats_of(radii, "radii", lead)
+        balls[:, 8] = given.reshape(-1)
+        columns = 9 if self.dtype == FLOAT32 else 7
+        hits = np.empty((len(balls), columns), self.dtype)
+        self._core.sweep(balls, hits, self.threads)
+        hits = hits.reshape(lead + (columns,))
+        ids = hits.view(UINT32)
+        if self.dtype == FLOAT32:
+            prim, geometry, instance = ids[..., 1], ids[..., 2], ids[..., 3]
+        else:
+            prim = ids[..., 2]
+            geometry, instance = self._of_one_mesh(prim)
+        return {
+            "t": hits[..., 0],
+            "point": hits[..., -5:-2],
+            "prim": prim,
+            "geometry": geometry,
+            "instance": instance,
+            "u": hits[..., -2],
+            "v": hits[..., -1],
+        }
 
     def refit(self, vertices: ArrayLike) -> dict[str, float]:
         """Moves the vertices, shape (V, 3) as before, converted to the scene's type, and commits;

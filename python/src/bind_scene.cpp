@@ -1,4 +1,4 @@
-// Scenes asked: rays, closest points, inside and outside, overlaps.
+// Scenes asked: rays, and what they are.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
@@ -8,12 +8,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/variant.h>
 #include <raydix/check.h>
-#include <raydix/closest.h>
 #include <raydix/double.h>
-#include <raydix/error.h>
-#include <raydix/overlap.h>
-#include <raydix/pairs.h>
-#include <raydix/scene_pairs.h>
 #include <raydix/surface.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
@@ -21,7 +16,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -31,35 +25,21 @@
 #include <vector>
 
 #include "arrays.h"
+#include "asking.h"
 #include "batch.h"
 #include "bindings.h"
 #include "figures.h"
 #include "lists.h"
 #include "ray_parts.h"
 #include "scene_changes.h"
+#include "scene_queries.h"
 #include "scene_trees.h"
 
 namespace raydix::python {
 namespace {
 
-using Counts = std::pair<std::uint64_t, std::uint64_t>;  // hits or found, invalid
-using FlagsOut = Out<bool, nb::ndim<1>>;
 using Masks = In<std::uint32_t, nb::ndim<1>>;  // of rays
 
-/// Throws what an output of another length deserves: memory past its end is not ours.
-void require_length(std::size_t length, std::size_t wanted) {
-    if (length != wanted) throw nb::value_error("a result has another length than its queries");
-}
-
-// What both types of scenes call by the same names.
-template <class Scene>
-using Scalar = typename Scene::Types::Scalar;
-template <class Scene>
-using Point = typename Scene::Types::Point;
-template <class Scene>
-using PointRows = In<Scalar<Scene>, nb::shape<-1, 3>>;
-template <class Scene>
-using ValuesOut = Out<Scalar<Scene>, nb::ndim<1>>;
 /// Hits as rows of scalars, of which a whole number takes the room of one: t, prim, u, v, geometry,
 /// instance; in double the last two share the room of one.
 template <class Scene>
@@ -67,27 +47,6 @@ constexpr std::size_t hit_columns = sizeof(typename Scene::Types::Hit) / sizeof(
 static_assert(sizeof(Hit) == 6 * sizeof(float) && sizeof(HitD) == 5 * sizeof(double));
 template <class Scene>
 using HitRows = Out<Scalar<Scene>, nb::shape<-1, hit_columns<Scene>>>;
-/// Closest points as rows of scalars: x, y, z, distance, prim, geometry, instance, u, v; in double,
-/// where they are of one mesh, without geometry and instance.
-template <class Scene>
-using PlaceRows =
-    Out<Scalar<Scene>,
-        nb::shape<-1, sizeof(typename Scene::Types::ClosestPoint) / sizeof(Scalar<Scene>)>>;
-static_assert(sizeof(SceneClosestPoint) == 9 * sizeof(float) &&
-              sizeof(ClosestPointD) == 7 * sizeof(double));
-
-/// As in_pieces, and the trees stay as they are from the first piece to the last.
-template <class Scene, class Body>
-void read_in_pieces(Scene& scene, std::size_t n, const Body& body, std::size_t first = piece_size) {
-    Reading lock;
-    in_pieces(
-        n,
-        [&](std::size_t begin, std::size_t end) {
-            if (!lock.owns_lock()) lock = scene.read();
-            body(begin, end);
-        },
-        first);
-}
 
 /// Of rays whose hits are all listed, which may be many.
 constexpr std::size_t first_listed = piece_size / 64;
@@ -260,180 +219,6 @@ void normals_of(SceneTrees& scene, const HitsIn& hits, const MaybeRays& rays, co
                   [](const auto&... arguments) { normals(arguments...); });
 }
 
-template <class Scene>
-Counts closest(Scene& scene, const PointRows<Scene>& points, const PlaceRows<Scene>& out,
-               Scalar<Scene> max_distance, int threads) {
-    const auto queries = rows<Point<Scene>>(points);
-    const auto results = rows_out<typename Scene::Types::ClosestPoint>(out);
-    require_length(results.size(), queries.size());
-    Counts counts{0, 0};
-    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const ClosestCounts met = scene.closest_points(queries.subspan(begin, end - begin),
-                                                       results.subspan(begin, end - begin),
-                                                       max_distance, threads_for(threads));
-        counts.first += met.found;
-        counts.second += met.invalid_queries;
-    });
-    return counts;
-}
-
-InsideRule inside_rule(const std::string& name) {
-    static const std::pair<const char*, InsideRule> rules[] = {{"automatic", InsideRule::automatic},
-                                                               {"crossings", InsideRule::crossings},
-                                                               {"parity", InsideRule::parity},
-                                                               {"winding", InsideRule::winding}};
-    for (const auto& [known, rule] : rules)
-        if (name == known) return rule;
-    throw InputError("unknown rule \"" + name +
-                     "\"; known are automatic, crossings, parity, winding");
-}
-
-template <class Scene>
-Counts signed_distance(Scene& scene, const PointRows<Scene>& points, const ValuesOut<Scene>& out,
-                       Scalar<Scene> max_distance, const std::string& rule_name, int threads) {
-    const auto queries = rows<Point<Scene>>(points);
-    const std::span distances(out.data(), out.shape(0));
-    require_length(distances.size(), queries.size());
-    const InsideRule rule = inside_rule(rule_name);
-    const typename Scene::Types::ClosestOptions options{.max_distance = max_distance,
-                                                        .threads = threads_for(threads)};
-    Counts counts{0, 0};
-    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const ClosestCounts met = signed_distances(scene.solid(rule, "signed_distance"),
-                                                   queries.subspan(begin, end - begin),
-                                                   distances.subspan(begin, end - begin), options);
-        counts.first += met.found;
-        counts.second += met.invalid_queries;
-    });
-    return counts;
-}
-
-template <class Scene>
-Counts inside(Scene& scene, const PointRows<Scene>& points, const FlagsOut& out,
-              const std::string& rule_name, int threads) {
-    const auto queries = rows<Point<Scene>>(points);
-    const std::span flags(reinterpret_cast<std::uint8_t*>(out.data()), out.shape(0));
-    require_length(flags.size(), queries.size());
-    const InsideRule rule = inside_rule(rule_name);
-    Counts counts{0, 0};
-    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const ClosestCounts met =
-            contains(scene.solid(rule, "contains"), queries.subspan(begin, end - begin),
-                     flags.subspan(begin, end - begin), threads_for(threads));
-        counts.first += met.found;
-        counts.second += met.invalid_queries;
-    });
-    return counts;
-}
-
-template <class Scene>
-void winding(Scene& scene, const PointRows<Scene>& points, const Out<double, nb::ndim<1>>& out,
-             const std::string& rule_name, int threads) {
-    const auto queries = rows<Point<Scene>>(points);
-    require_length(out.shape(0), queries.size());
-    const InsideRule rule = inside_rule(rule_name);
-    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const std::vector<double> numbers =
-            winding_numbers(scene.solid(rule, "winding_number"),
-                            queries.subspan(begin, end - begin), threads_for(threads));
-        std::copy(numbers.begin(), numbers.end(), out.data() + begin);
-    });
-}
-
-/// closure, open edges, and the rule that `automatic` stands for.
-template <class Scene>
-nb::tuple closure(Scene& scene) {
-    static const char* const closures[] = {"open", "closed", "oriented"};
-    static const char* const rules[] = {"automatic", "crossings", "parity", "winding"};
-    const auto [kind, open_edges, rule] = [&] {
-        const nb::gil_scoped_release unlocked;
-        const auto lock = scene.read();
-        const auto& solid = scene.solid(InsideRule::automatic, "closure");
-        return std::tuple(solid.closure(), solid.open_edges(), solid.rule());
-    }();
-    return nb::make_tuple(closures[static_cast<int>(kind)], open_edges,
-                          rules[static_cast<int>(rule)]);
-}
-
-/// call(whether both are meshes, the other scene or null), without the interpreter's lock. One lock
-/// for a scene that is asked about itself: two of the same thread may block each other.
-template <class Scene, class Call>
-auto with_two(Scene& scene, Scene* other, const Call& call) {
-    const nb::gil_scoped_release unlocked;
-    Scene* const last = other == nullptr ? &scene : other;
-    Reading first_lock, second_lock;
-    first_lock = std::min(&scene, last, std::less<>())->read();
-    if (last == &scene) return call(scene.is_mesh(), static_cast<Scene*>(nullptr));
-    second_lock = std::max(&scene, last, std::less<>())->read();
-    return call(scene.is_mesh() && other->is_mesh(), other);
-}
-
-/// Two columns of meshes; of other scenes six: instance, geometry and prim of the first, and of the
-/// second.
-template <class Scene>
-Array2<std::uint32_t> overlaps(Scene& scene, Scene* other, bool narrow,
-                               std::uint64_t max_result_bytes, int threads) {
-    const PairOptions options{
-        .narrow = narrow, .max_result_bytes = max_result_bytes, .threads = threads_for(threads)};
-    const ScenePairOptions of_scenes{
-        .narrow = narrow, .max_result_bytes = max_result_bytes, .threads = threads_for(threads)};
-    std::vector<PrimitivePair> pairs;
-    std::optional<ScenePairs> named;
-    with_two(scene, other, [&](bool are_meshes, Scene* b) {
-        if (!are_meshes)
-            named = b != nullptr ? overlapping_pairs(scene.traced(), b->traced(), of_scenes)
-                                 : overlapping_pairs(scene.traced(), of_scenes);
-        else if (b != nullptr)
-            pairs = overlapping_pairs(scene.bvh("overlaps"), b->bvh("overlaps"), options);
-        else
-            pairs = overlapping_pairs(scene.bvh("overlaps"), options);
-    });
-    return named ? hand_over_rows<std::uint32_t>(std::move(named->pairs))
-                 : hand_over_rows<std::uint32_t>(std::move(pairs));
-}
-
-template <class Scene>
-std::uint64_t count_overlaps(Scene& scene, Scene* other, bool narrow, int threads) {
-    const PairOptions options{.narrow = narrow, .threads = threads_for(threads)};
-    const ScenePairOptions of_scenes{.narrow = narrow, .threads = threads_for(threads)};
-    return with_two(scene, other, [&](bool are_meshes, Scene* b) {
-        if (!are_meshes)
-            return b != nullptr ? count_overlapping_pairs(scene.traced(), b->traced(), of_scenes)
-                                : count_overlapping_pairs(scene.traced(), of_scenes);
-        return b != nullptr ? count_overlapping_pairs(scene.bvh("count_overlaps"),
-                                                      b->bvh("count_overlaps"), options)
-                            : count_overlapping_pairs(scene.bvh("count_overlaps"), options);
-    });
-}
-
-/// Offsets, and rows of instance, geometry and prim; in double of prim alone.
-template <class Shape, class Scene, class Array>
-nb::tuple touched(Scene& scene, const Array& shapes, std::uint64_t max_result_bytes, int threads) {
-    using Lists = typename Scene::Types::OverlapLists;
-    const auto queries = rows<Shape>(shapes);
-    PieceLimit limit("touched_by", max_result_bytes);
-    std::vector<Lists> pieces;
-    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        pieces.push_back(limit.next([&](std::uint64_t bytes) {
-            return scene.touch_all(queries.subspan(begin, end - begin), bytes,
-                                   threads_for(threads));
-        }));
-        limit.hold(piece_bytes(pieces.back(), &Lists::offsets, &Lists::prims));
-    });
-    require_room_to_join(limit, pieces, &Lists::offsets, &Lists::prims);
-    auto offsets = join_offsets(pieces);
-    return nb::make_tuple(offsets,
-                          hand_over_rows<std::uint32_t>(join_column(pieces, &Lists::prims)));
-}
-
-/// Runs call(scene) without the interpreter's lock and with the trees held.
-template <class Scene, class Call>
-auto reading(Scene& scene, const Call& call) {
-    const nb::gil_scoped_release unlocked;
-    const auto lock = scene.read();
-    return call();
-}
-
 /// The wide tree of the one mesh, made as a commit makes it.
 nb::dict wide_stats(SceneTrees& scene) {
     return wide_figures(reading(scene, [&] {
@@ -569,34 +354,6 @@ void bind_rays(nb::class_<Scene>& scene) {
         },
         MoreArguments<std::uint64_t, std::uint32_t, const Each&, int, const Filter&>(),
         nb::arg("max_result_bytes") = 0, mask, masks, threads, filter);
-}
-
-template <class Scene>
-void bind_queries(nb::class_<Scene>& scene) {
-    using Sphere = typename Scene::Types::Sphere;
-    using Segment = typename Scene::Types::Segment;
-    using Spheres = In<Scalar<Scene>, nb::shape<-1, 4>>;
-    using Segments = In<Scalar<Scene>, nb::shape<-1, 6>>;
-    scene
-        .def("closest", &closest<Scene>, nb::arg("points").noconvert(), nb::arg("out").noconvert(),
-             nb::arg("max_distance"), nb::arg("threads") = 0)
-        .def("signed_distance", &signed_distance<Scene>, nb::arg("points").noconvert(),
-             nb::arg("out").noconvert(), nb::arg("max_distance"), nb::arg("rule"),
-             nb::arg("threads") = 0)
-        .def("contains", &inside<Scene>, nb::arg("points").noconvert(),
-             nb::arg("flags").noconvert(), nb::arg("rule"), nb::arg("threads") = 0)
-        .def("winding", &winding<Scene>, nb::arg("points").noconvert(), nb::arg("out").noconvert(),
-             nb::arg("rule"), nb::arg("threads") = 0)
-        .def("closure", &closure<Scene>)
-        .def("overlaps", &overlaps<Scene>, nb::arg("other").none(), nb::arg("narrow"),
-             nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
-        .def("count_overlaps", &count_overlaps<Scene>, nb::arg("other").none(), nb::arg("narrow"),
-             nb::arg("threads") = 0)
-        .def("touched_by_spheres", &touched<Sphere, Scene, Spheres>, nb::arg("spheres").noconvert(),
-             nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
-        .def("touched_by_segments", &touched<Segment, Scene, Segments>,
-             nb::arg("segments").noconvert(), nb::arg("max_result_bytes") = 0,
-             nb::arg("threads") = 0);
 }
 
 /// A view that stays as it is when the scene moves its vertices or goes.

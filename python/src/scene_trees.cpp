@@ -398,6 +398,28 @@ typename Names::OverlapLists BasicSceneTrees<Names>::touch_all(std::span<const S
 }
 
 template <class Names>
+template <class Shape>
+OverlapCounts BasicSceneTrees<Names>::touch_any(std::span<const Shape> queries,
+                                                std::span<std::uint8_t> touched, int threads) {
+    if constexpr (std::is_same_v<Names, InFloat>)
+        return raydix::touch_any(traced(), queries, touched, {.threads = threads});
+    else
+        return raydix::touch_any(this->bvh("touches in float64"), queries, touched,
+                                 {.threads = threads});
+}
+
+template <class Names>
+OverlapCounts BasicSceneTrees<Names>::sweep_spheres(std::span<const typename Names::Sweep> sweeps,
+                                                    std::span<typename Names::SweepHit> hits,
+                                                    int threads) {
+    if constexpr (std::is_same_v<Names, InFloat>)
+        return raydix::sweep_spheres(traced(), sweeps, hits, {.threads = threads});
+    else
+        return raydix::sweep_spheres(this->bvh("sweep_spheres in float64"), sweeps, hits,
+                                     {.threads = threads});
+}
+
+template <class Names>
 const typename Names::Solid& BasicSceneTrees<Names>::solid(InsideRule rule, const char* call) {
     if (this->is_mesh()) return MeshTrees<Names>::solid(rule, call);
     const std::lock_guard lock(build_);
@@ -446,6 +468,13 @@ bool BasicSceneTrees<Names>::any_hit(const Ray& ray, std::uint32_t mask) {
 
 template class BasicSceneTrees<InFloat>;
 template class BasicSceneTrees<InDouble>;
+template OverlapCounts SceneTrees::touch_any(std::span<const Segment>, std::span<std::uint8_t>,
+                                             int);
+template OverlapCounts SceneTrees::touch_any(std::span<const Sphere>, std::span<std::uint8_t>, int);
+template OverlapCounts SceneTreesD::touch_any(std::span<const SegmentD>, std::span<std::uint8_t>,
+                                              int);
+template OverlapCounts SceneTreesD::touch_any(std::span<const SphereD>, std::span<std::uint8_t>,
+                                              int);
 template SceneOverlapLists SceneTrees::touch_all(std::span<const Segment>, std::uint64_t, int);
 template SceneOverlapLists SceneTrees::touch_all(std::span<const Sphere>, std::uint64_t, int);
 template OverlapLists SceneTreesD::touch_all(std::span<const SegmentD>, std::uint64_t, int);

@@ -60,6 +60,8 @@ struct InFloat {
     using ClosestPoint = SceneClosestPoint;
     using ClosestOptions = raydix::ClosestOptions;
     using OverlapLists = SceneOverlapLists;
+    using Sweep = SphereSweep;
+    using SweepHit = SceneSweepHit;
     using Segment = raydix::Segment;
     using Sphere = raydix::Sphere;
 };
@@ -81,6 +83,8 @@ struct InDouble {
     using ClosestPoint = ClosestPointD;
     using ClosestOptions = ClosestOptionsD;
     using OverlapLists = raydix::OverlapLists;
+    using Sweep = SphereSweepD;
+    using SweepHit = SweepHitD;
     using Segment = SegmentD;
     using Sphere = SphereD;
 };
@@ -229,6 +233,11 @@ public:
     [[nodiscard]] typename Names::OverlapLists touch_all(std::span<const Shape> queries,
                                                          std::uint64_t max_result_bytes,
                                                          int threads);
+    template <class Shape>
+    OverlapCounts touch_any(std::span<const Shape> queries, std::span<std::uint8_t> touched,
+                            int threads);
+    OverlapCounts sweep_spheres(std::span<const typename Names::Sweep> sweeps,
+                                std::span<typename Names::SweepHit> hits, int threads);
     /// All meshes as one body, whatever else there is. Throws InputError, which names the call:
     /// what raydix::Solid throws.
     [[nodiscard]] const typename Names::Solid& solid(InsideRule rule, const char* call);

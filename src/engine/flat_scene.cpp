@@ -5,6 +5,7 @@
 #include <raydix/error.h>
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <string>
 #include <utility>
@@ -27,43 +28,46 @@ const ShapeTree* seen_shapes(const SceneTree& scene, std::uint32_t mask) {
 }
 const ShapeTree* seen_shapes(const SceneTreeD&, std::uint32_t) { return nullptr; }
 
-/// A way out of an instance.
+constexpr std::size_t no_way = ~std::size_t{0};
+
+/// A way out of an instance. Map: Affine or AffineD.
+template <class Map>
 struct WayOut {
-    static constexpr std::size_t none = ~std::size_t{0};
-
-    Double3 x, y, z, move;  // rows, and what is added
-    std::size_t outer;      // the way that goes on from there; none: this is the world
-    bool mirrors;           // with those that follow
-
-    template <class AnyAffine>
-    WayOut(const AnyAffine& map, std::size_t goes_on, bool outer_mirrors)
-        : x(map.x),
-          y(map.y),
-          z(map.z),
-          move(map.move),
-          outer(goes_on),
-          mirrors((dot(x, cross(y, z)) < 0) != outer_mirrors) {}
-    [[nodiscard]] Double3 point(Double3 p) const {
-        return Double3{dot(x, p), dot(y, p), dot(z, p)} + move;
-    }
+    Map map;
+    std::size_t outer;  // the way that goes on from there; no_way: this is the world
+    bool mirrors;       // with those that follow
 };
+
+/// Whether a map that does not flatten mirrors; its rows may be of any size.
+bool mirrors(Double3 x, Double3 y, Double3 z) {
+    const auto of_unit_size = [](Double3 row) {
+        int exponent;
+        std::frexp(std::max({std::fabs(row.x), std::fabs(row.y), std::fabs(row.z)}), &exponent);
+        // In two steps: 2^1074 is no double.
+        return row * std::ldexp(1.0, -exponent / 2) * std::ldexp(1.0, -exponent - -exponent / 2);
+    };
+    return dot(of_unit_size(x), cross(of_unit_size(y), of_unit_size(z))) < 0;
+}
 
 /// A mesh on a path.
 template <class Scalar>
 struct FlatCopy {
+    using Transform = typename SceneTypes<Scalar>::Transform;
+    using Way = WayOut<decltype(affine_of(std::declval<Transform>()))>;
+
     typename SceneTypes<Scalar>::MeshView mesh;
     std::uint64_t first_vertex, first_triangle;
-    const std::vector<WayOut>* ways;
+    const std::vector<Way>* ways;
     std::size_t way;  // the innermost one
 
-    [[nodiscard]] bool mirrors() const { return way != WayOut::none && (*ways)[way].mirrors; }
+    [[nodiscard]] bool mirrors() const { return way != no_way && (*ways)[way].mirrors; }
     [[nodiscard]] auto mover() const {
         return [this](const auto& vertex) {
             auto out = vertex;
-            if (way == WayOut::none) return out;
+            if (way == no_way) return out;
             Double3 p(vertex);
-            for (std::size_t at = way; at != WayOut::none; at = (*ways)[at].outer)
-                p = (*ways)[at].point(p);
+            for (std::size_t at = way; at != no_way; at = (*ways)[at].outer)
+                p = (*ways)[at].map.vector(p) + (*ways)[at].map.move;
             p.round_to(out);
             return without_negative_zero(out);
         };
@@ -99,10 +103,10 @@ public:
         ways.reserve(counts.instances);
         copies.reserve(counts.meshes);
         out.names.runs.reserve(counts.meshes);
-        walk(*plan.tree_, 0, WayOut::none);
+        walk(*plan.tree_, 0, no_way);
     }
 
-    std::vector<WayOut> ways;
+    std::vector<typename Copy::Way> ways;
     std::vector<Copy> copies;
 
 private:
@@ -119,8 +123,9 @@ private:
             const Tree& inner = *instance.scene;
             if ((instance.mask & plan_.mask_) == 0 || plan_.counts_of(inner).triangles == 0)
                 continue;
-            ways.emplace_back(affine_of(instance.transform), way,
-                              way != WayOut::none && ways[way].mirrors);
+            const auto map = affine_of(instance.transform);
+            const bool turned = mirrors(map.x, map.y, map.z);
+            ways.push_back({map, way, turned != (way != no_way && ways[way].mirrors)});
             walk(inner, number + instance.number, ways.size() - 1);
         }
     }
@@ -186,7 +191,7 @@ std::uint64_t FlatPlan<Scalar>::bytes() const {
     const FlatCounts& all = counts();
     std::uint64_t sum = saturating_sum(
         saturating_product(all.meshes, sizeof(FlatNames::Run) + sizeof(FlatCopy<Scalar>)),
-        saturating_product(all.instances, sizeof(WayOut)));
+        saturating_product(all.instances, sizeof(typename FlatCopy<Scalar>::Way)));
     if (is_one_mesh()) return sum;
     sum = saturating_sum(sum, saturating_product(all.triangles, sizeof(Triangle)));
     return saturating_sum(

@@ -100,6 +100,7 @@ HWY_INLINE PointInside point_inside(const NearWay& way, Double3 query) {
 
 /// Distances of a point. Sink says what happens to what is close enough:
 ///   float reach()        squares of distances that still matter, closed
+///   Tangent tangent()    a plane behind which nothing does
 ///   bool take(points, lane, prim, mesh, number), take_shape(point, prim, shapes, number)
 ///                        whether the search ends
 template <class Sink>
@@ -177,7 +178,8 @@ public:
     HWY_INLINE bool triangles(const TriangleBlock& block, std::uint32_t lanes, const MeshTree& mesh,
                               std::uint32_t number) {
         NearPoints points;
-        for (std::uint32_t left = points_within(block, lanes, query_, sink_.reach(), points);
+        for (std::uint32_t left =
+                 points_within(block, lanes, query_, sink_.reach(), sink_.tangent(), points);
              left != 0; left &= left - 1) {
             const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
             if (sink_.take(points, lane, block.prim[lane], mesh, number)) return true;
@@ -227,8 +229,9 @@ struct TriangleName {
 /// Keeps the closest.
 class ClosestSink {
 public:
-    explicit ClosestSink(float limit) : best_{limit} {}
+    ClosestSink(Vec3 query, float limit) : query_(query), best_{limit} {}
     [[nodiscard]] float reach() const { return best_.d2; }
+    [[nodiscard]] const Tangent& tangent() const { return tangent_; }
     [[nodiscard]] const NearBest& best() const { return best_; }
     /// Whether there is a new one since the last call.
     [[nodiscard]] bool improved() { return std::exchange(improved_, false); }
@@ -257,9 +260,12 @@ private:
     HWY_INLINE void keep(const NearBest& other) {
         if (!(other.d2 < best_.d2) && !(other.name() < best_.name())) return;
         best_ = other;
+        tangent_ = {query_, best_.position, best_.d2};
         improved_ = true;
     }
+    const Vec3 query_;
     NearBest best_;
+    Tangent tangent_;
     bool improved_ = false;
 };
 
@@ -268,6 +274,7 @@ class TouchSink {
 public:
     TouchSink(float limit, BudgetVector<ScenePrimitive>* found) : limit_(limit), found_(found) {}
     [[nodiscard]] float reach() const { return limit_; }
+    [[nodiscard]] static Tangent tangent() { return {}; }
     [[nodiscard]] bool any() const { return any_; }
 
     HWY_INLINE bool take(const NearPoints&, std::uint32_t, std::uint32_t triangle,

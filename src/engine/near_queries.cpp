@@ -234,10 +234,13 @@ ClosestCounts closest_points(const Scene& scene, std::span<const Vec3> queries,
             queries.size(), order,
             [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
                 NearJob& job = near_job_of_this_thread(tree, options.mask);
+                constexpr std::size_t ahead = 8;
                 for (std::size_t k = begin; k < end; ++k) {
-                    const std::size_t i = at(k);
-                    results[i] = {};
+                    const std::size_t i = at(k), later = at(std::min(k + ahead, end - 1));
+                    __builtin_prefetch(&queries[later]);
+                    __builtin_prefetch(&results[later], 1);
                     if (!is_finite(queries[i])) {
+                        results[i] = {};
                         ++parts[block].invalid_queries;
                         continue;
                     }

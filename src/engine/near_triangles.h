@@ -149,23 +149,58 @@ HWY_INLINE hn::Vec<D> square_of(D, hn::Vec<D> x, hn::Vec<D> y, hn::Vec<D> z) {
     return hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z));
 }
 
-/// Those of `lanes` whose own boxes are within reach: squared_distance_to_box <= reach.
-HWY_INLINE std::uint32_t boxes_within(const TriangleBlock& block, std::uint32_t lanes, Vec3 query,
-                                      float reach) {
-    const auto off = [&](int axis, float q) {
-        const V4 a = hn::Load(f4, block.corner[axis]), b = hn::Load(f4, block.corner[3 + axis]),
-                 c = hn::Load(f4, block.corner[6 + axis]), at = hn::Set(f4, q);
-        const V4 lo = hn::Min(hn::Min(a, b), c), hi = hn::Max(hn::Max(a, b), c);
-        return hn::Max(hn::Max(hn::Sub(lo, at), hn::Sub(at, hi)), hn::Zero(f4));
-    };
-    const V4 square = square_of(f4, off(0, query.x), off(1, query.y), off(2, query.z));
-    return lanes & bits_of(f4, hn::Le(square, hn::Set(f4, reach)));
+/// What is on the far side of a plane cannot be closer than what is known: no x with
+/// normal . (query - x) above limit + 2^-20 |query - x|_1 matters. At first all does.
+struct Tangent {
+    Vec3 normal{};
+    float limit = infinity;
+
+    Tangent() = default;
+    /// Of the sphere around the query through the closest point so far. Its normal is of unit
+    /// length up to 2^-21; points are rounded by less than 2^-23 of their coordinates, those of the
+    /// query and of the way to it. Squares that may have lost digits at the ends of their range
+    /// give none.
+    Tangent(Vec3 query, Vec3 closest, float d2) {
+        if (!(d2 > 0x1p-100f && d2 < 0x1p100f)) return;
+        const float distance = std::sqrt(d2);
+        normal = (1.0f / distance) * (query - closest);
+        const float most =
+            max_of(max_of(std::fabs(query.x), std::fabs(query.y)), std::fabs(query.z));
+        limit = distance * (1.0f + 0x1p-19f) + most * 0x1p-21f;
+    }
+};
+
+/// Those of `lanes` that may be within reach: squared_distance_to_box <= reach for their own boxes,
+/// and a corner on the near side of the plane.
+HWY_INLINE std::uint32_t may_be_within(const TriangleBlock& block, std::uint32_t lanes, Vec3 query,
+                                       float reach, const Tangent& tangent) {
+    V4 off[3], depth[3], far = hn::Zero(f4);
+    const float q[3] = {query.x, query.y, query.z},
+                n[3] = {tangent.normal.x, tangent.normal.y, tangent.normal.z};
+    for (V4& d : depth) d = hn::Zero(f4);
+    for (int axis = 0; axis < 3; ++axis) {
+        const V4 at = hn::Set(f4, q[axis]), normal = hn::Set(f4, n[axis]);
+        const V4 a = hn::Sub(at, hn::Load(f4, block.corner[axis])),
+                 b = hn::Sub(at, hn::Load(f4, block.corner[3 + axis])),
+                 c = hn::Sub(at, hn::Load(f4, block.corner[6 + axis]));
+        // Rounding is monotone and has no sides: the ends of these are those of the box.
+        const V4 above = hn::Min(hn::Min(a, b), c), below = hn::Neg(hn::Max(hn::Max(a, b), c));
+        off[axis] = hn::Max(hn::Max(below, above), hn::Zero(f4));
+        far = hn::Add(far, hn::Max(hn::Abs(below), hn::Abs(above)));
+        depth[0] = hn::MulAdd(a, normal, depth[0]);
+        depth[1] = hn::MulAdd(b, normal, depth[1]);
+        depth[2] = hn::MulAdd(c, normal, depth[2]);
+    }
+    const V4 square = square_of(f4, off[0], off[1], off[2]);
+    const V4 least = hn::Min(hn::Min(depth[0], depth[1]), depth[2]);
+    const V4 limit = hn::MulAdd(far, hn::Set(f4, 0x1p-20f), hn::Set(f4, tangent.limit));
+    return lanes & bits_of(f4, hn::And(hn::Le(square, hn::Set(f4, reach)), hn::Le(least, limit)));
 }
 
 /// Fills the lanes of `lanes` that are within reach: returns those.
 HWY_INLINE std::uint32_t points_within(const TriangleBlock& block, std::uint32_t lanes, Vec3 query,
-                                       float reach, NearPoints& out) {
-    lanes = boxes_within(block, lanes, query, reach);
+                                       float reach, const Tangent& tangent, NearPoints& out) {
+    lanes = may_be_within(block, lanes, query, reach, tangent);
     std::uint32_t within = 0;
     const Doubles3 at{hn::Set(doubles, double{query.x}), hn::Set(doubles, double{query.y}),
                       hn::Set(doubles, double{query.z})};

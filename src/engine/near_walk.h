@@ -14,13 +14,14 @@
 
 #include "engine/near_job.h"
 #include "engine/near_probes.h"
+#include "trace/simd/children.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
 /// Visits all leaves below the root that matter to the probe: leaf(word) -> whether the search
 /// ends, and so does this.
-template <bool compact, class Probe, class Leaf>
+template <bool compact, bool may_ask, class Probe, class Leaf>
 HWY_INLINE bool walk_near(const NearTree& tree, const NearSpace* space, const Probe& probe,
                           NearStack& stack, const Leaf& leaf) {
     const typename Probe::Frame frame = probe.frame(tree, space);
@@ -39,18 +40,33 @@ HWY_INLINE bool walk_near(const NearTree& tree, const NearSpace* space, const Pr
                 word = node.child[std::countr_zero(bits)];
                 continue;
             }
-            // Behind each other by key, the nearest on top.
             stack.make_room();
             NearStack::Entry* const all = stack.entries.data();
+            const auto entry = [&](std::uint32_t slots) -> NearStack::Entry {
+                const auto s = static_cast<std::uint32_t>(std::countr_zero(slots));
+                return {keys[s], node.child[s]};
+            };
+            const std::uint32_t rest = bits & (bits - 1);
+            if (std::has_single_bit(rest)) {
+                const NearStack::Entry a = entry(bits), b = entry(rest);
+                const bool b_first = b.key < a.key;
+                all[stack.top++] = b_first ? a : b;
+                if constexpr (may_ask) ask_for<compact>(tree.view, all[stack.top - 1].word);
+                word = b_first ? b.word : a.word;
+                continue;
+            }
+            // Behind each other by key, the nearest on top.
             const std::size_t first = stack.top;
             std::size_t top = first;
             for (; bits != 0; bits &= bits - 1) {
-                const auto s = static_cast<std::uint32_t>(std::countr_zero(bits));
+                const NearStack::Entry next = entry(bits);
                 std::size_t k = top++;
-                for (; k > first && all[k - 1].key < keys[s]; --k) all[k] = all[k - 1];
-                all[k] = {keys[s], node.child[s]};
+                for (; k > first && all[k - 1].key < next.key; --k) all[k] = all[k - 1];
+                all[k] = next;
             }
             stack.top = top;
+            if constexpr (may_ask)
+                if (top - first > 1) ask_for<compact>(tree.view, all[top - 2].word);
         }
         const NearStack::Entry* const all = stack.entries.data();
         do {
@@ -78,6 +94,7 @@ public:
             visit_leaf<true>(*guess.view, *guess.mesh, space, guess.number, guess.word);
         else
             visit_leaf<false>(*guess.view, *guess.mesh, space, guess.number, guess.word);
+        visited_ = guess;
     }
 
 private:
@@ -102,13 +119,13 @@ private:
     template <class Visit>
     HWY_INLINE bool walk_parts(const PartTree& tree, const NearSpace* space, const Visit& visit) {
         if (tree.empty()) return false;
-        return walk_near<false>({tree.view, parts_room}, space, probe_, job_.stack,
-                                [&](std::uint32_t word) {
-                                    const std::uint32_t place = (word & ~wide_leaf_bit) >> 3;
-                                    for (std::uint32_t k = place; k <= place + (word & 7); ++k)
-                                        if (visit(tree.part[k])) return true;
-                                    return false;
-                                });
+        return walk_near<false, false>(
+            {tree.view, parts_room}, space, probe_, job_.stack, [&](std::uint32_t word) {
+                const std::uint32_t place = (word & ~wide_leaf_bit) >> 3;
+                for (std::uint32_t k = place; k <= place + (word & 7); ++k)
+                    if (visit(tree.part[k])) return true;
+                return false;
+            });
     }
 
     HWY_NOINLINE bool visit_part(const SceneTree& scene, std::uint32_t part, const NearSpace* space,
@@ -182,14 +199,16 @@ private:
     template <bool compact>
     HWY_NOINLINE bool visit_triangles(const WideView& view, const MeshTree& mesh,
                                       const NearSpace* space, std::uint32_t number) {
-        return walk_near<compact>({view, mesh_room}, space, probe_, job_.stack,
-                                  [&](std::uint32_t word) {
-                                      return visit_leaf<compact>(view, mesh, space, number, word);
-                                  });
+        return walk_near<compact, true>(
+            {view, mesh_room}, space, probe_, job_.stack, [&](std::uint32_t word) {
+                return visit_leaf<compact>(view, mesh, space, number, word);
+            });
     }
     template <bool compact>
     HWY_INLINE bool visit_leaf(const WideView& view, const MeshTree& mesh, const NearSpace* space,
                                std::uint32_t number, std::uint32_t word) {
+        if (word == visited_.word && &view == visited_.view && number == visited_.number)
+            return false;
         const std::uint32_t place = (word & ~wide_leaf_bit) >> 3;
         std::uint32_t lanes = ((2u << (word & 7)) - 1) << place % block_lanes;
         const TriangleBlock* block;
@@ -218,21 +237,22 @@ private:
 
     bool visit_shapes(const ShapeTree& tree, const NearSpace* space, std::uint32_t number) {
         if ((tree.mask & job_.mask) == 0 || tree.empty() || tree.user() != nullptr) return false;
-        return walk_near<false>({tree.view, part_room_of_points}, space, probe_, job_.stack,
-                                [&](std::uint32_t word) {
-                                    return probe_.shapes(tree, (word & ~wide_leaf_bit) >> 3,
-                                                         (word & 7) + 1, space, number);
-                                });
+        return walk_near<false, false>({tree.view, part_room_of_points}, space, probe_, job_.stack,
+                                       [&](std::uint32_t word) {
+                                           return probe_.shapes(tree, (word & ~wide_leaf_bit) >> 3,
+                                                                (word & 7) + 1, space, number);
+                                       });
     }
 
     NearJob& job_;
     Probe& probe_;
+    NearGuess visited_;    // a leaf that is done
     TriangleBlock room_;   // of a compact tree's leaf
     TriangleBlock moved_;  // of an instance's
 };
 
 NearBest closest_in_scene(NearJob& job, Vec3 query, float limit) {
-    ClosestSink sink(limit);
+    ClosestSink sink(query, limit);
     DistanceProbe<ClosestSink> probe(query, sink);
     NearWalk<DistanceProbe<ClosestSink>> walk(job, probe);
     walk.start_at(job.guess);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <raydix/error.h>
 #include <raydix/scene_pairs.h>
+#include <raydix/scene_queries.h>
 #include <raydix/solid.h>
 #include <raydix/user_geometry.h>
 
@@ -271,6 +272,32 @@ TEST(SceneSolid, NothingAndWhatIsNotFinite) {
     EXPECT_EQ(signed_distance(solid, Vec3{nan_value, 0.5f, 0.5f}), infinity);
 }
 
+TEST(FlatScene, ClosestPointsOfTheSceneAreThoseOfTheMesh) {
+    std::size_t turned = 0, found = 0;
+    for_random_worlds([&](const World& world, RandomScenes& random) {
+        const FlatWorld flat = flat_of(world);
+        if (flat.mesh.triangles.empty()) return;
+        const std::vector<Vec3> queries = queries_around(random, 600);
+        const std::vector<ClosestPoint> wanted = closest_points(build_bvh(flat.mesh), queries);
+        const std::vector<SceneClosestPoint> near = closest_points(world.scene, queries);
+        for (std::size_t i = 0; i < queries.size(); ++i) {
+            const ClosestPoint& w = wanted[i];
+            ASSERT_EQ(near[i].distance, w.distance);
+            ASSERT_EQ(near[i].found(), w.found());
+            if (!w.found()) continue;
+            ++found;
+            ASSERT_TRUE(same_bits(near[i].position, w.position));
+            ASSERT_EQ((ScenePrimitive{near[i].instance, near[i].geometry, near[i].prim}),
+                      flat.names[w.prim]);
+            // Weights of corners that changed places do so too.
+            turned += near[i].u != w.u || near[i].v != w.v;
+            ASSERT_TRUE((near[i].u == w.u && near[i].v == w.v) || near[i].instance != 0);
+        }
+    });
+    EXPECT_GT(found, 5000u);
+    EXPECT_GT(turned, 500u);
+}
+
 using Pairs = std::vector<ScenePair>;
 
 Pairs named(const std::vector<PrimitivePair>& pairs, const FlatWorld& a, const FlatWorld& b) {
@@ -462,6 +489,30 @@ TEST(SceneSolid, InDoubleNothingIsRounded) {
         EXPECT_EQ(found[i].second,
                   (ScenePrimitive{pairs[i].second / 12 + 1, 0, pairs[i].second % 12}));
     }
+}
+
+TEST(SceneSolid, ATinyMirrorTurnsCornersToo) {
+    const Mesh in_floats = box_mesh({0, 0, 0}, {1, 1, 1});
+    MeshD box{"", {}, in_floats.triangles};
+    for (const Vec3 v : in_floats.vertices) box.vertices.push_back({v.x, v.y, v.z});
+    const SceneD inner(box);
+    constexpr double size = 0x1p-400;  // whose third power is no double
+    SceneD small, scene;
+    for (const double side : {1.0, -1.0}) {
+        TransformD t;
+        t.m[0][0] = side * size, t.m[1][1] = t.m[2][2] = size;
+        t.m[0][3] = side < 0 ? size : 0;
+        small.add(inner, t);
+    }
+    small.commit();
+    TransformD large;
+    for (std::size_t k = 0; k < 3; ++k) large.m[k][k] = 1 / size;
+    scene.add(small, large);
+    scene.commit();
+    const SolidD solid(scene);
+    EXPECT_EQ(solid.closure(), Closure::oriented);
+    const std::vector<Vec3d> queries = {{0.25, 0.375, 0.5}, {-1, 0.5, 0.5}};
+    EXPECT_EQ(winding_numbers(solid, queries), (std::vector<double>{2, 0}));
 }
 
 }  // namespace

@@ -282,7 +282,7 @@ void expect_no_differences(const World& world, RandomScenes& random, std::size_t
 TEST(Near, WorldsAnswerAsTheirTrianglesDo) {
     std::size_t touched = 0, swept = 0;
     for (std::uint32_t levels = 0; levels < 4; ++levels)
-        for (int k = 0; k < 4 * static_cast<int>(thorough); ++k) {
+        for (int k = 0; k < static_cast<int>(1 + thorough / 3); ++k) {
             SCOPED_TRACE("levels " + std::to_string(levels) + ", world " + std::to_string(k));
             RandomScenes random(9000 + 100 * levels + static_cast<std::uint64_t>(k));
             Recipe recipe{levels, 1 + random.below(levels == 3 ? 4 : 6),
@@ -296,8 +296,8 @@ TEST(Near, WorldsAnswerAsTheirTrianglesDo) {
             const auto world = random_world(random, recipe);
             expect_no_differences(*world, random, touched, swept);
         }
-    EXPECT_GT(touched, 1000u * thorough);
-    EXPECT_GT(swept, 500u * thorough);
+    EXPECT_GT(touched, 1000u);
+    EXPECT_GT(swept, 500u);
 }
 
 /// A world of one mesh.
@@ -502,7 +502,7 @@ TEST(NearShapes, SpheresAndCapsulesAreClosedSets) {
 /// In a world of instances: each shape by itself gives the answer of all.
 TEST(NearShapes, ImagesAnswerAsEachOfThemDoes) {
     RandomScenes random(12);
-    for (int round = 0; round < 20 * static_cast<int>(thorough); ++round) {
+    for (int round = 0; round < static_cast<int>(1 + thorough / 3); ++round) {
         std::vector<Capsule> capsules;
         for (int k = 0; k < 30; ++k) {
             capsules.push_back({random.in(-1, 1), random.in(-1, 1), random.between(0, 0.3f)});
@@ -533,7 +533,7 @@ TEST(NearShapes, ImagesAnswerAsEachOfThemDoes) {
 /// The point is in the image, and none in it is much nearer: neither at random nor around it.
 TEST(NearShapes, PointsOfImagesAreTheClosest) {
     RandomScenes random(13);
-    for (int round = 0; round < 300 * static_cast<int>(thorough); ++round) {
+    for (int round = 0; round < 100 * static_cast<int>(thorough); ++round) {
         const Transform transform = random.transform(2, round % 3 == 0 ? 5.0f : 0.0f);
         const Affine map = affine_of(transform), inverse = *inverse_of(map);
         Capsule capsule{random.in(-1, 1), random.in(-1, 1), random.between(0.05f, 0.5f)};

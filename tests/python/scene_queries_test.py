@@ -90,8 +90,52 @@ def test_closest_points_and_touches(rng):
         np.testing.assert_array_equal(found["offsets"], wanted["offsets"])
         same_names(found, names, wanted["prim"])
         assert len(found["prim"]) > 100
+        flags = world.scene.touches(**asked)
+        np.testing.assert_array_equal(flags, np.diff(found["offsets"].astype(int)) > 0)
+        assert flags.dtype == bool and 0 < flags.sum() < len(flags)
     with pytest.raises(raydix.InputError, match="max_result_bytes"):
         world.scene.touched_by(spheres=balls, max_result_bytes=100)
+
+
+def test_sweeps(rng):
+    world = random_world(rng)
+    world.scene.commit()
+    vertices, faces, names = out_of(world)
+    flat = raydix.Scene(vertices, faces)
+    rays = support.random_rays(rng, 400).reshape(20, 20, -1)
+    radii = rng.uniform(0, 0.5, (20, 20))
+    radii[0, 0] = -1
+    found, wanted = (s.sweep_spheres(rays, radii=radii) for s in (world.scene, flat))
+    for name in ("t", "point"):
+        np.testing.assert_array_equal(found[name], wanted[name])
+    same_names(found, names, wanted["prim"])
+    met = found["prim"] != raydix.MISSING
+    assert 50 < met.sum() < 400 and not met[0, 0] and found["point"].shape == (20, 20, 3)
+    # Where the ball is then, what it touches is as far as its radius; before it, nothing is.
+    center = rays[..., :3] + np.where(met, found["t"], 0)[..., None] * rays[..., 4:7]
+    apart = np.linalg.norm(center - found["point"], axis=-1)
+    later = met & (found["t"] > 0)
+    np.testing.assert_allclose(apart[later], radii[later], atol=1e-4)
+    assert (apart[met] <= radii[met] + 1e-4).all()
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_sweeps_of_one_mesh(rng, precision):
+    scene = raydix.Scene(*triangles(rng, 60), precision=precision)
+    rays = support.random_rays(rng, 300)
+    points = scene.sweep_spheres(rays, radii=0)
+    hits = scene.intersect(rays)
+    np.testing.assert_array_equal(points["t"], hits["t"])
+    np.testing.assert_array_equal(points["prim"], hits["prim"])
+    np.testing.assert_array_equal(points["geometry"], hits["geometry"])
+    balls = scene.sweep_spheres(rays[:, :3], rays[:, 4:7], radii=0.1, tmax=5)
+    assert (balls["t"] <= 5).sum() > (hits["t"] <= 5).sum()
+    assert scene.touches(segments=np.zeros((2, 3, 6))).shape == (2, 3)
+    for wrong, error in (([1, 2], ValueError), ("a", TypeError)):
+        with pytest.raises(error, match="radii: expected"):
+            scene.sweep_spheres(rays, radii=wrong)
+    with pytest.raises(ValueError, match="touches: expected either"):
+        scene.touches()
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
@@ -155,6 +199,8 @@ def test_shapes_are_named(rng):
     inner.commit()
     scene.add(inner, np.eye(4), id=9)
     scene.commit()
+    with pytest.raises(raydix.InputError, match=r"geometry 4 \(spheres\)"):
+        scene.sweep_spheres([[0, 0, 9, 0, 0, -1]], radii=1)
     text = r"geometry 4 \(spheres\) on path 1 of instances"
     for name, call in {
         "contains": lambda: scene.contains([0, 0, 0]),
