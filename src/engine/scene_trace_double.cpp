@@ -3,6 +3,7 @@
 #include <raydix/scene.h>
 
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "base/double3.h"
@@ -12,6 +13,7 @@
 #include "engine/scene_job_double.h"
 #include "engine/scene_state.h"
 #include "exec/parallel.h"
+#include "rays/place_order.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
 #include "trace/ray_frame.h"
@@ -49,19 +51,21 @@ const SceneTreeD& checked_tree(const SceneD& scene, std::size_t rays,
     return tree;
 }
 
-/// Rays begin to end - 1 of a batch, but for where answers go.
-SceneJobD& job_for(const SceneTreeD& tree, const Batch& batch, std::size_t begin, std::size_t end) {
+/// Rays begin to end - 1 of a batch, or order[begin] to order[end - 1].
+SceneJobD& job_for(const SceneTreeD& tree, const Batch& batch,
+                   const std::vector<std::uint32_t>& order, std::size_t begin, std::size_t end) {
     SceneJobD& job = job_of_this_thread();
+    const std::size_t from = order.empty() ? begin : 0;
     job.tree = &tree;
-    job.rays = batch.rays.data() + begin;
-    job.order = nullptr;
-    job.first = begin;
+    job.rays = batch.rays.data() + from;
+    job.order = order.empty() ? nullptr : order.data() + begin;
+    job.first = from;
     job.filter = filter_of(batch.options);
     job.n = end - begin;
     job.mask = batch.options.mask;
-    job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + begin;
-    job.hits = batch.hits == nullptr ? nullptr : batch.hits + begin;
-    job.occluded = batch.occluded == nullptr ? nullptr : batch.occluded + begin;
+    job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + from;
+    job.hits = batch.hits == nullptr ? nullptr : batch.hits + from;
+    job.occluded = batch.occluded == nullptr ? nullptr : batch.occluded + from;
     return job;
 }
 
@@ -70,7 +74,8 @@ using Way = SceneJobD::Way;
 /// What the rays of a batch do, and may try instead.
 struct Ways {
     std::array<Way, 2> way;
-    std::size_t likely;  // of the two
+    std::size_t likely;   // of the two
+    bool sorted = false;  // by where they start
 };
 
 /// choose_path for rays about the center of a tree.
@@ -101,7 +106,18 @@ Ways ways_of(const SceneTreeD& tree, const Batch& batch) {
     const SimdPath path =
         options.path == SimdPath::automatic ? choose_path(*mesh->tree, batch.rays) : options.path;
     if (path == SimdPath::packet) return {{Way::packets, Way::packets}, 1};
-    return {{Way::turns, Way::packets}, path == SimdPath::stream ? 2u : 1u};
+    const bool sorted = path == SimdPath::sorted &&
+                        batch.rays.size() <= std::size_t{std::numeric_limits<std::int32_t>::max()};
+    return {{Way::turns, Way::packets}, path == SimdPath::stream ? 2u : 1u, sorted};
+}
+
+/// Rays along a curve through where they start.
+std::vector<std::uint32_t> order_by_place(const WideTreeD& tree, std::span<const RayD> rays) {
+    std::vector<Vec3> places(rays.size());
+    for_each_index(rays.size(), [&](std::size_t i) {
+        places[i] = Double3(tree.space.local(rays[i].origin)).rounded();
+    });
+    return raydix::order_by_place(tree.arrays.bounds, places);
 }
 
 /// With fewer jobs than this a trial would cost more than it may gain.
@@ -117,9 +133,11 @@ TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
     const bool races = ways.way[0] != ways.way[1] && batch.options.path == SimdPath::automatic &&
                        parts.size() >= least_jobs_of_race;
     with_threads(batch.options.threads, [&] {
+        std::vector<std::uint32_t> order;
+        if (ways.sorted) order = order_by_place(*tree.only_mesh()->tree, batch.rays);
         for_each_block(n, job_size, [&](std::size_t part, std::size_t begin, std::size_t end) {
             const auto trace = [&](std::size_t way, std::size_t from, std::size_t to) {
-                SceneJobD& job = job_for(tree, batch, from, to);
+                SceneJobD& job = job_for(tree, batch, order, from, to);
                 job.way = ways.way[way];
                 kernels.trace(job);
                 parts[part] += {job.hit_count, job.invalid};
@@ -179,7 +197,7 @@ AllHitsD trace_all(const SceneD& scene, std::span<const RayD> rays,
     with_threads(options.threads, [&] {
         for_each_block(rays.size(), block_size,
                        [&](std::size_t block, std::size_t begin, std::size_t end) {
-                           SceneJobD& job = job_for(tree, batch, begin, end);
+                           SceneJobD& job = job_for(tree, batch, {}, begin, end);
                            job.found = &found.hits(block);
                            job.hit_counts = found.hit_counts() + begin;
                            kernels.all_hits(job);

@@ -182,6 +182,8 @@ private:
     bool start(Turn& turn) {
         while (next_ < job_.n) {
             turn.place = job_.place(next_++);
+            if (job_.order != nullptr)
+                hwy::Prefetch(job_.rays + job_.order[std::min(next_ + ahead, job_.n - 1)]);
             const RayD& ray = job_.rays[turn.place];
             HitD hit;
             if (is_valid(ray)) {
@@ -196,6 +198,7 @@ private:
         return false;
     }
 
+    static constexpr std::size_t ahead = 16;
     SceneJobD& job_;
     std::size_t next_ = 0;
 };

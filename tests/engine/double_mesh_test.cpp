@@ -95,7 +95,7 @@ void expect_hits_of_all_triangles(const MeshD& mesh, std::span<const RayD> rays)
         for (const std::string& isa : simd_instruction_sets()) {
             SceneTraceOptions options;
             options.isa = isa, options.threads = 1;
-            for (const SimdPath path : {SimdPath::automatic, SimdPath::single, SimdPath::packet}) {
+            for (const SimdPath path : {SimdPath::single, SimdPath::packet, SimdPath::sorted}) {
                 options.path = path;
                 EXPECT_EQ(differences(scene, rays, wanted, options), 0u)
                     << isa << ", " << simd_path_name(path);

@@ -298,6 +298,23 @@ TEST(FlatScene, ClosestPointsOfTheSceneAreThoseOfTheMesh) {
     EXPECT_GT(turned, 500u);
 }
 
+TEST(SceneSolid, AtTheEdgeOfTheRangeOfCoordinates) {
+    constexpr float far = 5e11f, size = 1e11f;
+    Scene inner(box_mesh({0, 0, 0}, {1, 1, 1})), scene;
+    Transform t;
+    for (std::size_t k = 0; k < 3; ++k) t.m[k][k] = k == 1 ? -size : size, t.m[k][3] = far;
+    scene.add(inner, t);  // x and z from 5e11 to 6e11, y from 4e11 to 5e11
+    scene.add(box_mesh({-far, -far, -far}, {far, far, far}));
+    scene.commit();
+    const Solid solid(scene);
+    EXPECT_EQ(solid.closure(), Closure::oriented);
+    const std::vector<Vec3> queries = {
+        {5.5e11f, 4.5e11f, 5.5e11f}, {4.9e11f, 4.5e11f, 4.9e11f}, {5.5e11f, 5.5e11f, 5.5e11f}};
+    EXPECT_EQ(winding_numbers(solid, queries), (std::vector<double>{1, 1, 0}));
+    // They have the edge from (far, 4e11, far) to (far, far, far) in common, and no corner but one.
+    EXPECT_FALSE(overlapping_pairs(scene, {.narrow = true}).pairs.empty());
+}
+
 using Pairs = std::vector<ScenePair>;
 
 Pairs named(const std::vector<PrimitivePair>& pairs, const FlatWorld& a, const FlatWorld& b) {
