@@ -67,6 +67,8 @@ public:
         touch(tree, segments, "segment");
         touch(tree, spheres, "sphere");
         sweeps(tree);
+        // One mesh of all knows no triangle that only its own mesh finds too small.
+        if (tiny_) return;
         bodies(tree);
         pairs(tree);
     }
@@ -124,6 +126,15 @@ private:
         }
     }
 
+    static bool in_range(const Mesh& mesh, std::uint32_t triangle) {
+        for (const std::uint32_t v : mesh.triangles[triangle]) {
+            if (v >= mesh.vertices.size()) return false;
+            const Vec3 p = mesh.vertices[v];
+            if (!(std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)}) <= 1e12f))
+                return false;
+        }
+        return true;
+    }
     static bool mirrors(const Transform& t) {
         const auto m = [&](std::size_t r, std::size_t k) { return double{t.m[r][k]}; };
         return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) -
@@ -157,6 +168,7 @@ private:
             for (std::uint32_t i = 0; i < held.mesh.mesh.triangles.size(); ++i) {
                 Triangle t = held.mesh.mesh.triangles[i];
                 if (!valid[i]) t = {nowhere - first, nowhere - first, nowhere - first};
+                tiny_ |= !valid[i] && in_range(held.mesh.mesh, i);
                 if (turned) std::swap(t[1], t[2]);
                 flat_.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
                 names_.push_back({number, held.id, i});
@@ -301,6 +313,7 @@ private:
     Mesh flat_;
     std::vector<ScenePrimitive> names_;  // [triangles]
     std::vector<bool> turned_;           // [triangles]: two corners change places
+    bool tiny_ = false;                  // a triangle is left out for its size
     Aabb bounds_;
     std::string isa_;
     BuildOptions build_;

@@ -38,17 +38,6 @@ struct WayOut {
     bool mirrors;       // with those that follow
 };
 
-/// Whether a map that does not flatten mirrors; its rows may be of any size.
-bool mirrors(Double3 x, Double3 y, Double3 z) {
-    const auto of_unit_size = [](Double3 row) {
-        int exponent;
-        std::frexp(std::max({std::fabs(row.x), std::fabs(row.y), std::fabs(row.z)}), &exponent);
-        // In two steps: 2^1074 is no double.
-        return row * std::ldexp(1.0, -exponent / 2) * std::ldexp(1.0, -exponent - -exponent / 2);
-    };
-    return dot(of_unit_size(x), cross(of_unit_size(y), of_unit_size(z))) < 0;
-}
-
 /// A mesh on a path.
 template <class Scalar>
 struct FlatCopy {
@@ -66,6 +55,9 @@ struct FlatCopy {
             auto out = vertex;
             if (way == no_way) return out;
             Double3 p(vertex);
+            // What the mesh leaves out is nowhere, however near an instance brings it.
+            if (!(max_of(max_of(std::fabs(p.x), std::fabs(p.y)), std::fabs(p.z)) <= max_coordinate))
+                p = {NAN, NAN, NAN};
             for (std::size_t at = way; at != no_way; at = (*ways)[at].outer)
                 p = (*ways)[at].map.vector(p) + (*ways)[at].map.move;
             p.round_to(out);

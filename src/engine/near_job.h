@@ -67,6 +67,7 @@ struct NearContact {
     std::uint32_t instance = no_primitive, geometry = no_primitive, prim = no_primitive;
     LeafTriangle triangle{};  // in the world
     float u = 0, v = 0;       // of a ray
+    bool turned = false;      // its second and third corner changed places
 
     [[nodiscard]] auto order() const { return std::tuple(t, instance, geometry, prim); }
     [[nodiscard]] bool found() const { return prim != no_primitive; }

@@ -5,7 +5,7 @@
 //   Frame frame(tree, space)          of a tree in a space; space null: that of the query
 //   float limit(frame)                keys above it do not matter any more
 //   near(frame, node, limit, keys)    the children that matter, and their keys, by slot
-//   triangles(block, lanes, mesh, number), shapes(tree, place, count, space, number)
+//   triangles(block, lanes, mesh, number, turned), shapes(tree, place, count, space, number)
 //                                     at a leaf, triangles as they are in the world: whether the
 //                                     search ends
 #if defined(RAYDIX_ENGINE_NEAR_PROBES_H) == defined(HWY_TARGET_TOGGLE)
@@ -101,7 +101,7 @@ HWY_INLINE PointInside point_inside(const NearWay& way, Double3 query) {
 /// Distances of a point. Sink says what happens to what is close enough:
 ///   float reach()        squares of distances that still matter, closed
 ///   Tangent tangent()    a plane behind which nothing does
-///   bool take(points, lane, prim, mesh, number), take_shape(point, prim, shapes, number)
+///   bool take(points, lane, prim, mesh, number, turned), take_shape(point, prim, shapes, number)
 ///                        whether the search ends
 template <class Sink>
 class DistanceProbe {
@@ -176,13 +176,13 @@ public:
         return bits & slots_of(node);
     }
     HWY_INLINE bool triangles(const TriangleBlock& block, std::uint32_t lanes, const MeshTree& mesh,
-                              std::uint32_t number) {
+                              std::uint32_t number, bool turned) {
         NearPoints points;
         for (std::uint32_t left =
                  points_within(block, lanes, query_, sink_.reach(), sink_.tangent(), points);
              left != 0; left &= left - 1) {
             const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
-            if (sink_.take(points, lane, block.prim[lane], mesh, number)) return true;
+            if (sink_.take(points, lane, block.prim[lane], mesh, number, turned)) return true;
         }
         return false;
     }
@@ -237,7 +237,7 @@ public:
     [[nodiscard]] bool improved() { return std::exchange(improved_, false); }
 
     HWY_INLINE bool take(const NearPoints& p, std::uint32_t lane, std::uint32_t triangle,
-                         const MeshTree& mesh, std::uint32_t number) {
+                         const MeshTree& mesh, std::uint32_t number, bool turned) {
         if (!(p.d2[lane] <= best_.d2)) return false;  // one of the same leaf was closer
         const TriangleName name(mesh, triangle);
         keep({p.d2[lane],
@@ -245,8 +245,8 @@ public:
               name.geometry,
               name.prim,
               {p.x[lane], p.y[lane], p.z[lane]},
-              p.u[lane],
-              p.v[lane]});
+              turned ? p.v[lane] : p.u[lane],
+              turned ? p.u[lane] : p.v[lane]});
         return false;
     }
     HWY_INLINE bool take_shape(const ShapePoint& p, std::uint32_t prim, std::uint32_t geometry,
@@ -278,7 +278,7 @@ public:
     [[nodiscard]] bool any() const { return any_; }
 
     HWY_INLINE bool take(const NearPoints&, std::uint32_t, std::uint32_t triangle,
-                         const MeshTree& mesh, std::uint32_t number) {
+                         const MeshTree& mesh, std::uint32_t number, bool) {
         return take_triangle(triangle, mesh, number);
     }
     HWY_INLINE bool take_triangle(std::uint32_t triangle, const MeshTree& mesh,
@@ -429,7 +429,7 @@ public:
         return bits & children_of(node);
     }
     bool triangles(const TriangleBlock& block, std::uint32_t lanes, const MeshTree& mesh,
-                   std::uint32_t number) {
+                   std::uint32_t number, bool) {
         for (; lanes != 0; lanes &= lanes - 1) {
             const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
             if (segment_touches_triangle(segment_.a, segment_.b, triangle_of(block, lane)) &&
@@ -523,7 +523,7 @@ public:
         return bits & children_of(node);
     }
     bool triangles(const TriangleBlock& block, std::uint32_t lanes, const MeshTree& mesh,
-                   std::uint32_t number) {
+                   std::uint32_t number, bool turned) {
         for (; lanes != 0; lanes &= lanes - 1) {
             const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
             const LeafTriangle triangle = triangle_of(block, lane);
@@ -531,7 +531,7 @@ public:
             if (!meet(triangle, hit)) continue;
             const TriangleName name(mesh, block.prim[lane]);
             const NearContact contact{hit.t,    number, name.geometry, name.prim,
-                                      triangle, hit.u,  hit.v};
+                                      triangle, hit.u,  hit.v,         turned};
             if (hit.t < best_.t || contact.order() < best_.order()) best_ = contact;
         }
         return false;

@@ -93,8 +93,7 @@ SceneClosestPoint public_point(const NearBest& best) {
             best.v};
 }
 
-SceneSweepHit public_hit(const NearContact& contact, const SphereSweep& sweep) {
-    if (!contact.found()) return {};
+SceneSweepHit hit_in_world(const NearContact& contact, const SphereSweep& sweep) {
     if (sweep.radius == 0.0f) {
         const float t = contact.t * make_frame(sweep.path).t_scale + 0.0f;  // -0 becomes +0
         if (!(t < infinity)) return {};  // farther than numbers go
@@ -113,6 +112,12 @@ SceneSweepHit public_hit(const NearContact& contact, const SphereSweep& sweep) {
             at.position,
             at.u,
             at.v};
+}
+SceneSweepHit public_hit(const NearContact& contact, const SphereSweep& sweep) {
+    if (!contact.found()) return {};
+    SceneSweepHit hit = hit_in_world(contact, sweep);
+    if (contact.turned) std::swap(hit.u, hit.v);
+    return hit;
 }
 
 /// Of parts of a batch.

@@ -124,7 +124,9 @@ private:
             for (std::uint32_t level = levels; level-- > 0;) {
                 const Affine map = affine_of(way[level]->transform);
                 out_.maps.push_back(map);
-                near = compose({map, *inverse_of(map), {}, 0, near.first, near.count}, near);
+                const bool turned = mirrors(map.x, map.y, map.z);
+                near =
+                    compose({map, *inverse_of(map), {}, 0, near.first, near.count, turned}, near);
             }
             out_.reach = std::max(out_.reach, near.size);
             if (inner.has_flats())
@@ -201,7 +203,8 @@ NearWay compose(const NearWay& outer, const NearWay& inner) {
                 norm_of(outer.map) * inner.size +
                     std::max({std::fabs(move.x), std::fabs(move.y), std::fabs(move.z)}),
                 inner.first,
-                inner.count};
+                inner.count,
+                outer.mirrors != inner.mirrors};
     set_weights(out);
     return out;
 }

@@ -31,6 +31,7 @@ struct NearWay {
     float weight[3];
     double size;                 // at least the largest coordinate of the image, on all levels
     std::uint32_t first, count;  // of the instances' maps in NearScene::maps
+    bool mirrors = false;        // all maps together
 };
 
 /// What of weight and size follows from map, and from the largest coordinate in the inner space.

@@ -233,11 +233,13 @@ HWY_INLINE std::uint32_t points_within(const TriangleBlock& block, std::uint32_t
 }
 
 /// The triangles of a block as they are in the world: moved by each map in turn, in double, and
-/// rounded once. Returns those of `lanes` that a flattened mesh would hold.
+/// rounded once. Where the maps mirror, two corners change places, as in a flattened mesh. Returns
+/// those of `lanes` that it would hold.
 HWY_NOINLINE std::uint32_t move_triangles(const TriangleBlock& block, std::uint32_t lanes,
                                           const NearSpace& space, TriangleBlock& out) {
     for (std::size_t l = 0; l < block_lanes; l += double_lanes)
         for (int corner = 0; corner < 3; ++corner) {
+            const int place = corner == 0 || !space.way->mirrors ? corner : 3 - corner;
             Doubles3 p = corner_of(block, corner, l);
             for (const NearSpace* at = &space; at != nullptr; at = at->outer)
                 for (std::uint32_t k = 0; k < at->count; ++k) {
@@ -251,7 +253,7 @@ HWY_NOINLINE std::uint32_t move_triangles(const TriangleBlock& block, std::uint3
                 }
             const auto store = [&](VD x, int axis) {
                 const VF rounded = hn::Add(hn::DemoteTo(floats, x), hn::Zero(floats));
-                hn::Store(rounded, floats, out.corner[3 * corner + axis] + l);
+                hn::Store(rounded, floats, out.corner[3 * place + axis] + l);
             };
             store(p.x, 0), store(p.y, 1), store(p.z, 2);
         }

@@ -222,7 +222,8 @@ private:
             lanes = move_triangles(*block, lanes, *space, moved_);
             block = &moved_;
         }
-        if (probe_.triangles(*block, lanes, mesh, number)) return true;
+        if (probe_.triangles(*block, lanes, mesh, number, space != nullptr && space->way->mirrors))
+            return true;
         if constexpr (requires { probe_.improved(); }) {
             if (probe_.improved()) keep_guess(view, mesh, space, number, word);
         }
