@@ -12,6 +12,7 @@
 
 #include <bit>
 
+#include "engine/near_contacts.h"
 #include "engine/near_job.h"
 #include "engine/near_probes.h"
 #include "trace/simd/children.h"
