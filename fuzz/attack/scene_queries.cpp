@@ -245,7 +245,17 @@ private:
             expect(std::ranges::equal(row, wanted_row, {}, {},
                                       [&](std::uint32_t prim) { return names_[prim]; }),
                    text("touch_all of %s", what), [&] {
-                       return text("    %zu touched, wanted %zu\n", row.size(), wanted_row.size());
+                       std::string out =
+                           text("    %zu touched, wanted %zu\n", row.size(), wanted_row.size());
+                       for (const std::uint32_t prim : wanted_row) {
+                           if (std::ranges::count(row, names_[prim]) != 0) continue;
+                           const auto [path, geometry, lost] = names_[prim];
+                           out += text("    lost: path %u geometry %u prim %u\n", path, geometry,
+                                       lost);
+                           for (const std::uint32_t v : flat_.triangles[prim])
+                               out += "        " + text_of(flat_.vertices[v]) + "\n";
+                       }
+                       return out;
                    });
             expect((touched[q] != 0) == !wanted_row.empty(), text("touch_any of %s", what));
             expect(touches(scene(), queries[q], mask_) == !wanted_row.empty(),

@@ -101,7 +101,11 @@ public:
         for (std::size_t m = 0; m < scene_.meshes.size(); ++m) {
             const FlatTriangles* const flats =
                 flat_triangles_of(*scene_.meshes[m], scene_.mesh_names);
-            if (flats != nullptr) flat_boxes_[m].box = flats->arrays.bounds;
+            // Builders leave out what is smaller than they count.
+            const Vec3 side{min_diagonal, min_diagonal, min_diagonal};
+            if (flats != nullptr)
+                flat_boxes_[m].box = {flats->arrays.bounds.lo - side,
+                                      flats->arrays.bounds.hi + side};
         }
         add_ways();
         build_flats();
