@@ -29,7 +29,7 @@ NearJob& near_job_of_this_thread(const SceneTree& tree, std::uint32_t mask) {
     thread_local NearJob job;
     job.tree = &tree;
     job.mask = mask;
-    job.guess = {};
+    job.guess.view = nullptr;
     return job;
 }
 

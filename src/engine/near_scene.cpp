@@ -150,9 +150,8 @@ private:
                 shown.masks.push_back(instance.mask);
                 out_.shapes.push_back(std::move(shown));
             }
-        std::ranges::sort(out_.shapes);
-        const auto rest = std::ranges::unique(out_.shapes);
-        out_.shapes.erase(rest.begin(), rest.end());
+        std::sort(out_.shapes.begin(), out_.shapes.end());
+        out_.shapes.erase(std::unique(out_.shapes.begin(), out_.shapes.end()), out_.shapes.end());
     }
 
     const SceneTree& scene_;

@@ -12,6 +12,7 @@
 
 #include <bit>
 
+#include "engine/near_contacts.h"
 #include "engine/near_job.h"
 #include "engine/near_probes.h"
 #include "trace/simd/children.h"
@@ -87,14 +88,15 @@ public:
     bool run() { return visit_scene(*job_.tree, nullptr, 0); }
 
     /// For probes that get closer: the leaf where the last query ended.
-    void start_at(NearGuess guess) {
-        if (guess.view == nullptr) return;
+    void start_at(const NearGuess& last) {
+        if (last.view == nullptr) return;
+        const NearGuess guess = last;  // the leaf may bring a new one
         const NearSpace* const space = guess.placed ? &guess.space : nullptr;
         if (guess.view->is_compact)
             visit_leaf<true>(*guess.view, *guess.mesh, space, guess.number, guess.word);
         else
             visit_leaf<false>(*guess.view, *guess.mesh, space, guess.number, guess.word);
-        visited_ = guess;
+        visited_ = {guess.view, guess.number, guess.word};
     }
 
 private:
@@ -155,6 +157,8 @@ private:
     bool visit_flats(const SceneTree& scene, const NearSpace* space, std::uint32_t number) {
         const NearScene& near = near_scene_of(scene);
         if (!near.has_flats()) return false;
+        if (near.flats.part.size() == 1)
+            return visit_flat_part(scene, near.flats.part.front(), space, number);
         return walk_parts(near.flats, space, [&](std::uint32_t part) {
             return visit_flat_part(scene, part, space, number);
         });
@@ -231,8 +235,13 @@ private:
     void keep_guess(const WideView& view, const MeshTree& mesh, const NearSpace* space,
                     std::uint32_t number, std::uint32_t word) {
         if (space != nullptr && space->outer != nullptr) return;  // its way goes with this walk
-        job_.guess = {&view, &mesh, number, word, space != nullptr, {}};
-        if (space != nullptr) job_.guess.space = *space;
+        NearGuess& guess = job_.guess;
+        guess.view = &view;
+        guess.mesh = &mesh;
+        guess.number = number;
+        guess.word = word;
+        guess.placed = space != nullptr;
+        if (guess.placed) guess.space = *space;
     }
 
     bool visit_shapes(const ShapeTree& tree, const NearSpace* space, std::uint32_t number) {
@@ -246,7 +255,11 @@ private:
 
     NearJob& job_;
     Probe& probe_;
-    NearGuess visited_;    // a leaf that is done
+    /// A leaf that is done.
+    struct {
+        const WideView* view = nullptr;
+        std::uint32_t number = 0, word = 0;
+    } visited_;
     TriangleBlock room_;   // of a compact tree's leaf
     TriangleBlock moved_;  // of an instance's
 };
