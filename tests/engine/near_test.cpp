@@ -13,6 +13,7 @@
 #include <string>
 #include <thread>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "engine/extent.h"
@@ -32,6 +33,7 @@ struct Flattened {
     ScenePrimitive name;
     std::uint32_t masks[6];  // of all on the way
     std::size_t mask_count;
+    bool turned;  // the way mirrors: the second and the third corner have changed places
 
     [[nodiscard]] bool seen_by(std::uint32_t mask) const {
         return std::all_of(masks, masks + mask_count,
@@ -61,7 +63,13 @@ void flatten(const World& world, std::vector<Affine>& maps, std::vector<std::uin
             const auto corner = [&](std::size_t k) {
                 return in_world(item.mesh.vertices[t[k]], maps);
             };
-            Flattened flat{{corner(0), corner(1), corner(2)}, {number, item.id, prim}, {}, 0};
+            bool turned = false;
+            for (const Affine& map : maps) turned ^= mirrors(map.x, map.y, map.z);
+            Flattened flat{{corner(0), corner(turned ? 2 : 1), corner(turned ? 1 : 2)},
+                           {number, item.id, prim},
+                           {},
+                           0,
+                           turned};
             for (const std::uint32_t mask : masks) flat.masks[flat.mask_count++] = mask;
             out.push_back(flat);
         }
@@ -100,6 +108,7 @@ SceneClosestPoint brute_closest(const std::vector<Flattened>& seen, Vec3 q, floa
         if (!(p.d2 < d2 || (p.d2 == d2 && flat.name < name))) continue;
         d2 = p.d2, name = flat.name;
         best = {p.position, std::sqrt(p.d2), name.prim, name.geometry, name.instance, p.u, p.v};
+        if (flat.turned) std::swap(best.u, best.v);
     }
     return best;
 }
@@ -124,6 +133,11 @@ using Contacted = std::tuple<float, ScenePrimitive, float, float, float, float, 
 Contacted answer_of(const SceneSweepHit& h) {
     return {h.t, {h.instance, h.geometry, h.prim}, h.position.x, h.position.y, h.position.z, h.u,
             h.v};
+}
+
+SceneSweepHit with_own_corners(SceneSweepHit hit, const Flattened& flat) {
+    if (flat.turned) std::swap(hit.u, hit.v);
+    return hit;
 }
 
 SceneSweepHit brute_sweep(const std::vector<Flattened>& seen, const SphereSweep& sweep) {
@@ -153,12 +167,12 @@ SceneSweepHit brute_sweep(const std::vector<Flattened>& seen, const SphereSweep&
         const Double3 a(found->triangle.v0), b(found->triangle.v1), c(found->triangle.v2);
         best.position = (a + (b - a) * of_ray.u + (c - a) * of_ray.v).rounded();
         best.u = of_ray.u, best.v = of_ray.v;
-        return best;
+        return with_own_corners(best, *found);
     }
     const TrianglePoint at = closest_on_triangle(found->triangle, kept(path.at(least).rounded()));
     best.t = least + 0.0f;
     best.position = at.position, best.u = at.u, best.v = at.v;
-    return best;
+    return with_own_corners(best, *found);
 }
 
 /// Where something is: on corners, edges and faces, beside them, far away, and nowhere.
@@ -358,6 +372,24 @@ TEST(Near, TrianglesWithoutAreaAreFoundWhereThereIsNothingElse) {
     EXPECT_EQ(found.instance, 2u);
     EXPECT_EQ(found.position.x, 11.5f);
     EXPECT_EQ(found.position.y, 10.0f);
+}
+
+TEST(Near, PointsCloserTogetherThanBuildersCountAreFound) {
+    for (const float apart : {0.5f, 1e-13f, 1e-30f, 0x1p-140f}) {
+        Mesh mesh;
+        mesh.vertices = {{0, 0, 0}, {0, 0, apart}};
+        mesh.triangles = {{0, 0, 0}, {1, 1, 1}};
+        Scene inner(mesh), scene;
+        Transform up;
+        up.m[1][3] = 2;
+        scene.add(inner, up);
+        scene.add(mesh);
+        scene.commit();
+        EXPECT_EQ(closest_point(scene, {0, 3, 0}).instance, 1u) << apart;
+        EXPECT_EQ(closest_point(scene, {0, -3, 0}).geometry, 1u) << apart;
+        const std::vector<Segment> through{{{0, -1, 0}, {0, 3, 0}}};
+        EXPECT_GE(touch_all(scene, through).prims.size(), 2u) << apart;
+    }
 }
 
 TEST(Near, EqualDistancesGoToTheLeastName) {
