@@ -81,9 +81,8 @@ private:
             tree_->instances.push_back(
                 {id, geometry.mask, number, geometry.transform, geometry.inverse, inner});
             const AffineD map = affine_of(geometry.transform);
-            const auto image = [&](const ExtentD& extent) {
-                return is_empty(extent) ? ExtentD{nothing_d, 0.0}
-                                        : image_of(map, geometry.inverse, extent);
+            const auto image = [&map, &inverse = geometry.inverse](const ExtentD& extent) {
+                return is_empty(extent) ? ExtentD{nothing_d, 0.0} : image_of(map, inverse, extent);
             };
             place({{geometry.inverse, geometry.mask}, number, 0, 0, inner.get()}, image);
             const ExtentD whole = image(inner->parts.around);
