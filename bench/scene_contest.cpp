@@ -139,10 +139,6 @@ std::vector<Ratio> ratios_of(const Question& question) {
     return ratios;
 }
 
-std::optional<std::size_t> best_peer(const Question& question) {
-    return best_mode(question, [](const TimedMode& m) { return !m.ours && !m.robust; });
-}
-
 std::vector<Question> ask_rays(const Question& about, const RayKindOf& rays, RaySide* ours,
                                const RaySides& peers, const SceneBench& options) {
     std::vector<Contender> contenders;

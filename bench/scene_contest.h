@@ -28,7 +28,6 @@ struct Question {
     bool in_ms = false;                   // figures are milliseconds, not rates
     bool compares_times = false;          // ratios are of times: less is better
     std::vector<TimedMode> modes{};
-    std::string missing{};  // what we cannot do, or empty
 };
 
 /// The best of a question's peers beside ours, and rounds compared pair by pair.
@@ -39,9 +38,6 @@ struct Ratio {
 };
 /// Ours over the peer's: of rates, or of times.
 [[nodiscard]] std::vector<Ratio> ratios_of(const Question& question);
-
-/// The fastest of the peers that stand beside our batches.
-[[nodiscard]] std::optional<std::size_t> best_peer(const Question& question);
 
 using RaySides = std::vector<std::unique_ptr<RaySide>>;
 

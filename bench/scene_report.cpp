@@ -44,9 +44,7 @@ Json question_json(const Question& question) {
               {"hits", question.hits},
               {"modes", Json::array()},
               {"ratios", Json::array()},
-              {"ratio_of", question.compares_times ? "times" : "rates"},
-              {"not_available", nullptr}};
-    if (!question.missing.empty()) json["not_available"] = question.missing;
+              {"ratio_of", question.compares_times ? "times" : "rates"}};
     for (const TimedMode& mode : question.modes) json["modes"].push_back(mode_json(question, mode));
     for (const Ratio& r : ratios_of(question)) {
         const TimedMode& peer = question.modes[r.peer];
@@ -100,11 +98,6 @@ void print_question(const Question& question, const Question* before) {
         std::tie(question.workload, question.scene) != std::tie(before->workload, before->scene))
         fmt::print("{}: {}, {} primitives\n", question.workload, question.scene,
                    cli::grouped(question.primitives));
-    if (!question.missing.empty()) {
-        const std::optional<std::size_t> best = best_peer(question);
-        print_row(question, "batch", "not available", best ? &question.modes[*best] : nullptr,
-                  question.missing);
-    }
     for (const Ratio& r : ratios_of(question))
         print_row(question, r.figure, figure_text(question, question.modes[r.ours]),
                   &question.modes[r.peer],

@@ -115,10 +115,9 @@ private:
                 answered_(question);
     }
 
-    void filters(Question about, const Mesh& mesh, const std::vector<RayKindOf>& rays,
+    void filters(const Question& about, const Mesh& mesh, const std::vector<RayKindOf>& rays,
                  const char* which, AcceptPrimitive accept) {
         const auto ours = our_filtered_mesh(mesh, accept, sides_);
-        if (ours == nullptr) about.missing = "no filters";
         const auto peers = embree_filtered_meshes(mesh, accept, sides_);
         for (const RayKindOf& kind : rays)
             for (Question& question : ask_rays(about, kind, ours.get(), peers, options_)) {
