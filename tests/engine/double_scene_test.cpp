@@ -175,7 +175,7 @@ TEST(DoubleScene, FiltersSayWhichHitsCount) {
             EXPECT_EQ(any_hit(world->scene, rays[i], one), wanted[i].hit());
         }
     }
-    EXPECT_GT(found, 20u * thorough);
+    EXPECT_GT(found, 10u * thorough);
     const SceneD scene(one_triangle());
     struct Refusal {};
     SceneTraceOptions options;
