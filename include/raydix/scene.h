@@ -185,7 +185,7 @@ public:
     [[nodiscard]] std::optional<MeshView> mesh(std::uint32_t id) const;
     /// Throws InputError if there is no such geometry.
     [[nodiscard]] std::uint32_t mask(std::uint32_t id) const;
-    /// Of the last commit: around all triangles; lo > hi if there are none.
+    /// Of the last commit: around all triangles and shapes; lo > hi if there are none.
     [[nodiscard]] Box bounds() const;
     /// Of the last commit: the ids of the instances on path `number` of a hit, the outermost first.
     /// Empty for 0. Throws InputError if there is no such path.
