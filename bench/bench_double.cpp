@@ -1,12 +1,11 @@
-// What does double cost? Builds, closest hits, closest points, moving spheres and instances of one
-// scene in float and in double: CPU milliseconds of both (other programs disturb them little),
+// What does double cost? Builds, closest hits, closest points and moving spheres of one scene in
+// float and in double: CPU milliseconds of both (other programs disturb them little),
 // their ratio, and work per ray, as it is and with detail below what float nodes can tell apart.
 // Hits in double are compared with every triangle first, on a sample. A JSON line per scene, place
 // and kind of work on standard output.
 #include <fmt/format.h>
 #include <raydix/closest.h>
 #include <raydix/double.h>
-#include <raydix/instances_d.h>
 #include <raydix/machine.h>
 #include <raydix/model.h>
 #include <raydix/overlap.h>
@@ -25,8 +24,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 using raydix::Vec3;
 using raydix::Vec3d;
-
-constexpr std::uint32_t crowd_size = 9;
 
 struct Options {
     std::vector<std::string> scenes{"builtin:atrium?triangles=300000"};
@@ -153,53 +150,6 @@ Json bench_sweeps(const Trees& trees, std::span<const raydix::Ray> rays, const O
     return line;
 }
 
-/// The scene a few times side by side, each turned by another quarter about z, and every ray to
-/// each of them.
-template <class Scene, class Instance, class Tree>
-Scene crowd(const Tree& tree, double step, int threads) {
-    Scene scene;
-    const std::uint32_t object = scene.add_object(tree);
-    for (std::uint32_t k = 0; k < crowd_size; ++k) {
-        Instance instance{.object = object};
-        auto& m = instance.transform.m;
-        using Scalar = std::remove_reference_t<decltype(m[0][0])>;
-        const Scalar c = k % 2 == 0 ? Scalar(1) : Scalar(0), s = Scalar(1) - c;
-        m = {};
-        m[0][0] = m[1][1] = c;
-        m[0][1] = -s;
-        m[1][0] = s;
-        m[2][2] = 1;
-        m[2][3] = static_cast<Scalar>(step * k);
-        scene.add_instance(Scene::scene, instance);
-    }
-    scene.build(threads);
-    return scene;
-}
-
-Json bench_instances(const Trees& trees, std::span<const raydix::Ray> rays,
-                     const Options& options) {
-    const raydix::Aabb box = trees.in_float.bounds();
-    const double step = 0.7 * (double{box.hi.z} - box.lo.z);
-    const auto in_float =
-        crowd<raydix::InstancedScene, raydix::Instance>(trees.in_float, step, options.threads);
-    const auto in_double =
-        crowd<raydix::InstancedSceneD, raydix::InstanceD>(trees.in_double, step, options.threads);
-    std::vector<raydix::RayD> wide;
-    for (const raydix::Ray& ray : rays)
-        wide.push_back({widened(ray.origin), ray.tmin, widened(ray.direction), ray.tmax});
-    std::vector<raydix::InstanceHit> hits(rays.size());
-    std::vector<raydix::InstanceHitD> wide_hits(rays.size());
-    const raydix::InstanceTraceOptions timed{.threads = options.threads};
-    Json line = times(ms_of(options.repeat, [&] { trace(in_float, rays, hits, timed); }),
-                      ms_of(options.repeat, [&] { trace(in_double, wide, wide_hits, timed); }));
-    std::size_t same = 0;
-    for (std::size_t i = 0; i < rays.size(); ++i)
-        same += hits[i].hit.prim == wide_hits[i].hit.prim && hits[i].path == wide_hits[i].path;
-    line["instances"] = crowd_size;
-    line["same_primitive"] = static_cast<double>(same) / static_cast<double>(rays.size());
-    return line;
-}
-
 void run(const Options& options) {
     for (const std::string& name : options.scenes) {
         const raydix::Model scene = raydix::load_flat_model(name, options.seed);
@@ -228,7 +178,6 @@ void run(const Options& options) {
         line["diffuse"] = bench_rays(trees, diffuse, options);
         line["closest_points"] = bench_closest(trees, diffuse, options);
         line["sweeps"] = bench_sweeps(trees, diffuse, options);
-        line["instances"] = bench_instances(trees, diffuse, options);
         fmt::print("{}\n", line.dump());
     }
 }
@@ -236,8 +185,7 @@ void run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    CLI::App app(
-        "Builds, rays, closest points, moving spheres and instances in double beside float");
+    CLI::App app("Builds, rays, closest points and moving spheres in double beside float");
     Options options;
     app.add_option("--scene", options.scenes, "Scenes of triangles")->capture_default_str();
     app.add_option("--builder", options.builder, "Builder")->capture_default_str();

@@ -1,6 +1,5 @@
-// What does motion cost? A refit beside Embree's of the same mesh, and the tree over the instances
-// of a scene built again, in one run, in turns (A B A B). Hits are compared first. Wall-clock and
-// processor time, one JSON line a question.
+// What does motion cost? A refit beside Embree's of the same mesh, in one run, in turns (A B A B).
+// Hits are compared first. Wall-clock and processor time in a JSON line.
 #include <fmt/format.h>
 #include <raydix/machine.h>
 #include <raydix/raydix.h>
@@ -27,7 +26,6 @@ using Json = nlohmann::ordered_json;
 struct Options {
     std::string scene = "builtin:figure?triangles=1000000", builder = "ploc";
     int threads = 2, repeat = 5;
-    std::uint32_t instances = 10'000;
 };
 
 Json both_spreads(const std::vector<Times>& times) {
@@ -172,49 +170,18 @@ void run_refit(const Options& options) {
     fmt::print("{}\n", line.dump());
 }
 
-void run_instances(const Options& options) {
-    const Bvh object = build_bvh(load_flat_model("builtin:figure?triangles=5000").mesh());
-    InstancedScene scene;
-    const std::uint32_t id = scene.add_object(object);
-    std::mt19937_64 random(1);
-    const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
-    const auto anywhere = [&] {
-        const float angle = 6.28f * unit(), c = std::cos(angle), s = std::sin(angle);
-        return Instance{
-            id, {{{{c, 0, -s, 300 * unit()}, {0, 1, 0, 300 * unit()}, {s, 0, c, 300 * unit()}}}}};
-    };
-    for (std::uint32_t i = 0; i < options.instances; ++i)
-        scene.add_instance(InstancedScene::scene, anywhere());
-    scene.build(options.threads);
-    std::vector<Times> moved, built;
-    for (int i = 0; i < options.repeat; ++i) {
-        moved.push_back(time_of([&] {
-            for (std::uint32_t k = 0; k < options.instances; ++k)
-                scene.set_instance(InstancedScene::scene, k, anywhere());
-        }));
-        built.push_back(time_of([&] { scene.build(options.threads); }));
-    }
-    Json line = head("instances", options);
-    line["instances"] = options.instances;
-    line["set_instance"] = both_spreads(moved);
-    line["build"] = both_spreads(built);
-    fmt::print("{}\n", line.dump());
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
-    CLI::App app{"Refit beside Embree's; trees over instances built again"};
+    CLI::App app{"Refit beside Embree's"};
     Options options;
     app.add_option("--scene", options.scene, "a mesh")->capture_default_str();
     app.add_option("--builder", options.builder, "of the tree")->capture_default_str();
     app.add_option("--threads", options.threads, "of both")->capture_default_str();
     app.add_option("--repeat", options.repeat, "turns after the first")->capture_default_str();
-    app.add_option("--instances", options.instances, "in the scene")->capture_default_str();
     CLI11_PARSE(app, argc, argv);
     try {
         run_refit(options);
-        run_instances(options);
     } catch (const std::exception& error) {
         fmt::print(stderr, "bench_motion: {}\n", error.what());
         return 1;

@@ -25,10 +25,8 @@ MAY_INCLUDE = {
     "trace": {"base", "exec", "primitives", "layout", "rays", "simt"},
     # walks through the same trees as rays do, with the same stacks
     "proximity": {"base", "exec", "primitives", "sort", "tree", "rays", "trace"},
-    # primitives, tree: a tree in double over instances is made as one over triangles
-    "instances": {"base", "exec", "primitives", "tree", "trace"},
     # what rays of a user go through: trees of triangles and shapes, and instances over them
-    "engine": {"base", "exec", "primitives", "tree", "layout", "rays", "trace", "proximity", "instances"},
+    "engine": {"base", "exec", "primitives", "tree", "layout", "rays", "trace", "proximity"},
     "measure": {"base", "exec"},  # exec: the number of threads is a property of the machine
     "report": {"base", "exec", "measure"},
     "api": {"*"},

@@ -3,7 +3,6 @@
 #include <raydix/bvh.h>
 #include <raydix/check.h>
 #include <raydix/cwbvh.h>
-#include <raydix/instances.h>
 #include <raydix/wide.h>
 
 #include "attack/attack.h"

@@ -11,6 +11,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace raydix {
 
@@ -200,6 +201,12 @@ private:
     struct Scratch;
     std::unique_ptr<Scratch> scratch_;
 };
+
+/// Many small trees in one call, as build_bvh makes them. A mesh is one thread's, so thousands of
+/// them keep all threads busy. `peak_bytes` of each is 0. Throws InputError as build_bvh does,
+/// naming the mesh: the first that a thread met.
+[[nodiscard]] std::vector<Bvh> build_many(std::span<const MeshView> meshes,
+                                          const BuildOptions& options = {});
 
 /// Figures of the binary tree (contract.md 2).
 struct TreeStats {

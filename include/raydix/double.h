@@ -79,6 +79,8 @@ private:
 /// Throws InputError: option out of range, a vertex index past the end, 2^31 triangles or more.
 [[nodiscard]] BvhD build_bvh(const MeshViewD& mesh, const BuildOptions& options = {});
 [[nodiscard]] BvhD build_bvh(const MeshD& mesh, const BuildOptions& options = {});
+[[nodiscard]] std::vector<BvhD> build_many(std::span<const MeshViewD> meshes,
+                                           const BuildOptions& options = {});
 
 /// New corners for the same number of triangles in the same order; the hierarchy is kept. Throws
 /// InputError that names a triangle, or for a tree with parts of triangles, the tree unchanged, as

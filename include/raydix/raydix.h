@@ -18,8 +18,6 @@
 #include <raydix/error.h>            // IWYU pragma: export
 #include <raydix/files.h>            // IWYU pragma: export
 #include <raydix/hierarchy_study.h>  // IWYU pragma: export
-#include <raydix/instances.h>        // IWYU pragma: export
-#include <raydix/instances_d.h>      // IWYU pragma: export
 #include <raydix/kdtree.h>           // IWYU pragma: export
 #include <raydix/machine.h>          // IWYU pragma: export
 #include <raydix/mesh.h>             // IWYU pragma: export

@@ -12,8 +12,6 @@
 
 namespace raydix {
 
-enum class TraceKernel : std::uint32_t { scalar = 0, simd = 1 };
-
 /// How `simd` takes a batch through a wide tree. The hits do not depend on it.
 enum class SimdPath : std::uint32_t {
     automatic = 0,  // what the order of the batch suggests; large batches try others, and go on
@@ -28,7 +26,6 @@ enum class SimdPath : std::uint32_t {
 [[nodiscard]] SimdPath simd_path_from_name(std::string_view name);
 
 struct TraceOptions {
-    TraceKernel kernel = TraceKernel::scalar;
     int threads = 0;        // 0 to 1,024; 0: all the machine has. Results do not depend on it
     bool counters = false;  // also count node visits and triangle tests; costs a little time
     SimdPath path = SimdPath::automatic;  // wide trees only

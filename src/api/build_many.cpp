@@ -1,7 +1,7 @@
 // Many small trees in one call: a mesh is one thread's, scratch is kept from one to the next.
+#include <raydix/bvh.h>
+#include <raydix/double.h>
 #include <raydix/error.h>
-#include <raydix/instances.h>
-#include <raydix/instances_d.h>
 
 #include <string>
 

@@ -10,8 +10,8 @@
 #include <limits>
 
 #include "base/math.h"
+#include "engine/affine.h"
 #include "engine/support.h"
-#include "instances/affine.h"
 
 namespace raydix {
 

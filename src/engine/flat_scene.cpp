@@ -10,12 +10,12 @@
 #include <string>
 #include <utility>
 
+#include "engine/affine.h"
+#include "engine/affine_double.h"
 #include "engine/merge.h"
 #include "engine/shape_tree.h"
 #include "exec/join_copies.h"
 #include "exec/result_memory.h"
-#include "instances/affine.h"
-#include "instances/affine_double.h"
 
 namespace raydix {
 namespace {

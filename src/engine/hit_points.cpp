@@ -10,10 +10,10 @@
 #include <limits>
 #include <string>
 
+#include "engine/affine.h"
 #include "engine/scene_state.h"
 #include "engine/shape_tree.h"
 #include "exec/search.h"
-#include "instances/affine.h"
 
 namespace raydix {
 namespace {

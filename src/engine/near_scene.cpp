@@ -14,6 +14,28 @@
 namespace raydix {
 namespace {
 
+/// A box around the image of `box`, larger by more than corners move that are rounded in the world.
+Aabb box_of_image(const Affine& a, const Aabb& box) {
+    const Double3 middle = (Double3(box.lo) + Double3(box.hi)) * 0.5,
+                  half = (Double3(box.hi) - Double3(box.lo)) * 0.5;
+    const Double3 center = a.point(middle);
+    const auto reach = [&](Double3 row) {
+        return std::fabs(row.x) * half.x + std::fabs(row.y) * half.y + std::fabs(row.z) * half.z;
+    };
+    const auto pad = [&](Double3 row, double moved) {
+        const auto largest = [](double lo, double hi) {
+            return std::max(std::fabs(lo), std::fabs(hi));
+        };
+        return 0x1p-20 * (std::fabs(row.x) * largest(box.lo.x, box.hi.x) +
+                          std::fabs(row.y) * largest(box.lo.y, box.hi.y) +
+                          std::fabs(row.z) * largest(box.lo.z, box.hi.z) + std::fabs(moved)) +
+               double(min_diagonal);
+    };
+    const Double3 by{reach(a.x) + pad(a.x, a.move.x), reach(a.y) + pad(a.y, a.move.y),
+                     reach(a.z) + pad(a.z, a.move.z)};
+    return {(center - by).rounded(), (center + by).rounded()};
+}
+
 const MeshName& name_of(const std::vector<MeshName>& names, std::uint32_t id) {
     return *std::ranges::lower_bound(names, id, {}, &MeshName::id);
 }
@@ -135,7 +157,7 @@ private:
             out_.reach = std::max(out_.reach, near.size);
             if (inner.has_flats())
                 flat_boxes_[scene_.own_part_count() + k].box =
-                    image_of(near.map, inner.flats.arrays.bounds);
+                    box_of_image(near.map, inner.flats.arrays.bounds);
         }
     }
 

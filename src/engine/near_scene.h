@@ -9,9 +9,9 @@
 #include <memory>
 #include <vector>
 
+#include "engine/affine.h"
 #include "engine/scene_tree.h"
 #include "engine/shape_tree.h"
-#include "instances/affine.h"
 
 namespace raydix {
 

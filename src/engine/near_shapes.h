@@ -13,7 +13,7 @@
 #include "base/distance.h"
 #include "base/double3.h"
 #include "base/math.h"
-#include "instances/affine.h"
+#include "engine/affine.h"
 #include "tree/outward_box.h"
 
 namespace raydix {

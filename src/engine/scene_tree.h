@@ -12,11 +12,11 @@
 #include <utility>
 #include <vector>
 
+#include "engine/affine.h"
 #include "engine/extent.h"
 #include "engine/grouped_meshes.h"
 #include "engine/mesh_name.h"
 #include "engine/support.h"
-#include "instances/affine.h"
 #include "layout/wide_bvh.h"
 #include "trace/simd/wide_ray.h"
 

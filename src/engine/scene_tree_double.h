@@ -10,11 +10,10 @@
 #include <memory>
 #include <vector>
 
+#include "engine/affine_double.h"
 #include "engine/grouped_meshes.h"
 #include "engine/mesh_name.h"
 #include "engine/wide_tree_double.h"
-#include "instances/affine_double.h"
-#include "instances/instance_tree_double.h"
 
 namespace raydix {
 

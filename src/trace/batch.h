@@ -22,7 +22,6 @@ inline void check_sizes(std::size_t rays, std::size_t results) {
 
 /// Throws InputError for what no caller can have meant. `threads` is with_threads' matter.
 inline void check_options(const TraceOptions& options) {
-    check_enum("kernel", options.kernel, TraceKernel::simd);
     check_enum("path", options.path, SimdPath::sorted);
 }
 

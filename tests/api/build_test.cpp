@@ -8,6 +8,8 @@
 #include <cstring>
 #include <thread>
 
+#include "support/message.h"
+#include "support/scenes.h"
 #include "support/support.h"
 
 #if defined(__SSE2__)
@@ -31,6 +33,26 @@ TEST(BuildBvh, OptionsOutOfRangeAreNamed) {
     EXPECT_NE(input_error_of(mesh, {.bits = 31}).find("bits is 31"), std::string::npos);
     EXPECT_NE(input_error_of(mesh, {.max_leaf = 0}).find("max_leaf is 0"), std::string::npos);
     EXPECT_NE(input_error_of(mesh, {.max_leaf = 256}).find("max_leaf is 256"), std::string::npos);
+}
+
+TEST(BuildMany, AreTheTreesOfEachMesh) {
+    std::vector<Mesh> meshes;
+    for (std::size_t i = 0; i < 300; ++i) meshes.push_back(test::random_soup(i % 40, 20 + i));
+    const std::vector<MeshView> views(meshes.begin(), meshes.end());
+    for (const int threads : {1, 2, 7})
+        for (const Builder builder : {Builder::apetrei, Builder::ploc, Builder::sbvh}) {
+            const std::vector<Bvh> trees =
+                build_many(views, {.builder = builder, .threads = threads});
+            ASSERT_EQ(trees.size(), meshes.size());
+            for (std::size_t i = 0; i < trees.size(); ++i)
+                EXPECT_EQ(tree_hash(trees[i]),
+                          tree_hash(build_bvh(meshes[i], {.builder = builder})));
+        }
+    meshes[123].triangles[0][0] = 100000;
+    const std::vector<MeshView> broken(meshes.begin(), meshes.end());
+    EXPECT_EQ(test::message_of([&] { static_cast<void>(build_many(broken, {})); }).substr(0, 23),
+              "mesh 123: triangle 0: i");
+    EXPECT_TRUE(build_many({}, {}).empty());
 }
 
 TEST(BuildBvh, IndexPastTheVerticesNamesTheTriangle) {

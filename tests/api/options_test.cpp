@@ -45,8 +45,8 @@ struct Inputs {
     PointsD index_d;
     Solid solid;
     SolidD solid_d;
-    InstancedScene instances;
-    InstancedSceneD instances_d;
+    Scene scene;
+    SceneD scene_d;
 
     /// `count` triangles, boxes, points, rays and queries each.
     explicit Inputs(std::size_t count)
@@ -71,10 +71,9 @@ struct Inputs {
           index(build_points(std::span<const Vec3>(points))),
           index_d(build_points(std::span<const Vec3d>(points_d))),
           solid(bvh),
-          solid_d(bvh_d) {
-        instances.build();
-        instances_d.build();
-    }
+          solid_d(bvh_d),
+          scene(mesh),
+          scene_d(mesh_d) {}
 
     static MeshD wide_mesh(const Mesh& mesh) {
         MeshD wide;
@@ -134,8 +133,8 @@ std::vector<Threads> builds(Inputs& in) {
         {"refit boxes in double", [&in](int n) { (void)refit(in.box_bvh_d, in.boxes_d, n); }},
         {"Solid", [&in](int n) { (void)Solid(in.bvh, {.threads = n}); }},
         {"SolidD", [&in](int n) { (void)SolidD(in.bvh_d, {.threads = n}); }},
-        {"InstancedScene", [&in](int n) { in.instances.build(n); }},
-        {"InstancedSceneD", [&in](int n) { in.instances_d.build(n); }},
+        {"Scene", [&in](int n) { (void)Scene(in.mesh, {.threads = n}); }},
+        {"SceneD", [&in](int n) { (void)SceneD(in.mesh_d, {.threads = n}); }},
         {"tree_stats", [&in](int n) { (void)tree_stats(in.bvh, {.threads = n}); }},
         {"measure_this_machine", [](int n) { (void)measure_this_machine(n); }},
         {"study_hierarchy", [&in](int n) { (void)study_hierarchy(in.mesh, {.threads = n}, 1); }},
@@ -202,9 +201,6 @@ std::vector<Threads> traces(Inputs& in) {
              auto to = hits_d();
              trace(in.box_bvh_d, none_d, in.rays_d, to, {.threads = n});
          }},
-        {"trace instances", [&in](int n) { (void)trace(in.instances, in.rays, {.threads = n}); }},
-        {"trace instances double",
-         [&in](int n) { (void)trace(in.instances_d, in.rays_d, {.threads = n}); }},
         {"trace_reference",
          [&in](int n) {
              std::vector<TreeHit> to(in.rays.size());
@@ -220,6 +216,10 @@ std::vector<Threads> traces(Inputs& in) {
          [&in](int n) { (void)render(in.bvh, camera(), small_picture(View::shaded, n)); }},
         {"render_tree",
          [&in](int n) { (void)render_tree(in.bvh, camera(), {}, small_picture(View::shaded, n)); }},
+        {"trace scene", [&in](int n) { (void)trace(in.scene, in.rays, {.threads = n}); }},
+        {"trace scene double",
+         [&in](int n) { (void)trace(in.scene_d, in.rays_d, {.threads = n}); }},
+        {"trace_all scene", [&in](int n) { (void)trace_all(in.scene, in.rays, {.threads = n}); }},
     };
 }
 
@@ -334,8 +334,6 @@ TEST(Options, EnumerationsAreOfTheirKind) {
         expect_refused<Builder>(
             "builder", 9, [&](Builder b) { (void)study_hierarchy(in.mesh, {.builder = b}, 1); });
         expect_refused<Fit>("fit", 2, [&](Fit f) { (void)build_bvh(in.boxes, {.fit = f}); });
-        expect_refused<TraceKernel>(
-            "kernel", 1, [&](TraceKernel k) { (void)trace(in.bvh, in.rays, {.kernel = k}); });
         expect_refused<SimdPath>("path", 4,
                                  [&](SimdPath p) { (void)trace(in.bvh, in.rays, {.path = p}); });
         expect_refused<SimdPath>(

@@ -14,7 +14,7 @@
 #include "api/rdx_faults.h"
 #include "api/rdx_parse.h"
 #include "api/rdx_scene_format.h"
-#include "instances/affine.h"
+#include "engine/affine.h"
 #include "support/random.h"
 #include "support/support.h"
 

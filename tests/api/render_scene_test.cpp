@@ -16,7 +16,7 @@
 #include "api/pictures.h"
 #include "api/shapes.h"
 #include "base/double3.h"
-#include "instances/affine.h"
+#include "engine/affine.h"
 #include "support/message.h"
 #include "support/support.h"
 

@@ -12,7 +12,7 @@
 #include <tuple>
 #include <vector>
 
-#include "instances/affine_double.h"
+#include "engine/affine_double.h"
 #include "support/double_scenes.h"
 
 namespace raydix::test {

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "instances/affine.h"
+#include "engine/affine.h"
 #include "support/random.h"
 #include "support/support.h"
 #include "trace/ray_frame.h"

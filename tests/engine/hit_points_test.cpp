@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "api/shapes.h"
+#include "engine/affine.h"
 #include "engine/long_double_maps.h"
-#include "instances/affine.h"
 #include "support/random.h"
 #include "support/support.h"
 

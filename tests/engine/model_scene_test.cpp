@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "instances/affine.h"
+#include "engine/affine.h"
 #include "support/message.h"
 #include "support/random.h"
 #include "support/support.h"

@@ -2,7 +2,6 @@
 // that floats only just hold.
 #include <gtest/gtest.h>
 #include <raydix/bvh.h>
-#include <raydix/instances.h>
 #include <raydix/overlap.h>
 #include <raydix/scene.h>
 #include <raydix/trace.h>
@@ -140,10 +139,10 @@ TEST(Scene, OneRayOfACallerThatFlushesDenormals) {
     EXPECT_TRUE(trace(one_d, {&ray_d, 1})[0].hit());
     EXPECT_TRUE(closest_hit(one_d, ray_d).hit());
     EXPECT_TRUE(any_hit(one_d, ray_d));
-    InstancedScene placed;
-    placed.add_instance(InstancedScene::scene, {placed.add_object(tree), Transform{}});
-    placed.build();
-    EXPECT_TRUE(closest_hit(placed, ray).hit.hit());
+    Scene placed;
+    placed.add(one, Transform{});
+    placed.commit();
+    EXPECT_TRUE(closest_hit(placed, ray).hit());
     EXPECT_TRUE(sweep_sphere(tree, {ray, 0.1f}).hit());
     const WideBvh nothing(build_bvh(Mesh{}));
     std::vector<Hit> hits(1);

@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "engine/affine.h"
 #include "engine/float_world.h"
-#include "instances/affine.h"
 #include "support/support.h"
 
 namespace raydix::test {

@@ -1,7 +1,8 @@
-// Affine maps in double: their inverses, rays through them, boxes around what they make of boxes.
+// Affine maps in double: their inverses, and rays through them.
 #pragma once
 
-#include <raydix/instances.h>
+#include <raydix/transform.h>
+#include <raydix/types.h>
 
 #include <algorithm>
 #include <cmath>
@@ -68,28 +69,5 @@ struct WideRayLine {
         return {inverse.point(origin), inverse.vector(direction)};
     }
 };
-
-/// A box around the image of `box`, larger by more than the rounding of rays that go through the
-/// map may move a hit.
-inline Aabb image_of(const Affine& a, const Aabb& box) {
-    const Double3 middle = (Double3(box.lo) + Double3(box.hi)) * 0.5,
-                  half = (Double3(box.hi) - Double3(box.lo)) * 0.5;
-    const Double3 center = a.point(middle);
-    const auto reach = [&](Double3 row) {
-        return std::fabs(row.x) * half.x + std::fabs(row.y) * half.y + std::fabs(row.z) * half.z;
-    };
-    const auto pad = [&](Double3 row, double moved) {
-        const auto largest = [](double lo, double hi) {
-            return std::max(std::fabs(lo), std::fabs(hi));
-        };
-        return 0x1p-20 * (std::fabs(row.x) * largest(box.lo.x, box.hi.x) +
-                          std::fabs(row.y) * largest(box.lo.y, box.hi.y) +
-                          std::fabs(row.z) * largest(box.lo.z, box.hi.z) + std::fabs(moved)) +
-               double(min_diagonal);
-    };
-    const Double3 by{reach(a.x) + pad(a.x, a.move.x), reach(a.y) + pad(a.y, a.move.y),
-                     reach(a.z) + pad(a.z, a.move.z)};
-    return {(center - by).rounded(), (center + by).rounded()};
-}
 
 }  // namespace raydix

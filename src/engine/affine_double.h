@@ -2,7 +2,9 @@
 // make of boxes, with what rounding may add.
 #pragma once
 
-#include <raydix/instances_d.h>
+#include <raydix/double.h>
+#include <raydix/transform.h>
+#include <raydix/types.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +12,7 @@
 
 #include "base/double3.h"
 #include "base/math.h"
+#include "primitives/double_sources.h"
 
 namespace raydix {
 
@@ -142,6 +145,15 @@ struct ExtentD {
     AabbD box;
     double error;
 };
+inline constexpr AabbD nothing_d{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
+[[nodiscard]] inline bool is_empty(const ExtentD& extent) {
+    return extent.box.lo.x > extent.box.hi.x;
+}
+[[nodiscard]] inline bool in_range(const ExtentD& extent) {
+    return in_range(extent.box.lo) && in_range(extent.box.hi);
+}
+/// Of triangles in `box`: at t the ray is as near to the triangle as slab.h says, twice over.
+[[nodiscard]] inline ExtentD extent_of_triangles(const AabbD& box) { return {box, 0x1p-46}; }
 
 /// Of what a map makes of `inner`. With M = |L| |L^-1| for the map's matrix L, rounding on the way
 /// in moves the point at t by at most 2^-49 M (|origin - move| + |point - origin|): L^-1 is off by

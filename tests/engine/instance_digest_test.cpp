@@ -1,19 +1,20 @@
 // Hits of instances, in float and in double, against digests kept here: the same bits for every
 // tree, every number of threads and every processor, and those of each instance looked at alone.
 #include <gtest/gtest.h>
-#include <raydix/instances.h>
-#include <raydix/instances_d.h>
+#include <raydix/double.h>
+#include <raydix/scene.h>
 #include <raydix/trace.h>
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
-#include "instances/affine.h"
-#include "instances/affine_double.h"
+#include "engine/affine.h"
+#include "engine/affine_double.h"
 #include "support/digest_inputs.h"
 #include "support/digests.h"
 #include "support/double_scenes.h"
@@ -25,25 +26,18 @@ namespace {
 constexpr std::uint64_t seed = 12;
 constexpr std::size_t ray_count = 1000, rays_to_hits = 150;
 
-/// Today's calls in float.
-struct FloatCalls {
+struct InFloat {
     using Tree = Bvh;
-    using Scene = InstancedScene;
-    using SceneHit = InstanceHit;
+    using Scene = raydix::Scene;
+    using SceneHit = Hit;
     using AnyRay = Ray;
     using Inverse = Affine;
 
-    static std::vector<Tree> trees(const Layout& layout, Builder builder) {
-        std::vector<Tree> trees;
-        for (const MeshD& mesh : layout.meshes)
-            trees.push_back(build_bvh(in_float(mesh), {.builder = builder}));
-        return trees;
-    }
-    static Instance instance(std::uint32_t object, const Placed& placed) {
-        Instance out{object, {}, placed.mask};
+    static Mesh mesh(const MeshD& mesh) { return in_float(mesh); }
+    static Transform transform(const Placed& placed) {
+        Transform out;
         for (std::size_t i = 0; i < 3; ++i)
-            for (std::size_t j = 0; j < 4; ++j)
-                out.transform.m[i][j] = static_cast<float>(placed.rows[i][j]);
+            for (std::size_t j = 0; j < 4; ++j) out.m[i][j] = static_cast<float>(placed.rows[i][j]);
         return out;
     }
     static std::vector<Ray> rays(const std::vector<RayD>& rays) { return in_float(rays); }
@@ -55,23 +49,15 @@ struct FloatCalls {
     }
 };
 
-/// Today's calls in double.
-struct DoubleCalls {
+struct InDouble {
     using Tree = BvhD;
-    using Scene = InstancedSceneD;
-    using SceneHit = InstanceHitD;
+    using Scene = SceneD;
+    using SceneHit = HitD;
     using AnyRay = RayD;
     using Inverse = InverseD;
 
-    static std::vector<Tree> trees(const Layout& layout, Builder builder) {
-        std::vector<Tree> trees;
-        for (const MeshD& mesh : layout.meshes)
-            trees.push_back(build_bvh(mesh, {.builder = builder}));
-        return trees;
-    }
-    static InstanceD instance(std::uint32_t object, const Placed& placed) {
-        return {object, {placed.rows}, placed.mask};
-    }
+    static MeshD mesh(const MeshD& mesh) { return mesh; }
+    static TransformD transform(const Placed& placed) { return {placed.rows}; }
     static std::vector<RayD> rays(const std::vector<RayD>& rays) { return rays; }
     static RayD inside(const RayD& ray, const std::vector<Inverse>& inverses) {
         LineD line(ray);
@@ -80,56 +66,42 @@ struct DoubleCalls {
     }
 };
 
-/// A scene of a layout over trees of its meshes, of whatever kind the scene takes.
-template <class Calls, class Tree = typename Calls::Tree>
-class Built {
-public:
-    Built(const Layout& layout, std::vector<Tree> trees) : trees_(std::move(trees)) {
-        std::vector<std::uint32_t> meshes, groups{Calls::Scene::scene};
-        for (const Tree& tree : trees_) meshes.push_back(scene.add_object(tree));
-        while (groups.size() < layout.groups.size()) groups.push_back(scene.add_group());
-        for (std::size_t g = 0; g < groups.size(); ++g)
-            for (const Placed& placed : layout.groups[g])
-                scene.add_instance(
-                    groups[g],
-                    Calls::instance((placed.group ? groups : meshes)[placed.what], placed));
-        scene.build();
+/// The scene of a layout: each mesh is geometry 0 of a scene of its own, each group a scene.
+template <class Kind>
+typename Kind::Scene scene_of(const Layout& layout, const SceneOptions& options) {
+    using Scene = typename Kind::Scene;
+    std::vector<Scene> meshes, groups(layout.groups.size());
+    for (const MeshD& mesh : layout.meshes) meshes.emplace_back(Kind::mesh(mesh), options);
+    for (std::size_t g = groups.size(); g-- > 0;) {
+        for (const Placed& placed : layout.groups[g])
+            groups[g].add((placed.group ? groups : meshes)[placed.what], Kind::transform(placed),
+                          {.mask = placed.mask, .id = {}});
+        groups[g].commit(options);
     }
+    return std::move(groups[0]);
+}
 
-    typename Calls::Scene scene;
-
-private:
-    std::vector<Tree> trees_;
-};
-
-/// Rays with their masks through a layout, and what became of them in terms of any API: t, prim, u,
-/// v, geometry and instance. A mesh is geometry 0 of what an instance shows.
-template <class Calls>
+/// Rays with their masks through a layout, and what became of them: t, prim, u, v, geometry and
+/// instance.
+template <class Kind>
 class Traced {
 public:
-    using AnyRay = typename Calls::AnyRay;
-    using SceneHit = typename Calls::SceneHit;
-    using Hits = std::vector<SceneHit>;
-    using Path = decltype(SceneHit::path);
+    using AnyRay = typename Kind::AnyRay;
+    using Scene = typename Kind::Scene;
+    using Hits = std::vector<typename Kind::SceneHit>;
 
     explicit Traced(const std::string& name) : layout_(layout_named(name)) {
         for (ShownMesh& shown : shown_meshes(layout_)) {
-            Path path = InstanceHit::unused();
-            std::copy(shown.path.begin(), shown.path.end(), path.begin());
-            numbers_[path] = shown.number;
-            Alone alone{std::move(shown), path, {}};
+            Alone alone{std::move(shown), {}};
             for (const Placed* placed : alone.shown.way)
-                alone.inverses.push_back(
-                    *inverse_of(affine_of(Calls::instance(0, *placed).transform)));
+                alone.inverses.push_back(*inverse_of(affine_of(Kind::transform(*placed))));
             alone_.push_back(std::move(alone));
         }
-        rays_ = Calls::rays(digest_rays(some_triangles(layout_, 20), ray_count, seed));
+        for (const MeshD& mesh : layout_.meshes)
+            trees_.push_back(build_bvh(Kind::mesh(mesh), {.builder = Builder::karras}));
+        rays_ = Kind::rays(digest_rays(some_triangles(layout_, 20), ray_count, seed));
         see_by_masks();
-        const auto built = scene(Builder::karras);
-        std::vector<decltype(SceneHit::hit)> hits;
-        for (const SceneHit& hit : trace(built->scene, rays_, {.masks = masks_}))
-            hits.push_back(hit.hit);
-        add_rays_to_hits(rays_, hits, rays_to_hits);
+        add_rays_to_hits(rays_, closest_of_each_alone(), rays_to_hits);
         see_by_masks();
     }
 
@@ -143,17 +115,15 @@ public:
             }
         return packed.add_all(rays_).add_all(masks_);
     }
-    [[nodiscard]] const Layout& layout() const { return layout_; }
     [[nodiscard]] std::size_t rays() const { return rays_.size(); }
-    [[nodiscard]] std::shared_ptr<Built<Calls>> scene(Builder builder) const {
-        return std::make_shared<Built<Calls>>(layout_, Calls::trees(layout_, builder));
+    [[nodiscard]] std::shared_ptr<Scene> scene(const SceneOptions& options) const {
+        return std::make_shared<Scene>(scene_of<Kind>(layout_, options));
     }
 
-    template <class Scene>
-    [[nodiscard]] Answer closest(const Scene& scene, int threads) const {
-        return answer(trace(scene, rays_, {.masks = masks_, .threads = threads}));
+    [[nodiscard]] Answer closest(const Scene& scene, SceneTraceOptions options) const {
+        options.masks = masks_;
+        return answer(trace(scene, rays_, options));
     }
-    template <class Scene>
     [[nodiscard]] Answer closest_one_by_one(const Scene& scene) const {
         Hits hits;
         for (std::size_t i = 0; i < rays_.size(); ++i)
@@ -161,7 +131,6 @@ public:
         return answer(hits);
     }
     /// Of calls with one mask for all their rays.
-    template <class Scene>
     [[nodiscard]] Answer closest_by_mask(const Scene& scene) const {
         Hits hits(rays_.size());
         std::map<std::uint32_t, std::vector<std::size_t>> places;
@@ -174,39 +143,38 @@ public:
         }
         return answer(hits);
     }
+    /// By the binary tree of every mesh on every path.
     [[nodiscard]] Hits closest_of_each_alone() const {
-        const auto trees = Calls::trees(layout_, Builder::karras);
         Hits hits;
         for (std::size_t i = 0; i < rays_.size(); ++i) {
-            SceneHit best;
+            typename Kind::SceneHit best;
             for (const Alone& alone : alone_) {
                 if (!alone.seen_by(masks_[i])) continue;
                 const auto hit =
-                    closest_hit(trees[alone.shown.mesh], Calls::inside(rays_[i], alone.inverses));
+                    closest_hit(trees_[alone.shown.mesh], Kind::inside(rays_[i], alone.inverses));
                 if (!hit.hit()) continue;
-                const bool nearer = !best.hit.hit() || hit.t < best.hit.t;
-                if (nearer || (hit.t == best.hit.t && alone.path < best.path))
-                    best = {hit, 0, alone.path};
+                const bool nearer = !best.hit() || hit.t < best.t;
+                if (nearer || (hit.t == best.t && alone.shown.number < best.instance))
+                    best = {hit, 0, alone.shown.number};
             }
             hits.push_back(best);
         }
         return hits;
     }
-    template <class Scene>
-    [[nodiscard]] Answer any(const Scene& scene, int threads) const {
+    [[nodiscard]] Answer any(const Scene& scene, SceneTraceOptions options) const {
         std::vector<std::uint8_t> occluded(rays_.size());
-        trace_any(scene, rays_, occluded, {.masks = masks_, .threads = threads});
+        options.masks = masks_;
+        trace_any(scene, rays_, occluded, options);
         return answer_any(occluded);
     }
 
-    [[nodiscard]] Answer answer(const Hits& hits) const {
+    [[nodiscard]] static Answer answer(const Hits& hits) {
         Answer out;
-        for (const SceneHit& hit : hits) {
-            out.values.add_hit(hit.hit);
-            const std::uint32_t geometry = hit.hit.hit() ? 0 : no_primitive,
-                                instance = hit.hit.hit() ? numbers_.at(hit.path) : no_primitive;
-            out.where.add(geometry).add(instance);
-            out.found += hit.hit.hit();
+        for (const auto& hit : hits) {
+            out.values.add_hit(hit);
+            out.where.add(hit.hit() ? hit.geometry : no_primitive)
+                .add(hit.hit() ? hit.instance : no_primitive);
+            out.found += hit.hit();
         }
         return out;
     }
@@ -220,8 +188,7 @@ public:
 private:
     struct Alone {
         ShownMesh shown;
-        Path path;
-        std::vector<typename Calls::Inverse> inverses;
+        std::vector<typename Kind::Inverse> inverses;
 
         [[nodiscard]] bool seen_by(std::uint32_t mask) const {
             for (const Placed* placed : shown.way)
@@ -238,67 +205,70 @@ private:
 
     Layout layout_;
     std::vector<Alone> alone_;
-    std::map<Path, std::uint32_t> numbers_;
+    std::vector<typename Kind::Tree> trees_;
     std::vector<AnyRay> rays_;
     std::vector<std::uint32_t> masks_;
 };
 
-template <class Calls>
-Question closest_question(std::shared_ptr<Traced<Calls>> traced) {
-    Question question{traced->input(), traced->rays() / 5, {}};
-    for (const Builder builder : {Builder::karras, Builder::ploc, Builder::sbvh}) {
-        const auto built = traced->scene(builder);
-        for (const int threads : {1, 2})
-            question.ways.push_back({fmt::format("{}, {} threads", builder_name(builder), threads),
-                                     [=] { return traced->closest(built->scene, threads); }});
+constexpr std::pair<const char*, Quality> qualities[] = {
+    {"fast", Quality::fast}, {"balanced", Quality::balanced}, {"high", Quality::high}};
+constexpr SimdPath paths[] = {SimdPath::automatic, SimdPath::single, SimdPath::packet,
+                              SimdPath::stream, SimdPath::sorted};
+
+/// Adds a way for each quality and each of several ways through the trees. answer(scene, options).
+template <class Kind, class Ask>
+void add_ways(Question& question, const std::shared_ptr<Traced<Kind>>& traced, const Ask& ask) {
+    for (const auto& [name, quality] : qualities) {
+        const auto built = traced->scene({.quality = quality});
+        for (const SimdPath path : paths) {
+            SceneTraceOptions options;
+            options.path = path;
+            options.threads = 1 + static_cast<int>(path) % 2;
+            const std::string way = fmt::format("{}, path {}", name, static_cast<int>(path));
+            question.ways.push_back({way, [=] { return ask(*traced, *built, options); }});
+        }
     }
-    const auto built = traced->scene(Builder::ploc);
-    question.ways.push_back(
-        {"one by one", [=] { return traced->closest_one_by_one(built->scene); }});
-    question.ways.push_back(
-        {"a mask a call", [=] { return traced->closest_by_mask(built->scene); }});
+}
+
+template <class Kind>
+Question closest_question(const std::shared_ptr<Traced<Kind>>& traced) {
+    Question question{traced->input(), traced->rays() / 5, {}};
+    add_ways(question, traced,
+             [](const auto& all, const auto& scene, const SceneTraceOptions& options) {
+                 return all.closest(scene, options);
+             });
+    const auto built = traced->scene({.compact = true});
+    question.ways.push_back({"one by one", [=] { return traced->closest_one_by_one(*built); }});
+    question.ways.push_back({"a mask a call", [=] { return traced->closest_by_mask(*built); }});
     question.ways.push_back(
         {"each alone", [=] { return traced->answer(traced->closest_of_each_alone()); }});
     return question;
 }
 
-template <class Calls>
-Question any_question(std::shared_ptr<Traced<Calls>> traced) {
+template <class Kind>
+Question any_question(const std::shared_ptr<Traced<Kind>>& traced) {
     Question question{traced->input(), traced->rays() / 5, {}};
-    for (const Builder builder : {Builder::karras, Builder::sbvh}) {
-        const auto built = traced->scene(builder);
-        for (const int threads : {1, 2})
-            question.ways.push_back({fmt::format("{}, {} threads", builder_name(builder), threads),
-                                     [=] { return traced->any(built->scene, threads); }});
-    }
+    add_ways(question, traced,
+             [](const auto& all, const auto& scene, const SceneTraceOptions& options) {
+                 return all.any(scene, options);
+             });
     question.ways.push_back({"each alone", [=] {
                                  std::vector<std::uint8_t> hit_or_miss;
                                  for (const auto& hit : traced->closest_of_each_alone())
-                                     hit_or_miss.push_back(hit.hit.hit());
+                                     hit_or_miss.push_back(hit.hit());
                                  return traced->answer_any(hit_or_miss);
                              }});
     return question;
 }
 
-/// A scene in double shows trees in float too, with the hits of the same corners in double.
-void add_float_trees(Question& question, std::shared_ptr<Traced<DoubleCalls>> traced) {
-    const auto built = std::make_shared<Built<DoubleCalls, Bvh>>(
-        traced->layout(), FloatCalls::trees(traced->layout(), Builder::ploc));
-    question.ways.push_back({"trees in float", [=] { return traced->closest(built->scene, 2); }});
+template <class Kind>
+Question ask(const std::string& layout, const std::string& query) {
+    const auto traced = std::make_shared<Traced<Kind>>(layout);
+    return query == "closest" ? closest_question(traced) : any_question(traced);
 }
-
-Question ask(const std::string& scene, const std::string& query) {
+Question ask_scene(const std::string& scene, const std::string& query) {
     const std::string layout = scene.substr(scene.find(' ') + 1);
-    const bool closest = query == "closest";
-    if (scene.starts_with("float")) {
-        const auto traced = std::make_shared<Traced<FloatCalls>>(layout);
-        return closest ? closest_question(traced) : any_question(traced);
-    }
-    const auto traced = std::make_shared<Traced<DoubleCalls>>(layout);
-    if (!closest) return any_question(traced);
-    Question question = closest_question(traced);
-    add_float_trees(question, traced);
-    return question;
+    return scene.starts_with("float") ? ask<InFloat>(layout, query) : ask<InDouble>(layout, query);
 }
 
 constexpr Known known[] = {
@@ -345,7 +315,7 @@ constexpr Known known[] = {
 class InstanceDigest : public testing::TestWithParam<Known> {};
 
 TEST_P(InstanceDigest, IsKnown) {
-    expect_known(GetParam(), ask(GetParam().scene, GetParam().query));
+    expect_known(GetParam(), ask_scene(GetParam().scene, GetParam().query));
 }
 
 INSTANTIATE_TEST_SUITE_P(Layouts, InstanceDigest, testing::ValuesIn(known),
