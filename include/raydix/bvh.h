@@ -201,7 +201,7 @@ private:
     std::unique_ptr<Scratch> scratch_;
 };
 
-/// Figures of the binary tree (contract.md 2).
+/// Figures of the binary tree (docs/contract.md 2).
 struct TreeStats {
     std::uint64_t nodes = 0;  // inner + leaves
     std::uint64_t leaves = 0;

@@ -37,11 +37,11 @@ struct ClosestCounts {
 };
 
 /// For each query the least (d2, prim) over all triangles of the tree, the same bits for every
-/// builder and thread count. Triangles without area count as segments or points (contract.md 3).
-/// The square of a distance above 1.8e19 overflows: it is infinite, but the point is there. queries
-/// [n] -> results [n]. Any order of queries will do: they are taken along a Morton curve. Throws
-/// InputError: sizes that differ, a max_distance that is negative or NaN, a tree that holds no
-/// triangles but boxes or points.
+/// builder and thread count. Triangles without area count as segments or points (docs/contract.md
+/// 3). The square of a distance above 1.8e19 overflows: it is infinite, but the point is there.
+/// queries [n] -> results [n]. Any order of queries will do: they are taken along a Morton curve.
+/// Throws InputError: sizes that differ, a max_distance that is negative or NaN, a tree that holds
+/// no triangles but boxes or points.
 ClosestCounts closest_points(const Bvh& bvh, std::span<const Vec3> queries,
                              std::span<ClosestPoint> results, const ClosestOptions& options = {});
 [[nodiscard]] std::vector<ClosestPoint> closest_points(const Bvh& bvh,

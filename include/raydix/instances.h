@@ -74,8 +74,8 @@ public:
     [[nodiscard]] std::uint32_t instance_count(std::uint32_t group = scene) const;
 
     /// Throws InputError: groups that show each other in a circle, more than
-    /// InstanceHit::max_levels of them, an instance beyond the range of coordinates (contract.md
-    /// 1).
+    /// InstanceHit::max_levels of them, an instance beyond the range of coordinates
+    /// (docs/contract.md 1).
     void build(int threads = 0);
     /// Around all that the last `build` saw; lo > hi if there is nothing.
     [[nodiscard]] Aabb bounds() const;

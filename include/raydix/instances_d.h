@@ -61,8 +61,8 @@ public:
     [[nodiscard]] std::uint32_t instance_count(std::uint32_t group = scene) const;
 
     /// Throws InputError: groups that show each other in a circle, more than
-    /// InstanceHitD::max_levels of them, an instance beyond the range of coordinates (contract.md
-    /// 1).
+    /// InstanceHitD::max_levels of them, an instance beyond the range of coordinates
+    /// (docs/contract.md 1).
     void build(int threads = 0);
     /// Around all that the last `build` saw, with room for rounding; lo > hi if there is nothing.
     [[nodiscard]] AabbD bounds() const;

@@ -117,8 +117,8 @@ private:
 [[nodiscard]] KdTree build_kdtree(const Mesh& mesh, const KdTreeOptions& options = {});
 [[nodiscard]] KdTree build_kdtree(std::span<const Vec3> points, const KdTreeOptions& options = {});
 
-/// Figures of the tree, as contract.md 2 has them for the BVH. `sah` and `epo` stay null: nodes
-/// have no boxes.
+/// Figures of the tree, as docs/contract.md 2 has them for the BVH. `sah` and `epo` stay null:
+/// nodes have no boxes.
 [[nodiscard]] TreeStats kd_stats(const KdTree& tree);
 
 /// 128 bits as hex over the canonical tree: equal exactly when topology, planes, intervals and
@@ -159,9 +159,9 @@ struct KdQueryCounts {
 };
 
 /// The k nearest points of each query, ordered by (d2, id), where d2 = (dx*dx + dy*dy) + dz*dz in
-/// float32 without FMA (contract.md 8). Any k > 0: rows end with missing ones where there are fewer
-/// points. A distance whose square overflows is infinite, but the point is there. queries [n] ->
-/// neighbors [n * k]. Throws InputError: sizes that do not fit, k = 0, a tree of triangles; what
+/// float32 without FMA (docs/contract.md 8). Any k > 0: rows end with missing ones where there are
+/// fewer points. A distance whose square overflows is infinite, but the point is there. queries [n]
+/// -> neighbors [n * k]. Throws InputError: sizes that do not fit, k = 0, a tree of triangles; what
 /// makes room for its result throws ResultTooLarge before it does so.
 KdQueryCounts kd_nearest(const KdTree& tree, std::span<const Vec3> queries, std::uint32_t k,
                          std::span<KdNeighbor> neighbors, const KdQueryOptions& options = {});

@@ -2,7 +2,7 @@
 // pairs within a distance. float32 and float64, 2-D and 3-D.
 //
 // Distances are true ones: sqrt(d2) with d2 = (dx*dx + dy*dy) + dz*dz in the index's own scalar,
-// without FMA (contract.md 8); in 2-D d2 = dx*dx + dy*dy. Nearest points are ordered by (d2,
+// without FMA (docs/contract.md 8); in 2-D d2 = dx*dx + dy*dy. Nearest points are ordered by (d2,
 // index); a point is within a radius R if d2 <= R*R. Answers are exact, and the same for every kind
 // of tree, number of threads, instruction set and order of queries.
 #pragma once

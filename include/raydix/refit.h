@@ -11,7 +11,7 @@ namespace raydix {
 /// How good a tree still is. Boxes that grow into each other cost rays time: rebuild when `ratio`
 /// has grown by more than a rebuild costs; from 1.5 on it usually has.
 struct RefitQuality {
-    double sah = 0;           // of the tree as it is now (contract.md 2, costs 1 and 1)
+    double sah = 0;           // of the tree as it is now (docs/contract.md 2, costs 1 and 1)
     double sah_at_build = 0;  // of the tree that the Refitter was made for
     double ratio = 1;         // sah / sah_at_build; 1 if either tree has no area
 };

@@ -172,8 +172,8 @@ public:
     void set_mask(std::uint32_t id, std::uint32_t mask);
 
     /// Takes all changes in. Throws InputError, the last commit still stands: an instance of a
-    /// scene without a commit, one that reaches beyond the range of coordinates (contract.md 1),
-    /// more than max_levels levels or 2^32 - 2 paths.
+    /// scene without a commit, one that reaches beyond the range of coordinates (docs/contract.md
+    /// 1), more than max_levels levels or 2^32 - 2 paths.
     CommitReport commit(const SceneOptions& options = {});
     [[nodiscard]] bool committed() const;  // nothing changed since the last commit
 
