@@ -15,11 +15,11 @@
 
 namespace raydix {
 
-/// `karras`, `lauterbach`, `garanzha` and `apetrei` give the same tree, bit for bit; `ploc` and
-/// `hploc` merge clusters by surface area and `binned` splits by it; they give better ones for more
-/// time. `sweep` looks at every split there is; `split` cuts large triangles into parts before, and
-/// `sbvh` on the way, so that one triangle may be in several leaves. Over boxes and points both are
-/// `sweep`.
+/// How the tree is built. `karras`, `lauterbach`, `garanzha` and `apetrei` give the same tree, bit
+/// for bit, in little time. The others give better trees for more time: `ploc` and `hploc` merge
+/// clusters by surface area, `binned` splits by it, and `sweep` looks at every split. `split` cuts
+/// large triangles into parts before the build and `sbvh` during it, so that one triangle may be in
+/// several leaves. Over boxes and points `split` and `sbvh` are `sweep`.
 enum class Builder : std::uint32_t {
     karras = 0,
     lauterbach = 1,
@@ -36,9 +36,9 @@ enum class Builder : std::uint32_t {
 /// Throws InputError that lists the known names.
 [[nodiscard]] Builder builder_from_name(std::string_view name);
 
-/// How boxes are fitted: one launch per level from the deepest up, or one pass in which the second
-/// child to arrive goes on. `as_published` is what the builder's source does. The boxes are the
-/// same.
+/// How boxes are fitted. `levels` takes one launch per level, from the deepest up. `atomic` takes
+/// one pass, in which the second child to arrive goes on. `as_published` is what the builder's
+/// source does. The boxes are the same.
 enum class Fit : std::uint32_t { as_published = 0, levels = 1, atomic = 2 };
 
 /// Costs of the surface area heuristic: one inner node, one primitive of a leaf.
@@ -49,18 +49,16 @@ struct SahConstants {
 
 struct BuildOptions {
     Builder builder = Builder::karras;
-    int bits = 63;  // Morton code bits, 30 or 63; 30 sorts a little faster, but crowds large scenes
-                    // into few cells
-    int max_leaf =
-        4;  // 1..255 primitives in a leaf; more means fewer nodes and more primitive tests
+    int bits = 63;     // of Morton codes, 30 or 63. 30 sorts a little faster, but crowds large
+                       // scenes into few cells
+    int max_leaf = 4;  // primitives in a leaf, 1 to 255. More means fewer nodes and more tests
     Fit fit = Fit::as_published;
-    bool strict = false;  // invalid primitives are an InputError instead of being left out
+    bool strict = false;  // true: an invalid primitive is an InputError, not left out
     int threads = 0;      // 0 to 1,024; 0, or more than the machine has: all it has. The tree does
                           // not depend on it
-    int reinsertion_rounds =
-        0;  // 0..255: so often, at most, large subtrees are then moved to better places; each round
-            // costs 1 to 4 % of a build by sbvh or ploc, of small meshes up to 7 %, and up to 4
-            // rounds make the part of the tree larger that is looked at. On the CPU only
+    int reinsertion_rounds = 0;  // after the build, 0 to 255, on the CPU only. Each round moves
+                                 // large subtrees to cheaper places. Fewer than four rounds look
+                                 // at less of the tree (docs/algorithms/reinsertion.md)
 };
 
 /// What a tree is for: built each frame, built once for some million rays, built once for many.
@@ -70,8 +68,9 @@ namespace detail {
 [[noreturn]] void refuse_quality(int number);
 }
 
-/// What the word stands for: apetrei; ploc and 2 rounds of reinsertion; sbvh and 4. Other options
-/// are as they are. Throws InputError for a number that is none of the three.
+/// Options that a quality stands for: `fast` is apetrei, `balanced` is ploc with 2 rounds of
+/// reinsertion, `high` is sbvh with 4. Other options have their defaults. Throws InputError for a
+/// number that is none of the three.
 [[nodiscard]] constexpr BuildOptions build_options_for(Quality quality) {
     switch (quality) {
         case Quality::fast:
@@ -84,10 +83,11 @@ namespace detail {
     detail::refuse_quality(static_cast<int>(quality));
 }
 
-/// 32 bytes. Inner: count == 0, children are nodes `first` and `first + 1`, left = lower code
-/// range, in trees with reinsertion the side of the smallest id. Leaf: count > 0 primitives,
-/// positions [first, first + count) of the primitive order. Slot 1 is padding, so that each pair of
-/// children lies in one 64-byte line; an inner node's `first` is even and >= 2.
+/// A node of 32 bytes. An inner node has count 0; its children are nodes `first` and `first + 1`. A
+/// leaf has count > 0; its primitives stand at [first, first + count) of the order. In trees of the
+/// LBVH family the left child has the lower codes, in all others the smallest primitive id. Slot 1
+/// is padding, so that each pair of children lies in one line of 64 bytes. An inner node's `first`
+/// is even and at least 2.
 struct BvhNode {
     Vec3 lo;
     std::uint32_t first;
@@ -98,7 +98,7 @@ struct BvhNode {
 };
 static_assert(sizeof(BvhNode) == 32);
 
-/// A triangle's three corners, copied into leaf order so that a leaf is read in one run.
+/// A triangle's three corners, copied into the order of leaves, so that a leaf lies in one piece.
 struct LeafTriangle {
     Vec3 v0, v1, v2;
 };
@@ -111,8 +111,9 @@ struct BuildMs {
     double bounds = 0, codes = 0, sort = 0, hierarchy = 0, fit = 0, layout = 0, total = 0;
 };
 
-/// A finished tree. Holds all that a trace reads (it does not refer to the mesh it was built from).
-/// With n primitives left after invalid ones went: n = 0 has no nodes; else nodes[0] is the root.
+/// A finished tree. Holds all that a trace reads; the mesh that it was built from may go. A tree
+/// without valid primitives has no nodes; else nodes[0] is the root. Move-only. Any number of
+/// threads may trace and ask one tree at once.
 class Bvh {
 public:
     [[nodiscard]] bool empty() const { return order_.empty(); }
@@ -135,12 +136,12 @@ public:
     /// Primitives the caller gave, and how many of them were invalid and left out.
     [[nodiscard]] std::uint64_t input_count() const { return input_count_; }
     [[nodiscard]] std::uint64_t left_out() const { return left_out_; }
-    /// Whether a primitive may stand in more than one leaf, with a box around each part of it. Such
-    /// a tree cannot be refitted: the parts are not kept.
+    /// Whether a primitive stands in more than one leaf, with a box around each part of it. Such a
+    /// tree cannot be refitted: the parts are not kept.
     [[nodiscard]] bool has_split_primitives() const {
         return order_.size() != input_count_ - left_out_;
     }
-    /// Whether the primitives have moved since the build (refit.h): a tree of the LBVH family is
+    /// Whether the primitives have moved since the build (refit.h). A tree of the LBVH family is
     /// then no longer in the order of its Morton codes.
     [[nodiscard]] bool refitted() const { return refitted_; }
     [[nodiscard]] Aabb bounds() const;
@@ -169,22 +170,24 @@ private:
     std::uint64_t peak_bytes_ = 0;
 };
 
-/// Builds a tree over the mesh's triangles; if it has none, over its vertices as points.
-/// Triangles with a non-finite or out-of-range vertex are left out and counted; `options.strict`
-/// throws instead. The tree refers to triangles by their position in the mesh. Same input, same
-/// tree, for every thread count. Throws InputError: option out of range, a vertex index past the
-/// end, 2^31 primitives or more.
+/// Builds a tree over the mesh's triangles or, if it has none, over its vertices as points.
+/// Triangles that are not finite or out of range (docs/contract.md 1) are left out and counted. The
+/// tree names triangles by their position in the mesh. It does not depend on the number of threads.
+/// Throws InputError: an option out of range, a vertex index past the end, 2^31 primitives or more;
+/// with `options.strict` the first primitive that would be left out.
 [[nodiscard]] Bvh build_bvh(const MeshView& mesh, const BuildOptions& options = {});
 [[nodiscard]] Bvh build_bvh(const Mesh& mesh, const BuildOptions& options = {});
 
-/// Builds a tree over `boxes`. Boxes with lo > hi or a non-finite bound are left out and counted.
+/// Builds a tree over `boxes`. Boxes that are empty (lo > hi), not finite or out of range are left
+/// out and counted. Errors as above.
 [[nodiscard]] Bvh build_bvh(std::span<const Aabb> boxes, const BuildOptions& options = {});
 
-/// Builds a tree over points. Non-finite points are left out and counted.
+/// Builds a tree over points. Points that are not finite or out of range are left out and counted.
+/// Errors as above.
 [[nodiscard]] Bvh build_bvh(std::span<const Vec3> points, const BuildOptions& options = {});
 
-/// Builds again and again into the same memory: scratch space and, if they are large enough, the
-/// arrays of the tree are kept from one call to the next. Not for use by two threads at once.
+/// Builds again and again into the same memory. Scratch is kept from one call to the next, and so
+/// are the arrays of the tree if they are large enough. Not for use by two threads at once.
 class BvhBuilder {
 public:
     BvhBuilder();
@@ -208,7 +211,7 @@ private:
 [[nodiscard]] std::vector<Bvh> build_many(std::span<const MeshView> meshes,
                                           const BuildOptions& options = {});
 
-/// Figures of the binary tree (contract.md 2).
+/// Figures of the binary tree (docs/contract.md 2).
 struct TreeStats {
     std::uint64_t nodes = 0;  // inner + leaves
     std::uint64_t leaves = 0;
@@ -221,7 +224,7 @@ struct TreeStats {
     SahConstants sah_constants;
     std::optional<double> epo;  // only if asked for
     std::uint64_t bytes = 0;
-    std::uint64_t bytes_referenced = 0;  // caller's buffers that a trace reads: none
+    std::uint64_t bytes_referenced = 0;  // of the caller's arrays that a trace reads: always 0
     std::string tree_hash;               // 32 hex digits
 };
 
@@ -237,10 +240,8 @@ struct StatsOptions {
 /// thread count.
 [[nodiscard]] TreeStats tree_stats(const Bvh& bvh, const StatsOptions& options = {});
 
-/// 128 bits as hex over the canonical tree: equal exactly when topology, order and boxes are.
-/// XXH3-128 (seed 0) of a little-endian byte stream: tree kind (uint32, 0 = bvh), bits, max_leaf
-/// (uint32), then in preorder, left first, per node its six floats lo.xyz hi.xyz, per leaf also its
-/// count and primitive ids (uint32).
+/// A hash of nodes, order, boxes, bits and max_leaf, as 32 hex digits. Builder, device and threads
+/// have no part in it. The bytes that are hashed: docs/contract.md 2.
 [[nodiscard]] std::string tree_hash(const Bvh& bvh);
 
 }  // namespace raydix

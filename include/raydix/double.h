@@ -3,10 +3,10 @@
 // 5,000,000, and for answers with more than seven digits.
 //
 // The rules are those of the float calls of the same names: ties, edges, limits, invalid input and
-// its counts. Answers are pure functions of the caller's doubles, so they are the same bits for
-// every builder and thread count; but winding numbers (<raydix/solid.h>), and what follows from
-// them on open meshes, are sums over the tree, the same for every thread count. Doubles other than
-// 0 below 2^-500 in magnitude count as 0.
+// its counts. Answers are pure functions of the caller's doubles, so they have the same bits for
+// every builder and number of threads. Winding numbers (<raydix/solid.h>), and what follows from
+// them on open meshes, are sums over the tree: the same for every number of threads, not for every
+// builder. Doubles below 2^-500 in magnitude count as 0.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -33,12 +33,12 @@ struct LeafTriangleD {
 };
 static_assert(sizeof(LeafTriangleD) == 72);
 
-/// A tree over triangles in double. Its nodes are those of a float tree over boxes of the triangles
-/// or, with the builders split and sbvh, of their parts, moved so that `center()`, near which most
-/// triangles are, is at 0, scaled down where the scene reaches farther than 2^39 (`scale()`), and
-/// rounded outward: as small as a float tree, and any builder can make it. Its leaves hold the
-/// corners as the caller gave them. Where detail is finer than 2^-24 of its distance from the
-/// center, boxes overlap more than they need to: queries take longer, and are as right.
+/// A tree over triangles in double. Its leaves hold the corners as the caller gave them. Its nodes
+/// are those of a float tree over boxes around the triangles or, with the builders split and sbvh,
+/// around their parts. The boxes are moved so that `center()`, near which most triangles are, is at
+/// 0. They are scaled down where the scene reaches farther than 2^39 (`scale()`), and rounded
+/// outward. Where detail is finer than 2^-24 of its distance from the center, boxes overlap more
+/// than they need to: queries take longer, and are as right. Move-only.
 class BvhD {
 public:
     [[nodiscard]] bool empty() const { return tree_.empty(); }
@@ -73,23 +73,22 @@ private:
     BuildMs build_ms_;
 };
 
-/// Builds a tree over the mesh's triangles; a mesh without any gives an empty tree (points:
-/// <raydix/points.h>). Triangles with a coordinate that is not finite or beyond 1e12, and those
-/// with a diagonal in (0, 1e-12), are left out and counted; `options.strict` throws instead.
-/// Throws InputError: option out of range, a vertex index past the end, 2^31 triangles or more.
+/// Builds a tree over the mesh's triangles. A mesh without any gives an empty tree. Triangles with
+/// a coordinate that is not finite or beyond 1e12, and those with a diagonal in (0, 1e-12), are
+/// left out and counted. Throws InputError: an option out of range, a vertex index past the end,
+/// 2^31 triangles or more; with `options.strict` the first triangle that would be left out.
 [[nodiscard]] BvhD build_bvh(const MeshViewD& mesh, const BuildOptions& options = {});
 [[nodiscard]] BvhD build_bvh(const MeshD& mesh, const BuildOptions& options = {});
 [[nodiscard]] std::vector<BvhD> build_many(std::span<const MeshViewD> meshes,
                                            const BuildOptions& options = {});
 
-/// New corners for the same number of triangles in the same order; the hierarchy is kept. Throws
-/// InputError that names a triangle, or for a tree with parts of triangles, the tree unchanged, as
-/// Refitter::refit does; nothing is found late here.
+/// Gives the tree new corners for the same number of triangles in the same order; the hierarchy is
+/// kept. Throws InputError as Refitter::refit does; here the tree is unchanged in every case.
 RefitQuality refit(BvhD& bvh, const MeshViewD& mesh, int threads = 0);
 
-/// Closest hit of each ray, the least (t, prim): Woop, Benthin, Wald (2013) in double, watertight.
-/// rays [n] -> hits [n]. Of the options, `threads` and `counters` matter. Throws InputError if the
-/// sizes differ.
+/// Finds the closest hit of each ray, the least (t, prim), by the watertight test of Woop, Benthin
+/// and Wald (2013) in double. rays [n] -> hits [n]. Of the options only `threads` and `counters`
+/// are used. Throws InputError if the sizes differ.
 TraceCounts trace(const BvhD& bvh, std::span<const RayD> rays, std::span<HitD> hits,
                   const TraceOptions& options = {});
 [[nodiscard]] std::vector<HitD> trace(const BvhD& bvh, std::span<const RayD> rays,
@@ -123,8 +122,8 @@ struct ClosestOptionsD {
     int threads = 0;                 // 0 to 1,024; 0: all the machine has
 };
 
-/// For each query the least (d2, prim). queries [n] -> results [n]. Throws InputError: sizes that
-/// differ, a max_distance that is negative or NaN.
+/// Finds for each query the least (d2, prim). queries [n] -> results [n]. Throws InputError: sizes
+/// that differ, a max_distance that is negative or NaN.
 ClosestCounts closest_points(const BvhD& bvh, std::span<const Vec3d> queries,
                              std::span<ClosestPointD> results, const ClosestOptionsD& options = {});
 [[nodiscard]] std::vector<ClosestPointD> closest_points(const BvhD& bvh,
@@ -210,9 +209,9 @@ struct SweepHitD {
     [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
 };
 
-/// First contacts, as in <raydix/overlap.h>: for each sweep the least (t, prim). All lengths are
-/// measured from the start, so that t and the place of the contact are as exact far from the origin
-/// as the corners are. sweeps [n] -> hits [n]. Throws InputError if the sizes differ.
+/// Finds the first contact of each sweep, as in <raydix/overlap.h>: the least (t, prim). sweeps [n]
+/// -> hits [n]. Lengths are measured from the start, so that t and the place of the contact are as
+/// exact far from the origin as the corners are. Throws InputError if the sizes differ.
 OverlapCounts sweep_spheres(const BvhD& bvh, std::span<const SphereSweepD> sweeps,
                             std::span<SweepHitD> hits, const OverlapOptions& options = {});
 [[nodiscard]] std::vector<SweepHitD> sweep_spheres(const BvhD& bvh,

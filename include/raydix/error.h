@@ -7,15 +7,15 @@
 
 namespace raydix {
 
-/// The input is at fault: a file, a mesh, an option value. The message is one line that says where
-/// and why.
+/// The input is at fault: a file, a mesh, an option. The message is one line that says where and
+/// why. A change or a commit of a scene that throws it has changed nothing.
 class InputError : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
 };
 
-/// The result of a call, with all that the call holds on its way there, is larger than the option
-/// `max_result_bytes` lets it be. The message names the bytes.
+/// A call would hold more than the option `max_result_bytes` allows: the result, and what the call
+/// needs on the way. The message names the bytes. Nothing of the result is returned.
 class ResultTooLarge : public InputError {
 public:
     /// `exact`: the call needs `bytes`. Otherwise it needs more than that; it stopped before it

@@ -24,16 +24,17 @@ struct KdTreeOptions {
     int threads = 0;      // 0 to 1,024; 0: all the machine has. The tree does not depend on it
 };
 
-/// 16 bytes; the two children of a node lie side by side in 32.
-/// Every node but the root says how far its primitives reach along the axis that its parent splits.
-/// An inner node splits `axis()` at the plane of the Morton grid where its codes first differ:
-/// primitives with their centre below `plane` are on the left, those with it at or above are on the
-/// right. `plane` is infinity where all codes below the node are equal: then the first positions of
-/// the order are on the left, and no plane parts the centres.
-/// A node covers its parent's part of space on its own side of the parent's plane. Halvings that
-/// would leave one half empty make no node (path compression), so its primitives may fill much less
-/// than that part; [lo, hi] is what walks go by. Triangles reach over planes: the intervals of two
-/// children may overlap, those of points only do where equal codes are parted.
+/// A node of 16 bytes; the two children of a node lie side by side in 32.
+///
+/// An inner node splits `axis()` at the plane of the Morton grid where its codes first differ.
+/// Primitives with their center below `plane` are on the left, all others on the right. `plane` is
+/// infinity where all codes below the node are equal: then the first positions of the order are on
+/// the left.
+///
+/// Every node but the root says in [lo, hi] how far its primitives reach along the axis that its
+/// parent splits. Walks go by these intervals. They may be much smaller than the node's side of the
+/// plane, since halvings that would leave one half empty make no node. Those of two children may
+/// overlap: triangles reach over planes, and points where equal codes are parted.
 struct KdNode {
     static constexpr std::uint32_t leaf_axis = 3;
 
@@ -56,9 +57,9 @@ struct KdNode {
 };
 static_assert(sizeof(KdNode) == 16);
 
-/// A finished tree. Holds all that queries read. With n primitives left after invalid ones went:
-/// n = 0 has no nodes; else nodes()[0] is the root, slot 1 is padding (all zero), and the children
-/// of inner node r lie in slots 2r + 2 and 2r + 3.
+/// A finished tree. Holds all that queries read; the input may go. A tree without valid primitives
+/// has no nodes. Else nodes()[0] is the root, slot 1 is padding (all zero), and the children of
+/// inner node r lie in slots 2r + 2 and 2r + 3.
 class KdTree {
 public:
     [[nodiscard]] bool empty() const { return order_.empty(); }
@@ -107,18 +108,17 @@ private:
     std::uint64_t peak_bytes_ = 0;
 };
 
-/// Builds a k-d tree over the mesh's triangles, ordered by the centres of their boxes; if it has
-/// none, over its vertices as points (Karras 2012, section 5: a radix node whose codes share p bits
-/// is a middle split of axis p mod 3). Triangles and points that are not finite or out of range are
-/// left out and counted; `options.strict` throws instead. Same input, same tree, for every thread
-/// count. Throws InputError: option out of range, a vertex index past the end, 2^31 primitives or
-/// more, more than 2^30 inner nodes.
+/// Builds a k-d tree (Karras 2012, section 5) over the mesh's triangles, ordered by the centers of
+/// their boxes, or, if it has none, over its vertices as points. Primitives that are not finite or
+/// out of range are left out and counted. The tree does not depend on the number of threads. Throws
+/// InputError: an option out of range, a vertex index past the end, 2^31 primitives or more, more
+/// than 2^30 inner nodes; with `options.strict` the first primitive that would be left out.
 [[nodiscard]] KdTree build_kdtree(const MeshView& mesh, const KdTreeOptions& options = {});
 [[nodiscard]] KdTree build_kdtree(const Mesh& mesh, const KdTreeOptions& options = {});
 [[nodiscard]] KdTree build_kdtree(std::span<const Vec3> points, const KdTreeOptions& options = {});
 
-/// Figures of the tree, as contract.md 2 has them for the BVH. `sah` and `epo` stay null: nodes
-/// have no boxes.
+/// Figures of the tree, as docs/contract.md 2 has them for the BVH. `sah` and `epo` stay null:
+/// nodes have no boxes.
 [[nodiscard]] TreeStats kd_stats(const KdTree& tree);
 
 /// 128 bits as hex over the canonical tree: equal exactly when topology, planes, intervals and
@@ -158,26 +158,26 @@ struct KdQueryCounts {
     std::uint64_t distances = 0;        // points looked at
 };
 
-/// The k nearest points of each query, ordered by (d2, id), where d2 = (dx*dx + dy*dy) + dz*dz in
-/// float32 without FMA (contract.md 8). Any k > 0: rows end with missing ones where there are fewer
-/// points. A distance whose square overflows is infinite, but the point is there. queries [n] ->
-/// neighbors [n * k]. Throws InputError: sizes that do not fit, k = 0, a tree of triangles; what
-/// makes room for its result throws ResultTooLarge before it does so.
+/// Finds the k nearest points of each query, ordered by (d2, id), where d2 = (dx*dx + dy*dy) +
+/// dz*dz in float32 without FMA (docs/contract.md 8). queries [n] -> neighbors [n * k]. Where there
+/// are fewer points, a row ends with missing ones. A distance whose square overflows is infinite,
+/// but the point is found. Throws InputError: sizes that do not fit, k = 0, a tree of triangles.
+/// The form that returns a vector throws ResultTooLarge before it makes room for too much.
 KdQueryCounts kd_nearest(const KdTree& tree, std::span<const Vec3> queries, std::uint32_t k,
                          std::span<KdNeighbor> neighbors, const KdQueryOptions& options = {});
 [[nodiscard]] std::vector<KdNeighbor> kd_nearest(const KdTree& tree, std::span<const Vec3> queries,
                                                  std::uint32_t k,
                                                  const KdQueryOptions& options = {});
 
-/// Closest hits, front to back through the k-d tree: bit for bit those of `trace` on a BVH of the
-/// same triangles. rays [n] -> hits [n]. Counters: nodes entered, root and leaves included. Throws
-/// InputError if the sizes differ or the tree holds points.
+/// Finds closest hits, front to back through the k-d tree. rays [n] -> hits [n]. They are bit for
+/// bit those of `trace` on a BVH of the same triangles. Counters count nodes entered, root and
+/// leaves included. Throws InputError: sizes that differ, a tree that holds points.
 TraceCounts kd_trace(const KdTree& tree, std::span<const Ray> rays, std::span<Hit> hits,
                      const TraceOptions& options = {});
 [[nodiscard]] std::vector<Hit> kd_trace(const KdTree& tree, std::span<const Ray> rays,
                                         const TraceOptions& options = {});
 
-/// Whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n].
+/// Says whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n].
 TraceCounts kd_trace_any(const KdTree& tree, std::span<const Ray> rays,
                          std::span<std::uint8_t> occluded, const TraceOptions& options = {});
 

@@ -19,8 +19,8 @@ struct Mesh {
     [[nodiscard]] bool is_point_cloud() const { return triangles.empty() && !vertices.empty(); }
 };
 
-/// The same without owning: [vertices], [triangles]. The caller keeps the arrays alive during the
-/// call.
+/// A mesh that owns no arrays: [vertices], [triangles]. The caller keeps them alive during the call
+/// that takes the view; Scene::share says when longer.
 struct MeshView {
     std::span<const Vec3> vertices;
     std::span<const Triangle> triangles;
@@ -38,7 +38,7 @@ struct MeshD {
     std::vector<Triangle> triangles;
 };
 
-/// As MeshView: [vertices], [triangles], kept alive by the caller during the call.
+/// As MeshView, in double.
 struct MeshViewD {
     std::span<const Vec3d> vertices;
     std::span<const Triangle> triangles;
@@ -49,8 +49,8 @@ struct MeshViewD {
         : vertices(mesh.vertices), triangles(mesh.triangles) {}  // NOLINT: meant to be implicit
 };
 
-/// What `inspect` counts. Coordinates beyond 1e12 and boxes with a diagonal in (0, 1e-12) are
-/// "out of range"; builders treat them like non-finite ones and leave them out.
+/// What `inspect` counts. "Out of range" are coordinates beyond 1e12 and boxes with a diagonal in
+/// (0, 1e-12). Builders leave out what is out of range or not finite (docs/contract.md 1).
 struct MeshInfo {
     std::uint64_t vertices = 0;
     std::uint64_t triangles = 0;
@@ -67,7 +67,8 @@ struct MeshInfo {
     std::uint64_t bytes = 0;  // of the two arrays
 };
 
-/// Counts the elements a user should know about. Throws InputError if an index is out of range.
+/// Counts the elements that a user should know about. Throws InputError if an index is past the
+/// vertices.
 [[nodiscard]] MeshInfo inspect(const MeshView& mesh);
 
 }  // namespace raydix

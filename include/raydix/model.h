@@ -68,12 +68,12 @@ struct Model {
     void flatten();
 };
 
-/// `spec` is a file path, or "builtin:NAME?key=value&key=value". `seed` drives built-in scenes.
-/// Files: .ply (ascii, binary little and big endian), .obj, .stl (ascii, binary), .gltf, .glb,
-/// .off, .xyz or .npy, each also with .gz, .xz or .zst behind it. Polygons are fanned in order. -0
-/// becomes +0. Non-finite coordinates are kept (builders leave such triangles out). Throws
-/// InputError for anything that cannot be read or does not exist: "FILE: ELEMENT: reason". Memory
-/// stays in proportion to what the file really holds.
+/// Loads a file, or makes a built-in scene. `spec` is a path or "builtin:NAME?key=value&key=value".
+/// `seed` drives built-in scenes. Files: .ply (ascii, binary little and big endian), .obj, .stl
+/// (ascii, binary), .gltf, .glb, .off, .xyz or .npy, each also with .gz, .xz or .zst behind it.
+/// Polygons are fanned in order. -0 becomes +0. Coordinates that are not finite are kept; builders
+/// leave such triangles out. Memory stays in proportion to what the file really holds. Throws
+/// InputError for what cannot be read or does not exist: "FILE: ELEMENT: reason".
 [[nodiscard]] Model load_model(const std::string& spec, std::uint64_t seed = 1);
 
 /// As load_model, then Model::flatten.

@@ -27,8 +27,8 @@ struct OctreeOptions {
     int threads = 0;      // 0 to 1,024; 0: all the machine has. The tree does not depend on it
 };
 
-/// 32 bytes. A node at level k is a cell of the grid that cuts the root in 2^k parts along each
-/// axis; only cells with points in them are nodes. The points of a node, leaf or not, stand at
+/// A node of 32 bytes. At level k it is a cell of the grid that cuts the root in 2^k parts along
+/// each axis. Only cells with points in them are nodes. The points of a node, leaf or not, stand at
 /// [first_point, first_point + point_count) of the leaf order. Its children follow each other from
 /// `first_child` on, ascending by octant.
 struct OctreeNode {
@@ -58,9 +58,9 @@ struct NodeRange {
 };
 
 /// A finished octree (Karras 2012, section 5). A node is divided if it has more than max_leaf
-/// points and its level is below max_level. Nodes are numbered level by level and by code within a
-/// level: the same for every number of threads. Holds all that queries read. With n points left
-/// after invalid ones went: n = 0 has no nodes; else nodes()[0] is the root.
+/// points and its level is below max_level. Nodes are numbered level by level, and by code within a
+/// level. The tree does not depend on the number of threads. It holds all that queries read; the
+/// input may go. A tree without valid points has no nodes; else nodes()[0] is the root.
 class Octree {
 public:
     [[nodiscard]] bool empty() const { return order_.empty(); }
@@ -109,10 +109,9 @@ private:
     std::uint64_t peak_bytes_ = 0;
 };
 
-/// Builds an octree over points. Non-finite ones and those beyond 1e12 are left out and counted;
-/// `options.strict` throws instead. Same input, same tree, for every thread count. Throws
-/// InputError: option out of range, 2^28 points or more (node numbers have 32 bits, and chains of
-/// nodes with one child can make 11.5 nodes a point).
+/// Builds an octree over points. Points that are not finite or beyond 1e12 are left out and
+/// counted. Throws InputError: an option out of range, 2^28 points or more; with `options.strict`
+/// the first point that would be left out.
 [[nodiscard]] Octree build_octree(std::span<const Vec3> points, const OctreeOptions& options = {});
 
 /// The same over the mesh's triangles, each standing at the centre of its box; if it has none, over
@@ -120,12 +119,11 @@ private:
 [[nodiscard]] Octree build_octree(const MeshView& mesh, const OctreeOptions& options = {});
 [[nodiscard]] Octree build_octree(const Mesh& mesh, const OctreeOptions& options = {});
 
-/// The cube of a node, as floats. Cells follow the Morton grid, whose rounding decides where one
-/// ends: `lo` is the least float in the node's cell, and `hi` the least one in the next cell. A
-/// point of the root therefore belongs to the node exactly if, on each axis, lo <= p < hi, or
-/// p == hi where the node touches the root's upper face (the last cell is closed). Faces of
-/// neighbours have the same bits. The root's upper face is lo + longest edge, or the scene's
-/// own where rounding puts that farther. Throws InputError if there is no such node.
+/// The cube of a node, as floats. `lo` is the least float in the node's cell of the Morton grid,
+/// and `hi` the least one in the next cell. A point of the root belongs to the node exactly if lo
+/// <= p < hi on each axis, or p == hi where the node touches the root's upper face. Faces of
+/// neighbours have the same bits. The root's upper face is lo + longest edge, or the scene's own
+/// where rounding puts that farther. Throws InputError if there is no such node.
 [[nodiscard]] Aabb node_box(const Octree& octree, std::uint32_t node_index);
 
 /// The deepest node whose cell holds the point: a leaf, or an inner node if the point is in an
@@ -166,11 +164,10 @@ struct PointsInBoxes {
         0;  // boxes with lo > hi or a non-finite bound; their rows are empty
 };
 
-/// Ids of the points p with lo <= p <= hi on every axis, compared as floats: exact, and never cut
-/// short. Whole subtrees are skipped or taken by their integer cells, which is exact because the
-/// grid is monotone. Of triangles it is the centres that are asked about. `max_result_bytes` bounds
-/// the peak of the call, 0: half of what is left (result_limit.h). Throws ResultTooLarge, an
-/// InputError, if it would take more.
+/// Finds the ids of the points p with lo <= p <= hi on every axis, compared as floats. Of triangles
+/// it is the centers that are asked about. `max_result_bytes` is the most that the call may hold;
+/// 0: half of what is left to the process (result_limit.h). Throws ResultTooLarge, an InputError,
+/// if it would take more; no id is ever dropped.
 [[nodiscard]] std::vector<std::uint32_t> points_in_box(const Octree& octree, const Aabb& box,
                                                        std::uint64_t max_result_bytes = 0);
 [[nodiscard]] PointsInBoxes points_in_boxes(const Octree& octree, std::span<const Aabb> boxes,

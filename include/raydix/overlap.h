@@ -12,7 +12,8 @@
 namespace raydix {
 
 struct OverlapOptions {
-    /// touch_all only: bounds the peak of the call. 0: half of what is left (result_limit.h).
+    /// touch_all only: the most bytes that the call may hold. 0: half of what is left to the
+    /// process (result_limit.h).
     std::uint64_t max_result_bytes = 0;
     int threads = 0;  // 0 to 1,024; 0: all the machine has. Results do not depend on it
 };
@@ -20,14 +21,15 @@ struct OverlapOptions {
 /// What a batch met.
 struct OverlapCounts {
     std::uint64_t queries = 0;
-    std::uint64_t found = 0;            // queries that touch something; of lists: ids in them
-    std::uint64_t invalid_queries = 0;  // touch nothing
+    std::uint64_t found = 0;            // queries that touch something; for lists: ids in them
+    std::uint64_t invalid_queries = 0;  // a number is not finite, or a radius is negative: they
+                                        // touch nothing
 };
 
-/// Whether each query has a point in common with any triangle: 1 or 0. Segments are decided without
-/// rounding, triangles in their plane and triangles without area included. A sphere touches a
-/// triangle if d2 <= radius * radius with the d2 of closest_points. queries [n] -> touched [n].
-/// Throws InputError: sizes that differ, a tree of boxes or points.
+/// Says whether each query has a point in common with any triangle: 1 or 0. queries [n] -> touched
+/// [n]. Segments are decided without rounding, triangles in their plane and triangles without area
+/// included. A sphere touches a triangle if d2 <= radius * radius with the d2 of closest_points.
+/// Throws InputError: sizes that differ, a tree that holds boxes or points.
 OverlapCounts touch_any(const Bvh& bvh, std::span<const Segment> queries,
                         std::span<std::uint8_t> touched, const OverlapOptions& options = {});
 OverlapCounts touch_any(const Bvh& bvh, std::span<const Sphere> queries,
@@ -35,29 +37,29 @@ OverlapCounts touch_any(const Bvh& bvh, std::span<const Sphere> queries,
 [[nodiscard]] bool touches(const Bvh& bvh, const Segment& segment);
 [[nodiscard]] bool touches(const Bvh& bvh, const Sphere& sphere);
 
-/// All triangles that each query touches: those of query i are prims[offsets[i]] ..
-/// prims[offsets[i + 1]], ascending.
+/// All triangles that each query touches. Those of query i are [offsets[i], offsets[i + 1]) of
+/// `prims`, ascending.
 struct OverlapLists {
     std::vector<std::uint64_t> offsets;  // [queries + 1]
     std::vector<std::uint32_t> prims;
     OverlapCounts counts;
 };
 
-/// As touch_any, but all of them. None is ever dropped. Throws ResultTooLarge, an InputError, if
-/// the call would take more than options.max_result_bytes.
+/// As touch_any, but lists all triangles that each query touches. None is ever dropped. Throws
+/// ResultTooLarge, an InputError, if the call would take more than options.max_result_bytes.
 [[nodiscard]] OverlapLists touch_all(const Bvh& bvh, std::span<const Segment> queries,
                                      const OverlapOptions& options = {});
 [[nodiscard]] OverlapLists touch_all(const Bvh& bvh, std::span<const Sphere> queries,
                                      const OverlapOptions& options = {});
 
-/// A ball whose center moves along a ray, for t in [tmin, tmax] as rays have it. Radius 0 is a ray.
-/// Invalid as a ray is, or with a radius that is negative or not finite.
+/// A ball whose center moves along a ray, for t in [tmin, tmax]. Radius 0 is a ray. A sweep is
+/// invalid if its ray is, or if its radius is negative or not finite.
 struct SphereSweep {
     Ray path;
     float radius;
 };
 
-/// The first contact: the ball touches triangle `prim` at `position`, which is
+/// The first contact. The ball touches triangle `prim` at `position`, which is
 /// (1-u-v)*v0 + u*v1 + v*v2, when its center is at t. A ball that touches at the start has t =
 /// tmin.
 struct SweepHit {
@@ -69,10 +71,9 @@ struct SweepHit {
     [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
 };
 
-/// First contacts: for each sweep the least (t, prim) of those with a finite t, the same bits for
-/// every builder and thread count. In double inside: faces moved by the radius, cylinders around
-/// edges, balls around corners. sweeps [n] -> hits [n]. Throws InputError: sizes that differ, a
-/// tree of boxes or points.
+/// Finds the first contact of each sweep: the least (t, prim) with a finite t. sweeps [n] -> hits
+/// [n]. The answers have the same bits for every builder and number of threads. They are computed
+/// in double. Throws InputError: sizes that differ, a tree that holds boxes or points.
 OverlapCounts sweep_spheres(const Bvh& bvh, std::span<const SphereSweep> sweeps,
                             std::span<SweepHit> hits, const OverlapOptions& options = {});
 [[nodiscard]] std::vector<SweepHit> sweep_spheres(const Bvh& bvh,

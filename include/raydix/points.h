@@ -1,10 +1,11 @@
-// An index over points that answers who is near: the k nearest, all within a radius or a box, all
+// An index over points that finds what is near: the k nearest, all within a radius or a box, all
 // pairs within a distance. float32 and float64, 2-D and 3-D.
 //
-// Distances are true ones: sqrt(d2) with d2 = (dx*dx + dy*dy) + dz*dz in the index's own scalar,
-// without FMA (contract.md 8); in 2-D d2 = dx*dx + dy*dy. Nearest points are ordered by (d2,
-// index); a point is within a radius R if d2 <= R*R. Answers are exact, and the same for every kind
-// of tree, number of threads, instruction set and order of queries.
+// Distances are sqrt(d2) with d2 = (dx*dx + dy*dy) + dz*dz in the index's own type, without FMA
+// (docs/contract.md 8). In 2-D d2 = dx*dx + dy*dy. Nearest points are ordered by (d2, index). A
+// point is within a radius R if d2 <= R*R. Answers are exact. They are the same for every kind of
+// tree, number of threads, instruction set and order of queries. Any number of threads may ask one
+// index at once.
 #pragma once
 
 #include <raydix/buffer.h>
@@ -28,7 +29,7 @@ struct Vec2d {
     double x, y;
 };
 
-/// A closed box of any of these points.
+/// A closed box between two points of a type.
 template <class Point>
 struct PointBox {
     Point lo, hi;
@@ -61,9 +62,9 @@ struct PointOf<double, 3> {
 
 /// How points are put into groups of 16, and those into larger ones. Answers do not depend on it.
 enum class PointsTree : std::uint32_t {
-    automatic = 0,  // kdtree, but bvh where the curve alone already parts the points well
-    kdtree = 1,     // short runs of the Morton curve are halved at the median of their widest side
-    bvh = 2,        // runs of the Morton curve as they are: built faster, boxes overlap more
+    automatic = 0,  // bvh where the Morton curve alone parts the points well, else kdtree
+    kdtree = 1,     // short runs of the curve are halved at the median of their widest side
+    bvh = 2,        // runs of the curve as they are. Built faster; boxes overlap more
 };
 [[nodiscard]] std::string_view points_tree_name(PointsTree tree);
 /// Throws InputError that lists the known names.
@@ -71,7 +72,7 @@ enum class PointsTree : std::uint32_t {
 
 struct PointsOptions {
     PointsTree tree = PointsTree::automatic;
-    bool strict = false;  // points that are not finite or beyond 1e12 are an InputError
+    bool strict = false;  // true: a point that is not finite or beyond 1e12 is an InputError
     int threads = 0;      // 0 to 1,024; 0: all the machine has. The index does not depend on it
 };
 
@@ -85,8 +86,8 @@ template <class Scalar, int Dim>
 struct PointArrays;
 }
 
-/// A finished index. Owns copies of the points, in the order of its tree; move-only. Made by
-/// `build_points`; an index that was never built is empty and may be asked.
+/// A finished index, made by `build_points`. Owns copies of the points, in the order of its tree.
+/// Move-only. An index that was never built is empty and may be asked.
 template <class Scalar_, int Dim_>
 class PointIndex {
     static_assert((std::is_same_v<Scalar_, float> || std::is_same_v<Scalar_, double>)&&(Dim_ == 2 ||
@@ -103,35 +104,37 @@ public:
     PointIndex(PointIndex&&) noexcept;
     PointIndex& operator=(PointIndex&&) noexcept;
 
-    /// The same as a new index over `points`, with the options of the last build or others, in the
-    /// memory of the old one, which grows only where it is too small; scratch is kept as well from
-    /// the first rebuild on. Throws what `build_points` throws; the index is then empty.
+    /// Makes the index that `build_points` would make, in the memory of this one. Without `options`
+    /// those of the last build hold. The memory grows only where it is too small. Scratch is kept
+    /// too, from the first rebuild on. Needs the index for itself. Throws what `build_points`
+    /// throws; the index is then empty.
     void rebuild(std::span<const Point> points);
     void rebuild(std::span<const Point> points, const PointsOptions& options);
 
-    /// Points that are in the index; the caller gave left_out() more.
+    /// Number of points in the index.
     [[nodiscard]] std::uint32_t size() const;
     [[nodiscard]] bool empty() const { return size() == 0; }
+    /// Number of points that the caller gave, and of those that were left out.
     [[nodiscard]] std::uint64_t input_count() const;
     [[nodiscard]] std::uint64_t left_out() const;
-    /// Around all points in the index; lo > hi if there are none.
+    /// The box around all points in the index; lo > hi if there are none.
     [[nodiscard]] Box bounds() const;
-    /// As given, and the tree that was chosen: kdtree or bvh.
+    /// The options as given, and the tree that was chosen: kdtree or bvh.
     [[nodiscard]] const PointsOptions& options() const;
     [[nodiscard]] PointsTree tree() const;
-    /// Groups of 16 points, inner nodes above them, and edges from the root to a group.
+    /// Number of groups of 16 points, of nodes above them, and of edges from the root to a group.
     [[nodiscard]] std::uint32_t leaf_count() const;
     [[nodiscard]] std::uint32_t node_count() const;
     [[nodiscard]] std::uint32_t depth() const;
     /// Every byte a query touches.
     [[nodiscard]] std::uint64_t bytes() const;
-    /// Most bytes that the last build held at once, index included, above its input.
+    /// Most bytes that the last build held at once: the index included, its input not.
     [[nodiscard]] std::uint64_t peak_bytes() const;
     [[nodiscard]] const PointsBuildMs& build_ms() const;
     /// Position in the index -> the caller's index of that point, [size()]: a copy.
     [[nodiscard]] std::vector<std::uint32_t> order() const;
 
-    /// What the queries read (src).
+    /// What the queries read; for the library's own use.
     [[nodiscard]] const detail::PointArrays<Scalar, Dim_>& arrays() const;
 
 private:
@@ -143,10 +146,10 @@ using Points2 = PointIndex<float, 2>;
 using PointsD = PointIndex<double, 3>;   // D: double
 using Points2D = PointIndex<double, 2>;  // two coordinates, double
 
-/// points [n] -> an index of them. Points that are not finite or have a coordinate beyond 1e12 are
-/// left out and counted, or an error with `options.strict`. Same input, same index, for every
-/// number of threads. Throws InputError: 2^31 points or more, an invalid point with `strict` (it is
-/// named).
+/// Builds an index of points. Points that are not finite or have a coordinate beyond 1e12 are left
+/// out and counted. The others keep their numbers. The index does not depend on the number of
+/// threads. Throws InputError: 2^31 points or more; with `options.strict` the first point that
+/// would be left out (it is named).
 [[nodiscard]] Points build_points(std::span<const Vec3> points, const PointsOptions& options = {});
 [[nodiscard]] Points2 build_points(std::span<const Vec2> points, const PointsOptions& options = {});
 [[nodiscard]] PointsD build_points(std::span<const Vec3d> points,
@@ -156,17 +159,17 @@ using Points2D = PointIndex<double, 2>;  // two coordinates, double
 
 /// In which order a batch is worked off. Answers do not depend on it.
 enum class QueryOrder : std::uint32_t {
-    automatic = 0,  // as given where neighbours in the batch are neighbours in space, else sorted
+    automatic = 0,  // as_given if neighbours in the batch are neighbours in space, else sorted
     as_given = 1,
     sorted = 2,  // along a Morton curve
 };
 
 struct PointQueryOptions {
     int threads = 0;    // 0 to 1,024; 0: all the machine has
-    bool sort = false;  // rows by (distance, index) instead of by index
+    bool sort = false;  // true: rows by (distance, index). false: by index
     QueryOrder order = QueryOrder::automatic;
-    /// Bounds the peak of a call that makes room for its result. 0: half of what is left
-    /// (result_limit.h).
+    /// The most bytes that a call may hold which makes room for its result. 0: half of what is left
+    /// to the process (result_limit.h).
     std::uint64_t max_result_bytes = 0;
     std::string isa = {};  // one of point_instruction_sets(); empty: the best
 };
@@ -180,8 +183,8 @@ struct PointQueryCounts {
     std::uint64_t found = 0;            // points, over all queries
 };
 
-/// The k nearest of each query: row i is [i * k, (i + 1) * k) of both. Where there are fewer than k
-/// points the row ends with no_primitive and infinity.
+/// The k nearest of each query. Row i is [i * k, (i + 1) * k) of both arrays. Where there are fewer
+/// than k points the row ends with no_primitive and infinity.
 template <class Scalar>
 struct NearestPoints {
     Buffer<std::uint32_t> indices;  // [queries * k]
@@ -189,7 +192,7 @@ struct NearestPoints {
     PointQueryCounts counts;
 };
 
-/// Rows of any length: those of query i are [offsets[i], offsets[i + 1]) of the other two.
+/// Rows of any length. That of query i is [offsets[i], offsets[i + 1]) of the other two arrays.
 template <class Scalar>
 struct PointLists {
     Buffer<std::uint64_t> offsets;  // [queries + 1]
@@ -207,9 +210,10 @@ using ScalarsOf = std::type_identity_t<std::span<typename Index::Scalar>>;
 template <class Index>
 using ScalarOf = std::type_identity_t<typename Index::Scalar>;
 
-/// queries [n] -> indices and distances [n * k], the query's own point included if it is one of the
-/// index. Throws InputError: k = 0, sizes that do not fit. What makes
-/// room for its result throws ResultTooLarge, before it does so.
+/// Finds the k nearest points of each query, a point at the query's own place included. queries [n]
+/// -> indices and distances [n * k]. A query that is not finite finds nothing and is counted.
+/// Throws InputError: k = 0, sizes that do not fit. The form that returns NearestPoints throws
+/// ResultTooLarge before it makes room for more than options.max_result_bytes.
 template <class Index>
 PointQueryCounts knn(const Index& index, PointsOf<Index> queries, std::uint32_t k,
                      std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
@@ -218,15 +222,16 @@ template <class Index>
 [[nodiscard]] NearestPoints<typename Index::Scalar> knn(const Index& index, PointsOf<Index> queries,
                                                         std::uint32_t k,
                                                         const PointQueryOptions& options = {});
-/// One query: indices and distances [k], any k > 0, nothing is allocated. Returns how many there
-/// are.
+/// One query: indices and distances [k] for any k > 0. Nothing is allocated. Returns how many were
+/// found.
 template <class Index>
 std::uint32_t knn(const Index& index, const typename Index::Point& query,
                   std::span<std::uint32_t> indices, ScalarsOf<Index> distances);
 
-/// All points with d2 <= R*R. Zero finds equal points, infinity all. Throws InputError: a radius is
-/// negative or NaN (it is named). ResultTooLarge, an InputError: the call would take more than
-/// options.max_result_bytes; known before the result is allocated.
+/// Finds all points with d2 <= R*R. A radius of 0 finds points at the same place, infinity all.
+/// Throws InputError if a radius is negative or NaN (it is named). Throws ResultTooLarge, an
+/// InputError, before the result is allocated, if the call would take more than
+/// options.max_result_bytes.
 template <class Index>
 [[nodiscard]] PointLists<typename Index::Scalar> radius_search(
     const Index& index, PointsOf<Index> queries, ScalarOf<Index> radius,
@@ -237,7 +242,7 @@ template <class Index>
     const Index& index, PointsOf<Index> queries,
     std::type_identity_t<std::span<const typename Index::Scalar>> radii,
     const PointQueryOptions& options = {});
-/// How many there are: queries [n] -> counts [n].
+/// Counts the points within the radius: queries [n] -> counts [n].
 template <class Index>
 PointQueryCounts radius_count(const Index& index, PointsOf<Index> queries, ScalarOf<Index> radius,
                               std::span<std::uint32_t> counts,
@@ -247,8 +252,8 @@ template <class Index>
 [[nodiscard]] std::uint32_t radius_count(const Index& index, const typename Index::Point& query,
                                          ScalarOf<Index> radius);
 
-/// All points in each closed box, ascending by index; their distance from the box is 0. A box with
-/// lo > hi holds none; one with NaN or Inf neither, and counts as invalid.
+/// Finds all points in each closed box, ascending by index. The distances are 0. A box with lo > hi
+/// holds none. A box with NaN or Inf holds none and is counted as invalid.
 template <class Index>
 [[nodiscard]] PointLists<typename Index::Scalar> box_search(
     const Index& index, std::type_identity_t<std::span<const typename Index::Box>> boxes,
@@ -260,8 +265,9 @@ enum class PairRows : std::uint32_t {
     full = 1,  // in both
 };
 
-/// The points within `radius` of each point, itself left out: one row for each point that the index
-/// was built from, invalid ones have none. Two points at the same place are neighbours.
+/// Finds the points within `radius` of each point of the index, itself left out. There is a row for
+/// each point that the caller gave; the row of a point that was left out is empty. Two points at
+/// the same place are neighbours. Throws as radius_search does.
 template <class Index>
 [[nodiscard]] PointLists<typename Index::Scalar> neighbour_lists(
     const Index& index, ScalarOf<Index> radius, PairRows rows,
@@ -275,9 +281,9 @@ bool visit_radius(const Index& index, const typename Index::Point& query,
                   bool (*call)(void*, std::uint32_t, typename Index::Scalar), void* data);
 }  // namespace detail
 
-/// Calls visit(index, distance) for the points within the radius, in the order of the tree, until
-/// it returns false; nothing is allocated. Returns whether all were visited. Throws InputError as
-/// `radius_search` does.
+/// Calls visit(index, distance) for the points within the radius, on the caller's thread and in the
+/// order of the tree, until it returns false. Nothing is allocated. Returns whether all were
+/// visited. Throws InputError as `radius_search` does, and what `visit` throws.
 template <class Index, class Visit>
 bool for_each_in_radius(const Index& index, const typename Index::Point& query,
                         ScalarOf<Index> radius, Visit&& visit) {

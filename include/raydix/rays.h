@@ -18,9 +18,9 @@ namespace raydix {
 enum class RayKind : std::uint32_t { primary, ao, diffuse, diffuse_shuffled };
 [[nodiscard]] std::string_view ray_kind_name(RayKind kind);
 
-/// One ray per pixel centre, pixels in 2-D Morton order (x in the lower bit); `pixels` (if not
-/// null) receives y * width + x of each ray. Directions are unit. Throws InputError that names the
-/// camera if it shows nothing, or a side is not 1..16384.
+/// Makes one ray for each pixel, through its center, in 2-D Morton order of pixels (x in the lower
+/// bit). Directions are of unit length. `pixels`, if not null, receives y * width + x of each ray.
+/// Throws InputError that names the camera: it shows nothing, or a side is not 1 to 16,384.
 [[nodiscard]] std::vector<Ray> make_primary_rays(const Camera& camera, std::uint32_t width,
                                                  std::uint32_t height,
                                                  std::vector<std::uint32_t>* pixels = nullptr);
@@ -30,33 +30,35 @@ struct SecondaryOptions {
     int samples = 32;        // rays per primary hit, 1..1024
     float ao_radius = 0.0f;  // tmax of ao rays; 0: 5 % of the box diagonal
     std::uint64_t seed = 1;  // of the per-pixel rotations
-    // By a 6-D Morton key: level by level from the highest bit, one bit each of origin x y z and
-    // direction x y z. Origin scaled to 2^24 in the box of all end points (origin, and the far end
-    // where tmax is finite), direction to 2^21. If not, rays follow the hits, `samples` in a row;
-    // diffuse_shuffled rays are permuted at random by `seed` in any case.
+    // true: rays are sorted by a 6-D Morton key, one bit each of origin x y z and direction x y z a
+    // level, from the highest on. Origins are scaled to 2^24 in the box of all end points, the far
+    // ends included where tmax is finite; directions are scaled to 2^21. false: rays follow the
+    // hits, `samples` in a row. diffuse_shuffled rays are permuted by `seed` in any case.
     bool sorted = true;
     int threads = 0;  // 0 to 1,024; 0: all the machine has
 };
 
-/// `samples` rays from each of `hits` (missed rays give none): Halton points (bases 2, 3),
-/// cosine-weighted about the geometric normal turned toward the ray, rotated by a hash of (pixel
-/// id, seed). Origins move back along the primary ray by 3e-6 of the box diagonal. rays, hits,
-/// pixels [n] -> [hits * samples] rays. The same for every thread count. Throws InputError: sizes
-/// that differ, an option out of range, a hit on a primitive that the tree does not hold.
+/// Makes `samples` rays from each of `hits`; misses give none. rays, hits, pixels [n] -> [hits *
+/// samples] rays. Directions are Halton points (bases 2, 3), cosine-weighted about the geometric
+/// normal that is turned toward the ray, and rotated by a hash of (pixel id, seed). Origins move
+/// back along the primary ray by 3e-6 of the box's diagonal. The rays do not depend on the number
+/// of threads. Throws InputError: sizes that differ, an option out of range, a hit on a primitive
+/// that the tree does not hold.
 [[nodiscard]] std::vector<Ray> make_secondary_rays(const Bvh& bvh, std::span<const Ray> rays,
                                                    std::span<const Hit> hits,
                                                    std::span<const std::uint32_t> pixels,
                                                    const SecondaryOptions& options);
-/// The same from hits of a scene, as its last commit left it; for a scene of one mesh the same
-/// rays. Normals are those of raydix/surface.h, turned toward the ray. Also throws if the scene was
-/// never committed, or does not have the path or the mesh of a hit.
+/// The same from hits of a scene, as its last commit left it. A scene of one mesh gives the same
+/// rays as its tree. Normals are those of raydix/surface.h, turned toward the ray. Throws
+/// InputError also if the scene was never committed, or does not have the path or the mesh of a
+/// hit.
 [[nodiscard]] std::vector<Ray> make_secondary_rays(const Scene& scene, std::span<const Ray> rays,
                                                    std::span<const Hit> hits,
                                                    std::span<const std::uint32_t> pixels,
                                                    const SecondaryOptions& options);
 
-/// NumPy files of shape (N, 8) float32: ox oy oz tmin dx dy dz tmax. Throws InputError that names
-/// the file.
+/// NumPy files of shape (N, 8), float32: ox oy oz tmin dx dy dz tmax (docs/contract.md 5). Reading
+/// takes float64 too and rounds it. Throws InputError that names the file.
 [[nodiscard]] std::vector<Ray> load_rays(const std::filesystem::path& file);
 void save_rays(const std::filesystem::path& file, std::span<const Ray> rays);
 
@@ -65,14 +67,16 @@ enum class HitFields : std::uint32_t {
     scene = 1,  // geometry and instance behind them
 };
 
-/// NumPy files of shape (N,) with named fields.
+/// Writes a NumPy file of shape (N,) with named fields (docs/contract.md 9). Throws as write_file
+/// of files.h.
 void save_hits(const std::filesystem::path& file, std::span<const Hit> hits,
                HitFields fields = HitFields::tree);
 
-/// A NumPy file of shape (N,) uint8: what trace_any says of each ray.
+/// Writes a NumPy file of shape (N,) uint8: what trace_any says of each ray.
 void save_occluded(const std::filesystem::path& file, std::span<const std::uint8_t> occluded);
 
-/// A NumPy file of shape (N + 1,) uint64: where the hits of each of N rays begin, and the end.
+/// Writes a NumPy file of shape (N + 1,) uint64: where the hits of each of N rays begin, and the
+/// end.
 void save_offsets(const std::filesystem::path& file, std::span<const std::uint64_t> offsets);
 
 }  // namespace raydix

@@ -13,9 +13,9 @@
 
 namespace raydix {
 
-/// Versioned, little-endian, 64-byte aligned sections, a checksum (XXH3-128) per section and one
-/// over the header. Writes as write_file of files.h, so that a reader never sees half a file.
-/// Throws InputError.
+/// Saves a tree with the model that it was built from (docs/rdx-format.md). Writes as write_file of
+/// files.h, so that a reader never sees half a file. Throws InputError: a tree that does not belong
+/// to the model, a file that cannot be written.
 void save_rdx(const std::filesystem::path& file, const Bvh& bvh, const Model& scene);
 
 struct RdxFile {
@@ -23,15 +23,16 @@ struct RdxFile {
     Bvh bvh;  // views the mapped file, which stays mapped as long as the tree lives
 };
 
-/// Maps the file, compares lengths and checksums, then validates children, ranges, acyclicity and
-/// geometry in O(n) before anything is used: a right checksum proves nothing. Throws InputError:
-/// "FILE: SECTION: reason".
+/// Loads a tree. Maps the file, compares lengths and checksums, then validates children, ranges,
+/// acyclicity and geometry in O(n) before anything is used. The file must not be changed in place
+/// while the tree lives; to replace it by renaming is safe. Throws InputError: "FILE: SECTION:
+/// reason".
 [[nodiscard]] RdxFile load_rdx(const std::filesystem::path& file);
 
-/// Saves a scene as its last commit left it, with all scenes that it shows, each of them once, and
-/// with the vertices and triangles of its meshes. Of ids it keeps which were given. Throws
-/// InputError: changes that no commit has taken in, shared arrays that changed since the commit, a
-/// file that cannot be written.
+/// Saves a scene as its last commit left it, with all scenes that stand in it, each of them once,
+/// and with the vertices and triangles of its meshes. Ids that were given stay given. Throws
+/// InputError: changes that no commit has taken in; spheres, capsules, points or user geometry
+/// (they are named); shared arrays that changed since the commit; a file that cannot be written.
 void save_rdx(const std::filesystem::path& file, const Scene& scene, const std::string& name = {},
               const CameraSet& cameras = {});
 
@@ -55,8 +56,8 @@ struct RdxScene {
     double load_ms = 0;
 };
 
-/// Maps a file that holds a scene and validates it as load_rdx does. Rays have the hits of the
-/// scene that was saved, bit for bit. Throws InputError: "FILE: SECTION: reason".
+/// Loads a scene. Maps the file and validates it as load_rdx does. Rays have the hits of the scene
+/// that was saved, bit for bit. Throws InputError: "FILE: SECTION: reason".
 [[nodiscard]] RdxScene load_rdx_scene(const std::filesystem::path& file);
 
 /// Whether an .rdx file holds a scene (load_rdx_scene), not a tree (load_rdx). Reads its header

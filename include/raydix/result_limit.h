@@ -9,10 +9,10 @@
 
 namespace raydix {
 
-/// What `max_result_bytes` = 0 stands for at this moment: half of what is left to the process. That
-/// is MemAvailable of the system or the limit of its control group minus the use, file caches left
-/// out, whichever is less; on other systems than Linux the physical memory. A call that takes less
-/// than 4 MiB does not ask.
+/// What `max_result_bytes` = 0 stands for at this moment: half of what is left to the process. On
+/// Linux that is the less of two numbers: MemAvailable of the system, and the limit of the control
+/// group minus its use without file caches. On other systems it is the physical memory. A call that
+/// takes less than 4 MiB does not ask.
 [[nodiscard]] std::uint64_t usual_result_bytes();
 
 /// Throws ResultTooLarge if `bytes` are more than `max_result_bytes`, or than half of what is left

@@ -1,5 +1,6 @@
 // What rays are traced through: triangle meshes, spheres, capsules, points with a radius, geometry
-// of the caller's own, and instances of other scenes; in float and in double.
+// of the caller's own, and instances of other scenes. In float; meshes and instances also in
+// double. Exact rules: docs/contract.md 1 and 3. Common questions: docs/questions.md.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -58,10 +59,10 @@ struct SceneTypes<double> {
     using AllHits = AllHitsD;
 };
 
-/// What happens to a scene after its first commit.
+/// How much a scene changes after its first commit. Hits do not depend on it.
 enum class Usage : std::uint32_t {
-    fixed = 0,   // little: meshes share trees, and a change of one builds its tree again
-    moving = 1,  // much: a tree a mesh; a commit refits or builds those of meshes that changed
+    fixed = 0,   // little. Meshes share trees; a change of one builds their tree again
+    moving = 1,  // much. Each mesh has a tree; a commit refits or builds those that changed
 };
 
 struct SceneOptions {
@@ -69,21 +70,23 @@ struct SceneOptions {
     Usage usage = Usage::fixed;
     bool compact = false;  // the small layout (WideBvhOptions::compact); no effect in double
     int threads = 0;       // 0 to 1,024; 0: all the machine has. Hits do not depend on it
-    /// Usage::moving: a mesh whose vertices moved keeps its tree, with boxes fitted again, while
-    /// the tree's SAH is at most so many times that at its build. So does the tree over meshes and
-    /// instances while it holds as many of them. Below 1: it is always built
-    /// again. So are compact trees, those that hold parts of triangles (quality high), and those of
-    /// meshes where a triangle comes, goes, gets an area or loses it.
+    /// Usage::moving only. How many times its SAH at the build a tree may cost and still be kept:
+    /// its boxes are then fitted again around the moved vertices. A tree that costs more is built
+    /// again. Below 1 every changed tree is built again. A tree is also built again if it is
+    /// compact, if it holds parts of triangles (quality high), or if a triangle of its mesh comes,
+    /// goes, gets an area or loses it. The tree over meshes and instances follows the same rule
+    /// while it holds the same of them.
     double refit_limit = 1.5;
-    /// Called with the part of the commit that is done, 0..1 and at last 1, on any thread, one at a
-    /// time, while others build; it may trace the scene. What it throws ends the commit, the scene
-    /// as it was, and it is not called again.
+    /// Called with the part of the commit that is done, from 0 to 1; the last call has 1. Calls
+    /// come on any thread, one at a time, while other threads build. It may trace the scene. What
+    /// it throws ends the commit: the scene stays as it was, and no more calls come.
     std::function<void(double)> progress = {};
 };
 
-/// Of a geometry. Rays see it if mask & their mask is not 0, and the same holds for each instance
-/// on the way to it.
+/// Options of one geometry.
 struct GeometryOptions {
+    /// A ray sees the geometry if this mask & the ray's is not 0, and so for each instance on the
+    /// way to it.
     std::uint32_t mask = 0xFFFFFFFFu;
     std::optional<std::uint32_t> id = {};  // none: the next one
 };
@@ -91,24 +94,32 @@ struct GeometryOptions {
 /// What a commit did.
 struct CommitReport {
     double ms = 0;
-    std::uint64_t meshes = 0, instances = 0;  // of the scene itself
-    std::uint64_t triangles = 0;              // of its meshes
-    std::uint64_t shapes = 0;                 // its geometries that are neither
-    std::uint64_t primitives = 0;             // of those
-    std::uint64_t trees_built = 0;     // of triangles and primitives; those that did not change are
-                                       // kept
-    std::uint64_t trees_refitted = 0;  // instead
-    double sah_ratio = 1;  // the largest SAH after a refit / at the build; above refit_limit:
-                           // that tree was built again
-    bool parts_refitted = false;  // the tree over meshes and instances, instead of a new one
+    std::uint64_t meshes = 0, instances = 0;  // in the scene itself; meshes that have triangles
+    std::uint64_t triangles = 0;              // of its meshes, those that are left out included
+    std::uint64_t shapes = 0;                 // its geometries that are neither mesh nor instance
+    std::uint64_t primitives = 0;             // of those shapes
+    std::uint64_t trees_built = 0;            // trees of triangles and shapes that were built
+    std::uint64_t trees_refitted = 0;  // those whose boxes were fitted again; others were kept
+    double sah_ratio = 1;  // the largest SAH after a refit / at the build. Above refit_limit: that
+                           // tree was built again
+    bool parts_refitted = false;  // the tree over meshes and instances was refitted, not built
     std::uint64_t bytes = 0;      // what rays read of the scene itself
-    std::uint64_t paths = 0;      // instances, counted on every way to them
+    std::uint64_t paths = 0;      // ways to instances: each instance counts on every way to it
 };
 
-/// Meshes, shapes, and instances of other scenes, which may hold instances themselves. Changes take
-/// effect with `commit`; until then rays meet what the last one saw. Any number of threads may
-/// trace a scene at once; changes and commits need it for themselves. Scalar: float or double, of
-/// all coordinates; a scene holds instances of scenes of its own type.
+/// Holds meshes, shapes, and instances of other scenes, which may hold instances themselves.
+///
+/// Changes take effect with `commit`. Until then rays and queries meet what the last commit saw.
+/// Any number of threads may trace one scene and ask it at once. Changes and commits need the scene
+/// for themselves. They do not disturb rays through other scenes in which this one stands: those
+/// meet what their own last commit saw.
+///
+/// Triangles and shapes that are not finite or out of range are left out (docs/contract.md 1): rays
+/// never meet them, and the others keep their numbers.
+///
+/// Scalar is the type of all coordinates, float or double. A scene holds instances of scenes of its
+/// own type alone. A copy is not possible; a scene that was moved from may only be assigned to or
+/// destroyed.
 template <class Scalar>
 class BasicScene {
 public:
@@ -122,73 +133,85 @@ public:
     using Capsule = typename Types::Capsule;
     using UserGeometry = BasicUserGeometry<Scalar>;
 
-    /// Levels of instances, at most.
+    /// Most levels of instances in each other.
     static constexpr std::uint32_t max_levels = 32;
 
     BasicScene();
-    /// One mesh with id 0, committed.
+    /// One mesh with id 0, copied and committed. Throws InputError as `add` and `commit` do.
     explicit BasicScene(const MeshView& mesh, const SceneOptions& options = {});
     explicit BasicScene(const Mesh& mesh, const SceneOptions& options = {});
+    /// The model's meshes as geometries and its nodes as instances, committed (docs/scenes.md).
     explicit BasicScene(const Model& model, const SceneOptions& options = {});
     ~BasicScene();
     BasicScene(BasicScene&&) noexcept;
     BasicScene& operator=(BasicScene&&) noexcept;
 
     /// Adds a mesh, of which the scene keeps a copy. Returns its id: 0, 1, 2, ... in the order of
-    /// calls. Throws InputError: an index past the vertices, vertices without triangles, an id that
-    /// was used before.
+    /// calls, or `options.id`. An id is given once, never again after `remove`. Throws InputError,
+    /// and nothing is added: an index past the vertices, vertices without triangles, an id that was
+    /// given before.
     std::uint32_t add(const MeshView& mesh, const GeometryOptions& options = {});
     std::uint32_t add(const Mesh& mesh, const GeometryOptions& options = {});
-    /// The same without a copy: the arrays must outlive the scene, or its last commit with this
-    /// mesh.
+    /// The same without a copy. The caller keeps the arrays as they are, as long as the scene lives
+    /// or until it is committed without them. To change them, call `update`.
     std::uint32_t share(const MeshView& mesh, const GeometryOptions& options = {});
-    /// Adds spheres, capsules, or points of one radius, of which the scene keeps a copy: `prim`
-    /// counts them. Rays hit their surfaces from both sides; one that starts inside hits where it
+    /// Adds spheres, capsules, or points of one radius, of which the scene keeps a copy. `prim`
+    /// counts them. Rays hit their surfaces from both sides. A ray that starts inside hits where it
     /// leaves. t is computed in double and rounded once. `u` of a capsule's hit is the place along
-    /// its axis, 0 at a and 1 at b; else u and v are 0. Rays that start beyond 1.7e38 may miss
-    /// them. Those that are not finite, have a negative radius or reach beyond 1e12 are left out.
-    /// Throws InputError for an id that was used before, and in double, which has none of them yet.
+    /// its axis, 0 at a and 1 at b; other u and v are 0. Shapes that are not finite, have a
+    /// negative radius or reach beyond 1e12 are left out. Rays that start beyond 1.7e38 may miss
+    /// shapes. Throws InputError: an id that was given before; always in a SceneD, which has no
+    /// shapes yet.
     std::uint32_t add(std::span<const Sphere> spheres, const GeometryOptions& options = {});
     std::uint32_t add(std::span<const Capsule> capsules, const GeometryOptions& options = {});
     std::uint32_t add(std::span<const Point> points, Scalar radius,
                       const GeometryOptions& options = {});
-    /// Primitives that a function of the caller's intersects. The scene keeps a copy of it and of
-    /// the boxes.
+    /// Adds primitives that a function of the caller's intersects (user_geometry.h). The scene
+    /// keeps a copy of the function and of the boxes. Throws InputError as for shapes.
     std::uint32_t add(const UserGeometry& geometry, const GeometryOptions& options = {});
-    /// Places another scene: as its last commit left it when this one is committed. Throws
-    /// InputError: a transform that is singular or not finite, a scene that would hold itself.
+    /// Adds an instance of another scene. A commit of this scene takes the other one as its own
+    /// last commit left it; later commits of the other one show with the next commit of this one.
+    /// The other scene may be destroyed. Throws InputError: a transform that is singular or not
+    /// finite, a scene that would hold itself.
     std::uint32_t add(const BasicScene& scene, const Transform& transform,
                       const GeometryOptions& options = {});
-    /// The id is not given again. Throws InputError if there is no such geometry; so do all below.
+    /// Removes a geometry. Others keep their ids; this one is not given again. Throws InputError if
+    /// there is no such geometry, as all calls below do.
     void remove(std::uint32_t id);
-    /// Other vertices or triangles. A shared mesh stays shared, with these arrays.
+    /// Replaces vertices and triangles of a mesh. A shared mesh stays shared, with these arrays.
+    /// Throws InputError as `add` does, and for a geometry that is no mesh.
     void update(std::uint32_t id, const MeshView& mesh);
-    /// Other shapes of the same kind.
+    /// Replaces shapes by others of the same kind. Throws InputError for another kind.
     void update(std::uint32_t id, std::span<const Sphere> spheres);
     void update(std::uint32_t id, std::span<const Capsule> capsules);
     void update(std::uint32_t id, std::span<const Point> points, Scalar radius);
     void update(std::uint32_t id, const UserGeometry& geometry);
+    /// Moves an instance. Throws InputError as `add` does, and for a geometry that is none.
     void set_transform(std::uint32_t id, const Transform& transform);
     void set_mask(std::uint32_t id, std::uint32_t mask);
 
-    /// Takes all changes in. Throws InputError, the last commit still stands: an instance of a
-    /// scene without a commit, one that reaches beyond the range of coordinates (contract.md 1),
-    /// more than max_levels levels or 2^32 - 2 paths.
+    /// Takes all changes in: rays meet them from then on. Throws InputError, and the last commit
+    /// still stands: an option out of range, an instance of a scene without a commit, one that
+    /// reaches beyond the range of coordinates (docs/contract.md 1), more than max_levels levels or
+    /// 2^32 - 2 paths.
     CommitReport commit(const SceneOptions& options = {});
     [[nodiscard]] bool committed() const;  // nothing changed since the last commit
 
-    [[nodiscard]] std::uint32_t size() const;  // geometries
+    /// Number of geometries. This call and the four below answer from the changes, those without a
+    /// commit included.
+    [[nodiscard]] std::uint32_t size() const;
     [[nodiscard]] bool contains(std::uint32_t id) const;
     [[nodiscard]] std::vector<std::uint32_t> ids() const;  // ascending
-    /// The arrays of a mesh, changes without a commit included: valid until its next change. None
-    /// for an instance. Throws InputError if there is no such geometry.
+    /// The arrays of a mesh. They are valid until its next change. None for what is no mesh. Throws
+    /// InputError if there is no such geometry.
     [[nodiscard]] std::optional<MeshView> mesh(std::uint32_t id) const;
     /// Throws InputError if there is no such geometry.
     [[nodiscard]] std::uint32_t mask(std::uint32_t id) const;
-    /// Of the last commit: around all triangles and shapes; lo > hi if there are none.
+    /// The box around all triangles and shapes of the last commit; lo > hi if there are none.
+    /// Throws InputError without a commit.
     [[nodiscard]] Box bounds() const;
-    /// Of the last commit: the ids of the instances on path `number` of a hit, the outermost first.
-    /// Empty for 0. Throws InputError if there is no such path.
+    /// The ids of the instances on path `number` of a hit, the outermost first, in the last commit.
+    /// Empty for 0. Throws InputError without a commit, or if there is no such path.
     [[nodiscard]] std::vector<std::uint32_t> path(std::uint32_t number) const;
 
 private:
@@ -200,16 +223,21 @@ private:
 extern template class BasicScene<float>;
 extern template class BasicScene<double>;
 using Scene = BasicScene<float>;
-/// In double: hits have the bits of trees of <raydix/double.h>. Rays go through the same wide trees
-/// as in float, and meet the triangles in double.
+/// In double. Rays go through the same wide trees as in float and meet the triangles in double.
+/// Hits have the bits of trees of <raydix/double.h>.
 using SceneD = BasicScene<double>;
 
-/// Which hits count: alpha tests, the triangle that a ray starts on, masks of one's own. `place`:
-/// of the ray among those of the call, 0 for a single one; `ray`: as the caller gave it. Called
-/// from several threads at once, any number of times for each hit, also for hits that turn out not
-/// to be the closest, in any order; so its answer may depend on its arguments alone. Each triangle
-/// or shape has one hit on a ray: the first within [tmin, tmax]. If that is refused, the next one
-/// is of another. What it throws comes out of the call that traces.
+/// Says whether a hit counts: for alpha tests, the triangle that a ray starts on, masks of one's
+/// own. `place` is the number of the ray in the call, 0 for a single ray. `ray` is as the caller
+/// gave it.
+///
+/// Calls come from several threads at once and in any order. A hit may be asked about any number of
+/// times, also one that turns out not to be the closest. So the answer may depend on the arguments
+/// alone. A filter must not call functions of the library that trace or query. What it throws comes
+/// out of the call that traces.
+///
+/// Each triangle or shape has one hit on a ray, the first within [tmin, tmax]. Where that one is
+/// refused, the ray goes on to other triangles and shapes.
 using HitFilter = std::function<bool(std::size_t place, const Ray& ray, const Hit& hit)>;
 
 /// The same in double.
@@ -217,22 +245,28 @@ using HitFilterD = std::function<bool(std::size_t place, const RayD& ray, const 
 
 struct SceneTraceOptions {
     std::uint32_t mask = 0xFFFFFFFFu;           // of all rays
-    std::span<const std::uint32_t> masks = {};  // of each ray, [rays], instead; or empty
+    std::span<const std::uint32_t> masks = {};  // [rays], one for each ray instead; or empty
     int threads = 0;                            // 0 to 1,024; 0: all the machine has
     SimdPath path = SimdPath::automatic;        // hits do not depend on it
     std::string isa = {};                       // one of simd_instruction_sets(); empty: the best
-    HitFilter filter = {};                      // of a Scene; empty: all hits count
-    HitFilterD filter_d = {};                   // of a SceneD
-    /// trace_all only: bounds the peak of the call. 0: half of what is left (result_limit.h).
+    HitFilter filter = {};                      // for a Scene; empty: all hits count
+    HitFilterD filter_d = {};                   // for a SceneD
+    /// trace_all only: the most bytes that the call may hold. 0: half of what is left to the
+    /// process (result_limit.h).
     std::uint64_t max_result_bytes = 0;
 };
 
-/// Closest hit of each ray: the least (t, instance, geometry, prim) over all triangles that the
-/// watertight test accepts (Woop, Benthin, Wald 2013; edges belong to both triangles) and all
-/// shapes that it meets. Rays go
-/// through each instance's inverse in double and are rounded once, where the mesh is; in double the
-/// translation comes first, so that a place far from the origin costs no digits. rays [n] ->
-/// hits [n]. Throws InputError: sizes that differ, a scene that was never committed.
+/// Finds the closest hit of each ray: the least (t, instance, geometry, prim). rays [n] -> hits
+/// [n]. The hits have the same bits for every quality, layout, path, instruction set and number of
+/// threads (docs/contract.md 3).
+///
+/// Triangles are tested by the watertight test of Woop, Benthin and Wald (2013): an edge belongs to
+/// both triangles, and no ray slips between. A ray goes through the inverse of each instance in
+/// double and is rounded once, where the triangles are. t stays in units of the caller's direction.
+/// Invalid rays (types.h) miss and are counted.
+///
+/// Throws InputError: sizes that differ, a scene that was never committed, an option out of range,
+/// an instruction set that this processor does not have.
 TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<Hit> hits,
                   const SceneTraceOptions& options = {});
 TraceCounts trace(const SceneD& scene, std::span<const RayD> rays, std::span<HitD> hits,
@@ -241,29 +275,30 @@ TraceCounts trace(const SceneD& scene, std::span<const RayD> rays, std::span<Hit
                                      const SceneTraceOptions& options = {});
 [[nodiscard]] std::vector<HitD> trace(const SceneD& scene, std::span<const RayD> rays,
                                       const SceneTraceOptions& options = {});
-/// Whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n].
+/// Says whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n]. Errors as above.
 TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const SceneTraceOptions& options = {});
 TraceCounts trace_any(const SceneD& scene, std::span<const RayD> rays,
                       std::span<std::uint8_t> occluded, const SceneTraceOptions& options = {});
 
-/// All hits of all rays, those of one ray sorted by (t, instance, geometry, prim). Each triangle at
-/// most once on every path. Edges are half open (exact sign, then a top-left
-/// rule), so that the number of crossings of a closed mesh is right for rays through edges and
+/// Finds all hits of all rays, those of one ray sorted by (t, instance, geometry, prim). Each
+/// triangle or shape comes at most once on every path. An edge belongs to one of its triangles
+/// here, so that the number of crossings of a closed mesh is right for rays through edges and
 /// vertices too. Throws ResultTooLarge, an InputError, if the call would take more than
-/// options.max_result_bytes.
+/// options.max_result_bytes; no hit is ever dropped. Other errors as above.
 [[nodiscard]] AllHits trace_all(const Scene& scene, std::span<const Ray> rays,
                                 const SceneTraceOptions& options = {});
 [[nodiscard]] AllHitsD trace_all(const SceneD& scene, std::span<const RayD> rays,
                                  const SceneTraceOptions& options = {});
 
-/// One ray, on the caller's thread.
+/// One ray, on the caller's thread: the same bits as in a batch. Throws InputError if the scene was
+/// never committed.
 [[nodiscard]] Hit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask = 0xFFFFFFFFu);
 [[nodiscard]] HitD closest_hit(const SceneD& scene, const RayD& ray,
                                std::uint32_t mask = 0xFFFFFFFFu);
 [[nodiscard]] bool any_hit(const Scene& scene, const Ray& ray, std::uint32_t mask = 0xFFFFFFFFu);
 [[nodiscard]] bool any_hit(const SceneD& scene, const RayD& ray, std::uint32_t mask = 0xFFFFFFFFu);
-/// Of the hits that `filter` accepts.
+/// The same among the hits that `filter` accepts.
 [[nodiscard]] Hit closest_hit(const Scene& scene, const Ray& ray, const HitFilter& filter,
                               std::uint32_t mask = 0xFFFFFFFFu);
 [[nodiscard]] HitD closest_hit(const SceneD& scene, const RayD& ray, const HitFilterD& filter,

@@ -11,8 +11,8 @@
 
 namespace raydix {
 
-/// Within one scene first < second; between two, `first` is of the first scene and `second` of the
-/// second.
+/// Within one scene first < second. Between two scenes `first` is of the first one and `second` of
+/// the second one.
 struct ScenePair {
     ScenePrimitive first, second;
 
@@ -20,7 +20,7 @@ struct ScenePair {
 };
 static_assert(sizeof(ScenePair) == 24);
 
-/// Of one scene, instances counted on every way to them.
+/// What one scene gave; instances count on every way to them.
 struct ScenePairCounts {
     std::uint64_t triangles = 0;
     std::uint64_t left_out = 0;  // of those: not finite, or out of range (mesh.h)
@@ -32,22 +32,26 @@ struct ScenePairs {
 };
 
 struct ScenePairOptions {
-    bool narrow = false;  // the triangles themselves must have a point in common, not only their
-                          // boxes; decided without rounding, coplanar ones included
+    bool narrow = false;  // true: the triangles themselves must have a point in common, decided
+                          // without rounding, coplanar ones included. false: their boxes
     std::uint32_t mask = 0xFFFFFFFFu;  // as that of a ray: which geometries and instances count
-    /// Bounds the peak of the call: the copy of all triangles, its tree, and the pairs if they are
-    /// kept. 0: half of what is left (result_limit.h).
+    /// The most bytes that the call may hold: the copy of all triangles, its tree, and the pairs if
+    /// they are kept. 0: half of what is left to the process (result_limit.h).
     std::uint64_t max_result_bytes = 0;
     int threads = 0;  // 0 to 1,024; 0: all the machine has. Results do not depend on it
 };
 
-/// As overlapping_pairs of one mesh that holds all triangles of the scene's last commit, on every
-/// path of instances, moved in double and rounded once (docs/algorithms/queries.md): each pair
-/// once, sorted. Pairs within one scene that share a corner (the same place in the world, bit for
-/// bit) are left out. None is ever dropped. Throws InputError: a scene that was never committed;
-/// spheres, capsules, points or user geometry, which it names; more than 2^31 - 1 triangles on all
-/// paths. ResultTooLarge: the call would take more than options.max_result_bytes; what copies and
-/// trees take is known before any of it is there.
+/// Finds all pairs of triangles whose boxes overlap or, with `narrow`, that meet themselves. Each
+/// pair comes once, sorted. None is ever dropped.
+///
+/// The answer is that of overlapping_pairs on one mesh of all triangles of the last commit: on
+/// every path of instances, moved in double and rounded once (docs/algorithms/queries.md). Pairs
+/// within one scene that share a corner (the same place in the world, bit for bit) are left out.
+///
+/// Throws InputError: a scene that was never committed; spheres, capsules, points or user geometry
+/// that the mask shows (they are named); more than 2^31 - 1 triangles on all paths. Throws
+/// ResultTooLarge, an InputError, if the call would take more than options.max_result_bytes; for
+/// copies and trees it does so before any of them is made.
 [[nodiscard]] ScenePairs overlapping_pairs(const Scene& scene,
                                            const ScenePairOptions& options = {});
 [[nodiscard]] ScenePairs overlapping_pairs(const SceneD& scene,
@@ -58,7 +62,7 @@ struct ScenePairOptions {
 [[nodiscard]] ScenePairs overlapping_pairs(const SceneD& a, const SceneD& b,
                                            const ScenePairOptions& options = {});
 
-/// How many there are, without keeping them.
+/// Counts the pairs without keeping them.
 [[nodiscard]] std::uint64_t count_overlapping_pairs(const Scene& scene,
                                                     const ScenePairOptions& options = {});
 [[nodiscard]] std::uint64_t count_overlapping_pairs(const SceneD& scene,

@@ -16,20 +16,28 @@
 
 namespace raydix {
 
-/// All calls of this header answer from the scene's last commit. The triangles of an instance are
-/// those that its vertices make in the world: moved by each transform in turn, the innermost first,
-/// in double, and rounded to float once. So the answers are those of one mesh of all triangles, ids
-/// apart. Triangles without area, which rays never hit, count here as segments or points. Spheres,
-/// capsules and points answer closest points and touch as closed balls and capsules; a query inside
-/// is at distance 0. Where they stand in instances that stretch or shear, their images answer, in
-/// double. All throw InputError: a scene that was never committed, user geometry that the mask
-/// shows (it is named), an instruction set that this processor does not have.
+/// All calls of this header answer from the scene's last commit. Any number of threads may ask at
+/// once, beside others that trace. Answers have the same bits for every number of threads and
+/// instruction set.
+///
+/// Vertices of an instance are moved by each transform in turn, the innermost first, in double, and
+/// rounded to float once. So the answers are those of one mesh of all triangles, ids apart.
+/// Triangles without area, which rays never hit, count here as segments or points.
+///
+/// Spheres, capsules and points answer closest points and touch. They are closed bodies there: a
+/// query inside is at distance 0. Where an instance stretches or shears them, their images answer,
+/// in double.
+///
+/// A query with a coordinate that is NaN or infinite finds nothing and is counted.
+///
+/// All calls throw InputError: a scene that was never committed, user geometry that the mask shows
+/// (it is named), an instruction set that this processor does not have.
 ///
 /// `instance` counts as in hits of rays: 0 is the scene itself, others are for Scene::path.
 
-/// The closest point of a scene to a query. position, distance, u and v are as in ClosestPoint; of
-/// a sphere u and v are 0, of a capsule u is the place along its axis, from 0 at a to 1 at b.
-/// Nothing found: no_primitive and infinity.
+/// The closest point of a scene to a query. position, distance, u and v are as in ClosestPoint. Of
+/// a sphere u and v are 0. Of a capsule u is the place along its axis, from 0 at a to 1 at b. If
+/// nothing is found prim is no_primitive and the distance infinity.
 struct SceneClosestPoint {
     Vec3 position{infinity, infinity, infinity};
     float distance = infinity;
@@ -49,10 +57,9 @@ struct SceneClosestOptions {
                            // on it
 };
 
-/// For each query the least (d2, instance, geometry, prim) over all triangles and shapes, d2 as in
-/// closest.h. queries [n] -> results [n]. Any order of queries will do: they are taken along a
-/// Morton curve. Throws InputError also for sizes that differ and for a max_distance that is
-/// negative or NaN.
+/// Finds for each query the least (d2, instance, geometry, prim) over all triangles and shapes, d2
+/// as in closest.h. queries [n] -> results [n], in any order. Throws InputError also for sizes that
+/// differ and for a max_distance that is negative or NaN.
 ClosestCounts closest_points(const Scene& scene, std::span<const Vec3> queries,
                              std::span<SceneClosestPoint> results,
                              const SceneClosestOptions& options = {});
@@ -71,10 +78,10 @@ struct SceneOverlapOptions {
     std::string isa = {};  // as in SceneClosestOptions
 };
 
-/// Whether each query has a point in common with any triangle or shape: 1 or 0. On triangles as
-/// touch_any of overlap.h. A sphere touches a shape if d2 <= radius * radius with the d2 of
-/// closest_points; a segment is decided in double there. queries [n] -> touched [n]. Throws
-/// InputError also for sizes that differ.
+/// Says whether each query has a point in common with any triangle or shape: 1 or 0. queries [n] ->
+/// touched [n]. Triangles are decided as by touch_any of overlap.h. A sphere touches a shape if
+/// d2 <= radius * radius with the d2 of closest_points. A segment and a shape are decided in
+/// double. Throws InputError also for sizes that differ.
 OverlapCounts touch_any(const Scene& scene, std::span<const Segment> queries,
                         std::span<std::uint8_t> touched, const SceneOverlapOptions& options = {});
 OverlapCounts touch_any(const Scene& scene, std::span<const Sphere> queries,
@@ -84,8 +91,8 @@ OverlapCounts touch_any(const Scene& scene, std::span<const Sphere> queries,
 [[nodiscard]] bool touches(const Scene& scene, const Sphere& sphere,
                            std::uint32_t mask = 0xFFFFFFFFu);
 
-/// A primitive of a scene: on which path of instances, of which geometry, and its number there.
-/// In this order they ascend.
+/// A primitive of a scene: the path of instances to it, its geometry, and its number there. They
+/// are compared in this order.
 struct ScenePrimitive {
     std::uint32_t instance, geometry, prim;
 
@@ -100,8 +107,8 @@ struct SceneOverlapLists {
     OverlapCounts counts;
 };
 
-/// As touch_any, but all of them, each once. None is ever dropped. Throws ResultTooLarge, an
-/// InputError, if the call would take more than options.max_result_bytes.
+/// As touch_any, but lists all that each query touches, each once. None is ever dropped. Throws
+/// ResultTooLarge, an InputError, if the call would take more than options.max_result_bytes.
 [[nodiscard]] SceneOverlapLists touch_all(const Scene& scene, std::span<const Segment> queries,
                                           const SceneOverlapOptions& options = {});
 [[nodiscard]] SceneOverlapLists touch_all(const Scene& scene, std::span<const Sphere> queries,
@@ -119,10 +126,10 @@ struct SceneSweepHit {
     [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
 };
 
-/// First contacts with triangles: for each sweep the least (t, instance, geometry, prim) of those
-/// with a finite t, as sweep_spheres of overlap.h. A sweep without a radius is a ray through the
-/// triangles as they are in the world. sweeps [n] -> hits [n]. Throws InputError also for sizes
-/// that differ and for spheres, capsules or points that the mask shows (they are named).
+/// Finds the first contact of each sweep with triangles: the least (t, instance, geometry, prim)
+/// with a finite t, as sweep_spheres of overlap.h. sweeps [n] -> hits [n]. A sweep without a radius
+/// is a ray through the triangles as they are in the world. Throws InputError also for sizes that
+/// differ and for spheres, capsules or points that the mask shows (they are named).
 OverlapCounts sweep_spheres(const Scene& scene, std::span<const SphereSweep> sweeps,
                             std::span<SceneSweepHit> hits, const SceneOverlapOptions& options = {});
 [[nodiscard]] std::vector<SceneSweepHit> sweep_spheres(const Scene& scene,

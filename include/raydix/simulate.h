@@ -132,7 +132,7 @@ struct Simulation {
 
 /// Rates in Mrays/s, all simulated.
 struct SimulatedRates {
-    double bound = 0;      // the issue limit alone (contract.md 7)
+    double bound = 0;      // the issue limit alone (docs/contract.md 7)
     double scheduled = 0;  // with the distribution of work and the tails of launches
     double memory = 0;     // the lower of `bound` and the memory limits; 0 without the memory model
     double simd_efficiency = 0;

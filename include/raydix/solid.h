@@ -15,23 +15,23 @@ namespace raydix {
 template <class Scalar>
 class BasicScene;  // <raydix/scene.h>
 
-/// What the edges of a mesh say of it. Corners at the same place are the same corner, whatever
-/// their indices.
+/// Whether a mesh encloses a body, told from its edges. Corners at the same place are the same
+/// corner, whatever their indices.
 enum class Closure : std::uint32_t {
     open = 0,     // some edge belongs to an odd number of triangles
-    closed = 1,   // none does, but not all neighbours turn the same way
+    closed = 1,   // no edge does, but not all neighbours turn the same way
     oriented = 2  // each edge is run through as often one way as the other
 };
 
-/// How inside is told from outside. The first two are decided without any rounding, at edges and
-/// vertices too: a point is inside if and only if it is, and a point of the surface is inside.
+/// How inside is told from outside. `crossings` and `parity` are exact for closed meshes: no point
+/// is ever put on the wrong side, and a point of the surface is inside. `winding` is for meshes
+/// with holes and is computed with rounding.
 enum class InsideRule : std::uint32_t {
     automatic = 0,  // crossings if oriented, parity if closed, else winding
-    crossings = 1,  // the winding number, the signed number of crossings to infinity, is not 0
-    parity = 2,     // the number of crossings is odd
-    winding = 3,    // the generalized winding number (Jacobson et al. 2013) is 1/2 or more in
-                    // absolute value: for meshes with holes. Far triangles are taken together
-                    // (Barill et al. 2018), with an error far below 1/2
+    crossings = 1,  // inside: the signed number of crossings on the way to infinity is not 0
+    parity = 2,     // inside: the number of crossings is odd
+    winding = 3,    // inside: the generalized winding number (Jacobson et al. 2013) is 1/2 or more
+                    // in magnitude. Far triangles are taken together (Barill et al. 2018)
 };
 
 struct SolidOptions {
@@ -39,31 +39,32 @@ struct SolidOptions {
     int threads = 0;  // 0 to 1,024; 0: all the machine has. Results do not depend on it
 };
 
-/// Of a scene as a body.
+/// Options of a scene as a body.
 struct SceneSolidOptions {
     InsideRule rule = InsideRule::automatic;
     std::uint32_t mask = 0xFFFFFFFFu;  // as that of a ray: which geometries and instances count
-    /// Bounds what the copy of all triangles, its tree and the solid take while they are made. 0:
-    /// half of what is left (result_limit.h).
+    /// The most bytes that the copy of all triangles, its tree and the solid may take while they
+    /// are made. 0: half of what is left to the process (result_limit.h).
     std::uint64_t max_result_bytes = 0;
     int threads = 0;  // 0 to 1,024; 0: all the machine has. Results do not depend on it
 };
 
-/// Triangles as the boundary of a body. Made in O(n log n) once: edges are matched, and for
-/// `winding` sums of normals are made.
+/// Triangles as the boundary of a body. Making one takes O(n log n): edges are matched, and
+/// `winding` also sums normals. Any number of threads may ask a solid at once.
 class Solid {
 public:
-    /// Refers to the tree, which must outlive it and stay as it is. Throws InputError: a tree that
-    /// holds boxes or points; more than 1.4e9 triangles.
+    /// Refers to the tree. The caller keeps it as it is, as long as the solid lives. Throws
+    /// InputError: a tree that holds boxes or points; more than 1.4e9 triangles.
     explicit Solid(const Bvh& bvh, const SolidOptions& options = {});
     /// The same, and keeps the tree, which must not be null.
     explicit Solid(std::shared_ptr<const Bvh> bvh, const SolidOptions& options = {});
-    /// All meshes of the scene's last commit, on every path of instances, as one body: crossings
-    /// are summed, an edge may belong to triangles of several geometries. Makes a tree of its own
-    /// over all triangles, moved to the world in double and rounded once; two corners change places
-    /// where a path mirrors. Refers to nothing of the scene. Throws InputError: a scene that was
-    /// never committed; spheres, capsules, points or user geometry, which it names; more than 1.4e9
-    /// triangles. ResultTooLarge, before anything is made: it would take more than
+    /// Takes all meshes of the scene's last commit, on every path of instances, as one body.
+    /// Crossings are summed, and an edge may belong to triangles of several geometries. Makes a
+    /// tree of its own and refers to nothing of the scene. Vertices are moved to the world in
+    /// double and rounded once. Where a path mirrors, two corners change places, so that the
+    /// outside stays outside. Throws InputError: a scene that was never committed; spheres,
+    /// capsules, points or user geometry that the mask shows (they are named); more than 1.4e9
+    /// triangles. Throws ResultTooLarge before anything is made, if it would take more than
     /// options.max_result_bytes.
     explicit Solid(const BasicScene<float>& scene, const SceneSolidOptions& options = {});
     ~Solid();
@@ -73,9 +74,10 @@ public:
     [[nodiscard]] Closure closure() const;
     /// Never `automatic`.
     [[nodiscard]] InsideRule rule() const;
-    /// Edges that belong to an odd number of triangles.
+    /// Number of edges that belong to an odd number of triangles.
     [[nodiscard]] std::uint64_t open_edges() const;
-    /// Of a scene: the tree over all of its triangles, numbered by (instance, geometry, prim).
+    /// The tree that the solid asks. Of a scene it is that over all triangles, numbered by
+    /// (instance, geometry, prim).
     [[nodiscard]] const Bvh& bvh() const;
 
 private:
@@ -84,23 +86,26 @@ private:
     std::unique_ptr<State> state_;
 };
 
-/// 1 for each query that is inside. Non-finite queries are outside, and counted; `found` counts
-/// those inside. queries [n] -> inside [n]. Throws InputError if the sizes differ.
+/// Says whether each query is inside: 1 or 0. queries [n] -> inside [n]. `found` counts those
+/// inside. Queries that are not finite are outside and are counted. Throws InputError if the sizes
+/// differ.
 ClosestCounts contains(const Solid& solid, std::span<const Vec3> queries,
                        std::span<std::uint8_t> inside, int threads = 0);
 [[nodiscard]] bool contains(const Solid& solid, Vec3 query);
 
-/// The distances of closest_points, negative inside. Those beyond options.max_distance are
-/// infinite, with their sign. Non-finite queries: infinity, counted. queries [n] -> distances [n].
-/// Throws InputError: sizes that differ, a max_distance that is negative or NaN.
+/// Computes the distances of closest_points, negative inside. queries [n] -> distances [n]. A
+/// distance beyond options.max_distance is infinite, with its sign. A query that is not finite gets
+/// infinity and is counted. Throws InputError: sizes that differ, a max_distance that is negative
+/// or NaN.
 ClosestCounts signed_distances(const Solid& solid, std::span<const Vec3> queries,
                                std::span<float> distances, const ClosestOptions& options = {});
 [[nodiscard]] std::vector<float> signed_distances(const Solid& solid, std::span<const Vec3> queries,
                                                   const ClosestOptions& options = {});
 [[nodiscard]] float signed_distance(const Solid& solid, Vec3 query);
 
-/// Winding numbers by the solid's rule: whole numbers by `crossings` (0 on the surface), 0 or 1 by
-/// `parity`, else the generalized ones. NaN for non-finite queries. queries [n] -> [n].
+/// Computes winding numbers by the solid's rule. queries [n] -> numbers [n]. `crossings` gives
+/// whole numbers, 0 on the surface. `parity` gives 0 or 1. `winding` gives the generalized numbers,
+/// the same for every number of threads. A query that is not finite gets NaN.
 [[nodiscard]] std::vector<double> winding_numbers(const Solid& solid, std::span<const Vec3> queries,
                                                   int threads = 0);
 

@@ -9,15 +9,18 @@
 
 namespace raydix {
 
-/// The point of each hit: (1-u-v)*v0 + u*v1 + v*v2 of its triangle, through the transforms of all
-/// instances on its path, the innermost first. Computed in double, rounded once; of a SceneD every
-/// sum and product is rounded to double. There the triangle, and each instance, adds an error of at
-/// most 2^-50 of the magnitudes it sums up: those of the corners; those of a row's products and its
-/// translation. A miss gives NaN. hits [n] -> points [n]. The vertices are those of the scene's
-/// last commit; of shared meshes they are read from the caller's arrays. `threads`: 0 to 1,024; 0:
-/// all the machine has. Throws InputError: sizes that differ, a scene that was never committed, a
-/// hit whose path, geometry or triangle the last commit does not have; the message names the first
-/// such hit.
+/// Computes the point of each hit: (1-u-v)*v0 + u*v1 + v*v2 of its triangle, moved through the
+/// transforms of all instances on its path, the innermost first. hits [n] -> points [n]. A miss
+/// gives NaN.
+///
+/// The vertices are those of the scene's last commit; those of shared meshes are read from the
+/// caller's arrays. Sums are in double. The point of a Scene is rounded to float once. In a SceneD
+/// every step is rounded: the triangle and each instance add an error of at most 2^-50 of what they
+/// sum up.
+///
+/// `threads`: 0 to 1,024; 0: all the machine has. Throws InputError: sizes that differ, a scene
+/// that was never committed, a hit whose path, geometry or triangle the last commit does not have
+/// (the first such hit is named).
 void positions(const Scene& scene, std::span<const Hit> hits, std::span<Vec3> points,
                int threads = 0);
 void positions(const SceneD& scene, std::span<const HitD> hits, std::span<Vec3d> points,
@@ -32,13 +35,14 @@ void positions(const SceneD& scene, std::span<const HitD> hits, std::span<Vec3d>
 void positions(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
                std::span<Vec3> points, int threads = 0);
 
-/// The geometric normal at each hit, of unit length. In the mesh's own space it is the direction of
-/// (v1-v0) x (v2-v0): counter-clockwise corners face the viewer. Each instance moves it by the
-/// inverse transpose of its transform, so that the outside of a mesh stays outside where an
-/// instance mirrors it; there the corners in the world appear clockwise. Computed in double,
-/// rounded once; of a SceneD every step is rounded to double, and errors grow where a triangle is
-/// long and narrow and where a transform shears. NaN: a miss, or a triangle without area, which
-/// rays never hit. hits [n] -> normals [n]. Vertices, `threads` and errors as for positions.
+/// Computes the geometric normal at each hit, of unit length. hits [n] -> normals [n]. In the
+/// mesh's own space it is the direction of (v1-v0) x (v2-v0): it points to the side from which the
+/// corners appear counter-clockwise. Each instance moves it by the inverse transpose of its
+/// transform. So the outside of a mesh stays outside where an instance mirrors it; there the
+/// corners appear clockwise. A miss, and a triangle without area, gives NaN. The normal of a Scene
+/// is computed in double and rounded once. In a SceneD every step is rounded; errors grow where a
+/// triangle is long and narrow and where a transform shears. Vertices, `threads` and errors as for
+/// positions.
 void normals(const Scene& scene, std::span<const Hit> hits, std::span<Vec3> normals,
              int threads = 0);
 void normals(const SceneD& scene, std::span<const HitD> hits, std::span<Vec3d> normals,

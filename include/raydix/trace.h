@@ -12,10 +12,10 @@
 
 namespace raydix {
 
-/// How `simd` takes a batch through a wide tree. The hits do not depend on it.
+/// How a batch goes through a wide tree. The hits do not depend on it.
 enum class SimdPath : std::uint32_t {
-    automatic = 0,  // what the order of the batch suggests; large batches try others, and go on
-                    // with the one that takes least time
+    automatic = 0,  // what the order of the batch suggests. Large batches also try other ways and
+                    // go on with the fastest
     single = 1,     // each ray alone, some of them in turn
     packet = 2,     // 64 neighbours together, with bounds around all of them
     stream = 3,     // thousands together: each node is tested with all rays that reach it
@@ -30,11 +30,12 @@ struct TraceOptions {
     bool counters = false;  // also count node visits and triangle tests; costs a little time
     SimdPath path = SimdPath::automatic;  // wide trees only
     std::string isa = {};  // wide trees only: one of simd_instruction_sets(); empty: the best
-    /// trace_all only: bounds the peak of the call. 0: half of what is left (result_limit.h).
+    /// trace_all only: the most bytes that the call may hold. 0: half of what is left to the
+    /// process (result_limit.h).
     std::uint64_t max_result_bytes = 0;
 };
 
-/// What a batch met. Counters are 0 unless asked for.
+/// What a batch met. The last two are 0 unless TraceOptions::counters asks for them.
 struct TraceCounts {
     std::uint64_t rays = 0;
     std::uint64_t hits = 0;  // rays that hit (all-hits: hits)
@@ -44,21 +45,22 @@ struct TraceCounts {
     std::uint64_t triangle_tests = 0;
 };
 
-/// Closest hit of each ray: the least (t, prim) over all triangles that the watertight test accepts
-/// (Woop, Benthin, Wald 2013; edges belong to both triangles). Bit-equal for every builder, kernel
-/// and thread count. rays [n] -> hits [n]; throws InputError if the sizes differ or the tree holds
-/// no triangles but boxes or points.
+/// Finds the closest hit of each ray: the least (t, prim) over all triangles that the watertight
+/// test accepts (Woop, Benthin, Wald 2013). rays [n] -> hits [n]. An edge belongs to both of its
+/// triangles. The hits have the same bits for every builder, kernel and number of threads. Invalid
+/// rays (types.h) miss and are counted. Throws InputError: sizes that differ, an option out of
+/// range, a tree that holds boxes or points.
 TraceCounts trace(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits,
                   const TraceOptions& options = {});
 [[nodiscard]] std::vector<Hit> trace(const Bvh& bvh, std::span<const Ray> rays,
                                      const TraceOptions& options = {});
 
-/// Whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n].
+/// Says whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n]. Errors as above.
 TraceCounts trace_any(const Bvh& bvh, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                       const TraceOptions& options = {});
 
-/// All hits of all rays: those of ray i are hits[offsets[i]] .. hits[offsets[i + 1]], sorted by (t,
-/// prim).
+/// All hits of all rays. Those of ray i are [offsets[i], offsets[i + 1]) of `hits`, sorted by (t,
+/// prim), in a scene by (t, instance, geometry, prim).
 struct AllHits {
     std::vector<std::uint64_t> offsets;  // [rays + 1]
     std::vector<Hit> hits;
@@ -72,17 +74,18 @@ struct AllHitsD {
     TraceCounts counts;
 };
 
-/// Each triangle at most once per ray. Edges are half open (exact sign, then a top-left rule), so
-/// that the number of crossings of a closed mesh is right for rays through edges and vertices too.
-/// Throws ResultTooLarge, an InputError, if the call would take more than
-/// options.max_result_bytes.
+/// Finds all hits of all rays, each triangle at most once a ray. An edge belongs to one of its
+/// triangles here, so that the number of crossings of a closed mesh is right for rays through edges
+/// and vertices too. Throws ResultTooLarge, an InputError, if the call would take more than
+/// options.max_result_bytes; no hit is ever dropped.
 [[nodiscard]] AllHits trace_all(const Bvh& bvh, std::span<const Ray> rays,
                                 const TraceOptions& options = {});
 
+/// One ray, on the caller's thread.
 [[nodiscard]] Hit closest_hit(const Bvh& bvh, const Ray& ray);
 [[nodiscard]] bool any_hit(const Bvh& bvh, const Ray& ray);
 
-/// The same answers by testing every triangle: slow, and independent of any tree.
+/// Gives the answers of `trace` by testing every triangle. Slow, and independent of any tree.
 [[nodiscard]] std::vector<Hit> trace_brute_force(const MeshView& mesh, std::span<const Ray> rays,
                                                  int threads = 0);
 

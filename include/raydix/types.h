@@ -33,9 +33,10 @@ inline constexpr float infinity = std::numeric_limits<float>::infinity();
 /// Stands in `Hit::prim` for "nothing was hit".
 inline constexpr std::uint32_t no_primitive = 0xFFFFFFFFu;
 
-/// Origin + t * direction for t in [tmin, tmax]. The direction need not be unit; t is in its units.
-/// A negative tmin counts as 0. Rays with tmin > tmax, a zero or non-finite direction, a non-finite
-/// origin or a NaN limit are invalid: they miss, and are counted.
+/// Origin + t * direction for t in [tmin, tmax]. The direction need not be of unit length; t is in
+/// its units. A negative tmin counts as 0. Invalid are rays with tmin > tmax, tmax < 0, a limit
+/// that is NaN, a direction of 0, or an origin or direction that is not finite. Invalid rays miss
+/// and are counted.
 struct Ray {
     Vec3 origin;
     float tmin = 0.0f;
@@ -45,7 +46,7 @@ struct Ray {
 static_assert(sizeof(Ray) == 32);
 
 /// What a ray hits in one tree: the point (1-u-v)*v0 + u*v1 + v*v2 of triangle `prim`, at `t` along
-/// the ray. A miss has t infinity and prim no_primitive.
+/// the ray, in units of its direction. A miss has t infinity and prim no_primitive.
 struct TreeHit {
     float t = infinity;
     std::uint32_t prim = no_primitive;
@@ -55,9 +56,10 @@ struct TreeHit {
 };
 static_assert(sizeof(TreeHit) == 16);
 
-/// A hit and where in a scene it is: `prim` counts within `geometry`. `instance` 0: the geometry
-/// belongs to the scene itself. Else it is the number of the path of instances that lead to it:
-/// paths count from 1, depth first, ascending id (Scene::path). What is traced through one tree
+/// A hit and where in a scene it is. `prim` counts within `geometry`, whose id is that of the scene
+/// that holds it. `instance` 0: that is the scene itself. Else `instance` is the number of the path
+/// of instances that leads there: paths count from 1, depth first, by ascending id (Scene::path). t
+/// is always in units of the caller's direction, whatever an instance scales. A hit of one tree
 /// alone has geometry 0; a miss has no_primitive.
 struct Hit : TreeHit {
     std::uint32_t geometry = no_primitive;

@@ -1,6 +1,6 @@
-// Rays through geometry of the caller's own: boxes, and a function that knows what is in them. As a
-// geometry of a Scene, and through one tree alone. Spheres, capsules and points with a radius come
-// with the library.
+// Rays through geometry of the caller's own: boxes, and a function that knows what is in them. It
+// is a geometry of a Scene, or stands in one tree alone. Spheres, capsules and points with a radius
+// come with the library (Scene::add). Step by step: docs/add-a-geometry.md.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -28,7 +28,7 @@ public:
     using Ray = typename SceneTypes<Scalar>::Ray;
     using TreeHit = typename SceneTypes<Scalar>::TreeHit;
 
-    /// Made by the library. Arrays [count]; a place is that of the ray among the caller's.
+    /// For the library. Arrays [count]; a place is the number of a ray among the caller's.
     BasicRaysAtPrimitive(const Ray* rays, const std::size_t* places, TreeHit* hits,
                          std::uint32_t count)
         : rays_(rays), places_(places), hits_(hits), count_(count) {}
@@ -70,17 +70,21 @@ public:
     using Box = typename SceneTypes<Scalar>::Box;
     using Rays = BasicRaysAtPrimitive<Scalar>;
 
-    /// `boxes` [primitives]: around each, in the geometry's own space. Primitives with a box that
-    /// is not finite, that is empty or that reaches beyond 1e12 are left out.
-    /// `test` is one of these, and is called inline from the loop over rays:
+    /// `boxes` [primitives] are around each primitive, in the geometry's own space. The caller
+    /// keeps them until the scene has copied them (Scene::add). Primitives whose box is not finite,
+    /// is empty or reaches beyond 1e12 are left out.
+    ///
+    /// `test` has one of these forms and is called inline from the loop over rays:
     ///     void test(std::uint32_t prim, RaysAtPrimitive& rays)
     ///     bool test(std::uint32_t prim, const Ray& ray, Hit& hit)
-    /// The second sets t, u and v of `hit` and says whether there is one.
-    /// A hit at t must be within the primitive's box, up to 2^-17 of the distance that the ray has
-    /// come. Else it may be missed.
-    /// It is called from several threads at once, in any order, once or several times for each ray
-    /// that may hit the primitive, and not at all for some that miss it. Answers must depend on
-    /// `prim` and the ray alone. What it throws comes out of the call that traces.
+    /// The second sets t, u and v of `hit` and says whether there is one. A hit at t must lie
+    /// within the primitive's box, up to 2^-17 of the distance that the ray has come. Else it may
+    /// be missed.
+    ///
+    /// Calls come from several threads at once and in any order. A ray that may hit a primitive is
+    /// asked about once or several times; some rays that miss it are not asked about. Answers must
+    /// depend on `prim` and the ray alone. The function must not call functions of the library that
+    /// trace or query. What it throws comes out of the call that traces.
     template <class Test>
     requires(std::is_invocable_v<const Test&, std::uint32_t, Rays&> ||
              std::is_invocable_r_v<bool, const Test&, std::uint32_t, const Ray&, Hit&>)
@@ -119,20 +123,20 @@ private:
 using UserGeometry = BasicUserGeometry<float>;
 using UserGeometryD = BasicUserGeometry<double>;
 
-/// Whether `ray` hits primitive `prim`, a position in the boxes that the tree was built over; if
-/// so, where: a finite hit.t in [ray.tmin, ray.tmax] (others are no hits; -0 becomes +0), and hit.u
-/// and hit.v as it likes.
-/// `ray` is the caller's, with tmax cut to the best hit so far. Called from several threads at
-/// once, in any order, at least once for each primitive that may have the closest hit.
+/// Says whether `ray` hits primitive `prim`, a position in the boxes that the tree was built over.
+/// If so it sets hit.t, and hit.u and hit.v as it likes. A t that is not finite or outside
+/// [ray.tmin, ray.tmax] is no hit; -0 becomes +0. `ray` is the caller's, with tmax cut to the best
+/// hit so far. Calls come from several threads at once and in any order, at least one for each
+/// primitive that may have the closest hit.
 using IntersectPrimitive = std::function<bool(std::uint32_t prim, const Ray& ray, Hit& hit)>;
 
-/// Closest hit of each ray: the least (t, prim) that `intersect` gives. The same for every builder
-/// and thread count, if it is within its box up to 2^-17 of t. rays [n] -> hits [n]. Only the
-/// threads of `options` and its counters (tests: calls of `intersect`) are used. Throws InputError
-/// if the sizes differ, and what `intersect` throws.
+/// Finds the closest hit of each ray: the least (t, prim) that `intersect` gives. rays [n] -> hits
+/// [n]. It is the same for every builder and number of threads if each hit is within its box, up to
+/// 2^-17 of t. Of `options` only threads and counters are used; triangle_tests counts calls of
+/// `intersect`. Throws InputError if the sizes differ, and what `intersect` throws.
 TraceCounts trace(const Bvh& boxes, const IntersectPrimitive& intersect, std::span<const Ray> rays,
                   std::span<Hit> hits, const TraceOptions& options = {});
-/// Whether each ray hits anything: 1 or 0. rays [n] -> occluded [n].
+/// Says whether each ray hits anything: 1 or 0. rays [n] -> occluded [n].
 TraceCounts trace_any(const Bvh& boxes, const IntersectPrimitive& intersect,
                       std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                       const TraceOptions& options = {});
@@ -140,14 +144,16 @@ TraceCounts trace_any(const Bvh& boxes, const IntersectPrimitive& intersect,
                               const Ray& ray);
 [[nodiscard]] bool any_hit(const Bvh& boxes, const IntersectPrimitive& intersect, const Ray& ray);
 
-/// Boxes to build the tree over, rounded outward; invalid shapes get boxes that builders leave out.
+/// Makes boxes to build a tree over, rounded outward. Invalid shapes get boxes that builders leave
+/// out.
 [[nodiscard]] std::vector<Aabb> boxes_of(std::span<const Sphere> spheres);
 [[nodiscard]] std::vector<Aabb> boxes_of(std::span<const Capsule> capsules);
 [[nodiscard]] std::vector<Aabb> boxes_of(std::span<const Vec3> points, float radius);
 
-/// The surfaces of the shapes, from both sides: a ray that starts inside hits where it leaves. In
-/// double inside. hit.u of a capsule is the place along its axis, 0 at a and 1 at b; else 0. The
-/// arrays must outlive the function and be those that the tree was built over.
+/// Makes functions that hit the surfaces of shapes, from both sides. A ray that starts inside hits
+/// where it leaves. t is computed in double. hit.u of a capsule is the place along its axis, 0 at a
+/// and 1 at b; other u and v are 0. The arrays must outlive the function and be those that the tree
+/// was built over.
 [[nodiscard]] IntersectPrimitive intersect_spheres(std::span<const Sphere> spheres);
 [[nodiscard]] IntersectPrimitive intersect_capsules(std::span<const Capsule> capsules);
 [[nodiscard]] IntersectPrimitive intersect_points(std::span<const Vec3> points, float radius);

@@ -1,6 +1,6 @@
-// Wide trees for the CPU: up to eight children a node, boxes of floats or, if compact, of 8 bits an
-// axis, triangles in blocks of four that one vector instruction reads. Made from any binary tree of
-// triangles; traced by the kernel `simd`, whose code is chosen at run time for the processor.
+// Wide trees for the CPU: up to eight children a node. Boxes are floats or, if compact, 8 bits an
+// axis. Triangles stand in blocks of four. They are made from any binary tree of triangles. Code to
+// trace them is chosen at run time for the processor.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -17,8 +17,8 @@ namespace raydix {
 
 struct WideBvhOptions {
     int width = 8;         // children a node at most: 4 or 8
-    bool compact = false;  // corners are looked up in a list of vertices: half the bytes or less
-                           // where triangles share them, for somewhat slower rays
+    bool compact = false;  // true: corners are looked up in a list of vertices. Fewer bytes where
+                           // triangles share them, and somewhat slower rays (docs/performance.md)
     int threads = 0;       // as in BuildOptions; the layout does not depend on it
 };
 
@@ -75,10 +75,10 @@ public:
     WideBvhBuilder(WideBvhBuilder&&) noexcept;
     WideBvhBuilder& operator=(WideBvhBuilder&&) noexcept;
 
-    /// The same bits as WideBvh(build_bvh(mesh, options)), without the binary tree in between where
-    /// the builder is ploc, hploc or binned and max_leaf is at most 4. The mesh may go afterwards.
-    /// `wide.threads` has no effect, that of `options` counts. Throws InputError as both of them
-    /// do, and if the mesh has vertices but no triangles.
+    /// Makes the tree that WideBvh(build_bvh(mesh, options)) would be, bit for bit. With the
+    /// builders ploc, hploc and binned and a max_leaf of at most 4 it needs no binary tree in
+    /// between. The mesh may go afterwards. The threads of `options` count; `wide.threads` has no
+    /// effect. Throws InputError as both calls do, and if the mesh has vertices but no triangles.
     void build(const MeshView& mesh, const BuildOptions& options, WideBvh& tree,
                const WideBvhOptions& wide = {});
 
@@ -95,10 +95,10 @@ private:
     const Mesh& mesh, const BuildOptions& options = build_options_for(Quality::balanced),
     const WideBvhOptions& wide = {});
 
-/// As trace(), trace_any() and trace_all() of a Bvh, bit for bit, by the kernel `simd`.
-/// options.path says how rays go through the tree, options.isa with which instructions;
-/// options.kernel has no effect. rays [n] -> hits, occluded [n]. Throws InputError if the sizes
-/// differ or this processor does not have the instruction set.
+/// As trace(), trace_any() and trace_all() of a Bvh, bit for bit. rays [n] -> hits, occluded [n].
+/// options.path says how rays go through the tree, and options.isa with which instructions.
+/// options.kernel has no effect. Throws InputError: sizes that differ, an instruction set that this
+/// processor does not have.
 TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit> hits,
                   const TraceOptions& options = {});
 [[nodiscard]] std::vector<Hit> trace(const WideBvh& tree, std::span<const Ray> rays,
@@ -109,10 +109,9 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
 [[nodiscard]] AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays,
                                 const TraceOptions& options = {});
 
-/// The path that `automatic` takes, but for large batches without counters, where the jobs of
-/// streams, sorted or not, may go as packets. Judged by a few windows of 64 rays, evenly spread:
-/// packets if in most of them origins and directions lie close together, streams if origins do,
-/// else sorted.
+/// The path that `automatic` takes; large batches without counters may also try packets in place of
+/// streams. It is judged by a few windows of 64 rays, evenly spread: packets if in most of them
+/// origins and directions lie close together, streams if only origins do, else sorted.
 [[nodiscard]] SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays);
 
 /// One ray, on the caller's thread, without any set-up.
