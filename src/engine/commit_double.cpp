@@ -61,6 +61,7 @@ public:
             report_.bytes += tree_->parts.arrays.nodes.size() * sizeof(WideNode) +
                              tree_->placed.size() * sizeof(PlacedSceneD) +
                              tree_->ways.size() * sizeof(WayInD);
+        list_masks();
         report_.instances = tree_->instances.size();
         report_.paths = tree_->paths;
         return std::move(tree_);
@@ -122,6 +123,19 @@ private:
                 tree_->ways.push_back(inner.ways[below.first + w]);
             add(part, inner.extents[inner.meshes.size() + k]);
         }
+    }
+
+    void list_masks() {
+        std::vector<std::uint32_t>& all = tree_->masks;
+        const SceneTreeD* last = nullptr;
+        for (const auto& [id, geometry] : state_.geometries) all.push_back(geometry.mask);
+        for (const InstanceNameD& instance : tree_->instances) {
+            if (instance.scene.get() == last) continue;  // most place what the one before them does
+            last = instance.scene.get();
+            all.insert(all.end(), last->masks.begin(), last->masks.end());
+        }
+        std::ranges::sort(all);
+        all.erase(std::unique(all.begin(), all.end()), all.end());
     }
 
     /// The meshes alone, for scenes that place this one.

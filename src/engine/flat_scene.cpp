@@ -76,12 +76,11 @@ std::uint64_t build_bytes_a_triangle(Quality quality) {
 
 }  // namespace
 
-ScenePrimitive FlatNames::name(std::uint32_t prim) const {
+auto FlatNames::run_of(std::uint32_t prim) const -> const Run& {
     const auto past =
         std::upper_bound(runs.begin(), runs.end(), prim,
                          [](std::uint32_t wanted, const Run& run) { return wanted < run.first; });
-    const Run& run = *(past - 1);
-    return {run.instance, run.geometry, prim - run.first};
+    return *(past - 1);
 }
 
 /// All paths with triangles, as copies and the ways out of them.
@@ -106,8 +105,9 @@ private:
     void walk(const Tree& scene, std::uint32_t number, std::size_t way) {
         for (const auto& name : scene.mesh_names) {
             if ((name.mask & plan_.mask_) == 0 || name.mesh.triangles.empty()) continue;
-            out_.names.runs.push_back({static_cast<std::uint32_t>(triangles_), number, name.id});
             copies.push_back({name.mesh, vertices_, triangles_, &ways, way});
+            out_.names.runs.push_back(
+                {static_cast<std::uint32_t>(triangles_), number, name.id, copies.back().mirrors()});
             vertices_ += name.mesh.vertices.size();
             triangles_ += name.mesh.triangles.size();
         }

@@ -23,10 +23,16 @@ struct FlatNames {
     /// A mesh on a path: `first` is its first triangle.
     struct Run {
         std::uint32_t first, instance, geometry;
+        bool turned;  // the path mirrors: second and third corners have changed places
     };
     std::vector<Run> runs;  // ascending, by (instance, geometry) too
 
-    [[nodiscard]] ScenePrimitive name(std::uint32_t prim) const;
+    /// That `prim` belongs to.
+    [[nodiscard]] const Run& run_of(std::uint32_t prim) const;
+    [[nodiscard]] ScenePrimitive name(std::uint32_t prim) const {
+        const Run& run = run_of(prim);
+        return {run.instance, run.geometry, prim - run.first};
+    }
 };
 
 /// In float or in double.

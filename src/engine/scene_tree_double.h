@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "engine/grouped_meshes.h"
@@ -53,6 +54,18 @@ struct PartTreeD : NodesD {
     ExtentD around{nothing_d, 0.0};   // all of them
 };
 
+struct NearBodyD;  // near_body.h
+
+/// What queries of distance made of a scene (near_body_of), by masks: the last ones.
+struct KeptBodies {
+    struct Body {
+        std::uint32_t mask;
+        std::shared_ptr<const NearBodyD> body;
+    };
+    std::mutex asked;
+    std::vector<Body> known;
+};
+
 struct SceneTreeD {
     std::vector<std::shared_ptr<const MeshTreeD>> meshes;
     std::vector<InstanceNameD> instances;  // by ascending id
@@ -69,6 +82,9 @@ struct SceneTreeD {
     std::uint64_t paths = 0;
     std::uint32_t levels = 0;    // of instances, below this scene
     std::size_t stack_size = 0;  // of a ray: children still to visit, on all levels
+    /// Of all geometries and instances, those of inner scenes too: ascending, each once.
+    std::vector<std::uint32_t> masks;
+    std::shared_ptr<KeptBodies> bodies = std::make_shared<KeptBodies>();
 
     /// The only mesh tree, if rays need nothing else.
     [[nodiscard]] const MeshTreeD* only_mesh() const {

@@ -1,0 +1,31 @@
+// What queries of distance and overlap ask of a scene in double: all triangles on all paths as one
+// mesh in the world, and a tree over it. Made when the first of them comes, and kept with the
+// scene's tree.
+#pragma once
+
+#include <raydix/scene.h>
+
+#include <cstdint>
+#include <memory>
+
+#include "engine/flat_scene.h"
+#include "exec/result_budget.h"
+#include "proximity/closest_walk.h"
+
+namespace raydix {
+
+struct NearBodyD {
+    explicit NearBodyD(FlatTree<double> of) : triangles(std::move(of)), padded(triangles.tree) {}
+
+    const FlatTree<double> triangles;
+    const PaddedTreeD padded;  // a view of it
+};
+
+/// What a mask shows. Any number of threads may ask at once; one makes it while the others wait.
+/// `budget`: of the call, charged with what has to be made; null: half of what is left. Throws
+/// InputError, which names `call`: the scene was never committed, geometry that has no answer;
+/// ResultTooLarge.
+[[nodiscard]] std::shared_ptr<const NearBodyD> near_body_of(const SceneD& scene, std::uint32_t mask,
+                                                            const char* call, ResultBudget* budget);
+
+}  // namespace raydix
