@@ -145,9 +145,9 @@ public:
     /// Adds spheres, capsules, or points of one radius, of which the scene keeps a copy: `prim`
     /// counts them. Rays hit their surfaces from both sides; one that starts inside hits where it
     /// leaves. t is computed in double and rounded once. `u` of a capsule's hit is the place along
-    /// its axis, 0 at a and 1 at b; else u and v are 0. Rays that start beyond 1.7e38 may miss
-    /// them. Those that are not finite, have a negative radius or reach beyond 1e12 are left out.
-    /// Throws InputError for an id that was used before, and in double, which has none of them yet.
+    /// its axis, 0 at a and 1 at b; else u and v are 0. In float rays that start beyond 1.7e38 may
+    /// miss them. Those that are not finite, have a negative radius or reach beyond 1e12 are left
+    /// out. Throws InputError for an id that was used before.
     std::uint32_t add(std::span<const Sphere> spheres, const GeometryOptions& options = {});
     std::uint32_t add(std::span<const Capsule> capsules, const GeometryOptions& options = {});
     std::uint32_t add(std::span<const Point> points, Scalar radius,

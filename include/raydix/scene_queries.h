@@ -31,10 +31,10 @@ namespace raydix {
 /// `instance` counts as in hits of rays: 0 is the scene itself, others are for Scene::path.
 ///
 /// A Scene is asked through the trees that rays take. Of a SceneD the first query after a commit
-/// makes a mesh of all triangles on every path of instances, and a tree over it. The scene keeps
-/// both for later queries: up to four, for masks that show different things. The query throws
-/// ResultTooLarge, an InputError, before anything is made if that would take more than half of the
-/// memory that is left; touch_all if it would take more than its max_result_bytes.
+/// makes a mesh of all triangles on every path of instances, and trees over it and over all shapes.
+/// The scene keeps them for later queries: up to four, for masks that show different things. The
+/// query throws ResultTooLarge, an InputError, before anything is made if that would take more than
+/// half of the memory that is left; touch_all if it would take more than its max_result_bytes.
 
 /// The closest point of a scene to a query. position, distance, u and v are as in ClosestPoint; of
 /// a sphere u and v are 0, of a capsule u is the place along its axis, from 0 at a to 1 at b.

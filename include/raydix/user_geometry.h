@@ -77,7 +77,8 @@ public:
     ///     bool test(std::uint32_t prim, const Ray& ray, Hit& hit)
     /// The second sets t, u and v of `hit` and says whether there is one.
     /// A hit at t must be within the primitive's box, up to 2^-17 of the distance that the ray has
-    /// come. Else it may be missed.
+    /// come; in double up to 2^-41 of that and 2^-44 of the box's largest coordinate. Else it may
+    /// be missed. In double the function gets one ray at a time.
     /// It is called from several threads at once, in any order, once or several times for each ray
     /// that may hit the primitive, and not at all for some that miss it. Answers must depend on
     /// `prim` and the ray alone. What it throws comes out of the call that traces.

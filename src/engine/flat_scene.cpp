@@ -21,12 +21,12 @@ namespace raydix {
 namespace {
 
 /// Shapes of a scene that queries see; null if there are none.
-const ShapeTree* seen_shapes(const SceneTree& scene, std::uint32_t mask) {
+template <class Tree>
+auto seen_shapes(const Tree& scene, std::uint32_t mask) -> decltype(scene.shapes.front().get()) {
     for (const auto& shapes : scene.shapes)
         if ((shapes->mask & mask) != 0) return shapes.get();
     return nullptr;
 }
-const ShapeTree* seen_shapes(const SceneTreeD&, std::uint32_t) { return nullptr; }
 
 constexpr std::size_t no_way = ~std::size_t{0};
 
@@ -128,9 +128,10 @@ private:
 };
 
 template <class Scalar>
-FlatPlan<Scalar>::FlatPlan(const Scene& scene, std::uint32_t mask, const char* call)
+FlatPlan<Scalar>::FlatPlan(const Scene& scene, std::uint32_t mask, const char* call,
+                           FlatShapes shapes)
     : tree_(BasicSceneAccess<Scalar>::tree(scene)), mask_(mask) {
-    if (count(*tree_).has_shapes) refuse_shapes(*tree_, 0, call);
+    if (count(*tree_).has_shapes && shapes == FlatShapes::refused) refuse_shapes(*tree_, 0, call);
 }
 
 template <class Scalar>
@@ -161,7 +162,7 @@ const FlatCounts& FlatPlan<Scalar>::count(const Tree& scene) {
 template <class Scalar>
 void FlatPlan<Scalar>::refuse_shapes(const Tree& scene, std::uint32_t number,
                                      const char* call) const {
-    if (const ShapeTree* const shapes = seen_shapes(scene, mask_))
+    if (const auto* const shapes = seen_shapes(scene, mask_))
         throw InputError(
             std::string(call) + ": geometry " + std::to_string(shapes->id) + " (" +
             kind_of(shapes->shapes) + ")" +

@@ -67,6 +67,8 @@ struct FlatCounts {
     bool has_shapes = false;      // among what counts
 };
 
+enum class FlatShapes { refused, left_out };
+
 /// Knows what flatten() would make, without making it. `mask`: a geometry counts if its own mask &
 /// this is not 0, and the same holds for each instance on the way to it.
 template <class Scalar>
@@ -76,8 +78,9 @@ public:
     using Tree = typename SceneKind<Scalar>::Tree;
 
     /// Throws InputError, which names `call` and the geometry: spheres or other shapes, that have
-    /// no triangles; a scene that was never committed.
-    FlatPlan(const Scene& scene, std::uint32_t mask, const char* call);
+    /// no triangles, unless they are left out; a scene that was never committed.
+    FlatPlan(const Scene& scene, std::uint32_t mask, const char* call,
+             FlatShapes shapes = FlatShapes::refused);
 
     [[nodiscard]] const FlatCounts& counts() const { return counts_of(*tree_); }
     /// Whether flatten() copies no vertex.

@@ -26,23 +26,11 @@ NearJob& near_job_of_this_thread(const SceneTree& tree, std::uint32_t mask) {
     return job;
 }
 
-[[noreturn]] void refuse_shapes(const char* call, const ShapeTree& shapes, const char* why) {
-    throw InputError(std::string(call) + ": geometry " + std::to_string(shapes.id) + " (" +
-                     kind_of(shapes.shapes) + ") " + why);
-}
-
 /// Throws InputError for geometry that has no answer.
 const SceneTree& tree_for(const Scene& scene, std::uint32_t mask, NearCall call) {
     const SceneTree& tree = *SceneAccess::tree(scene);
-    for (const ShownShapes& shown : near_scene_of(tree).shapes) {
-        if (!shown.seen_by(mask)) continue;
-        if (call == NearCall::sweep)
-            refuse_shapes(name_of(call), *shown.shapes,
-                          "cannot be swept against: only triangles can");
-        if (shown.shapes->user() != nullptr)
-            refuse_shapes(name_of(call), *shown.shapes,
-                          "has no distances: it is known by its hits alone");
-    }
+    for (const ShownShapes& shown : near_scene_of(tree).shapes)
+        if (shown.seen_by(mask)) require_answers(*shown.shapes, call);
     return tree;
 }
 

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "base/float_env.h"
+#include "engine/near_call.h"
 #include "exec/parallel.h"
 #include "exec/result_budget.h"
 #include "proximity/query_batch.h"
@@ -29,13 +30,6 @@
 #include "trace/simd/wide_batch.h"
 
 namespace raydix {
-
-enum class NearCall { closest, overlap, sweep };
-/// As errors name it.
-inline const char* name_of(NearCall call) {
-    constexpr const char* names[] = {"closest points", "overlap queries", "sweeps"};
-    return names[static_cast<std::size_t>(call)];
-}
 
 template <class Scalar>
 Scalar square_limit_of(Scalar max_distance) {

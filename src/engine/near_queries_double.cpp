@@ -3,6 +3,7 @@
 #include <raydix/double.h>
 #include <raydix/scene_queries.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string_view>
@@ -21,7 +22,7 @@ class Near {
 public:
     Near(const SceneD& scene, std::uint32_t mask, NearCall call, std::string_view = {},
          ResultBudget* budget = nullptr)
-        : body_(near_body_of(scene, mask, name_of(call), budget)) {}
+        : body_(near_body_of(scene, mask, call, budget)) {}
 
     [[nodiscard]] std::vector<std::uint32_t> order(std::span<const Vec3d> places) const {
         return query_order(body_->triangles.tree, places);
@@ -32,31 +33,46 @@ public:
         explicit Thread(const Near& near)
             : names_(near.body_->triangles.names),
               tree_(near.body_->padded),
-              stack_(tree_.max_depth) {}
+              shapes_(near.body_->shapes),
+              stack_(std::max(tree_.max_depth, shapes_.max_depth())) {}
 
         SceneClosestPointD closest(Vec3d query, double limit) {
-            if (tree_.empty) return {};
-            const auto best = find_closest_triangle(tree_, query, limit, guess_, stack_);
-            if (best.prim == no_primitive) return {};
-            guess_ = best.position;
-            const FlatNames::Run& run = names_.run_of(best.prim);
-            SceneClosestPointD out{best.point.position,   std::sqrt(best.point.d2),
-                                   best.prim - run.first, run.geometry,
-                                   run.instance,          best.point.u,
-                                   best.point.v};
-            if (run.turned) std::swap(out.u, out.v);
+            SceneClosestPointD out;
+            NearShapesD::Found best{{{}, 0, limit}, {no_primitive, no_primitive, no_primitive}};
+            if (!tree_.empty) {
+                const auto found = find_closest_triangle(tree_, query, limit, guess_, stack_);
+                if (found.prim != no_primitive) {
+                    guess_ = found.position;
+                    out = of_triangle(found);
+                    best.point.d2 = found.point.d2;
+                    best.name = {out.instance, out.geometry, out.prim};
+                }
+            }
+            if (!shapes_.empty() && shapes_.find_closest(query, best, stack_))
+                out = {best.point.position,
+                       std::sqrt(best.point.d2),
+                       best.name.prim,
+                       best.name.geometry,
+                       best.name.instance,
+                       best.point.u,
+                       0};
             return out;
         }
         template <class Query>
         bool touch(const Query& query, BudgetVector<ScenePrimitive>* found) {
-            if (tree_.empty) return false;
             bool any = false;
-            for_each_touched(tree_, prepared(query), stack_, [&](std::uint32_t position) {
+            const auto take = [&](const ScenePrimitive& name) {
                 any = true;
                 if (found == nullptr) return true;
-                found->push_back(names_.name(tree_.order[position]));
+                found->push_back(name);
                 return false;
-            });
+            };
+            if (!tree_.empty)
+                for_each_touched(tree_, prepared(query), stack_, [&](std::uint32_t position) {
+                    return take(names_.name(tree_.order[position]));
+                });
+            if (!shapes_.empty() && !(any && found == nullptr))
+                shapes_.for_each_touched(query, stack_, take);
             return any;
         }
         SceneSweepHitD sweep(const SphereSweepD& sweep) {
@@ -72,8 +88,20 @@ public:
         }
 
     private:
+        [[nodiscard]] SceneClosestPointD of_triangle(
+            const BasicClosestTriangle<double>& found) const {
+            const FlatNames::Run& run = names_.run_of(found.prim);
+            SceneClosestPointD out{found.point.position,   std::sqrt(found.point.d2),
+                                   found.prim - run.first, run.geometry,
+                                   run.instance,           found.point.u,
+                                   found.point.v};
+            if (run.turned) std::swap(out.u, out.v);
+            return out;
+        }
+
         const FlatNames& names_;
         const PaddedTreeD& tree_;
+        const NearShapesD& shapes_;
         BasicWalkStack<double> stack_;
         std::uint32_t guess_ = no_primitive;
     };

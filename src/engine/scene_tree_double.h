@@ -24,6 +24,7 @@ struct MeshTreeD : GroupedMeshes {
 };
 
 struct SceneTreeD;
+struct ShapeTreeD;  // shape_tree.h
 
 /// The way into an instance.
 struct WayInD {
@@ -48,7 +49,8 @@ struct InstanceNameD {
     std::shared_ptr<const SceneTreeD> scene;
 };
 
-/// A wide tree over parts, one a leaf: mesh trees first, then placed scenes.
+/// A wide tree over parts, one a leaf. The parts of a scene are numbered: mesh trees first, then
+/// trees of shapes, then placed scenes.
 struct PartTreeD : NodesD {
     std::vector<std::uint32_t> part;  // by the place that leaves name
     ExtentD around{nothing_d, 0.0};   // all of them
@@ -68,12 +70,13 @@ struct KeptBodies {
 
 struct SceneTreeD {
     std::vector<std::shared_ptr<const MeshTreeD>> meshes;
-    std::vector<InstanceNameD> instances;  // by ascending id
-    std::vector<MeshNameD> mesh_names;     // by ascending id
+    std::vector<std::shared_ptr<const ShapeTreeD>> shapes;  // by ascending id
+    std::vector<InstanceNameD> instances;                   // by ascending id
+    std::vector<MeshNameD> mesh_names;                      // by ascending id
     std::vector<PlacedSceneD> placed;
     std::vector<WayInD> ways;
     std::vector<ExtentD> extents;  // [parts]
-    /// The meshes without the instances, where there are both.
+    /// The meshes and shapes without the instances, where there are both.
     std::shared_ptr<const SceneTreeD> own_parts;
     PartTreeD parts;
     AabbD bounds = nothing_d;  // without what rays may miss it by
@@ -88,8 +91,11 @@ struct SceneTreeD {
 
     /// The only mesh tree, if rays need nothing else.
     [[nodiscard]] const MeshTreeD* only_mesh() const {
-        return instances.empty() && meshes.size() == 1 ? meshes.front().get() : nullptr;
+        return instances.empty() && shapes.empty() && meshes.size() == 1 ? meshes.front().get()
+                                                                         : nullptr;
     }
+    /// Parts before the placed scenes.
+    [[nodiscard]] std::size_t own_part_count() const { return meshes.size() + shapes.size(); }
 };
 
 }  // namespace raydix

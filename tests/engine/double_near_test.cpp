@@ -4,7 +4,9 @@
 #include <raydix/double.h>
 #include <raydix/error.h>
 #include <raydix/result_limit.h>
+#include <raydix/scene_pairs.h>
 #include <raydix/scene_queries.h>
+#include <raydix/solid.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,6 +20,7 @@
 #include <vector>
 
 #include "engine/double_world.h"
+#include "engine/near_shapes.h"
 #include "primitives/exact_overlap.h"
 #include "proximity/closest_walk.h"
 #include "proximity/touch_walk.h"
@@ -33,6 +36,12 @@ struct FlatWorldD {
     MeshD mesh;
     std::vector<ScenePrimitive> names;  // [triangles]
     std::vector<bool> turned;           // second and third corner have changed places
+    struct Shape {
+        ScenePrimitive name;
+        CapsuleD own;
+        std::vector<TransformD> way;  // the outermost first
+    };
+    std::vector<Shape> shapes;
 };
 
 bool mirrors(const TransformD& t) {
@@ -56,6 +65,8 @@ void add_flat(const WorldD& world, std::uint32_t mask, std::uint32_t number,
     for (const TransformD& t : way) turned ^= mirrors(t);
     for (const WorldD::Item& item : world.items) {
         if (item.inside || (item.mask & mask) == 0) continue;
+        for (std::uint32_t i = 0; i < item.capsules.size(); ++i)
+            out.shapes.push_back({{number, item.id, i}, item.capsules[i], way});
         const auto first = static_cast<std::uint32_t>(out.mesh.vertices.size());
         for (const Vec3d p : item.mesh.vertices) out.mesh.vertices.push_back(out_of(way, p));
         for (std::uint32_t i = 0; i < item.mesh.triangles.size(); ++i) {
@@ -88,6 +99,33 @@ LeafTriangleD triangle_of(const FlatWorldD& flat, std::size_t i) {
     return {flat.mesh.vertices[t[0]], flat.mesh.vertices[t[1]], flat.mesh.vertices[t[2]]};
 }
 
+/// A ball's or a capsule's image.
+ShapePointD closest_on(const FlatWorldD::Shape& shape, Vec3d q) {
+    const CapsuleD& own = shape.own;
+    if (shape.way.empty()) return closest_on_capsule(Double3(own.a), Double3(own.b), own.radius, q);
+    Affine all{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {}};
+    for (auto t = shape.way.rbegin(); t != shape.way.rend(); ++t) {
+        const AffineD map = affine_of(*t);
+        const auto row = [&](Double3 r) { return all.x * r.x + all.y * r.y + all.z * r.z; };
+        all = {row(map.x), row(map.y), row(map.z), {}};
+    }
+    return closest_on_image(Double3(out_of(shape.way, own.a)), Double3(out_of(shape.way, own.b)),
+                            BallImage(all, own.radius), own.radius, q);
+}
+bool touches(const FlatWorldD::Shape& shape, const SphereD& s) {
+    return closest_on(shape, s.center).d2 <= s.radius * s.radius;
+}
+bool touches(const FlatWorldD::Shape& shape, const SegmentD& s) {
+    const auto inside = [&](Vec3d p) {
+        Double3 at(p);
+        for (const TransformD& t : shape.way) at = inverse_of(affine_of(t))->point(at);
+        return at - Double3(shape.own.a);
+    };
+    const Double3 axis = Double3(shape.own.b) - Double3(shape.own.a);
+    return segment_distance2(inside(s.a), inside(s.b), {}, axis) <=
+           shape.own.radius * shape.own.radius;
+}
+
 auto answer_of(const SceneClosestPointD& p) {
     return std::tuple(p.distance, p.position.x, p.position.y, p.position.z,
                       ScenePrimitive{p.instance, p.geometry, p.prim}, p.u, p.v);
@@ -108,6 +146,12 @@ SceneClosestPointD brute_closest(const FlatWorldD& flat, Vec3d q, double max_dis
         d2 = p.d2, least = flat.names[i];
         best = {p.position, std::sqrt(p.d2), least.prim, least.geometry, least.instance, p.u, p.v};
         if (flat.turned[i]) std::swap(best.u, best.v);
+    }
+    for (const FlatWorldD::Shape& shape : flat.shapes) {
+        const ShapePointD p = closest_on(shape, q);
+        if (!(p.d2 < d2 || (p.d2 == d2 && shape.name < least))) continue;
+        d2 = p.d2, least = shape.name;
+        best = {p.position, std::sqrt(p.d2), least.prim, least.geometry, least.instance, p.u, 0};
     }
     return best;
 }
@@ -142,7 +186,9 @@ std::vector<Vec3d> queries_of(RandomWorlds& random, const FlatWorldD& flat, Vec3
 std::size_t wrong_points(const WorldD& world, const FlatWorldD& flat, std::uint32_t mask,
                          const std::vector<Vec3d>& queries) {
     std::size_t wrong = 0;
-    for (const double most : {std::numeric_limits<double>::infinity(), 0.25, 0.0})
+    for (const double most : {std::numeric_limits<double>::infinity(), 0.25, 0.0}) {
+        std::vector<SceneClosestPointD> expected;
+        for (const Vec3d& q : queries) expected.push_back(brute_closest(flat, q, most));
         for (const int threads : {1, 2}) {
             std::vector<SceneClosestPointD> found(queries.size());
             const ClosestCounts counts =
@@ -150,7 +196,7 @@ std::size_t wrong_points(const WorldD& world, const FlatWorldD& flat, std::uint3
                                {.max_distance = most, .mask = mask, .threads = threads});
             std::uint64_t found_count = 0, invalid = 0;
             for (std::size_t i = 0; i < queries.size(); ++i) {
-                const SceneClosestPointD wanted = brute_closest(flat, queries[i], most);
+                const SceneClosestPointD& wanted = expected[i];
                 wrong += answer_of(found[i]) != answer_of(wanted);
                 found_count += wanted.found();
                 invalid += !is_finite(queries[i]);
@@ -160,6 +206,7 @@ std::size_t wrong_points(const WorldD& world, const FlatWorldD& flat, std::uint3
             }
             wrong += counts.found != found_count || counts.invalid_queries != invalid;
         }
+    }
     return wrong;
 }
 
@@ -176,6 +223,8 @@ std::size_t wrong_touches(const WorldD& world, const FlatWorldD& flat, std::uint
         std::vector<ScenePrimitive> wanted;
         for (std::size_t k = 0; is_valid(queries[i]) && k < flat.names.size(); ++k)
             if (touches(triangle_of(flat, k), queries[i])) wanted.push_back(flat.names[k]);
+        for (std::size_t k = 0; is_valid(queries[i]) && k < flat.shapes.size(); ++k)
+            if (touches(flat.shapes[k], queries[i])) wanted.push_back(flat.shapes[k].name);
         std::ranges::sort(wanted);
         const std::vector<ScenePrimitive> found(
             lists.prims.begin() + static_cast<std::ptrdiff_t>(lists.offsets[i]),
@@ -211,18 +260,20 @@ std::size_t wrong_sweeps(const WorldD& world, const FlatWorldD& flat, std::uint3
 }
 
 TEST(DoubleNear, WorldsAnswerAsTheirTrianglesDo) {
-    std::size_t touched = 0, swept = 0;
+    std::size_t touched = 0, swept = 0, shapes = 0;
     for (std::uint32_t levels = 0; levels < 4; ++levels)
-        for (int k = 0; k < (sanitized ? 1 : 3); ++k) {
+        for (int k = 0; k < 6; k += sanitized ? 3 : 1) {
             SCOPED_TRACE("levels " + std::to_string(levels) + ", world " + std::to_string(k));
             RandomWorlds random(9000 + 100 * levels + static_cast<std::uint64_t>(k));
             const double shears[] = {1e4, 100.0, 0.0}, distances[] = {0.0, 4.5e6, 1e11};
-            const RecipeD recipe{levels, 1 + random.under(levels == 3 ? 4 : 6), shears[k],
-                                 distances[k]};
+            RecipeD recipe{levels, 1 + random.under(levels == 3 ? 4 : 6), shears[k % 3],
+                           distances[k % 3]};
+            recipe.shapes = k >= 3, recipe.users = false;
             const auto world = random.world(recipe);
             for (const std::uint32_t mask : {every_mask, 2u, 5u}) {
                 const FlatWorldD flat = flat_of(*world, mask);
-                const std::vector<Vec3d> queries = queries_of(random, flat, world->home, 150);
+                const std::vector<Vec3d> queries =
+                    queries_of(random, flat, world->home, recipe.shapes ? 30 : 150);
                 EXPECT_EQ(wrong_points(*world, flat, mask, queries), 0u);
                 std::vector<SphereD> spheres;
                 std::vector<SegmentD> segments;
@@ -238,11 +289,18 @@ TEST(DoubleNear, WorldsAnswerAsTheirTrianglesDo) {
                 spheres.push_back({{0, 0, 0}, -1});
                 EXPECT_EQ(wrong_touches(*world, flat, mask, spheres, touched), 0u);
                 EXPECT_EQ(wrong_touches(*world, flat, mask, segments, touched), 0u);
-                EXPECT_EQ(wrong_sweeps(*world, flat, mask, sweeps, swept), 0u);
+                if (flat.shapes.empty())
+                    EXPECT_EQ(wrong_sweeps(*world, flat, mask, sweeps, swept), 0u);
+                else
+                    EXPECT_THROW(
+                        static_cast<void>(sweep_spheres(world->scene, sweeps, {.mask = mask})),
+                        InputError);
+                shapes += flat.shapes.size();
             }
         }
     EXPECT_GT(touched, 1000u);
     EXPECT_GT(swept, 200u);
+    EXPECT_GT(shapes, 200u);
 }
 
 TEST(DoubleNear, OneMeshAnswersAsItsTreeDoes) {
@@ -340,6 +398,67 @@ TEST(DoubleNear, ManyThreadsMayAskFirst) {
             EXPECT_EQ(answer_of(found[k][i]),
                       answer_of(closest_point(scene, queries[i], infinity,
                                               k < 3 ? every_mask : 1u << k)));
+}
+
+TEST(DoubleNear, ShapesAnswerWhatTheyAre) {
+    const Vec3d home{4.5e6, -4.5e6, 120};
+    const std::vector<SphereD> spheres{{home, 2}, {home, 0}};
+    const std::vector<CapsuleD> capsules{{home + Vec3d{10, 0, 0}, home + Vec3d{14, 0, 0}, 1}};
+    SceneD scene;
+    scene.add(std::span<const SphereD>(spheres).first(1));
+    scene.add(std::span<const CapsuleD>(capsules));
+    scene.commit();
+    SceneClosestPointD p = closest_point(scene, home + Vec3d{0, 5, 0});
+    EXPECT_EQ(p.distance, 3);
+    EXPECT_EQ(p.position.y, home.y + 2);
+    EXPECT_EQ(closest_point(scene, home + Vec3d{1, 1, 0}).distance, 0) << "inside";
+    p = closest_point(scene, home + Vec3d{13, 0, 4});
+    EXPECT_EQ(p.distance, 3);
+    EXPECT_EQ(p.u, 0.75);
+    EXPECT_EQ(p.geometry, 1u);
+    EXPECT_TRUE(raydix::touches(scene, SegmentD{home + Vec3d{9, 1, -9}, home + Vec3d{11, 1, 9}}));
+    EXPECT_FALSE(
+        raydix::touches(scene, SegmentD{home + Vec3d{9, 1.001, -9}, home + Vec3d{11, 1.001, 9}}));
+    // A point, and an ellipsoid.
+    SceneD inner, outer;
+    inner.add(std::span<const SphereD>(spheres).last(1));
+    inner.commit();
+    TransformD wide;
+    wide.m[0][0] = 3, wide.m[0][3] = -2 * home.x;
+    outer.add(inner, wide);
+    outer.add(scene, wide);
+    outer.commit();
+    EXPECT_EQ(closest_point(outer, home + Vec3d{7, 0, 0}).distance, 1) << "6 wide";
+    EXPECT_EQ(closest_point(outer, home + Vec3d{0, 0, 7}).distance, 5);
+    EXPECT_EQ(closest_point(outer, home).instance, 1u);
+}
+
+TEST(DoubleNear, ErrorsNameTheGeometry) {
+    const std::vector<SphereD> spheres{{{0, 0, 0}, 1}};
+    const std::vector<AabbD> boxes{{{0, 0, 0}, {1, 1, 1}}};
+    SceneD inner, scene;
+    inner.add(std::span<const SphereD>(spheres), {.mask = 2, .id = 7});
+    inner.add(UserGeometryD(boxes, [](std::uint32_t, const RayD&, HitD&) { return false; }),
+              {.mask = 4, .id = 9});
+    inner.commit();
+    scene.add(one_triangle());
+    scene.add(inner, moved(0, 0, 0));
+    scene.commit();
+    const std::string users =
+        "closest points: geometry 9 (user geometry) has no distances: it is known by its hits "
+        "alone";
+    for (int round = 0; round < 2; ++round) {
+        EXPECT_EQ(message_of([&] { static_cast<void>(closest_point(scene, {0, 0, 0})); }), users);
+        EXPECT_TRUE(closest_point(scene, {0, 0, 5}, infinity, 3).found());
+        EXPECT_EQ(message_of([&] {
+                      static_cast<void>(sweep_sphere(scene, {down, 1}, 3));
+                  }),
+                  "sweeps: geometry 7 (spheres) cannot be swept against: only triangles can");
+        EXPECT_TRUE(sweep_sphere(scene, {down, 1}, 1).hit());
+    }
+    // All triangles as one body: shapes are none.
+    EXPECT_THROW(SolidD(scene, {.mask = 3}), InputError);
+    EXPECT_THROW(static_cast<void>(overlapping_pairs(scene, {.mask = 3})), InputError);
 }
 
 TEST(DoubleNear, NothingIsFoundInNothing) {
