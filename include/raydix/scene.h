@@ -159,9 +159,8 @@ public:
     /// counts them. Rays hit their surfaces from both sides. A ray that starts inside hits where it
     /// leaves. t is computed in double and rounded once. `u` of a capsule's hit is the place along
     /// its axis, 0 at a and 1 at b; other u and v are 0. Shapes that are not finite, have a
-    /// negative radius or reach beyond 1e12 are left out. Rays that start beyond 1.7e38 may miss
-    /// shapes. Throws InputError: an id that was given before; always in a SceneD, which has no
-    /// shapes yet.
+    /// negative radius or reach beyond 1e12 are left out. In float, rays that start beyond 1.7e38
+    /// may miss shapes. Throws InputError for an id that was given before.
     std::uint32_t add(std::span<const Sphere> spheres, const GeometryOptions& options = {});
     std::uint32_t add(std::span<const Capsule> capsules, const GeometryOptions& options = {});
     std::uint32_t add(std::span<const Point> points, Scalar radius,

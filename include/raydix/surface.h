@@ -34,6 +34,8 @@ void positions(const SceneD& scene, std::span<const HitD> hits, std::span<Vec3d>
 /// origin + t * direction of its ray. rays [n], hits [n] -> points [n].
 void positions(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
                std::span<Vec3> points, int threads = 0);
+void positions(const SceneD& scene, std::span<const RayD> rays, std::span<const HitD> hits,
+               std::span<Vec3d> points, int threads = 0);
 
 /// Computes the geometric normal at each hit, of unit length. hits [n] -> normals [n]. In the
 /// mesh's own space it is the direction of (v1-v0) x (v2-v0): it points to the side from which the
@@ -52,6 +54,8 @@ void normals(const SceneD& scene, std::span<const HitD> hits, std::span<Vec3d> n
 /// of 0. Throws InputError for user geometry too, whose normals its owner knows.
 void normals(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
              std::span<Vec3> normals, int threads = 0);
+void normals(const SceneD& scene, std::span<const RayD> rays, std::span<const HitD> hits,
+             std::span<Vec3d> normals, int threads = 0);
 [[nodiscard]] std::vector<Vec3> normals(const Scene& scene, std::span<const Hit> hits,
                                         int threads = 0);
 [[nodiscard]] std::vector<Vec3d> normals(const SceneD& scene, std::span<const HitD> hits,

@@ -78,8 +78,9 @@ public:
     ///     void test(std::uint32_t prim, RaysAtPrimitive& rays)
     ///     bool test(std::uint32_t prim, const Ray& ray, Hit& hit)
     /// The second sets t, u and v of `hit` and says whether there is one. A hit at t must lie
-    /// within the primitive's box, up to 2^-17 of the distance that the ray has come. Else it may
-    /// be missed.
+    /// within the primitive's box, up to 2^-17 of the distance that the ray has come; in double up
+    /// to 2^-41 of that and 2^-44 of the box's largest coordinate. Else it may be missed. In double
+    /// the function gets one ray at a time.
     ///
     /// Calls come from several threads at once and in any order. A ray that may hit a primitive is
     /// asked about once or several times; some rays that miss it are not asked about. Answers must

@@ -99,8 +99,10 @@ class Scene(SceneContents, SceneViews):
     scene of one mesh count whatever its mask is; of others those with mask 0 do not.
 
     `refit`, `vertices`, `faces`, `stats`, `wide_stats`, `info`, `check` and `raydix.simulate` need
-    a scene of one mesh and nothing else, in float64 `closest_point`, `touches`, `touched_by` and
-    `sweep_spheres` too: InputError names the geometry that stands in the way.
+    a scene of one mesh and nothing else: InputError names the geometry that stands in the way.
+
+    In float64 the first of `closest_point`, `touches`, `touched_by` and `sweep_spheres` after a
+    commit makes one mesh in the world too, and a tree over it, which later ones ask.
 
     With precision "float64" these raise NotImplementedError: compact=True, `positions`, `normals`,
     `render`, `cameras`, `primary_rays`, `secondary_rays`, `save`, `info`, `wide_stats` and
@@ -431,24 +433,18 @@ class Scene(SceneContents, SceneViews):
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
         reach = number(max_distance, "max_distance")
-        if self.dtype == FLOAT32:
-            places = np.empty((len(asked), 9), self.dtype)
-            self._core.closest(asked, places, reach, self.threads)
-            places = places.reshape(lead + (9,))
-            ids = places.view(UINT32)
-            prim, geometry, instance = ids[..., 4], ids[..., 5], ids[..., 6]
-        else:
-            places = np.empty((len(asked), 7), self.dtype)
-            self._core.closest(asked, places, reach, self.threads)
-            places = places.reshape(lead + (7,))
-            prim = places.view(UINT32)[..., 8]
-            geometry, instance = self._of_one_mesh(prim)
+        # prim, geometry and instance are uint32 behind the distance, padded to whole scalars.
+        places = np.empty((len(asked), 9 if self.dtype == FLOAT32 else 8), self.dtype)
+        self._core.closest(asked, places, reach, self.threads)
+        places = places.reshape(lead + (places.shape[1],))
+        first = self.dtype.itemsize
+        ids = places.view(UINT32)[..., first : first + 3]
         return {
             "point": places[..., :3],
             "distance": places[..., 3],
-            "prim": prim,
-            "geometry": geometry,
-            "instance": instance,
+            "prim": ids[..., 0],
+            "geometry": ids[..., 1],
+            "instance": ids[..., 2],
             "u": places[..., -2],
             "v": places[..., -1],
         }
@@ -543,12 +539,12 @@ class Scene(SceneContents, SceneViews):
         kind, shapes, _ = self._touching(spheres, segments, "touched_by")
         call = getattr(self._core, f"touched_by_{kind}")
         offsets, names = call(shapes, max_result_bytes, self.threads)
-        prim = names[:, -1]
-        if self.dtype == FLOAT32:
-            geometry, instance = names[:, 1], names[:, 0]
-        else:
-            geometry, instance = self._of_one_mesh(prim)
-        return {"offsets": offsets, "prim": prim, "geometry": geometry, "instance": instance}
+        return {
+            "offsets": offsets,
+            "prim": names[:, 2],
+            "geometry": names[:, 1],
+            "instance": names[:, 0],
+        }
 
     def touches(
         self, *, spheres: ArrayLike | None = None, segments: ArrayLike | None = None
@@ -567,11 +563,6 @@ class Scene(SceneContents, SceneViews):
         if spheres is not None:
             return ("spheres", *rows(spheres, "spheres", (4,), self.dtype))
         return ("segments", *rows(segments, "segments", (6,), self.dtype))
-
-    def _of_one_mesh(self, prim: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Geometry and instance of primitives of the scene's only mesh."""
-        only = UINT32.type(self._core.mesh_id() or 0)
-        return np.where(prim == MISSING, UINT32.type(MISSING), only), np.zeros(prim.shape, UINT32)
 
     def sweep_spheres(
         self,
@@ -600,22 +591,19 @@ class Scene(SceneContents, SceneViews):
             balls[:, :3], balls[:, 4:7], balls[:, 3], balls[:, 7] = (args[i] for i in (0, 1, 2, 3))
         given = floats_of(radii, "radii", lead)
         balls[:, 8] = given.reshape(-1)
-        columns = 9 if self.dtype == FLOAT32 else 7
+        # prim, geometry and instance as in closest_point, behind t.
+        columns = 9 if self.dtype == FLOAT32 else 8
         hits = np.empty((len(balls), columns), self.dtype)
         self._core.sweep(balls, hits, self.threads)
         hits = hits.reshape(lead + (columns,))
-        ids = hits.view(UINT32)
-        if self.dtype == FLOAT32:
-            prim, geometry, instance = ids[..., 1], ids[..., 2], ids[..., 3]
-        else:
-            prim = ids[..., 2]
-            geometry, instance = self._of_one_mesh(prim)
+        first = self.dtype.itemsize // 4
+        ids = hits.view(UINT32)[..., first : first + 3]
         return {
             "t": hits[..., 0],
             "point": hits[..., -5:-2],
-            "prim": prim,
-            "geometry": geometry,
-            "instance": instance,
+            "prim": ids[..., 0],
+            "geometry": ids[..., 1],
+            "instance": ids[..., 2],
             "u": hits[..., -2],
             "v": hits[..., -1],
         }

@@ -30,14 +30,14 @@
 namespace raydix::python {
 namespace {
 
-/// Closest points as rows of scalars: x, y, z, distance, prim, geometry, instance, u, v; in double,
-/// where they are of one mesh, without geometry and instance.
+/// Closest points as rows of scalars: x, y, z, distance; prim, geometry and instance, each as half
+/// a scalar in double, with as much left over; u, v.
 template <class Scene>
 using PlaceRows =
     Out<Scalar<Scene>,
         nb::shape<-1, sizeof(typename Scene::Types::ClosestPoint) / sizeof(Scalar<Scene>)>>;
 static_assert(sizeof(SceneClosestPoint) == 9 * sizeof(float) &&
-              sizeof(ClosestPointD) == 7 * sizeof(double));
+              sizeof(SceneClosestPointD) == 8 * sizeof(double));
 
 template <class Scene>
 Counts closest(Scene& scene, const PointRows<Scene>& points, const PlaceRows<Scene>& out,
@@ -204,7 +204,7 @@ Counts touches(Scene& scene, const Array& shapes, const FlagsOut& out, int threa
 /// Rows of a ray and a radius.
 template <class Scene>
 using SweepRows = In<Scalar<Scene>, nb::shape<-1, 9>>;
-/// t, prim, geometry, instance, x, y, z, u, v; in double without geometry and instance.
+/// t; prim, geometry and instance as in PlaceRows; x, y, z, u, v.
 template <class Scene>
 using ContactRows =
     Out<Scalar<Scene>,
@@ -212,7 +212,7 @@ using ContactRows =
 static_assert(sizeof(SphereSweep) == 9 * sizeof(float) &&
               sizeof(SceneSweepHit) == 9 * sizeof(float));
 static_assert(sizeof(SphereSweepD) == 9 * sizeof(double) &&
-              sizeof(SweepHitD) == 7 * sizeof(double));
+              sizeof(SceneSweepHitD) == 8 * sizeof(double));
 
 template <class Scene>
 Counts sweeps(Scene& scene, const SweepRows<Scene>& balls, const ContactRows<Scene>& out,
@@ -231,10 +231,10 @@ Counts sweeps(Scene& scene, const SweepRows<Scene>& balls, const ContactRows<Sce
     return counts;
 }
 
-/// Offsets, and rows of instance, geometry and prim; in double of prim alone.
+/// Offsets, and rows of instance, geometry and prim.
 template <class Shape, class Scene, class Array>
 nb::tuple touched(Scene& scene, const Array& shapes, std::uint64_t max_result_bytes, int threads) {
-    using Lists = typename Scene::Types::OverlapLists;
+    using Lists = SceneOverlapLists;
     const auto queries = rows<Shape>(shapes);
     PieceLimit limit("touched_by", max_result_bytes);
     std::vector<Lists> pieces;

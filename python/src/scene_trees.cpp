@@ -374,49 +374,30 @@ template <class Names>
 ClosestCounts BasicSceneTrees<Names>::closest_points(
     std::span<const Point> queries, std::span<typename Names::ClosestPoint> results,
     typename Names::Scalar max_distance, int threads) {
-    if constexpr (std::is_same_v<Names, InFloat>) {
-        return raydix::closest_points(traced(), queries, results,
-                                      {.max_distance = max_distance, .threads = threads});
-    } else {
-        return raydix::closest_points(this->bvh("closest_point in float64"), queries, results,
-                                      {.max_distance = max_distance, .threads = threads});
-    }
+    return raydix::closest_points(traced(), queries, results,
+                                  {.max_distance = max_distance, .threads = threads});
 }
 
 template <class Names>
 template <class Shape>
-typename Names::OverlapLists BasicSceneTrees<Names>::touch_all(std::span<const Shape> queries,
-                                                               std::uint64_t max_result_bytes,
-                                                               int threads) {
-    if constexpr (std::is_same_v<Names, InFloat>) {
-        return raydix::touch_all(traced(), queries,
-                                 {.max_result_bytes = max_result_bytes, .threads = threads});
-    } else {
-        return raydix::touch_all(this->bvh("touched_by in float64"), queries,
-                                 {.max_result_bytes = max_result_bytes, .threads = threads});
-    }
+SceneOverlapLists BasicSceneTrees<Names>::touch_all(std::span<const Shape> queries,
+                                                    std::uint64_t max_result_bytes, int threads) {
+    return raydix::touch_all(traced(), queries,
+                             {.max_result_bytes = max_result_bytes, .threads = threads});
 }
 
 template <class Names>
 template <class Shape>
 OverlapCounts BasicSceneTrees<Names>::touch_any(std::span<const Shape> queries,
                                                 std::span<std::uint8_t> touched, int threads) {
-    if constexpr (std::is_same_v<Names, InFloat>)
-        return raydix::touch_any(traced(), queries, touched, {.threads = threads});
-    else
-        return raydix::touch_any(this->bvh("touches in float64"), queries, touched,
-                                 {.threads = threads});
+    return raydix::touch_any(traced(), queries, touched, {.threads = threads});
 }
 
 template <class Names>
 OverlapCounts BasicSceneTrees<Names>::sweep_spheres(std::span<const typename Names::Sweep> sweeps,
                                                     std::span<typename Names::SweepHit> hits,
                                                     int threads) {
-    if constexpr (std::is_same_v<Names, InFloat>)
-        return raydix::sweep_spheres(traced(), sweeps, hits, {.threads = threads});
-    else
-        return raydix::sweep_spheres(this->bvh("sweep_spheres in float64"), sweeps, hits,
-                                     {.threads = threads});
+    return raydix::sweep_spheres(traced(), sweeps, hits, {.threads = threads});
 }
 
 template <class Names>
@@ -477,8 +458,8 @@ template OverlapCounts SceneTreesD::touch_any(std::span<const SphereD>, std::spa
                                               int);
 template SceneOverlapLists SceneTrees::touch_all(std::span<const Segment>, std::uint64_t, int);
 template SceneOverlapLists SceneTrees::touch_all(std::span<const Sphere>, std::uint64_t, int);
-template OverlapLists SceneTreesD::touch_all(std::span<const SegmentD>, std::uint64_t, int);
-template OverlapLists SceneTreesD::touch_all(std::span<const SphereD>, std::uint64_t, int);
+template SceneOverlapLists SceneTreesD::touch_all(std::span<const SegmentD>, std::uint64_t, int);
+template SceneOverlapLists SceneTreesD::touch_all(std::span<const SphereD>, std::uint64_t, int);
 template std::uint32_t SceneTrees::add_shapes(std::span<const Sphere>, const GeometryOptions&);
 template std::uint32_t SceneTrees::add_shapes(std::span<const Capsule>, const GeometryOptions&);
 template void SceneTrees::update_shapes(std::uint32_t, std::span<const Sphere>);

@@ -59,7 +59,6 @@ struct InFloat {
     using AllHits = raydix::AllHits;
     using ClosestPoint = SceneClosestPoint;
     using ClosestOptions = raydix::ClosestOptions;
-    using OverlapLists = SceneOverlapLists;
     using Sweep = SphereSweep;
     using SweepHit = SceneSweepHit;
     using Segment = raydix::Segment;
@@ -80,11 +79,10 @@ struct InDouble {
     using Ray = RayD;
     using Hit = HitD;
     using AllHits = AllHitsD;
-    using ClosestPoint = ClosestPointD;
+    using ClosestPoint = SceneClosestPointD;
     using ClosestOptions = ClosestOptionsD;
-    using OverlapLists = raydix::OverlapLists;
     using Sweep = SphereSweepD;
-    using SweepHit = SweepHitD;
+    using SweepHit = SceneSweepHitD;
     using Segment = SegmentD;
     using Sphere = SphereD;
 };
@@ -223,16 +221,13 @@ public:
     /// As the last commit left it. Throws InputError, as its functions do, if there was none.
     [[nodiscard]] const Scene& traced();
 
-    // Of scenes of any kind; in double of one mesh, and others throw InputError that names what
-    // stands in the way.
     using Point = typename Names::Point;
     ClosestCounts closest_points(std::span<const Point> queries,
                                  std::span<typename Names::ClosestPoint> results,
                                  typename Names::Scalar max_distance, int threads);
     template <class Shape>
-    [[nodiscard]] typename Names::OverlapLists touch_all(std::span<const Shape> queries,
-                                                         std::uint64_t max_result_bytes,
-                                                         int threads);
+    [[nodiscard]] SceneOverlapLists touch_all(std::span<const Shape> queries,
+                                              std::uint64_t max_result_bytes, int threads);
     template <class Shape>
     OverlapCounts touch_any(std::span<const Shape> queries, std::span<std::uint8_t> touched,
                             int threads);

@@ -5,6 +5,7 @@
 
 #include "engine/mesh_commit.h"
 #include "engine/part_tree.h"
+#include "engine/shape_commit.h"
 #include "engine/shape_tree.h"
 #include "exec/parallel.h"
 #include "layout/wide_refit.h"
@@ -67,7 +68,9 @@ public:
             else if (geometry.is_mesh())
                 tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
         MeshCommit<float, WideMaker> meshes(state_, options_, report_);
-        tree_->meshes = meshes.run(other_work());
+        ShapeCommit<float> shapes(state_, options_, report_);
+        const double other_work = shapes.work() + parts_of_instances();
+        tree_->meshes = meshes.run(other_work);
         for (const auto& mesh : tree_->meshes) {
             report_.bytes += mesh->tree->stats().bytes;
             tree_->extents.emplace_back();
@@ -78,7 +81,12 @@ public:
         }
         const ProgressStage others(meshes.part_done(), 1);
         progress_at(0);
-        const ProgressStage top(make_shapes(), 1);
+        const double made = shapes.run(other_work, [&](const auto& tree) {
+            tree_->shapes.push_back(tree);
+            tree_->extents.push_back(tree->extent);
+            tree_->bounds = unite(tree_->bounds, tree->bounds);
+        });
+        const ProgressStage top(made, 1);
         place_instances();
         const bool may_refit = options_.usage == Usage::moving && options_.refit_limit >= 1 &&
                                state_.tree != nullptr && state_.tree->quality == options_.quality &&
@@ -91,59 +99,13 @@ public:
     }
 
 private:
-    /// Primitives that are no triangles, and parts that instances become.
-    [[nodiscard]] double other_work() const {
+    /// Parts that instances become.
+    [[nodiscard]] double parts_of_instances() const {
         double parts = 0;
-        for (const auto& [id, geometry] : state_.geometries)
-            if (geometry.shapes) parts += static_cast<double>(count_of(*geometry.shapes));
         for (const auto& [id, geometry] : instances_)
             if (geometry->scene->tree != nullptr)
                 parts += 1 + static_cast<double>(geometry->scene->tree->placed.size());
         return parts;
-    }
-
-    /// Returns the part of the work on all that are no triangles that is done then.
-    double make_shapes() {
-        const double work = other_work();
-        double done = 0;
-        for (const auto& [id, geometry] : state_.geometries) {
-            if (!geometry.shapes) continue;
-            const double after = done + static_cast<double>(count_of(*geometry.shapes));
-            const ProgressStage stage(done / work, after / work);
-            const auto shapes = shapes_of(id, geometry);
-            done = after;
-            progress_at(1);
-            tree_->shapes.push_back(shapes);
-            tree_->extents.push_back(shapes->extent);
-            tree_->bounds = unite(tree_->bounds, shapes->bounds);
-            ++report_.shapes;
-            report_.primitives += count_of(*geometry.shapes);
-            report_.bytes += shapes->bytes();
-        }
-        return work > 0 ? done / work : 0;
-    }
-    std::shared_ptr<const ShapeTree> shapes_of(std::uint32_t id, const Geometry& geometry) {
-        const auto old = last_shapes(id);
-        const bool same_way = old != nullptr && state_.tree->quality == options_.quality;
-        if (same_way && !geometry.changed && old->mask == geometry.mask) return old;
-        const bool may_refit =
-            same_way && options_.usage == Usage::moving && options_.refit_limit >= 1;
-        bool refitted = false;
-        try {
-            auto made =
-                make_shape_tree(id, geometry.mask, *geometry.shapes, geometry.own, options_.quality,
-                                may_refit ? old.get() : nullptr, options_.refit_limit, refitted);
-            ++(refitted ? report_.trees_refitted : report_.trees_built);
-            return made;
-        } catch (const InputError& error) {
-            throw InputError("geometry " + std::to_string(id) + ": " + error.what());
-        }
-    }
-    [[nodiscard]] std::shared_ptr<const ShapeTree> last_shapes(std::uint32_t id) const {
-        if (state_.tree == nullptr) return nullptr;
-        const auto& all = state_.tree->shapes;
-        const auto at = std::ranges::lower_bound(all, id, {}, &ShapeTree::id);
-        return at != all.end() && (*at)->id == id ? *at : nullptr;
     }
 
     /// A scene to place, and what leads to it.

@@ -9,6 +9,7 @@
 #include "engine/commit.h"
 #include "engine/mesh_commit.h"
 #include "engine/part_tree.h"
+#include "engine/shape_commit.h"
 
 namespace raydix {
 namespace {
@@ -47,13 +48,22 @@ public:
         for (const auto& [id, geometry] : state_.geometries)
             if (geometry.is_instance())
                 ++instances;
-            else
+            else if (geometry.is_mesh())
                 tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
         MeshCommit<double, WideMakerD> meshes(state_, options_, report_);
-        tree_->meshes = meshes.run(static_cast<double>(instances));
+        ShapeCommit<double> shapes(state_, options_, report_);
+        const double other_work = shapes.work() + static_cast<double>(instances);
+        tree_->meshes = meshes.run(other_work);
         for (const auto& mesh : tree_->meshes) add_extent(*mesh->tree);
+        const ProgressStage others(meshes.part_done(), 1);
+        progress_at(0);
+        const double made = shapes.run(other_work, [&](const auto& tree) {
+            tree_->shapes.push_back(tree);
+            tree_->extents.push_back(tree->around);
+            unite_with(tree_->bounds, tree->bounds);
+        });
         place_instances();
-        const ProgressStage top(meshes.part_done(), 1);
+        const ProgressStage top(made, 1);
         progress_at(0);
         build_top(*tree_);
         keep_own_parts();
@@ -61,6 +71,7 @@ public:
             report_.bytes += tree_->parts.arrays.nodes.size() * sizeof(WideNode) +
                              tree_->placed.size() * sizeof(PlacedSceneD) +
                              tree_->ways.size() * sizeof(WayInD);
+        list_masks();
         report_.instances = tree_->instances.size();
         report_.paths = tree_->paths;
         return std::move(tree_);
@@ -120,18 +131,32 @@ private:
             tree_->ways.push_back(below.way);
             for (std::uint32_t w = 0; w < below.more; ++w)
                 tree_->ways.push_back(inner.ways[below.first + w]);
-            add(part, inner.extents[inner.meshes.size() + k]);
+            add(part, inner.extents[inner.own_part_count() + k]);
         }
     }
 
-    /// The meshes alone, for scenes that place this one.
+    void list_masks() {
+        std::vector<std::uint32_t>& all = tree_->masks;
+        const SceneTreeD* last = nullptr;
+        for (const auto& [id, geometry] : state_.geometries) all.push_back(geometry.mask);
+        for (const InstanceNameD& instance : tree_->instances) {
+            if (instance.scene.get() == last) continue;  // most place what the one before them does
+            last = instance.scene.get();
+            all.insert(all.end(), last->masks.begin(), last->masks.end());
+        }
+        std::ranges::sort(all);
+        all.erase(std::unique(all.begin(), all.end()), all.end());
+    }
+
+    /// The meshes and shapes alone, for scenes that place this one.
     void keep_own_parts() {
-        if (tree_->instances.empty() || tree_->meshes.empty()) return;
+        const std::size_t count = tree_->own_part_count();
+        if (tree_->instances.empty() || count == 0) return;
         auto own = std::make_shared<SceneTreeD>();
         own->meshes = tree_->meshes;
-        own->extents.assign(
-            tree_->extents.begin(),
-            tree_->extents.begin() + static_cast<std::ptrdiff_t>(tree_->meshes.size()));
+        own->shapes = tree_->shapes;
+        own->extents.assign(tree_->extents.begin(),
+                            tree_->extents.begin() + static_cast<std::ptrdiff_t>(count));
         build_top(*own);
         tree_->own_parts = std::move(own);
     }
@@ -140,6 +165,9 @@ private:
         for (const auto& mesh : tree.meshes)
             tree.stack_size =
                 std::max(tree.stack_size, wide_stack_capacity(mesh->tree->arrays.stats.max_depth));
+        for (const auto& shapes : tree.shapes)
+            tree.stack_size =
+                std::max(tree.stack_size, wide_stack_capacity(shapes->arrays.stats.max_depth));
         build_part_tree(tree.extents, quality_of_parts(options_), tree.parts);
         tree.stack_size += wide_stack_capacity(tree.parts.arrays.stats.max_depth);
     }

@@ -21,12 +21,12 @@ namespace raydix {
 namespace {
 
 /// Shapes of a scene that queries see; null if there are none.
-const ShapeTree* seen_shapes(const SceneTree& scene, std::uint32_t mask) {
+template <class Tree>
+auto seen_shapes(const Tree& scene, std::uint32_t mask) -> decltype(scene.shapes.front().get()) {
     for (const auto& shapes : scene.shapes)
         if ((shapes->mask & mask) != 0) return shapes.get();
     return nullptr;
 }
-const ShapeTree* seen_shapes(const SceneTreeD&, std::uint32_t) { return nullptr; }
 
 constexpr std::size_t no_way = ~std::size_t{0};
 
@@ -76,12 +76,11 @@ std::uint64_t build_bytes_a_triangle(Quality quality) {
 
 }  // namespace
 
-ScenePrimitive FlatNames::name(std::uint32_t prim) const {
+auto FlatNames::run_of(std::uint32_t prim) const -> const Run& {
     const auto past =
         std::upper_bound(runs.begin(), runs.end(), prim,
                          [](std::uint32_t wanted, const Run& run) { return wanted < run.first; });
-    const Run& run = *(past - 1);
-    return {run.instance, run.geometry, prim - run.first};
+    return *(past - 1);
 }
 
 /// All paths with triangles, as copies and the ways out of them.
@@ -106,8 +105,9 @@ private:
     void walk(const Tree& scene, std::uint32_t number, std::size_t way) {
         for (const auto& name : scene.mesh_names) {
             if ((name.mask & plan_.mask_) == 0 || name.mesh.triangles.empty()) continue;
-            out_.names.runs.push_back({static_cast<std::uint32_t>(triangles_), number, name.id});
             copies.push_back({name.mesh, vertices_, triangles_, &ways, way});
+            out_.names.runs.push_back(
+                {static_cast<std::uint32_t>(triangles_), number, name.id, copies.back().mirrors()});
             vertices_ += name.mesh.vertices.size();
             triangles_ += name.mesh.triangles.size();
         }
@@ -128,9 +128,10 @@ private:
 };
 
 template <class Scalar>
-FlatPlan<Scalar>::FlatPlan(const Scene& scene, std::uint32_t mask, const char* call)
+FlatPlan<Scalar>::FlatPlan(const Scene& scene, std::uint32_t mask, const char* call,
+                           FlatShapes shapes)
     : tree_(BasicSceneAccess<Scalar>::tree(scene)), mask_(mask) {
-    if (count(*tree_).has_shapes) refuse_shapes(*tree_, 0, call);
+    if (count(*tree_).has_shapes && shapes == FlatShapes::refused) refuse_shapes(*tree_, 0, call);
 }
 
 template <class Scalar>
@@ -161,7 +162,7 @@ const FlatCounts& FlatPlan<Scalar>::count(const Tree& scene) {
 template <class Scalar>
 void FlatPlan<Scalar>::refuse_shapes(const Tree& scene, std::uint32_t number,
                                      const char* call) const {
-    if (const ShapeTree* const shapes = seen_shapes(scene, mask_))
+    if (const auto* const shapes = seen_shapes(scene, mask_))
         throw InputError(
             std::string(call) + ": geometry " + std::to_string(shapes->id) + " (" +
             kind_of(shapes->shapes) + ")" +

@@ -23,10 +23,16 @@ struct FlatNames {
     /// A mesh on a path: `first` is its first triangle.
     struct Run {
         std::uint32_t first, instance, geometry;
+        bool turned;  // the path mirrors: second and third corners have changed places
     };
     std::vector<Run> runs;  // ascending, by (instance, geometry) too
 
-    [[nodiscard]] ScenePrimitive name(std::uint32_t prim) const;
+    /// That `prim` belongs to.
+    [[nodiscard]] const Run& run_of(std::uint32_t prim) const;
+    [[nodiscard]] ScenePrimitive name(std::uint32_t prim) const {
+        const Run& run = run_of(prim);
+        return {run.instance, run.geometry, prim - run.first};
+    }
 };
 
 /// In float or in double.
@@ -61,6 +67,8 @@ struct FlatCounts {
     bool has_shapes = false;      // among what counts
 };
 
+enum class FlatShapes { refused, left_out };
+
 /// Knows what flatten() would make, without making it. `mask`: a geometry counts if its own mask &
 /// this is not 0, and the same holds for each instance on the way to it.
 template <class Scalar>
@@ -70,8 +78,9 @@ public:
     using Tree = typename SceneKind<Scalar>::Tree;
 
     /// Throws InputError, which names `call` and the geometry: spheres or other shapes, that have
-    /// no triangles; a scene that was never committed.
-    FlatPlan(const Scene& scene, std::uint32_t mask, const char* call);
+    /// no triangles, unless they are left out; a scene that was never committed.
+    FlatPlan(const Scene& scene, std::uint32_t mask, const char* call,
+             FlatShapes shapes = FlatShapes::refused);
 
     [[nodiscard]] const FlatCounts& counts() const { return counts_of(*tree_); }
     /// Whether flatten() copies no vertex.

@@ -100,16 +100,21 @@ bool find(const Tree& scene, const AnyHit& hit, BasicHitTriangle<Tree>& triangle
 }
 
 /// A hit of shapes, and the way to it.
+template <class Tree>
 struct HitShape {
-    HitTriangle way;  // without corners
-    const ShapeTree* shapes = nullptr;
+    using Shapes = typename decltype(Tree::shapes)::value_type::element_type;
+
+    BasicHitTriangle<Tree> way;  // without corners
+    const Shapes* shapes = nullptr;
     std::uint32_t prim = 0;
 };
 
-bool find(const SceneTree& scene, const Hit& hit, HitShape& shape) {
-    const SceneTree* const inner = follow_path(scene, hit, shape.way);
+template <class Tree, class AnyHit>
+bool find(const Tree& scene, const AnyHit& hit, HitShape<Tree>& shape) {
+    const Tree* const inner = follow_path(scene, hit, shape.way);
     if (inner == nullptr) return false;
-    const auto at = std::ranges::lower_bound(inner->shapes, hit.geometry, {}, &ShapeTree::id);
+    const auto at = std::ranges::lower_bound(inner->shapes, hit.geometry, {},
+                                             [](const auto& shapes) { return shapes->id; });
     if (at == inner->shapes.end() || (*at)->id != hit.geometry) return false;
     shape.shapes = at->get();
     shape.prim = hit.prim;
@@ -117,12 +122,12 @@ bool find(const SceneTree& scene, const Hit& hit, HitShape& shape) {
 }
 
 /// "geometry 3 (spheres)", if the hit is of shapes.
-std::string shapes_of(const SceneTree& scene, const Hit& hit) {
-    HitShape shape;
+template <class Tree, class AnyHit>
+std::string shapes_of(const Tree& scene, const AnyHit& hit) {
+    HitShape<Tree> shape;
     if (!find(scene, hit, shape)) return {};
     return "geometry " + std::to_string(hit.geometry) + " (" + kind_of(shape.shapes->shapes) + ")";
 }
-std::string shapes_of(const SceneTreeD&, const HitD&) { return {}; }
 
 template <class Tree, class AnyHit>
 [[noreturn]] void refuse(const Tree& scene, const AnyHit& hit, std::size_t at) {
@@ -184,12 +189,13 @@ void fill(const BasicScene<Scalar>& scene, std::span<const AnyHit> hits, std::sp
 }
 
 /// Of hits whose rays are known: as above; value_of_shape(ray i, hit i, its shape) for shapes.
-template <class Value, class ValueOfShape>
-void fill_by_rays(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
-                  std::span<Vec3> out, int threads, const char* call, const Value& value,
-                  const ValueOfShape& value_of_shape) {
-    constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-    const SceneTree& tree = *SceneAccess::tree(scene);
+template <class Scalar, class AnyRay, class AnyHit, class Point, class Value, class ValueOfShape>
+void fill_by_rays(const BasicScene<Scalar>& scene, std::span<const AnyRay> rays,
+                  std::span<const AnyHit> hits, std::span<Point> out, int threads, const char* call,
+                  const Value& value, const ValueOfShape& value_of_shape) {
+    using Tree = typename SceneKind<Scalar>::Tree;
+    constexpr Scalar nan = std::numeric_limits<Scalar>::quiet_NaN();
+    const Tree& tree = *BasicSceneAccess<Scalar>::tree(scene);
     if (hits.size() != out.size() || hits.size() != rays.size())
         throw InputError(std::string(call) + ": " + std::to_string(rays.size()) + " rays, " +
                          std::to_string(hits.size()) + " hits and room for " +
@@ -197,8 +203,8 @@ void fill_by_rays(const Scene& scene, std::span<const Ray> rays, std::span<const
     std::atomic<bool> all_there{true};
     with_threads(threads, [&] {
         for_each_range(hits.size(), 4096, [&](std::size_t begin, std::size_t end) {
-            HitTriangle triangle;
-            HitShape shape;
+            BasicHitTriangle<Tree> triangle;
+            HitShape<Tree> shape;
             for (std::size_t i = begin; i < end; ++i) {
                 if (!hits[i].hit())
                     out[i] = {nan, nan, nan};
@@ -212,28 +218,31 @@ void fill_by_rays(const Scene& scene, std::span<const Ray> rays, std::span<const
         });
         if (all_there.load()) return;
         for (std::size_t i = 0; i < hits.size(); ++i) {
-            HitTriangle triangle;
-            HitShape shape;
+            BasicHitTriangle<Tree> triangle;
+            HitShape<Tree> shape;
             if (hits[i].hit() && !find(tree, hits[i], triangle) && !find(tree, hits[i], shape))
                 refuse(tree, hits[i], i);
         }
     });
 }
 
-Double3 point_on(const Ray& ray, float t) {
-    return Double3(ray.origin) + Double3(ray.direction) * double{t};
+template <class AnyRay>
+Double3 point_on(const AnyRay& ray, double t) {
+    return Double3(ray.origin) + Double3(ray.direction) * t;
 }
 
 /// From the axis or center of a shape to a point, in the shape's own space. NaN: the caller's own
 /// shapes.
-Double3 away_from(const HitShape& hit, Double3 point) {
-    const Shapes& shapes = hit.shapes->shapes;
-    if (const auto* const spheres = std::get_if<std::span<const Sphere>>(&shapes))
+template <class Tree>
+Double3 away_from(const HitShape<Tree>& hit, Double3 point) {
+    constexpr std::size_t of_spheres = 0, of_capsules = 1, of_balls = 2;
+    const auto& shapes = hit.shapes->shapes;
+    if (const auto* const spheres = std::get_if<of_spheres>(&shapes))
         return point - Double3((*spheres)[hit.prim].center);
-    if (const auto* const balls = std::get_if<BasicBalls<float>>(&shapes))
+    if (const auto* const balls = std::get_if<of_balls>(&shapes))
         return point - Double3(balls->centers[hit.prim]);
-    if (const auto* const capsules = std::get_if<std::span<const Capsule>>(&shapes)) {
-        const Capsule& capsule = (*capsules)[hit.prim];
+    if (const auto* const capsules = std::get_if<of_capsules>(&shapes)) {
+        const auto& capsule = (*capsules)[hit.prim];
         const Double3 a(capsule.a), axis = Double3(capsule.b) - a, from = point - a;
         const double length2 = dot(axis, axis);
         const double along = length2 > 0 ? std::clamp(dot(from, axis) / length2, 0.0, 1.0) : 0.0;
@@ -243,12 +252,15 @@ Double3 away_from(const HitShape& hit, Double3 point) {
                      " is user geometry, whose normals its owner knows");
 }
 
-Double3 normal_of(const HitShape& hit, Double3 point) {
-    const HitTriangle& way = hit.way;
-    for (std::uint32_t level = 0; level < way.levels; ++level) {
-        const Affine inverse = *inverse_of(affine_of(way.way[level]->transform));
-        point = inverse.vector(point) + inverse.move;
-    }
+Double3 into(const InstanceName& instance, Double3 point) {
+    return inverse_of(affine_of(instance.transform))->point(point);
+}
+Double3 into(const InstanceNameD& instance, Double3 point) { return instance.inverse.point(point); }
+
+template <class Tree>
+Double3 normal_of(const HitShape<Tree>& hit, Double3 point) {
+    const BasicHitTriangle<Tree>& way = hit.way;
+    for (std::uint32_t level = 0; level < way.levels; ++level) point = into(*way.way[level], point);
     Double3 normal = away_from(hit, point);
     for (std::uint32_t level = way.levels; level-- > 0;)
         normal = turned(*way.way[level], unit_of(normal));
@@ -267,6 +279,26 @@ void fill_normals(const BasicScene<Scalar>& scene, std::span<const AnyHit> hits,
                   std::span<Point> normals, int threads) {
     fill(scene, hits, normals, threads, "normals",
          [](const auto&, const auto& triangle) { return unit_of(triangle.normal()); });
+}
+
+template <class Scalar, class AnyRay, class AnyHit, class Point>
+void fill_positions_by_rays(const BasicScene<Scalar>& scene, std::span<const AnyRay> rays,
+                            std::span<const AnyHit> hits, std::span<Point> points, int threads) {
+    fill_by_rays(
+        scene, rays, hits, points, threads, "positions",
+        [](const auto& hit, const auto& triangle) { return triangle.point(hit.u, hit.v); },
+        [&](std::size_t i, const auto&) { return point_on(rays[i], hits[i].t); });
+}
+
+template <class Scalar, class AnyRay, class AnyHit, class Point>
+void fill_normals_by_rays(const BasicScene<Scalar>& scene, std::span<const AnyRay> rays,
+                          std::span<const AnyHit> hits, std::span<Point> normals, int threads) {
+    fill_by_rays(
+        scene, rays, hits, normals, threads, "normals",
+        [](const auto&, const auto& triangle) { return unit_of(triangle.normal()); },
+        [&](std::size_t i, const auto& shape) {
+            return normal_of(shape, point_on(rays[i], hits[i].t));
+        });
 }
 
 }  // namespace
@@ -339,20 +371,22 @@ void normals(const SceneD& scene, std::span<const HitD> hits, std::span<Vec3d> n
 
 void positions(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
                std::span<Vec3> points, int threads) {
-    fill_by_rays(
-        scene, rays, hits, points, threads, "positions",
-        [](const Hit& hit, const HitTriangle& triangle) { return triangle.point(hit.u, hit.v); },
-        [&](std::size_t i, const HitShape&) { return point_on(rays[i], hits[i].t); });
+    fill_positions_by_rays(scene, rays, hits, points, threads);
+}
+
+void positions(const SceneD& scene, std::span<const RayD> rays, std::span<const HitD> hits,
+               std::span<Vec3d> points, int threads) {
+    fill_positions_by_rays(scene, rays, hits, points, threads);
 }
 
 void normals(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
              std::span<Vec3> normals, int threads) {
-    fill_by_rays(
-        scene, rays, hits, normals, threads, "normals",
-        [](const Hit&, const HitTriangle& triangle) { return unit_of(triangle.normal()); },
-        [&](std::size_t i, const HitShape& shape) {
-            return normal_of(shape, point_on(rays[i], hits[i].t));
-        });
+    fill_normals_by_rays(scene, rays, hits, normals, threads);
+}
+
+void normals(const SceneD& scene, std::span<const RayD> rays, std::span<const HitD> hits,
+             std::span<Vec3d> normals, int threads) {
+    fill_normals_by_rays(scene, rays, hits, normals, threads);
 }
 
 std::vector<Vec3> normals(const Scene& scene, std::span<const Hit> hits, int threads) {

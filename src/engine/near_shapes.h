@@ -13,16 +13,20 @@
 #include "base/distance.h"
 #include "base/double3.h"
 #include "base/math.h"
+#include "base/scalar.h"
 #include "engine/affine.h"
 #include "tree/outward_box.h"
 
 namespace raydix {
 
-struct ShapePoint {
-    Vec3 position;
-    float u;  // along the axis
-    float d2;
+template <class Scalar>
+struct BasicShapePoint {
+    VecOf<Scalar> position;
+    Scalar u;  // along the axis
+    Scalar d2;
 };
+using ShapePoint = BasicShapePoint<float>;
+using ShapePointD = BasicShapePoint<double>;
 
 inline Capsule capsule_of(const Sphere& s) { return {s.center, s.center, s.radius}; }
 
@@ -34,8 +38,16 @@ inline ShapePoint rounded_point(Double3 position, Double3 lo, Double3 hi, double
     return {p, static_cast<float>(u), squared_distance(p, query)};
 }
 
+inline ShapePointD rounded_point(Double3 position, Double3 lo, Double3 hi, double u, Vec3d query) {
+    Vec3d p, low, high;
+    position.round_to(p), lo.round_to(low), hi.round_to(high);
+    p = without_negative_zero(min_of(max_of(p, low), high));
+    return {p, u, squared_distance(p, query)};
+}
+
 /// Of the points within `radius` of the segment a, b.
-inline ShapePoint closest_on_capsule(Double3 a, Double3 b, double radius, Vec3 q) {
+template <class Vec>
+auto closest_on_capsule(Double3 a, Double3 b, double radius, Vec q) {
     const Double3 query(q), axis = b - a;
     const double length2 = dot(axis, axis);
     const double u = length2 > 0.0 ? std::clamp(dot(query - a, axis) / length2, 0.0, 1.0) : 0.0;
@@ -140,12 +152,11 @@ private:
     std::array<Double3, 3> axis_;
 };
 
-/// Of a capsule in the space of an instance; `map` leads from there to the query.
-inline ShapePoint closest_on_image(const Affine& map, const Capsule& capsule, Vec3 q) {
-    const Double3 a = map.point(Double3(capsule.a)), b = map.point(Double3(capsule.b));
-    const BallImage ball(map, capsule.radius);
+/// Of all that images of balls of a radius have around points of the segment a, b.
+template <class Vec>
+auto closest_on_image(Double3 a, Double3 b, const BallImage& ball, double radius, Vec q) {
     if (const double scale = ball.scale(); scale > 0.0)
-        return closest_on_capsule(a, b, scale * double{capsule.radius}, q);
+        return closest_on_capsule(a, b, scale * radius, q);
     const Double3 query(q), axis = b - a;
     // The distance from a + u * axis + ball is convex in u: its slope has the sign of -off . axis.
     double u = 0.0;
@@ -173,6 +184,12 @@ inline ShapePoint closest_on_image(const Affine& map, const Capsule& capsule, Ve
         {least(a.x, b.x, reach.x), least(a.y, b.y, reach.y), least(a.z, b.z, reach.z)},
         {largest(a.x, b.x, reach.x), largest(a.y, b.y, reach.y), largest(a.z, b.z, reach.z)}, u, q);
 }
+/// Of a capsule in the space of an instance; `map` leads from there to the query.
+inline ShapePoint closest_on_image(const Affine& map, const Capsule& capsule, Vec3 q) {
+    const double radius = capsule.radius;
+    return closest_on_image(map.point(Double3(capsule.a)), map.point(Double3(capsule.b)),
+                            BallImage(map, radius), radius, q);
+}
 
 /// The square of the least distance between two segments.
 inline double segment_distance2(Double3 a, Double3 b, Double3 c, Double3 d) {
@@ -198,7 +215,8 @@ inline double segment_distance2(Double3 a, Double3 b, Double3 c, Double3 d) {
 }
 
 /// Segment and capsule in one space.
-inline bool segment_touches_capsule(Double3 from, Double3 to, const Capsule& capsule) {
+template <class AnyCapsule>
+bool segment_touches_capsule(Double3 from, Double3 to, const AnyCapsule& capsule) {
     const double r = capsule.radius;
     return segment_distance2(from, to, Double3(capsule.a), Double3(capsule.b)) <= r * r;
 }

@@ -21,6 +21,11 @@ Aabb built_box(const Extent& extent) {
     constexpr Vec3 edge{max_coordinate, max_coordinate, max_coordinate};
     return {max_of(extent.box.lo, edge * -1.0f), min_of(extent.box.hi, edge)};
 }
+/// They leave out boxes smaller than they count too, which points near the center have.
+Aabb built_box(const Aabb& box) {
+    constexpr Vec3 side{min_diagonal, min_diagonal, min_diagonal};
+    return {box.lo - side, box.hi + side};
+}
 Aabb reach_of(const Aabb& built) {
     constexpr float far = max_coordinate * (1.0f + 0x1p-20f);
     const auto low = [](float x) { return x <= -max_coordinate ? -far : x; };
@@ -223,6 +228,10 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
 }
 
 void build_part_tree(std::span<const ExtentD> extents, Quality quality, PartTreeD& out) {
+    build_box_tree(extents, build_of_parts(quality), out);
+}
+
+void build_box_tree(std::span<const ExtentD> extents, const BuildOptions& build, PartTreeD& out) {
     out.around = {nothing_d, 0.0};
     for (const ExtentD& extent : extents) {
         if (is_empty(extent)) continue;
@@ -239,13 +248,14 @@ void build_part_tree(std::span<const ExtentD> extents, Quality quality, PartTree
     std::vector<Aabb> boxes(extents.size());
     for_each_index(boxes.size(), [&](std::size_t i) {
         AabbD box;
-        boxes[i] = box_at(i, box)
-                       ? grown_planes(box_around_center(box, out.space.center, out.space.scale))
-                       : empty_box();
+        boxes[i] =
+            box_at(i, box)
+                ? built_box(grown_planes(box_around_center(box, out.space.center, out.space.scale)))
+                : empty_box();
     });
     PartTree tree;
     const Vec3 middle{};
-    make_box_tree(boxes, build_of_parts(quality), leaves_of_parts, &middle, tree);
+    make_box_tree(boxes, build, leaves_of_parts, &middle, tree);
     out.arrays = std::move(tree.arrays);
     out.part = std::move(tree.part);
     out.set_view();

@@ -22,6 +22,8 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
 
 /// In double: [parts], those that are empty are left out and the others must be in range.
 void build_part_tree(std::span<const ExtentD> extents, Quality quality, PartTreeD& out);
+/// The same for the primitives of a geometry, of any size.
+void build_box_tree(std::span<const ExtentD> extents, const BuildOptions& build, PartTreeD& out);
 
 /// Leaves hold the numbers of boxes, as `leaves` says. Boxes that builders leave out are left out.
 /// `out.growth` stays as it is.

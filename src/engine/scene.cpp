@@ -125,8 +125,6 @@ template <class Scalar, class State>
 std::uint32_t add_shapes(State& state, const BasicShapes<Scalar>& shapes,
                          const GeometryOptions& options) {
     const std::uint32_t id = new_id(state, options.id);
-    if constexpr (std::is_same_v<Scalar, double>)
-        throw InputError(name_of(id) + ": scenes in double have no " + kind_of(shapes));
     typename State::Geometry geometry;
     geometry.mask = options.mask;
     set_shapes<typename State::Geometry, Scalar>(geometry, shapes);

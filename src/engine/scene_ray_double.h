@@ -16,7 +16,9 @@
 #include "engine/box_frame_double.h"
 #include "engine/hit_order.h"
 #include "engine/scene_job_double.h"
+#include "engine/shape_tree.h"
 #include "engine/triangle_leaves_double.h"
+#include "proximity/shape_hits.h"
 #include "trace/simd/single.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -69,15 +71,19 @@ HWY_INLINE LineD line_into(const LineD& line, const SceneTreeD& scene, const Pla
 template <Wanted wanted>
 class SceneRayD {
 public:
-    /// The ray must be valid; `stack` has room for SceneTreeD::stack_size. `found`: of all hits.
-    SceneRayD(const RayD& ray, std::uint32_t mask, const WideStackView& stack,
+    /// The ray must be valid; `place`: among the caller's; `stack` has room for
+    /// SceneTreeD::stack_size. `found`: of all hits.
+    SceneRayD(const RayD& ray, std::size_t place, std::uint32_t mask, const WideStackView& stack,
               BudgetVector<HitD>* found = nullptr)
-        : mask_(mask), tmin_(ray.tmin), reach_(ray.tmax), stack_(stack), found_(found) {}
+        : mask_(mask),
+          tmin_(ray.tmin),
+          reach_(ray.tmax),
+          stack_(stack),
+          found_(found),
+          place_(place) {}
 
-    /// Says which hits count; `place`: of the ray among the caller's. Both must outlive the walk.
-    void filter_by(const HitFilterD& filter, std::size_t place, const RayD& ray) {
-        filter_ = &filter, place_ = place, given_ = &ray;
-    }
+    /// Says which hits count. Both must outlive the walk.
+    void filter_by(const HitFilterD& filter, const RayD& ray) { filter_ = &filter, given_ = &ray; }
 
     [[nodiscard]] const HitD& best() const { return best_; }
 
@@ -146,7 +152,12 @@ protected:
             hit_mesh(*scene.meshes[part], number, line);
             return;
         }
-        const PlacedSceneD& placed = scene.placed[part - scene.meshes.size()];
+        const std::size_t own = scene.own_part_count();
+        if (part < own) {
+            hit_shapes(*scene.shapes[part - scene.meshes.size()], number, line);
+            return;
+        }
+        const PlacedSceneD& placed = scene.placed[part - own];
         if (sees(scene, placed))
             walk(*placed.scene, number + placed.number, line_into(line, scene, placed));
     }
@@ -179,6 +190,70 @@ protected:
         }
     }
 
+    /// What the ray does at the leaves of a tree over shapes.
+    struct AtShapes {
+        SceneRayD& ray;
+        const ShapeTreeD& tree;
+        const std::uint32_t number;
+        RayD line;  // tmax: as far as it still goes
+        const double t_scale;
+        const BoxDistances& distances;
+        static constexpr bool large = false, nearest_first = false;
+
+        HWY_NOINLINE float visit_one(std::uint32_t place, std::uint32_t, std::uint32_t) {
+            ray.hit_primitive(tree, tree.part[place], number, line);
+            if (wants_any(wanted) && ray.best_.hit()) return -1.0f;
+            line.tmax = ray.reach_;
+            return distances.above(ray.reach_ / t_scale);
+        }
+    };
+
+    HWY_NOINLINE void hit_shapes(const ShapeTreeD& tree, std::uint32_t number, const LineD& line) {
+        if (tree.empty() || (tree.mask & mask_) == 0) return;
+        RayD ray = line.ray(tmin_, reach_);
+        if (!is_valid(ray)) return;
+        const RayFrameD frame = make_frame(ray);
+        SingleFrame boxes;
+        BoxDistances distances;
+        if (!fill_box_frame(tree, ray, frame, tree.around.error, boxes, distances)) return;
+        ray.tmin = max_of(ray.tmin, 0.0) + 0.0;  // -0 becomes +0
+        AtShapes shapes{*this, tree, number, ray, frame.t_scale, distances};
+        SimdCounts counts;
+        SingleRay<wanted, false, false, false, AtShapes>(tree.view, boxes, stack_, counts, &shapes)
+            .trace(0, {boxes.tmax});
+    }
+
+    void hit_primitive(const ShapeTreeD& tree, std::uint32_t prim, std::uint32_t number,
+                       const RayD& ray) {
+        TreeHitD hit;
+        if (const UserGeometryD* const user = tree.user()) {
+            RaysAtPrimitiveD rays(&ray, &place_, &hit, 1);
+            user->test(prim, rays);
+            if (!hit.hit()) return;
+        } else if (const auto* const capsules =
+                       std::get_if<std::span<const CapsuleD>>(&tree.shapes)) {
+            if (!hit_capsule((*capsules)[prim], ray, hit)) return;
+        } else if (!tree.with_capsule(prim, [&](Vec3d center, Vec3d, double radius) {
+                       return hit_ball(center, radius, ray, hit);
+                   })) {
+            return;
+        }
+        hit.prim = prim;
+        take({hit, tree.id, number});
+    }
+    void take(const HitD& hit) {
+        if constexpr (wanted == Wanted::all) {
+            found_->push_back(hit);
+            return;
+        }
+        if constexpr (wants_accepted(wanted))
+            if (!(*filter_)(place_, *given_, hit)) return;
+        if constexpr (wants_any(wanted))
+            best_.prim = 0;
+        else
+            keep(hit);
+    }
+
     void keep(const HitD& hit) {
         if (best_.hit() && !(order_of(hit) < order_of(best_))) return;
         best_ = hit;
@@ -194,7 +269,7 @@ protected:
     WideStackView stack_;  // from where it is free
     BudgetVector<HitD>* const found_;
     const HitFilterD* filter_ = nullptr;
-    std::size_t place_ = 0;
+    const std::size_t place_;
     const RayD* given_ = nullptr;
 };
 

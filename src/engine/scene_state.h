@@ -23,6 +23,7 @@ struct SceneKind;
 template <>
 struct SceneKind<float> {
     using MeshTree = raydix::MeshTree;
+    using ShapeTree = raydix::ShapeTree;
     using Tree = SceneTree;
     struct WayBack {
         Affine inverse;
@@ -32,6 +33,7 @@ struct SceneKind<float> {
 template <>
 struct SceneKind<double> {
     using MeshTree = MeshTreeD;
+    using ShapeTree = ShapeTreeD;
     using Tree = SceneTreeD;
     struct WayBack {
         InverseD inverse;

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "engine/affine_double.h"
@@ -22,6 +23,7 @@ struct MeshTreeD : GroupedMeshes {
 };
 
 struct SceneTreeD;
+struct ShapeTreeD;  // shape_tree.h
 
 /// The way into an instance.
 struct WayInD {
@@ -46,20 +48,34 @@ struct InstanceNameD {
     std::shared_ptr<const SceneTreeD> scene;
 };
 
-/// A wide tree over parts, one a leaf: mesh trees first, then placed scenes.
+/// A wide tree over parts, one a leaf. The parts of a scene are numbered: mesh trees first, then
+/// trees of shapes, then placed scenes.
 struct PartTreeD : NodesD {
     std::vector<std::uint32_t> part;  // by the place that leaves name
     ExtentD around{nothing_d, 0.0};   // all of them
 };
 
+struct NearBodyD;  // near_body.h
+
+/// What queries of distance made of a scene (near_body_of), by masks: the last ones.
+struct KeptBodies {
+    struct Body {
+        std::uint32_t mask;
+        std::shared_ptr<const NearBodyD> body;
+    };
+    std::mutex asked;
+    std::vector<Body> known;
+};
+
 struct SceneTreeD {
     std::vector<std::shared_ptr<const MeshTreeD>> meshes;
-    std::vector<InstanceNameD> instances;  // by ascending id
-    std::vector<MeshNameD> mesh_names;     // by ascending id
+    std::vector<std::shared_ptr<const ShapeTreeD>> shapes;  // by ascending id
+    std::vector<InstanceNameD> instances;                   // by ascending id
+    std::vector<MeshNameD> mesh_names;                      // by ascending id
     std::vector<PlacedSceneD> placed;
     std::vector<WayInD> ways;
     std::vector<ExtentD> extents;  // [parts]
-    /// The meshes without the instances, where there are both.
+    /// The meshes and shapes without the instances, where there are both.
     std::shared_ptr<const SceneTreeD> own_parts;
     PartTreeD parts;
     AabbD bounds = nothing_d;  // without what rays may miss it by
@@ -68,11 +84,17 @@ struct SceneTreeD {
     std::uint64_t paths = 0;
     std::uint32_t levels = 0;    // of instances, below this scene
     std::size_t stack_size = 0;  // of a ray: children still to visit, on all levels
+    /// Of all geometries and instances, those of inner scenes too: ascending, each once.
+    std::vector<std::uint32_t> masks;
+    std::shared_ptr<KeptBodies> bodies = std::make_shared<KeptBodies>();
 
     /// The only mesh tree, if rays need nothing else.
     [[nodiscard]] const MeshTreeD* only_mesh() const {
-        return instances.empty() && meshes.size() == 1 ? meshes.front().get() : nullptr;
+        return instances.empty() && shapes.empty() && meshes.size() == 1 ? meshes.front().get()
+                                                                         : nullptr;
     }
+    /// Parts before the placed scenes.
+    [[nodiscard]] std::size_t own_part_count() const { return meshes.size() + shapes.size(); }
 };
 
 }  // namespace raydix

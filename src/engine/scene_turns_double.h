@@ -34,9 +34,9 @@ class StandingRayD : SceneRayD<any ? Wanted::any : Wanted::closest> {
 public:
     /// `scene` and `ray`, which must be valid, stay where they are; `stack` has room for
     /// SceneTreeD::stack_size.
-    StandingRayD(const SceneTreeD& scene, const RayD& ray, std::uint32_t mask,
+    StandingRayD(const SceneTreeD& scene, const RayD& ray, std::size_t place, std::uint32_t mask,
                  const WideStackView& stack)
-        : Walk(ray, mask, stack), scene_(scene), line_(ray), parts_stack_(stack) {
+        : Walk(ray, place, mask, stack), scene_(scene), line_(ray), parts_stack_(stack) {
         const std::size_t taken = wide_stack_capacity(scene.parts.arrays.stats.max_depth);
         this->stack_ = {stack.words + taken, stack.entries + taken};
     }
@@ -66,8 +66,8 @@ public:
             leaves_->ask_for(now_->next());
         else if (kind() == TurnKind::node)
             ask_for_all(scene_.parts.view.nodes[now_->next()]);
-        else if (part() >= scene_.meshes.size())
-            ask_for_all(scene_.placed[part() - scene_.meshes.size()]);
+        else if (part() >= scene_.own_part_count())
+            ask_for_all(scene_.placed[part() - scene_.own_part_count()]);
     }
     HWY_INLINE bool step(std::integral_constant<TurnKind, TurnKind::node>) {
         return now_->step_node() || leave();
@@ -87,7 +87,12 @@ private:
     /// What the ray visits in turns, if it is a mesh; all else at once. Whether it stands in one.
     HWY_NOINLINE bool enter_part(std::uint32_t part) {
         if (part < scene_.meshes.size()) return enter_mesh(*scene_.meshes[part], 0, line_);
-        const PlacedSceneD& placed = scene_.placed[part - scene_.meshes.size()];
+        const std::size_t own = scene_.own_part_count();
+        if (part < own) {
+            this->hit_shapes(*scene_.shapes[part - scene_.meshes.size()], 0, line_);
+            return false;
+        }
+        const PlacedSceneD& placed = scene_.placed[part - own];
         if (!this->sees(scene_, placed)) return false;
         const LineD inside = line_into(line_, scene_, placed);
         if (const MeshTreeD* const mesh = placed.scene->only_mesh())
@@ -187,7 +192,8 @@ private:
             const RayD& ray = job_.rays[turn.place];
             HitD hit;
             if (is_valid(ray)) {
-                turn.ray.emplace(*job_.tree, ray, job_.mask_of(turn.place), turn.stack);
+                turn.ray.emplace(*job_.tree, ray, job_.first + turn.place, job_.mask_of(turn.place),
+                                 turn.stack);
                 if (turn.ray->begin(ray)) return true;
                 hit = turn.ray->best();
             } else {

@@ -23,12 +23,13 @@ template <bool any>
 HitD hit_of_scene(const SceneTreeD& scene, const RayD& ray, std::uint32_t mask,
                   const HitFilterD* filter, std::size_t place, const WideStackView& stack) {
     if (filter != nullptr) {
-        SceneRayD<any ? Wanted::any_accepted : Wanted::closest_accepted> one(ray, mask, stack);
-        one.filter_by(*filter, place, ray);
+        SceneRayD<any ? Wanted::any_accepted : Wanted::closest_accepted> one(ray, place, mask,
+                                                                             stack);
+        one.filter_by(*filter, ray);
         one.trace(scene, ray);
         return one.best();
     }
-    SceneRayD<any ? Wanted::any : Wanted::closest> one(ray, mask, stack);
+    SceneRayD<any ? Wanted::any : Wanted::closest> one(ray, place, mask, stack);
     one.trace(scene, ray);
     return one.best();
 }
@@ -74,7 +75,7 @@ inline void all_scene_hits(SceneJobD& job) {
         const RayD& ray = job.rays[k];
         const std::size_t before = job.found->size();
         if (is_valid(ray)) {
-            SceneRayD<Wanted::all>(ray, job.mask_of(k), job.stack.view(), job.found)
+            SceneRayD<Wanted::all>(ray, job.first + k, job.mask_of(k), job.stack.view(), job.found)
                 .trace(*job.tree, ray);
             if (job.filter != nullptr) {
                 const auto first = job.found->begin() + static_cast<std::ptrdiff_t>(before);

@@ -1,12 +1,14 @@
 #include "engine/shape_tree.h"
 
 #include <raydix/error.h>
+#include <raydix/user_geometry_d.h>
 
 #include <algorithm>
 #include <string>
 #include <type_traits>
 
 #include "exec/parallel.h"
+#include "primitives/double_sources.h"
 
 namespace raydix {
 namespace {
@@ -60,38 +62,40 @@ void copy_primitives(ShapeTree& tree) {
     }
 }
 
-}  // namespace
-
-std::size_t count_of(const Shapes& shapes) {
-    return std::visit(
-        [](const auto& all) -> std::size_t {
-            using All = std::remove_cvref_t<decltype(all)>;
-            if constexpr (std::is_same_v<All, BasicBalls<float>>)
-                return all.centers.size();
-            else if constexpr (std::is_same_v<All, UserGeometry>)
-                return all.boxes().size();
-            else
-                return all.size();
-        },
-        shapes);
-}
-
-std::vector<Aabb> boxes_of(const Shapes& shapes) {
+template <class Scalar>
+std::vector<typename SceneTypes<Scalar>::Box> boxes_of_any(const BasicShapes<Scalar>& shapes) {
     if (count_of(shapes) >= most_primitives)
         throw InputError(std::to_string(count_of(shapes)) + " " + kind_of(shapes) +
                          " are too many for one geometry: fewer than 2^28 are allowed");
     return std::visit(
-        [](const auto& all) -> std::vector<Aabb> {
-            using All = std::remove_cvref_t<decltype(all)>;
-            if constexpr (std::is_same_v<All, BasicBalls<float>>)
+        [](const auto& all) -> std::vector<typename SceneTypes<Scalar>::Box> {
+            if constexpr (requires { all.centers; })
                 return boxes_of(all.centers, all.radius);
-            else if constexpr (std::is_same_v<All, UserGeometry>)
+            else if constexpr (requires { all.boxes(); })
                 return {all.boxes().begin(), all.boxes().end()};
             else
                 return boxes_of(all);
         },
         shapes);
 }
+
+/// In double, what rays may be told of hits beside boxes, of the distance to their far side: a
+/// surface's t is that of a point within 2^-50 of all lengths (shape_hits.h); a user's is promised
+/// to be within 2^-41, and within 2^-44 of the box's largest coordinate, which the box grows by.
+constexpr double surface_error = 0x1p-44, user_error = 0x1p-40;
+constexpr double user_box_slack = 0x1p-43;
+
+ExtentD extent_of_shape(const AabbD& box, bool is_users) {
+    if (!is_users) return {box, surface_error};
+    const Vec3d far = max_of(max_of(box.hi, -1.0 * box.hi), max_of(box.lo, -1.0 * box.lo));
+    const double by = user_box_slack * max_of(max_of(far.x, far.y), far.z);
+    const Vec3d side{by, by, by};
+    return {{box.lo - side, box.hi + side}, user_error};
+}
+
+}  // namespace
+
+std::vector<Aabb> boxes_of(const Shapes& shapes) { return boxes_of_any<float>(shapes); }
 
 std::shared_ptr<const ShapeTree> make_shape_tree(std::uint32_t id, std::uint32_t mask,
                                                  const Shapes& shapes,
@@ -125,6 +129,28 @@ std::shared_ptr<const ShapeTree> make_shape_tree(std::uint32_t id, std::uint32_t
         tree->growth.rate = static_cast<float>(user_slack);
         tree->extent.error += 2 * user_slack;
     }
+    return tree;
+}
+
+std::shared_ptr<const ShapeTreeD> make_shape_tree(std::uint32_t id, std::uint32_t mask,
+                                                  const BasicShapes<double>& shapes,
+                                                  std::shared_ptr<const void> own, Quality quality,
+                                                  const ShapeTreeD*, double, bool& refitted) {
+    auto tree = std::make_shared<ShapeTreeD>();
+    tree->id = id;
+    tree->mask = mask;
+    tree->shapes = shapes;
+    tree->own = std::move(own);
+    refitted = false;
+    const std::vector<AabbD> boxes = boxes_of_any<double>(shapes);
+    std::vector<ExtentD> extents(boxes.size(), ExtentD{nothing_d, 0.0});
+    for (std::uint32_t k = 0; k < boxes.size(); ++k) {
+        AabbD box;
+        if (!BoxSourceD{boxes.data()}.box(k, box)) continue;
+        extents[k] = extent_of_shape(box, tree->user() != nullptr);
+        tree->bounds = {min_of(tree->bounds.lo, box.lo), max_of(tree->bounds.hi, box.hi)};
+    }
+    build_box_tree(extents, build_of(quality), *tree);
     return tree;
 }
 

@@ -1,6 +1,7 @@
 // A geometry of a scene that is not made of triangles: what was added, and the tree over it.
 #pragma once
 
+#include <raydix/double.h>
 #include <raydix/scene.h>
 #include <raydix/shapes.h>
 #include <raydix/user_geometry.h>
@@ -38,15 +39,36 @@ template <class AnyShapes>
     constexpr const char* names[] = {"spheres", "capsules", "points", "user geometry"};
     return names[shapes.index()];
 }
-[[nodiscard]] std::size_t count_of(const Shapes& shapes);
+template <class AnyShapes>
+[[nodiscard]] std::size_t count_of(const AnyShapes& shapes) {
+    return std::visit(
+        [](const auto& all) -> std::size_t {
+            if constexpr (requires { all.centers; })
+                return all.centers.size();
+            else if constexpr (requires { all.boxes(); })
+                return all.boxes().size();
+            else
+                return all.size();
+        },
+        shapes);
+}
 /// Throws InputError: 2^28 primitives or more.
 [[nodiscard]] std::vector<Aabb> boxes_of(const Shapes& shapes);
 
-/// A tree over the primitives of one geometry. `part` has their numbers.
-struct ShapeTree : PartTree {
+/// A geometry, beside the tree over its primitives.
+template <class Scalar>
+struct ShapeGeometry {
     std::uint32_t id = 0, mask = 0;
     std::shared_ptr<const void> own;  // what `shapes` views
-    Shapes shapes;
+    BasicShapes<Scalar> shapes = {};
+
+    [[nodiscard]] const BasicUserGeometry<Scalar>* user() const {
+        return std::get_if<BasicUserGeometry<Scalar>>(&shapes);
+    }
+};
+
+/// A tree over the primitives of one geometry. `part` has their numbers.
+struct ShapeTree : PartTree, ShapeGeometry<float> {
     // As leaves name them, if that is what they are: one behind the other.
     Buffer<Sphere> spheres;  // points too; and room for a whole vector behind the last
     Buffer<Capsule> capsules;
@@ -57,10 +79,29 @@ struct ShapeTree : PartTree {
 
     /// Gives a hit of the tree its geometry.
     void name(Hit& hit) const { hit.geometry = id; }
-    [[nodiscard]] const UserGeometry* user() const { return std::get_if<UserGeometry>(&shapes); }
     [[nodiscard]] std::uint64_t bytes() const {
         return arrays.nodes.size() * sizeof(WideNode) + part.size() * sizeof(part[0]) +
                spheres.size() * sizeof(Sphere) + capsules.size() * sizeof(Capsule);
+    }
+};
+
+/// The same in double. `around` has the room that rays need.
+struct ShapeTreeD : PartTreeD, ShapeGeometry<double> {
+    AabbD bounds = nothing_d;
+
+    /// Calls use(a, b, radius) with a ball's center, or the ends of a capsule: of primitive `prim`,
+    /// which is no user geometry.
+    template <class Use>
+    auto with_capsule(std::uint32_t prim, const Use& use) const {
+        if (const auto* const spheres = std::get_if<std::span<const SphereD>>(&shapes))
+            return use((*spheres)[prim].center, (*spheres)[prim].center, (*spheres)[prim].radius);
+        if (const auto* const balls = std::get_if<BasicBalls<double>>(&shapes))
+            return use(balls->centers[prim], balls->centers[prim], balls->radius);
+        const CapsuleD& capsule = std::get<std::span<const CapsuleD>>(shapes)[prim];
+        return use(capsule.a, capsule.b, capsule.radius);
+    }
+    [[nodiscard]] std::uint64_t bytes() const {
+        return arrays.nodes.size() * sizeof(WideNode) + part.size() * sizeof(part[0]);
     }
 };
 
@@ -72,5 +113,10 @@ inline constexpr std::size_t sphere_lanes = 8;
 [[nodiscard]] std::shared_ptr<const ShapeTree> make_shape_tree(
     std::uint32_t id, std::uint32_t mask, const Shapes& shapes, std::shared_ptr<const void> own,
     Quality quality, const ShapeTree* old, double limit, bool& refitted);
+/// In double. Never refitted.
+[[nodiscard]] std::shared_ptr<const ShapeTreeD> make_shape_tree(
+    std::uint32_t id, std::uint32_t mask, const BasicShapes<double>& shapes,
+    std::shared_ptr<const void> own, Quality quality, const ShapeTreeD* old, double limit,
+    bool& refitted);
 
 }  // namespace raydix

@@ -76,30 +76,30 @@ private:
 inline BasicSegmentBoxes<false> segment_boxes(const PaddedTree&, const Segment& s) {
     return {segment_box(s.a, s.b), Double3(s.a), Double3(s.b), 0.0};
 }
-inline BasicSegmentBoxes<true> segment_boxes(const PaddedTreeD& tree, const SegmentD& s) {
-    const Vec3d from = tree.space.local(s.a), to = tree.space.local(s.b);
+inline BasicSegmentBoxes<true> segment_boxes(const TreeSpace& space, const SegmentD& s) {
+    const Vec3d from = space.local(s.a), to = space.local(s.b);
     const Vec3d far = max_of(max_of(from, -1.0 * from), max_of(to, -1.0 * to));
-    return {box_around_center(segment_box(s.a, s.b), tree.space.center, tree.space.scale),
-            Double3(from), Double3(to), 0x1p-50 * max_of(max_of(far.x, far.y), far.z)};
+    return {box_around_center(segment_box(s.a, s.b), space.center, space.scale), Double3(from),
+            Double3(to), 0x1p-50 * max_of(max_of(far.x, far.y), far.z)};
+}
+inline BasicSegmentBoxes<true> segment_boxes(const PaddedTreeD& tree, const SegmentD& s) {
+    return segment_boxes(tree.space, s);
 }
 
-/// visit(position in leaf order) -> whether to stop. The query must be valid, the tree not empty.
-template <class Tree, class AnySegment, class Visit>
-requires requires(AnySegment s) { s.b; }
-void for_each_touched(const Tree& tree, const AnySegment& s,
-                      BasicWalkStack<typename Tree::Scalar>& stack, const Visit& visit) {
-    const auto boxes = segment_boxes(tree, s);
+/// visit(position in leaf order) -> whether to stop, for all in leaves that a segment's boxes meet.
+template <class Boxes, class Stack, class Visit>
+void for_each_met(const BvhNode* nodes, const Boxes& boxes, Stack& stack, const Visit& visit) {
     auto* const bottom = stack.begin();
     auto* top = bottom;
     std::uint32_t slot = 0;
     for (;;) {
-        const BvhNode& node = tree.nodes[slot];
+        const BvhNode& node = nodes[slot];
         if (node.is_leaf()) {
             for (std::uint32_t k = node.first; k < node.first + node.count; ++k)
-                if (segment_touches_triangle(s.a, s.b, tree.triangles[k]) && visit(k)) return;
+                if (visit(k)) return;
         } else {
-            const bool left = boxes.meet(tree.nodes[node.first]),
-                       right = boxes.meet(tree.nodes[node.first + 1]);
+            const bool left = boxes.meet(nodes[node.first]),
+                       right = boxes.meet(nodes[node.first + 1]);
             if (left && right) {
                 RAYDIX_CHECK(static_cast<std::uint32_t>(top - bottom), <, stack.capacity());
                 *top++ = {node.first + 1, 0};
@@ -114,6 +114,15 @@ void for_each_touched(const Tree& tree, const AnySegment& s,
     }
 }
 
+/// visit(position in leaf order) -> whether to stop. The query must be valid, the tree not empty.
+template <class Tree, class AnySegment, class Visit>
+requires requires(AnySegment s) { s.b; }
+void for_each_touched(const Tree& tree, const AnySegment& s,
+                      BasicWalkStack<typename Tree::Scalar>& stack, const Visit& visit) {
+    for_each_met(tree.nodes, segment_boxes(tree, s), stack, [&](std::uint32_t k) {
+        return segment_touches_triangle(s.a, s.b, tree.triangles[k]) && visit(k);
+    });
+}
 template <class Tree, class AnySphere, class Visit>
 requires requires(AnySphere s) { s.radius; }
 void for_each_touched(const Tree& tree, const AnySphere& s,

@@ -21,32 +21,6 @@ namespace {
 constexpr double far_away = 1e7;
 constexpr int worlds = 3 * static_cast<int>(thorough);
 
-/// Rays that end, or begin, where they hit: the bounds of boxes decide.
-std::vector<RayD> rays_to_hits(std::span<const RayD> rays, std::span<const HitD> hits) {
-    std::vector<RayD> out;
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-        if (!hits[i].hit()) continue;
-        for (int k = 0; k < 3; ++k) {
-            out.push_back(rays[i]);
-            if (k != 1) out.back().tmax = hits[i].t;
-            if (k != 0) out.back().tmin = hits[i].t;
-        }
-    }
-    return out;
-}
-
-std::size_t differences_with_ends(const WorldD& world, RandomWorlds& random, std::size_t count,
-                                  std::size_t& hit_count) {
-    const std::vector<RayD> rays = random.rays(count, world.home);
-    std::vector<std::uint32_t> masks;
-    for (std::size_t i = 0; i < rays.size(); ++i) masks.push_back(random.mask());
-    std::size_t wrong = differences(world, rays, masks);
-    const std::vector<HitD> hits = look(world, rays, every_mask);
-    for (const HitD& hit : hits) hit_count += hit.hit();
-    const std::vector<RayD> ends = rays_to_hits(rays, hits);
-    return wrong + differences(world, ends, std::vector<std::uint32_t>(ends.size(), every_mask));
-}
-
 SceneOptions options_of(int k) {
     return {.quality = static_cast<Quality>(k % 3),
             .usage = k % 2 == 0 ? Usage::fixed : Usage::moving,

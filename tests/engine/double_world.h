@@ -1,8 +1,10 @@
-// Random scenes in double, and a judge that looks at every mesh on every path.
+// Random scenes in double, and a judge that looks at every mesh and shape on every path.
 #pragma once
 
 #include <raydix/double.h>
 #include <raydix/scene.h>
+#include <raydix/user_geometry.h>
+#include <raydix/user_geometry_d.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -14,6 +16,7 @@
 
 #include "engine/affine_double.h"
 #include "support/double_scenes.h"
+#include "trace/ray_frame.h"
 
 namespace raydix::test {
 
@@ -26,6 +29,9 @@ struct WorldD {
         MeshD mesh;
         TransformD transform;
         std::shared_ptr<const WorldD> inside;  // of an instance
+        IntersectPrimitiveD intersect = {};    // instead of a mesh: shapes
+        std::uint32_t shape_count = 0;
+        std::vector<CapsuleD> capsules = {};  // what they are, if not a user's; or balls
     };
     std::vector<Item> items;  // by ascending id
     SceneD scene;
@@ -57,7 +63,33 @@ struct RecipeD {
     std::uint32_t levels, items;
     double shear = 0, distance = 0;  // of homes from the origin
     SceneOptions options = {};
+    bool shapes = false;  // among the meshes
+    bool users = true;    // a user's own among the shapes
 };
+
+/// Where a ray enters or leaves a box: a user's own test. u: the axis of the side.
+inline bool hits_box(const AabbD& box, const RayD& ray, HitD& hit) {
+    constexpr double none = std::numeric_limits<double>::infinity();
+    double enter = -none, leave = none;
+    int side = 0;
+    const auto cut = [&](int axis, double lo, double hi, double o, double d) {
+        if (d == 0.0) {
+            if (o < lo || o > hi) leave = -none;
+            return;
+        }
+        const double one = (lo - o) / d, other = (hi - o) / d;
+        if (std::min(one, other) > enter) enter = std::min(one, other), side = axis;
+        leave = std::min(leave, std::max(one, other));
+    };
+    cut(0, box.lo.x, box.hi.x, ray.origin.x, ray.direction.x);
+    cut(1, box.lo.y, box.hi.y, ray.origin.y, ray.direction.y);
+    cut(2, box.lo.z, box.hi.z, ray.origin.z, ray.direction.z);
+    if (!(enter <= leave)) return false;
+    hit.t = enter;
+    if (!(hit.t >= ray.tmin)) hit.t = leave;
+    hit.u = side, hit.v = 0;
+    return hit.t >= ray.tmin && hit.t <= ray.tmax;
+}
 
 class RandomWorlds : public RandomD {
 public:
@@ -107,6 +139,8 @@ public:
                 item.transform =
                     transform(item.inside->home, world->home, level == 0 ? 4 : 2, recipe.shear);
                 world->scene.add(item.inside->scene, item.transform, options);
+            } else if (recipe.shapes && below(3) != 0) {
+                add_shapes(*world, item, options, recipe.users);
             } else {
                 if (below(8) != 0) item.mesh = soup(40, world->home);
                 world->scene.add(item.mesh, options);
@@ -133,6 +167,50 @@ public:
     }
 
 private:
+    /// Spheres, capsules, points or boxes of a user's own; some twice, some without a radius.
+    void add_shapes(WorldD& world, WorldD::Item& item, const GeometryOptions& options, bool users) {
+        const std::uint32_t count = 1 + under(40), kind = under(users ? 4 : 3);
+        item.shape_count = count;
+        const double one = below(10) == 0 ? 0.0 : between(0.01, 0.3);
+        std::vector<CapsuleD> all;
+        for (std::uint32_t k = 0; k < count; ++k) {
+            const Vec3d a = around(world.home, 0.6);
+            const double radius = below(10) == 0 ? 0.0 : between(0.01, 0.3);
+            all.push_back({a, kind == 1 ? around(world.home, 0.6) : a, kind == 2 ? one : radius});
+            if (k % 8 == 7) all.back() = all[k - 1];
+        }
+        if (kind == 0) {
+            const auto spheres = std::make_shared<std::vector<SphereD>>();
+            for (const CapsuleD& c : all) spheres->push_back({c.a, c.radius});
+            item.intersect = [spheres](std::uint32_t prim, const RayD& ray, HitD& hit) {
+                return intersect_spheres(*spheres)(prim, ray, hit);
+            };
+            world.scene.add(std::span<const SphereD>(*spheres), options);
+        } else if (kind == 1) {
+            const auto capsules = std::make_shared<std::vector<CapsuleD>>(all);
+            item.intersect = [capsules](std::uint32_t prim, const RayD& ray, HitD& hit) {
+                return intersect_capsules(*capsules)(prim, ray, hit);
+            };
+            world.scene.add(std::span<const CapsuleD>(*capsules), options);
+        } else if (kind == 2) {
+            const auto points = std::make_shared<std::vector<Vec3d>>();
+            for (const CapsuleD& c : all) points->push_back(c.a);
+            item.intersect = [points, one](std::uint32_t prim, const RayD& ray, HitD& hit) {
+                return intersect_points(*points, one)(prim, ray, hit);
+            };
+            world.scene.add(std::span<const Vec3d>(*points), one, options);
+        } else {
+            const auto boxes = std::make_shared<std::vector<AabbD>>();
+            for (const CapsuleD& c : all)
+                boxes->push_back({c.a, c.a + in({{0, 0, 0}, {0.3, 0.3, 0.3}})});
+            item.intersect = [boxes](std::uint32_t prim, const RayD& ray, HitD& hit) {
+                return hits_box((*boxes)[prim], ray, hit);
+            };
+            world.scene.add(UserGeometryD(*boxes, item.intersect), options);
+            return;
+        }
+        item.capsules = std::move(all);
+    }
     static MeshD in_double_at(MeshD mesh, Vec3d home) {
         for (Vec3d& v : mesh.vertices) v = v + home;
         return mesh;
@@ -141,6 +219,30 @@ private:
 
 inline auto key_of(const HitD& hit) {
     return std::tuple(hit.t, hit.instance, hit.geometry, hit.prim);
+}
+
+/// What each shape on its own says, in order of primitives.
+inline std::vector<HitD> hits_of_shapes(const WorldD::Item& item, RayD ray) {
+    std::vector<HitD> hits;
+    if (!is_valid(ray)) return hits;
+    ray.tmin = std::max(ray.tmin, 0.0) + 0.0;
+    for (std::uint32_t prim = 0; prim < item.shape_count; ++prim) {
+        HitD hit;
+        if (!item.intersect(prim, ray, hit)) continue;
+        hit.t += 0.0;  // -0 becomes +0
+        hit.prim = prim;
+        hits.push_back(hit);
+    }
+    return hits;
+}
+/// The least hit of each ray.
+inline std::vector<HitD> closest_in(const WorldD::Item& item, const std::vector<RayD>& rays) {
+    if (item.shape_count == 0) return trace_brute_force(item.mesh, rays, 1);
+    std::vector<HitD> best(rays.size());
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        for (const HitD& hit : hits_of_shapes(item, rays[i]))
+            if (!best[i].hit() || hit.t < best[i].t) best[i] = hit;
+    return best;
 }
 
 /// Calls meet(item, rays as they come in, number of the path) for each mesh on each path that
@@ -176,7 +278,7 @@ inline std::vector<HitD> look(const WorldD& world, std::span<const RayD> rays, s
     for_each_mesh(
         world, rays, mask,
         [&](const WorldD::Item& item, const std::vector<RayD>& entering, std::uint32_t number) {
-            const std::vector<HitD> hits = trace_brute_force(item.mesh, entering, 1);
+            const std::vector<HitD> hits = closest_in(item, entering);
             for (std::size_t i = 0; i < rays.size(); ++i) {
                 if (!hits[i].hit()) continue;
                 const HitD found{hits[i], item.id, number};
@@ -193,6 +295,9 @@ inline std::vector<std::vector<HitD>> look_for_all(const WorldD& world, std::spa
     for_each_mesh(
         world, rays, mask,
         [&](const WorldD::Item& item, const std::vector<RayD>& entering, std::uint32_t number) {
+            for (std::size_t i = 0; i < rays.size() && item.shape_count != 0; ++i)
+                for (const HitD& hit : hits_of_shapes(item, entering[i]))
+                    rows[i].push_back({hit, item.id, number});
             if (item.mesh.triangles.empty()) return;
             const AllHitsD all = trace_all(build_bvh(item.mesh), entering, {.threads = 1});
             for (std::size_t i = 0; i < rays.size(); ++i)
@@ -234,6 +339,33 @@ inline std::size_t differences(const WorldD& world, std::span<const RayD> rays,
         wrong += any_hit(world.scene, rays[i], masks[i]) != wanted[i].hit();
     }
     return wrong;
+}
+
+/// Rays that end, or begin, where they hit: the bounds of boxes decide.
+inline std::vector<RayD> rays_to_hits(std::span<const RayD> rays, std::span<const HitD> hits) {
+    std::vector<RayD> out;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        if (!hits[i].hit()) continue;
+        for (int k = 0; k < 3; ++k) {
+            out.push_back(rays[i]);
+            if (k != 1) out.back().tmax = hits[i].t;
+            if (k != 0) out.back().tmin = hits[i].t;
+        }
+    }
+    return out;
+}
+
+/// With rays of its own, that begin and end anywhere and at hits.
+inline std::size_t differences_with_ends(const WorldD& world, RandomWorlds& random,
+                                         std::size_t count, std::size_t& hit_count) {
+    const std::vector<RayD> rays = random.rays(count, world.home);
+    std::vector<std::uint32_t> masks;
+    for (std::size_t i = 0; i < rays.size(); ++i) masks.push_back(random.mask());
+    std::size_t wrong = differences(world, rays, masks);
+    const std::vector<HitD> hits = look(world, rays, every_mask);
+    for (const HitD& hit : hits) hit_count += hit.hit();
+    const std::vector<RayD> ends = rays_to_hits(rays, hits);
+    return wrong + differences(world, ends, std::vector<std::uint32_t>(ends.size(), every_mask));
 }
 
 }  // namespace raydix::test

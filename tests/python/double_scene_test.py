@@ -166,8 +166,6 @@ def test_one_mesh_of_several_is_asked_again(rng):
     np.testing.assert_array_equal(pair.closest_point(points)["distance"], wanted)
     pair.commit()
     calls = {
-        "closest_point in float64": lambda s: s.closest_point(points),
-        "touched_by in float64": lambda s: s.touched_by(spheres=[[0, 0, 0, 1]]),
         "stats": lambda s: s.stats(),
         "check": lambda s: s.check(),
         "refit": lambda s: s._core.refit(BOX[0]),

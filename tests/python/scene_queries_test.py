@@ -119,6 +119,39 @@ def test_sweeps(rng):
     assert (apart[met] <= radii[met] + 1e-4).all()
 
 
+def test_queries_of_scenes_in_float64(rng):
+    """Far from the origin, where float32 has steps of half a metre."""
+    world = closed_world(rng, precision="float64")
+    far = World(precision="float64")
+    far.add_instance(world, np.array([[1, 0, 0, 5e5], [0, -1, 0, 4.5e6], [0, 0, 1, 120.0]]))
+    far.scene.commit()
+    for part, center in ((world, np.zeros(3)), (far, np.array([5e5, 4.5e6, 120]))):
+        vertices, faces, names = out_of(part, np.float64)
+        flat = raydix.Scene(vertices, faces, precision="float64")
+        points = rng.uniform(-3, 3, (60, 3)) + center
+        near, wanted = part.scene.closest_point(points), flat.closest_point(points)
+        np.testing.assert_array_equal(near["distance"], wanted["distance"])
+        np.testing.assert_array_equal(near["point"], wanted["point"])
+        found = np.stack([near[n] for n in ("instance", "geometry", "prim")], axis=1)
+        np.testing.assert_array_equal(found, names[wanted["prim"]])
+        balls = np.concatenate([points, rng.uniform(0, 1, (60, 1))], axis=1)
+        touched, wanted = (s.touched_by(spheres=balls) for s in (part.scene, flat))
+        np.testing.assert_array_equal(touched["offsets"], wanted["offsets"])
+        found = np.stack([touched[n] for n in ("instance", "geometry", "prim")], axis=1)
+        np.testing.assert_array_equal(found, names[wanted["prim"]])
+        assert len(found) > 10
+        np.testing.assert_array_equal(
+            part.scene.touches(spheres=balls), np.diff(touched["offsets"]) > 0
+        )
+        rays = np.concatenate([points, center - points + rng.uniform(-1, 1, (60, 3))], axis=1)
+        swept, wanted = (s.sweep_spheres(rays, radii=0.1) for s in (part.scene, flat))
+        np.testing.assert_array_equal(swept["t"], wanted["t"])
+        hit = wanted["prim"] != raydix.MISSING
+        found = np.stack([swept[n] for n in ("instance", "geometry", "prim")], axis=1)
+        np.testing.assert_array_equal(found[hit], names[wanted["prim"][hit]])
+        assert hit.sum() > 10
+
+
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_sweeps_of_one_mesh(rng, precision):
     scene = raydix.Scene(*triangles(rng, 60), precision=precision)
