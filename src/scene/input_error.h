@@ -9,7 +9,8 @@
 
 namespace raydix {
 
-/// A word of the input in quotes, escaped and cut to a readable length.
+/// A word of the input, escaped and cut to a readable length; the same in quotes.
+[[nodiscard]] std::string readable(std::string_view word);
 [[nodiscard]] std::string in_quotes(std::string_view word);
 
 /// Throws InputError("file: element: reason"). `file` is printable already.

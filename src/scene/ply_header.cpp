@@ -46,7 +46,7 @@ PlyFormat parse_format(const LineReader& lines, Words words) {
 
 PlyElement parse_element(const LineReader& lines, Words words) {
     PlyElement element;
-    element.name = printable(words.next());
+    element.name = readable(words.next());
     std::int64_t count = 0;
     if (element.name.empty() || !words.integer(count) || count < 0)
         lines.fail("expected \"element NAME COUNT\" with a count from 0 to 2^63 - 1");
@@ -65,7 +65,7 @@ PlyProperty parse_property(const LineReader& lines, Words words) {
         type = words.next();
     }
     property.type = parse_type(lines, type);
-    property.name = printable(words.next());
+    property.name = readable(words.next());
     if (property.name.empty()) lines.fail("a property without a name");
     return property;
 }

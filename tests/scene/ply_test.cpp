@@ -136,5 +136,15 @@ TEST(Ply, false_counts_cost_nothing) {
               "sample: face 1: file ends after 0 of 1");
 }
 
+TEST(Ply, long_names_are_cut_in_messages) {
+    const std::string name(500, '\xFF');
+    const std::string message = error_of(
+        load_ply, head("binary_big_endian",
+                       "element " + name + " 2\nproperty float x\nelement vertex 0\n" + xyz));
+    EXPECT_LT(message.size(), 300u);
+    EXPECT_NE(message.find("\\xFF...: file ends before all 2 of them"), std::string::npos)
+        << message;
+}
+
 }  // namespace
 }  // namespace raydix::test
