@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ._arrays import (
     ALL,
-    FLOAT32,
     MISSING,
     UINT32,
     cast,
@@ -71,14 +70,14 @@ def _one_or_many(value: Any, name: str) -> np.ndarray:
     return array
 
 
-def _points(value: Any, name: str) -> np.ndarray:
+def _points(value: Any, name: str, dtype: np.dtype) -> np.ndarray:
     array = to_numpy(value, name)
     expected = f"{name}: expected shape (N, 3)"
     if array.dtype.kind not in "iuf":
         raise TypeError(f"{expected} float32 or float64, given {describe(array)}")
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{expected}, given {describe(array)}")
-    return cast(array, FLOAT32)
+    return cast(array, dtype)
 
 
 def _with_radii(radii: Any, *points: np.ndarray) -> np.ndarray:
@@ -90,7 +89,14 @@ def _with_radii(radii: Any, *points: np.ndarray) -> np.ndarray:
         raise TypeError(f"{expected} float32 or float64, given {describe(given)}")
     if given.shape not in ((), (count,)):
         raise ValueError(f"{expected}, given {describe(given)}")
-    return np.column_stack((*points, np.broadcast_to(cast(given, FLOAT32), count)))
+    return np.column_stack((*points, np.broadcast_to(cast(given, points[0].dtype), count)))
+
+
+def _radius(value: Any) -> float:
+    radius = number(value, "radius")
+    if not 0 <= radius < np.inf:
+        raise ValueError(f"radius: expected a finite number, 0 or more, given {value!r}")
+    return radius
 
 
 def _mask_and_id(mask: Any, id: Any) -> tuple[int, int | None]:
@@ -177,7 +183,7 @@ class SceneContents:
         starts inside hits where it leaves.
 
         Spheres that are not finite, have a negative radius or reach beyond 1e12 are left out.
-        Copied. `mask`, `id` and the result as in `add`. NotImplementedError in float64.
+        Copied, in the scene's type. `mask`, `id` and the result as in `add`.
         """
         made = self._spheres(centers, radii)
         return self._core.add_spheres(made, *_mask_and_id(mask, id))
@@ -197,6 +203,14 @@ class SceneContents:
         made = self._capsules(starts, ends, radii)
         return self._core.add_capsules(made, *_mask_and_id(mask, id))
 
+    def add_points(
+        self, points: ArrayLike, radius: float, *, mask: int = ALL, id: int | None = None
+    ) -> int:
+        """Adds points of one radius as one geometry: `points` of shape (N, 3), `radius` a number,
+        0 or more. Rays hit them as spheres. All else as in `add_spheres`."""
+        made = _points(points, "points", self.dtype)
+        return self._core.add_points(made, _radius(radius), *_mask_and_id(mask, id))
+
     def update_spheres(self, id: int, centers: ArrayLike, radii: ArrayLike) -> None:
         """Gives a geometry of spheres others, from the next `commit` on. InputError: no such
         geometry, or another kind of it."""
@@ -208,13 +222,16 @@ class SceneContents:
         """As `update_spheres`."""
         self._core.update_capsules(whole(id, "id", 0, ALL), self._capsules(starts, ends, radii))
 
+    def update_points(self, id: int, points: ArrayLike, radius: float) -> None:
+        """As `update_spheres`."""
+        made = _points(points, "points", self.dtype)
+        self._core.update_points(whole(id, "id", 0, ALL), made, _radius(radius))
+
     def _spheres(self, centers: ArrayLike, radii: ArrayLike) -> np.ndarray:
-        require_float32(self, "spheres")
-        return _with_radii(radii, _points(centers, "centers"))
+        return _with_radii(radii, _points(centers, "centers", self.dtype))
 
     def _capsules(self, starts: ArrayLike, ends: ArrayLike, radii: ArrayLike) -> np.ndarray:
-        require_float32(self, "capsules")
-        first, last = _points(starts, "starts"), _points(ends, "ends")
+        first, last = _points(starts, "starts", self.dtype), _points(ends, "ends", self.dtype)
         if first.shape != last.shape:
             raise ValueError(f"ends: expected shape {first.shape}, given {describe(last)}")
         return _with_radii(radii, first, last)
@@ -294,7 +311,7 @@ class SceneContents:
         Returns
         -------
         dict: "ms"; "meshes", "instances" and "triangles" of the scene itself; "shapes", its
-        geometries of spheres and capsules, and "primitives", how many those are; "trees_built",
+        geometries of spheres, capsules and points, and "primitives", how many those are; "trees_built",
         "trees_refitted"; "sah_ratio", the largest SAH after a refit over that at the build;
         "parts_refitted", whether the tree over meshes and instances was refitted; "bytes" that
         rays read of the scene itself; "paths", instances counted on every way to them.

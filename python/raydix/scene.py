@@ -282,7 +282,7 @@ class Scene(SceneContents, SceneViews):
             return self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
-        only = self._filter(keep, skip, lead)
+        only = hit_filter(keep, skip, lead)
         columns = self._core.hit_columns
         hits = np.empty((*lead, columns), self.dtype)
         self._core.intersect(
@@ -313,7 +313,7 @@ class Scene(SceneContents, SceneViews):
             return self._on_cuda().occluded(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
-        only = self._filter(keep, skip, lead)
+        only = hit_filter(keep, skip, lead)
         flags = np.empty(lead, np.bool_)
         self._core.occluded(*args, flags.reshape(-1), *seen, self.threads, only)
         return flags
@@ -338,7 +338,7 @@ class Scene(SceneContents, SceneViews):
         """
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
-        only = self._filter(keep, skip, lead)
+        only = hit_filter(keep, skip, lead)
         counts = np.empty(lead, UINT32)
         self._core.count(*args, counts.reshape(-1), *seen, self.threads, only)
         return counts
@@ -367,14 +367,9 @@ class Scene(SceneContents, SceneViews):
         """
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
-        only = self._filter(keep, skip, lead)
+        only = hit_filter(keep, skip, lead)
         offsets, hits, _ = self._core.all_hits(*args, max_result_bytes, *seen, self.threads, only)
         return {"offsets": offsets, **hit_columns(hits, 0)}
-
-    def _filter(self, keep: Any, skip: Any, lead: tuple[int, ...]) -> Any:
-        if keep is not None or skip is not None:
-            require_float32(self, "keep, skip")
-        return hit_filter(keep, skip, lead)
 
     def _refuse_filter(self, keep: Any, skip: Any) -> None:
         if keep is not None or skip is not None:

@@ -21,7 +21,8 @@ struct ArrayFilter {
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::span<const bool>> seen;
 
     /// Throws InputError if the array of a geometry ends before the primitive.
-    [[nodiscard]] bool takes(std::size_t ray, const Hit& hit) const {
+    template <class AnyHit>
+    [[nodiscard]] bool takes(std::size_t ray, const AnyHit& hit) const {
         if (!prims.empty() && hit.prim == prims[ray] && hit.geometry == geometries[ray] &&
             hit.instance == instances[ray])
             return false;

@@ -411,6 +411,7 @@ void bind_scene(nb::module_& module) {
     nb::class_<SceneTreesD> in_double(module, "SceneTreesD",
                                       "A scene in double; raydix.Scene is what to use.");
     bind_changes(in_double);
+    bind_shapes(in_double);
     bind_asking(in_double);
     in_double.def("check", &check_boxes);
 }

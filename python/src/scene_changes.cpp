@@ -336,38 +336,79 @@ template void bind_changes(nb::class_<SceneTreesD>& scene);
 namespace {
 
 /// Rows of numbers that are one shape each.
-template <class Shape>
-using ShapeRows = In<float, nb::shape<-1, sizeof(Shape) / sizeof(float)>>;
+template <class Shape, class Scene>
+using ShapeRows = In<Scalar<Scene>, nb::shape<-1, sizeof(Shape) / sizeof(Scalar<Scene>)>>;
 
-template <class Shape>
-void bind_shapes(nb::class_<SceneTrees>& scene, const char* add, const char* update) {
+template <class Shape, class Scene>
+void bind_shapes_of_a_kind(nb::class_<Scene>& scene, const char* add, const char* update) {
     scene
         .def(
             add,
-            [](SceneTrees& self, const ShapeRows<Shape>& shapes, std::uint32_t mask,
+            [](Scene& self, const ShapeRows<Shape, Scene>& shapes, std::uint32_t mask,
                std::optional<std::uint32_t> id) {
                 const auto all = rows<Shape>(shapes);
                 const nb::gil_scoped_release unlocked;
-                return self.add_shapes(all, {mask, id});
+                return self.add_shapes(
+                    [&](auto& to, const GeometryOptions& options) { return to.add(all, options); },
+                    {mask, id});
             },
             nb::arg("shapes").noconvert(), nb::arg("mask"), nb::arg("id").none())
         .def(
             update,
-            [](SceneTrees& self, std::uint32_t id, const ShapeRows<Shape>& shapes) {
+            [](Scene& self, std::uint32_t id, const ShapeRows<Shape, Scene>& shapes) {
                 const auto all = rows<Shape>(shapes);
                 const nb::gil_scoped_release unlocked;
-                self.update_shapes(id, all);
+                self.update_shapes([&](auto& of, std::uint32_t which) { of.update(which, all); },
+                                   id);
             },
             nb::arg("id"), nb::arg("shapes").noconvert());
 }
 
+/// Points of one radius.
+template <class Scene>
+void bind_balls(nb::class_<Scene>& scene) {
+    using Point = typename Scene::Types::Point;
+    scene
+        .def(
+            "add_points",
+            [](Scene& self, const PointRows<Scene>& points, Scalar<Scene> radius,
+               std::uint32_t mask, std::optional<std::uint32_t> id) {
+                const auto all = rows<Point>(points);
+                const nb::gil_scoped_release unlocked;
+                return self.add_shapes(
+                    [&](auto& to, const GeometryOptions& options) {
+                        return to.add(all, radius, options);
+                    },
+                    {mask, id});
+            },
+            nb::arg("points").noconvert(), nb::arg("radius"), nb::arg("mask"), nb::arg("id").none())
+        .def(
+            "update_points",
+            [](Scene& self, std::uint32_t id, const PointRows<Scene>& points,
+               Scalar<Scene> radius) {
+                const auto all = rows<Point>(points);
+                const nb::gil_scoped_release unlocked;
+                self.update_shapes(
+                    [&](auto& of, std::uint32_t which) { of.update(which, all, radius); }, id);
+            },
+            nb::arg("id"), nb::arg("points").noconvert(), nb::arg("radius"));
+}
+
 }  // namespace
 
-void bind_shapes(nb::class_<SceneTrees>& scene) {
-    static_assert(sizeof(Sphere) == 4 * sizeof(float) && sizeof(Capsule) == 7 * sizeof(float));
-    bind_shapes<Sphere>(scene, "add_spheres", "update_spheres");
-    bind_shapes<Capsule>(scene, "add_capsules", "update_capsules");
+template <class Scene>
+void bind_shapes(nb::class_<Scene>& scene) {
+    using Sphere = typename Scene::Types::Sphere;
+    using Capsule = typename Scene::Types::Capsule;
+    static_assert(sizeof(Sphere) == 4 * sizeof(Scalar<Scene>) &&
+                  sizeof(Capsule) == 7 * sizeof(Scalar<Scene>));
+    bind_shapes_of_a_kind<Sphere>(scene, "add_spheres", "update_spheres");
+    bind_shapes_of_a_kind<Capsule>(scene, "add_capsules", "update_capsules");
+    bind_balls(scene);
 }
+
+template void bind_shapes(nb::class_<SceneTrees>& scene);
+template void bind_shapes(nb::class_<SceneTreesD>& scene);
 
 void bind_files(nb::class_<SceneTrees>& scene) {
     scene.def("save_rdx", &save_rdx, nb::arg("file"), nb::arg("name"), nb::arg("cameras"))

@@ -13,7 +13,10 @@ extern template void bind_changes(nanobind::class_<SceneTrees>& scene);
 extern template void bind_changes(nanobind::class_<SceneTreesD>& scene);
 /// Scenes of files are in float32.
 void bind_files(nanobind::class_<SceneTrees>& scene);
-/// Spheres and capsules, in float32 too.
-void bind_shapes(nanobind::class_<SceneTrees>& scene);
+/// Spheres, capsules and points of one radius.
+template <class Scene>
+void bind_shapes(nanobind::class_<Scene>& scene);
+extern template void bind_shapes(nanobind::class_<SceneTrees>& scene);
+extern template void bind_shapes(nanobind::class_<SceneTreesD>& scene);
 
 }  // namespace raydix::python

@@ -14,13 +14,12 @@
 
 namespace raydix::python {
 
-namespace {
-
-/// Changes of any scene: an instance asks what its scene holds, and that one's scenes in turn.
 std::mutex& structure() {
     static std::mutex mutex;
     return mutex;
 }
+
+namespace {
 
 SceneTraceOptions trace_options(const RayOptions& options) {
     SceneTraceOptions out;
@@ -28,11 +27,14 @@ SceneTraceOptions trace_options(const RayOptions& options) {
     out.masks = options.masks;
     out.threads = options.threads;
     out.max_result_bytes = options.max_result_bytes;
-    if (options.filter != nullptr)
-        out.filter = [filter = options.filter, first = options.first](std::size_t place, const Ray&,
-                                                                      const Hit& hit) {
+    if (options.filter != nullptr) {
+        const auto takes = [filter = options.filter, first = options.first](
+                               std::size_t place, const auto&, const auto& hit) {
             return filter->takes(first + place, hit);
         };
+        out.filter = takes;
+        out.filter_d = takes;
+    }
     return out;
 }
 
@@ -160,26 +162,6 @@ std::vector<std::uint32_t> BasicSceneTrees<Names>::add(std::shared_ptr<BasicScen
         throw;
     }
     return ids;
-}
-
-template <class Names>
-template <class Shape>
-std::uint32_t BasicSceneTrees<Names>::add_shapes(std::span<const Shape> shapes,
-                                                 const GeometryOptions& options) {
-    const Writing lock("add", queue_, use_);
-    settle();
-    const std::lock_guard all(structure());
-    const std::uint32_t id = scene_.add(shapes, options);
-    geometries_[id] = {.is_shapes = true, .mask = options.mask};
-    return id;
-}
-
-template <class Names>
-template <class Shape>
-void BasicSceneTrees<Names>::update_shapes(std::uint32_t id, std::span<const Shape> shapes) {
-    const Writing lock("update", queue_, use_);
-    settle();
-    scene_.update(id, shapes);
 }
 
 template <class Names>
@@ -460,9 +442,5 @@ template SceneOverlapLists SceneTrees::touch_all(std::span<const Segment>, std::
 template SceneOverlapLists SceneTrees::touch_all(std::span<const Sphere>, std::uint64_t, int);
 template SceneOverlapLists SceneTreesD::touch_all(std::span<const SegmentD>, std::uint64_t, int);
 template SceneOverlapLists SceneTreesD::touch_all(std::span<const SphereD>, std::uint64_t, int);
-template std::uint32_t SceneTrees::add_shapes(std::span<const Sphere>, const GeometryOptions&);
-template std::uint32_t SceneTrees::add_shapes(std::span<const Capsule>, const GeometryOptions&);
-template void SceneTrees::update_shapes(std::uint32_t, std::span<const Sphere>);
-template void SceneTrees::update_shapes(std::uint32_t, std::span<const Capsule>);
 
 }  // namespace raydix::python

@@ -63,6 +63,7 @@ struct InFloat {
     using SweepHit = SceneSweepHit;
     using Segment = raydix::Segment;
     using Sphere = raydix::Sphere;
+    using Capsule = raydix::Capsule;
 };
 
 /// The same in double.
@@ -85,6 +86,7 @@ struct InDouble {
     using SweepHit = SceneSweepHitD;
     using Segment = SegmentD;
     using Sphere = SphereD;
+    using Capsule = CapsuleD;
 };
 
 /// A mesh in memory that stays where it is for as long as somebody looks at it. Never null.
@@ -110,7 +112,7 @@ struct RayOptions {
     std::span<const std::uint32_t> masks = {};  // of each ray, instead; or empty
     int threads = 0;
     std::uint64_t max_result_bytes = 0;
-    const ArrayFilter* filter = nullptr;  // float only; null: all hits count
+    const ArrayFilter* filter = nullptr;  // null: all hits count
     std::size_t first = 0;                // the filter's number of the first ray
 };
 
@@ -162,6 +164,10 @@ private:
 extern template class MeshTrees<InFloat>;
 extern template class MeshTrees<InDouble>;
 
+/// Held while the structure of any scene changes: an instance asks what its scene holds, and that
+/// one's scenes in turn.
+[[nodiscard]] std::mutex& structure();
+
 /// raydix::Scene or SceneD. Changes and commits wait for the queries of other threads; what they
 /// throw leaves all answers as they were.
 template <class Names>
@@ -191,11 +197,12 @@ public:
                                    std::span<const Transform> transforms,
                                    std::span<const std::uint32_t> masks,
                                    std::optional<std::uint32_t> id);
-    /// Spheres or capsules, copied.
-    template <class Shape>
-    std::uint32_t add_shapes(std::span<const Shape> shapes, const GeometryOptions& options);
-    template <class Shape>
-    void update_shapes(std::uint32_t id, std::span<const Shape> shapes);
+    /// Spheres, capsules, or points of one radius, copied. add(scene, options) and
+    /// update(scene, id) are calls of raydix::Scene.
+    template <class Add>
+    std::uint32_t add_shapes(const Add& add, const GeometryOptions& options);
+    template <class Update>
+    void update_shapes(const Update& update, std::uint32_t id);
     void remove(std::uint32_t id);
     /// Without triangles: those it has.
     void update(std::uint32_t id, Vertices vertices,
@@ -289,6 +296,25 @@ private:
     std::optional<typename Names::Refitter> refitter_;
     std::array<std::optional<typename Names::Solid>, 4> scene_solids_;  // by rule, if not a mesh's
 };
+
+template <class Names>
+template <class Add>
+std::uint32_t BasicSceneTrees<Names>::add_shapes(const Add& add, const GeometryOptions& options) {
+    const Writing lock("add", queue_, use_);
+    settle();
+    const std::lock_guard all(structure());
+    const std::uint32_t id = add(scene_, options);
+    geometries_[id] = {.is_shapes = true, .mask = options.mask};
+    return id;
+}
+
+template <class Names>
+template <class Update>
+void BasicSceneTrees<Names>::update_shapes(const Update& update, std::uint32_t id) {
+    const Writing lock("update", queue_, use_);
+    settle();
+    update(scene_, id);
+}
 
 extern template class BasicSceneTrees<InFloat>;
 extern template class BasicSceneTrees<InDouble>;

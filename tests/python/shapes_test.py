@@ -90,8 +90,62 @@ def test_bad_shapes_are_named():
         scene.add_spheres([[0, 0, 0], [1, 1, 1]], [1, 2, 3])
     with pytest.raises(ValueError, match="ends: expected shape"):
         scene.add_capsules([[0, 0, 0]], [[0, 0, 0], [1, 1, 1]], 1)
-    with pytest.raises(NotImplementedError):
-        raydix.Scene(precision="float64").add_spheres([[0, 0, 0]], 1)
+    for wrong in (-1, np.nan, np.inf):
+        with pytest.raises(ValueError, match="radius: expected a finite number"):
+            scene.add_points([[0, 0, 0]], wrong)
+    with pytest.raises(ValueError, match=r"points: expected shape \(N, 3\)"):
+        scene.add_points([1, 2, 3], 1)
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_points_are_spheres_of_one_radius(precision):
+    random = np.random.default_rng(6)
+    points = random.uniform(-1, 1, (300, 3))
+    rays = _rays(2000)
+    one, other = raydix.Scene(precision=precision), raydix.Scene(precision=precision)
+    assert one.add_points(points, 0.1, mask=3, id=4) == other.add_spheres(points, 0.1, id=4) == 4
+    for radius in (0.1, 0, 0.25):
+        one.update_points(4, points, radius)
+        other.update_spheres(4, points, radius)
+        one.commit(), other.commit()
+        hits, wanted = one.intersect(rays), other.intersect(rays)
+        for name, column in wanted.items():
+            np.testing.assert_array_equal(hits[name], column)
+        near, wanted = one.closest_point(rays[:, :3]), other.closest_point(rays[:, :3])
+        for name, column in wanted.items():
+            np.testing.assert_array_equal(near[name], column)
+    assert (hits["prim"] != raydix.MISSING).sum() > 500
+    assert (one.intersect(rays, mask=4)["prim"] == raydix.MISSING).all()
+    with pytest.raises(raydix.InputError, match="geometry 4 is points, not spheres"):
+        one.update_spheres(4, points, 1)
+
+
+def test_shapes_in_float64_keep_their_digits():
+    """At a map's coordinates, where float32 has steps of half a metre."""
+    home = np.array([500_000.0, 4_500_000.0, 120.0])
+    ball, scene = raydix.Scene(precision="float64"), raydix.Scene(precision="float64")
+    ball.add_spheres([[0, 0, 0], [3, 0, 0]], [1, 0.5])
+    ball.commit()
+    scene.add(ball, np.concatenate([np.eye(3), home[:, None]], axis=1))
+    rod = scene.add_capsules([home + [0, 5, 0]], [home + [4, 5, 0]], 1)
+    scene.commit()
+    rays = np.array([[0, 0, 9, 0, 0, -1], [3, 0, 9, 0, 0, -1], [1, 5, 9, 0, 0, -1]], float)
+    rays[:, :3] += home
+    hits = scene.intersect(rays)
+    assert hits["t"].tolist() == [8, 8.5, 8]
+    assert hits["prim"].tolist() == [0, 1, 0] and hits["instance"].tolist() == [1, 1, 0]
+    assert hits["u"].tolist() == [0, 0, 0.25]
+    kept = scene.intersect(rays, keep={(1, 0): np.array([False, True])})
+    assert kept["t"].tolist() == [np.inf, 8.5, 8]
+    skipped = scene.intersect(rays, skip=hits)
+    assert skipped["t"].tolist() == [np.inf] * 3
+    assert scene.count(rays, keep={rod: np.array([False])}).tolist() == [1, 1, 0]
+    near = scene.closest_point(home + [[0, 0, 3], [3, 0, 0.25], [5.5, 5, 0]])
+    assert near["distance"].tolist() == [2, 0, 0.5] and near["u"].tolist() == [0, 0, 1]
+    touched = scene.touched_by(spheres=[[*(home + [0, 0, 3]), 2]])
+    assert touched["instance"].tolist() == [1] and touched["prim"].tolist() == [0]
+    with pytest.raises(raydix.InputError, match="sweeps: geometry 1 .capsules. cannot be swept"):
+        scene.sweep_spheres(rays, radii=1)
 
 
 def test_filters_are_filtered_hits():
@@ -138,5 +192,5 @@ def test_filters_name_what_is_wrong():
     with pytest.raises(raydix.InputError, match="keep: geometry 0 has primitive"):
         mesh.intersect(rays, keep=np.ones(1, bool))
     double = raydix.Scene(mesh.vertices, mesh.faces, precision="float64")
-    with pytest.raises(NotImplementedError):
-        double.intersect(rays, keep=np.ones(len(mesh.faces), bool))
+    with pytest.raises(raydix.InputError, match="keep: geometry 0 has primitive"):
+        double.intersect(rays, keep=np.ones(1, bool))
