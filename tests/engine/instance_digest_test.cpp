@@ -211,7 +211,12 @@ private:
 };
 
 constexpr std::pair<const char*, Quality> qualities[] = {
-    {"fast", Quality::fast}, {"balanced", Quality::balanced}, {"high", Quality::high}};
+    {"balanced", Quality::balanced},
+#if !defined(RAYDIX_EMULATED) && !defined(RAYDIX_SANITIZED)
+    {"fast", Quality::fast},
+    {"high", Quality::high},
+#endif
+};
 constexpr SimdPath paths[] = {SimdPath::automatic, SimdPath::single, SimdPath::packet,
                               SimdPath::stream, SimdPath::sorted};
 
