@@ -260,7 +260,7 @@ FAULTS = [
           "return wide_leaf_bit | child.first << 3;", "scenes: only the first part of a leaf is seen", "engine"),
     Fault("src/engine/commit.cpp", "part.number = whole.number + below.number;", "part.number = below.number;",
           "scenes: paths of opened instances count from the inner scene's own", "engine"),
-    Fault("src/engine/commit.cpp", "if (same_way && !geometry.changed && old->mask == geometry.mask) return old;",
+    Fault("src/engine/shape_commit.h", "if (same_way && !geometry.changed && old->mask == geometry.mask) return old;",
           "if (same_way && !geometry.changed) return old;", "scenes: a new mask of shapes is not seen", "engine"),
     Fault("src/engine/commit.cpp", "tree_->ways.push_back(inner.ways[below.first + w]);",
           "tree_->ways.push_back(inner.ways[below.first]);", "scenes: the third level of instances stands where the second does",
