@@ -335,6 +335,9 @@ template void bind_changes(nb::class_<SceneTreesD>& scene);
 
 namespace {
 
+template <class Scene>
+using Scalar = typename Scene::Types::Scalar;
+
 /// Rows of numbers that are one shape each.
 template <class Shape, class Scene>
 using ShapeRows = In<Scalar<Scene>, nb::shape<-1, sizeof(Shape) / sizeof(Scalar<Scene>)>>;
