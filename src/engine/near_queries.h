@@ -51,9 +51,13 @@ Counts sum_of(const std::vector<Counts>& parts, std::size_t queries) {
     return sum;
 }
 
+/// Whether a batch is worth an order, and can have one.
+inline bool is_ordered(std::size_t queries) {
+    return queries >= worth_ordering && queries < std::size_t{1} << 31;
+}
 template <class Near, class Query>
 std::vector<std::uint32_t> order_in(const Near& near, std::span<const Query> queries) {
-    if (queries.size() < worth_ordering || queries.size() >= std::size_t{1} << 31) return {};
+    if (!is_ordered(queries.size())) return {};
     std::vector<decltype(place_of(queries[0]))> places(queries.size());
     for_each_index(queries.size(), [&](std::size_t i) { places[i] = place_of(queries[i]); });
     return near.order(places);
@@ -97,8 +101,7 @@ ClosestCounts closest_batch(const Scene& scene, std::span<const Query> queries,
     with_threads(options.threads, [&] {
         const Near near(scene, options.mask, NearCall::closest, options.isa);
         std::vector<std::uint32_t> order;
-        if (queries.size() >= worth_ordering && queries.size() < std::size_t{1} << 31)
-            order = near.order(queries);
+        if (is_ordered(queries.size())) order = near.order(queries);
         for_each_query_block(
             queries.size(), order,
             [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
