@@ -20,6 +20,9 @@ if(NOT RAYDIX_CUDA STREQUAL "OFF")
         target_compile_options(raydix_cuda_options INTERFACE $<$<COMPILE_LANGUAGE:CUDA>:
             -fmad=false -ftz=false -prec-div=true -prec-sqrt=true -Xcompiler=-ffp-contract=off --expt-relaxed-constexpr
             -Werror=all-warnings>)
+        if(RAYDIX_TESTS)  # tests/device/resources_test.py reads the device code
+            target_compile_options(raydix_cuda_options INTERFACE $<$<COMPILE_LANGUAGE:CUDA>:-no-compress>)
+        endif()
         set(RAYDIX_HAVE_CUDA ON)
     elseif(RAYDIX_CUDA STREQUAL "ON")
         message(FATAL_ERROR "RAYDIX_CUDA=ON, but no CUDA compiler was found")
