@@ -308,6 +308,8 @@ FAULTS = [
     Fault("src/engine/affine.h", "Double3(yz.y, zx.y, xy.y) * s,", "Double3(yz.y, zx.y, xy.y),", "instances: a row of the inverse is not divided",
           "engine instances"),
     Fault("src/engine/affine.h", "std::fabs(det) > 0x1p-40 * size", "std::fabs(det) > 0.0 * size", "instances: flat maps are let in", "engine instances"),
+    Fault("src/exec/thread_own.h", "if (!kept.taken) {", "if (!kept.taken || true) {",
+          "calls from within calls share one memory", "engine"),
     Fault("src/exec/scan.cpp", "scan_serially(values.subspan(begin, end - begin), sums[b]);", "scan_serially(values.subspan(begin, end - begin), T{0});",
           "scan: blocks begin at zero", "exec tree"),
     Fault("src/exec/result_budget.cpp", "    held_.fetch_sub(bytes, std::memory_order_relaxed);\n    return false;", "    return false;",

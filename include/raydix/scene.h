@@ -232,8 +232,7 @@ using SceneD = BasicScene<double>;
 ///
 /// Calls come from several threads at once and in any order. A hit may be asked about any number of
 /// times, also one that turns out not to be the closest. So the answer may depend on the arguments
-/// alone. A filter must not call functions of the library that trace or query. What it throws comes
-/// out of the call that traces.
+/// alone. A filter may itself trace and query. What it throws comes out of the call that traces.
 ///
 /// Each triangle or shape has one hit on a ray, the first within [tmin, tmax]. Where that one is
 /// refused, the ray goes on to other triangles and shapes.

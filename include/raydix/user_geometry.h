@@ -84,8 +84,8 @@ public:
     ///
     /// Calls come from several threads at once and in any order. A ray that may hit a primitive is
     /// asked about once or several times; some rays that miss it are not asked about. Answers must
-    /// depend on `prim` and the ray alone. The function must not call functions of the library that
-    /// trace or query. What it throws comes out of the call that traces.
+    /// depend on `prim` and the ray alone. The function may itself trace and query. What it throws
+    /// comes out of the call that traces.
     template <class Test>
     requires(std::is_invocable_v<const Test&, std::uint32_t, Rays&> ||
              std::is_invocable_r_v<bool, const Test&, std::uint32_t, const Ray&, Hit&>)

@@ -13,18 +13,10 @@
 #include "engine/near_job.h"
 #include "engine/near_scene.h"
 #include "engine/scene_state.h"
+#include "exec/thread_own.h"
 
 namespace raydix {
 namespace {
-
-/// The job of each thread: its memory stays from batch to batch.
-NearJob& near_job_of_this_thread(const SceneTree& tree, std::uint32_t mask) {
-    thread_local NearJob job;
-    job.tree = &tree;
-    job.mask = mask;
-    job.guess.view = nullptr;
-    return job;
-}
 
 /// Throws InputError for geometry that has no answer.
 const SceneTree& tree_for(const Scene& scene, std::uint32_t mask, NearCall call) {
@@ -93,25 +85,28 @@ public:
 
     class Thread {
     public:
-        explicit Thread(const Near& near)
-            : kernels_(near.kernels_), job_(near_job_of_this_thread(near.tree_, near.mask_)) {}
+        explicit Thread(const Near& near) : kernels_(near.kernels_) {
+            job_->tree = &near.tree_;
+            job_->mask = near.mask_;
+            job_->guess.view = nullptr;
+        }
 
         SceneClosestPoint closest(Vec3 query, float limit) {
-            return public_point(kernels_.closest(job_, query, limit));
+            return public_point(kernels_.closest(*job_, query, limit));
         }
         bool touch(const Segment& segment, BudgetVector<ScenePrimitive>* found) {
-            return kernels_.touch_segment(job_, segment, found);
+            return kernels_.touch_segment(*job_, segment, found);
         }
         bool touch(const Sphere& sphere, BudgetVector<ScenePrimitive>* found) {
-            return kernels_.touch_sphere(job_, sphere, found);
+            return kernels_.touch_sphere(*job_, sphere, found);
         }
         SceneSweepHit sweep(const SphereSweep& sweep) {
-            return public_hit(kernels_.sweep(job_, sweep), sweep);
+            return public_hit(kernels_.sweep(*job_, sweep), sweep);
         }
 
     private:
         const NearKernels& kernels_;
-        NearJob& job_;
+        ThreadOwn<NearJob> job_;
     };
 
 private:

@@ -13,6 +13,7 @@
 #include "engine/scene_state.h"
 #include "engine/trace_here.h"
 #include "exec/parallel.h"
+#include "exec/thread_own.h"
 #include "rays/place_order.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
@@ -47,12 +48,6 @@ const HitFilter* filter_of(const SceneTraceOptions& options) {
     return options.filter ? &options.filter : nullptr;
 }
 
-/// The job of each thread: its memory stays from batch to batch.
-SceneJob& job_of_this_thread() {
-    thread_local SceneJob job;
-    return job;
-}
-
 /// How a batch goes through a scene.
 struct Way {
     const SimdKernels* kernels;
@@ -63,7 +58,8 @@ struct Way {
 /// Rays begin to end - 1, or order[begin] to order[end - 1].
 JobCounts trace_job(const SceneTree& tree, const Way& way, const Batch& batch,
                     const std::vector<std::uint32_t>& order, std::size_t begin, std::size_t end) {
-    SceneJob& job = job_of_this_thread();
+    const ThreadOwn<SceneJob> own;
+    SceneJob& job = *own;
     const std::size_t from = order.empty() ? begin : 0;
     job.tree = &tree;
     job.kernels = way.kernels;
@@ -202,7 +198,8 @@ TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
 [[gnu::noinline]] Hit trace_parts(const SceneTree& tree, const Ray& ray, std::uint32_t mask,
                                   const HitFilter* filter, bool any) {
     static const SceneKernels& kernels = scene_kernels_for({});
-    StackMemory& stack = job_of_this_thread().single_stack;
+    const ThreadOwn<SceneJob> own;
+    StackMemory& stack = own->single_stack;
     stack.reserve_words(tree.stack_size);
     const auto answer = [&]() -> Hit {
         if (!is_valid(ray)) return {};
@@ -273,7 +270,8 @@ void occluded_here(const SceneTree& scene, std::span<const Ray> rays,
 void count_steps_here(const SceneTree& scene, std::span<const Ray> rays,
                       std::span<std::uint32_t> visits) {
     check_sizes(rays.size(), visits.size());
-    SceneJob& job = job_of_this_thread();
+    const ThreadOwn<SceneJob> own;
+    SceneJob& job = *own;
     job.tree = &scene;
     job.rays = rays.data();
     job.n = rays.size();
@@ -296,7 +294,8 @@ AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTrac
     with_threads(options.threads, [&] {
         for_each_block(
             rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
-                SceneJob& job = job_of_this_thread();
+                const ThreadOwn<SceneJob> own;
+                SceneJob& job = *own;
                 job.tree = &tree;
                 job.rays = rays.data() + begin;
                 job.order = nullptr;

@@ -13,6 +13,7 @@
 #include "engine/scene_job_double.h"
 #include "engine/scene_state.h"
 #include "exec/parallel.h"
+#include "exec/thread_own.h"
 #include "rays/place_order.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
@@ -36,12 +37,6 @@ const HitFilterD* filter_of(const SceneTraceOptions& options) {
     return options.filter_d ? &options.filter_d : nullptr;
 }
 
-/// The job of each thread: its memory stays from batch to batch.
-SceneJobD& job_of_this_thread() {
-    thread_local SceneJobD job;
-    return job;
-}
-
 const SceneTreeD& checked_tree(const SceneD& scene, std::size_t rays,
                                const SceneTraceOptions& options) {
     const SceneTreeD& tree = *SceneAccessD::tree(scene);
@@ -52,9 +47,8 @@ const SceneTreeD& checked_tree(const SceneD& scene, std::size_t rays,
 }
 
 /// Rays begin to end - 1 of a batch, or order[begin] to order[end - 1].
-SceneJobD& job_for(const SceneTreeD& tree, const Batch& batch,
-                   const std::vector<std::uint32_t>& order, std::size_t begin, std::size_t end) {
-    SceneJobD& job = job_of_this_thread();
+void set_job(SceneJobD& job, const SceneTreeD& tree, const Batch& batch,
+             const std::vector<std::uint32_t>& order, std::size_t begin, std::size_t end) {
     const std::size_t from = order.empty() ? begin : 0;
     job.tree = &tree;
     job.rays = batch.rays.data() + from;
@@ -66,7 +60,6 @@ SceneJobD& job_for(const SceneTreeD& tree, const Batch& batch,
     job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + from;
     job.hits = batch.hits == nullptr ? nullptr : batch.hits + from;
     job.occluded = batch.occluded == nullptr ? nullptr : batch.occluded + from;
-    return job;
 }
 
 using Way = SceneJobD::Way;
@@ -137,7 +130,9 @@ TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
         if (ways.sorted) order = order_by_place(*tree.only_mesh()->tree, batch.rays);
         for_each_block(n, job_size, [&](std::size_t part, std::size_t begin, std::size_t end) {
             const auto trace = [&](std::size_t way, std::size_t from, std::size_t to) {
-                SceneJobD& job = job_for(tree, batch, order, from, to);
+                const ThreadOwn<SceneJobD> own;
+                SceneJobD& job = *own;
+                set_job(job, tree, batch, order, from, to);
                 job.way = ways.way[way];
                 kernels.trace(job);
                 parts[part] += {job.hit_count, job.invalid};
@@ -153,7 +148,8 @@ HitD trace_one(const SceneD& scene, const RayD& ray, std::uint32_t mask, const H
                bool any) {
     static const SceneKernelsD& kernels = scene_kernels_double_for({});
     const SceneTreeD& tree = *SceneAccessD::tree(scene);
-    StackMemory& stack = job_of_this_thread().stack;
+    const ThreadOwn<SceneJobD> own;
+    StackMemory& stack = own->stack;
     stack.reserve_words(tree.stack_size);
     const auto answer = [&]() -> HitD {
         if (!is_valid(ray)) return {};
@@ -197,7 +193,9 @@ AllHitsD trace_all(const SceneD& scene, std::span<const RayD> rays,
     with_threads(options.threads, [&] {
         for_each_block(rays.size(), block_size,
                        [&](std::size_t block, std::size_t begin, std::size_t end) {
-                           SceneJobD& job = job_for(tree, batch, {}, begin, end);
+                           const ThreadOwn<SceneJobD> own;
+                           SceneJobD& job = *own;
+                           set_job(job, tree, batch, {}, begin, end);
                            job.found = &found.hits(block);
                            job.hit_counts = found.hit_counts() + begin;
                            kernels.all_hits(job);

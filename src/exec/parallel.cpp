@@ -9,18 +9,46 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "base/float_env.h"
 #include "base/options.h"
 #include "exec/progress.h"
 
 namespace raydix {
+namespace {
+
+thread_local bool inside_range = false;
+
+/// A range that this thread runs.
+class Range {
+public:
+    Range() = default;
+    ~Range() { inside_range = outer_; }
+    Range(const Range&) = delete;
+    Range& operator=(const Range&) = delete;
+
+private:
+    const FloatEnvironment plain_;
+    const bool outer_ = std::exchange(inside_range, true);
+};
+
+/// From within a range the caller's functions call the library again. While such a call waits for
+/// others, its thread must not begin another range of the outer call: it could go on and on.
+void run_here(const std::function<void()>& body) {
+    if (inside_range)
+        isolated(body);
+    else
+        body();
+}
+
+}  // namespace
 
 void with_threads(int threads, const std::function<void()>& body) {
     check_threads(threads);
     const FloatEnvironment plain;
     if (threads == 0) {
-        body();
+        run_here(body);
         return;
     }
     // An arena that asks for more than the process may have at work gets no more, and oneTBB prints
@@ -30,7 +58,7 @@ void with_threads(int threads, const std::function<void()>& body) {
     const int wanted = static_cast<int>(std::min(static_cast<std::size_t>(threads), most));
     // Workers take a millisecond to come over to another arena.
     if (wanted == thread_count()) {
-        body();
+        run_here(body);
         return;
     }
     tbb::task_arena arena(wanted);
@@ -51,13 +79,13 @@ void parallel_ranges(std::size_t n, std::size_t grain,
                      void (*call)(const void*, std::size_t, std::size_t), const void* body) {
     if (n == 0) return;
     if (n <= grain || thread_count() == 1) {
-        const FloatEnvironment plain;
+        const Range range;
         call(body, 0, n);
         return;
     }
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, grain),
                       [&](const tbb::blocked_range<std::size_t>& range) {
-                          const FloatEnvironment plain;
+                          const Range inside;
                           call(body, range.begin(), range.end());
                       });
 }
