@@ -17,8 +17,9 @@
 
 #include "exec/parallel.h"
 #include "layout/wide_collapse.h"
+#include "tests/support/cwbvh_trace.h"
+#include "tests/support/wide_walk.h"
 #include "trace/triangle_test.h"
-#include "trace/wide_walk.h"
 
 namespace {
 
@@ -100,7 +101,7 @@ Json work_of(const raydix::Bvh& bvh, const raydix::Cwbvh& cwbvh,
         work["wide" + std::to_string(width)] = per_ray(trace_wide(bvh, tree, rays, hits));
         expect_same(hits, wanted, "wide");
     }
-    work["cwbvh"] = per_ray(trace(cwbvh, rays, hits, {.counters = true}));
+    work["cwbvh"] = per_ray(trace(cwbvh, rays, hits));
     expect_same(hits, wanted, "cwbvh");
     return work;
 }

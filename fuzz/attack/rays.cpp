@@ -10,6 +10,7 @@
 #include "attack/attack.h"
 #include "attack/brute_all.h"
 #include "attack/ray_families.h"
+#include "support/cwbvh_trace.h"
 
 namespace raydix::attack {
 namespace {

@@ -1,13 +1,17 @@
-// Rays through the caller's own geometry: spheres, capsules, points with a radius and boxes,
-// through one tree and as geometries of a Scene with and without a filter, against the same
-// function called for every primitive, and spheres against extended precision.
+// Rays through the caller's own geometry: spheres, capsules and points with a radius as geometries
+// of a Scene or a SceneD, as they are and as user geometry, with and without a filter, against the
+// same function called for every primitive.
 #include <raydix/scene.h>
 #include <raydix/user_geometry.h>
-#include <raydix/user_geometry_d.h>
 #include <raydix/wide.h>
+
+#include <functional>
 
 #include "attack/attack.h"
 #include "attack/precision.h"
+#include "engine/shape_tree.h"
+#include "primitives/double_sources.h"
+#include "proximity/shape_hits.h"
 
 namespace raydix::attack {
 namespace {
@@ -44,31 +48,35 @@ bool same_hit(const AnyHit& a, const AnyHit& b) {
     return a.prim == b.prim && (!a.hit() || (a.t == b.t && same_number(a.u, b.u) && a.v == b.v));
 }
 
-template <class Box>
-std::vector<bool> kept_boxes(const std::vector<Box>& boxes) {
-    std::vector<bool> kept;
-    for (const Box& box : boxes) {
-        const Box single[] = {box};
-        kept.push_back(build_bvh(std::span<const Box>(single), {.threads = 1}).left_out() == 0);
-    }
-    return kept;
+bool is_kept(const Aabb& box) {
+    return build_bvh(std::span<const Aabb>(&box, 1), {.threads = 1}).left_out() == 0;
+}
+bool is_kept(const AabbD& box) {
+    AabbD as_it_is;
+    return BoxSourceD{&box}.box(0, as_it_is);
 }
 
-/// Shapes as geometry 1 of a scene, in each way that scenes hold them. add(scene): as they are.
-template <class Add>
+/// Shapes as geometry 1 of a scene, in each way that scenes hold them.
+template <class In>
 class SceneDuel {
 public:
-    SceneDuel(Case& c, const char* shape, const std::vector<Aabb>& boxes,
-              const IntersectPrimitive& intersect, const std::vector<Ray>& rays, const Add& add)
-        : case_(c), shape_(shape), boxes_(boxes), intersect_(intersect) {
+    using Scalar = typename In::Scalar;
+    using Scene = BasicScene<Scalar>;
+    using AnyRay = typename In::AnyRay;
+    using AnyHit = typename Scene::Types::Hit;
+    using Box = typename Scene::Types::Box;
+    using Intersect = std::function<bool(std::uint32_t prim, const AnyRay& ray, AnyHit& hit)>;
+    using Filter = std::function<bool(std::size_t place, const AnyRay& ray, const AnyHit& hit)>;
+
+    SceneDuel(Case& c, const char* shape, const BasicShapes<Scalar>& shapes, Intersect intersect,
+              const std::vector<AnyRay>& rays)
+        : case_(c), shape_(shape), intersect_(std::move(intersect)) {
         // t of longer or shorter directions, and from farther away, may be infinite or subnormal in
         // one unit only.
-        const auto longest = [](Vec3 v) {
-            return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
-        };
-        for (const Ray& ray : rays) {
-            const float length = longest(ray.direction);
-            if (length > 0x1p-60f && length < 0x1p60f && !(longest(ray.origin) > 1.6e38f))
+        for (const AnyRay& ray : rays) {
+            const auto length = longest(ray.direction);
+            if (sizeof(Scalar) == 8 || (length > Scalar(0x1p-60) && length < Scalar(0x1p60) &&
+                                        !(longest(ray.origin) > Scalar(1.6e38))))
                 rays_.push_back(ray);
         }
         const SceneOptions options{.quality = static_cast<Quality>(c.random.below(3)),
@@ -78,45 +86,63 @@ public:
         const auto accepts = [turn](std::uint32_t prim) {
             return ((prim * 40503u ^ turn) >> 3 & 1) != 0;
         };
+        const std::vector<Box> boxes = boxes_of<Scalar>(shapes);
+        for (const Box& box : boxes) kept_.push_back(is_kept(box));
         for (const bool native : {true, false}) {
             Scene scene;
-            const std::vector<Sphere> none;
-            scene.add(std::span<const Sphere>(none));
+            scene.add(std::span<const typename In::AnySphere>());
             if (native)
-                add(scene);
+                add(scene, shapes);
             else
-                scene.add(UserGeometry(boxes, intersect));
+                scene.add(BasicUserGeometry<Scalar>(boxes, intersect_));
             scene.commit(options);
             const char* const kind = native ? "in a Scene" : "as user geometry in a Scene";
             run(scene, kind, {}, [](std::uint32_t) { return true; });
             run(
                 scene, kind,
-                [&](std::size_t, const Ray&, const Hit& hit) { return accepts(hit.prim); },
+                [&](std::size_t, const AnyRay&, const AnyHit& hit) { return accepts(hit.prim); },
                 accepts);
         }
     }
 
 private:
+    template <class Point>
+    static auto longest(const Point& v) {
+        return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
+    }
+    static void add(Scene& scene, const BasicShapes<Scalar>& shapes) {
+        std::visit(
+            [&](const auto& all) {
+                if constexpr (requires { all.centers; })
+                    scene.add(all.centers, all.radius);
+                else
+                    scene.add(all);
+            },
+            shapes);
+    }
     template <class Accepts>
-    void run(const Scene& scene, const char* kind, const HitFilter& filter,
-             const Accepts& accepts) {
-        std::vector<bool> kept = kept_boxes(boxes_);
+    void run(const Scene& scene, const char* kind, const Filter& filter, const Accepts& accepts) {
+        std::vector<bool> kept = kept_;
         for (std::uint32_t i = 0; i < kept.size(); ++i) kept[i] = kept[i] && accepts(i);
         const std::vector<std::string> sets = simd_instruction_sets();
         SceneTraceOptions options;
         options.threads = 1;
         options.path = static_cast<SimdPath>(case_.random.below(5));
         options.isa = sets[case_.random.below(sets.size())];
-        options.filter = filter;
-        const std::vector<Hit> hits = trace(scene, rays_, options);
+        if constexpr (std::is_same_v<Filter, HitFilter>)
+            options.filter = filter;
+        else
+            options.filter_d = filter;
+        const std::vector<AnyHit> hits = trace(scene, rays_, options);
         std::vector<std::uint8_t> any(rays_.size());
         trace_any(scene, rays_, any, options);
         for (std::size_t i = 0; i < rays_.size(); ++i) {
-            const Hit wanted = least_of_all<Hit>(static_cast<std::uint32_t>(boxes_.size()), kept,
-                                                 intersect_, rays_[i]);
-            const auto expect = [&](bool right, const char* what, const Hit& got) {
-                case_.expect(right, "user_geometry/scene",
-                             text("%s of %s %s%s", what, shape_, kind, filter ? ", filtered" : ""),
+            const AnyHit wanted = least_of_all<AnyHit>(static_cast<std::uint32_t>(kept.size()),
+                                                       kept, intersect_, rays_[i]);
+            const auto expect = [&](bool right, const char* what, const AnyHit& got) {
+                case_.expect(right, text("user_geometry/%s", In::name),
+                             text("%s of %s %s%s, %s", what, shape_, kind,
+                                  filter ? ", filtered" : "", In::name),
                              [&] {
                                  return text_of(rays_[i]) + "    got " + text_of(got) +
                                         ", wanted " + text_of(wanted) + "\n";
@@ -124,8 +150,10 @@ private:
             };
             expect(same_place(hits[i], wanted), "closest", hits[i]);
             expect((any[i] != 0) == wanted.hit(), "any", hits[i]);
+            expect(!hits[i].hit() || (std::isfinite(hits[i].u) && std::isfinite(hits[i].v)),
+                   "a hit without a place: u", hits[i]);
             if (i % 8 != 0) continue;
-            const Hit one =
+            const AnyHit one =
                 filter ? closest_hit(scene, rays_[i], filter) : closest_hit(scene, rays_[i]);
             expect(same_place(one, wanted), "single closest", one);
             expect((filter ? any_hit(scene, rays_[i], filter) : any_hit(scene, rays_[i])) ==
@@ -133,56 +161,22 @@ private:
                    "single any", one);
         }
     }
-    static bool same_place(const Hit& hit, const Hit& wanted) {
+    static bool same_place(const AnyHit& hit, const AnyHit& wanted) {
         return same_hit(hit, wanted) && (!hit.hit() || (hit.geometry == 1 && hit.instance == 0));
     }
 
     Case& case_;
     const char* shape_;
-    const std::vector<Aabb>& boxes_;
-    const IntersectPrimitive& intersect_;
-    std::vector<Ray> rays_;
+    Intersect intersect_;
+    std::vector<bool> kept_;
+    std::vector<AnyRay> rays_;
 };
-
-template <class In, class Box, class Intersect, class Add>
-void duel(Case& c, const char* shape, const std::vector<Box>& boxes, const Intersect& intersect,
-          const std::vector<typename In::AnyRay>& rays, const Add& add) {
-    if constexpr (std::is_same_v<Box, Aabb>) SceneDuel(c, shape, boxes, intersect, rays, add);
-    using AnyHit = decltype(closest_hit(build_bvh(std::span<const Box>(boxes), BuildOptions{}),
-                                        intersect, rays[0]));
-    const std::vector<bool> kept = kept_boxes(boxes);
-    std::vector<AnyHit> wanted;
-    for (const auto& ray : rays)
-        wanted.push_back(
-            least_of_all<AnyHit>(static_cast<std::uint32_t>(boxes.size()), kept, intersect, ray));
-    for (const BuildOptions& build : every_builder(c.random)) {
-        const auto tree = build_bvh(std::span<const Box>(boxes), build);
-        std::vector<AnyHit> hits(rays.size());
-        std::vector<std::uint8_t> any(rays.size());
-        trace(tree, intersect, std::span(rays), hits, {.threads = 1});
-        trace_any(tree, intersect, std::span(rays), any, {.threads = 1});
-        for (std::size_t i = 0; i < rays.size(); ++i) {
-            const auto expect = [&](bool right, const char* what) {
-                c.expect(right, text("user_geometry/%s", In::name),
-                         text("%s of %s, %s", what, shape, In::name), [&] {
-                             return "    " + text_of(build) + "\n" + text_of(rays[i]) + "    got " +
-                                    text_of(hits[i]) + ", wanted " + text_of(wanted[i]) + "\n";
-                         });
-            };
-            expect(same_hit(hits[i], wanted[i]), "closest");
-            expect((any[i] != 0) == wanted[i].hit(), "any");
-            expect(!hits[i].hit() || (std::isfinite(hits[i].u) && std::isfinite(hits[i].v)),
-                   "a hit without a place: u");
-            if (i % 8 != 0) continue;
-            expect(same_hit(closest_hit(tree, intersect, rays[i]), wanted[i]), "single closest");
-            expect(any_hit(tree, intersect, rays[i]) == wanted[i].hit(), "single any");
-        }
-    }
-}
 
 template <class In>
 void attack_in(Case& c) {
     using Scalar = typename In::Scalar;
+    using AnyRay = typename In::AnyRay;
+    using AnyHit = typename SceneDuel<In>::AnyHit;
     // Lengths of ordinary size: what the boxes of the shapes promise is relative to them.
     const Family families[] = {Family::soup, Family::voxels, Family::grid, Family::sphere,
                                Family::tetrahedra};
@@ -196,23 +190,37 @@ void attack_in(Case& c) {
             std::vector<typename In::AnySphere> spheres;
             for (int i = 0; i < 20; ++i) spheres.push_back({scenery.place(c.random), radius()});
             const std::span<const typename In::AnySphere> all(spheres);
-            return duel<In>(c, "spheres", boxes_of(all), intersect_spheres(all), rays,
-                            [&](auto& scene) { scene.add(all); });
+            SceneDuel<In>(
+                c, "spheres", all,
+                [all](std::uint32_t prim, const AnyRay& ray, AnyHit& hit) {
+                    return hit_ball(all[prim].center, all[prim].radius, ray, hit);
+                },
+                rays);
+            break;
         }
         case 1: {
-            using AnyCapsule = std::conditional_t<sizeof(Scalar) == 4, Capsule, CapsuleD>;
+            using AnyCapsule = typename SceneTypes<Scalar>::Capsule;
             std::vector<AnyCapsule> capsules;
             for (int i = 0; i < 20; ++i)
                 capsules.push_back({scenery.place(c.random), scenery.place(c.random), radius()});
             const std::span<const AnyCapsule> all(capsules);
-            return duel<In>(c, "capsules", boxes_of(all), intersect_capsules(all), rays,
-                            [&](auto& scene) { scene.add(all); });
+            SceneDuel<In>(
+                c, "capsules", all,
+                [all](std::uint32_t prim, const AnyRay& ray, AnyHit& hit) {
+                    return hit_capsule(all[prim], ray, hit);
+                },
+                rays);
+            break;
         }
         default: {
             const Scalar common = radius();
             const std::span<const typename In::Point> points = scenery.mesh.vertices;
-            return duel<In>(c, "points", boxes_of(points, common), intersect_points(points, common),
-                            rays, [&](auto& scene) { scene.add(points, common); });
+            SceneDuel<In>(
+                c, "points", BasicBalls<Scalar>{points, common},
+                [points, common](std::uint32_t prim, const AnyRay& ray, AnyHit& hit) {
+                    return hit_ball(points[prim], common, ray, hit);
+                },
+                rays);
         }
     }
 }

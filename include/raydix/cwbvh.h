@@ -1,15 +1,11 @@
 // The compressed wide BVH (Ylitie, Karras, Laine 2017): eight children a node of 80 bytes, made
-// from any binary tree of triangles; its rays on the CPU. raydix/device_cwbvh.h traces it on a GPU.
+// from any binary tree of triangles. raydix/device_cwbvh.h traces it on a GPU.
 #pragma once
 
 #include <raydix/bvh.h>
-#include <raydix/trace.h>
-#include <raydix/types.h>
 
 #include <cstdint>
 #include <memory>
-#include <span>
-#include <vector>
 
 namespace raydix {
 
@@ -50,14 +46,5 @@ public:
 private:
     std::unique_ptr<Arrays> arrays_;
 };
-
-/// As trace() and trace_any() of a Bvh, bit for bit, by the kernel `cwbvh`; options.kernel has no
-/// effect. rays [n] -> hits, occluded [n]. Throws InputError if the sizes differ.
-TraceCounts trace(const Cwbvh& tree, std::span<const Ray> rays, std::span<Hit> hits,
-                  const TraceOptions& options = {});
-[[nodiscard]] std::vector<Hit> trace(const Cwbvh& tree, std::span<const Ray> rays,
-                                     const TraceOptions& options = {});
-TraceCounts trace_any(const Cwbvh& tree, std::span<const Ray> rays,
-                      std::span<std::uint8_t> occluded, const TraceOptions& options = {});
 
 }  // namespace raydix

@@ -39,7 +39,7 @@ enum class CwbvhKernel : std::uint32_t {
 /// Bytes of device memory that a launch of this kernel wants beside rays and results: 0 or 256.
 [[nodiscard]] std::size_t device_cwbvh_scratch_bytes(CwbvhKernel kernel);
 
-/// As trace() and trace_any() of a Cwbvh, bit for bit. rays, hits, occluded: device memory,
+/// As trace() and trace_any() of the Bvh, bit for bit. rays, hits, occluded: device memory,
 /// [count], aligned to 16 bytes (occluded: any). `scratch`: aligned to 256 bytes, at least
 /// device_cwbvh_scratch_bytes, in use until the stream is past the call. Asynchronous: nothing is
 /// allocated and nothing waited for. Invalid rays are misses and not counted. Throws InputError,

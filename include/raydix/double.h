@@ -174,7 +174,7 @@ struct SphereD {
     Vec3d center;
     double radius;
 };
-/// As Capsule, for rays through <raydix/user_geometry_d.h>.
+/// As Capsule.
 struct CapsuleD {
     Vec3d a, b;
     double radius;

@@ -43,6 +43,5 @@
 #include <raydix/tree_view.h>        // IWYU pragma: export
 #include <raydix/types.h>            // IWYU pragma: export
 #include <raydix/user_geometry.h>    // IWYU pragma: export
-#include <raydix/user_geometry_d.h>  // IWYU pragma: export
 #include <raydix/version.h>          // IWYU pragma: export
 #include <raydix/wide.h>             // IWYU pragma: export

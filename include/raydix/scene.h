@@ -157,10 +157,13 @@ public:
     std::uint32_t share(const MeshView& mesh, const GeometryOptions& options = {});
     /// Adds spheres, capsules, or points of one radius, of which the scene keeps a copy. `prim`
     /// counts them. Rays hit their surfaces from both sides. A ray that starts inside hits where it
-    /// leaves. t is computed in double and rounded once. `u` of a capsule's hit is the place along
-    /// its axis, 0 at a and 1 at b; other u and v are 0. Shapes that are not finite, have a
-    /// negative radius or reach beyond 1e12 are left out. In float, rays that start beyond 1.7e38
-    /// may miss shapes. Throws InputError for an id that was given before.
+    /// leaves. t is computed in double and rounded once. In double, the point of the ray at t is
+    /// within 2^-50 of (distance of the origin from the shape + its length and radius) of the
+    /// surface; what the ray passes or starts from within that may be hit or missed. `u` of a
+    /// capsule's hit is the place along its axis, 0 at a and 1 at b; other u and v are 0. Shapes
+    /// that are not finite, have a negative radius or reach beyond 1e12 are left out. In float,
+    /// rays that start beyond 1.7e38 may miss shapes. Throws InputError for an id that was given
+    /// before.
     std::uint32_t add(std::span<const Sphere> spheres, const GeometryOptions& options = {});
     std::uint32_t add(std::span<const Capsule> capsules, const GeometryOptions& options = {});
     std::uint32_t add(std::span<const Point> points, Scalar radius,

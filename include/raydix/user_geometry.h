@@ -1,23 +1,18 @@
-// Rays through geometry of the caller's own: boxes, and a function that knows what is in them. It
-// is a geometry of a Scene, or stands in one tree alone. Spheres, capsules and points with a radius
-// come with the library (Scene::add). Step by step: docs/add-a-geometry.md.
+// Geometry of the caller's own in a Scene or a SceneD: boxes, and a function that knows what is in
+// them. Spheres, capsules and points with a radius come with the library (Scene::add). Step by
+// step: docs/add-a-geometry.md.
 #pragma once
 
-#include <raydix/bvh.h>
 #include <raydix/scene.h>
-#include <raydix/shapes.h>
-#include <raydix/trace.h>
 #include <raydix/types.h>
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 namespace raydix {
 
@@ -123,40 +118,5 @@ private:
 };
 using UserGeometry = BasicUserGeometry<float>;
 using UserGeometryD = BasicUserGeometry<double>;
-
-/// Says whether `ray` hits primitive `prim`, a position in the boxes that the tree was built over.
-/// If so it sets hit.t, and hit.u and hit.v as it likes. A t that is not finite or outside
-/// [ray.tmin, ray.tmax] is no hit; -0 becomes +0. `ray` is the caller's, with tmax cut to the best
-/// hit so far. Calls come from several threads at once and in any order, at least one for each
-/// primitive that may have the closest hit.
-using IntersectPrimitive = std::function<bool(std::uint32_t prim, const Ray& ray, Hit& hit)>;
-
-/// Finds the closest hit of each ray: the least (t, prim) that `intersect` gives. rays [n] -> hits
-/// [n]. It is the same for every builder and number of threads if each hit is within its box, up to
-/// 2^-17 of t. Of `options` only threads and counters are used; triangle_tests counts calls of
-/// `intersect`. Throws InputError if the sizes differ, and what `intersect` throws.
-TraceCounts trace(const Bvh& boxes, const IntersectPrimitive& intersect, std::span<const Ray> rays,
-                  std::span<Hit> hits, const TraceOptions& options = {});
-/// Says whether each ray hits anything: 1 or 0. rays [n] -> occluded [n].
-TraceCounts trace_any(const Bvh& boxes, const IntersectPrimitive& intersect,
-                      std::span<const Ray> rays, std::span<std::uint8_t> occluded,
-                      const TraceOptions& options = {});
-[[nodiscard]] Hit closest_hit(const Bvh& boxes, const IntersectPrimitive& intersect,
-                              const Ray& ray);
-[[nodiscard]] bool any_hit(const Bvh& boxes, const IntersectPrimitive& intersect, const Ray& ray);
-
-/// Makes boxes to build a tree over, rounded outward. Invalid shapes get boxes that builders leave
-/// out.
-[[nodiscard]] std::vector<Aabb> boxes_of(std::span<const Sphere> spheres);
-[[nodiscard]] std::vector<Aabb> boxes_of(std::span<const Capsule> capsules);
-[[nodiscard]] std::vector<Aabb> boxes_of(std::span<const Vec3> points, float radius);
-
-/// Makes functions that hit the surfaces of shapes, from both sides. A ray that starts inside hits
-/// where it leaves. t is computed in double. hit.u of a capsule is the place along its axis, 0 at a
-/// and 1 at b; other u and v are 0. The arrays must outlive the function and be those that the tree
-/// was built over.
-[[nodiscard]] IntersectPrimitive intersect_spheres(std::span<const Sphere> spheres);
-[[nodiscard]] IntersectPrimitive intersect_capsules(std::span<const Capsule> capsules);
-[[nodiscard]] IntersectPrimitive intersect_points(std::span<const Vec3> points, float radius);
 
 }  // namespace raydix

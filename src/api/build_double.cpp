@@ -1,16 +1,21 @@
 // build_bvh in double: boxes -> center -> float boxes around it -> a float tree over them or over
 // parts -> corners in leaf order.
+#include <raydix/buffer.h>
 #include <raydix/double.h>
 #include <raydix/error.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "api/bvh_builder_access.h"
 #include "api/bvh_builder_d.h"
-#include "api/double_builds.h"
 #include "api/refit_checks.h"
 #include "exec/parallel.h"
 #include "exec/progress.h"
+#include "exec/search.h"
 #include "measure/stopwatch.h"
 #include "primitives/double_sources.h"
 #include "tree/bvh_access.h"
@@ -20,6 +25,72 @@
 namespace raydix {
 
 namespace {
+
+struct BoundsD {
+    AabbD box{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
+    std::uint64_t left_out = 0;
+    std::uint32_t first_left_out = no_primitive;
+    std::uint32_t first_unreadable = no_primitive;
+
+    void add(const BoundsD& other) {
+        box = {min_of(box.lo, other.box.lo), max_of(box.hi, other.box.hi)};
+        left_out += other.left_out;
+        first_left_out = std::min(first_left_out, other.first_left_out);
+        first_unreadable = std::min(first_unreadable, other.first_unreadable);
+    }
+};
+
+BoundsD bounds_of_range(const TriangleSourceD& source, std::size_t begin, std::size_t end) {
+    BoundsD sum;
+    for (std::size_t at = begin; at < end; ++at) {
+        const auto i = static_cast<std::uint32_t>(at);
+        AabbD box;
+        if (!source.readable(i)) {
+            sum.first_unreadable = std::min(sum.first_unreadable, i);
+        } else if (source.box(i, box)) {
+            sum.box = {min_of(sum.box.lo, box.lo), max_of(sum.box.hi, box.hi)};
+        } else {
+            ++sum.left_out;
+            sum.first_left_out = std::min(sum.first_left_out, i);
+        }
+    }
+    return sum;
+}
+
+BoundsD bounds_of(const TriangleSourceD& source, std::size_t n) {
+    constexpr std::size_t block_size = 4096;
+    std::vector<BoundsD> parts((n + block_size - 1) / block_size);
+    for_each_block(n, block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
+        parts[block] = bounds_of_range(source, begin, end);
+    });
+    BoundsD sum;
+    for (const BoundsD& part : parts) sum.add(part);
+    return sum;
+}
+
+Vec3d center_of(const TriangleSourceD& source, std::size_t n, const AabbD& bounds) {
+    return median_center(
+        n,
+        [&](std::size_t i, AabbD& box) { return source.box(static_cast<std::uint32_t>(i), box); },
+        bounds);
+}
+
+/// Into `boxes`. Triangles that are left out get a box that float builders leave out.
+std::span<const Aabb> local_boxes(const TriangleSourceD& source, std::size_t n,
+                                  const BvhDAccess& tree, Buffer<Aabb>& boxes) {
+    boxes.reset(n);
+    for_each_index(n, [&](std::size_t i) {
+        AabbD box;
+        const bool valid = source.box(static_cast<std::uint32_t>(i), box);
+        boxes[i] = valid ? tree.local(box) : empty_box();
+    });
+    return boxes.view();
+}
+
+void require_size(std::size_t n) {
+    if (n >= std::size_t{1} << 31)
+        throw InputError(std::to_string(n) + " primitives; a tree takes fewer than 2147483648");
+}
 
 void require_triangles_that_fit(const MeshViewD& mesh, const BoundsD& bounds, bool strict) {
     if (bounds.first_unreadable != no_primitive) {
@@ -69,6 +140,29 @@ void build(const MeshViewD& mesh, const BuildOptions& options, BvhBuilderD& buil
     tree.build_ms() = ms;
 }
 
+/// Each triangle of the tree is still valid, and no other one is: what the float tree over boxes
+/// would find too, but could not name.
+void require_same_valid(const BvhD& bvh, const TriangleSourceD& source, std::uint64_t left_out) {
+    if (left_out == 0 && bvh.left_out() == 0) return;
+    const auto valid = [&](std::uint32_t i) {
+        AabbD box;
+        return source.box(i, box);
+    };
+    const std::size_t n = bvh.order().size();
+    const std::size_t bad =
+        first_index_where(n, [&](std::size_t k) { return !valid(bvh.order()[k]); });
+    if (bad != n) {
+        std::uint32_t first = bvh.order()[bad];
+        for (const std::uint32_t i : bvh.order())
+            if (i < first && !valid(i)) first = i;
+        throw InputError("refit: triangle " + std::to_string(first) +
+                         " is not finite or out of range now");
+    }
+    if (left_out != bvh.left_out())
+        throw InputError("refit: " + std::to_string(bvh.left_out() - left_out) +
+                         " triangle(s) were left out when the tree was built, but are valid now");
+}
+
 }  // namespace
 
 std::uint64_t BvhD::bytes() const {
@@ -95,14 +189,26 @@ BvhD build_bvh(const MeshD& mesh, const BuildOptions& options) {
 RefitQuality refit(BvhD& bvh, const MeshViewD& mesh, int threads) {
     require_whole(bvh.tree());
     const std::size_t n = mesh.triangles.size();
-    require_same_count(bvh, n, "triangles");
+    if (n != bvh.input_count())
+        throw InputError("refit: " + std::to_string(n) +
+                         " triangles, but the tree was built from " +
+                         std::to_string(bvh.input_count()));
     const TriangleSourceD source{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()};
     RefitQuality quality;
     with_threads(threads, [&] {
         const BoundsD bounds = bounds_of(source, n);
         require_triangles_that_fit(mesh, bounds, false);
-        quality = refit_around_center<BvhDAccess>(bvh, source, bounds, "triangle", threads);
-        copy_corners({bvh}, source);
+        require_same_valid(bvh, source, bounds.left_out);
+        // The hierarchy kept, boxes around the center that the triangles have now. On an error the
+        // tree is as it was.
+        BvhD moved;
+        const BvhDAccess to{moved}, tree{bvh};
+        const Vec3d center = center_of(source, n, bounds.box);
+        to.place(bounds.box, center);
+        Buffer<Aabb> boxes;
+        quality = refit(tree.tree(), local_boxes(source, n, to, boxes), threads);
+        tree.place(bounds.box, center);
+        copy_corners(tree, source);
     });
     return quality;
 }

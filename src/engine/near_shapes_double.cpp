@@ -9,6 +9,9 @@
 
 #include "exec/parallel.h"
 #include "exec/result_memory.h"
+#include "primitives/double_sources.h"
+#include "tree/around_center.h"
+#include "tree/median_center.h"
 
 namespace raydix {
 namespace {
@@ -68,7 +71,7 @@ AabbD ShapesOnPath::box_of(std::uint32_t prim) const {
             maps.empty() ? Double3{radius, radius, radius} : BallImage(all_maps, radius).reach();
         double lengths = std::max({largest(a), largest(b), largest(reach)});
         for (const AffineD& map : maps) lengths = std::max(lengths, largest(map.move));
-        const double room = 0x1p-44 * condition * lengths + double{min_diagonal};
+        const double room = (0x1p-44 * condition + 0x1p-42) * lengths + double{min_diagonal};
         const auto side = [&](double x, double y, double by, double& lo, double& hi) {
             constexpr double edge = max_coordinate;
             by = by * (1.0 + 0x1p-40) + room;
@@ -91,16 +94,30 @@ NearShapesD::NearShapesD(std::vector<ShapesOnPath> paths) : paths_(std::move(pat
         for_each_index(on_path.shapes->part.size(), [&](std::size_t k) {
             boxes[on_path.first + k] = on_path.box_of(on_path.shapes->part[k]);
         });
-    boxes_ = build_bvh(boxes, build_options_for(Quality::balanced));
-    if (boxes_.empty()) return;
-    space_ = {boxes_.center(), boxes_.scale()};
+    const BoxSourceD source{boxes.data()};
+    const auto box_at = [&](std::size_t k, AabbD& box) {
+        return source.box(static_cast<std::uint32_t>(k), box);
+    };
+    AabbD bounds = nothing_d, box;
+    for (std::size_t k = 0; k < boxes.size(); ++k)
+        if (box_at(k, box)) bounds = {min_of(bounds.lo, box.lo), max_of(bounds.hi, box.hi)};
+    const Vec3d center = median_center(boxes.size(), box_at, bounds);
+    space_ = {center, scale_around(center, bounds)};
+    std::vector<Aabb> around_center(boxes.size());
+    for_each_index(boxes.size(), [&](std::size_t k) {
+        AabbD valid;
+        around_center[k] =
+            box_at(k, valid) ? box_around_center(valid, space_.center, space_.scale) : empty_box();
+    });
+    tree_ = build_bvh(around_center, build_options_for(Quality::balanced));
+    if (tree_.empty()) return;
     const BvhNode& root = nodes()[0];
     const Vec3 far = max_of(root.hi, -1.0f * root.lo);
     reach_ = max_of(max_of(max_of(far.x, far.y), far.z), 0.0f);
 }
 
 auto NearShapesD::place(std::uint32_t position) const -> Place {
-    const std::uint32_t index = boxes_.order()[position];
+    const std::uint32_t index = tree_.order()[position];
     const auto past = std::upper_bound(
         paths_.begin(), paths_.end(), index,
         [](std::uint32_t wanted, const ShapesOnPath& on_path) { return wanted < on_path.first; });

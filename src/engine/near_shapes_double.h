@@ -4,7 +4,6 @@
 
 #include <raydix/double.h>
 #include <raydix/scene_queries.h>
-#include <raydix/user_geometry_d.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -46,8 +45,8 @@ public:
     NearShapesD() = default;
     explicit NearShapesD(std::vector<ShapesOnPath> paths);
 
-    [[nodiscard]] bool empty() const { return boxes_.empty(); }
-    [[nodiscard]] std::uint32_t max_depth() const { return boxes_.max_depth(); }
+    [[nodiscard]] bool empty() const { return tree_.empty(); }
+    [[nodiscard]] std::uint32_t max_depth() const { return tree_.max_depth(); }
     /// Throws InputError, which names a geometry.
     void require_answers(NearCall call) const {
         if (!paths_.empty()) raydix::require_answers(*paths_.front().shapes, call);
@@ -95,11 +94,11 @@ private:
     [[nodiscard]] static ScenePrimitive name_of(const Place& at) {
         return {at.on_path->number, at.on_path->shapes->id, at.prim};
     }
-    [[nodiscard]] const BvhNode* nodes() const { return boxes_.tree().nodes().data(); }
+    [[nodiscard]] const BvhNode* nodes() const { return tree_.nodes().data(); }
     [[nodiscard]] BoxDistancesD distances(Vec3d query) const;
 
     std::vector<ShapesOnPath> paths_;  // by `first`
-    BoxBvhD boxes_;
+    Bvh tree_;                         // over their boxes around `space_`
     TreeSpace space_{{0.0, 0.0, 0.0}, 1.0};
     double reach_ = 0;  // of the nodes' coordinates
 };

@@ -3,7 +3,6 @@
 #include <raydix/error.h>
 #include <raydix/scene.h>
 #include <raydix/user_geometry.h>
-#include <raydix/user_geometry_d.h>
 
 #include <algorithm>
 #include <chrono>

@@ -1,14 +1,17 @@
 #include "engine/shape_tree.h"
 
 #include <raydix/error.h>
-#include <raydix/user_geometry_d.h>
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <type_traits>
 
+#include "base/distance.h"
 #include "exec/parallel.h"
 #include "primitives/double_sources.h"
+#include "tree/around_center.h"
+#include "tree/outward_box.h"
 
 namespace raydix {
 namespace {
@@ -62,21 +65,24 @@ void copy_primitives(ShapeTree& tree) {
     }
 }
 
+/// The largest number that is not above x - y.
+float below(float x, float y) { return round_down(double(x) - double(y)); }
+double below(double x, double y) { return below_difference(x, y) + 0.0; }
+
 template <class Scalar>
-std::vector<typename SceneTypes<Scalar>::Box> boxes_of_any(const BasicShapes<Scalar>& shapes) {
-    if (count_of(shapes) >= most_primitives)
-        throw InputError(std::to_string(count_of(shapes)) + " " + kind_of(shapes) +
-                         " are too many for one geometry: fewer than 2^28 are allowed");
-    return std::visit(
-        [](const auto& all) -> std::vector<typename SceneTypes<Scalar>::Box> {
-            if constexpr (requires { all.centers; })
-                return boxes_of(all.centers, all.radius);
-            else if constexpr (requires { all.boxes(); })
-                return {all.boxes().begin(), all.boxes().end()};
-            else
-                return boxes_of(all);
-        },
-        shapes);
+Scalar above(Scalar x, Scalar y) {
+    return Scalar(0) - below(-x, y);
+}
+
+/// Around the balls at both ends; NaN if they are none.
+template <class Point, class Scalar>
+typename SceneTypes<Scalar>::Box box_around(Point a, Point b, Scalar r) {
+    constexpr Scalar nan = std::numeric_limits<Scalar>::quiet_NaN();
+    if (!is_finite(a) || !is_finite(b) || !(r >= 0 && r < std::numeric_limits<Scalar>::infinity()))
+        return {{nan, nan, nan}, {nan, nan, nan}};
+    const Point lo = min_of(a, b), hi = max_of(a, b);
+    return {{below(lo.x, r), below(lo.y, r), below(lo.z, r)},
+            {above(hi.x, r), above(hi.y, r), above(hi.z, r)}};
 }
 
 /// In double, what rays may be told of hits beside boxes, of the distance to their far side: a
@@ -95,7 +101,29 @@ ExtentD extent_of_shape(const AabbD& box, bool is_users) {
 
 }  // namespace
 
-std::vector<Aabb> boxes_of(const Shapes& shapes) { return boxes_of_any<float>(shapes); }
+template <class Scalar>
+std::vector<typename SceneTypes<Scalar>::Box> boxes_of(const BasicShapes<Scalar>& shapes) {
+    if (count_of(shapes) >= most_primitives)
+        throw InputError(std::to_string(count_of(shapes)) + " " + kind_of(shapes) +
+                         " are too many for one geometry: fewer than 2^28 are allowed");
+    std::vector<typename SceneTypes<Scalar>::Box> boxes;
+    boxes.reserve(count_of(shapes));
+    std::visit(
+        [&](const auto& all) {
+            if constexpr (requires { all.centers; })
+                for (const auto& p : all.centers) boxes.push_back(box_around(p, p, all.radius));
+            else if constexpr (requires { all.boxes(); })
+                boxes.assign(all.boxes().begin(), all.boxes().end());
+            else if constexpr (requires { all[0].center; })
+                for (const auto& s : all) boxes.push_back(box_around(s.center, s.center, s.radius));
+            else
+                for (const auto& c : all) boxes.push_back(box_around(c.a, c.b, c.radius));
+        },
+        shapes);
+    return boxes;
+}
+template std::vector<Aabb> boxes_of<float>(const BasicShapes<float>&);
+template std::vector<AabbD> boxes_of<double>(const BasicShapes<double>&);
 
 std::shared_ptr<const ShapeTree> make_shape_tree(std::uint32_t id, std::uint32_t mask,
                                                  const Shapes& shapes,
@@ -107,7 +135,7 @@ std::shared_ptr<const ShapeTree> make_shape_tree(std::uint32_t id, std::uint32_t
     tree->mask = mask;
     tree->shapes = shapes;
     tree->own = std::move(own);
-    const std::vector<Aabb> boxes = boxes_of(shapes);
+    const std::vector<Aabb> boxes = boxes_of<float>(shapes);
     refitted = old != nullptr && refit_box_tree(*old, boxes, limit, *tree);
     if (!refitted) build_box_tree(boxes, build_of(quality), leaves_of(shapes), *tree);
     if (tree->empty()) return tree;
@@ -142,7 +170,7 @@ std::shared_ptr<const ShapeTreeD> make_shape_tree(std::uint32_t id, std::uint32_
     tree->shapes = shapes;
     tree->own = std::move(own);
     refitted = false;
-    const std::vector<AabbD> boxes = boxes_of_any<double>(shapes);
+    const std::vector<AabbD> boxes = boxes_of<double>(shapes);
     std::vector<ExtentD> extents(boxes.size(), ExtentD{nothing_d, 0.0});
     for (std::uint32_t k = 0; k < boxes.size(); ++k) {
         AabbD box;

@@ -52,8 +52,13 @@ template <class AnyShapes>
         },
         shapes);
 }
-/// Throws InputError: 2^28 primitives or more.
-[[nodiscard]] std::vector<Aabb> boxes_of(const Shapes& shapes);
+/// Rounded outward; of what is no shape, a box that builders leave out. Throws InputError: 2^28
+/// primitives or more.
+template <class Scalar>
+[[nodiscard]] std::vector<typename SceneTypes<Scalar>::Box> boxes_of(
+    const BasicShapes<Scalar>& shapes);
+extern template std::vector<Aabb> boxes_of<float>(const BasicShapes<float>&);
+extern template std::vector<AabbD> boxes_of<double>(const BasicShapes<double>&);
 
 /// A geometry, beside the tree over its primitives.
 template <class Scalar>

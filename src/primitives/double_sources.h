@@ -53,7 +53,6 @@ struct TriangleSourceD {
 struct BoxSourceD {
     const AabbD* boxes;
 
-    [[nodiscard]] bool readable(std::uint32_t) const { return true; }
     bool box(std::uint32_t i, AabbD& box) const {
         box = {without_negative_zero(boxes[i].lo), without_negative_zero(boxes[i].hi)};
         return in_range(box.lo) && in_range(box.hi) && box.lo.x <= box.hi.x &&

@@ -10,14 +10,9 @@ namespace raydix {
 TraceCounts trace(const BvhD& bvh, std::span<const RayD> rays, std::span<HitD> hits,
                   const TraceOptions& options) {
     check_sizes(rays.size(), hits.size());
-    check_options(options);
-    TraceCounts counts;
-    with_threads(options.threads, [&] {
-        const TriangleTreeD tree(bvh);
-        counts = options.counters ? closest_batch<RaySteps>(tree, rays, hits)
-                                  : closest_batch<NoSteps>(tree, rays, hits);
+    return on_threads(options, [&](auto steps) {
+        return closest_batch<decltype(steps)>(TriangleTreeD(bvh), rays, hits);
     });
-    return counts;
 }
 
 std::vector<HitD> trace(const BvhD& bvh, std::span<const RayD> rays, const TraceOptions& options) {
@@ -29,25 +24,16 @@ std::vector<HitD> trace(const BvhD& bvh, std::span<const RayD> rays, const Trace
 TraceCounts trace_any(const BvhD& bvh, std::span<const RayD> rays, std::span<std::uint8_t> occluded,
                       const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size());
-    check_options(options);
-    TraceCounts counts;
-    with_threads(options.threads, [&] {
-        const TriangleTreeD tree(bvh);
-        counts = options.counters ? any_batch<RaySteps>(tree, rays, occluded)
-                                  : any_batch<NoSteps>(tree, rays, occluded);
+    return on_threads(options, [&](auto steps) {
+        return any_batch<decltype(steps)>(TriangleTreeD(bvh), rays, occluded);
     });
-    return counts;
 }
 
 AllHitsD trace_all(const BvhD& bvh, std::span<const RayD> rays, const TraceOptions& options) {
-    check_options(options);
-    AllHitsD all;
-    with_threads(options.threads, [&] {
-        const TriangleTreeD tree(bvh);
-        all = options.counters ? all_batch<AllHitsD, RaySteps>(tree, rays, options.max_result_bytes)
-                               : all_batch<AllHitsD, NoSteps>(tree, rays, options.max_result_bytes);
+    return on_threads(options, [&](auto steps) {
+        return all_batch<AllHitsD, decltype(steps)>(TriangleTreeD(bvh), rays,
+                                                    options.max_result_bytes);
     });
-    return all;
 }
 
 HitD closest_hit(const BvhD& bvh, const RayD& ray) {

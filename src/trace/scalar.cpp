@@ -24,14 +24,9 @@ TriangleTree view_of(const Bvh& bvh) {
 TraceCounts trace(const Bvh& bvh, std::span<const Ray> rays, std::span<Hit> hits,
                   const TraceOptions& options) {
     check_sizes(rays.size(), hits.size());
-    check_options(options);
-    TraceCounts counts;
-    with_threads(options.threads, [&] {
-        const TriangleTree tree = view_of(bvh);
-        counts = options.counters ? closest_batch<RaySteps>(tree, rays, hits)
-                                  : closest_batch<NoSteps>(tree, rays, hits);
+    return on_threads(options, [&](auto steps) {
+        return closest_batch<decltype(steps)>(view_of(bvh), rays, hits);
     });
-    return counts;
 }
 
 std::vector<Hit> trace(const Bvh& bvh, std::span<const Ray> rays, const TraceOptions& options) {
@@ -43,25 +38,15 @@ std::vector<Hit> trace(const Bvh& bvh, std::span<const Ray> rays, const TraceOpt
 TraceCounts trace_any(const Bvh& bvh, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                       const TraceOptions& options) {
     check_sizes(rays.size(), occluded.size());
-    check_options(options);
-    TraceCounts counts;
-    with_threads(options.threads, [&] {
-        const TriangleTree tree = view_of(bvh);
-        counts = options.counters ? any_batch<RaySteps>(tree, rays, occluded)
-                                  : any_batch<NoSteps>(tree, rays, occluded);
+    return on_threads(options, [&](auto steps) {
+        return any_batch<decltype(steps)>(view_of(bvh), rays, occluded);
     });
-    return counts;
 }
 
 AllHits trace_all(const Bvh& bvh, std::span<const Ray> rays, const TraceOptions& options) {
-    check_options(options);
-    AllHits all;
-    with_threads(options.threads, [&] {
-        const TriangleTree tree = view_of(bvh);
-        all = options.counters ? all_batch<AllHits, RaySteps>(tree, rays, options.max_result_bytes)
-                               : all_batch<AllHits, NoSteps>(tree, rays, options.max_result_bytes);
+    return on_threads(options, [&](auto steps) {
+        return all_batch<AllHits, decltype(steps)>(view_of(bvh), rays, options.max_result_bytes);
     });
-    return all;
 }
 
 Hit closest_hit(const Bvh& bvh, const Ray& ray) {

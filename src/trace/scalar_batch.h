@@ -1,5 +1,6 @@
-// Batches of rays over threads, each ray by walk_tree, in float or in double. Blocks of rays are
-// fixed, so that counts and the order of all-hits results do not depend on the number of threads.
+// Batches of rays over threads, each ray by the walk of its tree: binary, in float or in double, or
+// a k-d tree. Blocks of rays are fixed, so that counts and the order of all-hits results do not
+// depend on the number of threads.
 #pragma once
 
 #include <raydix/trace.h>
@@ -26,6 +27,23 @@ AnyHit public_hit(const BasicClosestHit<Scalar>& best, const BasicRayFrame<Scala
     return hit_in_tree<AnyHit>(best.t * ray.t_scale, best.prim, best.u, best.v);
 }
 
+/// What a walk of the tree keeps.
+template <class Tree>
+BasicWalkStack<typename Tree::Scalar> stack_of(const Tree& tree) {
+    return BasicWalkStack<typename Tree::Scalar>(tree.max_depth);
+}
+
+/// What `batch(steps)` gives, on the threads of `options`. Which steps are counted, if any, is told
+/// by the type of `steps`.
+template <class Batch>
+auto on_threads(const TraceOptions& options, const Batch& batch) {
+    check_options(options);
+    decltype(batch(NoSteps())) result;
+    with_threads(options.threads,
+                 [&] { result = options.counters ? batch(RaySteps()) : batch(NoSteps()); });
+    return result;
+}
+
 /// Calls one(i, frame, stack, steps) -> number of hits for each valid ray and miss(i) for each
 /// other one; done(b) after those of block b.
 template <class Steps, class Tree, class AnyRay, class One, class Miss, class Done>
@@ -34,7 +52,7 @@ TraceCounts for_each_ray(const Tree& tree, std::span<const AnyRay> rays, const O
     std::vector<TraceCounts> parts((rays.size() + rays_per_block - 1) / rays_per_block);
     for_each_block(rays.size(), rays_per_block,
                    [&](std::size_t block, std::size_t begin, std::size_t end) {
-                       BasicWalkStack<typename Tree::Scalar> stack(tree.max_depth);
+                       auto stack = stack_of(tree);
                        TraceCounts part;
                        part.rays = end - begin;
                        for (std::size_t i = begin; i < end; ++i) {

@@ -12,6 +12,7 @@
 
 #include "engine/name_hit.h"
 #include "exec/host_launcher.h"
+#include "support/cwbvh_trace.h"
 #include "support/launched_queries.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"

@@ -28,16 +28,13 @@ struct Inputs {
     Mesh mesh;
     MeshD mesh_d;
     std::vector<Aabb> boxes;
-    std::vector<AabbD> boxes_d;
     std::vector<Ray> rays;
     std::vector<RayD> rays_d;
     std::vector<Vec3> points;
     std::vector<Vec3d> points_d;
     Bvh bvh, box_bvh;
     BvhD bvh_d;
-    BoxBvhD box_bvh_d;
     WideBvh wide;
-    Cwbvh cwbvh;
     WarpTree warp;
     KdTree kd, kd_points;
     Octree octree;
@@ -53,7 +50,6 @@ struct Inputs {
         : mesh(test::random_soup(count, 1)),
           mesh_d(wide_mesh(mesh)),
           boxes(count, Aabb{{0, 0, 0}, {1, 1, 1}}),
-          boxes_d(count, AabbD{{0, 0, 0}, {1, 1, 1}}),
           rays(count, Ray{{0.5f, 0.5f, -1}, 0, {0, 0, 1}}),
           rays_d(count, RayD{{0.5, 0.5, -1}, 0, {0, 0, 1}}),
           points(count, Vec3{0.5f, 0.5f, 0.5f}),
@@ -61,9 +57,7 @@ struct Inputs {
           bvh(build_bvh(mesh)),
           box_bvh(build_bvh(boxes)),
           bvh_d(build_bvh(mesh_d)),
-          box_bvh_d(build_bvh(boxes_d)),
           wide(bvh),
-          cwbvh(bvh),
           warp(bvh),
           kd(build_kdtree(mesh)),
           kd_points(build_kdtree(points)),
@@ -108,8 +102,6 @@ std::vector<Threads> builds(Inputs& in) {
         {"build_bvh points",
          [&in](int n) { (void)build_bvh(std::span<const Vec3>(in.points), {.threads = n}); }},
         {"build_bvh double", [&in](int n) { (void)build_bvh(in.mesh_d, {.threads = n}); }},
-        {"build_bvh boxes in double",
-         [&in](int n) { (void)build_bvh(in.boxes_d, {.threads = n}); }},
         {"build_many",
          [&in](int n) {
              const MeshView view = in.mesh;
@@ -130,7 +122,6 @@ std::vector<Threads> builds(Inputs& in) {
         {"refit", [&in](int n) { (void)refit(in.bvh, in.mesh, n); }},
         {"refit boxes", [&in](int n) { (void)refit(in.box_bvh, in.boxes, n); }},
         {"refit double", [&in](int n) { (void)refit(in.bvh_d, in.mesh_d, n); }},
-        {"refit boxes in double", [&in](int n) { (void)refit(in.box_bvh_d, in.boxes_d, n); }},
         {"Solid", [&in](int n) { (void)Solid(in.bvh, {.threads = n}); }},
         {"SolidD", [&in](int n) { (void)SolidD(in.bvh_d, {.threads = n}); }},
         {"Scene", [&in](int n) { (void)Scene(in.mesh, {.threads = n}); }},
@@ -143,10 +134,7 @@ std::vector<Threads> builds(Inputs& in) {
 }
 
 std::vector<Threads> traces(Inputs& in) {
-    const auto none = [](std::uint32_t, const Ray&, Hit&) { return false; };
-    const auto none_d = [](std::uint32_t, const RayD&, HitD&) { return false; };
     const auto hits = [&in] { return std::vector<Hit>(in.rays.size()); };
-    const auto hits_d = [&in] { return std::vector<HitD>(in.rays.size()); };
     const auto flags = [&in] { return std::vector<std::uint8_t>(in.rays.size()); };
     return {
         {"trace", [&in](int n) { (void)trace(in.bvh, in.rays, {.threads = n}); }},
@@ -174,32 +162,11 @@ std::vector<Threads> traces(Inputs& in) {
              trace_any(in.wide, in.rays, to, {.threads = n});
          }},
         {"trace_all wide", [&in](int n) { (void)trace_all(in.wide, in.rays, {.threads = n}); }},
-        {"trace cwbvh", [&in](int n) { (void)trace(in.cwbvh, in.rays, {.threads = n}); }},
-        {"trace_any cwbvh",
-         [&in, flags](int n) {
-             auto to = flags();
-             trace_any(in.cwbvh, in.rays, to, {.threads = n});
-         }},
         {"kd_trace", [&in](int n) { (void)kd_trace(in.kd, in.rays, {.threads = n}); }},
         {"kd_trace_any",
          [&in, flags](int n) {
              auto to = flags();
              kd_trace_any(in.kd, in.rays, to, {.threads = n});
-         }},
-        {"trace user",
-         [&in, hits, none](int n) {
-             auto to = hits();
-             trace(in.box_bvh, none, in.rays, to, {.threads = n});
-         }},
-        {"trace_any user double",
-         [&in, flags, none_d](int n) {
-             auto to = flags();
-             trace_any(in.box_bvh_d, none_d, in.rays_d, to, {.threads = n});
-         }},
-        {"trace user double",
-         [&in, hits_d, none_d](int n) {
-             auto to = hits_d();
-             trace(in.box_bvh_d, none_d, in.rays_d, to, {.threads = n});
          }},
         {"trace_reference",
          [&in](int n) {
@@ -307,7 +274,7 @@ TEST(Options, ThreadsAre0To1024InEveryCall) {
                         << call.name << " over " << count << ", threads " << threads;
                 EXPECT_EQ(message_of([&] { call.run(1); }), "no error") << call.name;
             }
-        EXPECT_GT(calls, 70u);
+        EXPECT_GT(calls, 65u);
     }
 }
 
@@ -342,8 +309,6 @@ TEST(Options, EnumerationsAreOfTheirKind) {
                                  [&](SimdPath p) { (void)trace(in.wide, in.rays, {.path = p}); });
         expect_refused<SimdPath>(
             "path", 4, [&](SimdPath p) { (void)trace_all(in.wide, in.rays, {.path = p}); });
-        expect_refused<SimdPath>("path", 4,
-                                 [&](SimdPath p) { (void)trace(in.cwbvh, in.rays, {.path = p}); });
         expect_refused<SimdPath>("path", 4,
                                  [&](SimdPath p) { (void)kd_trace(in.kd, in.rays, {.path = p}); });
         expect_refused<InsideRule>("rule", 3, [&](InsideRule r) { (void)Solid(in.bvh, {r}); });

@@ -5,7 +5,6 @@
 #include <raydix/scene.h>
 #include <raydix/surface.h>
 #include <raydix/user_geometry.h>
-#include <raydix/user_geometry_d.h>
 #include <raydix/wide.h>
 
 #include <algorithm>

@@ -4,7 +4,6 @@
 #include <raydix/double.h>
 #include <raydix/scene.h>
 #include <raydix/user_geometry.h>
-#include <raydix/user_geometry_d.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "engine/affine_double.h"
+#include "proximity/shape_hits.h"
 #include "support/double_scenes.h"
 #include "trace/ray_frame.h"
 
@@ -29,7 +29,8 @@ struct WorldD {
         MeshD mesh;
         TransformD transform;
         std::shared_ptr<const WorldD> inside;  // of an instance
-        IntersectPrimitiveD intersect = {};    // instead of a mesh: shapes
+        // Instead of a mesh: shapes.
+        std::function<bool(std::uint32_t prim, const RayD& ray, HitD& hit)> intersect = {};
         std::uint32_t shape_count = 0;
         std::vector<CapsuleD> capsules = {};  // what they are, if not a user's; or balls
     };
@@ -183,20 +184,20 @@ private:
             const auto spheres = std::make_shared<std::vector<SphereD>>();
             for (const CapsuleD& c : all) spheres->push_back({c.a, c.radius});
             item.intersect = [spheres](std::uint32_t prim, const RayD& ray, HitD& hit) {
-                return intersect_spheres(*spheres)(prim, ray, hit);
+                return hit_ball((*spheres)[prim].center, (*spheres)[prim].radius, ray, hit);
             };
             world.scene.add(std::span<const SphereD>(*spheres), options);
         } else if (kind == 1) {
             const auto capsules = std::make_shared<std::vector<CapsuleD>>(all);
             item.intersect = [capsules](std::uint32_t prim, const RayD& ray, HitD& hit) {
-                return intersect_capsules(*capsules)(prim, ray, hit);
+                return hit_capsule((*capsules)[prim], ray, hit);
             };
             world.scene.add(std::span<const CapsuleD>(*capsules), options);
         } else if (kind == 2) {
             const auto points = std::make_shared<std::vector<Vec3d>>();
             for (const CapsuleD& c : all) points->push_back(c.a);
             item.intersect = [points, one](std::uint32_t prim, const RayD& ray, HitD& hit) {
-                return intersect_points(*points, one)(prim, ray, hit);
+                return hit_ball((*points)[prim], one, ray, hit);
             };
             world.scene.add(std::span<const Vec3d>(*points), one, options);
         } else {

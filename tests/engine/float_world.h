@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <string>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "engine/affine.h"
+#include "proximity/shape_hits.h"
 #include "support/random.h"
 #include "support/support.h"
 #include "trace/ray_frame.h"
@@ -51,7 +53,8 @@ struct World {
         Mesh mesh;
         Transform transform;
         std::shared_ptr<const World> inside;  // of an instance
-        IntersectPrimitive intersect = {};    // instead of a mesh: shapes
+        // Instead of a mesh: shapes.
+        std::function<bool(std::uint32_t prim, const Ray& ray, Hit& hit)> intersect = {};
         std::uint32_t shape_count = 0;
     };
     std::vector<Item> items;  // by ascending id
@@ -202,7 +205,7 @@ inline void add_random_shapes(RandomScenes& random, World& world, World::Item& i
             for (std::uint32_t k = 0; k < count; ++k)
                 all->push_back(again(k) ? all->back() : Sphere{random.in(0, 1), radius()});
             item.intersect = [all](std::uint32_t prim, const Ray& ray, Hit& hit) {
-                return intersect_spheres(*all)(prim, ray, hit);
+                return hit_ball((*all)[prim].center, (*all)[prim].radius, ray, hit);
             };
             world.scene.add(std::span<const Sphere>(*all), options);
             break;
@@ -213,7 +216,7 @@ inline void add_random_shapes(RandomScenes& random, World& world, World::Item& i
                 all->push_back(again(k) ? all->back()
                                         : Capsule{random.in(0, 1), random.in(0, 1), radius()});
             item.intersect = [all](std::uint32_t prim, const Ray& ray, Hit& hit) {
-                return intersect_capsules(*all)(prim, ray, hit);
+                return hit_capsule((*all)[prim], ray, hit);
             };
             world.scene.add(std::span<const Capsule>(*all), options);
             break;
@@ -224,7 +227,7 @@ inline void add_random_shapes(RandomScenes& random, World& world, World::Item& i
                 all->push_back(again(k) ? all->back() : random.in(0, 1));
             const float one = radius();
             item.intersect = [all, one](std::uint32_t prim, const Ray& ray, Hit& hit) {
-                return intersect_points(*all, one)(prim, ray, hit);
+                return hit_ball((*all)[prim], one, ray, hit);
             };
             world.scene.add(std::span<const Vec3>(*all), one, options);
             break;

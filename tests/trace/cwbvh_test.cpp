@@ -1,5 +1,5 @@
 // The kernel `cwbvh` against `scalar`, bit for bit: scenes of every size, all kinds of rays, nasty
-// meshes, any thread count; no leaks; and that its planes stay within their pad.
+// meshes; no leaks; and that its planes stay within their pad.
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
 
@@ -10,6 +10,7 @@
 #include <random>
 
 #include "layout/cwbvh.h"
+#include "support/cwbvh_trace.h"
 #include "support/quantised_steps.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"
@@ -28,7 +29,7 @@ void expect_like_scalar(const std::string& what, const Bvh& bvh, const Cwbvh& tr
                         std::span<const Ray> rays, bool some_hit = true) {
     std::vector<Hit> wanted(rays.size()), hits(rays.size());
     const TraceCounts counts = trace(bvh, rays, wanted);
-    const TraceCounts own = trace(tree, rays, hits, {.counters = true});
+    const TraceCounts own = trace(tree, rays, hits);
     std::uint64_t different = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) different += !same_bits(hits[i], wanted[i]);
     std::cout << what << ": " << rays.size() << " rays, " << counts.hits << " hits, " << different
@@ -161,20 +162,6 @@ TEST(CwbvhTrace, DuplicatedReferences) {
     const auto rays = make_mixed_rays(scene, 20'000, seed);
     EXPECT_TRUE(
         std::ranges::equal(trace(tree, rays), trace(build_bvh(scene.mesh()), rays), same_bits));
-}
-
-TEST(CwbvhTrace, SameCountsForEveryThreadCount) {
-    const Model scene = load_model("builtin:atrium?triangles=10000");
-    const auto rays = make_mixed_rays(scene, 1000 * thorough, seed);
-    const Cwbvh tree(build_bvh(scene.mesh()));
-    std::vector<Hit> wanted(rays.size()), hits(rays.size());
-    const TraceCounts one = trace(tree, rays, wanted, {.threads = 1, .counters = true});
-    for (const int threads : {2, 7, 0}) {
-        const TraceCounts counts = trace(tree, rays, hits, {.threads = threads, .counters = true});
-        EXPECT_TRUE(std::ranges::equal(hits, wanted, same_bits));
-        EXPECT_EQ(counts.node_visits, one.node_visits);
-        EXPECT_EQ(counts.triangle_tests, one.triangle_tests);
-    }
 }
 
 /// Rays from the middle of a closed surface, at vertices and edges, wherever it lies.

@@ -11,6 +11,7 @@
 
 #include <ostream>
 
+#include "support/cwbvh_trace.h"
 #include "support/ray_sets.h"
 #include "support/support.h"
 

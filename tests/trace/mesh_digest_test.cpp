@@ -10,6 +10,7 @@
 #include <memory>
 #include <string>
 
+#include "support/cwbvh_trace.h"
 #include "support/digest_inputs.h"
 #include "support/digests.h"
 #include "support/double_scenes.h"

@@ -8,8 +8,8 @@
 #include "support/ray_sets.h"
 #include "support/scenes.h"
 #include "support/support.h"
+#include "support/wide_walk.h"
 #include "trace/triangle_test.h"
-#include "trace/wide_walk.h"
 
 namespace raydix::test {
 namespace {

@@ -1,19 +1,21 @@
-// Rays through geometry of the caller's own, in float and in double, against digests kept here:
-// functions written in this test and those of the library.
+// Rays through shapes and geometry of the caller's own in scenes, in float and in double, against
+// digests kept here: functions written in this test, and the shapes of the library as they are.
 #include <gtest/gtest.h>
 #include <raydix/scene.h>
 #include <raydix/user_geometry.h>
-#include <raydix/user_geometry_d.h>
 
 #include <fmt/format.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <string>
 #include <type_traits>
 
 #include "base/double3.h"
+#include "engine/shape_tree.h"
+#include "proximity/shape_hits.h"
 #include "support/digest_inputs.h"
 #include "support/digests.h"
 #include "support/double_scenes.h"
@@ -24,7 +26,6 @@ namespace {
 constexpr std::uint64_t seed = 12;
 constexpr std::size_t ray_count = 4000, rays_to_hits = 500, shape_count = 300;
 
-/// Today's calls in float.
 struct FloatCalls {
     using Number = float;
     using Point = Vec3;
@@ -33,7 +34,7 @@ struct FloatCalls {
     using AnyHit = Hit;
     using Ball = Sphere;
     using Rod = Capsule;
-    using Intersect = IntersectPrimitive;
+    using Scene = raydix::Scene;
 
     static Point point(Vec3d p) { return Double3(p).rounded(); }
     static AabbD wide(const Box& box) {
@@ -42,7 +43,6 @@ struct FloatCalls {
     static std::vector<Ray> rays(const std::vector<RayD>& rays) { return in_float(rays); }
 };
 
-/// Today's calls in double.
 struct DoubleCalls {
     using Number = double;
     using Point = Vec3d;
@@ -51,7 +51,7 @@ struct DoubleCalls {
     using AnyHit = HitD;
     using Ball = SphereD;
     using Rod = CapsuleD;
-    using Intersect = IntersectPrimitiveD;
+    using Scene = SceneD;
 
     static Point point(Vec3d p) { return p; }
     static AabbD wide(const Box& box) { return box; }
@@ -108,31 +108,33 @@ bool hits_box(const Box& box, const AnyRay& ray, AnyHit& hit) {
 
 /// Shapes, the boxes around them and the function that knows them. The shapes stay where they are.
 template <class Calls>
-struct Shapes {
+struct TestShapes {
     using Number = typename Calls::Number;
+    using AnyShapes = BasicShapes<Number>;
+    using AnyRay = typename Calls::AnyRay;
+    using AnyHit = typename Calls::AnyHit;
+    static constexpr Number one_radius{0.0625};
 
     std::vector<typename Calls::Ball> balls;
     std::vector<typename Calls::Rod> rods;
     std::vector<typename Calls::Point> points;
     std::vector<typename Calls::Box> boxes;
-    typename Calls::Intersect intersect;
+    std::function<bool(std::uint32_t prim, const AnyRay& ray, AnyHit& hit)> intersect;
 
-    explicit Shapes(const std::string& name) : random_(seed) {
+    explicit TestShapes(const std::string& name) : random_(seed) {
         if (name.starts_with("far")) middle_ = utm_place;
-        if (name == "my spheres") {
-            make_balls();
-            boxes = boxes_of(balls);
-            intersect = [this](std::uint32_t prim, const auto& ray, auto& hit) {
-                return hits_ball(balls[prim], ray, hit);
+        if (name == "my boxes") {
+            make_boxes();
+            intersect = [this](std::uint32_t prim, const AnyRay& ray, AnyHit& hit) {
+                return hits_box(boxes[prim], ray, hit);
             };
         } else if (name.ends_with("spheres")) {
             make_balls();
-            boxes = boxes_of(balls);
-            intersect = intersect_spheres(balls);
-        } else if (name == "my boxes") {
-            make_boxes();
-            intersect = [this](std::uint32_t prim, const auto& ray, auto& hit) {
-                return hits_box(boxes[prim], ray, hit);
+            boxes = boxes_of<Number>(std::span<const typename Calls::Ball>(balls));
+            const bool mine = name.starts_with("my");
+            intersect = [this, mine](std::uint32_t prim, const AnyRay& ray, AnyHit& hit) {
+                return mine ? hits_ball(balls[prim], ray, hit)
+                            : hit_ball(balls[prim].center, balls[prim].radius, ray, hit);
             };
         } else if (name.ends_with("capsules")) {
             for (std::size_t i = 0; i < shape_count; ++i) {
@@ -140,15 +142,19 @@ struct Shapes {
                 const Vec3d b = i % 9 == 0 ? a : a + along;
                 rods.push_back({Calls::point(a), Calls::point(b), radius()});
             }
-            boxes = boxes_of(rods);
-            intersect = intersect_capsules(rods);
+            boxes = boxes_of<Number>(std::span<const typename Calls::Rod>(rods));
+            intersect = [this](std::uint32_t prim, const AnyRay& ray, AnyHit& hit) {
+                return hit_capsule(rods[prim], ray, hit);
+            };
         } else {
             for (std::size_t i = 0; i < shape_count; ++i) points.push_back(Calls::point(place()));
-            boxes = boxes_of(points, Number{0.0625});
-            intersect = intersect_points(points, Number{0.0625});
+            boxes = boxes_of<Number>(BasicBalls<Number>{points, one_radius});
+            intersect = [this](std::uint32_t prim, const AnyRay& ray, AnyHit& hit) {
+                return hit_ball(points[prim], one_radius, ray, hit);
+            };
         }
     }
-    Shapes(const Shapes&) = delete;
+    TestShapes(const TestShapes&) = delete;
 
 private:
     Vec3d in_cube() { return random_.in({{-1, -1, -1}, {1, 1, 1}}); }
@@ -179,16 +185,14 @@ private:
 template <class Calls>
 class Traced {
 public:
-    using Tree = decltype(build_bvh(std::vector<typename Calls::Box>{}));
+    using Scene = typename Calls::Scene;
     using Hits = std::vector<typename Calls::AnyHit>;
 
     explicit Traced(const std::string& name) : shapes_(name) {
         std::vector<AabbD> wide;
         for (const auto& box : shapes_.boxes) wide.push_back(Calls::wide(box));
         rays_ = Calls::rays(digest_rays(across(wide), ray_count, seed));
-        Hits hits(rays_.size());
-        trace(tree(Builder::karras), shapes_.intersect, rays_, hits);
-        add_rays_to_hits(rays_, hits, rays_to_hits);
+        add_rays_to_hits(rays_, trace(*scene(true, Quality::fast), rays_), rays_to_hits);
     }
 
     [[nodiscard]] Packed input() const {
@@ -197,59 +201,34 @@ public:
         return packed.add_all(rays_);
     }
     [[nodiscard]] std::size_t rays() const { return rays_.size(); }
-    [[nodiscard]] Tree tree(Builder builder) const {
-        return build_bvh(shapes_.boxes, {.builder = builder});
-    }
-
-    [[nodiscard]] Answer closest(const Tree& tree, int threads) const {
-        Hits hits(rays_.size());
-        trace(tree, shapes_.intersect, rays_, hits, {.threads = threads});
-        return answer(hits);
-    }
-    [[nodiscard]] Answer any(const Tree& tree, int threads) const {
-        std::vector<std::uint8_t> occluded(rays_.size());
-        trace_any(tree, shapes_.intersect, rays_, occluded, {.threads = threads});
-        return answer_any(occluded);
-    }
-    /// As a geometry of a scene. In double scenes have no shapes.
+    /// As one geometry of a scene.
     [[nodiscard]] std::shared_ptr<const Scene> scene(bool as_user_geometry, Quality quality) const {
         auto scene = std::make_shared<Scene>();
         if (as_user_geometry)
-            scene->add(UserGeometry(shapes_.boxes, shapes_.intersect));
+            scene->add(BasicUserGeometry<typename Calls::Number>(shapes_.boxes, shapes_.intersect));
         else if (!shapes_.balls.empty())
-            scene->add(std::span<const Sphere>(shapes_.balls));
+            scene->add(std::span<const typename Calls::Ball>(shapes_.balls));
         else if (!shapes_.rods.empty())
-            scene->add(std::span<const Capsule>(shapes_.rods));
+            scene->add(std::span<const typename Calls::Rod>(shapes_.rods));
         else
-            scene->add(std::span<const Vec3>(shapes_.points), 0.0625f);
+            scene->add(std::span<const typename Calls::Point>(shapes_.points), shapes_.one_radius);
         scene->commit({.quality = quality});
         return scene;
     }
-    [[nodiscard]] Answer in_scene(const Scene& scene, bool any, SimdPath path) const {
+    [[nodiscard]] Answer ask(const Scene& scene, bool any, SimdPath path, int threads) const {
         SceneTraceOptions options;
-        options.path = path;
+        options.path = path, options.threads = threads;
         if (!any) return answer(trace(scene, rays_, options));
         std::vector<std::uint8_t> occluded(rays_.size());
         trace_any(scene, rays_, occluded, options);
         return answer_any(occluded);
     }
-    [[nodiscard]] Answer in_scene_one_by_one(const Scene& scene, bool any) const {
+    [[nodiscard]] Answer ask_one_by_one(const Scene& scene, bool any) const {
         Hits hits;
         std::vector<std::uint8_t> occluded;
         for (const auto& ray : rays_)
             any ? occluded.push_back(any_hit(scene, ray)) : hits.push_back(closest_hit(scene, ray));
         return any ? answer_any(occluded) : answer(hits);
-    }
-
-    [[nodiscard]] Answer closest_one_by_one(const Tree& tree) const {
-        Hits hits;
-        for (const auto& ray : rays_) hits.push_back(closest_hit(tree, shapes_.intersect, ray));
-        return answer(hits);
-    }
-    [[nodiscard]] Answer any_one_by_one(const Tree& tree) const {
-        std::vector<std::uint8_t> occluded;
-        for (const auto& ray : rays_) occluded.push_back(any_hit(tree, shapes_.intersect, ray));
-        return answer_any(occluded);
     }
     /// Without any tree.
     [[nodiscard]] Hits each_shape() const {
@@ -281,7 +260,7 @@ public:
     }
 
 private:
-    Shapes<Calls> shapes_;
+    TestShapes<Calls> shapes_;
     std::vector<typename Calls::AnyRay> rays_;
 };
 
@@ -292,30 +271,21 @@ Question question_of(const std::string& shapes, bool any) {
     const auto add = [&](std::string name, auto answer) {
         question.ways.push_back({std::move(name), answer});
     };
-    for (const Builder builder :
-         {Builder::karras, Builder::ploc, Builder::binned, Builder::sweep}) {
-        const auto tree = std::make_shared<typename Traced<Calls>::Tree>(traced->tree(builder));
-        for (const int threads : {1, 2})
-            add(fmt::format("{}, {} threads", builder_name(builder), threads), [=] {
-                return any ? traced->any(*tree, threads) : traced->closest(*tree, threads);
-            });
-        add(fmt::format("{}, one by one", builder_name(builder)), [=] {
-            return any ? traced->any_one_by_one(*tree) : traced->closest_one_by_one(*tree);
-        });
-    }
-    if constexpr (std::is_same_v<Calls, FloatCalls>) {
-        for (const bool own_kind : {true, false}) {
-            if (own_kind && shapes.starts_with("my")) continue;
-            const auto scene =
-                traced->scene(!own_kind, own_kind ? Quality::balanced : Quality::fast);
-            const std::string name = own_kind ? "scene" : "scene, user geometry";
+    for (const bool as_user_geometry : {true, false})
+        for (const Quality quality : {Quality::fast, Quality::balanced, Quality::high}) {
+            if (!as_user_geometry && shapes.starts_with("my")) continue;
+            const auto scene = traced->scene(as_user_geometry, quality);
+            const std::string name =
+                fmt::format("{}quality {}", as_user_geometry ? "user geometry, " : "",
+                            static_cast<int>(quality));
             for (const SimdPath path : {SimdPath::automatic, SimdPath::single, SimdPath::packet,
-                                        SimdPath::stream, SimdPath::sorted})
+                                        SimdPath::stream, SimdPath::sorted}) {
+                const int threads = 1 + static_cast<int>(path) % 2;
                 add(fmt::format("{}, {}", name, simd_path_name(path)),
-                    [=] { return traced->in_scene(*scene, any, path); });
-            add(name + ", one by one", [=] { return traced->in_scene_one_by_one(*scene, any); });
+                    [=] { return traced->ask(*scene, any, path, threads); });
+            }
+            add(name + ", one by one", [=] { return traced->ask_one_by_one(*scene, any); });
         }
-    }
     add("each shape", [=] {
         const auto hits = traced->each_shape();
         if (!any) return traced->answer(hits);

@@ -1,5 +1,6 @@
-// Depth-first walk of one ray through a wide tree with its boxes in float32, nearest child first.
-// What happens at a leaf, and how far the ray still reaches, is the caller's.
+// Depth-first walk of one ray through a wide tree with its boxes in float32, nearest child first:
+// what the collapse to wide trees is judged by. What happens at a leaf, and how far the ray still
+// reaches, is the caller's.
 #pragma once
 
 #include <raydix/bvh.h>
