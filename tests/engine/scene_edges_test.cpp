@@ -2,12 +2,17 @@
 // that floats only just hold.
 #include <gtest/gtest.h>
 #include <raydix/bvh.h>
+#include <raydix/double.h>
 #include <raydix/overlap.h>
 #include <raydix/scene.h>
+#include <raydix/scene_pairs.h>
+#include <raydix/scene_queries.h>
+#include <raydix/solid.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
 
 #include <cstring>
+#include <type_traits>
 #include <vector>
 
 #include "support/float_control.h"
@@ -115,6 +120,38 @@ TEST(Scene, DirectionsMayBeAsLongAsFloatsAre) {
         EXPECT_EQ(any_hit(instance, rays[i]), wanted[i].hit()) << i;
     }
     EXPECT_GT(found, 500u);
+}
+
+/// A triangle that its own mesh leaves out for its size is nowhere, however large an instance makes
+/// it: in every query, in float and in double.
+template <class Scalar>
+void expect_small_triangles_nowhere() {
+    using Types = SceneTypes<Scalar>;
+    using Point = typename Types::Point;
+    const auto small = static_cast<Scalar>(5e-13);
+    typename Types::Mesh mesh;
+    mesh.vertices = {{0, 0, 0}, {small, 0, 0}, {0, small, 0}};
+    mesh.triangles = {{0, 1, 2}};
+    BasicScene<Scalar> inner, scene;
+    inner.add(mesh);
+    mesh.vertices = {{7, 0, 0}, {8, 0, 0}, {7, 1, 0}};
+    inner.add(mesh);
+    inner.commit();
+    typename Types::Transform large;
+    for (std::size_t axis = 0; axis < 3; ++axis) large.m[axis][axis] = 1000;
+    scene.add(inner, large);
+    mesh.vertices = {{0, 0, -1}, {1, 0, 1}, {-1, 0, 1}};
+    scene.add(mesh);
+    scene.commit();
+    EXPECT_EQ(closest_point(inner, Point{0, 0, 0}).geometry, 1u);
+    EXPECT_EQ(closest_point(scene, Point{0, static_cast<Scalar>(2e-10), 0}).instance, 0u);
+    EXPECT_TRUE(overlapping_pairs(scene).pairs.empty());
+    using Body = std::conditional_t<std::is_same_v<Scalar, float>, Solid, SolidD>;
+    EXPECT_EQ(Body(scene).open_edges(), 6u);
+}
+TEST(Scene, WhatAMeshFindsTooSmallStaysSo) {
+    expect_small_triangles_nowhere<float>();
+    expect_small_triangles_nowhere<double>();
 }
 
 #if defined(RAYDIX_FLUSHES_DENORMALS)
