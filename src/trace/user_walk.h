@@ -17,7 +17,7 @@
 
 namespace raydix {
 
-/// Long directions are scaled to less than 1, and a t there may be beyond all numbers where the
+/// Long directions are scaled down, and a t there may be beyond all numbers where the
 /// caller's is not: four times as long, none is.
 template <class Frame>
 Frame frame_with_room(Frame frame) {
