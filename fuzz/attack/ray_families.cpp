@@ -156,7 +156,39 @@ Ray make_ray(Random& random, Places& places) {
     return ray;
 }
 
+/// From up to the largest float away, along an axis or nearly so; or from beside a place of the
+/// mesh, with a direction near the least float.
+Ray make_extreme_ray(Random& random, Places& places) {
+    Ray ray;
+    ray.origin = random.chance(0.5) ? places.on_surface() : places.inside();
+    const std::uint32_t axis = random.below(3);
+    const float side = random.chance(0.5) ? 1.0f : -1.0f;
+    if (random.chance(0.3)) {
+        if (random.chance(0.5)) at(ray.origin, axis) *= random.power_of_ten(-44, -20);
+        ray.direction = random.cube() * random.power_of_ten(-44, -36);
+        return ray;
+    }
+    at(ray.origin, axis) =
+        random.chance(0.3) ? side * 3.4e38f : side * random.power_of_ten(15, 38.5);
+    const float along = random.chance(0.3) ? 1.0f : random.power_of_ten(-44, 38);
+    if (random.chance(0.5))
+        ray.direction = random.cube() * (along * random.power_of_ten(-45, -25));
+    else
+        ray.direction = {0, 0, 0};
+    at(ray.direction, axis) = -side * along;
+    if (random.chance(0.2)) ray.tmin = random.power_of_ten(-44, 38);
+    if (random.chance(0.2)) ray.tmax = random.power_of_ten(-44, 38);
+    return ray;
+}
+
 }  // namespace
+
+std::vector<Ray> make_extreme_rays(Random& random, const Mesh& mesh, std::size_t count) {
+    Places places(random, mesh, finite_bounds(mesh));
+    std::vector<Ray> rays(count);
+    for (Ray& ray : rays) ray = make_extreme_ray(random, places);
+    return rays;
+}
 
 std::vector<Ray> make_rays(Random& random, const Mesh& mesh, std::size_t count) {
     Places places(random, mesh, finite_bounds(mesh));

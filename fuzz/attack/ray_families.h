@@ -14,6 +14,9 @@ namespace raydix::attack {
 
 /// `count` rays around and at the mesh, a few of them invalid.
 std::vector<Ray> make_rays(Random& random, const Mesh& mesh, std::size_t count);
+/// From up to the largest float away, and with directions down to the least one. Spheres, capsules
+/// and points may be missed by these.
+std::vector<Ray> make_extreme_rays(Random& random, const Mesh& mesh, std::size_t count);
 /// For each hit of `rays`: the ray with tmax, tmin, both, or the floats next to them at the hit's
 /// t.
 std::vector<Ray> tightened(Random& random, std::span<const Ray> rays, std::span<const Hit> hits,

@@ -310,6 +310,8 @@ static void attack_rays(Case& c) {
                               ? make_mesh(c.random, Family::needles, 1 + c.random.below(most))
                               : any_mesh(c.random, most);
     std::vector<Ray> rays = make_rays(c.random, made.mesh, 100 + c.random.below(300));
+    const std::vector<Ray> extreme = make_extreme_rays(c.random, made.mesh, 16);
+    rays.insert(rays.end(), extreme.begin(), extreme.end());
     const std::vector<Ray> narrower =
         tightened(c.random, rays, trace_brute_force(made.mesh, rays, 1), 200);
     rays.insert(rays.end(), narrower.begin(), narrower.end());

@@ -23,6 +23,14 @@
 namespace raydix::attack {
 namespace {
 
+/// The first few are extreme.
+std::vector<Ray> any_rays(Random& random, const Mesh& mesh, std::size_t count) {
+    std::vector<Ray> rays = make_extreme_rays(random, mesh, 4);
+    const std::vector<Ray> others = make_rays(random, mesh, count);
+    rays.insert(rays.end(), others.begin(), others.end());
+    return rays;
+}
+
 /// Of a mesh of its own, or now and then none.
 Mesh mesh_of_a_scene(Random& random) {
     // Those that stay within the range of coordinates wherever they are placed.
@@ -320,7 +328,7 @@ void load_mutated(Case& c, const Bytes& bytes) {
     }
     const std::string name = "attack.rdx";
     const Tables tables(name, sealed);
-    const std::vector<Ray> rays = make_rays(c.random, tables.flat(), 24);
+    const std::vector<Ray> rays = any_rays(c.random, tables.flat(), 24);
     SceneJudge judge(c, "files/mutated scenes that loaded");
     const Scene anew = tables.made_anew();
     if (references_of(file->scene) == references_of(anew))
@@ -346,7 +354,7 @@ void attack_scene_file(Case& c) {
         const RdxScene back = load_rdx_scene(file.path());
         const SealedFile sealed(sound);
         const std::string name = "attack.rdx";
-        const std::vector<Ray> rays = make_rays(c.random, Tables(name, sealed).flat(), 100);
+        const std::vector<Ray> rays = any_rays(c.random, Tables(name, sealed).flat(), 100);
         SceneJudge(c, "files/saved scenes").compare(back.scene, scene, rays);
     }
     const std::vector<Stretch> stretches = stretches_of(sound);

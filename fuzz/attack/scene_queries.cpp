@@ -1,6 +1,6 @@
 // Distance, overlap, solids and pairs of whole scenes, nested, mirrored, sheared and masked,
 // against the same calls on one tree over all triangles, which are moved to the world by a walk of
-// its own.
+// its own. In float and in double.
 #include <raydix/pairs.h>
 #include <raydix/scene.h>
 #include <raydix/scene_pairs.h>
@@ -16,6 +16,7 @@
 #include "attack/any_transform.h"
 #include "attack/attack.h"
 #include "attack/parts.h"
+#include "attack/precision.h"
 #include "attack/ray_families.h"
 #include "attack/vectors.h"
 
@@ -23,31 +24,41 @@ namespace raydix::attack {
 namespace {
 
 /// What a scene holds, by ascending id.
+template <class In>
 struct Holder {
+    using Scalar = typename In::Scalar;
+
     struct Placed {
         std::size_t holder;
-        Transform transform;
+        typename SceneTypes<Scalar>::Transform transform;
         std::uint32_t id, mask;
     };
     struct Held {
-        TestMesh mesh;
+        typename In::AnyMesh mesh;
         std::uint32_t id, mask;
     };
     std::vector<Held> meshes;
     std::vector<Placed> placed;
-    Scene scene;
+    BasicScene<Scalar> scene;
     std::uint32_t paths = 0;
 };
 
+template <class In>
 class SceneDuel {
+    using Scalar = typename In::Scalar;
+    using Point = typename In::Point;
+    using Map = typename SceneTypes<Scalar>::Transform;
+    using Tree = typename In::Tree;
+
 public:
     explicit SceneDuel(Case& c) : case_(c) {
         mask_ = c.random.chance(0.6) ? 0xFFFFFFFFu : 1 + c.random.below(7);
         const std::uint32_t levels = c.random.below(3);
         for (std::uint32_t level = 0; level <= levels; ++level) make_holder();
-        std::vector<Transform> way;
+        std::vector<Map> way;
         flatten(holders_.back(), 0, way);
-        bounds_ = finite_bounds(flat_);
+        near_ = to_float(flat_);
+        bounds_ = finite_bounds(near_);
         const std::vector<std::string> sets = simd_instruction_sets();
         isa_ = sets[c.random.below(sets.size())];
         build_ = any_build_options(c.random);
@@ -55,34 +66,32 @@ public:
     }
 
     void run() {
-        const Bvh tree = build_bvh(flat_, build_);
+        const Tree tree = build_bvh(flat_, build_);
         closest(tree);
-        std::vector<Segment> segments;
-        std::vector<Sphere> spheres;
+        std::vector<typename In::AnySegment> segments;
+        std::vector<typename In::AnySphere> spheres;
         for (int i = 0; i < 12; ++i) {
-            const Vec3 a = place();
+            const Point a = place();
             segments.push_back({a, random().chance(0.1) ? a : place()});
-            spheres.push_back({place(), random().chance(0.1) ? 0.0f : any_radius()});
+            spheres.push_back({place(), random().chance(0.1) ? 0 : any_radius()});
         }
         touch(tree, segments, "segment");
         touch(tree, spheres, "sphere");
         sweeps(tree);
-        // One mesh of all knows no triangle that only its own mesh finds too small.
-        if (tiny_) return;
         bodies(tree);
         pairs(tree);
     }
 
 private:
     [[nodiscard]] Random& random() { return case_.random; }
-    [[nodiscard]] const Scene& scene() const { return holders_.back().scene; }
+    [[nodiscard]] const BasicScene<Scalar>& scene() const { return holders_.back().scene; }
     /// Now and then a corner, bit for bit.
-    Vec3 place() {
+    Point place() {
         if (!flat_.vertices.empty() && random().chance(0.2))
             return flat_.vertices[random().below(flat_.vertices.size())];
-        return make_point(random(), flat_, bounds_);
+        return In::point(random(), make_point(random(), near_, bounds_));
     }
-    float any_radius() {
+    Scalar any_radius() {
         const Vec3 size = bounds_.hi - bounds_.lo;
         return std::max({size.x, size.y, size.z}) * random().power_of_ten(-4, 0.3f);
     }
@@ -90,21 +99,21 @@ private:
 
     void make_holder() {
         const bool first = holders_.empty();
-        Holder made;
+        Holder<In> made;
         const SceneOptions options{.quality = static_cast<Quality>(random().below(3)),
                                    .usage = static_cast<Usage>(random().below(2)),
                                    .compact = random().chance(0.3),
                                    .threads = 1};
         const std::uint32_t meshes = first ? 1 + random().below(3) : random().below(2);
         for (std::uint32_t k = 0; k < meshes; ++k) {
-            TestMesh mesh = ordinary_mesh();
+            typename In::AnyMesh mesh = ordinary_mesh();
             const std::uint32_t mask = any_mask();
-            const std::uint32_t id = made.scene.add(mesh.mesh, {.mask = mask, .id = {}});
+            const std::uint32_t id = made.scene.add(mesh, {.mask = mask, .id = {}});
             made.meshes.push_back({std::move(mesh), id, mask});
         }
         for (std::uint32_t k = 0; !first && k < 1 + random().below(3); ++k) {
             const std::size_t inner = random().below(holders_.size());
-            const auto transform = any_transform<Transform>(random());
+            const auto transform = any_transform<Map>(random());
             const std::uint32_t mask = any_mask();
             const std::uint32_t id =
                 made.scene.add(holders_[inner].scene, transform, {.mask = mask, .id = {}});
@@ -115,60 +124,50 @@ private:
         holders_.push_back(std::move(made));
     }
     /// Instances beyond the range of coordinates are refused.
-    TestMesh ordinary_mesh() {
+    typename In::AnyMesh ordinary_mesh() {
         for (;;) {
-            TestMesh made = any_mesh(random(), 14);
-            const Aabb box = finite_bounds(made.mesh);
+            typename In::AnyMesh made = In::mesh(random(), any_mesh(random(), 14).mesh);
+            const Aabb box = float_bounds(to_float(made));
             const Vec3 size = box.hi - box.lo;
             const float most = std::max({std::fabs(box.lo.x), std::fabs(box.lo.y),
                                          std::fabs(box.lo.z), size.x, size.y, size.z});
-            if (most < 1e6f && !made.mesh.triangles.empty()) return made;
+            if (most < 1e6f && !made.triangles.empty()) return made;
         }
     }
 
-    static bool in_range(const Mesh& mesh, std::uint32_t triangle) {
-        for (const std::uint32_t v : mesh.triangles[triangle]) {
-            if (v >= mesh.vertices.size()) return false;
-            const Vec3 p = mesh.vertices[v];
-            if (!(std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)}) <= 1e12f))
-                return false;
-        }
-        return true;
-    }
-    static bool mirrors(const Transform& t) {
+    static bool mirrors(const Map& t) {
         const auto m = [&](std::size_t r, std::size_t k) { return double{t.m[r][k]}; };
         return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) -
                    m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0)) +
                    m(0, 2) * (m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0)) <
                0;
     }
-    static Vec3 moved(const std::vector<Transform>& way, Vec3 p) {
-        Vec3d at{p.x, p.y, p.z};
+    static Point moved(const std::vector<Map>& way, Point p) {
+        Vec3d at = as_double(p);
         for (auto t = way.rbegin(); t != way.rend(); ++t) {
             const auto row = [&](std::size_t r) {
                 return ((at.x * t->m[r][0] + at.y * t->m[r][1]) + at.z * t->m[r][2]) + t->m[r][3];
             };
             at = {row(0), row(1), row(2)};
         }
-        return narrow(at);
+        return {static_cast<Scalar>(at.x), static_cast<Scalar>(at.y), static_cast<Scalar>(at.z)};
     }
-    void flatten(const Holder& holder, std::uint32_t number, std::vector<Transform>& way) {
+    void flatten(const Holder<In>& holder, std::uint32_t number, std::vector<Map>& way) {
         bool turned = false;
-        for (const Transform& t : way) turned ^= mirrors(t);
-        for (const Holder::Held& held : holder.meshes) {
+        for (const Map& t : way) turned ^= mirrors(t);
+        for (const auto& held : holder.meshes) {
             if ((held.mask & mask_) == 0) continue;
             const auto first = static_cast<std::uint32_t>(flat_.vertices.size());
-            for (const Vec3 p : held.mesh.mesh.vertices)
+            for (const Point& p : held.mesh.vertices)
                 flat_.vertices.push_back(way.empty() ? p : moved(way, p));
             // A triangle that its own mesh leaves out is nowhere.
             const auto nowhere = static_cast<std::uint32_t>(flat_.vertices.size());
             flat_.vertices.push_back({NAN, NAN, NAN});
-            std::vector<bool> valid(held.mesh.mesh.triangles.size());
-            for (const std::uint32_t t : valid_triangles(held.mesh.mesh)) valid[t] = true;
-            for (std::uint32_t i = 0; i < held.mesh.mesh.triangles.size(); ++i) {
-                Triangle t = held.mesh.mesh.triangles[i];
+            std::vector<bool> valid(held.mesh.triangles.size());
+            for (const std::uint32_t t : valid_triangles(held.mesh)) valid[t] = true;
+            for (std::uint32_t i = 0; i < held.mesh.triangles.size(); ++i) {
+                Triangle t = held.mesh.triangles[i];
                 if (!valid[i]) t = {nowhere - first, nowhere - first, nowhere - first};
-                tiny_ |= !valid[i] && in_range(held.mesh.mesh, i);
                 if (turned) std::swap(t[1], t[2]);
                 flat_.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
                 names_.push_back({number, held.id, i});
@@ -176,7 +175,7 @@ private:
             }
         }
         std::uint32_t next = number + 1;
-        for (const Holder::Placed& placed : holder.placed) {
+        for (const auto& placed : holder.placed) {
             if ((placed.mask & mask_) != 0) {
                 way.push_back(placed.transform);
                 flatten(holders_[placed.holder], next, way);
@@ -199,18 +198,19 @@ private:
                got.position.z == wanted.position.z;
     }
 
-    void closest(const Bvh& tree) {
-        std::vector<Vec3> queries;
+    void closest(const Tree& tree) {
+        std::vector<Point> queries;
         for (int i = 0; i < 40; ++i) queries.push_back(place());
-        float limit = infinity;
+        Scalar limit = infinity;
         if (random().chance(0.3)) limit = any_radius();
-        const auto wanted =
-            closest_points(tree, queries, ClosestOptions{.max_distance = limit, .threads = 1});
-        const auto got = closest_points(
-            scene(), queries,
-            SceneClosestOptions{.max_distance = limit, .mask = mask_, .threads = 1, .isa = isa_});
+        const auto wanted = closest_points(
+            tree, queries, typename In::Options{.max_distance = limit, .threads = 1});
+        const auto got =
+            closest_points(scene(), queries,
+                           BasicSceneClosestOptions<Scalar>{
+                               .max_distance = limit, .mask = mask_, .threads = 1, .isa = isa_});
         for (std::size_t q = 0; q < queries.size(); ++q) {
-            const auto right = [&](const SceneClosestPoint& point) {
+            const auto right = [&](const BasicSceneClosestPoint<Scalar>& point) {
                 return same_place(point, wanted[q]) && point.distance == wanted[q].distance;
             };
             const auto text_of_both = [&] {
@@ -230,7 +230,7 @@ private:
     }
 
     template <class Query>
-    void touch(const Bvh& tree, const std::vector<Query>& queries, const char* what) {
+    void touch(const Tree& tree, const std::vector<Query>& queries, const char* what) {
         const OverlapLists wanted = touch_all(tree, queries, OverlapOptions{.threads = 1});
         const SceneOverlapOptions options{.mask = mask_, .threads = 1, .isa = isa_};
         const SceneOverlapLists got = touch_all(scene(), queries, options);
@@ -263,31 +263,33 @@ private:
         }
     }
 
-    void sweeps(const Bvh& tree) {
-        std::vector<SphereSweep> all;
-        for (const Ray& path : make_rays(random(), flat_, 16))
-            all.push_back({path, random().chance(0.1) ? 0.0f : any_radius()});
+    void sweeps(const Tree& tree) {
+        std::vector<typename In::Sweep> all;
+        for (const Ray& path : make_rays(random(), near_, 16))
+            all.push_back({In::ray(path), random().chance(0.1) ? 0 : any_radius()});
         const auto wanted = sweep_spheres(tree, all, OverlapOptions{.threads = 1});
         const auto got = sweep_spheres(
             scene(), all, SceneOverlapOptions{.mask = mask_, .threads = 1, .isa = isa_});
         for (std::size_t q = 0; q < all.size(); ++q)
-            expect(same_place(got[q], wanted[q]) && got[q].t == wanted[q].t,
-                   all[q].radius == 0 ? "sweep without a radius" : "sweep", [&] {
-                       return text_of(all[q].path) +
-                              text("    radius %a, got t %a prim %u, wanted t %a prim %u\n",
-                                   double{all[q].radius}, double{got[q].t}, got[q].prim,
-                                   double{wanted[q].t}, wanted[q].prim);
-                   });
+            for (const auto& hit : {got[q], sweep_sphere(scene(), all[q], mask_)})
+                expect(same_place(hit, wanted[q]) && hit.t == wanted[q].t,
+                       all[q].radius == 0 ? "sweep without a radius" : "sweep", [&] {
+                           return text_of(all[q].path) +
+                                  text("    radius %a, got t %a prim %u, wanted t %a prim %u\n",
+                                       double{all[q].radius}, double{hit.t}, hit.prim,
+                                       double{wanted[q].t}, wanted[q].prim);
+                       });
     }
 
-    void bodies(const Bvh& tree) {
-        const Solid wanted(tree, {.rule = InsideRule::automatic, .threads = 1});
-        const Solid got(scene(), {.rule = InsideRule::automatic, .mask = mask_, .threads = 1});
+    void bodies(const Tree& tree) {
+        const typename In::Body wanted(tree, {.rule = InsideRule::automatic, .threads = 1});
+        const typename In::Body got(scene(),
+                                    {.rule = InsideRule::automatic, .mask = mask_, .threads = 1});
         expect(got.closure() == wanted.closure() && got.rule() == wanted.rule() &&
                    got.open_edges() == wanted.open_edges(),
                "closure of a body");
         for (int i = 0; i < 12; ++i) {
-            const Vec3 query = place();
+            const Point query = place();
             // Far triangles are summed by the tree, which another builder may have made.
             if (wanted.rule() != InsideRule::winding)
                 expect(contains(got, query) == contains(wanted, query), "inside of a body");
@@ -297,7 +299,7 @@ private:
         }
     }
 
-    void pairs(const Bvh& tree) {
+    void pairs(const Tree& tree) {
         const bool narrow = random().chance(0.5);
         const auto wanted = overlapping_pairs(tree, {.narrow = narrow, .threads = 1});
         const ScenePairs got = overlapping_pairs(
@@ -311,19 +313,19 @@ private:
 
     void expect(bool right, const std::string& what,
                 const std::function<std::string()>& reproducer = {}) {
-        case_.expect(right, "scene_queries", what, [&] {
+        case_.expect(right, text("scene_queries/%s", In::name), what + ", " + In::name, [&] {
             return (reproducer ? reproducer() : std::string()) +
                    text("    %s, mask %u, %s\n", isa_.c_str(), mask_, text_of(build_).c_str());
         });
     }
 
     Case& case_;
-    std::vector<Holder> holders_;
+    std::vector<Holder<In>> holders_;
     std::uint32_t mask_;
-    Mesh flat_;
+    typename In::AnyMesh flat_;
+    Mesh near_;                          // the same in float
     std::vector<ScenePrimitive> names_;  // [triangles]
     std::vector<bool> turned_;           // [triangles]: two corners change places
-    bool tiny_ = false;                  // a triangle is left out for its size
     Aabb bounds_;
     std::string isa_;
     BuildOptions build_;
@@ -331,7 +333,12 @@ private:
 
 }  // namespace
 
-static void attack_scene_queries(Case& c) { SceneDuel(c).run(); }
+static void attack_scene_queries(Case& c) {
+    if (c.random.chance(0.5))
+        SceneDuel<InFloat>(c).run();
+    else
+        SceneDuel<InDouble>(c).run();
+}
 
 static const Kind kind("scene_queries", attack_scene_queries, 1);
 

@@ -16,6 +16,8 @@
 #include "engine/shape_tree.h"
 #include "exec/join_copies.h"
 #include "exec/result_memory.h"
+#include "primitives/double_sources.h"
+#include "primitives/sources.h"
 
 namespace raydix {
 namespace {
@@ -49,15 +51,20 @@ struct FlatCopy {
     const std::vector<Way>* ways;
     std::size_t way;  // the innermost one
 
+    /// Whether its own mesh has a place for a triangle.
+    [[nodiscard]] bool counts(std::uint32_t triangle) const {
+        using Source =
+            std::conditional_t<std::is_same_v<Scalar, float>, TriangleSource, TriangleSourceD>;
+        typename SceneTypes<Scalar>::Box box;
+        return Source{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()}.box(
+            triangle, box);
+    }
     [[nodiscard]] bool mirrors() const { return way != no_way && (*ways)[way].mirrors; }
     [[nodiscard]] auto mover() const {
         return [this](const auto& vertex) {
             auto out = vertex;
             if (way == no_way) return out;
             Double3 p(vertex);
-            // What the mesh leaves out is nowhere, however near an instance brings it.
-            if (!(max_of(max_of(std::fabs(p.x), std::fabs(p.y)), std::fabs(p.z)) <= max_coordinate))
-                p = {NAN, NAN, NAN};
             for (std::size_t at = way; at != no_way; at = (*ways)[at].outer)
                 p = (*ways)[at].map.vector(p) + (*ways)[at].map.move;
             p.round_to(out);
@@ -65,6 +72,23 @@ struct FlatCopy {
         };
     }
 };
+
+/// What a mesh leaves out is nowhere, however near an instance brings it and however large it makes
+/// it: such triangles get the last vertex of `out`, which is no place.
+template <class Scalar>
+void drop_what_meshes_leave_out(std::span<const FlatCopy<Scalar>> copies,
+                                typename SceneTypes<Scalar>::Mesh& out) {
+    const auto nowhere = static_cast<std::uint32_t>(out.vertices.size());
+    out.vertices.push_back({NAN, NAN, NAN});
+    for_each_part_of_copies(
+        copies, &FlatCopy<Scalar>::first_triangle, out.triangles.size(),
+        [&](const FlatCopy<Scalar>& copy, std::size_t begin, std::size_t end) {
+            if (copy.way == no_way) return;  // a build leaves it out
+            for (std::size_t i = begin; i < end; ++i)
+                if (!copy.counts(static_cast<std::uint32_t>(i)))
+                    out.triangles[copy.first_triangle + i] = {nowhere, nowhere, nowhere};
+        });
+}
 
 /// More than a build holds at any time for each triangle, the tree included. Measured are 76 in
 /// float and 123 in double for quality fast, 221 and 234 for the others.
@@ -187,21 +211,23 @@ std::uint64_t FlatPlan<Scalar>::bytes() const {
         saturating_product(all.instances, sizeof(typename FlatCopy<Scalar>::Way)));
     if (is_one_mesh()) return sum;
     sum = saturating_sum(sum, saturating_product(all.triangles, sizeof(Triangle)));
-    return saturating_sum(
-        sum, saturating_product(all.vertices, sizeof(typename SceneTypes<Scalar>::Point)));
+    return saturating_sum(sum, saturating_product(saturating_sum(all.vertices, 1),
+                                                  sizeof(typename SceneTypes<Scalar>::Point)));
 }
 
 template <class Scalar>
 FlatScene<Scalar> FlatPlan<Scalar>::flatten() const {
-    require_countable(counts().triangles, counts().vertices);
+    require_countable(counts().triangles, saturating_sum(counts().vertices, 1));
     FlatScene<Scalar> out;
     const Paths paths(*this, out);
     if (is_one_mesh()) {
         out.mesh = paths.copies.front().mesh;
         return out;
     }
-    join_copies(std::span<const FlatCopy<Scalar>>(paths.copies), counts().vertices,
-                counts().triangles, out.own);
+    const std::span<const FlatCopy<Scalar>> copies(paths.copies);
+    out.own.vertices.reserve(counts().vertices + 1);
+    join_copies(copies, counts().vertices, counts().triangles, out.own);
+    if (!paths.ways.empty()) drop_what_meshes_leave_out<Scalar>(copies, out.own);
     out.mesh = out.own;
     return out;
 }

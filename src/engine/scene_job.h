@@ -6,6 +6,7 @@
 #include <raydix/user_geometry.h>
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string_view>
@@ -18,6 +19,13 @@
 
 namespace raydix {
 
+/// The end of a ray in units of `scale`: t of the caller's ray = scale * t there, and finite.
+[[nodiscard]] inline float end_in_units(double scale, float t) {
+    if (scale == 1.0) return t;
+    constexpr float most = std::numeric_limits<float>::max();
+    return static_cast<float>(double{t < most ? t : most} / scale);
+}
+
 /// A ray in the space of a scene, in double. Its direction is near unit length, by a power of two.
 /// The fourth component of each is 0.
 struct SceneLine {
@@ -29,6 +37,8 @@ struct SceneLine {
     [[nodiscard]] float units(float t) const {
         return scale == 1.0 ? t : static_cast<float>(double{t} / scale);
     }
+    /// The same for the end of the ray, where t of the caller's ray must be finite.
+    [[nodiscard]] float end(float t) const { return end_in_units(scale, t); }
 };
 
 /// Where a ray of a level comes from.

@@ -68,6 +68,24 @@ inline double line_scale(double longest) {
     return longest >= 0x1p125 && longest < 0x1p128 ? 0x1p-125 : direction_scale(longest);
 }
 
+/// Scales beyond this are those of subnormal directions. The triangle test of a ray on its own
+/// (trace/ray_frame.h) has no larger one, and what it rounds t to there is what counts.
+constexpr double largest_ray_scale = 0x1p125;
+inline HWY_NOINLINE const SceneLine& with_ray_scale(const SceneLine& line, std::uint32_t number,
+                                                    SceneLine& room) {
+    if (number != 0) return line;
+    room = line;
+    for (double& d : room.direction) d *= largest_ray_scale / line.scale;
+    room.scale = largest_ray_scale;
+    return room;
+}
+/// A line as a scene's own meshes meet it, on path `number`; `room` is for a line that changes.
+HWY_INLINE const SceneLine& line_at_mesh(const SceneLine& line, std::uint32_t number,
+                                         SceneLine& room) {
+    if (HWY_UNLIKELY(line.scale > largest_ray_scale)) return with_ray_scale(line, number, room);
+    return line;
+}
+
 /// Brings a line's direction near unit length.
 inline HWY_NOINLINE void rescale(SceneLine& line) {
     const double longest =
@@ -211,7 +229,8 @@ public:
 
     void walk(const SceneTree& scene, std::uint32_t number, const SceneLine& line) {
         if (const MeshTree* const mesh = scene.only_mesh()) {
-            if (!mesh->tree->empty()) hit_mesh(*mesh, number, line);
+            SceneLine room;
+            if (!mesh->tree->empty()) hit_mesh(*mesh, number, line_at_mesh(line, number, room));
             return;
         }
         if (const ShapeTree* const shapes = scene.only_shapes()) {
@@ -226,8 +245,9 @@ public:
     HWY_INLINE void visit(const SceneTree& scene, std::uint32_t part, std::uint32_t number,
                           const SceneLine& line) {
         const std::size_t meshes = scene.meshes.size();
+        SceneLine inside;
         if (part < meshes) {
-            hit_mesh(*scene.meshes[part], number, line);
+            hit_mesh(*scene.meshes[part], number, line_at_mesh(line, number, inside));
             return;
         }
         const std::size_t own = scene.own_part_count();
@@ -237,7 +257,6 @@ public:
         }
         const PlacedScene& placed = scene.placed[part - own];
         if (!sees(mask_, scene, placed)) return;
-        SceneLine inside;
         enter(line, scene, placed, inside);
         number += placed.number;
         if (placed.mesh != nullptr)
@@ -258,7 +277,7 @@ protected:
 
         HWY_NOINLINE float visit_one(std::uint32_t leaf, std::uint32_t, std::uint32_t) {
             ray.visit(scene, tree.part[leaf], number, line);
-            return min_of(line.units(ray.reach_), std::numeric_limits<float>::max());
+            return min_of(line.end(ray.reach_), std::numeric_limits<float>::max());
         }
     };
 
@@ -280,7 +299,7 @@ protected:
     /// False if floats do not hold the ray, or it ends before it begins.
     HWY_INLINE bool fill(const WideView& view, const SceneLine& line, PadGrowth growth,
                          SingleFrame& frame) const {
-        const float tmin = line.units(tmin_), tmax = line.units(reach_);
+        const float tmin = line.units(tmin_), tmax = line.end(reach_);
         if (!(tmin <= tmax && tmax >= 0.0f)) return false;
         frame.tmin = tmin > 0.0f ? tmin : 0.0f;
         frame.tmax = min_of(tmax, std::numeric_limits<float>::max());

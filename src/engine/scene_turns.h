@@ -43,8 +43,9 @@ public:
 
     /// Whether there is anything to do.
     bool begin() {
+        SceneLine room;
         if (const MeshTree* const mesh = scene_.only_mesh())
-            return !mesh->tree->empty() && enter_mesh(*mesh, 0, line_);
+            return !mesh->tree->empty() && enter_mesh(*mesh, 0, line_at_mesh(line_, 0, room));
         if (const ShapeTree* const shapes = scene_.only_shapes())
             return !shapes->empty() && enter_shapes(*shapes, 0, line_);
         return begin_tree(scene_.near) || begin_tree(scene_.wild);
@@ -102,12 +103,13 @@ private:
     /// in one of those.
     HWY_NOINLINE bool enter_part(std::uint32_t part) {
         const std::size_t meshes = scene_.meshes.size();
-        if (part < meshes) return enter_mesh(*scene_.meshes[part], 0, line_);
+        SceneLine inside;
+        if (part < meshes)
+            return enter_mesh(*scene_.meshes[part], 0, line_at_mesh(line_, 0, inside));
         const std::size_t own = scene_.own_part_count();
         if (part < own) return enter_shapes(*scene_.shapes[part - meshes], 0, line_);
         const PlacedScene& placed = scene_.placed[part - own];
         if (!sees(this->mask_, scene_, placed)) return false;
-        SceneLine inside;
         enter(line_, scene_, placed, inside);
         if (placed.mesh != nullptr) return enter_mesh(*placed.mesh, placed.number, inside);
         this->walk(*placed.scene, placed.number, inside);
@@ -163,7 +165,7 @@ private:
     HWY_INLINE bool go_on() {
         if (tree_ == nullptr || (any && this->reach_ < 0)) return false;
         now_ = &*parts_, in_ = In::parts;
-        const float reach = line_.units(this->reach_);
+        const float reach = line_.end(this->reach_);
         if (parts_->skip(min_of(reach, std::numeric_limits<float>::max()))) return true;
         return tree_ == &scene_.near && begin_tree(scene_.wild);
     }

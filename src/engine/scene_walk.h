@@ -118,7 +118,10 @@ private:
     void start_each(std::size_t begin, std::size_t end, SceneLevel& first) {
         for (std::size_t k = begin; k < end; ++k)
             if (const Ray* const ray = start(k))
-                add_first(first, *ray, static_cast<std::uint32_t>(k));
+                if (const auto id = static_cast<std::uint32_t>(k); !add_first(first, *ray, id))
+                    alone(id, true, [&](auto& one) {
+                        one.walk(*job_.tree, 0, HWY_NAMESPACE::line_of(*ray));
+                    });
     }
     /// Rays k to k + lanes16 - 1, if all of them are valid and near unit length.
     HWY_INLINE bool start_vector(std::size_t k, SceneLevel& first) {
@@ -244,43 +247,48 @@ private:
         const ShapeTree& tree_;
     };
 
-    [[nodiscard]] static float in_units_of(double scale, float t) {
-        return scale == 1.0 ? t : static_cast<float>(double{t} / scale);
-    }
-
     /// Ends a ray where its best hit is; how far it goes.
     HWY_INLINE float shorten(SceneLevel& level, std::size_t ray) {
         const SceneRaySource& source = level.sources[ray];
-        const float reach = in_units_of(source.scale, job_.limits[source.id].reach);
+        const float reach = end_in_units(source.scale, job_.limits[source.id].reach);
         level.rays[ray].tmax = reach;
         return min_of(reach, std::numeric_limits<float>::max());
     }
 
-    /// A ray as the caller has it becomes the last one of a level.
-    HWY_INLINE void add_first(SceneLevel& level, const Ray& ray, std::uint32_t id) {
+    /// A ray as the caller has it becomes the last one of a level. False, and nothing, if parts and
+    /// meshes need different scales of it.
+    HWY_INLINE bool add_first(SceneLevel& level, const Ray& ray, std::uint32_t id) {
         level.rays[level.count] = ray;
-        level.sources[level.count++] = {1.0, id};
+        level.sources[level.count] = {1.0, id};
         const Vec3 d = ray.direction;
         const float longest = max_of(max_of(std::fabs(d.x), std::fabs(d.y)), std::fabs(d.z));
-        if (!near_unit_length(longest)) rescale(level, longest);
+        const bool taken = near_unit_length(longest) || rescale(level, longest);
+        level.count += static_cast<std::size_t>(taken);
+        return taken;
     }
-    HWY_NOINLINE void rescale(SceneLevel& level, float longest) {
-        Ray& ray = level.rays[level.count - 1];
-        SceneRaySource& source = level.sources[level.count - 1];
-        source.scale = line_scale(double{longest});
-        const Double3 scaled = Double3(ray.direction) * source.scale;
+    HWY_NOINLINE bool rescale(SceneLevel& level, float longest) {
+        const double scale = line_scale(double{longest});
+        if (scale > largest_ray_scale) return false;
+        Ray& ray = level.rays[level.count];
+        level.sources[level.count].scale = scale;
+        const Double3 scaled = Double3(ray.direction) * scale;
         ray.direction = scaled.rounded();
-        ray.tmin = in_units_of(source.scale, ray.tmin);
-        ray.tmax = in_units_of(source.scale, ray.tmax);
+        ray.tmin = static_cast<float>(double{ray.tmin} / scale);
+        ray.tmax = end_in_units(scale, ray.tmax);
+        return true;
     }
 
     /// Ray `ray` of one level, in double.
     [[nodiscard]] HWY_INLINE SceneLine line_of(const Place& place, const SceneLevel& level,
                                                std::uint32_t ray) const {
         if (place.depth != 0 && !place.scene.instances.empty()) return level.lines[ray];
+        const SceneRaySource& source = level.sources[ray];
+        // Scaled, its smaller components may be less than floats have.
+        if (place.depth == 0 && source.scale != 1.0)
+            return HWY_NAMESPACE::line_of(job_.ray(source.id));
         // Floats have all of it: the caller's, or that of a scene that holds no instances.
         SceneLine line;
-        set_line(level.rays[ray], level.sources[ray].scale, line);
+        set_line(level.rays[ray], source.scale, line);
         return line;
     }
 
@@ -298,7 +306,7 @@ private:
         ray.origin = {origin[0], origin[1], origin[2]};
         ray.direction = {direction[0], direction[1], direction[2]};
         ray.tmin = line.units(limits.tmin);
-        ray.tmax = line.units(limits.reach);
+        ray.tmax = line.end(limits.reach);
         if (!is_valid(ray)) return;
         if (!placed.scene->instances.empty()) to.lines[to.count] = line;
         to.sources[to.count++] = {line.scale, id};

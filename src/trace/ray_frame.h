@@ -55,7 +55,9 @@ RAYDIX_HD inline bool is_valid(const RayD& ray) { return is_valid_ray(ray); }
 
 /// Long or short directions are scaled by a power of two, so that no product of the triangle test
 /// overflows or underflows on their account: twice an area of up to 1.6e25 times a depth of up to
-/// 2e12, divided by the direction, must stay below 3.4e38. 1 for all near unit length.
+/// 2e12, divided by the direction, must stay below 3.4e38. 1 for all near unit length. Others get a
+/// longest component of at least 1, so that no t on the way overflows where the caller's does not,
+/// unless they are subnormal.
 template <class Scalar>
 RAYDIX_HD inline Scalar direction_scale(Scalar longest) {
     if (longest > Scalar(0x1p-3f) && longest < Scalar(0x1p3f)) return 1;
@@ -64,6 +66,7 @@ RAYDIX_HD inline Scalar direction_scale(Scalar longest) {
     // A subnormal direction would need more than the largest power of two that has a finite
     // inverse.
     constexpr int limit = -std::numeric_limits<Scalar>::min_exponent;
+    --exponent;  // of the largest power of two that is not above
     const int limited = exponent < -limit ? -limit : exponent > limit ? limit : exponent;
     return std::ldexp(Scalar(1), -limited);
 }
@@ -94,7 +97,9 @@ RAYDIX_HD inline BasicRayFrame<Scalar> make_frame(const AnyRay& ray) {
     frame.inverse = {one / d.x, one / d.y, one / d.z};
     frame.t_scale = scale;
     frame.tmin = (ray.tmin > 0 ? ray.tmin : 0) / scale;
-    frame.tmax = min_of(ray.tmax / scale, std::numeric_limits<Scalar>::max());
+    // The caller's t is finite too: first in those units, then in these.
+    constexpr Scalar most = std::numeric_limits<Scalar>::max();
+    frame.tmax = min_of(min_of(ray.tmax, most) / scale, most);
     return frame;
 }
 

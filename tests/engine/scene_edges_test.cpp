@@ -2,12 +2,18 @@
 // that floats only just hold.
 #include <gtest/gtest.h>
 #include <raydix/bvh.h>
+#include <raydix/double.h>
 #include <raydix/overlap.h>
 #include <raydix/scene.h>
+#include <raydix/scene_pairs.h>
+#include <raydix/scene_queries.h>
+#include <raydix/solid.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
 
+#include <cmath>
 #include <cstring>
+#include <type_traits>
 #include <vector>
 
 #include "support/float_control.h"
@@ -115,6 +121,212 @@ TEST(Scene, DirectionsMayBeAsLongAsFloatsAre) {
         EXPECT_EQ(any_hit(instance, rays[i]), wanted[i].hit()) << i;
     }
     EXPECT_GT(found, 500u);
+}
+
+constexpr SimdPath all_paths[] = {SimdPath::automatic, SimdPath::single, SimdPath::packet,
+                                  SimdPath::stream, SimdPath::sorted};
+
+/// Every way to ask a scene for closest hits says `wanted`. `instance`: of each of them that hits.
+void expect_hits(const Scene& scene, const std::vector<Ray>& rays, std::vector<Hit> wanted,
+                 std::uint32_t instance) {
+    for (Hit& hit : wanted)
+        if (hit.hit()) hit.instance = instance;
+    const std::vector<std::uint32_t> masks(rays.size(), 1);
+    const auto all_count = [](std::size_t, const Ray&, const Hit&) { return true; };
+    const auto differ = [](const Hit& a, const Hit& b) {
+        return std::memcmp(&a, &b, sizeof a) != 0;
+    };
+    for (const SimdPath path : all_paths)
+        for (const bool masked : {false, true})
+            for (const bool filtered : {false, true}) {
+                SceneTraceOptions options;
+                options.path = path;
+                if (masked) options.masks = masks;
+                if (filtered) options.filter = all_count;
+                const std::vector<Hit> hits = trace(scene, rays, options);
+                std::vector<std::uint8_t> any(rays.size());
+                trace_any(scene, rays, any, options);
+                for (std::size_t i = 0; i < rays.size(); ++i) {
+                    ASSERT_FALSE(differ(hits[i], wanted[i]))
+                        << i << ": t " << hits[i].t << ", not " << wanted[i].t << "; path "
+                        << int(path) << (masked ? ", masks" : "") << (filtered ? ", filter" : "");
+                    ASSERT_EQ(any[i] != 0, wanted[i].hit()) << i;
+                }
+            }
+    const AllHits all = trace_all(scene, rays),
+                  all_masked = trace_all(scene, rays, {.masks = masks});
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        ASSERT_FALSE(differ(closest_hit(scene, rays[i]), wanted[i])) << i;
+        ASSERT_FALSE(differ(closest_hit(scene, rays[i], all_count), wanted[i])) << i;
+        ASSERT_EQ(any_hit(scene, rays[i]), wanted[i].hit()) << i;
+        for (const AllHits* const found : {&all, &all_masked}) {
+            const bool some = found->offsets[i] != found->offsets[i + 1];
+            ASSERT_EQ(some, wanted[i].hit()) << i;
+            if (some) {
+                ASSERT_EQ(found->hits[found->offsets[i]].t, wanted[i].t) << i;
+            }
+        }
+    }
+}
+
+/// One mesh, one mesh beside something else, one mesh as an instance.
+struct ThreeScenes {
+    Scene one, beside, shown;
+    ThreeScenes(const Mesh& mesh, bool compact) : one(mesh, {.compact = compact}) {
+        Mesh other = test::random_soup(3, 4);
+        for (Vec3& p : other.vertices) p = {p.x + 900, p.y + 900, p.z + 900};
+        beside.add(mesh);
+        beside.add(other, {.mask = 2, .id = {}});
+        beside.commit({.usage = Usage::moving, .compact = compact});
+        shown.add(one, Transform{});
+        shown.commit();
+    }
+};
+
+/// What floats round t to depends on the scale of a direction where both are that small: it is the
+/// one of a ray on its own, whatever way the ray goes.
+TEST(Scene, SubnormalDirectionsBesideSubnormalPlaces) {
+    test::Random random(11);
+    Mesh mesh;
+    for (std::uint32_t k = 0; k < 8; ++k) {
+        const auto corner = [&](float x, float y) {
+            return Vec3{x, y, std::ldexp(random.between(1, 2), -128 - static_cast<int>(k))};
+        };
+        mesh.vertices.push_back(corner(-1, -1));
+        mesh.vertices.push_back(corner(1, -1));
+        mesh.vertices.push_back(corner(0, 2));
+        mesh.triangles.push_back({3 * k, 3 * k + 1, 3 * k + 2});
+    }
+    std::vector<Ray> rays;
+    for (int i = 0; i < 400; ++i) {
+        const float along = std::ldexp(random.between(1, 2), -149 + i % 26);
+        const Vec3 from{random.between(-0.5f, 0.5f), random.between(-0.5f, 0.5f), 0};
+        rays.push_back({from, 0, {0, i % 3 == 0 ? along : 0.0f, along}});
+        if (i % 5 == 0) rays.back().tmin = std::ldexp(1.0f, i % 20);
+    }
+    const std::vector<Hit> wanted = trace_brute_force(mesh, rays);
+    std::size_t found = 0;
+    for (const Hit& hit : wanted) found += hit.hit();
+    EXPECT_GT(found, 100u);
+    for (const bool compact : {false, true}) {
+        const ThreeScenes scenes(mesh, compact);
+        expect_hits(scenes.one, rays, wanted, 0);
+        expect_hits(scenes.beside, rays, wanted, 0);
+    }
+}
+
+/// Where the way is longer than the largest float, a hit is none; where t is a float, no hit is
+/// lost because the ray's own units have no number for it.
+TEST(Scene, RaysFromTheLargestFloat) {
+    const Mesh mesh{{}, {{-1, 0, -1}, {1, 0, -1}, {0, 0, 2}}, {{0, 1, 2}}};
+    constexpr float most = 3.4e38f;
+    std::vector<Ray> rays;
+    std::vector<Hit> wanted;
+    for (int exponent = -149; exponent < 128; ++exponent)
+        for (const float digits : {1.0f, 1.2f, 1.9f})
+            for (const float side : {1.0f, -1.0f}) {
+                const float along = std::ldexp(digits, exponent);
+                rays.push_back({{0.1f, side * most, 0.2f}, 0, {0, -side * along, 0}});
+                Hit hit;
+                const auto t = static_cast<float>(double{most} / double{along});
+                if (std::isfinite(t)) hit.t = t, hit.prim = 0, hit.geometry = 0;
+                wanted.push_back(hit);
+            }
+    const std::vector<Hit> hits = trace_brute_force(mesh, rays),
+                           in_tree = trace(build_bvh(mesh), rays);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        ASSERT_EQ(hits[i].t, wanted[i].t) << rays[i].direction.y;
+        ASSERT_EQ(hits[i].hit(), wanted[i].hit()) << rays[i].direction.y;
+        ASSERT_EQ(in_tree[i].t, wanted[i].t) << rays[i].direction.y;
+    }
+    for (const bool compact : {false, true}) {
+        const ThreeScenes scenes(mesh, compact);
+        expect_hits(scenes.one, rays, hits, 0);
+        expect_hits(scenes.beside, rays, hits, 0);
+        expect_hits(scenes.shown, rays, hits, 1);
+    }
+}
+
+TEST(Scene, DoubleHitsAreFinite) {
+    const MeshD mesh{{}, {{-1, 0, -1}, {1, 0, -1}, {0, 0, 2}}, {{0, 1, 2}}};
+    const RayD beyond{{0.1, 1e300, 0.2}, 0, {0, -1e-20, 0}},
+        within{{0.1, 1e300, 0.2}, 0, {0, -1e-5, 0}};
+    SceneD scene, shown;
+    scene.add(mesh);
+    scene.commit();
+    shown.add(scene, TransformD{});
+    shown.commit();
+    for (const SceneD* const at : {&scene, &shown}) {
+        EXPECT_FALSE(closest_hit(*at, beyond).hit());
+        EXPECT_FALSE(any_hit(*at, beyond));
+        EXPECT_FALSE(trace(*at, {&beyond, 1})[0].hit());
+        EXPECT_EQ(closest_hit(*at, within).t, 1e300 / 1e-5);
+    }
+    EXPECT_FALSE(trace_brute_force(MeshViewD(mesh), {&beyond, 1})[0].hit());
+}
+
+/// The small component of a long direction has more digits than a float that is scaled to unit
+/// length, and the instance makes them large: batches and single calls see all of them.
+TEST(Scene, SmallComponentsOfLongDirectionsKeepTheirDigits) {
+    const Scene wall(Mesh{{}, {{0, 0, -1}, {0, 1024, 0}, {0, 0, 1}}, {{0, 1, 2}}});
+    Scene scene;
+    Transform flat;
+    flat.m[1][1] = 0x1p-20f;
+    scene.add(wall, flat);
+    scene.add(test::random_soup(3, 4), {.mask = 2, .id = {}});
+    scene.commit();
+    test::Random random(12);
+    std::vector<Ray> rays;
+    for (int i = 0; i < 200; ++i)
+        rays.push_back({{-0x1p126f, 0, 0}, 0, {0x1p100f, random.between(0x1p-40f, 0x1p-39f), 0}});
+    std::vector<Hit> wanted;
+    for (const Ray& ray : rays) {
+        wanted.push_back(closest_hit(scene, ray, 1));
+        ASSERT_TRUE(wanted.back().hit());
+        const double y = double{ray.direction.y} * 0x1p26 * 0x1p20 / 1024;
+        ASSERT_EQ(wanted.back().u, static_cast<float>(y));
+    }
+    for (const SimdPath path : all_paths) {
+        SceneTraceOptions options;
+        options.path = path;
+        options.mask = 1;
+        const std::vector<Hit> hits = trace(scene, rays, options);
+        for (std::size_t i = 0; i < rays.size(); ++i)
+            ASSERT_EQ(std::memcmp(&hits[i], &wanted[i], sizeof(Hit)), 0)
+                << i << ", path " << int(path) << ": u " << hits[i].u << ", not " << wanted[i].u;
+    }
+}
+
+/// A triangle that its own mesh leaves out for its size is nowhere, however large an instance makes
+/// it: in every query, in float and in double.
+template <class Scalar>
+void expect_small_triangles_nowhere() {
+    using Types = SceneTypes<Scalar>;
+    using Point = typename Types::Point;
+    const auto small = static_cast<Scalar>(5e-13);
+    typename Types::Mesh mesh;
+    mesh.vertices = {{0, 0, 0}, {small, 0, 0}, {0, small, 0}};
+    mesh.triangles = {{0, 1, 2}};
+    BasicScene<Scalar> inner, scene;
+    inner.add(mesh);
+    mesh.vertices = {{7, 0, 0}, {8, 0, 0}, {7, 1, 0}};
+    inner.add(mesh);
+    inner.commit();
+    typename Types::Transform large;
+    for (std::size_t axis = 0; axis < 3; ++axis) large.m[axis][axis] = 1000;
+    scene.add(inner, large);
+    mesh.vertices = {{0, 0, -1}, {1, 0, 1}, {-1, 0, 1}};
+    scene.add(mesh);
+    scene.commit();
+    EXPECT_EQ(closest_point(inner, Point{0, 0, 0}).geometry, 1u);
+    EXPECT_EQ(closest_point(scene, Point{0, static_cast<Scalar>(2e-10), 0}).instance, 0u);
+    EXPECT_TRUE(overlapping_pairs(scene).pairs.empty());
+    using Body = std::conditional_t<std::is_same_v<Scalar, float>, Solid, SolidD>;
+    EXPECT_EQ(Body(scene).open_edges(), 6u);
+}
+TEST(Scene, WhatAMeshFindsTooSmallStaysSo) {
+    expect_small_triangles_nowhere<float>();
+    expect_small_triangles_nowhere<double>();
 }
 
 #if defined(RAYDIX_FLUSHES_DENORMALS)

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -31,7 +32,7 @@ RAYDIX_HD static inline Ray prepared_ray(Ray ray) {
     if (scale == 1.0f) return ray;
     ray.direction = ray.direction * scale;
     ray.tmin /= scale;
-    ray.tmax /= scale;
+    ray.tmax = min_of(ray.tmax, std::numeric_limits<float>::max()) / scale;
     return ray;
 }
 
