@@ -108,7 +108,8 @@ TYPED_TEST(NestedCalls, FiltersMayTraceTheSceneThatTheyFilter) {
             set_filter(by_asking, [&](std::size_t, const RayOf<Scalar>&, const HitOf<Scalar>& hit) {
                 return questions.answer(hit.geometry, hit.prim);
             });
-            const auto expected = trace(scene, rays, by_table), found = trace(scene, rays, by_asking);
+            const auto expected = trace(scene, rays, by_table),
+                       found = trace(scene, rays, by_asking);
             std::size_t hits = 0;
             for (std::size_t i = 0; i < rays.size(); ++i) {
                 hits += expected[i].hit();
