@@ -12,7 +12,7 @@
 
 #include "base/math.h"
 #include "embree_api.h"
-#include "tree/bvh_access.h"
+#include "tree/bvh_internals.h"
 #include "tree/spatial_split.h"
 
 namespace raydix::bench {
@@ -158,7 +158,7 @@ private:
     [[nodiscard]] Bvh assemble(const MeshView& mesh, const std::vector<BvhNode>& nodes,
                                const std::vector<std::uint32_t>& order, std::uint32_t depth) const {
         Bvh bvh;
-        const BvhAccess access{bvh};
+        const BvhInternals access{bvh};
         access.nodes().reset(nodes.size());
         std::copy(nodes.begin(), nodes.end(), access.nodes().data());
         access.order().reset(order.size());

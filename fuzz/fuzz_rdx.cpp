@@ -8,7 +8,7 @@
 #include <cstring>
 
 #include "../tests/support/rdx_seal.h"
-#include "api/rdx_parse.h"
+#include "io/rdx_parse.h"
 
 namespace {
 

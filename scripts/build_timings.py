@@ -21,7 +21,7 @@ def last_times(folder):
 
 
 def short(output):
-    """CMakeFiles/raydix.dir/src/api/wide.cpp.o -> raydix: src/api/wide.cpp"""
+    """CMakeFiles/raydix.dir/src/build/wide.cpp.o -> raydix: src/build/wide.cpp"""
     match = re.match(r"(?:(.*)/)?CMakeFiles/([^/]*)\.dir/(.*)\.o$", output)
     if not match:
         return output

@@ -20,7 +20,7 @@ MAY_INCLUDE = {
     "layout": {"base", "exec", "sort", "tree", "primitives"},
     "rays": {"base", "exec", "keys", "sort"},
     # an index of its own: sorts points and groups them, then asks the groups
-    "points": {"base", "exec", "keys", "sort"},
+    "points": {"base", "exec", "keys", "sort", "measure"},
     "simt": {"base"},
     "trace": {"base", "exec", "primitives", "layout", "rays", "simt"},
     # walks through the same trees as rays do, with the same stacks
@@ -29,7 +29,12 @@ MAY_INCLUDE = {
     "engine": {"base", "exec", "primitives", "tree", "layout", "rays", "trace", "proximity"},
     "measure": {"base", "exec"},  # exec: the number of threads is a property of the machine
     "report": {"base", "exec", "measure"},
-    "api": {"*"},
+    # stages put together: the public calls that build, refit and lay out trees
+    "build": {"base", "exec", "measure", "primitives", "keys", "sort", "tree", "layout"},
+    # the same stages as launches, and what is asked of trees on a device
+    "gpu": {"base", "exec", "primitives", "keys", "sort", "tree", "layout", "trace", "proximity", "engine", "build"},
+    "io": {"base", "exec", "scene", "primitives", "measure", "tree", "simt", "engine"},
+    "image": {"base", "exec", "rays", "trace", "report", "engine"},
 }
 # The lowest folders know only the plain structs, errors and arrays of the public headers.
 PUBLIC_HEADERS = {"base": {"types.h", "error.h"}, "exec": {"types.h", "error.h", "buffer.h", "result_limit.h"}}

@@ -7,11 +7,11 @@
 #include <raydix/trace.h>
 #include <raydix/wide.h>
 
-#include "api/rdx_format.h"
-#include "api/rdx_parse.h"
 #include "attack/attack.h"
 #include "attack/file_bytes.h"
 #include "attack/ray_families.h"
+#include "io/rdx_format.h"
+#include "io/rdx_parse.h"
 
 namespace raydix::attack {
 namespace {

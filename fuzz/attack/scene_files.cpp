@@ -10,8 +10,6 @@
 #include <optional>
 #include <set>
 
-#include "api/rdx_parse.h"
-#include "api/rdx_scene_format.h"
 #include "attack/any_transform.h"
 #include "attack/attack.h"
 #include "attack/file_bytes.h"
@@ -19,6 +17,8 @@
 #include "engine/extent.h"
 #include "engine/hit_points.h"
 #include "engine/scene_state.h"
+#include "io/rdx_parse.h"
+#include "io/rdx_scene_format.h"
 
 namespace raydix::attack {
 namespace {
@@ -219,7 +219,7 @@ std::uint64_t references_of(const SceneTree& scene, std::set<const SceneTree*>& 
 }
 std::uint64_t references_of(const Scene& scene) {
     std::set<const SceneTree*> seen;
-    return references_of(*SceneAccess::tree(scene), seen);
+    return references_of(*SceneInternals::tree(scene), seen);
 }
 
 /// All that can be asked of a scene.
@@ -280,7 +280,7 @@ private:
     void expect_places(const Scene& scene, std::span<const Hit> hits) {
         const std::vector<Vec3> points = positions(scene, hits, 1);
         (void)normals(scene, hits, 1);
-        const SceneTree& tree = *SceneAccess::tree(scene);
+        const SceneTree& tree = *SceneInternals::tree(scene);
         for (std::size_t i = 0; i < hits.size(); ++i) {
             if (!hits[i].hit()) continue;
             expect(within(scene.bounds(), points[i], slack_of(tree, hits[i])),

@@ -153,7 +153,7 @@ public:
     [[nodiscard]] std::uint64_t bytes() const;
 
 private:
-    friend struct BvhAccess;  // builders and the file reader (src) fill the arrays through it
+    friend struct BvhInternals;  // builders and the file reader (src) fill the arrays through it
     Buffer<BvhNode> nodes_;
     Buffer<std::uint32_t> order_;
     Buffer<LeafTriangle> triangles_;
@@ -200,7 +200,7 @@ public:
     void build(std::span<const Aabb> boxes, const BuildOptions& options, Bvh& tree);
 
 private:
-    friend struct BvhBuilderAccess;  // for builders that go on where this one would end
+    friend struct BvhBuilderInternals;  // for builders that go on where this one would end
     struct Scratch;
     std::unique_ptr<Scratch> scratch_;
 };

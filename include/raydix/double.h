@@ -64,7 +64,7 @@ public:
     [[nodiscard]] std::uint64_t bytes() const;
 
 private:
-    friend struct BvhDAccess;
+    friend struct BvhDInternals;
     Bvh tree_;
     Buffer<LeafTriangleD> triangles_;
     Vec3d center_{0.0, 0.0, 0.0};
@@ -148,7 +148,7 @@ public:
     [[nodiscard]] const BvhD& bvh() const;
 
 private:
-    friend struct SolidAccess;
+    friend struct SolidInternals;
     struct State;
     std::unique_ptr<State> state_;
 };

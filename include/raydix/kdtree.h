@@ -92,7 +92,7 @@ public:
     [[nodiscard]] std::uint64_t bytes() const;
 
 private:
-    friend struct KdTreeAccess;  // the builder (src) fills the arrays through it
+    friend struct KdTreeInternals;  // the builder (src) fills the arrays through it
     Buffer<KdNode> nodes_;
     Buffer<std::uint32_t> order_;
     Buffer<LeafTriangle> triangles_;

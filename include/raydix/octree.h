@@ -95,7 +95,7 @@ public:
     [[nodiscard]] std::uint64_t bytes() const;
 
 private:
-    friend struct OctreeAccess;  // the builder (src) fills the arrays through it
+    friend struct OctreeInternals;  // the builder (src) fills the arrays through it
     Buffer<OctreeNode> nodes_;
     Buffer<std::uint32_t> order_;
     Buffer<Vec3> points_;

@@ -218,7 +218,7 @@ public:
 
 private:
     template <class>
-    friend struct BasicSceneAccess;
+    friend struct BasicSceneInternals;
     struct State;
     std::shared_ptr<State> state_;
 };

@@ -81,7 +81,7 @@ public:
     [[nodiscard]] const Bvh& bvh() const;
 
 private:
-    friend struct SolidAccess;
+    friend struct SolidInternals;
     struct State;
     std::unique_ptr<State> state_;
 };

@@ -62,7 +62,7 @@ public:
 
 private:
     friend class WideBvhBuilder;
-    friend struct WideBvhAccess;
+    friend struct WideBvhInternals;
     std::unique_ptr<Arrays> arrays_;
 };
 

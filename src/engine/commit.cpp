@@ -13,7 +13,7 @@
 namespace raydix {
 namespace {
 
-using Geometry = SceneAccess::State::Geometry;
+using Geometry = SceneInternals::State::Geometry;
 
 /// Parts whose error is larger stand in a tree of their own.
 constexpr double wild_error = 0x1p-12;
@@ -53,7 +53,7 @@ private:
 
 class Commit {
 public:
-    Commit(const SceneAccess::State& state, const SceneOptions& options, CommitReport& report,
+    Commit(const SceneInternals::State& state, const SceneOptions& options, CommitReport& report,
            std::size_t most_placed)
         : state_(state), options_(options), report_(report), most_placed_(most_placed) {
         tree_->quality = options.quality;
@@ -244,7 +244,7 @@ private:
             tree.placed.size() * sizeof(PlacedScene) + tree.ways.size() * sizeof(WayIn);
     }
 
-    const SceneAccess::State& state_;
+    const SceneInternals::State& state_;
     const SceneOptions& options_;
     CommitReport& report_;
     const std::size_t most_placed_;
@@ -255,7 +255,7 @@ private:
 
 }  // namespace
 
-std::shared_ptr<const SceneTree> make_scene_tree(const SceneAccess::State& state,
+std::shared_ptr<const SceneTree> make_scene_tree(const SceneInternals::State& state,
                                                  const SceneOptions& options, CommitReport& report,
                                                  std::size_t most_placed) {
     return run_commit(options, [&] { return Commit(state, options, report, most_placed).run(); });

@@ -11,9 +11,9 @@ inline constexpr std::size_t usually_placed = std::size_t{1} << 15;
 /// Trees of triangles that did not change since `state.tree` was made are kept. `state` stays as it
 /// is. Throws InputError as BasicScene::commit says, and what options.progress throws.
 [[nodiscard]] std::shared_ptr<const SceneTree> make_scene_tree(
-    const SceneAccess::State& state, const SceneOptions& options, CommitReport& report,
+    const SceneInternals::State& state, const SceneOptions& options, CommitReport& report,
     std::size_t most_placed = usually_placed);
-[[nodiscard]] std::shared_ptr<const SceneTreeD> make_scene_tree(const SceneAccessD::State& state,
+[[nodiscard]] std::shared_ptr<const SceneTreeD> make_scene_tree(const SceneInternalsD::State& state,
                                                                 const SceneOptions& options,
                                                                 CommitReport& report);
 

@@ -37,7 +37,7 @@ void unite_with(AabbD& box, const AabbD& other) {
 
 class CommitD {
 public:
-    CommitD(const SceneAccessD::State& state, const SceneOptions& options, CommitReport& report)
+    CommitD(const SceneInternalsD::State& state, const SceneOptions& options, CommitReport& report)
         : state_(state), options_(options), report_(report) {
         tree_->quality = options.quality;
         tree_->compact = options.compact;
@@ -172,7 +172,7 @@ private:
         tree.stack_size += wide_stack_capacity(tree.parts.arrays.stats.max_depth);
     }
 
-    const SceneAccessD::State& state_;
+    const SceneInternalsD::State& state_;
     const SceneOptions& options_;
     CommitReport& report_;
     std::shared_ptr<SceneTreeD> tree_ = std::make_shared<SceneTreeD>();
@@ -180,7 +180,7 @@ private:
 
 }  // namespace
 
-std::shared_ptr<const SceneTreeD> make_scene_tree(const SceneAccessD::State& state,
+std::shared_ptr<const SceneTreeD> make_scene_tree(const SceneInternalsD::State& state,
                                                   const SceneOptions& options,
                                                   CommitReport& report) {
     return run_commit(options, [&] { return CommitD(state, options, report).run(); });

@@ -154,7 +154,7 @@ private:
 template <class Scalar>
 FlatPlan<Scalar>::FlatPlan(const Scene& scene, std::uint32_t mask, const char* call,
                            FlatShapes shapes)
-    : tree_(BasicSceneAccess<Scalar>::tree(scene)), mask_(mask) {
+    : tree_(BasicSceneInternals<Scalar>::tree(scene)), mask_(mask) {
     if (count(*tree_).has_shapes && shapes == FlatShapes::refused) refuse_shapes(*tree_, 0, call);
 }
 

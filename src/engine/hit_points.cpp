@@ -167,7 +167,7 @@ void fill(const BasicScene<Scalar>& scene, std::span<const AnyHit> hits, std::sp
           int threads, const char* call, const Value& value) {
     using Tree = typename SceneKind<Scalar>::Tree;
     constexpr Scalar nan = std::numeric_limits<Scalar>::quiet_NaN();
-    const Tree& tree = *BasicSceneAccess<Scalar>::tree(scene);
+    const Tree& tree = *BasicSceneInternals<Scalar>::tree(scene);
     if (hits.size() != out.size())
         throw InputError(std::string(call) + ": " + std::to_string(hits.size()) +
                          " hits, but room for " + std::to_string(out.size()));
@@ -195,7 +195,7 @@ void fill_by_rays(const BasicScene<Scalar>& scene, std::span<const AnyRay> rays,
                   const Value& value, const ValueOfShape& value_of_shape) {
     using Tree = typename SceneKind<Scalar>::Tree;
     constexpr Scalar nan = std::numeric_limits<Scalar>::quiet_NaN();
-    const Tree& tree = *BasicSceneAccess<Scalar>::tree(scene);
+    const Tree& tree = *BasicSceneInternals<Scalar>::tree(scene);
     if (hits.size() != out.size() || hits.size() != rays.size())
         throw InputError(std::string(call) + ": " + std::to_string(rays.size()) + " rays, " +
                          std::to_string(hits.size()) + " hits and room for " +

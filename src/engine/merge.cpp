@@ -16,7 +16,7 @@
 namespace raydix {
 
 MergedMeshes merge_meshes(const Scene& scene, std::uint32_t mask) {
-    const SceneTree& tree = *SceneAccess::tree(scene);
+    const SceneTree& tree = *SceneInternals::tree(scene);
     if (!tree.instances.empty())
         throw BackendUnavailable("geometry " + std::to_string(tree.instances.front().id) +
                                  " is an instance; devices trace meshes alone (Model::flatten "

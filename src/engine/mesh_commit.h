@@ -28,7 +28,7 @@ namespace raydix {
 template <class Scalar, class Maker>
 class MeshCommit {
 public:
-    using State = typename BasicSceneAccess<Scalar>::State;
+    using State = typename BasicSceneInternals<Scalar>::State;
     using Geometry = typename State::Geometry;
     using Mesh = typename SceneTypes<Scalar>::Mesh;
     using MeshView = typename SceneTypes<Scalar>::MeshView;

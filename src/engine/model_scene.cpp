@@ -153,7 +153,7 @@ private:
 
     /// With their arrays and their tree, which the next commit keeps.
     static void take_meshes(const Scene& from, Scene& to) {
-        using Access = BasicSceneAccess<Scalar>;
+        using Access = BasicSceneInternals<Scalar>;
         const typename Access::State& source = *Access::shared_state(from);
         typename Access::State& state = Access::state(to);
         state.geometries = source.geometries;

@@ -24,7 +24,7 @@ std::uint32_t same_for_all(const SceneTreeD& tree, std::uint32_t mask) {
 std::shared_ptr<const NearBodyD> make_body(const SceneD& scene, std::uint32_t mask, NearCall call,
                                            ResultBudget* budget) {
     const FlatPlan<double> plan(scene, mask, name_of(call), FlatShapes::left_out);
-    const NearShapesPlan shapes(*SceneAccessD::tree(scene), mask, call);
+    const NearShapesPlan shapes(*SceneInternalsD::tree(scene), mask, call);
     const std::uint64_t peak = saturating_sum(plan.tree_bytes(), shapes.bytes());
     ResultBudget own(name_of(call), 0);
     ResultBudget& charged = budget == nullptr ? own : *budget;
@@ -41,7 +41,7 @@ std::shared_ptr<const NearBodyD> make_body(const SceneD& scene, std::uint32_t ma
 
 std::shared_ptr<const NearBodyD> near_body_of(const SceneD& scene, std::uint32_t mask,
                                               NearCall call, ResultBudget* budget) {
-    const SceneTreeD& tree = *SceneAccessD::tree(scene);
+    const SceneTreeD& tree = *SceneInternalsD::tree(scene);
     KeptBodies& kept = *tree.bodies;
     const std::uint32_t shown = same_for_all(tree, mask);
     const std::lock_guard lock(kept.asked);

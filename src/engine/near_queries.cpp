@@ -20,7 +20,7 @@ namespace {
 
 /// Throws InputError for geometry that has no answer.
 const SceneTree& tree_for(const Scene& scene, std::uint32_t mask, NearCall call) {
-    const SceneTree& tree = *SceneAccess::tree(scene);
+    const SceneTree& tree = *SceneInternals::tree(scene);
     for (const ShownShapes& shown : near_scene_of(tree).shapes)
         if (shown.seen_by(mask)) require_answers(*shown.shapes, call);
     return tree;

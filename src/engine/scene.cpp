@@ -176,15 +176,15 @@ bool BasicScene<Scalar>::State::holds(const State* other) const {
 }
 
 template <class Scalar>
-auto BasicSceneAccess<Scalar>::tree(const Scene& scene) -> const std::shared_ptr<const Tree>& {
+auto BasicSceneInternals<Scalar>::tree(const Scene& scene) -> const std::shared_ptr<const Tree>& {
     if (scene.state_->tree == nullptr) throw InputError("scene: it was never committed");
     return scene.state_->tree;
 }
 
 template <class Scalar>
-void BasicSceneAccess<Scalar>::place(std::uint32_t id,
-                                     const typename SceneTypes<Scalar>::Transform& transform,
-                                     typename State::Geometry& geometry) {
+void BasicSceneInternals<Scalar>::place(std::uint32_t id,
+                                        const typename SceneTypes<Scalar>::Transform& transform,
+                                        typename State::Geometry& geometry) {
     const auto back = way_back(transform);
     if (!back)
         throw InputError("instance " + std::to_string(id) +
@@ -253,7 +253,7 @@ std::uint32_t BasicScene<Scalar>::add(const BasicScene& scene, const Transform& 
         throw InputError("instance " + std::to_string(id) + ": the scene would hold itself");
     typename State::Geometry geometry;
     geometry.mask = options.mask;
-    BasicSceneAccess<Scalar>::place(id, transform, geometry);
+    BasicSceneInternals<Scalar>::place(id, transform, geometry);
     geometry.scene = scene.state_;
     return insert(*state_, id, std::move(geometry));
 }
@@ -297,7 +297,7 @@ void BasicScene<Scalar>::set_transform(std::uint32_t id, const Transform& transf
     auto& geometry = state_->at(id);
     if (!geometry.is_instance())
         throw InputError(name_of(id) + " is " + what_is(geometry) + ", not an instance");
-    BasicSceneAccess<Scalar>::place(id, transform, geometry);
+    BasicSceneInternals<Scalar>::place(id, transform, geometry);
     state_->changed = true;
 }
 
@@ -360,12 +360,12 @@ std::uint32_t BasicScene<Scalar>::mask(std::uint32_t id) const {
 
 template <class Scalar>
 typename SceneTypes<Scalar>::Box BasicScene<Scalar>::bounds() const {
-    return BasicSceneAccess<Scalar>::tree(*this)->bounds;
+    return BasicSceneInternals<Scalar>::tree(*this)->bounds;
 }
 
 template <class Scalar>
 std::vector<std::uint32_t> BasicScene<Scalar>::path(std::uint32_t number) const {
-    const auto* tree = BasicSceneAccess<Scalar>::tree(*this).get();
+    const auto* tree = BasicSceneInternals<Scalar>::tree(*this).get();
     std::vector<std::uint32_t> ids;
     for (std::uint32_t left = number; left != 0;) {
         if (left > tree->paths)
@@ -383,7 +383,7 @@ std::vector<std::uint32_t> BasicScene<Scalar>::path(std::uint32_t number) const 
 
 template class BasicScene<float>;
 template class BasicScene<double>;
-template struct BasicSceneAccess<float>;
-template struct BasicSceneAccess<double>;
+template struct BasicSceneInternals<float>;
+template struct BasicSceneInternals<double>;
 
 }  // namespace raydix

@@ -20,7 +20,7 @@
 namespace raydix {
 namespace {
 
-using State = SceneAccess::State;
+using State = SceneInternals::State;
 
 [[noreturn]] void fail(const std::string& section, const std::string& reason) {
     throw InputError(section + ": " + reason);
@@ -126,7 +126,7 @@ private:
             arrays->stats.widening = tree.widening;
             tree_of_.insert(tree_of_.end(), own.size(), trees_.size());
             trees_.push_back(
-                {std::make_shared<const WideBvh>(WideBvhAccess::tree_of(std::move(arrays))),
+                {std::make_shared<const WideBvh>(WideBvhInternals::tree_of(std::move(arrays))),
                  tree.sah_at_build, first});
             first += tree.meshes;
         }
@@ -189,7 +189,7 @@ private:
             used_.resize(in_.scenes.size());
             used_[stored.number] = true;
             try {
-                SceneAccess::place(stored.id, stored.transform, out);
+                SceneInternals::place(stored.id, stored.transform, out);
             } catch (const InputError& error) {
                 fail("geometries", name_of(scene) + ": " + error.what());
             }
@@ -304,7 +304,7 @@ private:
 Scene scene_of(const SceneArrays& arrays) {
     std::shared_ptr<State> state;
     with_threads(0, [&] { state = SceneReader(arrays).read(); });
-    return SceneAccess::scene_of(std::move(state));
+    return SceneInternals::scene_of(std::move(state));
 }
 
 }  // namespace raydix

@@ -73,7 +73,7 @@ struct BasicScene<Scalar>::State {
 };
 
 template <class Scalar>
-struct BasicSceneAccess {
+struct BasicSceneInternals {
     using Scene = BasicScene<Scalar>;
     using State = typename Scene::State;
     using Tree = typename SceneKind<Scalar>::Tree;
@@ -90,7 +90,7 @@ struct BasicSceneAccess {
     static void place(std::uint32_t id, const typename SceneTypes<Scalar>::Transform& transform,
                       typename State::Geometry& geometry);
 };
-using SceneAccess = BasicSceneAccess<float>;
-using SceneAccessD = BasicSceneAccess<double>;
+using SceneInternals = BasicSceneInternals<float>;
+using SceneInternalsD = BasicSceneInternals<double>;
 
 }  // namespace raydix

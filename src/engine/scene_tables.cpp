@@ -89,8 +89,8 @@ private:
 }  // namespace
 
 SceneTables tables_of(const Scene& scene) {
-    const SceneTree& tree = *SceneAccess::tree(scene);
-    const SceneAccess::State& state = *SceneAccess::shared_state(scene);
+    const SceneTree& tree = *SceneInternals::tree(scene);
+    const SceneInternals::State& state = *SceneInternals::shared_state(scene);
     if (state.changed) throw InputError("scenes: it has changes that no commit has taken in");
     SceneTables out;
     with_threads(0, [&] {

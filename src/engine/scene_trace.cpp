@@ -11,7 +11,7 @@
 #include "engine/scene_batch.h"
 #include "engine/scene_job.h"
 #include "engine/scene_state.h"
-#include "engine/trace_here.h"
+#include "engine/trace_on_this_thread.h"
 #include "exec/parallel.h"
 #include "exec/thread_own.h"
 #include "rays/place_order.h"
@@ -19,7 +19,7 @@
 #include "trace/batch.h"
 #include "trace/ray_frame.h"
 #include "trace/simd/path_race.h"
-#include "trace/simd/trace_here.h"
+#include "trace/simd/trace_on_this_thread.h"
 #include "trace/simd/wide_batch.h"
 
 namespace raydix {
@@ -186,7 +186,7 @@ const MeshTree* visible_mesh(const SceneTree& tree, const SceneTraceOptions& opt
 }
 
 TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
-    const SceneTree& tree = *SceneAccess::tree(scene);
+    const SceneTree& tree = *SceneInternals::tree(scene);
     const SceneTraceOptions& options = batch.options;
     check_enum("path", options.path, SimdPath::sorted);
     check_masks(batch.rays.size(), options);
@@ -247,10 +247,11 @@ TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
     return trace_batch(scene, {rays, nullptr, occluded.data(), options});
 }
 
-void closest_here(const SceneTree& scene, std::span<const Ray> rays, std::span<Hit> hits) {
+void closest_on_this_thread(const SceneTree& scene, std::span<const Ray> rays,
+                            std::span<Hit> hits) {
     check_sizes(rays.size(), hits.size());
     if (const MeshTree* const mesh = visible_mesh(scene)) {
-        closest_here(*mesh->tree, rays, hits);
+        closest_on_this_thread(*mesh->tree, rays, hits);
         for (Hit& hit : hits)
             if (hit.hit()) mesh->name(hit);
     } else {
@@ -258,17 +259,17 @@ void closest_here(const SceneTree& scene, std::span<const Ray> rays, std::span<H
     }
 }
 
-void occluded_here(const SceneTree& scene, std::span<const Ray> rays,
-                   std::span<std::uint8_t> occluded) {
+void occluded_on_this_thread(const SceneTree& scene, std::span<const Ray> rays,
+                             std::span<std::uint8_t> occluded) {
     check_sizes(rays.size(), occluded.size());
     if (const MeshTree* const mesh = visible_mesh(scene))
-        occluded_here(*mesh->tree, rays, occluded);
+        occluded_on_this_thread(*mesh->tree, rays, occluded);
     else
         trace_on_this_thread(scene, rays, nullptr, occluded.data());
 }
 
-void count_steps_here(const SceneTree& scene, std::span<const Ray> rays,
-                      std::span<std::uint32_t> visits) {
+void count_steps_on_this_thread(const SceneTree& scene, std::span<const Ray> rays,
+                                std::span<std::uint32_t> visits) {
     check_sizes(rays.size(), visits.size());
     const ThreadOwn<SceneJob> own;
     SceneJob& job = *own;
@@ -281,7 +282,7 @@ void count_steps_here(const SceneTree& scene, std::span<const Ray> rays,
 }
 
 AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTraceOptions& options) {
-    const SceneTree& tree = *SceneAccess::tree(scene);
+    const SceneTree& tree = *SceneInternals::tree(scene);
     check_masks(rays.size(), options);
     static_cast<void>(kernels_for(options.isa));
     if (const MeshTree* const mesh = visible_mesh(tree, options); mesh && !options.filter)
@@ -317,16 +318,16 @@ AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTrac
 }
 
 Hit closest_hit(const Scene& scene, const Ray& ray, const HitFilter& filter, std::uint32_t mask) {
-    return trace_parts(*SceneAccess::tree(scene), ray, mask, filter ? &filter : nullptr, false);
+    return trace_parts(*SceneInternals::tree(scene), ray, mask, filter ? &filter : nullptr, false);
 }
 
 bool any_hit(const Scene& scene, const Ray& ray, const HitFilter& filter, std::uint32_t mask) {
-    return trace_parts(*SceneAccess::tree(scene), ray, mask, filter ? &filter : nullptr, true)
+    return trace_parts(*SceneInternals::tree(scene), ray, mask, filter ? &filter : nullptr, true)
         .hit();
 }
 
 Hit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
-    const SceneTree& tree = *SceneAccess::tree(scene);
+    const SceneTree& tree = *SceneInternals::tree(scene);
     const MeshTree* const mesh = tree.only_mesh();
     if (mesh == nullptr) return trace_parts(tree, ray, mask, nullptr, false);
     if ((mesh->mask & mask) == 0) return {};
@@ -340,7 +341,7 @@ Hit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
 }
 
 bool any_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
-    const SceneTree& tree = *SceneAccess::tree(scene);
+    const SceneTree& tree = *SceneInternals::tree(scene);
     const MeshTree* const mesh = tree.only_mesh();
     if (mesh == nullptr) return trace_parts(tree, ray, mask, nullptr, true).hit();
     return (mesh->mask & mask) != 0 && any_hit(*mesh->tree, ray);

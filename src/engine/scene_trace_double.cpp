@@ -39,7 +39,7 @@ const HitFilterD* filter_of(const SceneTraceOptions& options) {
 
 const SceneTreeD& checked_tree(const SceneD& scene, std::size_t rays,
                                const SceneTraceOptions& options) {
-    const SceneTreeD& tree = *SceneAccessD::tree(scene);
+    const SceneTreeD& tree = *SceneInternalsD::tree(scene);
     check_enum("path", options.path, SimdPath::sorted);
     check_masks(rays, options);
     static_cast<void>(kernels_for(options.isa));
@@ -147,7 +147,7 @@ TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
 HitD trace_one(const SceneD& scene, const RayD& ray, std::uint32_t mask, const HitFilterD* filter,
                bool any) {
     static const SceneKernelsD& kernels = scene_kernels_double_for({});
-    const SceneTreeD& tree = *SceneAccessD::tree(scene);
+    const SceneTreeD& tree = *SceneInternalsD::tree(scene);
     const ThreadOwn<SceneJobD> own;
     StackMemory& stack = own->stack;
     stack.reserve_words(tree.stack_size);

@@ -17,7 +17,7 @@ namespace raydix {
 template <class Scalar>
 class ShapeCommit {
 public:
-    using State = typename BasicSceneAccess<Scalar>::State;
+    using State = typename BasicSceneInternals<Scalar>::State;
     using ShapeTree = typename SceneKind<Scalar>::ShapeTree;
 
     ShapeCommit(const State& state, const SceneOptions& options, CommitReport& report)

@@ -10,7 +10,7 @@
 
 #include "base/math.h"
 #include "layout/binary_view.h"
-#include "layout/divisions.h"
+#include "layout/subtree_shares.h"
 #include "layout/wide_collapse.h"
 
 namespace raydix {
@@ -148,7 +148,7 @@ private:
         Entry& entry = entries_[k];
         const Plan& a = plans_[entry.children];
         const Plan& b = plans_[entry.children + 1];
-        const Divisions<width> shared = divide(a, b);
+        const SubtreeShares<width> shared = divide(a, b);
         const auto left = [&](std::size_t i) { return shared.left[i - 1]; };
         Plan& plan = plans_[k];
         plan.choices = 0;
@@ -173,13 +173,13 @@ private:
     }
 
     /// Plans begin with their costs, and end with another word.
-    [[nodiscard]] Divisions<width> divide(const Plan& a, const Plan& b) const {
+    [[nodiscard]] SubtreeShares<width> divide(const Plan& a, const Plan& b) const {
 #if defined(RAYDIX_X86_INTRINSICS)
         static_assert(sizeof(Plan) == width * sizeof(float));
         if constexpr (width == 8)
-            if (with_avx2_) return cheapest_divisions_avx2(a.cost.data(), b.cost.data());
+            if (with_avx2_) return cheapest_shares_avx2(a.cost.data(), b.cost.data());
 #endif
-        return cheapest_divisions<width>(a.cost.data(), b.cost.data());
+        return cheapest_shares<width>(a.cost.data(), b.cost.data());
     }
 
     const View& view_;

@@ -122,7 +122,7 @@ struct WideBvh::Arrays {
     }
 };
 
-struct WideBvhAccess {
+struct WideBvhInternals {
     static WideBvh tree_of(std::unique_ptr<WideBvh::Arrays> arrays) {
         WideBvh tree;
         tree.arrays_ = std::move(arrays);

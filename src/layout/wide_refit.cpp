@@ -180,7 +180,7 @@ std::optional<WideBvh> refit_wide(const WideBvh& tree, const MeshView& mesh) {
     if (stats.compact || tree.empty() || stats.input_count != mesh.triangles.size()) return {};
     std::unique_ptr<WideBvh::Arrays> arrays = WideRefit(tree.arrays(), mesh).run();
     if (arrays == nullptr) return {};
-    return WideBvhAccess::tree_of(std::move(arrays));
+    return WideBvhInternals::tree_of(std::move(arrays));
 }
 
 }  // namespace raydix

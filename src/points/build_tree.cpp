@@ -12,7 +12,7 @@
 #include "exec/parallel.h"
 #include "keys/morton.h"
 #include "points/curve.h"
-#include "points/halve.h"
+#include "points/median_split.h"
 
 namespace raydix {
 namespace {
@@ -276,7 +276,7 @@ void fill_leaves(const T* points, const std::vector<BottomRange>& bottoms, bool 
     const Record* records = arrays.sort_scratch.records.data();
     for_each_range(bottoms.size(), 8, [&](std::size_t first, std::size_t last) {
         PointRun<T, Dim> run;
-        Halver<T, Dim> halver;
+        MedianSplitter<T, Dim> halver;
         for (std::size_t b = first; b < last; ++b) {
             const BottomRange bottom = bottoms[b];
             const std::uint32_t n = bottom.end - bottom.begin;

@@ -10,7 +10,7 @@
 #include <hwy/highway.h>
 
 #include "points/nearest.h"
-#include "points/within.h"
+#include "points/range_query.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "proximity/pair_search.h"
-#include "proximity/whole_tree.h"
+#include "proximity/unsplit_tree.h"
 #include "trace/double_tree.h"
 #include "tree/around_center.h"
 #include "tree/walk.h"
@@ -17,7 +17,7 @@ namespace {
 class PairSideD {
 public:
     PairSideD(const BvhD& given, const BvhD& where) {
-        if (has_parts(given)) whole_ = make_whole_tree(given);
+        if (has_parts(given)) whole_ = make_unsplit_tree(given);
         const BvhD& bvh = whole_ ? *whole_ : given;
         boxes_.reset(bvh.order().size());
         keys_.reset(bvh.order().size());
@@ -41,7 +41,7 @@ public:
         const std::size_t nodes = bvh.tree().nodes().size();
         const std::uint64_t own = bvh.order().size() * (sizeof(PairBox) + sizeof(CornerKeys)) +
                                   nodes * (sizeof(BvhNode) + sizeof(std::uint32_t));
-        return own + (has_parts(bvh) ? whole_tree_bytes(bvh) : 0);
+        return own + (has_parts(bvh) ? unsplit_tree_bytes(bvh) : 0);
     }
 
 private:

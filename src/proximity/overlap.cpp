@@ -10,7 +10,7 @@
 #include "proximity/query_batch.h"
 #include "proximity/row_blocks.h"
 #include "proximity/touch_walk.h"
-#include "proximity/whole_tree.h"
+#include "proximity/unsplit_tree.h"
 
 namespace raydix {
 namespace {

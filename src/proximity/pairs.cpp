@@ -6,7 +6,7 @@
 #include <string>
 
 #include "proximity/pair_search.h"
-#include "proximity/whole_tree.h"
+#include "proximity/unsplit_tree.h"
 
 namespace raydix {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 class PairSide {
 public:
     PairSide(const Bvh& given, const Bvh&) {
-        if (has_parts(given)) whole_ = make_whole_tree(given);
+        if (has_parts(given)) whole_ = make_unsplit_tree(given);
         const Bvh& bvh = whole_ ? *whole_ : given;
         boxes_.reset(bvh.order().size());
         for_each_index(boxes_.size(), [&](std::size_t k) {
@@ -36,7 +36,7 @@ public:
     static std::uint64_t bytes_for(const Bvh& bvh) {
         const std::uint64_t own =
             bvh.order().size() * sizeof(PairBox) + bvh.triangles().size() * sizeof(CornerKeys);
-        return own + (has_parts(bvh) ? whole_tree_bytes(bvh) : 0);
+        return own + (has_parts(bvh) ? unsplit_tree_bytes(bvh) : 0);
     }
 
 private:

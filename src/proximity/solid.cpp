@@ -14,7 +14,7 @@
 #include "proximity/crossings.h"
 #include "proximity/edge_closure.h"
 #include "proximity/query_batch.h"
-#include "proximity/whole_tree.h"
+#include "proximity/unsplit_tree.h"
 #include "proximity/winding_tree.h"
 
 namespace raydix {
@@ -68,7 +68,7 @@ struct SolidState {
     void prepare(const AnyBvh& given, InsideRule rule) {
         check_enum("rule", rule, InsideRule::winding);
         bvh = &given;
-        if (has_parts(given)) whole = make_whole_tree(given);
+        if (has_parts(given)) whole = make_unsplit_tree(given);
         inside.emplace(Tree(single()), single().triangles(), nodes_of(single()), rule);
     }
 };
@@ -78,7 +78,7 @@ struct SolidState {
 struct Solid::State : SolidState<TriangleTree, Bvh> {};
 struct SolidD::State : SolidState<TriangleTreeD, BvhD> {};
 
-struct SolidAccess {
+struct SolidInternals {
     template <class AnySolid>
     static const auto& state(const AnySolid& solid) {
         return *solid.state_;
@@ -126,7 +126,7 @@ Vec3d prepared(Vec3d query) { return without_tiny(query); }
 
 template <class AnySolid, class Vec>
 Winding test_one(const AnySolid& solid, Vec query) {
-    return InsideTest(SolidAccess::state(solid))(prepared(query));
+    return InsideTest(SolidInternals::state(solid))(prepared(query));
 }
 
 /// Calls one(i, winding) for each query and bad(i) for those that are not finite.
@@ -137,7 +137,7 @@ ClosestCounts for_each_query(const AnySolid& solid, std::span<const Vec> queries
     for_each_query_block(
         solid.bvh(), queries,
         [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
-            InsideTest test(SolidAccess::state(solid));
+            InsideTest test(SolidInternals::state(solid));
             for (std::size_t k = begin; k < end; ++k) {
                 const std::size_t i = at(k);
                 if (!is_finite(queries[i])) {

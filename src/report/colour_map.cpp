@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "report/tone.h"
+#include "report/srgb.h"
 
 namespace raydix {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "exec/parallel.h"
 #include "report/picture_codec.h"
-#include "report/tone.h"
+#include "report/srgb.h"
 
 namespace raydix {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "exec/arena.h"
 #include "tree/apetrei.h"
-#include "tree/counted_keys.h"
+#include "tree/device_key_count.h"
 #include "tree/fit.h"
 #include "tree/fit_levels.h"
 #include "tree/garanzha.h"

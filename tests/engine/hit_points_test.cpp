@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "api/shapes.h"
+#include "build/shapes.h"
 #include "engine/affine.h"
 #include "engine/long_double_maps.h"
 #include "support/random.h"

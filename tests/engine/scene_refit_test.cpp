@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "support/random.h"
+#include "support/sanitized.h"
 
 namespace raydix {
 namespace {
@@ -134,7 +135,7 @@ TEST(SceneRefit, MovedVerticesRefitATreeWhileItIsGood) {
     Mesh mesh = sheet(40, 0.02f, 0);
     const SceneOptions moving{.usage = Usage::moving};
     test::Random random(3);
-    const std::vector<Ray> rays = rays_about(random, 3000);
+    const std::vector<Ray> rays = rays_about(random, test::sanitized ? 1000 : 3000);
     for (const Quality quality : {Quality::fast, Quality::balanced}) {
         SceneOptions options = moving;
         options.quality = quality;

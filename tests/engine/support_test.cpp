@@ -25,7 +25,7 @@ Double3 random_direction(std::mt19937& random) {
         if (const Double3 d{sign(random), sign(random), sign(random)}; length(d) > 0.1) return d;
 }
 
-const SceneTree& tree_of(const Scene& scene) { return *SceneAccess::tree(scene); }
+const SceneTree& tree_of(const Scene& scene) { return *SceneInternals::tree(scene); }
 
 TEST(Support, ReachesAsFarAsTheMeshAndLittleFarther) {
     const Mesh mesh = load_model("builtin:figure?triangles=5000", 5).mesh();

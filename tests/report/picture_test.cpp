@@ -12,7 +12,7 @@
 #include <limits>
 #include <random>
 
-#include "report/tone.h"
+#include "report/srgb.h"
 #include "support/support.h"
 
 namespace raydix {

@@ -14,7 +14,7 @@ CLEAN = {
     "src/base/math.h": "#include <raydix/types.h>\n",
     "src/exec/parallel.cpp": '#include <tbb/parallel_for.h>\n#include "base/math.h"\n',
     "src/tree/fit.h": '#include <raydix/bvh.h>\n#include "base/math.h"\n',
-    "src/api/build.cpp": '#include "tree/fit.h"\n',
+    "src/build/build.cpp": '#include "tree/fit.h"\n',
     "cli/main.cpp": "#include <raydix/bvh.h>\n",
 }
 FAULTS = {

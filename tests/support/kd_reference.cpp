@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/math.h"
-#include "tree/kdtree_access.h"
+#include "tree/kdtree_internals.h"
 
 namespace raydix::test {
 namespace {
@@ -169,7 +169,7 @@ KdTree reference_kdtree(const MeshView& mesh, const KdTreeOptions& options) {
     std::vector<Item> items = items_of(mesh);
     const bool points = mesh.triangles.empty();
     KdTree tree;
-    const KdTreeAccess access{tree};
+    const KdTreeInternals access{tree};
     access.kind() = points ? PrimitiveKind::points : PrimitiveKind::triangles;
     access.options() = options;
     access.input_count() = points ? mesh.vertices.size() : mesh.triangles.size();

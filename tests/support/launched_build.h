@@ -1,4 +1,4 @@
-// The build of a GPU (api/device_build.h) on the host, by any launcher, as a Bvh that can be
+// The build of a GPU (gpu/device_build.h) on the host, by any launcher, as a Bvh that can be
 // compared.
 #pragma once
 
@@ -11,9 +11,9 @@
 #include <memory>
 #include <vector>
 
-#include "api/device_build.h"
+#include "gpu/device_build.h"
 #include "support/shuffled_launcher.h"
-#include "tree/bvh_access.h"
+#include "tree/bvh_internals.h"
 
 namespace raydix::test {
 
@@ -112,7 +112,7 @@ private:
         std::copy_n(from.begin(), size, out.data());
     }
     void make_bvh(PrimitiveKind kind, const BuildOptions& options) {
-        const BvhAccess access{bvh};
+        const BvhInternals access{bvh};
         access.kind() = kind;
         access.options() = options;
         access.input_count() = counts.input_count;

@@ -1,4 +1,4 @@
-// The k-d tree and the octree of a GPU (api/device_core.h) on the host, by any launcher, as trees
+// The k-d tree and the octree of a GPU (gpu/device_trees.h) on the host, by any launcher, as trees
 // that can be compared.
 #pragma once
 
@@ -8,8 +8,8 @@
 #include <cstring>
 #include <vector>
 
-#include "api/device_assemble.h"
-#include "api/device_core.h"
+#include "gpu/device_assemble.h"
+#include "gpu/device_trees.h"
 #include "support/launched_build.h"
 
 namespace raydix::test {

@@ -1,4 +1,4 @@
-// The queries of a GPU (api/device_queries.h) on the host, by any launcher, into memory that begins
+// The queries of a GPU (gpu/device_queries.h) on the host, by any launcher, into memory that begins
 // as garbage and has a guard behind it.
 #pragma once
 
@@ -9,7 +9,7 @@
 #include <cstring>
 #include <vector>
 
-#include "api/device_queries.h"
+#include "gpu/device_queries.h"
 
 namespace raydix::test {
 

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "api/rdx_format.h"
-#include "api/rdx_scene_format.h"
+#include "io/rdx_format.h"
+#include "io/rdx_scene_format.h"
 
 namespace raydix::test {
 

@@ -9,7 +9,7 @@
 
 #include "base/math.h"
 #include "support/reference_tree.h"
-#include "tree/bvh_access.h"
+#include "tree/bvh_internals.h"
 
 namespace raydix::test {
 namespace {
@@ -86,7 +86,7 @@ struct Forest {
         return next;
     }
 
-    void emit(std::size_t cluster, std::size_t slot, std::uint32_t depth, const BvhAccess& out,
+    void emit(std::size_t cluster, std::size_t slot, std::uint32_t depth, const BvhInternals& out,
               std::vector<BvhNode>& nodes, std::vector<std::uint32_t>& order) {
         const Cluster& c = all[cluster];
         out.max_depth() = std::max(out.max_depth(), depth);
@@ -130,7 +130,7 @@ template <class Clustering>
 Bvh reference(std::span<const Aabb> boxes, const BuildOptions& options, const Clustering& cluster) {
     const std::vector<Item> items = items_in_order(boxes, options.bits);
     Bvh bvh;
-    const BvhAccess out{bvh};
+    const BvhInternals out{bvh};
     out.kind() = PrimitiveKind::boxes;
     out.options() = options;
     out.input_count() = boxes.size();

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/math.h"
-#include "tree/bvh_access.h"
+#include "tree/bvh_internals.h"
 
 namespace raydix::test {
 namespace {
@@ -92,7 +92,7 @@ Bvh build(const std::vector<Aabb>& boxes, PrimitiveKind kind, const BuildOptions
         builder.build(0, 0, items.size(), 0);
     }
     Bvh bvh;
-    const BvhAccess access{bvh};
+    const BvhInternals access{bvh};
     access.nodes().reset(builder.nodes.size());
     std::ranges::copy(builder.nodes, access.nodes().data());
     access.order().reset(items.size());
@@ -137,7 +137,7 @@ Bvh reference_tree(const MeshView& mesh, const BuildOptions& options) {
         boxes.push_back(fit ? box_of(v[0], v[1], v[2]) : empty_box());
     }
     Bvh bvh = build(boxes, PrimitiveKind::triangles, options);
-    auto& corners = BvhAccess{bvh}.triangles();
+    auto& corners = BvhInternals{bvh}.triangles();
     corners.reset(bvh.order().size());
     for (std::size_t i = 0; i < bvh.order().size(); ++i) {
         const Triangle& t = mesh.triangles[bvh.order()[i]];
@@ -150,9 +150,9 @@ Bvh reference_tree(std::span<const Aabb> input, const BuildOptions& options) {
     std::vector<Aabb> boxes;
     for (const Aabb& box : input) boxes.push_back(clean(box));
     Bvh bvh = build(boxes, PrimitiveKind::boxes, options);
-    BvhAccess{bvh}.boxes().reset(bvh.order().size());
+    BvhInternals{bvh}.boxes().reset(bvh.order().size());
     for (std::size_t i = 0; i < bvh.order().size(); ++i)
-        BvhAccess{bvh}.boxes()[i] = boxes[bvh.order()[i]];
+        BvhInternals{bvh}.boxes()[i] = boxes[bvh.order()[i]];
     return bvh;
 }
 
@@ -160,9 +160,9 @@ Bvh reference_tree(std::span<const Vec3> input, const BuildOptions& options) {
     std::vector<Aabb> boxes;
     for (const Vec3& p : input) boxes.push_back(clean({p, p}));
     Bvh bvh = build(boxes, PrimitiveKind::points, options);
-    BvhAccess{bvh}.points().reset(bvh.order().size());
+    BvhInternals{bvh}.points().reset(bvh.order().size());
     for (std::size_t i = 0; i < bvh.order().size(); ++i)
-        BvhAccess{bvh}.points()[i] = boxes[bvh.order()[i]].lo;
+        BvhInternals{bvh}.points()[i] = boxes[bvh.order()[i]].lo;
     return bvh;
 }
 

@@ -16,7 +16,7 @@
 #include "support/scenes.h"
 #include "support/support.h"
 #include "trace/cwbvh_walk.h"
-#include "tree/bvh_access.h"
+#include "tree/bvh_internals.h"
 
 namespace raydix::test {
 namespace {
@@ -154,8 +154,8 @@ TEST(CwbvhTrace, DuplicatedReferences) {
     doubled.triangles.insert(doubled.triangles.end(), scene.mesh().triangles.begin(),
                              scene.mesh().triangles.end());
     Bvh bvh = build_bvh(doubled);
-    for (std::uint32_t& prim : BvhAccess{bvh}.order().span()) prim %= n;
-    BvhAccess{bvh}.input_count() = n;
+    for (std::uint32_t& prim : BvhInternals{bvh}.order().span()) prim %= n;
+    BvhInternals{bvh}.input_count() = n;
     const Cwbvh tree(bvh);
     EXPECT_EQ(tree.stats().references, 2 * n);
     EXPECT_EQ(tree.stats().triangles, n);

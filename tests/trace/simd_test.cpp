@@ -17,7 +17,7 @@
 #include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
-#include "tree/bvh_access.h"
+#include "tree/bvh_internals.h"
 
 namespace raydix::test {
 namespace {
@@ -302,8 +302,8 @@ TEST(Simd, DuplicatedReferences) {
     doubled.triangles.insert(doubled.triangles.end(), scene.mesh().triangles.begin(),
                              scene.mesh().triangles.end());
     Bvh bvh = build_bvh(doubled);
-    for (std::uint32_t& prim : BvhAccess{bvh}.order().span()) prim %= n;
-    BvhAccess{bvh}.input_count() = n;
+    for (std::uint32_t& prim : BvhInternals{bvh}.order().span()) prim %= n;
+    BvhInternals{bvh}.input_count() = n;
     const WideBvh tree(bvh);
     EXPECT_EQ(tree.stats().references, 2 * n);
     const auto rays = make_mixed_rays(scene, 20'000, seed);

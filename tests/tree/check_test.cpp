@@ -8,7 +8,7 @@
 
 #include "support/reference_tree.h"
 #include "support/support.h"
-#include "tree/bvh_access.h"
+#include "tree/bvh_internals.h"
 
 namespace raydix::test {
 namespace {
@@ -20,24 +20,24 @@ Mesh sound_mesh() { return random_soup(triangle_count, 21); }
 struct Planted {
     const char* fault;
     const char* named;  // must occur in the report
-    std::function<void(const BvhAccess&)> plant;
+    std::function<void(const BvhInternals&)> plant;
 };
 
 /// The lowest slot from 2 on that fits.
 template <class Fits>
-std::size_t find_node(const BvhAccess& tree, const Fits& fits) {
+std::size_t find_node(const BvhInternals& tree, const Fits& fits) {
     for (std::size_t i = 2; i < tree.nodes().size(); ++i)
         if (fits(tree.nodes()[i])) return i;
     ADD_FAILURE() << "no such node";
     return 0;
 }
-std::size_t some_leaf(const BvhAccess& tree) {
+std::size_t some_leaf(const BvhInternals& tree) {
     return find_node(tree, [](const BvhNode& n) { return n.is_leaf(); });
 }
-std::size_t large_leaf(const BvhAccess& tree) {
+std::size_t large_leaf(const BvhInternals& tree) {
     return find_node(tree, [](const BvhNode& n) { return n.count > 1; });
 }
-std::size_t some_inner(const BvhAccess& tree) {
+std::size_t some_inner(const BvhInternals& tree) {
     return find_node(tree, [](const BvhNode& n) { return !n.is_leaf(); });
 }
 float next(float x) { return std::nextafter(x, infinity); }
@@ -131,7 +131,7 @@ TEST(Check, EachPlantedFaultIsNamed) {
         for (const Planted& planted : group) {
             Bvh bvh = build_bvh(mesh);
             ASSERT_EQ(check(bvh).broken, "");
-            planted.plant(BvhAccess{bvh});
+            planted.plant(BvhInternals{bvh});
             const CheckReport report = check(bvh);
             EXPECT_FALSE(report.ok) << planted.fault;
             EXPECT_NE(report.broken.find(planted.named), std::string::npos)
@@ -144,7 +144,7 @@ TEST(Check, OrderOfEqualCodes) {
     const std::vector<Vec3> points(6, Vec3{1, 1, 1});
     Bvh bvh = build_bvh(points, {.max_leaf = 2});
     ASSERT_TRUE(check(bvh).ok);
-    std::swap(BvhAccess{bvh}.order()[0], BvhAccess{bvh}.order()[1]);
+    std::swap(BvhInternals{bvh}.order()[0], BvhInternals{bvh}.order()[1]);
     EXPECT_NE(check(bvh).broken.find("do not ascend"), std::string::npos) << check(bvh).broken;
 }
 
@@ -153,7 +153,7 @@ TEST(Check, SplitAtTheWrongPlace) {
     const std::vector<Vec3> points{{0, 0, 0}, {1, 0, 0}, {6, 0, 0}, {7, 0, 0}};
     Bvh bvh = build_bvh(points, {.max_leaf = 3});
     ASSERT_TRUE(check(bvh).ok);
-    auto& nodes = BvhAccess{bvh}.nodes();
+    auto& nodes = BvhInternals{bvh}.nodes();
     ASSERT_EQ(nodes.size(), 4u);
     nodes[2] = {points[0], 0, points[0], 1};
     nodes[3] = {points[1], 1, points[3], 3};
@@ -207,7 +207,7 @@ TEST(Check, PointsAndBoxes) {
     const std::vector<Aabb> boxes{{{0, 0, 0}, {1, 1, 1}}, {{3, 0, 0}, {4, 1, 1}}};
     Bvh of_boxes = build_bvh(boxes);
     EXPECT_EQ(check(of_boxes, Mesh{}).broken, "");
-    BvhAccess{of_boxes}.boxes()[0].hi.x = -1;
+    BvhInternals{of_boxes}.boxes()[0].hi.x = -1;
     EXPECT_NE(check(of_boxes).broken.find("belongs in no tree"), std::string::npos);
 }
 
@@ -217,7 +217,7 @@ TEST(Check, FewReferencesToManyPrimitives) {
     Bvh bvh = build_bvh(boxes);
     ASSERT_EQ(bvh.order().size(), 2u);
     EXPECT_EQ(check(bvh).broken, "");
-    BvhAccess{bvh}.order()[1] = 7;
+    BvhInternals{bvh}.order()[1] = 7;
     EXPECT_NE(check(bvh).broken.find("primitive 7 stands in more than one place"),
               std::string::npos);
 }
@@ -225,7 +225,7 @@ TEST(Check, FewReferencesToManyPrimitives) {
 TEST(Check, EmptyTree) {
     Bvh bvh = build_bvh(Mesh{});
     EXPECT_EQ(check(bvh, Mesh{}).broken, "");
-    BvhAccess{bvh}.max_depth() = 1;
+    BvhInternals{bvh}.max_depth() = 1;
     EXPECT_NE(check(bvh).broken.find("empty tree"), std::string::npos);
 }
 
@@ -234,7 +234,7 @@ TEST(Check, RandomWordsAreSurvivedAndFound) {
     std::mt19937_64 random(99);
     for (std::size_t round = 0; round < 500 * thorough; ++round) {
         Bvh bvh = build_bvh(mesh, {.max_leaf = round % 2 == 0 ? 1 : 4, .threads = 1});
-        const BvhAccess tree{bvh};
+        const BvhInternals tree{bvh};
         const std::string before = tree_hash(bvh);
         for (std::uint64_t k = 0; k <= random() % 4; ++k) {
             auto* words = reinterpret_cast<unsigned char*>(tree.nodes().data());
@@ -261,9 +261,9 @@ TEST(CheckSame, NamesTheFirstDifference) {
     EXPECT_EQ(check_same(bvh, build_bvh(random_soup(100, 1))).broken,
               "primitives given: 200 / 100");
 
-    const auto broken_by = [&](const std::function<void(const BvhAccess&)>& change) {
+    const auto broken_by = [&](const std::function<void(const BvhInternals&)>& change) {
         Bvh other = build_bvh(mesh);
-        change(BvhAccess{other});
+        change(BvhInternals{other});
         return check_same(bvh, other).broken;
     };
     EXPECT_EQ(broken_by([](auto& t) { t.nodes()[0].lo.x -= 1; }), "nodes 0 / 0: boxes differ");

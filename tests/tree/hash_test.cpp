@@ -9,7 +9,7 @@
 #include <cstring>
 
 #include "support/support.h"
-#include "tree/bvh_access.h"
+#include "tree/bvh_internals.h"
 
 namespace raydix::test {
 namespace {
@@ -66,7 +66,7 @@ TEST(TreeHash, EveryPartCounts) {
     EXPECT_NE(tree_hash(build_bvh(mesh, {.max_leaf = 5})), original);
 
     Bvh bvh = build_bvh(mesh);
-    const BvhAccess access{bvh};
+    const BvhInternals access{bvh};
     std::swap(access.order()[3], access.order()[4]);
     EXPECT_NE(tree_hash(bvh), original) << "order";
     std::swap(access.order()[3], access.order()[4]);
@@ -78,7 +78,7 @@ TEST(TreeHash, EveryPartCounts) {
 TEST(TreeHash, NodeNumbersDoNotCount) {
     Bvh bvh = build_bvh(random_soup(100, 6));
     const std::string original = tree_hash(bvh);
-    auto& nodes = BvhAccess{bvh}.nodes();
+    auto& nodes = BvhInternals{bvh}.nodes();
     for (int k = 0; k < 2; ++k) std::swap(nodes[4 + k], nodes[8 + k]);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         if (i == 1 || nodes[i].is_leaf()) continue;

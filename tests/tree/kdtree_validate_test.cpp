@@ -8,36 +8,36 @@
 
 #include "support/point_sets.h"
 #include "support/support.h"
-#include "tree/kdtree_access.h"
+#include "tree/kdtree_internals.h"
 
 namespace raydix::test {
 namespace {
 
 /// What kd_check says of a good tree after `damage`.
-std::string broken_after(const std::function<void(const KdTreeAccess&)>& damage,
+std::string broken_after(const std::function<void(const KdTreeInternals&)>& damage,
                          const MeshView* mesh = nullptr) {
     const Mesh soup = random_soup(400, 2);
     KdTree tree = build_kdtree(soup, {.max_leaf = 4});
     EXPECT_EQ(kd_check(tree, soup).broken, "");
-    damage(KdTreeAccess{tree});
+    damage(KdTreeInternals{tree});
     const CheckReport report = mesh ? kd_check(tree, *mesh) : kd_check(tree);
     EXPECT_EQ(report.ok, report.broken.empty());
     return report.broken;
 }
 
 /// The first slot from 2 on that is a leaf, or is not.
-std::uint32_t find_slot(const KdTreeAccess& tree, bool leaf) {
+std::uint32_t find_slot(const KdTreeInternals& tree, bool leaf) {
     std::uint32_t slot = 2;
     while (tree.nodes()[slot].is_leaf() != leaf) ++slot;
     return slot;
 }
 
-void expect_names(const char* text, const std::function<void(const KdTreeAccess&)>& damage) {
+void expect_names(const char* text, const std::function<void(const KdTreeInternals&)>& damage) {
     const std::string said = broken_after(damage);
     EXPECT_NE(said.find(text), std::string::npos) << '"' << said << "\" does not say " << text;
 }
 
-using Access = const KdTreeAccess&;
+using Access = const KdTreeInternals&;
 
 TEST(KdCheck, Counts) {
     expect_names("31 code bits", [](Access t) { t.options().bits = 31; });
@@ -133,7 +133,7 @@ TEST(KdCheck, HashSeesEveryPart) {
     for (const auto& damage : damages) {
         KdTree tree = build_kdtree(soup);
         ASSERT_EQ(kd_hash(tree), hash);
-        damage(KdTreeAccess{tree});
+        damage(KdTreeInternals{tree});
         EXPECT_NE(kd_hash(tree), hash) << &damage - damages;
     }
     EXPECT_EQ(kd_hash(build_kdtree(Mesh{})).size(), 32u);

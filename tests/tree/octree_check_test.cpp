@@ -7,7 +7,7 @@
 
 #include "support/octree_inputs.h"
 #include "support/support.h"
-#include "tree/octree_access.h"
+#include "tree/octree_internals.h"
 
 namespace raydix::test {
 namespace {
@@ -37,17 +37,17 @@ TEST(OctreeCheck, BuiltTreesKeepEveryInvariant) {
 
 struct PlantedFault {
     const char* part;  // what the report begins with
-    std::function<void(OctreeAccess)> plant;
+    std::function<void(OctreeInternals)> plant;
 };
 
-std::uint32_t first_leaf(OctreeAccess t) {
+std::uint32_t first_leaf(OctreeInternals t) {
     std::uint32_t i = 0;
     while (!t.nodes()[i].is_leaf()) ++i;
     return i;
 }
 
 std::vector<PlantedFault> faults() {
-    using Access = OctreeAccess;
+    using Access = OctreeInternals;
     return {
         {"info:", [](Access t) { t.options().bits = 31; }},
         {"info:", [](Access t) { t.options().max_level = 22; }},
@@ -96,7 +96,7 @@ TEST(OctreeCheck, NamesEveryPlantedFault) {
         Octree octree = sample();
         ASSERT_EQ(check(octree).broken, "");
         ASSERT_GT(octree.level_count(), 3u);
-        fault.plant(OctreeAccess{octree});
+        fault.plant(OctreeInternals{octree});
         const CheckReport report = check(octree);
         EXPECT_FALSE(report.ok) << "fault " << number;
         EXPECT_EQ(report.broken.rfind(fault.part, 0), 0u)

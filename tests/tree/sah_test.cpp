@@ -15,7 +15,7 @@
 #include "base/math.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"
-#include "tree/bvh_access.h"
+#include "tree/bvh_internals.h"
 #include "tree/cluster_cases.h"
 #include "tree/sah_reference.h"
 #include "tree/validate_cover.h"
@@ -369,12 +369,12 @@ TEST(SplitTrees, CheckFindsWhatIsWrong) {
     const Model scene = sticks(500);
     const auto broken = [&](const auto& damage) {
         Bvh tree = build_bvh(scene.mesh(), options_of(Builder::sbvh));
-        damage(BvhAccess{tree});
+        damage(BvhInternals{tree});
         return check(tree).broken;
     };
-    EXPECT_EQ(broken([](const BvhAccess&) {}), "");
+    EXPECT_EQ(broken([](const BvhInternals&) {}), "");
     // One triangle's place goes to another one.
-    EXPECT_NE(broken([](const BvhAccess& tree) {
+    EXPECT_NE(broken([](const BvhInternals& tree) {
                   std::map<std::uint32_t, int> uses;
                   for (const std::uint32_t id : tree.order().view()) ++uses[id];
                   for (std::uint32_t& id : tree.order().span())
@@ -382,9 +382,10 @@ TEST(SplitTrees, CheckFindsWhatIsWrong) {
               }),
               "");
     // A builder that may not cut primitives.
-    EXPECT_NE(broken([](const BvhAccess& tree) { tree.options().builder = Builder::sweep; }), "");
+    EXPECT_NE(broken([](const BvhInternals& tree) { tree.options().builder = Builder::sweep; }),
+              "");
     // More primitives than there are references.
-    EXPECT_NE(broken([](const BvhAccess& tree) { tree.input_count() = 1'000'000; }), "");
+    EXPECT_NE(broken([](const BvhInternals& tree) { tree.input_count() = 1'000'000; }), "");
 }
 
 TEST(BoxesCover, FindsGapsOfOneFloat) {

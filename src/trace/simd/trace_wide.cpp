@@ -17,7 +17,7 @@
 #include "trace/batch.h"
 #include "trace/simd/path_race.h"
 #include "trace/simd/simd_kernels.h"
-#include "trace/simd/trace_here.h"
+#include "trace/simd/trace_on_this_thread.h"
 #include "trace/simd/wide_batch.h"
 
 namespace raydix {
@@ -245,7 +245,7 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
     return miss_all(rays);
 }
 
-void closest_here(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit> hits) {
+void closest_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit> hits) {
     check_sizes(rays.size(), hits.size());
     if (tree.empty()) {
         std::ranges::fill(hits, Hit{});
@@ -255,8 +255,8 @@ void closest_here(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit>
     std::ranges::for_each(hits, place_in_tree);
 }
 
-void occluded_here(const WideBvh& tree, std::span<const Ray> rays,
-                   std::span<std::uint8_t> occluded) {
+void occluded_on_this_thread(const WideBvh& tree, std::span<const Ray> rays,
+                             std::span<std::uint8_t> occluded) {
     check_sizes(rays.size(), occluded.size());
     if (tree.empty())
         std::ranges::fill(occluded, std::uint8_t{0});

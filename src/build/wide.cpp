@@ -1,0 +1,132 @@
+// The public wide tree: binary tree -> wide tree -> nodes and blocks of triangles, and its figures.
+#include <raydix/error.h>
+#include <raydix/wide.h>
+
+#include <string>
+
+#include "base/float_env.h"
+#include "base/options.h"
+#include "build/bvh_builder_internals.h"
+#include "exec/parallel.h"
+#include "exec/progress.h"
+#include "layout/cluster_view.h"
+#include "layout/wide_bvh.h"
+#include "layout/wide_collapse.h"
+#include "measure/stopwatch.h"
+#include "tree/cluster.h"
+
+namespace raydix {
+namespace {
+
+WideOptions collapse_options(const WideBvhOptions& options) {
+    const WideOptions collapse{.width = options.width,
+                               .max_leaf = wide_max_leaf,
+                               .node_cost = 1.0,
+                               .primitive_cost = wide_primitive_cost,
+                               .block = wide_block,
+                               .compact = options.compact};
+    check_wide_options(collapse);
+    check_threads(options.threads);
+    return collapse;
+}
+
+}  // namespace
+
+WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
+    : arrays_(std::make_unique<Arrays>()) {
+    const WideOptions collapse = collapse_options(options);
+    arrays_->clear(collapse);
+    arrays_->stats.input_count = bvh.input_count();
+    arrays_->stats.left_out = bvh.left_out();
+    if (bvh.empty()) return;
+    if (bvh.kind() != PrimitiveKind::triangles)
+        throw InputError(std::string("rays need triangles; this tree holds ") +
+                         (bvh.kind() == PrimitiveKind::points ? "points" : "boxes"));
+    const FloatEnvironment environment;
+    with_threads(options.threads, [&] {
+        Stopwatch watch;
+        WideScratch scratch;
+        make_wide_layout(bvh, collapse, *arrays_, scratch);
+        arrays_->stats.ms = arrays_->stats.layout_ms = watch.lap();
+    });
+}
+
+WideBvh::WideBvh() : arrays_(std::make_unique<Arrays>()) { arrays_->clear({}); }
+WideBvh::~WideBvh() = default;
+WideBvh::WideBvh(WideBvh&&) noexcept = default;
+WideBvh& WideBvh::operator=(WideBvh&&) noexcept = default;
+
+struct WideBvhBuilder::Scratch {
+    BvhBuilder builder;
+    Bvh tree;
+    WideScratch wide;
+};
+
+WideBvhBuilder::WideBvhBuilder() : scratch_(std::make_unique<Scratch>()) {}
+WideBvhBuilder::~WideBvhBuilder() = default;
+WideBvhBuilder::WideBvhBuilder(WideBvhBuilder&&) noexcept = default;
+WideBvhBuilder& WideBvhBuilder::operator=(WideBvhBuilder&&) noexcept = default;
+
+void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, WideBvh& tree,
+                           const WideBvhOptions& wide) {
+    const FloatEnvironment environment;
+    Stopwatch watch;
+    const WideOptions collapse = collapse_options(wide);
+    if (mesh.triangles.empty() && !mesh.vertices.empty())
+        throw InputError("rays need triangles; this mesh has vertices alone");
+    WideBvh::Arrays& arrays = *tree.arrays_;
+    Bvh& bvh = scratch_->tree;
+    double layout_ms = 0;
+    const auto lay_out = [&](const auto& make) {
+        Stopwatch stage;
+        make();
+        layout_ms = stage.lap();
+    };
+    try {
+        arrays.clear(collapse);
+        if (grows_clusters(options.builder) &&
+            options.max_leaf <= static_cast<int>(wide_max_leaf)) {
+            BvhBuilderInternals::build_clusters(
+                scratch_->builder, mesh, options, bvh,
+                [&](const ClusterTree& clusters, const TriangleSource& source,
+                    const std::uint8_t* flat) {
+                    ClusterView view(clusters, source, flat);
+                    lay_out([&] { make_wide_layout(view, collapse, arrays, scratch_->wide); });
+                });
+        } else {
+            {
+                const ProgressStage binary(0, 0.75);
+                scratch_->builder.build(mesh, options, bvh);
+            }
+            const ProgressStage rest(0.75, 1);
+            progress_at(0);
+            if (!bvh.empty())
+                with_threads(options.threads, [&] {
+                    lay_out([&] { make_wide_layout(bvh, collapse, arrays, scratch_->wide); });
+                });
+        }
+    } catch (...) {
+        arrays.clear(collapse);  // nothing half-built gets out
+        throw;
+    }
+    arrays.stats.input_count = bvh.input_count();
+    arrays.stats.left_out = bvh.left_out();
+    arrays.stats.layout_ms = layout_ms;
+    arrays.stats.ms = watch.lap();
+}
+
+WideBvh build_wide_bvh(const MeshView& mesh, const BuildOptions& options,
+                       const WideBvhOptions& wide) {
+    WideBvh tree;
+    WideBvhBuilder().build(mesh, options, tree, wide);
+    return tree;
+}
+
+WideBvh build_wide_bvh(const Mesh& mesh, const BuildOptions& options, const WideBvhOptions& wide) {
+    return build_wide_bvh(MeshView(mesh), options, wide);
+}
+
+bool WideBvh::empty() const { return arrays_->blocks.empty() && arrays_->compact_blocks.empty(); }
+const WideBvhStats& WideBvh::stats() const { return arrays_->stats; }
+
+}  // namespace raydix

@@ -1,0 +1,77 @@
+// What a hit says about the surface there, and the checks that come before rays start from it.
+#include "image/surface_points.h"
+
+#include <raydix/error.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/math.h"
+#include "engine/hit_points.h"
+#include "engine/scene_state.h"
+#include "exec/search.h"
+
+namespace raydix {
+
+Aabb BvhSurface::bounds() const { return bvh_.empty() ? empty_box() : bvh_.bounds(); }
+
+Double3 BvhSurface::normal(const Hit& hit) const {
+    const LeafTriangle& t = lookup_.triangle(hit.prim);
+    return normal_of(t.v0, t.v1, t.v2);
+}
+
+void BvhSurface::check(std::span<const Hit> hits) const {
+    const std::size_t bad = first_index_where(hits.size(), [&](std::size_t i) {
+        return hits[i].hit() && !lookup_.contains(hits[i].prim);
+    });
+    if (bad < hits.size())
+        throw InputError("hit " + std::to_string(bad) + ": the tree holds no triangle " +
+                         std::to_string(hits[bad].prim));
+}
+
+SceneSurface::SceneSurface(const Scene& scene) : tree_(SceneInternals::tree(scene)) {}
+
+Aabb SceneSurface::bounds() const { return tree_->bounds; }
+
+Double3 SceneSurface::normal(const Hit& hit) const {
+    HitTriangle triangle;
+    return find_triangle(*tree_, hit, triangle) ? triangle.normal() : Double3();
+}
+
+void SceneSurface::check(std::span<const Hit> hits) const { check_hits(*tree_, hits); }
+
+void require_triangles(const Bvh& bvh, std::string_view call) {
+    if (bvh.empty() || bvh.kind() == PrimitiveKind::triangles) return;
+    throw InputError(std::string(call) + " needs a tree over triangles; this one holds " +
+                     (bvh.kind() == PrimitiveKind::boxes ? "boxes" : "points"));
+}
+
+float ao_radius_or_default(const Aabb& box, float given) {
+    if (!(given >= 0.0f))
+        throw InputError("ao_radius is " + std::to_string(given) + "; it must not be negative");
+    return given > 0.0f ? given : static_cast<float>(ao_radius_part * diagonal_of(box));
+}
+
+double step_back_distance(const Aabb& box) {
+    double largest = 0.0;
+    for (const Vec3& p : {box.lo, box.hi})
+        for (const float x : {p.x, p.y, p.z}) largest = std::max(largest, std::abs(double(x)));
+    return std::max(step_back_part * diagonal_of(box), 8.0 * 0x1p-23 * largest);
+}
+
+std::vector<std::uint32_t> positions_of_hits(std::span<const Hit> hits) {
+    std::vector<std::uint32_t> positions;
+    positions.reserve(hits.size());
+    for (std::size_t i = 0; i < hits.size(); ++i)
+        if (hits[i].hit()) positions.push_back(static_cast<std::uint32_t>(i));
+    return positions;
+}
+
+SurfacePoint surface_point(const Surface& surface, const Ray& ray, const Hit& hit,
+                           std::uint32_t pixel, double step_back) {
+    return {point_before(ray, hit.t, step_back), normal_toward(surface.normal(hit), ray.direction),
+            pixel, 0};
+}
+
+}  // namespace raydix

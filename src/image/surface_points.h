@@ -1,0 +1,79 @@
+// Hits -> the points that secondary rays start from. What render and make_secondary_rays share.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/scene.h>
+#include <raydix/types.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "base/double3.h"
+#include "engine/scene_tree.h"
+#include "image/primitive_lookup.h"
+#include "rays/hemisphere_rays.h"
+
+namespace raydix {
+
+/// What was hit, as far as rays that start from its hits need to know.
+class Surface {
+public:
+    virtual ~Surface() = default;
+    /// Around all of it; lo > hi if there is nothing.
+    [[nodiscard]] virtual Aabb bounds() const = 0;
+    /// Geometric, in the world, of any length and on either side; 0 if there is none.
+    [[nodiscard]] virtual Double3 normal(const Hit& hit) const = 0;
+    /// Throws InputError that names the first hit that is not on this surface.
+    virtual void check(std::span<const Hit> hits) const = 0;
+
+    [[nodiscard]] bool empty() const { return !(bounds().lo.x <= bounds().hi.x); }
+};
+
+/// The tree must outlive it.
+class BvhSurface final : public Surface {
+public:
+    explicit BvhSurface(const Bvh& bvh) : bvh_(bvh), lookup_(bvh) {}
+    [[nodiscard]] Aabb bounds() const override;
+    [[nodiscard]] Double3 normal(const Hit& hit) const override;
+    void check(std::span<const Hit> hits) const override;
+
+private:
+    const Bvh& bvh_;
+    PrimitiveLookup lookup_;
+};
+
+/// As the last commit left the scene. Throws InputError if there was none.
+class SceneSurface final : public Surface {
+public:
+    explicit SceneSurface(const Scene& scene);
+    [[nodiscard]] Aabb bounds() const override;
+    [[nodiscard]] Double3 normal(const Hit& hit) const override;
+    void check(std::span<const Hit> hits) const override;
+
+private:
+    std::shared_ptr<const SceneTree> tree_;
+};
+
+/// Throws InputError "CALL needs a tree over triangles; this one holds ..." unless the tree is
+/// empty or has them.
+void require_triangles(const Bvh& bvh, std::string_view call);
+
+/// `given`, or 5 % of the diagonal of `box` if it is 0. Throws InputError if it is negative or NaN.
+[[nodiscard]] float ao_radius_or_default(const Aabb& box, float given);
+
+/// How far secondary rays of pictures start before their surface: the protocol's distance, but
+/// never less than what float32 can tell apart at the coordinates of `box` (the protocol's rays do
+/// without: they must stay comparable).
+[[nodiscard]] double step_back_distance(const Aabb& box);
+
+/// Positions of the rays that hit something, ascending.
+[[nodiscard]] std::vector<std::uint32_t> positions_of_hits(std::span<const Hit> hits);
+
+/// Origin `step_back` before the hit, geometric normal turned toward the ray.
+[[nodiscard]] SurfacePoint surface_point(const Surface& surface, const Ray& ray, const Hit& hit,
+                                         std::uint32_t pixel, double step_back);
+
+}  // namespace raydix

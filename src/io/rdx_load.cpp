@@ -1,0 +1,46 @@
+// .rdx file -> scene and a tree, or a Scene, that view the mapped file.
+#include <raydix/rdx.h>
+
+#include <system_error>
+
+#include "exec/mapped_file.h"
+#include "io/rdx_parse.h"
+#include "io/rdx_sections.h"
+#include "measure/stopwatch.h"
+#include "scene/input_error.h"
+
+namespace raydix {
+namespace {
+
+MappedFile mapped(const std::filesystem::path& file) {
+    try {
+        return map_file(file);
+    } catch (const std::system_error& error) {
+        input_error(printable(file), "file", error.what());
+    }
+}
+
+}  // namespace
+
+RdxFile load_rdx(const std::filesystem::path& file) {
+    Stopwatch watch;
+    const MappedFile whole = mapped(file);
+    RdxFile result = rdx::parse(printable(file), whole.bytes, whole.owner);
+    result.scene.load_ms = watch.lap();
+    return result;
+}
+
+RdxScene load_rdx_scene(const std::filesystem::path& file) {
+    Stopwatch watch;
+    const MappedFile whole = mapped(file);
+    RdxScene result = rdx::parse_scene(printable(file), whole.bytes, whole.owner);
+    result.load_ms = watch.lap();
+    return result;
+}
+
+bool holds_scene(const std::filesystem::path& file) {
+    const MappedFile whole = mapped(file);
+    return rdx::version_of(printable(file), whole.bytes) == rdx::scene_version;
+}
+
+}  // namespace raydix

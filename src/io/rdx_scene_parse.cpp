@@ -1,0 +1,65 @@
+// The bytes of an .rdx file of version 2 -> a scene. Lengths and checksums are found right first
+// (rdx_sections.h), all the rest by scene_of.
+#include <raydix/error.h>
+
+#include <algorithm>
+
+#include "io/rdx_faults.h"
+#include "io/rdx_names.h"
+#include "io/rdx_parse.h"
+#include "io/rdx_scene_format.h"
+
+namespace raydix::rdx {
+
+RdxScene parse_scene(const std::string& file, std::span<const std::byte> bytes,
+                     const std::shared_ptr<void>& owner) {
+    if (!supported) throw BackendUnavailable(std::string(unsupported_text));
+    const Sections sections(file, bytes, owner, scene_version, scene_kinds);
+    const auto stored = sections.only<SceneInfo>(scene_info);
+    if (stored.reserved != 0) sections.fail("info", "the reserved bytes are not zero");
+    RdxScene out;
+    out.cameras.width = stored.picture_width;
+    out.cameras.height = stored.picture_height;
+    out.cameras.ao_radius = stored.ao_radius;
+    NameReader reader(sections, scene_names);
+    out.name = reader.next(stored.name_bytes);
+    out.cameras.cameras = reader.cameras(sections.view<Camera>(scene_cameras));
+    reader.finish();
+    if (const Fault fault = camera_fault(out.cameras)) throw InputError(file + ": " + *fault);
+    const SceneArrays arrays{
+        .scenes = sections.view<StoredScene>(scene_scenes),
+        .geometries = sections.view<StoredGeometry>(scene_geometries),
+        .trees = sections.view<StoredTree>(scene_trees),
+        .meshes = sections.view<StoredMesh>(scene_meshes),
+        .next_id = stored.next_id,
+        .taken = sections.view<std::uint32_t>(scene_taken),
+        .nodes = sections.view<WideNode>(scene_nodes),
+        .blocks = sections.view<TriangleBlock>(scene_blocks),
+        .compact_nodes = sections.view<CompactNode>(scene_compact_nodes),
+        .compact_blocks = sections.view<CompactBlock>(scene_compact_blocks),
+        .corners = sections.view<Vec3>(scene_corners),
+        .vertices = sections.view<Vec3>(scene_vertices),
+        .triangles = sections.view<Triangle>(scene_triangles),
+        .owner = owner,
+    };
+    try {
+        out.scene = scene_of(arrays);
+    } catch (const InputError& error) {
+        throw InputError(file + ": " + error.what());
+    }
+    const StoredScene& whole = arrays.scenes.back();
+    out.options.quality = static_cast<Quality>(whole.quality);
+    out.options.usage = static_cast<Usage>(whole.usage);
+    out.options.compact = whole.compact != 0;
+    out.counts = {.scenes = arrays.scenes.size(),
+                  .instances = static_cast<std::uint64_t>(
+                      std::ranges::count(arrays.geometries, 1u, &StoredGeometry::is_instance)),
+                  .meshes = arrays.meshes.size(),
+                  .vertices = arrays.vertices.size(),
+                  .triangles = arrays.triangles.size(),
+                  .nodes = arrays.nodes.size() + arrays.compact_nodes.size(),
+                  .bytes = bytes.size()};
+    return out;
+}
+
+}  // namespace raydix::rdx
