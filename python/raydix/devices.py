@@ -126,5 +126,5 @@ class CudaRays:
             return _like(self._core.occluded_there(flat, stream), rays, lead)
         packed, lead = _packed(rays, directions, tmin, tmax)
         flags = np.empty(lead, np.bool_)
-        self._core.occluded_on_this_thread(packed, flags.reshape(-1))
+        self._core.occluded_here(packed, flags.reshape(-1))
         return flags

@@ -131,7 +131,7 @@ void intersect_here(const DeviceScene& self, const RaysIn& rays, const HitsOut& 
     });
 }
 
-void occluded_on_this_thread(const DeviceScene& self, const RaysIn& rays, const FlagsOut& out) {
+void occluded_here(const DeviceScene& self, const RaysIn& rays, const FlagsOut& out) {
     const auto given = rows<Ray>(rays);
     const std::span results(reinterpret_cast<std::uint8_t*>(out.data()), out.shape(0));
     if (results.size() != given.size())
@@ -154,7 +154,7 @@ void bind_device(nb::module_& module) {
         .def("occluded_there", &occluded_there, nb::arg("rays").noconvert(), nb::arg("stream"))
         .def("intersect_here", &intersect_here, nb::arg("rays").noconvert(),
              nb::arg("hits").noconvert())
-        .def("occluded_on_this_thread", &occluded_on_this_thread, nb::arg("rays").noconvert(),
+        .def("occluded_here", &occluded_here, nb::arg("rays").noconvert(),
              nb::arg("flags").noconvert());
 }
 
