@@ -272,8 +272,10 @@ TEST(DoubleNear, WorldsAnswerAsTheirTrianglesDo) {
             const auto world = random.world(recipe);
             for (const std::uint32_t mask : {every_mask, 2u, 5u}) {
                 const FlatWorldD flat = flat_of(*world, mask);
-                const std::vector<Vec3d> queries =
-                    queries_of(random, flat, world->home, recipe.shapes || sanitized ? 30 : 150);
+                const std::vector<Vec3d> queries = queries_of(random, flat, world->home,
+                                                              recipe.shapes ? 30
+                                                              : sanitized   ? 50
+                                                                            : 150);
                 EXPECT_EQ(wrong_points(*world, flat, mask, queries), 0u);
                 std::vector<SphereD> spheres;
                 std::vector<SegmentD> segments;
