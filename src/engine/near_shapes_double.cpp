@@ -71,6 +71,8 @@ AabbD ShapesOnPath::box_of(std::uint32_t prim) const {
             maps.empty() ? Double3{radius, radius, radius} : BallImage(all_maps, radius).reach();
         double lengths = std::max({largest(a), largest(b), largest(reach)});
         for (const AffineD& map : maps) lengths = std::max(lengths, largest(map.move));
+        // What moving the shape loses grows with the condition of the maps; 2^-42 is far more than
+        // the roundings of distances to the shape and to the box.
         const double room = (0x1p-44 * condition + 0x1p-42) * lengths + double{min_diagonal};
         const auto side = [&](double x, double y, double by, double& lo, double& hi) {
             constexpr double edge = max_coordinate;

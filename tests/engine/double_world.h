@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "engine/affine_double.h"
+#include "engine/box_hits.h"
 #include "proximity/shape_hits.h"
 #include "support/double_scenes.h"
 #include "trace/ray_frame.h"
@@ -67,30 +68,6 @@ struct RecipeD {
     bool shapes = false;  // among the meshes
     bool users = true;    // a user's own among the shapes
 };
-
-/// Where a ray enters or leaves a box: a user's own test. u: the axis of the side.
-inline bool hits_box(const AabbD& box, const RayD& ray, HitD& hit) {
-    constexpr double none = std::numeric_limits<double>::infinity();
-    double enter = -none, leave = none;
-    int side = 0;
-    const auto cut = [&](int axis, double lo, double hi, double o, double d) {
-        if (d == 0.0) {
-            if (o < lo || o > hi) leave = -none;
-            return;
-        }
-        const double one = (lo - o) / d, other = (hi - o) / d;
-        if (std::min(one, other) > enter) enter = std::min(one, other), side = axis;
-        leave = std::min(leave, std::max(one, other));
-    };
-    cut(0, box.lo.x, box.hi.x, ray.origin.x, ray.direction.x);
-    cut(1, box.lo.y, box.hi.y, ray.origin.y, ray.direction.y);
-    cut(2, box.lo.z, box.hi.z, ray.origin.z, ray.direction.z);
-    if (!(enter <= leave)) return false;
-    hit.t = enter;
-    if (!(hit.t >= ray.tmin)) hit.t = leave;
-    hit.u = side, hit.v = 0;
-    return hit.t >= ray.tmin && hit.t <= ray.tmax;
-}
 
 class RandomWorlds : public RandomD {
 public:

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "engine/affine.h"
+#include "engine/box_hits.h"
 #include "proximity/shape_hits.h"
 #include "support/random.h"
 #include "support/support.h"
@@ -166,30 +167,6 @@ inline void add_flats(RandomScenes& random, Mesh& mesh) {
             mesh.triangles.push_back({end - 3, end - 1, end - 2});
         }
     }
-}
-
-/// Where a ray enters or leaves a box: a user's own test. u: the axis of the side.
-inline bool hits_box(const Aabb& box, const Ray& ray, Hit& hit) {
-    constexpr double none = std::numeric_limits<double>::infinity();
-    double enter = -none, leave = none;
-    int side = 0;
-    const auto cut = [&](int axis, double lo, double hi, double o, double d) {
-        if (d == 0.0) {
-            if (o < lo || o > hi) leave = -none;
-            return;
-        }
-        const double one = (lo - o) / d, other = (hi - o) / d;
-        if (std::min(one, other) > enter) enter = std::min(one, other), side = axis;
-        leave = std::min(leave, std::max(one, other));
-    };
-    cut(0, box.lo.x, box.hi.x, ray.origin.x, ray.direction.x);
-    cut(1, box.lo.y, box.hi.y, ray.origin.y, ray.direction.y);
-    cut(2, box.lo.z, box.hi.z, ray.origin.z, ray.direction.z);
-    if (!(enter <= leave)) return false;
-    hit.t = static_cast<float>(enter);
-    if (!(hit.t >= ray.tmin)) hit.t = static_cast<float>(leave);
-    hit.u = static_cast<float>(side), hit.v = 0;
-    return hit.t >= ray.tmin && hit.t <= ray.tmax;
 }
 
 /// Spheres, capsules, points or boxes of a user's own; some twice. Keeps what it is made of.

@@ -140,19 +140,19 @@ TYPED_TEST(ShapeEdges, FewAndEqualBoxes) {
         }
 }
 
-/// A hit needs a finite t: rays that begin at infinity, and in double shapes so far away for the
-/// length of the direction that t is beyond all numbers.
+/// A hit needs a finite t: rays that begin at infinity, and shapes so far away for the length of
+/// the direction that t is beyond all numbers.
 TYPED_TEST(ShapeEdges, AHitIsAtAFinitePlace) {
     using At = Of<TypeParam>;
     constexpr TypeParam inf = At::inf;
     std::vector<typename At::Ray> some{{{0, 0, 0}, inf, {0, 0, 1}, inf},
                                        {{0, 0, 10}, inf, {0, 0, 1}, inf},
                                        {{0, 0, 0}, inf, {1, 0, 0}, inf}};
-    if constexpr (sizeof(TypeParam) == 8) {
-        some.push_back({{0, 0, 0}, 0, {0, 0, 1e-308}, inf});
-        some.push_back({{0, 0, 0}, 0, {0, 0, 5e-324}, inf});
-        some.push_back({{0, 0, 0}, 1e300, {0, 0, 1e-308}, inf});
-    }
+    using Limits = std::numeric_limits<TypeParam>;
+    const TypeParam little = Limits::min() / 2;
+    some.push_back({{0, 0, 0}, 0, {0, 0, little}, inf});
+    some.push_back({{0, 0, 0}, 0, {0, 0, Limits::denorm_min()}, inf});
+    some.push_back({{0, 0, 0}, Limits::max() / 1024, {0, 0, little}, inf});
     const auto rays = At::often(some);
     const auto expect_none = [&](const typename At::Scene& scene) {
         for (const auto& hit : trace(scene, rays)) EXPECT_FALSE(hit.hit());
