@@ -69,6 +69,7 @@ struct SceneOptions {
     Quality quality = Quality::balanced;
     Usage usage = Usage::fixed;
     bool compact = false;  // the small layout (WideBvhOptions::compact); no effect in double
+    bool strict = false;   // a triangle or shape that would be left out is an InputError
     int threads = 0;       // 0 to 1,024; 0: all the machine has. Hits do not depend on it
     /// Usage::moving only. How many times its SAH at the build a tree may cost and still be kept:
     /// its boxes are then fitted again around the moved vertices. A tree that costs more is built
@@ -97,7 +98,8 @@ struct CommitReport {
     std::uint64_t meshes = 0, instances = 0;  // in the scene itself; meshes that have triangles
     std::uint64_t triangles = 0;              // of its meshes, those that are left out included
     std::uint64_t shapes = 0;                 // its geometries that are neither mesh nor instance
-    std::uint64_t primitives = 0;             // of those shapes
+    std::uint64_t primitives = 0;             // of those shapes, left out ones included
+    std::uint64_t left_out = 0;               // triangles and shapes: not finite, out of range
     std::uint64_t trees_built = 0;            // trees of triangles and shapes that were built
     std::uint64_t trees_refitted = 0;  // those whose boxes were fitted again; others were kept
     double sah_ratio = 1;  // the largest SAH after a refit / at the build. Above refit_limit: that
@@ -115,7 +117,9 @@ struct CommitReport {
 /// meet what their own last commit saw.
 ///
 /// Triangles and shapes that are not finite or out of range are left out (docs/contract.md 1): rays
-/// never meet them, and the others keep their numbers.
+/// never meet them, and the others keep their numbers. A commit counts them in its report, or
+/// refuses them if its options are strict. Those in scenes that instances place are not asked
+/// again.
 ///
 /// Scalar is the type of all coordinates, float or double. A scene holds instances of scenes of its
 /// own type alone. A copy is not possible; a scene that was moved from may only be assigned to or

@@ -311,8 +311,8 @@ class SceneContents:
         Returns
         -------
         dict: "ms"; "meshes", "instances" and "triangles" of the scene itself; "shapes", its
-        geometries of spheres, capsules and points, and "primitives", how many those are; "trees_built",
-        "trees_refitted"; "sah_ratio", the largest SAH after a refit over that at the build;
+        geometries of spheres, capsules and points, and "primitives", how many those are; "left_out",
+        triangles and shapes that are not finite or out of range; "trees_built", "trees_refitted"; "sah_ratio", the largest SAH after a refit over that at the build;
         "parts_refitted", whether the tree over meshes and instances was refitted; "bytes" that
         rays read of the scene itself; "paths", instances counted on every way to them.
 

@@ -78,6 +78,7 @@ nb::dict commit_figures(const CommitReport& report) {
     fields["triangles"] = report.triangles;
     fields["shapes"] = report.shapes;
     fields["primitives"] = report.primitives;
+    fields["left_out"] = report.left_out;
     fields["trees_built"] = report.trees_built;
     fields["trees_refitted"] = report.trees_refitted;
     fields["sah_ratio"] = report.sah_ratio;

@@ -28,6 +28,7 @@ struct WideMaker {
         out.sah_at_build = built.stats().sah;
         finish(std::move(built), out);
     }
+    static std::uint64_t left_out(const MeshTree& made) { return made.tree->stats().left_out; }
     static void keep(const MeshTree& old, MeshTree& out) {
         out.tree = old.tree;
         out.view = old.view;

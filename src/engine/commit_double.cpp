@@ -22,6 +22,9 @@ struct WideMakerD {
         out.tree = build_wide_tree(mesh, build);
         out.sah_at_build = out.tree->arrays.stats.sah;
     }
+    static std::uint64_t left_out(const MeshTreeD& made) {
+        return made.tree->arrays.stats.left_out;
+    }
     static void keep(const MeshTreeD& old, MeshTreeD& out) { out.tree = old.tree; }
     static std::optional<double> refit(const MeshTreeD& old, const MeshViewD& mesh,
                                        const SceneOptions&, MeshTreeD& out) {

@@ -18,7 +18,8 @@ struct GroupedMeshes {
     std::uint32_t shift = 0;
     std::uint32_t mask = 0;  // of all of them
     std::uint64_t triangles = 0;
-    double sah_at_build = 0;  // of the tree that this one was refitted from, or of itself
+    std::uint64_t left_out = 0;  // of them: not finite, or out of range
+    double sah_at_build = 0;     // of the tree that this one was refitted from, or of itself
 
     /// When `first` and `triangles` are known: about two buckets a mesh.
     void make_buckets() {

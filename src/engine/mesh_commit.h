@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/left_out.h"
 #include "engine/merge.h"
 #include "engine/scene_state.h"
 #include "exec/parallel.h"
@@ -23,6 +24,7 @@ namespace raydix {
 
 /// Maker says how trees of triangles come about, MeshTree and MeshView being those of the type:
 ///   build(mesh, options, out)         a new one: tree and sah_at_build, 0 if it is not known
+///   left_out(out)                     how many of its triangles are invalid
 ///   keep(old, out)                    the same tree
 ///   refit(old, mesh, options, out)    the old one around moved vertices, and its SAH; or none
 template <class Scalar, class Maker>
@@ -60,6 +62,8 @@ public:
         for (const auto& tree : trees) {
             report_.meshes += tree->ids.size();
             report_.triangles += tree->triangles;
+            report_.left_out += tree->left_out;
+            if (options_.strict && tree->left_out != 0) refuse(*tree);
         }
         return trees;
     }
@@ -137,8 +141,18 @@ private:
             }
             ++report_.trees_built;
         }
+        out->left_out = Maker::left_out(*out);
         out->make_buckets();
         return out;
+    }
+
+    void refuse(const MeshTree& tree) const {
+        using Box = typename SceneTypes<Scalar>::Box;
+        for (const std::uint32_t id : tree.ids) {
+            const MeshView& mesh = mesh_of(id);
+            refuse_left_out<Box>(id, "triangle", source_of(mesh), mesh.triangles.size(),
+                                 tree.left_out);
+        }
     }
 
     /// The last tree around one mesh whose vertices moved, if it is still good enough.

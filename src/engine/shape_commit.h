@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "engine/left_out.h"
 #include "engine/scene_state.h"
 #include "engine/shape_tree.h"
 #include "exec/progress.h"
@@ -48,6 +51,9 @@ public:
             ++report_.shapes;
             report_.primitives += count;
             report_.bytes += shapes->bytes();
+            const std::uint64_t left_out = count - shapes->part.size();
+            report_.left_out += left_out;
+            if (options_.strict && left_out != 0) refuse(id, *geometry.shapes, left_out);
         }
         return all > 0 ? done / all : 0;
     }
@@ -70,6 +76,14 @@ private:
         } catch (const InputError& error) {
             throw InputError("geometry " + std::to_string(id) + ": " + error.what());
         }
+    }
+    static void refuse(std::uint32_t id, const BasicShapes<Scalar>& shapes,
+                       std::uint64_t left_out) {
+        using Box = typename SceneTypes<Scalar>::Box;
+        const std::vector<Box> boxes = boxes_of<Scalar>(shapes);
+        constexpr const char* kinds[] = {"sphere", "capsule", "point", "primitive"};
+        refuse_left_out<Box>(id, kinds[shapes.index()], source_of(std::span<const Box>(boxes)),
+                             boxes.size(), left_out);
     }
     [[nodiscard]] std::shared_ptr<const ShapeTree> last_of(std::uint32_t id) const {
         if (state_.tree == nullptr) return nullptr;

@@ -79,7 +79,6 @@ public:
         auto made = std::make_shared<WideTreeD>();
         WideTreeD& out = *made;
         if (!place(out)) return {};
-        out.arrays.stats = from_.arrays.stats;
         out.arrays.nodes.reset(from_.arrays.nodes.size());
         out.blocks.reset(from_.blocks.size());
         prefer_large_pages(out.arrays.nodes);
@@ -99,14 +98,20 @@ private:
         const std::size_t n = mesh_.triangles.size();
         out.input_count = n;
         AabbD bounds{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
+        std::uint64_t left_out = 0;
         for (std::uint32_t i = 0; i < n; ++i) {
             AabbD box;
             if (!source_.readable(i)) return false;
-            if (!source_.box(i, box)) continue;
+            if (!source_.box(i, box)) {
+                ++left_out;
+                continue;
+            }
             bounds = {min_of(bounds.lo, box.lo), max_of(bounds.hi, box.hi)};
         }
         if (!(bounds.lo.x <= bounds.hi.x)) return false;
         out.bounds = bounds;
+        out.arrays.stats = from_.arrays.stats;
+        out.arrays.stats.left_out = left_out;
         const Vec3d center = median_center(
             n,
             [&](std::size_t i, AabbD& box) {
@@ -246,6 +251,7 @@ std::shared_ptr<const WideTreeD> build_wide_tree(const MeshViewD& mesh,
     WideTreeD& out = *made;
     const BvhD bvh = build_bvh(mesh, options);
     out.input_count = bvh.input_count();
+    out.arrays.stats.left_out = bvh.left_out();
     if (bvh.empty()) return made;
     out.bounds = bvh.bounds();
     out.space = {bvh.center(), bvh.scale()};
@@ -274,6 +280,7 @@ std::shared_ptr<const WideTreeD> build_wide_tree(const MeshViewD& mesh,
         },
         1024);
     out.arrays.blocks = {};
+    out.arrays.stats.left_out = bvh.left_out();
     out.set_view();
     out.suits_packets = is_compact_place(mesh, out);
     return made;

@@ -256,8 +256,9 @@ def test_commits_tell_what_they_did(rng, precision):
     ids = [scene.add(vertices + np.float32([4 * i, 0, 0]), faces) for i in range(3)]
     report = scene.commit()
     assert set(report) == {"ms", "meshes", "instances", "triangles", "trees_built", "trees_refitted",
-                           "sah_ratio", "parts_refitted", "bytes", "paths", "shapes", "primitives"}  # fmt: skip
+                           "sah_ratio", "parts_refitted", "bytes", "paths", "shapes", "primitives", "left_out"}  # fmt: skip
     assert report["meshes"] == report["trees_built"] == 3 and report["triangles"] == 1500
+    assert report["left_out"] == 0
     scene.update(ids[1], vertices * np.float32(1.01))
     report = scene.commit()  # still moving
     assert report["trees_refitted"] == 1 and report["trees_built"] == 0
