@@ -1,5 +1,4 @@
-// An array that either owns its memory or views a mapped file. Move-only; elements are plain data
-// and start uninitialised, because builders write every one of them.
+// An array that owns its memory or views a mapped file.
 #pragma once
 
 #include <cstddef>
@@ -11,9 +10,11 @@
 
 namespace raydix {
 
-/// 64-byte aligned, uninitialised, counted by the library. Throws std::bad_alloc.
+/// Memory that is aligned to 64 bytes, uninitialised, and counted in peak_bytes. Null for 0 bytes.
+/// Throws std::bad_alloc.
 [[nodiscard]] std::shared_ptr<void> allocate_bytes(std::size_t bytes);
 
+/// Move-only. Elements are plain data and start uninitialised.
 template <class T>
 class Buffer {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -21,8 +22,8 @@ class Buffer {
 public:
     Buffer() = default;
     explicit Buffer(std::size_t size) { reset(size); }
-    /// Views `size` elements at `data`, kept alive by `owner`. `reset` never reuses them: they may
-    /// be read-only.
+    /// Views `size` elements at `data`, which `owner` keeps alive. They may be read-only: `reset`
+    /// takes memory of its own in their place.
     Buffer(std::shared_ptr<void> owner, T* data, std::size_t size)
         : owner_(std::move(owner)), data_(data), size_(size) {}
     Buffer(Buffer&& other) noexcept { swap(other); }
@@ -32,8 +33,8 @@ public:
         return *this;
     }
 
-    /// Makes room for `size` elements; the old ones are lost. Keeps the memory if it is large
-    /// enough.
+    /// Makes room for `size` elements. The old ones are lost. Keeps the memory if it is large
+    /// enough. Throws std::bad_alloc.
     void reset(std::size_t size) {
         if (size > capacity_) {
             *this = Buffer();  // give the old memory back first: it is not needed beside the new

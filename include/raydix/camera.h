@@ -9,7 +9,8 @@
 
 namespace raydix {
 
-/// A pinhole camera. right = cross(target - position, up); `vfov` is the vertical angle in degrees.
+/// A pinhole camera. Right is cross(target - position, up). `vfov` is the vertical angle in
+/// degrees, between 0 and 180.
 struct Camera {
     std::string name;
     Vec3 position{0, 0, 1};
@@ -18,18 +19,21 @@ struct Camera {
     float vfov = 45.0f;
 };
 
-/// What a cameras.json holds.
+/// What a cameras.json file holds (docs/scenes.md).
 struct CameraSet {
-    std::uint32_t width = 1024, height = 768;
-    float ao_radius = 0.0f;  // 0: not given, use 5 % of the box diagonal
+    std::uint32_t width = 1024, height = 768;  // pixels
+    float ao_radius = 0.0f;  // 0: not given, which means 5 % of the diagonal of the scene's box
     std::vector<Camera> cameras;
 };
 
-/// Reads an object {width, height, ao_radius?, cameras: [...]} or a bare list of cameras.
-/// Throws InputError that names the file, the camera and the field.
+/// Reads an object {width?, height?, ao_radius?, cameras: [...]} or a bare list of cameras. Throws
+/// InputError that names the file and what is at fault: the camera and its field, or the setting.
 [[nodiscard]] CameraSet load_cameras(const std::filesystem::path& file);
 
-/// One camera that sees all of `bounds`, for scenes that bring none.
+/// Makes a camera that sees all of `bounds` in any picture at least as wide as it is high. It looks
+/// toward -z, from a little to the right and above; y is up. Bounds that are empty or not finite
+/// give the place and target of a default Camera. Throws InputError if vfov is not between 0 and
+/// 180.
 [[nodiscard]] Camera fit_camera(const Aabb& bounds, float vfov = 45.0f);
 
 }  // namespace raydix

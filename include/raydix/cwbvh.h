@@ -1,5 +1,6 @@
-// The compressed wide BVH (Ylitie, Karras, Laine 2017): eight children a node of 80 bytes, made
-// from any binary tree of triangles. raydix/device_cwbvh.h traces it on a GPU.
+// The compressed wide BVH (Ylitie, Karras, Laine 2017, sections 3.1 and 3.2): nodes of 80 bytes
+// with up to eight children, made from any binary tree of triangles. raydix/device_cwbvh.h traces
+// it on a GPU.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -9,6 +10,7 @@
 
 namespace raydix {
 
+/// Figures of a compressed wide tree.
 struct CwbvhStats {
     std::uint64_t nodes = 0;           // of 80 bytes
     std::uint64_t inner_children = 0;  // children that are nodes: nodes - 1
@@ -17,8 +19,8 @@ struct CwbvhStats {
     std::uint64_t triangles = 0;  // different ones; less than references if a builder splits them
     std::uint32_t max_depth = 0;  // edges from the root to the deepest leaf child
     double children_per_node = 0;
-    double sah = 0;  // cost of the wide tree, 1 a node and 1 a triangle, by the boxes before they
-                     // are quantised; 0 if the root has no area
+    double sah = 0;       // 1 a node and 1 a triangle, by the boxes before they are quantised; 0
+                          // if the root has no area
     double widening = 0;  // surface of all quantised child boxes / that of the exact ones; 1
                           // without surface
     std::uint64_t node_bytes = 0, triangle_bytes = 0;
@@ -26,12 +28,13 @@ struct CwbvhStats {
     double bytes_per_triangle = 0;  // bytes / triangles
 };
 
-/// Holds all that a trace reads. Children are chosen by dynamic programming over the surface area
-/// heuristic; child boxes are quantised to 8 bits an axis outward, and every quantised box was
-/// compared with its box. The same bits for every thread count.
+/// Holds all that a trace reads: the binary tree may go. Children are chosen by dynamic programming
+/// over the surface area heuristic. Child boxes have 8 bits an axis and are rounded outward. The
+/// tree has the same bits for every number of threads.
 class Cwbvh {
 public:
-    /// Throws InputError if the tree holds boxes or points. `threads` as in BuildOptions.
+    /// `threads`: 0 to 1,024; 0: all the machine has. Throws InputError: a tree that holds boxes or
+    /// points, threads out of range.
     explicit Cwbvh(const Bvh& bvh, int threads = 0);
     ~Cwbvh();
     Cwbvh(Cwbvh&&) noexcept;

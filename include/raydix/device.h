@@ -1,6 +1,6 @@
 // Building on an NVIDIA GPU: device pointers in, device pointers out, on the caller's stream.
-// Memory belongs to the caller. Plain C++: in a build without CUDA every call but
-// `device_available` throws BackendUnavailable.
+// Memory belongs to the caller. Plain C++. In a build without CUDA every call that needs a device
+// throws BackendUnavailable.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -19,9 +19,9 @@ using Stream = void*;
 
 /// True if this build has CUDA and this machine a device that can run it. Never throws.
 [[nodiscard]] bool device_available() noexcept;
-/// The name of the current device. Throws BackendUnavailable, with the reason, if there is none.
+/// The name of the current device. Throws BackendUnavailable, which says why, if there is none.
 [[nodiscard]] std::string device_name();
-/// Waits until `stream` has done all that was asked of it. Throws DeviceError if any of it failed.
+/// Waits until `stream` has done all that was put on it. Throws DeviceError if any of it failed.
 void synchronize(Stream stream);
 
 namespace detail {
@@ -32,8 +32,8 @@ void copy_to_device(void* device, const void* host, std::size_t bytes, Stream st
 void copy_to_host(void* host, const void* device, std::size_t bytes, Stream stream);
 }  // namespace detail
 
-/// An array in device memory. Move-only; elements are plain data and start uninitialised. The
-/// memory behind it is a whole number of 256-byte lines.
+/// An array in device memory. Move-only. Elements are plain data and start uninitialised. Memory is
+/// taken in whole lines of 256 bytes.
 template <class T>
 class DeviceBuffer {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -52,8 +52,8 @@ public:
     }
     ~DeviceBuffer() { detail::device_free(data_); }
 
-    /// Makes room for `size` elements; the old ones are lost. Keeps the memory if it is large
-    /// enough.
+    /// Makes room for `size` elements. The old ones are lost. Keeps the memory if it is large
+    /// enough. Throws BackendUnavailable, DeviceError.
     void reset(std::size_t size) {
         if (size > capacity_) {
             *this = DeviceBuffer();
@@ -62,13 +62,14 @@ public:
         }
         size_ = size;
     }
-    /// Copies; `values` may be changed once the call returns.
+    /// Copies `values` and waits for the end: they may change once the call returns.
     void upload(std::span<const T> values, Stream stream = nullptr) {
         reset(values.size());
         detail::copy_to_device(data_, values.data(), values.size_bytes(), stream);
         synchronize(stream);
     }
-    /// Waits for `stream`, then copies the first out.size() elements.
+    /// Copies the first out.size() elements, after all that is on `stream`, and waits for the end.
+    /// There must be so many.
     void download(std::span<T> out, Stream stream = nullptr) const {
         detail::copy_to_host(out.data(), data_, out.size_bytes(), stream);
         synchronize(stream);
@@ -90,19 +91,20 @@ private:
     std::size_t capacity_ = 0;
 };
 
-/// Arrays on the device. Without triangles the vertices are points.
+/// A mesh on the device. Without triangles its vertices are the primitives, as points.
 struct DeviceMesh {
     const Vec3* vertices = nullptr;       // [vertex_count]
     std::uint32_t vertex_count = 0;       // below 2^31
     const Triangle* triangles = nullptr;  // [triangle_count]
     std::uint32_t triangle_count = 0;     // below 2^31
 };
+/// Boxes on the device.
 struct DeviceBoxList {
     const Aabb* boxes = nullptr;  // [count]
     std::uint32_t count = 0;      // below 2^31
 };
 
-/// What a build found out about its input; lies on the device until it is asked for.
+/// What a build finds out about its input. It lies on the device.
 struct DeviceInputCounts {
     Aabb bounds;                     // around all valid primitives
     std::uint32_t input_count;       // primitives given
@@ -112,17 +114,19 @@ struct DeviceInputCounts {
     std::uint32_t unreadable;        // triangles with an index past the vertices; left out as well
     std::uint32_t first_unreadable;  // the lowest id among them, or no_primitive
 };
-/// And about a binary tree.
+/// What a build finds out about its input and about the binary tree.
 struct DeviceCounts : DeviceInputCounts {
     std::uint32_t inner_count;  // inner nodes; leaves are one more, unless references is 0
     std::uint32_t max_depth;    // edges from the root to the deepest leaf
 };
 
-/// AL09's node of 64 bytes, both children's boxes in one; src/layout/pair64.h tells the fields.
+/// The node of 64 bytes of Aila and Laine 2009: it holds the boxes of both children. Its fields are
+/// in src/layout/pair64.h.
 struct NodePair;
 
-/// Where a build writes; every pointer is the caller's device memory, aligned to 64 bytes. After
-/// the build the arrays are as in Bvh, the first `references` and `2 * inner_count + 2` elements.
+/// Where a build writes. Every pointer is device memory of the caller's, aligned to 64 bytes. After
+/// the build the arrays hold what those of a Bvh hold: `nodes` in its first 2 * inner_count + 2
+/// elements, the others in their first `references`.
 struct DeviceTree {
     BvhNode* nodes = nullptr;           // [device_node_capacity(n, options)]
     std::uint32_t* order = nullptr;     // [n]
@@ -133,64 +137,74 @@ struct DeviceTree {
     NodePair* pairs = nullptr;          // null, or [device_pair_capacity(n, options)]
     std::uint32_t* pair_ids = nullptr;  // with pairs: [n], primitive ids, bit 31 ends a leaf's list
 };
-/// For n primitives at most. Throws InputError as device_scratch_bytes.
+/// Number of elements that `nodes` and `pairs` need for up to n primitives. Throws InputError as
+/// device_scratch_bytes does.
 [[nodiscard]] std::size_t device_node_capacity(std::uint32_t n, const BuildOptions& options);
 [[nodiscard]] std::size_t device_pair_capacity(std::uint32_t n, const BuildOptions& options);
 
-/// Bytes of scratch that a build of up to `n` primitives wants with these options. Throws
-/// InputError (as build_bvh, and for builders that do not run on a device: those that do are
-/// karras, lauterbach, garanzha, apetrei and hploc), BackendUnavailable.
+/// Bytes of scratch that a build of up to n primitives needs. karras, lauterbach, garanzha, apetrei
+/// and hploc run on a device. Throws InputError: another builder, any reinsertion rounds, an option
+/// out of range, 2^31 primitives or more. Throws BackendUnavailable.
 [[nodiscard]] std::size_t device_scratch_bytes(std::uint32_t n, const BuildOptions& options);
 
-/// Builds the tree that build_bvh builds, bit for bit, for the same input: bounds, codes, sort,
-/// hierarchy, leaf copies, boxes, and pairs if asked for. raydix/device_trees.h has k-d trees and
-/// octrees. Asynchronous: the launches are put on `stream` and the call returns; nothing is
-/// allocated and nothing waited for. `scratch`: device memory, aligned to 256 bytes,
-/// device_scratch_bytes or more, in use until the stream is past the build. Calling again with the
-/// same arrays rebuilds in place. What is wrong with the data is found on the device and stands in
-/// `counts`; see check_counts. options.strict and options.threads have no effect here, nor has
-/// options.fit on hploc. Throws InputError, BackendUnavailable, DeviceError.
+/// Builds the tree that build_bvh builds from the same input, bit for bit, and the node pairs if
+/// `tree.pairs` is not null. k-d trees and octrees are in raydix/device_trees.h.
+///
+/// Asynchronous: the call puts launches on `stream` and returns. It allocates nothing and waits for
+/// nothing. `scratch` is device memory of device_scratch_bytes or more, aligned to 256 bytes. It is
+/// in use until the stream is past the build. Another call with the same arrays rebuilds in place.
+///
+/// Faults of the data are found on the device and stand in `counts` (check_counts). options.strict
+/// and options.threads have no effect, nor has options.fit for hploc. Throws InputError as
+/// device_scratch_bytes does, and for scratch that is too small or not aligned. Throws
+/// BackendUnavailable, DeviceError.
 void build_bvh_on_device(const DeviceMesh& mesh, const BuildOptions& options,
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 void build_bvh_on_device(const DeviceBoxList& boxes, const BuildOptions& options,
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 
-/// The same, but waits for the end and returns the milliseconds between the stages as the device
-/// saw them (CUDA events; `layout` has the node pairs as well). For measurements.
+/// The same, but waits for the end. Returns the milliseconds of the stages as the device saw them
+/// (CUDA events). `layout` includes the node pairs. For measurements.
 BuildMs time_build_on_device(const DeviceMesh& mesh, const BuildOptions& options,
                              const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 BuildMs time_build_on_device(const DeviceBoxList& boxes, const BuildOptions& options,
                              const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 
-/// Bytes read and written per second when the device copies `bytes` from one place of its memory to
-/// another: the best of `repeat` copies after a first one. Allocates twice `bytes`.
+/// Copies `bytes` from one place of the device's memory to another, once and then `repeat` times.
+/// Returns the bytes read and written per second by the fastest of the `repeat` copies. Allocates
+/// twice `bytes`. Throws BackendUnavailable, DeviceError.
 [[nodiscard]] double measure_device_copy(std::size_t bytes, int repeat);
 
-/// Throws the InputError that build_bvh throws for such an input: an index past the vertices or,
-/// with `strict`, a primitive that was left out.
+/// Throws InputError where build_bvh would, for the same input: an index past the vertices or, with
+/// `strict`, a primitive that was left out.
 void check_counts(const DeviceInputCounts& counts, PrimitiveKind kind, bool strict);
 
-/// Copies a finished tree to the host, as the Bvh that build_bvh returns (without times). Waits for
-/// `stream`; throws as check_counts does.
+/// Copies a finished tree to the host, as the Bvh that build_bvh returns. Its times and peak_bytes
+/// are 0. Waits for `stream`. Throws as check_counts does with options.strict, and
+/// BackendUnavailable, DeviceError.
 [[nodiscard]] Bvh download_bvh(const DeviceTree& tree, PrimitiveKind kind,
                                const BuildOptions& options, Stream stream);
 
-/// Device memory for builds of up to so many primitives of one kind, kept from one build to the
-/// next: the convenient way to DeviceTree.
+/// Device memory for builds of up to n primitives of one kind, kept from one build to the next. The
+/// convenient way to a DeviceTree.
 class DeviceBvh {
 public:
     DeviceBvh() = default;
-    /// `with_pairs`: also AL09's node pairs. Throws as device_scratch_bytes does.
+    /// `with_pairs`: builds make node pairs too. Throws as device_scratch_bytes does, and
+    /// DeviceError.
     DeviceBvh(PrimitiveKind kind, std::uint32_t n, const BuildOptions& options,
               bool with_pairs = false);
 
-    /// As build_bvh_on_device. The input must be of this kind and no larger than promised.
+    /// As build_bvh_on_device. Throws InputError also for primitives of another kind, or more than
+    /// n.
     void build(const DeviceMesh& mesh, Stream stream = nullptr);
     void build(const DeviceBoxList& boxes, Stream stream = nullptr);
     /// As time_build_on_device.
     BuildMs build_timed(const DeviceMesh& mesh, Stream stream = nullptr);
     [[nodiscard]] DeviceTree tree() const;
+    /// As download_bvh.
     [[nodiscard]] Bvh download(Stream stream = nullptr) const;
+    /// Of all arrays, scratch included.
     [[nodiscard]] std::size_t bytes() const;
 
 private:

@@ -1,6 +1,6 @@
-// Scenes where trees know neither geometries nor instances: on an NVIDIA GPU (device_trace.h,
-// device_cwbvh.h) and in the warp simulator (simulate.h). A tree is made over all meshes as one,
-// and its hits are named afterwards, on the host or where they lie.
+// Scenes of meshes on an NVIDIA GPU (device_trace.h, device_cwbvh.h) and in the warp simulator
+// (simulate.h), whose trees know neither geometries nor instances. A tree is made over all meshes
+// as one. Its hits are named afterwards, on the host or on the device.
 //
 //   const MergedMeshes merged = merge_meshes(scene);
 //   const DeviceCwbvh tree{Cwbvh(build_bvh(merged.mesh, build_options_for(Quality::balanced)))};
@@ -8,8 +8,8 @@
 //   trace_on_device(tree.tree(), rays, n, found.data(), CwbvhKernel::cwbvh, {}, stream);
 //   name_hits_on_device(names, found, hits, stream);
 //
-// These hits are those of trace(scene, rays), bit for bit. The warp kernels have another triangle
-// test (device_trace.h).
+// These hits are those of trace(scene, rays), bit for bit. Those of the warp kernels are not: they
+// have another triangle test (device_trace.h).
 #pragma once
 
 #include <raydix/device.h>
@@ -23,7 +23,7 @@
 
 namespace raydix {
 
-/// Which meshes stand behind each other in a merged one.
+/// Which meshes a merged one consists of, one behind the other.
 struct MeshNames {
     std::vector<std::uint32_t> first;  // [meshes] the first triangle of each, ascending from 0
     std::vector<std::uint32_t> ids;    // [meshes] their geometry ids, ascending
@@ -34,14 +34,16 @@ struct MergedMeshes {
     MeshNames names;
 };
 
-/// A copy of the scene's meshes, of its last commit, in one: by ascending id. Meshes without
-/// triangles are left out, and so are those that rays of this mask do not see; on a device all rays
-/// have one mask. Throws BackendUnavailable: an instance, which it names. InputError: a scene that
-/// was never committed, 2^32 - 1 triangles or vertices or more.
+/// Copies the meshes of the scene's last commit into one, by ascending id. Meshes without triangles
+/// are left out, and so are those that rays of this mask do not see: on a device all rays have one
+/// mask. Throws BackendUnavailable for a scene with an instance, a sphere, a capsule, a point or
+/// user geometry, whatever its mask, and names the geometry. Throws InputError: a scene that was
+/// never committed, 2^32 - 1 triangles or vertices or more.
 [[nodiscard]] MergedMeshes merge_meshes(const Scene& scene, std::uint32_t mask = 0xFFFFFFFFu);
 
-/// Hits of a tree over the merged mesh -> hits of the scene: found [n] -> hits [n]. Misses stay
-/// misses. `threads` as in SceneTraceOptions. Throws InputError: sizes that differ.
+/// Turns hits of a tree over the merged mesh into hits of the scene. found [n] -> hits [n]. Misses
+/// stay misses. `threads`: 0 to 1,024; 0: all the machine has. Throws InputError if the sizes
+/// differ.
 void name_hits(const MeshNames& names, std::span<const TreeHit> found, std::span<Hit> hits,
                int threads = 0);
 
@@ -62,10 +64,10 @@ private:
     DeviceBuffer<std::uint32_t> first_, ids_;
 };
 
-/// As name_hits: found [n] -> hits [n], both in device memory and apart from each other, aligned to
-/// 4 bytes. Asynchronous: the launch is put on `stream` and the call returns; nothing is allocated
-/// and nothing waited for. `names` and `found` are in use until the stream is past it. Throws
-/// InputError: sizes that differ, 2^31 hits or more. BackendUnavailable, DeviceError.
+/// As name_hits on the device. found [n] -> hits [n], both in device memory, aligned to 4 bytes.
+/// They may not overlap. Asynchronous: the call puts a launch on `stream` and returns. It allocates
+/// nothing and waits for nothing. `names` and `found` are in use until the stream is past it.
+/// Throws InputError: sizes that differ, 2^31 hits or more. Throws BackendUnavailable, DeviceError.
 void name_hits_on_device(const DeviceMeshNames& names, std::span<const TreeHit> found,
                          std::span<Hit> hits, Stream stream);
 

@@ -1,6 +1,6 @@
-// k-d trees and octrees built on an NVIDIA GPU, by the rules of raydix/device.h: device pointers
-// in, device pointers out, on the caller's stream, memory of the caller's. In a build without CUDA
-// every call but the capacities throws BackendUnavailable.
+// Building k-d trees and octrees on an NVIDIA GPU, by the rules of raydix/device.h: device pointers
+// in, device pointers out, on the caller's stream. Memory belongs to the caller. In a build without
+// CUDA every call that needs a device throws BackendUnavailable.
 #pragma once
 
 #include <raydix/device.h>
@@ -13,8 +13,9 @@
 
 namespace raydix {
 
-/// Where a k-d tree is written; device memory, aligned to 64 bytes. After the build the arrays are
-/// as in KdTree, the first `references` and `2 * inner_count + 2` elements.
+/// Where a k-d tree is written. Every pointer is device memory, aligned to 64 bytes. After the
+/// build the arrays hold what those of a KdTree hold: `nodes` in its first 2 * inner_count + 2
+/// elements, the others in their first `references`.
 struct DeviceKdArrays {
     KdNode* nodes = nullptr;            // [device_node_capacity(n, kind, options)]
     std::uint32_t* order = nullptr;     // [n]
@@ -22,62 +23,65 @@ struct DeviceKdArrays {
     Vec3* points = nullptr;             // [n], of points
     DeviceCounts* counts = nullptr;     // [1]
 };
-/// For n primitives at most; `kind` is triangles or points, which differ in the default of
-/// max_leaf. Throws InputError as build_kdtree.
+/// Number of elements that `nodes` needs for up to n primitives. `kind` is triangles or points,
+/// which differ in the default of max_leaf. Throws InputError: an option out of range, 2^31
+/// primitives or more, more inner nodes than a k-d tree can number.
 [[nodiscard]] std::size_t device_node_capacity(std::uint32_t n, PrimitiveKind kind,
                                                const KdTreeOptions& options);
-/// Bytes of scratch for n primitives at most. Throws BackendUnavailable as well.
+/// Bytes of scratch that a build of up to n primitives needs. Throws InputError as
+/// device_node_capacity does, and BackendUnavailable.
 [[nodiscard]] std::size_t device_scratch_bytes(std::uint32_t n, PrimitiveKind kind,
                                                const KdTreeOptions& options);
 
-/// Builds the tree that build_kdtree builds, bit for bit: bounds, codes, sort, ranges of radix
-/// nodes, leaf copies, nodes and their intervals. Asynchronous, without allocation, and in place
-/// when called again: see build_bvh_on_device, also for `scratch`, errors and options.
+/// Builds the tree that build_kdtree builds from the same input, bit for bit. Asynchronous;
+/// `scratch`, rebuilds, faults of the data, options and errors as for build_bvh_on_device.
 void build_kdtree_on_device(const DeviceMesh& mesh, const KdTreeOptions& options,
                             const DeviceKdArrays& tree, std::span<std::byte> scratch,
                             Stream stream);
-/// The same, but waits for the end and returns the milliseconds of the stages (CUDA events).
+/// The same, but waits for the end. Returns the milliseconds of the stages as the device saw them
+/// (CUDA events). For measurements.
 BuildMs time_kdtree_on_device(const DeviceMesh& mesh, const KdTreeOptions& options,
                               const DeviceKdArrays& tree, std::span<std::byte> scratch,
                               Stream stream);
-/// Copies a finished tree to the host (without times). Waits for `stream`; throws as check_counts.
+/// Copies a finished tree to the host. Its times and peak_bytes are 0. Waits for `stream`. Throws
+/// as check_counts does with options.strict, and BackendUnavailable, DeviceError.
 [[nodiscard]] KdTree download_kdtree(const DeviceKdArrays& tree, PrimitiveKind kind,
                                      const KdTreeOptions& options, Stream stream);
 
-/// What the build of an octree found out.
+/// What a build finds out about its input and about the octree.
 struct DeviceOctreeCounts : DeviceInputCounts {
     std::uint32_t node_count;       // of the whole tree, even where there was too little room
     std::uint32_t level_begin[23];  // first node of each level up to max_level, then node_count
 };
 
-/// Where an octree is written; device memory, aligned to 64 bytes. How many nodes there will be is
-/// not known before: with more than `node_capacity` no node is written, and counts->node_count says
-/// how many it takes.
+/// Where an octree is written. Every pointer is device memory, aligned to 64 bytes. The number of
+/// nodes is not known before the build. If it is more than `node_capacity`, no node is written;
+/// counts->node_count says how many there are.
 struct DeviceOctreeArrays {
     OctreeNode* nodes = nullptr;  // [node_capacity]
     std::uint32_t node_capacity = 0;
     std::uint32_t* order = nullptr;        // [n]
-    Vec3* points = nullptr;                // [n], of triangles their centres
+    Vec3* points = nullptr;                // [n], of triangles the centers of their boxes
     DeviceOctreeCounts* counts = nullptr;  // [1]
 };
-/// The most nodes an octree over n points can have. The built-in scenes have 0.6n to 0.8n with
-/// leaves of up to 4 and 1.5n to 3.7n with leaves of 1: the bound is for codes that stay together
-/// down to the last level. Throws InputError as build_octree.
+/// The most nodes that an octree over n points can have. Most octrees have far fewer
+/// (docs/algorithms/octree.md). Throws InputError: an option out of range, 2^28 points or more.
 [[nodiscard]] std::uint64_t device_node_bound(std::uint32_t n, const OctreeOptions& options);
-/// Bytes of scratch for n primitives and `node_capacity` nodes at most. Throws BackendUnavailable
-/// as well.
+/// Bytes of scratch that a build of up to n primitives and `node_capacity` nodes needs. Throws
+/// InputError as device_node_bound does, and BackendUnavailable.
 [[nodiscard]] std::size_t device_scratch_bytes(std::uint32_t n, std::uint32_t node_capacity,
                                                const OctreeOptions& options);
 
-/// Builds the octree that build_octree builds, bit for bit; else as build_kdtree_on_device.
+/// Builds the octree that build_octree builds from the same input, bit for bit. All else as for
+/// build_kdtree_on_device.
 void build_octree_on_device(const DeviceMesh& mesh, const OctreeOptions& options,
                             const DeviceOctreeArrays& tree, std::span<std::byte> scratch,
                             Stream stream);
 BuildMs time_octree_on_device(const DeviceMesh& mesh, const OctreeOptions& options,
                               const DeviceOctreeArrays& tree, std::span<std::byte> scratch,
                               Stream stream);
-/// Waits for `stream`. Throws as check_counts does, and InputError that names the nodes it takes if
-/// there was too little room.
+/// Copies a finished octree to the host, as download_kdtree does. Throws InputError also if there
+/// was too little room, and names the number of nodes.
 [[nodiscard]] Octree download_octree(const DeviceOctreeArrays& tree, PrimitiveKind kind,
                                      const OctreeOptions& options, Stream stream);
 
@@ -86,9 +90,11 @@ BuildMs time_octree_on_device(const DeviceMesh& mesh, const OctreeOptions& optio
 class DeviceKdTree {
 public:
     DeviceKdTree() = default;
+    /// Throws as device_scratch_bytes does, and DeviceError.
     DeviceKdTree(PrimitiveKind kind, std::uint32_t n, const KdTreeOptions& options);
 
-    /// The mesh must be of this kind and no larger than promised.
+    /// As build_kdtree_on_device. Throws InputError also for primitives of another kind, or more
+    /// than n.
     void build(const DeviceMesh& mesh, Stream stream = nullptr);
     BuildMs build_timed(const DeviceMesh& mesh, Stream stream = nullptr);
     [[nodiscard]] DeviceKdArrays tree() const;
@@ -111,14 +117,18 @@ private:
 class DeviceOctree {
 public:
     DeviceOctree() = default;
-    /// `node_capacity` 0: 2n + 64, or the bound if that is less.
+    /// `node_capacity` 0: 2n + 64, or device_node_bound if that is less. Throws as
+    /// device_scratch_bytes does, and DeviceError.
     DeviceOctree(PrimitiveKind kind, std::uint32_t n, const OctreeOptions& options,
                  std::uint32_t node_capacity = 0);
 
+    /// As build_octree_on_device. Throws InputError also for primitives of another kind, or more
+    /// than n.
     void build(const DeviceMesh& mesh, Stream stream = nullptr);
     BuildMs build_timed(const DeviceMesh& mesh, Stream stream = nullptr);
     [[nodiscard]] DeviceOctreeArrays tree() const;
-    /// Nodes of the last build's tree, for which there may not have been room. Waits for `stream`.
+    /// Number of nodes of the last build's octree, whether there was room or not. Waits for
+    /// `stream`.
     [[nodiscard]] std::uint32_t node_count(Stream stream = nullptr) const;
     [[nodiscard]] std::uint32_t node_capacity() const { return node_capacity_; }
     [[nodiscard]] Octree download(Stream stream = nullptr) const;

@@ -14,12 +14,23 @@
 
 namespace raydix {
 
-/// Linear RGB, rows from the top. pixels [height * width].
+/// Linear RGB. pixels [height * width], rows from the top.
 struct Picture {
     std::uint32_t width = 0, height = 0;
     std::vector<Vec3> pixels;
 };
 
+/// What a picture shows. A pixel whose ray hits nothing has the sky in `shaded` and `diffuse`,
+/// white in `ao`, and black in `normal`, `depth` and `primitive`.
+/// - `shaded`: grey surfaces under sky and sun with shadows; in closed rooms under a lamp at the
+///   camera.
+/// - `normal`: (n + 1) / 2 of the geometric normal, turned to the viewer.
+/// - `depth`: distance along the view, from white at the nearest hit to black at the farthest.
+/// - `primitive`: a colour for each triangle, and of a scene for each instance that shows it.
+/// - `ao`: the part of the sky that is open within ao_radius.
+/// - `diffuse`: as `shaded`, with one bounce of light in place of the even sky.
+/// - `steps`: the number of nodes that a ray visits, as a heat map. For a scene: of a ray that goes
+///   alone, which may differ between instruction sets. For a tree: of that tree.
 enum class View : std::uint32_t { shaded, normal, depth, primitive, ao, diffuse, steps };
 [[nodiscard]] std::string_view view_name(View view);
 /// Throws InputError that lists the known names.
@@ -28,40 +39,36 @@ enum class View : std::uint32_t { shaded, normal, depth, primitive, ao, diffuse,
 struct RenderOptions {
     View view = View::shaded;
     std::uint32_t width = 1024, height = 768;  // each 1..16384
-    // Rays per pixel that gather light, 1..4096; 0: 64 for ao, 32 for diffuse, 16 for shaded.
+    // Rays per pixel that gather light, 1..4096. From 4 on a pixel has four primary rays, and this
+    // is rounded up to a multiple of 4; below 4 it has one. 0: 64 for ao, 32 for diffuse, 16 for
+    // shaded. No effect in the other views.
     int samples = 0;
-    float ao_radius = 0.0f;  // 0: 5 % of the box diagonal
+    float ao_radius = 0.0f;  // 0: 5 % of the diagonal of the scene's box
     std::uint64_t seed = 1;
     int threads = 0;  // 0 to 1,024; 0: all the machine has
-    // Called with the part done, 0..1, on any thread, one at a time, while others render; what it
-    // throws ends the render, and it is not called again.
+    // Called with the part done, 0 to 1, ascending: on any thread, one call at a time. What it
+    // throws comes out of the render, and it is not called again.
     std::function<void(double)> progress;
 };
 
-/// `shaded`: sun with shadow and sky over grey, a lamp at the camera in closed rooms; `normal`: (n
-/// + 1) / 2 of the geometric normal turned to the viewer; `depth`: near white to far black;
-/// `primitive`: one colour per triangle; `ao`: open part of the sky within the radius; `diffuse`:
-/// one bounce; `steps`: node visits as a heat map. Deterministic for every thread count. Where a
-/// ray hits nothing: sky for `shaded` and `diffuse`, white for `ao`, black for `normal`, `depth`
-/// and `primitive`. Four primary rays per pixel in the views that gather light, one through its
-/// centre in the others. The scene is shown as its last commit left it, instances in the world; a
-/// geometry or instance without any bit in its mask is not seen. `primitive`: a triangle has a
-/// colour for each instance that shows it. `steps`: nodes on the way of a ray that goes alone,
-/// which may differ between instruction sets. Throws InputError: a scene that was never committed,
-/// a camera that shows nothing, options out of range.
+/// Renders the scene as its last commit left it. A geometry or instance without any bit in its mask
+/// is not seen. `shaded`, `ao` and `diffuse` gather light; a pixel of the other views has one ray,
+/// through its center. The picture does not depend on the number of threads. Throws InputError: a
+/// scene that was never committed, a camera that shows nothing, options out of range.
 [[nodiscard]] Picture render(const Scene& scene, const Camera& camera,
                              const RenderOptions& options = {});
-/// The same of one tree over triangles; all views but `steps`, which counts nodes of this tree,
-/// show what those of a scene of the one mesh show. Throws InputError for a tree of boxes or
-/// points.
+/// Renders one tree over triangles. All views but `steps` show what they show of a scene of the one
+/// mesh. Throws InputError for a tree of boxes or points, and as above.
 [[nodiscard]] Picture render(const Bvh& bvh, const Camera& camera,
                              const RenderOptions& options = {});
 
-/// Writes .png (8 bit sRGB, clamped after a filmic curve if `tone_map`) or .exr (linear float), by
-/// extension. Throws InputError that names the file.
+/// Writes a .png or .exr file, by its extension. A .png has 8 bits sRGB, after a filmic curve if
+/// `tone_map`, and is clamped. An .exr has linear floats. Throws InputError that names the file:
+/// another extension, a side that is not 1 to 16,384, and as write_file of files.h does.
 void save_picture(const std::filesystem::path& file, const Picture& picture, bool tone_map);
 
-/// Reads an 8-bit RGB .png back as linear values.
+/// Reads a .png file, with 8 bits a channel, as linear values. Throws InputError that names the
+/// file.
 [[nodiscard]] Picture load_picture(const std::filesystem::path& file);
 
 }  // namespace raydix

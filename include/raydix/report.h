@@ -1,4 +1,5 @@
-// One HTML page from the JSON documents that the raydix program writes: tables, plots, pictures.
+// One HTML page from the JSON documents that the raydix program writes: tables, plots, pictures
+// (docs/report.md).
 #pragma once
 
 #include <raydix/picture.h>
@@ -11,9 +12,9 @@
 
 namespace raydix {
 
-/// A document as a command wrote it with --json.
+/// A document that a command wrote with --json.
 struct ReportDocument {
-    std::string name;  // shown: the name of its file
+    std::string name;  // as the page shows it; usually the name of its file
     std::string json;
 };
 
@@ -24,10 +25,11 @@ struct ReportPicture {
     std::vector<std::byte> png;
 };
 
-/// Reads a .png file. Throws InputError that names the file if it is not a whole PNG picture.
+/// Reads a .png file. Throws InputError that names the file if it cannot be read, is no whole PNG
+/// picture, or has a side above 16,384.
 [[nodiscard]] ReportPicture load_report_picture(const std::filesystem::path& file);
 
-/// A rendered picture as 8-bit PNG, after a filmic curve if `tone_map`.
+/// Turns a rendered picture into an 8-bit PNG, after a filmic curve if `tone_map`.
 [[nodiscard]] ReportPicture make_report_picture(std::string name, std::string caption,
                                                 const Picture& picture, bool tone_map);
 
@@ -37,23 +39,22 @@ struct ReportInput {
     std::vector<ReportPicture> pictures;
 };
 
-/// The page as one text: no script, font or picture from elsewhere; the same input gives the same
-/// page. Fields that are absent, null or of another kind than expected are left out, unknown
-/// documents and fields are shown as plain tables. Two documents of one command are also compared
-/// row by row. Everything simulated is labelled as such. Throws InputError "NAME: reason" for a
-/// document that is no JSON object.
+/// Makes the page as one text. It needs no script, font or picture from elsewhere. The same input
+/// gives the same page. Fields that are absent, null or of another kind than expected are left out.
+/// Unknown documents and fields are shown as plain tables. Two documents of one command are also
+/// compared row by row. Simulated figures are labelled as such. Throws InputError "NAME: reason"
+/// for a document that is not a JSON object.
 [[nodiscard]] std::string make_report(const ReportInput& input);
 
-/// What documents refer to, for programs that add pictures: scenes by name and picture files as
-/// `render` wrote them, each once, in order.
+/// What a document refers to, each once, in order: names of scenes, and picture files that `render`
+/// wrote. For programs that add pictures.
 struct ReportReferences {
     std::vector<std::string> scenes, pictures;
 };
 /// Throws InputError as make_report does.
 [[nodiscard]] ReportReferences report_references(const ReportDocument& document);
 
-/// Writes the page; a reader sees the old file or the new one, never half of either. Throws
-/// InputError that names the file.
+/// Writes the page. Replaces the file and throws as write_file of files.h does.
 void save_report(const std::filesystem::path& file, const std::string& html);
 
 }  // namespace raydix

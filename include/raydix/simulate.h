@@ -1,6 +1,6 @@
-// The warp simulator: traversal kernels of Aila and Laine 2009 on a simulated SIMT machine, which
-// says what the kernel could reach there if memory were infinitely fast. All its rates are
-// simulated ones.
+// The warp simulator: traversal kernels of Aila and Laine 2009 and 2012 on a simulated SIMT
+// machine. It says what rate a kernel could reach there if memory had no delay and, if asked, what
+// memory would allow. All its rates are simulated (docs/simulator.md).
 #pragma once
 
 #include <raydix/bvh.h>
@@ -17,6 +17,7 @@
 
 namespace raydix {
 
+/// The kernels (docs/algorithms/warp-kernels.md).
 enum class WarpKernel : std::uint32_t {
     packet,
     while_while,
@@ -35,11 +36,12 @@ enum class WarpKernel : std::uint32_t {
 /// Throws InputError that lists the known names.
 [[nodiscard]] WarpKernel warp_kernel_from_name(std::string_view name);
 
-/// A tree of triangles in the form that the kernels read: node pairs of 64 bytes (`pair64`) and
-/// Woop's triangles of 48 bytes (`woop48`), as in Aila and Laine 2009.
+/// A tree of triangles in the form that the kernels read, as in Aila and Laine 2009: node pairs of
+/// 64 bytes (`pair64`) and Woop's triangles of 48 bytes (`woop48`). Holds all that they read: the
+/// binary tree may go.
 class WarpTree {
 public:
-    /// Throws InputError if the tree holds boxes or points.
+    /// Throws InputError for a tree that holds boxes or points.
     explicit WarpTree(const Bvh& bvh);
     ~WarpTree();
     WarpTree(WarpTree&&) noexcept;
@@ -56,18 +58,19 @@ private:
     std::unique_ptr<Arrays> arrays_;
 };
 
-/// The scalar reference: closest hits with Woop's triangle test, one ray at a time. Not the
-/// library's watertight test: hits may differ from trace() at edges and in the last bits.
-/// rays [n] -> hits [n].
+/// The scalar reference for the kernels: finds closest hits with Woop's triangle test, one ray at a
+/// time. rays [n] -> hits [n]. That test is not watertight: hits may differ from those of trace()
+/// at edges and in the last bits. With `any_hit` a ray ends at the first hit it meets. `threads`: 0
+/// to 1,024; 0: all the machine has. Throws InputError: sizes that differ, threads out of range.
 void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<TreeHit> hits,
                      bool any_hit = false, int threads = 0);
 
-/// Native instructions that one issue of an operation takes.
+/// How many native instructions one issue of an operation takes.
 struct OperationCost {
     std::string operation;
     std::uint32_t instructions = 0;
     std::string origin;       // where the number comes from
-    std::string kernel = {};  // empty: in all kernels that have no count of their own
+    std::string kernel = {};  // empty: all kernels that have no cost of their own
 };
 
 /// A SIMT machine. Rates are per clock and multiprocessor.
@@ -79,20 +82,22 @@ struct MachineModel {
     double lanes_per_clock = 32;          // lane instructions issued; a warp of 32 takes 32 of them
     double warp_issue_clocks = 1;         // least clocks between two instructions of one warp
     std::uint32_t resident_lanes = 1024;  // in flight
-    std::uint32_t block_lanes = 128;      // of one block; a block's place is free when all are done
+    std::uint32_t block_lanes = 128;      // of one block. Its place is free when all are done
     // The memory model: a transaction brings up to 16 bytes a lane from one 128-byte line.
     double l1_transactions_per_clock = 1;
     double l2_gb_per_s = 100, dram_gb_per_s = 100;
     std::uint32_t l1_bytes = 16384;  // of each multiprocessor
     std::uint32_t l2_bytes = 1u << 20;
-    std::vector<OperationCost> costs;  // every operation once, or once for each kernel
+    std::vector<OperationCost> costs;  // of every operation: one for all kernels, or one for each
 };
 
-/// `gtx285`, `gtx285_enum_popc`, `gtx480`, `gtx680`, `h200`. Throws InputError that lists them.
+/// A machine by its name: `gtx285`, `gtx285_enum_popc`, `gtx480`, `gtx680` or `h200`. Throws
+/// InputError that lists the known names.
 [[nodiscard]] MachineModel machine_model(std::string_view name);
 [[nodiscard]] std::span<const std::string_view> machine_model_names();
-/// A JSON file with the fields of MachineModel; what it leaves out comes from the machine that its
-/// "base" names. Throws InputError that names the file and the field.
+/// Reads a JSON file with the fields of MachineModel. What it leaves out comes from the machine
+/// that its "base" names. Without "base" it must have all but name and origin. Throws InputError
+/// that names the file and the field: one that is missing, unknown or out of range.
 [[nodiscard]] MachineModel load_machine_model(const std::filesystem::path& file);
 
 struct SimulateOptions {
@@ -101,29 +106,29 @@ struct SimulateOptions {
     int width = 32;        // lanes of a warp: 1, 2, 4, 8, 16, 32 or 64
     bool any_hit = false;  // rays end at their first hit
     bool memory = false;   // also run the memory model
-    // The rays are this part of a launch: as many of the persistent warps trace them. Matters to
-    // the bound only; times of a part say nothing.
+    // Which part of a launch the rays are, above 0 and at most 1: so large a part of the persistent
+    // warps traces them. For the bound alone: the times of a part say nothing.
     double part_of_launch = 1.0;
 };
 
-/// How often an operation was issued, for how many lanes in sum, and at what cost.
+/// How often an operation was issued, for how many lanes in all, and at what cost.
 struct OperationFigure {
     std::string_view operation;
     std::uint64_t issues = 0, lanes = 0;
     std::uint32_t instructions = 0;
 };
 
-/// Figures of one or more launches; those of several add up.
+/// Figures of one launch, or the sums of several.
 struct Simulation {
     std::uint64_t rays = 0, launches = 0, hits = 0;
     std::vector<OperationFigure> operations;
     std::uint64_t instructions = 0;       // issued, once for all lanes of a warp
     std::uint64_t lane_instructions = 0;  // of which active lanes made use
     double scheduled_clocks = 0;          // launches one after the other, with their tails
-    double idle_issues = 0;               // lost after the last ray or block was handed out
+    double idle_issues = 0;               // issue slots lost after the last ray or block was taken
     double issue_slots = 0;               // of all clocks of all launches
-    // Warp execution times in instructions: of a batch, or of a warp's life where rays are
-    // replaced. Bin k of 8 an octave: [2^(k / 8), 2^((k + 1) / 8)).
+    // Times of warps in instructions: of a batch or, where rays are replaced, of a warp's whole
+    // life. Bin k counts those in [2^(k / 8), 2^((k + 1) / 8)).
     std::array<std::uint64_t, 256> warp_times{};
     std::uint64_t l1_transactions = 0, l2_bytes = 0, dram_bytes = 0;  // of the memory model
 
@@ -140,9 +145,12 @@ struct SimulatedRates {
 [[nodiscard]] SimulatedRates simulated_rates(const Simulation& simulation,
                                              const SimulateOptions& options);
 
-/// Runs one launch through each of `runs`. rays [n] -> hits [runs][n]. Every ray is traced by the
-/// kernel itself; hits are its hits. The same figures for every thread count. Throws InputError: an
-/// unknown width, a machine without a cost for an operation, a rate that is not positive.
+/// Simulates one launch of all rays for each of `runs`. rays [n] -> figures [runs] and, if `hits`
+/// is not null, hits [runs][n]: those that the kernel itself found. Invalid rays miss. The figures
+/// do not depend on the number of threads. Throws InputError: 2^31 - 1 rays or more; a width,
+/// kernel or part_of_launch out of range; a machine with a figure that is not positive, without a
+/// cost for an operation, with more than 2^24 lanes in flight or, for the memory model, more than
+/// 2^30 bytes of caches.
 [[nodiscard]] std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays,
                                                std::span<const SimulateOptions> runs,
                                                std::vector<std::vector<TreeHit>>* hits = nullptr,
