@@ -11,6 +11,7 @@
 
 #include "support/double_scenes.h"
 #include "support/message.h"
+#include "support/sanitized.h"
 #include "support/support.h"
 #include "tree/around_center.h"
 #include "tree/early_splits.h"
@@ -218,12 +219,14 @@ std::size_t count_uncovered(const BvhD& bvh) {
 }
 
 TEST(BuildDouble, PartsCoverTheirTriangles) {
-    MeshD nearly_flat = slivers_d(800, 13, {});  // edges that barely cross a plane
+    constexpr std::size_t few_slivers = fewer(800, 8);
+    MeshD nearly_flat = slivers_d(few_slivers, 13, {});  // edges that barely cross a plane
     for (Vec3d& p : nearly_flat.vertices) p.z = p.z * 1e-11 + 1.0 / 3;
     for (const MeshD& mesh :
-         {slivers_d(800, 12), with_stray(slivers_d(800, 12), utm_place - Vec3d{800.0, 0.0, 0.0}),
-          slivers_d(800, 12, {}), nearly_flat,
-          in_double(in_float(slivers_d(800, 14, {})), 3e9, {-0.1e12, 0.2e12, 0.1e12})})
+         {slivers_d(few_slivers, 12),
+          with_stray(slivers_d(few_slivers, 12), utm_place - Vec3d{800.0, 0.0, 0.0}),
+          slivers_d(few_slivers, 12, {}), nearly_flat,
+          in_double(in_float(slivers_d(few_slivers, 14, {})), 3e9, {-0.1e12, 0.2e12, 0.1e12})})
         for (const Builder builder : {Builder::split, Builder::sbvh}) {
             const BvhD bvh = build_bvh(mesh, {.builder = builder, .max_leaf = 1});
             EXPECT_EQ(bvh.left_out(), 0u);
@@ -248,7 +251,7 @@ TEST(BuildDouble, CutsHoldWhatRoundingMoved) {
     const Vec3d center{1.0 / 3, -1.0 / 7, 0.1};
     const float plane = 64.0f;
     MeshD mesh;
-    constexpr std::uint32_t count = thorough > 1 ? 2000 : 200;
+    constexpr auto count = static_cast<std::uint32_t>(fewer(2000, 40));
     Buffer<SahReference> references(count), spare;
     for (std::uint32_t i = 0; i < count; ++i) {
         const auto near = [&] {
@@ -288,7 +291,7 @@ TEST(BuildDouble, CutsHoldWhatRoundingMoved) {
 }
 
 TEST(BuildDouble, TreesOfPartsLeaveOutAndRefuseWhatOthersDo) {
-    MeshD mesh = slivers_d(6000, 15);
+    MeshD mesh = slivers_d(fewer(6000, 10), 15);
     const MeshD good = mesh;
     mesh.vertices[3 * 4].x = nan;
     mesh.vertices[3 * 32 + 1].y = inf;
@@ -310,7 +313,7 @@ TEST(BuildDouble, TreesOfPartsLeaveOutAndRefuseWhatOthersDo) {
 }
 
 TEST(BuildDouble, TreesDoNotDependOnThreads) {
-    const MeshD mesh = slivers_d(20'000, 7);
+    const MeshD mesh = slivers_d(fewer(20'000, 4), 7);
     for (const Builder builder : {Builder::karras, Builder::ploc, Builder::hploc, Builder::binned,
                                   Builder::sweep, Builder::split, Builder::sbvh}) {
         const BvhD one = build_bvh(mesh, {.builder = builder, .threads = 1});

@@ -144,8 +144,9 @@ TEST(ReinsertionOption, IsAnErrorOutOfRange) {
 }
 
 TEST(ReinsertionOption, WideTreesFromMeshesAreThoseFromBinaryTrees) {
+    const std::vector<Model> scenes = builtin_triangle_scenes(few ? 500 : 3000);
     for (const Builder builder : builders)
-        for (const Model& scene : builtin_triangle_scenes(few ? 500 : 3000)) {
+        for (const Model& scene : scenes) {
             BuildOptions options = build_options_for(Quality::high);
             options.builder = builder;
             const WideBvh direct = build_wide_bvh(scene.mesh(), options);

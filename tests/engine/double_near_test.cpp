@@ -271,11 +271,10 @@ TEST(DoubleNear, WorldsAnswerAsTheirTrianglesDo) {
             recipe.shapes = k >= 3, recipe.users = false;
             const auto world = random.world(recipe);
             for (const std::uint32_t mask : {every_mask, 2u, 5u}) {
+                if (sanitized && mask == 5) continue;
                 const FlatWorldD flat = flat_of(*world, mask);
-                const std::vector<Vec3d> queries = queries_of(random, flat, world->home,
-                                                              recipe.shapes ? 30
-                                                              : sanitized   ? 50
-                                                                            : 150);
+                const std::vector<Vec3d> queries = queries_of(
+                    random, flat, world->home, recipe.shapes ? fewer(30, 2) : fewer(150, 6));
                 EXPECT_EQ(wrong_points(*world, flat, mask, queries), 0u);
                 std::vector<SphereD> spheres;
                 std::vector<SegmentD> segments;
@@ -300,9 +299,9 @@ TEST(DoubleNear, WorldsAnswerAsTheirTrianglesDo) {
                 shapes += flat.shapes.size();
             }
         }
-    EXPECT_GT(touched, 1000u);
-    EXPECT_GT(swept, 200u);
-    EXPECT_GT(shapes, 200u);
+    EXPECT_GT(touched, fewer(1000, 10));
+    EXPECT_GT(swept, fewer(200, 10));
+    EXPECT_GT(shapes, fewer(200, 10));
 }
 
 TEST(DoubleNear, OneMeshAnswersAsItsTreeDoes) {

@@ -19,6 +19,7 @@
 #include "engine/affine_double.h"
 #include "support/double_scenes.h"
 #include "support/random.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -149,8 +150,8 @@ std::vector<RayD> rays_around(Vec3d place, double reach, std::size_t count) {
 }
 
 void expect_every_instance(const char* name, Vec3d place, double reach, double flat) {
-    const Nest nest(place, reach, flat, 60);
-    ASSERT_GT(nest.all().size(), 100u);
+    const Nest nest(place, reach, flat, sanitized ? 20 : 60);
+    ASSERT_GT(nest.all().size(), sanitized ? 30u : 100u);
     const std::vector<RayD> rays = rays_around(place, reach, 180 + 60 * thorough);
     RandomD random(seed);
     std::vector<std::uint32_t> masks;

@@ -54,12 +54,13 @@ TYPED_TEST(LeftOut, TrianglesAreCountedOrRefused) {
             scene.add(this->triangles(7), {.id = 5});
             scene.add(this->triangles(100), {.id = 9});
             // Nothing is asked of a scene whose commit was refused but what the last one saw.
-            EXPECT_EQ(this->refusal(scene, options),
-                      usage == Usage::fixed
-                          ? "geometry 5: triangle 1: not finite, out of range or inverted, as are "
-                            "52 others"
-                          : "geometry 5: triangle 1: not finite, out of range or inverted, as are 2 "
-                            "others");
+            EXPECT_EQ(
+                this->refusal(scene, options),
+                usage == Usage::fixed
+                    ? "geometry 5: triangle 1: not finite, out of range or inverted, as are "
+                      "52 others"
+                    : "geometry 5: triangle 1: not finite, out of range or inverted, as are 2 "
+                      "others");
             EXPECT_FALSE(scene.committed());
             EXPECT_EQ(scene.bounds().hi.x, 1);
             EXPECT_EQ(scene.commit(options).left_out, 53u);
@@ -106,11 +107,10 @@ TYPED_TEST(LeftOut, Shapes) {
     using Types = typename TestFixture::Scene::Types;
     const std::vector<typename Types::Sphere> spheres = {
         {{0, 0, 0}, 1}, {{0, 0, 0}, -1}, {{5, 0, 0}, 0}, {{this->nan, 0, 0}, 1}};
-    const std::vector<typename Types::Capsule> capsules = {
-        {{0, 0, 0}, {0, 0, this->nan}, 1}, {{0, 0, 0}, {0, 0, 0}, 1}};
+    const std::vector<typename Types::Capsule> capsules = {{{0, 0, 0}, {0, 0, this->nan}, 1},
+                                                           {{0, 0, 0}, {0, 0, 0}, 1}};
     const std::vector<typename Types::Point> points = {{0, 0, 0}, {TypeParam(2e12), 0, 0}};
-    const std::vector<typename Types::Box> boxes = {{{0, 0, 0}, {1, 1, 1}},
-                                                    {{1, 0, 0}, {0, 1, 1}}};
+    const std::vector<typename Types::Box> boxes = {{{0, 0, 0}, {1, 1, 1}}, {{1, 0, 0}, {0, 1, 1}}};
     const auto expect = [&](auto add, std::uint64_t left_out, const std::string& refused) {
         typename TestFixture::Scene scene;
         add(scene);
@@ -122,9 +122,12 @@ TYPED_TEST(LeftOut, Shapes) {
         EXPECT_EQ(this->refusal(scene, {}), wanted);
         EXPECT_EQ(this->refusal(scene, {.quality = Quality::high}), wanted);
     };
-    expect([&](auto& scene) { scene.add(std::span<const typename Types::Sphere>(spheres)); }, 2, "sphere 1");
-    expect([&](auto& scene) { scene.add(std::span<const typename Types::Capsule>(capsules)); }, 1, "capsule 0");
-    expect([&](auto& scene) { scene.add(std::span<const typename Types::Point>(points), 1); }, 1, "point 1");
+    expect([&](auto& scene) { scene.add(std::span<const typename Types::Sphere>(spheres)); }, 2,
+           "sphere 1");
+    expect([&](auto& scene) { scene.add(std::span<const typename Types::Capsule>(capsules)); }, 1,
+           "capsule 0");
+    expect([&](auto& scene) { scene.add(std::span<const typename Types::Point>(points), 1); }, 1,
+           "point 1");
     expect(
         [&](auto& scene) {
             using User = BasicUserGeometry<TypeParam>;

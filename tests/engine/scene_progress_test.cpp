@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "support/random.h"
+#include "support/sanitized.h"
 #include "support/support.h"
 
 namespace raydix {
@@ -135,8 +136,8 @@ const std::vector<Case>& cases() {
         {"moving, fast", {.quality = Quality::fast, .usage = Usage::moving}, 2000, 8},
         {"moving, never refitted", {.usage = Usage::moving, .refit_limit = 0}, 2000, 12},
         {"fixed, large", {}, 40000, 60},
-        {"fixed, high, large", {.quality = Quality::high}, 20000, 15},
-        {"fixed, fast, large", {.quality = Quality::fast}, 100000, 20},
+        {"fixed, high, large", {.quality = Quality::high}, test::fewer(20000, 2), 15},
+        {"fixed, fast, large", {.quality = Quality::fast}, test::fewer(100000, 2), 20},
     };
     return all;
 }

@@ -12,6 +12,7 @@
 #include <numeric>
 
 #include "support/launched_build.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -120,7 +121,7 @@ Mesh laced(Mesh mesh, std::size_t k) {
 
 TEST(DeviceBuild, FewPrimitivesValidAndNot) {
     const float nan = std::nanf("");
-    const std::size_t most = thorough == 1 ? 3 : 10;
+    const std::size_t most = sanitized ? 2 : 10;
     for (std::size_t n = 0; n <= most; ++n) {
         const Mesh mesh = random_soup(n, n + 1);
         expect_same_everywhere(std::to_string(n) + " triangles", MeshView(mesh));
@@ -135,7 +136,7 @@ TEST(DeviceBuild, FewPrimitivesValidAndNot) {
 }
 
 TEST(DeviceBuild, Triangles) {
-    constexpr std::size_t count = thorough == 1 ? 300 : 700;
+    constexpr std::size_t count = fewer(700, 7);
     const Mesh soup = random_soup(count, 3);
     expect_same_everywhere("soup", MeshView(soup));
     expect_same_everywhere("soup with NaN", MeshView(laced(soup, 5)));
@@ -144,7 +145,7 @@ TEST(DeviceBuild, Triangles) {
 }
 
 TEST(DeviceBuild, PointsAndBoxes) {
-    constexpr std::size_t count = thorough == 1 ? 100 : 200;
+    constexpr std::size_t count = fewer(200, 5);
     std::vector<Vec3> points(3 * count / 2, Vec3{1, 2, 3});
     for (std::size_t i = 0; i < count; ++i) points.push_back(random_soup(1, i).vertices[0]);
     points.push_back({-0.0f, 1, -0.0f});
@@ -178,7 +179,7 @@ TEST(DeviceBuild, EachBuiltinScene) {
 }
 
 TEST(DeviceBuild, AHundredOrdersGiveOneTree) {
-    const std::uint64_t orders = thorough == 1 ? 10 : 100;
+    const std::uint64_t orders = fewer(100, 20);
     const Mesh mesh = laced(random_soup(100 + 25 * thorough, 77), 11);
     for (const Builder builder : builders)
         for (const Fit fit : {Fit::atomic, Fit::levels, Fit::as_published}) {

@@ -18,6 +18,7 @@
 #include "engine/affine.h"
 #include "image/pictures.h"
 #include "support/message.h"
+#include "support/sanitized.h"
 #include "support/support.h"
 
 namespace raydix {
@@ -53,8 +54,8 @@ std::vector<Mesh> parts_of(const Mesh& mesh, std::size_t count) {
 }
 
 TEST(RenderScene, OneMeshIsTheSamePictureAsItsTree) {
-    const Mesh meshes[] = {test::ball_and_boxes(), awkward_mesh(), test::random_soup(20'000, 3),
-                           Mesh{}};
+    const Mesh meshes[] = {test::ball_and_boxes(), awkward_mesh(),
+                           test::random_soup(test::fewer(20'000, 10), 3), Mesh{}};
     for (const Mesh& mesh : meshes) {
         const Bvh bvh = build_bvh(mesh);
         for (const SceneOptions& how :
@@ -254,7 +255,7 @@ TEST(RenderScene, ShowsTheLastCommit) {
 TEST(RenderScene, ProgressMayTraceTheSameScene) {
     const Boxes boxes;
     RenderOptions options = options_for(View::ao, 128, 128);
-    options.samples = 256;
+    options.samples = test::sanitized ? 16 : 256;
     const Picture quiet = render(boxes.scene, camera_before_ball(), options);
     const std::vector<Ray> rays = make_primary_rays(camera_before_ball(), 64, 64);
     std::size_t calls = 0;

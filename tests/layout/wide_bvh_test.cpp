@@ -196,7 +196,7 @@ TEST(WideBuild, GivesTheTreeThatTheBinaryOneGives) {
         for (const Builder name : {Builder::ploc, Builder::hploc, Builder::binned, Builder::karras,
                                    Builder::apetrei, Builder::sbvh})
             for (const int max_leaf : {1, 4, 5}) {
-                const bool few = thorough == 1 && mesh.triangles.size() > 10'000;
+                const bool few = thorough == 1 && mesh.triangles.size() > 600;
                 if (few && max_leaf != 4) continue;
                 const BuildOptions options{.builder = name, .max_leaf = max_leaf, .threads = 3};
                 const Bvh binary = build_bvh(mesh, options);

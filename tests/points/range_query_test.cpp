@@ -9,6 +9,7 @@
 
 #include "support/message.h"
 #include "support/point_reference.h"
+#include "support/sanitized.h"
 #include "support/support.h"
 
 namespace raydix::test {
@@ -272,7 +273,7 @@ TYPED_TEST(Within, RowsOfOneWalkAndOfTwo) {
                                      {.threads = 1, .order = order, .max_result_bytes = room});
             };
             std::uint64_t refused = 0, least = std::uint64_t{1} << 40;
-            while (least - refused > 1) {
+            while (least - refused > (sanitized ? least / 16 : 1)) {
                 const std::uint64_t room = refused + (least - refused) / 2;
                 const bool fits = message_of([&] { (void)lists_within(room); }) == "no error";
                 (fits ? least : refused) = room;

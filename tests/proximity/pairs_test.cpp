@@ -9,6 +9,7 @@
 
 #include "primitives/exact_overlap.h"
 #include "support/exact_overlap_reference.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -82,7 +83,7 @@ void expect_all(const std::string& name, const Mesh& x, const Mesh& y, const Tou
 }
 
 TEST(Pairs, AreBruteForce) {
-    const std::size_t n = 200 + 60 * test::thorough;
+    const std::size_t n = test::sanitized ? 120 : 200 + 60 * test::thorough;
     expect_all("soups", test::random_soup(n, seed, 0.15f), test::random_soup(n, seed + 1, 0.1f),
                triangles_touch<LeafTriangle>);
     expect_all("lattices", test::lattice_mesh(n / 4, 6, seed),

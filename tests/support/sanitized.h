@@ -2,6 +2,8 @@
 // too, where what asks this keeps all of its cases.
 #pragma once
 
+#include <cstddef>
+
 namespace raydix::test {
 
 #if defined(RAYDIX_SANITIZED)
@@ -9,5 +11,10 @@ inline constexpr bool sanitized = true;
 #else
 inline constexpr bool sanitized = false;
 #endif
+
+/// n in plain builds, a by-th of it under sanitizers.
+constexpr std::size_t fewer(std::size_t n, std::size_t by) {
+    return sanitized ? (n + by - 1) / by : n;
+}
 
 }  // namespace raydix::test

@@ -102,7 +102,8 @@ TEST(Hits, LineTreeAgreesWithEveryTriangle) {
                                scene_of(lattice_mesh(300, 5, 9), "lattice of 300"),
                                load_model("builtin:figure?triangles=10000")}) {
         const bool small = scene.mesh().triangles.size() < 1000;
-        const auto rays = make_mixed_rays(scene, (small ? 2000 : 100) * thorough, seed);
+        const auto rays =
+            make_mixed_rays(scene, (small ? 2000 : 100) * thorough / (thorough == 1 ? 4 : 1), seed);
         expect_same_hits(scene.name + ", line tree against trace_brute_force", rays,
                          LineTree(scene.mesh()).closest(rays),
                          trace_brute_force(scene.mesh(), rays));
@@ -111,12 +112,12 @@ TEST(Hits, LineTreeAgreesWithEveryTriangle) {
 
 TEST(Hits, SoupAgainstEveryTriangle) {
     const Model scene = scene_of(random_soup(2000, 12, 0.3f), "soup of 2000");
-    const auto rays = make_mixed_rays(scene, 10'000 * thorough, seed);
+    const auto rays = make_mixed_rays(scene, thorough == 1 ? 3000 : 10'000 * thorough, seed);
     expect_same_hits(scene.name + " against trace_brute_force", rays,
                      trace(build_bvh(scene.mesh()), rays), trace_brute_force(scene.mesh(), rays));
 }
 
-constexpr std::size_t million = thorough == 1 ? 20'000 : 1'000'000;
+constexpr std::size_t million = thorough == 1 ? 6'000 : 1'000'000;
 
 TEST(Hits, SoupsLikeBruteForce) {
     expect_like_brute_force(scene_of(random_soup(2000, 1), "soup"), million);
@@ -144,7 +145,7 @@ std::vector<Hit> hits_with(const Mesh& mesh, std::span<const Ray> rays, const Bu
 
 TEST(Hits, FaultResultsDifferByThreadCount) {
     const Model scene = load_model("builtin:atrium?triangles=10000");
-    const auto rays = make_mixed_rays(scene, 5000 * thorough, seed);
+    const auto rays = make_mixed_rays(scene, thorough == 1 ? 1500 : 5000 * thorough, seed);
     const Bvh bvh = build_bvh(scene.mesh());
     const auto wanted = trace(bvh, rays, {.threads = 1});
     const AllHits all_wanted = trace_all(bvh, rays, {.threads = 1});
@@ -159,7 +160,7 @@ TEST(Hits, FaultResultsDifferByThreadCount) {
 TEST(Hits, LeafSizeAndCodeBitsChangeNoBit) {
     for (const Model& scene : {load_model("builtin:grove?triangles=10000"),
                                scene_of(lattice_mesh(3000, 12, 8), "lattice")}) {
-        const auto rays = make_mixed_rays(scene, 5000 * thorough, seed);
+        const auto rays = make_mixed_rays(scene, thorough == 1 ? 1500 : 5000 * thorough, seed);
         const auto wanted = hits_with(scene.mesh(), rays, {}, 1);
         for (const int bits : {30, 63})
             for (const int max_leaf : {1, 4, 255})
