@@ -217,8 +217,12 @@ constexpr std::pair<const char*, Quality> qualities[] = {
     {"high", Quality::high},
 #endif
 };
-constexpr SimdPath paths[] = {SimdPath::automatic, SimdPath::single, SimdPath::packet,
-                              SimdPath::stream, SimdPath::sorted};
+constexpr SimdPath paths[] = {
+    SimdPath::single, SimdPath::packet, SimdPath::stream,
+#if !defined(RAYDIX_EMULATED) && !defined(RAYDIX_SANITIZED)
+    SimdPath::automatic, SimdPath::sorted,  // which choose among the others
+#endif
+};
 
 /// Adds a way for each quality and each of several ways through the trees. answer(scene, options).
 template <class Kind, class Ask>

@@ -195,15 +195,15 @@ TEST(MedianBuilder, DepthIsTheLeast) {
 TEST(MedianBuilder, TreeDependsOnNothingButTheMesh) {
     std::vector<MeshInput> inputs = median_inputs(3);
     inputs.push_back({"more than one task", random_soup(20'000, 3)});
-    for (const auto& [name, mesh] : inputs) {
-        const auto hash_of = [&mesh](int threads, Ids given) {
+    for (const MeshInput& input : inputs) {
+        const auto hash_of = [&](int threads, Ids given) {
             std::string hash;
-            with_threads(threads, [&] { hash = tree_hash(build_median(mesh, 4, given)); });
+            with_threads(threads, [&] { hash = tree_hash(build_median(input.mesh, 4, given)); });
             return hash;
         };
         const std::string one = hash_of(1, Ids::ascending);
-        EXPECT_EQ(hash_of(7, Ids::ascending), one) << name;
-        EXPECT_EQ(hash_of(2, Ids::descending), one) << name;
+        EXPECT_EQ(hash_of(7, Ids::ascending), one) << input.name;
+        EXPECT_EQ(hash_of(2, Ids::descending), one) << input.name;
     }
 }
 
