@@ -39,7 +39,6 @@ struct BvhBuilder::Scratch {
     ClusterScratch clusters;
     SweepScratch sweeps;
     TopScratch top;
-    const TakeClusters* take_clusters = nullptr;  // if clusters are wanted, not a tree
 };
 
 namespace {
@@ -90,6 +89,12 @@ void check_options(const BuildOptions& options, std::size_t n) {
         throw InputError(std::to_string(n) + " primitives; a tree takes fewer than 2147483648");
 }
 
+/// What a build may be asked for besides a tree over its input.
+struct BuildRequest {
+    const TakeClusters* take = nullptr;       // clusters are wanted, not a tree
+    const TriangleCorners* around = nullptr;  // the triangles that boxes are around
+};
+
 /// One build: a source of primitives, the kind of copies its leaves hold, and the key type.
 template <class Key, class Source, class Copy, class Scratch>
 struct BuildRun {
@@ -97,6 +102,7 @@ struct BuildRun {
     std::uint32_t n;
     const char* kind_name;
     const BuildOptions& options;
+    const BuildRequest& request;
     Scratch& scratch;
     BvhInternals tree;
     Buffer<Copy>& copies;
@@ -122,8 +128,8 @@ struct BuildRun {
         }
         if (sweeps(options.builder)) {
             const ProgressStage rest(0.03, 1);
-            build_by_sweeps(source, n, valid, bounds.box, scratch.sweeps, scratch.top, tree, copies,
-                            ms);
+            build_by_sweeps(source, n, valid, bounds.box, request.around, scratch.sweeps,
+                            scratch.top, tree, copies, ms);
             ms.total = total.lap();
             tree.build_ms() = ms;
             return;
@@ -146,8 +152,8 @@ struct BuildRun {
         const std::span<const Key> keys = codes.first(valid);
         if (grows_clusters(options.builder)) {
             const ProgressStage rest(0.2, 1);
-            build_clusters(source, keys, scratch.clusters, scratch.top, scratch.take_clusters, tree,
-                           copies, ms);
+            build_clusters(source, keys, scratch.clusters, scratch.top, request.take, tree, copies,
+                           ms);
             ms.total = total.lap();
             tree.build_ms() = ms;
             return;
@@ -301,7 +307,8 @@ private:
 
 template <class Source, class Copy, class Scratch>
 void build(const Source& source, std::size_t n, const char* kind_name, PrimitiveKind kind,
-           const BuildOptions& options, Scratch& scratch, BvhInternals tree, Buffer<Copy>& copies) {
+           const BuildOptions& options, const BuildRequest& request, Scratch& scratch,
+           BvhInternals tree, Buffer<Copy>& copies) {
     check_options(options, n);
     const std::uint64_t before = memory_count().now() - bytes_held(scratch, tree);
     memory_count().restart_peak();
@@ -311,12 +318,12 @@ void build(const Source& source, std::size_t n, const char* kind_name, Primitive
     const auto run = [&] {
         const auto count = static_cast<std::uint32_t>(n);
         if (options.bits == 30)
-            BuildRun<std::uint32_t, Source, Copy, Scratch>{source,  count, kind_name, options,
-                                                           scratch, tree,  copies}
+            BuildRun<std::uint32_t, Source, Copy, Scratch>{source,  count,   kind_name, options,
+                                                           request, scratch, tree,      copies}
                 .run();
         else
-            BuildRun<std::uint64_t, Source, Copy, Scratch>{source,  count, kind_name, options,
-                                                           scratch, tree,  copies}
+            BuildRun<std::uint64_t, Source, Copy, Scratch>{source,  count,   kind_name, options,
+                                                           request, scratch, tree,      copies}
                 .run();
     };
     try {
@@ -329,17 +336,29 @@ void build(const Source& source, std::size_t n, const char* kind_name, Primitive
 }
 
 template <class Scratch>
-void build_mesh(const MeshView& mesh, const BuildOptions& options, Scratch& scratch,
-                BvhInternals tree) {
-    if (mesh.triangles.empty()) {
+void build_mesh(const MeshView& mesh, const BuildOptions& options, const BuildRequest& request,
+                Scratch& scratch, Bvh& out) {
+    const bool points = mesh.triangles.empty();
+    if (out.kind() != (points ? PrimitiveKind::points : PrimitiveKind::triangles)) out = Bvh();
+    const BvhInternals tree{out};
+    if (points) {
         build(PointSource{mesh.vertices.data()}, mesh.vertices.size(), "point",
-              PrimitiveKind::points, options, scratch, tree, tree.points());
+              PrimitiveKind::points, options, request, scratch, tree, tree.points());
     } else {
         const TriangleSource source{mesh.vertices.data(), mesh.triangles.data(),
                                     mesh.vertices.size()};
-        build(source, mesh.triangles.size(), "triangle", PrimitiveKind::triangles, options, scratch,
-              tree, tree.triangles());
+        build(source, mesh.triangles.size(), "triangle", PrimitiveKind::triangles, options, request,
+              scratch, tree, tree.triangles());
     }
+}
+
+template <class Scratch>
+void build_boxes(std::span<const Aabb> boxes, const BuildOptions& options,
+                 const BuildRequest& request, Scratch& scratch, Bvh& out) {
+    if (out.kind() != PrimitiveKind::boxes) out = Bvh();
+    const BvhInternals tree{out};
+    build(BoxSource{boxes.data()}, boxes.size(), "box", PrimitiveKind::boxes, options, request,
+          scratch, tree, tree.boxes());
 }
 
 }  // namespace
@@ -352,27 +371,17 @@ BvhBuilder& BvhBuilder::operator=(BvhBuilder&&) noexcept = default;
 void BvhBuilderInternals::build_clusters(BvhBuilder& builder, const MeshView& mesh,
                                          const BuildOptions& options, Bvh& tree,
                                          const TakeClusters& take) {
-    builder.scratch_->take_clusters = &take;
-    const auto forget = [&](void*) { builder.scratch_->take_clusters = nullptr; };
-    const std::unique_ptr<void, decltype(forget)> guard(&builder, forget);
-    builder.build(mesh, options, tree);
+    build_mesh(mesh, options, {.take = &take}, *builder.scratch_, tree);
 }
 
 void BvhBuilderInternals::build_around(BvhBuilder& builder, std::span<const Aabb> boxes,
                                        const TriangleCorners& corners, const BuildOptions& options,
                                        Bvh& tree) {
-    const TriangleCorners*& known = builder.scratch_->sweeps.corners;
-    known = &corners;
-    const auto forget = [&](void*) { known = nullptr; };
-    const std::unique_ptr<void, decltype(forget)> guard(&builder, forget);
-    builder.build(boxes, options, tree);
+    build_boxes(boxes, options, {.around = &corners}, *builder.scratch_, tree);
 }
 
 void BvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Bvh& tree) {
-    const bool same_kind =
-        tree.kind() == (mesh.triangles.empty() ? PrimitiveKind::points : PrimitiveKind::triangles);
-    if (!same_kind) tree = Bvh();
-    build_mesh(mesh, options, *scratch_, BvhInternals{tree});
+    build_mesh(mesh, options, {}, *scratch_, tree);
 }
 
 Bvh build_bvh(const MeshView& mesh, const BuildOptions& options) {
@@ -393,10 +402,7 @@ Bvh build_bvh(std::span<const Aabb> boxes, const BuildOptions& options) {
 }
 
 void BvhBuilder::build(std::span<const Aabb> boxes, const BuildOptions& options, Bvh& tree) {
-    if (tree.kind() != PrimitiveKind::boxes) tree = Bvh();
-    const BvhInternals access{tree};
-    raydix::build(BoxSource{boxes.data()}, boxes.size(), "box", PrimitiveKind::boxes, options,
-                  *scratch_, access, access.boxes());
+    build_boxes(boxes, options, {}, *scratch_, tree);
 }
 
 Bvh build_bvh(std::span<const Vec3> points, const BuildOptions& options) {

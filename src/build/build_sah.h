@@ -26,7 +26,6 @@ namespace raydix {
 }
 
 struct SweepScratch {
-    const TriangleCorners* corners = nullptr;  // of the triangles that boxes are around, if any
     SahScratch sah;
     SbvhScratch sbvh;
     Buffer<SahReference> spare;
@@ -106,31 +105,31 @@ inline void sort_and_build(const SahInput& input, SweepScratch& scratch, const B
     ms.hierarchy = stage.lap();
 }
 
-/// What can be cut: triangles, and those that boxes are around.
+/// What can be cut: triangles, and `around`, those that boxes are around, if any.
 inline std::optional<TriangleCorners> corners_of(const TriangleSource& source, std::uint32_t n,
-                                                 const SweepScratch&) {
+                                                 const TriangleCorners*) {
     return MeshView{{source.vertices, source.vertex_count}, {source.triangles, n}};
 }
 inline std::optional<TriangleCorners> corners_of(const BoxSource&, std::uint32_t,
-                                                 const SweepScratch& scratch) {
-    if (scratch.corners == nullptr) return {};
-    return *scratch.corners;
+                                                 const TriangleCorners* around) {
+    if (around == nullptr) return {};
+    return *around;
 }
 inline std::optional<TriangleCorners> corners_of(const PointSource&, std::uint32_t,
-                                                 const SweepScratch&) {
+                                                 const TriangleCorners*) {
     return {};
 }
 
 /// Of `n` primitives `valid` > 0 are not left out. On return all arrays of the tree are complete.
 template <class Source, class Copy>
 void build_by_sweeps(const Source& source, std::uint32_t n, std::uint32_t valid, const Aabb& scene,
-                     SweepScratch& scratch, TopScratch& top_scratch, const BvhInternals& tree,
-                     Buffer<Copy>& copies, BuildMs& ms) {
+                     const TriangleCorners* around, SweepScratch& scratch, TopScratch& top_scratch,
+                     const BvhInternals& tree, Buffer<Copy>& copies, BuildMs& ms) {
     Stopwatch stage;
     const Builder builder = tree.options().builder;
     const auto max_leaf = static_cast<std::uint32_t>(tree.options().max_leaf);
     SahInput input{valid, max_leaf};
-    const std::optional<TriangleCorners> corners = corners_of(source, n, scratch);
+    const std::optional<TriangleCorners> corners = corners_of(source, n, around);
     if (builder == Builder::sbvh && corners) {
         const ReferenceCutter cutter(*corners);
         const SbvhInput cut_input{cutter, valid, max_leaf};

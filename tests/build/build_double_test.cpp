@@ -208,6 +208,7 @@ std::size_t count_uncovered(const BvhD& bvh) {
     const Exact scale(bvh.scale());
     std::size_t uncovered = 0;
     for (const auto& [id, parts] : boxes) {
+        if (sanitized && id % 16 != 0) continue;  // exact arithmetic takes its time
         ExactPiece whole;
         for (const Vec3d& p : {triangles[id].v0, triangles[id].v1, triangles[id].v2}) {
             const ExactPoint at = exact(p) - center;
@@ -219,14 +220,12 @@ std::size_t count_uncovered(const BvhD& bvh) {
 }
 
 TEST(BuildDouble, PartsCoverTheirTriangles) {
-    constexpr std::size_t few_slivers = fewer(800, 8);
-    MeshD nearly_flat = slivers_d(few_slivers, 13, {});  // edges that barely cross a plane
+    MeshD nearly_flat = slivers_d(800, 13, {});  // edges that barely cross a plane
     for (Vec3d& p : nearly_flat.vertices) p.z = p.z * 1e-11 + 1.0 / 3;
     for (const MeshD& mesh :
-         {slivers_d(few_slivers, 12),
-          with_stray(slivers_d(few_slivers, 12), utm_place - Vec3d{800.0, 0.0, 0.0}),
-          slivers_d(few_slivers, 12, {}), nearly_flat,
-          in_double(in_float(slivers_d(few_slivers, 14, {})), 3e9, {-0.1e12, 0.2e12, 0.1e12})})
+         {slivers_d(800, 12), with_stray(slivers_d(800, 12), utm_place - Vec3d{800.0, 0.0, 0.0}),
+          slivers_d(800, 12, {}), nearly_flat,
+          in_double(in_float(slivers_d(800, 14, {})), 3e9, {-0.1e12, 0.2e12, 0.1e12})})
         for (const Builder builder : {Builder::split, Builder::sbvh}) {
             const BvhD bvh = build_bvh(mesh, {.builder = builder, .max_leaf = 1});
             EXPECT_EQ(bvh.left_out(), 0u);
@@ -291,7 +290,7 @@ TEST(BuildDouble, CutsHoldWhatRoundingMoved) {
 }
 
 TEST(BuildDouble, TreesOfPartsLeaveOutAndRefuseWhatOthersDo) {
-    MeshD mesh = slivers_d(fewer(6000, 10), 15);
+    MeshD mesh = slivers_d(fewer(6000, 3), 15);
     const MeshD good = mesh;
     mesh.vertices[3 * 4].x = nan;
     mesh.vertices[3 * 32 + 1].y = inf;

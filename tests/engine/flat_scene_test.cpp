@@ -179,8 +179,8 @@ TEST(SceneSolid, IsTheSolidOfTheFlatMesh) {
         compare(*world_of_boxes(random, static_cast<std::uint32_t>(k) % 4), random);
     }
     for_random_worlds(compare);
-    EXPECT_GT(inside, 1000u);
-    EXPECT_GT(wound, 100u);  // boxes within boxes, mirrored or not, add up
+    EXPECT_GT(inside, fewer(1000, 10));
+    EXPECT_GT(wound, fewer(100, 10));  // boxes within boxes, mirrored or not, add up
 }
 
 TEST(SceneSolid, ABodyMayBeSplitOverGeometriesAndInstances) {
@@ -295,8 +295,8 @@ TEST(FlatScene, ClosestPointsOfTheSceneAreThoseOfTheMesh) {
             ASSERT_TRUE((near[i].u == w.u && near[i].v == w.v) || near[i].instance != 0);
         }
     });
-    EXPECT_GT(found, 5000u);
-    EXPECT_GT(turned, 500u);
+    EXPECT_GT(found, fewer(5000, 10));
+    EXPECT_GT(turned, fewer(500, 10));
 }
 
 TEST(SceneSolid, AtTheEdgeOfTheRangeOfCoordinates) {
@@ -431,7 +431,7 @@ Scene doubled(const Mesh& mesh, std::uint32_t levels) {
 }
 
 TEST(SceneSolid, WhatDoesNotFitIsRefusedBeforeItIsMade) {
-    const Mesh mesh = random_soup(1000, 5);
+    const Mesh mesh = random_soup(fewer(1000, 3), 5);
     const Scene many = doubled(mesh, 24);  // 2^24 * 1000 triangles: some 3 TB
     for (const auto& call :
          {std::function<void()>([&] { Solid{many}; }),

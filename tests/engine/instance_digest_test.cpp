@@ -218,7 +218,7 @@ constexpr std::pair<const char*, Quality> qualities[] = {
 #endif
 };
 constexpr SimdPath paths[] = {
-    SimdPath::single, SimdPath::packet, SimdPath::stream,
+    SimdPath::single,    SimdPath::packet, SimdPath::stream,
 #if !defined(RAYDIX_EMULATED) && !defined(RAYDIX_SANITIZED)
     SimdPath::automatic, SimdPath::sorted,  // which choose among the others
 #endif

@@ -17,6 +17,7 @@
 #include "engine/affine.h"
 #include "support/message.h"
 #include "support/random.h"
+#include "support/sanitized.h"
 #include "support/support.h"
 
 namespace raydix {
@@ -129,7 +130,7 @@ std::vector<Hit> hits_of_nodes(const Model& model, std::span<const Ray> rays) {
 TEST(ModelScene, NodesAreInstancesAndMeshesGeometries) {
     Random random(5);
     std::size_t found = 0, deep = 0;
-    for (int round = 0; round < 60; ++round) {
+    for (int round = 0; round < (test::sanitized ? 12 : 60); ++round) {
         const SomeModel model(random);
         for (const bool compact : {false, true}) {
             const Scene scene(model, {.compact = compact});
@@ -154,8 +155,8 @@ TEST(ModelScene, NodesAreInstancesAndMeshesGeometries) {
             }
         }
     }
-    EXPECT_GT(found, 1000u);
-    EXPECT_GT(deep, 100u);
+    EXPECT_GT(found, test::fewer(1000, 10));
+    EXPECT_GT(deep, test::fewer(100, 10));
 }
 
 TEST(ModelScene, FlattenedHitsAreThoseOfTheNodesButForRounding) {

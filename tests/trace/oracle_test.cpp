@@ -116,7 +116,7 @@ TEST(OracleHits, SoupsLikeDouble) {
 
 TEST(OracleHits, BuiltinScenesLikeDouble) {
     for (const Model& scene : builtin_triangle_scenes(10'000))
-        expect_like_double(scene, thorough > 1 ? 100 + 5 * thorough : 15);
+        expect_like_double(scene, thorough > 1 ? 100 + 5 * thorough : 30);
 }
 
 constexpr std::size_t embree_rays = thorough > 1 ? 2500 * thorough : 200;

@@ -102,7 +102,8 @@ TEST(Simd, HasCodeForThisProcessor) {
     EXPECT_EQ(sets.size(), 1u) << "that of the baseline alone";
 #elif defined(__x86_64__)
     EXPECT_EQ(sets.back(), "sse4");
-    EXPECT_EQ(std::ranges::count(sets, "avx2"), __builtin_cpu_supports("avx2") ? 1 : 0);
+    // Sanitizers are given the ends alone.
+    EXPECT_EQ(std::ranges::count(sets, "avx2"), !sanitized && __builtin_cpu_supports("avx2"));
     if (__builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl")) {
         EXPECT_EQ(sets.front(), "avx512");
     }
@@ -349,9 +350,10 @@ TEST(Simd, AllHitsOfManyLayers) {
         mesh.triangles.push_back({3 * k, 3 * k + 1, 3 * k + 2});
     }
     const Bvh bvh = build_bvh(mesh);
+    constexpr std::size_t count = fewer(1500, 5);
     for (const bool mixed : {false, true}) {
         std::vector<Ray> rays;
-        for (std::uint32_t k = 0; k < 1500; ++k) {
+        for (std::uint32_t k = 0; k < count; ++k) {
             const bool up = mixed && k % 3 == 0;
             const auto x = 0.001f * static_cast<float>(k);
             rays.push_back(
@@ -359,7 +361,7 @@ TEST(Simd, AllHitsOfManyLayers) {
             if (k % 7 == 0) rays.back().tmax = 0.5f;  // hits nothing
         }
         const AllHits wanted = trace_all(bvh, rays);
-        EXPECT_EQ(wanted.hits.size(), 400u * (1500 - 215));
+        EXPECT_EQ(wanted.hits.size(), 400u * (count - (count + 6) / 7));
         for (const bool compact : {false, true})
             for (const SimdPath path : {SimdPath::packet, SimdPath::single}) {
                 const AllHits all =

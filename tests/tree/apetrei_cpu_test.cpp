@@ -1,7 +1,7 @@
 // The bottom-up pass over runs of positions against the definition of the tree, and against itself
 // with other runs.
-#include "support/sanitized.h"
 #include "tree/apetrei_cpu.h"
+#include "support/sanitized.h"
 
 #include <gtest/gtest.h>
 

@@ -55,7 +55,8 @@ TEST(Octree, EndsAtEveryLevelItIsAskedTo) {
 TEST(Octree, EveryLeafSize) {
     const auto inputs = octree_inputs(200, seed + 2);
     for (const NamedPoints& input : inputs)
-        for (int max_leaf = 1; max_leaf <= 64; max_leaf += sanitized ? 7 : 1) compare(input, {.max_leaf = max_leaf});
+        for (int max_leaf = 1; max_leaf <= 64; max_leaf += sanitized ? 7 : 1)
+            compare(input, {.max_leaf = max_leaf});
 }
 
 TEST(Octree, MillionsOfEqualPointsAreOneChain) {
