@@ -1,11 +1,18 @@
 #include "support/digest_inputs.h"
 
 #include <raydix/model.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <string>
 
 #include "support/double_scenes.h"
+#include "support/support.h"
 
 namespace raydix::test {
 
@@ -33,7 +40,39 @@ std::vector<Ray> in_float(const std::vector<RayD>& rays) {
     return out;
 }
 
-Mesh small_builtin(const char* spec) { return load_model(spec).mesh(); }
+namespace {
+
+void write_ply(const std::filesystem::path& file, const Mesh& mesh) {
+    std::ofstream out(file, std::ios::binary);
+    out << "ply\nformat binary_little_endian 1.0\nelement vertex " << mesh.vertices.size()
+        << "\nproperty float x\nproperty float y\nproperty float z\nelement face "
+        << mesh.triangles.size() << "\nproperty list uchar uint vertex_indices\nend_header\n";
+    out.write(reinterpret_cast<const char*>(mesh.vertices.data()),
+              static_cast<std::streamsize>(mesh.vertices.size() * sizeof(Vec3)));
+    for (const Triangle& triangle : mesh.triangles) {
+        out.put(3);
+        out.write(reinterpret_cast<const char*>(&triangle), sizeof triangle);
+    }
+    if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
+}
+
+}  // namespace
+
+Mesh small_builtin(const char* spec) {
+    if (thorough > 1) return load_model(spec).mesh();
+    std::string name = spec;
+    std::ranges::replace_if(
+        name, [](char c) { return std::isalnum(c) == 0; }, '-');
+    const std::filesystem::path folder = RAYDIX_BINARY_DIR "/builtin",
+                                file = folder / (name + ".ply");
+    if (!std::filesystem::exists(file)) {
+        std::filesystem::create_directories(folder);
+        const auto own = folder / (name + "." + std::to_string(getpid()));
+        write_ply(own, load_model(spec).mesh());
+        std::filesystem::rename(own, file);
+    }
+    return load_model(file.string()).mesh();
+}
 
 MeshD thinned(MeshD mesh, std::size_t step) {
     std::vector<Triangle> kept;

@@ -19,7 +19,8 @@ std::vector<RayD> digest_rays(const MeshD& mesh, std::size_t count, std::uint64_
 /// Rounded to float. A limit of 0 or infinity stays.
 std::vector<Ray> in_float(const std::vector<RayD>& rays);
 
-/// The built-in scene of a name that makes triangles, at its least size.
+/// The built-in scene of a name that makes triangles, at its least size. Where that takes seconds,
+/// under sanitizers and on an emulated processor, it is kept in the build folder for the next test.
 Mesh small_builtin(const char* spec);
 
 /// The triangles of a mesh that are left when all but every `step`-th go; all vertices stay.
