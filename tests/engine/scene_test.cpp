@@ -115,7 +115,7 @@ TEST(Scene, AllHitsAreThoseOfEveryMeshOnEveryPath) {
             }
         }
     }
-    EXPECT_GT(found, 100u * thorough);
+    EXPECT_GT(found, 40u * thorough);  // with one instruction set
 }
 
 TEST(Scene, AllHitsKeepToTheirMemory) {

@@ -297,6 +297,49 @@ TYPED_TEST(Within, RowsOfOneWalkAndOfTwo) {
               (some.size() - all.counts.invalid_queries) * std::uint64_t{large.size()});
 }
 
+/// Where rows are counted first, boxes of the tree that lie inside a query's count as a whole: in
+/// trees that are deep enough.
+TYPED_TEST(Within, RowsInBoxesOfOneWalkAndOfTwo) {
+    using Box = typename TypeParam::Box;
+    std::mt19937_64 random(seed + 13);
+    const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+    std::vector<Vec3> places(fewer(30'000, 3));
+    for (Vec3& p : places) p = {unit(), unit(), unit()};
+    const auto points = points_as<TypeParam>(places);
+    const auto corners = points_as<TypeParam>(queries_for(places, fewer(200, 4), seed + 14));
+    std::vector<Box> boxes;
+    for (std::size_t i = 0; i + 1 < corners.size(); ++i) {
+        Box box{corners[i], corners[i + 1]};
+        for (int d = 0; d < TypeParam::dimension; ++d)
+            if ((&box.lo.x)[d] > (&box.hi.x)[d]) std::swap((&box.lo.x)[d], (&box.hi.x)[d]);
+        boxes.push_back(box);
+    }
+    const EveryPoint<TypeParam> every(points);
+    for (const PointsTree tree : {PointsTree::kdtree, PointsTree::bvh})
+        for (const std::string& isa : point_instruction_sets()) {
+            const TypeParam index = build_points(points, {.tree = tree});
+            const auto lists_within = [&](std::uint64_t room) {
+                return box_search(index, boxes,
+                                  {.threads = 1, .isa = isa, .max_result_bytes = room});
+            };
+            std::uint64_t refused = 0, least = std::uint64_t{1} << 40;
+            while (least - refused > least / 64) {
+                const std::uint64_t room = refused + (least - refused) / 2;
+                const bool fits = message_of([&] { (void)lists_within(room); }) == "no error";
+                (fits ? least : refused) = room;
+            }
+            for (const std::uint64_t room : {least, least * 3}) {
+                const auto lists = lists_within(room);
+                for (std::size_t b = 0; b < boxes.size(); ++b)
+                    ASSERT_TRUE(std::ranges::equal(
+                        lists.indices.view().subspan(lists.offsets[b],
+                                                     lists.offsets[b + 1] - lists.offsets[b]),
+                        every.in_box(boxes[b])))
+                        << isa << ", box " << b << ", " << room << " bytes";
+            }
+        }
+}
+
 TYPED_TEST(Within, LongRowsBesideShortOnes) {
     using Point = typename TypeParam::Point;
     std::vector<Point> points(150 * thorough);
