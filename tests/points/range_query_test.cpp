@@ -320,7 +320,7 @@ TYPED_TEST(Within, RowsInBoxesOfOneWalkAndOfTwo) {
             const TypeParam index = build_points(points, {.tree = tree});
             const auto lists_within = [&](std::uint64_t room) {
                 return box_search(index, boxes,
-                                  {.threads = 1, .isa = isa, .max_result_bytes = room});
+                                  {.threads = 1, .max_result_bytes = room, .isa = isa});
             };
             std::uint64_t refused = 0, least = std::uint64_t{1} << 40;
             while (least - refused > least / 64) {
