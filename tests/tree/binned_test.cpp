@@ -5,8 +5,11 @@
 
 #include <bit>
 #include <numeric>
+#include <optional>
+#include <vector>
 
 #include "tree/cluster_cases.h"
+#include "tree/split_bins.h"
 
 namespace raydix::test {
 namespace {
@@ -56,6 +59,37 @@ TEST(BinnedWidths, GiveTheSameTree) {
                 ASSERT_TRUE(same_node(nodes[k], expected[k]))
                     << input.name << ", node " << k << ", width " << width << ", seed " << seed;
         }
+    }
+}
+
+/// Three cubes in a row cost as much divided behind the first as before the last, and each plane
+/// between them as much as its neighbours in the same gap; eight cubes cost the same on each axis.
+TEST(SplitBins, OfEqualPlanesTheFirstIsTaken) {
+    for (const bool wide : {false, true}) {
+        if (wide && split_width() < 8) continue;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            std::vector<SplitBox> row;
+            for (std::uint32_t k = 0; k < 3; ++k) {
+                Vec3 lo{0, 0, 0};
+                (&lo.x)[axis] = static_cast<float>(k);
+                row.push_back(SplitBox::of({lo, lo + Vec3{1, 1, 1}}, k, 1));
+            }
+            const BinGrid grid(row);
+            const std::optional<Split> split = find_split(row, grid, wide);
+            ASSERT_TRUE(split);
+            EXPECT_EQ(split->axis, axis);
+            EXPECT_EQ(split->left_boxes, 1u);
+            EXPECT_EQ(split->last_left, grid.bin(row[0], axis));
+        }
+        std::vector<SplitBox> cube;
+        for (std::uint32_t k = 0; k < 8; ++k) {
+            const Vec3 lo{float(k & 1), float(k >> 1 & 1), float(k >> 2)};
+            cube.push_back(SplitBox::of({lo, lo + Vec3{1, 1, 1}}, k, 1));
+        }
+        const std::optional<Split> split = find_split(cube, BinGrid(cube), wide);
+        ASSERT_TRUE(split);
+        EXPECT_EQ(split->axis, 0u);
+        EXPECT_EQ(split->left_boxes, 4u);
     }
 }
 
