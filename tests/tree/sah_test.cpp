@@ -194,6 +194,19 @@ TEST_P(SahTrees, TakeBoxesThatBuildersGetWrong) {
         }
 }
 
+/// On a line nothing has a surface, so nothing costs anything.
+TEST_P(SahTrees, ALeafThatCostsAsMuchAsItsSubtreeIsTaken) {
+    Mesh mesh;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+        const auto x = static_cast<float>(i);
+        for (const float step : {0.0f, 0.5f, 0.7f}) mesh.vertices.push_back({x + step, 0, 0});
+        mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    const Bvh tree = build_bvh(mesh, {.builder = GetParam(), .max_leaf = 4});
+    EXPECT_EQ(tree.inner_count(), 0u);
+    EXPECT_EQ(tree.nodes()[0].count, 4u);
+}
+
 TEST_P(SahTrees, DoNotDependOnThreads) {
     std::vector<Model> scenes = builtin_triangle_scenes(thorough * 1000);
     scenes.push_back(sticks(thorough * 1000));
