@@ -62,11 +62,15 @@ TEST(Cwbvh, ADifferenceNoDoubleHoldsIsRoundedTheRightWay) {
     EXPECT_GE(255 * step_of(exponent), Exact{large});
     const int q = static_cast<int>(Exact{large} / step_of(exponent));
     ASSERT_EQ(q * step_of(exponent), Exact{large});  // a whole number of steps
+    const float all = 255 * 0x1p20f;                 // as many steps as there are
+    EXPECT_EQ(step_exponent(-tiny, all), step_exponent(0, all) + 1);
     for (const float origin : {0.0f, -tiny, tiny}) {
         ASSERT_EQ(step_exponent(origin, large), exponent);
         const auto [below, above] = quantised_steps(origin, large, large);
         EXPECT_EQ(below, origin > 0 ? q - 1 : q);
         EXPECT_EQ(above, origin < 0 ? q + 1 : q);
+        EXPECT_EQ(is_at_most(origin, exponent, q, large), origin <= 0);
+        EXPECT_EQ(is_at_least(origin, exponent, q, large), origin >= 0);
     }
 }
 
