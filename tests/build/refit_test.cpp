@@ -70,6 +70,7 @@ TEST(Refit, GivesTheHitsOfANewTree) {
             const std::uint32_t depth = bvh.max_depth();
             const Refitter refitter(bvh);
             for (const float by : {0.3f, 1.0f}) {
+                // Sanitizers take one of them for each number of threads.
                 if (test::sanitized && (by == 1.0f) == (threads == 1)) continue;
                 const Mesh now = deformed(mesh, by);
                 const RefitQuality quality = refitter.refit(bvh, now, threads);

@@ -12,7 +12,7 @@ inline constexpr bool sanitized = true;
 inline constexpr bool sanitized = false;
 #endif
 
-/// n in plain builds, a by-th of it under sanitizers.
+/// n in plain builds; under sanitizers n / by, rounded up.
 constexpr std::size_t fewer(std::size_t n, std::size_t by) {
     return sanitized ? (n + by - 1) / by : n;
 }

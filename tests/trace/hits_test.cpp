@@ -102,8 +102,9 @@ TEST(Hits, LineTreeAgreesWithEveryTriangle) {
                                scene_of(lattice_mesh(300, 5, 9), "lattice of 300"),
                                load_model("builtin:figure?triangles=10000")}) {
         const bool small = scene.mesh().triangles.size() < 1000;
-        const auto rays =
-            make_mixed_rays(scene, (small ? 2000 : 100) * thorough / (thorough == 1 ? 4 : 1), seed);
+        const std::size_t per_thorough = small ? 2000 : 100;
+        const auto rays = make_mixed_rays(
+            scene, thorough == 1 ? per_thorough / 4 : per_thorough * thorough, seed);
         expect_same_hits(scene.name + ", line tree against trace_brute_force", rays,
                          LineTree(scene.mesh()).closest(rays),
                          trace_brute_force(scene.mesh(), rays));
