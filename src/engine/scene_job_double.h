@@ -29,7 +29,7 @@ struct SceneJobD {
     HitD* hits = nullptr;                  // or else
     std::uint8_t* occluded = nullptr;
     /// In packets: through one mesh that is not empty, which all rays see. With a filter: alone.
-    enum class Way { alone, turns, packets } way = Way::alone;
+    PathWay way = PathWay::alone;  // not streams
 
     // Of all hits: those of each ray behind those of the one before, sorted; how many [n].
     BudgetVector<HitD>* found = nullptr;

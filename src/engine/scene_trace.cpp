@@ -2,7 +2,6 @@
 #include <raydix/scene.h>
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <vector>
 
@@ -13,12 +12,12 @@
 #include "engine/scene_state.h"
 #include "engine/trace_on_this_thread.h"
 #include "exec/parallel.h"
+#include "exec/path_rates.h"
 #include "exec/thread_own.h"
 #include "rays/place_order.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
 #include "trace/ray_frame.h"
-#include "trace/simd/path_race.h"
 #include "trace/simd/trace_on_this_thread.h"
 #include "trace/simd/wide_batch.h"
 
@@ -48,21 +47,19 @@ const HitFilter* filter_of(const SceneTraceOptions& options) {
     return options.filter ? &options.filter : nullptr;
 }
 
-/// How a batch goes through a scene.
-struct Way {
-    const SimdKernels* kernels;
+struct Kernels {
+    const SimdKernels* tree;
     const SceneKernels* scene;
-    bool packets, single, turns;
 };
 
 /// Rays begin to end - 1, or order[begin] to order[end - 1].
-JobCounts trace_job(const SceneTree& tree, const Way& way, const Batch& batch,
+JobCounts trace_job(const SceneTree& tree, const Kernels& kernels, PathWay way, const Batch& batch,
                     const std::vector<std::uint32_t>& order, std::size_t begin, std::size_t end) {
     const ThreadOwn<SceneJob> own;
     SceneJob& job = *own;
     const std::size_t from = order.empty() ? begin : 0;
     job.tree = &tree;
-    job.kernels = way.kernels;
+    job.kernels = kernels.tree;
     job.rays = batch.rays.data() + from;
     job.order = order.empty() ? nullptr : order.data() + begin;
     job.n = end - begin;
@@ -71,10 +68,10 @@ JobCounts trace_job(const SceneTree& tree, const Way& way, const Batch& batch,
     job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + from;
     job.filter = filter_of(batch.options);
     job.any = batch.hits == nullptr;
-    job.packets = way.packets;
-    job.single = way.single;
-    job.turns = way.turns;
-    way.scene->trace(job);
+    job.packets = way == PathWay::packets;
+    job.single = way == PathWay::turns || way == PathWay::alone;
+    job.turns = way == PathWay::turns;
+    kernels.scene->trace(job);
     JobCounts counts;
     counts.invalid = job.invalid;
     for (std::size_t k = 0; k < job.n; ++k) {
@@ -84,46 +81,42 @@ JobCounts trace_job(const SceneTree& tree, const Way& way, const Batch& batch,
     return counts;
 }
 
-SimdPath path_of(const SceneTree& tree, const Batch& batch) {
-    if (batch.options.path != SimdPath::automatic) return batch.options.path;
-    const SimdPath path = choose_path(tree.extent.box, batch.rays);
-    // Rays that go apart meet parts in lists too short to pay.
-    return path == SimdPath::sorted ? SimdPath::single : path;
-}
+/// How a batch goes.
+struct Plan {
+    SimdPath path;
+    JobWays ways{};
 
-/// For a path, and what its jobs may try instead: rays alone, in turns and one after the other.
-std::array<Way, 3> ways_of(SimdPath path, const SceneTraceOptions& options) {
-    Way way{&kernels_for(options.isa), &scene_kernels_for(options.isa), path == SimdPath::packet,
-            path == SimdPath::single, true};
-    std::array<Way, 3> ways{way, way, way};
-    ways[1].single = ways[2].single = true;
-    ways[path == SimdPath::single ? 1 : 2].turns = false;
-    return ways;
-}
-
-/// With fewer jobs than this a trial would cost more than it may gain.
-constexpr std::size_t least_jobs_of_race = 16;
+    Plan(const SceneTree& tree, const Batch& batch) : path(batch.options.path) {
+        const bool automatic = path == SimdPath::automatic;
+        BatchLook look{path, {}};
+        if (automatic) look = look_at(tree.extent.box, batch.rays);
+        // Rays that go apart meet parts in lists too short to pay.
+        path = automatic && look.path == SimdPath::sorted ? SimdPath::single : look.path;
+        if (path != SimdPath::single)
+            ways.add(path == SimdPath::packet ? PathWay::packets : PathWay::streams);
+        ways.add(PathWay::turns);
+        ways.add(PathWay::alone);
+        if (!automatic) return;
+        look.kind.any = batch.hits == nullptr;
+        ways.rates = &tree.rates.ways(look.kind);
+    }
+};
 
 TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
     const std::size_t n = batch.rays.size();
-    const SimdPath path = path_of(tree, batch);
+    const Plan plan(tree, batch);
     const bool sorted =
-        path == SimdPath::sorted && n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
+        plan.path == SimdPath::sorted && n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
     const std::size_t job_size = rays_per_job(n, SimdPath::stream);
     std::vector<JobCounts> parts((n + job_size - 1) / job_size);
-    const std::array<Way, 3> ways = ways_of(path, batch.options);
-    // Where rays go apart only the ways of rays that go alone take part.
-    PathRace paths(path == SimdPath::single ? 2 : 1, path == SimdPath::single ? 0 : 2);
-    const bool race =
-        batch.options.path == SimdPath::automatic && parts.size() >= least_jobs_of_race;
+    const Kernels kernels{&kernels_for(batch.options.isa), &scene_kernels_for(batch.options.isa)};
     with_threads(batch.options.threads, [&] {
         std::vector<std::uint32_t> order;
         if (sorted) order = order_by_place(tree.extent.box, batch.rays);
         for_each_block(n, job_size, [&](std::size_t job, std::size_t begin, std::size_t end) {
-            const auto trace = [&](std::size_t way, std::size_t from, std::size_t to) {
-                parts[job] += trace_job(tree, ways[way], batch, order, from, to);
-            };
-            race ? paths.run(begin, end, trace) : trace(0, begin, end);
+            plan.ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
+                parts[job] += trace_job(tree, kernels, way, batch, order, from, to);
+            });
         });
     });
     return sum_of(parts, n);
@@ -153,15 +146,15 @@ TraceCounts trace_mesh(const MeshTree& mesh, const Batch& batch) {
     const HitRows rows{batch.hits, sizeof(Hit)};
     return trace_rows(
         *mesh.tree, batch.rays, rows, batch.occluded, options,
-        [&](const std::uint32_t* order, std::size_t begin, std::size_t end) {
+        [&](std::size_t first, const std::uint32_t* order, std::size_t begin, std::size_t end) {
             if (batch.hits == nullptr) return;
-            const std::uint32_t first = mesh.ids.front();
+            Hit* const hits = batch.hits + first;
+            const std::uint32_t least_id = mesh.ids.front();
             if (mesh.ids.size() == 1)
-                for_each_row(batch.hits, order, begin, end,
-                             [&](Hit& hit) { place_hit(hit, first); });
+                for_each_row(hits, order, begin, end, [&](Hit& hit) { place_hit(hit, least_id); });
             else
-                for_each_row(batch.hits, order, begin, end, [&](Hit& hit) {
-                    place_hit(hit, first);
+                for_each_row(hits, order, begin, end, [&](Hit& hit) {
+                    place_hit(hit, least_id);
                     if (hit.hit()) mesh.name(hit);
                 });
         },
@@ -173,9 +166,11 @@ void trace_on_this_thread(const SceneTree& tree, std::span<const Ray> rays, Hit*
                           std::uint8_t* occluded) {
     const SceneTraceOptions options;
     const Batch batch{rays, hits, occluded, options};
-    const Way way = ways_of(path_of(tree, batch), options).front();
+    const PathWay way = Plan(tree, batch).ways.ways[0];
+    const Kernels kernels{&kernels_for({}), &scene_kernels_for({})};
     for (std::size_t begin = 0; begin < rays.size(); begin += max_job_rays)
-        trace_job(tree, way, batch, {}, begin, std::min(begin + max_job_rays, rays.size()));
+        trace_job(tree, kernels, way, batch, {}, begin,
+                  std::min(begin + max_job_rays, rays.size()));
 }
 
 /// The only mesh tree, if all rays can see it.

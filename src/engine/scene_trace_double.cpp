@@ -2,7 +2,6 @@
 #include <raydix/error.h>
 #include <raydix/scene.h>
 
-#include <array>
 #include <limits>
 #include <vector>
 
@@ -13,12 +12,12 @@
 #include "engine/scene_job_double.h"
 #include "engine/scene_state.h"
 #include "exec/parallel.h"
+#include "exec/path_rates.h"
 #include "exec/thread_own.h"
 #include "rays/place_order.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
 #include "trace/ray_frame.h"
-#include "trace/simd/path_race.h"
 #include "trace/simd/wide_batch.h"
 
 namespace raydix {
@@ -62,17 +61,14 @@ void set_job(SceneJobD& job, const SceneTreeD& tree, const Batch& batch,
     job.occluded = batch.occluded == nullptr ? nullptr : batch.occluded + from;
 }
 
-using Way = SceneJobD::Way;
-
-/// What the rays of a batch do, and may try instead.
-struct Ways {
-    std::array<Way, 2> way;
-    std::size_t likely;   // of the two
+/// How a batch goes.
+struct Plan {
+    JobWays ways{};
     bool sorted = false;  // by where they start
 };
 
-/// choose_path for rays about the center of a tree.
-SimdPath choose_path(const WideTreeD& tree, std::span<const RayD> rays) {
+/// look_at for rays about the center of a tree.
+BatchLook look_at(const WideTreeD& tree, std::span<const RayD> rays) {
     constexpr std::size_t window = 64, windows = 32;
     std::vector<Ray> some;
     for (std::size_t w = 0; w < windows; ++w) {
@@ -84,24 +80,38 @@ SimdPath choose_path(const WideTreeD& tree, std::span<const RayD> rays) {
             Double3(ray.direction).round_to(near.direction);
         }
     }
-    return raydix::choose_path(tree.arrays.bounds, some);
+    BatchLook look = raydix::look_at(tree.arrays.bounds, some);
+    look.kind.size = BatchKind::size_of(rays.size());
+    return look;
 }
 
-Ways ways_of(const SceneTreeD& tree, const Batch& batch) {
+Plan plan_for(const SceneTreeD& tree, const Batch& batch) {
     const MeshTreeD* const mesh = tree.only_mesh();
     const SceneTraceOptions& options = batch.options;
-    if (options.filter_d) return {{Way::alone, Way::alone}, 1};
-    // Rays that follow each other through little gain nothing by turns.
-    if (mesh == nullptr || mesh->tree->empty()) return {{Way::turns, Way::alone}, 2};
-    const bool may_go_together =
-        mesh->tree->suits_packets && options.masks.empty() && (mesh->mask & options.mask) != 0;
-    if (!may_go_together || options.path == SimdPath::single) return {{Way::turns, Way::turns}, 1};
-    const SimdPath path =
-        options.path == SimdPath::automatic ? choose_path(*mesh->tree, batch.rays) : options.path;
-    if (path == SimdPath::packet) return {{Way::packets, Way::packets}, 1};
-    const bool sorted = path == SimdPath::sorted &&
-                        batch.rays.size() <= std::size_t{std::numeric_limits<std::int32_t>::max()};
-    return {{Way::turns, Way::packets}, path == SimdPath::stream ? 2u : 1u, sorted};
+    const bool automatic = options.path == SimdPath::automatic;
+    BatchLook look{options.path, {}};
+    Plan plan;
+    if (options.filter_d) {
+        plan.ways.add(PathWay::alone);
+    } else if (mesh == nullptr || mesh->tree->empty()) {
+        plan.ways.add(PathWay::turns);
+        plan.ways.add(
+            PathWay::alone);  // rays that follow each other through little gain by no turns
+    } else {
+        const bool may_go_together =
+            mesh->tree->suits_packets && options.masks.empty() && (mesh->mask & options.mask) != 0;
+        if (automatic && may_go_together) look = look_at(*mesh->tree, batch.rays);
+        const bool packets = may_go_together && look.path == SimdPath::packet;
+        plan.sorted = may_go_together && look.path == SimdPath::sorted &&
+                      batch.rays.size() <= std::size_t{std::numeric_limits<std::int32_t>::max()};
+        plan.ways.add(packets ? PathWay::packets : PathWay::turns);
+        if (may_go_together) plan.ways.add(packets ? PathWay::turns : PathWay::packets);
+    }
+    if (!automatic || plan.ways.count < 2) return plan;
+    look.kind.any = batch.hits == nullptr;
+    look.kind.sorted = plan.sorted;
+    plan.ways.rates = &tree.rates.ways(look.kind);
+    return plan;
 }
 
 /// Rays along a curve through where they start.
@@ -113,31 +123,24 @@ std::vector<std::uint32_t> order_by_place(const WideTreeD& tree, std::span<const
     return raydix::order_by_place(tree.arrays.bounds, places);
 }
 
-/// With fewer jobs than this a trial would cost more than it may gain.
-constexpr std::size_t least_jobs_of_race = 16;
-
 TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
     const SceneTreeD& tree = checked_tree(scene, batch.rays.size(), batch.options);
     const SceneKernelsD& kernels = scene_kernels_double_for(batch.options.isa);
     const std::size_t n = batch.rays.size(), job_size = rays_per_job(n, SimdPath::packet);
     std::vector<JobCounts> parts((n + job_size - 1) / job_size);
-    const Ways ways = ways_of(tree, batch);
-    PathRace race(ways.likely, 2 - ways.likely);
-    const bool races = ways.way[0] != ways.way[1] && batch.options.path == SimdPath::automatic &&
-                       parts.size() >= least_jobs_of_race;
+    const Plan plan = plan_for(tree, batch);
     with_threads(batch.options.threads, [&] {
         std::vector<std::uint32_t> order;
-        if (ways.sorted) order = order_by_place(*tree.only_mesh()->tree, batch.rays);
+        if (plan.sorted) order = order_by_place(*tree.only_mesh()->tree, batch.rays);
         for_each_block(n, job_size, [&](std::size_t part, std::size_t begin, std::size_t end) {
-            const auto trace = [&](std::size_t way, std::size_t from, std::size_t to) {
+            plan.ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
                 const ThreadOwn<SceneJobD> own;
                 SceneJobD& job = *own;
                 set_job(job, tree, batch, order, from, to);
-                job.way = ways.way[way];
+                job.way = way;
                 kernels.trace(job);
                 parts[part] += {job.hit_count, job.invalid};
-            };
-            races ? race.run(begin, end, trace) : trace(0, begin, end);
+            });
         });
     });
     return sum_of(parts, n);

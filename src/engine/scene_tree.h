@@ -17,6 +17,7 @@
 #include "engine/grouped_meshes.h"
 #include "engine/mesh_name.h"
 #include "engine/support.h"
+#include "exec/path_rates.h"
 #include "layout/wide_bvh.h"
 #include "trace/simd/wide_ray.h"
 
@@ -113,6 +114,7 @@ struct SceneTree {
         std::call_once(support_asked, [&] { support_known = support_of(*this); });
         return support_known;
     }
+    mutable PathRates rates;  // of batches so far
     mutable std::once_flag support_asked;
     mutable Support support_known;
     /// What queries of distance need besides, made when the first of them asks (near_scene_of).

@@ -15,6 +15,7 @@
 #include "engine/grouped_meshes.h"
 #include "engine/mesh_name.h"
 #include "engine/wide_tree_double.h"
+#include "exec/path_rates.h"
 
 namespace raydix {
 
@@ -84,6 +85,7 @@ struct SceneTreeD {
     std::uint64_t paths = 0;
     std::uint32_t levels = 0;    // of instances, below this scene
     std::size_t stack_size = 0;  // of a ray: children still to visit, on all levels
+    mutable PathRates rates;     // of batches so far
     /// Of all geometries and instances, those of inner scenes too: ascending, each once.
     std::vector<std::uint32_t> masks;
     std::shared_ptr<KeptBodies> bodies = std::make_shared<KeptBodies>();

@@ -51,9 +51,9 @@ void trace_alone(SceneJobD& job, std::size_t k) {
 template <bool any>
 void trace_scene_as(SceneJobD& job) {
     job.stack.reserve_words(job.tree->stack_size);
-    if (job.way == SceneJobD::Way::packets)
+    if (job.way == PathWay::packets)
         MeshPacketsD<any>(job).trace([&](std::size_t k) { trace_alone<any>(job, k); });
-    else if (job.way == SceneJobD::Way::turns)
+    else if (job.way == PathWay::turns)
         SceneTurnsD<any>(job).trace();
     else
         for (std::size_t k = 0; k < job.n; ++k) trace_alone<any>(job, k);

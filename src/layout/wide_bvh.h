@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "exec/path_rates.h"
 #include "layout/block_filler.h"
 #include "layout/quantise.h"
 #include "layout/wide_collapse.h"
@@ -92,6 +93,7 @@ struct WideBvh::Arrays {
         alignas(16) float lo[4]{}, hi[4]{}, middle[4]{};
     } frame;
     WideBvhStats stats;
+    mutable PathRates rates;  // of batches so far
 
     void set_bounds(const Aabb& box) { set_bounds(box, center_of(box)); }
     /// `about`: in place of the middle, where planes of nodes are about another point.
@@ -119,6 +121,7 @@ struct WideBvh::Arrays {
         stats.width = options.width;
         stats.compact = options.compact;
         stats.widening = 1.0;
+        rates = {};
     }
 };
 

@@ -12,10 +12,10 @@
 
 #include "base/float_env.h"
 #include "exec/parallel.h"
+#include "exec/path_rates.h"
 #include "rays/place_order.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
-#include "trace/simd/path_race.h"
 #include "trace/simd/simd_kernels.h"
 #include "trace/simd/trace_on_this_thread.h"
 #include "trace/simd/wide_batch.h"
@@ -44,15 +44,18 @@ std::size_t rays_per_job(std::size_t n, SimdPath path) {
 
 namespace {
 
-void (*job_of(const SimdKernels& kernels, SimdPath path))(const SimdJob&, SimdCounts&) {
-    if (path == SimdPath::single) return kernels.single;
-    return path == SimdPath::packet ? kernels.packets : kernels.streams;
+void (*job_of(const SimdKernels& kernels, PathWay way))(const SimdJob&, SimdCounts&) {
+    if (way == PathWay::turns) return kernels.single;
+    return way == PathWay::packets ? kernels.packets : kernels.streams;
+}
+
+PathWay way_of(SimdPath path) {
+    if (path == SimdPath::single) return PathWay::turns;
+    return path == SimdPath::packet ? PathWay::packets : PathWay::streams;
 }
 
 /// Kernels of compact trees count unasked: what they count depends on the paths of the jobs.
-TraceCounts sum_of(const std::vector<SimdCounts>& parts, std::size_t rays, bool counters) {
-    TraceCounts sum;
-    sum.rays = rays;
+void add_counts(const std::vector<SimdCounts>& parts, bool counters, TraceCounts& sum) {
     for (const SimdCounts& part : parts) {
         sum.hits += part.hits;
         sum.invalid_rays += part.invalid;
@@ -60,23 +63,72 @@ TraceCounts sum_of(const std::vector<SimdCounts>& parts, std::size_t rays, bool 
         sum.node_visits += part.visits;
         sum.triangle_tests += part.tests;
     }
-    return sum;
 }
 
-SimdPath path_for(const WideBvh& tree, std::span<const Ray> rays, SimdPath wanted) {
-    const SimdPath path = wanted == SimdPath::automatic ? choose_simd_path(tree, rays) : wanted;
-    const bool can_sort = rays.size() <= std::size_t{std::numeric_limits<std::int32_t>::max()};
-    return path == SimdPath::sorted && !can_sort ? SimdPath::stream : path;
-}
+/// How a batch goes.
+struct Plan {
+    const WideBvh& tree;
+    BatchLook look;
+    bool automatic, learns, streams;
+    std::size_t job_rays;
 
-/// With fewer jobs than this a trial would cost more than it may gain.
-constexpr std::size_t least_jobs_of_race = 16;
+    /// `streams`: whether they can answer. `any`: what is asked.
+    Plan(const WideBvh& through, std::span<const Ray> rays, const TraceOptions& options, bool any,
+         bool can_stream)
+        : tree(through),
+          look{options.path, {}},
+          automatic(options.path == SimdPath::automatic),
+          // Counters are those of one way: they do not depend on times.
+          learns(automatic && !options.counters),
+          streams(can_stream) {
+        if (automatic) look = look_at(tree.arrays().bounds, rays);
+        look.kind.any = any;
+        job_rays = rays_per_job(rays.size(), streams ? look.path : SimdPath::packet);
+    }
+
+    [[nodiscard]] std::size_t jobs(std::size_t rays) const {
+        return (rays + job_rays - 1) / job_rays;
+    }
+
+    /// Rays 0 to n - 1 by trace(order, begin, end).
+    template <class Trace>
+    void run_in_order(std::size_t n, const Trace& trace) const {
+        // With fewer rays than this, to sort them takes longer than it saves, most often.
+        constexpr std::size_t least = 8192, many = 65536;
+        const bool can_sort = streams && look.path == SimdPath::sorted &&
+                              n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
+        if (!can_sort || (automatic && n < 2 * least)) {
+            trace(RayOrder::given, 0, n);
+        } else if (!learns) {
+            trace(RayOrder::sorted, 0, n);
+        } else {
+            constexpr RayOrder orders[] = {RayOrder::given, RayOrder::sorted, RayOrder::given};
+            tree.arrays().rates.orders(look.kind).run(
+                std::span(orders).subspan(n < many ? 0 : 1, 2), 0, n, trace, least);
+        }
+    }
+
+    /// Of jobs in this order.
+    [[nodiscard]] JobWays ways(RayOrder order) const {
+        PathWay first = way_of(look.path);
+        if (look.path == SimdPath::sorted && order == RayOrder::given) first = PathWay::turns;
+        if (!streams && first == PathWay::streams) first = PathWay::turns;
+        JobWays ways;
+        ways.add(first);
+        if (!learns) return ways;
+        for (const PathWay way : {PathWay::packets, PathWay::turns, PathWay::streams})
+            if (way != first && (streams || way != PathWay::streams)) ways.add(way);
+        BatchKind kind = look.kind;
+        kind.sorted = order == RayOrder::sorted;
+        ways.rates = &tree.arrays().rates.ways(kind);
+        return ways;
+    }
+};
 
 /// A batch as its jobs see it: hits, or else occluded, or all hits.
 struct Batch {
     const WideBvh& tree;
     const SimdKernels& kernels;
-    SimdPath path;
     std::span<const Ray> rays;
     HitRows hits;
     std::uint8_t* occluded;
@@ -85,13 +137,10 @@ struct Batch {
     HitBlocks<AllHits>* all = nullptr;
     const HitCheck* check = nullptr;
 
-    void run(std::size_t begin, std::size_t end, SimdCounts& counts) const {
-        run(path, begin, end, counts);
-    }
-    void run(SimdPath own, std::size_t begin, std::size_t end, SimdCounts& counts) const {
+    void run(PathWay way, std::size_t begin, std::size_t end, SimdCounts& counts) const {
         const std::size_t stack_size = wide_stack_capacity(tree.stats().max_depth);
         StackMemory stack;
-        stack.reserve_words(stack_size * (own == SimdPath::single ? rays_in_turn : 1));
+        stack.reserve_words(stack_size * (way == PathWay::turns ? rays_in_turn : 1));
         StreamMemory memory;
         const std::size_t from = order.empty() ? begin : 0;
         TriangleBlock room{};
@@ -109,78 +158,45 @@ struct Batch {
                           all == nullptr ? nullptr : &all->hits_with(begin),
                           all == nullptr ? nullptr : all->hit_counts() + begin,
                           check};
-        job_of(kernels, own)(job, counts);
+        job_of(kernels, way)(job, counts);
     }
 };
 
-/// What kernels without streams take, and what they may try instead.
-struct WaysOfTwo {
-    SimdPath ways[2] = {SimdPath::single, SimdPath::packet};
-    bool packets;
-    PathRace race;
-
-    explicit WaysOfTwo(SimdPath path)
-        : packets(path == SimdPath::packet),
-          race(path == SimdPath::stream ? 2 : 1, path == SimdPath::stream ? 0 : 1) {}
-    [[nodiscard]] SimdPath first() const { return packets ? SimdPath::packet : SimdPath::single; }
-};
-
-TraceCounts trace_checked(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
-                          std::uint8_t* occluded, const TraceOptions& options, const RowsDone& done,
-                          const HitCheck& check) {
-    WaysOfTwo two(path_for(tree, rays, options.path));
-    const std::size_t block_size = rays_per_job(rays.size(), two.first());
-    std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
-    Batch batch{tree,     kernels_for(options.isa), two.first(), rays, hits,
-                occluded, options.counters};
-    batch.check = &check;
-    const bool race =
-        options.path == SimdPath::automatic && !two.packets && parts.size() >= least_jobs_of_race;
-    with_threads(options.threads, [&] {
-        for_each_block(rays.size(), block_size,
-                       [&](std::size_t block, std::size_t begin, std::size_t end) {
-                           if (race)
-                               two.race.run(begin, end,
-                                            [&](std::size_t way, std::size_t from, std::size_t to) {
-                                                batch.run(two.ways[way], from, to, parts[block]);
-                                            });
-                           else
-                               batch.run(begin, end, parts[block]);
-                           done(nullptr, begin, end);
-                       });
-    });
-    return sum_of(parts, rays.size(), options.counters);
-}
-
+/// `done` comes for the rays of each job. `check`: of the hits that it accepts, or null.
 TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
-                        std::uint8_t* occluded, const TraceOptions& options,
-                        const RowsDone* done = nullptr) {
+                        std::uint8_t* occluded, const TraceOptions& options, const RowsDone& done,
+                        const HitCheck* check) {
+    const Plan plan(tree, rays, options, !hits, check == nullptr);
     const SimdKernels& kernels = kernels_for(options.isa);
-    const SimdPath path = path_for(tree, rays, options.path);
-    const std::size_t block_size = rays_per_job(rays.size(), path);
-    std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
-    Batch batch{tree, kernels, path, rays, hits, occluded, options.counters};
-    // Counters are those of one path: they do not depend on times.
-    const bool race = options.path == SimdPath::automatic && path != SimdPath::packet &&
-                      !options.counters && parts.size() >= least_jobs_of_race;
-    // Rays that take turns only win where they go anywhere.
-    constexpr SimdPath ways[] = {SimdPath::stream, SimdPath::packet, SimdPath::single};
-    PathRace paths(2, path == SimdPath::sorted ? 1 : 0);
+    TraceCounts sum;
+    sum.rays = rays.size();
     with_threads(options.threads, [&] {
-        if (path == SimdPath::sorted) batch.order = order_by_place(tree.arrays().bounds, rays);
-        for_each_block(
-            rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
-                if (race)
-                    paths.run(begin, end, [&](std::size_t way, std::size_t from, std::size_t to) {
-                        batch.run(ways[way], from, to, parts[block]);
+        plan.run_in_order(rays.size(), [&](RayOrder order, std::size_t first, std::size_t last) {
+            const std::span<const Ray> part = rays.subspan(first, last - first);
+            Batch batch{tree,
+                        kernels,
+                        part,
+                        hits ? HitRows{hits.at(first), hits.bytes} : HitRows{},
+                        occluded == nullptr ? nullptr : occluded + first,
+                        options.counters};
+            batch.check = check;
+            if (order == RayOrder::sorted) batch.order = order_by_place(tree.arrays().bounds, part);
+            const JobWays ways = plan.ways(order);
+            std::vector<SimdCounts> parts(plan.jobs(part.size()));
+            for_each_block(
+                part.size(), plan.job_rays,
+                [&](std::size_t job, std::size_t begin, std::size_t end) {
+                    ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
+                        batch.run(way, from, to, parts[job]);
                     });
-                else
-                    batch.run(begin, end, parts[block]);
-                if (done != nullptr)
-                    (*done)(batch.order.empty() ? nullptr : batch.order.data(), begin, end);
-            });
+                    if (done)
+                        done(first, order == RayOrder::sorted ? batch.order.data() : nullptr, begin,
+                             end);
+                });
+            add_counts(parts, options.counters, sum);
+        });
     });
-    return sum_of(parts, rays.size(), options.counters);
+    return sum;
 }
 
 HitRows rows_of(std::span<Hit> hits) { return {hits.data(), sizeof(Hit)}; }
@@ -190,12 +206,11 @@ void place_in_tree(Hit& hit) { place_hit(hit, 0); }
 /// Largest jobs, one after the other, in the caller's floating-point environment.
 void trace_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
                           std::uint8_t* occluded) {
-    SimdPath path = choose_simd_path(tree, rays);
-    if (path == SimdPath::sorted) path = SimdPath::stream;
-    const Batch batch{tree, simd_kernels().front(), path, rays, hits, occluded, false};
+    const PathWay way = way_of(choose_simd_path(tree, rays));
+    const Batch batch{tree, simd_kernels().front(), rays, hits, occluded, false};
     SimdCounts counts;
     for (std::size_t begin = 0; begin < rays.size(); begin += max_job_rays)
-        batch.run(begin, std::min(begin + max_job_rays, rays.size()), counts);
+        batch.run(way, begin, std::min(begin + max_job_rays, rays.size()), counts);
 }
 
 /// Before a call may end early: an empty tree answers without any threads.
@@ -220,10 +235,12 @@ TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit>
     check_sizes(rays.size(), hits.size());
     check_call(options);
     static_cast<void>(kernels_for(options.isa));
-    const RowsDone place = [&](const std::uint32_t* order, std::size_t begin, std::size_t end) {
-        for_each_row(hits.data(), order, begin, end, place_in_tree);
+    const RowsDone place = [&](std::size_t first, const std::uint32_t* order, std::size_t begin,
+                               std::size_t end) {
+        for_each_row(hits.data() + first, order, begin, end, place_in_tree);
     };
-    if (!tree.empty()) return trace_batch(tree, rays, rows_of(hits), nullptr, options, &place);
+    if (!tree.empty())
+        return trace_batch(tree, rays, rows_of(hits), nullptr, options, place, nullptr);
     std::ranges::fill(hits, Hit{});
     return miss_all(rays);
 }
@@ -240,7 +257,7 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
     check_sizes(rays.size(), occluded.size());
     check_call(options);
     static_cast<void>(kernels_for(options.isa));
-    if (!tree.empty()) return trace_batch(tree, rays, {}, occluded.data(), options);
+    if (!tree.empty()) return trace_batch(tree, rays, {}, occluded.data(), options, {}, nullptr);
     std::ranges::fill(occluded, std::uint8_t{0});
     return miss_all(rays);
 }
@@ -275,27 +292,23 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
         all.counts = miss_all(rays);
         return all;
     }
-    std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
-    WaysOfTwo two(path_for(tree, rays, options.path));
-    Batch batch{tree, kernels, two.first(), rays, {}, nullptr, options.counters};
+    const Plan plan(tree, rays, options, false, false);
+    const JobWays ways = plan.ways(RayOrder::given);
+    std::vector<SimdCounts> parts(plan.jobs(rays.size()));
+    Batch batch{tree, kernels, rays, {}, nullptr, options.counters};
     batch.all = &found;
-    const bool race = options.path == SimdPath::automatic && !two.packets && !options.counters &&
-                      parts.size() >= least_jobs_of_race;
     with_threads(options.threads, [&] {
-        for_each_block(rays.size(), block_size,
-                       [&](std::size_t block, std::size_t begin, std::size_t end) {
-                           if (race)
-                               two.race.run(begin, end,
-                                            [&](std::size_t way, std::size_t from, std::size_t to) {
-                                                batch.run(two.ways[way], from, to, parts[block]);
-                                            });
-                           else
-                               batch.run(begin, end, parts[block]);
-                           found.finish(block);
+        for_each_block(rays.size(), plan.job_rays,
+                       [&](std::size_t job, std::size_t begin, std::size_t end) {
+                           ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
+                               batch.run(way, from, to, parts[job]);
+                           });
+                           found.finish(job);
                        });
         all = found.join();
     });
-    all.counts = sum_of(parts, rays.size(), options.counters);
+    all.counts.rays = rays.size();
+    add_counts(parts, options.counters, all.counts);
     return all;
 }
 
@@ -304,29 +317,41 @@ TraceCounts trace_rows(const WideBvh& tree, std::span<const Ray> rays, HitRows h
                        const HitCheck* check) {
     check_call(options);
     static_cast<void>(kernels_for(options.isa));
-    if (!tree.empty())
-        return check == nullptr ? trace_batch(tree, rays, hits, occluded, options, &done)
-                                : trace_checked(tree, rays, hits, occluded, options, done, *check);
+    if (!tree.empty()) return trace_batch(tree, rays, hits, occluded, options, done, check);
     for (std::size_t i = 0; i < rays.size(); ++i)
         if (hits)
             *hits.at(i) = {};
         else
             occluded[i] = 0;
-    done(nullptr, 0, rays.size());
+    done(0, nullptr, 0, rays.size());
     return miss_all(rays);
 }
 
 SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays) {
-    return choose_path(tree.arrays().bounds, rays);
+    return look_at(tree.arrays().bounds, rays).path;
 }
 
-SimdPath choose_path(const Aabb& bounds, std::span<const Ray> rays) {
+namespace {
+
+/// How many of the limits, which grow, x is beyond.
+template <std::size_t n>
+std::uint32_t beyond(const float (&limits)[n], float x) {
+    std::uint32_t count = 0;
+    for (const float limit : limits) count += !(x <= limit);
+    return count;
+}
+
+}  // namespace
+
+BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
     const FloatEnvironment plain;
-    constexpr std::size_t window = 64, windows = 32;
-    constexpr float small_angle = 0.25f, small_part = 0.05f;
+    constexpr std::size_t window = 64;
+    constexpr float small_angle = 0.25f, wide_angle = 1.0f, small_part = 0.05f;
+    constexpr float parts[] = {0.002f, 0.01f, small_part}, angles[] = {small_angle, wide_angle};
     const Vec3 size = bounds.hi - bounds.lo;
-    const float near = small_part * max_of(max_of(size.x, size.y), size.z);
-    std::size_t looked_at = 0, coherent = 0, close = 0;
+    const float longest_side = max_of(max_of(size.x, size.y), size.z);
+    const std::size_t windows = std::clamp<std::size_t>(rays.size() / 256, 1, 32);
+    std::size_t looked_at = 0, coherent = 0, close = 0, apart = 0, spread = 0;
     for (std::size_t w = 0; w < windows; ++w) {
         const std::size_t begin = rays.size() / windows * w;
         if (begin + window > rays.size()) break;
@@ -341,12 +366,22 @@ SimdPath choose_path(const Aabb& bounds, std::span<const Ray> rays) {
         }
         ++looked_at;
         const Vec3 o = origins.hi - origins.lo, d = directions.hi - directions.lo;
-        const bool here = max_of(max_of(o.x, o.y), o.z) <= near;
+        const float from = max_of(max_of(o.x, o.y), o.z), to = max_of(max_of(d.x, d.y), d.z);
+        const bool here = from <= small_part * longest_side;
         close += here;
-        coherent += here && max_of(max_of(d.x, d.y), d.z) <= small_angle;
+        coherent += here && to <= small_angle;
+        apart += beyond(parts, from / longest_side);
+        spread += beyond(angles, to);
     }
-    if (4 * coherent >= 3 * looked_at) return SimdPath::packet;
-    return 2 * close >= looked_at ? SimdPath::stream : SimdPath::sorted;
+    BatchLook look{SimdPath::packet, {}};
+    look.kind.size = BatchKind::size_of(rays.size());
+    if (looked_at != 0) {
+        look.kind.apart = static_cast<std::uint32_t>((apart + looked_at / 2) / looked_at);
+        look.kind.spread = static_cast<std::uint32_t>((spread + looked_at / 2) / looked_at);
+    }
+    if (4 * coherent < 3 * looked_at)
+        look.path = 2 * close >= looked_at ? SimdPath::stream : SimdPath::sorted;
+    return look;
 }
 
 namespace {

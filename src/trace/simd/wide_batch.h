@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "exec/path_rates.h"
 #include "trace/simd/simd_kernels.h"
 
 namespace raydix {
@@ -17,8 +18,12 @@ namespace raydix {
 /// Throws InputError that names those there are. Empty: the best.
 [[nodiscard]] const SimdKernels& kernels_for(const std::string& isa);
 
-/// choose_simd_path for rays through anything with these bounds.
-[[nodiscard]] SimdPath choose_path(const Aabb& bounds, std::span<const Ray> rays);
+/// What rays through anything with these bounds are like: choose_simd_path, and more.
+struct BatchLook {
+    SimdPath path;
+    BatchKind kind;  // `any` and `sorted` are left to the caller
+};
+[[nodiscard]] BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays);
 
 /// So many rays are a job of this path.
 [[nodiscard]] std::size_t rays_per_job(std::size_t n, SimdPath path);
@@ -50,10 +55,10 @@ inline void place_hit(Hit& hit, std::uint32_t geometry) {
     std::memcpy(&hit.geometry, place, sizeof place);  // both in one store
 }
 
-/// The hits of rays order[begin] to order[end - 1], or begin to end - 1 without an order, are
-/// there.
-using RowsDone =
-    std::function<void(const std::uint32_t* order, std::size_t begin, std::size_t end)>;
+/// The hits of rays first + order[begin] to first + order[end - 1] are there; without an order,
+/// those of first + begin to first + end - 1.
+using RowsDone = std::function<void(std::size_t first, const std::uint32_t* order,
+                                    std::size_t begin, std::size_t end)>;
 
 /// Calls place(hit) for the hits that are there.
 template <class Place>

@@ -1,0 +1,240 @@
+// Which way rays take through a tree: the one that took the least time a ray. It cannot be told
+// from the rays alone: it depends on how many of them go the same way in the tree and how deep, so
+// on the scene too. What batches of a kind took is kept with the tree for those to come.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+namespace raydix {
+
+/// How rays can go through a tree.
+enum class PathWay : std::uint8_t { packets, streams, turns, alone };
+/// In which order: as the caller has them, or by where they start.
+enum class RayOrder : std::uint8_t { given, sorted };
+
+/// What ways took for batches that are alike, each in times of the others. Any number of threads
+/// may add to it and ask it at once. Way: an enum of `count` values.
+template <class Way, std::size_t way_count>
+class WayRates {
+public:
+    /// Rays begin to end - 1 of a job, by trace(way, begin, end). `ways`: those that there are, not
+    /// more than four, in the order of promise. Most jobs go the fastest way known. In a trial some
+    /// rays go another way, and both are timed side by side: what rays take differs from place to
+    /// place. These are at least `least_share` rays, enough to tell, or an eighth. A job too small
+    /// to be divided goes the other way as a whole, and the next one is timed beside it.
+    template <class Trace>
+    void run(std::span<const Way> ways, std::size_t begin, std::size_t end, const Trace& trace,
+             std::size_t least_share = 256) {
+        const std::uint32_t job = jobs_.fetch_add(1, std::memory_order_relaxed);
+        const Way best = fastest(ways);
+        const std::size_t rays = end - begin;
+        if (ways.size() < 2 || rays == 0) {
+            if (rays != 0) trace(best, begin, end);
+        } else if (rays < 2 * least_share) {
+            run_whole(ways, best, job, begin, end, trace);
+        } else {
+            run_divided(ways, best, job, begin, end, trace, least_share);
+        }
+    }
+
+    /// The first one where nothing is known yet.
+    [[nodiscard]] Way fastest(std::span<const Way> ways) const {
+        Way best = ways.front();
+        float least = known(best) ? cost(best) : 1.0f;
+        for (const Way way : ways.subspan(1))
+            if (known(way) && cost(way) < least) least = cost(way), best = way;
+        return best;
+    }
+
+    /// A ray took so many times as long by `way` as one beside it by `other`, which is the first to
+    /// be known or known already.
+    void add(Way way, Way other, float ratio) {
+        if (!(ratio > 0.0f)) return;
+        if (!known(other)) set(other, 1.0f);
+        const float base = cost(other),
+                    now = base * std::clamp(ratio, 1 / most_at_once, most_at_once);
+        const std::uint8_t trials = trials_[index(way)].load(std::memory_order_relaxed);
+        // The first one finds memory as it was, and counts until there is another.
+        const float weight = trials < 2 ? 1.0f : trials < 4 ? 0.5f : 0.2f;
+        set(way, trials == 0 ? now : cost(way) + weight * (now - cost(way)));
+        if (trials < 4)
+            trials_[index(way)].store(static_cast<std::uint8_t>(trials + 1),
+                                      std::memory_order_relaxed);
+    }
+
+    /// Whether job number `job` should try `way`.
+    [[nodiscard]] bool is_due(Way way, std::uint32_t job) const {
+        return job >= due_[index(way)].load(std::memory_order_relaxed);
+    }
+
+private:
+    static constexpr std::size_t share_of_job = 8;
+    static constexpr float most_at_once = 16.0f;
+    static constexpr std::uint32_t least_pause = 8, longest_pause = 1024;
+
+    static std::size_t index(Way way) { return static_cast<std::size_t>(way); }
+    [[nodiscard]] float cost(Way way) const {
+        return costs_[index(way)].load(std::memory_order_relaxed);
+    }
+    [[nodiscard]] bool known(Way way) const { return cost(way) > 0.0f; }
+    void set(Way way, float cost) { costs_[index(way)].store(cost, std::memory_order_relaxed); }
+
+    using Clock = std::chrono::steady_clock;
+    template <class Trace>
+    static float time_a_ray(Way way, std::size_t begin, std::size_t end, const Trace& trace) {
+        const auto start = Clock::now();
+        trace(way, begin, end);
+        const std::chrono::duration<float> took = Clock::now() - start;
+        return took.count() / static_cast<float>(end - begin);
+    }
+
+    /// The slower a way was, the longer until it is tried again.
+    void pause(Way way, Way best, std::uint32_t job) {
+        std::uint32_t jobs = 1;
+        if (trials_[index(way)].load(std::memory_order_relaxed) >= 2) {
+            const float ratio = std::max(cost(way) / cost(best), 1.0f);
+            jobs = static_cast<std::uint32_t>(
+                std::min(least_pause * ratio * ratio, static_cast<float>(longest_pause)));
+        }
+        due_[index(way)].store(job + jobs, std::memory_order_relaxed);
+    }
+
+    template <class Trace>
+    void run_divided(std::span<const Way> ways, Way best, std::uint32_t job, std::size_t begin,
+                     std::size_t end, const Trace& trace, std::size_t least_share) {
+        const std::size_t rays = end - begin;
+        // The first job finds memory as it was.
+        std::array<Way, way_count> tried;
+        std::size_t count = 0;
+        for (const Way way : ways)
+            if (job > 0 && way != best && is_due(way, job)) tried[count++] = way;
+        const std::size_t share =
+            std::min(std::max(least_share, rays / share_of_job), rays / (count + 1));
+        std::array<float, way_count> took;
+        for (std::size_t k = 0; k < count; ++k) {
+            took[k] = time_a_ray(tried[k], begin, begin + share, trace);
+            begin += share;
+        }
+        if (count == 0) {
+            trace(best, begin, end);
+            return;
+        }
+        const float main = time_a_ray(best, begin, end, trace);
+        for (std::size_t k = 0; k < count; ++k) {
+            add(tried[k], best, took[k] / main);
+            pause(tried[k], best, job);
+        }
+    }
+
+    /// A way whose time has yet to be compared: its number plus one, and the time as a float.
+    static std::uint64_t pack(Way way, float took) {
+        return (std::uint64_t{index(way)} + 1) << 32 | std::bit_cast<std::uint32_t>(took);
+    }
+
+    template <class Trace>
+    void run_whole(std::span<const Way> ways, Way best, std::uint32_t job, std::size_t begin,
+                   std::size_t end, const Trace& trace) {
+        if (const std::uint64_t open = open_.exchange(0, std::memory_order_relaxed); open != 0) {
+            const auto tried = static_cast<Way>((open >> 32) - 1);
+            const float main = time_a_ray(best, begin, end, trace);
+            if (tried == best) return;  // it has won since
+            add(tried, best, std::bit_cast<float>(static_cast<std::uint32_t>(open)) / main);
+            pause(tried, best, job);
+            return;
+        }
+        for (const Way way : ways)
+            if (job > 0 && way != best && is_due(way, job)) {
+                open_.store(pack(way, time_a_ray(way, begin, end, trace)),
+                            std::memory_order_relaxed);
+                return;
+            }
+        trace(best, begin, end);
+    }
+
+    std::atomic<std::uint32_t> jobs_{0};
+    std::array<std::atomic<float>, way_count> costs_{};  // 0: not known
+    std::array<std::atomic<std::uint32_t>, way_count> due_{};
+    std::array<std::atomic<std::uint8_t>, way_count> trials_{};
+    std::atomic<std::uint64_t> open_{0};
+};
+
+/// What a batch is like, as far as a few of its rays tell.
+struct BatchKind {
+    bool any = false, sorted = false;
+    std::uint32_t apart = 0;   // where rays start that follow each other: 0 close together to 3
+    std::uint32_t spread = 0;  // of their directions: 0 to 2
+    std::uint32_t size = 0;    // of the batch: 0 to 4
+
+    static constexpr std::size_t count = 2 * 2 * 4 * 3 * 5;
+    [[nodiscard]] std::size_t index() const {
+        return (((std::size_t{any} * 2 + sorted) * 4 + apart) * 3 + spread) * 5 + size;
+    }
+    static std::uint32_t size_of(std::size_t rays) {
+        std::uint32_t size = 0;
+        for (std::size_t limit = 128; size < 4 && rays >= limit; limit *= 8) ++size;
+        return size;
+    }
+};
+
+using PathWayRates = WayRates<PathWay, 4>;
+using OrderRates = WayRates<RayOrder, 2>;
+
+/// The rates of a tree, from the first batch on. A copy knows nothing yet.
+class PathRates {
+public:
+    PathRates() = default;
+    PathRates(const PathRates&) {}
+    PathRates& operator=(const PathRates&) {
+        forget();
+        return *this;
+    }
+    ~PathRates() { forget(); }
+
+    [[nodiscard]] PathWayRates& ways(const BatchKind& kind) { return table().ways[kind.index()]; }
+    [[nodiscard]] OrderRates& orders(const BatchKind& kind) { return table().orders[kind.index()]; }
+
+private:
+    struct Table {
+        std::array<PathWayRates, BatchKind::count> ways;
+        std::array<OrderRates, BatchKind::count> orders;
+    };
+    [[nodiscard]] Table& table() {
+        Table* table = table_.load(std::memory_order_acquire);
+        if (table == nullptr) {
+            auto made = std::make_unique<Table>();
+            if (table_.compare_exchange_strong(table, made.get(), std::memory_order_acq_rel))
+                table = made.release();
+        }
+        return *table;
+    }
+    void forget() { delete table_.exchange(nullptr); }
+
+    std::atomic<Table*> table_{nullptr};
+};
+
+/// The ways that the jobs of a batch may go, in the order of promise.
+struct JobWays {
+    std::array<PathWay, 3> ways{};
+    std::size_t count = 0;
+    PathWayRates* rates = nullptr;  // null: all jobs go the first way
+
+    void add(PathWay way) { ways[count++] = way; }
+    /// Rays begin to end - 1 of a job, by trace(way, begin, end).
+    template <class Trace>
+    void run(std::size_t begin, std::size_t end, const Trace& trace) const {
+        if (rates == nullptr)
+            trace(ways[0], begin, end);
+        else
+            rates->run(std::span(ways).first(count), begin, end, trace);
+    }
+};
+
+}  // namespace raydix

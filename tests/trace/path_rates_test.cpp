@@ -1,0 +1,218 @@
+// Which way the jobs of a batch take, and that no answer depends on it.
+#include "exec/path_rates.h"
+
+#include <gtest/gtest.h>
+#include <raydix/model.h>
+#include <raydix/rays.h>
+#include <raydix/wide.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <thread>
+#include <vector>
+
+#include "support/support.h"
+
+namespace raydix::test {
+namespace {
+
+struct Share {
+    PathWay way;
+    std::size_t begin, end;
+};
+/// Of a job of rays 100 to 100 + rays - 1.
+std::vector<Share> shares_of(PathWayRates& rates, std::span<const PathWay> ways, std::size_t rays) {
+    std::vector<Share> shares;
+    rates.run(ways, 100, 100 + rays, [&](PathWay way, std::size_t begin, std::size_t end) {
+        shares.push_back({way, begin, end});
+    });
+    return shares;
+}
+
+constexpr PathWay three_ways[] = {PathWay::packets, PathWay::streams, PathWay::turns};
+
+TEST(PathRates, EveryRayGoesOneWay) {
+    for (std::size_t count = 1; count <= 3; ++count)
+        for (const std::size_t rays : {0u, 1u, 2u, 63u, 64u, 511u, 512u, 513u, 1024u, 8192u}) {
+            PathWayRates rates;
+            for (int job = 0; job < 40; ++job) {
+                std::size_t at = 100;
+                for (const Share& share :
+                     shares_of(rates, std::span(three_ways).first(count), rays)) {
+                    EXPECT_EQ(share.begin, at);
+                    EXPECT_LT(share.begin, share.end);
+                    at = share.end;
+                }
+                EXPECT_EQ(at, 100 + rays);
+            }
+        }
+}
+
+TEST(PathRates, TheFirstJobGoesTheFirstWayAndTrialsGoAllWays) {
+    for (const std::size_t rays : {64u, 8192u}) {
+        PathWayRates rates;
+        for (const Share& share : shares_of(rates, three_ways, rays))
+            EXPECT_EQ(share.way, PathWay::packets);
+        std::size_t tried[4] = {};
+        for (int job = 0; job < 30; ++job)
+            for (const Share& share : shares_of(rates, three_ways, rays))
+                ++tried[static_cast<std::size_t>(share.way)];
+        for (const PathWay way : three_ways) EXPECT_GE(tried[static_cast<std::size_t>(way)], 2u);
+    }
+}
+
+TEST(PathRates, TakesTheFastest) {
+    for (const PathWay faster : three_ways) {
+        PathWayRates rates;
+        EXPECT_EQ(rates.fastest(three_ways), PathWay::packets);  // nothing is known
+        for (const PathWay way : three_ways)
+            if (way != PathWay::packets)
+                for (int trial = 0; trial < 8; ++trial)
+                    rates.add(way, PathWay::packets, way == faster ? 0.5f : 1.5f);
+        EXPECT_EQ(rates.fastest(three_ways), faster);
+    }
+    // Others are compared through what both were timed beside.
+    PathWayRates rates;
+    rates.add(PathWay::streams, PathWay::packets, 0.5f);
+    rates.add(PathWay::turns, PathWay::streams, 0.8f);
+    EXPECT_EQ(rates.fastest(three_ways), PathWay::turns);
+    constexpr PathWay two[] = {PathWay::packets, PathWay::streams};
+    EXPECT_EQ(rates.fastest(two), PathWay::streams);
+}
+
+TEST(PathRates, ForgetsWhatNoLongerHolds) {
+    PathWayRates rates;
+    for (int trial = 0; trial < 50; ++trial) rates.add(PathWay::streams, PathWay::packets, 0.5f);
+    EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
+    for (int trial = 0; trial < 10; ++trial) rates.add(PathWay::streams, PathWay::packets, 3.0f);
+    EXPECT_EQ(rates.fastest(three_ways), PathWay::packets);
+}
+
+TEST(PathRates, OneThatStoodStillForAWhileDecidesLittle) {
+    PathWayRates rates;
+    for (int trial = 0; trial < 8; ++trial) rates.add(PathWay::streams, PathWay::packets, 0.25f);
+    rates.add(PathWay::streams, PathWay::packets, 1e9f);
+    for (int trial = 0; trial < 8; ++trial) rates.add(PathWay::streams, PathWay::packets, 0.25f);
+    EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
+    for (const float nonsense : {0.0f, -1.0f, std::numeric_limits<float>::quiet_NaN()})
+        rates.add(PathWay::packets, PathWay::streams, nonsense);
+    EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
+}
+
+/// Takes as many ns a ray.
+void spend(std::size_t rays, std::int64_t ns) {
+    const auto end = std::chrono::steady_clock::now() +
+                     std::chrono::nanoseconds(static_cast<std::int64_t>(rays) * ns);
+    while (std::chrono::steady_clock::now() < end) {
+    }
+}
+
+TEST(PathRates, JobsTakeTheWayThatTookLeastAndSlowOnesRarely) {
+    for (const std::size_t rays : {100u, 3000u}) {
+        PathWayRates rates;
+        std::size_t slow = 0, all = 0;
+        const auto trace = [&](PathWay way, std::size_t begin, std::size_t end) {
+            spend(end - begin, way == PathWay::turns ? 20 : 400);
+            all += end - begin;
+            slow += way == PathWay::turns ? 0 : end - begin;
+        };
+        for (int job = 0; job < 12; ++job) rates.run(three_ways, 0, rays, trace);
+        EXPECT_EQ(rates.fastest(three_ways), PathWay::turns);
+        slow = all = 0;
+        for (int job = 0; job < 100; ++job) rates.run(three_ways, 0, rays, trace);
+        EXPECT_LT(slow, all / 20);
+    }
+}
+
+TEST(PathRates, ManyThreadsMayAskAndAdd) {
+    PathRates rates;
+    std::atomic<std::size_t> traced{0};
+    constexpr std::size_t threads = 4, jobs = 200, rays = 600;
+    {
+        std::vector<std::jthread> all;
+        for (std::size_t t = 0; t < threads; ++t)
+            all.emplace_back([&, t] {
+                for (std::size_t job = 0; job < jobs; ++job) {
+                    const BatchKind kind{.any = job % 2 == 0, .size = BatchKind::size_of(rays)};
+                    rates.ways(kind).run(three_ways, 0, job % 3 == t % 3 ? rays : 100,
+                                         [&](PathWay, std::size_t begin, std::size_t end) {
+                                             traced += end - begin;
+                                         });
+                }
+            });
+    }
+    EXPECT_GT(traced, threads * jobs * 100);
+}
+
+TEST(PathRates, EachKindHasItsOwnPlace) {
+    std::vector<bool> taken(BatchKind::count);
+    for (const bool any : {false, true})
+        for (const bool sorted : {false, true})
+            for (std::uint32_t apart = 0; apart < 4; ++apart)
+                for (std::uint32_t spread = 0; spread < 3; ++spread)
+                    for (std::uint32_t size = 0; size < 5; ++size) {
+                        const std::size_t place =
+                            BatchKind{any, sorted, apart, spread, size}.index();
+                        ASSERT_LT(place, taken.size());
+                        EXPECT_FALSE(taken[place]);
+                        taken[place] = true;
+                    }
+    EXPECT_EQ(BatchKind::size_of(0), 0u);
+    EXPECT_EQ(BatchKind::size_of(127), 0u);
+    EXPECT_EQ(BatchKind::size_of(128), 1u);
+    EXPECT_EQ(BatchKind::size_of(1000000), 4u);
+}
+
+/// Rays of which many jobs are made, and for which streams would be taken, or sorted streams.
+struct ManyRays {
+    WideBvh tree;
+    std::vector<Ray> rays;
+};
+ManyRays many_rays(RayKind kind) {
+    const Model scene = load_model("builtin:atrium?triangles=20000", 5);
+    const Bvh bvh = build_bvh(scene.mesh());
+    std::vector<std::uint32_t> pixels;
+    const auto primary = make_primary_rays(scene.cameras.cameras.at(0), 160, 120, &pixels);
+    ManyRays out{WideBvh(bvh), make_secondary_rays(bvh, primary, trace(bvh, primary), pixels,
+                                                   {.kind = kind, .samples = 8, .seed = 3})};
+    EXPECT_GE(out.rays.size(), 100000u);  // jobs enough for a race
+    EXPECT_EQ(choose_simd_path(out.tree, out.rays),
+              kind == RayKind::diffuse_shuffled ? SimdPath::sorted : SimdPath::stream);
+    return out;
+}
+
+TEST(PathRates, ChangesNoClosestHit) {
+    for (const RayKind kind : {RayKind::diffuse, RayKind::diffuse_shuffled}) {
+        const auto [tree, rays] = many_rays(kind);
+        std::vector<Hit> expected(rays.size()), found(rays.size());
+        const TraceCounts counts = trace(tree, rays, expected, {.path = SimdPath::single});
+        EXPECT_GT(counts.hits, rays.size() / 20);
+        for (const SimdPath path : {SimdPath::automatic, SimdPath::packet, SimdPath::sorted})
+            for (const int threads : {1, 2, 7}) {
+                if (thorough == 1 && threads != 7) continue;
+                const TraceCounts own =
+                    trace(tree, rays, found, {.threads = threads, .path = path});
+                EXPECT_EQ(own.hits, counts.hits);
+                EXPECT_EQ(std::memcmp(found.data(), expected.data(), rays.size() * sizeof(Hit)), 0);
+            }
+    }
+}
+
+TEST(PathRates, ChangesNoAnswer) {
+    const auto [tree, rays] = many_rays(RayKind::ao);
+    std::vector<std::uint8_t> expected(rays.size()), found(rays.size());
+    const TraceCounts counts = trace_any(tree, rays, expected, {.path = SimdPath::stream});
+    EXPECT_GT(counts.hits, rays.size() / 20);
+    for (const int threads : {1, 2, 7})
+        for (int round = 0; round < 3; ++round) {
+            const TraceCounts own = trace_any(tree, rays, found, {.threads = threads});
+            EXPECT_EQ(found, expected);
+            EXPECT_EQ(own.hits, counts.hits);
+        }
+}
+
+}  // namespace
+}  // namespace raydix::test
