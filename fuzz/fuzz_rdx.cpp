@@ -24,7 +24,8 @@ void use(RdxScene file) {
         rays.push_back({{0.3f * x, 0.3f * y, -5}, 0, {0.01f * x, 0.02f * y, 1}});
     }
     const std::vector<Hit> hits = trace(file.scene, rays, {.threads = 1});
-    static_cast<void>(positions(file.scene, hits, 1));
+    std::vector<Vec3> points(hits.size());
+    positions(file.scene, rays, hits, points, 1);
     for (std::size_t i = 0; i < rays.size(); ++i)
         if (hits[i].hit() != any_hit(file.scene, rays[i])) std::abort();
     SceneOptions options = file.options;
@@ -41,7 +42,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (size >= sizeof(rdx::HeaderStart)) test::seal_rdx(bytes);
     try {
         if (size >= sizeof(rdx::HeaderStart) &&
-            rdx::version_of("fuzz.rdx", bytes) == rdx::scene_version) {
+            rdx::version_of("fuzz.rdx", bytes) != rdx::version) {
             use(rdx::parse_scene("fuzz.rdx", bytes, owner));
         } else {
             const RdxFile file = rdx::parse("fuzz.rdx", bytes, owner);

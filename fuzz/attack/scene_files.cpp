@@ -103,7 +103,8 @@ Scene any_scene(Random& random) {
 class Tables {
 public:
     Tables(const std::string& file, const SealedFile& sealed)
-        : sections_(file, sealed.view, sealed.owner, rdx::scene_version, rdx::scene_kinds) {
+        : sections_(file, sealed.view, sealed.owner, rdx::version_of(file, sealed.view),
+                    rdx::scene_kinds_of(rdx::version_of(file, sealed.view))) {
         const auto vertices = sections_.view<Vec3>(rdx::scene_vertices);
         const auto triangles = sections_.view<Triangle>(rdx::scene_triangles);
         std::size_t v = 0, t = 0;

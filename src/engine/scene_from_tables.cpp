@@ -13,6 +13,7 @@
 #include "engine/commit.h"
 #include "engine/scene_state.h"
 #include "engine/scene_tables.h"
+#include "engine/shape_tree.h"
 #include "exec/parallel.h"
 #include "exec/search.h"
 #include "layout/wide_check.h"
@@ -56,6 +57,7 @@ public:
     std::shared_ptr<State> read() {
         read_meshes();
         read_trees();
+        read_shapes();
         if (in_.scenes.empty()) fail("scenes", "there are none");
         Supply geometries("geometries", in_.geometries);
         for (std::size_t k = 0; k < in_.scenes.size(); ++k)
@@ -138,6 +140,30 @@ private:
         meshes.finish();
     }
 
+    void read_shapes() {
+        Supply spheres("spheres", in_.spheres);
+        Supply capsules("capsules", in_.capsules);
+        Supply points("points", in_.points);
+        for (const StoredShapes& stored : in_.shapes) {
+            const std::string name = "shapes " + std::to_string(shapes_.size());
+            if (stored.kind == 0)
+                shapes_.emplace_back(spheres.take(stored.count, name));
+            else if (stored.kind == 1)
+                shapes_.emplace_back(capsules.take(stored.count, name));
+            else if (stored.kind == 2)
+                shapes_.emplace_back(
+                    BasicBalls<float>{points.take(stored.count, name), stored.radius});
+            else
+                fail("shapes", name + " are of an unknown kind");
+            if (stored.kind != 2 && stored.radius != 0)
+                fail("shapes", name + " have a radius each, and one more");
+        }
+        spheres.finish();
+        capsules.finish();
+        points.finish();
+        used_shapes_.resize(shapes_.size());
+    }
+
     /// Nobody writes through the pointer: trees are handed out as const only.
     template <class T>
     [[nodiscard]] Buffer<T> buffer(std::span<const T> elements) const {
@@ -168,7 +194,8 @@ private:
         } catch (const InputError& error) {
             fail("geometries", name_of(k) + ": " + error.what());
         }
-        if (report.trees_built != 0)
+        // Trees of shapes are made anew.
+        if (report.trees_built != report.shapes)
             fail("trees", "those of " + name_of(k) + " are around other meshes than its own");
         placed_ += state->tree->placed.size();
         state->changed = false;
@@ -180,8 +207,8 @@ private:
         out.mask = stored.mask;
         out.changed = false;
         const std::string name = name_of(scene) + ": geometry " + std::to_string(stored.id);
-        if (stored.is_instance > 1) fail("geometries", name + " is of an unknown kind");
-        if (stored.is_instance == 1) {
+        if (stored.kind > stored_shapes) fail("geometries", name + " is of an unknown kind");
+        if (stored.kind == stored_instance) {
             if (stored.number >= scene)
                 fail("geometries",
                      name + " shows " + name_of(stored.number) + ", which is not before it");
@@ -197,7 +224,19 @@ private:
         }
         if (const Transform zeros = no_transform();
             std::memcmp(&stored.transform, &zeros, sizeof(zeros)) != 0)
-            fail("geometries", name + " is a mesh with a transform");
+            fail("geometries", name + " is no instance, but has a transform");
+        if (stored.kind == stored_shapes) {
+            if (stored.number >= shapes_.size())
+                fail("geometries", name + " is shapes " + std::to_string(stored.number) + " of " +
+                                       std::to_string(shapes_.size()));
+            if (used_shapes_[stored.number])
+                fail("geometries",
+                     name + " is shapes " + std::to_string(stored.number) + " once more");
+            used_shapes_[stored.number] = true;
+            out.shapes = shapes_[stored.number];
+            out.own = in_.owner;
+            return out;
+        }
         if (stored.number == stored_none) return out;
         if (stored.number >= meshes_.size())
             fail("geometries", name + " is mesh " + std::to_string(stored.number) + " of " +
@@ -214,7 +253,7 @@ private:
         std::vector<std::pair<std::size_t, std::shared_ptr<MeshTree>>> trees;  // their numbers
         std::unordered_map<std::size_t, std::size_t> place;                    // in `trees`
         for (const StoredGeometry& geometry : geometries) {
-            if (geometry.is_instance != 0 || geometry.number == stored_none) continue;
+            if (geometry.kind != stored_mesh || geometry.number == stored_none) continue;
             const std::size_t number = tree_of_[geometry.number];
             const auto [found, is_new] = place.emplace(number, trees.size());
             if (is_new) trees.emplace_back(number, std::make_shared<MeshTree>());
@@ -268,6 +307,8 @@ private:
         used_meshes_.resize(meshes_.size());
         for (std::size_t m = 0; m < used_meshes_.size(); ++m)
             if (!used_meshes_[m]) fail("meshes", "mesh " + std::to_string(m) + " stands nowhere");
+        for (std::size_t k = 0; k < used_shapes_.size(); ++k)
+            if (!used_shapes_[k]) fail("shapes", "shapes " + std::to_string(k) + " stand nowhere");
     }
 
     void read_ids(State& state) const {
@@ -295,7 +336,8 @@ private:
     std::vector<Tree> trees_;
     std::vector<std::size_t> tree_of_;  // [meshes]
     std::vector<std::shared_ptr<State>> scenes_;
-    std::vector<bool> used_, used_meshes_;
+    std::vector<Shapes> shapes_;
+    std::vector<bool> used_, used_meshes_, used_shapes_;
     std::size_t placed_ = 0;
 };
 

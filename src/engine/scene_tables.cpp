@@ -22,17 +22,15 @@ public:
     std::uint32_t add(const SceneTree& scene) {
         const auto known = scenes_.find(&scene);
         if (known != scenes_.end()) return known->second;
-        if (!scene.shapes.empty()) {
-            const ShapeTree& shapes = *scene.shapes.front();
-            throw InputError("scenes: geometry " + std::to_string(shapes.id) + " holds " +
-                             kind_of(shapes.shapes) + ", which files have no place for");
-        }
         std::vector<StoredGeometry> geometries;
         for (const InstanceName& instance : scene.instances)
-            geometries.push_back(
-                {instance.id, instance.mask, 1, add(*instance.scene), instance.transform});
+            geometries.push_back({instance.id, instance.mask, stored_instance, add(*instance.scene),
+                                  instance.transform});
         for (const MeshName& mesh : scene.mesh_names)
-            geometries.push_back({mesh.id, mesh.mask, 0, stored_none, no_transform()});
+            geometries.push_back({mesh.id, mesh.mask, stored_mesh, stored_none, no_transform()});
+        for (const auto& shapes : scene.shapes)
+            geometries.push_back(
+                {shapes->id, shapes->mask, stored_shapes, add_shapes(*shapes), no_transform()});
         std::ranges::sort(geometries, {}, &StoredGeometry::id);
         for (const auto& mesh : scene.meshes) number_meshes(scene, *mesh, geometries);
         const auto number = static_cast<std::uint32_t>(out_.scenes.size());
@@ -47,6 +45,27 @@ public:
     SceneTables finish() { return std::move(out_); }
 
 private:
+    /// Returns their number.
+    std::uint32_t add_shapes(const ShapeTree& tree) {
+        if (tree.user() != nullptr)
+            throw InputError("scenes: geometry " + std::to_string(tree.id) + " holds " +
+                             kind_of(tree.shapes) + ", which files have no place for");
+        StoredShapes stored{static_cast<std::uint32_t>(tree.shapes.index()), 0,
+                            count_of(tree.shapes)};
+        if (const auto* const spheres = std::get_if<std::span<const Sphere>>(&tree.shapes)) {
+            out_.spheres.push_back(*spheres);
+        } else if (const auto* const capsules =
+                       std::get_if<std::span<const Capsule>>(&tree.shapes)) {
+            out_.capsules.push_back(*capsules);
+        } else {
+            const auto& balls = std::get<BasicBalls<float>>(tree.shapes);
+            out_.points.push_back(balls.centers);
+            stored.radius = balls.radius;
+        }
+        out_.shapes.push_back(stored);
+        return static_cast<std::uint32_t>(out_.shapes.size() - 1);
+    }
+
     void number_meshes(const SceneTree& scene, const MeshTree& mesh,
                        std::vector<StoredGeometry>& geometries) {
         std::uint32_t number = first_mesh(scene, mesh);

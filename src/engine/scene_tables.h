@@ -4,6 +4,7 @@
 
 #include <raydix/mesh.h>
 #include <raydix/scene.h>
+#include <raydix/shapes.h>
 #include <raydix/wide.h>
 
 #include <cstdint>
@@ -25,19 +26,22 @@ struct StoredScene {
 };
 static_assert(sizeof(StoredScene) == 16);
 
-/// Of a mesh: zeros.
+/// Of what is no instance: zeros.
 inline Transform no_transform() {
     Transform none;
     none.m = {};
     return none;
 }
 
+/// What a geometry is.
+enum StoredKind : std::uint32_t { stored_mesh, stored_instance, stored_shapes };
+
 /// In the order of their ids, scene by scene.
 struct StoredGeometry {
     std::uint32_t id, mask;
-    std::uint32_t is_instance;  // 0: a mesh
-    std::uint32_t number;       // of the scene; of the mesh, or none if it has no triangles
-    Transform transform;        // of an instance
+    std::uint32_t kind;    // StoredKind
+    std::uint32_t number;  // of the mesh, or none if it has no triangles; of the scene; of shapes
+    Transform transform;   // of an instance
 };
 static_assert(sizeof(StoredGeometry) == 64);
 
@@ -46,6 +50,14 @@ struct StoredMesh {
     std::uint64_t vertices, triangles;
 };
 static_assert(sizeof(StoredMesh) == 16);
+
+/// Spheres, capsules or points, by the order of `Shapes`; those of a kind follow each other.
+struct StoredShapes {
+    std::uint32_t kind;  // 0 to 2
+    float radius;        // of points; else 0
+    std::uint64_t count;
+};
+static_assert(sizeof(StoredShapes) == 16);
 
 /// The meshes of a tree follow each other, and so do those of all trees.
 struct StoredTree {
@@ -62,13 +74,17 @@ struct SceneTables {
     std::vector<StoredGeometry> geometries;
     std::vector<StoredTree> trees;
     std::vector<StoredMesh> meshes;
-    std::uint64_t next_id = 0;         // of the whole: all below were given once
-    std::vector<std::uint32_t> taken;  // those above, ascending
-    std::vector<const WideBvh*> wide;  // [trees]
-    std::vector<MeshView> views;       // [meshes]
+    std::vector<StoredShapes> shapes;
+    std::uint64_t next_id = 0;                     // of the whole: all below were given once
+    std::vector<std::uint32_t> taken;              // those above, ascending
+    std::vector<const WideBvh*> wide;              // [trees]
+    std::vector<MeshView> views;                   // [meshes]
+    std::vector<std::span<const Sphere>> spheres;  // of each shapes of the kind
+    std::vector<std::span<const Capsule>> capsules;
+    std::vector<std::span<const Vec3>> points;
 };
 /// Throws InputError if there is no commit that holds all changes, or if shared arrays are no
-/// longer those of the commit: "SECTION: reason".
+/// longer those of the commit, or for user geometry: "SECTION: reason".
 [[nodiscard]] SceneTables tables_of(const Scene& scene);
 
 /// What is read, wherever it lies.
@@ -77,6 +93,7 @@ struct SceneArrays {
     std::span<const StoredGeometry> geometries;
     std::span<const StoredTree> trees;
     std::span<const StoredMesh> meshes;
+    std::span<const StoredShapes> shapes;
     std::uint64_t next_id = 0;
     std::span<const std::uint32_t> taken;
     std::span<const WideNode> nodes;
@@ -86,11 +103,14 @@ struct SceneArrays {
     std::span<const Vec3> corners;
     std::span<const Vec3> vertices;
     std::span<const Triangle> triangles;
+    std::span<const Sphere> spheres;
+    std::span<const Capsule> capsules;
+    std::span<const Vec3> points;
     std::shared_ptr<void> owner;  // keeps all of it alive
 };
-/// A committed scene whose trees of triangles and meshes view the arrays. Arrays may hold anything:
-/// all of it is checked first, in time and memory linear in them. The same hits as the scene that
-/// was stored, bit for bit. Throws InputError("SECTION: reason").
+/// A committed scene whose trees of triangles, meshes and shapes view the arrays. Arrays may hold
+/// anything: all of it is checked first, in time and memory linear in them. The same hits as the
+/// scene that was stored, bit for bit. Throws InputError("SECTION: reason").
 [[nodiscard]] Scene scene_of(const SceneArrays& arrays);
 
 }  // namespace raydix

@@ -40,7 +40,7 @@ RdxScene load_rdx_scene(const std::filesystem::path& file) {
 
 bool holds_scene(const std::filesystem::path& file) {
     const MappedFile whole = mapped(file);
-    return rdx::version_of(printable(file), whole.bytes) == rdx::scene_version;
+    return rdx::version_of(printable(file), whole.bytes) != rdx::version;
 }
 
 }  // namespace raydix

@@ -1,8 +1,10 @@
-// The layout of .rdx files, version 2 (docs/rdx-format.md): a committed scene.
+// The layout of .rdx files, versions 2 and 3 (docs/rdx-format.md): a committed scene. Version 3 has
+// shapes too.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "engine/scene_tables.h"
 #include "io/rdx_sections.h"
@@ -26,10 +28,16 @@ enum SceneSectionId : std::uint32_t {
     scene_triangles,       // uint32 x 3: of meshes
     scene_cameras,         // Camera
     scene_names,           // bytes: of the scene, then each camera, without separators
-    scene_section_count
+    scene_section_count,
+    // Of version 3:
+    scene_shapes = scene_section_count,  // StoredShapes
+    scene_spheres,                       // Sphere
+    scene_capsules,                      // Capsule
+    scene_points,                        // Vec3
+    shapes_section_count
 };
 
-inline constexpr std::array<SectionKind, scene_section_count> scene_kinds{{
+inline constexpr std::array<SectionKind, shapes_section_count> scene_kinds{{
     {"info", {32}},
     {"scenes", {sizeof(StoredScene)}},
     {"geometries", {sizeof(StoredGeometry)}},
@@ -45,7 +53,17 @@ inline constexpr std::array<SectionKind, scene_section_count> scene_kinds{{
     {"triangles", {sizeof(Triangle)}},
     {"cameras", {sizeof(Camera)}},
     {"names", {1}},
+    {"shapes", {sizeof(StoredShapes)}},
+    {"spheres", {sizeof(Sphere)}},
+    {"capsules", {sizeof(Capsule)}},
+    {"points", {sizeof(Vec3)}},
 }};
+
+/// Of a file that holds a scene.
+[[nodiscard]] inline std::span<const SectionKind> scene_kinds_of(std::uint32_t file_version) {
+    return std::span(scene_kinds)
+        .first(file_version == shapes_version ? shapes_section_count : scene_section_count);
+}
 
 struct SceneInfo {
     std::uint32_t picture_width, picture_height;

@@ -1,8 +1,9 @@
-// The bytes of an .rdx file of version 2 -> a scene. Lengths and checksums are found right first
-// (rdx_sections.h), all the rest by scene_of.
+// The bytes of an .rdx file of version 2 or 3 -> a scene. Lengths and checksums are found right
+// first (rdx_sections.h), all the rest by scene_of.
 #include <raydix/error.h>
 
 #include <algorithm>
+#include <type_traits>
 
 #include "io/rdx_faults.h"
 #include "io/rdx_names.h"
@@ -14,7 +15,9 @@ namespace raydix::rdx {
 RdxScene parse_scene(const std::string& file, std::span<const std::byte> bytes,
                      const std::shared_ptr<void>& owner) {
     if (!supported) throw BackendUnavailable(std::string(unsupported_text));
-    const Sections sections(file, bytes, owner, scene_version, scene_kinds);
+    const bool has_shapes = version_of(file, bytes) == shapes_version;
+    const std::uint32_t wanted = has_shapes ? shapes_version : scene_version;
+    const Sections sections(file, bytes, owner, wanted, scene_kinds_of(wanted));
     const auto stored = sections.only<SceneInfo>(scene_info);
     if (stored.reserved != 0) sections.fail("info", "the reserved bytes are not zero");
     RdxScene out;
@@ -26,11 +29,16 @@ RdxScene parse_scene(const std::string& file, std::span<const std::byte> bytes,
     out.cameras.cameras = reader.cameras(sections.view<Camera>(scene_cameras));
     reader.finish();
     if (const Fault fault = camera_fault(out.cameras)) throw InputError(file + ": " + *fault);
+    // Of version 2: none.
+    const auto shapes_view = [&]<class T>(SceneSectionId id, std::type_identity<T>) {
+        return has_shapes ? sections.view<T>(id) : std::span<const T>();
+    };
     const SceneArrays arrays{
         .scenes = sections.view<StoredScene>(scene_scenes),
         .geometries = sections.view<StoredGeometry>(scene_geometries),
         .trees = sections.view<StoredTree>(scene_trees),
         .meshes = sections.view<StoredMesh>(scene_meshes),
+        .shapes = shapes_view(scene_shapes, std::type_identity<StoredShapes>()),
         .next_id = stored.next_id,
         .taken = sections.view<std::uint32_t>(scene_taken),
         .nodes = sections.view<WideNode>(scene_nodes),
@@ -40,6 +48,9 @@ RdxScene parse_scene(const std::string& file, std::span<const std::byte> bytes,
         .corners = sections.view<Vec3>(scene_corners),
         .vertices = sections.view<Vec3>(scene_vertices),
         .triangles = sections.view<Triangle>(scene_triangles),
+        .spheres = shapes_view(scene_spheres, std::type_identity<Sphere>()),
+        .capsules = shapes_view(scene_capsules, std::type_identity<Capsule>()),
+        .points = shapes_view(scene_points, std::type_identity<Vec3>()),
         .owner = owner,
     };
     try {
@@ -52,8 +63,8 @@ RdxScene parse_scene(const std::string& file, std::span<const std::byte> bytes,
     out.options.usage = static_cast<Usage>(whole.usage);
     out.options.compact = whole.compact != 0;
     out.counts = {.scenes = arrays.scenes.size(),
-                  .instances = static_cast<std::uint64_t>(
-                      std::ranges::count(arrays.geometries, 1u, &StoredGeometry::is_instance)),
+                  .instances = static_cast<std::uint64_t>(std::ranges::count(
+                      arrays.geometries, stored_instance, &StoredGeometry::kind)),
                   .meshes = arrays.meshes.size(),
                   .vertices = arrays.vertices.size(),
                   .triangles = arrays.triangles.size(),

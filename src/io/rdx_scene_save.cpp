@@ -3,6 +3,7 @@
 #include <raydix/rdx.h>
 
 #include <array>
+#include <functional>
 
 #include "io/rdx_faults.h"
 #include "io/rdx_names.h"
@@ -27,7 +28,7 @@ rdx::SectionContent list_of(const std::vector<T>& elements) {
     return rdx::content_of(std::span<const T>(elements));
 }
 
-std::array<rdx::SectionContent, rdx::scene_section_count> contents_of(
+std::array<rdx::SectionContent, rdx::shapes_section_count> contents_of(
     const rdx::SceneInfo& info, const SceneTables& tables, const rdx::PackedCameras& packed) {
     using Wide = const WideBvh*;
     return {rdx::content_of(std::span<const rdx::SceneInfo>(&info, 1)),
@@ -46,7 +47,11 @@ std::array<rdx::SectionContent, rdx::scene_section_count> contents_of(
             pieces_of<Vec3>(tables.views, [](const MeshView& mesh) { return mesh.vertices; }),
             pieces_of<Triangle>(tables.views, [](const MeshView& mesh) { return mesh.triangles; }),
             list_of(packed.cameras),
-            rdx::content_of(std::span<const char>(packed.names))};
+            rdx::content_of(std::span<const char>(packed.names)),
+            list_of(tables.shapes),
+            pieces_of<Sphere>(tables.spheres, std::identity()),
+            pieces_of<Capsule>(tables.capsules, std::identity()),
+            pieces_of<Vec3>(tables.points, std::identity())};
 }
 
 }  // namespace
@@ -70,7 +75,12 @@ void save_rdx(const std::filesystem::path& file, const Scene& scene, const std::
                               .name_bytes = rdx::length_of(name),
                               .next_id = tables.next_id,
                               .reserved = 0};
-    rdx::write_sections(file, rdx::scene_version, contents_of(info, tables, packed));
+    const auto contents = contents_of(info, tables, packed);
+    if (tables.shapes.empty())
+        rdx::write_sections(file, rdx::scene_version,
+                            std::span(contents).first(rdx::scene_section_count));
+    else
+        rdx::write_sections(file, rdx::shapes_version, contents);
 }
 
 }  // namespace raydix

@@ -1,5 +1,6 @@
 // .rdx files of scenes that were cut, altered or made up are refused with one clear line.
 #include <gtest/gtest.h>
+#include <raydix/shapes.h>
 
 #include <functional>
 #include <limits>
@@ -24,19 +25,39 @@ Scene sample(bool compact) {
     return scene;
 }
 
+/// All kinds of shapes, some of them beside a mesh and an instance.
+Scene sample_of_shapes() {
+    Scene inner, scene;
+    inner.add(std::vector<Sphere>{{{0, 0, 0}, 1}, {{2, 0, 0}, 0.5f}});
+    inner.commit();
+    scene.add(random_soup(30, 3));
+    scene.add(std::vector<Capsule>{{{0, 0, 0}, {1, 1, 0}, 0.25f}});
+    scene.add(std::vector<Vec3>{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, 0.125f);
+    scene.add(inner, Transform{});
+    scene.commit();
+    return scene;
+}
+
 TEST_F(RdxSceneFaults, EveryTruncationIsRefused) {
-    const Bytes whole = saved(sample(false));
-    expect_cuts_refused(whole, header_bytes, sizeof(rdx::HeaderStart), table_of(whole), verdict);
+    for (const Bytes& whole : {saved(sample(false)), saved(sample_of_shapes())})
+        expect_cuts_refused(whole, header_bytes_of(whole), sizeof(rdx::HeaderStart),
+                            table_of(whole), verdict);
 }
 
 TEST_F(RdxSceneFaults, EveryByteIsGuarded) {
     expect_every_byte_guarded(saved(Scene(random_soup(3, 2))), verdict);
+    Scene shapes;
+    shapes.add(std::vector<Vec3>{{1, 0, 0}}, 0.5f);
+    shapes.commit();
+    expect_every_byte_guarded(saved(shapes), verdict);
 }
 
 TEST_F(RdxSceneFaults, FlipsUnderRightChecksumsAreSurvived) {
     for (const bool compact : {false, true})
         EXPECT_GT(refused_after_flips(saved(sample(compact)), 1500 * thorough, verdict),
                   500 * thorough);
+    EXPECT_GT(refused_after_flips(saved(sample_of_shapes()), 1500 * thorough, verdict),
+              300 * thorough);
 }
 
 /// A file after a change, with right checksums.
@@ -124,8 +145,8 @@ std::vector<Lie> lies() {
         {"x.rdx: geometries: scene 1: instance 4: it reaches beyond 1e12",
          [](Liar& l) { l.at<StoredGeometry>(rdx::scene_geometries, 2).transform.m[1][3] = 3e12f; }},
         {"x.rdx: geometries: scene 1: geometry 4 is of an unknown kind",
-         [](Liar& l) { l.at<StoredGeometry>(rdx::scene_geometries, 2).is_instance = 2; }},
-        {"x.rdx: geometries: scene 1: geometry 0 is a mesh with a transform",
+         [](Liar& l) { l.at<StoredGeometry>(rdx::scene_geometries, 2).kind = 3; }},
+        {"x.rdx: geometries: scene 1: geometry 0 is no instance, but has a transform",
          [](Liar& l) { l.at<StoredGeometry>(rdx::scene_geometries, 1).transform.m[0][0] = 1; }},
         {"x.rdx: geometries: scene 1: geometry 0 is mesh 2 of 2",
          [](Liar& l) { l.at<StoredGeometry>(rdx::scene_geometries, 1).number = 2; }},
@@ -262,12 +283,42 @@ std::vector<Lie> lies_of_compact_trees() {
     return out;
 }
 
+std::vector<Lie> lies_of_shapes() {
+    return {
+        {"x.rdx: shapes: shapes 0 are of an unknown kind",
+         [](Liar& l) { l.at<StoredShapes>(rdx::scene_shapes, 0).kind = 3; }},
+        {"x.rdx: shapes: shapes 0 have a radius each, and one more",
+         [](Liar& l) { l.at<StoredShapes>(rdx::scene_shapes, 0).radius = 1; }},
+        {"x.rdx: spheres: shapes 0 has 18446744073709551615, but 2 are left",
+         [](Liar& l) { l.at<StoredShapes>(rdx::scene_shapes, 0).count = ~std::uint64_t{0}; }},
+        {"x.rdx: spheres: 1 belong to nothing",
+         [](Liar& l) { l.at<StoredShapes>(rdx::scene_shapes, 0).count = 1; }},
+        {"x.rdx: spheres: shapes 1 has 1, but 0 are left",
+         [](Liar& l) { l.at<StoredShapes>(rdx::scene_shapes, 1).kind = 0; }},
+        {"x.rdx: points: 1 belong to nothing",
+         [](Liar& l) { l.at<StoredShapes>(rdx::scene_shapes, 2).count = 2; }},
+        {"x.rdx: geometries: scene 1: geometry 1 is shapes 3 of 3",
+         [](Liar& l) { l.at<StoredGeometry>(rdx::scene_geometries, 2).number = 3; }},
+        {"x.rdx: geometries: scene 1: geometry 1 is shapes 0 once more",
+         [](Liar& l) { l.at<StoredGeometry>(rdx::scene_geometries, 2).number = 0; }},
+        {"x.rdx: geometries: scene 1: geometry 1 is no instance, but has a transform",
+         [](Liar& l) { l.at<StoredGeometry>(rdx::scene_geometries, 2).transform.m[0][0] = 1; }},
+        {"x.rdx: shapes: shapes 1 stand nowhere",
+         [](Liar& l) {
+             StoredGeometry& geometry = l.at<StoredGeometry>(rdx::scene_geometries, 2);
+             geometry.kind = stored_mesh;
+             geometry.number = stored_none;
+         }},
+    };
+}
+
 TEST_F(RdxSceneFaults, LiesUnderRightChecksumsAreNamed) {
     const Bytes plain = saved(sample(false)), compact = saved(sample(true));
     expect_told(plain, lies());
     expect_told(compact, lies());
     expect_told(plain, lies_of_plain_trees());
     expect_told(compact, lies_of_compact_trees());
+    expect_told(saved(sample_of_shapes()), lies_of_shapes());
 }
 
 }  // namespace

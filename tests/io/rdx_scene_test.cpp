@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 #include <raydix/error.h>
 #include <raydix/rdx.h>
+#include <raydix/shapes.h>
 #include <raydix/surface.h>
+#include <raydix/user_geometry.h>
 
 #include <algorithm>
 #include <cstring>
@@ -58,6 +60,9 @@ bool same_points(std::span<const Vec3> a, std::span<const Vec3> b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
 }
 
+using SurfaceCall = void(const Scene&, std::span<const Ray>, std::span<const Hit>, std::span<Vec3>,
+                         int);
+
 /// Every answer that a scene gives.
 void expect_same(const Scene& loaded, const Scene& saved, Dice& dice,
                  std::size_t* found = nullptr) {
@@ -75,8 +80,14 @@ void expect_same(const Scene& loaded, const Scene& saved, Dice& dice,
     const AllHits expected_all = trace_all(saved, rays), all = trace_all(loaded, rays);
     EXPECT_EQ(all.offsets, expected_all.offsets);
     EXPECT_TRUE(same_hits(all.hits, expected_all.hits));
-    EXPECT_TRUE(same_points(positions(loaded, hits), positions(saved, expected)));
-    EXPECT_TRUE(same_points(normals(loaded, hits), normals(saved, expected)));
+    const auto points = [&](const Scene& scene, SurfaceCall* of) {
+        std::vector<Vec3> out(rays.size());
+        of(scene, rays, expected, out, 0);
+        return out;
+    };
+    for (SurfaceCall* const of :
+         {static_cast<SurfaceCall*>(&positions), static_cast<SurfaceCall*>(&normals)})
+        EXPECT_TRUE(same_points(points(loaded, of), points(saved, of)));
     for (const Hit& hit : expected)
         if (hit.hit()) {
             EXPECT_EQ(loaded.path(hit.instance), saved.path(hit.instance));
@@ -140,6 +151,60 @@ TEST_F(RdxSceneTest, SmallScenes) {
     Mesh huge = random_soup(20, 6);
     for (Vec3& v : huge.vertices) v = {v.x * 1e12f, v.y * 1e12f, v.z * 1e12f};
     for (const bool compact : {false, true}) round_trip(Scene(huge, {.compact = compact}));
+}
+
+std::uint32_t version_of_file(const Bytes& bytes) {
+    rdx::HeaderStart start;
+    std::memcpy(&start, bytes.data(), sizeof(start));
+    return start.version;
+}
+
+TEST_F(RdxSceneTest, ShapesHaveTheSameHits) {
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+    std::size_t found = 0;
+    for (std::uint32_t seed = 0; seed < 12; ++seed) {
+        Dice dice(seed);
+        const auto fill = [&](Scene& scene) {
+            std::vector<Sphere> spheres;
+            std::vector<Capsule> capsules;
+            std::vector<Vec3> points;
+            for (std::uint32_t k = 0; k < 1 + dice.below(40); ++k) {
+                spheres.push_back({dice.in(-2, 2), dice.below(5) == 0 ? nan : 0.3f});
+                capsules.push_back({dice.in(-2, 2), dice.in(-2, 2), 0.1f});
+                points.push_back(dice.in(-2, 2));
+            }
+            const std::uint32_t id = scene.add(spheres, {dice.mask(), 3 + dice.below(3)});
+            scene.add(capsules, {dice.mask(), {}});
+            if (dice.below(2) == 0) scene.add(random_mesh(dice), {dice.mask(), {}});
+            scene.add(points, 0.2f, {dice.mask(), {}});
+            scene.add(std::span<const Sphere>(), {dice.mask(), {}});
+            return id;
+        };
+        const SceneOptions options{.quality = seed % 2 == 0 ? Quality::balanced : Quality::fast,
+                                   .usage = seed % 3 == 0 ? Usage::moving : Usage::fixed};
+        Scene inner, scene;
+        fill(inner);
+        inner.commit(options);
+        const std::uint32_t id = fill(scene);
+        scene.add(inner, dice.transform(2));
+        scene.add(inner, dice.transform(2));
+        scene.commit(options);
+        const Bytes once = saved(scene);
+        EXPECT_EQ(version_of_file(once), 3u);
+        RdxScene loaded = load_rdx_scene(file());
+        expect_same(loaded.scene, scene, dice, &found);
+        save_rdx(file(), loaded.scene, loaded.name, loaded.cameras);
+        EXPECT_EQ(read_bytes(file()), once);
+        // It goes on as a scene.
+        const std::vector<Sphere> moved{{{0.5f, 0, 0}, 1}};
+        for (Scene* const each : {&loaded.scene, &scene}) {
+            each->update(id, moved);
+            each->commit(options);
+        }
+        expect_same(loaded.scene, scene, dice);
+    }
+    EXPECT_GT(found, 500u);
+    EXPECT_EQ(version_of_file(saved(Scene(random_soup(3, 2)))), 2u);
 }
 
 TEST_F(RdxSceneTest, LargerMeshesOfAllQualities) {
@@ -305,6 +370,12 @@ TEST_F(RdxSceneTest, WhatCannotBeSaved) {
     EXPECT_EQ(message(scene, bad), start + "info: a picture of 0 x 480; sides are 1 to 65536");
     scene.set_mask(0, 1);
     EXPECT_EQ(message(scene), start + "scenes: it has changes that no commit has taken in");
+    Scene own;
+    const std::vector<Aabb> boxes{{{0, 0, 0}, {1, 1, 1}}};
+    own.add(UserGeometry(boxes, [](std::uint32_t, const Ray&, Hit&) { return false; }));
+    own.commit();
+    EXPECT_EQ(message(own),
+              start + "scenes: geometry 0 holds user geometry, which files have no place for");
 }
 
 TEST_F(RdxSceneTest, TheOtherKindIsNamed) {

@@ -48,20 +48,25 @@ inline std::string verdict(std::span<const std::byte> bytes) {
     return verdict_of(bytes, [](std::span<std::byte> copy, const std::shared_ptr<void>& owner) {
         const RdxScene file = rdx::parse_scene("x.rdx", copy, owner);
         Dice dice(1);
-        const std::vector<Hit> hits = trace(file.scene, random_rays(dice, 20), {.threads = 1});
-        static_cast<void>(positions(file.scene, hits, 1));
+        const std::vector<Ray> rays = random_rays(dice, 20);
+        const std::vector<Hit> hits = trace(file.scene, rays, {.threads = 1});
+        std::vector<Vec3> points(hits.size());
+        positions(file.scene, rays, hits, points, 1);
     });
 }
 
 inline std::vector<rdx::Section> table_of(std::span<const std::byte> bytes) {
-    std::vector<rdx::Section> table(rdx::scene_section_count);
+    rdx::HeaderStart start;
+    std::memcpy(&start, bytes.data(), sizeof(start));
+    std::vector<rdx::Section> table(start.section_count);
     std::memcpy(table.data(), bytes.data() + sizeof(rdx::HeaderStart),
                 table.size() * sizeof(rdx::Section));
     return table;
 }
 
-inline constexpr std::size_t header_bytes =
-    sizeof(rdx::HeaderStart) + rdx::scene_section_count * sizeof(rdx::Section);
+inline std::size_t header_bytes_of(std::span<const std::byte> bytes) {
+    return sizeof(rdx::HeaderStart) + table_of(bytes).size() * sizeof(rdx::Section);
+}
 
 /// A folder with one such file.
 class RdxSceneTest : public ::testing::Test {

@@ -11,17 +11,18 @@
 
 namespace raydix::test {
 
-/// `file` holds a HeaderStart at least. Any version but that of scenes becomes that of trees.
+/// `file` holds a HeaderStart at least. Any version but those of scenes becomes that of trees.
 /// Sections that do not fit keep their checksum.
 inline void seal_rdx(std::span<std::byte> file) {
     rdx::HeaderStart start;
     std::memcpy(&start, file.data(), sizeof(start));
     start.magic = rdx::magic;
-    if (start.version != rdx::scene_version) start.version = rdx::version;
+    const bool scene = start.version == rdx::scene_version || start.version == rdx::shapes_version;
+    if (!scene) start.version = rdx::version;
     start.file_bytes = file.size();
     std::memcpy(file.data(), &start, sizeof(start));
-    const std::size_t count = start.version == rdx::version ? std::size_t{rdx::section_count}
-                                                            : std::size_t{rdx::scene_section_count};
+    const std::size_t count =
+        scene ? rdx::scene_kinds_of(start.version).size() : std::size_t{rdx::section_count};
     const std::size_t whole = sizeof(start) + count * sizeof(rdx::Section);
     if (file.size() < whole) return;
     for (std::size_t id = 0; id < count; ++id) {
