@@ -2,14 +2,15 @@
 
 #include <fmt/format.h>
 #include <raydix/raydix.h>
-#include <raydix/wide.h>
 
 #include <algorithm>
+#include <stdexcept>
 
+#include "bench_clock.h"
+#include "embree_kinds.h"
 #include "embree_scene.h"
 #include "embree_trace.h"
 #include "embree_tree.h"
-#include "exec/parallel.h"
 #include "one_by_one.h"
 
 namespace raydix::bench {
@@ -45,10 +46,19 @@ public:
         : mesh_(mesh),
           bench_(bench),
           options_(embree_options(kind, threads)),
-          scene_(mesh, options_) {}
+          robust_((options_.flags & RTC_SCENE_FLAG_ROBUST) != 0),
+          device_(threads) {}
 
-    void prepare() override { scene_.touch(); }
-    void build() override { scene_.commit(); }
+    void build() override {
+        if (!group_) {
+            group_.emplace(device_, options_.quality, options_.flags);
+            add_mesh(*group_, mesh_);
+        } else {
+            rtcUpdateGeometryBuffer(group_->geometry(0), RTC_BUFFER_TYPE_VERTEX, 0);
+            rtcCommitGeometry(group_->geometry(0));
+        }
+        group_->commit();
+    }
 
     /// Of another scene: to be told of each block of memory would cost the first one time.
     PeerBytes bytes() override {
@@ -63,28 +73,27 @@ public:
 
     std::optional<double> sah() override {
         if (options_.quality != RTC_BUILD_QUALITY_MEDIUM) return std::nullopt;
-        EmbreeTree tree(mesh_, options_.threads, bench_.max_leaf);
+        EmbreeTree tree(mesh_, options_.threads, BuildOptions().max_leaf);
         tree.refill();
         tree.build();
         return tree_stats(tree.as_bvh(mesh_), {.with_hash = false}).sah;
     }
 
+    /// ROBUST trees stand beside our single calls alone.
     std::vector<Mode> modes() const override {
         std::vector<Mode> modes;
-        const RTCScene scene = scene_.scene();
-        for (const EmbreeMode mode : embree_modes) {
-            modes.push_back(
-                {.name = mode.name(),
-                 .single = mode.single(),
-                 .closest =
-                     [=](std::span<const Ray> rays, std::span<Hit> hits, int threads) {
-                         with_threads(threads, [&] { trace_embree(scene, mode, rays, hits); });
-                     },
-                 .any =
-                     [=](std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) {
-                         with_threads(threads, [&] { trace_any_embree(scene, mode, rays, found); });
-                     }});
-        }
+        const RTCScene scene = group_->scene();
+        for (const EmbreeMode mode : embree_modes)
+            if (mode.single() || !robust_ || bench_.all_paths)
+                modes.push_back(
+                    {.name = mode.name(),
+                     .single = mode.single(),
+                     .closest = [=](std::span<const Ray> rays,
+                                    std::span<Hit> hits) { trace_embree(scene, mode, rays, hits); },
+                     .any =
+                         [=](std::span<const Ray> rays, std::span<std::uint8_t> found) {
+                             trace_any_embree(scene, mode, rays, found);
+                         }});
         return modes;
     }
 
@@ -92,31 +101,46 @@ private:
     const Mesh& mesh_;
     const CpuBench& bench_;
     EmbreeOptions options_;
-    EmbreeScene scene_;
+    bool robust_;
+    EmbreeDevice device_;
+    std::optional<EmbreeGroup> group_;
 };
 
-/// A wide tree by the builder that the word of quality stands for.
+Quality quality_of(const std::string& word) {
+    return word == "fast" ? Quality::fast : word == "high" ? Quality::high : Quality::balanced;
+}
+
+/// A scene of one mesh.
 class RaydixPeer : public Peer {
 public:
-    RaydixPeer(const std::string& quality, const Mesh& mesh, const CpuBench& bench, int threads)
+    RaydixPeer(const PeerName& name, const Mesh& mesh, const CpuBench& bench, int threads)
         : mesh_(mesh), bench_(bench) {
-        cli::CommonOptions common = bench.common;
-        common.threads = threads;
-        cli::TreeOptions tree;
-        const std::size_t end = quality.find("+compact");
-        tree.quality = quality.substr(0, end);
-        wide_options_.width = bench.width;
-        wide_options_.compact = end != std::string::npos;
-        tree.max_leaf = bench.max_leaf;
-        build_options_ = tree.build_options(common);
+        options_.quality = quality_of(name.quality());
+        options_.compact = name.kind().ends_with("+compact");
+        options_.threads = threads;
     }
 
-    void build() override { builder_.build(mesh_, build_options_, wide_, wide_options_); }
+    void build() override {
+        const clockid_t clock = clock_from(bench_.clock);
+        const double start = seconds_of(clock);
+        if (!scene_) {
+            scene_.emplace();
+            scene_->add(mesh_);
+        } else {
+            scene_->update(0, mesh_);
+        }
+        copy_ms_ = 1e3 * (seconds_of(clock) - start);
+        report_ = scene_->commit(options_);
+        if (report_.trees_built != 1)
+            throw std::runtime_error("a commit of a changed mesh has built no tree");
+    }
 
-    std::optional<double> layout_ms() const override { return wide_.stats().layout_ms; }
-    PeerBytes bytes() override { return {wide_.stats().bytes, 0}; }
+    std::optional<double> copy_ms() const override { return copy_ms_; }
+    PeerBytes bytes() override { return {report_.bytes, 0}; }
     std::optional<double> sah() override {
-        return tree_stats(build_bvh(mesh_, build_options_), {.with_hash = false}).sah;
+        BuildOptions build = build_options_for(options_.quality);
+        build.threads = options_.threads;
+        return tree_stats(build_bvh(mesh_, build), {.with_hash = false}).sah;
     }
 
     std::vector<Mode> modes() const override {
@@ -139,47 +163,40 @@ public:
 
 private:
     Mode batch_mode(const std::string& name, SimdPath path, const std::string& isa) const {
-        TraceOptions options;
+        SceneTraceOptions options;
         options.path = path;
         options.isa = isa;
-        const WideBvh* tree = &wide_;
-        return {.name = "batch " + name + (isa.empty() ? "" : " " + isa),
-                .closest =
-                    [=](std::span<const Ray> rays, std::span<Hit> hits, int threads) {
-                        TraceOptions here = options;
-                        here.threads = threads;
-                        trace(*tree, rays, hits, here);
-                    },
-                .any =
-                    [=](std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) {
-                        TraceOptions here = options;
-                        here.threads = threads;
-                        trace_any(*tree, rays, found, here);
-                    }};
+        const Scene* scene = &*scene_;
+        return {
+            .name = "batch " + name + (isa.empty() ? "" : " " + isa),
+            .closest = [=](std::span<const Ray> rays,
+                           std::span<Hit> hits) { trace(*scene, rays, hits, options); },
+            .any = [=](std::span<const Ray> rays,
+                       std::span<std::uint8_t> found) { trace_any(*scene, rays, found, options); }};
     }
 
     Mode single_mode() const {
-        const WideBvh* tree = &wide_;
+        const Scene* scene = &*scene_;
         return {.name = "single",
                 .single = true,
                 .closest =
-                    [=](std::span<const Ray> rays, std::span<Hit> hits, int threads) {
-                        one_by_one(rays.size(), threads,
-                                   [&](std::size_t i) { hits[i] = closest_hit(*tree, rays[i]); });
+                    [=](std::span<const Ray> rays, std::span<Hit> hits) {
+                        one_by_one(rays.size(),
+                                   [&](std::size_t i) { hits[i] = closest_hit(*scene, rays[i]); });
                     },
                 .any =
-                    [=](std::span<const Ray> rays, std::span<std::uint8_t> found, int threads) {
-                        one_by_one(rays.size(), threads,
-                                   [&](std::size_t i) { found[i] = any_hit(*tree, rays[i]); });
+                    [=](std::span<const Ray> rays, std::span<std::uint8_t> found) {
+                        one_by_one(rays.size(),
+                                   [&](std::size_t i) { found[i] = any_hit(*scene, rays[i]); });
                     }};
     }
 
     const Mesh& mesh_;
     const CpuBench& bench_;
-    BuildOptions build_options_;
-    WideBvhOptions wide_options_;
-    WideBvhBuilder builder_;
-    WideBvh wide_;
+    SceneOptions options_;
+    std::optional<Scene> scene_;
+    CommitReport report_;
+    double copy_ms_ = 0;
 };
 
 }  // namespace
@@ -196,7 +213,7 @@ std::vector<PeerName> peers_of(const CpuBench& options) {
 
 std::unique_ptr<Peer> make_peer(const PeerName& name, const Mesh& mesh, const CpuBench& options,
                                 int threads) {
-    if (name.ours()) return std::make_unique<RaydixPeer>(name.kind(), mesh, options, threads);
+    if (name.ours()) return std::make_unique<RaydixPeer>(name, mesh, options, threads);
     return std::make_unique<EmbreePeer>(name.kind(), mesh, options, threads);
 }
 

@@ -12,33 +12,29 @@
 #include <string>
 #include <vector>
 
+#include "cpu_figures.h"
 #include "cpu_options.h"
 
 namespace raydix::bench {
 
-/// One way to send a batch of rays through a tree. Both calls return when all rays are done.
+/// One way to send rays through a tree. Both calls return when all rays are done, and work with as
+/// many threads as the calling context has (with_threads).
 struct Mode {
     std::string name;
     bool single = false;     // one ray a call, in a parallel loop
     bool automatic = false;  // what a user gets who asks for nothing
-    std::function<void(std::span<const Ray>, std::span<Hit>, int threads)> closest;
-    std::function<void(std::span<const Ray>, std::span<std::uint8_t>, int threads)> any;
-};
-
-/// Bytes that a trace touches: of the tree's own, and of the caller's arrays that it reads.
-struct PeerBytes {
-    std::uint64_t own = 0, referenced = 0;
+    std::function<void(std::span<const Ray>, std::span<Hit>)> closest;
+    std::function<void(std::span<const Ray>, std::span<std::uint8_t>)> any;
 };
 
 class Peer {
 public:
     virtual ~Peer() = default;
-    /// Before each build(), outside of its time.
-    virtual void prepare() {}
-    /// From vertices and indices to what can be traced. Again: into the memory that is kept.
+    /// From the caller's vertices and indices to what can be traced. The first call makes the
+    /// scene; the others say that the mesh has changed and commit again.
     virtual void build() = 0;
-    /// How much of the last build went to the layout that is traced, if that is a step of its own.
-    [[nodiscard]] virtual std::optional<double> layout_ms() const { return std::nullopt; }
+    /// How much of the last build copied the mesh, if it does so.
+    [[nodiscard]] virtual std::optional<double> copy_ms() const { return std::nullopt; }
     [[nodiscard]] virtual PeerBytes bytes() = 0;
     /// Of the binary tree, node 1 and triangle 1; nothing if the peer has no binary tree to show.
     [[nodiscard]] virtual std::optional<double> sah() { return std::nullopt; }
@@ -46,11 +42,6 @@ public:
     [[nodiscard]] virtual std::vector<Mode> modes() const = 0;
 };
 
-struct PeerName {
-    std::string text;  // "raydix balanced", "embree medium+robust"
-    [[nodiscard]] bool ours() const { return text.starts_with("raydix "); }
-    [[nodiscard]] std::string kind() const { return text.substr(7); }
-};
 /// Embree's first, then ours, so that a round goes from one side to the other. Throws
 /// CLI::ValidationError for a kind that does not exist.
 [[nodiscard]] std::vector<PeerName> peers_of(const CpuBench& options);

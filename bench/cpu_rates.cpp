@@ -1,19 +1,18 @@
 #include "cpu_rates.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cstring>
 #include <stdexcept>
 
+#include "bench_clock.h"
 #include "cli/output.h"
+#include "exec/parallel.h"
 #include "hit_distance.h"
-#include "measure/stopwatch.h"
 
 namespace raydix::bench {
 namespace {
 
-/// What a launch gives: closest hits, or 0 and 1.
+/// What a portion gives: closest hits, or 0 and 1.
 struct Answers {
     std::vector<Hit> hits;
     std::vector<std::uint8_t> found;
@@ -24,11 +23,25 @@ struct Answers {
     }
 };
 
-void send(const Mode& mode, bool any, std::span<const Ray> rays, Answers& answers, int threads) {
-    if (any)
-        mode.any(rays, answers.found, threads);
-    else
-        mode.closest(rays, answers.hits, threads);
+/// A mode on the bench.
+struct Contender {
+    Mode mode;
+    ModeFigures figures;
+    std::vector<double> ms;  // of each round, summed over the portions
+};
+
+/// All calls of a portion, one after the other.
+void send(const Mode& mode, bool any, const Portion& portion, Answers& answers) {
+    const std::span<const Ray> rays = portion.rays;
+    std::size_t begin = 0;
+    for (const std::size_t end : portion.ends) {
+        const std::size_t count = end - begin;
+        if (any)
+            mode.any(rays.subspan(begin, count), std::span(answers.found).subspan(begin, count));
+        else
+            mode.closest(rays.subspan(begin, count), std::span(answers.hits).subspan(begin, count));
+        begin = end;
+    }
 }
 
 Differences differences_of(std::span<const Ray> rays, const Answers& ours, const Answers& theirs,
@@ -52,66 +65,84 @@ bool same_bits(const Answers& a, const Answers& b) {
            (bytes == 0 || std::memcmp(a.hits.data(), b.hits.data(), bytes) == 0);
 }
 
+std::uint64_t hits_in(const Answers& answers) {
+    return std::uint64_t(std::ranges::count_if(answers.hits, [](const Hit& h) { return h.hit(); }) +
+                         std::ranges::count(answers.found, 1));
+}
+
 /// The untimed round: all modes must answer, ours in the same bits.
-void compare(KindRates& all, std::span<const Ray> rays, const std::vector<PeerName>& names,
-             const CpuBench& options) {
-    const bool any = all.kind == RayKind::ao;
-    const auto ours = std::find_if(all.modes.begin(), all.modes.end(), [&](const ModeRates& m) {
-        return names[m.peer].ours() && m.mode.automatic;
-    });
+void compare(WorkloadFigures& workload, std::vector<Contender>& all, bool any,
+             const Portion& portion, double tolerance) {
+    const auto ours =
+        std::ranges::find_if(all, [](const Contender& c) { return c.figures.automatic; });
     Answers expected, answers;
-    expected.make_room(any, rays.size());
-    answers.make_room(any, rays.size());
-    send(ours->mode, any, rays, expected, ours->threads);
-    for (ModeRates& m : all.modes) {
-        send(m.mode, any, rays, answers, m.threads);
-        if (names[m.peer].ours()) {
+    expected.make_room(any, portion.rays.size());
+    answers.make_room(any, portion.rays.size());
+    send(ours->mode, any, portion, expected);
+    workload.hits += hits_in(expected);
+    for (Contender& c : all) {
+        with_threads(c.figures.threads, [&] { send(c.mode, any, portion, answers); });
+        if (c.figures.peer.ours()) {
             if (!same_bits(expected, answers))
-                throw std::runtime_error(names[m.peer].text + ", " + m.mode.name +
-                                         ": other hits than " + names[ours->peer].text + ", " +
-                                         ours->mode.name);
+                throw std::runtime_error(workload.name + ": " + c.figures.peer.text + ", " +
+                                         c.mode.name + ": other hits than " +
+                                         ours->figures.peer.text + ", " + ours->mode.name);
             continue;
         }
-        const Differences here = differences_of(rays, expected, answers, options.tolerance);
-        m.differences.hit_or_miss += here.hit_or_miss;
-        m.differences.distance += here.distance;
+        const Differences here = differences_of(portion.rays, expected, answers, tolerance);
+        c.figures.differences.hit_or_miss += here.hit_or_miss;
+        c.figures.differences.distance += here.distance;
     }
 }
 
-void time_launch(KindRates& all, std::span<const Ray> rays, int rounds) {
-    const bool any = all.kind == RayKind::ao;
+void time_portion(std::vector<Contender>& all, bool any, const Portion& portion,
+                  const CpuBench& options) {
+    const clockid_t clock = clock_from(options.clock);
+    const bool warms_up = portion.rays.size() < rays_of_a_cold_pass;
     Answers answers;
-    answers.make_room(any, rays.size());
-    for (int round = 0; round < rounds; ++round)
-        for (ModeRates& m : all.modes) {
-            Stopwatch watch;
-            send(m.mode, any, rays, answers, m.threads);
-            m.ms[static_cast<std::size_t>(round)] += watch.lap();
-        }
+    answers.make_room(any, portion.rays.size());
+    for (int round = 0; round < options.rounds; ++round)
+        for (Contender& c : all)
+            with_threads(c.figures.threads, [&] {
+                if (warms_up) send(c.mode, any, portion, answers);
+                const double start = seconds_of(clock);
+                send(c.mode, any, portion, answers);
+                c.ms[std::size_t(round)] += 1e3 * (seconds_of(clock) - start);
+            });
 }
 
 }  // namespace
 
-KindRates measure_rates(RayKind kind, const cli::RayLaunches& launches,
-                        const std::vector<PeerName>& names,
-                        const std::vector<std::unique_ptr<Peer>>& peers, const CpuBench& options,
-                        const std::vector<int>& thread_counts) {
-    KindRates all;
-    all.kind = kind;
+WorkloadFigures measure_rates(const Workload& workload, const WorkloadRays& rays,
+                              const std::vector<PeerName>& names,
+                              const std::vector<std::unique_ptr<Peer>>& peers,
+                              const CpuBench& options, const std::vector<int>& thread_counts) {
+    const bool any = workload.any();
+    std::vector<Contender> all;
     for (std::size_t p = 0; p < peers.size(); ++p)
         for (const Mode& mode : peers[p]->modes())
             for (const int threads : thread_counts)
-                all.modes.push_back(
-                    {p, mode, threads, std::vector<double>(std::size_t(options.rounds)), {}});
-    cli::Progress progress(fmt::format("{} rays", ray_kind_name(kind)), options.common);
-    launches.for_each(kind, [&](const cli::RayUnit& unit, double done) {
-        compare(all, unit.rays, names, options);
-        time_launch(all, unit.rays, options.rounds);
-        all.rays += unit.rays.size();
-        ++all.launches;
+                all.push_back({mode,
+                               {names[p], mode.name, mode.single, mode.automatic, threads, {}, {}},
+                               std::vector<double>(std::size_t(options.rounds))});
+    WorkloadFigures figures;
+    figures.name = workload.text;
+    cli::Progress progress(workload.text, options.common);
+    rays.for_each(workload, [&](const Portion& portion, double done) {
+        compare(figures, all, any, portion, options.tolerance);
+        time_portion(all, any, portion, options);
+        figures.rays += portion.rays.size();
+        figures.calls += portion.ends.size();
         progress.show(done);
     });
-    return all;
+    for (const Contender& c : all) {
+        figures.modes.push_back(c.figures);
+        if (figures.rays == 0) continue;
+        std::vector<double> rates;
+        for (const double ms : c.ms) rates.push_back(double(figures.rays) / ms * 1e-3);
+        figures.modes.back().mrays_per_s = cli::spread_of(rates);
+    }
+    return figures;
 }
 
 }  // namespace raydix::bench

@@ -36,6 +36,11 @@ std::vector<Camera> chosen_cameras(const std::string& which, const Model& scene)
     return {all[index]};
 }
 
+Size chosen_size(const LaunchOptions& options, const Model& scene) {
+    return options.size_text.empty() ? Size{scene.cameras.width, scene.cameras.height}
+                                     : parse_size(options.size_text);
+}
+
 void add_launch_options(CLI::App& command, LaunchOptions& options) {
     command.add_option("--camera", options.camera, "Number of a camera, or all")
         ->capture_default_str();
@@ -69,17 +74,24 @@ void add_launch_options(CLI::App& command, LaunchOptions& options) {
 
 RayLaunches::RayLaunches(const LaunchOptions& options, const SceneTree& input,
                          const CommonOptions& common)
-    : options_(options),
-      input_(input),
-      common_(common),
-      ao_radius_(chosen_ao_radius(options.ao_radius, input.scene, input.bvh.bounds())) {
-    const Size size = options.size_text.empty()
-                          ? Size{input.scene.cameras.width, input.scene.cameras.height}
-                          : parse_size(options.size_text);
-    for (const Camera& camera : chosen_cameras(options.camera, input.scene)) {
+    : RayLaunches(options, input.scene, &input.bvh, common) {}
+
+RayLaunches::RayLaunches(const LaunchOptions& options, const Model& model, const Scene& scene,
+                         const CommonOptions& common)
+    : RayLaunches(options, model, &scene, common) {}
+
+RayLaunches::RayLaunches(const LaunchOptions& options, const Model& model, Traced traced,
+                         const CommonOptions& common)
+    : options_(options), traced_(traced), common_(common) {
+    const auto bounds = [](const auto* tree) { return tree->bounds(); };
+    ao_radius_ = chosen_ao_radius(options.ao_radius, model, std::visit(bounds, traced));
+    const Size size = chosen_size(options, model);
+    for (const Camera& camera : chosen_cameras(options.camera, model)) {
         View& view = views_.emplace_back();
         view.rays = make_primary_rays(camera, size.width, size.height, &view.pixels);
-        view.hits = trace(input.bvh, view.rays, TraceOptions{.threads = common.threads});
+        view.hits = std::visit(
+            [&](const auto* tree) { return trace(*tree, view.rays, {.threads = common.threads}); },
+            traced);
     }
 }
 
@@ -116,8 +128,12 @@ std::vector<Ray> RayLaunches::rays_of(RayKind kind, const Launch& launch) const 
     const auto part = [&](const auto& values) {
         return std::span(values).subspan(launch.begin, launch.end - launch.begin);
     };
-    return make_secondary_rays(input_.bvh, part(view.rays), part(view.hits), part(view.pixels),
-                               secondary);
+    return std::visit(
+        [&](const auto* tree) {
+            return make_secondary_rays(*tree, part(view.rays), part(view.hits), part(view.pixels),
+                                       secondary);
+        },
+        traced_);
 }
 
 double RayLaunches::for_each(RayKind kind,

@@ -3,11 +3,13 @@
 
 #include <raydix/model.h>
 #include <raydix/rays.h>
+#include <raydix/scene.h>
 #include <raydix/trace.h>
 
 #include <functional>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "options.h"
@@ -34,6 +36,9 @@ struct RayUnit {
 class RayLaunches {
 public:
     RayLaunches(const LaunchOptions& options, const SceneTree& input, const CommonOptions& common);
+    /// `scene` holds the mesh of `model` alone: the same rays as from its tree.
+    RayLaunches(const LaunchOptions& options, const Model& model, const Scene& scene,
+                const CommonOptions& common);
 
     /// Calls visit(unit, part of the work done) for the launches of one kind, or of those that
     /// `sample` picks: whole launches spread over all cameras if there are enough, else runs of
@@ -45,6 +50,10 @@ public:
     [[nodiscard]] std::size_t cameras() const { return views_.size(); }
 
 private:
+    using Traced = std::variant<const Bvh*, const Scene*>;
+    RayLaunches(const LaunchOptions& options, const Model& model, Traced traced,
+                const CommonOptions& common);
+
     struct View {
         std::vector<Ray> rays;
         std::vector<Hit> hits;
@@ -58,7 +67,7 @@ private:
     [[nodiscard]] std::vector<Ray> rays_of(RayKind kind, const Launch& launch) const;
 
     const LaunchOptions& options_;
-    const SceneTree& input_;
+    Traced traced_;
     const CommonOptions& common_;
     float ao_radius_ = 0.0f;
     std::vector<View> views_;
@@ -66,6 +75,8 @@ private:
 
 /// --camera: all of the scene's, or one.
 [[nodiscard]] std::vector<Camera> chosen_cameras(const std::string& which, const Model& scene);
+/// --size, or of cameras.json.
+[[nodiscard]] Size chosen_size(const LaunchOptions& options, const Model& scene);
 /// Given, of cameras.json, or 5 % of the box diagonal, in this order.
 [[nodiscard]] float chosen_ao_radius(float given, const Model& scene, const Aabb& bounds);
 
