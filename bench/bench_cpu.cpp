@@ -84,7 +84,7 @@ int main(int argc, char** argv) {
     app.add_option("SCENE", options.scenes, "Scenes of triangles");
     raydix::bench::add_peer_options(app, options);
     raydix::bench::add_measuring_options(app, options);
-    options.launches.sample = 0.02;
+    options.launches.sample = 0.1;
     options.launches.size_text = "512x384";
     raydix::cli::add_launch_options(app, options.launches);
     app.get_option("--size")->description("Pixels of each picture")->capture_default_str();

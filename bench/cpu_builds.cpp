@@ -52,12 +52,14 @@ struct PeerBuilds {
 std::vector<BuildFigures> measure_builds(const std::string& scene, const CpuBench& options,
                                          const std::vector<int>& thread_counts) {
     std::vector<PeerBuilds> all;
-    for (const PeerName& peer : peers_of(options))
+    for (const PeerName& peer : peers_of(options)) {
+        if (peer.robust()) continue;
         for (const int threads : thread_counts) {
             BuildFigures& figures = all.emplace_back().figures;
             figures.peer = peer;
             figures.threads = threads;
         }
+    }
     cli::Progress progress("builds of " + scene, options.common);
     for (int round = 0; round < options.rounds; ++round)
         for (std::size_t k = 0; k < all.size(); ++k) {

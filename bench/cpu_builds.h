@@ -10,7 +10,8 @@
 
 namespace raydix::bench {
 
-/// For each peer and each of `thread_counts`, in this order.
+/// For each peer and each of `thread_counts`, in this order. ROBUST trees stand beside single calls
+/// alone, so they are left out.
 [[nodiscard]] std::vector<BuildFigures> measure_builds(const std::string& scene,
                                                        const CpuBench& options,
                                                        const std::vector<int>& thread_counts);

@@ -78,8 +78,11 @@ ModeFigures mode_from(const Json& json) {
 }
 
 Json workload_json(const WorkloadFigures& w) {
-    Json json{{"workload", w.name}, {"count", w.rays},          {"calls", w.calls},
-              {"hits", w.hits},     {"modes", Json::array()}};
+    Json json{{"workload", w.name},
+              {"count", w.rays},
+              {"calls", w.calls},
+              {"hits", w.hits},
+              {"modes", Json::array()}};
     for (const ModeFigures& m : w.modes) json["modes"].push_back(mode_json(m));
     return json;
 }

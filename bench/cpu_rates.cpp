@@ -98,7 +98,7 @@ void compare(WorkloadFigures& workload, std::vector<Contender>& all, bool any,
 void time_portion(std::vector<Contender>& all, bool any, const Portion& portion,
                   const CpuBench& options) {
     const clockid_t clock = clock_from(options.clock);
-    const bool warms_up = portion.rays.size() < rays_of_a_cold_pass;
+    const bool warms_up = portion.rays.size() < rays_of_a_long_pass;
     Answers answers;
     answers.make_room(any, portion.rays.size());
     for (int round = 0; round < options.rounds; ++round)

@@ -11,8 +11,9 @@
 
 namespace raydix::bench {
 
-/// Passes of fewer rays are timed right behind one that is not timed.
-inline constexpr std::size_t rays_of_a_cold_pass = std::size_t{1} << 18;
+/// A pass of fewer rays follows one of the same mode that is not timed: the other trees have just
+/// been in the caches.
+inline constexpr std::size_t rays_of_a_long_pass = std::size_t{1} << 18;
 
 /// Modes that are ours must agree bit for bit, else this throws. Differences are found in the
 /// warm-up, which is not timed.

@@ -35,7 +35,10 @@ std::vector<std::string> trees_beside(const WorkloadFigures& workload, const Pee
         for (const ModeFigures& m : workload.modes) {
             if (m.peer.ours() || m.peer.robust() != robust) continue;
             const std::string theirs = m.peer.quality(), own = ours.quality();
-            const bool fits = any_quality || (own == "fast" ? theirs == "low" : theirs == "medium" || (own == "high" && theirs == "high"));
+            const bool fits =
+                any_quality ||
+                (own == "fast" ? theirs == "low"
+                               : theirs == "medium" || (own == "high" && theirs == "high"));
             if (fits && std::ranges::find(trees, m.peer.kind()) == trees.end())
                 trees.push_back(m.peer.kind());
         }
@@ -178,11 +181,13 @@ std::vector<SpeedUp> speed_ups_of(const SceneFigures& figures) {
         std::map<int, double> kept;
         for (const BuildFigures& b : figures.builds)
             if (b.peer.text == peer.text) kept[b.threads] = b.kept_ms.median;
-        if (kept.contains(1)) all.push_back({peer.text, "", "kept_ms", kept[1] / kept[figures.threads]});
+        if (kept.contains(1))
+            all.push_back({peer.text, "", "kept_ms", kept[1] / kept[figures.threads]});
         for (const WorkloadFigures& w : figures.workloads)
             for (const bool single : {false, true}) {
                 const ModeFigures* most = fastest(figures, w, [&](const ModeFigures& m) {
-                    return m.peer.text == peer.text && (single ? m.single : m.automatic || !peer.ours());
+                    return m.peer.text == peer.text &&
+                           (single ? m.single : m.automatic || !peer.ours());
                 });
                 if (most == nullptr) continue;
                 for (const ModeFigures& one : w.modes)
@@ -226,9 +231,8 @@ Json summary_json(const std::vector<SummaryRow>& rows) {
                            {"median", row.median},
                            {"worst", row.worst},
                            {"worst_scene", row.worst_scene},
-                           {"worst_workload", row.worst_workload.empty()
-                                                  ? Json(nullptr)
-                                                  : Json(row.worst_workload)},
+                           {"worst_workload",
+                            row.worst_workload.empty() ? Json(nullptr) : Json(row.worst_workload)},
                            {"scenes", row.scenes}});
     return summary;
 }

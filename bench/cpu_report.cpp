@@ -94,7 +94,7 @@ void print_table(const std::vector<const SummaryRow*>& rows) {
         if (beside.empty() && row->figure == "batch") beside = row->embree;
     }
     const SummaryRow& first = *rows.front();
-    fmt::print("\n{} {}, raydix {} over Embree, median / worst\n",
+    fmt::print("\n{}: {}, raydix {} over Embree, median / worst\n",
                first.group == "tuned" ? "tuned" : "held out",
                cli::counted(scenes, "scene", "scenes"), first.ours);
     for (const SummaryRow* row : rows)
@@ -149,7 +149,7 @@ void print_workload(const SceneFigures& figures, const WorkloadFigures& workload
                    ratio_text(ratio_of(ratios, kind, "single")),
                    ratio_text(ratio_of(ratios, kind, "single_robust")));
     }
-    print_differences(workload);
+    if (!ours.empty()) print_differences(workload);
     if (all_modes) print_modes(workload);
 }
 

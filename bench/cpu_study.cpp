@@ -81,9 +81,6 @@ public:
 
     void run() {
         if (options_.resume) resume();
-        if (tables())
-            fmt::print("Embree {}, {}; builds in processes of their own\n", embree_version(),
-                       machine_info().cpu);
         for (const std::string& name : options_.scenes) study(name, "tuned");
         for (const std::string& name : options_.held_out) study(name, "held_out");
         if (tables()) print_summary(summary_of(scenes_));
@@ -165,10 +162,12 @@ private:
             const Json here = document(false);
             for (const char* field : {"command", "machine", "embree", "options"})
                 if (there.at(field) != here.at(field))
-                    throw InputError(file + ": is of another " + field + ", so --resume cannot go on with it");
+                    throw InputError(file + ": is of another " + field +
+                                     ", so --resume cannot go on with it");
             for (const Json& scene : there.at("scenes")) earlier_.push_back(figures_from(scene));
         } catch (const Json::exception&) {
-            throw InputError(file + ": is no document of bench cpu, so --resume cannot go on with it");
+            throw InputError(file +
+                             ": is no document of bench cpu, so --resume cannot go on with it");
         }
     }
 
@@ -177,10 +176,6 @@ private:
     }
 
     void study(const std::string& name, const std::string& group) {
-        cli::about(name, [&] { study_scene(name, group); });
-    }
-
-    void study_scene(const std::string& name, const std::string& group) {
         const std::size_t place = scenes_.size();
         SceneFigures& figures = scenes_.emplace_back();
         if (place < earlier_.size()) figures = earlier_[place];
@@ -199,12 +194,17 @@ private:
             figures.builds = measure_builds(name, options_, thread_counts_);
             save();
         }
+        if (tables() && place == 0)
+            fmt::print("Embree {}, {}; builds in processes of their own\n", embree_version(),
+                       machine_info().cpu);
         if (tables()) print_scene(figures);
         if (tables() && !workloads_.empty())
             print_head_of_workloads(options_.rounds, options_.clock);
         for (const Workload& workload : workloads_) {
             if (!figures.has(workload.text)) {
-                figures.workloads.push_back(loaded().measure(workload, thread_counts_));
+                LoadedScene& here = loaded();
+                figures.workloads.push_back(
+                    cli::about(name, [&] { return here.measure(workload, thread_counts_); }));
                 save();
             }
             if (tables()) print(figures, workload.text);

@@ -24,14 +24,14 @@ constexpr std::size_t least_rays_in_calls = std::size_t{1} << 16;  // of NAME@N
 
 /// The protocol's kinds: launches of --launch-rays, of which --sample takes a part.
 constexpr const char* launched_kinds[] = {"ao", "diffuse", "diffuse_shuffled"};
-constexpr const char* all_kinds[] = {
-    "primary",  "ao",          "diffuse",     "diffuse_shuffled", "ao_1",     "ao_4",
-    "diffuse_1", "diffuse_4",  "bounce_1",    "bounce_2",         "bounce_3", "bounce_4",
-    "bounce_5", "shadow_lamp", "shadow_area", "lidar",            "random",   "outside"};
-constexpr const char* default_calls[] = {"primary@64",    "primary@1024",   "primary@16384",
-                                         "diffuse_1@64",  "diffuse_1@1024", "diffuse_1@16384",
-                                         "random@64",     "random@1024",    "random@16384",
-                                         "random@262144"};
+constexpr const char* all_kinds[] = {"primary",  "ao",          "diffuse",     "diffuse_shuffled",
+                                     "ao_1",     "ao_4",        "diffuse_1",   "diffuse_4",
+                                     "bounce_1", "bounce_2",    "bounce_3",    "bounce_4",
+                                     "bounce_5", "shadow_lamp", "shadow_area", "lidar",
+                                     "random",   "outside"};
+constexpr const char* default_calls[] = {
+    "primary@64",      "primary@1024", "primary@16384", "diffuse_1@64", "diffuse_1@1024",
+    "diffuse_1@16384", "random@64",    "random@1024",   "random@16384", "random@262144"};
 
 /// Each use of chance has numbers of its own.
 enum Salt : std::uint64_t { scatter_salt = 1000, lamp_salt, turn_salt, random_salt, outside_salt };
@@ -67,8 +67,7 @@ Workload workload_from(const std::string& text) {
     const auto wrong = [&](const std::string& what) {
         throw CLI::ValidationError("--workloads", "'" + text + "' " + what);
     };
-    if (std::find(std::begin(all_kinds), std::end(all_kinds), workload.kind) ==
-        std::end(all_kinds))
+    if (std::find(std::begin(all_kinds), std::end(all_kinds), workload.kind) == std::end(all_kinds))
         wrong(fmt::format("is not all or one of {}, with @N behind it or not",
                           fmt::join(all_kinds, ", ")));
     if (workload.kind == text) return workload;
@@ -87,7 +86,9 @@ class CallsOfBatches {
 public:
     explicit CallsOfBatches(std::size_t call_rays) : call_rays_(call_rays) {}
 
-    void take(std::span<const Ray> batch) { batches_.emplace_back(batch.begin(), batch.end()); }
+    void take(std::span<const Ray> batch) {
+        if (!batch.empty()) batches_.emplace_back(batch.begin(), batch.end());
+    }
 
     [[nodiscard]] Portion portion() const {
         const std::size_t wanted = (least_rays_in_calls + call_rays_ - 1) / call_rays_;
@@ -155,7 +156,7 @@ void WorkloadRays::for_each(const Workload& workload,
     if (workload.call_rays != 0) {
         CallsOfBatches calls(workload.call_rays);
         for_each_batch(workload, [&](std::span<const Ray> rays, double) { calls.take(rays); });
-        visit(calls.portion(), 1.0);
+        if (const Portion portion = calls.portion(); !portion.rays.empty()) visit(portion, 1.0);
         return;
     }
     Portion portion;
@@ -179,9 +180,8 @@ void WorkloadRays::for_each_batch(const Workload& workload, const VisitBatch& vi
     if (std::find(std::begin(launched_kinds), std::end(launched_kinds), kind) !=
         std::end(launched_kinds)) {
         const cli::RayLaunches launches(options_.launches, model_, scene_, options_.common);
-        launches.for_each(
-            cli::kinds_from(kind).front(),
-            [&](const cli::RayUnit& unit, double done) { visit(unit.rays, done); });
+        launches.for_each(cli::kinds_from(kind).front(),
+                          [&](const cli::RayUnit& unit, double done) { visit(unit.rays, done); });
         return;
     }
     if (kind == "random")
@@ -203,9 +203,9 @@ std::vector<Ray> WorkloadRays::view_rays(const std::string& kind, std::size_t vi
     if (kind.starts_with("shadow")) return lamp_rays(primary, kind == "shadow_area");
     const int number = kind.back() - '0';
     if (kind.starts_with("bounce")) return bounced(primary, number);
-    const float tmax = kind.starts_with("ao") ? cli::chosen_ao_radius(options_.launches.ao_radius,
-                                                                      model_, box_)
-                                              : infinity;
+    const float tmax = kind.starts_with("ao")
+                           ? cli::chosen_ao_radius(options_.launches.ao_radius, model_, box_)
+                           : infinity;
     return scattered(primary, static_cast<std::uint32_t>(number), tmax, options_.common.seed);
 }
 
@@ -232,9 +232,7 @@ std::vector<Ray> WorkloadRays::scattered(const Wave& wave, std::uint32_t rays_a_
     }
     std::vector<Ray> rays(points.size() * rays_a_hit);
     make_hemisphere_rays(
-        points,
-        {.samples = rays_a_hit, .sequences = sequences, .tmax = tmax, .seed = seed},
-        rays);
+        points, {.samples = rays_a_hit, .sequences = sequences, .tmax = tmax, .seed = seed}, rays);
     return rays;
 }
 
@@ -253,8 +251,8 @@ std::vector<Ray> WorkloadRays::bounced(const Wave& primary, int bounce) const {
 }
 
 /// From each hit to the lamp. t is 1 there. The lamp hangs over the camera whose number the seed
-/// gives, a twentieth of the way to its target higher. The area lamp is a square about it that faces
-/// the target, with sides of a tenth of that way.
+/// gives, a twentieth of the way to its target higher. The area lamp is a square about it that
+/// faces the target, with sides of a tenth of that way.
 std::vector<Ray> WorkloadRays::lamp_rays(const Wave& wave, bool area) const {
     constexpr float just_before = 1.0f - 0x1p-10f;
     const std::uint64_t seed = options_.common.seed;
@@ -269,16 +267,15 @@ std::vector<Ray> WorkloadRays::lamp_rays(const Wave& wave, bool area) const {
             return area ? 0.1 * reach * (chance(seed + lamp_salt, wave.pixels[i], k) - 0.5) : 0.0;
         };
         const Double3 goal = lamp + axes.right * offset(0) + axes.up * offset(1);
-        const Vec3 origin =
-            point_before(wave.rays[i], wave.hits[i].t, step_back_part * diagonal_);
+        const Vec3 origin = point_before(wave.rays[i], wave.hits[i].t, step_back_part * diagonal_);
         rays.push_back({origin, 0.0f, (goal - Double3(origin)).rounded(), just_before});
     }
     return rays;
 }
 
-/// A scanner with 64 beams from 10 degrees above the horizon to 30 below it, 2,048 times a turn, all
-/// beams of a time in a row. Turn k starts at camera k, pulled into the box, and moves a tenth of
-/// the way to what the camera looks at.
+/// A scanner with 64 beams from 10 degrees above the horizon to 30 below it, 2,048 times a turn,
+/// all beams of a time in a row. Turn k starts at camera k, pulled into the box, and moves a tenth
+/// of the way to what the camera looks at.
 std::vector<Ray> WorkloadRays::lidar_turn(std::size_t turn) const {
     constexpr std::size_t beams = 64, times = 2048;
     constexpr double degree = std::numbers::pi / 180;

@@ -17,8 +17,8 @@ namespace raydix::bench {
 
 /// NAME, or NAME@N: the rays of NAME in calls of N.
 struct Workload {
-    std::string text, kind;      // as it is written; NAME
-    std::size_t call_rays = 0;   // N; 0: each batch is one call
+    std::string text, kind;          // as it is written; NAME
+    std::size_t call_rays = 0;       // N; 0: each batch is one call
     [[nodiscard]] bool any() const;  // asks whether anything is hit, not for the closest hit
 };
 /// Names separated by commas, or "all": those that run unless others are asked for. Throws
@@ -68,7 +68,7 @@ private:
     Aabb box_;
     double diagonal_;
     std::vector<Camera> cameras_;
-    std::vector<Wave> views_;  // primary rays of each camera
+    std::vector<Wave> views_;   // primary rays of each camera
     std::size_t picture_rays_;  // of all cameras
 };
 
