@@ -13,6 +13,7 @@
 #include "cli/program.h"
 #include "cpu_builds.h"
 #include "cpu_study.h"
+#include "cpu_workloads.h"
 
 namespace raydix::bench {
 namespace {
@@ -47,16 +48,17 @@ void add_peer_options(CLI::App& app, CpuBench& options) {
 }
 
 void add_measuring_options(CLI::App& app, CpuBench& options) {
-    app.add_option("--workloads", options.workloads,
-                   "Workloads separated by commas, each NAME or NAME@N (calls of N rays), or all: "
-                   "docs/performance.md")
+    app.add_option(
+           "--workloads", options.workloads,
+           "Names separated by commas, or all. Each name also with @N: in calls of N rays. " +
+               workload_kinds())
         ->capture_default_str();
     app.add_option("--held-out", options.held_out,
                    "A scene that nobody tunes on: its summary stands apart")
         ->type_name("SCENE")
         ->allow_extra_args(false);
     app.add_flag("--resume", options.resume,
-                 "Go on with the document of --json, which is written behind each workload");
+                 "Go on with the document of --json, which is written after each workload");
     app.add_option("--cameras", options.cameras_file,
                    "Cameras file instead of cameras.json beside the scene")
         ->type_name("FILE");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <tuple>
 
@@ -10,7 +11,9 @@ namespace {
 
 using cli::Json;
 
-constexpr double large_batch = 16384, small_batch_from = 64, small_batch_to = 4096;
+constexpr double large_batch = 16384, small_batch_from = 64, small_batch_to = 4096;  // rays
+constexpr const char* workload_groups[] = {"batches of 16 K rays and more",
+                                           "batches of 64 to 4 K rays", "single calls"};
 
 /// Else a time or a number of bytes.
 bool is_rate(const std::string& figure) { return !figure.ends_with("_ms") && figure != "bytes"; }
@@ -106,13 +109,13 @@ struct Values {
     }
 };
 
-/// The group of workloads that a ratio also counts in; empty: none.
-std::string kind_of_workloads(const WorkloadFigures& workload, const Ratio& ratio) {
+/// Of workload_groups, the one that a ratio also counts in; empty: none.
+std::string group_of_workloads(const WorkloadFigures& workload, const Ratio& ratio) {
     const bool in_calls = workload.name.find('@') != std::string::npos;
-    if (ratio.figure.starts_with("single")) return in_calls ? "" : "single calls";
+    if (ratio.figure.starts_with("single")) return in_calls ? "" : workload_groups[2];
     const double rays = workload.rays_a_call();
-    if (rays >= large_batch) return "batches of 16 K rays and more";
-    return rays >= small_batch_from && rays <= small_batch_to ? "batches of 64 to 4 K rays" : "";
+    if (rays >= large_batch) return workload_groups[0];
+    return rays >= small_batch_from && rays <= small_batch_to ? workload_groups[1] : "";
 }
 
 void add_value(std::vector<Values>& rows, const std::string& group, const Ratio& ratio,
@@ -200,7 +203,7 @@ std::vector<SpeedUp> speed_ups_of(const SceneFigures& figures) {
 }
 
 std::vector<SummaryRow> summary_of(const std::vector<SceneFigures>& scenes) {
-    std::vector<Values> rows, of_kinds;
+    std::vector<Values> rows, of_groups;
     for (const SceneFigures& figures : scenes) {
         std::vector<Ratio> builds;
         add_build_ratios(figures, builds);
@@ -210,11 +213,13 @@ std::vector<SummaryRow> summary_of(const std::vector<SceneFigures>& scenes) {
             for (const Ratio& ratio : workload_ratios(figures, w)) {
                 const Values::Value value{ratio.value, figures.scene, w.name};
                 add_value(rows, figures.group, ratio, w.name, value);
-                const std::string kind = kind_of_workloads(w, ratio);
-                if (!kind.empty()) add_value(of_kinds, figures.group, ratio, kind, value);
+                const std::string kind = group_of_workloads(w, ratio);
+                if (!kind.empty()) add_value(of_groups, figures.group, ratio, kind, value);
             }
     }
-    rows.insert(rows.end(), of_kinds.begin(), of_kinds.end());
+    for (const char* name : workload_groups)
+        std::ranges::copy_if(of_groups, std::back_inserter(rows),
+                             [&](const Values& v) { return v.row.workload == name; });
     std::vector<SummaryRow> summary;
     for (const Values& row : rows) summary.push_back(row.summed_up());
     return summary;

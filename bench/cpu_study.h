@@ -5,7 +5,7 @@
 
 namespace raydix::bench {
 
-/// Prints tables as it goes and writes the document behind each workload. Throws InputError: a
+/// Prints tables as it goes and writes the document after each workload. Throws InputError: a
 /// scene that cannot be read, a document of other options to go on with.
 void run_study(const CpuBench& options);
 

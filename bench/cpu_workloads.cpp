@@ -68,15 +68,14 @@ Workload workload_from(const std::string& text) {
         throw CLI::ValidationError("--workloads", "'" + text + "' " + what);
     };
     if (std::find(std::begin(all_kinds), std::end(all_kinds), workload.kind) == std::end(all_kinds))
-        wrong(fmt::format("is not all or one of {}, with @N behind it or not",
-                          fmt::join(all_kinds, ", ")));
+        wrong("is not all or one of " + workload_kinds() + ", with @N after it or not");
     if (workload.kind == text) return workload;
     const char* begin = text.data() + workload.kind.size() + 1;
     const char* end = text.data() + text.size();
     const auto [rest, error] = std::from_chars(begin, end, workload.call_rays);
     if (error != std::errc() || rest != end || workload.call_rays == 0 ||
         workload.call_rays > std::size_t{1} << 26)
-        wrong("has no number from 1 to 67108864 behind @");
+        wrong("has no number from 1 to 67108864 after @");
     return workload;
 }
 
@@ -119,6 +118,8 @@ private:
 }  // namespace
 
 bool Workload::any() const { return kind.starts_with("ao") || kind.starts_with("shadow"); }
+
+std::string workload_kinds() { return fmt::format("{}", fmt::join(all_kinds, ", ")); }
 
 std::vector<Workload> workloads_from(const std::string& names) {
     std::vector<Workload> all;

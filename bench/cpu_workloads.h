@@ -21,6 +21,8 @@ struct Workload {
     std::size_t call_rays = 0;       // N; 0: each batch is one call
     [[nodiscard]] bool any() const;  // asks whether anything is hit, not for the closest hit
 };
+/// Those that NAME may be, separated by commas.
+[[nodiscard]] std::string workload_kinds();
 /// Names separated by commas, or "all": those that run unless others are asked for. Throws
 /// CLI::ValidationError for one that does not exist.
 [[nodiscard]] std::vector<Workload> workloads_from(const std::string& names);
