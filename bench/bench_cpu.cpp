@@ -86,7 +86,8 @@ int main(int argc, char** argv) {
     app.add_option("SCENE", options.scenes, "Scenes of triangles");
     raydix::bench::add_peer_options(app, options);
     raydix::bench::add_measuring_options(app, options);
-    options.launches.sample = 0.1;
+    options.launches.sample = 0.05;  // of pictures of the size below: a launch for each camera
+    options.launches.launch_rays = 1u << 19;
     options.launches.size_text = "512x384";
     raydix::cli::add_launch_options(app, options.launches);
     app.get_option("--size")->description("Pixels of each picture")->capture_default_str();
