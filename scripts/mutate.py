@@ -3,8 +3,8 @@
 scripts/mutate.py --commit-results: writes what the last run of each fault gave to bench/results/mutations.json.
 
 Works on a copy of the tree in build/mutate. A fault is noticed if something no longer builds, or if a test program
-fails, crashes or runs out of time: first those of `tests`, then all others. Exit code 1 if a fault goes unnoticed or
-no longer applies (its old text must stand exactly once in the file).
+fails, crashes or runs out of time: first those of `tests`, then all others; of each, tests that take long last. Exit
+code 1 if a fault goes unnoticed or no longer applies (its old text must stand exactly once in the file).
 """
 import dataclasses
 import fcntl
@@ -22,6 +22,25 @@ SOURCE, BUILD = WORK / "source", WORK / "build"
 RESULTS, COMMITTED = WORK / "results.json", ROOT / "bench" / "results" / "mutations.json"
 LEAST_TIME_LIMIT_S = 60
 JOBS = os.environ.get("RAYDIX_JOBS", str(os.cpu_count() or 1))
+
+
+# Tests of a folder that take more than a second each, together minutes: only what the others let pass is put to them.
+LONG = {
+    "trace": ("Hits.BuiltinScenesLikeBruteForce", "Hits.SoupsLikeBruteForce", "Hits.LeafSizeAndCodeBitsChangeNoBit",
+              "Hits.SoupAgainstEveryTriangle", "Hits.FaultResultsDifferByThreadCount", "Simd.SoupsLikeScalar",
+              "Simd.BuiltinScenesLikeScalar", "Simd.EveryBuilderAndLeafSize", "Simd.LimitsBesideTheHit",
+              "Simd.NoRayLeavesAClosedSurface", "KdRays.SoupsLikeBruteForce", "KdRays.BuiltinScenesLikeBruteForce",
+              "KdRays.SharedBunnyLikeTheBvh", "KdNearest.LikeEveryPoint", "Watertight.*", "DoubleWatertight.*",
+              "CwbvhTrace.SoupsLikeScalar", "CwbvhTrace.BuiltinScenesLikeScalar", "OracleHits.BuiltinScenes*",
+              "DoubleTrace.EveryBuilderLikeEveryTriangle", "DoubleTrace.PartsOfTrianglesChangeNoBit",
+              "DoubleTrace.ThreadsLeavesAndCodesChangeNoBit", "DoubleTrace.TIsThatOfExactArithmetic",
+              "RayFaults.GpsCoordinatesCollapseCodes", "Simulate.FiguresDoNotDependOnThreads"),
+    "engine": ("*WorldsAnswerAsTheirTrianglesDo", "DoubleMesh.AtAnyPlaceHasTheHitsOfAllTriangles",
+               "DoubleMesh.OfAnyShapeHasTheHitsOfAllTriangles", "*ShearedInstancesLoseNoHits",
+               "*MixedScenesAnswerAsEachShapeDoes", "*MovedVerticesRefitATreeWhileItIsGood",
+               "*AnswersAreThoseOfEveryMeshOnEveryPath", "InstanceEdges.NearlyFlatMaps",
+               "SceneProgress.ACommitThatEndsAtAnyCallLeavesTheSceneAsItWas"),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -368,8 +387,14 @@ def build(targets):
     return run(["cmake", "--build", str(BUILD), "--parallel", JOBS, "--target", *targets]) == 0
 
 
-def run_program(program, limit):
-    code = run([str(program), "--gtest_brief=1", "--gtest_fail_fast=1"], limit, cwd=WORK)
+def looks_of(folders):
+    """The looks that test programs take at a fault, as (folder, filter of its tests): at first without those of LONG."""
+    long = [(folder, ":".join(LONG[folder])) for folder in folders if folder in LONG]
+    return [(folder, "-" + dict(long).get(folder, "")) for folder in folders], long
+
+
+def run_program(program, tests, limit):
+    code = run([str(program), "--gtest_brief=1", "--gtest_fail_fast=1", f"--gtest_filter={tests}"], limit, cwd=WORK)
     return {0: None, None: "time"}.get(code, "test")
 
 
@@ -394,23 +419,23 @@ def prepare(faults):
     return programs, lock
 
 
-def set_limits(folders, programs, limits):
-    """Without a fault every program must pass, and its time sets its limit. Each runs once, when it is first needed."""
-    for folder in folders:
-        if folder in limits:
+def set_limits(looks, programs, limits):
+    """Without a fault every look must pass, and its time sets its limit. Each is taken once, when it is first needed."""
+    for folder, tests in looks:
+        if (folder, tests) in limits:
             continue
         start = time.monotonic()
-        if not build([programs[folder].name]) or run_program(programs[folder], None) is not None:
+        if not build([programs[folder].name]) or run_program(programs[folder], tests, None) is not None:
             sys.exit(f"without any fault, {programs[folder].name} fails:\n{last_lines()}")
-        limits[folder] = LEAST_TIME_LIMIT_S + 5 * (time.monotonic() - start)
+        limits[folder, tests] = LEAST_TIME_LIMIT_S + 5 * (time.monotonic() - start)
 
 
-def noticed_in(folders, programs, limits):
-    """Which of these programs notices what is planted, or None."""
-    if folders and not build([programs[f].name for f in folders]):
+def noticed_in(looks, programs, limits):
+    """Which of these looks notices what is planted, or None."""
+    if looks and not build([programs[folder].name for folder, _ in looks]):
         return "the compiler"
-    for folder in folders:
-        reason = run_program(programs[folder], limits[folder])
+    for folder, tests in looks:
+        reason = run_program(programs[folder], tests, limits[folder, tests])
         if reason:
             return f"{folder}_test" + (" (time)" if reason == "time" else "")
     return None
@@ -421,11 +446,11 @@ def noticed_by(fault, programs, limits):
     first = [folder for folder in fault.tests.split() if folder in programs]
     file = SOURCE / fault.file
     text = file.read_text()
-    for folders in (first, [f for f in programs if f not in first]):
-        set_limits(folders, programs, limits)
+    for looks in (*looks_of(first), *looks_of([f for f in programs if f not in first])):
+        set_limits(looks, programs, limits)
         file.write_text(text.replace(fault.old, fault.new))
         try:
-            who = noticed_in(folders, programs, limits)
+            who = noticed_in(looks, programs, limits)
         finally:
             file.write_text(text)
         if who:

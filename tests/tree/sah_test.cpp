@@ -378,6 +378,22 @@ TEST(SplitTrees, AreBetterThanSweepOverSticks) {
     EXPECT_LT(sah(Builder::sbvh), 0.9 * sweep);
 }
 
+/// One triangle among many small ones is cut near its end: its two parts are each other's
+/// neighbours, and so large that even a leaf that counted both would cost no more than they do.
+TEST(SplitTrees, ALeafOfTwoPartsHoldsTheirTriangleOnce) {
+    Mesh mesh = random_soup(4000, seed, 0.01f);
+    for (Vec3& v : mesh.vertices) v = {0.3f * v.x - 0.9f, 0.3f * v.y, 0.3f * v.z};
+    mesh.vertices[0].x = -1;  // the scene's middle in x is 0
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (const Vec3 v : {Vec3{-0.01f, 0.5f, 0.5f}, Vec3{-0.01f, 1, 1}, Vec3{1, 0.5f, 0.5f}})
+        mesh.vertices.push_back(v);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    EXPECT_EQ(build_bvh(mesh, options_of(Builder::split, 1)).order().size(), 4002u);
+    const Bvh tree = build_bvh(mesh, options_of(Builder::split, 4));
+    EXPECT_EQ(std::ranges::count(tree.order(), 4000u), 1);
+    EXPECT_EQ(check(tree, mesh).broken, "");
+}
+
 TEST(SplitTrees, CheckFindsWhatIsWrong) {
     const Model scene = sticks(500);
     const auto broken = [&](const auto& damage) {
