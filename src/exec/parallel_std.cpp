@@ -7,10 +7,10 @@
 #include <exception>
 #include <mutex>
 #include <thread>
-#include <vector>
 
 #include "base/float_env.h"
 #include "base/options.h"
+#include "exec/crew.h"
 #include "exec/parallel.h"
 
 namespace raydix {
@@ -50,7 +50,8 @@ struct SharedLoop {
         const FloatEnvironment plain;
         const Restore within(1, true);
         try {
-            for (std::size_t begin; (begin = next.fetch_add(step)) < n;)
+            // Relaxed: to take a range from each other must not order what threads do with theirs.
+            for (std::size_t begin; (begin = next.fetch_add(step, std::memory_order_relaxed)) < n;)
                 call(body, begin, std::min(begin + step, n));
         } catch (...) {
             const std::scoped_lock lock(failing);
@@ -64,15 +65,15 @@ struct SharedLoop {
 void with_threads(int threads, const std::function<void()>& body) {
     check_threads(threads);
     const FloatEnvironment plain;
-    constexpr int most = 16;  // threads are made anew for each loop
+    constexpr int most = 16;  // each calling thread has a crew of its own
     const Restore limited(threads > 0 ? std::min(threads, most) : thread_limit, inside_loop);
     body();
 }
 
 int thread_count() {
     if (inside_loop) return 1;
-    return thread_limit > 0 ? thread_limit
-                            : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    static const int all = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    return thread_limit > 0 ? thread_limit : all;
 }
 
 void isolated(const std::function<void()>& body) { body(); }  // loops take up nothing else
@@ -89,10 +90,8 @@ void parallel_ranges(std::size_t n, std::size_t grain,
         return;
     }
     SharedLoop loop{n, std::max(grain, n / (8 * threads)), call, body, {}, {}, {}};
-    std::vector<std::thread> others;
-    for (std::size_t t = 1; t < threads; ++t) others.emplace_back([&loop] { loop.work(); });
-    loop.work();
-    for (std::thread& other : others) other.join();
+    thread_local Crew crew;
+    crew.run(threads - 1, [&loop] { loop.work(); });
     if (loop.failure) std::rethrow_exception(loop.failure);
 }
 

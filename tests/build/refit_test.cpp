@@ -62,7 +62,9 @@ bool same_hits(const std::vector<Hit>& a, const std::vector<Hit>& b) {
 }
 
 TEST(Refit, GivesTheHitsOfANewTree) {
-    const Mesh mesh = load_model("builtin:figure?triangles=20000").mesh();
+    const Mesh mesh = load_model(test::sanitized ? "builtin:figure?triangles=5000"
+                                                 : "builtin:figure?triangles=20000")
+                          .mesh();
     for (const char* builder : whole_builders)
         for (const int threads : {1, 2, 7}) {
             if (test::thorough == 1 && threads == 2) continue;
@@ -77,7 +79,7 @@ TEST(Refit, GivesTheHitsOfANewTree) {
                 EXPECT_EQ(check(bvh, now).broken, "") << builder;
                 EXPECT_TRUE(bvh.refitted());
                 EXPECT_EQ(bvh.max_depth(), depth);
-                const std::vector<Ray> rays = rays_at(bvh.bounds(), 2000);
+                const std::vector<Ray> rays = rays_at(bvh.bounds(), test::fewer(2000, 4));
                 EXPECT_TRUE(same_hits(trace(bvh, rays), trace(build_bvh(now), rays))) << builder;
                 const double sah = *tree_stats(bvh).sah;
                 EXPECT_NEAR(quality.sah, sah, 1e-9 * sah);

@@ -13,6 +13,7 @@
 #include <limits>
 
 #include "support/ray_sets.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 #include "tree/cluster_cases.h"
@@ -144,7 +145,7 @@ TEST(ReinsertionOption, IsAnErrorOutOfRange) {
 }
 
 TEST(ReinsertionOption, WideTreesFromMeshesAreThoseFromBinaryTrees) {
-    const std::vector<Model> scenes = builtin_triangle_scenes(few ? 500 : 3000);
+    const std::vector<Model> scenes = builtin_triangle_scenes(sanitized ? 150 : few ? 500 : 3000);
     for (const Builder builder : builders)
         for (const Model& scene : scenes) {
             BuildOptions options = build_options_for(Quality::high);

@@ -121,7 +121,7 @@ std::vector<RayD> rays_of(const MeshD& mesh, std::size_t count, std::uint64_t se
     const Vec3d size = box.hi - box.lo, middle = 0.5 * box.lo + 0.5 * box.hi;
     for (const double back : {1.2, 40.0, 3000.0}) {
         const auto more = fan(mesh, middle + back * Vec3d{0.1 * size.x, -0.2 * size.y, size.z},
-                              sanitized ? 8 : 16);
+                              sanitized ? 6 : 16);
         rays.insert(rays.end(), more.begin(), more.end());
     }
     return rays;
@@ -129,18 +129,18 @@ std::vector<RayD> rays_of(const MeshD& mesh, std::size_t count, std::uint64_t se
 
 void expect_all_hits(const std::string& what, const MeshD& mesh, std::size_t least_hits) {
     SCOPED_TRACE(what);
-    const std::vector<RayD> rays = with_extremes(rays_of(mesh, fewer(200, 4), 11));
+    const std::vector<RayD> rays = with_extremes(rays_of(mesh, fewer(200, 8), 11));
     expect_hits_of_all_triangles(mesh, rays);
     const std::vector<HitD> hits = trace_brute_force(mesh, rays);
     EXPECT_GE(static_cast<std::size_t>(
                   std::ranges::count_if(hits, [](const HitD& hit) { return hit.hit(); })),
-              fewer(least_hits, 6));
+              fewer(least_hits, 10));
     SCOPED_TRACE("to the hits");
     expect_hits_of_all_triangles(mesh, rays_to_hits(rays, hits));
 }
 
 MeshD soup_at(Vec3d at, double scale) {
-    MeshD mesh = random_soup_d(400, 5, 0.2);
+    MeshD mesh = random_soup_d(fewer(400, 2), 5, sanitized ? 0.3 : 0.2);
     for (Vec3d& v : mesh.vertices) v = scale * v + at;
     return mesh;
 }

@@ -12,6 +12,7 @@
 
 #include "layout/wide_bvh.h"
 #include "primitives/zero_area.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -192,11 +193,11 @@ TEST(WideBuild, GivesTheTreeThatTheBinaryOneGives) {
     WideBvhBuilder builder;
     WideBvh tree;
     for (const Mesh& mesh : {crowded_mesh(), random_soup(700, 1), random_soup(1, 1), Mesh{},
-                             lattice_mesh(1'000 * thorough, 7, 3), random_soup(3, 9)})
+                             lattice_mesh(fewer(1'000 * thorough, 2), 7, 3), random_soup(3, 9)})
         for (const Builder name : {Builder::ploc, Builder::hploc, Builder::binned, Builder::karras,
                                    Builder::apetrei, Builder::sbvh})
             for (const int max_leaf : {1, 4, 5}) {
-                const bool few = thorough == 1 && mesh.triangles.size() > 600;
+                const bool few = thorough == 1 && mesh.triangles.size() > 400;
                 if (few && max_leaf != 4) continue;
                 const BuildOptions options{.builder = name, .max_leaf = max_leaf, .threads = 3};
                 const Bvh binary = build_bvh(mesh, options);

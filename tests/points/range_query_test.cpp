@@ -254,11 +254,12 @@ TYPED_TEST(Within, RowsOfOneWalkAndOfTwo) {
     using T = typename TypeParam::Scalar;
     std::mt19937_64 random(seed + 10);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
-    std::vector<Vec3> places(thorough > 1 ? 1000 : 200);  // each room that is tried asks for all
+    std::vector<Vec3> places(thorough > 1 ? 1000
+                                          : fewer(200, 2));  // each room that is tried asks for all
     for (Vec3& p : places) p = {unit(), unit(), unit()};
     const auto points = points_as<TypeParam>(places);
     const auto queries =
-        points_as<TypeParam>(queries_for(places, thorough > 1 ? 4500 : 1200, seed + 11));
+        points_as<TypeParam>(queries_for(places, thorough > 1 ? 4500 : fewer(1200, 2), seed + 11));
     const TypeParam index = build_points(points);
     const auto same = [&](const auto& a, const auto& b) {
         return std::ranges::equal(a.offsets.view(), b.offsets.view()) &&
@@ -283,10 +284,11 @@ TYPED_TEST(Within, RowsOfOneWalkAndOfTwo) {
                     << "radius " << radius << ", " << room << " bytes";
         }
     }
-    // More than a block keeps: all of 5,000 points for each of 700 queries.
+    // More than a block keeps: all of 5,000 points for each of many queries.
     const TypeParam large =
         build_points(points_as<TypeParam>(queries_for(places, 5000, seed + 12)));
-    const std::vector<typename TypeParam::Point> some(queries.begin(), queries.begin() + 700);
+    const std::vector<typename TypeParam::Point> some(queries.begin(),
+                                                      queries.begin() + fewer(700, 2));
     const auto all = radius_search(large, some, std::numeric_limits<T>::infinity());
     for (std::size_t q = 0; q < some.size(); ++q) {
         const std::uint64_t n = all.offsets[q + 1] - all.offsets[q];

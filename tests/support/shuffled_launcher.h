@@ -7,13 +7,11 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdint>
-#include <exception>
-#include <mutex>
 #include <numeric>
 #include <random>
-#include <thread>
 #include <vector>
 
+#include "exec/crew.h"
 #include "exec/host_launcher.h"
 
 namespace raydix::test {
@@ -33,14 +31,11 @@ public:
         const std::vector<std::uint32_t> blocks = shuffled((n - 1) / block_size + 1, launch_seed);
         std::atomic<std::size_t> next{0};
         const auto run_blocks = [&] {
-            for (std::size_t k = next++; k < blocks.size(); k = next++)
+            for (std::size_t k; (k = next.fetch_add(1, std::memory_order_relaxed)) < blocks.size();)
                 run_block(blocks[k], n, launch_seed, work);
         };
-        std::vector<std::thread> crew;
         const std::size_t helpers = std::min(blocks.size(), static_cast<std::size_t>(threads_)) - 1;
-        for (std::size_t t = 0; t < helpers; ++t) crew.emplace_back(run_blocks);
-        run_blocks();
-        for (std::thread& thread : crew) thread.join();
+        crew_.run(helpers, run_blocks);
     }
 
     template <class Work>
@@ -104,6 +99,7 @@ private:
     std::mt19937_64 random_;
     int threads_;
     HostLauncher<> host_;
+    Crew crew_;
 };
 
 }  // namespace raydix::test

@@ -11,6 +11,7 @@
 
 #include "support/line_tree.h"
 #include "support/ray_sets.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -92,7 +93,7 @@ TEST(RayFaults, NaNTrianglePoisonsNoBox) {
         poisoned.vertices.push_back(bad);
         poisoned.triangles.push_back({0, 1, v});
     }
-    const auto rays = make_mixed_rays(clean, 20'000, seed);
+    const auto rays = make_mixed_rays(clean, fewer(20'000, 8), seed);
     const Bvh bvh = build_bvh(poisoned);
     EXPECT_EQ(bvh.left_out(), 5u);
     const auto wanted = trace(build_bvh(clean.mesh()), rays);
@@ -174,7 +175,7 @@ TEST(RayFaults, GpsCoordinatesCollapseCodes) {
     mesh.vertices.push_back({-1e7f + 1, -1e7f, -1e7f});
     const auto v = static_cast<std::uint32_t>(mesh.vertices.size());
     Model scene = scene_of(mesh, "GPS");
-    const auto rays = make_rays(scene, RaySet::at_vertex, 500 * thorough, seed);
+    const auto rays = make_rays(scene, RaySet::at_vertex, fewer(500 * thorough, 4), seed);
     mesh.triangles.push_back({v - 3, v - 2, v - 1});
     expect_brute_force(mesh, rays);
 }

@@ -11,6 +11,7 @@
 
 #include "support/line_tree.h"
 #include "support/ray_sets.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -113,12 +114,13 @@ TEST(Hits, LineTreeAgreesWithEveryTriangle) {
 
 TEST(Hits, SoupAgainstEveryTriangle) {
     const Model scene = scene_of(random_soup(2000, 12, 0.3f), "soup of 2000");
-    const auto rays = make_mixed_rays(scene, thorough == 1 ? 3000 : 10'000 * thorough, seed);
+    const auto rays =
+        make_mixed_rays(scene, thorough == 1 ? fewer(3000, 4) : 10'000 * thorough, seed);
     expect_same_hits(scene.name + " against trace_brute_force", rays,
                      trace(build_bvh(scene.mesh()), rays), trace_brute_force(scene.mesh(), rays));
 }
 
-constexpr std::size_t million = thorough == 1 ? 6'000 : 1'000'000;
+constexpr std::size_t million = thorough == 1 ? fewer(6'000, 4) : 1'000'000;
 
 TEST(Hits, SoupsLikeBruteForce) {
     expect_like_brute_force(scene_of(random_soup(2000, 1), "soup"), million);
@@ -134,7 +136,7 @@ TEST(Hits, SoupsLikeBruteForce) {
 }
 
 TEST(Hits, BuiltinScenesLikeBruteForce) {
-    const auto scenes = builtin_triangle_scenes(20'000);
+    const auto scenes = builtin_triangle_scenes(fewer(20'000, 4));
     EXPECT_GE(scenes.size(), 4u);
     for (const Model& scene : scenes) expect_like_brute_force(scene, million);
 }
@@ -159,9 +161,11 @@ TEST(Hits, FaultResultsDifferByThreadCount) {
 }
 
 TEST(Hits, LeafSizeAndCodeBitsChangeNoBit) {
-    for (const Model& scene : {load_model("builtin:grove?triangles=10000"),
-                               scene_of(lattice_mesh(3000, 12, 8), "lattice")}) {
-        const auto rays = make_mixed_rays(scene, thorough == 1 ? 1500 : 5000 * thorough, seed);
+    for (const Model& scene :
+         {load_model(sanitized ? "builtin:grove?triangles=2000" : "builtin:grove?triangles=10000"),
+          scene_of(lattice_mesh(fewer(3000, 3), 12, 8), "lattice")}) {
+        const auto rays =
+            make_mixed_rays(scene, thorough == 1 ? fewer(1500, 3) : 5000 * thorough, seed);
         const auto wanted = hits_with(scene.mesh(), rays, {}, 1);
         for (const int bits : {30, 63})
             for (const int max_leaf : {1, 4, 255})

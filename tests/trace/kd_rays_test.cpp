@@ -9,6 +9,7 @@
 
 #include "support/line_tree.h"
 #include "support/ray_sets.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -51,13 +52,13 @@ void expect_like_brute_force(const Model& scene, std::size_t ray_count) {
 
 TEST(KdRays, SoupAgainstEveryTriangle) {
     const Model scene = scene_of(random_soup(2000, 12, 0.3f), "soup of 2000");
-    const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
+    const auto rays = make_mixed_rays(scene, fewer(2000 * thorough, 4), seed);
     expect_same(scene.name + " against trace_brute_force", build_kdtree(scene.mesh()), rays,
                 trace_brute_force(scene.mesh(), rays));
 }
 
 TEST(KdRays, SoupsLikeBruteForce) {
-    const std::size_t rays = thorough == 1 ? 1200 : 5000 * thorough;
+    const std::size_t rays = thorough == 1 ? fewer(1200, 4) : 5000 * thorough;
     expect_like_brute_force(scene_of(random_soup(2000, 1), "soup"), rays);
     expect_like_brute_force(scene_of(random_soup(2000, 2, 1.0f), "soup of large ones"), rays);
     expect_like_brute_force(scene_of(lattice_mesh(2000, 20, 5), "lattice"), rays);
@@ -71,7 +72,7 @@ TEST(KdRays, BuiltinScenesLikeBruteForce) {
     const auto scenes = builtin_triangle_scenes(1000 * thorough);
     EXPECT_GE(scenes.size(), 4u);
     for (const Model& scene : scenes)
-        expect_like_brute_force(scene, thorough == 1 ? 2000 : 10'000 * thorough);
+        expect_like_brute_force(scene, thorough == 1 ? fewer(2000, 4) : 10'000 * thorough);
 }
 
 TEST(KdRays, SharedBunnyLikeTheBvh) {

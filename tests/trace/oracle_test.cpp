@@ -13,6 +13,7 @@
 #include "exec/parallel.h"
 #include "support/line_tree.h"
 #include "support/ray_sets.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -115,7 +116,7 @@ TEST(OracleHits, SoupsLikeDouble) {
 }
 
 TEST(OracleHits, BuiltinScenesLikeDouble) {
-    for (const Model& scene : builtin_triangle_scenes(10'000))
+    for (const Model& scene : builtin_triangle_scenes(fewer(10'000, 4)))
         expect_like_double(scene, thorough > 1 ? 100 + 5 * thorough : 30);
 }
 
@@ -123,7 +124,7 @@ constexpr std::size_t embree_rays = thorough > 1 ? 2500 * thorough : 200;
 
 TEST(OracleHits, BuiltinScenesLikeEmbree) {
     RAYDIX_SKIP_WITHOUT_EMBREE();
-    for (const Model& scene : builtin_triangle_scenes(100'000))
+    for (const Model& scene : builtin_triangle_scenes(fewer(100'000, 5)))
         expect_like_embree(scene, embree_rays);
 }
 

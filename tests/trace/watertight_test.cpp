@@ -10,6 +10,7 @@
 #include <random>
 
 #include "base/math.h"
+#include "support/sanitized.h"
 #include "support/support.h"
 #include "trace/triangle_test.h"
 
@@ -115,7 +116,7 @@ Ray inside_ray(const Solid& solid, Random& random) {
 
 std::size_t rays_wanted() {
     const char* given = std::getenv("RAYDIX_WATERTIGHT_RAYS");
-    return given ? std::strtoull(given, nullptr, 10) : 500000 * test::thorough;
+    return given ? std::strtoull(given, nullptr, 10) : test::fewer(500'000 * test::thorough, 10);
 }
 
 void expect_no_leak(const char* name, const Solid& solid) {

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "support/ray_sets.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 #include "support/wide_walk.h"
@@ -41,7 +42,7 @@ Hit closest(const Bvh& bvh, const WideTree& tree, const Ray& given, WideStack& s
 
 void expect_like_scalar(const Model& scene, const BuildOptions& options) {
     const Bvh bvh = build_bvh(scene.mesh(), options);
-    const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
+    const auto rays = make_mixed_rays(scene, fewer(2000 * thorough, 4), seed);
     std::vector<Hit> wanted(rays.size());
     const TraceCounts scalar = trace(bvh, rays, wanted, {.counters = true});
     std::uint64_t last = scalar.node_visits;
@@ -62,7 +63,7 @@ void expect_like_scalar(const Model& scene, const BuildOptions& options) {
 
 TEST(WideWalk, LikeScalar) {
     for (const int max_leaf : {1, 4}) {
-        for (const Model& scene : builtin_triangle_scenes(5000))
+        for (const Model& scene : builtin_triangle_scenes(fewer(5000, 4)))
             expect_like_scalar(scene, {.max_leaf = max_leaf});
         expect_like_scalar(scene_of(lattice_mesh(2000, 12, 5), "lattice"), {.max_leaf = max_leaf});
         expect_like_scalar(scene_of(random_soup(2000, 5, 0.5f), "soup"), {.max_leaf = max_leaf});

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "support/sanitized.h"
 #include "support/support.h"
 #include "tree/clip.h"
 #include "tree/epo.h"
@@ -97,7 +98,7 @@ TEST(Clip, SixPlanesThroughOneTriangle) {
 
 /// A thousand triangles; fewer where every step is slow, for the naive way is quadratic.
 TEST(EndPointOverlap, EqualsNaiveClippingOnAThousandTriangles) {
-    const std::size_t count = thorough == 1 ? 300 : 1000;
+    const std::size_t count = thorough == 1 ? fewer(300, 2) : 1000;
     for (const int max_leaf : {1, 4}) {
         for (const float size : {0.05f, 0.5f}) {
             const Bvh bvh = build_bvh(random_soup(count, 12, size), {.max_leaf = max_leaf});

@@ -47,7 +47,7 @@ TEST(Octree, EqualsTheTreeOfOneInsertionAfterTheOther) {
 TEST(Octree, EndsAtEveryLevelItIsAskedTo) {
     for (const NamedPoints& input : octree_inputs(size / 4, seed + 1))
         for (const int bits : {30, 63})
-            for (int max_level = 0; max_level <= bits / 3; max_level += sanitized ? 3 : 1)
+            for (int max_level = 0; max_level <= bits / 3; max_level += sanitized ? 4 : 1)
                 for (const int max_leaf : {1, 3})
                     compare(input, {.bits = bits, .max_level = max_level, .max_leaf = max_leaf});
 }
@@ -55,7 +55,7 @@ TEST(Octree, EndsAtEveryLevelItIsAskedTo) {
 TEST(Octree, EveryLeafSize) {
     const auto inputs = octree_inputs(200, seed + 2);
     for (const NamedPoints& input : inputs)
-        for (int max_leaf = 1; max_leaf <= 64; max_leaf += sanitized ? 7 : 1)
+        for (int max_leaf = 1; max_leaf <= 64; max_leaf += sanitized ? 21 : 1)
             compare(input, {.max_leaf = max_leaf});
 }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "exec/parallel.h"
+#include "support/sanitized.h"
 #include "support/support.h"
 #include "tree/cluster_cases.h"
 #include "tree/reinsert_top.h"
@@ -174,7 +175,8 @@ TEST(Reinsertion, GainsWhereCodesDividedBadly) {
 }
 
 TEST(Reinsertion, IsTheSameForEveryNumberOfThreads) {
-    const Nodes before = nodes_of(build_bvh(random_soup(20'000, seed, 0.1f), {.max_leaf = 1}));
+    const Nodes before =
+        nodes_of(build_bvh(random_soup(fewer(20'000, 4), seed, 0.1f), {.max_leaf = 1}));
     Nodes one = before;
     with_threads(1, [&] {
         ReinsertionScratch scratch;
@@ -216,7 +218,7 @@ Nodes chain(std::size_t leaves) {
 }
 
 TEST(Reinsertion, ADeepChainTakesNoStackAndGetsShorter) {
-    const Nodes before = chain(thorough > 1 ? 100'000 : 20'000);
+    const Nodes before = chain(sanitized ? 6'000 : thorough > 1 ? 100'000 : 20'000);
     ASSERT_EQ(walk(before).size(), before.size() - 1);
     Nodes after = before;
     ReinsertionScratch scratch;
