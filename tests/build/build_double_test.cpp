@@ -290,7 +290,7 @@ TEST(BuildDouble, CutsHoldWhatRoundingMoved) {
 }
 
 TEST(BuildDouble, TreesOfPartsLeaveOutAndRefuseWhatOthersDo) {
-    MeshD mesh = slivers_d(test::fewer(6000, 3), 15);
+    MeshD mesh = slivers_d(6000, 15);
     const MeshD good = mesh;
     mesh.vertices[3 * 4].x = nan;
     mesh.vertices[3 * 32 + 1].y = inf;

@@ -145,9 +145,12 @@ TEST(ReinsertionOption, IsAnErrorOutOfRange) {
 }
 
 TEST(ReinsertionOption, WideTreesFromMeshesAreThoseFromBinaryTrees) {
-    const std::vector<Model> scenes = builtin_triangle_scenes(sanitized ? 150 : few ? 500 : 3000);
-    for (const Builder builder : builders)
+    const std::vector<Model> scenes = builtin_triangle_scenes(few ? 500 : 3000);
+    std::size_t turn = 0;
+    for (const Builder builder : builders) {
+        const std::size_t own = turn++ % scenes.size();
         for (const Model& scene : scenes) {
+            if (sanitized && &scene != &scenes[own]) continue;  // one scene for each builder
             BuildOptions options = build_options_for(Quality::high);
             options.builder = builder;
             const WideBvh direct = build_wide_bvh(scene.mesh(), options);
@@ -156,6 +159,7 @@ TEST(ReinsertionOption, WideTreesFromMeshesAreThoseFromBinaryTrees) {
             EXPECT_EQ(direct.stats().bytes, from_binary.stats().bytes) << scene.name;
             EXPECT_EQ(direct.stats().sah, from_binary.stats().sah) << scene.name;
         }
+    }
 }
 
 }  // namespace

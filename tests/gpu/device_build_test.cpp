@@ -170,9 +170,9 @@ TEST(DeviceBuild, EachBuiltinScene) {
     for (const Model& scene : builtin_triangle_scenes(100 * thorough)) {
         for (const Builder builder : builders)
             for (const int bits : {30, 63}) {
+                if (++seed % 3 != 0 && sanitized) continue;
                 const BuildOptions options{.builder = builder, .bits = bits};
-                SCOPED_TRACE(scene.name + ": " + told(options) + ", seed " +
-                             std::to_string(++seed));
+                SCOPED_TRACE(scene.name + ": " + told(options) + ", seed " + std::to_string(seed));
                 ShuffledLauncher shuffled(seed);
                 expect_same_tree(launched_build(shuffled, MeshView(scene.mesh()), options),
                                  MeshView(scene.mesh()), options);
