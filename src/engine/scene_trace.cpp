@@ -88,7 +88,7 @@ struct Plan {
 
     Plan(const SceneTree& tree, const Batch& batch) : path(batch.options.path) {
         const bool automatic = path == SimdPath::automatic;
-        BatchLook look{path, {}};
+        BatchLook look{path, {}, false};
         if (automatic) look = look_at(tree.extent.box, batch.rays);
         // Rays that go apart meet parts in lists too short to pay.
         path = automatic && look.path == SimdPath::sorted ? SimdPath::single : look.path;

@@ -89,7 +89,7 @@ Plan plan_for(const SceneTreeD& tree, const Batch& batch) {
     const MeshTreeD* const mesh = tree.only_mesh();
     const SceneTraceOptions& options = batch.options;
     const bool automatic = options.path == SimdPath::automatic;
-    BatchLook look{options.path, {}};
+    BatchLook look{options.path, {}, false};
     Plan plan;
     if (options.filter_d) {
         plan.ways.add(PathWay::alone);

@@ -79,6 +79,8 @@ private:
     static constexpr std::size_t share_of_job = 8;
     static constexpr float most_at_once = 16.0f;
     static constexpr std::uint32_t least_pause = 8, longest_pause = 1024;
+    /// Of jobs that go another way as a whole: rays of one that is asked once should not suffer.
+    static constexpr std::uint32_t whole_pause = 4;
 
     static std::size_t index(Way way) { return static_cast<std::size_t>(way); }
     [[nodiscard]] float cost(Way way) const {
@@ -97,8 +99,8 @@ private:
     }
 
     /// The slower a way was, the longer until it is tried again.
-    void pause(Way way, Way best, std::uint32_t job) {
-        std::uint32_t jobs = 1;
+    void pause(Way way, Way best, std::uint32_t job, std::uint32_t least = 1) {
+        std::uint32_t jobs = least;
         if (trials_[index(way)].load(std::memory_order_relaxed) >= 2) {
             const float ratio = std::max(cost(way) / cost(best), 1.0f);
             jobs = static_cast<std::uint32_t>(
@@ -147,11 +149,11 @@ private:
             const float main = time_a_ray(best, begin, end, trace);
             if (tried == best) return;  // it has won since
             add(tried, best, std::bit_cast<float>(static_cast<std::uint32_t>(open)) / main);
-            pause(tried, best, job);
+            pause(tried, best, job, whole_pause);
             return;
         }
         for (const Way way : ways)
-            if (job > 0 && way != best && is_due(way, job)) {
+            if (job % whole_pause == whole_pause - 1 && way != best && is_due(way, job)) {
                 open_.store(pack(way, time_a_ray(way, begin, end, trace)),
                             std::memory_order_relaxed);
                 return;
@@ -222,7 +224,7 @@ private:
 
 /// The ways that the jobs of a batch may go, in the order of promise.
 struct JobWays {
-    std::array<PathWay, 3> ways{};
+    std::array<PathWay, 4> ways{};
     std::size_t count = 0;
     PathWayRates* rates = nullptr;  // null: all jobs go the first way
 

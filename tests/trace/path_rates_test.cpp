@@ -115,14 +115,14 @@ TEST(PathRates, JobsTakeTheWayThatTookLeastAndSlowOnesRarely) {
         PathWayRates rates;
         std::size_t slow = 0, all = 0;
         const auto trace = [&](PathWay way, std::size_t begin, std::size_t end) {
-            spend(end - begin, way == PathWay::turns ? 20 : 400);
+            spend(end - begin, way == PathWay::turns ? 20 : 200);
             all += end - begin;
             slow += way == PathWay::turns ? 0 : end - begin;
         };
-        for (int job = 0; job < 12; ++job) rates.run(three_ways, 0, rays, trace);
+        for (int job = 0; job < 100; ++job) rates.run(three_ways, 0, rays, trace);
         EXPECT_EQ(rates.fastest(three_ways), PathWay::turns);
         slow = all = 0;
-        for (int job = 0; job < 100; ++job) rates.run(three_ways, 0, rays, trace);
+        for (int job = 0; job < 200; ++job) rates.run(three_ways, 0, rays, trace);
         EXPECT_LT(slow, all / 20);
     }
 }

@@ -13,9 +13,11 @@
 #include "base/float_env.h"
 #include "exec/parallel.h"
 #include "exec/path_rates.h"
+#include "exec/thread_own.h"
 #include "rays/place_order.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
+#include "trace/simd/scaled_rays.h"
 #include "trace/simd/simd_kernels.h"
 #include "trace/simd/trace_on_this_thread.h"
 #include "trace/simd/wide_batch.h"
@@ -76,7 +78,7 @@ struct Plan {
     Plan(const WideBvh& through, std::span<const Ray> rays, const TraceOptions& options, bool any,
          bool can_stream)
         : tree(through),
-          look{options.path, {}},
+          look{options.path, {}, false},
           automatic(options.path == SimdPath::automatic),
           // Counters are those of one way: they do not depend on times.
           learns(automatic && !options.counters),
@@ -118,11 +120,20 @@ struct Plan {
         if (!learns) return ways;
         for (const PathWay way : {PathWay::packets, PathWay::turns, PathWay::streams})
             if (way != first && (streams || way != PathWay::streams)) ways.add(way);
+        // So few rays hardly take turns.
+        if (streams && look.kind.size == 0) ways.add(PathWay::alone);
         BatchKind kind = look.kind;
         kind.sorted = order == RayOrder::sorted;
         ways.rates = &tree.arrays().rates.ways(kind);
         return ways;
     }
+};
+
+/// Kept from job to job.
+struct JobMemory {
+    StackMemory stack;
+    StreamMemory streams;
+    ScaledJob scaled;
 };
 
 /// A batch as its jobs see it: hits, or else occluded, or all hits.
@@ -136,12 +147,13 @@ struct Batch {
     std::vector<std::uint32_t> order{};  // of the path `sorted`
     HitBlocks<AllHits>* all = nullptr;
     const HitCheck* check = nullptr;
+    bool scaled = false;  // many rays have directions far from unit length
 
     void run(PathWay way, std::size_t begin, std::size_t end, SimdCounts& counts) const {
+        const ThreadOwn<JobMemory> own;
+        StackMemory& stack = own->stack;
         const std::size_t stack_size = wide_stack_capacity(tree.stats().max_depth);
-        StackMemory stack;
         stack.reserve_words(stack_size * (way == PathWay::turns ? rays_in_turn : 1));
-        StreamMemory memory;
         const std::size_t from = order.empty() ? begin : 0;
         TriangleBlock room{};
         const SimdJob job{view_of(tree.arrays(), room),
@@ -152,13 +164,36 @@ struct Batch {
                           occluded == nullptr ? nullptr : occluded + from,
                           stack.view(),
                           stack.packet_view(),
-                          &memory,
+                          &own->streams,
                           counters,
                           stack_size,
                           all == nullptr ? nullptr : &all->hits_with(begin),
                           all == nullptr ? nullptr : all->hit_counts() + begin,
                           check};
-        job_of(kernels, way)(job, counts);
+        if (way == PathWay::alone) {
+            run_alone(job, counts);
+        } else if (scaled && all == nullptr && check == nullptr) {
+            job_of(kernels, way)(own->scaled.copied(job), counts);
+            own->scaled.hand_over(job);
+        } else {
+            job_of(kernels, way)(job, counts);
+        }
+    }
+
+private:
+    /// Calls of one ray, without an order.
+    void run_alone(const SimdJob& job, SimdCounts& counts) const {
+        OneRay* const kernel = hits ? kernels.closest : kernels.any;
+        CallHistory history;
+        for (std::size_t k = 0; k < job.n; ++k) {
+            const TreeHit hit = kernel(tree.arrays(), job.rays[k], job.stack, history);
+            counts.hits += hit.hit();
+            counts.invalid += !hit.hit() && !is_valid(job.rays[k]);
+            if (hits)
+                *job.hits.at(k) = hit;
+            else
+                job.occluded[k] = hit.hit();
+        }
     }
 };
 
@@ -170,7 +205,7 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
     const SimdKernels& kernels = kernels_for(options.isa);
     TraceCounts sum;
     sum.rays = rays.size();
-    with_threads(options.threads, [&] {
+    const auto run = [&] {
         plan.run_in_order(rays.size(), [&](RayOrder order, std::size_t first, std::size_t last) {
             const std::span<const Ray> part = rays.subspan(first, last - first);
             Batch batch{tree,
@@ -180,6 +215,7 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
                         occluded == nullptr ? nullptr : occluded + first,
                         options.counters};
             batch.check = check;
+            batch.scaled = plan.look.scaled;
             if (order == RayOrder::sorted) batch.order = order_by_place(tree.arrays().bounds, part);
             const JobWays ways = plan.ways(order);
             std::vector<SimdCounts> parts(plan.jobs(part.size()));
@@ -195,7 +231,13 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
                 });
             add_counts(parts, options.counters, sum);
         });
-    });
+    };
+    if (rays.size() <= plan.job_rays) {  // one job: no other thread has a part in it
+        check_threads(options.threads);
+        run();
+    } else {
+        with_threads(options.threads, run);
+    }
     return sum;
 }
 
@@ -351,7 +393,7 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
     const Vec3 size = bounds.hi - bounds.lo;
     const float longest_side = max_of(max_of(size.x, size.y), size.z);
     const std::size_t windows = std::clamp<std::size_t>(rays.size() / 256, 1, 32);
-    std::size_t looked_at = 0, coherent = 0, close = 0, apart = 0, spread = 0;
+    std::size_t looked_at = 0, coherent = 0, close = 0, apart = 0, spread = 0, odd = 0;
     for (std::size_t w = 0; w < windows; ++w) {
         const std::size_t begin = rays.size() / windows * w;
         if (begin + window > rays.size()) break;
@@ -359,7 +401,8 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
         for (const Ray& ray : rays.subspan(begin, window)) {
             if (!is_valid(ray)) continue;
             const Vec3 d = ray.direction;
-            const float longest = max_of(max_of(std::fabs(d.x), std::fabs(d.y)), std::fabs(d.z));
+            const float longest = longest_of(ray);
+            odd += !is_near_unit(longest);
             const Vec3 scaled{d.x / longest, d.y / longest, d.z / longest};
             origins = unite(origins, {ray.origin, ray.origin});
             directions = unite(directions, {scaled, scaled});
@@ -373,11 +416,12 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
         apart += beyond(parts, from / longest_side);
         spread += beyond(angles, to);
     }
-    BatchLook look{SimdPath::packet, {}};
+    BatchLook look{SimdPath::packet, {}, false};
     look.kind.size = BatchKind::size_of(rays.size());
     if (looked_at != 0) {
         look.kind.apart = static_cast<std::uint32_t>((apart + looked_at / 2) / looked_at);
         look.kind.spread = static_cast<std::uint32_t>((spread + looked_at / 2) / looked_at);
+        look.scaled = 8 * odd >= window * looked_at;
     }
     if (4 * coherent < 3 * looked_at)
         look.path = 2 * close >= looked_at ? SimdPath::stream : SimdPath::sorted;

@@ -21,7 +21,8 @@ namespace raydix {
 /// What rays through anything with these bounds are like: choose_simd_path, and more.
 struct BatchLook {
     SimdPath path;
-    BatchKind kind;  // `any` and `sorted` are left to the caller
+    BatchKind kind;       // `any` and `sorted` are left to the caller
+    bool scaled = false;  // many directions are far from unit length: scaled_rays.h
 };
 [[nodiscard]] BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays);
 
