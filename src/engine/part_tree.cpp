@@ -125,7 +125,7 @@ std::array<BvhNode, quantised_width> slots_of(const PartTree& old, std::size_t w
             const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
             Aabb box = empty_box();
             for (std::uint32_t k = place; k < place + count; ++k)
-                box = unite(box, box_of(old.part[k]));
+                box = unite(box, box_of(old.named(k)));
             slots[s] = {box.lo, place, box.hi, count};
         } else {
             slots[s] = {boxes[word].lo, word, boxes[word].hi, 0};
@@ -179,6 +179,7 @@ bool refit_nodes(const PartTree& old, const BoxOf& box_of, double limit, PartTre
     out.cost_at_build = old.cost_at_build;
     out.arrays.stats.max_depth = old.arrays.stats.max_depth;
     out.part = old.part;
+    out.leaves_name_parts = old.leaves_name_parts;
     set_view(out);
     return true;
 }
@@ -264,6 +265,18 @@ void build_box_tree(std::span<const ExtentD> extents, const BuildOptions& build,
 void build_box_tree(std::span<const Aabb> boxes, BuildOptions build, const WideOptions& leaves,
                     PartTree& out) {
     make_box_tree(boxes, build, leaves, nullptr, out);
+}
+
+void name_parts_in_leaves(PartTree& tree) {
+    for_each_index(
+        tree.arrays.nodes.size(),
+        [&](std::size_t w) {
+            for (std::uint32_t& word : tree.arrays.nodes[w].child)
+                if (word != wide_no_child && (word & wide_leaf_bit) != 0)
+                    word = wide_leaf_bit | tree.part[(word & ~wide_leaf_bit) >> 3] << 3;
+        },
+        256);
+    tree.leaves_name_parts = true;
 }
 
 bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,

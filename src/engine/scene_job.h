@@ -73,24 +73,29 @@ struct SceneLevel {
 /// Rays at a primitive of the caller's, as its function gets them.
 class UserRays {
 public:
-    void clear() { rays_.clear(), places_.clear(), sources_.clear(); }
+    /// None yet, and room for `most`.
+    void begin(std::uint32_t most) {
+        count_ = 0;
+        if (rays_.size() < most)
+            rays_.resize(most), places_.resize(most), sources_.resize(most), hits_.resize(most);
+    }
     /// `number`: of the ray in its level; `scale`: t of the caller's ray = scale * t of this one.
     void add(const Ray& ray, double scale, std::uint32_t number, std::size_t place) {
-        rays_.push_back(ray);
-        places_.push_back(place);
-        sources_.push_back({scale, number});
+        rays_[count_] = ray;
+        places_[count_] = place;
+        sources_[count_] = {scale, number};
+        hits_[count_++] = {};
     }
-    [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(rays_.size()); }
+    [[nodiscard]] std::uint32_t count() const { return count_; }
     [[nodiscard]] std::uint32_t number(std::uint32_t k) const { return sources_[k].id; }
     [[nodiscard]] double scale(std::uint32_t k) const { return sources_[k].scale; }
-    /// No hits yet.
     [[nodiscard]] RaysAtPrimitive at_primitive() {
-        hits_.assign(rays_.size(), {});
-        return {rays_.data(), places_.data(), hits_.data(), count()};
+        return {rays_.data(), places_.data(), hits_.data(), count_};
     }
     [[nodiscard]] const TreeHit& hit(std::uint32_t k) const { return hits_[k]; }
 
 private:
+    std::uint32_t count_ = 0;
     std::vector<Ray> rays_;
     std::vector<std::size_t> places_;
     std::vector<SceneRaySource> sources_;
@@ -153,10 +158,11 @@ struct SceneKernels {
     void (*trace)(SceneJob& job);
     void (*all_hits)(SceneJob& job);
     void (*steps)(SceneJob& job);
-    /// A valid ray; `filter` may be null; `stack` has room for SceneTree::stack_size. For any hit
-    /// only prim has a meaning.
+    /// `filter` may be null; `stack` has room for SceneTree::stack_size; `history`: of the calls
+    /// of this thread. For any hit only prim has a meaning.
     using OneRayOfScene = Hit(const SceneTree& scene, const Ray& ray, std::uint32_t mask,
-                              const HitFilter* filter, const WideStackView& stack);
+                              const HitFilter* filter, const WideStackView& stack,
+                              CallHistory& history);
     OneRayOfScene* closest;
     OneRayOfScene* any;
 };

@@ -220,6 +220,10 @@ public:
     /// Says which hits count; `ray` is the caller's. Both must outlive the walk.
     void filter_by(const HitFilter& filter, const Ray& ray) { filter_ = &filter, given_ = &ray; }
 
+    /// For single calls through one geometry of shapes: rays that are like those of the last calls
+    /// take much the same way, and often find any hit where they enter first.
+    void come_after(CallHistory& history) { history_ = &history; }
+
     [[nodiscard]] const Hit& best() const { return best_; }
     void store(SceneJob& job, std::uint32_t id) const {
         job.limits[id].reach = reach_;
@@ -327,7 +331,8 @@ protected:
         const ShapeTree& tree;
         std::uint32_t number;
         ShapeRay at;
-        static constexpr bool nearest_first = false, large = true;
+        bool nearest_first;
+        static constexpr bool large = true;
 
         RAYDIX_PREFETCHING void ask_for(std::uint32_t word) const { ask_for_shapes(tree, word); }
         float visit_one(std::uint32_t place, std::uint32_t count, std::uint32_t) {
@@ -345,10 +350,21 @@ protected:
         if ((tree.mask & mask_) == 0) return;
         SingleFrame frame;
         if (!fill(tree.view, line, tree.growth, frame)) return;
-        AtShapes shapes{*this, tree, number, shape_ray(line, frame)};
+        AtShapes shapes{*this, tree, number, shape_ray(line, frame), false};
+        if constexpr (wanted != Wanted::all && !counting) {
+            if (history_ != nullptr && follows(tree.view, frame, *history_)) {
+                shapes.nearest_first = true;
+                walk_shapes<true>(tree, frame, shapes);
+                return;
+            }
+        }
+        walk_shapes<false>(tree, frame, shapes);
+    }
+    template <bool guessing>
+    HWY_INLINE void walk_shapes(const ShapeTree& tree, const SingleFrame& frame, AtShapes& shapes) {
         SimdCounts counts;
-        SingleRay<wanted, counting, false, false, AtShapes>(tree.view, frame, stack_, counts,
-                                                            &shapes, 0)
+        SingleRay<wanted, counting, false, guessing, AtShapes>(tree.view, frame, stack_, counts,
+                                                               &shapes, 0)
             .trace(0, {frame.tmax});
         if constexpr (counting) visits_ += counts.visits;
     }
@@ -363,7 +379,7 @@ protected:
     HWY_INLINE void hit_primitives(const ShapeTree& tree, std::uint32_t place, std::uint32_t count,
                                    std::uint32_t number, ShapeRay& at) {
         if (const UserGeometry* const user = tree.user()) {
-            hit_user(*user, tree, place, count, number, at);
+            hit_user(*user, tree, place, number, at);
             return;
         }
         hit_leaf(tree, place, count, at,
@@ -397,19 +413,15 @@ protected:
             return check.ray.accepts(hit_in_scene(check.mesh, check.number, check.scale, hit));
         }
     };
-    HWY_NOINLINE void hit_user(const UserGeometry& user, const ShapeTree& tree, std::uint32_t place,
-                               std::uint32_t count, std::uint32_t number, ShapeRay& at) {
+    HWY_NOINLINE void hit_user(const UserGeometry& user, const ShapeTree& tree, std::uint32_t prim,
+                               std::uint32_t number, ShapeRay& at) {
         UserRay given(at.ray, at.scale, tmin_, reach_);
-        for (std::uint32_t k = place; k < place + count; ++k) {
-            TreeHit hit;
-            RaysAtPrimitive rays(&given.ray, &at.place, &hit, 1);
-            user.test(tree.part[k], rays);
-            if (!hit.hit()) continue;
-            hit.prim = tree.part[k];
-            if (take(tree, number, given.scale, hit, at)) return;
-            if constexpr (wants_closest(wanted))
-                given.ray.tmax = given.scale == 1.0 ? reach_ : at.ray.tmax;
-        }
+        TreeHit hit;
+        RaysAtPrimitive rays(&given.ray, &at.place, &hit, 1);
+        user.test(prim, rays);
+        if (!hit.hit()) return;
+        hit.prim = prim;
+        take(tree, number, given.scale, hit, at);
     }
 
     template <bool compact>
@@ -452,6 +464,7 @@ protected:
     const bool nearest_first_;  // see single.h
     const HitFilter* filter_ = nullptr;
     const Ray* given_ = nullptr;
+    CallHistory* history_ = nullptr;
 };
 
 }  // namespace raydix::HWY_NAMESPACE

@@ -10,6 +10,7 @@
 #include "engine/scene_batch.h"
 #include "engine/scene_job.h"
 #include "engine/scene_state.h"
+#include "engine/shape_tree.h"
 #include "engine/trace_on_this_thread.h"
 #include "exec/parallel.h"
 #include "exec/path_rates.h"
@@ -81,6 +82,14 @@ JobCounts trace_job(const SceneTree& tree, const Kernels& kernels, PathWay way, 
     return counts;
 }
 
+/// Whether rays that go alone have nothing to wait for: all that they visit is a geometry of shapes
+/// that lies in a cache of one core. Turns only cost time then.
+bool is_at_hand(const SceneTree& tree) {
+    constexpr std::uint64_t most_bytes = 1 << 19;
+    const ShapeTree* const shapes = tree.only_shapes();
+    return shapes != nullptr && shapes->bytes() <= most_bytes;
+}
+
 /// How a batch goes.
 struct Plan {
     SimdPath path;
@@ -94,8 +103,9 @@ struct Plan {
         path = automatic && look.path == SimdPath::sorted ? SimdPath::single : look.path;
         if (path != SimdPath::single)
             ways.add(path == SimdPath::packet ? PathWay::packets : PathWay::streams);
-        ways.add(PathWay::turns);
-        ways.add(PathWay::alone);
+        const bool at_hand = path == SimdPath::single && is_at_hand(tree);
+        ways.add(at_hand ? PathWay::alone : PathWay::turns);
+        ways.add(at_hand ? PathWay::turns : PathWay::alone);
         if (!automatic) return;
         look.kind.any = batch.hits == nullptr;
         ways.rates = &tree.rates.ways(look.kind);
@@ -190,19 +200,29 @@ TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
     return mesh != nullptr ? trace_mesh(*mesh, batch) : trace_scene(tree, batch);
 }
 
+thread_local CallHistory call_history;
+
+/// In a plain environment.
+Hit trace_parts_plainly(SceneKernels::OneRayOfScene* kernel, const SceneTree& tree, const Ray& ray,
+                        std::uint32_t mask, const HitFilter* filter) {
+    constexpr std::size_t inside = 1024;
+    if (tree.stack_size > inside) {
+        StackMemory stack;
+        stack.reserve_words(tree.stack_size);
+        return kernel(tree, ray, mask, filter, stack.view(), call_history);
+    }
+    std::uint32_t words[inside];
+    float entries[inside];
+    return kernel(tree, ray, mask, filter, {words, entries}, call_history);
+}
+
 [[gnu::noinline]] Hit trace_parts(const SceneTree& tree, const Ray& ray, std::uint32_t mask,
                                   const HitFilter* filter, bool any) {
     static const SceneKernels& kernels = scene_kernels_for({});
-    const ThreadOwn<SceneJob> own;
-    StackMemory& stack = own->single_stack;
-    stack.reserve_words(tree.stack_size);
-    const auto answer = [&]() -> Hit {
-        if (!is_valid(ray)) return {};
-        return (any ? kernels.any : kernels.closest)(tree, ray, mask, filter, stack.view());
-    };
-    if (FloatEnvironment::is_plain()) return answer();
+    SceneKernels::OneRayOfScene* const kernel = any ? kernels.any : kernels.closest;
+    if (FloatEnvironment::is_plain()) return trace_parts_plainly(kernel, tree, ray, mask, filter);
     const FloatEnvironment plain;
-    return answer();
+    return trace_parts_plainly(kernel, tree, ray, mask, filter);
 }
 
 /// The order by triangles of the tree is that by geometry and triangle.

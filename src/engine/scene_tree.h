@@ -80,8 +80,14 @@ struct PartTree {
     WideBvh::Arrays arrays;  // nodes and bounds alone
     WideView view{};
     std::vector<std::uint32_t> part;  // by the place that leaves name
+    bool leaves_name_parts = false;   // not their places: one part a leaf
     PadGrowth growth;
     double cost_at_build = 0;  // areas of all children's boxes in those of the root's
+
+    /// What a leaf names.
+    [[nodiscard]] std::uint32_t named(std::uint32_t place) const {
+        return leaves_name_parts ? place : part[place];
+    }
 
     [[nodiscard]] bool empty() const { return part.empty(); }
 };

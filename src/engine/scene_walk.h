@@ -177,7 +177,7 @@ private:
 
         float visit_one(std::uint32_t first, std::uint32_t count, std::uint32_t ray) {
             if (const UserGeometry* const user = tree_.user()) {
-                for (std::uint32_t k = first; k < first + count; ++k) visit_user(*user, k, &ray, 1);
+                visit_user(*user, first, &ray, 1);
             } else {
                 ShapeRay at = shape_ray(ray);
                 hit_leaf(tree_, first, count, at, [&](const TreeHit& hit) {
@@ -191,14 +191,13 @@ private:
         void visit(std::uint32_t first, std::uint32_t parts, const std::uint32_t* rays,
                    std::uint32_t count) {
             if (const UserGeometry* const user = tree_.user()) {
-                for (std::uint32_t k = first; k < first + parts; ++k)
-                    visit_user(*user, k, rays, count);
+                visit_user(*user, first, rays, count);
             } else {
                 for (std::uint32_t k = 0; k < count; ++k) visit_one(first, parts, rays[k]);
             }
         }
         float reach(std::uint32_t ray) { return walk_.shorten(level_, ray); }
-        static constexpr bool nearest_first = false, large = true;
+        static constexpr bool nearest_first = false, packets_nearest_first = true, large = true;
         RAYDIX_PREFETCHING void ask_for(std::uint32_t word) const { ask_for_shapes(tree_, word); }
 
     private:
@@ -219,10 +218,10 @@ private:
                              walk_.job_.limits[id].reach);
         }
         /// The rays of a list that still go on, to one primitive.
-        HWY_NOINLINE void visit_user(const UserGeometry& user, std::uint32_t part,
+        HWY_NOINLINE void visit_user(const UserGeometry& user, std::uint32_t prim,
                                      const std::uint32_t* rays, std::uint32_t count) {
             UserRays& all = walk_.job_.user_rays;
-            all.clear();
+            all.begin(count);
             for (std::uint32_t k = 0; k < count; ++k) {
                 const SceneRaySource& source = level_.sources[rays[k]];
                 const SceneJob::Limits& limits = walk_.job_.limits[source.id];
@@ -232,11 +231,11 @@ private:
             }
             if (all.count() == 0) return;
             RaysAtPrimitive at = all.at_primitive();
-            user.test(tree_.part[part], at);
+            user.test(prim, at);
             for (std::uint32_t k = 0; k < all.count(); ++k) {
                 TreeHit hit = all.hit(k);
                 if (!hit.hit()) continue;
-                hit.prim = tree_.part[part];
+                hit.prim = prim;
                 if (take(all.number(k), hit, all.scale(k))) walk_.shorten(level_, all.number(k));
             }
         }
@@ -608,20 +607,74 @@ inline void count_scene_steps(SceneJob& job) {
     }
 }
 
-/// A valid ray alone; for any hit only prim has a meaning.
+/// A ray alone through a mesh that is all of a scene, for what the filter accepts. The frame is that
+/// of a tree's own single calls: it takes no lines in double.
+template <bool any, bool compact, bool guessing>
+HWY_INLINE WideBest accepted_in_mesh(const WideView& view, const SingleFrame& frame,
+                                     const WideStackView& stack, const HitCheck& check,
+                                     const Ray& ray) {
+    SimdCounts counts;
+    SingleRay<any ? Wanted::any_accepted : Wanted::closest_accepted, compact, compact, guessing>
+        one(view, frame, stack, counts);
+    one.check_by(check, &ray);
+    return one.trace(0, {frame.tmax});
+}
+
+/// Asks a filter about hits of a mesh that is all of a scene, of a ray that is all of a call.
+struct FilterOfOneRay {
+    const MeshTree& mesh;
+    const HitFilter& filter;
+
+    static bool accepts(const void* context, const Ray* ray, const TreeHit& hit) {
+        const auto& ask = *static_cast<const FilterOfOneRay*>(context);
+        return ask.filter(0, *ray, hit_in_scene(ask.mesh, 0, 1.0, hit));
+    }
+};
+
+template <bool any>
+Hit accepted_hit_of_mesh(const MeshTree& mesh, const Ray& ray, const HitFilter& filter,
+                         const WideStackView& stack, CallHistory& history) {
+    SingleFrame frame;
+    if (mesh.tree->empty() || !fill_frame(mesh.view, ray, frame)) return {};
+    const FilterOfOneRay ask{mesh, filter};
+    const HitCheck check{&FilterOfOneRay::accepts, &ask};
+    WideBest best;
+    if (mesh.view.is_compact) {
+        TriangleBlock room{};
+        WideView view = mesh.view;
+        view.room = &room;
+        best = accepted_in_mesh<any, true, false>(view, frame, stack, check, ray);
+    } else if (follows(mesh.view, frame, history)) {
+        best = accepted_in_mesh<any, false, true>(mesh.view, frame, stack, check, ray);
+    } else {
+        best = accepted_in_mesh<any, false, false>(mesh.view, frame, stack, check, ray);
+    }
+    if (!best.found()) return {};
+    return hit_in_scene(mesh, 0, 1.0, {best.t * frame.t_scale, best.prim, best.u, best.v});
+}
+
+/// A ray alone; for any hit only prim has a meaning.
 template <bool any>
 Hit hit_of_scene(const SceneTree& scene, const Ray& ray, std::uint32_t mask,
-                 const HitFilter* filter, const WideStackView& stack) {
+                 const HitFilter* filter, const WideStackView& stack, CallHistory& history) {
+    if (const MeshTree* const mesh = scene.only_mesh(); mesh != nullptr && filter != nullptr) {
+        if ((mesh->mask & mask) == 0) return {};
+        return accepted_hit_of_mesh<any>(*mesh, ray, *filter, stack, history);
+    }
+    if (!is_valid(ray)) return {};
     const SceneJob::Limits limits{ray.tmin, ray.tmax, mask};
+    const auto walk = [&](auto& one) {
+        if (scene.only_shapes() != nullptr) one.come_after(history);
+        one.walk(scene, 0, line_of(ray));
+        return one.best();
+    };
     if (filter != nullptr) {
         SceneRay<any ? Wanted::any_accepted : Wanted::closest_accepted> one(limits, 0, {}, stack);
         one.filter_by(*filter, ray);
-        one.walk(scene, 0, line_of(ray));
-        return one.best();
+        return walk(one);
     }
     SceneRay<any ? Wanted::any : Wanted::closest> one(limits, 0, {}, stack);
-    one.walk(scene, 0, line_of(ray));
-    return one.best();
+    return walk(one);
 }
 
 inline void trace_scene(SceneJob& job) {

@@ -137,7 +137,10 @@ std::shared_ptr<const ShapeTree> make_shape_tree(std::uint32_t id, std::uint32_t
     tree->own = std::move(own);
     const std::vector<Aabb> boxes = boxes_of<float>(shapes);
     refitted = old != nullptr && refit_box_tree(*old, boxes, limit, *tree);
-    if (!refitted) build_box_tree(boxes, build_of(quality), leaves_of(shapes), *tree);
+    if (!refitted) {
+        build_box_tree(boxes, build_of(quality), leaves_of(shapes), *tree);
+        if (tree->user() != nullptr) name_parts_in_leaves(*tree);
+    }
     if (tree->empty()) return tree;
     copy_primitives(*tree);
     const auto name_leaves = [&](const auto* first) {
@@ -148,8 +151,6 @@ std::shared_ptr<const ShapeTree> make_shape_tree(std::uint32_t id, std::uint32_t
         name_leaves(tree->spheres.data());
     else if (!tree->capsules.empty())
         name_leaves(tree->capsules.data());
-    else
-        name_leaves(tree->part.data());
     tree->bounds = tree->arrays.bounds;
     // A surface's t is that of a point on it, rounded: within the pads of slab.h, as of triangles.
     tree->extent = extent_of_mesh(tree->bounds);

@@ -77,8 +77,10 @@ struct ShapeTree : PartTree, ShapeGeometry<float> {
     // As leaves name them, if that is what they are: one behind the other.
     Buffer<Sphere> spheres;  // points too; and room for a whole vector behind the last
     Buffer<Capsule> capsules;
-    std::uintptr_t leaves = 0;   // the address of what leaves name first: primitives, or `part`
-    std::size_t leaf_bytes = 0;  // of each
+    // Where the primitives are that leaves name, and how large they are: of user geometry only the
+    // caller knows, and leaves name their numbers.
+    std::uintptr_t leaves = 0;
+    std::size_t leaf_bytes = 0;
     Aabb bounds = empty_box();
     Extent extent;  // lines in double may miss the bounds by so much
 

@@ -78,6 +78,10 @@ template <Wanted query, bool counting, bool compact, class Parts = NoParts>
 class PacketWalk {
     static constexpr bool any = wants_any(query), closest = wants_closest(query);
     static constexpr bool has_parts = !std::is_same_v<Parts, NoParts>;
+    /// For any hit too, where Parts say so.
+    static constexpr bool nearest_first = requires {
+        requires Parts::packets_nearest_first;
+    };
     using Leaves = typename LeavesOfPacket<query, Parts>::Type;
 
 public:
@@ -366,7 +370,8 @@ private:
 
     static HWY_INLINE std::uint32_t order_of(std::uint32_t met, const float* entries,
                                              std::uint32_t* order) {
-        return closest ? order_by_entry(met, entries, order) : order_by_area(met, order);
+        return closest || nearest_first ? order_by_entry(met, entries, order)
+                                        : order_by_area(met, order);
     }
 
     void test_leaf(std::uint32_t word, std::uint64_t active) {

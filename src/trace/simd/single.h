@@ -233,6 +233,9 @@ private:
             push_sorted(node.child, entries, met, top, word);
         } else {
             if constexpr (may_take_nearest) {
+                if constexpr (Parts::large)
+                    for (std::uint32_t left = met; left != 0; left &= left - 1)
+                        parts_->ask_for(node.child[std::countr_zero(left)]);
                 if (parts_->nearest_first) {
                     const std::size_t nearest = nearest_of(entries, met);
                     push_by_area(node.child, met & ~(1u << nearest), top, word);
