@@ -30,8 +30,8 @@ void build_box_tree(std::span<const ExtentD> extents, const BuildOptions& build,
 void build_box_tree(std::span<const Aabb> boxes, BuildOptions build, const WideOptions& leaves,
                     PartTree& out);
 
-/// Leaves of one part each name it, so that rays need not look up which one it is. `tree.part` still
-/// lists them, in the order of leaves. Numbers must be less than 2^28 - 1.
+/// Leaves of one part each name it, so that rays need not look up which one it is. `tree.part`
+/// still lists them, in the order of leaves. Numbers must be less than 2^28 - 1.
 void name_parts_in_leaves(PartTree& tree);
 
 /// As refit_part_tree, for new boxes of which the same are valid.

@@ -334,6 +334,7 @@ protected:
         bool nearest_first;
         static constexpr bool large = true;
 
+        [[nodiscard]] bool is_at_hand() const { return tree.is_at_hand; }
         RAYDIX_PREFETCHING void ask_for(std::uint32_t word) const { ask_for_shapes(tree, word); }
         float visit_one(std::uint32_t place, std::uint32_t count, std::uint32_t) {
             ray.hit_primitives(tree, place, count, number, at);
@@ -353,7 +354,7 @@ protected:
         AtShapes shapes{*this, tree, number, shape_ray(line, frame), false};
         if constexpr (wanted != Wanted::all && !counting) {
             if (history_ != nullptr && follows(tree.view, frame, *history_)) {
-                shapes.nearest_first = true;
+                shapes.nearest_first = !tree.is_at_hand;
                 walk_shapes<true>(tree, frame, shapes);
                 return;
             }

@@ -82,12 +82,10 @@ JobCounts trace_job(const SceneTree& tree, const Kernels& kernels, PathWay way, 
     return counts;
 }
 
-/// Whether rays that go alone have nothing to wait for: all that they visit is a geometry of shapes
-/// that lies in a cache of one core. Turns only cost time then.
+/// Whether turns only cost rays time that go alone.
 bool is_at_hand(const SceneTree& tree) {
-    constexpr std::uint64_t most_bytes = 1 << 19;
     const ShapeTree* const shapes = tree.only_shapes();
-    return shapes != nullptr && shapes->bytes() <= most_bytes;
+    return shapes != nullptr && shapes->is_at_hand;
 }
 
 /// How a batch goes.

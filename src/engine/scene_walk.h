@@ -607,8 +607,8 @@ inline void count_scene_steps(SceneJob& job) {
     }
 }
 
-/// A ray alone through a mesh that is all of a scene, for what the filter accepts. The frame is that
-/// of a tree's own single calls: it takes no lines in double.
+/// A ray alone through a mesh that is all of a scene, for what the filter accepts. The frame is
+/// that of a tree's own single calls: it takes no lines in double.
 template <bool any, bool compact, bool guessing>
 HWY_INLINE WideBest accepted_in_mesh(const WideView& view, const SingleFrame& frame,
                                      const WideStackView& stack, const HitCheck& check,

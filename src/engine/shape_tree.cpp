@@ -19,6 +19,9 @@ namespace {
 /// Leaves name a place and a count in 31 bits.
 constexpr std::size_t most_primitives = std::size_t{1} << 28;
 
+/// A quarter to a half of the second cache of common processors.
+constexpr std::uint64_t most_bytes_at_hand = 1 << 19;
+
 /// How far a user's hit may be from its box, of the distance that the ray has come.
 constexpr double user_slack = 0x1p-17;
 
@@ -151,6 +154,9 @@ std::shared_ptr<const ShapeTree> make_shape_tree(std::uint32_t id, std::uint32_t
         name_leaves(tree->spheres.data());
     else if (!tree->capsules.empty())
         name_leaves(tree->capsules.data());
+    else
+        tree->leaves = reinterpret_cast<std::uintptr_t>(tree->arrays.nodes.data());
+    tree->is_at_hand = tree->bytes() <= most_bytes_at_hand;
     tree->bounds = tree->arrays.bounds;
     // A surface's t is that of a point on it, rounded: within the pads of slab.h, as of triangles.
     tree->extent = extent_of_mesh(tree->bounds);

@@ -77,10 +77,11 @@ struct ShapeTree : PartTree, ShapeGeometry<float> {
     // As leaves name them, if that is what they are: one behind the other.
     Buffer<Sphere> spheres;  // points too; and room for a whole vector behind the last
     Buffer<Capsule> capsules;
-    // Where the primitives are that leaves name, and how large they are: of user geometry only the
-    // caller knows, and leaves name their numbers.
+    // Where the primitives are that leaves name, and how large they are. Of user geometry only the
+    // caller knows: all of its leaves are said to be at the root.
     std::uintptr_t leaves = 0;
     std::size_t leaf_bytes = 0;
+    bool is_at_hand = false;  // it lies in a cache of one core: rays have nothing to wait for
     Aabb bounds = empty_box();
     Extent extent;  // lines in double may miss the bounds by so much
 

@@ -79,9 +79,7 @@ class PacketWalk {
     static constexpr bool any = wants_any(query), closest = wants_closest(query);
     static constexpr bool has_parts = !std::is_same_v<Parts, NoParts>;
     /// For any hit too, where Parts say so.
-    static constexpr bool nearest_first = requires {
-        requires Parts::packets_nearest_first;
-    };
+    static constexpr bool nearest_first = requires { requires Parts::packets_nearest_first; };
     using Leaves = typename LeavesOfPacket<query, Parts>::Type;
 
 public:

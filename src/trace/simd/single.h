@@ -32,6 +32,8 @@ constexpr std::size_t parts8 = 8 / lanes8;
 ///   float reach(std::uint32_t ray)
 ///   void ask_for(std::uint32_t word), static constexpr bool large
 ///       if large: asks for the cache lines of a node or leaf that will be visited soon
+///   bool is_at_hand()
+///       if there is such a function: whether any hit need not ask; else it never asks
 ///   bool nearest_first
 ///       for any hit: whether the nearest child is the next one, not the largest. It ends rays soon
 ///       that begin close to something.
@@ -233,9 +235,11 @@ private:
             push_sorted(node.child, entries, met, top, word);
         } else {
             if constexpr (may_take_nearest) {
-                if constexpr (Parts::large)
-                    for (std::uint32_t left = met; left != 0; left &= left - 1)
+                if constexpr (requires { parts_->is_at_hand(); }) {
+                    const std::uint32_t asked = parts_->is_at_hand() ? 0 : met;
+                    for (std::uint32_t left = asked; left != 0; left &= left - 1)
                         parts_->ask_for(node.child[std::countr_zero(left)]);
+                }
                 if (parts_->nearest_first) {
                     const std::size_t nearest = nearest_of(entries, met);
                     push_by_area(node.child, met & ~(1u << nearest), top, word);
