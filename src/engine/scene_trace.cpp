@@ -99,6 +99,9 @@ struct Plan {
         if (automatic) look = look_at(tree.extent.box, batch.rays);
         // Rays that go apart meet parts in lists too short to pay.
         path = automatic && look.path == SimdPath::sorted ? SimdPath::single : look.path;
+        // Rays from one place are often those of a coarse picture, which packets suit.
+        if (automatic && path == SimdPath::stream && tree.only_shapes() != nullptr)
+            ways.add(PathWay::packets);
         if (path != SimdPath::single)
             ways.add(path == SimdPath::packet ? PathWay::packets : PathWay::streams);
         const bool at_hand = path == SimdPath::single && is_at_hand(tree);

@@ -114,7 +114,9 @@ struct Plan {
     [[nodiscard]] JobWays ways(RayOrder order) const {
         PathWay first = way_of(look.path);
         if (look.path == SimdPath::sorted && order == RayOrder::given) first = PathWay::turns;
-        if (!streams && first == PathWay::streams) first = PathWay::turns;
+        // Rays from one place are often those of a coarse picture, which packets suit.
+        if (!streams && first == PathWay::streams)
+            first = automatic ? PathWay::packets : PathWay::turns;
         JobWays ways;
         ways.add(first);
         if (!learns) return ways;
