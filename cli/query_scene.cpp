@@ -134,7 +134,8 @@ std::optional<QueriedScene> load_queried_scene(const std::string& name,
         out.load_ms = file.load_ms;
         out.quality = file.options.quality;
         out.scene = std::move(file.scene);
-        out.is_one_mesh = file.counts.meshes == 1 && file.counts.instances == 0;
+        out.is_one_mesh =
+            file.counts.meshes == 1 && file.counts.instances == 0 && file.shape_ids.empty();
         return out;
     }
     if (is_rdx(name)) return {};

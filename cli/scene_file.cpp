@@ -111,6 +111,7 @@ Json scene_file_json(const RdxScene& file) {
             {"vertices", file.counts.vertices},
             {"geometries", file.counts.meshes},
             {"instances", file.counts.instances},
+            {"shapes", file.counts.shapes},
             {"cameras", file.cameras.cameras.size()},
             {"scenes", file.counts.scenes},
             {"nodes", file.counts.nodes},
@@ -127,6 +128,7 @@ void print_scene_file(const RdxScene& file) {
                counted(counts.instances, "instance", "instances"));
     fmt::print("triangles    {}\n", grouped(counts.triangles));
     fmt::print("vertices     {}\n", grouped(counts.vertices));
+    if (counts.shapes != 0) fmt::print("shapes       {}\n", grouped(counts.shapes));
     const Aabb bounds = file.scene.bounds();
     if (bounds.lo.x <= bounds.hi.x)
         fmt::print("bounds       ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})\n", bounds.lo.x,

@@ -129,7 +129,7 @@ public:
             Scene scene;
             for (const StoredGeometry& geometry : geometries_[k]) {
                 const GeometryOptions with{.mask = geometry.mask, .id = geometry.id};
-                if (geometry.is_instance != 0)
+                if (geometry.kind == stored_instance)
                     scene.add(scenes[geometry.number], geometry.transform, with);
                 else
                     scene.add(
@@ -158,7 +158,7 @@ private:
         constexpr std::size_t most = 1000;
         for (const StoredGeometry& geometry : geometries_[scene]) {
             if (out.triangles.size() > most) return;
-            if (geometry.is_instance != 0) {
+            if (geometry.kind == stored_instance) {
                 way.push_back(affine_of(geometry.transform));
                 add(geometry.number, way, out);
                 way.pop_back();

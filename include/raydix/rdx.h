@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace raydix {
 
@@ -30,9 +31,10 @@ struct RdxFile {
 [[nodiscard]] RdxFile load_rdx(const std::filesystem::path& file);
 
 /// Saves a scene as its last commit left it, with all scenes that stand in it, each of them once,
-/// and with the vertices and triangles of its meshes. Ids that were given stay given. Throws
-/// InputError: changes that no commit has taken in; spheres, capsules, points or user geometry
-/// (they are named); shared arrays that changed since the commit; a file that cannot be written.
+/// with the vertices and triangles of its meshes, and with its spheres, capsules and points. Ids
+/// that were given stay given. Throws InputError: changes that no commit has taken in; user
+/// geometry, whose function has no place in a file (it is named); shared arrays that changed since
+/// the commit; a file that cannot be written.
 void save_rdx(const std::filesystem::path& file, const Scene& scene, const std::string& name = {},
               const CameraSet& cameras = {});
 
@@ -42,8 +44,9 @@ struct RdxCounts {
     std::uint64_t instances = 0;  // of all of them
     std::uint64_t meshes = 0;     // that have triangles
     std::uint64_t vertices = 0, triangles = 0;
-    std::uint64_t nodes = 0;  // of trees of triangles
-    std::uint64_t bytes = 0;  // of the file
+    std::uint64_t shapes = 0;  // spheres, capsules and points
+    std::uint64_t nodes = 0;   // of trees of triangles
+    std::uint64_t bytes = 0;   // of the file
 };
 
 struct RdxScene {
@@ -53,6 +56,8 @@ struct RdxScene {
     std::string name;
     CameraSet cameras;
     RdxCounts counts;
+    std::vector<std::uint32_t> shape_ids;  // ascending: geometries of the scene itself that hold
+                                           // spheres, capsules or points
     double load_ms = 0;
 };
 

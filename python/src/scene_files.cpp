@@ -1,4 +1,5 @@
 // What files hold -> scenes.
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -39,9 +40,12 @@ std::shared_ptr<SceneTrees> SceneFiles::scene_of(RdxScene file, const BuildOptio
     auto scene = std::make_shared<SceneTrees>(trees, file.options);
     scene->scene_ = std::move(file.scene);
     for (const std::uint32_t id : scene->scene_.ids()) {
-        const bool is_instance = !scene->scene_.mesh(id).has_value();
-        scene->geometries_[id] = {
-            .is_instance = is_instance, .mask = scene->scene_.mask(id), .is_in_file = !is_instance};
+        const bool is_mesh = scene->scene_.mesh(id).has_value();
+        const bool is_shapes = std::ranges::binary_search(file.shape_ids, id);
+        scene->geometries_[id] = {.is_instance = !is_mesh && !is_shapes,
+                                  .is_shapes = is_shapes,
+                                  .mask = scene->scene_.mask(id),
+                                  .is_in_file = is_mesh};
     }
     scene->look_for_mesh();
     return scene;

@@ -68,8 +68,11 @@ RdxScene parse_scene(const std::string& file, std::span<const std::byte> bytes,
                   .meshes = arrays.meshes.size(),
                   .vertices = arrays.vertices.size(),
                   .triangles = arrays.triangles.size(),
+                  .shapes = arrays.spheres.size() + arrays.capsules.size() + arrays.points.size(),
                   .nodes = arrays.nodes.size() + arrays.compact_nodes.size(),
                   .bytes = bytes.size()};
+    for (const StoredGeometry& geometry : arrays.geometries.last(whole.geometry_count))
+        if (geometry.kind == stored_shapes) out.shape_ids.push_back(geometry.id);
     return out;
 }
 

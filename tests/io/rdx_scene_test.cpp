@@ -192,6 +192,9 @@ TEST_F(RdxSceneTest, ShapesHaveTheSameHits) {
         const Bytes once = saved(scene);
         EXPECT_EQ(version_of_file(once), 3u);
         RdxScene loaded = load_rdx_scene(file());
+        EXPECT_EQ(loaded.shape_ids.size(), 4u);
+        EXPECT_TRUE(std::ranges::binary_search(loaded.shape_ids, id));
+        EXPECT_GE(loaded.counts.shapes, 6u);
         expect_same(loaded.scene, scene, dice, &found);
         save_rdx(file(), loaded.scene, loaded.name, loaded.cameras);
         EXPECT_EQ(read_bytes(file()), once);

@@ -71,8 +71,14 @@ def test_shapes_mix_with_meshes_and_instances(tmp_path):
         scene.update_spheres(rod, [[0, 0, 0]], 1)
     with pytest.raises(raydix.InputError, match="geometry 1 holds shapes, not a mesh"):
         scene.update(rod, [[0, 0, 0]] * 3)
-    with pytest.raises(raydix.InputError, match="holds spheres"):
-        ball.save(tmp_path / "never.rdx")
+    scene.save(tmp_path / "shapes.rdx")
+    loaded = raydix.load_scene(tmp_path / "shapes.rdx")
+    assert loaded.intersect(down).tolist() == scene.intersect(down).tolist()
+    with pytest.raises(raydix.InputError, match="geometry 1 holds shapes, not a mesh"):
+        loaded.update(rod, [[0, 0, 0]] * 3)
+    loaded.update_capsules(rod, [[0, 0, 0]], [[0, 4, 0]], 2)
+    loaded.commit()
+    assert loaded.intersect(down)["t"].tolist() == [8, 7, 14]
     with pytest.raises(raydix.InputError, match="vertices: geometry 0 holds shapes"):
         ball.vertices
     near = scene.closest_point([[5, 0, 3], [0, 2, 0.5], [3, -2, -4]])
