@@ -46,10 +46,12 @@ void expect_outward(const BvhD& bvh) {
         const BvhNode& node = bvh.tree().nodes()[slots.back()];
         slots.pop_back();
         if (!node.is_leaf()) slots.insert(slots.end(), {node.first, node.first + 1});
-        for (std::uint32_t k = node.first; k < node.first + node.count; ++k, ++seen)
+        for (std::uint32_t k = node.first; k < node.first + node.count; ++k, ++seen) {
+            if (sanitized && k % 8 != 0 && bvh.order().size() > 1000) continue;
             for (const Vec3d& p :
                  {bvh.triangles()[k].v0, bvh.triangles()[k].v1, bvh.triangles()[k].v2})
                 expect_inside(place, p, node);
+        }
     }
     EXPECT_EQ(seen, bvh.input_count() - bvh.left_out());
     const CheckReport report = check(bvh.tree());
@@ -58,10 +60,11 @@ void expect_outward(const BvhD& bvh) {
 
 TEST(BuildDouble, BoxesHoldTheirTrianglesExactly) {
     for (const MeshD& mesh :
-         {random_soup_d(300, 1), in_double(random_soup(300, 2), 100.0, utm_place),
-          in_double(random_soup(300, 3), 1.8e12, {-0.9e12, -0.9e12, -0.9e12}),
-          in_double(random_soup(300, 4), 1e-6, {1e5, -2e5, 3e5}),
-          in_double(random_soup(300, 5), 1e-10)})
+         {random_soup_d(fewer(300, 3), 1),
+          in_double(random_soup(fewer(300, 3), 2), 100.0, utm_place),
+          in_double(random_soup(fewer(300, 3), 3), 1.8e12, {-0.9e12, -0.9e12, -0.9e12}),
+          in_double(random_soup(fewer(300, 3), 4), 1e-6, {1e5, -2e5, 3e5}),
+          in_double(random_soup(fewer(300, 3), 5), 1e-10)})
         for (const Builder builder : {Builder::karras, Builder::hploc, Builder::binned})
             expect_outward(build_bvh(mesh, {.builder = builder, .max_leaf = 1}));
 }
@@ -208,7 +211,7 @@ std::size_t count_uncovered(const BvhD& bvh) {
     const Exact scale(bvh.scale());
     std::size_t uncovered = 0;
     for (const auto& [id, parts] : boxes) {
-        if (sanitized && id % 16 != 0) continue;  // exact arithmetic takes its time
+        if (sanitized && id % 64 != 0) continue;  // exact arithmetic takes its time
         ExactPiece whole;
         for (const Vec3d& p : {triangles[id].v0, triangles[id].v1, triangles[id].v2}) {
             const ExactPoint at = exact(p) - center;

@@ -274,7 +274,7 @@ TEST(DoubleNear, WorldsAnswerAsTheirTrianglesDo) {
                 if (sanitized && mask == 5) continue;
                 const FlatWorldD flat = flat_of(*world, mask);
                 const std::vector<Vec3d> queries = queries_of(
-                    random, flat, world->home, recipe.shapes ? fewer(30, 3) : fewer(150, 10));
+                    random, flat, world->home, recipe.shapes ? fewer(30, 5) : fewer(150, 10));
                 EXPECT_EQ(wrong_points(*world, flat, mask, queries), 0u);
                 std::vector<SphereD> spheres;
                 std::vector<SegmentD> segments;

@@ -431,7 +431,7 @@ Scene doubled(const Mesh& mesh, std::uint32_t levels) {
 }
 
 TEST(SceneSolid, WhatDoesNotFitIsRefusedBeforeItIsMade) {
-    const Mesh mesh = random_soup(fewer(1000, 3), 5);
+    const Mesh mesh = random_soup(fewer(1000, 5), 5);
     const Scene many = doubled(mesh, 24);  // 2^24 * 1000 triangles: some 3 TB
     for (const auto& call :
          {std::function<void()>([&] { Solid{many}; }),

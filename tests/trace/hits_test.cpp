@@ -161,9 +161,8 @@ TEST(Hits, FaultResultsDifferByThreadCount) {
 }
 
 TEST(Hits, LeafSizeAndCodeBitsChangeNoBit) {
-    for (const Model& scene :
-         {load_model(sanitized ? "builtin:grove?triangles=2000" : "builtin:grove?triangles=10000"),
-          scene_of(lattice_mesh(fewer(3000, 3), 12, 8), "lattice")}) {
+    for (const Model& scene : {load_model("builtin:grove?triangles=10000"),
+                               scene_of(lattice_mesh(fewer(3000, 3), 12, 8), "lattice")}) {
         const auto rays =
             make_mixed_rays(scene, thorough == 1 ? fewer(1500, 3) : 5000 * thorough, seed);
         const auto wanted = hits_with(scene.mesh(), rays, {}, 1);
