@@ -7,7 +7,6 @@
 #include <raydix/wide.h>
 
 #include <atomic>
-#include <chrono>
 #include <cstring>
 #include <limits>
 #include <span>
@@ -102,29 +101,17 @@ TEST(PathRates, OneThatStoodStillForAWhileDecidesLittle) {
     EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
 }
 
-/// Takes as many ns a ray.
-void spend(std::size_t rays, std::int64_t ns) {
-    const auto end = std::chrono::steady_clock::now() +
-                     std::chrono::nanoseconds(static_cast<std::int64_t>(rays) * ns);
-    while (std::chrono::steady_clock::now() < end) {
-    }
-}
-
-TEST(PathRates, JobsTakeTheWayThatTookLeastAndSlowOnesRarely) {
-    for (const std::size_t rays : {100u, 3000u}) {
-        PathWayRates rates;
-        std::size_t slow = 0, all = 0;
-        const auto trace = [&](PathWay way, std::size_t begin, std::size_t end) {
-            spend(end - begin, way == PathWay::turns ? 20 : 200);
-            all += end - begin;
-            slow += way == PathWay::turns ? 0 : end - begin;
-        };
-        for (int job = 0; job < 100; ++job) rates.run(three_ways, 0, rays, trace);
-        EXPECT_EQ(rates.fastest(three_ways), PathWay::turns);
-        slow = all = 0;
-        for (int job = 0; job < 200; ++job) rates.run(three_ways, 0, rays, trace);
-        EXPECT_LT(slow, all / 20);
-    }
+TEST(PathRates, AJobThatIsNoTrialGoesTheFastestWay) {
+    for (const std::size_t rays : {64u, 8192u})
+        for (const PathWay faster : three_ways) {
+            PathWayRates rates;
+            for (const PathWay way : three_ways)
+                if (way != PathWay::packets)
+                    for (int trial = 0; trial < 8; ++trial)
+                        rates.add(way, PathWay::packets, way == faster ? 0.1f : 10.0f);
+            for (const Share& share : shares_of(rates, three_ways, rays))
+                EXPECT_EQ(share.way, faster);
+        }
 }
 
 TEST(PathRates, ManyThreadsMayAskAndAdd) {
