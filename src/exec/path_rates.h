@@ -21,8 +21,8 @@ enum class PathWay : std::uint8_t { packets, streams, turns, alone };
 enum class RayOrder : std::uint8_t { given, sorted };
 
 /// What ways took for batches that are alike, each in times of the others. Any number of threads
-/// may add to it and ask it at once. Way: an enum of `count` values.
-template <class Way, std::size_t way_count>
+/// may add to it and ask it at once. Way: an enum of `way_count` values. Clock: as in std::chrono.
+template <class Way, std::size_t way_count, class Clock = std::chrono::steady_clock>
 class WayRates {
 public:
     /// Rays begin to end - 1 of a job, by trace(way, begin, end). `ways`: those that there are, not
@@ -89,7 +89,6 @@ private:
     [[nodiscard]] bool known(Way way) const { return cost(way) > 0.0f; }
     void set(Way way, float cost) { costs_[index(way)].store(cost, std::memory_order_relaxed); }
 
-    using Clock = std::chrono::steady_clock;
     template <class Trace>
     static float time_a_ray(Way way, std::size_t begin, std::size_t end, const Trace& trace) {
         const auto start = Clock::now();

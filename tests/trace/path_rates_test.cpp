@@ -6,7 +6,10 @@
 #include <raydix/rays.h>
 #include <raydix/wide.h>
 
+#include <array>
 #include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <span>
@@ -18,15 +21,33 @@
 namespace raydix::test {
 namespace {
 
+/// Time that passes when a test says so.
+struct HandClock {
+    using duration = std::chrono::nanoseconds;
+    using rep = duration::rep;
+    using period = duration::period;
+    using time_point = std::chrono::time_point<HandClock>;
+    static constexpr bool is_steady = true;
+    static time_point now() { return time_point(passed); }
+    static inline duration passed{0};
+};
+using Rates = WayRates<PathWay, 4, HandClock>;
+
 struct Share {
     PathWay way;
     std::size_t begin, end;
 };
+/// What a ray takes by each way, in nanoseconds.
+using Costs = std::array<int, 4>;
+constexpr Costs all_alike{100, 100, 100, 100};
 /// Of a job of rays 100 to 100 + rays - 1.
-std::vector<Share> shares_of(PathWayRates& rates, std::span<const PathWay> ways, std::size_t rays) {
+std::vector<Share> shares_of(Rates& rates, std::span<const PathWay> ways, std::size_t rays,
+                             const Costs& costs = all_alike) {
     std::vector<Share> shares;
     rates.run(ways, 100, 100 + rays, [&](PathWay way, std::size_t begin, std::size_t end) {
         shares.push_back({way, begin, end});
+        HandClock::passed += std::chrono::nanoseconds(costs[static_cast<std::size_t>(way)]) *
+                             static_cast<std::int64_t>(end - begin);
     });
     return shares;
 }
@@ -36,7 +57,7 @@ constexpr PathWay three_ways[] = {PathWay::packets, PathWay::streams, PathWay::t
 TEST(PathRates, EveryRayGoesOneWay) {
     for (std::size_t count = 1; count <= 3; ++count)
         for (const std::size_t rays : {0u, 1u, 2u, 63u, 64u, 511u, 512u, 513u, 1024u, 8192u}) {
-            PathWayRates rates;
+            Rates rates;
             for (int job = 0; job < 40; ++job) {
                 std::size_t at = 100;
                 for (const Share& share :
@@ -52,7 +73,7 @@ TEST(PathRates, EveryRayGoesOneWay) {
 
 TEST(PathRates, TheFirstJobGoesTheFirstWayAndTrialsGoAllWays) {
     for (const std::size_t rays : {64u, 8192u}) {
-        PathWayRates rates;
+        Rates rates;
         for (const Share& share : shares_of(rates, three_ways, rays))
             EXPECT_EQ(share.way, PathWay::packets);
         std::size_t tried[4] = {};
@@ -63,9 +84,26 @@ TEST(PathRates, TheFirstJobGoesTheFirstWayAndTrialsGoAllWays) {
     }
 }
 
+TEST(PathRates, MostRaysGoTheFastestWay) {
+    for (const std::size_t rays : {64u, 8192u})
+        for (const PathWay faster : three_ways) {
+            Rates rates;
+            Costs costs{300, 400, 500, 600};
+            costs[static_cast<std::size_t>(faster)] = 100;
+            std::size_t fastest = 0, all = 0;
+            for (int job = 0; job < 400; ++job)
+                for (const Share& share : shares_of(rates, three_ways, rays, costs)) {
+                    all += share.end - share.begin;
+                    if (share.way == faster) fastest += share.end - share.begin;
+                }
+            EXPECT_GT(fastest * 10, all * 9);
+            EXPECT_LT(fastest, all);  // the others are tried
+        }
+}
+
 TEST(PathRates, TakesTheFastest) {
     for (const PathWay faster : three_ways) {
-        PathWayRates rates;
+        Rates rates;
         EXPECT_EQ(rates.fastest(three_ways), PathWay::packets);  // nothing is known
         for (const PathWay way : three_ways)
             if (way != PathWay::packets)
@@ -74,7 +112,7 @@ TEST(PathRates, TakesTheFastest) {
         EXPECT_EQ(rates.fastest(three_ways), faster);
     }
     // Others are compared through what both were timed beside.
-    PathWayRates rates;
+    Rates rates;
     rates.add(PathWay::streams, PathWay::packets, 0.5f);
     rates.add(PathWay::turns, PathWay::streams, 0.8f);
     EXPECT_EQ(rates.fastest(three_ways), PathWay::turns);
@@ -83,7 +121,7 @@ TEST(PathRates, TakesTheFastest) {
 }
 
 TEST(PathRates, ForgetsWhatNoLongerHolds) {
-    PathWayRates rates;
+    Rates rates;
     for (int trial = 0; trial < 50; ++trial) rates.add(PathWay::streams, PathWay::packets, 0.5f);
     EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
     for (int trial = 0; trial < 10; ++trial) rates.add(PathWay::streams, PathWay::packets, 3.0f);
@@ -91,7 +129,7 @@ TEST(PathRates, ForgetsWhatNoLongerHolds) {
 }
 
 TEST(PathRates, OneThatStoodStillForAWhileDecidesLittle) {
-    PathWayRates rates;
+    Rates rates;
     for (int trial = 0; trial < 8; ++trial) rates.add(PathWay::streams, PathWay::packets, 0.25f);
     rates.add(PathWay::streams, PathWay::packets, 1e9f);
     for (int trial = 0; trial < 8; ++trial) rates.add(PathWay::streams, PathWay::packets, 0.25f);
@@ -104,7 +142,7 @@ TEST(PathRates, OneThatStoodStillForAWhileDecidesLittle) {
 TEST(PathRates, AJobThatIsNoTrialGoesTheFastestWay) {
     for (const std::size_t rays : {64u, 8192u})
         for (const PathWay faster : three_ways) {
-            PathWayRates rates;
+            Rates rates;
             for (const PathWay way : three_ways)
                 if (way != PathWay::packets)
                     for (int trial = 0; trial < 8; ++trial)
