@@ -1,3 +1,15 @@
+# result: the compiler option -OPTION=list, a file, as a path that is the same in every build folder. The compiler runs in
+# the build folder; the name there changes with what the list says, so that whatever was compiled with another is
+# compiled again and a compiler cache knows it apart.
+function(raydix_list_option result option list)
+    file(SHA256 "${list}" hash)
+    string(SUBSTRING ${hash} 0 12 hash)
+    get_filename_component(name "${list}" NAME_WE)
+    set(copy ${name}-${hash}.txt)
+    configure_file("${list}" "${CMAKE_BINARY_DIR}/${copy}" COPYONLY)
+    set(${result} -${option}=${copy} PARENT_SCOPE)
+endfunction()
+
 # What every target of this project is compiled with.
 # - No contraction: keys, boxes and hits must have the same bits on every path (docs/architecture.md).
 # - x86-64-v2 is the oldest processor that the library promises to run on.
@@ -15,8 +27,8 @@ if(RAYDIX_SANITIZE)
     # GCC's documentation of -fsanitize: with it, the analysis of uninitialised values reports places that are not.
     target_compile_options(raydix_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
     if(RAYDIX_SANITIZE MATCHES "undefined" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang")
-        target_compile_options(raydix_options INTERFACE
-            $<$<COMPILE_LANGUAGE:CXX>:-fsanitize-ignorelist=${CMAKE_CURRENT_LIST_DIR}/sanitizers_ignored.txt>)
+        raydix_list_option(raydix_ignored fsanitize-ignorelist "${CMAKE_CURRENT_LIST_DIR}/sanitizers_ignored.txt")
+        target_compile_options(raydix_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:${raydix_ignored}>)
     endif()
     target_link_options(raydix_options INTERFACE -fsanitize=${RAYDIX_SANITIZE})
     target_compile_definitions(raydix_options INTERFACE RAYDIX_CHECKS=1 RAYDIX_SANITIZED=1)
