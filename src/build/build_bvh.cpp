@@ -92,6 +92,7 @@ void check_options(const BuildOptions& options, std::size_t n) {
 /// What a build may be asked for besides a tree over its input.
 struct BuildRequest {
     const TakeClusters* take = nullptr;       // clusters are wanted, not a tree
+    const SortedTaker* sorted = nullptr;      // sorted triangles are wanted
     const TriangleCorners* around = nullptr;  // the triangles that boxes are around
 };
 
@@ -110,7 +111,7 @@ struct BuildRun {
     void run() {
         Stopwatch total, stage;
         BuildMs ms;
-        const Bounds bounds = scene_bounds(source, n);
+        const Bounds bounds = bounds_of_all();
         check_bounds(bounds, source, kind_name, options.strict);
         const auto valid = static_cast<std::uint32_t>(n - bounds.left_out);
         tree.input_count() = n;
@@ -119,6 +120,13 @@ struct BuildRun {
         progress_at(0.03);
         if (valid == 0) return make_empty();
 
+        if constexpr (of_triangles)
+            if (request.sorted != nullptr) {
+                sort_triangles(bounds);
+                ms.total = total.lap();
+                tree.build_ms() = ms;
+                return;
+            }
         if (in_one_pass(valid)) {
             build_in_one_pass(valid, bounds.box, ms);
             reinsert(ms);
@@ -177,6 +185,14 @@ struct BuildRun {
     }
 
 private:
+    static constexpr bool of_triangles = std::is_same_v<Source, TriangleSource>;
+
+    [[nodiscard]] Bounds bounds_of_all() const {
+        if constexpr (of_triangles)
+            if (request.sorted != nullptr) return scene_bounds<true>(source, n);
+        return scene_bounds(source, n);
+    }
+
     /// Sort records behind `offset` bytes of the memory of the leaf copies, which are written after
     /// the last use of the records; in memory of their own if the copies are too small.
     bool borrow_records(Buffer<SortRecord<Key>>& records, std::size_t offset) {
@@ -203,17 +219,34 @@ private:
         return options.builder == Builder::apetrei && options.fit != Fit::levels &&
                valid > static_cast<std::uint32_t>(options.max_leaf);
     }
-    /// Codes are made twice rather than stored, and once sorted only their common prefixes are
-    /// kept: what is written, read and written again costs more time than arithmetic.
     void build_in_one_pass(std::uint32_t valid, const Aabb& scene_box, BuildMs& ms) {
         Stopwatch stage;
+        borrow_records(sort_scratch_of<Key>(scratch).records, 0);
+        const NeighbourPrefixes prefixes = sort_to_prefixes(source, valid, scene_box);
+        ms.sort = stage.lap();
+        progress_at(0.4);
+        copies.reset(valid);
+        const CopyWithBox<Source, Copy> leaf_box{source, tree.order().view(), copies.data()};
+        const ProgressStage climb(0.4, 0.75);
+        const ApetreiTree built =
+            build_apetrei_cpu(prefixes, options.max_leaf, leaf_box, tree.nodes(), scratch.apetrei);
+        tree.inner_count() = built.inner;
+        tree.max_depth() = built.max_depth;
+        ms.hierarchy = stage.lap();
+    }
+
+    /// Codes are made twice rather than stored, and once sorted only their common prefixes are
+    /// kept: what is written, read and written again costs more time than arithmetic. The records
+    /// have their memory; on return tree.order() is complete.
+    template <class Some>
+    NeighbourPrefixes sort_to_prefixes(const Some& some, std::uint32_t valid,
+                                       const Aabb& scene_box) {
         SortScratch<Key>& sort_scratch = sort_scratch_of<Key>(scratch);
-        borrow_records(sort_scratch.records, 0);
         tree.order().reset(n);
         NeighbourPrefixes prefixes(n, scratch.apetrei.prefixes);
         const HostGrid grid(make_grid(scene_box, CodeFormat<Key>::axis_bits));
         const auto load = [&](std::size_t begin, std::size_t end, Key* out) {
-            host_encode_range(source, grid, valid == n, begin, end, out);
+            host_encode_range(some, grid, valid == n, begin, end, out);
         };
         const auto take = [&](std::size_t begin, std::span<const SortRecord<Key>> sorted) {
             std::uint32_t* order = tree.order().data() + begin;
@@ -229,16 +262,25 @@ private:
                 prefixes.set(k - 1, sort_scratch.records[k - 1].key, sort_scratch.records[k].key);
         prefixes.end_at(valid);
         tree.order().reset(valid);
-        ms.sort = stage.lap();
+        return prefixes;
+    }
+
+    /// Those with an area, for request.sorted.
+    void sort_triangles(const Bounds& bounds) {
+        const auto valid = static_cast<std::uint32_t>(n - bounds.left_out - bounds.flat);
+        if (valid == 0) return make_empty();
+        using Record = SortRecord<Key>;
+        const std::span<std::byte> memory = request.sorted->memory(n, n * sizeof(Record));
+        auto* records = reinterpret_cast<Record*>(memory.data());
+        sort_scratch_of<Key>(scratch).records = Buffer<Record>(nullptr, records, n);
+        const NeighbourPrefixes prefixes =
+            bounds.flat == 0 ? sort_to_prefixes(source, valid, bounds.box)
+                             : sort_to_prefixes(TrianglesWithArea{source}, valid, bounds.box);
+        sort_scratch_of<Key>(scratch).records = {};
         progress_at(0.4);
-        copies.reset(valid);
-        const CopyWithBox<Source, Copy> leaf_box{source, tree.order().view(), copies.data()};
-        const ProgressStage climb(0.4, 0.75);
-        const ApetreiTree built =
-            build_apetrei_cpu(prefixes, options.max_leaf, leaf_box, tree.nodes(), scratch.apetrei);
-        tree.inner_count() = built.inner;
-        tree.max_depth() = built.max_depth;
-        ms.hierarchy = stage.lap();
+        const ProgressStage rest(0.4, 1);
+        request.sorted->take({prefixes, tree.order().view(), source, bounds.box});
+        tree.make_empty();
     }
 
     /// Of a tree that is complete.
@@ -372,6 +414,11 @@ void BvhBuilderInternals::build_clusters(BvhBuilder& builder, const MeshView& me
                                          const BuildOptions& options, Bvh& tree,
                                          const TakeClusters& take) {
     build_mesh(mesh, options, {.take = &take}, *builder.scratch_, tree);
+}
+
+void BvhBuilderInternals::sort(BvhBuilder& builder, const MeshView& mesh,
+                               const BuildOptions& options, Bvh& tree, const SortedTaker& take) {
+    build_mesh(mesh, options, {.sorted = &take}, *builder.scratch_, tree);
 }
 
 void BvhBuilderInternals::build_around(BvhBuilder& builder, std::span<const Aabb> boxes,

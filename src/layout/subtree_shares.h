@@ -68,9 +68,9 @@ inline constexpr SharePlaces share_places = [] {
     return out;
 }();
 
-/// The bits of cheapest_shares<8>, all i at once. On processors with AVX2.
-__attribute__((target("avx2"))) inline SubtreeShares<8> cheapest_shares_avx2(const float* a,
-                                                                             const float* b) {
+/// The bits of cheapest_shares<8>, all i at once, for functions compiled for AVX2.
+[[gnu::always_inline]] __attribute__((target("avx2"))) inline SubtreeShares<8>
+cheapest_shares_within_avx2(const float* a, const float* b) {
     const auto* const places_a = reinterpret_cast<const __m256i*>(share_places.in_a.data()->data());
     const auto* const places_b = reinterpret_cast<const __m256i*>(share_places.in_b.data()->data());
     const auto* const lefts = reinterpret_cast<const __m256i*>(share_places.left.data()->data());
@@ -94,6 +94,11 @@ __attribute__((target("avx2"))) inline SubtreeShares<8> cheapest_shares_avx2(con
     _mm256_store_ps(out.cost.data(), best);
     _mm256_store_si256(reinterpret_cast<__m256i*>(out.left.data()), best_left);
     return out;
+}
+/// The same for all others, on processors with AVX2.
+__attribute__((target("avx2"))) inline SubtreeShares<8> cheapest_shares_avx2(const float* a,
+                                                                             const float* b) {
+    return cheapest_shares_within_avx2(a, b);
 }
 
 #endif

@@ -12,6 +12,7 @@ namespace raydix {
 struct Bounds {
     Aabb box = empty_box();
     std::uint64_t left_out = 0;
+    std::uint64_t flat = 0;  // valid triangles without area, if they are counted
     std::uint32_t first_left_out = no_primitive;  // the lowest id among them
     std::uint32_t first_unreadable =
         no_primitive;  // the lowest id that refers to a vertex that is not there
@@ -19,13 +20,14 @@ struct Bounds {
     void merge(const Bounds& other) {
         box = unite(box, other.box);
         left_out += other.left_out;
+        flat += other.flat;
         first_left_out = std::min(first_left_out, other.first_left_out);
         first_unreadable = std::min(first_unreadable, other.first_unreadable);
     }
 };
 
 /// Minima and maxima do not depend on the order, so neither does the result.
-template <class Source>
+template <bool count_flat = false, class Source>
 Bounds scene_bounds(const Source& source, std::uint32_t n) {
     Bounds all;
     std::mutex merging;
@@ -39,6 +41,7 @@ Bounds scene_bounds(const Source& source, std::uint32_t n) {
                 part.first_unreadable = std::min(part.first_unreadable, i);
             } else if (host_box(source, i, box)) {
                 around = unite(around, box);
+                if constexpr (count_flat) part.flat += host_zero_area(source, i) ? 1 : 0;
             } else {
                 ++part.left_out;
                 part.first_left_out = std::min(part.first_left_out, i);

@@ -1,0 +1,210 @@
+// The parts of a group, one after the other: triangles into blocks, leaves and boxes from left to
+// right (the climb of tree/apetrei_cpu.h), the best children of each subtree on the way (the plans
+// of collapse_plan.h), then wide nodes from the root down. Part of part_kernels.cpp alone.
+#if defined(RAYDIX_LAYOUT_SORTED_PART_WRITER) == defined(HWY_TARGET_TOGGLE)
+#ifdef RAYDIX_LAYOUT_SORTED_PART_WRITER
+#undef RAYDIX_LAYOUT_SORTED_PART_WRITER
+#else
+#define RAYDIX_LAYOUT_SORTED_PART_WRITER
+#endif
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace raydix::HWY_NAMESPACE {
+
+template <int width>
+class SortedPartWriter {
+public:
+    SortedPartWriter(const PartInput& in, const PartGroup& group, PartEntries<width>& entries,
+                     WidePart& out)
+        : in_(in), group_(group), entries_(entries), out_(out) {}
+
+    void run() {
+        for (std::size_t p = 0; p < group_.parts.size(); ++p) {
+            const SortedPart& part = group_.parts[p];
+            const std::uint32_t root = climb(part.begin, part.end);
+            const Entry& entry = entries_[root];
+            const std::uint32_t word = is_whole(root) ? entry.link : write_nodes(root, part.depth);
+            group_.roots[p] = {{entry.lo, entry.hi}, entry.area, word};
+        }
+    }
+
+    // What choose_children asks.
+    [[nodiscard]] const CollapsePlan<width>& plan_of(std::uint32_t k) const {
+        return entries_[k].plan;
+    }
+    [[nodiscard]] bool is_whole(std::uint32_t k) const {
+        return (entries_[k].link & wide_leaf_bit) != 0;
+    }
+    [[nodiscard]] std::array<std::uint32_t, 2> parts_of(std::uint32_t k) const {
+        return {entries_[k].link, k - 1};
+    }
+
+private:
+    using Entry = PartEntry<width>;
+    static constexpr std::size_t most_open = 1 + 63 + 32;  // the prefixes that wait all differ
+    struct Open {
+        std::uint32_t entry, prefix;
+    };
+    struct Waiting {
+        std::uint32_t entry, parent, slot, depth;
+    };
+
+    /// Enters the subtree of keys [begin, end), from left to right; what waits for its right
+    /// sibling lies on a stack whose prefixes grow towards the top. Returns the root.
+    std::uint32_t climb(std::uint32_t begin, std::uint32_t end) {
+        entries_.reset(2 * std::size_t{end - begin});
+        const std::uint8_t* const prefixes = in_.triangles.prefixes.at(0);
+        std::array<Open, most_open + 1> open;
+        open[0] = {0, 0};
+        std::size_t top = 0;
+        std::uint32_t next = 0;
+        for (std::uint32_t k = begin; k < end;) {
+            const std::uint32_t count = std::min(leaf_size(k), end - k);
+            add_leaf(entries_[next++], k, count);
+            k += count;
+            // Behind the last leaf: shorter than all prefixes inside.
+            const std::uint32_t prefix = prefixes[k - 1];
+            for (; open[top].prefix > prefix; --top) {
+                add_inner(open[top].entry, next);
+                ++next;
+            }
+            open[++top] = {next - 1, prefix};
+        }
+        return next - 1;
+    }
+
+    /// How many keys there are up to the next split that is kept.
+    [[nodiscard]] std::uint32_t leaf_size(std::uint32_t k) const {
+        std::uint64_t bits;
+        std::memcpy(&bits, reinterpret_cast<const std::uint8_t*>(in_.kept) + k / 8, sizeof(bits));
+        return 1 + static_cast<std::uint32_t>(std::countr_zero(bits >> k % 8 | 8));
+    }
+
+    void add_leaf(Entry& entry, std::uint32_t first, std::uint32_t count) {
+        constexpr std::size_t indices_ahead = 32, corners_ahead = 16;
+        const TriangleSource& source = in_.triangles.source;
+        const std::span<const std::uint32_t> order = in_.triangles.order;
+        const std::uint32_t place = out_.filler.place(count), lane = place % block_lanes;
+        TriangleBlock& block = group_.blocks[place / block_lanes];
+        if (lane == 0) block = TriangleBlock{};
+        Box3 box = Box3::load(empty_box());
+        for (std::uint32_t k = 0; k < count; ++k) {
+            const std::size_t at = std::size_t{first} + k;
+            if (at + indices_ahead < order.size()) {
+                prefetch_indices(source, order[at + indices_ahead]);
+                prefetch_corners(source, order[at + corners_ahead]);
+            }
+            const LeafTriangle corners = copy_primitive(source, order[at]);
+            box = unite(box, copy_box(corners));
+            block.set(lane + k, corners, order[at]);
+        }
+        const Aabb plain = box.box();
+        entry.lo = plain.lo;
+        entry.hi = plain.hi;
+        entry.link = wide_leaf_bit | place << 3 | (count - 1);
+        entry.area = area_of(entry);
+        entry.plan.cost.fill(entry.area * static_cast<float>(count) *
+                             static_cast<float>(wide_primitive_cost));
+        entry.plan.choices = 1;
+    }
+
+    /// Entry `k`, with the one before it as right child.
+    void add_inner(std::uint32_t left, std::uint32_t k) {
+        const Entry &a = entries_[left], &b = entries_[k - 1];
+        Entry& entry = entries_[k];
+        const Box3 box = unite(Box3::load(a.lo, a.hi), Box3::load(b.lo, b.hi));
+        box.lo.store(entry.lo);
+        box.hi.store(entry.hi);
+        entry.link = left;
+        entry.area = area_of(entry);
+        make_plan<width>(divide(a.plan, b.plan), entry.area, infinity, entry.plan);
+    }
+    static SubtreeShares<width> divide(const CollapsePlan<width>& a, const CollapsePlan<width>& b) {
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
+        if constexpr (width == 8) return cheapest_shares_within_avx2(a.cost.data(), b.cost.data());
+#endif
+        return cheapest_shares<width>(a.cost.data(), b.cost.data());
+    }
+    static float area_of(const Entry& entry) {
+        const float x = entry.hi.x - entry.lo.x, y = entry.hi.y - entry.lo.y,
+                    z = entry.hi.z - entry.lo.z;
+        return x * y + y * z + z * x;
+    }
+
+    /// Depth first: what rays visit together lies together. Returns the number of the first node.
+    std::uint32_t write_nodes(std::uint32_t root, std::uint32_t depth) {
+        constexpr std::uint32_t no_parent = ~std::uint32_t{0};
+        const auto first = static_cast<std::uint32_t>(out_.nodes.size());
+        waiting_.assign(1, {root, no_parent, 0, depth});
+        while (!waiting_.empty()) {
+            const Waiting at = waiting_.back();
+            waiting_.pop_back();
+            const auto w = static_cast<std::uint32_t>(out_.nodes.size());
+            if (at.parent != no_parent) out_.nodes[at.parent].child[at.slot] = w;
+            write_node(out_.nodes.emplace_back(), w, at);
+        }
+        return first;
+    }
+
+    void write_node(WideNode& node, std::uint32_t w, const Waiting& at) {
+        std::array<std::uint32_t, width> chosen;
+        const auto count =
+            static_cast<std::uint32_t>(choose_children<width>(*this, at.entry, chosen));
+        std::array<std::uint32_t, quantised_width> by_area;
+        sort_by_area(chosen, count, by_area);
+        WideSums& sums = out_.sums;
+        SlotBoxes boxes;
+        boxes.used = (1u << count) - 1;
+        for (std::uint32_t s = 0; s < count; ++s) {
+            const Entry& child = entries_[by_area[s]];
+            boxes.lo[0][s] = child.lo.x, boxes.lo[1][s] = child.lo.y, boxes.lo[2][s] = child.lo.z;
+            boxes.hi[0][s] = child.hi.x, boxes.hi[1][s] = child.hi.y, boxes.hi[2][s] = child.hi.z;
+            node.child[s] = child.link;
+            if ((child.link & wide_leaf_bit) != 0) {
+                const std::uint32_t triangles = (child.link & 7) + 1;
+                ++sums.leaves;
+                sums.references += triangles;
+                sums.triangle_area += double{child.area} * triangles;
+            } else {
+                waiting_.push_back({by_area[s], w, s, at.depth + 1});
+            }
+        }
+        for (std::uint32_t s = count; s < quantised_width; ++s) {
+            for (int axis = 0; axis < 3; ++axis) boxes.lo[axis][s] = boxes.hi[axis][s] = 0;
+            node.child[s] = wide_no_child;
+        }
+        set_boxes_about_middle(in_.middle, boxes, node);
+        sums.children += count;
+        sums.node_area += double{entries_[at.entry].area};
+        sums.levels = std::max(sums.levels, at.depth + 1);
+    }
+
+    /// The smallest first: rays that stop at any hit take the last slot first, where a hit is
+    /// likeliest. Equal areas keep their order.
+    void sort_by_area(const std::array<std::uint32_t, width>& chosen, std::uint32_t count,
+                      std::array<std::uint32_t, quantised_width>& out) const {
+        alignas(32) std::array<float, quantised_width> areas;
+        areas.fill(infinity);
+        for (std::uint32_t s = 0; s < count; ++s) areas[s] = entries_[chosen[s]].area;
+        alignas(32) std::array<std::uint32_t, quantised_width> ranks{};
+        for (std::uint32_t other = 0; other < quantised_width; ++other)
+            for (std::uint32_t s = 0; s < quantised_width; ++s)
+                ranks[s] += static_cast<std::uint32_t>(areas[other] < areas[s]) |
+                            (static_cast<std::uint32_t>(areas[other] == areas[s]) &
+                             static_cast<std::uint32_t>(other < s));
+        for (std::uint32_t s = 0; s < count; ++s) out[ranks[s]] = chosen[s];
+    }
+
+    const PartInput& in_;
+    const PartGroup& group_;
+    PartEntries<width>& entries_;
+    WidePart& out_;
+    std::vector<Waiting> waiting_;
+};
+
+}  // namespace raydix::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
