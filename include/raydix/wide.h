@@ -76,9 +76,9 @@ public:
     WideBvhBuilder& operator=(WideBvhBuilder&&) noexcept;
 
     /// Makes WideBvh(build_bvh(mesh, options)), bit for bit. By apetrei with a max_leaf of 4, not
-    /// compact, it may have other nodes; then, and by ploc, hploc and binned with up to 4, no binary
-    /// tree is made. The mesh may go. The threads of `options` count, not `wide.threads`. Throws
-    /// InputError as both calls do, and if the mesh has vertices but no triangles.
+    /// compact, it may have other nodes; then, and by ploc, hploc and binned with up to 4, no
+    /// binary tree is made. The mesh may go. The threads of `options` count, not `wide.threads`.
+    /// Throws InputError as both calls do, and if the mesh has vertices but no triangles.
     void build(const MeshView& mesh, const BuildOptions& options, WideBvh& tree,
                const WideBvhOptions& wide = {});
 

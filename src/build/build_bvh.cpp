@@ -18,6 +18,7 @@
 #include "layout/leaf_order.h"
 #include "measure/stopwatch.h"
 #include "primitives/bounds.h"
+#include "primitives/centers.h"
 #include "sort/radix_sort.h"
 #include "tree/apetrei_cpu.h"
 #include "tree/bvh_internals.h"
@@ -96,6 +97,21 @@ struct BuildRequest {
     const TriangleCorners* around = nullptr;  // the triangles that boxes are around
 };
 
+/// For its lifetime a buffer views memory of somebody else.
+template <class T>
+class Lent {
+public:
+    Lent(Buffer<T>& buffer, T* memory, std::size_t size) : buffer_(buffer) {
+        buffer_ = Buffer<T>(nullptr, memory, size);
+    }
+    ~Lent() { buffer_ = {}; }
+    Lent(const Lent&) = delete;
+    Lent& operator=(const Lent&) = delete;
+
+private:
+    Buffer<T>& buffer_;
+};
+
 /// One build: a source of primitives, the kind of copies its leaves hold, and the key type.
 template <class Key, class Source, class Copy, class Scratch>
 struct BuildRun {
@@ -109,9 +125,11 @@ struct BuildRun {
     Buffer<Copy>& copies;
 
     void run() {
+        if constexpr (std::is_same_v<Source, TriangleSource>)
+            if (request.sorted != nullptr) return sort_triangles();
         Stopwatch total, stage;
         BuildMs ms;
-        const Bounds bounds = bounds_of_all();
+        const Bounds bounds = scene_bounds(source, n);
         check_bounds(bounds, source, kind_name, options.strict);
         const auto valid = static_cast<std::uint32_t>(n - bounds.left_out);
         tree.input_count() = n;
@@ -120,13 +138,6 @@ struct BuildRun {
         progress_at(0.03);
         if (valid == 0) return make_empty();
 
-        if constexpr (of_triangles)
-            if (request.sorted != nullptr) {
-                sort_triangles(bounds);
-                ms.total = total.lap();
-                tree.build_ms() = ms;
-                return;
-            }
         if (in_one_pass(valid)) {
             build_in_one_pass(valid, bounds.box, ms);
             reinsert(ms);
@@ -185,14 +196,6 @@ struct BuildRun {
     }
 
 private:
-    static constexpr bool of_triangles = std::is_same_v<Source, TriangleSource>;
-
-    [[nodiscard]] Bounds bounds_of_all() const {
-        if constexpr (of_triangles)
-            if (request.sorted != nullptr) return scene_bounds<true>(source, n);
-        return scene_bounds(source, n);
-    }
-
     /// Sort records behind `offset` bytes of the memory of the leaf copies, which are written after
     /// the last use of the records; in memory of their own if the copies are too small.
     bool borrow_records(Buffer<SortRecord<Key>>& records, std::size_t offset) {
@@ -265,22 +268,35 @@ private:
         return prefixes;
     }
 
-    /// Those with an area, for request.sorted.
-    void sort_triangles(const Bounds& bounds) {
-        const auto valid = static_cast<std::uint32_t>(n - bounds.left_out - bounds.flat);
-        if (valid == 0) return make_empty();
+    /// Sorts those that have an area, for request.sorted, whose memory holds the sort records and
+    /// then the centers of their boxes.
+    void sort_triangles() {
         using Record = SortRecord<Key>;
-        const std::span<std::byte> memory = request.sorted->memory(n, n * sizeof(Record));
-        auto* records = reinterpret_cast<Record*>(memory.data());
-        sort_scratch_of<Key>(scratch).records = Buffer<Record>(nullptr, records, n);
-        const NeighbourPrefixes prefixes =
-            bounds.flat == 0 ? sort_to_prefixes(source, valid, bounds.box)
-                             : sort_to_prefixes(TrianglesWithArea{source}, valid, bounds.box);
-        sort_scratch_of<Key>(scratch).records = {};
-        progress_at(0.4);
-        const ProgressStage rest(0.4, 1);
-        request.sorted->take({prefixes, tree.order().view(), source, bounds.box});
+        Stopwatch total, stage;
+        BuildMs ms;
+        const std::span<std::byte> memory =
+            request.sorted->memory(n, n * (sizeof(Record) + sizeof(Vec3)));
+        auto* const centers = reinterpret_cast<Vec3*>(memory.data() + n * sizeof(Record));
+        const Bounds bounds = scene_bounds(source, n, KeepCenters{source, centers});
+        check_bounds(bounds, source, kind_name, options.strict);
+        tree.input_count() = n;
+        tree.left_out() = bounds.left_out;
+        ms.bounds = stage.lap();
+        progress_at(0.03);
+        const auto valid = static_cast<std::uint32_t>(n - bounds.left_out - bounds.flat);
+        if (valid != 0) {
+            const Lent lent(sort_scratch_of<Key>(scratch).records,
+                            reinterpret_cast<Record*>(memory.data()), n);
+            const NeighbourPrefixes prefixes =
+                sort_to_prefixes(Centers{centers}, valid, bounds.box);
+            ms.sort = stage.lap();
+            progress_at(0.4);
+            const ProgressStage rest(0.4, 1);
+            request.sorted->take({prefixes, tree.order().view(), source, bounds.box});
+        }
         tree.make_empty();
+        ms.total = total.lap();
+        tree.build_ms() = ms;
     }
 
     /// Of a tree that is complete.

@@ -101,15 +101,18 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
                     lay_out([&] { make_wide_layout(view, collapse, arrays, scratch_->wide); });
                 });
         } else if (goes_straight(options, wide)) {
+            bool taken = false;
             BvhBuilderInternals::sort(
                 scratch_->builder, mesh, options, bvh,
                 {[&](std::size_t triangles, std::size_t bytes) {
                      return memory_for_sorting(triangles, bytes, arrays);
                  },
                  [&](const SortedTriangles& triangles) {
+                     taken = true;
                      lay_out(
                          [&] { make_wide_layout(triangles, collapse, arrays, scratch_->wide); });
                  }});
+            if (!taken) arrays.clear(collapse);  // but for the memory that was lent
         } else {
             {
                 const ProgressStage binary(0, 0.75);

@@ -10,6 +10,7 @@
 #include <span>
 #include <string_view>
 
+#include "exec/progress.h"
 #include "layout/collapse_plan.h"
 #include "layout/sorted_top.h"
 #include "layout/wide_bvh.h"
@@ -48,6 +49,7 @@ struct PartInput {
     const SortedTriangles& triangles;
     const std::uint64_t* kept;  // bit s: keys s and s + 1 are in different leaves; a word more
     Vec3 middle;                // what planes are about
+    const ProgressCounter& progress;  // of keys
 };
 
 /// Memory of a thread.

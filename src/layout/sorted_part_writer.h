@@ -24,8 +24,10 @@ public:
         for (std::size_t p = 0; p < group_.parts.size(); ++p) {
             const SortedPart& part = group_.parts[p];
             const std::uint32_t root = climb(part.begin, part.end);
+            in_.progress.add(0.5 * (part.end - part.begin));
             const Entry& entry = entries_[root];
             const std::uint32_t word = is_whole(root) ? entry.link : write_nodes(root, part.depth);
+            in_.progress.add(0.5 * (part.end - part.begin));
             group_.roots[p] = {{entry.lo, entry.hi}, entry.area, word};
         }
     }
@@ -105,9 +107,9 @@ private:
         entry.hi = plain.hi;
         entry.link = wide_leaf_bit | place << 3 | (count - 1);
         entry.area = area_of(entry);
-        entry.plan.cost.fill(entry.area * static_cast<float>(count) *
-                             static_cast<float>(wide_primitive_cost));
-        entry.plan.choices = 1;
+        set_leaf_plan(
+            entry.area * static_cast<float>(count) * static_cast<float>(wide_primitive_cost),
+            entry.plan);
     }
 
     /// Entry `k`, with the one before it as right child.
@@ -119,13 +121,22 @@ private:
         box.hi.store(entry.hi);
         entry.link = left;
         entry.area = area_of(entry);
-        make_plan<width>(divide(a.plan, b.plan), entry.area, infinity, entry.plan);
+        join_plans(a.plan, b.plan, entry.area, entry.plan);
     }
-    static SubtreeShares<width> divide(const CollapsePlan<width>& a, const CollapsePlan<width>& b) {
+    static void join_plans(const CollapsePlan<width>& a, const CollapsePlan<width>& b,
+                           float node_cost, CollapsePlan<width>& out) {
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
-        if constexpr (width == 8) return cheapest_shares_within_avx2(a.cost.data(), b.cost.data());
+        if constexpr (width == 8) return make_plan_within_avx2(a, b, node_cost, out);
 #endif
-        return cheapest_shares<width>(a.cost.data(), b.cost.data());
+        make_plan<width>(cheapest_shares<width>(a.cost.data(), b.cost.data()), node_cost, infinity,
+                         out);
+    }
+    static void set_leaf_plan(float cost, CollapsePlan<width>& out) {
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
+        if constexpr (width == 8) return set_leaf_plan_within_avx2(cost, out);
+#endif
+        out.cost.fill(cost);
+        out.choices = 1;
     }
     static float area_of(const Entry& entry) {
         const float x = entry.hi.x - entry.lo.x, y = entry.hi.y - entry.lo.y,
@@ -166,7 +177,7 @@ private:
                 const std::uint32_t triangles = (child.link & 7) + 1;
                 ++sums.leaves;
                 sums.references += triangles;
-                sums.triangle_area += double{child.area} * triangles;
+                sums.triangle_area += half_area({child.lo, child.hi}) * triangles;
             } else {
                 waiting_.push_back({by_area[s], w, s, at.depth + 1});
             }
@@ -177,7 +188,7 @@ private:
         }
         set_boxes_about_middle(in_.middle, boxes, node);
         sums.children += count;
-        sums.node_area += double{entries_[at.entry].area};
+        sums.node_area += half_area({entries_[at.entry].lo, entries_[at.entry].hi});
         sums.levels = std::max(sums.levels, at.depth + 1);
     }
 

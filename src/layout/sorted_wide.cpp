@@ -100,31 +100,31 @@ private:
     /// From the first one on, each thread the next, so that few wait for their places.
     void write_groups(PartPlacer& placer, WideBvh::Arrays& out) {
         const PartKernel& kernel = part_kernels().front();
-        const PartInput in{triangles_, scratch_.kept_bits.data(), center_of(triangles_.bounds)};
+        const ProgressCounter progress(static_cast<double>(triangles_.order.size()));
+        const PartInput in{triangles_, scratch_.kept_bits.data(), center_of(triangles_.bounds),
+                           progress};
         scratch_.roots.resize(top_.parts.size());
         const auto threads = std::min(groups_.size(), static_cast<std::size_t>(thread_count()));
         auto& entries = entries_of(scratch_);
         if (entries.size() < threads) entries.resize(threads);
         std::atomic<std::size_t> next = 0;
-        const ProgressCounter progress(static_cast<double>(groups_.size()));
         for_each_index(
             threads,
             [&](std::size_t thread) {
-                for (std::size_t g = next++; g < groups_.size(); g = next++) {
-                    const Group& group = groups_[g];
-                    const std::size_t count = group.end - group.begin;
-                    std::unique_ptr<WidePart> part = placer.take();
-                    const PartGroup work{std::span(top_.parts).subspan(group.begin, count),
-                                         std::span(scratch_.roots).subspan(group.begin, count),
-                                         out.blocks.data() + group.first_block};
-                    write_of(kernel)(in, work, entries[thread], *part);
-                    placer.place(g, std::move(part));
-                    try {
-                        progress.add(1);
-                    } catch (...) {
-                        next = groups_.size();  // the other threads end too
-                        throw;
+                try {
+                    for (std::size_t g = next++; g < groups_.size(); g = next++) {
+                        const Group& group = groups_[g];
+                        const std::size_t count = group.end - group.begin;
+                        std::unique_ptr<WidePart> part = placer.take();
+                        const PartGroup work{std::span(top_.parts).subspan(group.begin, count),
+                                             std::span(scratch_.roots).subspan(group.begin, count),
+                                             out.blocks.data() + group.first_block};
+                        write_of(kernel)(in, work, entries[thread], *part);
+                        placer.place(g, std::move(part));
                     }
+                } catch (...) {
+                    next = groups_.size();  // the other threads end too
+                    throw;
                 }
             },
             1);
@@ -181,12 +181,12 @@ private:
             const std::uint32_t triangles = (child.word & 7) + 1;
             ++sums.leaves;
             sums.references += triangles;
-            sums.triangle_area += double{child.area} * triangles;
+            sums.triangle_area += half_area(child.box) * triangles;
         }
         set_boxes_about_middle(middle, boxes, node);
         all.area = static_cast<float>(half_area(all.box));
         sums.children += children.size();
-        sums.node_area += double{all.area};
+        sums.node_area += half_area(all.box);
         return all;
     }
 

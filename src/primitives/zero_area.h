@@ -4,7 +4,6 @@
 #include <raydix/bvh.h>
 
 #include "base/hd.h"
-#include "primitives/sources.h"
 
 namespace raydix {
 
@@ -16,13 +15,5 @@ RAYDIX_HD inline bool has_zero_area(const LeafTriangle& t) {
                  bz = double(t.v2.z) - t.v0.z;
     return ay * bz == az * by && az * bx == ax * bz && ax * by == ay * bx;
 }
-
-/// Triangles of which those without area are left out as well.
-struct TrianglesWithArea {
-    const TriangleSource& all;
-    bool box(std::uint32_t i, Aabb& box) const {
-        return all.box(i, box) && !has_zero_area(all.corners(i));
-    }
-};
 
 }  // namespace raydix

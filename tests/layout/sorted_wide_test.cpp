@@ -268,7 +268,8 @@ TEST(PartKernels, WriteTheSameBytes) {
     Buffer<std::uint32_t> before;
     mark_kept_splits(prefixes, prefixes.count() - 1, 4, kept, before);
     const SortedTriangles triangles{prefixes, sorted.order.view(), sorted.source, sorted.bounds};
-    const PartInput in{triangles, kept.data(), center_of(sorted.bounds)};
+    const ProgressCounter progress(1);
+    const PartInput in{triangles, kept.data(), center_of(sorted.bounds), progress};
     const SortedPart whole{
         0, static_cast<std::uint32_t>(prefixes.count()), {TopSlot::no_node, 0}, 0};
     const auto write = [&](const PartKernel& kernel, bool wide) {
