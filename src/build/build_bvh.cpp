@@ -225,7 +225,13 @@ private:
     void build_in_one_pass(std::uint32_t valid, const Aabb& scene_box, BuildMs& ms) {
         Stopwatch stage;
         borrow_records(sort_scratch_of<Key>(scratch).records, 0);
-        const NeighbourPrefixes prefixes = sort_to_prefixes(source, valid, scene_box);
+        // Codes are made twice rather than stored.
+        const HostGrid grid(make_grid(scene_box, CodeFormat<Key>::axis_bits));
+        const NeighbourPrefixes prefixes = sort_to_prefixes(
+            [&](std::size_t begin, std::size_t end, Key* out) {
+                host_encode_range(source, grid, valid == n, begin, end, out);
+            },
+            valid);
         ms.sort = stage.lap();
         progress_at(0.4);
         copies.reset(valid);
@@ -238,19 +244,14 @@ private:
         ms.hierarchy = stage.lap();
     }
 
-    /// Codes are made twice rather than stored, and once sorted only their common prefixes are
-    /// kept: what is written, read and written again costs more time than arithmetic. The records
+    /// Once sorted, only the common prefixes of codes are kept: what is written, read and written
+    /// again costs more time than arithmetic. load(begin, end, out) gives the codes; the records
     /// have their memory; on return tree.order() is complete.
-    template <class Some>
-    NeighbourPrefixes sort_to_prefixes(const Some& some, std::uint32_t valid,
-                                       const Aabb& scene_box) {
+    template <class Load>
+    NeighbourPrefixes sort_to_prefixes(const Load& load, std::uint32_t valid) {
         SortScratch<Key>& sort_scratch = sort_scratch_of<Key>(scratch);
         tree.order().reset(n);
         NeighbourPrefixes prefixes(n, scratch.apetrei.prefixes);
-        const HostGrid grid(make_grid(scene_box, CodeFormat<Key>::axis_bits));
-        const auto load = [&](std::size_t begin, std::size_t end, Key* out) {
-            host_encode_range(some, grid, valid == n, begin, end, out);
-        };
         const auto take = [&](std::size_t begin, std::span<const SortRecord<Key>> sorted) {
             std::uint32_t* order = tree.order().data() + begin;
             for (std::size_t k = 0; k + 1 < sorted.size(); ++k) {
@@ -268,15 +269,16 @@ private:
         return prefixes;
     }
 
-    /// Sorts those that have an area, for request.sorted, whose memory holds the sort records and
-    /// then the centers of their boxes.
+    /// Sorts those that have an area, for request.sorted, whose memory holds the sort records, the
+    /// codes and the centers of the boxes.
     void sort_triangles() {
         using Record = SortRecord<Key>;
         Stopwatch total, stage;
         BuildMs ms;
         const std::span<std::byte> memory =
-            request.sorted->memory(n, n * (sizeof(Record) + sizeof(Vec3)));
-        auto* const centers = reinterpret_cast<Vec3*>(memory.data() + n * sizeof(Record));
+            request.sorted->memory(n, n * (sizeof(Record) + sizeof(Key) + sizeof(Vec3)));
+        auto* const codes = reinterpret_cast<Key*>(memory.data() + n * sizeof(Record));
+        auto* const centers = reinterpret_cast<Vec3*>(codes + n);
         const Bounds bounds = scene_bounds(source, n, KeepCenters{source, centers});
         check_bounds(bounds, source, kind_name, options.strict);
         tree.input_count() = n;
@@ -287,8 +289,12 @@ private:
         if (valid != 0) {
             const Lent lent(sort_scratch_of<Key>(scratch).records,
                             reinterpret_cast<Record*>(memory.data()), n);
+            host_encode(Centers{centers}, make_grid(bounds.box, CodeFormat<Key>::axis_bits),
+                        valid == n, n, codes);
             const NeighbourPrefixes prefixes =
-                sort_to_prefixes(Centers{centers}, valid, bounds.box);
+                sort_to_prefixes([&](std::size_t begin, std::size_t end,
+                                     Key* out) { std::copy(codes + begin, codes + end, out); },
+                                 valid);
             ms.sort = stage.lap();
             progress_at(0.4);
             const ProgressStage rest(0.4, 1);

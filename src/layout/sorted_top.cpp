@@ -109,7 +109,7 @@ public:
     }
 
 private:
-    static constexpr std::size_t stride = 8, chunk = 32;
+    static constexpr std::size_t stride = 16, chunk = 32;
 
     Buffer<Aabb>& samples_;
     Buffer<Aabb>& chunks_;

@@ -27,7 +27,8 @@ Box3 valid_box(const Source& source, std::uint32_t i) {
     return Box3::load(plain);
 }
 
-inline bool host_box(const TriangleSource& source, std::uint32_t i, Box3& box) {
+[[gnu::always_inline]] inline bool host_box(const TriangleSource& source, std::uint32_t i,
+                                            Box3& box) {
     const Float3 a = load_corner(source, i, 0), b = load_corner(source, i, 1),
                  c = load_corner(source, i, 2);
     box = {min_of(min_of(a, b), c), max_of(max_of(a, b), c)};
@@ -37,7 +38,7 @@ inline bool host_box(const TriangleSource& source, std::uint32_t i, Box3& box) {
 
 /// has_zero_area of a valid triangle. Where a component of the cross product is so much larger than
 /// what floats may have lost of it that it cannot be 0 in double either, no double is asked.
-inline bool host_zero_area(const TriangleSource& source, std::uint32_t i) {
+[[gnu::always_inline]] inline bool host_zero_area(const TriangleSource& source, std::uint32_t i) {
     const Float3 a = load_corner(source, i, 0), b = load_corner(source, i, 1) - a,
                  c = load_corner(source, i, 2) - a;
     const Float3 p = b * rotated(c), q = rotated(b) * c;
