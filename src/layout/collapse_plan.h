@@ -71,25 +71,12 @@ template <int width>
 [[gnu::always_inline]] __attribute__((target("avx2"))) inline void make_plan_within_avx2(
     const CollapsePlan<8>& a, const CollapsePlan<8>& b, float node_cost, CollapsePlan<8>& out) {
     const ShareVectors shared = cheapest_shares_within_avx2(a.cost.data(), b.cost.data());
-    const __m256 last = _mm256_permutevar8x32_ps(shared.cost, _mm256_set1_epi32(7));
-    // [i - 1]: as exactly i subtrees, then as at most i.
-    const __m256 apart =
-        _mm256_blend_ps(shared.cost, _mm256_add_ps(last, _mm256_set1_ps(node_cost)), 1);
-    const __m256i by_one = _mm256_setr_epi32(0, 0, 1, 2, 3, 4, 5, 6),
-                  by_two = _mm256_setr_epi32(0, 0, 0, 1, 2, 3, 4, 5),
-                  by_four = _mm256_setr_epi32(0, 0, 0, 0, 0, 1, 2, 3);
-    const __m256 none = _mm256_set1_ps(infinity);
-    __m256 least =
-        _mm256_min_ps(apart, _mm256_blend_ps(_mm256_permutevar8x32_ps(apart, by_one), none, 0x01));
-    least =
-        _mm256_min_ps(least, _mm256_blend_ps(_mm256_permutevar8x32_ps(least, by_two), none, 0x03));
-    least =
-        _mm256_min_ps(least, _mm256_blend_ps(_mm256_permutevar8x32_ps(least, by_four), none, 0x0F));
-    // As i subtrees where that costs no more than i - 1; 8 are always apart, 1 never is.
-    const __m256 divides = _mm256_blend_ps(
-        _mm256_cmp_ps(apart, _mm256_blend_ps(_mm256_permutevar8x32_ps(least, by_one), none, 0x01),
-                      _CMP_LE_OQ),
-        _mm256_castsi256_ps(_mm256_setr_epi32(0, 0, 0, 0, 0, 0, 0, -1)), 0x81);
+    const __m256 as_node = _mm256_add_ps(
+        _mm256_permutevar8x32_ps(shared.cost, _mm256_set1_epi32(7)), _mm256_set1_ps(node_cost));
+    // Costs of a and b fall with the number of subtrees, so those of shares do: i subtrees cost no
+    // more than i - 1 unless one node costs less than all of them.
+    const __m256 least = _mm256_min_ps(shared.cost, as_node);
+    const __m256 divides = _mm256_cmp_ps(shared.cost, as_node, _CMP_LE_OQ);
     const __m256i choices =
         _mm256_sllv_epi32(_mm256_and_si256(shared.left, _mm256_castps_si256(divides)),
                           _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));

@@ -21,6 +21,8 @@ public:
         : in_(in), group_(group), entries_(entries), out_(out) {}
 
     void run() {
+        // As few as make little difference to memory: to grow again and again costs new pages.
+        out_.nodes.reserve((group_.parts.back().end - group_.parts.front().begin) / 10 + 1);
         for (std::size_t p = 0; p < group_.parts.size(); ++p) {
             const SortedPart& part = group_.parts[p];
             const std::uint32_t root = climb(part.begin, part.end);
