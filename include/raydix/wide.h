@@ -75,10 +75,10 @@ public:
     WideBvhBuilder(WideBvhBuilder&&) noexcept;
     WideBvhBuilder& operator=(WideBvhBuilder&&) noexcept;
 
-    /// Makes the tree that WideBvh(build_bvh(mesh, options)) would be, bit for bit. With the
-    /// builders ploc, hploc and binned and a max_leaf of at most 4 it needs no binary tree in
-    /// between. The mesh may go afterwards. The threads of `options` count; `wide.threads` has no
-    /// effect. Throws InputError as both calls do, and if the mesh has vertices but no triangles.
+    /// Makes WideBvh(build_bvh(mesh, options)), bit for bit. By apetrei with a max_leaf of 4, not
+    /// compact, it may have other nodes; then, and by ploc, hploc and binned with up to 4, no
+    /// binary tree is made. The mesh may go. The threads of `options` count, not `wide.threads`.
+    /// Throws InputError as both calls do, and if the mesh has vertices but no triangles.
     void build(const MeshView& mesh, const BuildOptions& options, WideBvh& tree,
                const WideBvhOptions& wide = {});
 

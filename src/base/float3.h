@@ -58,6 +58,8 @@ inline bool any_at_least(Float3 a, Float3 b) {
     return (_mm_movemask_ps(_mm_cmpge_ps(a.v, b.v)) & 7) != 0;
 }
 inline Float3 absolute(Float3 a) { return {_mm_andnot_ps(_mm_set1_ps(-0.0f), a.v)}; }
+/// y, z, x.
+inline Float3 rotated(Float3 a) { return {_mm_shuffle_ps(a.v, a.v, _MM_SHUFFLE(3, 0, 2, 1))}; }
 /// The largest of |a|, |b|, |c| a component; NaN if one of them is. Without signs, floats are in
 /// the order of their bits, and NaN comes last: an integer maximum does not lose it as a float one
 /// may.
@@ -92,6 +94,7 @@ inline bool any_at_least(Float3 a, Float3 b) {
 inline Float3 absolute(Float3 a) {
     return {{a.v.x < 0 ? -a.v.x : a.v.x, a.v.y < 0 ? -a.v.y : a.v.y, a.v.z < 0 ? -a.v.z : a.v.z}};
 }
+inline Float3 rotated(Float3 a) { return {{a.v.y, a.v.z, a.v.x}}; }
 inline float larger_or_nan(float a, float b) { return a >= b || a != a ? a : b; }
 inline Float3 larger_or_nan(Float3 a, Float3 b) {
     return {

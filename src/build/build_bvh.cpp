@@ -18,6 +18,7 @@
 #include "layout/leaf_order.h"
 #include "measure/stopwatch.h"
 #include "primitives/bounds.h"
+#include "primitives/centers.h"
 #include "sort/radix_sort.h"
 #include "tree/apetrei_cpu.h"
 #include "tree/bvh_internals.h"
@@ -92,7 +93,23 @@ void check_options(const BuildOptions& options, std::size_t n) {
 /// What a build may be asked for besides a tree over its input.
 struct BuildRequest {
     const TakeClusters* take = nullptr;       // clusters are wanted, not a tree
+    const SortedTaker* sorted = nullptr;      // sorted triangles are wanted
     const TriangleCorners* around = nullptr;  // the triangles that boxes are around
+};
+
+/// For its lifetime a buffer views memory of somebody else.
+template <class T>
+class Lent {
+public:
+    Lent(Buffer<T>& buffer, T* memory, std::size_t size) : buffer_(buffer) {
+        buffer_ = Buffer<T>(nullptr, memory, size);
+    }
+    ~Lent() { buffer_ = {}; }
+    Lent(const Lent&) = delete;
+    Lent& operator=(const Lent&) = delete;
+
+private:
+    Buffer<T>& buffer_;
 };
 
 /// One build: a source of primitives, the kind of copies its leaves hold, and the key type.
@@ -108,6 +125,8 @@ struct BuildRun {
     Buffer<Copy>& copies;
 
     void run() {
+        if constexpr (std::is_same_v<Source, TriangleSource>)
+            if (request.sorted != nullptr) return sort_triangles();
         Stopwatch total, stage;
         BuildMs ms;
         const Bounds bounds = scene_bounds(source, n);
@@ -203,18 +222,36 @@ private:
         return options.builder == Builder::apetrei && options.fit != Fit::levels &&
                valid > static_cast<std::uint32_t>(options.max_leaf);
     }
-    /// Codes are made twice rather than stored, and once sorted only their common prefixes are
-    /// kept: what is written, read and written again costs more time than arithmetic.
     void build_in_one_pass(std::uint32_t valid, const Aabb& scene_box, BuildMs& ms) {
         Stopwatch stage;
+        borrow_records(sort_scratch_of<Key>(scratch).records, 0);
+        // Codes are made twice rather than stored.
+        const HostGrid grid(make_grid(scene_box, CodeFormat<Key>::axis_bits));
+        const NeighbourPrefixes prefixes = sort_to_prefixes(
+            [&](std::size_t begin, std::size_t end, Key* out) {
+                host_encode_range(source, grid, valid == n, begin, end, out);
+            },
+            valid);
+        ms.sort = stage.lap();
+        progress_at(0.4);
+        copies.reset(valid);
+        const CopyWithBox<Source, Copy> leaf_box{source, tree.order().view(), copies.data()};
+        const ProgressStage climb(0.4, 0.75);
+        const ApetreiTree built =
+            build_apetrei_cpu(prefixes, options.max_leaf, leaf_box, tree.nodes(), scratch.apetrei);
+        tree.inner_count() = built.inner;
+        tree.max_depth() = built.max_depth;
+        ms.hierarchy = stage.lap();
+    }
+
+    /// Once sorted, only the common prefixes of codes are kept: what is written, read and written
+    /// again costs more time than arithmetic. load(begin, end, out) gives the codes; the records
+    /// have their memory; on return tree.order() is complete.
+    template <class Load>
+    NeighbourPrefixes sort_to_prefixes(const Load& load, std::uint32_t valid) {
         SortScratch<Key>& sort_scratch = sort_scratch_of<Key>(scratch);
-        borrow_records(sort_scratch.records, 0);
         tree.order().reset(n);
         NeighbourPrefixes prefixes(n, scratch.apetrei.prefixes);
-        const HostGrid grid(make_grid(scene_box, CodeFormat<Key>::axis_bits));
-        const auto load = [&](std::size_t begin, std::size_t end, Key* out) {
-            host_encode_range(source, grid, valid == n, begin, end, out);
-        };
         const auto take = [&](std::size_t begin, std::span<const SortRecord<Key>> sorted) {
             std::uint32_t* order = tree.order().data() + begin;
             for (std::size_t k = 0; k + 1 < sorted.size(); ++k) {
@@ -229,16 +266,43 @@ private:
                 prefixes.set(k - 1, sort_scratch.records[k - 1].key, sort_scratch.records[k].key);
         prefixes.end_at(valid);
         tree.order().reset(valid);
-        ms.sort = stage.lap();
-        progress_at(0.4);
-        copies.reset(valid);
-        const CopyWithBox<Source, Copy> leaf_box{source, tree.order().view(), copies.data()};
-        const ProgressStage climb(0.4, 0.75);
-        const ApetreiTree built =
-            build_apetrei_cpu(prefixes, options.max_leaf, leaf_box, tree.nodes(), scratch.apetrei);
-        tree.inner_count() = built.inner;
-        tree.max_depth() = built.max_depth;
-        ms.hierarchy = stage.lap();
+        return prefixes;
+    }
+
+    /// Sorts those that have an area, for request.sorted, whose memory holds the sort records, the
+    /// codes and the centers of the boxes.
+    void sort_triangles() {
+        using Record = SortRecord<Key>;
+        Stopwatch total, stage;
+        BuildMs ms;
+        const std::span<std::byte> memory =
+            request.sorted->memory(n, n * (sizeof(Record) + sizeof(Key) + sizeof(Vec3)));
+        auto* const codes = reinterpret_cast<Key*>(memory.data() + n * sizeof(Record));
+        auto* const centers = reinterpret_cast<Vec3*>(codes + n);
+        const Bounds bounds = scene_bounds(source, n, KeepCenters{source, centers});
+        check_bounds(bounds, source, kind_name, options.strict);
+        tree.input_count() = n;
+        tree.left_out() = bounds.left_out;
+        ms.bounds = stage.lap();
+        progress_at(0.03);
+        const auto valid = static_cast<std::uint32_t>(n - bounds.left_out - bounds.flat);
+        if (valid != 0) {
+            const Lent lent(sort_scratch_of<Key>(scratch).records,
+                            reinterpret_cast<Record*>(memory.data()), n);
+            host_encode(Centers{centers}, make_grid(bounds.box, CodeFormat<Key>::axis_bits),
+                        valid == n, n, codes);
+            const NeighbourPrefixes prefixes =
+                sort_to_prefixes([&](std::size_t begin, std::size_t end,
+                                     Key* out) { std::copy(codes + begin, codes + end, out); },
+                                 valid);
+            ms.sort = stage.lap();
+            progress_at(0.4);
+            const ProgressStage rest(0.4, 1);
+            request.sorted->take({prefixes, tree.order().view(), source, bounds.box});
+        }
+        tree.make_empty();
+        ms.total = total.lap();
+        tree.build_ms() = ms;
     }
 
     /// Of a tree that is complete.
@@ -372,6 +436,11 @@ void BvhBuilderInternals::build_clusters(BvhBuilder& builder, const MeshView& me
                                          const BuildOptions& options, Bvh& tree,
                                          const TakeClusters& take) {
     build_mesh(mesh, options, {.take = &take}, *builder.scratch_, tree);
+}
+
+void BvhBuilderInternals::sort(BvhBuilder& builder, const MeshView& mesh,
+                               const BuildOptions& options, Bvh& tree, const SortedTaker& take) {
+    build_mesh(mesh, options, {.sorted = &take}, *builder.scratch_, tree);
 }
 
 void BvhBuilderInternals::build_around(BvhBuilder& builder, std::span<const Aabb> boxes,

@@ -4,10 +4,12 @@
 
 #include <raydix/bvh.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
 
+#include "layout/sorted_part.h"
 #include "primitives/sources.h"
 #include "tree/place_clusters.h"
 #include "tree/triangle_corners.h"
@@ -23,7 +25,19 @@ namespace raydix {
 using TakeClusters = std::function<void(const ClusterTree& clusters, const TriangleSource& source,
                                         const std::uint8_t* flat)>;
 
+/// Who wants triangles in the order of their codes instead of a tree.
+struct SortedTaker {
+    /// Memory for the sort, of so many triangles and at least so many bytes; it is not used any
+    /// more when `take` is called.
+    std::function<std::span<std::byte>(std::size_t triangles, std::size_t bytes)> memory;
+    std::function<void(const SortedTriangles& triangles)> take;
+};
+
 struct BvhBuilderInternals {
+    /// As build() by apetrei, but the triangles that have an area go to `take`, sorted; `tree` is
+    /// as from build_clusters. Without one `take` is not called. mesh has triangles.
+    static void sort(BvhBuilder& builder, const MeshView& mesh, const BuildOptions& options,
+                     Bvh& tree, const SortedTaker& take);
     /// As build(), but the clusters of a builder that grows some go to `take`, inside of which
     /// loops have the threads of `options`; `tree` then has no nodes, only figures: input_count,
     /// left_out, build_ms (fit is the time of `take`, layout 0) and peak_bytes. Without a valid

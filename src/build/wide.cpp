@@ -10,6 +10,7 @@
 #include "exec/parallel.h"
 #include "exec/progress.h"
 #include "layout/cluster_view.h"
+#include "layout/sorted_part.h"
 #include "layout/wide_bvh.h"
 #include "layout/wide_collapse.h"
 #include "measure/stopwatch.h"
@@ -28,6 +29,12 @@ WideOptions collapse_options(const WideBvhOptions& options) {
     check_wide_options(collapse);
     check_threads(options.threads);
     return collapse;
+}
+
+/// Whether nodes and blocks are written from sorted triangles, without a binary tree between.
+bool goes_straight(const BuildOptions& options, const WideBvhOptions& wide) {
+    return options.builder == Builder::apetrei && options.reinsertion_rounds == 0 &&
+           options.max_leaf == static_cast<int>(wide_max_leaf) && !wide.compact;
 }
 
 }  // namespace
@@ -93,6 +100,19 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
                     ClusterView view(clusters, source, flat);
                     lay_out([&] { make_wide_layout(view, collapse, arrays, scratch_->wide); });
                 });
+        } else if (goes_straight(options, wide)) {
+            bool taken = false;
+            BvhBuilderInternals::sort(
+                scratch_->builder, mesh, options, bvh,
+                {[&](std::size_t triangles, std::size_t bytes) {
+                     return memory_for_sorting(triangles, bytes, arrays);
+                 },
+                 [&](const SortedTriangles& triangles) {
+                     taken = true;
+                     lay_out(
+                         [&] { make_wide_layout(triangles, collapse, arrays, scratch_->wide); });
+                 }});
+            if (!taken) arrays.clear(collapse);  // but for the memory that was lent
         } else {
             {
                 const ProgressStage binary(0, 0.75);

@@ -43,6 +43,95 @@ struct CollapsePlan {
     [[nodiscard]] bool is_leaf() const { return choice(1) == 1; }
 };
 
+/// The plan of a node whose children's plans can be shared as `shared` says. node_cost, leaf_cost:
+/// of the node as a wide node and as a leaf; infinity if it cannot be one.
+template <int width>
+[[gnu::always_inline]] inline void make_plan(const SubtreeShares<width>& shared, float node_cost,
+                                             float leaf_cost, CollapsePlan<width>& out) {
+    const auto left = [&](std::size_t i) { return shared.left[i - 1]; };
+    out.choices = 0;
+    out.choose(width, left(width));
+    out.cost[0] = shared.cost[width - 1] + node_cost;
+    if (leaf_cost <= out.cost[0]) {
+        out.cost[0] = leaf_cost;
+        out.choose(1, 1);
+    }
+    for (std::size_t i = 2; i < width; ++i) {
+        const float together = out.cost[i - 2], apart = shared.cost[i - 1];
+        out.cost[i - 1] = apart <= together ? apart : together;
+        out.choose(static_cast<int>(i), apart <= together ? left(i) : 0);
+    }
+}
+
+#if defined(RAYDIX_X86_INTRINSICS)
+
+/// The same of two plans, for nodes that cannot be leaves, in functions compiled for AVX2. A plan
+/// is stored as one vector: one that was stored float by float would be waited for when it is
+/// loaded.
+[[gnu::always_inline]] __attribute__((target("avx2"))) inline void make_plan_within_avx2(
+    const CollapsePlan<8>& a, const CollapsePlan<8>& b, float node_cost, CollapsePlan<8>& out) {
+    const ShareVectors shared = cheapest_shares_within_avx2(a.cost.data(), b.cost.data());
+    const __m256 as_node = _mm256_add_ps(
+        _mm256_permutevar8x32_ps(shared.cost, _mm256_set1_epi32(7)), _mm256_set1_ps(node_cost));
+    // Costs of a and b fall with the number of subtrees, so those of shares do: i subtrees cost no
+    // more than i - 1 unless one node costs less than all of them.
+    const __m256 least = _mm256_min_ps(shared.cost, as_node);
+    const __m256 divides = _mm256_cmp_ps(shared.cost, as_node, _CMP_LE_OQ);
+    const __m256i choices =
+        _mm256_sllv_epi32(_mm256_and_si256(shared.left, _mm256_castps_si256(divides)),
+                          _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
+    __m128i word =
+        _mm_or_si128(_mm256_castsi256_si128(choices), _mm256_extracti128_si256(choices, 1));
+    word = _mm_or_si128(word, _mm_shuffle_epi32(word, 0x4E));
+    word = _mm_or_si128(word, _mm_shuffle_epi32(word, 0xB1));
+    _mm256_storeu_ps(
+        reinterpret_cast<float*>(&out),
+        _mm256_blend_ps(least, _mm256_castsi256_ps(_mm256_broadcastd_epi32(word)), 0x80));
+}
+
+/// The plan of a leaf, likewise.
+[[gnu::always_inline]] __attribute__((target("avx2"))) inline void set_leaf_plan_within_avx2(
+    float cost, CollapsePlan<8>& out) {
+    _mm256_storeu_ps(
+        reinterpret_cast<float*>(&out),
+        _mm256_blend_ps(_mm256_set1_ps(cost), _mm256_castsi256_ps(_mm256_set1_epi32(1)), 0x80));
+}
+
+#endif
+
+/// The children of the wide node whose root is k, from left to right; returns how many. Of k and of
+/// what is below it `tree` tells its plan, whether it is a leaf of the binary tree, and the two
+/// that it consists of if it is not.
+template <int width, class Tree>
+[[gnu::always_inline]] inline int choose_children(const Tree& tree, std::uint32_t k,
+                                                  std::array<std::uint32_t, width>& chosen) {
+    struct Forest {
+        std::uint32_t root;
+        int trees;
+    };
+    std::array<Forest, width> open;
+    std::size_t waiting = 0;
+    int count = 0;
+    const auto divide = [&](std::uint32_t inner, int trees) {
+        const int left = tree.plan_of(inner).choice(trees);
+        const auto [a, b] = tree.parts_of(inner);
+        open[waiting++] = {b, trees - left};
+        open[waiting++] = {a, left};
+    };
+    divide(k, width);
+    while (waiting > 0) {
+        Forest next = open[--waiting];
+        const CollapsePlan<width>& plan = tree.plan_of(next.root);
+        if (tree.is_whole(next.root)) next.trees = 1;
+        while (next.trees > 1 && plan.choice(next.trees) == 0) --next.trees;
+        if (next.trees == 1)
+            chosen[static_cast<std::size_t>(count++)] = next.root;
+        else
+            divide(next.root, next.trees);
+    }
+    return count;
+}
+
 /// Entry 0 is the root of the subtree. Used for one after the other, to keep the memory.
 template <int width, class View>
 class Collapse {
@@ -97,30 +186,14 @@ public:
             chosen[0] = k;
             return 1;
         }
-        struct Forest {
-            std::uint32_t entry;
-            int trees;
-        };
-        std::array<Forest, width> open;
-        std::size_t waiting = 0;
-        int count = 0;
-        const auto divide = [&](std::uint32_t inner, int trees) {
-            const int left = plans_[inner].choice(trees);
-            open[waiting++] = {entries_[inner].children + 1, trees - left};
-            open[waiting++] = {entries_[inner].children, left};
-        };
-        divide(k, width);
-        while (waiting > 0) {
-            Forest next = open[--waiting];
-            const Plan& plan = plans_[next.entry];
-            if (entries_[next.entry].is_leaf()) next.trees = 1;
-            while (next.trees > 1 && plan.choice(next.trees) == 0) --next.trees;
-            if (next.trees == 1)
-                chosen[static_cast<std::size_t>(count++)] = next.entry;
-            else
-                divide(next.entry, next.trees);
-        }
-        return count;
+        return choose_children<width>(*this, k, chosen);
+    }
+
+    // What choose_children asks.
+    [[nodiscard]] const Plan& plan_of(std::uint32_t k) const { return plans_[k]; }
+    [[nodiscard]] bool is_whole(std::uint32_t k) const { return entries_[k].is_leaf(); }
+    [[nodiscard]] std::array<std::uint32_t, 2> parts_of(std::uint32_t k) const {
+        return {entries_[k].children, entries_[k].children + 1};
     }
 
 private:
@@ -146,30 +219,16 @@ private:
 
     void make_plan(std::size_t k) {
         Entry& entry = entries_[k];
-        const Plan& a = plans_[entry.children];
-        const Plan& b = plans_[entry.children + 1];
-        const SubtreeShares<width> shared = divide(a, b);
-        const auto left = [&](std::size_t i) { return shared.left[i - 1]; };
-        Plan& plan = plans_[k];
-        plan.choices = 0;
         entry.run = view_.join(entries_[entry.children].run, entries_[entry.children + 1].run);
         const float area = relative_area(entry.box);
-        plan.choose(width, left(width));
         // The root is a node in any case: nothing is saved by making it a leaf, its only child.
         const double node_cost = entry.ref == view_.root() ? 0.0 : options_.node_cost;
-        plan.cost[0] = shared.cost[width - 1] + area * static_cast<float>(node_cost);
-        if (entry.run.first != PrimitiveRun::several && entry.run.count <= options_.max_leaf) {
-            const float as_leaf = leaf_cost(area, entry.run.count);
-            if (as_leaf <= plan.cost[0]) {
-                plan.cost[0] = as_leaf;
-                plan.choose(1, 1);
-            }
-        }
-        for (std::size_t i = 2; i < width; ++i) {
-            const float together = plan.cost[i - 2], apart = shared.cost[i - 1];
-            plan.cost[i - 1] = apart <= together ? apart : together;
-            plan.choose(static_cast<int>(i), apart <= together ? left(i) : 0);
-        }
+        const bool may_be_leaf =
+            entry.run.first != PrimitiveRun::several && entry.run.count <= options_.max_leaf;
+        raydix::make_plan<width>(divide(plans_[entry.children], plans_[entry.children + 1]),
+                                 area * static_cast<float>(node_cost),
+                                 may_be_leaf ? leaf_cost(area, entry.run.count) : infinity,
+                                 plans_[k]);
     }
 
     /// Plans begin with their costs, and end with another word.

@@ -68,31 +68,47 @@ inline constexpr SharePlaces share_places = [] {
     return out;
 }();
 
-/// The bits of cheapest_shares<8>, all i at once. On processors with AVX2.
-__attribute__((target("avx2"))) inline SubtreeShares<8> cheapest_shares_avx2(const float* a,
-                                                                             const float* b) {
+/// The members of SubtreeShares<8>.
+struct ShareVectors {
+    __m256 cost;
+    __m256i left;
+};
+
+/// The bits of cheapest_shares<8>, all i at once, for functions compiled for AVX2.
+[[gnu::always_inline]] __attribute__((target("avx2"))) inline ShareVectors
+cheapest_shares_within_avx2(const float* a, const float* b) {
     const auto* const places_a = reinterpret_cast<const __m256i*>(share_places.in_a.data()->data());
     const auto* const places_b = reinterpret_cast<const __m256i*>(share_places.in_b.data()->data());
     const auto* const lefts = reinterpret_cast<const __m256i*>(share_places.left.data()->data());
     const __m256 none = _mm256_set1_ps(infinity);
     const __m256 from_a = _mm256_blend_ps(_mm256_loadu_ps(a), none, 0x80);
     const __m256 from_b = _mm256_blend_ps(_mm256_loadu_ps(b), none, 0x80);
-    __m256 best = _mm256_set1_ps(infinity);
-    __m256i best_left = _mm256_setzero_si256();
+    std::array<ShareVectors, 7> best;
 #pragma GCC unroll 7
-    for (std::size_t j = 0; j < 7; ++j) {
-        const __m256 cost =
-            _mm256_add_ps(_mm256_permutevar8x32_ps(from_a, _mm256_load_si256(places_a + j)),
-                          _mm256_permutevar8x32_ps(from_b, _mm256_load_si256(places_b + j)));
-        const __m256 less = j == 0 ? _mm256_castsi256_ps(_mm256_set1_epi32(-1))
-                                   : _mm256_cmp_ps(cost, best, _CMP_LT_OQ);
-        best = _mm256_blendv_ps(best, cost, less);
-        best_left =
-            _mm256_blendv_epi8(best_left, _mm256_load_si256(lefts + j), _mm256_castps_si256(less));
-    }
+    for (std::size_t j = 0; j < 7; ++j)
+        best[j] = {_mm256_add_ps(_mm256_permutevar8x32_ps(from_a, _mm256_load_si256(places_a + j)),
+                                 _mm256_permutevar8x32_ps(from_b, _mm256_load_si256(places_b + j))),
+                   _mm256_load_si256(lefts + j)};
+        // Pairs of neighbours: no step waits for more than two others. Of equal costs the first
+        // stays.
+#pragma GCC unroll 3
+    for (std::size_t step = 1; step < 7; step *= 2)
+#pragma GCC unroll 4
+        for (std::size_t j = 0; j + step < 7; j += 2 * step) {
+            const __m256 less = _mm256_cmp_ps(best[j + step].cost, best[j].cost, _CMP_LT_OQ);
+            best[j].cost = _mm256_min_ps(best[j + step].cost, best[j].cost);
+            best[j].left =
+                _mm256_blendv_epi8(best[j].left, best[j + step].left, _mm256_castps_si256(less));
+        }
+    return best[0];
+}
+/// The same for all others, on processors with AVX2.
+__attribute__((target("avx2"))) inline SubtreeShares<8> cheapest_shares_avx2(const float* a,
+                                                                             const float* b) {
+    const ShareVectors shares = cheapest_shares_within_avx2(a, b);
     SubtreeShares<8> out;
-    _mm256_store_ps(out.cost.data(), best);
-    _mm256_store_si256(reinterpret_cast<__m256i*>(out.left.data()), best_left);
+    _mm256_store_ps(out.cost.data(), shares.cost);
+    _mm256_store_si256(reinterpret_cast<__m256i*>(out.left.data()), shares.left);
     return out;
 }
 

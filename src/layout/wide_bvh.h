@@ -7,8 +7,10 @@
 #include <raydix/types.h>
 #include <raydix/wide.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "exec/path_rates.h"
 #include "layout/block_filler.h"
@@ -18,6 +20,7 @@
 namespace raydix {
 
 class ClusterView;
+struct SortedTriangles;  // sorted_part.h
 
 /// A word of a node's `child`: the node's index, or with the highest bit set, a leaf's place among
 /// the triangles times 8 plus its count less one. Place p is lane p % 4 of block p / 4; no leaf
@@ -152,5 +155,12 @@ void make_wide_layout(const Bvh& bvh, const WideOptions& options, WideBvh::Array
                       WideScratch& scratch);
 void make_wide_layout(ClusterView& clusters, const WideOptions& options, WideBvh::Arrays& out,
                       WideScratch& scratch);
+/// From triangles with area in the order of their codes, at least one; not compact. Leaves are the
+/// highest subtrees of up to options.max_leaf of them. The top is chosen by the cells of the grid.
+void make_wide_layout(const SortedTriangles& triangles, const WideOptions& options,
+                      WideBvh::Arrays& out, WideScratch& scratch);
+/// Memory that may be used until then: at least `bytes`, which become blocks.
+[[nodiscard]] std::span<std::byte> memory_for_sorting(std::size_t triangles, std::size_t bytes,
+                                                      WideBvh::Arrays& out);
 
 }  // namespace raydix

@@ -40,11 +40,7 @@ public:
         write_parts(placer);
         const WideSums sums = placer.finish();
         if (options_.compact) number_vertices(out);
-        count_bytes(out);
-        out.set_bounds(view_.box(view_.root()), view_.middle());
-        const double root = half_area(out.bounds);
-        out.stats.sah =
-            root > 0 ? (sums.node_area + wide_primitive_cost * sums.triangle_area) / root : 0;
+        set_tree_figures(sums, view_.box(view_.root()), view_.middle(), out);
     }
 
 private:
@@ -133,16 +129,6 @@ private:
         prefer_large_pages(out.vertices);
         for_each_index(used.size(),
                        [&](std::size_t k) { out.vertices[k] = view_.vertex(used[k]); });
-    }
-
-    static void count_bytes(WideBvh::Arrays& out) {
-        WideBvhStats& stats = out.stats;
-        stats.node_bytes =
-            out.nodes.size() * sizeof(WideNode) + out.compact_nodes.size() * sizeof(CompactNode);
-        stats.triangle_bytes = out.blocks.size() * sizeof(TriangleBlock) +
-                               out.compact_blocks.size() * sizeof(CompactBlock) +
-                               out.vertices.size() * sizeof(Vec3);
-        stats.bytes = stats.node_bytes + stats.triangle_bytes;
     }
 
     /// The children of a node of the top: the largest one is replaced by its own two while there is

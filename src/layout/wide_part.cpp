@@ -35,6 +35,10 @@ void copy_nodes(const std::vector<Node>& nodes, std::size_t node_base, std::size
     }
 }
 
+std::size_t guessed_nodes(std::size_t references) {
+    return static_cast<std::size_t>(nodes_a_reference * static_cast<double>(references));
+}
+
 template <class T>
 std::size_t room_for(const Buffer<T>& buffer) {
     return buffer.capacity_bytes() / sizeof(T);
@@ -61,6 +65,23 @@ void WideSums::add(const WideSums& other) {
     levels = std::max(levels, other.levels);
 }
 
+std::size_t guessed_blocks(std::size_t references) {
+    return static_cast<std::size_t>(blocks_a_reference * static_cast<double>(references));
+}
+
+void set_tree_figures(const WideSums& sums, const Aabb& bounds, Vec3 middle, WideBvh::Arrays& out) {
+    WideBvhStats& stats = out.stats;
+    stats.node_bytes =
+        out.nodes.size() * sizeof(WideNode) + out.compact_nodes.size() * sizeof(CompactNode);
+    stats.triangle_bytes = out.blocks.size() * sizeof(TriangleBlock) +
+                           out.compact_blocks.size() * sizeof(CompactBlock) +
+                           out.vertices.size() * sizeof(Vec3);
+    stats.bytes = stats.node_bytes + stats.triangle_bytes;
+    out.set_bounds(bounds, middle);
+    const double root = half_area(out.bounds);
+    stats.sah = root > 0 ? (sums.node_area + wide_primitive_cost * sums.triangle_area) / root : 0;
+}
+
 void WidePart::clear() {
     nodes.clear();
     blocks.clear();
@@ -82,10 +103,12 @@ PartPlacer::PartPlacer(bool compact, std::size_t references, std::size_t parts, 
                        WideBvh::Arrays& out)
     : compact_(compact), pool_(pool), out_(out), states_(parts) {
     // One part alone: its size is known before anything is copied.
-    if (parts > 1)
-        make_room({static_cast<std::size_t>(nodes_a_reference * static_cast<double>(references)),
-                   static_cast<std::size_t>(blocks_a_reference * static_cast<double>(references)) +
-                       4 * parts});
+    if (parts > 1) make_room({guessed_nodes(references), guessed_blocks(references) + 4 * parts});
+}
+
+PartPlacer::PartPlacer(const PartRoom& room, PartPool& pool, WideBvh::Arrays& out)
+    : compact_(false), pool_(pool), out_(out), states_(room.parts) {
+    make_room({room.parts > 1 ? guessed_nodes(room.references) : 0, room.blocks});
 }
 
 void PartPlacer::make_room(Bases room) {
@@ -174,13 +197,14 @@ WideSums PartPlacer::finish() {
             if (state.waiting) break;
             used = {state.bases.node + state.nodes, state.bases.block + state.blocks};
         }
-        if (compact_) {
-            grow(out_.compact_nodes, used.node, end_.node);
-            grow(out_.compact_blocks, used.block, end_.block);
-        } else {
-            grow(out_.nodes, used.node, end_.node);
-            grow(out_.blocks, used.block, end_.block);
-        }
+        const auto grow_both = [&](auto& nodes, auto& blocks) {
+            if (end_.node > room_.node) grow(nodes, used.node, end_.node);
+            if (end_.block > room_.block) grow(blocks, used.block, end_.block);
+        };
+        if (compact_)
+            grow_both(out_.compact_nodes, out_.compact_blocks);
+        else
+            grow_both(out_.nodes, out_.blocks);
         for_each_index(
             states_.size(),
             [&](std::size_t k) {

@@ -45,6 +45,16 @@ using PartPool = std::vector<std::unique_ptr<WidePart>>;
 /// An empty part.
 [[nodiscard]] std::unique_ptr<WidePart> take_part(PartPool& pool);
 
+/// What is known of parts before they are written.
+struct PartRoom {
+    std::size_t references, parts, blocks;
+};
+/// Blocks that so many references most often fit in.
+[[nodiscard]] std::size_t guessed_blocks(std::size_t references);
+
+/// The figures that need the bounds, and the bytes. `middle`: what planes of nodes are about.
+void set_tree_figures(const WideSums& sums, const Aabb& bounds, Vec3 middle, WideBvh::Arrays& out);
+
 /// Puts parts behind each other into the arrays of a tree, the top first. A part is copied as soon
 /// as the sizes of all before it are known, while it is in a cache, and its memory serves the next:
 /// what a build touches for the first time is little more than the tree. The arrays do not depend
@@ -55,6 +65,9 @@ public:
     /// does not fit waits, and is copied once more.
     PartPlacer(bool compact, std::size_t references, std::size_t parts, PartPool& pool,
                WideBvh::Arrays& out);
+    /// For parts whose blocks are written where they stay, the top's apart, which has none: the
+    /// array of blocks is as long as they need. Not compact.
+    PartPlacer(const PartRoom& room, PartPool& pool, WideBvh::Arrays& out);
 
     /// The part that all others hang from; before all others.
     void set_top(std::unique_ptr<WidePart> top);
@@ -62,6 +75,8 @@ public:
     [[nodiscard]] std::unique_ptr<WidePart> take();
     /// Part k, from 0, is written. Any thread, each part once.
     void place(std::size_t k, std::unique_ptr<WidePart> part);
+    /// When all parts are placed: where the nodes of part k begin.
+    [[nodiscard]] std::size_t first_node(std::size_t k) const { return states_[k].bases.node; }
     /// When all parts are placed: the arrays are complete, and those figures that need no more than
     /// sums. Throws InputError for too many triangles.
     WideSums finish();
