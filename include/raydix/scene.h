@@ -66,6 +66,8 @@ enum class Usage : std::uint32_t {
 };
 
 struct SceneOptions {
+    /// A mesh's tree never has a higher SAH than a lower quality would give: `high` also builds the
+    /// tree of `balanced`, small meshes that of `fast`, and the cheaper one is kept.
     Quality quality = Quality::balanced;
     Usage usage = Usage::fixed;
     bool compact = false;  // the small layout (WideBvhOptions::compact); no effect in double

@@ -3,6 +3,7 @@
 #include <optional>
 #include <utility>
 
+#include "engine/build_by_quality.h"
 #include "engine/mesh_commit.h"
 #include "engine/part_tree.h"
 #include "engine/shape_commit.h"
@@ -21,10 +22,12 @@ constexpr double wild_error = 0x1p-12;
 /// Trees of triangles in float (mesh_commit.h).
 struct WideMaker {
     static void build(const MeshView& mesh, const SceneOptions& options, MeshTree& out) {
-        BuildOptions build = build_options_for(options.quality);
-        build.threads = options.threads;
-        WideBvh built;
-        WideBvhBuilder().build(mesh, build, built, {.compact = options.compact});
+        WideBvh built = build_by_quality(
+            options, mesh.triangles.size(),
+            [&](const BuildOptions& build) {
+                return build_wide_bvh(mesh, build, {.compact = options.compact});
+            },
+            [](const WideBvh& tree) { return tree.stats().sah; });
         out.sah_at_build = built.stats().sah;
         finish(std::move(built), out);
     }

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/build_by_quality.h"
 #include "engine/commit.h"
 #include "engine/mesh_commit.h"
 #include "engine/part_tree.h"
@@ -17,9 +18,10 @@ namespace {
 /// Trees of triangles in double (mesh_commit.h).
 struct WideMakerD {
     static void build(const MeshViewD& mesh, const SceneOptions& options, MeshTreeD& out) {
-        BuildOptions build = build_options_for(options.quality);
-        build.threads = options.threads;
-        out.tree = build_wide_tree(mesh, build);
+        out.tree = build_by_quality(
+            options, mesh.triangles.size(),
+            [&](const BuildOptions& build) { return build_wide_tree(mesh, build); },
+            [](const auto& tree) { return tree->arrays.stats.sah; });
         out.sah_at_build = out.tree->arrays.stats.sah;
     }
     static std::uint64_t left_out(const MeshTreeD& made) {

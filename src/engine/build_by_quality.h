@@ -1,0 +1,58 @@
+// A mesh's tree for a quality word. No builder is the best one for every mesh, so those of lower
+// qualities build too where they may be better: a better word never means a higher expected cost.
+#pragma once
+
+#include <raydix/bvh.h>
+#include <raydix/scene.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <optional>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "exec/parallel.h"
+#include "exec/progress.h"
+
+namespace raydix {
+
+/// Trees of so few triangles take so little time that all lower qualities are tried. In larger ones
+/// clustering has never cost more than the radix tree.
+inline constexpr std::size_t few_triangles = 1024;
+
+/// The tree of the least SAH among those that make(BuildOptions) gives for the quality asked for
+/// and lower ones; of equals that of the better word. sah_of(tree): in the engine's costs
+/// (wide_primitive_cost). All are built at once: what one leaves of the threads another takes.
+template <class Make, class SahOf>
+auto build_by_quality(const SceneOptions& options, std::size_t triangles, const Make& make,
+                      const SahOf& sah_of) {
+    std::vector<Quality> qualities{options.quality};
+    if (options.quality == Quality::high) qualities.push_back(Quality::balanced);
+    if (options.quality != Quality::fast && triangles <= few_triangles)
+        qualities.push_back(Quality::fast);
+    const auto build = [&](Quality quality) {
+        BuildOptions of_quality = build_options_for(quality);
+        of_quality.threads = options.threads;
+        return make(of_quality);
+    };
+    if (qualities.size() == 1) return build(options.quality);
+    using Tree = std::invoke_result_t<Make, const BuildOptions&>;
+    std::vector<std::optional<Tree>> trees(qualities.size());
+    // The best one takes the longest, and tells how far all are.
+    const ProgressSpan progress = progress_span();
+    with_threads(options.threads, [&] {
+        for_each_index(
+            trees.size(),
+            [&](std::size_t k) {
+                const ProgressStage stage(k == 0 ? progress : ProgressSpan{});
+                trees[k].emplace(build(qualities[k]));
+            },
+            1);
+    });
+    return std::move(**std::ranges::min_element(trees, {}, [&](const std::optional<Tree>& tree) {
+        return sah_of(*tree);
+    }));
+}
+
+}  // namespace raydix
