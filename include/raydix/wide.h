@@ -18,7 +18,8 @@ namespace raydix {
 struct WideBvhOptions {
     int width = 8;         // children a node at most: 4 or 8
     bool compact = false;  // true: corners are looked up in a list of vertices. Fewer bytes where
-                           // triangles share them, and somewhat slower rays (docs/performance.md)
+                           // triangles share them, and somewhat slower
+                           // rays (docs/performance/batches.md)
     int threads = 0;       // as in BuildOptions; the layout does not depend on it
 };
 

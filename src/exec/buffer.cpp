@@ -1,5 +1,5 @@
 // Memory of the library's arrays: aligned and counted. Huge pages are not asked for: on a virtual
-// machine their first touch cost more than they gave back (docs/performance.md).
+// machine their first touch cost more than they gave back (docs/performance/building.md).
 #include <raydix/buffer.h>
 
 #include <cstdlib>
