@@ -86,6 +86,16 @@ struct SceneOptions {
     std::function<void(double)> progress = {};
 };
 
+/// What a geometry of a scene is.
+enum class GeometryKind : std::uint32_t {
+    mesh = 0,
+    spheres = 1,
+    capsules = 2,
+    points = 3,  // with a radius
+    user = 4,    // boxes and a function of the caller's
+    instance = 5,
+};
+
 /// Options of one geometry.
 struct GeometryOptions {
     /// A ray sees the geometry if this mask & the ray's is not 0, and so for each instance on the
@@ -205,14 +215,19 @@ public:
     CommitReport commit(const SceneOptions& options = {});
     [[nodiscard]] bool committed() const;  // nothing changed since the last commit
 
-    /// Number of geometries. This call and the four below answer from the changes, those without a
+    /// Number of geometries. This call and the six below answer from the changes, those without a
     /// commit included.
     [[nodiscard]] std::uint32_t size() const;
     [[nodiscard]] bool contains(std::uint32_t id) const;
     [[nodiscard]] std::vector<std::uint32_t> ids() const;  // ascending
+    /// Throws InputError if there is no such geometry.
+    [[nodiscard]] GeometryKind kind(std::uint32_t id) const;
     /// The arrays of a mesh. They are valid until its next change. None for what is no mesh. Throws
     /// InputError if there is no such geometry.
     [[nodiscard]] std::optional<MeshView> mesh(std::uint32_t id) const;
+    /// Where an instance stands. None for what is no instance. Throws InputError if there is no
+    /// such geometry.
+    [[nodiscard]] std::optional<Transform> transform(std::uint32_t id) const;
     /// Throws InputError if there is no such geometry.
     [[nodiscard]] std::uint32_t mask(std::uint32_t id) const;
     /// The box around all triangles and shapes of the last commit; lo > hi if there are none.

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "build/bvh_builder_d.h"
+#include "build/bvh_builder_double.h"
 #include "build/bvh_builder_internals.h"
 #include "build/refit_checks.h"
 #include "exec/parallel.h"
@@ -18,7 +18,7 @@
 #include "exec/search.h"
 #include "measure/stopwatch.h"
 #include "primitives/double_sources.h"
-#include "tree/bvh_d_internals.h"
+#include "tree/bvh_double_internals.h"
 #include "tree/bvh_internals.h"
 #include "tree/median_center.h"
 

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "build/bvh_builder_d.h"
+#include "build/bvh_builder_double.h"
 #include "exec/parallel.h"
 #include "tree/bvh_internals.h"
 

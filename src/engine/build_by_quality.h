@@ -50,9 +50,8 @@ auto build_by_quality(const SceneOptions& options, std::size_t triangles, const 
             },
             1);
     });
-    return std::move(**std::ranges::min_element(trees, {}, [&](const std::optional<Tree>& tree) {
-        return sah_of(*tree);
-    }));
+    return std::move(**std::ranges::min_element(
+        trees, {}, [&](const std::optional<Tree>& tree) { return sah_of(*tree); }));
 }
 
 }  // namespace raydix

@@ -347,6 +347,20 @@ std::vector<std::uint32_t> BasicScene<Scalar>::ids() const {
 }
 
 template <class Scalar>
+GeometryKind BasicScene<Scalar>::kind(std::uint32_t id) const {
+    const auto& geometry = state_->at(id);
+    if (geometry.is_instance()) return GeometryKind::instance;
+    return geometry.shapes ? geometry_kind_of(*geometry.shapes) : GeometryKind::mesh;
+}
+
+template <class Scalar>
+auto BasicScene<Scalar>::transform(std::uint32_t id) const -> std::optional<Transform> {
+    const auto& geometry = state_->at(id);
+    if (!geometry.is_instance()) return {};
+    return geometry.transform;
+}
+
+template <class Scalar>
 auto BasicScene<Scalar>::mesh(std::uint32_t id) const -> std::optional<MeshView> {
     const auto& geometry = state_->at(id);
     if (!geometry.is_mesh()) return {};

@@ -40,6 +40,12 @@ template <class AnyShapes>
     return names[shapes.index()];
 }
 template <class AnyShapes>
+[[nodiscard]] GeometryKind geometry_kind_of(const AnyShapes& shapes) {
+    constexpr GeometryKind kinds[] = {GeometryKind::spheres, GeometryKind::capsules,
+                                      GeometryKind::points, GeometryKind::user};
+    return kinds[shapes.index()];
+}
+template <class AnyShapes>
 [[nodiscard]] std::size_t count_of(const AnyShapes& shapes) {
     return std::visit(
         [](const auto& all) -> std::size_t {

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "tree/bvh_d_internals.h"
+#include "tree/bvh_double_internals.h"
 #include "tree/bvh_internals.h"
 
 namespace raydix {

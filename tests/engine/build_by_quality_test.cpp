@@ -50,8 +50,8 @@ void expect_no_rise(const AnyMesh& mesh, const std::string& name, SceneOptions o
 Mesh odd_soup(std::uint64_t seed) {
     Random random(seed);
     Mesh mesh;
-    const auto count =
-        static_cast<std::uint32_t>(1 + std::ldexp(random.between(1, 2), static_cast<int>(seed % 10)));
+    const auto count = static_cast<std::uint32_t>(
+        1 + std::ldexp(random.between(1, 2), static_cast<int>(seed % 10)));
     const float size = std::pow(10.0f, random.between(-3, 0)),
                 longer = std::pow(10.0f, random.between(0, 3));
     const std::uint64_t shape = seed / 10 % 4;
@@ -85,8 +85,8 @@ TEST(BuildByQuality, CostNeverRisesOnOddSoups) {
         expect_no_rise(mesh, "soup " + std::to_string(seed));
         // What `high` alone would cost: there must be soups where that is more.
         BuildOptions alone = build_options_for(Quality::high);
-        other_builder += build_wide_bvh(mesh, alone).stats().sah >
-                         sah_of(mesh, {.quality = Quality::high});
+        other_builder +=
+            build_wide_bvh(mesh, alone).stats().sah > sah_of(mesh, {.quality = Quality::high});
     }
     EXPECT_GT(other_builder, seeds / 20);
 }

@@ -94,6 +94,23 @@ void tells_what_it_holds() {
     EXPECT_TRUE(scene.mesh(2)->triangles.empty());
     EXPECT_THROW(static_cast<void>(scene.mesh(1)), InputError);
     EXPECT_THROW(static_cast<void>(scene.mask(1)), InputError);
+
+    using Transform = typename AnyScene::Transform;
+    Transform placed;
+    placed.m[0][3] = 7;
+    scene.set_transform(0, placed);
+    EXPECT_EQ(scene.transform(0)->m[0][3], 7);
+    EXPECT_FALSE(scene.transform(2).has_value());
+    EXPECT_THROW(static_cast<void>(scene.transform(1)), InputError);
+    EXPECT_EQ(scene.kind(0), GeometryKind::instance);
+    EXPECT_EQ(scene.kind(2), GeometryKind::mesh);
+    EXPECT_THROW(static_cast<void>(scene.kind(1)), InputError);
+    const std::vector<typename AnyScene::Sphere> spheres(1);
+    const std::vector<typename AnyScene::Capsule> capsules(2);
+    const std::vector<typename AnyScene::Point> points(3);
+    EXPECT_EQ(scene.kind(scene.add(std::span(spheres))), GeometryKind::spheres);
+    EXPECT_EQ(scene.kind(scene.add(std::span(capsules))), GeometryKind::capsules);
+    EXPECT_EQ(scene.kind(scene.add(std::span(points), 1)), GeometryKind::points);
 }
 
 TEST(SceneChanges, TellsWhatItHolds) {
