@@ -142,11 +142,13 @@ void print_by_machine(const std::vector<SimulationRow>& rows) {
     for (const SimulationRow& row : rows) {
         if (!group.empty() && group.front().options.machine.name != row.options.machine.name) {
             print_simulation(group);
+            print_steps_to_scheduled(group);
             group.clear();
         }
         group.push_back(row);
     }
     print_simulation(group);
+    print_steps_to_scheduled(group);
 }
 
 class TraversalStudy {

@@ -47,6 +47,8 @@ struct SimulationRow {
 [[nodiscard]] Json simulation_json(const SimulationRow& row);
 [[nodiscard]] Json machine_model_json(const MachineModel& machine);
 void print_simulation(const std::vector<SimulationRow>& rows);
+/// Which part of the way from bound to scheduled is due to what, of rows over whole launches.
+void print_steps_to_scheduled(const std::vector<SimulationRow>& rows);
 /// A machine by name, or from a JSON file.
 [[nodiscard]] MachineModel machine_from(const std::string& name_or_file);
 /// Names separated by commas, or "all".

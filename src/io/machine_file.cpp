@@ -34,6 +34,9 @@ public:
         number("clock_ghz", m_.clock_ghz);
         number("lanes_per_clock", m_.lanes_per_clock);
         number("warp_issue_clocks", m_.warp_issue_clocks);
+        delay("read_clocks", m_.read_clocks);
+        delay("stack_read_clocks", m_.stack_read_clocks);
+        read_release();
         whole("resident_lanes", m_.resident_lanes);
         whole("block_lanes", m_.block_lanes);
         number("l1_transactions_per_clock", m_.l1_transactions_per_clock);
@@ -66,6 +69,28 @@ private:
         const double given = found->is_number() ? found->get<double>() : -1.0;
         if (!(given > 0 && given <= 1e15)) in_.fail(key, "not a number above 0");
         value = given;
+    }
+    /// A field that may be left out, base or not.
+    const json* find_optional(const char* key) {
+        known_.emplace_back(key);
+        const auto found = document_.find(key);
+        return found != document_.end() ? &*found : nullptr;
+    }
+    void delay(const char* key, double& value) {
+        const json* found = find_optional(key);
+        if (found == nullptr) return;
+        const double given = found->is_number() ? found->get<double>() : -1.0;
+        if (!(given >= 0 && given <= 1e9)) in_.fail(key, "not a number from 0 to 1e9");
+        value = given;
+    }
+    void read_release() {
+        const json* found = find_optional("block_release");
+        if (found == nullptr) return;
+        const std::string name = text(*found, "block_release");
+        const auto names = block_release_names();
+        const auto at = std::find(names.begin(), names.end(), name);
+        if (at == names.end()) in_.fail("block_release", "not own, in_order or together");
+        m_.block_release = static_cast<BlockRelease>(at - names.begin());
     }
     void whole(const char* key, std::uint32_t& value) {
         if (find(key) == nullptr) return;
