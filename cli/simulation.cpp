@@ -117,6 +117,7 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
                         .rays = std::string(ray_kind_name(kind)),
                         .options = run,
                         .sum = {},
+                        .builder = std::string(builder_name(input.bvh.options().builder)),
                         .sample = options.sample,
                         .seconds_per_ray = {}});
     }
@@ -140,6 +141,7 @@ std::vector<SimulationRow> simulate_rays(const SceneTree& input, const WarpTree&
                         .rays = name,
                         .options = run,
                         .sum = {},
+                        .builder = std::string(builder_name(input.bvh.options().builder)),
                         .seconds_per_ray = {}});
     add_unit(tree, {rays, 1.0}, runs, rows, common);
     return rows;
@@ -155,6 +157,7 @@ Json simulation_json(const SimulationRow& row) {
             {"rays", row.rays},
             {"mode", row.options.any_hit ? "any" : "closest"},
             {"machine", row.options.machine.name},
+            {"builder", row.builder},
             {"device", "sim"},
             {"simulated", true},
             {"width", row.options.width},
@@ -187,6 +190,7 @@ Json machine_model_json(const MachineModel& m) {
                          {"instructions", cost.instructions},
                          {"origin", cost.origin}});
         if (!cost.kernel.empty()) costs.back()["kernel"] = cost.kernel;
+        if (cost.most > 0) costs.back()["most"] = cost.most;
     }
     return {{"name", m.name},
             {"origin", m.origin},

@@ -18,6 +18,7 @@ struct SimulationRow {
     std::string rays;  // name of the kind, or a file
     SimulateOptions options;
     Simulation sum;
+    std::string builder = {};             // of the tree
     double sample = 1.0;                  // as asked for
     double part_taken = 1.0;              // of all rays
     bool whole_launches = true;           // else there is no launch to schedule

@@ -71,6 +71,7 @@ struct OperationCost {
     std::uint32_t instructions = 0;
     std::string origin;       // where the number comes from
     std::string kernel = {};  // empty: all kernels that have no cost of their own
+    std::uint32_t most = 0;   // upper end of its range if it was derived; 0: not known
 };
 
 /// When a block's place on a multiprocessor is free for another block.

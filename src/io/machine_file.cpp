@@ -123,9 +123,11 @@ private:
         if (!entry.is_object() || !entry.contains("operation") || !entry.contains("instructions"))
             in_.fail("costs", "an entry without \"operation\" or \"instructions\"");
         for (const auto& [key, value] : entry.items())
-            if (key != "operation" && key != "instructions" && key != "origin" && key != "kernel")
+            if (key != "operation" && key != "instructions" && key != "origin" && key != "kernel" &&
+                key != "most")
                 in_.fail("costs", fmt::format("{} is not a field of an entry", key));
         OperationCost cost = cost_of(text(entry["operation"], "costs"), entry["instructions"]);
+        if (entry.contains("most")) cost.most = cost_of(cost.operation, entry["most"]).instructions;
         if (entry.contains("origin")) cost.origin = text(entry["origin"], "origin");
         if (!entry.contains("kernel")) return cost;
         cost.kernel = text(entry["kernel"], "kernel");

@@ -97,13 +97,18 @@ TEST(Simulate, BothChildrenMeanOnePush) {
     expect_count(all[1], Op::pop, 1, 32);  // the packet's own stack, by all lanes
 }
 
+// Who fetches a ray depends on when its warp comes to the pool, and so on costs. Where one warp is
+// resident, it fetches all.
 TEST(Simulate, ADoubledCostMovesWhatUsesItOnly) {
     const Model scene = scene_of(random_soup(500, 3, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh()));
     const std::vector<Ray> rays = make_mixed_rays(scene, 640, 3);
     std::vector<SimulateOptions> runs;
-    for (const WarpKernel kernel : {WarpKernel::while_while, WarpKernel::persistent_packet})
+    for (const WarpKernel kernel : warp_kernels()) {
         runs.push_back(options_for(kernel));
+        runs.back().machine.multiprocessors = 1;
+        runs.back().machine.resident_lanes = runs.back().machine.block_lanes = 32;
+    }
     const auto before = simulate(tree, rays, runs);
     for (std::size_t op = 0; op < op_count; ++op) {
         auto changed = runs;
@@ -412,7 +417,10 @@ TEST(Simulate, RefusesWhatItCannotRun) {
     refuse("read_clocks", [](SimulateOptions& o) { o.machine.read_clocks = -1; });
     refuse("block_release", [](SimulateOptions& o) { o.machine.block_release = BlockRelease(7); });
     refuse("in flight", [](SimulateOptions& o) { o.machine.resident_lanes = 1u << 30; });
-    refuse("has no cost", [](SimulateOptions& o) { o.machine.costs.pop_back(); });
+    refuse("has no cost", [](SimulateOptions& o) {
+        std::erase_if(o.machine.costs,
+                      [](const OperationCost& cost) { return cost.operation == "visit_node"; });
+    });
     refuse("two costs", [](SimulateOptions& o) { o.machine.costs.push_back(o.machine.costs[0]); });
     refuse("no operation", [](SimulateOptions& o) { o.machine.costs[0].operation = "jump"; });
     EXPECT_THROW(static_cast<void>(machine_model("gtx1")), InputError);
