@@ -231,15 +231,17 @@ void expect_hits_of_the_oracle(const Model& scene, Builder builder, std::size_t 
         rays.size(), [&](std::size_t i) { expected[i] = oracle.closest(rays[i]); }, 64);
     const Bvh bvh = build_bvh(scene.mesh(), {.builder = builder, .max_leaf = 8});
     const WarpTree tree(bvh);
+    MachineModel machine = machine_model("gtx480");
+    machine.multiprocessors = 3;  // few warps, so that each fetches many times
+    machine.resident_lanes = 192;
+    machine.block_lanes = 64;
     std::vector<SimulateOptions> runs;
     for (const WarpKernel kernel : warp_kernels())
         for (const int width : widths)
             for (const bool any_hit : {false, true})
                 if (!any_hit || width == 32)
-                    runs.push_back({.kernel = kernel,
-                                    .machine = machine_model("gtx480"),
-                                    .width = width,
-                                    .any_hit = any_hit});
+                    runs.push_back(
+                        {.kernel = kernel, .machine = machine, .width = width, .any_hit = any_hit});
     std::size_t hits = 0;
     for (const TreeHit& hit : expected) hits += hit.hit();
     EXPECT_GT(hits, rays.size() / 4);
