@@ -19,7 +19,7 @@ MachineModel gtx285() {
         "30 multiprocessors of 8 lanes at 1.476 GHz, 159 GB/s: Aila and Laine 2009; 720 persistent "
         "warps, blocks of 192: their release; 22 clocks between dependent instructions, 400 to 600 "
         "for a read, with texture caches no less, and for local memory, which has no cache: CUDA C "
-        "Programming Guide 4.2 and Best Practices Guide 2.3; blocks that end in order: what the "
+        "Programming Guide 4.2 and Best Practices Guide; blocks that end in order: what the "
         "Fermi white paper says is new there; cache rates: estimates";
     m.multiprocessors = 30;
     m.clock_ghz = 1.476;
