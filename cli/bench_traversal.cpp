@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <raydix/error.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
@@ -26,6 +27,7 @@ struct TraversalBench {
     std::vector<std::string> machines{"gtx285", "gtx480", "gtx680"};
     std::string kernel = "all", rays = "all";
     double sweep_sample = 0.01;  // 0: no sweep
+    bool tree_of_machine = true;
     bool memory = false;
 };
 
@@ -51,6 +53,12 @@ std::vector<SimulateOptions> runs_of(const TraversalBench& options,
     return runs;
 }
 
+/// The trees that the authors had: of 2009 with early splits, of their addendum of 2012 with
+/// spatial splits (Stich et al. 2009).
+const char* builder_of(const MachineModel& machine) {
+    return machine.name == "gtx480" || machine.name == "gtx680" ? "sbvh" : "split";
+}
+
 std::string lower_case(std::string text) {
     for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     return text;
@@ -67,9 +75,35 @@ Json published_json(const std::string& scene) {
                             {"rays", ray_kind_name(kinds[k])},
                             {"machine", rates.machine},
                             {"mrays_per_s", rates.mrays_per_s[k]},
-                            {"other_edition", true}});
+                            {"other_edition", true},
+                            {"absolute", rates.scene == "sibenik"}});
     }
     return rows;
+}
+
+const SimulationRow* row_of(const Json& published, const std::vector<SimulationRow>& rows) {
+    const auto row = std::find_if(rows.begin(), rows.end(), [&](const SimulationRow& r) {
+        return warp_kernel_name(r.options.kernel) == published["kernel"].get<std::string>() &&
+               r.rays == published["rays"].get<std::string>() &&
+               r.scene == published["scene"].get<std::string>() &&
+               r.options.machine.name == published["machine"].get<std::string>();
+    });
+    return row == rows.end() ? nullptr : &*row;
+}
+
+/// Puts the bound beside each published rate: null where nothing was simulated.
+void judge_published(Json& published, const std::vector<SimulationRow>& rows) {
+    for (Json& p : published) {
+        const SimulationRow* row = row_of(p, rows);
+        const double bound = row == nullptr ? 0.0 : row->rates().bound;
+        p["mrays_per_s_bound"] = bound > 0 ? Json(bound) : Json(nullptr);
+        p["above_bound"] = bound > 0 ? Json(p["mrays_per_s"].get<double>() > bound) : Json(nullptr);
+    }
+}
+
+/// In red where a terminal shows it.
+std::string warning(const std::string& text) {
+    return isatty(STDOUT_FILENO) ? "\x1b[31m" + text + "\x1b[0m" : text;
 }
 
 void print_published(const Json& published, const std::vector<SimulationRow>& rows) {
@@ -78,22 +112,25 @@ void print_published(const Json& published, const std::vector<SimulationRow>& ro
         "\npublished Mrays/s of another edition of the scene, measured by the authors, beside our "
         "simulated bound\n{:<10} {:<36} {:<9} {:>9} {:>9} {:>7}\n",
         "machine", "kernel", "rays", "published", "bound", "part");
+    bool above = false;
     for (const Json& p : published) {
-        const auto row = std::find_if(rows.begin(), rows.end(), [&](const SimulationRow& r) {
-            return warp_kernel_name(r.options.kernel) == p["kernel"].get<std::string>() &&
-                   r.rays == p["rays"].get<std::string>() &&
-                   r.scene == p["scene"].get<std::string>() &&
-                   r.options.machine.name == p["machine"].get<std::string>();
-        });
+        const SimulationRow* row = row_of(p, rows);
         const double rate = p["mrays_per_s"].get<double>();
         fmt::print("{:<10} {:<36} {:<9} {:>9.1f}", p["machine"].get<std::string>(),
                    p["kernel"].get<std::string>(), p["rays"].get<std::string>(), rate);
-        if (row == rows.end())
+        if (row == nullptr || row->rates().bound <= 0) {
             fmt::print(" {:>9} {:>7}\n", "-", "-");
-        else
-            fmt::print(" {:>9.1f} {:>6.0f}%\n", row->rates().bound,
-                       100 * rate / row->rates().bound);
+            continue;
+        }
+        const double bound = row->rates().bound;
+        const std::string part = fmt::format(" {:>9.1f} {:>6.0f}%", bound, 100 * rate / bound);
+        fmt::print("{}\n", rate > bound ? warning(part + " above the bound") : part);
+        above = above || rate > bound;
     }
+    if (above)
+        fmt::print("{}\n",
+                   warning("above the bound: scene, tree or a cost of the model differs from "
+                           "the authors'"));
 }
 
 /// Efficiency and bound of every kernel over the width of a warp, with the costs of the first
@@ -142,11 +179,13 @@ void print_by_machine(const std::vector<SimulationRow>& rows) {
     for (const SimulationRow& row : rows) {
         if (!group.empty() && group.front().options.machine.name != row.options.machine.name) {
             print_simulation(group);
+            print_steps_to_scheduled(group);
             group.clear();
         }
         group.push_back(row);
     }
     print_simulation(group);
+    print_steps_to_scheduled(group);
 }
 
 class TraversalStudy {
@@ -170,6 +209,7 @@ public:
     void run() {
         for (const std::string& scene : options_.scenes) about(scene, [&] { study(scene); });
         document_["claims"] = traversal_claims(rows_);
+        judge_published(document_["published"], rows_);
         if (options_.common.prints_tables()) {
             print_published(document_["published"], rows_);
             print_claims(document_["claims"]);
@@ -181,31 +221,57 @@ public:
 private:
     void study(const std::string& name) {
         refuse_build_options(name, options_.tree);
-        const SceneTree input = load_scene_tree(name, options_.tree, options_.common);
+        std::vector<std::string> builders;
+        for (const SimulateOptions& run : runs_)
+            if (std::find(builders.begin(), builders.end(), tree_of(name, run.machine)) ==
+                builders.end())
+                builders.push_back(tree_of(name, run.machine));
+        for (const std::string& builder : builders) study(name, builder);
+        for (const Json& row : published_json(document_["scenes"].back()["name"]))
+            document_["published"].push_back(row);
+    }
+
+    /// The builder for a machine's rows; that of the command line if it names one, and of no
+    /// meaning for a tree from a file.
+    std::string tree_of(const std::string& scene, const MachineModel& machine) const {
+        return options_.tree_of_machine && !is_rdx(scene) ? builder_of(machine)
+                                                          : options_.tree.builder;
+    }
+
+    void study(const std::string& name, const std::string& builder) {
+        TreeOptions tree_options = options_.tree;
+        tree_options.builder = builder;
+        std::vector<SimulateOptions> runs;
+        for (const SimulateOptions& run : runs_)
+            if (tree_of(name, run.machine) == builder) runs.push_back(run);
+        const SceneTree input = load_scene_tree(name, tree_options, options_.common);
         const std::string& scene = input.scene.name;
         const std::vector<BuildMs> builds =
             is_rdx(name) ? std::vector<BuildMs>{} : std::vector{input.bvh.build_ms()};
-        const TreeStats stats =
-            tree_stats(input.bvh, stats_options(options_.tree, options_.common));
-        document_["scenes"].push_back(scene_json(input.scene));
+        const TreeStats stats = tree_stats(input.bvh, stats_options(tree_options, options_.common));
+        const Json scene_fields = scene_json(input.scene);
+        if (document_["scenes"].empty() || document_["scenes"].back() != scene_fields)
+            document_["scenes"].push_back(scene_fields);
         document_["builds"].push_back(build_json(input.bvh, stats, builds));
         const WarpTree tree(input.bvh);
         if (options_.common.prints_tables())
-            fmt::print("\n{}: {} triangles, {} nodes, SAH {:.1f}, depth {}\n", scene,
-                       grouped(input.scene.mesh().triangles.size()), grouped(stats.nodes),
+            fmt::print("\n{}: {} triangles, builder {}, {} nodes, SAH {:.1f}, depth {}\n", scene,
+                       grouped(input.scene.mesh().triangles.size()),
+                       builder_name(input.bvh.options().builder), grouped(stats.nodes),
                        stats.sah.value_or(0.0), stats.max_depth);
         const RayLaunches launches(options_.launches, input, options_.common);
         for (const RayKind kind : kinds_from(options_.rays)) {
             const std::vector<SimulationRow> rows = simulate_kind(
-                input, tree, launches, kind, runs_, options_.launches, options_.common);
+                input, tree, launches, kind, runs, options_.launches, options_.common);
             for (const SimulationRow& row : rows) {
                 document_["simulate"].push_back(simulation_json(row));
                 rows_.push_back(row);
             }
             if (options_.common.prints_tables()) print_by_machine(rows);
         }
-        for (const Json& row : published_json(scene)) document_["published"].push_back(row);
-        if (options_.sweep_sample <= 0) return;
+        // The sweep has the costs of the first machine, and its tree.
+        if (options_.sweep_sample <= 0 || runs.front().machine.name != machines_.front().name)
+            return;
         for (const Json& row : sweep_widths(options_, input, tree, machines_.front()))
             document_["width_sweep"].push_back(row);
     }
@@ -251,7 +317,9 @@ void add_traversal_suite(CLI::App& bench) {
     options->tree.max_leaf = 8;
     add_tree_options(*command, options->tree);
     add_common_options(*command, options->common);
-    command->callback([options] {
+    command->callback([options, command] {
+        options->tree_of_machine = command->get_option("--builder")->count() == 0 &&
+                                   command->get_option("--quality")->count() == 0;
         refuse_device(options->tree);
         TraversalStudy(*options).run();
     });

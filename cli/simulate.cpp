@@ -66,7 +66,10 @@ void run_simulate(const SimulateCommand& options) {
         const auto hand_out = [&](const std::vector<SimulationRow>& rows) {
             for (const SimulationRow& row : rows)
                 document["simulate"].push_back(simulation_json(row));
-            if (options.common.prints_tables()) print_simulation(rows);
+            if (options.common.prints_tables()) {
+                print_simulation(rows);
+                print_steps_to_scheduled(rows);
+            }
         };
         if (from_file)
             return hand_out(simulate_rays(input, tree, load_rays(options.rays), options.rays, runs,

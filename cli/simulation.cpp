@@ -117,6 +117,7 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
                         .rays = std::string(ray_kind_name(kind)),
                         .options = run,
                         .sum = {},
+                        .builder = std::string(builder_name(input.bvh.options().builder)),
                         .sample = options.sample,
                         .seconds_per_ray = {}});
     }
@@ -140,6 +141,7 @@ std::vector<SimulationRow> simulate_rays(const SceneTree& input, const WarpTree&
                         .rays = name,
                         .options = run,
                         .sum = {},
+                        .builder = std::string(builder_name(input.bvh.options().builder)),
                         .seconds_per_ray = {}});
     add_unit(tree, {rays, 1.0}, runs, rows, common);
     return rows;
@@ -155,6 +157,7 @@ Json simulation_json(const SimulationRow& row) {
             {"rays", row.rays},
             {"mode", row.options.any_hit ? "any" : "closest"},
             {"machine", row.options.machine.name},
+            {"builder", row.builder},
             {"device", "sim"},
             {"simulated", true},
             {"width", row.options.width},
@@ -164,6 +167,8 @@ Json simulation_json(const SimulationRow& row) {
             {"different_hits", row.different_hits},
             {"mrays_per_s_bound", or_null(any, rates.bound)},
             {"mrays_per_s_scheduled", or_null(any && row.whole_launches, rates.scheduled)},
+            {"mrays_per_s_single_warps", or_null(any && row.whole_launches, rates.single_warps)},
+            {"mrays_per_s_free_blocks", or_null(any && row.whole_launches, rates.free_blocks)},
             {"mrays_per_s_memory", or_null(any && row.options.memory, rates.memory)},
             {"simd_efficiency", or_null(any, rates.simd_efficiency)},
             {"issues_per_ray", or_null(any, static_cast<double>(row.sum.instructions) / rays)},
@@ -185,6 +190,7 @@ Json machine_model_json(const MachineModel& m) {
                          {"instructions", cost.instructions},
                          {"origin", cost.origin}});
         if (!cost.kernel.empty()) costs.back()["kernel"] = cost.kernel;
+        if (cost.most > 0) costs.back()["most"] = cost.most;
     }
     return {{"name", m.name},
             {"origin", m.origin},
@@ -192,8 +198,11 @@ Json machine_model_json(const MachineModel& m) {
             {"clock_ghz", m.clock_ghz},
             {"lanes_per_clock", m.lanes_per_clock},
             {"warp_issue_clocks", m.warp_issue_clocks},
+            {"read_clocks", m.read_clocks},
+            {"stack_read_clocks", m.stack_read_clocks},
             {"resident_lanes", m.resident_lanes},
             {"block_lanes", m.block_lanes},
+            {"block_release", block_release_name(m.block_release)},
             {"l1_transactions_per_clock", m.l1_transactions_per_clock},
             {"l1_bytes", m.l1_bytes},
             {"l2_gb_per_s", m.l2_gb_per_s},
@@ -231,6 +240,26 @@ void print_simulation(const std::vector<SimulationRow>& rows) {
         if (row.different_hits > 0)
             fmt::print("    {} hits differ from the scalar reference's\n",
                        grouped(row.different_hits));
+    }
+}
+
+void print_steps_to_scheduled(const std::vector<SimulationRow>& rows) {
+    bool first = true;
+    for (const SimulationRow& row : rows) {
+        const SimulatedRates rates = row.rates();
+        if (row.sum.instructions == 0 || !row.whole_launches) continue;
+        if (first)
+            fmt::print(
+                "what takes {} from bound to scheduled, each on top of those before it\n{:<36} "
+                "{:>16} {:>13} {:>17}\n",
+                rows.front().options.machine.name, "kernel", "latency and tail", "whole blocks",
+                "order of release");
+        first = false;
+        fmt::print("{:<36} {:>15.1f}% {:>12.1f}% {:>16.1f}%\n",
+                   warp_kernel_name(row.options.kernel),
+                   100 * (rates.single_warps / rates.bound - 1),
+                   100 * (rates.free_blocks / rates.single_warps - 1),
+                   100 * (rates.scheduled / rates.free_blocks - 1));
     }
 }
 

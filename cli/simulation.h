@@ -18,6 +18,7 @@ struct SimulationRow {
     std::string rays;  // name of the kind, or a file
     SimulateOptions options;
     Simulation sum;
+    std::string builder = {};             // of the tree
     double sample = 1.0;                  // as asked for
     double part_taken = 1.0;              // of all rays
     bool whole_launches = true;           // else there is no launch to schedule
@@ -47,6 +48,8 @@ struct SimulationRow {
 [[nodiscard]] Json simulation_json(const SimulationRow& row);
 [[nodiscard]] Json machine_model_json(const MachineModel& machine);
 void print_simulation(const std::vector<SimulationRow>& rows);
+/// Which part of the way from bound to scheduled is due to what, of rows over whole launches.
+void print_steps_to_scheduled(const std::vector<SimulationRow>& rows);
 /// A machine by name, or from a JSON file.
 [[nodiscard]] MachineModel machine_from(const std::string& name_or_file);
 /// Names separated by commas, or "all".

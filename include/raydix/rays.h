@@ -31,9 +31,10 @@ struct SecondaryOptions {
     float ao_radius = 0.0f;  // tmax of ao rays; 0: 5 % of the box diagonal
     std::uint64_t seed = 1;  // of the per-pixel rotations
     // true: rays are sorted by a 6-D Morton key, one bit each of origin x y z and direction x y z a
-    // level, from the highest on. Origins are scaled to 2^24 in the box of all end points, the far
-    // ends included where tmax is finite; directions are scaled to 2^21. false: rays follow the
-    // hits, `samples` in a row. diffuse_shuffled rays are permuted by `seed` in any case.
+    // level, from the highest on. Origins are scaled to 2^24 in the box of all end points;
+    // directions are scaled to 2^21. Diffuse rays end for that at 1.5 times the largest side of the
+    // scene's box, as in Aila and Laine's release. false: rays follow the hits, `samples` in a row.
+    // diffuse_shuffled rays are permuted by `seed` in any case.
     bool sorted = true;
     int threads = 0;  // 0 to 1,024; 0: all the machine has
 };

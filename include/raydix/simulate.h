@@ -71,7 +71,17 @@ struct OperationCost {
     std::uint32_t instructions = 0;
     std::string origin;       // where the number comes from
     std::string kernel = {};  // empty: all kernels that have no cost of their own
+    std::uint32_t most = 0;   // upper end of its range if it was derived; 0: not known
 };
+
+/// When a block's place on a multiprocessor is free for another block.
+enum class BlockRelease : std::uint32_t {
+    own,       // when the block is done
+    in_order,  // when the block and all that were started before it are done
+    together,  // when all blocks on the machine are done
+};
+[[nodiscard]] std::span<const std::string_view> block_release_names();
+[[nodiscard]] std::string_view block_release_name(BlockRelease release);
 
 /// A SIMT machine. Rates are per clock and multiprocessor.
 struct MachineModel {
@@ -81,8 +91,11 @@ struct MachineModel {
     double clock_ghz = 1.0;
     double lanes_per_clock = 32;          // lane instructions issued; a warp of 32 takes 32 of them
     double warp_issue_clocks = 1;         // least clocks between two instructions of one warp
+    double read_clocks = 0;               // that a warp waits for a node, a triangle or a ray
+    double stack_read_clocks = 0;         // and for the stack of a thread, in local memory
     std::uint32_t resident_lanes = 1024;  // in flight
-    std::uint32_t block_lanes = 128;      // of one block. Its place is free when all are done
+    std::uint32_t block_lanes = 128;      // of one block
+    BlockRelease block_release = BlockRelease::own;
     // The memory model: a transaction brings up to 16 bytes a lane from one 128-byte line.
     double l1_transactions_per_clock = 1;
     double l2_gb_per_s = 100, dram_gb_per_s = 100;
@@ -125,6 +138,8 @@ struct Simulation {
     std::uint64_t instructions = 0;       // issued, once for all lanes of a warp
     std::uint64_t lane_instructions = 0;  // of which active lanes made use
     double scheduled_clocks = 0;          // launches one after the other, with their tails
+    double single_warp_clocks = 0;        // the same if warps went out one by one, not by blocks
+    double free_block_clocks = 0;         // the same if a place were free when its block is done
     double idle_issues = 0;               // issue slots lost after the last ray or block was taken
     double issue_slots = 0;               // of all clocks of all launches
     // Times of warps in instructions: of a batch or, where rays are replaced, of a warp's whole
@@ -139,7 +154,10 @@ struct Simulation {
 struct SimulatedRates {
     double bound = 0;      // the issue limit alone (docs/contract.md 7)
     double scheduled = 0;  // with the distribution of work and the tails of launches
-    double memory = 0;     // the lower of `bound` and the memory limits; 0 without the memory model
+    // The steps from `bound` to `scheduled`; equal to it where warps are persistent.
+    double single_warps = 0;  // latency and tail: warps go out one by one
+    double free_blocks = 0;   // then by whole blocks, to places that are free when a block is done
+    double memory = 0;  // the lower of `bound` and the memory limits; 0 without the memory model
     double simd_efficiency = 0;
 };
 [[nodiscard]] SimulatedRates simulated_rates(const Simulation& simulation,

@@ -3,6 +3,7 @@
 #include <raydix/error.h>
 #include <raydix/rays.h>
 
+#include <algorithm>
 #include <string>
 
 #include "base/double3.h"
@@ -15,6 +16,14 @@ namespace raydix {
 namespace {
 
 constexpr int max_samples = 1024;
+
+/// Where diffuse rays end as far as their order is concerned: Aila and Laine's release has a camera
+/// whose far plane lies at 1.5 times the largest side of the scene's box, and diffuse rays of that
+/// length.
+float far_of(const Aabb& bounds) {
+    const Vec3 size = bounds.hi - bounds.lo;
+    return 1.5f * std::max({size.x, size.y, size.z});
+}
 
 void check_arguments(std::span<const Ray> rays, std::span<const Hit> hits,
                      std::span<const std::uint32_t> pixels, const SecondaryOptions& options) {
@@ -55,7 +64,7 @@ std::vector<Ray> make_rays(const Surface& surface, std::span<const Ray> rays,
     if (options.kind == RayKind::diffuse_shuffled) {
         shuffle_rays(secondary, options.seed);
     } else if (options.sorted) {
-        sort_rays(secondary);
+        sort_rays(secondary, far_of(surface.bounds()));
     }
     return secondary;
 }

@@ -34,6 +34,9 @@ public:
         number("clock_ghz", m_.clock_ghz);
         number("lanes_per_clock", m_.lanes_per_clock);
         number("warp_issue_clocks", m_.warp_issue_clocks);
+        delay("read_clocks", m_.read_clocks);
+        delay("stack_read_clocks", m_.stack_read_clocks);
+        read_release();
         whole("resident_lanes", m_.resident_lanes);
         whole("block_lanes", m_.block_lanes);
         number("l1_transactions_per_clock", m_.l1_transactions_per_clock);
@@ -67,6 +70,28 @@ private:
         if (!(given > 0 && given <= 1e15)) in_.fail(key, "not a number above 0");
         value = given;
     }
+    /// A field that may be left out, base or not.
+    const json* find_optional(const char* key) {
+        known_.emplace_back(key);
+        const auto found = document_.find(key);
+        return found != document_.end() ? &*found : nullptr;
+    }
+    void delay(const char* key, double& value) {
+        const json* found = find_optional(key);
+        if (found == nullptr) return;
+        const double given = found->is_number() ? found->get<double>() : -1.0;
+        if (!(given >= 0 && given <= 1e9)) in_.fail(key, "not a number from 0 to 1e9");
+        value = given;
+    }
+    void read_release() {
+        const json* found = find_optional("block_release");
+        if (found == nullptr) return;
+        const std::string name = text(*found, "block_release");
+        const auto names = block_release_names();
+        const auto at = std::find(names.begin(), names.end(), name);
+        if (at == names.end()) in_.fail("block_release", "not own, in_order or together");
+        m_.block_release = static_cast<BlockRelease>(at - names.begin());
+    }
     void whole(const char* key, std::uint32_t& value) {
         if (find(key) == nullptr) return;
         const std::uint64_t given = find_whole(in_, document_, key, "machine").value();
@@ -98,9 +123,11 @@ private:
         if (!entry.is_object() || !entry.contains("operation") || !entry.contains("instructions"))
             in_.fail("costs", "an entry without \"operation\" or \"instructions\"");
         for (const auto& [key, value] : entry.items())
-            if (key != "operation" && key != "instructions" && key != "origin" && key != "kernel")
+            if (key != "operation" && key != "instructions" && key != "origin" && key != "kernel" &&
+                key != "most")
                 in_.fail("costs", fmt::format("{} is not a field of an entry", key));
         OperationCost cost = cost_of(text(entry["operation"], "costs"), entry["instructions"]);
+        if (entry.contains("most")) cost.most = cost_of(cost.operation, entry["most"]).instructions;
         if (entry.contains("origin")) cost.origin = text(entry["origin"], "origin");
         if (!entry.contains("kernel")) return cost;
         cost.kernel = text(entry["kernel"], "kernel");

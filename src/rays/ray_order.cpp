@@ -73,12 +73,12 @@ void reorder(std::vector<Ray>& rays, const KeyOf& key_of) {
 
 }  // namespace
 
-Aabb end_point_box(std::span<const Ray> rays) {
+Aabb end_point_box(std::span<const Ray> rays, float far) {
     std::vector<Aabb> boxes((rays.size() + block_size - 1) / block_size);
     for_each_block(rays.size(), block_size, [&](std::size_t b, std::size_t begin, std::size_t end) {
         Aabb box = empty_box();
         for (const Ray& ray : rays.subspan(begin, end - begin)) {
-            for (const float t : {ray.tmin, ray.tmax}) {
+            for (const float t : {ray.tmin, ray.tmax == infinity ? far : ray.tmax}) {
                 const Double3 point = Double3(ray.origin) + Double3(ray.direction) * t;
                 if (!is_finite(point)) continue;
                 const Vec3 rounded = point.rounded();
@@ -113,8 +113,8 @@ RayKey ray_key(const Ray& ray, const Aabb& box) {
     return key;
 }
 
-void sort_rays(std::vector<Ray>& rays) {
-    const Aabb box = end_point_box(rays);
+void sort_rays(std::vector<Ray>& rays, float far) {
+    const Aabb box = end_point_box(rays, far);
     reorder<RayKey>(rays, [&](std::size_t i) { return ray_key(rays[i], box); });
 }
 

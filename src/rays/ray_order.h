@@ -23,16 +23,17 @@ struct RayKey {
 };
 
 /// The box of all end points: origin + tmin * direction and origin + tmax * direction, where
-/// finite.
-[[nodiscard]] Aabb end_point_box(std::span<const Ray> rays);
+/// finite. Rays whose tmax is infinite end at `far`.
+[[nodiscard]] Aabb end_point_box(std::span<const Ray> rays, float far);
 
 /// Origin: floor((o - lo) / (hi - lo) * 2^24) per axis, clamped to [0, 2^24 - 1]; an axis without
 /// extent gives 0. Direction: floor((d / |d| * 0.5 + 0.5) * 2^21) per axis, clamped to [0, 2^21 -
 /// 1].
 [[nodiscard]] RayKey ray_key(const Ray& ray, const Aabb& box);
 
-/// Sorts by (ray_key in the rays' own end-point box, position).
-void sort_rays(std::vector<Ray>& rays);
+/// Sorts by (ray_key in the rays' own end-point box, position). The farther the rays reach beyond
+/// their origins, the fewer levels of the key are spent on origins before directions come in.
+void sort_rays(std::vector<Ray>& rays, float far);
 
 /// Puts the rays in the order of (hash_of(seed, position), position): a permutation that looks
 /// random.

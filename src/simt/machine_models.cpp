@@ -17,12 +17,17 @@ MachineModel gtx285() {
     m.name = "gtx285";
     m.origin =
         "30 multiprocessors of 8 lanes at 1.476 GHz, 159 GB/s: Aila and Laine 2009; 720 persistent "
-        "warps, blocks of 192: their release; 24 clocks between dependent instructions, caches: "
-        "estimates";
+        "warps, blocks of 192: their release; 22 clocks between dependent instructions, 400 to 600 "
+        "for a read, with texture caches no less, and for local memory, which has no cache: CUDA C "
+        "Programming Guide 4.2 and Best Practices Guide; blocks that end in order: what the "
+        "Fermi white paper says is new there; cache rates: estimates";
     m.multiprocessors = 30;
     m.clock_ghz = 1.476;
     m.lanes_per_clock = 8;
-    m.warp_issue_clocks = 24;
+    m.warp_issue_clocks = 22;
+    m.read_clocks = 500;
+    m.stack_read_clocks = 500;
+    m.block_release = BlockRelease::in_order;
     m.resident_lanes = 768;
     m.block_lanes = 192;
     m.l1_transactions_per_clock = 0.25;
@@ -47,12 +52,14 @@ MachineModel gtx480() {
     m.name = "gtx480";
     m.origin =
         "15 multiprocessors of 32 lanes at 1.401 GHz, 177 GB/s: Karras 2012; blocks of 128: Aila "
-        "and Laine's release; 8 blocks in flight: Fermi's limit; 18 clocks between dependent "
-        "instructions, caches: estimates";
+        "and Laine's release; 8 blocks in flight: Fermi's limit; 22 clocks between dependent "
+        "instructions: CUDA C Programming Guide 4.2; blocks that end out of order: Fermi white "
+        "paper; 300 clocks for a read, caches: estimates";
     m.multiprocessors = 15;
     m.clock_ghz = 1.401;
     m.lanes_per_clock = 32;
-    m.warp_issue_clocks = 18;
+    m.warp_issue_clocks = 22;
+    m.read_clocks = 300;
     m.resident_lanes = 1024;
     m.block_lanes = 128;
     m.l1_transactions_per_clock = 0.5;
@@ -69,12 +76,14 @@ MachineModel gtx680() {
     m.name = "gtx680";
     m.origin =
         "8 multiprocessors of 192 lanes at 1.006 GHz: the maker's figures; all lanes busy, which "
-        "takes dual issue on each clock; 192 GB/s; 2048 lanes in flight: Kepler's limit; 9 clocks "
-        "between dependent instructions, caches: estimates";
+        "takes dual issue on each clock; 192 GB/s; 2048 lanes in flight: Kepler's limit; 11 "
+        "clocks between dependent instructions, 200 to 400 for a read: CUDA C Programming Guide "
+        "4.2; caches: estimates";
     m.multiprocessors = 8;
     m.clock_ghz = 1.006;
     m.lanes_per_clock = 192;
-    m.warp_issue_clocks = 9;
+    m.warp_issue_clocks = 11;
+    m.read_clocks = 300;
     m.resident_lanes = 2048;
     m.block_lanes = 128;
     m.l1_transactions_per_clock = 1;
@@ -93,11 +102,12 @@ MachineModel h200() {
         "132 multiprocessors of 128 lanes at 1.98 GHz, 4.8 TB/s, 50 MB of L2, up to 256 KB of L1: "
         "the maker's figures; 1536 lanes in flight: 40 registers a thread, blocks of 128; integer "
         "instructions, which run at half the rate, count as full ones; 4 clocks between dependent "
-        "instructions, cache rates: estimates";
+        "instructions, 33 for a read, cache rates: estimates";
     m.multiprocessors = 132;
     m.clock_ghz = 1.98;
     m.lanes_per_clock = 128;
     m.warp_issue_clocks = 4;
+    m.read_clocks = 33;
     m.resident_lanes = 1536;
     m.block_lanes = 128;
     m.l1_transactions_per_clock = 1;

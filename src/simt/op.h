@@ -49,4 +49,14 @@ inline constexpr std::array<std::string_view, op_count> op_names{
 /// Native instructions of one issue of each operation.
 using OpCosts = std::array<std::uint32_t, op_count>;
 
+/// Clocks of one issue of each operation, of a warp that has a multiprocessor to itself.
+using OpClocks = std::array<double, op_count>;
+
+/// Whether an operation begins with a read from memory that the rest of it waits for. The id of a
+/// triangle does not count: it can be read together with the triangle.
+[[nodiscard]] constexpr bool waits_for_read(Op op) {
+    return op == Op::visit_node || op == Op::test_triangle || op == Op::test_edges ||
+           op == Op::start_ray || op == Op::take_rays;
+}
+
 }  // namespace raydix

@@ -35,6 +35,7 @@ protected:
 struct WarpTally {
     OpCounts counts{};
     std::uint64_t issued = 0;  // native instructions, once for all lanes of a warp
+    double alone_clocks = 0;   // that they take if nobody else runs
 };
 
 /// `Isa` marks code that was compiled for certain processors, so that no two versions of it share a
@@ -46,8 +47,9 @@ class SimulatedWarp {
 public:
     std::array<Lane, Width> lanes{};
     WarpMemory<Lane> memory{};
-    WarpTally* tally = nullptr;      // of this warp, or of several that run one after the other
-    const OpCosts* costs = nullptr;  // null: nothing is issued, only counted
+    WarpTally* tally = nullptr;        // of this warp, or of several that run one after the other
+    const OpCosts* costs = nullptr;    // null: nothing is issued, only counted
+    const OpClocks* clocks = nullptr;  // null: no time is kept
     ReadObserver* observer = nullptr;
 
     [[nodiscard]] static constexpr std::uint32_t width() { return Width; }
@@ -171,6 +173,7 @@ private:
         ++count.issues;
         count.lanes += static_cast<std::uint64_t>(std::popcount(active_));
         if (costs != nullptr) tally->issued += (*costs)[static_cast<std::size_t>(op)];
+        if (clocks != nullptr) tally->alone_clocks += (*clocks)[static_cast<std::size_t>(op)];
     }
 
     LaneMask active_ = ~LaneMask{0} >> (64 - Width);

@@ -18,8 +18,17 @@
 
 namespace raydix {
 
+// RAYDIX_LANES_IN_STEP: the lanes of a warp go in step, as they did before Volta, so that nobody
+// keeps account of members. Only to count instructions for machines of that time
+// (scripts/sass_costs): such code would not run right on today's devices.
+#if defined(RAYDIX_LANES_IN_STEP)
+inline constexpr bool lanes_in_step = true;
+using LaneMask = std::uint32_t;
+#else
+inline constexpr bool lanes_in_step = false;
 /// A set of lanes: bit k is lane k.
 using LaneMask = std::uint64_t;
+#endif
 
 #if defined(__CUDACC__)
 inline constexpr std::uint32_t device_warp_width = 32;
@@ -125,6 +134,13 @@ public:
     /// for all.
     template <class Cond, class Body, class Stay>
     RAYDIX_HD void voting_loop(Op, Cond cond, Body body, Stay stay) {
+        if constexpr (lanes_in_step) {
+            while (cond(lane)) {
+                body();
+                if (!stay()) break;
+            }
+            return;
+        }
         const LaneMask entered = members_;
         while (true) {
             const bool in = cond(lane);
@@ -173,7 +189,7 @@ public:
     RAYDIX_HD void among(LaneMask mask, Body body) {
         const LaneMask entered = members_;
         if ((mask >> lane_id() & 1) != 0) {
-            members_ = entered & mask;
+            if (!lanes_in_step) members_ = entered & mask;
             body();
         }
         members_ = entered;
@@ -187,7 +203,9 @@ public:
         meet();
     }
     /// Members see what each of them wrote to shared memory.
-    RAYDIX_HD void meet() const { hardware.meet(members_); }
+    RAYDIX_HD void meet() const {
+        if (!lanes_in_step) hardware.meet(members_);
+    }
 
 private:
     RAYDIX_HD std::uint32_t first_member() const {
@@ -197,7 +215,7 @@ private:
         return static_cast<std::uint32_t>(std::countr_zero(members_));
 #endif
     }
-    LaneMask members_ = ~LaneMask{0} >> (64 - width());
+    LaneMask members_ = ~LaneMask{0} >> (8 * sizeof(LaneMask) - width());
 };
 
 }  // namespace raydix

@@ -68,11 +68,12 @@ std::vector<float> identities(const std::vector<Ray>& rays) {
 TEST(EndPointBox, HoldsBothEndsWhereTheyAreFinite) {
     const std::vector<Ray> rays{{{0, 0, 0}, 0.0f, {1, 2, 0}, 3.0f},
                                 {{-1, 0, 5}, 0.0f, {0, 0, 1}, infinity}};
-    const Aabb box = end_point_box(rays);
+    const Aabb box = end_point_box(rays, infinity);
     EXPECT_EQ(box.lo.x, -1.0f);
     EXPECT_EQ(box.hi.x, 3.0f);
     EXPECT_EQ(box.hi.y, 6.0f);
     EXPECT_EQ(box.hi.z, 5.0f);
+    EXPECT_EQ(end_point_box(rays, 7.0f).hi.z, 12.0f);
 }
 
 TEST(RayKey, BitsByHand) {
@@ -95,7 +96,7 @@ TEST(RayKey, BitsByHand) {
 
 TEST(RayKey, EqualsItsDefinition) {
     const auto rays = random_rays(2000, 4.0f);
-    const Aabb box = end_point_box(rays);
+    const Aabb box = end_point_box(rays, infinity);
     for (const Ray& ray : rays) ASSERT_EQ(text_of(ray_key(ray, box)), reference_key(ray, box));
 }
 
@@ -111,8 +112,8 @@ TEST(RayKey, TakesAnyRay) {
 TEST(SortRays, AscendingKeysOfTheSameRays) {
     const std::size_t count = 150000;  // several blocks and an odd number of merges
     auto rays = random_rays(count, infinity);
-    const Aabb box = end_point_box(rays);
-    sort_rays(rays);
+    const Aabb box = end_point_box(rays, infinity);
+    sort_rays(rays, infinity);
     for (std::size_t i = 1; i < count; ++i)
         ASSERT_LE(ray_key(rays[i - 1], box), ray_key(rays[i], box)) << i;
     auto ids = identities(rays);
@@ -123,7 +124,7 @@ TEST(SortRays, AscendingKeysOfTheSameRays) {
 TEST(SortRays, EqualKeysKeepTheirOrder) {
     std::vector<Ray> rays(100000, Ray{{1, 1, 1}, 0.0f, {0, 1, 0}, 1.0f});
     for (std::size_t i = 0; i < rays.size(); ++i) rays[i].tmax = static_cast<float>(i) * 1e-9f;
-    sort_rays(rays);
+    sort_rays(rays, infinity);
     for (std::size_t i = 1; i < rays.size(); ++i) ASSERT_LT(rays[i - 1].tmax, rays[i].tmax);
 }
 
@@ -133,7 +134,7 @@ TEST(RayOrder, IsTheSameForEveryThreadCount) {
     for (int k = 0; k < 3; ++k)
         with_threads(threads[k], [&] {
             sorted[k] = shuffled[k] = random_rays(100000, 1.0f);
-            sort_rays(sorted[k]);
+            sort_rays(sorted[k], infinity);
             shuffle_rays(shuffled[k], 5);
         });
     for (int k = 1; k < 3; ++k) {
@@ -159,11 +160,11 @@ TEST(ShuffleRays, IsAPermutationThatDependsOnTheSeed) {
 
 TEST(RayOrder, NoneAndOne) {
     std::vector<Ray> rays;
-    sort_rays(rays);
+    sort_rays(rays, infinity);
     shuffle_rays(rays, 1);
     EXPECT_TRUE(rays.empty());
     rays = random_rays(1, 1.0f);
-    sort_rays(rays);
+    sort_rays(rays, infinity);
     EXPECT_EQ(rays.size(), 1u);
 }
 

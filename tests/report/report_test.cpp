@@ -133,6 +133,13 @@ TEST(MakeReport, AMeasuredRateAboveItsBoundIsAnAlarm) {
     EXPECT_TRUE(holds(page_of({document}), "the model is wrong there"));
 }
 
+TEST(MakeReport, APublishedRateAboveItsBoundIsAnAlarm) {
+    Json document = Json::parse(shared_document("traversal.json"));
+    EXPECT_FALSE(holds(page_of({document}), "differ from the authors' there"));
+    document["published"][0]["mrays_per_s"] = 600.0;  // the bound is 584.7
+    EXPECT_TRUE(holds(page_of({document}), "differ from the authors' there"));
+}
+
 TEST(MakeReport, UnknownDocumentsAreTables) {
     const std::string html = page_of({Json::parse(R"({"command": "bench unheard-of", "answer": 42,
         "deep": {"a": {"b": {"c": {"d": {"e": {"f": 1}}}}}}, "rows": [{"x": 1, "y": {"z": "text"}}, {"x": null}],

@@ -78,8 +78,8 @@ TEST(Simulate, CountsOfWhileWhileByPencil) {
     // 15 multiprocessors issue one instruction a clock at 1.401 GHz.
     EXPECT_NEAR(rates.bound, 32 / (double(instructions) / (15 * 1401.0)), 1e-9);
     EXPECT_NEAR(rates.simd_efficiency, double(lanes) / (double(instructions) * 32), 1e-12);
-    // One warp alone issues every 18 clocks.
-    EXPECT_NEAR(s.scheduled_clocks, double(instructions) * 18, 1e-6);
+    // One warp alone issues every 22 clocks and waits for its ray, a node and a triangle twice.
+    EXPECT_NEAR(s.scheduled_clocks, double(instructions) * 22 + 4 * 300, 1e-6);
 }
 
 TEST(Simulate, BothChildrenMeanOnePush) {
@@ -97,13 +97,18 @@ TEST(Simulate, BothChildrenMeanOnePush) {
     expect_count(all[1], Op::pop, 1, 32);  // the packet's own stack, by all lanes
 }
 
+// Who fetches a ray depends on when its warp comes to the pool, and so on costs. Where one warp is
+// resident, it fetches all.
 TEST(Simulate, ADoubledCostMovesWhatUsesItOnly) {
     const Model scene = scene_of(random_soup(500, 3, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh()));
     const std::vector<Ray> rays = make_mixed_rays(scene, 640, 3);
     std::vector<SimulateOptions> runs;
-    for (const WarpKernel kernel : {WarpKernel::while_while, WarpKernel::persistent_packet})
+    for (const WarpKernel kernel : warp_kernels()) {
         runs.push_back(options_for(kernel));
+        runs.back().machine.multiprocessors = 1;
+        runs.back().machine.resident_lanes = runs.back().machine.block_lanes = 32;
+    }
     const auto before = simulate(tree, rays, runs);
     for (std::size_t op = 0; op < op_count; ++op) {
         auto changed = runs;
@@ -153,6 +158,7 @@ TEST(Simulate, ABlockKeepsItsPlaceUntilItsLastWarpIsDone) {
     options.machine.multiprocessors = 1;
     options.machine.lanes_per_clock = 32;
     options.machine.warp_issue_clocks = 2;  // two warps fill the machine
+    options.machine.read_clocks = 0;
     options.machine.block_lanes = options.machine.resident_lanes = 64;
     const auto clocks = [&](const std::vector<Ray>& rays) {
         return simulate(tree, rays, std::span(&options, 1)).front();
@@ -171,6 +177,69 @@ TEST(Simulate, ABlockKeepsItsPlaceUntilItsLastWarpIsDone) {
     // After the last block went out at 2 * longer, one slot in two is empty once its shorter warp
     // ends.
     EXPECT_NEAR(all.idle_issues, (longer - shorter) / 2, 1e-6);
+}
+
+/// Instructions of one warp in which all rays hit, or all miss.
+double warp_instructions(const WarpTree& tree, SimulateOptions options, Ray ray) {
+    const std::vector<Ray> rays(32, ray);
+    return static_cast<double>(simulate(tree, rays, std::span(&options, 1)).front().instructions);
+}
+
+TEST(Simulate, StepsFromBoundToScheduledByPencil) {
+    const WarpTree tree(build_bvh(two_triangles(), {.max_leaf = 1}));
+    SimulateOptions options = options_for(WarpKernel::while_while);
+    options.machine.multiprocessors = 1;
+    options.machine.lanes_per_clock = 64;  // two slots a clock: no warp slows another down
+    options.machine.warp_issue_clocks = 1;
+    options.machine.read_clocks = 0;
+    options.machine.resident_lanes = 64;
+    options.machine.block_lanes = 32;
+    for (OperationCost& cost : options.machine.costs)
+        if (cost.operation == "test_triangle") cost.instructions = 500;
+    const Ray hitting = down(0.25f, 0.25f), missing = down(5, 5);
+    const double longer = warp_instructions(tree, options, hitting),
+                 shorter = warp_instructions(tree, options, missing);
+    ASSERT_LT(3 * shorter, longer);
+    std::vector<Ray> rays(32, hitting);
+    for (int warp = 0; warp < 3; ++warp) rays.insert(rays.end(), 32, missing);
+    const auto clocks = [&](BlockRelease release) {
+        options.machine.block_release = release;
+        return simulate(tree, rays, std::span(&options, 1)).front();
+    };
+    // The short ones follow each other beside the long one, if that is allowed.
+    const Simulation own = clocks(BlockRelease::own);
+    EXPECT_DOUBLE_EQ(own.scheduled_clocks, longer);
+    EXPECT_DOUBLE_EQ(own.free_block_clocks, own.scheduled_clocks);
+    // Else two of them start when the long one, the first, is done.
+    for (const BlockRelease release : {BlockRelease::in_order, BlockRelease::together}) {
+        const Simulation s = clocks(release);
+        EXPECT_DOUBLE_EQ(s.scheduled_clocks, longer + shorter);
+        EXPECT_DOUBLE_EQ(s.free_block_clocks, own.scheduled_clocks);
+        EXPECT_DOUBLE_EQ(s.single_warp_clocks, own.scheduled_clocks);
+        EXPECT_EQ(s.instructions, own.instructions);
+    }
+    // Blocks of two: the long one keeps the place of the short one beside it.
+    options.machine.block_lanes = 64;
+    const Simulation blocks = clocks(BlockRelease::own);
+    EXPECT_DOUBLE_EQ(blocks.scheduled_clocks, longer + shorter);
+    EXPECT_DOUBLE_EQ(blocks.single_warp_clocks, longer);
+    // Persistent warps fetch at their own time, so that no release holds them up.
+    options.kernel = WarpKernel::persistent_while_while;
+    const Simulation persistent = clocks(BlockRelease::together);
+    EXPECT_DOUBLE_EQ(persistent.scheduled_clocks, clocks(BlockRelease::own).scheduled_clocks);
+    EXPECT_DOUBLE_EQ(persistent.single_warp_clocks, persistent.scheduled_clocks);
+}
+
+TEST(Simulate, StacksInLocalMemoryDelayKernelsThatHaveThem) {
+    const WarpTree tree(build_bvh(two_triangles(), {.max_leaf = 1}));
+    const std::vector<Ray> rays(5, Ray{{-1, 0.25f, 0.0f}, 0, {1, 0, 0}, infinity});
+    std::vector<SimulateOptions> runs{options_for(WarpKernel::while_while),
+                                      options_for(WarpKernel::packet)};
+    const auto before = simulate(tree, rays, runs);
+    for (SimulateOptions& run : runs) run.machine.stack_read_clocks = 1000;
+    const auto after = simulate(tree, rays, runs);
+    EXPECT_NEAR(after[0].scheduled_clocks, before[0].scheduled_clocks + 2 * 1000, 1e-6);
+    EXPECT_NEAR(after[1].scheduled_clocks, before[1].scheduled_clocks, 1e-6);
 }
 
 bool same(const Simulation& a, const Simulation& b) {
@@ -345,8 +414,13 @@ TEST(Simulate, RefusesWhatItCannotRun) {
     refuse("part_of_launch", [](SimulateOptions& o) { o.part_of_launch = 1.5; });
     refuse("clock_ghz", [](SimulateOptions& o) { o.machine.clock_ghz = 0; });
     refuse("multiprocessors", [](SimulateOptions& o) { o.machine.multiprocessors = 0; });
+    refuse("read_clocks", [](SimulateOptions& o) { o.machine.read_clocks = -1; });
+    refuse("block_release", [](SimulateOptions& o) { o.machine.block_release = BlockRelease(7); });
     refuse("in flight", [](SimulateOptions& o) { o.machine.resident_lanes = 1u << 30; });
-    refuse("has no cost", [](SimulateOptions& o) { o.machine.costs.pop_back(); });
+    refuse("has no cost", [](SimulateOptions& o) {
+        std::erase_if(o.machine.costs,
+                      [](const OperationCost& cost) { return cost.operation == "visit_node"; });
+    });
     refuse("two costs", [](SimulateOptions& o) { o.machine.costs.push_back(o.machine.costs[0]); });
     refuse("no operation", [](SimulateOptions& o) { o.machine.costs[0].operation = "jump"; });
     EXPECT_THROW(static_cast<void>(machine_model("gtx1")), InputError);

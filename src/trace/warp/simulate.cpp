@@ -40,6 +40,8 @@ constexpr std::array<std::string_view, kernels.size()> kernel_names{
     "work_queue",
     "dynamic_fetch"};
 
+constexpr std::array<std::string_view, 3> release_names{"own", "in_order", "together"};
+
 WarpScene scene_of(const WarpTree& tree) {
     const WarpTree::Arrays& arrays = tree.arrays();
     return {arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()};
@@ -60,6 +62,14 @@ void check_options(const SimulateOptions& options) {
     positive("clock_ghz", m.clock_ghz);
     positive("lanes_per_clock", m.lanes_per_clock);
     positive("warp_issue_clocks", m.warp_issue_clocks);
+    const auto not_negative = [&](const char* field, double value) {
+        if (!(value >= 0) || value > 1e9)
+            throw InputError("machine " + m.name + ": " + field + " is " + std::to_string(value) +
+                             "; it must be from 0 to 1e9");
+    };
+    not_negative("read_clocks", m.read_clocks);
+    not_negative("stack_read_clocks", m.stack_read_clocks);
+    check_enum("block_release", m.block_release, BlockRelease::together);
     positive("resident_lanes", m.resident_lanes);
     positive("block_lanes", m.block_lanes);
     if (!(options.part_of_launch > 0 && options.part_of_launch <= 1))
@@ -105,6 +115,13 @@ WarpKernel warp_kernel_from_name(std::string_view name) {
         known += (known.empty() ? "" : ", ") + std::string(warp_kernel_name(kernel));
     }
     throw InputError("kernel '" + std::string(name) + "' is not known; there are " + known);
+}
+
+std::span<const std::string_view> block_release_names() { return release_names; }
+
+std::string_view block_release_name(BlockRelease release) {
+    const auto k = static_cast<std::size_t>(release);
+    return k < release_names.size() ? release_names[k] : "unknown";
 }
 
 WarpTree::WarpTree(const Bvh& bvh) : arrays_(std::make_unique<Arrays>()) {
@@ -181,6 +198,8 @@ void Simulation::add(const Simulation& other) {
     instructions += other.instructions;
     lane_instructions += other.lane_instructions;
     scheduled_clocks += other.scheduled_clocks;
+    single_warp_clocks += other.single_warp_clocks;
+    free_block_clocks += other.free_block_clocks;
     idle_issues += other.idle_issues;
     issue_slots += other.issue_slots;
     for (std::size_t k = 0; k < warp_times.size(); ++k) warp_times[k] += other.warp_times[k];
@@ -199,6 +218,8 @@ SimulatedRates simulated_rates(const Simulation& s, const SimulateOptions& optio
                                 (m.lanes_per_clock * m.multiprocessors);
     rates.bound = rays / (issue_clocks / clocks_per_us);
     rates.scheduled = rays / (s.scheduled_clocks / clocks_per_us);
+    rates.single_warps = rays / (s.single_warp_clocks / clocks_per_us);
+    rates.free_blocks = rays / (s.free_block_clocks / clocks_per_us);
     rates.simd_efficiency = static_cast<double>(s.lane_instructions) /
                             (static_cast<double>(s.instructions) * options.width);
     if (!options.memory) return rates;

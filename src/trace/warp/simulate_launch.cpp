@@ -53,15 +53,14 @@ struct LaunchRun {
     WarpJob job;
     std::uint32_t stack_entries;
     OpCosts costs;
+    OpClocks clocks;
     std::unique_ptr<MemoryModel> memory;
 
     [[nodiscard]] std::uint32_t width() const { return static_cast<std::uint32_t>(options.width); }
-    [[nodiscard]] IssueRates rates() const {
-        const MachineModel& m = options.machine;
-        return {m.lanes_per_clock / options.width, 1.0 / m.warp_issue_clocks};
-    }
+    /// Warp instructions per clock of one multiprocessor.
+    [[nodiscard]] double slots() const { return options.machine.lanes_per_clock / options.width; }
     [[nodiscard]] WarpSetup setup(WarpTally& tally) const {
-        return {&costs, &tally, memory.get(), stack_entries};
+        return {&costs, &tally, memory.get(), stack_entries, &clocks};
     }
 };
 
@@ -76,16 +75,21 @@ void add_tally(Simulation& figures, const WarpTally& tally) {
 /// The end of a launch: what was lost once nothing was left to hand out.
 void add_times(Simulation& figures, const LaunchRun& run, double clocks, double last_handed_out,
                double work_after) {
-    const double slots_per_clock = run.rates().shared * run.options.machine.multiprocessors;
+    const double slots_per_clock = run.slots() * run.options.machine.multiprocessors;
     figures.scheduled_clocks += clocks;
     figures.issue_slots += clocks * slots_per_clock;
     figures.idle_issues += std::max(0.0, (clocks - last_handed_out) * slots_per_clock - work_after);
 }
 
-/// Instructions of each warp, in the order of the launch.
-std::vector<std::uint64_t> run_batches(const LaunchRun& run, Simulation& figures) {
+WarpWork work_between(const WarpTally& before, const WarpTally& after) {
+    return {static_cast<double>(after.issued - before.issued),
+            after.alone_clocks - before.alone_clocks};
+}
+
+/// What each warp does, in the order of the launch.
+std::vector<WarpWork> run_batches(const LaunchRun& run, Simulation& figures) {
     const std::size_t warps = (run.job.launch.count + run.width() - 1) / run.width();
-    std::vector<std::uint64_t> times(warps);
+    std::vector<WarpWork> works(warps);
     const std::size_t tasks = (warps + warps_per_task - 1) / warps_per_task;
     std::vector<WarpTally> tallies(tasks);
     const auto task = [&](std::size_t index, std::size_t begin, std::size_t end) {
@@ -93,14 +97,14 @@ std::vector<std::uint64_t> run_batches(const LaunchRun& run, Simulation& figures
         WarpMemoryPool memory(run.kernel, 1, run.setup(tally));
         KernelState state;
         for (std::size_t w = begin; w < end; ++w) {
-            const std::uint64_t before = tally.issued;
+            const WarpTally before = tally;
             if (run.memory)
                 run.memory->run_on(
                     static_cast<std::uint32_t>(w * run.width() / run.options.machine.block_lanes %
                                                run.options.machine.multiprocessors));
             run.kernel.start_kernel(state);
             run.kernel.turn(memory.at(0), state, run.job, static_cast<std::uint32_t>(w));
-            times[w] = tally.issued - before;
+            works[w] = work_between(before, tally);
         }
     };
     if (run.memory) {  // one cache, one order
@@ -110,36 +114,61 @@ std::vector<std::uint64_t> run_batches(const LaunchRun& run, Simulation& figures
         for_each_block(warps, warps_per_task, task);
     }
     for (const WarpTally& tally : tallies) add_tally(figures, tally);
-    for (const std::uint64_t time : times) ++figures.warp_times[time_bin(time)];
+    for (const WarpWork& work : works)
+        ++figures.warp_times[time_bin(static_cast<std::uint64_t>(work.instructions))];
+    return works;
+}
+
+/// When the warps of a launch end.
+struct LaunchTimes {
+    double clocks = 0;           // of the whole launch
+    double last_handed_out = 0;  // when its last block found a place
+    double work_after = 0;       // instructions issued from then on
+};
+
+/// Blocks of `block_warps` warps go in order to places as they become free.
+LaunchTimes schedule_blocks(const LaunchRun& run, const std::vector<WarpWork>& works,
+                            std::size_t block_warps, BlockRelease release) {
+    const MachineModel& m = run.options.machine;
+    const std::size_t blocks = (works.size() + block_warps - 1) / block_warps;
+    const auto block_lanes = static_cast<std::uint32_t>(block_warps) * run.width();
+    BlockPlaces places(m.multiprocessors, std::max(1u, m.resident_lanes / block_lanes), blocks,
+                       release);
+    Multiprocessors machine(m.multiprocessors, run.slots());
+    std::vector<std::uint32_t> left(blocks);
+    LaunchTimes times;
+    const auto start_blocks = [&] {
+        for (BlockPlaces::Start start{}; places.take(start);) {
+            const std::size_t end = std::min(works.size(), (start.block + 1) * block_warps);
+            for (std::size_t w = start.block * block_warps; w < end; ++w, ++left[start.block])
+                machine.add(start.place, static_cast<std::uint32_t>(w), works[w]);
+            if (!places.all_taken()) continue;
+            times.last_handed_out = machine.now();
+            times.work_after = machine.work_left();
+        }
+    };
+    start_blocks();
+    while (!machine.idle()) {
+        const std::size_t block = machine.next().warp / block_warps;
+        if (--left[block] != 0) continue;
+        places.finish(block);
+        start_blocks();
+    }
+    times.clocks = machine.now();
     return times;
 }
 
-/// Blocks go in order to whichever multiprocessor has room; a block's place is free again when its
-/// last warp is done.
-void schedule_blocks(const LaunchRun& run, const std::vector<std::uint64_t>& times,
+void add_batch_times(const LaunchRun& run, const std::vector<WarpWork>& works,
                      Simulation& figures) {
     const MachineModel& m = run.options.machine;
     const std::size_t block_warps = std::max(1u, m.block_lanes / run.width());
-    const std::size_t blocks = (times.size() + block_warps - 1) / block_warps;
-    const std::size_t places =
-        std::max(1u, m.resident_lanes / std::max(m.block_lanes, run.width()));
-    Multiprocessors machine(m.multiprocessors, run.rates());
-    std::vector<std::uint32_t> left(blocks);
-    std::size_t next = 0;
-    double last = 0, work_after = 0;
-    const auto dispatch = [&](std::uint32_t place) {
-        const std::size_t end = std::min(times.size(), (next + 1) * block_warps);
-        for (std::size_t w = next * block_warps; w < end; ++w, ++left[next])
-            machine.add(place, static_cast<std::uint32_t>(w), times[w]);
-        if (++next == blocks) last = machine.now(), work_after = machine.work_left();
-    };
-    for (std::size_t k = 0; k < places * m.multiprocessors && next < blocks; ++k)
-        dispatch(static_cast<std::uint32_t>(k % m.multiprocessors));
-    while (!machine.idle()) {
-        const Multiprocessors::Finished done = machine.next();
-        if (--left[done.warp / block_warps] == 0 && next < blocks) dispatch(done.place);
-    }
-    add_times(figures, run, machine.now(), last, work_after);
+    const LaunchTimes times = schedule_blocks(run, works, block_warps, m.block_release);
+    add_times(figures, run, times.clocks, times.last_handed_out, times.work_after);
+    figures.single_warp_clocks += schedule_blocks(run, works, 1, BlockRelease::own).clocks;
+    figures.free_block_clocks +=
+        m.block_release == BlockRelease::own
+            ? times.clocks
+            : schedule_blocks(run, works, block_warps, BlockRelease::own).clocks;
 }
 
 /// Persistent warps, each turn at its time.
@@ -155,20 +184,20 @@ void run_persistent(const LaunchRun& run, Simulation& figures) {
     std::vector<KernelState> states(warps);
     std::vector<std::uint64_t> lives(warps);
     std::vector<bool> done(warps);
-    Multiprocessors machine(m.multiprocessors, run.rates());
+    Multiprocessors machine(m.multiprocessors, run.slots());
     const RayLaunch& launch = run.job.launch;
     double last = 0, left_at_last = 0;
     std::uint64_t issued_at_last = 0;
     const auto turn = [&](std::uint32_t place, std::uint32_t warp) {
-        const std::uint64_t before = tally.issued;
+        const WarpTally before = tally;
         const bool more_rays = *launch.next < launch.count;
         if (run.memory) run.memory->run_on(place);
         done[warp] = !run.kernel.turn(memory.at(run.kernel.keeps_rays ? warp : 0), states[warp],
                                       run.job, warp);
-        const std::uint64_t time = tally.issued - before;
+        const std::uint64_t time = tally.issued - before.issued;
         lives[warp] += time;
         if (!run.kernel.keeps_rays && !done[warp]) ++figures.warp_times[time_bin(time)];
-        machine.add(place, warp, time);
+        machine.add(place, warp, work_between(before, tally));
         if (more_rays && *launch.next >= launch.count)
             last = machine.now(), left_at_last = machine.work_left(), issued_at_last = tally.issued;
     };
@@ -185,6 +214,20 @@ void run_persistent(const LaunchRun& run, Simulation& figures) {
     add_tally(figures, tally);
     add_times(figures, run, machine.now(), last,
               left_at_last + static_cast<double>(tally.issued - issued_at_last));
+    figures.single_warp_clocks = figures.free_block_clocks = figures.scheduled_clocks;
+}
+
+/// What a warp that is alone on its multiprocessor takes for each operation. Its instructions wait
+/// for each other; a read at the start of one waits for memory. A stack of the warp's own lies in
+/// shared memory, which counts as an instruction like others.
+OpClocks op_clocks(const MachineModel& machine, const OpCosts& costs, bool one_stack) {
+    OpClocks clocks{};
+    for (std::size_t k = 0; k < op_count; ++k) {
+        clocks[k] = costs[k] * machine.warp_issue_clocks;
+        if (waits_for_read(static_cast<Op>(k))) clocks[k] += machine.read_clocks;
+    }
+    if (!one_stack) clocks[static_cast<std::size_t>(Op::pop)] += machine.stack_read_clocks;
+    return clocks;
 }
 
 Simulation empty_figures(const OpCosts& costs) {
@@ -226,14 +269,18 @@ Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
                            std::span<const Ray> rays, std::span<TreeHit> hits,
                            const SimulateOptions& options, std::span<const MemoryRange> memory) {
     std::uint32_t next = 0;
+    const MachineModel& m = options.machine;
+    const SimulatedKernel& kernel =
+        *simulated_kernel(options.kernel, options.any_hit, options.width);
+    const OpCosts costs = op_costs(m, options.kernel);
     LaunchRun run{
         options,
-        *simulated_kernel(options.kernel, options.any_hit, options.width),
+        kernel,
         {scene, {rays.data(), hits.data(), static_cast<std::uint32_t>(rays.size()), &next}},
         stack_entries,
-        op_costs(options.machine, options.kernel),
+        costs,
+        op_clocks(m, costs, kernel.one_stack),
         nullptr};
-    const MachineModel& m = options.machine;
     if (options.memory) {
         std::vector<MemoryRange> ranges(memory.begin(), memory.end());
         ranges.push_back({rays.data(), rays.size_bytes()});
@@ -247,7 +294,7 @@ Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
     if (run.kernel.persistent) {
         run_persistent(run, figures);
     } else {
-        schedule_blocks(run, run_batches(run, figures), figures);
+        add_batch_times(run, run_batches(run, figures), figures);
     }
     for (const OperationFigure& op : figures.operations)
         figures.lane_instructions += op.lanes * op.instructions;

@@ -19,6 +19,7 @@ struct WarpSetup {
     WarpTally* tally;
     ReadObserver* observer;  // or null
     std::uint32_t stack_entries;
+    const OpClocks* clocks = nullptr;  // or null
 };
 
 /// A kernel's own state, the same in all lanes: a few words.
@@ -29,6 +30,7 @@ struct alignas(8) KernelState {
 struct SimulatedKernel {
     bool persistent;  // warps fetch from the pool; else warp k has batch k
     bool keeps_rays;  // lanes are in use from one turn to the next
+    bool one_stack;   // of the warp, in shared memory
     /// Memory of one warp, lanes and stacks, aligned to 64.
     std::size_t (*warp_bytes)(std::uint32_t stack_entries);
     void (*start_warp)(std::byte* warp, const WarpSetup& setup);

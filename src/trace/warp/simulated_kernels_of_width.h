@@ -46,6 +46,7 @@ struct SimulatedKernelOf {
         warp.tally = setup.tally;
         warp.costs = setup.costs;
         warp.observer = setup.observer;
+        warp.clocks = setup.clocks;
         std::byte* shared = memory + rounded(sizeof(Warp));
         if (Kernel::one_stack) {
             warp.memory.packets = reinterpret_cast<PacketEntry*>(shared);
@@ -72,8 +73,13 @@ struct SimulatedKernelOf {
         Kernel& kernel = *std::launder(reinterpret_cast<Kernel*>(&state));
         return kernel.template turn<any_hit>(warp, job, warp_index);
     }
-    static constexpr SimulatedKernel table{Kernel::persistent, Kernel::keeps_rays, &warp_bytes,
-                                           &start_warp,        &start_kernel,      &turn};
+    static constexpr SimulatedKernel table{Kernel::persistent,
+                                           Kernel::keeps_rays,
+                                           Kernel::one_stack,
+                                           &warp_bytes,
+                                           &start_warp,
+                                           &start_kernel,
+                                           &turn};
 };
 
 template <class Isa, int Width>
