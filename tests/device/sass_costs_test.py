@@ -30,7 +30,7 @@ class SassCosts(unittest.TestCase):
     def setUp(self):
         self.texts = {"per_ray.h": SCRIPT.Text(SOURCE.splitlines())}
         fixture = pathlib.Path(__file__).with_name("sass_fixture.txt").read_text(encoding="utf-8")
-        table, notes = SCRIPT.count_all(fixture, self.texts)
+        table, self.opcodes, notes = SCRIPT.count_all(fixture, self.texts)
         self.row, self.notes = table["while_while"], notes["while_while"]
 
     def test_operations_of_lines(self):

@@ -201,8 +201,10 @@ ManyRays many_rays(RayKind kind) {
     const Bvh bvh = build_bvh(scene.mesh());
     std::vector<std::uint32_t> pixels;
     const auto primary = make_primary_rays(scene.cameras.cameras.at(0), 160, 120, &pixels);
-    ManyRays out{WideBvh(bvh), make_secondary_rays(bvh, primary, trace(bvh, primary), pixels,
-                                                   {.kind = kind, .samples = 8, .seed = 3})};
+    ManyRays out{WideBvh(bvh),
+                 make_secondary_rays(
+                     bvh, primary, trace(bvh, primary), pixels,
+                     {.kind = kind, .samples = 8, .seed = 3, .sorted = kind == RayKind::ao})};
     EXPECT_GE(out.rays.size(), 100000u);  // jobs enough for a race
     EXPECT_EQ(choose_simd_path(out.tree, out.rays),
               kind == RayKind::diffuse_shuffled ? SimdPath::sorted : SimdPath::stream);
