@@ -27,7 +27,6 @@ struct HandClock {
     using rep = duration::rep;
     using period = duration::period;
     using time_point = std::chrono::time_point<HandClock>;
-    static constexpr bool is_steady = true;
     static time_point now() { return time_point(passed); }
     static inline duration passed{0};
 };
