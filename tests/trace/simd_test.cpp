@@ -436,6 +436,7 @@ TEST(Simd, EachPathWhereItBelongs) {
     SecondaryOptions secondary;
     secondary.kind = RayKind::diffuse;
     secondary.samples = 8;
+    secondary.sorted = false;
     const auto hits = trace(bvh, primary);
     EXPECT_EQ(choose_simd_path(tree, make_secondary_rays(bvh, primary, hits, pixels, secondary)),
               SimdPath::stream);
