@@ -262,6 +262,8 @@ FAULTS = [
     Fault("src/trace/warp/packet.h", "at.lanes &= alive;", "at.lanes = alive;", "packet: all lanes visit what one pushed", "trace"),
     Fault("src/trace/warp/simulate_launch.cpp", "if (--left[block] != 0) continue;",
           "if (left[block]-- == 0) continue;", "launch: a block's place is free with its first warp", "trace"),
+    Fault("src/exec/parallel.cpp", "tbb::task_group_context::isolated", "tbb::task_group_context::bound",
+          "loops: one that ends by an exception cuts short those inside of it", "exec"),
     Fault("src/layout/collapse_plan.h", "if (leaf_cost <= out.cost[0]) {", "if (leaf_cost <= 2 * out.cost[0]) {",
           "wide collapse: leaves that cost more than nodes", "layout"),
     Fault("src/layout/collapse_plan.h", "out.choose(static_cast<int>(i), apart <= together ? left(i) : 0);",

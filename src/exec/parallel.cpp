@@ -7,6 +7,7 @@
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <utility>
@@ -83,11 +84,16 @@ void parallel_ranges(std::size_t n, std::size_t grain,
         call(body, 0, n);
         return;
     }
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, grain),
-                      [&](const tbb::blocked_range<std::size_t>& range) {
-                          const Range inside;
-                          call(body, range.begin(), range.end());
-                      });
+    // A loop inside of another goes on when the other one ends by an exception. oneTBB would leave
+    // ranges out and return as if all were done.
+    tbb::task_group_context own(tbb::task_group_context::isolated);
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, n, grain),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+            const Range inside;
+            call(body, range.begin(), range.end());
+        },
+        own);
 }
 
 }  // namespace detail

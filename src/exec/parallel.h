@@ -28,7 +28,8 @@ void parallel_ranges(std::size_t n, std::size_t grain,
 }
 
 /// Calls body(begin, end) for ranges that cover [0, n), each at least `grain` long unless n is
-/// less.
+/// less. What a body throws comes out, and other ranges may then be left out. Loops that bodies run
+/// are not: each of them does all it should, or throws.
 template <class Body>
 void for_each_range(std::size_t n, std::size_t grain, const Body& body) {
     detail::parallel_ranges(

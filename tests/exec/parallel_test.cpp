@@ -1,4 +1,5 @@
 // Limits on threads: what is refused, who works, and that calls with different limits may meet.
+// Loops inside of loops, and exceptions.
 #include "exec/parallel.h"
 
 #include <gtest/gtest.h>
@@ -126,6 +127,29 @@ TEST(WithThreads, ArithmeticIsPlainOnEveryThread) {
     EXPECT_EQ(after & 0x8040u, 0x8040u) << "the caller's own stays";
 }
 #endif
+
+TEST(Loops, GoOnInsideOfOneThatEndsByAnException) {
+    struct Enough {};
+    constexpr std::size_t outer = 8, inner = 20'000;
+    std::atomic<std::size_t> unfinished = 0, complete = 0;
+    for (int round = 0; round < 50; ++round) {
+        std::atomic<std::size_t> begun = 0;
+        const auto loops = [&](std::size_t k) {
+            ++begun;
+            if (k == 0) {  // let another one begin, if there is a thread for it
+                for (int wait = 0; wait < 1000 && begun < 2; ++wait) std::this_thread::yield();
+                throw Enough{};
+            }
+            std::atomic<std::size_t> done = 0;
+            for_each_index(
+                inner, [&](std::size_t) { ++done; }, 16);
+            ++(done == inner ? complete : unfinished);
+        };
+        EXPECT_THROW(with_threads(2, [&] { for_each_index(outer, loops, 1); }), Enough);
+    }
+    EXPECT_EQ(unfinished, 0u);
+    EXPECT_TRUE(complete > 0 || thread_count() == 1);
+}
 
 TEST(WithThreads, ExceptionsComeOut) {
     for (const int threads : {0, 1, 7})
