@@ -66,8 +66,9 @@ enum class Usage : std::uint32_t {
 };
 
 struct SceneOptions {
-    /// A mesh's tree never has a higher SAH than a lower quality would give: `high` also builds the
-    /// tree of `balanced`, small meshes that of `fast`, and the cheaper one is kept.
+    /// A mesh's tree of quality `high` never has a higher SAH than that of `balanced`: both are
+    /// built, and the cheaper one is kept. Meshes of up to 1,024 triangles are also built as
+    /// `fast`.
     Quality quality = Quality::balanced;
     Usage usage = Usage::fixed;
     bool compact = false;  // the small layout (WideBvhOptions::compact); no effect in double

@@ -76,10 +76,11 @@ public:
     WideBvhBuilder(WideBvhBuilder&&) noexcept;
     WideBvhBuilder& operator=(WideBvhBuilder&&) noexcept;
 
-    /// Makes WideBvh(build_bvh(mesh, options)), bit for bit. By apetrei with a max_leaf of 4, not
-    /// compact, it may have other nodes; then, and by ploc, hploc and binned with up to 4, no
-    /// binary tree is made. The mesh may go. The threads of `options` count, not `wide.threads`.
-    /// Throws InputError as both calls do, and if the mesh has vertices but no triangles.
+    /// Makes WideBvh(build_bvh(mesh, options)), bit for bit, but for one case: by apetrei with a
+    /// max_leaf of 4, not compact and without reinsertion, nodes may be others. No binary tree is
+    /// made in this case, nor by ploc, hploc and binned with a max_leaf of up to 4. The mesh may go
+    /// afterwards. The threads of `options` count, not `wide.threads`. Throws InputError as both
+    /// calls do, and if the mesh has vertices but no triangles.
     void build(const MeshView& mesh, const BuildOptions& options, WideBvh& tree,
                const WideBvhOptions& wide = {});
 

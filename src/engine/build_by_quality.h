@@ -1,5 +1,5 @@
-// A mesh's tree for a quality word. No builder is the best one for every mesh, so those of lower
-// qualities build too where they may be better: a better word never means a higher expected cost.
+// A mesh's tree for a quality. No builder is the best one for every mesh, so those of lower
+// qualities build too where they may be better: a better word should never mean a higher cost.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -18,7 +18,7 @@
 namespace raydix {
 
 /// Trees of so few triangles take so little time that all lower qualities are tried. In larger ones
-/// clustering has never cost more than the radix tree.
+/// clustering was never seen to cost more than the radix tree.
 inline constexpr std::size_t few_triangles = 1024;
 
 /// The tree of the least SAH among those that make(BuildOptions) gives for the quality asked for

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "exec/parallel.h"
+#include "layout/about_middle.h"
 #include "layout/wide_collapse.h"
 #include "primitives/sources.h"
 #include "tree/around_center.h"

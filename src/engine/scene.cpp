@@ -23,9 +23,13 @@ namespace {
 std::string name_of(std::uint32_t id) { return "geometry " + std::to_string(id); }
 
 template <class Geometry>
+GeometryKind kind_of_geometry(const Geometry& geometry) {
+    if (geometry.is_instance()) return GeometryKind::instance;
+    return geometry.shapes ? geometry_kind_of(*geometry.shapes) : GeometryKind::mesh;
+}
+template <class Geometry>
 const char* what_is(const Geometry& geometry) {
-    if (geometry.shapes) return kind_of(*geometry.shapes);
-    return geometry.is_instance() ? "an instance" : "a mesh";
+    return name_of_kind(kind_of_geometry(geometry));
 }
 
 template <class AnyMeshView>
@@ -348,9 +352,7 @@ std::vector<std::uint32_t> BasicScene<Scalar>::ids() const {
 
 template <class Scalar>
 GeometryKind BasicScene<Scalar>::kind(std::uint32_t id) const {
-    const auto& geometry = state_->at(id);
-    if (geometry.is_instance()) return GeometryKind::instance;
-    return geometry.shapes ? geometry_kind_of(*geometry.shapes) : GeometryKind::mesh;
+    return kind_of_geometry(state_->at(id));
 }
 
 template <class Scalar>

@@ -33,17 +33,21 @@ using BasicShapes = std::variant<std::span<const typename SceneTypes<Scalar>::Sp
                                  BasicBalls<Scalar>, BasicUserGeometry<Scalar>>;
 using Shapes = BasicShapes<float>;
 
-/// "spheres", "capsules", "points" or "user geometry".
-template <class AnyShapes>
-[[nodiscard]] const char* kind_of(const AnyShapes& shapes) {
-    constexpr const char* names[] = {"spheres", "capsules", "points", "user geometry"};
-    return names[shapes.index()];
-}
+/// In the order of BasicShapes.
 template <class AnyShapes>
 [[nodiscard]] GeometryKind geometry_kind_of(const AnyShapes& shapes) {
-    constexpr GeometryKind kinds[] = {GeometryKind::spheres, GeometryKind::capsules,
-                                      GeometryKind::points, GeometryKind::user};
-    return kinds[shapes.index()];
+    return static_cast<GeometryKind>(static_cast<std::size_t>(GeometryKind::spheres) +
+                                     shapes.index());
+}
+/// As messages say it.
+[[nodiscard]] constexpr const char* name_of_kind(GeometryKind kind) {
+    constexpr const char* names[] = {"a mesh", "spheres",       "capsules",
+                                     "points", "user geometry", "an instance"};
+    return names[static_cast<std::size_t>(kind)];
+}
+template <class AnyShapes>
+[[nodiscard]] const char* kind_of(const AnyShapes& shapes) {
+    return name_of_kind(geometry_kind_of(shapes));
 }
 template <class AnyShapes>
 [[nodiscard]] std::size_t count_of(const AnyShapes& shapes) {

@@ -9,6 +9,7 @@
 
 #include "exec/large_pages.h"
 #include "exec/parallel.h"
+#include "layout/about_middle.h"
 #include "layout/wide_emit.h"
 #include "primitives/double_sources.h"
 #include "tree/around_center.h"

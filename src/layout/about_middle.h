@@ -23,8 +23,8 @@ namespace raydix {
 
 /// Slots of no child get lo = infinity and hi = -infinity.
 template <class Node>
-[[gnu::always_inline]] inline void set_boxes_about_middle(Vec3 middle, const SlotBoxes& boxes,
-                                                          Node& node) {
+[[gnu::always_inline]] inline void set_boxes_about(Vec3 middle, const SlotBoxes& boxes,
+                                                   Node& node) {
     for (int axis = 0; axis < 3; ++axis) {
         const float from = coordinate(middle, axis);
         for (int s = 0; s < quantised_width; ++s) {

@@ -288,7 +288,7 @@ private:
             boxes.set(static_cast<int>(s), {child.lo, child.hi});
             node.child[s] = child.link;
         }
-        set_boxes_about_middle(in_.middle, boxes, node);
+        set_boxes_about(in_.middle, boxes, node);
         return order;
     }
     [[nodiscard]] float area(std::uint32_t k) const { return entries_[k].area; }

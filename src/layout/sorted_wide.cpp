@@ -183,7 +183,7 @@ private:
             sums.references += triangles;
             sums.triangle_area += half_area(child.box) * triangles;
         }
-        set_boxes_about_middle(middle, boxes, node);
+        set_boxes_about(middle, boxes, node);
         all.area = static_cast<float>(half_area(all.box));
         sums.children += children.size();
         sums.node_area += half_area(all.box);

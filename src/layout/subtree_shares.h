@@ -85,12 +85,12 @@ cheapest_shares_within_avx2(const float* a, const float* b) {
     const __m256 from_b = _mm256_blend_ps(_mm256_loadu_ps(b), none, 0x80);
     std::array<ShareVectors, 7> best;
 #pragma GCC unroll 7
-    for (std::size_t j = 0; j < 7; ++j)
+    for (std::size_t j = 0; j < 7; ++j) {
         best[j] = {_mm256_add_ps(_mm256_permutevar8x32_ps(from_a, _mm256_load_si256(places_a + j)),
                                  _mm256_permutevar8x32_ps(from_b, _mm256_load_si256(places_b + j))),
                    _mm256_load_si256(lefts + j)};
-        // Pairs of neighbours: no step waits for more than two others. Of equal costs the first
-        // stays.
+    }
+    // Pairs of neighbours: no step waits for more than two others. Of equal costs the first stays.
 #pragma GCC unroll 3
     for (std::size_t step = 1; step < 7; step *= 2)
 #pragma GCC unroll 4

@@ -1,8 +1,7 @@
 #include "layout/wide_bvh.h"
 
-#include <cstdint>
+#include <memory>
 
-#include "layout/about_middle.h"
 #include "layout/cluster_view.h"
 #include "layout/wide_emit.h"
 #include "layout/wide_scratch.h"
@@ -24,10 +23,6 @@ void make_layout(const View& view, const WideOptions& options, WideBvh::Arrays& 
 }
 
 }  // namespace
-
-void set_boxes_about(Vec3 middle, const SlotBoxes& boxes, WideNode& node) {
-    set_boxes_about_middle(middle, boxes, node);
-}
 
 void make_wide_layout(const Bvh& bvh, const WideOptions& options, WideBvh::Arrays& out,
                       WideScratch& scratch) {

@@ -136,9 +136,6 @@ struct WideBvhInternals {
     }
 };
 
-/// Fills the boxes of a node.
-void set_boxes_about(Vec3 middle, const SlotBoxes& boxes, WideNode& node);
-
 /// Memory that making a layout takes, kept from one to the next.
 struct WideScratch {
     WideScratch();

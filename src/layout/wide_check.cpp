@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "exec/search.h"
+#include "layout/about_middle.h"
 #include "primitives/sources.h"
 #include "primitives/zero_area.h"
 

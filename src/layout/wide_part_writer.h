@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/math.h"
+#include "layout/about_middle.h"
 #include "layout/collapse_plan.h"
 #include "layout/wide_bvh.h"
 #include "layout/wide_part.h"

@@ -8,6 +8,7 @@
 
 #include "exec/large_pages.h"
 #include "exec/parallel.h"
+#include "layout/about_middle.h"
 #include "layout/wide_bvh.h"
 #include "primitives/bounds.h"
 #include "primitives/sources.h"
