@@ -33,8 +33,7 @@ struct WideMaker {
     }
     static std::uint64_t left_out(const MeshTree& made) { return made.tree->stats().left_out; }
     static void keep(const MeshTree& old, MeshTree& out) {
-        out.tree = old.tree;
-        out.view = old.view;
+        out.set_tree(old.tree);
         out.flats = old.flats;
     }
     static std::optional<double> refit(const MeshTree& old, const MeshView& mesh,
@@ -48,10 +47,7 @@ struct WideMaker {
 
 private:
     static void finish(WideBvh tree, MeshTree& out) {
-        out.tree = std::make_shared<const WideBvh>(std::move(tree));
-        TriangleBlock none;
-        out.view = view_of(out.tree->arrays(), none);
-        out.view.room = nullptr;
+        out.set_tree(std::make_shared<const WideBvh>(std::move(tree)));
     }
 };
 

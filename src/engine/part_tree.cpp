@@ -78,9 +78,7 @@ double area_of(std::span<const BvhNode> slots) {
 }
 
 void set_view(PartTree& out) {
-    TriangleBlock none;
-    out.view = view_of(out.arrays, none);
-    out.view.room = nullptr;
+    out.view = view_of(out.arrays);
 }
 
 void set_growth(std::span<const std::uint32_t> parts, std::span<const Extent> extents,

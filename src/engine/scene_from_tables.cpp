@@ -279,12 +279,9 @@ private:
             if (tree.wide->stats().compact != options.compact)
                 fail("trees", "tree " + std::to_string(number) + " is not of the kind that " +
                                   name_of(k) + " has");
-            mesh->tree = tree.wide;
+            mesh->set_tree(tree.wide);
             mesh->sah_at_build = tree.sah_at_build;
             mesh->make_buckets();
-            TriangleBlock none;
-            mesh->view = view_of(mesh->tree->arrays(), none);
-            mesh->view.room = nullptr;
             out->meshes.push_back(std::move(mesh));
         }
         return out;

@@ -19,6 +19,7 @@
 #include "trace/all_hits.h"
 #include "trace/batch.h"
 #include "trace/ray_frame.h"
+#include "trace/simd/one_ray.h"
 #include "trace/simd/trace_on_this_thread.h"
 #include "trace/simd/wide_batch.h"
 
@@ -201,8 +202,6 @@ TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
     return mesh != nullptr ? trace_mesh(*mesh, batch) : trace_scene(tree, batch);
 }
 
-thread_local CallHistory call_history;
-
 /// In a plain environment.
 Hit trace_parts_plainly(SceneKernels::OneRayOfScene* kernel, const SceneTree& tree, const Ray& ray,
                         std::uint32_t mask, const HitFilter* filter) {
@@ -343,24 +342,26 @@ bool any_hit(const Scene& scene, const Ray& ray, const HitFilter& filter, std::u
 }
 
 Hit closest_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
+    static OneRay* const kernel = simd_kernels().front().closest;
     const SceneTree& tree = *SceneInternals::tree(scene);
     const MeshTree* const mesh = tree.only_mesh();
     if (mesh == nullptr) return trace_parts(tree, ray, mask, nullptr, false);
-    if ((mesh->mask & mask) == 0) return {};
-    Hit hit = closest_hit(*mesh->tree, ray);
-    if (!hit.hit()) return hit;
-    if (mesh->ids.size() == 1)
-        hit.geometry = mesh->ids.front();
-    else
-        mesh->name(hit);
+    if ((mesh->mask & mask) == 0 || mesh->stack_size == 0) return {};
+    const TreeHit found = one_ray(kernel, mesh->view, mesh->stack_size, ray);
+    if (!found.hit()) return {};
+    if (mesh->ids.size() == 1) return {found, mesh->ids.front(), 0};
+    Hit hit{found};
+    mesh->name(hit);
     return hit;
 }
 
 bool any_hit(const Scene& scene, const Ray& ray, std::uint32_t mask) {
+    static OneRay* const kernel = simd_kernels().front().any;
     const SceneTree& tree = *SceneInternals::tree(scene);
     const MeshTree* const mesh = tree.only_mesh();
     if (mesh == nullptr) return trace_parts(tree, ray, mask, nullptr, true).hit();
-    return (mesh->mask & mask) != 0 && any_hit(*mesh->tree, ray);
+    return (mesh->mask & mask) != 0 && mesh->stack_size != 0 &&
+           one_ray(kernel, mesh->view, mesh->stack_size, ray).hit();
 }
 
 }  // namespace raydix

@@ -36,8 +36,15 @@ struct KeptFlatTriangles {
 /// One tree over the triangles of one mesh or of several, which follow each other by id.
 struct MeshTree : GroupedMeshes {
     std::shared_ptr<const WideBvh> tree;
-    WideView view{};  // without room for a compact tree's blocks
+    WideView view{};             // without room for a compact tree's blocks
+    std::size_t stack_size = 0;  // of the tree's deepest path; 0: no ray hits anything
     std::shared_ptr<KeptFlatTriangles> flats = std::make_shared<KeptFlatTriangles>();
+
+    void set_tree(std::shared_ptr<const WideBvh> to) {
+        tree = std::move(to);
+        view = view_of(tree->arrays());
+        stack_size = tree->empty() ? 0 : wide_stack_capacity(tree->stats().max_depth);
+    }
 };
 
 struct SceneTree;

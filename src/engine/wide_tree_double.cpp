@@ -233,9 +233,7 @@ Aabb grown_planes(const Aabb& box) {
 }
 
 void NodesD::set_view() {
-    TriangleBlock none;
-    view = view_of(arrays, none);
-    view.room = nullptr;
+    view = view_of(arrays);
     const double at[3] = {space.center.x, space.center.y, space.center.z};
     size = 0;
     for (int a = 0; a < 3; ++a) {

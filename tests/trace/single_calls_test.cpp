@@ -39,6 +39,7 @@ TEST(SingleCalls, FindTheSameWhateverCameBefore) {
          {WideBvhOptions{}, WideBvhOptions{.width = 4}, WideBvhOptions{.compact = true}}) {
         const WideBvh tree(view.bvh, options);
         const std::size_t room = wide_stack_capacity(tree.stats().max_depth);
+        const WideView in = view_of(tree.arrays());
         std::vector<std::uint32_t> words(room);
         std::vector<float> entries(room);
         for (const SimdKernels& kernels : simd_kernels())
@@ -51,10 +52,10 @@ TEST(SingleCalls, FindTheSameWhateverCameBefore) {
                     history.agreeing = agreeing;
                     const WideStackView stack{words.data(), entries.data()};
                     const Hit hit =
-                        hit_of_tree(kernels.closest(tree.arrays(), view.rays[i], stack, history));
+                        hit_of_tree(kernels.closest(in, view.rays[i], stack, history));
                     coherent += history.is_coherent();
                     different += !same_bits(hit, view.hits[i]);
-                    const TreeHit any = kernels.any(tree.arrays(), view.rays[i], stack, history);
+                    const TreeHit any = kernels.any(in, view.rays[i], stack, history);
                     different += any.hit() != view.hits[i].hit();
                 }
                 EXPECT_EQ(different, 0u);
@@ -91,13 +92,14 @@ TEST(SingleCalls, TellRaysThatFollowEachOtherFromOthers) {
     const View view = atrium_view(64);
     const WideBvh tree(view.bvh);
     const std::size_t room = wide_stack_capacity(tree.stats().max_depth);
+        const WideView in = view_of(tree.arrays());
     std::vector<std::uint32_t> words(room);
     std::vector<float> entries(room);
     const auto coherent_part = [&](std::span<const Ray> rays) {
         CallHistory history;
         std::size_t coherent = 0;
         for (const Ray& ray : rays) {
-            simd_kernels().front().closest(tree.arrays(), ray, {words.data(), entries.data()},
+            simd_kernels().front().closest(view_of(tree.arrays()), ray, {words.data(), entries.data()},
                                            history);
             coherent += history.is_coherent();
         }

@@ -54,7 +54,8 @@ struct SimdJob {
     const HitCheck* check = nullptr;
 };
 
-using OneRay = TreeHit(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,
+/// `tree` need not have room for blocks of a compact tree.
+using OneRay = TreeHit(const WideView& tree, const Ray& ray, const WideStackView& stack,
                        CallHistory& history);
 
 struct SimdKernels {

@@ -336,7 +336,6 @@ private:
         const bool swap = entries[second] < entries[first];
         const std::size_t near = swap ? second : first, far = swap ? first : second;
         word = choose(child, near);
-        ask_for_child(child[near]);
         ask_for_child(child[far]);
         float nearest = entries[near];
         stack_.words[top] = child[far];
@@ -440,7 +439,7 @@ private:
     SimdCounts& counts_;
     Parts* const parts_;
     const std::uint32_t place_;
-    const PlanePlaces at_;
+    const PlanePlaces& at_;
     WideBest best_{};
     BudgetVector<Hit>* all_ = nullptr;
     const HitCheck* check_ = nullptr;
@@ -537,14 +536,21 @@ void with_constants(const SimdJob& job, const Run& run) {
 }
 
 template <bool any>
-TreeHit one(const WideBvh::Arrays& arrays, const Ray& ray, const WideStackView& stack,
-            CallHistory& history) {
+HWY_NOINLINE TreeHit one_in_compact(const WideView& tree, const Ray& ray,
+                                    const WideStackView& stack, CallHistory& history) {
     SimdCounts counts;
-    TriangleBlock room;
-    if (!arrays.stats.compact)
-        return find_one<any, false, false>(view_of(arrays, room), ray, stack, counts, &history);
-    room = {};
-    return find_one<any, true, true>(view_of(arrays, room), ray, stack, counts, &history);
+    TriangleBlock room{};
+    WideView view = tree;
+    view.room = &room;
+    return find_one<any, true, true>(view, ray, stack, counts, &history);
+}
+
+template <bool any>
+TreeHit one(const WideView& tree, const Ray& ray, const WideStackView& stack,
+            CallHistory& history) {
+    if (tree.is_compact) return one_in_compact<any>(tree, ray, stack, history);
+    SimdCounts counts;
+    return find_one<any, false, false>(tree, ray, stack, counts, &history);
 }
 
 }  // namespace raydix::HWY_NAMESPACE

@@ -17,6 +17,7 @@
 #include "rays/place_order.h"
 #include "trace/all_hits.h"
 #include "trace/batch.h"
+#include "trace/simd/one_ray.h"
 #include "trace/simd/scaled_rays.h"
 #include "trace/simd/simd_kernels.h"
 #include "trace/simd/trace_on_this_thread.h"
@@ -158,7 +159,7 @@ struct Batch {
         stack.reserve_words(stack_size * (way == PathWay::turns ? rays_in_turn : 1));
         const std::size_t from = order.empty() ? begin : 0;
         TriangleBlock room{};
-        const SimdJob job{view_of(tree.arrays(), room),
+        const SimdJob job{view_of(tree.arrays(), &room),
                           rays.data() + from,
                           order.empty() ? nullptr : order.data() + begin,
                           end - begin,
@@ -188,7 +189,7 @@ private:
         OneRay* const kernel = hits ? kernels.closest : kernels.any;
         CallHistory history;
         for (std::size_t k = 0; k < job.n; ++k) {
-            const TreeHit hit = kernel(tree.arrays(), job.rays[k], job.stack, history);
+            const TreeHit hit = kernel(job.tree, job.rays[k], job.stack, history);
             counts.hits += hit.hit();
             counts.invalid += !hit.hit() && !is_valid(job.rays[k]);
             if (hits)
@@ -432,36 +433,21 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
 
 namespace {
 
-thread_local CallHistory call_history;
-
-/// In a plain environment.
-TreeHit trace_one_ray(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
-    constexpr std::size_t inside = 512;
-    if (wide_stack_capacity(tree.stats().max_depth) > inside) {
-        StackMemory stack(tree.stats().max_depth);
-        return kernel(tree.arrays(), ray, stack.view(), call_history);
-    }
-    std::uint32_t words[inside];
-    float entries[inside];
-    return kernel(tree.arrays(), ray, {words, entries}, call_history);
-}
-
-TreeHit one_ray(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
-    if (FloatEnvironment::is_plain()) return trace_one_ray(kernel, tree, ray);
-    const FloatEnvironment plain;
-    return trace_one_ray(kernel, tree, ray);
+TreeHit one_ray_of(OneRay* kernel, const WideBvh& tree, const Ray& ray) {
+    return one_ray(kernel, view_of(tree.arrays()), wide_stack_capacity(tree.stats().max_depth),
+                   ray);
 }
 
 }  // namespace
 
 Hit closest_hit(const WideBvh& tree, const Ray& ray) {
     static OneRay* const kernel = simd_kernels().front().closest;
-    return tree.empty() ? Hit{} : hit_of_tree(one_ray(kernel, tree, ray));
+    return tree.empty() ? Hit{} : hit_of_tree(one_ray_of(kernel, tree, ray));
 }
 
 bool any_hit(const WideBvh& tree, const Ray& ray) {
     static OneRay* const kernel = simd_kernels().front().any;
-    return !tree.empty() && one_ray(kernel, tree, ray).hit();
+    return !tree.empty() && one_ray_of(kernel, tree, ray).hit();
 }
 
 namespace {

@@ -62,7 +62,7 @@ struct WideView {
     const CompactNode* compact_nodes;
     const CompactBlock* compact_blocks;
     const Vec3* vertices;
-    TriangleBlock* room;  // of a compact tree, one for each thread
+    TriangleBlock* room;  // of a compact tree, one for each thread; or null
     bool is_compact;
     // By axis, the last is 0: the root's bounds, and their middle, which planes of WideNode are
     // about.
@@ -91,10 +91,10 @@ struct PadGrowth {
     float rate = 0, least = 0;
 };
 
-/// `room` is for compact trees.
-inline WideView view_of(const WideBvh::Arrays& arrays, TriangleBlock& room) {
+/// `room` is for compact trees; null: who traces brings it.
+inline WideView view_of(const WideBvh::Arrays& arrays, TriangleBlock* room = nullptr) {
     return {arrays.nodes.data(),          arrays.blocks.data(),   arrays.compact_nodes.data(),
-            arrays.compact_blocks.data(), arrays.vertices.data(), &room,
+            arrays.compact_blocks.data(), arrays.vertices.data(), room,
             arrays.stats.compact,         arrays.frame.lo,        arrays.frame.hi,
             arrays.frame.middle};
 }
