@@ -265,44 +265,44 @@ private:
     /// All children that the ray meets go onto the stack; the one to visit first is the last.
     template <class Node>
     HWY_INLINE void push_evenly(const Node& node) {
+        constexpr bool closest = wants_closest(wanted);
         HWY_ALIGN float entries[8];
-        const std::uint32_t met = meet<true>(node, plain_rates(), entries);
-        // The first two in their order, whether they are there or not.
-        const auto slot = [](std::uint32_t left) {
-            return static_cast<std::size_t>(std::countr_zero(left | 0x80));
-        };
-        const std::uint32_t others = met & (met - 1);
-        const std::size_t first = slot(met), second = slot(others);
+        const std::uint32_t met = meet<closest>(node, plain_rates(), entries);
         std::uint32_t* const words = stack_.words + top_;
         float* const at = stack_.entries + top_;
-        const auto two = static_cast<std::size_t>(others != 0);
-        std::size_t swap = two;
-        if constexpr (wants_closest(wanted)) {
-            // None is negative.
-            const auto first_at = std::bit_cast<std::int32_t>(entries[first]),
-                       second_at = std::bit_cast<std::int32_t>(entries[second]);
-            swap &= static_cast<std::size_t>(first_at <= second_at);
-        } else {
-            swap = 0;
+        std::size_t count = 0, ordered = 1;
+        for (std::size_t l = 0; l < 8; l += lanes8) {
+            const std::uint32_t here = met >> l & ((1u << lanes8) - 1);
+            auto word = compress(f8, hn::BitCast(f8, hn::Load(U8(), node.child + l)), here);
+            if constexpr (closest) {
+                // Behind the last comes 0 or what is not met: neither is before an entry.
+                auto entry = hn::IfThenElse(mask_of(f8, here), hn::Load(f8, entries + l),
+                                            hn::Set(f8, -1.0f));
+                entry = compress(f8, entry, here);
+                if constexpr (parts8 == 1) farther_first(entry, word), ordered = 2;
+                hn::StoreU(entry, f8, at + count);
+            }
+            hn::StoreU(word, f8, reinterpret_cast<float*>(words + count));
+            count += static_cast<std::size_t>(std::popcount(here));
         }
-        const std::size_t change = (first ^ second) & without_jump(std::size_t{0} - swap);
-        const std::size_t lower = first ^ change, upper = second ^ change;
-        words[0] = node.child[lower], at[0] = entries[lower];
-        words[1] = node.child[upper], at[1] = entries[upper];
-        top_ += static_cast<std::size_t>(met != 0) + two;
-        for (std::uint32_t left = others & (others - 1); left != 0; left &= left - 1)
-            insert(entries[slot(left)], node.child[slot(left)], words, at);
+        top_ += count;
+        if constexpr (closest)
+            for (; ordered < count; ++ordered) insert(ordered, words, at);
     }
-    /// One more child onto the stack, which has two of its siblings from `words` and `at` on.
-    HWY_INLINE void insert(float entry, std::uint32_t child, std::uint32_t* words, float* at) {
-        std::size_t k = static_cast<std::size_t>(stack_.words + top_++ - words);
-        if constexpr (wants_closest(wanted)) {
-            // Below the last, or in its place.
-            at[k] = at[k - 1], words[k] = words[k - 1];
-            if (entry < at[k]) std::swap(entry, at[k]), std::swap(child, words[k]);
-            for (--k; k > 0 && at[k - 1] < entry; --k) at[k] = at[k - 1], words[k] = words[k - 1];
-        }
-        at[k] = entry, words[k] = child;
+    /// The first two by entry, none of which is negative.
+    static HWY_INLINE void farther_first(V& entry, V& word) {
+        const V other = hn::Shuffle2301(entry);
+        const V pairs = hn::OddEven(hn::Min(entry, other), hn::Max(entry, other));
+        const V ordered = hn::IfThenElse(hn::FirstN(f8, 2), pairs, entry);
+        word = hn::IfThenElse(hn::Ne(ordered, entry), hn::Shuffle2301(word), word);
+        entry = ordered;
+    }
+    /// Child k to its place among those before it, which are in their order.
+    static HWY_INLINE void insert(std::size_t k, std::uint32_t* words, float* at) {
+        const float entry = at[k];
+        const std::uint32_t word = words[k];
+        for (; k > 0 && at[k - 1] < entry; --k) at[k] = at[k - 1], words[k] = words[k - 1];
+        at[k] = entry, words[k] = word;
     }
 
     /// Two children or more, in the order of their slots.

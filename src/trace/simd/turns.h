@@ -22,6 +22,49 @@ namespace raydix::HWY_NAMESPACE {
 /// What a ray does in its next turn.
 enum class TurnKind { node, leaf, part };
 
+/// Rays that wait for their turn, each kind apart: jumps that depend on it could not be foreseen.
+template <class Turn, std::size_t n>
+class TurnLists {
+public:
+    HWY_INLINE void add(Turn* turn) {
+        turn->ask();
+        const TurnKind kind = turn->kind();
+        // Every list takes the ray, and one of them keeps it.
+        nodes_[at_nodes_] = turn;
+        leaves_[at_leaves_] = turn;
+        at_nodes_ += static_cast<std::size_t>(kind == TurnKind::node);
+        at_leaves_ += static_cast<std::size_t>(kind == TurnKind::leaf);
+        if constexpr (Turn::has_parts) {
+            parts_[at_parts_] = turn;
+            at_parts_ += static_cast<std::size_t>(kind == TurnKind::part);
+        }
+    }
+    [[nodiscard]] bool empty() const { return at_nodes_ + at_leaves_ + at_parts_ == 0; }
+    HWY_INLINE void step_nodes() {
+        step_all(nodes_, at_nodes_, std::integral_constant<TurnKind, TurnKind::node>());
+    }
+    HWY_INLINE void step_leaves() {
+        step_all(leaves_, at_leaves_, std::integral_constant<TurnKind, TurnKind::leaf>());
+    }
+    HWY_INLINE void step_parts() {
+        step_all(parts_, at_parts_, std::integral_constant<TurnKind, TurnKind::part>());
+    }
+
+private:
+    using List = std::array<Turn*, n>;
+    template <class Kind>
+    HWY_INLINE void step_all(const List& list, std::size_t& at, Kind kind) {
+        const std::size_t count = std::exchange(at, 0);
+        for (std::size_t k = 0; k < count; ++k) {
+            Turn* const turn = list[k];
+            if (turn->step(kind) || turn->start()) add(turn);
+        }
+    }
+
+    List nodes_, leaves_, parts_;
+    std::size_t at_nodes_ = 0, at_leaves_ = 0, at_parts_ = 0;
+};
+
 /// Rays that take turns. Turn has:
 ///   bool start()                  the next ray; whether there was one
 ///   TurnKind kind()               what is next
@@ -29,36 +72,13 @@ enum class TurnKind { node, leaf, part };
 ///   void ask()                    for the memory that it needs next
 template <class Turn, std::size_t n>
 HWY_INLINE void take_turns(std::array<Turn, n>& turns) {
-    // Each kind apart: jumps that depend on it could not be foreseen. So every list takes the ray,
-    // and one of them keeps it.
-    std::array<Turn*, n> nodes, leaves, parts;
-    std::size_t at_nodes = 0, at_leaves = 0, at_parts = 0;
-    const auto add = [&](Turn* turn) {
-        turn->ask();
-        const TurnKind kind = turn->kind();
-        nodes[at_nodes] = turn;
-        leaves[at_leaves] = turn;
-        at_nodes += static_cast<std::size_t>(kind == TurnKind::node);
-        at_leaves += static_cast<std::size_t>(kind == TurnKind::leaf);
-        if constexpr (Turn::has_parts) {
-            parts[at_parts] = turn;
-            at_parts += static_cast<std::size_t>(kind == TurnKind::part);
-        }
-    };
+    TurnLists<Turn, n> lists;
     for (Turn& turn : turns)
-        if (turn.start()) add(&turn);
-    const auto step_all = [&](std::array<Turn*, n>& list, std::size_t& at, auto kind) {
-        const std::size_t count = std::exchange(at, 0);
-        for (std::size_t k = 0; k < count; ++k) {
-            Turn* const turn = list[k];
-            if (turn->step(kind) || turn->start()) add(turn);
-        }
-    };
-    while (at_nodes + at_leaves + at_parts != 0) {
-        step_all(nodes, at_nodes, std::integral_constant<TurnKind, TurnKind::node>());
-        step_all(leaves, at_leaves, std::integral_constant<TurnKind, TurnKind::leaf>());
-        if constexpr (Turn::has_parts)
-            step_all(parts, at_parts, std::integral_constant<TurnKind, TurnKind::part>());
+        if (turn.start()) lists.add(&turn);
+    while (!lists.empty()) {
+        lists.step_nodes();
+        lists.step_leaves();
+        if constexpr (Turn::has_parts) lists.step_parts();
     }
 }
 
