@@ -31,9 +31,7 @@ RAYDIX_PREFETCHING void ask_for_shapes(const ShapeTree& tree, std::uint32_t word
     const auto address = [](const auto* at) { return reinterpret_cast<std::uintptr_t>(at); };
     const std::uintptr_t node = address(tree.view.nodes) + std::size_t{word} * sizeof(WideNode),
                          leaf = tree.leaves + place * tree.leaf_bytes;
-    const auto is_leaf = std::size_t{0} - std::size_t{(word & wide_leaf_bit) != 0};
-    const auto* const at =
-        reinterpret_cast<const char*>(node ^ ((node ^ leaf) & without_jump(is_leaf)));
+    const auto* const at = reinterpret_cast<const char*>(by_kind_of(word, node, leaf));
     for (std::size_t k = 0; k < lines; ++k) hwy::Prefetch(at + k * line);
 }
 

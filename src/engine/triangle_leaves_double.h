@@ -36,8 +36,7 @@ RAYDIX_PREFETCHING void ask_for(const WideTreeD& tree, std::uint32_t word) {
                          std::size_t{word} * sizeof(WideNode),
                at_block = reinterpret_cast<std::uintptr_t>(tree.blocks.data()) +
                           block * sizeof(TriangleBlockD);
-    const auto* const place = reinterpret_cast<const char*>(
-        at_node ^ ((at_node ^ at_block) & without_jump(std::size_t{0} - std::size_t{leaf})));
+    const auto* const place = reinterpret_cast<const char*>(by_kind_of(word, at_node, at_block));
     for (std::size_t k = 0; k < node_lines; ++k) hwy::Prefetch(place + k * line);
     hwy::Prefetch(place + (leaf ? node_lines * line : 0));
 }

@@ -40,12 +40,22 @@ HWY_INLINE std::uint32_t used_slots(const WideNode& node) {
     return used;
 }
 
-/// The same number. What depends on it is computed, where the compiler would rather jump.
-HWY_INLINE std::size_t without_jump(std::size_t x) {
-#if defined(__GNUC__)
-    asm("" : "+r"(x));
+/// [how many lanes have a meaning]: the first two, if both have.
+alignas(32) inline constexpr std::uint32_t first_two[9][8] = {
+    {},       {},       {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u},
+    {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}};
+
+/// `leaf` if `word` is one, else `node`; without a jump, which could not be foreseen.
+HWY_INLINE std::uintptr_t by_kind_of(std::uint32_t word, std::uintptr_t node,
+                                     std::uintptr_t leaf) {
+    static_assert(wide_leaf_bit == 1u << 31);
+#if defined(__GNUC__) && defined(__x86_64__)
+    asm("test %1, %1\n\tcmovs %2, %0" : "+r"(node) : "r"(word), "r"(leaf) : "cc");
+    return node;
+#else
+    const auto is_leaf = std::uintptr_t{0} - (word >> 31);
+    return node ^ ((node ^ leaf) & is_leaf);
 #endif
-    return x;
 }
 
 /// Asks for the cache lines of a child, node or leaf, that will be visited soon. Without branches:
@@ -69,7 +79,7 @@ RAYDIX_PREFETCHING void ask_for(const WideView& tree, std::uint32_t word) {
     const auto at_node = reinterpret_cast<std::uintptr_t>(nodes + std::size_t{word} * sizeof(Node)),
                at_block = reinterpret_cast<std::uintptr_t>(blocks + block * sizeof(Block));
     const auto* const place = reinterpret_cast<const char*>(
-        at_node ^ ((at_node ^ at_block) & without_jump(std::size_t{0} - std::size_t{leaf})));
+        by_kind_of(word, at_node, at_block));
     constexpr std::size_t least = std::min(node_lines, block_lines);
     for (std::size_t k = 0; k < least; ++k) hwy::Prefetch(place + k * line);
     // The rest of the larger kind; the first line once more for the other.

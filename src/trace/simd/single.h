@@ -81,8 +81,11 @@ public:
     /// Visits the node that is next; whether there is another node or leaf. Few branches: those of
     /// rays in turn cannot be foreseen.
     HWY_INLINE bool step_node() {
-        push_evenly(tree_.template node<compact>(word_));
-        return pop(top_, word_);
+        std::size_t top = top_;
+        push_evenly(tree_.template node<compact>(word_), top);
+        const bool on = pop(top, word_);
+        top_ = top;
+        return on;
     }
     /// Tests the leaf that is next; whether there is another node or leaf.
     HWY_INLINE bool step_leaf() { return !test_leaf(word_) && pop(top_, word_); }
@@ -264,36 +267,35 @@ private:
 
     /// All children that the ray meets go onto the stack; the one to visit first is the last.
     template <class Node>
-    HWY_INLINE void push_evenly(const Node& node) {
+    HWY_INLINE void push_evenly(const Node& node, std::size_t& top) {
         constexpr bool closest = wants_closest(wanted);
         HWY_ALIGN float entries[8];
         const std::uint32_t met = meet<closest>(node, plain_rates(), entries);
-        std::uint32_t* const words = stack_.words + top_;
-        float* const at = stack_.entries + top_;
-        std::size_t count = 0, ordered = 1;
+        std::uint32_t* const words = stack_.words + top;
+        float* const at = stack_.entries + top;
+        std::size_t count = 0;
         for (std::size_t l = 0; l < 8; l += lanes8) {
             const std::uint32_t here = met >> l & ((1u << lanes8) - 1);
-            auto word = compress(f8, hn::BitCast(f8, hn::Load(U8(), node.child + l)), here);
+            V word = compress(f8, hn::BitCast(f8, hn::Load(U8(), node.child + l)), here);
+            const auto more = static_cast<std::size_t>(std::popcount(here));
             if constexpr (closest) {
-                // Behind the last comes 0 or what is not met: neither is before an entry.
-                auto entry = hn::IfThenElse(mask_of(f8, here), hn::Load(f8, entries + l),
-                                            hn::Set(f8, -1.0f));
-                entry = compress(f8, entry, here);
-                if constexpr (parts8 == 1) farther_first(entry, word), ordered = 2;
+                V entry = compress(f8, hn::Load(f8, entries + l), here);
+                farther_first(more, entry, word);
                 hn::StoreU(entry, f8, at + count);
             }
             hn::StoreU(word, f8, reinterpret_cast<float*>(words + count));
-            count += static_cast<std::size_t>(std::popcount(here));
+            count += more;
         }
-        top_ += count;
+        top += count;
         if constexpr (closest)
-            for (; ordered < count; ++ordered) insert(ordered, words, at);
+            for (std::size_t k = parts8 == 1 ? 2 : 1; k < count; ++k) insert(k, words, at);
     }
-    /// The first two by entry, none of which is negative.
-    static HWY_INLINE void farther_first(V& entry, V& word) {
+    /// The first two of `count` by entry.
+    static HWY_INLINE void farther_first(std::size_t count, V& entry, V& word) {
         const V other = hn::Shuffle2301(entry);
         const V pairs = hn::OddEven(hn::Min(entry, other), hn::Max(entry, other));
-        const V ordered = hn::IfThenElse(hn::FirstN(f8, 2), pairs, entry);
+        const auto two = hn::MaskFromVec(hn::BitCast(f8, hn::Load(U8(), first_two[count])));
+        const V ordered = hn::IfThenElse(two, pairs, entry);
         word = hn::IfThenElse(hn::Ne(ordered, entry), hn::Shuffle2301(word), word);
         entry = ordered;
     }
