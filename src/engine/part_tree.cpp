@@ -77,9 +77,7 @@ double area_of(std::span<const BvhNode> slots) {
     return sum;
 }
 
-void set_view(PartTree& out) {
-    out.view = view_of(out.arrays);
-}
+void set_view(PartTree& out) { out.view = view_of(out.arrays); }
 
 void set_growth(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
                 PartTree& out) {

@@ -51,8 +51,7 @@ TEST(SingleCalls, FindTheSameWhateverCameBefore) {
                     CallHistory history;
                     history.agreeing = agreeing;
                     const WideStackView stack{words.data(), entries.data()};
-                    const Hit hit =
-                        hit_of_tree(kernels.closest(in, view.rays[i], stack, history));
+                    const Hit hit = hit_of_tree(kernels.closest(in, view.rays[i], stack, history));
                     coherent += history.is_coherent();
                     different += !same_bits(hit, view.hits[i]);
                     const TreeHit any = kernels.any(in, view.rays[i], stack, history);
@@ -92,15 +91,15 @@ TEST(SingleCalls, TellRaysThatFollowEachOtherFromOthers) {
     const View view = atrium_view(64);
     const WideBvh tree(view.bvh);
     const std::size_t room = wide_stack_capacity(tree.stats().max_depth);
-        const WideView in = view_of(tree.arrays());
+    const WideView in = view_of(tree.arrays());
     std::vector<std::uint32_t> words(room);
     std::vector<float> entries(room);
     const auto coherent_part = [&](std::span<const Ray> rays) {
         CallHistory history;
         std::size_t coherent = 0;
         for (const Ray& ray : rays) {
-            simd_kernels().front().closest(view_of(tree.arrays()), ray, {words.data(), entries.data()},
-                                           history);
+            simd_kernels().front().closest(view_of(tree.arrays()), ray,
+                                           {words.data(), entries.data()}, history);
             coherent += history.is_coherent();
         }
         return static_cast<double>(coherent) / static_cast<double>(rays.size());

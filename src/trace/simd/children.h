@@ -42,12 +42,10 @@ HWY_INLINE std::uint32_t used_slots(const WideNode& node) {
 
 /// [how many lanes have a meaning]: the first two, if both have.
 alignas(32) inline constexpr std::uint32_t first_two[9][8] = {
-    {},       {},       {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u},
-    {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}};
+    {}, {}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}};
 
 /// `leaf` if `word` is one, else `node`; without a jump, which could not be foreseen.
-HWY_INLINE std::uintptr_t by_kind_of(std::uint32_t word, std::uintptr_t node,
-                                     std::uintptr_t leaf) {
+HWY_INLINE std::uintptr_t by_kind_of(std::uint32_t word, std::uintptr_t node, std::uintptr_t leaf) {
     static_assert(wide_leaf_bit == 1u << 31);
 #if defined(__GNUC__) && defined(__x86_64__)
     asm("test %1, %1\n\tcmovs %2, %0" : "+r"(node) : "r"(word), "r"(leaf) : "cc");
@@ -78,8 +76,7 @@ RAYDIX_PREFETCHING void ask_for(const WideView& tree, std::uint32_t word) {
     const std::size_t block = ((word & ~wide_leaf_bit) >> 3) / block_lanes;
     const auto at_node = reinterpret_cast<std::uintptr_t>(nodes + std::size_t{word} * sizeof(Node)),
                at_block = reinterpret_cast<std::uintptr_t>(blocks + block * sizeof(Block));
-    const auto* const place = reinterpret_cast<const char*>(
-        by_kind_of(word, at_node, at_block));
+    const auto* const place = reinterpret_cast<const char*>(by_kind_of(word, at_node, at_block));
     constexpr std::size_t least = std::min(node_lines, block_lines);
     for (std::size_t k = 0; k < least; ++k) hwy::Prefetch(place + k * line);
     // The rest of the larger kind; the first line once more for the other.
