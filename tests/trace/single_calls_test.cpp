@@ -98,8 +98,7 @@ TEST(SingleCalls, TellRaysThatFollowEachOtherFromOthers) {
         CallHistory history;
         std::size_t coherent = 0;
         for (const Ray& ray : rays) {
-            simd_kernels().front().closest(view_of(tree.arrays()), ray,
-                                           {words.data(), entries.data()}, history);
+            simd_kernels().front().closest(in, ray, {words.data(), entries.data()}, history);
             coherent += history.is_coherent();
         }
         return static_cast<double>(coherent) / static_cast<double>(rays.size());
