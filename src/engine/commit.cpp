@@ -9,7 +9,6 @@
 #include "engine/shape_commit.h"
 #include "engine/shape_tree.h"
 #include "exec/parallel.h"
-#include "layout/wide_refit.h"
 
 namespace raydix {
 namespace {
@@ -29,26 +28,33 @@ struct WideMaker {
             },
             [](const WideBvh& tree) { return tree.stats().sah; });
         out.sah_at_build = built.stats().sah;
-        finish(std::move(built), out);
+        out.refitter = nullptr;  // a refit that was tried had other links
+        finish(std::make_shared<const WideBvh>(std::move(built)), out);
     }
     static std::uint64_t left_out(const MeshTree& made) { return made.tree->stats().left_out; }
     static void keep(const MeshTree& old, MeshTree& out) {
         out.tree = old.tree;
         out.view = old.view;
+        out.refitter = old.refitter;
         out.flats = old.flats;
+    }
+    static void share_rates(const MeshTree& old, MeshTree& out) {
+        out.tree->arrays().rates.share(old.tree->arrays().rates);
     }
     static std::optional<double> refit(const MeshTree& old, const MeshView& mesh,
                                        const SceneOptions&, MeshTree& out) {
-        std::optional<WideBvh> tree = refit_wide(*old.tree, mesh);
-        if (!tree) return {};
+        out.refitter = old.refitter != nullptr ? old.refitter : WideRefitter::of(*old.tree);
+        if (out.refitter == nullptr) return {};
+        std::shared_ptr<const WideBvh> tree = out.refitter->refit(*old.tree, mesh);
+        if (tree == nullptr) return {};
         const double sah = tree->stats().sah;
-        finish(std::move(*tree), out);
+        finish(std::move(tree), out);
         return sah;
     }
 
 private:
-    static void finish(WideBvh tree, MeshTree& out) {
-        out.tree = std::make_shared<const WideBvh>(std::move(tree));
+    static void finish(std::shared_ptr<const WideBvh> tree, MeshTree& out) {
+        out.tree = std::move(tree);
         TriangleBlock none;
         out.view = view_of(out.tree->arrays(), none);
         out.view.room = nullptr;
@@ -96,6 +102,8 @@ public:
                                state_.tree != nullptr && state_.tree->quality == options_.quality &&
                                state_.tree->usage == options_.usage;
         build_tops(*tree_, may_refit ? state_.tree.get() : nullptr);
+        if (options_.usage == Usage::moving && state_.tree != nullptr)
+            tree_->rates.share(state_.tree->rates);
         keep_own_parts();
         report_.instances = tree_->instances.size();
         report_.paths = tree_->paths;

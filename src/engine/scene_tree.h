@@ -19,6 +19,7 @@
 #include "engine/support.h"
 #include "exec/path_rates.h"
 #include "layout/wide_bvh.h"
+#include "layout/wide_refit.h"
 #include "trace/simd/wide_ray.h"
 
 namespace raydix {
@@ -37,6 +38,7 @@ struct KeptFlatTriangles {
 struct MeshTree : GroupedMeshes {
     std::shared_ptr<const WideBvh> tree;
     WideView view{};  // without room for a compact tree's blocks
+    std::shared_ptr<WideRefitter> refitter;  // null before the first refit
     std::shared_ptr<KeptFlatTriangles> flats = std::make_shared<KeptFlatTriangles>();
 };
 
