@@ -6,6 +6,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "base/double3.h"
+#include "base/math.h"
 #include "bench_clock.h"
 #include "cli/output.h"
 #include "rays/hemisphere_rays.h"
@@ -16,11 +18,6 @@ namespace {
 /// Until memory that is used again comes round, and the ways of rays are known.
 constexpr std::uint64_t frames_before = 6;
 constexpr int trials = 3;
-
-double diagonal_of(const Aabb& box) {
-    const Vec3 d = box.hi - box.lo;
-    return std::sqrt(double(d.x) * d.x + double(d.y) * d.y + double(d.z) * d.z);
-}
 
 enum Part : std::size_t { commit_part, primary_part, ao_part, part_count };
 
@@ -129,7 +126,7 @@ std::vector<Vec3> MovingPicture::vertices(std::uint64_t frame) const {
     const double height = std::max(double(box_.hi.y) - box_.lo.y, 1e-6);
     const double phase =
         2 * std::numbers::pi * (double(frame) / 24 + double(seed_ % 1000) / 1000);
-    const Vec3 middle = 0.5f * (box_.lo + box_.hi);
+    const Vec3 middle = center_of(box_);
     std::vector<Vec3> moved;
     moved.reserve(mesh_.vertices.size() + 1);  // Embree reads 16 bytes a vertex
     for (const Vec3 v : mesh_.vertices) {
