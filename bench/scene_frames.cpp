@@ -65,8 +65,10 @@ public:
     }
 
     [[nodiscard]] TimedMode frame() const {
-        return {side_.name(), "primary " + primary_.name + ", ao " + ao_.name, ours_, false, false,
-                frame_ms_,    differences};
+        return {side_.name(), "primary " + primary_.name + ", ao " + ao_.name,
+                ours_,        false,
+                false,        frame_ms_,
+                differences};
     }
     [[nodiscard]] TimedMode part(Part part) const {
         const std::string names[] = {"commit", primary_.name, ao_.name};
@@ -124,8 +126,7 @@ MovingPicture::MovingPicture(const Mesh& mesh, cli::Size size, std::uint64_t see
 
 std::vector<Vec3> MovingPicture::vertices(std::uint64_t frame) const {
     const double height = std::max(double(box_.hi.y) - box_.lo.y, 1e-6);
-    const double phase =
-        2 * std::numbers::pi * (double(frame) / 24 + double(seed_ % 1000) / 1000);
+    const double phase = 2 * std::numbers::pi * (double(frame) / 24 + double(seed_ % 1000) / 1000);
     const Vec3 middle = center_of(box_);
     std::vector<Vec3> moved;
     moved.reserve(mesh_.vertices.size() + 1);  // Embree reads 16 bytes a vertex

@@ -14,8 +14,7 @@ namespace raydix::bench {
 /// The workloads by name, in the order in which they run.
 inline const std::vector<std::string> scene_workloads{"instances", "plants",   "nested",  "spheres",
                                                       "user",      "all_hits", "filters", "closest",
-                                                      "doubles",   "moved",    "fixed",
-                                                      "frames"};
+                                                      "doubles",   "moved",    "fixed",   "frames"};
 
 struct SceneBench {
     cli::CommonOptions common;  // its seed is that of the held-out group

@@ -211,8 +211,7 @@ private:
         const Question about{
             .workload = "frames", .scene = mesh->name, .primitives = mesh->triangles.size()};
         const MovingPicture picture(*mesh, size_, seed_);
-        for (const Question& question :
-             ask_frames(about, picture, *ours, peers, *guide, options_))
+        for (const Question& question : ask_frames(about, picture, *ours, peers, *guide, options_))
             answered_(question);
     }
 

@@ -2,6 +2,7 @@
 // the trees; other threads that still read what was; commits that end early.
 #include <gtest/gtest.h>
 #include <raydix/error.h>
+#include <raydix/model.h>
 #include <raydix/scene.h>
 #include <raydix/trace.h>
 
@@ -12,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/math.h"
 #include "support/random.h"
 #include "support/sanitized.h"
 #include "support/support.h"
@@ -19,7 +21,7 @@
 namespace raydix {
 namespace {
 
-constexpr SceneOptions moving{.usage = Usage::moving};
+const SceneOptions moving{.usage = Usage::moving};
 
 bool same(const Hit& a, const Hit& b) { return std::memcmp(&a, &b, sizeof(Hit)) == 0; }
 
@@ -27,7 +29,7 @@ std::vector<Ray> rays_into(const Aabb& box, test::Random& random, std::size_t co
     std::vector<Ray> rays;
     for (std::size_t i = 0; i < count; ++i) {
         const Vec3 from = random.in(box), to = random.in(box), out = random.in(-1, 1);
-        const Vec3 origin = i % 2 == 0 ? from : from + 3.0f * out;
+        const Vec3 origin = i % 2 == 0 ? from : from + out * 3.0f;
         rays.push_back({origin, 0, {to.x - origin.x, to.y - origin.y, to.z - origin.z}});
     }
     return rays;

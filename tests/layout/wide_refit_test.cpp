@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 #include <raydix/mesh.h>
+#include <raydix/model.h>
 
 #include <cmath>
 #include <cstring>
@@ -145,7 +146,9 @@ TEST(WideRefit, SaysNoWhereATreeCannotStay) {
     const Mesh mesh = waves(3000, 0);
     const WideBvh tree = build_wide_bvh(mesh);
     const auto refitter = WideRefitter::of(tree);
-    const auto refitted = [&](const Mesh& other) { return refitter->refit(tree, other) != nullptr; };
+    const auto refitted = [&](const Mesh& other) {
+        return refitter->refit(tree, other) != nullptr;
+    };
     EXPECT_TRUE(refitted(mesh));
     for (const float odd : {std::numeric_limits<float>::quiet_NaN(), infinity, -2e12f}) {
         Mesh other = mesh;
@@ -158,7 +161,7 @@ TEST(WideRefit, SaysNoWhereATreeCannotStay) {
     for (Vec3& v : other.vertices) v = {1, 2, 3};
     EXPECT_FALSE(refitted(other));
     other = mesh;
-    for (Vec3& v : other.vertices) v = 1e-16f * v;  // too small to count
+    for (Vec3& v : other.vertices) v = v * 1e-16f;  // too small to count
     EXPECT_FALSE(refitted(other));
     other = mesh;
     other.triangles.pop_back();
