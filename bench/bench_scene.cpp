@@ -83,7 +83,7 @@ void add_counts(CLI::App& app, SceneBench& options) {
     app.add_option("--frames", options.frames, "Triangles of figures that move")
         ->delimiter(',')
         ->allow_extra_args(false)
-        ->check(CLI::Range(1000, 100'000'000))
+        ->check(CLI::Range(5000, 20'000'000))
         ->capture_default_str();
 }
 
