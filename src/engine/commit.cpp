@@ -9,6 +9,7 @@
 #include "engine/shape_commit.h"
 #include "engine/shape_tree.h"
 #include "exec/parallel.h"
+#include "layout/wide_refit.h"
 
 namespace raydix {
 namespace {

@@ -105,8 +105,8 @@ void set_mesh(Geometry& geometry, const AnyMeshView& mesh, bool shared, bool sam
             arrays.triangles = std::make_shared<const std::vector<Triangle>>(mesh.triangles.begin(),
                                                                              mesh.triangles.end());
         arrays.vertices = copy_of_vertices(arrays, mesh.vertices);
-        geometry.own = std::make_shared<const std::pair<decltype(arrays.triangles),
-                                                        decltype(arrays.vertices)>>(
+        geometry.own = std::make_shared<
+            const std::pair<decltype(arrays.triangles), decltype(arrays.vertices)>>(
             arrays.triangles, arrays.vertices);
         geometry.mesh = {*arrays.vertices, *arrays.triangles};
         geometry.arrays = std::move(arrays);

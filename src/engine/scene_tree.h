@@ -19,11 +19,11 @@
 #include "engine/support.h"
 #include "exec/path_rates.h"
 #include "layout/wide_bvh.h"
-#include "layout/wide_refit.h"
 #include "trace/simd/wide_ray.h"
 
 namespace raydix {
 
+class WideRefitter;    // layout/wide_refit.h
 struct FlatTriangles;  // near_scene.h
 struct NearScene;      // near_scene.h
 
@@ -37,7 +37,7 @@ struct KeptFlatTriangles {
 /// One tree over the triangles of one mesh or of several, which follow each other by id.
 struct MeshTree : GroupedMeshes {
     std::shared_ptr<const WideBvh> tree;
-    WideView view{};  // without room for a compact tree's blocks
+    WideView view{};                         // without room for a compact tree's blocks
     std::shared_ptr<WideRefitter> refitter;  // null before the first refit
     std::shared_ptr<KeptFlatTriangles> flats = std::make_shared<KeptFlatTriangles>();
 };

@@ -23,9 +23,8 @@ public:
     }
     /// The last one who holds it gives it back, on any thread, also after the recycler's end.
     [[nodiscard]] std::shared_ptr<const T> share(std::unique_ptr<T> made) {
-        return {made.release(), [recycler = *this](T* used) mutable {
-                    recycler.give(std::unique_ptr<T>(used));
-                }};
+        return {made.release(),
+                [recycler = *this](T* used) mutable { recycler.give(std::unique_ptr<T>(used)); }};
     }
 
 private:

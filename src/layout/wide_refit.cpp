@@ -75,7 +75,9 @@ Aabb fit_node_plainly(Vec3 middle, WideNode& node, Areas& areas) {
 __attribute__((target("avx2"))) Aabb fit_node_avx2(Vec3 middle, WideNode& node, Areas& areas) {
     return fit_node(middle, node, areas);
 }
-FitNode best_fit_node() { return __builtin_cpu_supports("avx2") ? fit_node_avx2 : fit_node_plainly; }
+FitNode best_fit_node() {
+    return __builtin_cpu_supports("avx2") ? fit_node_avx2 : fit_node_plainly;
+}
 #else
 FitNode best_fit_node() { return fit_node_plainly; }
 #endif
@@ -100,7 +102,9 @@ struct Corners4 {
         select(used, z, zero).store(block.corner[3 * v + 2]);
     }
 };
-Corners4 operator-(const Corners4& a, const Corners4& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Corners4 operator-(const Corners4& a, const Corners4& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
 Corners4 min_of(const Corners4& a, const Corners4& b) {
     return {min_of(a.x, b.x), min_of(a.y, b.y), min_of(a.z, b.z)};
 }

@@ -32,11 +32,11 @@ public:
 private:
     friend class WideRefit;
 
-    /// Nodes first to last - 1 whose children are all among them or leaves, but for those in
-    /// `above`, and the blocks that belong to no others.
+    /// Nodes that are fitted one after the other, from the last to the first; those of `above_` and
+    /// blocks with leaves of several runs apart.
     static constexpr std::size_t nodes_of_a_run = 256;
-    /// A block, the triangle of each lane, and its leaf's slot among those of all nodes. Lanes of no
-    /// leaf have no_slot, and the triangle of one that has.
+    /// A block, the triangle of each lane, and its leaf's slot among those of all nodes. Lanes of
+    /// no leaf have no_slot, and the triangle of one that has.
     struct LeafBlock {
         std::uint32_t block;
         std::uint32_t prim[block_lanes];
