@@ -297,7 +297,7 @@ FAULTS = [
           "scenes: parts of the second tree are taken for those of the first", "engine"),
     Fault("src/engine/part_tree.cpp", "if (!(cost <= limit * old.cost_at_build)) return false;", "",
           "scenes: the tree over parts is refitted whatever it costs", "engine"),
-    Fault("src/layout/wide_refit.cpp", "if (!same(center_of(bounds), center_of(*guess))) {", "if (false) {",
+    Fault("src/layout/wide_refit.cpp", "            fit(center_of(bounds));\n", "",
           "refit: planes are about the middle of vertices that no triangle has", "layout engine"),
     Fault("src/layout/wide_refit.cpp", "waits_[word] != 0 || word / nodes_of_a_run", "word / nodes_of_a_run",
           "refit: a node is fitted before one that waits for another run", "layout"),
