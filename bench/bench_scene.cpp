@@ -29,6 +29,7 @@ void make_quick(const CLI::App& app, SceneBench& options) {
     choose("--moved", options.moved, 300u);
     choose("--queries", options.queries, 2000u);
     choose("--pieces", options.pieces, 20u);
+    choose("--frames", options.frames, std::vector<std::uint64_t>{5000});
     choose("--size", options.size, "64x48");
     choose("--rounds", options.rounds, 3);
 }
@@ -40,7 +41,8 @@ Json options_json(const SceneBench& options, int threads) {
             {"instances", options.instances}, {"plants", options.plants},
             {"shapes", options.shapes},       {"moved", options.moved},
             {"queries", options.queries},     {"pieces", options.pieces},
-            {"only", options.only},           {"quick", options.quick}};
+            {"frames", options.frames},       {"only", options.only},
+            {"quick", options.quick}};
 }
 
 void run(const SceneBench& options) {
@@ -78,6 +80,11 @@ void add_counts(CLI::App& app, SceneBench& options) {
     add("--moved", options.moved, "Instances that move");
     add("--queries", options.queries, "Queries for closest points");
     add("--pieces", options.pieces, "Meshes beside one merged mesh");
+    app.add_option("--frames", options.frames, "Triangles of figures that move")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->check(CLI::Range(5000, 20'000'000))
+        ->capture_default_str();
 }
 
 void add_options(CLI::App& app, SceneBench& options) {

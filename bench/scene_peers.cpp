@@ -1,6 +1,8 @@
 // Rays through Embree's scenes.
 #include "scene_peers.h"
 
+#include <algorithm>
+
 #include "embree_kinds.h"
 #include "embree_owned.h"
 #include "embree_trace.h"
@@ -131,6 +133,36 @@ private:
     EmbreeRays<PlacedHit> rays_;
 };
 
+class EmbreeMovingMesh : public FrameSide {
+public:
+    /// `refits`: the geometry has the quality of that name. Only scenes of low quality keep a tree
+    /// for each geometry, which alone can be refitted.
+    EmbreeMovingMesh(const EmbreeKind& kind, bool refits, const Mesh& mesh, int threads)
+        : name_(kind.name), mesh_(mesh), rays_(kind, threads) {
+        mesh_.vertices.reserve(mesh.vertices.size() + 1);  // Embree reads 16 bytes a vertex
+        EmbreeGroup& scene = rays_.add_group();
+        add_mesh(scene, mesh_, [&](RTCGeometry geometry) {
+            if (refits) rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_REFIT);
+        });
+        scene.commit();
+    }
+    std::string name() const override { return name_; }
+    void move(std::span<const Vec3> places) override {
+        std::copy(places.begin(), places.end(), mesh_.vertices.begin());
+    }
+    void commit() override {
+        rtcUpdateGeometryBuffer(rays_.scene().geometry(0), RTC_BUFFER_TYPE_VERTEX, 0);
+        rtcCommitGeometry(rays_.scene().geometry(0));
+        rays_.scene().commit();
+    }
+    RaySide& rays() override { return rays_; }
+
+private:
+    std::string name_;
+    Mesh mesh_;
+    EmbreeRays<Hit> rays_;
+};
+
 void disc_bounds(const RTCBoundsFunctionArguments* arguments) {
     const auto* discs = static_cast<const Disc*>(arguments->geometryUserPtr);
     const Aabb box = box_of(discs[arguments->primID]);
@@ -240,6 +272,21 @@ std::vector<std::unique_ptr<MovingSide>> embree_moving_instances(const PlacedSce
     sides.push_back(std::make_unique<EmbreeMoving>(
         EmbreeKind{"embree low+dynamic", RTC_BUILD_QUALITY_LOW, RTC_SCENE_FLAG_DYNAMIC, false},
         scene, options.threads));
+    return sides;
+}
+
+std::vector<std::unique_ptr<FrameSide>> embree_moving_mesh(const Mesh& mesh,
+                                                           const PeerOptions& options) {
+    std::vector<std::unique_ptr<FrameSide>> sides;
+    const auto add = [&](const char* name, RTCBuildQuality quality, RTCSceneFlags flags,
+                         bool refits) {
+        sides.push_back(std::make_unique<EmbreeMovingMesh>(EmbreeKind{name, quality, flags, false},
+                                                           refits, mesh, options.threads));
+    };
+    add("embree refit+dynamic", RTC_BUILD_QUALITY_LOW, RTC_SCENE_FLAG_DYNAMIC, true);
+    add("embree low+dynamic", RTC_BUILD_QUALITY_LOW, RTC_SCENE_FLAG_DYNAMIC, false);
+    add("embree low", RTC_BUILD_QUALITY_LOW, RTC_SCENE_FLAG_NONE, false);
+    add("embree medium", RTC_BUILD_QUALITY_MEDIUM, RTC_SCENE_FLAG_NONE, false);
     return sides;
 }
 

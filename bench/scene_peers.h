@@ -31,5 +31,9 @@ using EmbreeSides = std::vector<std::unique_ptr<RaySide>>;
 /// Of the quality that stands beside ours, and of the cheapest one with the flag DYNAMIC.
 [[nodiscard]] std::vector<std::unique_ptr<MovingSide>> embree_moving_instances(
     const PlacedScene& scene, const PeerOptions& options);
+/// Refitted, and built again with the qualities LOW and MEDIUM; LOW also with the flag DYNAMIC,
+/// which a refit needs.
+[[nodiscard]] std::vector<std::unique_ptr<FrameSide>> embree_moving_mesh(
+    const Mesh& mesh, const PeerOptions& options);
 
 }  // namespace raydix::bench

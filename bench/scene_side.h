@@ -65,16 +65,22 @@ public:
     [[nodiscard]] virtual float distance(std::size_t query) const = 0;
 };
 
-/// A scene of instances that move.
-class MovingSide {
+/// A scene whose things move. Place: where one of them is.
+template <class Place>
+class SideInMotion {
 public:
-    virtual ~MovingSide() = default;
+    virtual ~SideInMotion() = default;
     [[nodiscard]] virtual std::string name() const = 0;
-    /// One for each placement of the scene.
-    virtual void move(std::span<const Affine> to_world) = 0;
+    /// One for each of them.
+    virtual void move(std::span<const Place> places) = 0;
     virtual void commit() = 0;
     /// As it was committed last.
     [[nodiscard]] virtual RaySide& rays() = 0;
 };
+/// Instances.
+using MovingSide = SideInMotion<Affine>;
+/// A mesh by its vertices. Its commit begins when the program has them in an array, and says first
+/// that they changed.
+using FrameSide = SideInMotion<Vec3>;
 
 }  // namespace raydix::bench

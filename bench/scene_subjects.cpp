@@ -6,6 +6,9 @@
 #include <raydix/user_geometry.h>
 #include <raydix/wide.h>
 
+#include <algorithm>
+
+#include "exec/parallel.h"
 #include "one_by_one.h"
 
 namespace raydix::bench {
@@ -319,6 +322,47 @@ private:
     OurRays<InstanceCalls> rays_;
 };
 
+/// A mesh that is shared with the scene. The caller's vertices take turns between two arrays, since
+/// those of the last commit stay as they are.
+struct MovingMeshCalls : SceneCalls {
+    std::vector<Triangle> triangles;
+    std::array<std::vector<Vec3>, 2> vertices;
+    std::size_t now = 0;
+
+    explicit MovingMeshCalls(const Mesh& mesh)
+        : triangles(mesh.triangles), vertices{mesh.vertices, mesh.vertices} {
+        scene.share(view());
+    }
+    [[nodiscard]] MeshView view() const { return {vertices[now], triangles}; }
+    [[nodiscard]] PlacedHit placed(const Hit& hit) const { return bench::placed(hit); }
+};
+
+class OurMovingMesh : public FrameSide {
+public:
+    OurMovingMesh(const Mesh& mesh, const SubjectOptions& options)
+        : quality_(options.quality), threads_(options.threads), rays_(options, mesh) {
+        commit();
+    }
+
+    std::string name() const override { return "raydix"; }
+    void move(std::span<const Vec3> places) override {
+        MovingMeshCalls& calls = rays_.calls();
+        calls.now = 1 - calls.now;
+        std::copy(places.begin(), places.end(), calls.vertices[calls.now].begin());
+    }
+    void commit() override {
+        MovingMeshCalls& calls = rays_.calls();
+        with_threads(threads_, [&] { calls.scene.update(0, calls.view()); });
+        calls.scene.commit({.quality = quality_, .usage = Usage::moving, .threads = threads_});
+    }
+    RaySide& rays() override { return rays_; }
+
+private:
+    Quality quality_;
+    int threads_;
+    OurRays<MovingMeshCalls> rays_;
+};
+
 }  // namespace
 
 std::unique_ptr<RaySide> our_mesh(const Mesh& mesh, const SubjectOptions& options) {
@@ -370,6 +414,10 @@ std::unique_ptr<ClosestSide> our_closest_points(const Mesh& mesh, const SubjectO
 std::unique_ptr<MovingSide> our_moving_instances(const PlacedScene& scene,
                                                  const SubjectOptions& options) {
     return std::make_unique<OurMovingInstances>(scene, options);
+}
+
+std::unique_ptr<FrameSide> our_moving_mesh(const Mesh& mesh, const SubjectOptions& options) {
+    return std::make_unique<OurMovingMesh>(mesh, options);
 }
 
 }  // namespace raydix::bench

@@ -36,5 +36,7 @@ using AcceptPrimitive = bool (*)(std::uint32_t prim);
                                                               const SubjectOptions& options);
 [[nodiscard]] std::unique_ptr<MovingSide> our_moving_instances(const PlacedScene& scene,
                                                                const SubjectOptions& options);
+[[nodiscard]] std::unique_ptr<FrameSide> our_moving_mesh(const Mesh& mesh,
+                                                         const SubjectOptions& options);
 
 }  // namespace raydix::bench

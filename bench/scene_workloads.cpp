@@ -6,6 +6,7 @@
 
 #include "base/math.h"
 #include "closest_queries.h"
+#include "scene_frames.h"
 #include "scene_peers.h"
 #include "scene_subjects.h"
 
@@ -47,6 +48,8 @@ public:
         spheres();
         discs();
         fixed();
+        if (options_.wants("frames"))
+            for (const std::uint64_t triangles : options_.frames) frames(triangles);
     }
 
 private:
@@ -198,6 +201,18 @@ private:
         RaySides peers;
         peers.push_back(as_peer(our_mesh(*one, sides_), "raydix merged"));
         ask_all(about, make_rays(bounds_of(*one), size_, seed_), ours.get(), peers);
+    }
+
+    void frames(std::uint64_t triangles) {
+        const SharedMesh mesh =
+            load_shared_mesh("builtin:figure?triangles=" + std::to_string(triangles), seed_);
+        const auto ours = our_moving_mesh(*mesh, sides_), guide = our_moving_mesh(*mesh, sides_);
+        const auto peers = embree_moving_mesh(*mesh, sides_);
+        const Question about{
+            .workload = "frames", .scene = mesh->name, .primitives = mesh->triangles.size()};
+        const MovingPicture picture(*mesh, size_, seed_);
+        for (const Question& question : ask_frames(about, picture, *ours, peers, *guide, options_))
+            answered_(question);
     }
 
     /// One of our own sides in the place of Embree.

@@ -2,6 +2,8 @@
 // operation, so the bits are those of scalar code. Processors without SSE take the loop.
 #pragma once
 
+#include <raydix/types.h>
+
 #include <array>
 #include <cstdint>
 
@@ -17,6 +19,11 @@ struct Float4 {
     __m128 v;
 
     static Float4 load(const float* p) { return {_mm_loadu_ps(p)}; }
+    /// Reads twelve bytes, no more; the last lane is 0.
+    static Float4 load(const Vec3& p) {
+        const __m128i xy = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(&p.x));
+        return {_mm_movelh_ps(_mm_castsi128_ps(xy), _mm_load_ss(&p.z))};
+    }
     static Float4 all(float x) { return {_mm_set1_ps(x)}; }
     /// Of whole numbers below 2^31.
     static Float4 of(const std::uint32_t* p) {
@@ -51,6 +58,9 @@ inline Mask4 operator<(Float4 a, Float4 b) { return {_mm_cmplt_ps(a.v, b.v)}; }
 inline Mask4 operator<=(Float4 a, Float4 b) { return {_mm_cmple_ps(a.v, b.v)}; }
 inline Mask4 operator&(Mask4 a, Mask4 b) { return {_mm_and_ps(a.v, b.v)}; }
 inline Mask4 operator|(Mask4 a, Mask4 b) { return {_mm_or_ps(a.v, b.v)}; }
+/// Bit k: yes in lane k.
+inline unsigned bits_of(Mask4 mask) { return static_cast<unsigned>(_mm_movemask_ps(mask.v)); }
+inline Float4 absolute(Float4 a) { return {_mm_andnot_ps(_mm_set1_ps(-0.0f), a.v)}; }
 inline Float4 select(Mask4 mask, Float4 yes, Float4 no) {
     return {_mm_or_ps(_mm_and_ps(mask.v, yes.v), _mm_andnot_ps(mask.v, no.v))};
 }
@@ -66,6 +76,7 @@ struct Float4 {
     std::array<float, 4> v;
 
     static Float4 load(const float* p) { return {{p[0], p[1], p[2], p[3]}}; }
+    static Float4 load(const Vec3& p) { return {{p.x, p.y, p.z, 0}}; }
     static Float4 all(float x) { return {{x, x, x, x}}; }
     static Float4 of(const std::uint32_t* p) {
         const auto at = [p](int k) { return static_cast<float>(p[k]); };
@@ -120,6 +131,15 @@ inline Mask4 operator&(Mask4 a, Mask4 b) {
 }
 inline Mask4 operator|(Mask4 a, Mask4 b) {
     return detail::lane_by_lane<Mask4>(a, b, [](auto x, auto y) { return x | y; });
+}
+inline unsigned bits_of(Mask4 mask) {
+    unsigned bits = 0;
+    for (unsigned k = 0; k < 4; ++k) bits |= (mask.v[k] != 0 ? 1u : 0u) << k;
+    return bits;
+}
+inline Float4 absolute(Float4 a) {
+    for (float& x : a.v) x = x < 0 ? -x : x + 0.0f;
+    return a;
 }
 inline Float4 select(Mask4 mask, Float4 yes, Float4 no) {
     Float4 r;

@@ -29,25 +29,33 @@ struct WideMaker {
             },
             [](const WideBvh& tree) { return tree.stats().sah; });
         out.sah_at_build = built.stats().sah;
-        finish(std::move(built), out);
+        out.refitter = nullptr;  // a refit that was tried had other links
+        finish(std::make_shared<const WideBvh>(std::move(built)), out);
     }
     static std::uint64_t left_out(const MeshTree& made) { return made.tree->stats().left_out; }
     static void keep(const MeshTree& old, MeshTree& out) {
         out.set_tree(old.tree);
+        out.refitter = old.refitter;
         out.flats = old.flats;
+    }
+    static void share_rates(const MeshTree& old, MeshTree& out) {
+        if (out.tree == old.tree) return;  // others may be reading it
+        out.tree->arrays().rates.share(old.tree->arrays().rates);
     }
     static std::optional<double> refit(const MeshTree& old, const MeshView& mesh,
                                        const SceneOptions&, MeshTree& out) {
-        std::optional<WideBvh> tree = refit_wide(*old.tree, mesh);
-        if (!tree) return {};
+        out.refitter = old.refitter != nullptr ? old.refitter : WideRefitter::of(*old.tree);
+        if (out.refitter == nullptr) return {};
+        std::shared_ptr<const WideBvh> tree = out.refitter->refit(*old.tree, mesh);
+        if (tree == nullptr) return {};
         const double sah = tree->stats().sah;
-        finish(std::move(*tree), out);
+        finish(std::move(tree), out);
         return sah;
     }
 
 private:
-    static void finish(WideBvh tree, MeshTree& out) {
-        out.set_tree(std::make_shared<const WideBvh>(std::move(tree)));
+    static void finish(std::shared_ptr<const WideBvh> tree, MeshTree& out) {
+        out.set_tree(std::move(tree));
     }
 };
 
@@ -92,6 +100,8 @@ public:
                                state_.tree != nullptr && state_.tree->quality == options_.quality &&
                                state_.tree->usage == options_.usage;
         build_tops(*tree_, may_refit ? state_.tree.get() : nullptr);
+        if (options_.usage == Usage::moving && state_.tree != nullptr)
+            tree_->rates.share(state_.tree->rates);
         keep_own_parts();
         report_.instances = tree_->instances.size();
         report_.paths = tree_->paths;

@@ -28,6 +28,7 @@ struct WideMakerD {
         return made.tree->arrays.stats.left_out;
     }
     static void keep(const MeshTreeD& old, MeshTreeD& out) { out.tree = old.tree; }
+    static void share_rates(const MeshTreeD&, MeshTreeD&) {}  // a scene has them
     static std::optional<double> refit(const MeshTreeD& old, const MeshViewD& mesh,
                                        const SceneOptions&, MeshTreeD& out) {
         out.tree = refit_wide_tree(*old.tree, mesh);
@@ -71,6 +72,8 @@ public:
         const ProgressStage top(made, 1);
         progress_at(0);
         build_top(*tree_);
+        if (options_.usage == Usage::moving && state_.tree != nullptr)
+            tree_->rates.share(state_.tree->rates);
         keep_own_parts();
         if (tree_->only_mesh() == nullptr)
             report_.bytes += tree_->parts.arrays.nodes.size() * sizeof(WideNode) +

@@ -26,6 +26,7 @@ namespace raydix {
 ///   build(mesh, options, out)         a new one: tree and sah_at_build, 0 if it is not known
 ///   left_out(out)                     how many of its triangles are invalid
 ///   keep(old, out)                    the same tree
+///   share_rates(old, out)             which ways rays go is known from the old tree on
 ///   refit(old, mesh, options, out)    the old one around moved vertices, and its SAH; or none
 template <class Scalar, class Maker>
 class MeshCommit {
@@ -141,6 +142,8 @@ private:
             }
             ++report_.trees_built;
         }
+        if (options_.usage == Usage::moving)
+            if (const MeshTree* const old = last_of(group)) Maker::share_rates(*old, *out);
         out->left_out = Maker::left_out(*out);
         out->make_buckets();
         return out;

@@ -5,8 +5,10 @@
 #include <raydix/user_geometry.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <memory>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -16,6 +18,7 @@
 #include "base/options.h"
 #include "engine/commit.h"
 #include "engine/scene_state.h"
+#include "exec/parallel.h"
 
 namespace raydix {
 namespace {
@@ -32,10 +35,37 @@ const char* what_is(const Geometry& geometry) {
     return name_of_kind(kind_of_geometry(geometry));
 }
 
+constexpr std::size_t triangles_a_range = 65536;
+
+/// Whether all indices are below `count`.
+bool are_below(std::span<const Triangle> triangles, std::size_t count) {
+    std::atomic<std::uint32_t> most = 0;
+    for_each_range(triangles.size(), triangles_a_range, [&](std::size_t begin, std::size_t end) {
+        std::uint32_t found = 0;
+        for (std::size_t i = begin; i < end; ++i)
+            found = std::max({found, triangles[i][0], triangles[i][1], triangles[i][2]});
+        std::uint32_t known = most.load();
+        while (known < found && !most.compare_exchange_weak(known, found)) {
+        }
+    });
+    return triangles.empty() || most.load() < count;
+}
+
+bool are_equal(std::span<const Triangle> a, std::span<const Triangle> b) {
+    if (a.size() != b.size()) return false;
+    if (a.data() == b.data()) return true;
+    std::atomic<bool> equal = true;
+    for_each_range(a.size(), triangles_a_range, [&](std::size_t begin, std::size_t end) {
+        if (equal && !std::equal(a.data() + begin, a.data() + end, b.data() + begin)) equal = false;
+    });
+    return equal;
+}
+
 template <class AnyMeshView>
 void check_mesh(const std::string& name, const AnyMeshView& mesh) {
     if (mesh.triangles.empty() && !mesh.vertices.empty())
         throw InputError(name + ": vertices without triangles");
+    if (are_below(mesh.triangles, mesh.vertices.size())) return;
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
         const Triangle& t = mesh.triangles[i];
         if (std::max({t[0], t[1], t[2]}) >= mesh.vertices.size())
@@ -44,18 +74,45 @@ void check_mesh(const std::string& name, const AnyMeshView& mesh) {
     }
 }
 
+/// Whether these are the triangles that the geometry has a copy of.
 template <class Geometry, class AnyMeshView>
-void set_mesh(Geometry& geometry, const AnyMeshView& mesh, bool shared) {
-    using Mesh = std::conditional_t<std::is_same_v<AnyMeshView, MeshView>, raydix::Mesh, MeshD>;
+bool keeps_triangles(const Geometry& geometry, const AnyMeshView& mesh) {
+    return geometry.arrays && are_equal(*geometry.arrays->triangles, mesh.triangles);
+}
+
+/// In memory of vertices that nobody holds any more, where there is some.
+template <class Arrays, class Point>
+auto copy_of_vertices(Arrays& arrays, std::span<const Point> from) {
+    auto copy = arrays.memory.take();
+    if (copy == nullptr) copy = std::make_unique<std::vector<Point>>();
+    copy->resize(from.size());
+    for_each_range(from.size(), triangles_a_range, [&](std::size_t begin, std::size_t end) {
+        std::copy(from.data() + begin, from.data() + end, copy->data() + begin);
+    });
+    return arrays.memory.share(std::move(copy));
+}
+
+/// `same_triangles`: keeps_triangles(geometry, mesh).
+template <class Geometry, class AnyMeshView>
+void set_mesh(Geometry& geometry, const AnyMeshView& mesh, bool shared, bool same_triangles) {
+    if (shared) {
+        geometry.own = nullptr;
+        geometry.mesh = mesh;
+    } else {
+        using Arrays = typename decltype(geometry.arrays)::value_type;
+        Arrays arrays = geometry.arrays ? *geometry.arrays : Arrays{};
+        if (!same_triangles)
+            arrays.triangles = std::make_shared<const std::vector<Triangle>>(mesh.triangles.begin(),
+                                                                             mesh.triangles.end());
+        arrays.vertices = copy_of_vertices(arrays, mesh.vertices);
+        geometry.own = std::make_shared<
+            const std::pair<decltype(arrays.triangles), decltype(arrays.vertices)>>(
+            arrays.triangles, arrays.vertices);
+        geometry.mesh = {*arrays.vertices, *arrays.triangles};
+        geometry.arrays = std::move(arrays);
+    }
     geometry.shared = shared;
     geometry.changed = true;
-    const auto own =
-        shared ? nullptr
-               : std::make_shared<const Mesh>(Mesh{{},
-                                                   {mesh.vertices.begin(), mesh.vertices.end()},
-                                                   {mesh.triangles.begin(), mesh.triangles.end()}});
-    geometry.own = own;
-    geometry.mesh = shared ? mesh : AnyMeshView(*own);
 }
 
 /// Copies of what is given, as shapes that view them.
@@ -120,7 +177,7 @@ std::uint32_t add_mesh(State& state, const AnyMeshView& mesh, const GeometryOpti
     check_mesh(name_of(id), mesh);
     typename State::Geometry geometry;
     geometry.mask = options.mask;
-    set_mesh(geometry, mesh, shared);
+    set_mesh(geometry, mesh, shared, false);
     return insert(state, id, std::move(geometry));
 }
 
@@ -274,8 +331,11 @@ void BasicScene<Scalar>::update(std::uint32_t id, const MeshView& mesh) {
     auto& geometry = state_->at(id);
     if (!geometry.is_mesh())
         throw InputError(name_of(id) + " is " + what_is(geometry) + ", not a mesh");
-    check_mesh(name_of(id), mesh);
-    set_mesh(geometry, mesh, geometry.shared);
+    const bool same_triangles =
+        !geometry.shared && !mesh.triangles.empty() && keeps_triangles(geometry, mesh);
+    if (!same_triangles || mesh.vertices.size() < geometry.mesh.vertices.size())
+        check_mesh(name_of(id), mesh);
+    set_mesh(geometry, mesh, geometry.shared, same_triangles);
     state_->changed = true;
 }
 

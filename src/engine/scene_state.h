@@ -13,6 +13,7 @@
 #include "engine/scene_tree.h"
 #include "engine/scene_tree_double.h"
 #include "engine/shape_tree.h"
+#include "exec/recycler.h"
 
 namespace raydix {
 
@@ -40,6 +41,15 @@ struct SceneKind<double> {
     };
 };
 
+/// A copy of a mesh. Where only vertices move, the triangles stay.
+template <class Scalar>
+struct OwnMesh {
+    using Point = typename SceneTypes<Scalar>::Point;
+    std::shared_ptr<const std::vector<Triangle>> triangles;
+    std::shared_ptr<const std::vector<Point>> vertices;
+    Recycler<std::vector<Point>> memory;  // of vertices
+};
+
 template <class Scalar>
 struct BasicScene<Scalar>::State {
     struct Geometry : SceneKind<Scalar>::WayBack {
@@ -47,6 +57,7 @@ struct BasicScene<Scalar>::State {
         // own ones.
         MeshView mesh;
         std::shared_ptr<const void> own;
+        std::optional<OwnMesh<Scalar>> arrays;  // of `own`, unless they came from a file
         bool shared = false;
         // Or shapes, views of `own`.
         std::optional<BasicShapes<Scalar>> shapes;

@@ -23,6 +23,7 @@
 
 namespace raydix {
 
+class WideRefitter;    // layout/wide_refit.h
 struct FlatTriangles;  // near_scene.h
 struct NearScene;      // near_scene.h
 
@@ -36,8 +37,9 @@ struct KeptFlatTriangles {
 /// One tree over the triangles of one mesh or of several, which follow each other by id.
 struct MeshTree : GroupedMeshes {
     std::shared_ptr<const WideBvh> tree;
-    WideView view{};             // without room for a compact tree's blocks
-    std::size_t stack_size = 0;  // of the tree's deepest path; 0: no ray hits anything
+    WideView view{};                         // without room for a compact tree's blocks
+    std::size_t stack_size = 0;              // of the deepest path; 0: no ray hits anything
+    std::shared_ptr<WideRefitter> refitter;  // null before the first refit
     std::shared_ptr<KeptFlatTriangles> flats = std::make_shared<KeptFlatTriangles>();
 
     void set_tree(std::shared_ptr<const WideBvh> to) {

@@ -194,31 +194,48 @@ public:
     PathRates() = default;
     PathRates(const PathRates&) {}
     PathRates& operator=(const PathRates&) {
-        forget();
+        known_ = std::make_shared<Known>();
         return *this;
     }
-    ~PathRates() { forget(); }
+    ~PathRates() = default;
 
-    [[nodiscard]] PathWayRates& ways(const BatchKind& kind) { return table().ways[kind.index()]; }
-    [[nodiscard]] OrderRates& orders(const BatchKind& kind) { return table().orders[kind.index()]; }
+    /// From now on both know what either learns: a tree that follows another one is much like it.
+    void share(const PathRates& other) { known_ = other.known_; }
+
+    [[nodiscard]] PathWayRates& ways(const BatchKind& kind) {
+        return known_->table().ways[kind.index()];
+    }
+    [[nodiscard]] OrderRates& orders(const BatchKind& kind) {
+        return known_->table().orders[kind.index()];
+    }
 
 private:
     struct Table {
         std::array<PathWayRates, BatchKind::count> ways;
         std::array<OrderRates, BatchKind::count> orders;
     };
-    [[nodiscard]] Table& table() {
-        Table* table = table_.load(std::memory_order_acquire);
-        if (table == nullptr) {
-            auto made = std::make_unique<Table>();
-            if (table_.compare_exchange_strong(table, made.get(), std::memory_order_acq_rel))
-                table = made.release();
-        }
-        return *table;
-    }
-    void forget() { delete table_.exchange(nullptr); }
+    class Known {
+    public:
+        Known() = default;
+        Known(const Known&) = delete;
+        Known& operator=(const Known&) = delete;
+        ~Known() { delete table_.load(); }
 
-    std::atomic<Table*> table_{nullptr};
+        [[nodiscard]] Table& table() {
+            Table* table = table_.load(std::memory_order_acquire);
+            if (table == nullptr) {
+                auto made = std::make_unique<Table>();
+                if (table_.compare_exchange_strong(table, made.get(), std::memory_order_acq_rel))
+                    table = made.release();
+            }
+            return *table;
+        }
+
+    private:
+        std::atomic<Table*> table_{nullptr};
+    };
+
+    std::shared_ptr<Known> known_ = std::make_shared<Known>();
 };
 
 /// The ways that the jobs of a batch may go, in the order of promise.

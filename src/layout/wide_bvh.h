@@ -134,6 +134,7 @@ struct WideBvhInternals {
         tree.arrays_ = std::move(arrays);
         return tree;
     }
+    static WideBvh::Arrays& arrays_of(WideBvh& tree) { return *tree.arrays_; }
 };
 
 /// Memory that making a layout takes, kept from one to the next.

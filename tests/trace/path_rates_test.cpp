@@ -171,6 +171,25 @@ TEST(PathRates, ManyThreadsMayAskAndAdd) {
     EXPECT_GT(traced, threads * jobs * 100);
 }
 
+TEST(PathRates, ThoseThatShareKnowWhatEitherLearns) {
+    constexpr PathWay ways[] = {PathWay::packets, PathWay::turns};
+    PathRates first, second;
+    first.ways({}).add(PathWay::turns, PathWay::packets, 0.5f);
+    EXPECT_EQ(second.ways({}).fastest(ways), PathWay::packets);
+    second.share(first);
+    EXPECT_EQ(second.ways({}).fastest(ways), PathWay::turns);
+    for (int k = 0; k < 9; ++k) second.ways({}).add(PathWay::turns, PathWay::packets, 3.0f);
+    EXPECT_EQ(first.ways({}).fastest(ways), PathWay::packets);
+    second.ways({}).add(PathWay::turns, PathWay::packets, 0.1f);
+    const PathRates copy = second;
+    PathRates assigned;
+    assigned = second;
+    second = PathRates();
+    EXPECT_EQ(PathRates(copy).ways({}).fastest(ways), PathWay::packets);
+    EXPECT_EQ(assigned.ways({}).fastest(ways), PathWay::packets);
+    EXPECT_EQ(second.ways({}).fastest(ways), PathWay::packets);
+}
+
 TEST(PathRates, EachKindHasItsOwnPlace) {
     std::vector<bool> taken(BatchKind::count);
     for (const bool any : {false, true})
