@@ -44,6 +44,10 @@ HWY_INLINE std::uint32_t used_slots(const WideNode& node) {
 alignas(32) inline constexpr std::uint32_t first_two[9][8] = {
     {}, {}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}};
 
+/// The sign bits of every second lane.
+alignas(32) inline constexpr std::uint32_t odd_signs[8] = {0, 1u << 31, 0, 1u << 31,
+                                                           0, 1u << 31, 0, 1u << 31};
+
 /// `leaf` if `word` is one, else `node`; without a jump, which could not be foreseen.
 HWY_INLINE std::uintptr_t by_kind_of(std::uint32_t word, std::uintptr_t node, std::uintptr_t leaf) {
     static_assert(wide_leaf_bit == 1u << 31);

@@ -290,20 +290,22 @@ private:
         if constexpr (closest)
             for (std::size_t k = parts8 == 1 ? 2 : 1; k < count; ++k) insert(k, words, at);
     }
-    /// The first two of `count` by entry.
+    /// The first two of `count` by entry; the first of equals is the nearer one.
     static HWY_INLINE void farther_first(std::size_t count, V& entry, V& word) {
         const V other = hn::Shuffle2301(entry);
-        const V pairs = hn::OddEven(hn::Min(entry, other), hn::Max(entry, other));
+        const V turned = hn::BitCast(f8, hn::Load(U8(), odd_signs));  // -a <= -b: b <= a
         const auto two = hn::MaskFromVec(hn::BitCast(f8, hn::Load(U8(), first_two[count])));
-        const V ordered = hn::IfThenElse(two, pairs, entry);
-        word = hn::IfThenElse(hn::Ne(ordered, entry), hn::Shuffle2301(word), word);
-        entry = ordered;
+        const auto swap = hn::And(two, hn::Le(hn::Xor(entry, turned), hn::Xor(other, turned)));
+        word = hn::IfThenElse(swap, hn::Shuffle2301(word), word);
+        entry = hn::IfThenElse(swap, other, entry);
     }
     /// Child k to its place among those before it, which are in their order.
     static HWY_INLINE void insert(std::size_t k, std::uint32_t* words, float* at) {
         const float entry = at[k];
         const std::uint32_t word = words[k];
-        for (; k > 0 && at[k - 1] < entry; --k) at[k] = at[k - 1], words[k] = words[k - 1];
+        if (entry < at[k - 1]) return;
+        at[k] = at[k - 1], words[k] = words[k - 1];
+        for (--k; k > 0 && at[k - 1] < entry; --k) at[k] = at[k - 1], words[k] = words[k - 1];
         at[k] = entry, words[k] = word;
     }
 
