@@ -22,9 +22,11 @@ std::vector<Aabb> boxes_for(std::size_t n) {
 }
 
 template <class Key>
-CountedBuild count(Builder builder, Fit fit, const std::vector<Key>& keys, int max_leaf = 1) {
+CountedBuild count(Builder builder, Fit fit, const std::vector<Key>& keys, int max_leaf = 1,
+                   BuildForm form = BuildForm::launches) {
     const std::vector<Aabb> boxes = boxes_for(keys.size());
-    return count_build<Key>(builder, fit, keys, boxes, max_leaf);
+    CountedMemory memory;
+    return count_build<Key>({builder, fit, form}, keys, boxes, max_leaf, memory);
 }
 
 std::vector<std::uint64_t> items_of(const CountedBuild& build, const std::string& label) {
