@@ -1,6 +1,6 @@
-// raydix bench hierarchy: the builders of the LBVH family beside each other, with the stages and the
-// trees around them: counted, measured, predicted for this machine and for larger ones (Karras 2012,
-// section 5), and the paper's claims.
+// raydix bench hierarchy: the builders of the LBVH family beside each other, with the stages and
+// the trees around them: counted, measured, predicted for this machine and for larger ones (Karras
+// 2012, section 5), and the paper's claims.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <raydix/error.h>
@@ -95,8 +95,9 @@ public:
         document_["factors"] = options_.factors;
         for (const char* list : {"runs", "builds", "machines", "claims"})
             document_[list] = Json::array();
-        document_["gpu"] = "no GPU was used: rows of gtx480 and h200 are simulated, and measured "
-                           "ones wait for one (scripts/gpu)";
+        document_["gpu"] =
+            "no GPU was used: rows of gtx480 and h200 are simulated, and measured "
+            "ones wait for one (scripts/gpu)";
         for (const LaunchMachine& m : machines_) document_["machines"].push_back(machine_json(m));
         thread_counts_ = options_.thread_counts;
         if (thread_counts_.empty())
@@ -166,15 +167,17 @@ private:
                 "ns latency, {:.1f} us a launch\n    {}\n",
                 m.name + " (simulated)", m.lanes, m.item_ns, m.step_ns, m.bytes_per_ns,
                 m.latency_ns, m.launch_us, m.origin);
-        fmt::print("{:<20} {:.0f} ns latency, {:.2f} us a launch, {} kernels with {} bits\n    {}\n",
-                   here_name, costs_.latency_ns, costs_.launch_us, costs_.kernels.size(), bits,
-                   costs_.origin);
+        fmt::print(
+            "{:<20} {:.0f} ns latency, {:.2f} us a launch, {} kernels with {} bits\n    {}\n",
+            here_name, costs_.latency_ns, costs_.launch_us, costs_.kernels.size(), bits,
+            costs_.origin);
     }
 
     void print_head(const std::string& scene, std::uint32_t keys, int bits) const {
-        fmt::print("\n{}, {} keys, {} bits\n{:<38} {:>8} {:>6} {:>8} {:>7} {:>9} {:>9} {:>6} {:<20}",
-                   scene, grouped(keys), bits, "case", "launches", "chain", "MB", "threads",
-                   "here ms", "predicted", "error", "most of it");
+        fmt::print(
+            "\n{}, {} keys, {} bits\n{:<38} {:>8} {:>6} {:>8} {:>7} {:>9} {:>9} {:>6} {:<20}",
+            scene, grouped(keys), bits, "case", "launches", "chain", "MB", "threads", "here ms",
+            "predicted", "error", "most of it");
         for (const LaunchMachine& m : machines_)
             fmt::print(" | {:>9} {:>9} {:>6}", m.name,
                        fmt::format("x{:g}", options_.factors.back()), "speed");
@@ -239,7 +242,7 @@ private:
                    {"bits", run.bits},
                    {"builder", run.what.subject},
                    {"form", study_form_name(run.what.form)},
-                   {"fit", !run.what.is_builder()         ? Json(nullptr)
+                   {"fit", !run.what.is_builder()        ? Json(nullptr)
                            : run.what.fit == Fit::levels ? "levels"
                                                          : "atomic"},
                    {"threads", run.threads}};
@@ -247,7 +250,8 @@ private:
             entry["refusal"] = run.refusal;
             return entry;
         }
-        const double measured = run.measured_ms(), predicted = predicted_ms(run, costs_, run.threads);
+        const double measured = run.measured_ms(),
+                     predicted = predicted_ms(run, costs_, run.threads);
         entry["inner_nodes"] = run.inner_nodes;
         entry["max_depth"] = run.max_depth;
         entry["digest"] = run.digest.empty() ? Json(nullptr) : Json(run.digest);
@@ -317,14 +321,13 @@ void add_hierarchy_suite(CLI::App& bench) {
     for (const StudyCase& what : study_cases())
         if (subjects.empty() || subjects.back() != what.subject) subjects.push_back(what.subject);
     command
-        ->add_option("--builders", options->subjects,
-                     "What to study, of " + fmt::format("{}", fmt::join(subjects, ", ")) +
-                         " (default: all)")
+        ->add_option(
+            "--builders", options->subjects,
+            "What to study, of " + fmt::format("{}", fmt::join(subjects, ", ")) + " (default: all)")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(CLI::IsMember(subjects));
-    command
-        ->add_option("--factors", options->factors, "Sizes of the larger machines, in multiples")
+    command->add_option("--factors", options->factors, "Sizes of the larger machines, in multiples")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(finite_number(false))

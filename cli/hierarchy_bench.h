@@ -31,8 +31,8 @@ struct StudiedRow {
 };
 
 /// The claims of Karras 2012, judged by one rule (hierarchy_claims.cpp). `costs`: of these bits.
-[[nodiscard]] Json hierarchy_claims(const std::vector<StudiedRow>& rows,
-                                    const MeasuredCosts& costs, int bits);
+[[nodiscard]] Json hierarchy_claims(const std::vector<StudiedRow>& rows, const MeasuredCosts& costs,
+                                    int bits);
 void print_hierarchy_claims(const Json& claims);
 
 [[nodiscard]] Json whole_builds(const HierarchyBench& options, const Model& scene, int bits,

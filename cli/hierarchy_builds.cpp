@@ -67,11 +67,12 @@ Json whole_builds(const HierarchyBench& options, const Model& scene, int bits,
                                      .max_leaf = options.max_leaf,
                                      .threads = threads};
             if (print) fmt::print("{:<18} {:>8}", name, threads);
-            all.push_back({{"scene", scene.name},
-                           {"builder", name},
-                           {"bits", bits},
-                           {"threads", threads},
-                           {"ms", one_build(rebuilds(scene.mesh(), build, options.repeat), print)}});
+            all.push_back(
+                {{"scene", scene.name},
+                 {"builder", name},
+                 {"bits", bits},
+                 {"threads", threads},
+                 {"ms", one_build(rebuilds(scene.mesh(), build, options.repeat), print)}});
             if (print) fmt::print("\n");
         }
     return all;

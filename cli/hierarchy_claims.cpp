@@ -1,6 +1,6 @@
-// The claims of Karras 2012 as data. One rule for all: a claim is a figure and the range it must lie
-// in. What is counted has no error. What is modelled has an interval: the figure times 1 - e to 1 +
-// e, where e is the largest error of the rows it stands on at N = 1, and 0.5 on machines whose
+// The claims of Karras 2012 as data. One rule for all: a claim is a figure and the range it must
+// lie in. What is counted has no error. What is modelled has an interval: the figure times 1 - e to
+// 1 + e, where e is the largest error of the rows it stands on at N = 1, and 0.5 on machines whose
 // constants are estimates. Holds: the whole interval lies in the range. Does not hold: none of it.
 // Else open.
 #include <fmt/format.h>
@@ -113,8 +113,8 @@ void same_tree(const Scene& scene, Json& out) {
             ++builds;
         }
     if (builds < 2) return;
-    out.push_back(json_of({"1. the same tree as the level-by-level builder", "asserted", scene.name(),
-                           "any", fmt::format("different trees of {} builds", builds),
+    out.push_back(json_of({"1. the same tree as the level-by-level builder", "asserted",
+                           scene.name(), "any", fmt::format("different trees of {} builds", builds),
                            static_cast<double>(digests.size()), 0, 1, 1}));
 }
 
@@ -126,14 +126,13 @@ void scaling(const Scene& scene, const MeasuredCosts& costs, Json& out) {
         const auto gain = [&](const HierarchyRun& run) {
             return machine.ms(run, 1) / machine.ms(run, 64);
         };
-        out.push_back(json_of({"2. level by level goes sub-linear", "shown in a plot",
-                               scene.name(), machine.name,
-                               "garanzha as published: speed-up at N = 64, over 64",
+        out.push_back(json_of({"2. level by level goes sub-linear", "shown in a plot", scene.name(),
+                               machine.name, "garanzha as published: speed-up at N = 64, over 64",
                                gain(*levels) / 64, error, 0, 0.5}));
-        out.push_back(json_of({"2. the parallel builder keeps scaling", "shown in a plot",
-                               scene.name(), machine.name,
-                               "karras as published: speed-up at N = 64, over that of garanzha",
-                               gain(*ours) / gain(*levels), error, 1.0, any}));
+        out.push_back(
+            json_of({"2. the parallel builder keeps scaling", "shown in a plot", scene.name(),
+                     machine.name, "karras as published: speed-up at N = 64, over that of garanzha",
+                     gain(*ours) / gain(*levels), error, 1.0, any}));
     }
 }
 
@@ -151,11 +150,10 @@ void linear_work(const std::vector<StudiedRow>& rows, Json& out) {
         for (const LaunchFigures& l : run.launches) work += double(l.items) + double(l.steps);
         return work / run.keys;
     };
-    out.push_back(json_of({"3. work close to linear in n", "n log h at worst, near n in practice",
-                           "soups", "any",
-                           fmt::format("items and steps a key, {} keys over {}", most->keys,
-                                       least->keys),
-                           per_key(*most) / per_key(*least), 0, 0, 1.25}));
+    out.push_back(json_of(
+        {"3. work close to linear in n", "n log h at worst, near n in practice", "soups", "any",
+         fmt::format("items and steps a key, {} keys over {}", most->keys, least->keys),
+         per_key(*most) / per_key(*least), 0, 0, 1.25}));
     out.push_back(json_of({"3. in place", "no queue, no compaction", "soups", "any",
                            "launches of the hierarchy, whatever n is",
                            double(part_of(*most, "karras.").launches.size()), 0, 1, 1}));
@@ -183,12 +181,12 @@ void turbine_blade(const Scene& scene, Json& out) {
     const LaunchMachine machine = study_machines().front();
     const std::pair<const char*, double> published[] = {{"karras.", 1.28}, {"fit.", 2.10}};
     for (const auto& [prefix, ms] : published)
-        out.push_back(json_of(
-            {fmt::format("5. Turbine Blade: {} ms for {}", ms,
-                         prefix[0] == 'k' ? "the hierarchy" : "the boxes"),
-             "measured on a GTX 480; second hand, another scene of 1.77 M triangles", scene.name(),
-             machine.name, "our simulated time over the published one",
-             predicted_ms(part_of(*run, prefix), machine) / ms, estimated, 0.8, 1.25}));
+        out.push_back(
+            json_of({fmt::format("5. Turbine Blade: {} ms for {}", ms,
+                                 prefix[0] == 'k' ? "the hierarchy" : "the boxes"),
+                     "measured on a GTX 480; second hand, another scene of 1.77 M triangles",
+                     scene.name(), machine.name, "our simulated time over the published one",
+                     predicted_ms(part_of(*run, prefix), machine) / ms, estimated, 0.8, 1.25}));
 }
 
 }  // namespace
@@ -220,11 +218,12 @@ void print_hierarchy_claims(const Json& claims) {
         return value.is_null() ? std::string(none) : fmt::format("{:g}", value.get<double>());
     };
     for (const Json& c : claims)
-        fmt::print("{:<13} {} [{}, {}, {} bits]\n              {}: {:.3g} +- {:.0f} %, range {} to {}\n",
-                   c["verdict"].get<std::string>(), c["claim"].get<std::string>(),
-                   c["scene"].get<std::string>(), c["machine"].get<std::string>(),
-                   c["bits"].get<int>(), c["figure"].get<std::string>(), c["value"].get<double>(),
-                   100 * c["error"].get<double>(), limit(c["low"], "any"), limit(c["high"], "any"));
+        fmt::print(
+            "{:<13} {} [{}, {}, {} bits]\n              {}: {:.3g} +- {:.0f} %, range {} to {}\n",
+            c["verdict"].get<std::string>(), c["claim"].get<std::string>(),
+            c["scene"].get<std::string>(), c["machine"].get<std::string>(), c["bits"].get<int>(),
+            c["figure"].get<std::string>(), c["value"].get<double>(),
+            100 * c["error"].get<double>(), limit(c["low"], "any"), limit(c["high"], "any"));
 }
 
 }  // namespace raydix::cli

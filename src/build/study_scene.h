@@ -122,10 +122,10 @@ private:
         });
         launch_bounds(launcher_, source, scene_.n, scratch_, bounds);
         using Encode = EncodeInScene<Reads, Key>;
-        launcher_.launch(
-            "keys.encode", scene_.n,
-            CountedWrites<Encode, Probe>{{source, bounds, scene_.key_copy.data(), scene_.ids.data()},
-                                         sizeof(Key) + sizeof(std::uint32_t)});
+        launcher_.launch("keys.encode", scene_.n,
+                         CountedWrites<Encode, Probe>{
+                             {source, bounds, scene_.key_copy.data(), scene_.ids.data()},
+                             sizeof(Key) + sizeof(std::uint32_t)});
     }
     void codes_tuned() {
         scene_.key_copy.resize(scene_.n);

@@ -1,6 +1,6 @@
 // Garanzha 2011 with the counter of its source, beside ours in garanzha.h: a task finds its split
-// and takes places for its children in the next queue from one counter a level. Ranks within a level
-// are in the order of arrival; the tree is the same.
+// and takes places for its children in the next queue from one counter a level. Ranks within a
+// level are in the order of arrival; the tree is the same.
 #pragma once
 
 #include <cstdint>

@@ -1,8 +1,8 @@
 // The two kernels of Karras 2012 as its sections 3 and 4 have them, beside ours in
 // karras_launches.h and fit.h: leaves of one primitive, so that inner node i needs no other number
-// than i; one launch for the hierarchy; boxes by an item per leaf that climbs, with a word per inner
-// node to meet in. Where the paper adds one to that word, heights are left in it: the same exchange,
-// and the depth comes out.
+// than i; one launch for the hierarchy; boxes by an item per leaf that climbs, with a word per
+// inner node to meet in. Where the paper adds one to that word, heights are left in it: the same
+// exchange, and the depth comes out.
 #pragma once
 
 #include <cstdint>
