@@ -139,23 +139,49 @@ private:
         return names;
     }
 
+    /// All inputs of one length of codes: sheets for the costs of kernels, then what is studied.
+    struct Inputs {
+        std::vector<Mesh> sheets;
+        std::vector<Model> models;
+        std::size_t scene_count = 0;  // the first models; soups of growing size behind them
+        std::vector<MeshView> views;
+    };
+    [[nodiscard]] Inputs inputs() const {
+        Inputs in;
+        for (const std::uint32_t size : options_.cost_sizes)
+            in.sheets.push_back(cost_sheet(size, options_.common.seed));
+        std::vector<std::string> names = scenes();
+        in.scene_count = names.size();
+        for (const std::uint64_t n : options_.sizes)
+            names.push_back(fmt::format("builtin:soup?triangles={}", n));
+        for (const std::string& name : names)
+            in.models.push_back(load_flat_model(name, options_.common.seed));
+        for (const Mesh& sheet : in.sheets) in.views.emplace_back(sheet);
+        for (const Model& model : in.models) in.views.emplace_back(model.mesh());
+        return in;
+    }
+
     void study_bits(int bits) {
-        costs_ = measure_costs(study_options(bits, 1), options_.cost_sizes, options_.common.seed);
+        const Inputs in = inputs();
+        rows_.clear();
+        // One thread first, and sheets only there: the prediction for more stands on their costs.
+        const std::span<const MeshView> all = in.views;
+        const auto one = study_hierarchies(all, study_options(bits, 1));
+        costs_ = costs_of(std::span(one).first(in.sheets.size()));
         document_["machines"].push_back(costs_json(costs_, bits));
         if (options_.common.prints_tables()) print_machines(bits);
-        rows_.clear();
-        for (const std::string& name : scenes()) {
-            const Model scene = load_flat_model(name, options_.common.seed);
-            about(scene.name, [&] { study(scene, bits, false); });
-            about(scene.name, [&] {
-                for (const Json& build : whole_builds(options_, scene, bits, thread_counts_))
-                    document_["builds"].push_back(build);
-            });
-        }
-        for (const std::uint64_t n : options_.sizes)
-            study(
-                load_flat_model(fmt::format("builtin:soup?triangles={}", n), options_.common.seed),
-                bits, true);
+        std::vector<std::vector<std::vector<HierarchyRun>>> by_threads;
+        for (const int threads : thread_counts_)
+            by_threads.push_back(threads == 1
+                                     ? std::vector(one.begin() + std::ssize(in.sheets), one.end())
+                                     : study_hierarchies(all.subspan(in.sheets.size()),
+                                                         study_options(bits, threads)));
+        for (std::size_t m = 0; m < in.models.size(); ++m)
+            for (const auto& runs : by_threads)
+                note(in.models[m], m >= in.scene_count, runs[m], &runs == &by_threads.front());
+        for (std::size_t m = 0; m < in.scene_count; ++m)
+            for (const Json& build : whole_builds(options_, in.models[m], bits, thread_counts_))
+                document_["builds"].push_back(build);
         for (const Json& claim : hierarchy_claims(rows_, costs_, bits))
             document_["claims"].push_back(claim);
     }
@@ -202,24 +228,21 @@ private:
         fmt::print("\n");
     }
 
-    void study(const Model& scene, int bits, bool size_series) {
-        bool headed = false;
+    void note(const Model& scene, bool size_series, const std::vector<HierarchyRun>& runs,
+              bool with_head) {
         std::vector<std::uint64_t> levels;
-        for (const int threads : thread_counts_)
-            for (const HierarchyRun& run :
-                 study_hierarchy(scene.mesh(), study_options(bits, threads))) {
-                rows_.push_back({scene.name, size_series, run});
-                document_["runs"].push_back(run_json(rows_.back()));
-                if (run.items_per_level.size() > levels.size()) levels = run.items_per_level;
-                if (!options_.common.prints_tables()) continue;
-                if (!headed) print_head(scene.name, run.keys, bits);
-                headed = true;
-                if (run.refusal.empty())
-                    print_row(run);
-                else
-                    fmt::print("{:<38} refused: {}\n", run.what.name(), run.refusal);
-            }
-        if (headed && !levels.empty()) fmt::print("nodes a level: {}\n", fmt::join(levels, " "));
+        const bool print = options_.common.prints_tables();
+        if (print && with_head && !runs.empty())
+            print_head(scene.name, runs.front().keys, runs.front().bits);
+        for (const HierarchyRun& run : runs) {
+            rows_.push_back({scene.name, size_series, run});
+            document_["runs"].push_back(run_json(rows_.back()));
+            if (run.items_per_level.size() > levels.size()) levels = run.items_per_level;
+            if (print && run.refusal.empty()) print_row(run);
+            if (print && !run.refusal.empty())
+                fmt::print("{:<38} refused: {}\n", run.what.name(), run.refusal);
+        }
+        if (print && !levels.empty()) fmt::print("nodes a level: {}\n", fmt::join(levels, " "));
     }
 
     /// Times on machines of each size, in the order of the factors.

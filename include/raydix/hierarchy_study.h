@@ -72,11 +72,15 @@ struct StudyOptions {
     std::vector<StudyCase> cases = study_cases();
 };
 
-/// Runs the cases over the triangles of `mesh` or, if it has none, over its vertices. Launches run
-/// on the CPU. With one thread their times are its processor time, else those of the clock on the
-/// wall. Primitives that are not valid are left out; of no valid one there is nothing to run.
-/// Throws InputError: a case that is none of study_cases, an index past the vertices, options out
-/// of range.
+/// Runs the cases over the triangles of each mesh or, if it has none, over its vertices. Launches
+/// run on the CPU. With one thread their times are its processor time, else those of the clock on
+/// the wall. Each round goes through all meshes, so that what slows the machine down for a while
+/// slows all of them. Primitives that are not valid are left out; of no valid one there is nothing
+/// to run. Throws InputError: a case that is none of study_cases, an index past the vertices,
+/// options out of range.
+[[nodiscard]] std::vector<std::vector<HierarchyRun>> study_hierarchies(
+    std::span<const MeshView> meshes, const StudyOptions& options);
+/// The same for one mesh.
 [[nodiscard]] std::vector<HierarchyRun> study_hierarchy(const MeshView& mesh,
                                                         const StudyOptions& options);
 
@@ -103,10 +107,13 @@ struct MeasuredCosts {
     [[nodiscard]] const KernelCost* find(const std::string& kernel) const;
 };
 
-/// Measures each kernel of options.cases on sheets of triangles that are bent at random, one of
-/// about each size: scenes of the study are none of them. options.threads has no effect.
-[[nodiscard]] MeasuredCosts measure_costs(const StudyOptions& options,
-                                          std::span<const std::uint32_t> sizes, std::uint64_t seed);
+/// A sheet of about so many triangles, bent at random: what kernels are measured on. No scene of
+/// the study is one.
+[[nodiscard]] Mesh cost_sheet(std::uint32_t triangles, std::uint64_t seed);
+
+/// Measures launches and latency, and takes the costs of kernels from runs over sheets of several
+/// sizes with one thread.
+[[nodiscard]] MeasuredCosts costs_of(std::span<const std::vector<HierarchyRun>> sheets);
 
 /// Predicts one launch of `run` on `factor` times this machine: launch_us, and its work, (items +
 /// steps) * the kernel's cost, over as many threads as there are items, `factor` at most; not less

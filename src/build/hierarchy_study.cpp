@@ -4,6 +4,7 @@
 #include <raydix/hierarchy_study.h>
 
 #include <algorithm>
+#include <memory>
 
 #include "base/options.h"
 #include "build/study_scene.h"
@@ -24,18 +25,33 @@ std::vector<std::uint64_t> level_items(const std::vector<LaunchRecord>& launches
     return items;
 }
 
+/// One mesh: counted, then timed in rounds.
+class AnyStudy {
+public:
+    AnyStudy() = default;
+    virtual ~AnyStudy() = default;
+    AnyStudy(const AnyStudy&) = delete;
+    AnyStudy& operator=(const AnyStudy&) = delete;
+    virtual void count() = 0;
+    virtual void round(bool counts) = 0;
+    virtual std::vector<HierarchyRun> take() = 0;
+};
+
 template <class Key, class Source>
-class Study {
+class Study : public AnyStudy {
 public:
     Study(const Source& source, std::uint32_t n, const Bounds& bounds, const StudyOptions& options)
         : scene_(source, n, bounds), options_(options) {}
 
-    std::vector<HierarchyRun> run() {
+    void count() override {
         for (const StudyCase& what : options_.cases) runs_.push_back(count(what));
         times_.resize(runs_.size());
         for (std::size_t k = 0; k < runs_.size(); ++k) times_[k].resize(runs_[k].launches.size());
-        for (int round = 0; round <= options_.repeat; ++round)
-            for (std::size_t k = 0; k < runs_.size(); ++k) time(k, round > 0);
+    }
+    void round(bool counts) override {
+        for (std::size_t k = 0; k < runs_.size(); ++k) time(k, counts);
+    }
+    std::vector<HierarchyRun> take() override {
         for (std::size_t k = 0; k < runs_.size(); ++k)
             for (std::size_t l = 0; l < times_[k].size(); ++l)
                 runs_[k].launches[l].ms = median(times_[k][l]);
@@ -94,6 +110,24 @@ private:
     std::vector<std::vector<std::vector<double>>> times_;  // [case][launch][round]
 };
 
+std::unique_ptr<AnyStudy> study_of(const MeshView& mesh, const StudyOptions& options) {
+    const auto make = [&](const auto& source, std::size_t count) -> std::unique_ptr<AnyStudy> {
+        using Source = std::decay_t<decltype(source)>;
+        const auto n = static_cast<std::uint32_t>(count);
+        const Bounds bounds = scene_bounds(source, n);
+        if (bounds.first_unreadable != no_primitive)
+            throw InputError("triangle " + std::to_string(bounds.first_unreadable) +
+                             ": an index is past the last vertex");
+        if (options.bits == 30)
+            return std::make_unique<Study<std::uint32_t, Source>>(source, n, bounds, options);
+        return std::make_unique<Study<std::uint64_t, Source>>(source, n, bounds, options);
+    };
+    if (mesh.triangles.empty())
+        return make(PointSource{mesh.vertices.data()}, mesh.vertices.size());
+    return make(TriangleSource{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()},
+                mesh.triangles.size());
+}
+
 void check(const StudyOptions& options) {
     if (options.bits != 30 && options.bits != 63)
         throw InputError("bits is " + std::to_string(options.bits) + "; 30 and 63 are possible");
@@ -150,29 +184,25 @@ std::vector<StudyCase> study_cases() {
             {"kdtree", launches}};
 }
 
-std::vector<HierarchyRun> study_hierarchy(const MeshView& mesh, const StudyOptions& options) {
+std::vector<std::vector<HierarchyRun>> study_hierarchies(std::span<const MeshView> meshes,
+                                                         const StudyOptions& options) {
     check(options);
-    std::vector<HierarchyRun> runs;
-    const auto go = [&](const auto& source, std::size_t count) {
-        using Source = std::decay_t<decltype(source)>;
-        const auto n = static_cast<std::uint32_t>(count);
-        const Bounds bounds = scene_bounds(source, n);
-        if (bounds.first_unreadable != no_primitive)
-            throw InputError("triangle " + std::to_string(bounds.first_unreadable) +
-                             ": an index is past the last vertex");
-        if (options.bits == 30)
-            runs = Study<std::uint32_t, Source>(source, n, bounds, options).run();
-        else
-            runs = Study<std::uint64_t, Source>(source, n, bounds, options).run();
-    };
+    std::vector<std::vector<HierarchyRun>> runs;
     with_threads(options.threads, [&] {
-        if (mesh.triangles.empty())
-            go(PointSource{mesh.vertices.data()}, mesh.vertices.size());
-        else
-            go(TriangleSource{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()},
-               mesh.triangles.size());
+        std::vector<std::unique_ptr<AnyStudy>> studies;
+        for (const MeshView& mesh : meshes) {
+            studies.push_back(study_of(mesh, options));
+            studies.back()->count();
+        }
+        for (int round = 0; round <= options.repeat; ++round)  // the first one warms up
+            for (const auto& study : studies) study->round(round > 0);
+        for (const auto& study : studies) runs.push_back(study->take());
     });
     return runs;
+}
+
+std::vector<HierarchyRun> study_hierarchy(const MeshView& mesh, const StudyOptions& options) {
+    return std::move(study_hierarchies(std::span(&mesh, 1), options).front());
 }
 
 }  // namespace raydix

@@ -13,11 +13,10 @@
 #include "measure/launch_model.h"
 
 namespace raydix {
-namespace {
 
-/// A sheet of about so many triangles, row by row, as a sum of waves: a surface as scanners and
-/// modellers leave it, with neighbours in memory that are neighbours in space.
-Mesh bent_sheet(std::uint32_t triangles, std::uint64_t seed) {
+/// Row by row, as a sum of waves: a surface as scanners and modellers leave it, with neighbours in
+/// memory that are neighbours in space.
+Mesh cost_sheet(std::uint32_t triangles, std::uint64_t seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<float> unit(0.0f, 1.0f);
     struct Wave {
@@ -49,8 +48,6 @@ Mesh bent_sheet(std::uint32_t triangles, std::uint64_t seed) {
     return mesh;
 }
 
-}  // namespace
-
 double work_of(const LaunchFigures& launch) {
     return static_cast<double>(launch.items) + static_cast<double>(launch.steps);
 }
@@ -59,20 +56,16 @@ std::string kernel_of(const HierarchyRun& run, const LaunchFigures& launch) {
     return run.what.name() + ": " + launch.label;
 }
 
-MeasuredCosts measure_costs(const StudyOptions& options, std::span<const std::uint32_t> sizes,
-                            std::uint64_t seed) {
-    StudyOptions one_thread = options;
-    one_thread.threads = 1;
+MeasuredCosts costs_of(std::span<const std::vector<HierarchyRun>> sheets) {
     MeasuredCosts costs;
     with_threads(1, [&] {
         costs.launch_us = empty_launch_us();
         costs.latency_ns = memory_latency_ns();
     });
     std::map<std::string, std::vector<KernelCost::Point>> points;
-    for (const std::uint32_t size : sizes) {
-        const Mesh sheet = bent_sheet(size, seed);
+    for (const std::vector<HierarchyRun>& sheet : sheets) {
         std::map<std::string, std::pair<double, double>> sums;  // kernel -> ns, work
-        for (const HierarchyRun& run : study_hierarchy(MeshView(sheet), one_thread))
+        for (const HierarchyRun& run : sheet)
             for (const LaunchFigures& launch : run.launches) {
                 auto& [ns, work] = sums[kernel_of(run, launch)];
                 ns += launch.ms * 1e6 - costs.launch_us * 1e3;
@@ -80,7 +73,7 @@ MeasuredCosts measure_costs(const StudyOptions& options, std::span<const std::ui
             }
         for (const auto& [kernel, sum] : sums)
             if (sum.second > 0)
-                points[kernel].push_back({static_cast<double>(sheet.triangles.size()),
+                points[kernel].push_back({static_cast<double>(sheet.front().keys),
                                           std::max(0.0, sum.first / sum.second)});
     }
     for (auto& [kernel, list] : points) {

@@ -202,8 +202,10 @@ TEST(HierarchyStudy, FewAndNoPrimitives) {
 }
 
 TEST(HierarchyStudy, ThisMachineHasFiguresThatCanBe) {
-    const std::vector<std::uint32_t> sizes{500, fewer(4000, 2)};
-    const MeasuredCosts costs = measure_costs({.repeat = 1}, sizes, 1);
+    const Mesh small = cost_sheet(500, 1), large = cost_sheet(4000, 1);
+    EXPECT_NEAR(static_cast<double>(large.triangles.size()), 4000, 200);
+    const MeshView sheets[] = {MeshView(small), MeshView(large)};
+    const MeasuredCosts costs = costs_of(study_hierarchies(sheets, {.threads = 1, .repeat = 1}));
     EXPECT_GT(costs.latency_ns, 0);
     EXPECT_GT(costs.launch_us, 0);
     const HierarchyRun run = study(random_soup(1000, 2), own, 30);
