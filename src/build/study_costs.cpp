@@ -62,7 +62,11 @@ MeasuredCosts costs_of(std::span<const std::vector<HierarchyRun>> sheets) {
         costs.launch_us = empty_launch_us();
         costs.latency_ns = memory_latency_ns();
     });
-    std::map<std::string, std::vector<KernelCost::Point>> points;
+    struct Sample {
+        KernelCost::Point point;
+        double work;
+    };
+    std::map<std::string, std::vector<Sample>> samples;
     for (const std::vector<HierarchyRun>& sheet : sheets) {
         std::map<std::string, std::pair<double, double>> sums;  // kernel -> ns, work
         for (const HierarchyRun& run : sheet)
@@ -73,12 +77,20 @@ MeasuredCosts costs_of(std::span<const std::vector<HierarchyRun>> sheets) {
             }
         for (const auto& [kernel, sum] : sums)
             if (sum.second > 0)
-                points[kernel].push_back({static_cast<double>(sheet.front().keys),
-                                          std::max(0.0, sum.first / sum.second)});
+                samples[kernel].push_back({{static_cast<double>(sheet.front().keys),
+                                            std::max(0.0, sum.first / sum.second)},
+                                           sum.second});
     }
-    for (auto& [kernel, list] : points) {
-        std::ranges::sort(list, {}, &KernelCost::Point::keys);
-        costs.kernels.push_back({kernel, std::move(list)});
+    for (auto& [kernel, list] : samples) {
+        // What did nearly nothing on one size says little of its cost: the sums of a prefix sum's
+        // blocks share a name with a whole one.
+        const auto counts = [](const Sample& s) { return s.work >= 0.01 * s.point.keys; };
+        const bool any = std::ranges::any_of(list, counts);
+        KernelCost cost{kernel, {}};
+        for (const Sample& sample : list)
+            if (!any || counts(sample)) cost.points.push_back(sample.point);
+        std::ranges::sort(cost.points, {}, &KernelCost::Point::keys);
+        costs.kernels.push_back(std::move(cost));
     }
     costs.origin =
         "measured with one thread: empty launches, a chain of loads in 64 MB, and each kernel on "
