@@ -21,16 +21,31 @@ constexpr const char* here_name = "here";
 
 Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
+/// Launches with one name together.
 Json launches_json(const HierarchyRun& run, const MeasuredCosts& costs) {
+    std::vector<LaunchFigures> sums;
+    std::map<std::string, std::pair<int, double>> more;  // launches, predicted milliseconds
+    for (const LaunchFigures& l : run.launches) {
+        auto sum = std::ranges::find(sums, l.label, &LaunchFigures::label);
+        if (sum == sums.end()) sum = sums.insert(sums.end(), {l.label});
+        sum->items += l.items;
+        sum->bytes += l.bytes;
+        sum->steps += l.steps;
+        sum->longest_chain = std::max(sum->longest_chain, l.longest_chain);
+        sum->ms += l.ms;
+        more[l.label].first += 1;
+        more[l.label].second += predicted_ms(run, l, costs);
+    }
     Json launches = Json::array();
-    for (const LaunchFigures& l : run.launches)
+    for (const LaunchFigures& l : sums)
         launches.push_back({{"label", l.label},
+                            {"launches", more[l.label].first},
                             {"items", l.items},
                             {"bytes", l.bytes},
                             {"steps", l.steps},
                             {"longest_chain", l.longest_chain},
                             {"ms", l.ms},
-                            {"predicted_ms", finite(predicted_ms(run, l, costs))}});
+                            {"predicted_ms", finite(more[l.label].second)}});
     return launches;
 }
 
@@ -93,7 +108,7 @@ public:
     void run() {
         document_["max_leaf"] = options_.max_leaf;
         document_["factors"] = options_.factors;
-        for (const char* list : {"runs", "builds", "machines", "claims"})
+        for (const char* list : {"runs", "builds", "machines", "hierarchy_claims"})
             document_[list] = Json::array();
         document_["gpu"] =
             "no GPU was used: rows of gtx480 and h200 are simulated, and measured "
@@ -105,7 +120,7 @@ public:
         cases_ = cases();
         for (const int bits : options_.bits) study_bits(bits);
         if (options_.common.prints_tables()) {
-            print_hierarchy_claims(document_["claims"]);
+            print_hierarchy_claims(document_["hierarchy_claims"]);
             fmt::print("\n{}\n", document_["gpu"].get<std::string>());
         }
     }
@@ -183,7 +198,7 @@ private:
             for (const Json& build : whole_builds(options_, in.models[m], bits, thread_counts_))
                 document_["builds"].push_back(build);
         for (const Json& claim : hierarchy_claims(rows_, costs_, bits))
-            document_["claims"].push_back(claim);
+            document_["hierarchy_claims"].push_back(claim);
     }
 
     void print_machines(int bits) const {

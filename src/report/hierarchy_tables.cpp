@@ -88,7 +88,7 @@ std::string run_table(const Study& study) {
 /// Launches of one run with the same label, added up.
 struct LaunchSum {
     std::string label;
-    double launches = 0, items = 0, bytes = 0, steps = 0, chain = 0, ms = 0;
+    double launches = 0, items = 0, bytes = 0, steps = 0, chain = 0, ms = 0, predicted = 0;
 };
 
 std::string launch_table(const Study& study) {
@@ -107,7 +107,8 @@ std::string launch_table(const Study& study) {
                             {"moved", Format::number, "MB"},
                             {"steps", Format::integer},
                             {"longest chain", Format::integer, "steps"},
-                            {"time", Format::number, "ms"}}};
+                            {"time", Format::number, "ms"},
+                            {"predicted", Format::number, "ms", Origin::simulated}}};
     for (const StudyRun& run : study.runs) {
         if (run.size_series) continue;
         std::vector<LaunchSum> sums;
@@ -115,16 +116,17 @@ std::string launch_table(const Study& study) {
             const std::string label = text_at(*launch, "label");
             auto sum = std::ranges::find(sums, label, &LaunchSum::label);
             if (sum == sums.end()) sum = sums.insert(sums.end(), {label});
-            sum->launches += 1;
+            sum->launches += number_at(*launch, "launches").value_or(1);
             sum->items += number_at(*launch, "items").value_or(0);
             sum->bytes += number_at(*launch, "bytes").value_or(0);
             sum->steps += number_at(*launch, "steps").value_or(0);
             sum->chain = std::max(sum->chain, number_at(*launch, "longest_chain").value_or(0));
             sum->ms += number_at(*launch, "ms").value_or(0);
+            sum->predicted += number_at(*launch, "predicted_ms").value_or(0);
         }
         for (const LaunchSum& s : sums)
             table.rows.push_back({s.label, run.name(), run.scene, run.bits, run.threads, s.launches,
-                                  s.items, s.bytes / 1e6, s.steps, s.chain, s.ms});
+                                  s.items, s.bytes / 1e6, s.steps, s.chain, s.ms, s.predicted});
     }
     return table_html(table);
 }
@@ -191,7 +193,7 @@ std::string claim_table(const Study& study) {
                             {"from", Format::number, ""},
                             {"to", Format::number, ""},
                             {"verdict"}}};
-    for (const Json* c : objects_at(study.document->root, "claims"))
+    for (const Json* c : objects_at(study.document->root, "hierarchy_claims"))
         table.rows.push_back({text_at(*c, "claim"), text_at(*c, "paper"), scene_name(*c),
                               number_at(*c, "bits"), text_at(*c, "machine"), text_at(*c, "figure"),
                               number_at(*c, "value"), number_at(*c, "error"), number_at(*c, "low"),

@@ -39,7 +39,7 @@ class Bench(ProgramTest):
             if run["digest"]:
                 trees[run["scene"], run["bits"]].add((run["digest"], run["inner_nodes"], run["max_depth"]))
         self.assertTrue(all(len(kinds) == 1 for kinds in trees.values()))
-        claims = document["claims"]
+        claims = document["hierarchy_claims"]
         self.assertEqual({claim["claim"][0] for claim in claims}, {"1", "2", "3", "4"})  # 5: of one size of scene
         for claim in claims:
             self.assertIn(claim["verdict"], {"holds", "does not hold", "open"})
