@@ -69,6 +69,12 @@ class Bench(ProgramTest):
         self.assertEqual(refused.returncode, 1)
         self.assertIn("not a result of bench hierarchy", refused.stderr)
 
+    def test_traversal_on_a_device(self):
+        scene = "builtin:soup?triangles=200"
+        if json_of(self.succeed("doctor", "--json", "-").out)["machine"]["gpu"] is None:
+            self.fail_with_one_line("bench", "traversal", scene, "--device", "cuda")
+        self.fail_with_usage("bench", "traversal", scene, "--device", "sim")
+
     def test_what_is_refused(self):
         self.fail_with_usage("bench")
         self.fail_with_usage("bench", "hierarchy", "--builders", "ploc")
