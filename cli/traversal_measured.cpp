@@ -25,9 +25,10 @@ void check_hits(const DeviceLaunch& launch, WarpKernel kernel, bool any_hit) {
     for (std::size_t i = 0; i < launch.found.size(); ++i) {
         const TreeHit &a = launch.found[i], &b = launch.expected[i];
         if (any_hit ? a.hit() != b.hit() : std::memcmp(&a, &b, sizeof(a)) != 0)
-            throw InputError(fmt::format("{} on the device: the hit of ray {} is not the scalar "
-                                         "reference's",
-                                         warp_kernel_name(kernel), i));
+            throw InputError(
+                fmt::format("{} on the device: the hit of ray {} is not the scalar "
+                            "reference's",
+                            warp_kernel_name(kernel), i));
     }
 }
 
@@ -38,9 +39,9 @@ void time_launch(const DeviceWarpTree& tree, DeviceLaunch& launch, WarpKernel ke
     const std::size_t n = launch.expected.size();
     launch.scratch.reset(device_trace_scratch_bytes(tree, static_cast<std::uint32_t>(n), options));
     for (int turn = -warm_ups; turn < std::ssize(ms); ++turn) {
-        const DeviceTraceMs time = time_trace_on_device(
-            tree, {launch.rays.data(), n}, {launch.hits.data(), n}, options,
-            {launch.scratch.data(), launch.scratch.size()}, nullptr);
+        const DeviceTraceMs time =
+            time_trace_on_device(tree, {launch.rays.data(), n}, {launch.hits.data(), n}, options,
+                                 {launch.scratch.data(), launch.scratch.size()}, nullptr);
         if (turn >= 0) ms[static_cast<std::size_t>(turn)] += time.kernel;
         if (turn != -1) continue;
         launch.found.resize(n);

@@ -21,8 +21,8 @@ struct MeasureOptions {
 /// Rows of `measured`, one a kernel: rays of all launches over the kernel time of all. Every hit is
 /// first compared with the scalar reference. A row is set beside the simulated one of the same
 /// kernel, rays and tree on a machine whose name stands in the device's; without one there is no
-/// bound to compare with. Throws BackendUnavailable, DeviceError, and InputError for other hits than
-/// the reference's.
+/// bound to compare with. Throws BackendUnavailable, DeviceError, and InputError for other hits
+/// than the reference's.
 [[nodiscard]] Json measure_kind(const std::string& scene, const std::string& builder,
                                 const WarpTree& tree, const RayLaunches& launches, RayKind kind,
                                 const std::vector<SimulationRow>& simulated,

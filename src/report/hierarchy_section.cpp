@@ -112,7 +112,8 @@ std::vector<double> best_times(const Study& study, const StudyScene& scene,
                                const std::string& machine) {
     std::vector<double> best(study.factors.size(), std::numeric_limits<double>::infinity());
     for (const StudyRun* run : scene.one_each)
-        if (const auto found = run->simulated.find(machine); found != run->simulated.end())
+        if (const auto found = run->simulated.find(machine);
+            run->is_builder() && found != run->simulated.end())
             for (std::size_t i = 0; i < best.size() && i < found->second.size(); ++i)
                 best[i] = std::fmin(best[i], found->second[i]);
     return best;
@@ -125,6 +126,7 @@ LinePlot scaling_plot(const Study& study, const StudyScene& scene, const std::st
     for (const StudyRun* run : scene.one_each) {
         const auto found = run->simulated.find(machine);
         if (found == run->simulated.end() || found->second.empty()) continue;
+        if (kind == Scaling::ratio && !run->is_builder()) continue;
         const std::vector<double>& ms = found->second;
         Series series = series_of(*run, colours);
         for (std::size_t i = 0; i < ms.size() && i < study.factors.size(); ++i) {
@@ -228,7 +230,7 @@ std::string build_plots(const Study& study, PageColours& colours) {
 void say_measured(const Study& study, const StudyScene& scene, Section& section) {
     std::vector<const StudyRun*> timed;
     for (const StudyRun* run : scene.all)
-        if (run->measured && !run->fit.empty()) timed.push_back(run);
+        if (run->measured && run->is_builder()) timed.push_back(run);
     if (timed.size() < 2) return;
     const auto [fast, slow] =
         std::ranges::minmax(timed, {}, [](const StudyRun* run) { return *run->measured; });
@@ -250,7 +252,7 @@ void say_simulated(const Study& study, const StudyScene& scene, Section& section
     for (const std::string& machine : scene.machines()) {
         const StudyRun *best = nullptr, *least = nullptr;
         for (const StudyRun* run : scene.one_each) {
-            if (!run->speed_up(machine) || run->fit.empty()) continue;
+            if (!run->speed_up(machine) || !run->is_builder()) continue;
             if (!best || *run->speed_up(machine) > *best->speed_up(machine)) best = run;
             if (!least || *run->speed_up(machine) < *least->speed_up(machine)) least = run;
         }

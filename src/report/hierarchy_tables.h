@@ -22,6 +22,8 @@ struct StudyRun {
     std::string worst = {};  // the kernel that the prediction misses by most
 
     [[nodiscard]] bool by_levels() const { return fit == "levels"; }
+    /// Of a BVH: codes, sorts and other trees are no rivals of it.
+    [[nodiscard]] bool is_builder() const { return !fit.empty(); }
     /// Not for this processor alone: its launches are known.
     [[nodiscard]] bool scales() const { return form != "tuned"; }
     [[nodiscard]] std::optional<double> error() const;
