@@ -127,8 +127,8 @@ std::vector<Threads> builds(Inputs& in) {
         {"Scene", [&in](int n) { (void)Scene(in.mesh, {.threads = n}); }},
         {"SceneD", [&in](int n) { (void)SceneD(in.mesh_d, {.threads = n}); }},
         {"tree_stats", [&in](int n) { (void)tree_stats(in.bvh, {.threads = n}); }},
-        {"measure_this_machine", [](int n) { (void)measure_this_machine(n); }},
-        {"study_hierarchy", [&in](int n) { (void)study_hierarchy(in.mesh, {.threads = n}, 1); }},
+        {"study_hierarchy",
+         [&in](int n) { (void)study_hierarchy(in.mesh, {.threads = n, .repeat = 1}); }},
         {"device_node_capacity", [](int n) { (void)device_node_capacity(5u, {.threads = n}); }},
     };
 }
