@@ -15,7 +15,7 @@
 namespace raydix {
 
 /// Whose kernels a row of the study is made of.
-enum class StudyForm : std::uint8_t {
+enum class StudyForm {
     launches,   // ours, for any backend
     published,  // those of the source, where they differ from ours: K12's two kernels without
                 // ranks, the counter of garanzha

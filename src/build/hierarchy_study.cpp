@@ -137,9 +137,16 @@ void check(const StudyOptions& options) {
     if (options.repeat < 1)
         throw InputError("repeat is " + std::to_string(options.repeat) + "; at least 1 is needed");
     const std::vector<StudyCase> known = study_cases();
-    for (const StudyCase& what : options.cases)
-        if (std::ranges::find(known, what.name(), &StudyCase::name) == known.end())
+    for (const StudyCase& what : options.cases) {
+        check_enum("form", what.form, StudyForm::tuned);
+        check_enum("fit", what.fit, Fit::atomic);
+        const auto is_what = [&](const StudyCase& other) {
+            return other.subject == what.subject && other.form == what.form &&
+                   (!what.is_builder() || other.fit == what.fit);
+        };
+        if (std::ranges::none_of(known, is_what))
             throw InputError("the study has no case " + what.name());
+    }
 }
 
 }  // namespace

@@ -298,8 +298,11 @@ TEST(Options, EnumerationsAreOfTheirKind) {
                                 [&](Builder b) { (void)build_wide_bvh(in.mesh, {.builder = b}); });
         expect_refused<Builder>("builder", 9,
                                 [&](Builder b) { (void)device_node_capacity(5u, {.builder = b}); });
-        expect_refused<Builder>(
-            "builder", 9, [&](Builder b) { (void)study_hierarchy(in.mesh, {.builder = b}, 1); });
+        const auto study = [&](const StudyCase& what) {
+            (void)study_hierarchy(in.mesh, {.repeat = 1, .cases = {what}});
+        };
+        expect_refused<StudyForm>("form", 2, [&](StudyForm f) { study({"codes", f}); });
+        expect_refused<Fit>("fit", 2, [&](Fit f) { study({"karras", StudyForm::launches, f}); });
         expect_refused<Fit>("fit", 2, [&](Fit f) { (void)build_bvh(in.boxes, {.fit = f}); });
         expect_refused<SimdPath>("path", 4,
                                  [&](SimdPath p) { (void)trace(in.bvh, in.rays, {.path = p}); });
