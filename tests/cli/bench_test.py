@@ -7,7 +7,7 @@ import unittest
 sys.dont_write_bytecode = True
 from program import SANITIZED, ProgramTest, json_of, main  # noqa: E402
 
-SMALL = ("--sizes", "500", "--cost-sizes", "500,2000", "--thread-counts", "1,2", "--repeat", "1")
+SMALL = ("--sizes", "100,500", "--cost-sizes", "500,2000", "--thread-counts", "1,2", "--repeat", "1")
 SUBJECTS = {"codes", "sort", "karras", "apetrei", "garanzha", "lauterbach", "octree", "kdtree"}
 CASES = 19
 
@@ -18,7 +18,7 @@ class Bench(ProgramTest):
                                         "--factors", "1,64", "--json", "-").out)
         self.assertEqual(document["factors"], [1, 64])
         runs = document["runs"]
-        self.assertEqual(len(runs), 2 * 2 * CASES * 2)  # scenes, bits, cases, threads
+        self.assertEqual(len(runs), 3 * 2 * CASES * 2)  # scenes, bits, cases, threads
         self.assertEqual({run["builder"] for run in runs}, SUBJECTS)
         for run in runs:
             self.assertGreater(run["measured_ms"], 0)
@@ -71,7 +71,7 @@ class Bench(ProgramTest):
 
     def test_traversal_on_a_device(self):
         scene = "builtin:soup?triangles=200"
-        if json_of(self.succeed("doctor", "--json", "-").out)["machine"]["gpu"] is None:
+        if json_of(self.succeed("info", scene, "--json", "-").out)["machine"]["gpu"] is None:
             self.fail_with_one_line("bench", "traversal", scene, "--device", "cuda")
         self.fail_with_usage("bench", "traversal", scene, "--device", "sim")
 
