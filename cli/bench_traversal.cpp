@@ -3,6 +3,7 @@
 // of the warp's width.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <raydix/device.h>
 #include <raydix/error.h>
 #include <unistd.h>
 
@@ -15,6 +16,7 @@
 #include "ray_launches.h"
 #include "simulation.h"
 #include "traversal_claims.h"
+#include "traversal_measured.h"
 
 namespace raydix::cli {
 namespace {
@@ -29,6 +31,7 @@ struct TraversalBench {
     double sweep_sample = 0.01;  // 0: no sweep
     bool tree_of_machine = true;
     bool memory = false;
+    int repeat = 10;  // timed launches on a device
 };
 
 /// All kernels on each machine; where there is a gtx285, also the two kernels for which the authors
@@ -195,6 +198,7 @@ public:
         for (const char* list : {"scenes", "builds", "machines", "simulate", "measured",
                                  "published", "claims", "width_sweep"})
             document_[list] = Json::array();
+        if (on_device()) static_cast<void>(device_name());  // says what is missing, before any work
         for (const std::string& name : options.machines) machines_.push_back(machine_from(name));
         runs_ = runs_of(options, machines_);
         static_cast<void>(simulate(WarpTree(Bvh{}), {}, runs_));  // a machine that cannot be
@@ -213,12 +217,29 @@ public:
         if (options_.common.prints_tables()) {
             print_published(document_["published"], rows_);
             print_claims(document_["claims"]);
-            fmt::print("\nmeasured: no GPU was used; every rate above is simulated\n");
+            print_measured(document_["measured"]);
+            if (!on_device())
+                fmt::print("\nmeasured: no GPU was used; every rate above is simulated\n");
         }
         write_json(document_, options_.common);
     }
 
 private:
+    [[nodiscard]] bool on_device() const { return options_.tree.device == "cuda"; }
+
+    /// The same tree, cameras and launches as are simulated, all of them.
+    void measure(const SceneTree& input, const WarpTree& tree, RayKind kind,
+                 const std::vector<SimulationRow>& rows) {
+        LaunchOptions whole = options_.launches;
+        whole.sample = 1.0;
+        const RayLaunches launches(whole, input, options_.common);
+        for (const Json& row :
+             measure_kind(input.scene.name, std::string(builder_name(input.bvh.options().builder)),
+                          tree, launches, kind, rows,
+                          {.kernels = kernels_from(options_.kernel), .repeat = options_.repeat}))
+            document_["measured"].push_back(row);
+    }
+
     void study(const std::string& name) {
         refuse_build_options(name, options_.tree);
         std::vector<std::string> builders;
@@ -241,6 +262,7 @@ private:
     void study(const std::string& name, const std::string& builder) {
         TreeOptions tree_options = options_.tree;
         tree_options.builder = builder;
+        tree_options.device = "cpu";  // trees come from the host, whoever walks them
         std::vector<SimulateOptions> runs;
         for (const SimulateOptions& run : runs_)
             if (tree_of(name, run.machine) == builder) runs.push_back(run);
@@ -268,6 +290,7 @@ private:
                 rows_.push_back(row);
             }
             if (options_.common.prints_tables()) print_by_machine(rows);
+            if (on_device()) measure(input, tree, kind, rows);
         }
         // The sweep has the costs of the first machine, and its tree.
         if (options_.sweep_sample <= 0 || runs.front().machine.name != machines_.front().name)
@@ -312,6 +335,9 @@ void add_traversal_suite(CLI::App& bench) {
         ->capture_default_str();
     command->add_flag("--memory", options->memory,
                       "Also a first-order memory model, as a column of its own");
+    command->add_option("--repeat", options->repeat, "Timed launches with --device cuda")
+        ->check(CLI::Range(1, 1000))
+        ->capture_default_str();
     add_launch_options(*command, options->launches);
     options->tree.builder = "split";
     options->tree.max_leaf = 8;
@@ -320,7 +346,9 @@ void add_traversal_suite(CLI::App& bench) {
     command->callback([options, command] {
         options->tree_of_machine = command->get_option("--builder")->count() == 0 &&
                                    command->get_option("--quality")->count() == 0;
-        refuse_device(options->tree);
+        TreeOptions host_tree = options->tree;
+        if (host_tree.device == "cuda") host_tree.device = "cpu";
+        refuse_device(host_tree);
         TraversalStudy(*options).run();
     });
 }

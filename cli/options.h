@@ -124,6 +124,7 @@ void add_cpu_suite(CLI::App& bench);
 void add_scene_suite(CLI::App& bench);
 /// bench points
 void add_points_suite(CLI::App& bench);
+void add_hierarchy_suite(CLI::App& bench);
 void add_report_command(CLI::App& app);
 
 }  // namespace raydix::cli

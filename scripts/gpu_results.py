@@ -1,11 +1,14 @@
-"""gpu_results.py JUNIT [BENCH_LINES]: what scripts/gpu ran -> bench/results/GPU-NAME.json: the tests, and the lines that
-bench_gpu printed. Exit code 1 unless every test ran and passed."""
+"""gpu_results.py JUNIT [BENCH_LINES [TRAVERSAL.json...]]: what scripts/gpu ran -> bench/results/GPU-NAME.json: the tests,
+the lines that bench_gpu printed, and the measured rows of `raydix bench traversal --device cuda`. Exit code 1 unless every
+test ran and passed and, where there are benchmarks, every check of gpu_checks.py is met."""
 import json
 import pathlib
 import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+
+import gpu_checks
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
@@ -30,11 +33,15 @@ def bench_of(file):
     return [json.loads(line) for line in pathlib.Path(file).read_text(encoding="utf-8").splitlines() if line.strip()]
 
 
-def main(junit, bench=None):
+def traversal_of(files):
+    return [row for file in files for row in json.loads(pathlib.Path(file).read_text(encoding="utf-8"))["measured"]]
+
+
+def main(junit, bench=None, *traversal):
     name, driver = first_line_of("nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader").split(", ")
     tests = tests_of(junit)
     document = {"gpu": name, "driver": driver, "commit": first_line_of("git", "rev-parse", "HEAD"), "tests": tests,
-                "bench": bench_of(bench) if bench else []}
+                "bench": bench_of(bench) if bench else [], "traversal": traversal_of(traversal)}
     out = ROOT / "bench" / "results" / (re.sub(r"[^A-Za-z0-9.]+", "-", name) + ".json")
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
@@ -51,7 +58,8 @@ def main(junit, bench=None):
         print(f"{line['scene']:<40}{line.get('builder', line['tree']):<12}{line['bits']:>3} bits, leaves of "
               f"{line['max_leaf']}: {line['ms']['total']['median']:8.3f} ms, {line['gprims_per_s']:6.2f} Gprims/s{share}")
     print(f"{passed} of {len(tests)} GPU tests passed on {name}; written: {out.relative_to(ROOT)}")
-    return 0 if tests and passed == len(tests) else 1
+    targets = gpu_checks.main(out) if bench else 0
+    return 0 if tests and passed == len(tests) and targets == 0 else 1
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
-// How the builders of the LBVH family scale: what their launches do, counted as they run, and a
-// model of how long machines of any size take for them (Karras 2012, section 5).
+// How the builders of the LBVH family scale, and the stages and trees around them: what their
+// launches do, counted as they run; what they take on this machine; and models of how long machines
+// of any size take for them (Karras 2012, section 5).
 #pragma once
 
 #include <raydix/bvh.h>
@@ -8,9 +9,31 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace raydix {
+
+/// Whose kernels a row of the study is made of.
+enum class StudyForm {
+    launches,   // ours, for any backend
+    published,  // those of the source, where they differ from ours: K12's two kernels without
+                // ranks, the counter of garanzha
+    tuned       // ours for this processor alone; timed as a whole, nothing is counted
+};
+[[nodiscard]] std::string_view study_form_name(StudyForm form);
+
+/// A row of the study.
+struct StudyCase {
+    std::string subject;  // codes, sort, karras, apetrei, garanzha, lauterbach, octree, kdtree
+    StudyForm form = StudyForm::launches;
+    Fit fit = Fit::as_published;  // of the four builders
+
+    [[nodiscard]] bool is_builder() const;  // one of the four
+    [[nodiscard]] std::string name() const;
+};
+/// All there are.
+[[nodiscard]] std::vector<StudyCase> study_cases();
 
 /// One launch. All its items may run at once. The next launch waits for them.
 struct LaunchFigures {
@@ -22,33 +45,89 @@ struct LaunchFigures {
     double ms = 0;                    // on this machine, without counting: the median of all runs
 };
 
-/// The hierarchy and the boxes of one builder, as launches.
+/// What one case does over one input, as launches.
 struct HierarchyRun {
-    Builder builder = Builder::karras;
-    Fit fit = Fit::as_published;
-    int bits = 63, max_leaf = 1;
-    std::uint32_t keys = 0, inner_nodes = 0, max_depth = 0;
-    std::vector<LaunchFigures> launches;
-    std::vector<std::uint64_t> items_per_level;  // inner nodes at each depth, the root's first;
-                                                 // empty unless boxes are fitted by levels
-    std::string refusal;                         // why the builder does not run here, else empty
+    StudyCase what;
+    int bits = 30, max_leaf = 1, threads = 1;
+    std::uint32_t keys = 0;
+    std::uint32_t inner_nodes = 0;  // of trees; of an octree all nodes
+    std::uint32_t max_depth = 0;    // of BVHs and k-d trees
+    std::vector<LaunchFigures> launches = {};
+    std::vector<std::uint64_t> items_per_level =
+        {};  // inner nodes at each depth, the root's first;
+             // empty unless boxes are fitted by levels
+    std::string digest =
+        {};  // of a BVH: links, boxes and leaves in preorder; equal for equal trees
+    std::string refusal = {};  // why the case does not run here, else empty
 
     /// Of all launches together.
     [[nodiscard]] double measured_ms() const;
 };
 
-/// Runs the hierarchy and the box fitting of options.builder, one of the LBVH family, over the
-/// triangles of `mesh` or, if it has none, over its vertices: once to count, once to warm up, and
-/// `repeat` times to measure. They run as launches on the CPU, with options.threads threads.
-/// Primitives that are not valid are left out; options.strict has no effect. Throws InputError: a
-/// builder that is not of the LBVH family, any reinsertion rounds, a number that is no fit, an
-/// index past the vertices, threads out of range.
-[[nodiscard]] HierarchyRun study_hierarchy(const MeshView& mesh, const BuildOptions& options,
-                                           int repeat);
+struct StudyOptions {
+    int bits = 30;
+    int max_leaf = 1;
+    int threads = 1;
+    int repeat = 5;  // timed rounds behind one that warms up; each goes through all cases in turn
+    std::vector<StudyCase> cases = study_cases();
+};
 
-/// What the model knows of a machine. `lanes` items run at once. An item takes `item_ns`, and
-/// `step_ns` for each of its steps. All items share `bytes_per_ns`. A step of the longest chain
-/// waits `latency_ns` for memory.
+/// Runs the cases over the triangles of each mesh or, if it has none, over its vertices. Launches
+/// run on the CPU. With one thread their times are its processor time, else those of the clock on
+/// the wall. Each round goes through all meshes, so that what slows the machine down for a while
+/// slows all of them. Primitives that are not valid are left out; of no valid one there is nothing
+/// to run. Throws InputError: a case that is none of study_cases, an index past the vertices,
+/// options out of range.
+[[nodiscard]] std::vector<std::vector<HierarchyRun>> study_hierarchies(
+    std::span<const MeshView> meshes, const StudyOptions& options);
+/// The same for one mesh.
+[[nodiscard]] std::vector<HierarchyRun> study_hierarchy(const MeshView& mesh,
+                                                        const StudyOptions& options);
+
+/// What an item or a step of one kernel of one case takes on this machine with one thread. Measured
+/// on inputs of several sizes.
+struct KernelCost {
+    struct Point {
+        double keys, ns;
+    };
+    std::string kernel;         // "case: label"
+    std::vector<Point> points;  // ascending by keys
+
+    /// Between two sizes on a line over the logarithm of the size, beyond them the nearest.
+    [[nodiscard]] double at(double keys) const;
+};
+
+/// This machine with one thread.
+struct MeasuredCosts {
+    double launch_us = 0;   // of an empty launch
+    double latency_ns = 0;  // of one load that no cache holds
+    std::vector<KernelCost> kernels;
+    std::string origin;
+
+    [[nodiscard]] const KernelCost* find(const std::string& kernel) const;
+};
+
+/// A sheet of about so many triangles, bent at random: what kernels are measured on. No scene of
+/// the study is one.
+[[nodiscard]] Mesh cost_sheet(std::uint32_t triangles, std::uint64_t seed);
+
+/// Measures launches and latency, and takes the costs of kernels from runs over sheets of several
+/// sizes with one thread.
+[[nodiscard]] MeasuredCosts costs_of(std::span<const std::vector<HierarchyRun>> sheets);
+
+/// Predicts one launch of `run` on `factor` times this machine: launch_us, and its work, (items +
+/// steps) * the kernel's cost, over as many threads as there are items, `factor` at most; not less
+/// than the longest chain takes. NaN for a kernel that was not measured.
+[[nodiscard]] double predicted_ms(const HierarchyRun& run, const LaunchFigures& launch,
+                                  const MeasuredCosts& costs, double factor = 1);
+/// The sum over launches. NaN for factor > 1 if the case is tuned: nothing is known of its
+/// launches.
+[[nodiscard]] double predicted_ms(const HierarchyRun& run, const MeasuredCosts& costs,
+                                  double factor = 1);
+
+/// What the model knows of a machine that is not at hand. `lanes` items run at once. An item takes
+/// `item_ns`, and `step_ns` for each of its steps. All items share `bytes_per_ns`. A step of the
+/// longest chain waits `latency_ns` for memory.
 struct LaunchMachine {
     std::string name;
     double lanes = 1;
@@ -62,13 +141,11 @@ struct LaunchMachine {
 
 /// The machines `gtx480` and `h200`. `origin` says which of their figures are estimates.
 [[nodiscard]] std::vector<LaunchMachine> study_machines();
-/// Measures this machine with `threads` threads (0: all it has), in about a second. Its loops are
-/// none of the builders'.
-[[nodiscard]] LaunchMachine measure_this_machine(int threads);
 
 /// Predicts the milliseconds that `machine` with `factor` times its lanes and bandwidth takes.
 /// Launches run one after the other. Each takes launch_us and the largest of three times: (items *
-/// item_ns + steps * step_ns) / lanes, bytes / bytes_per_ns, and longest_chain * latency_ns.
+/// item_ns + steps * step_ns) / lanes, bytes / bytes_per_ns, and longest_chain * latency_ns. NaN
+/// for a tuned case.
 [[nodiscard]] double predicted_ms(const HierarchyRun& run, const LaunchMachine& machine,
                                   double factor = 1);
 

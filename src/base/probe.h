@@ -15,6 +15,7 @@ struct NoProbe {
     RAYDIX_HD static void bytes(std::uint64_t) {}
     /// One more access that had to wait for the one before.
     RAYDIX_HD static void step() {}
+    RAYDIX_HD static void steps(std::uint64_t) {}
     /// A chain of `length` accesses through several work items that wait for each other.
     RAYDIX_HD static void chain(std::uint32_t /*length*/) {}
 };
@@ -34,6 +35,7 @@ struct CountProbe {
     }
     static void bytes(std::uint64_t n) { work().bytes += n; }
     static void step() { ++work().steps; }
+    static void steps(std::uint64_t n) { work().steps += static_cast<std::uint32_t>(n); }
     static void chain(std::uint32_t length) {
         if (length > work().longest_chain) work().longest_chain = length;
     }

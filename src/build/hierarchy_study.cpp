@@ -1,45 +1,20 @@
-// study_hierarchy: bounds, codes and sort as in any build, then the counted and the timed launches.
+// study_hierarchy: bounds, codes and sort as in any build, then each case counted once, and all
+// cases timed in rounds.
 #include <raydix/error.h>
 #include <raydix/hierarchy_study.h>
 
 #include <algorithm>
+#include <memory>
 
 #include "base/options.h"
+#include "build/study_scene.h"
 #include "exec/parallel.h"
-#include "keys/host_encode.h"
-#include "primitives/bounds.h"
-#include "sort/radix_sort.h"
-#include "tree/counted_builds.h"
 #include "tree/lbvh_family.h"
 
 namespace raydix {
 namespace {
 
-template <class Key>
-struct SortedScene {
-    std::vector<Key> keys;
-    std::vector<Aabb> boxes;  // in key order
-};
-
-template <class Key, class Source>
-SortedScene<Key> sort_scene(const Source& source, std::uint32_t n) {
-    const Bounds bounds = scene_bounds(source, n);
-    if (bounds.first_unreadable != no_primitive)
-        throw InputError("triangle " + std::to_string(bounds.first_unreadable) +
-                         ": an index is past the last vertex");
-    const auto valid = static_cast<std::uint32_t>(n - bounds.left_out);
-    SortedScene<Key> scene;
-    scene.keys.resize(n);
-    std::vector<std::uint32_t> order(n);
-    host_encode(source, make_grid(bounds.box, CodeFormat<Key>::axis_bits), valid == n, n,
-                scene.keys.data());
-    SortScratch<Key> scratch;
-    sort_keys<Key>(scene.keys, order, static_cast<int>(8 * sizeof(Key)), scratch);
-    scene.keys.resize(valid);
-    scene.boxes.resize(valid);
-    for_each_index(valid, [&](std::size_t k) { source.box(order[k], scene.boxes[k]); });
-    return scene;
-}
+constexpr std::string_view builders[] = {"karras", "apetrei", "garanzha", "lauterbach"};
 
 /// Inner nodes by depth, as builders that go by levels meet them.
 std::vector<std::uint64_t> level_items(const std::vector<LaunchRecord>& launches) {
@@ -50,70 +25,191 @@ std::vector<std::uint64_t> level_items(const std::vector<LaunchRecord>& launches
     return items;
 }
 
+/// One mesh: counted, then timed in rounds.
+class AnyStudy {
+public:
+    AnyStudy() = default;
+    virtual ~AnyStudy() = default;
+    AnyStudy(const AnyStudy&) = delete;
+    AnyStudy& operator=(const AnyStudy&) = delete;
+    virtual void count() = 0;
+    virtual void round(bool counts) = 0;
+    virtual std::vector<HierarchyRun> take() = 0;
+};
+
 template <class Key, class Source>
-void study(const Source& source, std::uint32_t n, const BuildOptions& options, int repeat,
-           HierarchyRun& run) {
-    const SortedScene<Key> scene = sort_scene<Key>(source, n);
-    run.keys = static_cast<std::uint32_t>(scene.keys.size());
-    if (run.keys == 0) return;
-    const std::span<const Key> keys = scene.keys;
-    CountedBuild counted;
-    try {
-        counted =
-            count_build<Key>(options.builder, options.fit, keys, scene.boxes, options.max_leaf);
-    } catch (const InputError& error) {  // more memory than the builder may take
-        run.refusal = error.what();
-        return;
+class Study : public AnyStudy {
+public:
+    Study(const Source& source, std::uint32_t n, const Bounds& bounds, const StudyOptions& options)
+        : scene_(source, n, bounds), options_(options) {}
+
+    void count() override {
+        for (const StudyCase& what : options_.cases) runs_.push_back(count(what));
+        times_.resize(runs_.size());
+        for (std::size_t k = 0; k < runs_.size(); ++k) times_[k].resize(runs_[k].launches.size());
     }
-    run.inner_nodes = counted.inner_count;
-    run.max_depth = counted.max_depth;
-    for (const LaunchRecord& r : counted.launches)
-        run.launches.push_back({r.label, r.items, r.bytes, r.steps, r.longest_chain, 0});
-    run.items_per_level = level_items(counted.launches);
-    std::vector<std::vector<double>> times(run.launches.size());
-    for (int k = 0; k <= repeat; ++k) {  // the first one warms up
-        const CountedBuild timed =
-            time_build<Key>(options.builder, options.fit, keys, scene.boxes, options.max_leaf);
-        for (std::size_t l = 0; k > 0 && l < times.size(); ++l)
-            times[l].push_back(timed.launches[l].ms);
+    void round(bool counts) override {
+        for (std::size_t k = 0; k < runs_.size(); ++k) time(k, counts);
     }
-    for (std::size_t l = 0; l < times.size(); ++l) {
-        std::ranges::sort(times[l]);
-        if (!times[l].empty()) run.launches[l].ms = times[l][times[l].size() / 2];
+    std::vector<HierarchyRun> take() override {
+        for (std::size_t k = 0; k < runs_.size(); ++k)
+            for (std::size_t l = 0; l < times_[k].size(); ++l)
+                runs_[k].launches[l].ms = median(times_[k][l]);
+        return std::move(runs_);
+    }
+
+private:
+    static double median(std::vector<double>& values) {
+        if (values.empty()) return 0;
+        std::ranges::sort(values);
+        return values[values.size() / 2];
+    }
+
+    template <class Probe>
+    CountedBuild go(const StudyCase& what) {
+        if (!what.is_builder()) return StageRun<Key, Source, Probe>(scene_, options_).run(what);
+        const BuildWay way{builder_from_name(what.subject), what.fit,
+                           static_cast<BuildForm>(what.form)};
+        const std::span<const Key> keys = scene_.keys;
+        return Probe::counts
+                   ? count_build<Key>(way, keys, scene_.boxes, options_.max_leaf, scene_.memory)
+                   : time_build<Key>(way, keys, scene_.boxes, options_.max_leaf, scene_.memory);
+    }
+
+    HierarchyRun count(const StudyCase& what) {
+        HierarchyRun run{.what = what,
+                         .bits = options_.bits,
+                         .max_leaf = options_.max_leaf,
+                         .threads = thread_count(),
+                         .keys = scene_.valid};
+        if (scene_.valid == 0) return run;
+        try {
+            const CountedBuild counted = go<CountProbe>(what);
+            run.inner_nodes = counted.inner_count;
+            run.max_depth = counted.max_depth;
+            run.digest = counted.digest;
+            for (const LaunchRecord& r : counted.launches)
+                run.launches.push_back({r.label, r.items, r.bytes, r.steps, r.longest_chain, 0});
+            run.items_per_level = level_items(counted.launches);
+        } catch (const InputError& error) {  // more memory than the builder may take, larger leaves
+            run.refusal = error.what();
+        }
+        return run;
+    }
+
+    void time(std::size_t k, bool counts) {
+        if (runs_[k].launches.empty()) return;
+        const CountedBuild timed = go<NoProbe>(runs_[k].what);
+        for (std::size_t l = 0; counts && l < times_[k].size(); ++l)
+            times_[k][l].push_back(timed.launches[l].ms);
+    }
+
+    StudyScene<Key, Source> scene_;
+    const StudyOptions& options_;
+    std::vector<HierarchyRun> runs_;
+    std::vector<std::vector<std::vector<double>>> times_;  // [case][launch][round]
+};
+
+std::unique_ptr<AnyStudy> study_of(const MeshView& mesh, const StudyOptions& options) {
+    const auto make = [&](const auto& source, std::size_t count) -> std::unique_ptr<AnyStudy> {
+        using Source = std::decay_t<decltype(source)>;
+        const auto n = static_cast<std::uint32_t>(count);
+        const Bounds bounds = scene_bounds(source, n);
+        if (bounds.first_unreadable != no_primitive)
+            throw InputError("triangle " + std::to_string(bounds.first_unreadable) +
+                             ": an index is past the last vertex");
+        if (options.bits == 30)
+            return std::make_unique<Study<std::uint32_t, Source>>(source, n, bounds, options);
+        return std::make_unique<Study<std::uint64_t, Source>>(source, n, bounds, options);
+    };
+    if (mesh.triangles.empty())
+        return make(PointSource{mesh.vertices.data()}, mesh.vertices.size());
+    return make(TriangleSource{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()},
+                mesh.triangles.size());
+}
+
+void check(const StudyOptions& options) {
+    if (options.bits != 30 && options.bits != 63)
+        throw InputError("bits is " + std::to_string(options.bits) + "; 30 and 63 are possible");
+    if (options.max_leaf < 1 || options.max_leaf > 255)
+        throw InputError("max_leaf is " + std::to_string(options.max_leaf) +
+                         "; 1 to 255 are possible");
+    if (options.repeat < 1)
+        throw InputError("repeat is " + std::to_string(options.repeat) + "; at least 1 is needed");
+    const std::vector<StudyCase> known = study_cases();
+    for (const StudyCase& what : options.cases) {
+        check_enum("form", what.form, StudyForm::tuned);
+        check_enum("fit", what.fit, Fit::atomic);
+        const auto is_what = [&](const StudyCase& other) {
+            return other.subject == what.subject && other.form == what.form &&
+                   (!what.is_builder() || other.fit == what.fit);
+        };
+        if (std::ranges::none_of(known, is_what))
+            throw InputError("the study has no case " + what.name());
     }
 }
 
 }  // namespace
 
-HierarchyRun study_hierarchy(const MeshView& mesh, const BuildOptions& options, int repeat) {
-    HierarchyRun run;
-    run.builder = options.builder;
-    run.fit = options.fit;
-    run.bits = options.bits;
-    run.max_leaf = options.max_leaf;
-    check_enum("builder", options.builder, Builder::sbvh);
-    check_enum("fit", options.fit, Fit::atomic);
-    if (!in_lbvh_family(options.builder))
-        throw InputError("builder " + std::string(builder_name(options.builder)) +
-                         " is not of the LBVH family");
-    if (options.reinsertion_rounds != 0)
-        throw InputError("reinsertion_rounds is " + std::to_string(options.reinsertion_rounds) +
-                         "; the study is of builds without reinsertion");
-    const auto go = [&](const auto& source, std::size_t n) {
-        const auto count = static_cast<std::uint32_t>(n);
-        with_threads(options.threads, [&] {
-            if (options.bits == 30)
-                study<std::uint32_t>(source, count, options, repeat, run);
-            else
-                study<std::uint64_t>(source, count, options, repeat, run);
-        });
-    };
-    if (mesh.triangles.empty())
-        go(PointSource{mesh.vertices.data()}, mesh.vertices.size());
-    else
-        go(TriangleSource{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()},
-           mesh.triangles.size());
-    return run;
+std::string_view study_form_name(StudyForm form) {
+    return form == StudyForm::launches    ? "launches"
+           : form == StudyForm::published ? "published"
+                                          : "tuned";
+}
+
+bool StudyCase::is_builder() const {
+    return std::ranges::find(builders, subject) != std::end(builders);
+}
+
+std::string StudyCase::name() const {
+    std::string text = subject;
+    if (form != StudyForm::launches) text += ", " + std::string(study_form_name(form));
+    if (is_builder()) text += fit == Fit::levels ? ", boxes by levels" : ", boxes in one pass";
+    return text;
+}
+
+std::vector<StudyCase> study_cases() {
+    using enum StudyForm;
+    return {{"codes", launches},
+            {"codes", tuned},
+            {"sort", launches},
+            {"sort", tuned},
+            {"karras", published, Fit::atomic},
+            {"karras", launches, Fit::atomic},
+            {"karras", launches, Fit::levels},
+            {"karras", tuned, Fit::atomic},
+            {"apetrei", launches, Fit::atomic},
+            {"apetrei", launches, Fit::levels},
+            {"apetrei", tuned, Fit::atomic},
+            {"garanzha", published, Fit::levels},
+            {"garanzha", published, Fit::atomic},
+            {"garanzha", launches, Fit::levels},
+            {"garanzha", launches, Fit::atomic},
+            {"lauterbach", launches, Fit::levels},
+            {"lauterbach", launches, Fit::atomic},
+            {"octree", launches},
+            {"kdtree", launches}};
+}
+
+std::vector<std::vector<HierarchyRun>> study_hierarchies(std::span<const MeshView> meshes,
+                                                         const StudyOptions& options) {
+    check(options);
+    std::vector<std::vector<HierarchyRun>> runs;
+    with_threads(options.threads, [&] {
+        std::vector<std::unique_ptr<AnyStudy>> studies;
+        for (const MeshView& mesh : meshes) {
+            studies.push_back(study_of(mesh, options));
+            studies.back()->count();
+        }
+        for (int round = 0; round <= options.repeat; ++round)  // the first one warms up
+            for (const auto& study : studies) study->round(round > 0);
+        for (const auto& study : studies) runs.push_back(study->take());
+    });
+    return runs;
+}
+
+std::vector<HierarchyRun> study_hierarchy(const MeshView& mesh, const StudyOptions& options) {
+    return std::move(study_hierarchies(std::span(&mesh, 1), options).front());
 }
 
 }  // namespace raydix

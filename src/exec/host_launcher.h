@@ -27,7 +27,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -35,6 +34,7 @@
 #include <vector>
 
 #include "base/probe.h"
+#include "exec/launch_clock.h"
 #include "exec/parallel.h"
 #include "exec/scan.h"
 #include "exec/warp.h"
@@ -66,12 +66,14 @@ class HostLauncher {
 public:
     using Probe = Probe_;
 
-    /// `log`: where launches are written down; may be null.
-    explicit HostLauncher(std::vector<LaunchRecord>* log = nullptr) : log_(log) {}
+    /// `log`: where launches are written down; may be null. With one thread their times are its
+    /// processor time, which other programs do not lengthen; else those of the clock on the wall.
+    explicit HostLauncher(std::vector<LaunchRecord>* log = nullptr)
+        : log_(log), one_thread_(log != nullptr && thread_count() == 1) {}
 
     template <class Work>
     void launch(const char* label, std::uint32_t n, const Work& work) {
-        const Clock::time_point start = Clock::now();
+        const double start = now();
         LaunchRecord record{label, n};
         if constexpr (Probe::counts) {
             run_counted(record, n, work);
@@ -91,7 +93,7 @@ public:
     template <class Work>
     void launch_warps(const char* label, const std::uint32_t* count, std::uint32_t limit,
                       const Work& work) {
-        const Clock::time_point start = Clock::now();
+        const double start = now();
         const std::uint32_t warps = warps_for(std::min(*count, limit));
         for_each_index(
             warps, [&](std::size_t w) { work(HostWarp(), static_cast<std::uint32_t>(w)); },
@@ -101,11 +103,8 @@ public:
 
     void exclusive_scan(const char* label, std::uint32_t* values, std::uint32_t n,
                         std::uint32_t* total) {
-        const Clock::time_point start = Clock::now();
-        const std::uint32_t sum = raydix::exclusive_scan(std::span<std::uint32_t>(values, n));
+        const std::uint32_t sum = scan(label, std::span<std::uint32_t>(values, n));
         if (total != nullptr) *total = sum;
-        // One read and one write a value, as a single-pass scan on a GPU has; blocks hand sums on.
-        note({label, n, std::uint64_t{n} * 8, 4, n}, start);
     }
 
     void exclusive_scan_counted(const char* label, std::uint32_t* values,
@@ -115,9 +114,7 @@ public:
     }
 
     void exclusive_scan_wide(const char* label, std::uint64_t* values, std::uint32_t n) {
-        const Clock::time_point start = Clock::now();
-        static_cast<void>(raydix::exclusive_scan(std::span<std::uint64_t>(values, n)));
-        note({label, n, std::uint64_t{n} * 16, 4, n}, start);
+        static_cast<void>(scan(label, std::span<std::uint64_t>(values, n)));
     }
 
     template <class Key>
@@ -126,14 +123,58 @@ public:
 
     [[nodiscard]] bool maybe_any(const std::uint32_t* count) const { return *count != 0; }
 
+    /// What runs on this processor alone, written down as one launch of which only the time and the
+    /// items are known.
+    template <class Body>
+    void run_whole(const char* label, std::uint64_t items, const Body& body) {
+        const double start = now();
+        body();
+        note({label, items}, start);
+    }
+
 private:
     static constexpr std::size_t grain = 1024;
-    using Clock = std::chrono::steady_clock;
 
-    void note(LaunchRecord record, Clock::time_point start) {
+    [[nodiscard]] double now() const {
+        return log_ == nullptr ? 0 : one_thread_ ? thread_time_ms() : wall_time_ms();
+    }
+    void note(LaunchRecord record, double start) {
         if (log_ == nullptr) return;
-        record.ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        record.ms = now() - start;
         log_->push_back(std::move(record));
+    }
+
+    /// Rows of neighbours that one thread takes in order: body(b, begin, end) for each block. Items
+    /// are the neighbours, because a GPU's block has a thread for each; the chain is what one of
+    /// them waits for.
+    template <class Body>
+    void launch_blocks(const char* label, const char* pass, std::size_t n, std::size_t block,
+                       const Body& body) {
+        const double start = now();
+        LaunchRecord record{log_ == nullptr ? std::string() : std::string(label) + pass, n};
+        if constexpr (Probe::counts) {
+            std::atomic<std::uint64_t> bytes{0}, steps{0};
+            for_each_block(n, block, [&](std::size_t b, std::size_t begin, std::size_t end) {
+                Probe::work() = {};
+                body(b, begin, end);
+                bytes += Probe::work().bytes;
+                steps += Probe::work().steps;
+            });
+            record.bytes = bytes;
+            record.steps = steps;
+            record.longest_chain = static_cast<std::uint32_t>(n == 0 ? 0 : (steps + n - 1) / n);
+        } else {
+            for_each_block(n, block, body);
+        }
+        note(std::move(record), start);
+    }
+
+    template <class T>
+    T scan(const char* label, std::span<T> values) {
+        return detail::scan_blocks<Probe>(
+            values, [&](const char* pass, std::size_t n, std::size_t block, const auto& body) {
+                launch_blocks(label, pass, n, block, body);
+            });
     }
 
     template <class Work>
@@ -163,9 +204,12 @@ private:
     }
 
     std::vector<LaunchRecord>* log_;
+    bool one_thread_;
 };
 
-/// Stable least-significant-digit counting sort, eight bits a pass.
+/// Stable least-significant-digit counting sort, eight bits a pass. Each pass counts the digits of
+/// blocks, sums the counts up, and moves the pairs. A block's counters stay in its cache (or a
+/// GPU's shared memory): the bytes are those of keys and values.
 template <class Probe_>
 template <class Key>
 void HostLauncher<Probe_>::sort_pairs(const char* label, const SortArrays<Key>& a,
@@ -173,7 +217,7 @@ void HostLauncher<Probe_>::sort_pairs(const char* label, const SortArrays<Key>& 
                                       int key_bits) {
     static_assert(std::is_unsigned_v<Key>);
     constexpr std::size_t digits = 256, block = 1u << 14;
-    const Clock::time_point start = Clock::now();
+    constexpr std::uint64_t pair_bytes = sizeof(Key) + sizeof(std::uint32_t);
     const std::uint32_t n = count == nullptr ? limit : std::min(*count, limit);
     const std::size_t blocks = (n + block - 1) / block;
     Key* from_keys = a.keys;
@@ -181,38 +225,39 @@ void HostLauncher<Probe_>::sort_pairs(const char* label, const SortArrays<Key>& 
     std::uint32_t* from_values = a.values;
     std::uint32_t* to_values = a.sorted_values;
     std::vector<std::uint32_t> starts(digits * blocks);
-    int passes = 0;
-    for (int shift = 0; shift < key_bits; shift += 8, ++passes) {
+    const std::string starts_label = log_ == nullptr ? "" : std::string(label) + ".starts";
+    for (int shift = 0; shift < key_bits; shift += 8) {
         const auto digit = [&](std::size_t i) {
             return static_cast<std::size_t>(from_keys[i] >> shift & (digits - 1));
         };
-        std::fill(starts.begin(), starts.end(), 0u);
-        for_each_block(n, block, [&](std::size_t b, std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) ++starts[digit(i) * blocks + b];
-        });
-        raydix::exclusive_scan(starts);
-        for_each_block(n, block, [&](std::size_t b, std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
-                const std::uint32_t at = starts[digit(i) * blocks + b]++;
-                to_keys[at] = from_keys[i];
-                to_values[at] = from_values[i];
-            }
-        });
+        launch_blocks(label, ".count", n, block,
+                      [&](std::size_t b, std::size_t begin, std::size_t end) {
+                          for (std::size_t d = 0; d < digits; ++d) starts[d * blocks + b] = 0;
+                          for (std::size_t i = begin; i < end; ++i) ++starts[digit(i) * blocks + b];
+                          Probe::bytes((end - begin) * sizeof(Key) + digits * sizeof(starts[0]));
+                          Probe::steps(end - begin);
+                      });
+        scan(starts_label.c_str(), std::span<std::uint32_t>(starts));
+        launch_blocks(label, ".move", n, block,
+                      [&](std::size_t b, std::size_t begin, std::size_t end) {
+                          for (std::size_t i = begin; i < end; ++i) {
+                              const std::uint32_t at = starts[digit(i) * blocks + b]++;
+                              to_keys[at] = from_keys[i];
+                              to_values[at] = from_values[i];
+                          }
+                          Probe::bytes((end - begin) * 2 * pair_bytes);
+                          Probe::steps(2 * (end - begin));
+                      });
         std::swap(from_keys, to_keys);
         std::swap(from_values, to_values);
     }
-    if (from_keys != a.sorted_keys) {
-        for_each_range(n, block, [&](std::size_t begin, std::size_t end) {
-            std::copy(from_keys + begin, from_keys + end, a.sorted_keys + begin);
-            std::copy(from_values + begin, from_values + end, a.sorted_values + begin);
-        });
-    }
-    const std::uint64_t pair_bytes = sizeof(Key) + sizeof(std::uint32_t);
-    // Each pass reads keys to count them, then reads and writes pairs: two launches and a scan that
-    // wait for each other. The time of all passes stands at the first.
-    for (int pass = 0; pass < passes; ++pass)
-        note({label, n, n * (sizeof(Key) + 2 * pair_bytes), 4, 3 * std::uint64_t{n}},
-             pass == 0 ? start : Clock::now());
+    if (from_keys == a.sorted_keys) return;
+    launch_blocks(label, ".copy", n, block, [&](std::size_t, std::size_t begin, std::size_t end) {
+        std::copy(from_keys + begin, from_keys + end, a.sorted_keys + begin);
+        std::copy(from_values + begin, from_values + end, a.sorted_values + begin);
+        Probe::bytes((end - begin) * 2 * pair_bytes);
+        Probe::steps(end - begin);
+    });
 }
 
 }  // namespace raydix

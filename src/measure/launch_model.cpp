@@ -1,14 +1,13 @@
 #include "measure/launch_model.h"
 
 #include <algorithm>
-#include <array>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numeric>
 #include <random>
 
 #include "exec/host_launcher.h"
-#include "exec/parallel.h"
-#include "measure/stopwatch.h"
 
 namespace raydix {
 namespace {
@@ -16,37 +15,20 @@ namespace {
 /// The least of several runs: what disturbs a loop only adds.
 template <class Body>
 double least_ms(int runs, const Body& body) {
-    double least = 0;
+    double least = std::numeric_limits<double>::infinity();
     for (int k = 0; k < runs; ++k) {
-        Stopwatch watch;
-        body();
-        const double ms = watch.lap();
-        if (k == 0 || ms < least) least = ms;
+        std::vector<LaunchRecord> log;
+        HostLauncher<> launcher(&log);
+        body(launcher);
+        double ms = 0;
+        for (const LaunchRecord& record : log) ms += record.ms;
+        least = std::min(least, ms);
     }
     return least;
 }
 
-struct CopyItem {
-    const std::uint32_t* from;
-    std::uint32_t* to;
-    void operator()(std::uint32_t i) const { to[i] = from[i] + 1; }
-};
-
-/// A binary search: steps that compute an address, load, compare and branch on what nobody can
-/// foresee.
-struct Search {
-    static constexpr std::uint32_t steps = 15;
-    const std::uint32_t* sorted;  // [2^steps], ascending
-    const std::uint32_t* wanted;
-    std::uint32_t* out;
-    void operator()(std::uint32_t i) const {
-        std::uint32_t low = 0;
-        for (std::uint32_t half = 1u << (steps - 1); half > 0; half /= 2) {
-            if (sorted[low + half] > wanted[i]) continue;
-            low += half;
-            out[i] = low;  // keeps the branch a branch
-        }
-    }
+struct Nothing {
+    void operator()(std::uint32_t) const {}
 };
 
 struct Hop {
@@ -76,49 +58,10 @@ constexpr std::uint32_t past_caches = 1u << 18;
 constexpr std::uint32_t past_caches = 1u << 24;
 #endif
 
-/// One load from memory that no cache holds.
-double memory_latency_ns() {
-    constexpr std::uint32_t hops = 1u << 16;
-    const std::vector<std::uint32_t> next = one_cycle(past_caches);
-    std::uint32_t out = 0;
-    HostLauncher<> launcher;
-    return least_ms(5,
-                    [&] {
-                        launcher.launch("hop", 1, Hop{next.data(), hops, &out});
-                    }) *
-           1e6 / hops;
-}
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-/// One thread's time for a step of a search in a table that the second-level cache holds.
-double search_step_ns() {
-    constexpr std::uint32_t n = 1u << Search::steps, items = 1u << 16;
-    std::vector<std::uint32_t> sorted(n), wanted(items), out(items);
-    std::mt19937 random(7);
-    for (std::uint32_t& v : sorted) v = static_cast<std::uint32_t>(random());
-    for (std::uint32_t& v : wanted) v = static_cast<std::uint32_t>(random());
-    std::ranges::sort(sorted);
-    HostLauncher<> launcher;
-    const double ms = least_ms(5, [&] {
-        launcher.launch("search", items, Search{sorted.data(), wanted.data(), out.data()});
-    });
-    return ms * 1e6 * thread_count() / (double(items) * Search::steps);
-}
-
-/// Bytes per nanosecond of a[i] = b[i] + c[i] over arrays that no cache holds.
-double triad_bytes_per_ns() {
-    constexpr std::size_t n = past_caches;
-    std::vector<float> a(n), b(n, 1.0f), c(n, 2.0f);
-    const double ms = least_ms(5, [&] {
-        for_each_range(n, std::size_t{1} << 16, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) a[i] = b[i] + c[i];
-        });
-    });
-    return double(3 * n * sizeof(float)) / (ms * 1e6);
-}
-
-}  // namespace
-
-double predicted_ms(const LaunchFigures& launch, const LaunchMachine& machine, double factor) {
+double predicted_launch_ms(const LaunchFigures& launch, const LaunchMachine& machine,
+                           double factor) {
     const double lanes = machine.lanes * factor;
     const double work_ns =
         (double(launch.items) * machine.item_ns + double(launch.steps) * machine.step_ns) / lanes;
@@ -127,9 +70,65 @@ double predicted_ms(const LaunchFigures& launch, const LaunchMachine& machine, d
     return machine.launch_us * 1e-3 + std::max({work_ns, bytes_ns, chain_ns}) * 1e-6;
 }
 
-double predicted_ms(const HierarchyRun& run, const LaunchMachine& machine, double factor) {
+}  // namespace
+
+double empty_launch_us() {
+    constexpr int launches = 200;
+    return 1e3 / launches * least_ms(5, [&](HostLauncher<>& launcher) {
+               for (int k = 0; k < launches; ++k) launcher.launch("empty", 1, Nothing{});
+           });
+}
+
+double memory_latency_ns() {
+    constexpr std::uint32_t hops = 1u << 16;
+    const std::vector<std::uint32_t> next = one_cycle(past_caches);
+    std::uint32_t out = 0;
+    return least_ms(5,
+                    [&](HostLauncher<>& launcher) {
+                        launcher.launch("hop", 1, Hop{next.data(), hops, &out});
+                    }) *
+           1e6 / hops;
+}
+
+double KernelCost::at(double keys) const {
+    if (points.empty()) return unknown;
+    if (keys <= points.front().keys) return points.front().ns;
+    if (keys >= points.back().keys) return points.back().ns;
+    const auto above = std::ranges::lower_bound(points, keys, std::ranges::less(), &Point::keys);
+    const Point &low = *(above - 1), &high = *above;
+    const double part = std::log(keys / low.keys) / std::log(high.keys / low.keys);
+    return low.ns + part * (high.ns - low.ns);
+}
+
+const KernelCost* MeasuredCosts::find(const std::string& kernel) const {
+    const auto found = std::ranges::find(kernels, kernel, &KernelCost::kernel);
+    return found == kernels.end() ? nullptr : &*found;
+}
+
+double predicted_ms(const HierarchyRun& run, const LaunchFigures& launch,
+                    const MeasuredCosts& costs, double factor) {
+    const KernelCost* kernel = costs.find(kernel_of(run, launch));
+    if (kernel == nullptr) return launch.items == 0 ? costs.launch_us * 1e-3 : unknown;
+    const double work_ns = work_of(launch) * kernel->at(run.keys);
+    const double shared_ns = work_ns / std::clamp(double(launch.items), 1.0, factor);
+    // One thread has the chain in its work, most of it in a cache.
+    const double chain_ns = std::min(work_ns, launch.longest_chain * costs.latency_ns);
+    return costs.launch_us * 1e-3 + std::max(shared_ns, chain_ns) * 1e-6;
+}
+
+double predicted_ms(const HierarchyRun& run, const MeasuredCosts& costs, double factor) {
+    if (run.what.form == StudyForm::tuned && factor != 1) return unknown;
     double sum = 0;
-    for (const LaunchFigures& launch : run.launches) sum += predicted_ms(launch, machine, factor);
+    for (const LaunchFigures& launch : run.launches)
+        sum += predicted_ms(run, launch, costs, factor);
+    return sum;
+}
+
+double predicted_ms(const HierarchyRun& run, const LaunchMachine& machine, double factor) {
+    if (run.what.form == StudyForm::tuned) return unknown;
+    double sum = 0;
+    for (const LaunchFigures& launch : run.launches)
+        sum += predicted_launch_ms(launch, machine, factor);
     return sum;
 }
 
@@ -163,39 +162,6 @@ std::vector<LaunchMachine> study_machines() {
                     "cores, clock and bandwidth: data sheet; 700 clocks of memory latency, 2.5 us "
                     "a launch, 20 "
                     "instructions an item and 12 a step: estimates")};
-}
-
-LaunchMachine measure_this_machine(int threads) {
-    LaunchMachine machine;
-    with_threads(threads, [&] {
-        machine.name = "this machine";
-        machine.lanes = thread_count();
-        HostLauncher<> launcher;
-        std::vector<std::uint32_t> from(std::size_t{1} << 16), to(from.size());
-        constexpr int empty_launches = 200;
-        const auto small = static_cast<std::uint32_t>(2048 * thread_count());
-        machine.launch_us =
-            1e3 / empty_launches * least_ms(5, [&] {
-                for (int k = 0; k < empty_launches; ++k)
-                    launcher.launch("empty", small, CopyItem{from.data(), to.data()});
-            });
-        const auto n = static_cast<std::uint32_t>(from.size());
-        const double copy_ms = least_ms(9, [&] {
-            launcher.launch("copy", n, CopyItem{from.data(), to.data()});
-        });
-        machine.item_ns =
-            std::max(0.05, (copy_ms * 1e6 - machine.launch_us * 1e3) * machine.lanes / n);
-        machine.launch_us =
-            std::max(0.0, machine.launch_us - small * machine.item_ns * 1e-3 / machine.lanes);
-        machine.step_ns = search_step_ns();
-        machine.latency_ns = memory_latency_ns();
-        machine.bytes_per_ns = triad_bytes_per_ns();
-        machine.origin =
-            "measured: empty launches, a copy of 65,536 words, binary searches in 128 KB, a chain "
-            "of "
-            "loads in 64 MB, triad of 192 MB";
-    });
-    return machine;
 }
 
 }  // namespace raydix

@@ -5,13 +5,17 @@
 
 #include <raydix/hierarchy_study.h>
 
-#include <span>
+#include <string>
 
 namespace raydix {
 
-/// One launch: latency + the longest of what its work, its bytes and its longest chain take.
-/// `factor`: times the cores and the bandwidth of `machine`; latencies stay.
-[[nodiscard]] double predicted_ms(const LaunchFigures& launch, const LaunchMachine& machine,
-                                  double factor);
+/// What a launch is charged for: its items, and the steps of all of them.
+[[nodiscard]] double work_of(const LaunchFigures& launch);
+/// The name of its kernel in MeasuredCosts.
+[[nodiscard]] std::string kernel_of(const HierarchyRun& run, const LaunchFigures& launch);
+
+/// Of the calling context's threads, the least of several measurements.
+[[nodiscard]] double empty_launch_us();
+[[nodiscard]] double memory_latency_ns();
 
 }  // namespace raydix

@@ -89,8 +89,9 @@ void hierarchy_rows(const Document& document, std::vector<CompareRow>& rows) {
     for (const Json* r : objects_at(document.root, "runs")) {
         const char* threads = text_at(*r, "threads") == "1" ? " thread" : " threads";
         CompareRow row{scene_name(*r) + ", " + key_of(*r, {"keys"}, "") + " keys, " +
-                           key_of(*r, {"builder"}, "") + ", boxes " + text_at(*r, "fit") + ", " +
-                           text_at(*r, "bits") + " bits, " + text_at(*r, "threads") + threads,
+                           key_of(*r, {"builder", "form"}, "") + ", boxes " + text_at(*r, "fit") +
+                           ", " + text_at(*r, "bits") + " bits, " + text_at(*r, "threads") +
+                           threads,
                        {}};
         add(row, {"hierarchy and boxes", "ms", Better::lower, Origin::measured,
                   spread_at(*r, "measured_ms")});

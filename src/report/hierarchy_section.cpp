@@ -31,7 +31,7 @@ Series series_of(const StudyRun& run, PageColours& colours) {
 std::string size_plots(const Study& study, PageColours& colours) {
     std::map<std::pair<double, double>, std::vector<const StudyRun*>> panels;  // bits, threads
     for (const StudyRun& run : study.runs)
-        if (run.size_series && run.measured)
+        if (run.size_series && run.measured && run.scales())
             panels[{run.bits.value_or(0), run.threads.value_or(0)}].push_back(&run);
     std::string plots, legend;
     for (const auto& [key, runs] : panels) {
@@ -112,7 +112,8 @@ std::vector<double> best_times(const Study& study, const StudyScene& scene,
                                const std::string& machine) {
     std::vector<double> best(study.factors.size(), std::numeric_limits<double>::infinity());
     for (const StudyRun* run : scene.one_each)
-        if (const auto found = run->simulated.find(machine); found != run->simulated.end())
+        if (const auto found = run->simulated.find(machine);
+            run->is_builder() && found != run->simulated.end())
             for (std::size_t i = 0; i < best.size() && i < found->second.size(); ++i)
                 best[i] = std::fmin(best[i], found->second[i]);
     return best;
@@ -125,6 +126,7 @@ LinePlot scaling_plot(const Study& study, const StudyScene& scene, const std::st
     for (const StudyRun* run : scene.one_each) {
         const auto found = run->simulated.find(machine);
         if (found == run->simulated.end() || found->second.empty()) continue;
+        if (kind == Scaling::ratio && !run->is_builder()) continue;
         const std::vector<double>& ms = found->second;
         Series series = series_of(*run, colours);
         for (std::size_t i = 0; i < ms.size() && i < study.factors.size(); ++i) {
@@ -228,7 +230,7 @@ std::string build_plots(const Study& study, PageColours& colours) {
 void say_measured(const Study& study, const StudyScene& scene, Section& section) {
     std::vector<const StudyRun*> timed;
     for (const StudyRun* run : scene.all)
-        if (run->measured) timed.push_back(run);
+        if (run->measured && run->is_builder()) timed.push_back(run);
     if (timed.size() < 2) return;
     const auto [fast, slow] =
         std::ranges::minmax(timed, {}, [](const StudyRun* run) { return *run->measured; });
@@ -250,7 +252,7 @@ void say_simulated(const Study& study, const StudyScene& scene, Section& section
     for (const std::string& machine : scene.machines()) {
         const StudyRun *best = nullptr, *least = nullptr;
         for (const StudyRun* run : scene.one_each) {
-            if (!run->speed_up(machine)) continue;
+            if (!run->speed_up(machine) || !run->is_builder()) continue;
             if (!best || *run->speed_up(machine) > *best->speed_up(machine)) best = run;
             if (!least || *run->speed_up(machine) < *least->speed_up(machine)) least = run;
         }
@@ -269,20 +271,22 @@ void say_simulated(const Study& study, const StudyScene& scene, Section& section
 void say_model_error(const Study& study, Section& section) {
     std::vector<double> errors;
     for (const StudyRun& run : study.runs)
-        if (run.measured && run.predicted && *run.measured > 0)
-            errors.push_back(*run.predicted / *run.measured - 1);
+        if (!run.size_series && run.threads == 1.0 && run.error()) errors.push_back(*run.error());
     if (errors.empty()) return;
+    constexpr double wanted = 0.25;
+    const auto within =
+        std::ranges::count_if(errors, [](double e) { return std::fabs(e) <= wanted; });
     const auto [low, high] = std::ranges::minmax(errors);
     for (double& e : errors) e = std::fabs(e);
     std::ranges::sort(errors);
     const double middle = errors.size() % 2
                               ? errors[errors.size() / 2]
                               : 0.5 * (errors[errors.size() / 2 - 1] + errors[errors.size() / 2]);
-    section.summary.push_back(
-        fmt::format("How good the model of machines is: for the machine it ran on it is off by {} "
-                    "to {} over {} "
-                    "runs, by {} in the middle.",
-                    percent(low), percent(high), errors.size(), strong(percent(middle))));
+    section.summary.push_back(fmt::format(
+        "How good the model is: with one thread of the machine it ran on it is off by {} "
+        "to {} over {} runs of scenes, by {} in the middle; {} are within {}.",
+        percent(low), percent(high), errors.size(), strong(percent(middle)), within,
+        percent(wanted)));
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ using Format = Column::Format;
 StudyRun run_of(const Json& r) {
     StudyRun run{.scene = scene_name(r),
                  .builder = text_at(r, "builder"),
+                 .form = text_at(r, "form"),
                  .fit = text_at(r, "fit"),
                  .refusal = text_at(r, "refusal"),
                  .size_series = text_at(r, "series") == "size",
@@ -30,7 +31,8 @@ StudyRun run_of(const Json& r) {
                  .measured = number_at(r, "measured_ms"),
                  .predicted = number_at(r, "predicted_ms"),
                  .levels = numbers_at(r, "items_per_level"),
-                 .launches = objects_at(r, "launches")};
+                 .launches = objects_at(r, "launches"),
+                 .worst = text_at(at(r, "most_of_the_error"), "label")};
     if (const Json& machines = at(r, "simulated_ms"); machines.is_object())
         for (const auto& [machine, ms] : machines.items())
             run.simulated[machine] = numbers_at(ms, "");
@@ -38,12 +40,11 @@ StudyRun run_of(const Json& r) {
 }
 
 std::string run_table(const Study& study) {
-    Table table{.title = "Hierarchy and boxes, every run",
+    Table table{.title = "Every run",
                 .note =
                     "\xE2\x80\x9Cpredicted\xE2\x80\x9D is what the model says for the machine "
                     "that was measured.",
-                .columns = {{"builder"},
-                            {"boxes"},
+                .columns = {{"case"},
                             {"scene"},
                             {"keys", Format::integer},
                             {"bits", Format::integer},
@@ -51,6 +52,7 @@ std::string run_table(const Study& study) {
                             {"here", Format::number, "ms", Origin::measured},
                             {"predicted", Format::number, "ms", Origin::simulated},
                             {"error", Format::percent, "of measured"},
+                            {"most of it"},
                             {"inner nodes", Format::integer},
                             {"depth", Format::integer}}};
     std::vector<std::string> machines;
@@ -66,15 +68,9 @@ std::string run_table(const Study& study) {
     }
     table.columns.push_back({"refused"});
     for (const StudyRun& run : study.runs) {
-        std::optional<double> error;
-        if (run.measured && run.predicted && *run.measured > 0)
-            error = *run.predicted / *run.measured - 1;
-        std::vector<Cell> cells{run.builder,  run.by_levels() ? "by levels" : "in one pass",
-                                run.scene,    run.keys,
-                                run.bits,     run.threads,
-                                run.measured, run.predicted,
-                                error,        run.inner_nodes,
-                                run.depth};
+        std::vector<Cell> cells{run.name(),  run.scene,       run.keys,      run.bits,
+                                run.threads, run.measured,    run.predicted, run.error(),
+                                run.worst,   run.inner_nodes, run.depth};
         for (const std::string& machine : machines) {
             const auto found = run.simulated.find(machine);
             const bool known = found != run.simulated.end() && !found->second.empty();
@@ -92,7 +88,7 @@ std::string run_table(const Study& study) {
 /// Launches of one run with the same label, added up.
 struct LaunchSum {
     std::string label;
-    double launches = 0, items = 0, bytes = 0, steps = 0, chain = 0, ms = 0;
+    double launches = 0, items = 0, bytes = 0, steps = 0, chain = 0, ms = 0, predicted = 0;
 };
 
 std::string launch_table(const Study& study) {
@@ -102,8 +98,7 @@ std::string launch_table(const Study& study) {
                     "that counts nothing.",
                 .origin = Origin::measured,
                 .columns = {{"launch"},
-                            {"builder"},
-                            {"boxes"},
+                            {"case"},
                             {"scene"},
                             {"bits", Format::integer},
                             {"threads", Format::integer},
@@ -112,7 +107,8 @@ std::string launch_table(const Study& study) {
                             {"moved", Format::number, "MB"},
                             {"steps", Format::integer},
                             {"longest chain", Format::integer, "steps"},
-                            {"time", Format::number, "ms"}}};
+                            {"time", Format::number, "ms"},
+                            {"predicted", Format::number, "ms", Origin::simulated}}};
     for (const StudyRun& run : study.runs) {
         if (run.size_series) continue;
         std::vector<LaunchSum> sums;
@@ -120,18 +116,17 @@ std::string launch_table(const Study& study) {
             const std::string label = text_at(*launch, "label");
             auto sum = std::ranges::find(sums, label, &LaunchSum::label);
             if (sum == sums.end()) sum = sums.insert(sums.end(), {label});
-            sum->launches += 1;
+            sum->launches += number_at(*launch, "launches").value_or(1);
             sum->items += number_at(*launch, "items").value_or(0);
             sum->bytes += number_at(*launch, "bytes").value_or(0);
             sum->steps += number_at(*launch, "steps").value_or(0);
             sum->chain = std::max(sum->chain, number_at(*launch, "longest_chain").value_or(0));
             sum->ms += number_at(*launch, "ms").value_or(0);
+            sum->predicted += number_at(*launch, "predicted_ms").value_or(0);
         }
         for (const LaunchSum& s : sums)
-            table.rows.push_back({s.label, run.builder,
-                                  run.by_levels() ? "by levels" : "in one pass", run.scene,
-                                  run.bits, run.threads, s.launches, s.items, s.bytes / 1e6,
-                                  s.steps, s.chain, s.ms});
+            table.rows.push_back({s.label, run.name(), run.scene, run.bits, run.threads, s.launches,
+                                  s.items, s.bytes / 1e6, s.steps, s.chain, s.ms, s.predicted});
     }
     return table_html(table);
 }
@@ -153,6 +148,56 @@ std::string machine_table(const Study& study) {
                               number_at(*m, "bytes_per_ns"), number_at(*m, "latency_ns"),
                               number_at(*m, "launch_us"), text_at(*m, "origin")});
     table.drop_empty_columns();
+    return table_html(table);
+}
+
+/// What a kernel takes on the machine of the study, at the least and the largest size.
+std::string cost_table(const Study& study) {
+    Table table{.title = "Kernels of the model for the machine at hand",
+                .note =
+                    "An item or a step with one thread, on the smallest and the largest of the "
+                    "inputs that kernels were measured on.",
+                .origin = Origin::measured,
+                .columns = {{"kernel"},
+                            {"bits", Format::integer},
+                            {"small", Format::number, "ns"},
+                            {"large", Format::number, "ns"}}};
+    for (const Json* m : objects_at(study.document->root, "machines"))
+        for (const Json* kernel : objects_at(*m, "kernels")) {
+            const Json& points = at(*kernel, "keys_and_ns");
+            if (!points.is_array() || points.empty()) continue;
+            const auto ns = [](const Json& point) -> std::optional<double> {
+                const std::vector<double> pair = numbers_at(point, "");
+                return pair.size() == 2 ? std::optional(pair[1]) : std::nullopt;
+            };
+            table.rows.push_back({text_at(*kernel, "kernel"), number_at(*m, "bits"),
+                                  ns(points.front()), ns(points.back())});
+        }
+    return table_html(table);
+}
+
+std::string claim_table(const Study& study) {
+    Table table{.title = "Claims of Karras 2012",
+                .note =
+                    "Holds: the figure, with its error, lies in the range. Does not hold: none "
+                    "of it does. Else open. Counted figures have no error; on gtx480 and h200 "
+                    "it is 50 %, because constants are estimates.",
+                .columns = {{"claim"},
+                            {"paper"},
+                            {"scene"},
+                            {"bits", Format::integer},
+                            {"machine"},
+                            {"figure"},
+                            {"value", Format::number, ""},
+                            {"error", Format::percent, ""},
+                            {"from", Format::number, ""},
+                            {"to", Format::number, ""},
+                            {"verdict"}}};
+    for (const Json* c : objects_at(study.document->root, "hierarchy_claims"))
+        table.rows.push_back({text_at(*c, "claim"), text_at(*c, "paper"), scene_name(*c),
+                              number_at(*c, "bits"), text_at(*c, "machine"), text_at(*c, "figure"),
+                              number_at(*c, "value"), number_at(*c, "error"), number_at(*c, "low"),
+                              number_at(*c, "high"), text_at(*c, "verdict")});
     return table_html(table);
 }
 
@@ -178,7 +223,16 @@ std::string build_table(const Study& study) {
 }  // namespace
 
 std::string StudyRun::name() const {
-    return builder + (by_levels() ? ", boxes by levels" : ", boxes in one pass");
+    std::string text = builder;
+    if (form == "published" || form == "tuned") text += ", " + form;
+    if (by_levels()) text += ", boxes by levels";
+    if (fit == "atomic") text += ", boxes in one pass";
+    return text;
+}
+
+std::optional<double> StudyRun::error() const {
+    if (!measured || !predicted || *measured <= 0) return std::nullopt;
+    return *predicted / *measured - 1;
 }
 
 std::optional<double> StudyRun::speed_up(const std::string& machine) const {
@@ -232,9 +286,12 @@ std::string study_tables(const Study& study) {
     };
     constexpr std::size_t long_table = 24;
     const std::string runs = run_table(study);
-    return (study.runs.size() > long_table ? folded("Every run", runs) : runs) +
+    const std::string gpu = text_at(study.document->root, "gpu");
+    return claim_table(study) + (gpu.empty() ? "" : "<p>GPU: " + escaped(gpu) + "</p>\n") +
+           (study.runs.size() > long_table ? folded("Every run", runs) : runs) +
            folded("Launches, added up by name", launch_table(study)) +
            folded("Whole builds, every stage", build_table(study)) +
+           folded("Kernels, measured", cost_table(study)) +
            folded("Machines of the model and where their numbers are from", machine_table(study));
 }
 

@@ -12,16 +12,22 @@ namespace raydix::report {
 
 /// One builder, one way to fit boxes, one scene, one number of threads.
 struct StudyRun {
-    std::string scene, builder, fit, refusal;
+    std::string scene, builder, form, fit, refusal;
     bool size_series = false;
     std::optional<double> keys, bits, threads, inner_nodes, depth;
     std::optional<double> measured, predicted;                  // ms, here
     std::map<std::string, std::vector<double>> simulated = {};  // machine -> ms for each factor
     std::vector<double> levels = {};                            // nodes on each
     std::vector<const Json*> launches = {};
+    std::string worst = {};  // the kernel that the prediction misses by most
 
     [[nodiscard]] bool by_levels() const { return fit == "levels"; }
-    /// "karras, boxes in one pass"
+    /// Of a BVH: codes, sorts and other trees are no rivals of it.
+    [[nodiscard]] bool is_builder() const { return !fit.empty(); }
+    /// Not for this processor alone: its launches are known.
+    [[nodiscard]] bool scales() const { return form != "tuned"; }
+    [[nodiscard]] std::optional<double> error() const;
+    /// "karras, published, boxes in one pass"
     [[nodiscard]] std::string name() const;
     /// From the smallest machine to the largest.
     [[nodiscard]] std::optional<double> speed_up(const std::string& machine) const;

@@ -19,7 +19,8 @@ const std::map<std::string, std::set<std::string>>& known_fields() {
         {"simulate", {"build", "simulate", "machines"}},
         {"bench traversal",
          {"build", "simulate", "machines", "measured", "published", "claims", "width_sweep"}},
-        {"bench hierarchy", {"max_leaf", "factors", "runs", "builds", "machines"}},
+        {"bench hierarchy",
+         {"max_leaf", "factors", "runs", "builds", "machines", "hierarchy_claims", "gpu"}},
         {"check", {"check"}},
         {"info", {"build"}},
         {"render", {"render"}}};

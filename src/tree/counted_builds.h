@@ -6,41 +6,69 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "exec/host_launcher.h"
+#include "tree/apetrei_cpu.h"
+#include "tree/hierarchy.h"
 
 namespace raydix {
 
-/// What a build did or how long it took, and of its tree the root's box and the depth.
+/// Whose kernels a builder is made of.
+enum class BuildForm : std::uint8_t {
+    launches,   // ours, for any backend
+    published,  // karras, garanzha: those of the source, where they differ from ours
+    tuned       // karras, apetrei: ours for this processor alone, of which nothing is counted
+};
+
+struct BuildWay {
+    Builder builder = Builder::karras;
+    Fit fit = Fit::as_published;
+    BuildForm form = BuildForm::launches;
+};
+
+/// Kept from one build to the next, so that no build pays for new pages.
+struct CountedMemory {
+    Buffer<BvhNode> nodes;
+    Buffer<std::uint32_t> ranks;
+    HierarchyScratch scratch;
+    ClimbScratch climb;
+};
+
+/// What a build did or how long it took, and of its tree the root's box, the depth, and a hash of
+/// links, boxes and leaves in preorder, in which the numbers of nodes do not enter.
 struct CountedBuild {
     std::vector<LaunchRecord> launches;
     std::uint32_t inner_count = 0, max_depth = 0;
     Aabb bounds{};
+    std::string digest;  // of a counted build
 };
 
 /// Builds a tree over sorted keys [n], n > 0, and boxes [n] in the same order, and returns its
 /// launches: items, bytes read and written, and the longest chain of accesses that wait for each
 /// other. A climb from leaf to root counts as one chain, whichever items took part in it. `fit`
 /// as_published is what the builder's source does; apetrei fits boxes in its own pass unless `fit`
-/// is levels. Throws InputError for builders outside the LBVH family.
+/// is levels. Throws InputError for builders outside the LBVH family, and for those that have no
+/// such form.
 template <class Key>
-[[nodiscard]] CountedBuild count_build(Builder builder, Fit fit, std::span<const Key> keys,
-                                       std::span<const Aabb> leaf_boxes, int max_leaf);
+[[nodiscard]] CountedBuild count_build(const BuildWay& way, std::span<const Key> keys,
+                                       std::span<const Aabb> leaf_boxes, int max_leaf,
+                                       CountedMemory& memory);
 
 /// The same launches without counting: each with the milliseconds it took here.
 template <class Key>
-[[nodiscard]] CountedBuild time_build(Builder builder, Fit fit, std::span<const Key> keys,
-                                      std::span<const Aabb> leaf_boxes, int max_leaf);
+[[nodiscard]] CountedBuild time_build(const BuildWay& way, std::span<const Key> keys,
+                                      std::span<const Aabb> leaf_boxes, int max_leaf,
+                                      CountedMemory& memory);
 
-extern template CountedBuild count_build(Builder, Fit, std::span<const std::uint32_t>,
-                                         std::span<const Aabb>, int);
-extern template CountedBuild count_build(Builder, Fit, std::span<const std::uint64_t>,
-                                         std::span<const Aabb>, int);
-
-extern template CountedBuild time_build(Builder, Fit, std::span<const std::uint32_t>,
-                                        std::span<const Aabb>, int);
-extern template CountedBuild time_build(Builder, Fit, std::span<const std::uint64_t>,
-                                        std::span<const Aabb>, int);
+extern template CountedBuild count_build(const BuildWay&, std::span<const std::uint32_t>,
+                                         std::span<const Aabb>, int, CountedMemory&);
+extern template CountedBuild count_build(const BuildWay&, std::span<const std::uint64_t>,
+                                         std::span<const Aabb>, int, CountedMemory&);
+extern template CountedBuild time_build(const BuildWay&, std::span<const std::uint32_t>,
+                                        std::span<const Aabb>, int, CountedMemory&);
+extern template CountedBuild time_build(const BuildWay&, std::span<const std::uint64_t>,
+                                        std::span<const Aabb>, int, CountedMemory&);
 
 }  // namespace raydix

@@ -38,21 +38,10 @@ struct GaranzhaScratch {
     }
 };
 
-/// The task of keys [first, last]: the split is the last key that shares more with the first than
-/// the last one does.
 template <class Key, class Probe>
 RAYDIX_HD Task make_task(const SortedKeys<Key, Probe>& keys, std::uint32_t first,
                          std::uint32_t last) {
-    const int shared = keys.common_prefix(first, last);
-    std::uint32_t low = first, high = last;
-    while (high - low > 1) {
-        const std::uint32_t middle = low + (high - low) / 2;
-        if (keys.common_prefix(first, middle) > shared)
-            low = middle;
-        else
-            high = middle;
-    }
-    return {first, last, low};
+    return {first, last, find_split(keys, first, last)};
 }
 
 /// How many children of a task must be split again.

@@ -73,6 +73,23 @@ struct EmitOnlyLeaf {
     }
 };
 
+/// The split of keys [first, last]: the last key that shares more with the first than the last one
+/// does.
+template <class Key, class Probe>
+RAYDIX_HD std::uint32_t find_split(const SortedKeys<Key, Probe>& keys, std::uint32_t first,
+                                   std::uint32_t last) {
+    const int shared = keys.common_prefix(first, last);
+    std::uint32_t low = first, high = last;
+    while (high - low > 1) {
+        const std::uint32_t middle = low + (high - low) / 2;
+        if (keys.common_prefix(first, middle) > shared)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
 /// Bytes that a scratch struct takes from an arena; the arguments are those of its constructor
 /// behind the arena.
 template <class Scratch, class... Sizes>

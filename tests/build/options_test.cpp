@@ -127,8 +127,8 @@ std::vector<Threads> builds(Inputs& in) {
         {"Scene", [&in](int n) { (void)Scene(in.mesh, {.threads = n}); }},
         {"SceneD", [&in](int n) { (void)SceneD(in.mesh_d, {.threads = n}); }},
         {"tree_stats", [&in](int n) { (void)tree_stats(in.bvh, {.threads = n}); }},
-        {"measure_this_machine", [](int n) { (void)measure_this_machine(n); }},
-        {"study_hierarchy", [&in](int n) { (void)study_hierarchy(in.mesh, {.threads = n}, 1); }},
+        {"study_hierarchy",
+         [&in](int n) { (void)study_hierarchy(in.mesh, {.threads = n, .repeat = 1}); }},
         {"device_node_capacity", [](int n) { (void)device_node_capacity(5u, {.threads = n}); }},
     };
 }
@@ -298,8 +298,11 @@ TEST(Options, EnumerationsAreOfTheirKind) {
                                 [&](Builder b) { (void)build_wide_bvh(in.mesh, {.builder = b}); });
         expect_refused<Builder>("builder", 9,
                                 [&](Builder b) { (void)device_node_capacity(5u, {.builder = b}); });
-        expect_refused<Builder>(
-            "builder", 9, [&](Builder b) { (void)study_hierarchy(in.mesh, {.builder = b}, 1); });
+        const auto study = [&](const StudyCase& what) {
+            (void)study_hierarchy(in.mesh, {.repeat = 1, .cases = {what}});
+        };
+        expect_refused<StudyForm>("form", 2, [&](StudyForm f) { study({"codes", f}); });
+        expect_refused<Fit>("fit", 2, [&](Fit f) { study({"karras", StudyForm::launches, f}); });
         expect_refused<Fit>("fit", 2, [&](Fit f) { (void)build_bvh(in.boxes, {.fit = f}); });
         expect_refused<SimdPath>("path", 4,
                                  [&](SimdPath p) { (void)trace(in.bvh, in.rays, {.path = p}); });

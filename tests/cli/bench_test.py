@@ -7,7 +7,9 @@ import unittest
 sys.dont_write_bytecode = True
 from program import SANITIZED, ProgramTest, json_of, main  # noqa: E402
 
-SMALL = ("--sizes", "500", "--thread-counts", "1,2", "--repeat", "1")
+SMALL = ("--sizes", "100,500", "--cost-sizes", "500,2000", "--thread-counts", "1,2", "--repeat", "1")
+SUBJECTS = {"codes", "sort", "karras", "apetrei", "garanzha", "lauterbach", "octree", "kdtree"}
+CASES = 19
 
 
 class Bench(ProgramTest):
@@ -16,14 +18,17 @@ class Bench(ProgramTest):
                                         "--factors", "1,64", "--json", "-").out)
         self.assertEqual(document["factors"], [1, 64])
         runs = document["runs"]
-        self.assertEqual(len(runs), 2 * 2 * 4 * 2 * 2)  # scenes, bits, builders, fits, threads
+        self.assertEqual(len(runs), 3 * 2 * CASES * 2)  # scenes, bits, cases, threads
+        self.assertEqual({run["builder"] for run in runs}, SUBJECTS)
         for run in runs:
             self.assertGreater(run["measured_ms"], 0)
-            self.assertGreater(run["predicted_ms"], 0)
-            for machine in ("gtx480", "h200"):
-                once, larger = run["simulated_ms"][machine]
-                self.assertGreaterEqual(once, larger)
-            if run["fit"] == "levels":
+            self.assertGreater(run["predicted_ms"] or 1, 0)
+            self.assertEqual(run["predicted_ms"] is None, run["form"] == "tuned" and run["threads"] == 2)
+            for machine in ("here", "gtx480", "h200"):
+                if run["form"] != "tuned" and run["threads"] == 1:
+                    once, larger = run["simulated_ms"][machine]
+                    self.assertGreaterEqual(once, larger)
+            if "items_per_level" in run and run["fit"] == "levels":
                 self.assertEqual(sum(run["items_per_level"]), run["inner_nodes"])
         builds = document["builds"]
         self.assertEqual({build["builder"] for build in builds}, {"karras", "apetrei", "garanzha", "lauterbach"})
@@ -31,13 +36,21 @@ class Bench(ProgramTest):
             self.assertGreater(build["ms"]["total"]["median"], 0)
         trees = {(run["scene"], run["bits"]): set() for run in runs}
         for run in runs:
-            trees[run["scene"], run["bits"]].add((run["inner_nodes"], run["max_depth"]))
+            if run["digest"]:
+                trees[run["scene"], run["bits"]].add((run["digest"], run["inner_nodes"], run["max_depth"]))
         self.assertTrue(all(len(kinds) == 1 for kinds in trees.values()))
+        claims = document["hierarchy_claims"]
+        self.assertEqual({claim["claim"][0] for claim in claims}, {"1", "2", "3", "4"})  # 5: of one size of scene
+        for claim in claims:
+            self.assertIn(claim["verdict"], {"holds", "does not hold", "open"})
+            if claim["claim"].startswith("1."):
+                self.assertEqual((claim["value"], claim["verdict"]), (1, "holds"))
+        self.assertIn("no GPU was used", document["gpu"])
 
     def test_tables(self):
         out = self.succeed("bench", "hierarchy", "builtin:soup?triangles=300", *SMALL).out
-        for word in ("karras+atomic", "lauterbach+levels", "gtx480 (simulated)", "us a launch", "error", "nodes a level: 1 2",
-                     "whole builds"):
+        for word in ("karras, published, boxes in one pass", "lauterbach, boxes by levels", "gtx480 (simulated)", "us a launch",
+                     "error", "nodes a level: 1 2", "whole builds", "claims of Karras 2012", "holds", "no GPU was used"):
             self.assertIn(word, out)
 
     @unittest.skipIf(SANITIZED, "test_hierarchy writes the same document")
@@ -49,12 +62,18 @@ class Bench(ProgramTest):
         if "matplotlib is missing" in plot.stderr:
             self.skipTest(plot.stderr.strip())
         self.assertEqual(plot.returncode, 0, plot.stderr)
-        for name in ("time", "scaling", "levels"):
+        for name in ("time", "scaling", "error", "levels"):
             self.assertIn("<svg", (self.folder / "plots" / f"{name}.svg").read_text(encoding="utf-8"))
         bad = self.write("bad.json", b"{}")
         refused = subprocess.run([script, self.folder / bad], capture_output=True, text=True)
         self.assertEqual(refused.returncode, 1)
         self.assertIn("not a result of bench hierarchy", refused.stderr)
+
+    def test_traversal_on_a_device(self):
+        scene = "builtin:soup?triangles=200"
+        if json_of(self.succeed("info", scene, "--json", "-").out)["machine"]["gpu"] is None:
+            self.fail_with_one_line("bench", "traversal", scene, "--device", "cuda")
+        self.fail_with_usage("bench", "traversal", scene, "--device", "sim")
 
     def test_what_is_refused(self):
         self.fail_with_usage("bench")

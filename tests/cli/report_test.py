@@ -24,7 +24,7 @@ class Report(ProgramTest):
                    self.make("check.json", "check", FIGURE), self.make("info.json", "info", FIGURE),
                    self.make("scenes.json", "scenes"),
                    self.make("study.json", "bench", "hierarchy", "builtin:soup?triangles=2000", "--sizes", "200,2000",
-                             "--repeat", "1", "--thread-counts", "1")]
+                             "--cost-sizes", "500,2000", "--repeat", "1", "--thread-counts", "1")]
         html = self.page(*results)
         for section in ("summary", "builds", "traces", "construction", "scenes", "other", "sources"):
             self.assertIn(f'<section id="{section}">', html)

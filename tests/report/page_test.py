@@ -44,7 +44,7 @@ class PageTest(ProgramTest):
                 "trace2": ("trace", figure, "--size", "32x24", "--repeat", "2", "--builder", "ploc"),
                 "render": ("render", figure, "--size", "64x48", "--samples", "1", "-o", "figure.png"),
                 "study": ("bench", "hierarchy", "builtin:soup?triangles=3000", "--sizes", "300,3000", "--repeat", "1",
-                          "--thread-counts", "1")}.items():
+                          "--cost-sizes", "500,2000", "--thread-counts", "1")}.items():
             self.succeed(*arguments, "--quiet", "--json", f"{name}.json")
             results.append(f"{name}.json")
         attack = json.loads((self.folder / "karras.json").read_text(encoding="utf-8"))

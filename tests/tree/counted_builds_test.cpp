@@ -22,9 +22,11 @@ std::vector<Aabb> boxes_for(std::size_t n) {
 }
 
 template <class Key>
-CountedBuild count(Builder builder, Fit fit, const std::vector<Key>& keys, int max_leaf = 1) {
+CountedBuild count(Builder builder, Fit fit, const std::vector<Key>& keys, int max_leaf = 1,
+                   BuildForm form = BuildForm::launches) {
     const std::vector<Aabb> boxes = boxes_for(keys.size());
-    return count_build<Key>(builder, fit, keys, boxes, max_leaf);
+    CountedMemory memory;
+    return count_build<Key>({builder, fit, form}, keys, boxes, max_leaf, memory);
 }
 
 std::vector<std::uint64_t> items_of(const CountedBuild& build, const std::string& label) {
@@ -149,6 +151,38 @@ TEST(CountedBuilds, CountsDoNotDependOnThreads) {
             EXPECT_EQ(one.launches[i].bytes, many.launches[i].bytes) << one.launches[i].label;
         }
     }
+}
+
+TEST(CountedBuilds, KernelsOfTheSourcesMakeTheSameTree) {
+    std::mt19937_64 random(9);
+    for (const std::uint64_t codes :
+         {std::uint64_t{1}, std::uint64_t{50}, std::uint64_t{1} << 40}) {
+        const auto keys = random_keys<std::uint64_t>(random, 3000, codes);
+        const CountedBuild ours = count(Builder::karras, Fit::atomic, keys);
+        const CountedBuild own = count(Builder::karras, Fit::atomic, keys, 1, BuildForm::published);
+        EXPECT_EQ(items_of(own, "karras.link"), Items{2999});
+        EXPECT_EQ(items_of(own, "fit.leaves"), Items{3000});
+        EXPECT_EQ(own.launches.size(), 2u);  // no ranks, no clearing
+        EXPECT_EQ(own.digest, ours.digest);
+        EXPECT_EQ(own.max_depth, ours.max_depth);
+        for (const int max_leaf : {1, 4}) {
+            const CountedBuild by_scan = count(Builder::garanzha, Fit::levels, keys, max_leaf);
+            const CountedBuild by_counter =
+                count(Builder::garanzha, Fit::levels, keys, max_leaf, BuildForm::published);
+            EXPECT_EQ(by_counter.digest, by_scan.digest);
+            EXPECT_EQ(items_of(by_counter, "fit.level"), items_of(by_scan, "fit.level"));
+            EXPECT_LT(by_counter.launches.size(), by_scan.launches.size());
+            for (const Builder builder : {Builder::karras, Builder::apetrei})
+                EXPECT_EQ(count(builder, Fit::atomic, keys, max_leaf, BuildForm::tuned).digest,
+                          by_scan.digest);
+        }
+    }
+    EXPECT_THROW((void)count(Builder::karras, Fit::atomic, talk_keys<std::uint32_t>(), 4,
+                             BuildForm::published),
+                 InputError);
+    EXPECT_THROW((void)count(Builder::lauterbach, Fit::atomic, talk_keys<std::uint32_t>(), 1,
+                             BuildForm::tuned),
+                 InputError);
 }
 
 TEST(CountedBuilds, OneLeafAndStrangers) {
