@@ -44,8 +44,8 @@ void add_unit(const WarpTree& tree, const RayUnit& unit, std::vector<SimulateOpt
         rows[k].sum.add(figures[k]);
         rows[k].whole_launches &= unit.whole();
         rows[k].different_hits += count_different(hits[k], expected, runs[k].any_hit);
-        const double bound = simulated_rates(figures[k], runs[k]).bound;
-        if (bound > 0) rows[k].seconds_per_ray.push_back(1.0 / bound);
+        const SimulatedRates rates = simulated_rates(figures[k], runs[k]);
+        if (rates.bound > 0) rows[k].units.push_back(rates);
     }
 }
 
@@ -96,11 +96,12 @@ Json operations_json(const SimulationRow& row) {
 
 std::optional<double> SimulationRow::sampling_error() const {
     if (part_taken >= 1.0) return 0.0;
-    const auto n = static_cast<double>(seconds_per_ray.size());
+    const auto n = static_cast<double>(units.size());
     if (n < 2) return std::nullopt;
     double mean = 0, squares = 0;
-    for (const double s : seconds_per_ray) mean += s / n;
-    for (const double s : seconds_per_ray) squares += (s - mean) * (s - mean);
+    for (const SimulatedRates& unit : units) mean += 1.0 / unit.bound / n;
+    for (const SimulatedRates& unit : units)
+        squares += (1.0 / unit.bound - mean) * (1.0 / unit.bound - mean);
     return std::sqrt(squares / (n - 1) / n * (1.0 - part_taken)) / mean;
 }
 
@@ -119,7 +120,7 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
                         .sum = {},
                         .builder = std::string(builder_name(input.bvh.options().builder)),
                         .sample = options.sample,
-                        .seconds_per_ray = {}});
+                        .units = {}});
     }
     Progress progress(fmt::format("simulating {}", ray_kind_name(kind)), common);
     const double taken = launches.for_each(kind, [&](const RayUnit& unit, double part) {
@@ -142,7 +143,7 @@ std::vector<SimulationRow> simulate_rays(const SceneTree& input, const WarpTree&
                         .options = run,
                         .sum = {},
                         .builder = std::string(builder_name(input.bvh.options().builder)),
-                        .seconds_per_ray = {}});
+                        .units = {}});
     add_unit(tree, {rays, 1.0}, runs, rows, common);
     return rows;
 }

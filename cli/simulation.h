@@ -18,12 +18,12 @@ struct SimulationRow {
     std::string rays;  // name of the kind, or a file
     SimulateOptions options;
     Simulation sum;
-    std::string builder = {};             // of the tree
-    double sample = 1.0;                  // as asked for
-    double part_taken = 1.0;              // of all rays
-    bool whole_launches = true;           // else there is no launch to schedule
-    std::uint64_t different_hits = 0;     // from those of the scalar reference
-    std::vector<double> seconds_per_ray;  // of each unit, at the bound
+    std::string builder = {};           // of the tree
+    double sample = 1.0;                // as asked for
+    double part_taken = 1.0;            // of all rays
+    bool whole_launches = true;         // else there is no launch to schedule
+    std::uint64_t different_hits = 0;   // from those of the scalar reference
+    std::vector<SimulatedRates> units;  // of each launch or run that was traced
 
     [[nodiscard]] SimulatedRates rates() const { return simulated_rates(sum, options); }
     /// Relative standard error of the bound that comes from tracing a part of the rays only; 0 if

@@ -20,7 +20,7 @@ struct SimulatedRow {
     std::string scene, kernel, rays, mode, machine, document;
     std::optional<double> width, count, hits;
     std::optional<double> bound, scheduled, memory;  // Mrays/s
-    std::optional<double> efficiency, issues, instructions, idle, error, sample;
+    std::optional<double> efficiency, issues, instructions, idle, error, sample, part;
     std::vector<SimulatedOperation> operations = {};
     Histogram times = {};
     std::string unit = {};  // of the histogram

@@ -216,6 +216,23 @@ std::string group_html(const SimulatedGroup& group, PageColours& colours) {
                times);
 }
 
+/// " ± 3 %", two standard errors of the sample, behind a bound; nothing if all rays were traced.
+std::string error_text(const SimulatedRow& row) {
+    if (row.error) return *row.error > 0 ? " \xC2\xB1 " + percent(2 * *row.error) : "";
+    return row.part.value_or(1) < 1 ? ", error not known" : "";
+}
+
+double highest(const SimulatedRow& row) { return *row.bound * (1 + 2 * row.error.value_or(0)); }
+
+/// Kernels whose bounds the sample does not tell from the best one's.
+std::string as_good(const Rows& bounded, const SimulatedRow& best) {
+    const double least = *best.bound * (1 - 2 * best.error.value_or(0));
+    std::vector<std::string> names;
+    for (const SimulatedRow* row : bounded)
+        if (row != &best && highest(*row) >= least) names.push_back(breakable(row->kernel));
+    return names.empty() ? "" : ", within the error also " + listed(names);
+}
+
 /// The best bound of each machine.
 void add_tiles(const std::vector<SimulatedGroup>& groups, Section& section) {
     std::map<std::string, const SimulatedRow*> best;
@@ -227,7 +244,7 @@ void add_tiles(const std::vector<SimulatedGroup>& groups, Section& section) {
     for (const auto& [machine, row] : best)
         if (row != nullptr)
             section.tiles.push_back(
-                {significant(*row->bound), "Mrays/s",
+                {significant(*row->bound), "Mrays/s" + error_text(*row),
                  fmt::format("highest bound on {}: {}, {}", machine, row->kernel, row->rays),
                  badge(Origin::simulated)});
 }
@@ -240,9 +257,9 @@ void say(const SimulatedGroup& group, Section& section) {
         if (bounded.empty()) continue;
         const auto [low, high] =
             std::ranges::minmax(bounded, {}, [](const SimulatedRow* row) { return *row->bound; });
-        std::string part =
-            fmt::format("{} rays {} with {}", escaped(rays),
-                        strong(significant(*high->bound), "Mrays/s"), breakable(high->kernel));
+        std::string part = fmt::format(
+            "{} rays {}{} with {}{}", escaped(rays), strong(significant(*high->bound), "Mrays/s"),
+            error_text(*high), breakable(high->kernel), as_good(bounded, *high));
         if (bounded.size() > 1)
             part += fmt::format(" (least: {} with {})", significant(*low->bound),
                                 breakable(low->kernel));

@@ -22,10 +22,15 @@ using Format = Column::Format;
 
 std::string claim_table(const std::vector<const Json*>& claims) {
     Table table{.title = "The paper's claims",
+                .note =
+                    "Found: the ratio with the error of the sample and of the costs. A claim "
+                    "holds if all of that lies in the paper's interval, and does not if none "
+                    "of it does. Else it is open.",
                 .columns = {{"claim"}, {"here"}, {"the paper"}, {"found"}, {"scene"}}};
     for (const Json* claim : claims) {
         const Json& holds = at(*claim, "holds");
-        Cell verdict("open");
+        // Open, or what it would take to say more.
+        Cell verdict(text_at(*claim, "verdict").empty() ? "open" : text_at(*claim, "verdict"));
         verdict.mark = Cell::Mark::even;
         if (holds.is_boolean()) {
             verdict.text = holds.get<bool>() ? "\xE2\x9C\x93 holds" : "\xE2\x9C\x97 does not hold";
