@@ -128,10 +128,11 @@ RatioFound rate_ratio(const SimulationRow& a, const SimulationRow& b, Figure fig
     const SimulatedRates x = a.rates(), y = b.rates();
     const bool instructions = figure == Figure::instructions;
     RatioFound found;
-    found.ratio = instructions
-                      ? static_cast<double>(a.sum.instructions) / static_cast<double>(a.sum.rays) /
-                            (static_cast<double>(b.sum.instructions) / static_cast<double>(b.sum.rays))
-                      : x.*rate / (y.*rate);
+    found.ratio =
+        instructions
+            ? static_cast<double>(a.sum.instructions) / static_cast<double>(a.sum.rays) /
+                  (static_cast<double>(b.sum.instructions) / static_cast<double>(b.sum.rays))
+            : x.*rate / (y.*rate);
     const std::optional<double> error = paired_error(a, b, rate);
     if (!error) {
         found.needs = "needs two parts of launches or more";

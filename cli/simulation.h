@@ -26,6 +26,10 @@ struct SimulationRow {
     std::vector<SimulatedRates> units;  // of each launch or run that was traced
 
     [[nodiscard]] SimulatedRates rates() const { return simulated_rates(sum, options); }
+    /// Caches and warps in flight have no meaning for a part of a launch.
+    [[nodiscard]] bool has_memory() const { return options.memory && whole_launches; }
+    /// The lowest of bound, schedule and memory limits, as far as they are known.
+    [[nodiscard]] SimulatedRates::Limit tightest() const;
     /// Relative standard error of the bound that comes from tracing a part of the rays only; 0 if
     /// all were traced; nothing if there is only one unit.
     [[nodiscard]] std::optional<double> sampling_error() const;

@@ -27,7 +27,8 @@ SimulatedRow row_of(const Document& document, const Json& r) {
                      .error = number_at(r, "sampling_error"),
                      .sample = number_at(r, "sample"),
                      .part = number_at(r, "part_taken"),
-                     .unit = text_at(r, "histogram.unit")};
+                     .unit = text_at(r, "histogram.unit"),
+                     .memory_limit = text_at(r, "memory_limit")};
     if (row.scene.empty()) row.scene = scene_name(at(r, "scene").is_object() ? r : document.root);
     for (std::string* name : {&row.kernel, &row.rays, &row.machine})
         if (name->empty()) *name = "without a name";

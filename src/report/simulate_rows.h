@@ -24,6 +24,7 @@ struct SimulatedRow {
     std::vector<SimulatedOperation> operations = {};
     Histogram times = {};
     std::string unit = {};  // of the histogram
+    std::string memory_limit = {};
 };
 
 [[nodiscard]] std::vector<SimulatedRow> simulated_rows(const Documents& documents);

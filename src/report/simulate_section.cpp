@@ -147,7 +147,8 @@ std::string row_table(const SimulatedGroup& group) {
                 .note =
                     "Nothing in this table was timed. The bound is the issue limit alone; "
                     "\xE2\x80\x9Cscheduled\xE2\x80\x9D adds the distribution of work, "
-                    "\xE2\x80\x9Cmemory\xE2\x80\x9D a first-order memory model.",
+                    "\xE2\x80\x9Cmemory\xE2\x80\x9D is the lowest of it and the limits of "
+                    "caches, memory and latency.",
                 .origin = Origin::simulated,
                 .columns = {{"kernel"},
                             {"rays"},
@@ -155,6 +156,7 @@ std::string row_table(const SimulatedGroup& group) {
                             {"bound", Format::number, "Mrays/s"},
                             {"scheduled", Format::number, "Mrays/s"},
                             {"memory", Format::number, "Mrays/s"},
+                            {"memory's limit"},
                             {"SIMD efficiency", Format::percent},
                             {"issues", Format::number, "per ray"},
                             {"instructions", Format::number, "per ray"},
@@ -166,7 +168,7 @@ std::string row_table(const SimulatedGroup& group) {
                             {"sampling error", Format::percent}}};
     for (const SimulatedRow& row : group.rows)
         table.rows.push_back({row.kernel, row.rays, row.mode, row.bound, row.scheduled, row.memory,
-                              row.efficiency, row.issues, row.instructions,
+                              row.memory_limit, row.efficiency, row.issues, row.instructions,
                               histogram_median(row.times), row.idle, row.count, row.hits,
                               row.sample, row.error});
     table.drop_empty_columns();

@@ -44,6 +44,11 @@ class Simulate(ProgramTest):
         for row in one["simulate"] + two["simulate"]:
             self.assertIsNotNone(row["mrays_per_s_memory"])
             self.assertLessEqual(row["mrays_per_s_memory"], row["mrays_per_s_bound"] * 1.000001)
+            limits = {k: v for k, v in row["memory_limits"].items() if not k.endswith("_per_ray")}
+            self.assertEqual(set(limits), {"replays", "texture", "l1", "l2", "dram", "latency"})  # of gtx480
+            self.assertAlmostEqual(row["mrays_per_s_memory"], min(row["mrays_per_s_bound"], *limits.values()))
+            named = limits.get(row["memory_limit"], row["mrays_per_s_bound"])
+            self.assertAlmostEqual(row["mrays_per_s_memory"], named)
         self.assertEqual(one["simulate"], two["simulate"])
 
     @unittest.skipIf(SANITIZED, "many rays for a statistic; other tests run the same code")
@@ -116,6 +121,9 @@ class Simulate(ProgramTest):
                             ('{"base": "gtx480", "clock_ghz": -1}', ["clock_ghz"]),
                             ('{"base": "gtx480", "clock_ghz": "fast"}', ["clock_ghz"]),
                             ('{"base": "gtx480", "read_clocks": -1}', ["read_clocks"]),
+                            ('{"base": "gtx480", "replays": 1}', ["replays", "true or false"]),
+                            ('{"base": "gtx480", "l2_clocks": "long"}', ["l2_clocks"]),
+                            ('{"base": "gtx480", "texture_bytes": -5}', ["texture_bytes"]),
                             ('{"base": "gtx480", "block_release": "never"}', ["block_release", "in_order"]),
                             ('{"base": "gtx480", "multiprocessors": 0}', ["multiprocessors"]),
                             ('{"base": "gtx480", "multiprocessors": 1.5}', ["multiprocessors"]),
