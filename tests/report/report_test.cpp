@@ -191,6 +191,27 @@ TEST(MakeReport, ClaimsSayWhatTheyWouldTake) {
     EXPECT_TRUE(holds(page_of({document}), "needs whole launches"));
 }
 
+TEST(MakeReport, APublishedRateWithinTheErrorOfItsBoundIsNoAlarm) {
+    Json document = Json::parse(shared_document("traversal.json"));
+    document["published"][0]["mrays_per_s"] = 600.0;  // the bound is 584.7
+    for (Json& row : document["simulate"]) row["sampling_error"] = 0.03;
+    const std::string html = page_of({document});
+    EXPECT_FALSE(holds(html, "differ from the authors' there"));
+    EXPECT_TRUE(holds(html, "above, within the error"));
+    // Two documents, one row.
+    Json other = document;
+    other["simulate"] = Json::array();
+    const std::string twice = page_of({document, other});
+    const auto count = [](const std::string& text, const std::string& part) {
+        std::size_t n = 0;
+        for (std::size_t at = text.find(part); at != std::string::npos;
+             at = text.find(part, at + 1))
+            ++n;
+        return n;
+    };
+    EXPECT_EQ(count(twice, "above, within the error"), count(html, "above, within the error"));
+}
+
 TEST(MakeReport, UnknownDocumentsAreTables) {
     const std::string html = page_of({Json::parse(R"({"command": "bench unheard-of", "answer": 42,
         "deep": {"a": {"b": {"c": {"d": {"e": {"f": 1}}}}}}, "rows": [{"x": 1, "y": {"z": "text"}}, {"x": null}],
