@@ -101,6 +101,10 @@ void judge_published(Json& published, const std::vector<SimulationRow>& rows) {
         const double bound = row == nullptr ? 0.0 : row->rates().bound;
         p["mrays_per_s_bound"] = bound > 0 ? Json(bound) : Json(nullptr);
         p["above_bound"] = bound > 0 ? Json(p["mrays_per_s"].get<double>() > bound) : Json(nullptr);
+        if (bound <= 0) continue;
+        const SimulatedRates::Limit limit = row->tightest();
+        p["mrays_per_s_tightest"] = limit.mrays_per_s;
+        p["tightest_limit"] = limit.name;
     }
 }
 
@@ -113,8 +117,9 @@ void print_published(const Json& published, const std::vector<SimulationRow>& ro
     if (published.empty()) return;
     fmt::print(
         "\npublished Mrays/s of another edition of the scene, measured by the authors, beside our "
-        "simulated bound\n{:<10} {:<36} {:<9} {:>9} {:>9} {:>7}\n",
-        "machine", "kernel", "rays", "published", "bound", "part");
+        "simulated bound and the tightest of all limits\n{:<10} {:<36} {:<9} {:>9} {:>9} {:>7} "
+        "{:>9} {:>7} limit\n",
+        "machine", "kernel", "rays", "published", "bound", "part", "tightest", "part");
     bool above = false;
     for (const Json& p : published) {
         const SimulationRow* row = row_of(p, rows);
@@ -126,7 +131,10 @@ void print_published(const Json& published, const std::vector<SimulationRow>& ro
             continue;
         }
         const double bound = row->rates().bound;
-        const std::string part = fmt::format(" {:>9.1f} {:>6.0f}%", bound, 100 * rate / bound);
+        const SimulatedRates::Limit limit = row->tightest();
+        const std::string part =
+            fmt::format(" {:>9.1f} {:>6.0f}% {:>9.1f} {:>6.0f}% {}", bound, 100 * rate / bound,
+                        limit.mrays_per_s, 100 * rate / limit.mrays_per_s, limit.name);
         fmt::print("{}\n", rate > bound ? warning(part + " above the bound") : part);
         above = above || rate > bound;
     }

@@ -44,8 +44,8 @@ void add_unit(const WarpTree& tree, const RayUnit& unit, std::vector<SimulateOpt
         rows[k].sum.add(figures[k]);
         rows[k].whole_launches &= unit.whole();
         rows[k].different_hits += count_different(hits[k], expected, runs[k].any_hit);
-        const double bound = simulated_rates(figures[k], runs[k]).bound;
-        if (bound > 0) rows[k].seconds_per_ray.push_back(1.0 / bound);
+        const SimulatedRates rates = simulated_rates(figures[k], runs[k]);
+        if (rates.bound > 0) rows[k].units.push_back(rates);
     }
 }
 
@@ -94,13 +94,24 @@ Json operations_json(const SimulationRow& row) {
 
 }  // namespace
 
+SimulatedRates::Limit SimulationRow::tightest() const {
+    const SimulatedRates found = rates();
+    SimulatedRates::Limit limit{"issue", found.bound};
+    if (whole_launches && found.scheduled < limit.mrays_per_s)
+        limit = {"scheduled", found.scheduled};
+    if (has_memory() && found.memory < limit.mrays_per_s)
+        limit = {found.memory_limit, found.memory};
+    return limit;
+}
+
 std::optional<double> SimulationRow::sampling_error() const {
     if (part_taken >= 1.0) return 0.0;
-    const auto n = static_cast<double>(seconds_per_ray.size());
+    const auto n = static_cast<double>(units.size());
     if (n < 2) return std::nullopt;
     double mean = 0, squares = 0;
-    for (const double s : seconds_per_ray) mean += s / n;
-    for (const double s : seconds_per_ray) squares += (s - mean) * (s - mean);
+    for (const SimulatedRates& unit : units) mean += 1.0 / unit.bound / n;
+    for (const SimulatedRates& unit : units)
+        squares += (1.0 / unit.bound - mean) * (1.0 / unit.bound - mean);
     return std::sqrt(squares / (n - 1) / n * (1.0 - part_taken)) / mean;
 }
 
@@ -119,7 +130,7 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
                         .sum = {},
                         .builder = std::string(builder_name(input.bvh.options().builder)),
                         .sample = options.sample,
-                        .seconds_per_ray = {}});
+                        .units = {}});
     }
     Progress progress(fmt::format("simulating {}", ray_kind_name(kind)), common);
     const double taken = launches.for_each(kind, [&](const RayUnit& unit, double part) {
@@ -142,10 +153,30 @@ std::vector<SimulationRow> simulate_rays(const SceneTree& input, const WarpTree&
                         .options = run,
                         .sum = {},
                         .builder = std::string(builder_name(input.bvh.options().builder)),
-                        .seconds_per_ray = {}});
+                        .units = {}});
     add_unit(tree, {rays, 1.0}, runs, rows, common);
     return rows;
 }
+
+namespace {
+
+/// Rates, and per ray what they come from.
+Json memory_limits_json(const SimulationRow& row) {
+    if (row.sum.instructions == 0 || !row.has_memory()) return nullptr;
+    Json limits = Json::object();
+    for (const SimulatedRates::Limit& limit : row.rates().memory_limits)
+        limits[std::string(limit.name)] = limit.mrays_per_s;
+    const auto rays = static_cast<double>(row.sum.rays);
+    limits["texture_fetches_per_ray"] = static_cast<double>(row.sum.texture_fetches) / rays;
+    limits["l1_requests_per_ray"] = static_cast<double>(row.sum.l1_transactions) / rays;
+    limits["replays_per_ray"] = static_cast<double>(row.sum.replays) / rays;
+    limits["l2_bytes_per_ray"] = static_cast<double>(row.sum.l2_bytes) / rays;
+    limits["dram_bytes_per_ray"] = static_cast<double>(row.sum.dram_bytes) / rays;
+    limits["wait_clocks_per_ray"] = row.sum.memory_wait_clocks / rays;
+    return limits;
+}
+
+}  // namespace
 
 Json simulation_json(const SimulationRow& row) {
     const SimulatedRates rates = row.rates();
@@ -169,7 +200,9 @@ Json simulation_json(const SimulationRow& row) {
             {"mrays_per_s_scheduled", or_null(any && row.whole_launches, rates.scheduled)},
             {"mrays_per_s_single_warps", or_null(any && row.whole_launches, rates.single_warps)},
             {"mrays_per_s_free_blocks", or_null(any && row.whole_launches, rates.free_blocks)},
-            {"mrays_per_s_memory", or_null(any && row.options.memory, rates.memory)},
+            {"mrays_per_s_memory", or_null(any && row.has_memory(), rates.memory)},
+            {"memory_limit", any && row.has_memory() ? Json(rates.memory_limit) : Json(nullptr)},
+            {"memory_limits", memory_limits_json(row)},
             {"simd_efficiency", or_null(any, rates.simd_efficiency)},
             {"issues_per_ray", or_null(any, static_cast<double>(row.sum.instructions) / rays)},
             {"instructions_per_ray",
@@ -208,6 +241,16 @@ Json machine_model_json(const MachineModel& m) {
             {"l2_gb_per_s", m.l2_gb_per_s},
             {"l2_bytes", m.l2_bytes},
             {"dram_gb_per_s", m.dram_gb_per_s},
+            {"l1_line_bytes", m.l1_line_bytes},
+            {"replays", m.replays},
+            {"texture_bytes", m.texture_bytes},
+            {"texture_sharers", m.texture_sharers},
+            {"texture_fetches_per_clock", m.texture_fetches_per_clock},
+            {"nodes_by_texture", m.nodes_by_texture},
+            {"texture_clocks", m.texture_clocks},
+            {"l1_clocks", m.l1_clocks},
+            {"l2_clocks", m.l2_clocks},
+            {"dram_clocks", m.dram_clocks},
             {"costs", costs}};
 }
 
@@ -215,7 +258,7 @@ void print_simulation(const std::vector<SimulationRow>& rows) {
     if (rows.empty()) return;
     fmt::print("\n{} rays of {} on {}, width {}: simulated Mrays/s\n", rows.front().rays,
                rows.front().scene, rows.front().options.machine.name, rows.front().options.width);
-    fmt::print("{:<36} {:>11} {:>9} {:>9} {:>9} {:>7} {:>8} {:>9} {:>7} {:>7}\n", "kernel", "rays",
+    fmt::print("{:<36} {:>11} {:>9} {:>9} {:>17} {:>7} {:>8} {:>9} {:>7} {:>7}\n", "kernel", "rays",
                "bound", "scheduled", "memory", "SIMD", "issues", "instr", "idle", "error");
     for (const SimulationRow& row : rows) {
         const SimulatedRates rates = row.rates();
@@ -229,10 +272,12 @@ void print_simulation(const std::vector<SimulationRow>& rows) {
         const auto rays = static_cast<double>(row.sum.rays);
         const std::optional<double> error = row.sampling_error();
         fmt::print(
-            "{:<36} {:>11} {:>9} {:>9} {:>9} {:>7} {:>8} {:>9} {:>7} {:>7}\n",
+            "{:<36} {:>11} {:>9} {:>9} {:>17} {:>7} {:>8} {:>9} {:>7} {:>7}\n",
             warp_kernel_name(row.options.kernel), grouped(row.sum.rays),
             number(any, rates.bound, 1), number(any && row.whole_launches, rates.scheduled, 1),
-            number(any && row.options.memory, rates.memory, 1), percent(any, rates.simd_efficiency),
+            any && row.has_memory() ? fmt::format("{:.1f} {}", rates.memory, rates.memory_limit)
+                                    : std::string("-"),
+            percent(any, rates.simd_efficiency),
             number(any, static_cast<double>(row.sum.instructions) / rays, 1),
             number(any, static_cast<double>(row.sum.lane_instructions) / rays, 0),
             percent(any && row.whole_launches, row.sum.idle_issues / row.sum.issue_slots),

@@ -18,14 +18,18 @@ struct SimulationRow {
     std::string rays;  // name of the kind, or a file
     SimulateOptions options;
     Simulation sum;
-    std::string builder = {};             // of the tree
-    double sample = 1.0;                  // as asked for
-    double part_taken = 1.0;              // of all rays
-    bool whole_launches = true;           // else there is no launch to schedule
-    std::uint64_t different_hits = 0;     // from those of the scalar reference
-    std::vector<double> seconds_per_ray;  // of each unit, at the bound
+    std::string builder = {};           // of the tree
+    double sample = 1.0;                // as asked for
+    double part_taken = 1.0;            // of all rays
+    bool whole_launches = true;         // else there is no launch to schedule
+    std::uint64_t different_hits = 0;   // from those of the scalar reference
+    std::vector<SimulatedRates> units;  // of each launch or run that was traced
 
     [[nodiscard]] SimulatedRates rates() const { return simulated_rates(sum, options); }
+    /// Caches and warps in flight have no meaning for a part of a launch.
+    [[nodiscard]] bool has_memory() const { return options.memory && whole_launches; }
+    /// The lowest of bound, schedule and memory limits, as far as they are known.
+    [[nodiscard]] SimulatedRates::Limit tightest() const;
     /// Relative standard error of the bound that comes from tracing a part of the rays only; 0 if
     /// all were traced; nothing if there is only one unit.
     [[nodiscard]] std::optional<double> sampling_error() const;

@@ -96,11 +96,20 @@ struct MachineModel {
     std::uint32_t resident_lanes = 1024;  // in flight
     std::uint32_t block_lanes = 128;      // of one block
     BlockRelease block_release = BlockRelease::own;
-    // The memory model: a transaction brings up to 16 bytes a lane from one 128-byte line.
+    // The memory model (docs/simulator.md). A transaction is a request for one 128-byte line, by a
+    // quarter of a warp for words of 16 bytes.
     double l1_transactions_per_clock = 1;
     double l2_gb_per_s = 100, dram_gb_per_s = 100;
-    std::uint32_t l1_bytes = 16384;  // of each multiprocessor
+    std::uint32_t l1_bytes = 16384;  // of each multiprocessor; 0: no cache holds data
+    std::uint32_t l1_line_bytes = 128;
+    bool replays = false;  // further lines of one request are asked for by issuing it again
     std::uint32_t l2_bytes = 1u << 20;
+    std::uint32_t texture_bytes = 0;       // of a texture cache, in lines of 32; 0: there is none
+    std::uint32_t texture_sharers = 1;     // multiprocessors of one texture cache
+    double texture_fetches_per_clock = 0;  // of 16 bytes a lane, of one multiprocessor
+    bool nodes_by_texture = true;          // where there are textures; triangles always are
+    // Until a value is there, by what holds it.
+    double texture_clocks = 0, l1_clocks = 0, l2_clocks = 0, dram_clocks = 0;
     std::vector<OperationCost> costs;  // of every operation: one for all kernels, or one for each
 };
 
@@ -145,7 +154,10 @@ struct Simulation {
     // Times of warps in instructions: of a batch or, where rays are replaced, of a warp's whole
     // life. Bin k counts those in [2^(k / 8), 2^((k + 1) / 8)).
     std::array<std::uint64_t, 256> warp_times{};
-    std::uint64_t l1_transactions = 0, l2_bytes = 0, dram_bytes = 0;  // of the memory model
+    // Of the memory model.
+    std::uint64_t texture_fetches = 0, l1_transactions = 0, l2_bytes = 0, dram_bytes = 0;
+    std::uint64_t replays = 0;
+    double memory_wait_clocks = 0;  // of all warps
 
     void add(const Simulation& other);
 };
@@ -157,7 +169,14 @@ struct SimulatedRates {
     // The steps from `bound` to `scheduled`; equal to it where warps are persistent.
     double single_warps = 0;  // latency and tail: warps go out one by one
     double free_blocks = 0;   // then by whole blocks, to places that are free when a block is done
-    double memory = 0;  // the lower of `bound` and the memory limits; 0 without the memory model
+    // The lowest of `bound` and the memory limits, and which that is; 0 without the memory model.
+    double memory = 0;
+    std::string_view memory_limit = {};
+    struct Limit {
+        std::string_view name;  // "replays", "texture", "l1", "l2", "dram", "latency"
+        double mrays_per_s;
+    };
+    std::vector<Limit> memory_limits = {};  // those that the machine has
     double simd_efficiency = 0;
 };
 [[nodiscard]] SimulatedRates simulated_rates(const Simulation& simulation,

@@ -40,10 +40,20 @@ public:
         whole("resident_lanes", m_.resident_lanes);
         whole("block_lanes", m_.block_lanes);
         number("l1_transactions_per_clock", m_.l1_transactions_per_clock);
-        whole("l1_bytes", m_.l1_bytes);
+        whole("l1_bytes", m_.l1_bytes, 0);
+        whole_optional("l1_line_bytes", m_.l1_line_bytes);
         number("l2_gb_per_s", m_.l2_gb_per_s);
         whole("l2_bytes", m_.l2_bytes);
         number("dram_gb_per_s", m_.dram_gb_per_s);
+        whole_optional("texture_bytes", m_.texture_bytes);
+        whole_optional("texture_sharers", m_.texture_sharers);
+        delay("texture_fetches_per_clock", m_.texture_fetches_per_clock);
+        flag("replays", m_.replays);
+        flag("nodes_by_texture", m_.nodes_by_texture);
+        delay("texture_clocks", m_.texture_clocks);
+        delay("l1_clocks", m_.l1_clocks);
+        delay("l2_clocks", m_.l2_clocks);
+        delay("dram_clocks", m_.dram_clocks);
         for (const auto& [key, value] : document_.items())
             if (std::find(known_.begin(), known_.end(), key) == known_.end())
                 in_.fail(key, "not a field of a machine");
@@ -92,12 +102,23 @@ private:
         if (at == names.end()) in_.fail("block_release", "not own, in_order or together");
         m_.block_release = static_cast<BlockRelease>(at - names.begin());
     }
-    void whole(const char* key, std::uint32_t& value) {
-        if (find(key) == nullptr) return;
+    void whole(const char* key, std::uint32_t& value, std::uint32_t least = 1) {
+        if (find(key) != nullptr) take_whole(key, value, least);
+    }
+    void whole_optional(const char* key, std::uint32_t& value) {
+        if (find_optional(key) != nullptr) take_whole(key, value, 0);
+    }
+    void take_whole(const char* key, std::uint32_t& value, std::uint32_t least) {
         const std::uint64_t given = find_whole(in_, document_, key, "machine").value();
-        if (given < 1 || given > std::numeric_limits<std::uint32_t>::max())
-            in_.fail(key, "not from 1 to 2^32 - 1");
+        if (given < least || given > std::numeric_limits<std::uint32_t>::max())
+            in_.fail(key, fmt::format("not from {} to 2^32 - 1", least));
         value = static_cast<std::uint32_t>(given);
+    }
+    void flag(const char* key, bool& value) {
+        const json* found = find_optional(key);
+        if (found == nullptr) return;
+        if (!found->is_boolean()) in_.fail(key, "not true or false");
+        value = found->get<bool>();
     }
 
     /// {"visit_node": 50, ...}, or a list of {"operation", "instructions", "origin", "kernel"}, as

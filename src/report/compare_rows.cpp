@@ -1,6 +1,8 @@
 #include "report/compare_rows.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "report/sections.h"
 
@@ -60,21 +62,35 @@ void trace_rows(const Document& document, std::vector<CompareRow>& rows) {
     }
 }
 
+/// Two standard errors of the sample to either side; none for a run over all rays, not known for a
+/// single part.
+Measure simulated_measure(const Json& row, Measure measure, const char* field) {
+    measure.origin = Origin::simulated;
+    measure.value = spread_at(row, field);
+    const std::optional<double> error = number_at(row, "sampling_error");
+    measure.error_known = error.has_value() || number_at(row, "part_taken").value_or(1) >= 1;
+    if (error && measure.value.median) {
+        const double around = 2 * *error * std::fabs(*measure.value.median);
+        measure.value.min = *measure.value.median - around;
+        measure.value.max = *measure.value.median + around;
+    }
+    return measure;
+}
+
 void simulate_rows(const Document& document, std::vector<CompareRow>& rows) {
     for (const Json* s : objects_at(document.root, "simulate")) {
         const std::string scene = scene_name(at(*s, "scene").is_null() ? document.root : *s);
         CompareRow row{key_of(*s, {"kernel", "rays", "mode", "machine", "width"}, scene), {}};
-        add(row, {"bound", "Mrays/s", Better::higher, Origin::simulated,
-                  spread_at(*s, "mrays_per_s_bound")});
-        add(row, {"scheduled", "Mrays/s", Better::higher, Origin::simulated,
-                  spread_at(*s, "mrays_per_s_scheduled")});
-        add(row, {"memory", "Mrays/s", Better::higher, Origin::simulated,
-                  spread_at(*s, "mrays_per_s_memory")});
-        add(row, {"SIMD efficiency", "", Better::higher, Origin::simulated,
-                  spread_at(*s, "simd_efficiency")});
-        add(row, {"instructions", "per ray", Better::lower, Origin::simulated,
-                  spread_at(*s, "instructions_per_ray")});
-        add(row, {"hits", "", Better::neither, Origin::simulated, spread_at(*s, "hits")});
+        const auto put = [&](const char* name, const char* unit, Better better, const char* field) {
+            add(row, simulated_measure(*s, {name, unit, better, {}, {}}, field));
+        };
+        put("bound", "Mrays/s", Better::higher, "mrays_per_s_bound");
+        put("scheduled", "Mrays/s", Better::higher, "mrays_per_s_scheduled");
+        put("memory", "Mrays/s", Better::higher, "mrays_per_s_memory");
+        put("SIMD efficiency", "", Better::higher, "simd_efficiency");
+        put("instructions", "per ray", Better::lower, "instructions_per_ray");
+        // The number of hits has no meaning of its own where rays are left out.
+        if (number_at(*s, "part_taken").value_or(1) >= 1) put("hits", "", Better::neither, "hits");
         rows.push_back(std::move(row));
     }
     for (const Json* m : objects_at(document.root, "measured")) {
@@ -127,6 +143,22 @@ std::vector<CompareRow> compare_rows(const Document& document) {
     return rows;
 }
 
+namespace {
+
+/// The values of a field over all rows, each once: "0.003, 1".
+std::string values_of(const std::vector<const Json*>& rows, const char* field) {
+    std::vector<std::string> seen;
+    for (const Json* row : rows)
+        if (const std::string text = text_at(*row, field);
+            !text.empty() && std::ranges::find(seen, text) == seen.end())
+            seen.push_back(text);
+    std::string all;
+    for (const std::string& text : seen) all += (all.empty() ? "" : ", ") + text;
+    return all;
+}
+
+}  // namespace
+
 std::vector<std::pair<std::string, std::string>> settings_of(const Document& document) {
     std::vector<std::pair<std::string, std::string>> settings{
         {"raydix", text_at(document.root, "version")}};
@@ -136,6 +168,10 @@ std::vector<std::pair<std::string, std::string>> settings_of(const Document& doc
          {"tree", "builder", "bits", "max_leaf", "layout", "device", "threads", "tree_hash"})
         settings.emplace_back(field, text_at(document.root, std::string("build.") + field));
     settings.emplace_back("leaves", text_at(document.root, "max_leaf"));
+    const std::vector<const Json*> simulated = objects_at(document.root, "simulate");
+    settings.emplace_back("sample asked for, of the rays", values_of(simulated, "sample"));
+    settings.emplace_back("part of the rays that was traced", values_of(simulated, "part_taken"));
+    settings.emplace_back("builder of simulated trees", values_of(simulated, "builder"));
     return settings;
 }
 

@@ -13,8 +13,9 @@ struct Measure {
     enum class Better { lower, higher, neither };
     std::string name, unit;
     Better better = Better::neither;
-    Origin origin = Origin::none;  // measured values vary from run to run, all others do not
+    Origin origin = Origin::none;  // measured values vary from run to run, simulated ones by sample
     SpreadFields value;
+    bool error_known = true;  // of a simulated figure: min to max is what the sample leaves open
 };
 
 struct CompareRow {

@@ -22,7 +22,7 @@ using Better = Measure::Better;
 // A measured change below this says nothing where no spread is known.
 constexpr double least_change = 0.02;
 
-enum class Verdict { better, worse, even, differs };
+enum class Verdict { better, worse, even, differs, unknown };
 
 bool overlap(const SpreadFields& a, const SpreadFields& b) {
     return a.min && a.max && b.min && b.max && *a.min <= *b.max && *b.min <= *a.max;
@@ -31,6 +31,10 @@ bool overlap(const SpreadFields& a, const SpreadFields& b) {
 Verdict verdict_of(const Measure& a, const Measure& b) {
     const double first = *a.value.median, second = *b.value.median;
     if (first == second) return Verdict::even;
+    if (a.origin == Origin::simulated) {
+        if (!a.error_known || !b.error_known) return Verdict::unknown;
+        if (overlap(a.value, b.value)) return Verdict::even;
+    }
     if (a.origin == Origin::measured) {
         const double scale = std::fmax(std::fabs(first), std::fabs(second));
         if (overlap(a.value, b.value) || std::fabs(first - second) < least_change * scale)
@@ -54,8 +58,13 @@ Cell verdict_cell(Verdict verdict, const Measure& a, const Measure& b) {
         case Verdict::differs:
             cell = Cell("differs");
             break;
+        case Verdict::unknown:
+            cell = Cell("open: its error is not known");
+            cell.mark = Cell::Mark::even;
+            break;
         case Verdict::even:
             cell = Cell(*a.value.median == *b.value.median ? "= equal"
+                        : a.origin == Origin::simulated    ? "within the sampling error"
                         : overlap(a.value, b.value)        ? "within the spread"
                                                            : "within 2 %");
             cell.mark = Cell::Mark::even;
@@ -74,7 +83,7 @@ Cell value_cell(const Measure& measure) {
 }
 
 struct Tally {
-    std::size_t better = 0, worse = 0, even = 0, differs = 0, rows = 0;
+    std::size_t better = 0, worse = 0, even = 0, differs = 0, unknown = 0, rows = 0;
     double best_gain = 1, worst_loss = 1;  // as factors, both above 1
     std::string best, worst;
 };
@@ -115,11 +124,12 @@ public:
     [[nodiscard]] std::string sentence() const {
         std::string said = fmt::format(
             "{} against {}: of {} figures in {} matching {}, {} better, {} worse, {} equal or "
-            "within the spread",
+            "within their error",
             breakable(second_.name), breakable(first_.name), table_.rows.size(), tally_.rows,
             tally_.rows == 1 ? "row" : "rows", strong(std::to_string(tally_.better)),
             strong(std::to_string(tally_.worse)), tally_.even);
         if (tally_.differs) said += fmt::format(", {} different", tally_.differs);
+        if (tally_.unknown) said += fmt::format(", {} of unknown error", tally_.unknown);
         if (tally_.best_gain > 1)
             said += fmt::format("; most gained: {} ({} times)", breakable(tally_.best),
                                 significant(tally_.best_gain));
@@ -154,7 +164,9 @@ private:
             ++tally_.worse;
             if (change > tally_.worst_loss) tally_.worst = name, tally_.worst_loss = change;
         } else {
-            ++(verdict == Verdict::even ? tally_.even : tally_.differs);
+            ++(verdict == Verdict::even      ? tally_.even
+               : verdict == Verdict::unknown ? tally_.unknown
+                                             : tally_.differs);
         }
     }
 

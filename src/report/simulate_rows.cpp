@@ -26,7 +26,9 @@ SimulatedRow row_of(const Document& document, const Json& r) {
                      .idle = number_at(r, "idle_share"),
                      .error = number_at(r, "sampling_error"),
                      .sample = number_at(r, "sample"),
-                     .unit = text_at(r, "histogram.unit")};
+                     .part = number_at(r, "part_taken"),
+                     .unit = text_at(r, "histogram.unit"),
+                     .memory_limit = text_at(r, "memory_limit")};
     if (row.scene.empty()) row.scene = scene_name(at(r, "scene").is_object() ? r : document.root);
     for (std::string* name : {&row.kernel, &row.rays, &row.machine})
         if (name->empty()) *name = "without a name";

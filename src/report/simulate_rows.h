@@ -20,10 +20,11 @@ struct SimulatedRow {
     std::string scene, kernel, rays, mode, machine, document;
     std::optional<double> width, count, hits;
     std::optional<double> bound, scheduled, memory;  // Mrays/s
-    std::optional<double> efficiency, issues, instructions, idle, error, sample;
+    std::optional<double> efficiency, issues, instructions, idle, error, sample, part;
     std::vector<SimulatedOperation> operations = {};
     Histogram times = {};
     std::string unit = {};  // of the histogram
+    std::string memory_limit = {};
 };
 
 [[nodiscard]] std::vector<SimulatedRow> simulated_rows(const Documents& documents);

@@ -147,7 +147,8 @@ std::string row_table(const SimulatedGroup& group) {
                 .note =
                     "Nothing in this table was timed. The bound is the issue limit alone; "
                     "\xE2\x80\x9Cscheduled\xE2\x80\x9D adds the distribution of work, "
-                    "\xE2\x80\x9Cmemory\xE2\x80\x9D a first-order memory model.",
+                    "\xE2\x80\x9Cmemory\xE2\x80\x9D is the lowest of it and the limits of "
+                    "caches, memory and latency.",
                 .origin = Origin::simulated,
                 .columns = {{"kernel"},
                             {"rays"},
@@ -155,6 +156,7 @@ std::string row_table(const SimulatedGroup& group) {
                             {"bound", Format::number, "Mrays/s"},
                             {"scheduled", Format::number, "Mrays/s"},
                             {"memory", Format::number, "Mrays/s"},
+                            {"memory's limit"},
                             {"SIMD efficiency", Format::percent},
                             {"issues", Format::number, "per ray"},
                             {"instructions", Format::number, "per ray"},
@@ -166,7 +168,7 @@ std::string row_table(const SimulatedGroup& group) {
                             {"sampling error", Format::percent}}};
     for (const SimulatedRow& row : group.rows)
         table.rows.push_back({row.kernel, row.rays, row.mode, row.bound, row.scheduled, row.memory,
-                              row.efficiency, row.issues, row.instructions,
+                              row.memory_limit, row.efficiency, row.issues, row.instructions,
                               histogram_median(row.times), row.idle, row.count, row.hits,
                               row.sample, row.error});
     table.drop_empty_columns();
@@ -216,6 +218,23 @@ std::string group_html(const SimulatedGroup& group, PageColours& colours) {
                times);
 }
 
+/// " ± 3 %", two standard errors of the sample, behind a bound; nothing if all rays were traced.
+std::string error_text(const SimulatedRow& row) {
+    if (row.error) return *row.error > 0 ? " \xC2\xB1 " + percent(2 * *row.error) : "";
+    return row.part.value_or(1) < 1 ? ", error not known" : "";
+}
+
+double highest(const SimulatedRow& row) { return *row.bound * (1 + 2 * row.error.value_or(0)); }
+
+/// Kernels whose bounds the sample does not tell from the best one's.
+std::string as_good(const Rows& bounded, const SimulatedRow& best) {
+    const double least = *best.bound * (1 - 2 * best.error.value_or(0));
+    std::vector<std::string> names;
+    for (const SimulatedRow* row : bounded)
+        if (row != &best && highest(*row) >= least) names.push_back(breakable(row->kernel));
+    return names.empty() ? "" : ", within the error also " + listed(names);
+}
+
 /// The best bound of each machine.
 void add_tiles(const std::vector<SimulatedGroup>& groups, Section& section) {
     std::map<std::string, const SimulatedRow*> best;
@@ -227,7 +246,7 @@ void add_tiles(const std::vector<SimulatedGroup>& groups, Section& section) {
     for (const auto& [machine, row] : best)
         if (row != nullptr)
             section.tiles.push_back(
-                {significant(*row->bound), "Mrays/s",
+                {significant(*row->bound), "Mrays/s" + error_text(*row),
                  fmt::format("highest bound on {}: {}, {}", machine, row->kernel, row->rays),
                  badge(Origin::simulated)});
 }
@@ -240,9 +259,9 @@ void say(const SimulatedGroup& group, Section& section) {
         if (bounded.empty()) continue;
         const auto [low, high] =
             std::ranges::minmax(bounded, {}, [](const SimulatedRow* row) { return *row->bound; });
-        std::string part =
-            fmt::format("{} rays {} with {}", escaped(rays),
-                        strong(significant(*high->bound), "Mrays/s"), breakable(high->kernel));
+        std::string part = fmt::format(
+            "{} rays {}{} with {}{}", escaped(rays), strong(significant(*high->bound), "Mrays/s"),
+            error_text(*high), breakable(high->kernel), as_good(bounded, *high));
         if (bounded.size() > 1)
             part += fmt::format(" (least: {} with {})", significant(*low->bound),
                                 breakable(low->kernel));

@@ -20,7 +20,10 @@ MachineModel gtx285() {
         "warps, blocks of 192: their release; 22 clocks between dependent instructions, 400 to 600 "
         "for a read, with texture caches no less, and for local memory, which has no cache: CUDA C "
         "Programming Guide 4.2 and Best Practices Guide; blocks that end in order: what the "
-        "Fermi white paper says is new there; cache rates: estimates";
+        "Fermi white paper says is new there; 6 to 8 KB of texture cache for each multiprocessor, "
+        "shared by three: Programming Guide; 80 texture units at 0.648 GHz: the maker's figures; "
+        "261 clocks for a hit there, 371 in the second cache of 256 KB: Wong et al. 2010; rate of "
+        "the second cache: an estimate";
     m.multiprocessors = 30;
     m.clock_ghz = 1.476;
     m.lanes_per_clock = 8;
@@ -30,10 +33,15 @@ MachineModel gtx285() {
     m.block_release = BlockRelease::in_order;
     m.resident_lanes = 768;
     m.block_lanes = 192;
-    m.l1_transactions_per_clock = 0.25;
-    m.l1_bytes = 8 * 1024;
+    m.l1_bytes = 0;
     m.l2_gb_per_s = 300;
     m.l2_bytes = 256 * 1024;
+    m.texture_bytes = 3 * 8 * 1024;
+    m.texture_sharers = 3;
+    m.texture_fetches_per_clock = 80 * 0.648 / (30 * 1.476);
+    m.texture_clocks = 261;
+    m.l2_clocks = 371;
+    m.dram_clocks = 500;
     m.dram_gb_per_s = 159;
     m.costs = gt200_costs();
     return m;
@@ -54,7 +62,10 @@ MachineModel gtx480() {
         "15 multiprocessors of 32 lanes at 1.401 GHz, 177 GB/s: Karras 2012; blocks of 128: Aila "
         "and Laine's release; 8 blocks in flight: Fermi's limit; 22 clocks between dependent "
         "instructions: CUDA C Programming Guide 4.2; blocks that end out of order: Fermi white "
-        "paper; 300 clocks for a read, caches: estimates";
+        "paper; 48 KB of L1, a line of 128 bytes in two clocks, further lines of a request issued "
+        "again: Programming Guide 4.2, F.4; nodes through it, triangles by texture: their release; "
+        "12 KB of texture cache, four texture units at half the clock, 768 KB of L2: white paper; "
+        "300 clocks for a read, clocks of each cache, rate of L2: estimates";
     m.multiprocessors = 15;
     m.clock_ghz = 1.401;
     m.lanes_per_clock = 32;
@@ -66,6 +77,14 @@ MachineModel gtx480() {
     m.l1_bytes = 48 * 1024;
     m.l2_gb_per_s = 230;
     m.l2_bytes = 768 * 1024;
+    m.texture_bytes = 12 * 1024;
+    m.texture_fetches_per_clock = 2;
+    m.nodes_by_texture = false;
+    m.replays = true;
+    m.l1_clocks = 45;
+    m.texture_clocks = 220;
+    m.l2_clocks = 310;
+    m.dram_clocks = 600;
     m.dram_gb_per_s = 177;
     m.costs = fermi_costs();
     return m;
@@ -77,19 +96,28 @@ MachineModel gtx680() {
     m.origin =
         "8 multiprocessors of 192 lanes at 1.006 GHz: the maker's figures; all lanes busy, which "
         "takes dual issue on each clock; 192 GB/s; 2048 lanes in flight: Kepler's limit; 11 "
-        "clocks between dependent instructions, 200 to 400 for a read: CUDA C Programming Guide "
-        "4.2; caches: estimates";
+        "clocks between dependent instructions, 200 to 400 for a read from memory, up to 48 KB of "
+        "texture cache: CUDA C Programming Guide 4.2; nodes and triangles by texture: Aila and "
+        "Laine's release; 16 texture units, 512 bytes a clock of L2: the maker's figures; 105 "
+        "clocks for a hit in a texture cache, those of L1 and L2: estimates";
     m.multiprocessors = 8;
     m.clock_ghz = 1.006;
     m.lanes_per_clock = 192;
     m.warp_issue_clocks = 11;
-    m.read_clocks = 300;
+    m.read_clocks = 105;
     m.resident_lanes = 2048;
     m.block_lanes = 128;
     m.l1_transactions_per_clock = 1;
     m.l1_bytes = 48 * 1024;
     m.l2_gb_per_s = 512;
     m.l2_bytes = 512 * 1024;
+    m.texture_bytes = 48 * 1024;
+    m.texture_fetches_per_clock = 16;
+    m.replays = true;
+    m.l1_clocks = 33;
+    m.texture_clocks = 105;
+    m.l2_clocks = 200;
+    m.dram_clocks = 300;
     m.dram_gb_per_s = 192;
     m.costs = kepler_costs();
     return m;
@@ -102,7 +130,7 @@ MachineModel h200() {
         "132 multiprocessors of 128 lanes at 1.98 GHz, 4.8 TB/s, 50 MB of L2, up to 256 KB of L1: "
         "the maker's figures; 1536 lanes in flight: 40 registers a thread, blocks of 128; integer "
         "instructions, which run at half the rate, count as full ones; 4 clocks between dependent "
-        "instructions, 33 for a read, cache rates: estimates";
+        "instructions, 33 for a read, cache rates and clocks: estimates; sectors of 32 bytes";
     m.multiprocessors = 132;
     m.clock_ghz = 1.98;
     m.lanes_per_clock = 128;
@@ -112,6 +140,10 @@ MachineModel h200() {
     m.block_lanes = 128;
     m.l1_transactions_per_clock = 1;
     m.l1_bytes = 256 * 1024;
+    m.l1_line_bytes = 32;
+    m.l1_clocks = 33;
+    m.l2_clocks = 260;
+    m.dram_clocks = 560;
     m.l2_gb_per_s = 5500;
     m.l2_bytes = 50u << 20;
     m.dram_gb_per_s = 4800;

@@ -1,69 +1,126 @@
-// Addresses of a warp -> sectors -> traffic of each level.
 #include "simt/memory_model.h"
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 namespace raydix {
 namespace {
-constexpr std::uint64_t sector_bytes = 32, line_bytes = 128, chunk_bytes = 16;
+
+constexpr std::uint64_t nowhere = ~std::uint64_t{0};
+constexpr std::uint64_t align_bytes = 256;
+// One request serves as many lanes as it takes to ask for 128 bytes: a quarter of a warp for words
+// of 16 bytes, all of it for words of 4 (CUDA C Programming Guide 4.2, F.4.2).
+constexpr std::uint32_t request_bytes = 128, word_bytes = 16;
+
+std::uint64_t rounded(std::uint64_t bytes) {
+    return (bytes + align_bytes - 1) / align_bytes * align_bytes;
 }
 
-SectorCache::SectorCache(std::uint64_t bytes)
-    : sets_(std::max<std::uint64_t>(1, bytes / sector_bytes / ways)), entries_(sets_ * ways) {}
+}  // namespace
 
-bool SectorCache::touch(std::uint64_t number) {
-    Way* set = &entries_[number % sets_ * ways];
-    Way* oldest = set;
-    ++clock_;
-    for (Way* way = set; way != set + ways; ++way) {
-        if (way->number == number) {
-            way->used = clock_;
-            return true;
-        }
-        if (way->used < oldest->used) oldest = way;
-    }
-    *oldest = {number, clock_};
-    return false;
-}
-
-MemoryModel::MemoryModel(std::uint32_t multiprocessors, std::uint64_t l1_bytes,
-                         std::uint64_t l2_bytes, std::span<const MemoryRange> ranges)
-    : l1_(multiprocessors, SectorCache(l1_bytes)), l2_(l2_bytes) {
+std::uint64_t MemoryModel::set_out(std::span<const MemoryRange> ranges) {
     std::uint64_t at = 0;
     for (const MemoryRange& range : ranges) {
         const auto begin = reinterpret_cast<std::uintptr_t>(range.begin);
-        ranges_.push_back({begin, begin + range.bytes, at});
-        at += (range.bytes + line_bytes - 1) / line_bytes * line_bytes;
+        const bool texture =
+            machine_.texture_bytes > 0 &&
+            (range.holds == MemoryRange::Holds::triangles ||
+             (range.holds == MemoryRange::Holds::nodes && machine_.nodes_by_texture));
+        ranges_.push_back({begin, begin + range.bytes, at, texture});
+        at += rounded(range.bytes);
     }
+    if (at / sector_bytes >= 1u << 27)
+        throw std::logic_error("more than the memory model can hold");
+    return at / sector_bytes;
 }
 
-std::uint64_t MemoryModel::place_of(const void* address) const {
+MemoryModel::MemoryModel(const MachineModel& machine, std::uint32_t width,
+                         std::uint32_t stack_entries, std::span<const MemoryRange> ranges)
+    : machine_(machine),
+      width_(width),
+      places_(width),
+      replay_(machine, std::max(1u, machine.resident_lanes / width), set_out(ranges),
+              rounded(std::uint64_t{stack_entries} * width * 4) / sector_bytes) {}
+
+void MemoryModel::hand_over(std::uint32_t multiprocessor) {
+    replay_.start(multiprocessor, std::exchange(trace_, {}));
+}
+
+const MemoryModel::Range& MemoryModel::range_of(const void* address) const {
     const auto place = reinterpret_cast<std::uintptr_t>(address);
     for (const Range& range : ranges_)
-        if (place >= range.begin && place < range.end) return place - range.begin + range.at;
-    throw std::logic_error("the memory model does not know an address that a kernel reads");
+        if (place >= range.begin && place < range.end) return range;
+    throw std::logic_error("the memory model does not know an address that a kernel touches");
 }
 
-void MemoryModel::read(const void* const* addresses, int count, std::uint32_t bytes) {
-    const auto distinct = [&](std::uint64_t unit) {
-        numbers_.clear();
-        for (int k = 0; k < count; ++k) {
-            const std::uint64_t first = place_of(addresses[k]);
-            for (std::uint64_t n = first / unit; n <= (first + bytes - 1) / unit; ++n)
-                numbers_.push_back(n);
-        }
-        std::sort(numbers_.begin(), numbers_.end());
-        numbers_.erase(std::unique(numbers_.begin(), numbers_.end()), numbers_.end());
-    };
-    distinct(line_bytes);
-    l1_transactions_ += numbers_.size() * ((bytes + chunk_bytes - 1) / chunk_bytes);
-    distinct(sector_bytes);
-    for (const std::uint64_t sector : numbers_) {
-        if (l1_[place_].touch(sector)) continue;
-        l2_bytes_ += sector_bytes;
-        if (!l2_.touch(sector)) dram_bytes_ += sector_bytes;
+void MemoryModel::access(const void* const* addresses, std::uint32_t lanes, std::uint32_t bytes,
+                         Access how) {
+    const Range* range = nullptr;
+    std::uint32_t active = 0;
+    for (std::uint32_t k = 0; k < lanes; ++k) {
+        places_[k] = nowhere;
+        if (addresses[k] == nullptr) continue;
+        const auto place = reinterpret_cast<std::uintptr_t>(addresses[k]);
+        if (range == nullptr || place < range->begin || place >= range->end)
+            range = &range_of(addresses[k]);
+        places_[k] = place - range->begin + range->at;
+        ++active;
     }
+    if (active == 0) return;
+    if (range->texture)
+        replay_.traffic.texture_fetches += active * ((bytes + word_bytes - 1) / word_bytes);
+    else
+        count_requests(lanes, bytes);
+    add_units(lanes, bytes, {0, range->texture, 0, how == Access::write, how == Access::read, 0});
+}
+
+void MemoryModel::stack(const std::int32_t* entries, std::uint32_t lanes, Access how) {
+    // Entries of one height lie beside each other, a lane each.
+    bool any = false;
+    for (std::uint32_t k = 0; k < lanes; ++k) {
+        places_[k] =
+            entries[k] < 0 ? nowhere : (static_cast<std::uint64_t>(entries[k]) * width_ + k) * 4;
+        any = any || entries[k] >= 0;
+    }
+    if (!any) return;
+    count_requests(lanes, 4);
+    add_units(lanes, 4, {0, 0, 1, how == Access::write, how == Access::read, 0});
+}
+
+void MemoryModel::count_requests(std::uint32_t lanes, std::uint32_t bytes) {
+    const std::uint32_t word = std::min(bytes, word_bytes), together = request_bytes / word;
+    for (std::uint32_t offset = 0; offset < bytes; offset += word)
+        for (std::uint32_t first = 0; first < lanes; first += together) {
+            numbers_.clear();
+            for (std::uint32_t k = first; k < std::min(lanes, first + together); ++k) {
+                if (places_[k] == nowhere) continue;
+                const std::uint64_t line = (places_[k] + offset) / request_bytes;
+                if (std::find(numbers_.begin(), numbers_.end(), line) == numbers_.end())
+                    numbers_.push_back(line);
+            }
+            replay_.traffic.l1_requests += numbers_.size();
+            if (!numbers_.empty()) replay_.traffic.replays += numbers_.size() - 1;
+        }
+}
+
+void MemoryModel::add_units(std::uint32_t lanes, std::uint32_t bytes, MemoryUnit unit) {
+    // Lines where a whole line is brought, else sectors.
+    const bool lines = !unit.texture && machine_.l1_bytes > 0 && !(unit.write && !unit.stack);
+    const std::uint64_t size = lines ? machine_.l1_line_bytes : sector_bytes;
+    numbers_.clear();
+    for (std::uint32_t k = 0; k < lanes; ++k) {
+        if (places_[k] == nowhere) continue;
+        for (std::uint64_t n = places_[k] / size; n <= (places_[k] + bytes - 1) / size; ++n)
+            if (numbers_.empty() || numbers_.back() != n) numbers_.push_back(n);
+    }
+    std::sort(numbers_.begin(), numbers_.end());
+    numbers_.erase(std::unique(numbers_.begin(), numbers_.end()), numbers_.end());
+    for (const std::uint64_t number : numbers_) {
+        unit.sector = static_cast<std::uint32_t>(number * (size / sector_bytes)) & 0x7FFFFFFu;
+        trace_.push_back(unit);
+    }
+    trace_.back().last = 1;
 }
 
 }  // namespace raydix

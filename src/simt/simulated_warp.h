@@ -22,13 +22,17 @@ struct OpCount {
 };
 using OpCounts = std::array<OpCount, op_count>;
 
-/// Sees the addresses that the active lanes read in one go. Of memory models.
-class ReadObserver {
+/// Sees what the active lanes read or write in one go. Of memory models.
+class MemoryObserver {
 public:
-    virtual void read(const void* const* addresses, int count, std::uint32_t bytes) = 0;
+    /// `addresses`, one a lane, null of those that take no part.
+    virtual void access(const void* const* addresses, std::uint32_t lanes, std::uint32_t bytes,
+                        Access how) = 0;
+    /// `entries`: heights in the stacks of the lanes' own threads; below 0: takes no part.
+    virtual void stack(const std::int32_t* entries, std::uint32_t lanes, Access how) = 0;
 
 protected:
-    ~ReadObserver() = default;
+    ~MemoryObserver() = default;
 };
 
 /// What warps did: counts of a whole launch, or of a part of it.
@@ -50,7 +54,7 @@ public:
     WarpTally* tally = nullptr;        // of this warp, or of several that run one after the other
     const OpCosts* costs = nullptr;    // null: nothing is issued, only counted
     const OpClocks* clocks = nullptr;  // null: no time is kept
-    ReadObserver* observer = nullptr;
+    MemoryObserver* observer = nullptr;
 
     [[nodiscard]] static constexpr std::uint32_t width() { return Width; }
     [[nodiscard]] LaneMask active() const { return active_; }
@@ -85,14 +89,25 @@ public:
         }
     }
     template <class Address>
-    void reads(Address address, std::uint32_t bytes) {
+    void touches(Access how, Address address, std::uint32_t bytes) {
         if (observer == nullptr) return;
-        std::array<const void*, Width> addresses;
-        int count = 0;
-        for (LaneMask left = active_; left != 0; left &= left - 1)
-            addresses[static_cast<std::size_t>(count++)] =
-                address(lanes[static_cast<std::size_t>(std::countr_zero(left))]);
-        if (count > 0) observer->read(addresses.data(), count, bytes);
+        std::array<const void*, Width> addresses{};
+        for (LaneMask left = active_; left != 0; left &= left - 1) {
+            const auto k = static_cast<std::size_t>(std::countr_zero(left));
+            addresses[k] = address(lanes[k]);
+        }
+        observer->access(addresses.data(), width(), bytes, how);
+    }
+    template <class Entry>
+    void touches_stack(Access how, Entry entry) {
+        if (observer == nullptr) return;
+        std::array<std::int32_t, Width> entries;
+        entries.fill(-1);
+        for (LaneMask left = active_; left != 0; left &= left - 1) {
+            const auto k = static_cast<std::size_t>(std::countr_zero(left));
+            entries[k] = entry(lanes[k]);
+        }
+        observer->stack(entries.data(), width(), how);
     }
     template <class Cond, class Body, class Stay>
     void voting_loop(Op op, Cond cond, Body body, Stay stay) {

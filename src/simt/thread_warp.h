@@ -34,6 +34,10 @@ using LaneMask = std::uint64_t;
 inline constexpr std::uint32_t device_warp_width = 32;
 #endif
 
+/// What a warp does with memory. It waits for what it reads, unless another read beside is waited
+/// for in any case.
+enum class Access : std::uint8_t { read, read_beside, write };
+
 /// The bits below `lane`.
 RAYDIX_HD static inline LaneMask lanes_below(std::uint32_t lane) {
 #if defined(__CUDA_ARCH__)
@@ -126,9 +130,12 @@ public:
     RAYDIX_HD void step_indexed(Op, Fn fn) {
         fn(lane, lane_id());
     }
-    /// The lane is about to read `bytes` at address(lane): of interest to memory models.
+    /// The lane is about to touch `bytes` at address(lane), or entry(lane) of its stack: of
+    /// interest to memory models. Null and -1: it does not.
     template <class Address>
-    RAYDIX_HD void reads(Address, std::uint32_t) {}
+    RAYDIX_HD void touches(Access, Address, std::uint32_t) {}
+    template <class Entry>
+    RAYDIX_HD void touches_stack(Access, Entry) {}
 
     /// A loop whose members may vote. After each turn `stay`, the same for all members, may end it
     /// for all.

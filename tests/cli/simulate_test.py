@@ -44,6 +44,11 @@ class Simulate(ProgramTest):
         for row in one["simulate"] + two["simulate"]:
             self.assertIsNotNone(row["mrays_per_s_memory"])
             self.assertLessEqual(row["mrays_per_s_memory"], row["mrays_per_s_bound"] * 1.000001)
+            limits = {k: v for k, v in row["memory_limits"].items() if not k.endswith("_per_ray")}
+            self.assertEqual(set(limits), {"replays", "texture", "l1", "l2", "dram", "latency"})  # of gtx480
+            self.assertAlmostEqual(row["mrays_per_s_memory"], min(row["mrays_per_s_bound"], *limits.values()))
+            named = limits.get(row["memory_limit"], row["mrays_per_s_bound"])
+            self.assertAlmostEqual(row["mrays_per_s_memory"], named)
         self.assertEqual(one["simulate"], two["simulate"])
 
     @unittest.skipIf(SANITIZED, "many rays for a statistic; other tests run the same code")
@@ -116,6 +121,9 @@ class Simulate(ProgramTest):
                             ('{"base": "gtx480", "clock_ghz": -1}', ["clock_ghz"]),
                             ('{"base": "gtx480", "clock_ghz": "fast"}', ["clock_ghz"]),
                             ('{"base": "gtx480", "read_clocks": -1}', ["read_clocks"]),
+                            ('{"base": "gtx480", "replays": 1}', ["replays", "true or false"]),
+                            ('{"base": "gtx480", "l2_clocks": "long"}', ["l2_clocks"]),
+                            ('{"base": "gtx480", "texture_bytes": -5}', ["texture_bytes"]),
                             ('{"base": "gtx480", "block_release": "never"}', ["block_release", "in_order"]),
                             ('{"base": "gtx480", "multiprocessors": 0}', ["multiprocessors"]),
                             ('{"base": "gtx480", "multiprocessors": 1.5}', ["multiprocessors"]),
@@ -221,6 +229,58 @@ class Traversal(ProgramTest):
         out = self.succeed(*arguments, "--sweep-sample", "0").out
         for word in ("simulated Mrays/s", "claims", "no GPU was used"):
             self.assertIn(word, out)
+
+    def test_claims_are_intervals_against_intervals(self):
+        arguments = ("bench", "traversal", SCENE, *SMALL, "--machine", "gtx285", "--sweep-sample", "0")
+        claims = self.document(*arguments)["claims"]
+        for claim in claims:
+            self.assertTrue(0 < claim["low"] <= claim["ratio"] <= claim["high"], claim)
+            low, high = claim["paper_low"], claim["paper_high"] or float("inf")
+            inside = low <= claim["low"] and claim["high"] <= high
+            outside = claim["high"] < low or high < claim["low"]
+            self.assertEqual(claim["holds"], True if inside else False if outside else None, claim)
+            self.assertEqual(claim["verdict"], "holds" if inside else "does not hold" if outside else "open")
+        # The same claims for a small part of the launches: none is gone.
+        part = self.document(*arguments, "--launch-rays", "8192", "--sample", "0.2")["claims"]
+        self.assertEqual([c["claim"] for c in part], [c["claim"] for c in claims])
+        scheduled = [c for c in part if ", scheduled" in c["found"]]
+        self.assertGreaterEqual(len(scheduled), 7)
+
+    def test_the_error_of_a_claim_is_that_of_its_costs(self):
+        """Costs without a range leave none; a range of a node's cost is carried through."""
+        arguments = ("bench", "traversal", SCENE, *SMALL, "--sweep-sample", "0", "--rays", "diffuse", "--kernel",
+                     "persistent_packet,persistent_while_while,packet")
+        machine = self.document(*arguments, "--machine", "gtx285")["machines"][0]
+        for cost in machine["costs"]:
+            cost.pop("most", None)
+            if cost["operation"] == "visit_node":
+                cost["most"] = 2 * cost["instructions"]
+        document = self.document(*arguments, "--machine", self.write("gtx285.json", json.dumps(machine)))
+        rows = {row["kernel"]: row for row in document["simulate"]}
+
+        def share(kernel):
+            return next(op["share"] for op in rows[kernel]["operations"] if op["name"] == "visit_node")
+
+        beats, gain = document["claims"][0], document["claims"][1]
+        self.assertIn("twofold on diffuse", beats["claim"])
+        self.assertAlmostEqual(beats["low"], beats["ratio"] / (1 + share("persistent_while_while")), 5)
+        self.assertAlmostEqual(beats["high"], beats["ratio"] * (1 + share("persistent_packet")), 5)
+        # One kernel in two forms has one cost for a node, whatever it is.
+        plain, persistent = 1 + share("packet"), 1 + share("persistent_packet")
+        ends = sorted([gain["ratio"], gain["ratio"] * plain / persistent])
+        self.assertAlmostEqual(gain["low"], ends[0], 5)
+        self.assertAlmostEqual(gain["high"], ends[1], 5)
+
+    def test_a_small_sample_needs_whole_launches(self):
+        claims = self.document("bench", "traversal", SCENE, "--size", "256x192", "--samples", "4", "--sample", "0.1", "--rays",
+                               "primary", "--machine", "gtx285", "--sweep-sample", "0", "--kernel",
+                               "packet,persistent_packet,while_while,persistent_while_while,if_if")["claims"]
+        needing = [c for c in claims if c["verdict"] == "needs whole launches"]
+        self.assertEqual(len(needing), 3)
+        for claim in needing:
+            self.assertIsNone(claim["holds"])
+            self.assertIn(", scheduled", claim["found"])
+        self.assertGreater(len(claims), len(needing))
 
     def test_published_figures_of_the_papers_scenes(self):
         mesh = pathlib.Path(self.write("conference_copy.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"

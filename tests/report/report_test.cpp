@@ -140,6 +140,78 @@ TEST(MakeReport, APublishedRateAboveItsBoundIsAnAlarm) {
     EXPECT_TRUE(holds(page_of({document}), "differ from the authors' there"));
 }
 
+Json simulated_document(double bound, Json error, double part) {
+    return {{"command", "simulate"},
+            {"version", "1"},
+            {"scene", {{"name", "hall.obj"}}},
+            {"simulate",
+             {{{"kernel", "packet"},
+               {"rays", "primary"},
+               {"machine", "gtx285"},
+               {"mrays_per_s_bound", bound},
+               {"sample", part},
+               {"part_taken", part},
+               {"sampling_error", error}}}}};
+}
+
+TEST(MakeReport, SimulatedFiguresDifferBeyondTheirSamplingErrorOnly) {
+    const Json whole = simulated_document(100, 0.0, 1.0);
+    const std::string near = page_of({whole, simulated_document(104, 0.03, 0.003)});
+    EXPECT_TRUE(holds(near, "within the sampling error"));
+    EXPECT_FALSE(holds(near, "\xE2\x96\xB2 better"));
+    EXPECT_FALSE(holds(near, "settings are the same"));
+    EXPECT_TRUE(holds(near, "part of the rays that was traced"));
+    const std::string far = page_of({whole, simulated_document(107, 0.03, 0.003)});
+    EXPECT_TRUE(holds(far, "\xE2\x96\xB2 better"));
+    const std::string unknown = page_of({whole, simulated_document(500, nullptr, 0.003)});
+    EXPECT_TRUE(holds(unknown, "its error is not known"));
+    EXPECT_FALSE(holds(unknown, "\xE2\x96\xB2 better"));
+    // Two runs over all rays have no error.
+    const std::string exact = page_of({whole, simulated_document(100.1, 0.0, 1.0)});
+    EXPECT_TRUE(holds(exact, "\xE2\x96\xB2 better"));
+    EXPECT_TRUE(holds(exact, "settings are the same"));
+}
+
+TEST(MakeReport, TheBestBoundNamesItsError) {
+    Json document = simulated_document(100, 0.03, 0.01);
+    Json second = document["simulate"][0];
+    second["kernel"] = "if_if";
+    second["mrays_per_s_bound"] = 95.0;
+    document["simulate"].push_back(second);
+    const std::string html = page_of({document});
+    EXPECT_TRUE(holds(html, "\xC2\xB1 6"));
+    EXPECT_TRUE(holds(html, "within the error also"));
+    document["simulate"][1]["mrays_per_s_bound"] = 80.0;
+    EXPECT_FALSE(holds(page_of({document}), "within the error also"));
+}
+
+TEST(MakeReport, ClaimsSayWhatTheyWouldTake) {
+    Json document = Json::parse(shared_document("traversal.json"));
+    document["claims"][2]["verdict"] = "needs whole launches";
+    EXPECT_TRUE(holds(page_of({document}), "needs whole launches"));
+}
+
+TEST(MakeReport, APublishedRateWithinTheErrorOfItsBoundIsNoAlarm) {
+    Json document = Json::parse(shared_document("traversal.json"));
+    document["published"][0]["mrays_per_s"] = 600.0;  // the bound is 584.7
+    for (Json& row : document["simulate"]) row["sampling_error"] = 0.03;
+    const std::string html = page_of({document});
+    EXPECT_FALSE(holds(html, "differ from the authors' there"));
+    EXPECT_TRUE(holds(html, "above, within the error"));
+    // Two documents, one row.
+    Json other = document;
+    other["simulate"] = Json::array();
+    const std::string twice = page_of({document, other});
+    const auto count = [](const std::string& text, const std::string& part) {
+        std::size_t n = 0;
+        for (std::size_t at = text.find(part); at != std::string::npos;
+             at = text.find(part, at + 1))
+            ++n;
+        return n;
+    };
+    EXPECT_EQ(count(twice, "above, within the error"), count(html, "above, within the error"));
+}
+
 TEST(MakeReport, UnknownDocumentsAreTables) {
     const std::string html = page_of({Json::parse(R"({"command": "bench unheard-of", "answer": 42,
         "deep": {"a": {"b": {"c": {"d": {"e": {"f": 1}}}}}}, "rows": [{"x": 1, "y": {"z": "text"}}, {"x": null}],

@@ -6,8 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "simt/memory_model.h"
-
 namespace raydix::test {
 namespace {
 
@@ -123,43 +121,6 @@ TEST(BlockPlaces, TogetherWaitForAllBlocksOnTheMachine) {
     EXPECT_TRUE(started(places).empty());
     places.finish(1);
     EXPECT_EQ(started(places), (Starts{{2, 0}, {3, 1}}));
-}
-
-TEST(SectorCache, ForgetsTheLeastRecentlyUsed) {
-    SectorCache cache(8 * 32);  // one set of 8 ways
-    for (std::uint64_t n = 0; n < 8; ++n) EXPECT_FALSE(cache.touch(n));
-    for (std::uint64_t n = 0; n < 8; ++n) EXPECT_TRUE(cache.touch(n));
-    EXPECT_TRUE(cache.touch(0));   // now 1 is the oldest
-    EXPECT_FALSE(cache.touch(8));  // takes its place
-    EXPECT_TRUE(cache.touch(0));
-    EXPECT_FALSE(cache.touch(1));
-}
-
-TEST(MemoryModel, CountsLinesSectorsAndMisses) {
-    alignas(128) static std::byte memory[4096];
-    const MemoryRange all{memory, sizeof(memory)};
-    MemoryModel model(2, 1024, 64 * 1024, std::span(&all, 1));
-    const void* same[32];
-    for (const void*& address : same) address = memory;
-    model.run_on(0);
-    model.read(same, 32, 64);  // 64 bytes of one line: 4 transactions, 2 sectors
-    EXPECT_EQ(model.l1_transactions(), 4u);
-    EXPECT_EQ(model.l2_bytes(), 64u);
-    EXPECT_EQ(model.dram_bytes(), 64u);
-    model.read(same, 32, 64);  // all in the first cache
-    EXPECT_EQ(model.l1_transactions(), 8u);
-    EXPECT_EQ(model.l2_bytes(), 64u);
-    model.run_on(1);
-    model.read(same, 32, 64);  // in the second cache only
-    EXPECT_EQ(model.l2_bytes(), 128u);
-    EXPECT_EQ(model.dram_bytes(), 64u);
-    const void* apart[4];
-    for (int k = 0; k < 4; ++k) apart[k] = memory + 1024 + 128 * k;
-    model.read(apart, 4, 16);  // four lines, a sector each
-    EXPECT_EQ(model.l1_transactions(), 16u);
-    EXPECT_EQ(model.dram_bytes(), 64u + 4 * 32);
-    const void* elsewhere = &model;
-    EXPECT_THROW(model.read(&elsewhere, 1, 4), std::logic_error);
 }
 
 }  // namespace

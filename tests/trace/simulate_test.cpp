@@ -246,7 +246,9 @@ bool same(const Simulation& a, const Simulation& b) {
     bool equal = a.instructions == b.instructions && a.lane_instructions == b.lane_instructions &&
                  a.scheduled_clocks == b.scheduled_clocks && a.idle_issues == b.idle_issues &&
                  a.warp_times == b.warp_times && a.l1_transactions == b.l1_transactions &&
-                 a.l2_bytes == b.l2_bytes && a.dram_bytes == b.dram_bytes && a.hits == b.hits;
+                 a.l2_bytes == b.l2_bytes && a.dram_bytes == b.dram_bytes &&
+                 a.replays == b.replays && a.texture_fetches == b.texture_fetches &&
+                 a.memory_wait_clocks == b.memory_wait_clocks && a.hits == b.hits;
     for (std::size_t k = 0; k < a.operations.size(); ++k)
         equal = equal && a.operations[k].issues == b.operations[k].issues &&
                 a.operations[k].lanes == b.operations[k].lanes;
@@ -262,6 +264,7 @@ TEST(Simulate, FiguresDoNotDependOnThreads) {
         for (const bool any_hit : {false, true}) {
             runs.push_back(options_for(kernel));
             runs.back().any_hit = any_hit;
+            runs.back().memory = kernel == WarpKernel::while_while;
         }
     const auto one = simulate(tree, rays, runs, nullptr, 1);
     for (const int threads : {2, 7}) {

@@ -9,6 +9,7 @@
 
 #include "base/hd.h"
 #include "simt/op.h"
+#include "simt/thread_warp.h"
 #include "trace/warp/lane.h"
 #include "trace/warp/steps.h"
 
@@ -26,17 +27,28 @@ struct WarpJob {
     RayLaunch launch;
 };
 
+/// Tells memory models that lanes read their new rays.
+template <class Warp>
+RAYDIX_HD void touch_rays(Warp& warp, const RayLaunch& launch) {
+    warp.touches(
+        Access::read, [&](const Lane& l) { return has_ray(l) ? launch.rays + l.ray : nullptr; },
+        sizeof(Ray));
+}
+
+/// Results of the lanes that have one.
+template <class Warp>
+RAYDIX_HD void store_hits(Warp& warp, const RayLaunch& launch) {
+    warp.touches(
+        Access::write, [&](const Lane& l) { return has_ray(l) ? launch.hits + l.ray : nullptr; },
+        sizeof(TreeHit));
+    warp.step(Op::store_hit, [&](Lane& l) { store_hit(l, launch); });
+}
+
 template <class Warp>
 RAYDIX_HD void start_batch(Warp& warp, const RayLaunch& launch, std::uint32_t first) {
     warp.step_indexed(Op::start_ray,
                       [&](Lane& l, std::uint32_t lane) { start_ray(l, launch, first + lane); });
-    warp.reads([&](const Lane& l) { return launch.rays + (has_ray(l) ? l.ray : first); },
-               sizeof(Ray));
-}
-
-template <class Warp>
-RAYDIX_HD void store_batch(Warp& warp, const RayLaunch& launch) {
-    warp.step(Op::store_hit, [&](Lane& l) { store_hit(l, launch); });
+    touch_rays(warp, launch);
 }
 
 /// Warp k traces rays [k * width, (k + 1) * width).
@@ -49,7 +61,7 @@ struct OneBatch {
     RAYDIX_HD bool turn(Warp& warp, const WarpJob& job, std::uint32_t warp_index) {
         start_batch(warp, job.launch, warp_index * Warp::width());
         Body::template trace<any_hit>(warp, job.scene);
-        store_batch(warp, job.launch);
+        store_hits(warp, job.launch);
         return false;
     }
 };
@@ -72,7 +84,7 @@ struct Persistent {
         if (next >= job.launch.count) return false;
         start_batch(warp, job.launch, next);
         Body::template trace<any_hit>(warp, job.scene);
-        store_batch(warp, job.launch);
+        store_hits(warp, job.launch);
         warp.meet();  // else a lane that is done early could start the next batch alone
         next += Warp::width();
         return true;

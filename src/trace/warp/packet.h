@@ -49,7 +49,8 @@ private:
                                        std::uint32_t& top) {
         const NodePair& pair = scene.pairs[at.node];
         warp.among(at.lanes, [&] {
-            warp.reads([&](const Lane&) { return &pair; }, sizeof(NodePair));
+            warp.touches(
+                Access::read, [&](const Lane&) { return &pair; }, sizeof(NodePair));
             warp.step(Op::visit_node, [&](Lane& l) {
                 const PairVisit met = meet_pair(l, pair);
                 const bool rather_second = met.second && (met.second_is_closer || !met.first);

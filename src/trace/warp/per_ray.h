@@ -6,31 +6,48 @@
 
 #include "base/hd.h"
 #include "simt/op.h"
+#include "simt/thread_warp.h"
 #include "trace/warp/lane.h"
 #include "trace/warp/steps.h"
 
 namespace raydix {
 
+RAYDIX_HD static inline std::int32_t top_of(const Lane& l) {
+    return static_cast<std::int32_t>(l.top);
+}
+
+template <class Warp>
+RAYDIX_HD void pop_next(Warp& warp) {
+    warp.touches_stack(Access::read, [](const Lane& l) { return top_of(l) - 1; });
+    warp.step(Op::pop, [](Lane& l) { pop(l); });
+}
+
 /// One visit of an inner node.
 template <class Warp>
 RAYDIX_HD void visit_once(Warp& warp, const WarpScene& scene) {
-    warp.reads([&](const Lane& l) { return &scene.pairs[l.node]; }, sizeof(NodePair));
+    warp.touches(
+        Access::read, [&](const Lane& l) { return &scene.pairs[l.node]; }, sizeof(NodePair));
     warp.step(Op::visit_node, [&](Lane& l) { visit_node(l, scene); });
     warp.when([](const Lane& l) { return must_push(l); },
-              [&] { warp.step(Op::push, [](Lane& l) { push(l); }); });
-    warp.when([](const Lane& l) { return must_pop(l); },
-              [&] { warp.step(Op::pop, [](Lane& l) { pop(l); }); });
+              [&] {
+                  warp.touches_stack(Access::write, top_of);
+                  warp.step(Op::push, [](Lane& l) { push(l); });
+              });
+    warp.when([](const Lane& l) { return must_pop(l); }, [&] { pop_next(warp); });
 }
 
 /// Tests the triangle at `link(lane)`, a reference to a leaf link.
 template <class Warp, class Link>
 RAYDIX_HD void test_triangle(Warp& warp, const WarpScene& scene, Link link) {
     const auto position = [link](const Lane& l) { return static_cast<std::uint32_t>(~link(l)); };
-    warp.reads([&](const Lane& l) { return scene.triangles[position(l)].z; }, 16);
+    warp.touches(
+        Access::read, [&](const Lane& l) { return scene.triangles[position(l)].z; }, 16);
     warp.step(Op::test_triangle, [&](Lane& l) { test_plane(l, scene, position(l)); });
     warp.when([](const Lane& l) { return plane_in_range(l); },
               [&] {
-                  warp.reads([&](const Lane& l) { return scene.triangles[position(l)].x; }, 32);
+                  warp.touches(
+                      Access::read, [&](const Lane& l) { return scene.triangles[position(l)].x; },
+                      32);
                   warp.step(Op::test_edges, [&](Lane& l) { test_edges(l, scene, position(l)); });
                   warp.when([](const Lane& l) { return inside_edges(l); },
                             [&] {
@@ -44,13 +61,13 @@ RAYDIX_HD void test_triangle(Warp& warp, const WarpScene& scene, Link link) {
 template <bool any_hit, class Warp>
 RAYDIX_HD void test_in_place(Warp& warp, const WarpScene& scene) {
     test_triangle(warp, scene, [](const Lane& l) { return l.node; });
-    warp.reads([&](const Lane& l) { return &scene.ids[~l.node]; }, 4);
+    warp.touches(
+        Access::read_beside, [&](const Lane& l) { return &scene.ids[~l.node]; }, 4);
     warp.step(Op::next_triangle, [&](Lane& l) {
         const std::int32_t next = after_triangle(l.node, scene, popped_node);
         l.node = any_hit && l.prim != no_primitive ? finished_node : next;
     });
-    warp.when([](const Lane& l) { return must_pop(l); },
-              [&] { warp.step(Op::pop, [](Lane& l) { pop(l); }); });
+    warp.when([](const Lane& l) { return must_pop(l); }, [&] { pop_next(warp); });
 }
 
 /// Nodes until each lane has come to a leaf, then all triangles of those leaves.
@@ -110,12 +127,13 @@ private:
     template <class Warp>
     RAYDIX_HD static void put_leaf_aside(Warp& warp) {
         warp.step(Op::postpone_leaf, [](Lane& l) { l.leaf = l.node; });
-        warp.step(Op::pop, [](Lane& l) { pop(l); });
+        pop_next(warp);
     }
     template <bool any_hit, class Warp>
     RAYDIX_HD static void test_leaf_aside(Warp& warp, const WarpScene& scene) {
         test_triangle(warp, scene, [](const Lane& l) { return l.leaf; });
-        warp.reads([&](const Lane& l) { return &scene.ids[~l.leaf]; }, 4);
+        warp.touches(
+            Access::read_beside, [&](const Lane& l) { return &scene.ids[~l.leaf]; }, 4);
         warp.step(Op::next_triangle, [&](Lane& l) {
             const bool end = any_hit && l.prim != no_primitive;
             l.leaf = end ? 0 : after_triangle(l.leaf, scene, 0);
@@ -125,7 +143,7 @@ private:
         warp.when([](const Lane& l) { return l.leaf == 0 && at_leaf(l); },
                   [&] {
                       warp.step(Op::next_leaf, [](Lane& l) { l.leaf = l.node; });
-                      warp.step(Op::pop, [](Lane& l) { pop(l); });
+                      pop_next(warp);
                   });
     }
 };

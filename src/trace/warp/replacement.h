@@ -26,7 +26,7 @@ RAYDIX_HD bool replace_finished(Warp& warp, const RayLaunch& launch, bool& dry) 
     const LaneMask finished = warp.ballot(Op::ballot, is_finished);
     if (finished == 0) return true;
     warp.when([](const Lane& l) { return is_finished(l) && has_ray(l); },
-              [&] { warp.step(Op::store_hit, [&](Lane& l) { store_hit(l, launch); }); });
+              [&] { store_hits(warp, launch); });
     const auto count = static_cast<std::uint32_t>(count_ones(finished));
     if (dry) return count < Warp::width();
     const std::uint32_t first = warp.take(Op::take_rays, *launch.next, count);
@@ -37,8 +37,7 @@ RAYDIX_HD bool replace_finished(Warp& warp, const RayLaunch& launch, bool& dry) 
             l.ray = first + rank_in(finished, lane);
         });
         warp.step(Op::start_ray, [&](Lane& l) { start_ray(l, launch, l.ray); });
-        warp.reads([&](const Lane& l) { return launch.rays + (has_ray(l) ? l.ray : first); },
-                   sizeof(Ray));
+        touch_rays(warp, launch);
     });
     return true;
 }

@@ -81,10 +81,13 @@ void check_options(const SimulateOptions& options) {
     positive("l1_transactions_per_clock", m.l1_transactions_per_clock);
     positive("l2_gb_per_s", m.l2_gb_per_s);
     positive("dram_gb_per_s", m.dram_gb_per_s);
-    positive("l1_bytes", m.l1_bytes);
+    positive("l1_line_bytes", m.l1_line_bytes);
+    if (m.l1_line_bytes % 32 != 0)
+        throw InputError("machine " + m.name + ": l1_line_bytes is not a multiple of 32");
+    if (m.texture_bytes > 0) positive("texture_sharers", m.texture_sharers);
     positive("l2_bytes", m.l2_bytes);
     // The model keeps a record for each 32 bytes of cache.
-    if (double(m.l1_bytes) * m.multiprocessors + m.l2_bytes > 1 << 30)
+    if ((double(m.l1_bytes) + m.texture_bytes) * m.multiprocessors + m.l2_bytes > 1 << 30)
         throw InputError("machine " + m.name +
                          ": l1_bytes of all multiprocessors and l2_bytes are more than 2^30");
 }
@@ -203,10 +206,44 @@ void Simulation::add(const Simulation& other) {
     idle_issues += other.idle_issues;
     issue_slots += other.issue_slots;
     for (std::size_t k = 0; k < warp_times.size(); ++k) warp_times[k] += other.warp_times[k];
+    texture_fetches += other.texture_fetches;
+    replays += other.replays;
+    memory_wait_clocks += other.memory_wait_clocks;
     l1_transactions += other.l1_transactions;
     l2_bytes += other.l2_bytes;
     dram_bytes += other.dram_bytes;
 }
+
+namespace {
+
+std::vector<SimulatedRates::Limit> memory_limits(const Simulation& s,
+                                                 const SimulateOptions& options) {
+    const MachineModel& m = options.machine;
+    std::vector<SimulatedRates::Limit> limits;
+    const double clocks_per_us = m.clock_ghz * 1e3 * m.multiprocessors;
+    const auto add = [&](std::string_view name, double us) {
+        if (us > 0) limits.push_back({name, static_cast<double>(s.rays) / us});
+    };
+    if (m.replays)
+        add("replays", static_cast<double>(s.instructions + s.replays) * options.width /
+                           m.lanes_per_clock / clocks_per_us);
+    if (m.texture_fetches_per_clock > 0)
+        add("texture",
+            static_cast<double>(s.texture_fetches) / m.texture_fetches_per_clock / clocks_per_us);
+    if (m.l1_bytes > 0)
+        add("l1",
+            static_cast<double>(s.l1_transactions) / m.l1_transactions_per_clock / clocks_per_us);
+    add("l2", static_cast<double>(s.l2_bytes) / (m.l2_gb_per_s * 1e3));
+    add("dram", static_cast<double>(s.dram_bytes) / (m.dram_gb_per_s * 1e3));
+    // Warps in flight, each with its own instructions and waits one after the other.
+    const double alone =
+        static_cast<double>(s.instructions) * m.warp_issue_clocks + s.memory_wait_clocks;
+    add("latency", alone / std::max(1u, m.resident_lanes / static_cast<unsigned>(options.width)) /
+                       clocks_per_us);
+    return limits;
+}
+
+}  // namespace
 
 SimulatedRates simulated_rates(const Simulation& s, const SimulateOptions& options) {
     const MachineModel& m = options.machine;
@@ -223,11 +260,12 @@ SimulatedRates simulated_rates(const Simulation& s, const SimulateOptions& optio
     rates.simd_efficiency = static_cast<double>(s.lane_instructions) /
                             (static_cast<double>(s.instructions) * options.width);
     if (!options.memory) return rates;
-    const double l1_us = static_cast<double>(s.l1_transactions) /
-                         (m.l1_transactions_per_clock * m.multiprocessors) / clocks_per_us;
-    const double l2_us = static_cast<double>(s.l2_bytes) / (m.l2_gb_per_s * 1e3);
-    const double dram_us = static_cast<double>(s.dram_bytes) / (m.dram_gb_per_s * 1e3);
-    rates.memory = rays / std::max({issue_clocks / clocks_per_us, l1_us, l2_us, dram_us});
+    rates.memory_limits = memory_limits(s, options);
+    rates.memory = rates.bound;
+    rates.memory_limit = "issue";
+    for (const SimulatedRates::Limit& limit : rates.memory_limits)
+        if (limit.mrays_per_s < rates.memory)
+            rates.memory = limit.mrays_per_s, rates.memory_limit = limit.name;
     return rates;
 }
 
@@ -246,9 +284,12 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
     const PreparedRays prepared(rays);
     const WarpTree::Arrays& arrays = tree.arrays();
     const std::array memory{
-        MemoryRange{arrays.pairs.data(), arrays.pairs.view().size_bytes()},
-        MemoryRange{arrays.triangles.data(), arrays.triangles.view().size_bytes()},
-        MemoryRange{arrays.ids.data(), arrays.ids.view().size_bytes()}};
+        MemoryRange{arrays.pairs.data(), arrays.pairs.view().size_bytes(),
+                    MemoryRange::Holds::nodes},
+        MemoryRange{arrays.triangles.data(), arrays.triangles.view().size_bytes(),
+                    MemoryRange::Holds::triangles},
+        MemoryRange{arrays.ids.data(), arrays.ids.view().size_bytes(),
+                    MemoryRange::Holds::triangles}};
     with_threads(threads, [&] {
         for_each_index(
             runs.size(),

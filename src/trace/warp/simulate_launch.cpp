@@ -98,12 +98,12 @@ std::vector<WarpWork> run_batches(const LaunchRun& run, Simulation& figures) {
         KernelState state;
         for (std::size_t w = begin; w < end; ++w) {
             const WarpTally before = tally;
-            if (run.memory)
-                run.memory->run_on(
-                    static_cast<std::uint32_t>(w * run.width() / run.options.machine.block_lanes %
-                                               run.options.machine.multiprocessors));
             run.kernel.start_kernel(state);
             run.kernel.turn(memory.at(0), state, run.job, static_cast<std::uint32_t>(w));
+            if (run.memory)
+                run.memory->hand_over(
+                    static_cast<std::uint32_t>(w * run.width() / run.options.machine.block_lanes %
+                                               run.options.machine.multiprocessors));
             works[w] = work_between(before, tally);
         }
     };
@@ -191,9 +191,9 @@ void run_persistent(const LaunchRun& run, Simulation& figures) {
     const auto turn = [&](std::uint32_t place, std::uint32_t warp) {
         const WarpTally before = tally;
         const bool more_rays = *launch.next < launch.count;
-        if (run.memory) run.memory->run_on(place);
         done[warp] = !run.kernel.turn(memory.at(run.kernel.keeps_rays ? warp : 0), states[warp],
                                       run.job, warp);
+        if (run.memory) run.memory->hand_over(place);
         const std::uint64_t time = tally.issued - before.issued;
         lives[warp] += time;
         if (!run.kernel.keeps_rays && !done[warp]) ++figures.warp_times[time_bin(time)];
@@ -284,8 +284,8 @@ Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
     if (options.memory) {
         std::vector<MemoryRange> ranges(memory.begin(), memory.end());
         ranges.push_back({rays.data(), rays.size_bytes()});
-        run.memory =
-            std::make_unique<MemoryModel>(m.multiprocessors, m.l1_bytes, m.l2_bytes, ranges);
+        ranges.push_back({hits.data(), hits.size_bytes()});
+        run.memory = std::make_unique<MemoryModel>(m, run.width(), stack_entries, ranges);
     }
     Simulation figures = empty_figures(run.costs);
     figures.launches = 1;
@@ -301,9 +301,14 @@ Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
     figures.hits = static_cast<std::uint64_t>(
         std::count_if(hits.begin(), hits.end(), [](const TreeHit& hit) { return hit.hit(); }));
     if (run.memory) {
-        figures.l1_transactions = run.memory->l1_transactions();
-        figures.l2_bytes = run.memory->l2_bytes();
-        figures.dram_bytes = run.memory->dram_bytes();
+        run.memory->finish();
+        const MemoryTraffic& traffic = run.memory->traffic();
+        figures.texture_fetches = traffic.texture_fetches;
+        figures.l1_transactions = traffic.l1_requests;
+        figures.replays = traffic.replays;
+        figures.l2_bytes = traffic.l2_bytes;
+        figures.dram_bytes = traffic.dram_bytes;
+        figures.memory_wait_clocks = traffic.wait_clocks;
     }
     return figures;
 }

@@ -17,7 +17,7 @@ namespace raydix {
 struct WarpSetup {
     const OpCosts* costs;
     WarpTally* tally;
-    ReadObserver* observer;  // or null
+    MemoryObserver* observer;  // or null
     std::uint32_t stack_entries;
     const OpClocks* clocks = nullptr;  // or null
 };

@@ -60,7 +60,7 @@ private:
     RAYDIX_HD void fetch(Warp& warp, const RayLaunch& launch) {
         const LaneMask finished = warp.ballot(Op::ballot, is_finished);
         warp.when([](const Lane& l) { return is_finished(l) && has_ray(l); },
-                  [&] { warp.step(Op::store_hit, [&](Lane& l) { store_hit(l, launch); }); });
+                  [&] { store_hits(warp, launch); });
         if (dry_) return;
         const auto count = static_cast<std::uint32_t>(count_ones(finished));
         const std::uint32_t first = warp.take(Op::take_rays, *launch.next, count);
@@ -71,8 +71,7 @@ private:
                 l.ray = first + rank_in(finished, lane);
             });
             warp.step(Op::start_ray, [&](Lane& l) { start_ray(l, launch, l.ray); });
-            warp.reads([&](const Lane& l) { return launch.rays + (has_ray(l) ? l.ray : first); },
-                       sizeof(Ray));
+            touch_rays(warp, launch);
         });
     }
 

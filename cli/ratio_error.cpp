@@ -1,0 +1,158 @@
+#include "ratio_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+#include <vector>
+
+namespace raydix::cli {
+namespace {
+
+/// Instructions per ray of each operation: those that are charged, and those beyond that it may
+/// take.
+struct IssueRange {
+    double charged = 0;
+    std::vector<double> beyond;  // in the order of the simulation's operations
+
+    [[nodiscard]] double most() const {
+        double sum = charged;
+        for (const double instructions : beyond) sum += instructions;
+        return sum;
+    }
+};
+
+IssueRange issue_range(const SimulationRow& row) {
+    IssueRange range;
+    const std::string_view kernel = warp_kernel_name(row.options.kernel);
+    const auto rays = static_cast<double>(row.sum.rays);
+    for (const OperationFigure& op : row.sum.operations) {
+        const double issues = static_cast<double>(op.issues) / rays;
+        range.charged += issues * op.instructions;
+        double beyond = 0;
+        for (const OperationCost& cost : row.options.machine.costs)
+            if (cost.operation == op.operation && (cost.kernel.empty() || cost.kernel == kernel) &&
+                cost.most > op.instructions)
+                beyond = issues * (cost.most - op.instructions);
+        range.beyond.push_back(beyond);
+    }
+    return range;
+}
+
+/// The largest a / b if an operation is at the same end of its range in both: the ends that raise
+/// the ratio found so far, until none does.
+double largest_together(const IssueRange& a, const IssueRange& b) {
+    double ratio = a.charged / b.charged;
+    while (true) {
+        double above = a.charged, below = b.charged;
+        for (std::size_t k = 0; k < a.beyond.size(); ++k)
+            if (a.beyond[k] > ratio * b.beyond[k]) above += a.beyond[k], below += b.beyond[k];
+        if (above / below <= ratio * (1 + 1e-12)) return ratio;
+        ratio = above / below;
+    }
+}
+
+bool same_steps(const SimulationRow& a, const SimulationRow& b) {
+    constexpr std::string_view prefix = "persistent_";
+    const auto body = [&](const SimulationRow& row) {
+        std::string_view name = warp_kernel_name(row.options.kernel);
+        if (name.starts_with(prefix)) name.remove_prefix(prefix.size());
+        return name;
+    };
+    return a.options.machine.name == b.options.machine.name && body(a) == body(b);
+}
+
+/// Instructions of `a` over those of `b`, both per ray, relative to what is charged.
+Interval cost_range(const SimulationRow& a, const SimulationRow& b) {
+    const IssueRange x = issue_range(a), y = issue_range(b);
+    const double charged = x.charged / y.charged;
+    if (same_steps(a, b))
+        return {1.0 / (largest_together(y, x) * charged), largest_together(x, y) / charged};
+    return {x.charged / y.most() / charged, x.most() / y.charged / charged};
+}
+
+/// Relative standard error of the ratio of two rates whose rows traced the same units.
+std::optional<double> paired_error(const SimulationRow& a, const SimulationRow& b,
+                                   double SimulatedRates::*rate) {
+    if (a.part_taken >= 1.0 && b.part_taken >= 1.0) return 0.0;
+    const std::size_t n = a.units.size();
+    if (n < 2 || b.units.size() != n) return std::nullopt;
+    double sum_a = 0, sum_b = 0, squares = 0;
+    for (std::size_t k = 0; k < n; ++k)
+        sum_a += 1.0 / (a.units[k].*rate), sum_b += 1.0 / (b.units[k].*rate);
+    for (std::size_t k = 0; k < n; ++k) {
+        const double left = 1.0 / (a.units[k].*rate) - sum_a / sum_b / (b.units[k].*rate);
+        squares += left * left;
+    }
+    const auto count = static_cast<double>(n);
+    const double mean = sum_a / count;
+    return std::sqrt(squares / (count - 1) / count * (1.0 - a.part_taken)) / mean;
+}
+
+std::uint64_t warps_of(const Simulation& sum) {
+    std::uint64_t all = 0;
+    for (const std::uint64_t count : sum.warp_times) all += count;
+    return all;
+}
+
+/// Bin of the warp that `rank` warps are slower than.
+double bin_of_rank(const Simulation& sum, double rank) {
+    double seen = 0;
+    for (std::size_t k = sum.warp_times.size(); k-- > 0;) {
+        seen += static_cast<double>(sum.warp_times[k]);
+        if (seen > rank) return static_cast<double>(k);
+    }
+    return 0.0;
+}
+
+/// Time of the slowest 0.1 % of warps, in instructions, with its error.
+struct SlowTime {
+    double middle, low, high;
+};
+SlowTime slow_time(const SimulationRow& row) {
+    const double rank = 0.001 * static_cast<double>(warps_of(row.sum));
+    const double spread = row.part_taken < 1.0 ? 2.0 * std::sqrt(rank) + 1.0 : 0.0;
+    const auto at = [](double bin) { return std::exp2(bin / 8.0); };
+    return {at(bin_of_rank(row.sum, rank) + 0.5), at(bin_of_rank(row.sum, rank + spread)),
+            at(bin_of_rank(row.sum, std::max(0.0, rank - spread)) + 1.0)};
+}
+
+RatioFound slow_ratio(const SimulationRow& a, const SimulationRow& b) {
+    const SlowTime x = slow_time(a), y = slow_time(b);
+    const Interval costs = cost_range(a, b);
+    return {x.middle / y.middle, {x.low / y.high * costs.low, x.high / y.low * costs.high}, {}};
+}
+
+RatioFound rate_ratio(const SimulationRow& a, const SimulationRow& b, Figure figure) {
+    const auto rate =
+        figure == Figure::scheduled ? &SimulatedRates::scheduled : &SimulatedRates::bound;
+    const SimulatedRates x = a.rates(), y = b.rates();
+    const bool instructions = figure == Figure::instructions;
+    RatioFound found;
+    found.ratio =
+        instructions
+            ? static_cast<double>(a.sum.instructions) / static_cast<double>(a.sum.rays) /
+                  (static_cast<double>(b.sum.instructions) / static_cast<double>(b.sum.rays))
+            : x.*rate / (y.*rate);
+    const std::optional<double> error = paired_error(a, b, rate);
+    if (!error) {
+        found.needs = "needs two parts of launches or more";
+        return found;
+    }
+    // A rate is one over instructions.
+    const Interval costs = instructions ? cost_range(a, b) : cost_range(b, a);
+    found.error = {*found.ratio * costs.low * std::max(0.0, 1.0 - 2.0 * *error),
+                   *found.ratio * costs.high * (1.0 + 2.0 * *error)};
+    return found;
+}
+
+}  // namespace
+
+RatioFound ratio_of(const SimulationRow& a, const SimulationRow& b, Figure figure) {
+    if (a.sum.instructions == 0 || b.sum.instructions == 0)
+        return {.ratio = std::nullopt, .needs = "needs rays"};
+    if (figure == Figure::scheduled && !(a.whole_launches && b.whole_launches))
+        return {.ratio = std::nullopt, .needs = "needs whole launches"};
+    return figure == Figure::slowest_warps ? slow_ratio(a, b) : rate_ratio(a, b, figure);
+}
+
+}  // namespace raydix::cli

@@ -1,0 +1,33 @@
+// The ratio of one simulated figure to another, with its error: what the sample leaves open, and
+// what the derivation of costs does (docs/costs.md).
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "simulation.h"
+
+namespace raydix::cli {
+
+struct Interval {
+    double low, high;
+};
+
+enum class Figure { bound, scheduled, instructions, slowest_warps };
+
+struct RatioFound {
+    std::optional<double> ratio;  // nothing if a figure is missing
+    Interval error{};             // the ratio with all of its error
+    std::string needs;            // what is missing for a ratio, or for its error
+};
+
+/// `a` over `b`. The error is the product of two ranges. The first comes from costs: each operation
+/// of a machine takes any number of instructions between its cost and OperationCost::most. Forms of
+/// one kernel that differ by persistence only share that number; other kernels and machines have
+/// numbers of their own. A schedule moves at most as its instructions do. The second is two
+/// standard errors of the sample, of the differences between units that both rows traced. The
+/// slowest 0.1 % of warps also carry the width of their bins and, in a sample, two standard errors
+/// of their number.
+[[nodiscard]] RatioFound ratio_of(const SimulationRow& a, const SimulationRow& b, Figure figure);
+
+}  // namespace raydix::cli
