@@ -9,6 +9,8 @@
 
 #include <hwy/highway.h>
 
+#include <bit>
+
 #include "trace/simd/lanes.h"
 #include "trace/simd/ray_classes.h"
 #include "trace/simd/stream_rays.h"
@@ -102,15 +104,17 @@ HWY_INLINE V4 load_axes(const float* from) {
 #endif
 }
 
-/// A valid ray whose direction is near unit length; `components`: the direction once more.
+/// A valid ray whose direction is near unit length; `components`: the direction once more, and the
+/// longest of them, without sign.
 HWY_INLINE void fill_usual_frame(const WideView& tree, V4 place, V4 way, const float* components,
-                                 float tmin, float tmax, SingleFrame& out) {
+                                 float longest, float tmin, float tmax, SingleFrame& out) {
     const hn::RebindToSigned<F4> i4;
     const std::uint32_t negatives = bits_of(i4, hn::Lt(hn::BitCast(i4, way), hn::Zero(i4))) & 7;
-    const float ax = std::fabs(components[0]), ay = std::fabs(components[1]),
-                az = std::fabs(components[2]);
-    const float longest = max_of(max_of(ax, ay), az);
-    const std::uint32_t kz = az == longest ? 2 : ay == longest ? 1 : 0;
+    // The last of the longest axes, without a jump: rays that go anywhere could not be foreseen.
+    const V4 sizes = hn::Abs(way);
+    const std::uint32_t kz = static_cast<std::uint32_t>(std::bit_width(
+                                 bits_of(f4, hn::Eq(sizes, hn::Set(f4, longest))) & 7)) -
+                             1;
     out.kind = ray_classes[negatives + 8 * kz];
     const V4 origin = hn::Add(place, hn::Zero(f4));  // -0 becomes +0
     const V4 inverse = limited(hn::Div(hn::Set(f4, 1.0f), way)),
@@ -122,7 +126,7 @@ HWY_INLINE void fill_usual_frame(const WideView& tree, V4 place, V4 way, const f
     set_starts(tree, origin, inverse, pad, out);
     out.shear[0] = components[out.kind.kx] / components[kz];
     out.shear[1] = components[out.kind.ky] / components[kz];
-    out.tmin = tmin > 0.0f ? tmin : 0.0f;
+    out.tmin = max_of(tmin, 0.0f);
     out.tmax = min_of(tmax, std::numeric_limits<float>::max());
     out.t_scale = 1.0f;
 }
@@ -143,7 +147,7 @@ HWY_INLINE bool fill_frame(const WideView& tree, const Ray& ray, SingleFrame& ou
         fill_odd_frame(tree, ray, out);
         return true;
     }
-    fill_usual_frame(tree, place, way, &ray.direction.x, ray.tmin, ray.tmax, out);
+    fill_usual_frame(tree, place, way, &ray.direction.x, longest, ray.tmin, ray.tmax, out);
     return true;
 }
 
