@@ -306,7 +306,7 @@ TEST(MakeReport, DamagedDocumentsStillGiveAPage) {
     SCOPED_TRACE(fmt::format("seed {}", seed));
     std::mt19937 random(seed);
     std::ifstream study(std::string(RAYDIX_SOURCE_DIR) +
-                        "/bench/results/hierarchy-AMD-EPYC-2-cores.json");
+                        "/bench/results/hierarchy-Milan-2-cores.json");
     Json hierarchy = Json::parse(study);
     Json& runs = hierarchy["runs"];
     while (runs.size() > 12) runs.erase(runs.size() / 2);  // enough of each kind, and quick

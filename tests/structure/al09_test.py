@@ -47,6 +47,16 @@ class Al09(unittest.TestCase):
             if claim["verdict"] != "holds":
                 self.assertIn(claim["claim"], " | ".join(paragraphs))
 
+    def test_kernels_are_compared_on_the_same_launches(self):
+        def row(kernel, part, bound):
+            return {"scene": "s.ply", "machine": "m", "kernel": kernel, "rays": "ao", "part_taken": part, "count": 1000 * part, "sampling_error": 0.1 - part / 10,
+                    "mrays_per_s_bound": bound, "mrays_per_s_scheduled": bound - 1, "memory_limits": None}
+        # `slow` was also traced on a larger part of the launches, which are easier there.
+        made_up = plots.Results([{"simulate": [row("fast", 0.25, 100), row("slow", 0.25, 90)], "claims": [], "published": []},
+                                 {"simulate": [row("slow", 0.5, 150)], "claims": [], "published": []}])
+        self.assertEqual(made_up.on_same_launches("s", "m", "ao"), {"fast": ("scheduled", 99), "slow": ("scheduled", 89)})
+        self.assertEqual(made_up.bound(("s", "m", "slow", "ao")), (150, 0.05))
+
     def test_verdicts_follow_the_rule(self):
         self.assertGreater(len(results.claims), 40)
         for claim in results.claims.values():
