@@ -280,7 +280,7 @@ private:
             const auto more = static_cast<std::size_t>(std::popcount(here));
             if constexpr (closest) {
                 V entry = compress(f8, hn::Load(f8, entries + l), here);
-                farther_first(more, entry, word);
+                if constexpr (parts8 == 1) farther_first(more, entry, word);
                 hn::StoreU(entry, f8, at + count);
             }
             hn::StoreU(word, f8, reinterpret_cast<float*>(words + count));
