@@ -116,10 +116,8 @@ void print_claims(const Json& claims_found) {
     if (claims_found.empty()) return;
     fmt::print(
         "\nclaims of Aila and Laine 2009; found: all simulated, with the error of the sample and "
-        "of "
-        "the costs.\nA claim holds if all of that lies in the paper's interval, and does not if "
-        "none "
-        "of it does; else it is open\n");
+        "of the costs.\nA claim holds if all of that lies in the paper's interval, and does not "
+        "if none of it does; else it is open\n");
     for (const Json& row : claims_found) {
         const Json& high = row["paper_high"];
         fmt::print("{:<20} {:<12} {}\n     paper {} ({:.2f} to {}); found {}\n",

@@ -61,8 +61,10 @@ struct SceneTypes<double> {
 
 /// How much a scene changes after its first commit. Hits do not depend on it.
 enum class Usage : std::uint32_t {
-    fixed = 0,   // little. Meshes share trees; a change of one builds their tree again
-    moving = 1,  // much. Each mesh has a tree; a commit refits or builds those that changed
+    fixed = 0,  // little. Meshes share trees; a change of one builds their tree again
+    /// Much. Each mesh has a tree; a commit refits or builds those that changed. From the first
+    /// refit of a mesh on, memory of one more tree and one more copy of its vertices is kept.
+    moving = 1,
 };
 
 struct SceneOptions {
@@ -197,8 +199,10 @@ public:
     /// Removes a geometry. Others keep their ids; this one is not given again. Throws InputError if
     /// there is no such geometry, as all calls below do.
     void remove(std::uint32_t id);
-    /// Replaces vertices and triangles of a mesh. A shared mesh stays shared, with these arrays.
-    /// Throws InputError as `add` does, and for a geometry that is no mesh.
+    /// Replaces vertices and triangles of a mesh. A shared mesh stays shared, with these arrays. Of
+    /// any other the triangles are copied only if they are not those of before. Large arrays are
+    /// compared and copied by several threads. Throws InputError as `add` does, and for a geometry
+    /// that is no mesh.
     void update(std::uint32_t id, const MeshView& mesh);
     /// Replaces shapes by others of the same kind. Throws InputError for another kind.
     void update(std::uint32_t id, std::span<const Sphere> spheres);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "base/median.h"
 #include "base/options.h"
 #include "build/study_scene.h"
 #include "exec/parallel.h"
@@ -59,17 +60,10 @@ public:
     }
 
 private:
-    static double median(std::vector<double>& values) {
-        if (values.empty()) return 0;
-        std::ranges::sort(values);
-        return values[values.size() / 2];
-    }
-
     template <class Probe>
     CountedBuild go(const StudyCase& what) {
         if (!what.is_builder()) return StageRun<Key, Source, Probe>(scene_, options_).run(what);
-        const BuildWay way{builder_from_name(what.subject), what.fit,
-                           static_cast<BuildForm>(what.form)};
+        const BuildWay way{builder_from_name(what.subject), what.fit, what.form};
         const std::span<const Key> keys = scene_.keys;
         return Probe::counts
                    ? count_build<Key>(way, keys, scene_.boxes, options_.max_leaf, scene_.memory)

@@ -1,5 +1,5 @@
-// measure_costs: the study's own kernels over bent sheets of several sizes -> what an item or a
-// step of each takes on this machine.
+// costs_of: runs of the study over bent sheets of several sizes -> what an item or a step of each
+// kernel takes on this machine.
 #include <raydix/hierarchy_study.h>
 
 #include <algorithm>

@@ -177,16 +177,6 @@ private:
                     scene_.octree_nodes.data(), scene_.level_begin.data());
     }
 
-    struct LeafBox {
-        const Aabb* boxes;
-        Aabb operator()(std::uint32_t first, std::uint32_t count) const {
-            Aabb box = boxes[first];
-            for (std::uint32_t k = first + 1; k < first + count; ++k) box = unite(box, boxes[k]);
-            Probe::bytes(std::uint64_t{count} * sizeof(Aabb));
-            Probe::step();
-            return box;
-        }
-    };
     void kdtree() {
         const std::uint32_t n = scene_.valid;
         if (n < 2) return;
@@ -202,7 +192,7 @@ private:
         scene_.kd_nodes.resize(2 * std::size_t{limit} + 2);
         find_kd_ranges(launcher_, keys, ranges);
         result_.inner_count = *ranges.inner;
-        emit_kd_nodes(launcher_, keys, ranges, fit, LeafBox{scene_.boxes.data()},
+        emit_kd_nodes(launcher_, keys, ranges, fit, LeafBoxOfBoxes<Probe>{scene_.boxes.data()},
                       scene_.kd_nodes.data(), &result_.max_depth);
     }
 

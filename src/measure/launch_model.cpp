@@ -156,12 +156,10 @@ std::vector<LaunchMachine> study_machines() {
     };
     return {machine("gtx480", 480, 1.401, 177, 430, 5,
                     "cores, clock and bandwidth: Karras 2012; 600 clocks of memory latency, 5 us a "
-                    "launch, 20 "
-                    "instructions an item and 12 a step: estimates"),
+                    "launch, 20 instructions an item and 12 a step: estimates"),
             machine("h200", 132 * 128, 1.98, 4800, 350, 2.5,
                     "cores, clock and bandwidth: data sheet; 700 clocks of memory latency, 2.5 us "
-                    "a launch, 20 "
-                    "instructions an item and 12 a step: estimates")};
+                    "a launch, 20 instructions an item and 12 a step: estimates")};
 }
 
 }  // namespace raydix

@@ -19,18 +19,6 @@
 namespace raydix {
 namespace {
 
-template <class Probe>
-struct LeafBoxOfBoxes {
-    const Aabb* boxes;
-    Aabb operator()(std::uint32_t first, std::uint32_t count) const {
-        Aabb box = boxes[first];
-        for (std::uint32_t k = first + 1; k < first + count; ++k) box = unite(box, boxes[k]);
-        Probe::bytes(std::uint64_t{count} * sizeof(Aabb));
-        Probe::step();
-        return box;
-    }
-};
-
 /// Boxes and leaves in preorder. Keys of a leaf follow each other, so first and count say which.
 std::string digest_of(std::span<const BvhNode> nodes) {
     WordHash hash;
@@ -76,10 +64,10 @@ public:
 
     CountedBuild run(const BuildWay& way) {
         const bool by_levels = fits_by_levels({.builder = way.builder, .fit = way.fit});
-        const bool few = limit_ == 0 && way.form != BuildForm::launches;
-        if (way.form == BuildForm::launches || few)
+        const bool few = limit_ == 0 && way.form != StudyForm::launches;
+        if (way.form == StudyForm::launches || few)
             build_by_launches(way.builder, by_levels);
-        else if (way.form == BuildForm::published)
+        else if (way.form == StudyForm::published)
             build_as_published(way.builder, by_levels);
         else
             build_tuned(way.builder);

@@ -3,29 +3,37 @@
 #pragma once
 
 #include <raydix/bvh.h>
+#include <raydix/hierarchy_study.h>
 
 #include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "base/math.h"
 #include "exec/host_launcher.h"
 #include "tree/apetrei_cpu.h"
 #include "tree/hierarchy.h"
 
 namespace raydix {
 
-/// Whose kernels a builder is made of.
-enum class BuildForm : std::uint8_t {
-    launches,   // ours, for any backend
-    published,  // karras, garanzha: those of the source, where they differ from ours
-    tuned       // karras, apetrei: ours for this processor alone, of which nothing is counted
-};
-
 struct BuildWay {
     Builder builder = Builder::karras;
     Fit fit = Fit::as_published;
-    BuildForm form = BuildForm::launches;
+    StudyForm form = StudyForm::launches;  // published: karras, garanzha; tuned: karras, apetrei
+};
+
+/// The box of the leaf over keys first to first + count - 1, from boxes in their order.
+template <class Probe>
+struct LeafBoxOfBoxes {
+    const Aabb* boxes;
+    Aabb operator()(std::uint32_t first, std::uint32_t count) const {
+        Aabb box = boxes[first];
+        for (std::uint32_t k = first + 1; k < first + count; ++k) box = unite(box, boxes[k]);
+        Probe::bytes(std::uint64_t{count} * sizeof(Aabb));
+        Probe::step();
+        return box;
+    }
 };
 
 /// Kept from one build to the next, so that no build pays for new pages.

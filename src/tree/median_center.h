@@ -8,14 +8,9 @@
 #include <vector>
 
 #include "base/math.h"
+#include "base/median.h"
 
 namespace raydix {
-
-inline double median(std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
 
 /// Where most boxes are, so that floats are finest there: the median of the middles of some, which
 /// one that strayed does not move. `box_at(i, box) -> bool` writes the i-th of n boxes, or says

@@ -23,7 +23,7 @@ std::vector<Aabb> boxes_for(std::size_t n) {
 
 template <class Key>
 CountedBuild count(Builder builder, Fit fit, const std::vector<Key>& keys, int max_leaf = 1,
-                   BuildForm form = BuildForm::launches) {
+                   StudyForm form = StudyForm::launches) {
     const std::vector<Aabb> boxes = boxes_for(keys.size());
     CountedMemory memory;
     return count_build<Key>({builder, fit, form}, keys, boxes, max_leaf, memory);
@@ -159,7 +159,7 @@ TEST(CountedBuilds, KernelsOfTheSourcesMakeTheSameTree) {
          {std::uint64_t{1}, std::uint64_t{50}, std::uint64_t{1} << 40}) {
         const auto keys = random_keys<std::uint64_t>(random, 3000, codes);
         const CountedBuild ours = count(Builder::karras, Fit::atomic, keys);
-        const CountedBuild own = count(Builder::karras, Fit::atomic, keys, 1, BuildForm::published);
+        const CountedBuild own = count(Builder::karras, Fit::atomic, keys, 1, StudyForm::published);
         EXPECT_EQ(items_of(own, "karras.link"), Items{2999});
         EXPECT_EQ(items_of(own, "fit.leaves"), Items{3000});
         EXPECT_EQ(own.launches.size(), 2u);  // no ranks, no clearing
@@ -168,20 +168,20 @@ TEST(CountedBuilds, KernelsOfTheSourcesMakeTheSameTree) {
         for (const int max_leaf : {1, 4}) {
             const CountedBuild by_scan = count(Builder::garanzha, Fit::levels, keys, max_leaf);
             const CountedBuild by_counter =
-                count(Builder::garanzha, Fit::levels, keys, max_leaf, BuildForm::published);
+                count(Builder::garanzha, Fit::levels, keys, max_leaf, StudyForm::published);
             EXPECT_EQ(by_counter.digest, by_scan.digest);
             EXPECT_EQ(items_of(by_counter, "fit.level"), items_of(by_scan, "fit.level"));
             EXPECT_LT(by_counter.launches.size(), by_scan.launches.size());
             for (const Builder builder : {Builder::karras, Builder::apetrei})
-                EXPECT_EQ(count(builder, Fit::atomic, keys, max_leaf, BuildForm::tuned).digest,
+                EXPECT_EQ(count(builder, Fit::atomic, keys, max_leaf, StudyForm::tuned).digest,
                           by_scan.digest);
         }
     }
     EXPECT_THROW((void)count(Builder::karras, Fit::atomic, talk_keys<std::uint32_t>(), 4,
-                             BuildForm::published),
+                             StudyForm::published),
                  InputError);
     EXPECT_THROW((void)count(Builder::lauterbach, Fit::atomic, talk_keys<std::uint32_t>(), 1,
-                             BuildForm::tuned),
+                             StudyForm::tuned),
                  InputError);
 }
 

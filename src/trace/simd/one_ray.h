@@ -9,7 +9,7 @@
 
 namespace raydix {
 
-/// Of this thread's calls of one ray through one tree.
+/// Of this thread's calls of one ray, through whatever tree or scene.
 inline constinit thread_local CallHistory call_history;
 
 /// As one_ray, in a plain environment.
