@@ -131,6 +131,8 @@ private:
 /// arrive goes on (Karras 2012, section 4). One work item per inner node: its leaves, then up.
 template <class LeafBox, class Probe>
 struct FitKdIntervals {
+    static constexpr std::uint32_t accesses_per_level = 2;  // meeting, then the sibling's box
+
     LeafBox leaf_box;  // (first, count) -> box
     KdNode* nodes;     // [2 * inner + 2], intervals are written
     KdFitScratch scratch;
@@ -142,10 +144,13 @@ struct FitKdIntervals {
         if (left) fit_leaf(slot);
         if (right) fit_leaf(slot + 1);
         Probe::bytes(2 * sizeof(KdNode));
+        Probe::step();
         if (left && right) {
             climb(rank, 1);
         } else if (left || right) {
             const std::uint8_t other = arrive(scratch.meeting[rank], std::uint8_t{1});
+            Probe::bytes(1);
+            Probe::step();
             // The other child's height is other - 1 >= 1: it decides.
             if (other != 0) climb(rank, other);
         }
@@ -172,11 +177,15 @@ private:
             Probe::step();
             if (slot == 0) {
                 *max_depth = height;
+                // Leaf boxes first, then a turn per level, whichever items took them.
+                Probe::chain(2 + height * accesses_per_level);
                 return;
             }
             rank = rank_of_slot(slot);
             const std::uint8_t other =
                 arrive(scratch.meeting[rank], static_cast<std::uint8_t>(height + 1));
+            Probe::bytes(1);
+            Probe::step();
             if (other == 0) return;
             height = 1 + (height > other - 1u ? height : other - 1u);
         }
