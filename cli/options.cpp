@@ -53,10 +53,11 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->capture_default_str()
         ->group(group);
     CLI::Option* builder =
-        of_the_build(command.add_option("--builder", options.builder, "Builder"))
+        of_the_build(command.add_option("--builder", options.builder,
+                                        "Builder (default: karras; where rays go through the "
+                                        "engine, that of --quality balanced)"))
             ->check(CLI::IsMember({"karras", "lauterbach", "garanzha", "apetrei", "ploc", "hploc",
-                                   "binned", "sweep", "split", "sbvh"}))
-            ->capture_default_str();
+                                   "binned", "sweep", "split", "sbvh"}));
     of_the_build(
         command.add_option("--quality", options.quality,
                            "Picks a builder and its rounds of reinsertion: fast is apetrei, "
@@ -83,10 +84,10 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         command
             .add_option(
                 "--layout", options.layout,
-                "Memory layout that is traced: of the engine wide8, wide4 or compact, which is "
-                "wide8 with shared vertices; cwbvh: build only")
+                "Memory layout that is traced: binary, or of the engine wide8, wide4 or compact, "
+                "which is wide8 with shared vertices; cwbvh: build only (default: binary, of the "
+                "engine wide8)")
             ->check(CLI::IsMember({"binary", "wide4", "wide8", "compact", "cwbvh"}))
-            ->capture_default_str()
             ->group(group);
     command
         .add_option("--device", options.device,

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "help_pages.h"
 #include "options.h"
 #include "program.h"
 
@@ -23,6 +24,9 @@ int run_raydix(int argc, char** argv) {
     add_simulate_command(app);
     add_bench_command(app);
     add_report_command(app);
+    add_completion_command(app);
+    add_man_command(app);
+    group_options(app);
     return run_program(app, argc, argv);
 }
 

@@ -36,6 +36,10 @@ void positions(const Scene& scene, std::span<const Ray> rays, std::span<const Hi
                std::span<Vec3> points, int threads = 0);
 void positions(const SceneD& scene, std::span<const RayD> rays, std::span<const HitD> hits,
                std::span<Vec3d> points, int threads = 0);
+[[nodiscard]] std::vector<Vec3> positions(const Scene& scene, std::span<const Ray> rays,
+                                          std::span<const Hit> hits, int threads = 0);
+[[nodiscard]] std::vector<Vec3d> positions(const SceneD& scene, std::span<const RayD> rays,
+                                           std::span<const HitD> hits, int threads = 0);
 
 /// Computes the geometric normal at each hit, of unit length. hits [n] -> normals [n]. In the
 /// mesh's own space it is the direction of (v1-v0) x (v2-v0): it points to the side from which the
@@ -49,6 +53,11 @@ void normals(const Scene& scene, std::span<const Hit> hits, std::span<Vec3> norm
              int threads = 0);
 void normals(const SceneD& scene, std::span<const HitD> hits, std::span<Vec3d> normals,
              int threads = 0);
+[[nodiscard]] std::vector<Vec3> normals(const Scene& scene, std::span<const Hit> hits,
+                                        int threads = 0);
+[[nodiscard]] std::vector<Vec3d> normals(const SceneD& scene, std::span<const HitD> hits,
+                                         int threads = 0);
+
 /// The same for scenes that hold shapes, with the rays that hit. The normal of a sphere points from
 /// its center to the hit, that of a capsule from the nearest point of its axis; NaN for a radius
 /// of 0. Throws InputError for user geometry too, whose normals its owner knows.
@@ -56,9 +65,9 @@ void normals(const Scene& scene, std::span<const Ray> rays, std::span<const Hit>
              std::span<Vec3> normals, int threads = 0);
 void normals(const SceneD& scene, std::span<const RayD> rays, std::span<const HitD> hits,
              std::span<Vec3d> normals, int threads = 0);
-[[nodiscard]] std::vector<Vec3> normals(const Scene& scene, std::span<const Hit> hits,
-                                        int threads = 0);
-[[nodiscard]] std::vector<Vec3d> normals(const SceneD& scene, std::span<const HitD> hits,
-                                         int threads = 0);
+[[nodiscard]] std::vector<Vec3> normals(const Scene& scene, std::span<const Ray> rays,
+                                        std::span<const Hit> hits, int threads = 0);
+[[nodiscard]] std::vector<Vec3d> normals(const SceneD& scene, std::span<const RayD> rays,
+                                         std::span<const HitD> hits, int threads = 0);
 
 }  // namespace raydix

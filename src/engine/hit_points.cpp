@@ -389,6 +389,34 @@ void normals(const SceneD& scene, std::span<const RayD> rays, std::span<const Hi
     fill_normals_by_rays(scene, rays, hits, normals, threads);
 }
 
+std::vector<Vec3> positions(const Scene& scene, std::span<const Ray> rays,
+                            std::span<const Hit> hits, int threads) {
+    std::vector<Vec3> points(hits.size());
+    positions(scene, rays, hits, points, threads);
+    return points;
+}
+
+std::vector<Vec3d> positions(const SceneD& scene, std::span<const RayD> rays,
+                             std::span<const HitD> hits, int threads) {
+    std::vector<Vec3d> points(hits.size());
+    positions(scene, rays, hits, points, threads);
+    return points;
+}
+
+std::vector<Vec3> normals(const Scene& scene, std::span<const Ray> rays, std::span<const Hit> hits,
+                          int threads) {
+    std::vector<Vec3> out(hits.size());
+    normals(scene, rays, hits, out, threads);
+    return out;
+}
+
+std::vector<Vec3d> normals(const SceneD& scene, std::span<const RayD> rays,
+                           std::span<const HitD> hits, int threads) {
+    std::vector<Vec3d> out(hits.size());
+    normals(scene, rays, hits, out, threads);
+    return out;
+}
+
 std::vector<Vec3> normals(const Scene& scene, std::span<const Hit> hits, int threads) {
     std::vector<Vec3> out(hits.size());
     normals(scene, hits, out, threads);

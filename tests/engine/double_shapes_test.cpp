@@ -351,9 +351,9 @@ TEST(DoubleShapes, HavePointsAndNormals) {
                                  {home + Vec3d{1.5, 0, -9}, 0, {0, 0, 1}},
                                  {home + Vec3d{90, 0, 0}, 0, {0, 0, 1}}};
     const std::vector<HitD> hits = trace(outer, rays);
-    std::vector<Vec3d> points(rays.size()), towards(rays.size());
-    positions(outer, rays, hits, points);
-    normals(outer, rays, hits, towards);
+    const std::vector<Vec3d> points = positions(outer, rays, hits),
+                             towards = normals(outer, rays, hits);
+    ASSERT_EQ(points.size(), rays.size());
     const auto near = [](Vec3d a, Vec3d b) {
         return std::fabs(a.x - b.x) < 1e-8 && std::fabs(a.y - b.y) < 1e-8 &&
                std::fabs(a.z - b.z) < 1e-8;

@@ -30,6 +30,30 @@ class Questions(unittest.TestCase):
             self.assertTrue((ROOT / "include" / "raydix" / name).exists(), name)
 
 
+class Site(unittest.TestCase):
+    def test_every_public_header_has_a_place_in_the_reference(self):
+        named = re.findall(r"^```\{doxygenfile\} (.*)$", "\n".join(text_of(p) for p in sorted((ROOT / "docs/cpp").glob("*.md"))),
+                           re.MULTILINE)
+        headers = {h.name for h in (ROOT / "include/raydix").glob("*.h")} - {"raydix.h", "version.h"}
+        self.assertEqual(sorted(named), sorted(headers))
+
+    def test_every_page_is_reached_from_the_start(self):
+        seen, todo = set(), ["index"]
+        while todo:
+            page = todo.pop()
+            if page in seen:
+                continue
+            seen.add(page)
+            text = text_of(f"docs/{page}.md")
+            for tree in re.findall(r"```\{toctree\}\n(.*?)```", text, re.DOTALL):
+                for entry in (line for line in tree.splitlines() if line and not line.startswith(":")):
+                    folder = (ROOT / "docs" / page).parent
+                    found = [folder / f"{entry}.md"] if "*" not in entry else sorted(folder.glob(f"{entry}.md"))
+                    todo += [str(f.relative_to(ROOT / "docs").with_suffix("")) for f in found]
+        pages = {str(p.relative_to(ROOT / "docs").with_suffix("")) for p in (ROOT / "docs").rglob("*.md")}
+        self.assertEqual(pages, seen)
+
+
 class Contract(unittest.TestCase):
     def test_cited_sections_exist(self):
         sections = set(re.findall(r"^## (\d+)\.", text_of("docs/contract.md"), re.MULTILINE))

@@ -1,0 +1,33 @@
+"""Sphinx: the pages of this folder, the C++ reference from the headers (Doxygen, Breathe), the Python
+reference from the docstrings of the installed package. scripts/docs runs it."""
+
+import os
+import pathlib
+
+import raydix
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+project = "raydix"
+author = "the raydix authors"
+version = release = raydix.__version__
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode", "myst_parser", "breathe"]
+source_suffix = {".md": "markdown"}
+exclude_patterns = ["**/*.ipynb", "performance/figures.json"]
+
+myst_heading_anchors = 4
+
+breathe_projects = {"raydix": os.environ["RAYDIX_DOXYGEN_XML"]}
+breathe_default_project = "raydix"
+breathe_show_include = False
+
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+autodoc_member_order = "bysource"
+napoleon_numpy_docstring = True
+napoleon_google_docstring = False
+
+html_theme = "alabaster"
+html_title = "raydix"
+html_theme_options = {"page_width": "1100px", "sidebar_width": "260px", "fixed_sidebar": True}
+nitpicky = False
