@@ -25,9 +25,10 @@ const std::array<Head, 4>& heads() {
     static const std::array<Head, 4> all{
         {{"Scene", {"--cameras", "--flatten", "--seed", "--strict"}},
          {"Rays",
-          {"--rays", "--mode", "--kernel", "--machine", "--camera", "--size", "--samples",
-           "--ao-radius", "--path", "--isa", "--view", "--eye", "--target", "--up", "--fov",
-           "--launch-rays", "--sample", "--sweep-sample", "--width", "--memory", "--any"}},
+          {"--rays",    "--mode",      "--kernel", "--machine",     "--camera", "--size",
+           "--samples", "--ao-radius", "--path",   "--isa",         "--view",   "--eye",
+           "--target",  "--up",        "--fov",    "--launch-rays", "--sample", "--sweep-sample",
+           "--width",   "--memory",    "--any"}},
          {"Output",
           {"--json", "--quiet", "--output", "--out", "--hits", "--save-rays", "--explain"}},
          {"Run", {"--threads", "--repeat", "--max-result-bytes", "--resume"}}}};
@@ -120,8 +121,8 @@ std::string bash_script(CLI::App& app) {
                                       fmt::join(option.names, fmt::format("'|'{}:", path)),
                                       choices_of(option));
         }
-        words += fmt::format("    '{}') words='{}' always={} ;;\n", path, fmt::join(here, " "),
-                             always);
+        words +=
+            fmt::format("    '{}') words='{}' always={} ;;\n", path, fmt::join(here, " "), always);
     });
     return fmt::format(R"(# bash completion of raydix: source <(raydix completion bash)
 _raydix() {{
@@ -171,9 +172,11 @@ void append_zsh(CLI::App& command, int depth, std::string& script) {
     if (!below.empty()) {
         script += indent + "if (( CURRENT == 2 )); then\n" + indent + "  local -a commands=(\n";
         for (const CLI::App* one : below)
-            script += fmt::format("{}    {}\n", indent,
-                                  shell_word(one->get_name() + ":" + zsh_text(one->get_description())));
-        script += fmt::format("{0}  )\n{0}  _describe -t commands command commands\n{0}  return\n{0}fi\n", indent);
+            script +=
+                fmt::format("{}    {}\n", indent,
+                            shell_word(one->get_name() + ":" + zsh_text(one->get_description())));
+        script += fmt::format(
+            "{0}  )\n{0}  _describe -t commands command commands\n{0}  return\n{0}fi\n", indent);
         script += indent + "shift words; (( CURRENT-- ))\n" + indent + "case $words[1] in\n";
         for (CLI::App* one : below) {
             script += fmt::format("{}{})\n", indent, one->get_name());
@@ -186,18 +189,22 @@ void append_zsh(CLI::App& command, int depth, std::string& script) {
     script += indent + "_arguments -s";
     for (const OptionWords& option : options_of(command, false))
         for (const std::string& name : option.names)
-            script += fmt::format(" \\\n{}  {}", indent,
-                                  shell_word("*" + name + "[" + zsh_text(option.text) + "]" +
-                                         zsh_value(option)));
+            script += fmt::format(
+                " \\\n{}  {}", indent,
+                shell_word("*" + name + "[" + zsh_text(option.text) + "]" + zsh_value(option)));
     for (const OptionWords& option : options_of(command, true))
         script += fmt::format(" \\\n{}  {}", indent, shell_word("*" + zsh_value(option)));
     script += "\n";
 }
 
 std::string zsh_script(CLI::App& app) {
-    std::string script = "#compdef raydix\n# zsh completion of raydix: raydix completion zsh >\"${fpath[1]}/_raydix\"\n_raydix() {\n";
+    std::string script =
+        "#compdef raydix\n# zsh completion of raydix: raydix completion zsh "
+        ">\"${fpath[1]}/_raydix\"\n_raydix() {\n";
     append_zsh(app, 0, script);
-    return script + "}\nif [[ $zsh_eval_context[-1] == loadautofunc ]]; then _raydix \"$@\"; else compdef _raydix raydix; fi\n";
+    return script +
+           "}\nif [[ $zsh_eval_context[-1] == loadautofunc ]]; then _raydix \"$@\"; else compdef "
+           "_raydix raydix; fi\n";
 }
 
 std::string fish_script(CLI::App& app) {
@@ -210,26 +217,30 @@ std::string fish_script(CLI::App& app) {
         std::vector<std::string> below;
         for (const CLI::App* one : commands_of(command)) below.push_back(one->get_name());
         const std::string none_yet =
-            below.empty() ? condition
-                          : (condition.empty() ? "" : condition + "; and ") +
-                                fmt::format("not __fish_seen_subcommand_from {}", fmt::join(below, " "));
+            below.empty()
+                ? condition
+                : (condition.empty() ? "" : condition + "; and ") +
+                      fmt::format("not __fish_seen_subcommand_from {}", fmt::join(below, " "));
         for (const CLI::App* one : commands_of(command))
             script += fmt::format("complete -c raydix -n {} -f -a {} -d {}\n", shell_word(none_yet),
                                   one->get_name(), shell_word(one->get_description()));
         for (const OptionWords& option : options_of(command, false)) {
             script += fmt::format("complete -c raydix -n {}", shell_word(none_yet));
             for (const std::string& name : option.names)
-                script += name.starts_with("--") ? " -l " + name.substr(2) : " -s " + name.substr(1);
+                script +=
+                    name.starts_with("--") ? " -l " + name.substr(2) : " -s " + name.substr(1);
             if (!option.choices.empty())
-                script += fmt::format(" -x -a {}", shell_word(fmt::format("{}", fmt::join(option.choices, " "))));
+                script += fmt::format(
+                    " -x -a {}", shell_word(fmt::format("{}", fmt::join(option.choices, " "))));
             else if (!option.value.empty())
                 script += " -r";
             script += fmt::format(" -d {}\n", shell_word(option.text));
         }
         for (const OptionWords& option : options_of(command, true))
             if (!option.choices.empty())
-                script += fmt::format("complete -c raydix -n {} -f -a {}\n", shell_word(condition),
-                                      shell_word(fmt::format("{}", fmt::join(option.choices, " "))));
+                script +=
+                    fmt::format("complete -c raydix -n {} -f -a {}\n", shell_word(condition),
+                                shell_word(fmt::format("{}", fmt::join(option.choices, " "))));
     });
     return script;
 }
@@ -238,9 +249,12 @@ std::string fish_script(CLI::App& app) {
 std::string roff(std::string_view text) {
     std::string result;
     for (const char c : text) {
-        if (c == '\\') result += "\\e";
-        else if (c == '-') result += "\\-";
-        else result += c;
+        if (c == '\\')
+            result += "\\e";
+        else if (c == '-')
+            result += "\\-";
+        else
+            result += c;
     }
     return result.starts_with('.') || result.starts_with('\'') ? "\\&" + result : result;
 }
@@ -255,7 +269,8 @@ void append_roff(const OptionWords& option, std::string& page) {
         names += " \\fI" + roff(option.value) + "\\fR";
     page += names + "\n" + roff(option.text) + "\n";
     if (!option.choices.empty())
-        page += fmt::format(".br\nOne of {}.\n", roff(fmt::format("{}", fmt::join(option.choices, ", "))));
+        page += fmt::format(".br\nOne of {}.\n",
+                            roff(fmt::format("{}", fmt::join(option.choices, ", "))));
     if (!option.usual.empty()) page += fmt::format(".br\nWithout it: {}\n", roff(option.usual));
 }
 
@@ -269,12 +284,16 @@ std::string page_name(const CLI::App& command) {
 std::string man_page(CLI::App& command) {
     const std::string path = path_of(command), title = page_name(command);
     std::string upper = title;
-    std::ranges::transform(upper, upper.begin(), [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; });
-    std::string page = fmt::format(".TH {} 1 \"\" \"raydix {}\" \"raydix\"\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n.B raydix{}\n",
-                                   roff(upper), raydix::version, roff(title),
-                                   roff(command.get_description()), path.empty() ? "" : " " + roff(path));
+    std::ranges::transform(upper, upper.begin(), [](char c) {
+        return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+    });
+    std::string page = fmt::format(
+        ".TH {} 1 \"\" \"raydix {}\" \"raydix\"\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n.B raydix{}\n",
+        roff(upper), raydix::version, roff(title), roff(command.get_description()),
+        path.empty() ? "" : " " + roff(path));
     const std::vector<CLI::App*> below = commands_of(command);
-    const std::vector<OptionWords> positionals = options_of(command, true), options = options_of(command, false);
+    const std::vector<OptionWords> positionals = options_of(command, true),
+                                   options = options_of(command, false);
     page += fmt::format("[\\fIOPTIONS\\fR]{}", below.empty() ? "" : " \\fICOMMAND\\fR");
     for (const OptionWords& one : positionals) page += " \\fI" + roff(one.positional) + "\\fR";
     page += "\n";
@@ -282,16 +301,20 @@ std::string man_page(CLI::App& command) {
     for (const OptionWords& one : positionals) append_roff(one, page);
     if (!below.empty()) page += ".SH COMMANDS\n";
     for (const CLI::App* one : below)
-        page += fmt::format(".TP\n\\fB{}\\fR\n{}\n", roff(one->get_name()), roff(one->get_description()));
+        page += fmt::format(".TP\n\\fB{}\\fR\n{}\n", roff(one->get_name()),
+                            roff(one->get_description()));
     std::vector<std::string> seen;
     for (const OptionWords& first : options) {
         if (std::ranges::find(seen, first.head) != seen.end()) continue;
         seen.push_back(first.head);
-        page += fmt::format(".SH {}\n", roff(first.head == "Options" ? "OPTIONS" : "OPTIONS: " + first.head));
+        page += fmt::format(".SH {}\n",
+                            roff(first.head == "Options" ? "OPTIONS" : "OPTIONS: " + first.head));
         for (const OptionWords& option : options)
             if (option.head == first.head) append_roff(option, page);
     }
-    page += ".SH EXIT STATUS\n0: done. 1: the input or the machine is at fault; one line on standard error says what and where. 2: usage.\n";
+    page +=
+        ".SH EXIT STATUS\n0: done. 1: the input or the machine is at fault; one line on standard "
+        "error says what and where. 2: usage.\n";
     return page;
 }
 
@@ -299,9 +322,11 @@ CLI::App& command_at(CLI::App& app, const std::vector<std::string>& names) {
     CLI::App* at = &app;
     for (const std::string& name : names) {
         const std::vector<CLI::App*> below = commands_of(*at);
-        const auto found = std::ranges::find_if(below, [&](const CLI::App* one) { return one->get_name() == name; });
+        const auto found = std::ranges::find_if(
+            below, [&](const CLI::App* one) { return one->get_name() == name; });
         if (found == below.end())
-            throw CLI::ValidationError("COMMAND", "'" + name + "' is not a command" + (at == &app ? "" : " of " + path_of(*at)));
+            throw CLI::ValidationError("COMMAND", "'" + name + "' is not a command" +
+                                                      (at == &app ? "" : " of " + path_of(*at)));
         at = *found;
     }
     return *at;
@@ -320,13 +345,16 @@ void group_options(CLI::App& app) {
 }
 
 void add_completion_command(CLI::App& app) {
-    CLI::App* command = app.add_subcommand("completion", "Print a script that completes commands and options in a shell");
+    CLI::App* command = app.add_subcommand(
+        "completion", "Print a script that completes commands and options in a shell");
     auto shell = std::make_shared<std::string>();
     command->add_option("SHELL", *shell, "The shell")
         ->required()
         ->check(CLI::IsMember({"bash", "zsh", "fish"}));
     command->callback([&app, shell] {
-        fmt::print("{}", *shell == "bash" ? bash_script(app) : *shell == "zsh" ? zsh_script(app) : fish_script(app));
+        fmt::print("{}", *shell == "bash"  ? bash_script(app)
+                         : *shell == "zsh" ? zsh_script(app)
+                                           : fish_script(app));
     });
 }
 

@@ -54,14 +54,13 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->group(group);
     CLI::Option* builder =
         of_the_build(command.add_option("--builder", options.builder,
-                                        "Builder (default: karras; where rays go through the "
-                                        "engine, that of --quality balanced)"))
+                                        "Builder (default: that of --quality; on a GPU karras)"))
             ->check(CLI::IsMember({"karras", "lauterbach", "garanzha", "apetrei", "ploc", "hploc",
                                    "binned", "sweep", "split", "sbvh"}));
     of_the_build(
         command.add_option("--quality", options.quality,
                            "Picks a builder and its rounds of reinsertion: fast is apetrei, "
-                           "balanced is ploc and 2, high is sbvh and 4"))
+                           "balanced is ploc and 2, high is sbvh and 4 (default: balanced)"))
         ->check(CLI::IsMember({"fast", "balanced", "high"}))
         ->excludes(builder);
     of_the_build(command.add_option("--bits", options.bits, "Bits of the Morton codes"))
@@ -127,26 +126,24 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         options.of_a_bvh.push_back(command.get_option(name));
 }
 
-bool TreeOptions::leaves_build_open() const {
-    return std::ranges::all_of(of_the_build, [](const CLI::Option* o) { return o->count() == 0; });
+namespace {
+
+/// Builder and rounds of reinsertion, as far as the user named them.
+BuildOptions build_as_named(const TreeOptions& tree) {
+    if (tree.quality == "fast") return build_options_for(Quality::fast);
+    if (tree.quality == "high") return build_options_for(Quality::high);
+    if (tree.quality.empty() && !tree.builder.empty())
+        return {.builder = builder_from_name(tree.builder)};
+    const bool on_gpu = tree.quality.empty() && tree.device != "cpu";
+    return on_gpu ? BuildOptions{} : build_options_for(Quality::balanced);
 }
 
-void TreeOptions::prefer_balanced() {
-    if (tree == "bvh" && device == "cpu" && leaves_build_open()) quality = "balanced";
-}
+}  // namespace
 
 BuildOptions TreeOptions::build_options(const CommonOptions& common) const {
     refuse_simulator(*this);
     if (max_level) throw CLI::ValidationError("--max-level", "belongs to --tree octree");
-    BuildOptions result;
-    if (quality == "fast")
-        result = build_options_for(Quality::fast);
-    else if (quality == "balanced")
-        result = build_options_for(Quality::balanced);
-    else if (quality == "high")
-        result = build_options_for(Quality::high);
-    else
-        result.builder = builder_from_name(builder);
+    BuildOptions result = build_as_named(*this);
     if (reinsertion_rounds) result.reinsertion_rounds = *reinsertion_rounds;
     if (!fit.empty()) result.fit = fit == "levels" ? Fit::levels : Fit::atomic;
     result.bits = bits;

@@ -31,7 +31,8 @@ void add_flatten_option(CLI::App& command, CommonOptions& options);
 
 /// How a tree is to be built, in every command that needs one.
 struct TreeOptions {
-    std::string tree = "bvh", builder = "karras", quality, layout = "binary", device = "cpu", fit;
+    /// Without a builder and a quality: quality balanced, or karras where a GPU builds.
+    std::string tree = "bvh", builder, quality, layout = "binary", device = "cpu", fit;
     int bits = 63, max_leaf = 4;
     std::optional<int> reinsertion_rounds;
     std::optional<int> max_level;  // of an octree
@@ -45,10 +46,6 @@ struct TreeOptions {
         of_a_bvh;      // those that mean nothing to other trees
 
     [[nodiscard]] BuildOptions build_options(const CommonOptions& common) const;
-    /// Of the options that say how a tree is built, the user gave none.
-    [[nodiscard]] bool leaves_build_open() const;
-    /// Without a word on it, rays on the cpu go through a tree of quality balanced.
-    void prefer_balanced();
 };
 void add_tree_options(CLI::App& command, TreeOptions& options);
 

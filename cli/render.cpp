@@ -65,7 +65,6 @@ void run_render(RenderCommand options) {
     refuse_build_options(options.scene, options.tree);
     refuse_device(options.tree);
     const bool of_tree = is_tree_view(options.view);
-    if (!of_tree) options.tree.prefer_balanced();
     if (!of_tree) refuse_tree_view_options(options.tree_view);
     std::optional<Scene> scene;
     Json about_scene;  // of a file that holds one

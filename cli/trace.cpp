@@ -371,7 +371,6 @@ void explain_warps(const TraceCommand& options, const Bvh& bvh) {
 
 /// What the options say about the device, before any work. The tree is built on the cpu.
 TraceCommand with_device(TraceCommand options, Mode mode) {
-    options.tree.prefer_balanced();
     options.kernel = chosen_cpu_kernel(options.kernel, options.tree, options.wide);
     if (options.kernel != "engine") refuse_layout(options.tree);
     const std::string device = options.tree.device;

@@ -65,7 +65,7 @@ class Pipeline(ProgramTest):
             self.assertLessEqual(build["ms_spread"]["min"][stage], ms)
             self.assertLessEqual(ms, build["ms_spread"]["max"][stage])
         self.assertEqual((build["tree"], build["builder"], build["bits"], build["device"], build["threads"]),
-                         ("bvh", "karras", 63, "cpu", min(2, len(os.sched_getaffinity(0)))))
+                         ("bvh", "ploc", 63, "cpu", min(2, len(os.sched_getaffinity(0)))))
         self.assertEqual(build["nodes"], 2 * build["leaves"] - 1)
         self.assertEqual(build["references"], 2000)
         self.assertEqual(build["depth_bound"], 63 + 11)

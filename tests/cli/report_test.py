@@ -36,8 +36,8 @@ class Report(ProgramTest):
         self.assertEqual(html, self.page(*results))
 
     def test_two_runs_are_compared(self):
-        first = self.make("a.json", "build", FIGURE, "--max-leaf", "4")
-        second = self.make("b.json", "build", FIGURE, "--max-leaf", "8")
+        first = self.make("a.json", "build", FIGURE, "--builder", "karras", "--max-leaf", "4")
+        second = self.make("b.json", "build", FIGURE, "--builder", "karras", "--max-leaf", "8")
         a, b = (json.loads((self.folder / n).read_text(encoding="utf-8"))["build"] for n in (first, second))
         html = self.page(first, second)
         row = re.search(r"<tr><th[^>]*>[^<]*bvh</th><td[^>]*>size</td>.*?</tr>", html, re.DOTALL).group(0)

@@ -38,7 +38,7 @@ class PageTest(ProgramTest):
         figure = "builtin:figure?triangles=5000"
         results = []
         for name, arguments in {
-                "karras": ("build", figure), "ploc": ("build", figure, "--builder", "ploc"),
+                "karras": ("build", figure, "--builder", "karras"), "ploc": ("build", figure, "--builder", "ploc"),
                 "octree": ("build", figure, "--tree", "octree"), "info": ("info", figure), "check": ("check", figure),
                 "trace": ("trace", figure, "--size", "32x24", "--repeat", "2"), "scenes": ("scenes",),
                 "trace2": ("trace", figure, "--size", "32x24", "--repeat", "2", "--builder", "ploc"),
