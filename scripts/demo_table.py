@@ -18,7 +18,8 @@ def main(folder):
     for stage, ms in tree["ms"].items():
         row(f"build: {stage}", f"{ms:.2f}", "ms")
     row("nodes", f"{tree['nodes']:,}")
-    row("depth", f"{tree['max_depth']}", f"proven bound {tree['depth_bound']}")
+    bound = tree["depth_bound"]  # of LBVH builders alone
+    row("depth", f"{tree['max_depth']}", "" if bound is None else f"proven bound {bound}")
     row("SAH", "none" if tree["sah"] is None else f"{tree['sah']:.2f}")
     row("memory", f"{tree['bytes'] / 1e6:.1f}", f"MB, peak {tree['peak_bytes'] / 1e6:.1f} MB")
     for kind in ("primary", "ao", "diffuse"):

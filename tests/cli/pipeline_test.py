@@ -58,14 +58,16 @@ class Pipeline(ProgramTest):
         self.assert_shape(scenes, DOCUMENT)
         self.assertEqual({"atrium", "grove", "figure", "soup", "uniform", "clustered", "lidar"},
                          {s["name"] for s in scenes["scenes"]})
-        built = self.document("build", SOUP, "--repeat", "3", "-o", "fields.rdx", "--epo", "0.1", "--threads", "2")
+        usual = self.document("build", SOUP, "--bits", "30")["build"]
+        self.assertEqual((usual["builder"], usual["depth_bound"]), ("ploc", None))  # of quality balanced
+        built = self.document("build", SOUP, "--builder", "karras", "--repeat", "3", "-o", "fields.rdx", "--epo", "0.1", "--threads", "2")
         self.assert_shape(built, {**DOCUMENT, "scene": SCENE, "load_ms": NUMBER, "build": BUILT})
         build = built["build"]
         for stage, ms in build["ms"].items():
             self.assertLessEqual(build["ms_spread"]["min"][stage], ms)
             self.assertLessEqual(ms, build["ms_spread"]["max"][stage])
         self.assertEqual((build["tree"], build["builder"], build["bits"], build["device"], build["threads"]),
-                         ("bvh", "ploc", 63, "cpu", min(2, len(os.sched_getaffinity(0)))))
+                         ("bvh", "karras", 63, "cpu", min(2, len(os.sched_getaffinity(0)))))
         self.assertEqual(build["nodes"], 2 * build["leaves"] - 1)
         self.assertEqual(build["references"], 2000)
         self.assertEqual(build["depth_bound"], 63 + 11)
