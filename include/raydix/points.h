@@ -133,6 +133,8 @@ public:
     [[nodiscard]] const PointsBuildMs& build_ms() const;
     /// Position in the index -> the caller's index of that point, [size()]: a copy.
     [[nodiscard]] std::vector<std::uint32_t> order() const;
+    /// Position in the index -> the point there, [size()]: a copy.
+    [[nodiscard]] std::vector<Point> points() const;
 
     /// What the queries read; for the library's own use.
     [[nodiscard]] const detail::PointArrays<Scalar, Dim_>& arrays() const;

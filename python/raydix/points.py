@@ -70,6 +70,22 @@ class Points:
             cast(array, self.dtype), tree, strict, threads
         )
         self._given = len(array)
+        self._options = {"tree": tree, "strict": bool(strict), "threads": threads}
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What the index was made with: a new dict of the arguments of `Points` by their names."""
+        return dict(self._options)
+
+    def _points(self) -> np.ndarray:
+        """The points as they were given; NaN for those that were left out."""
+        points = np.full((self._given, self.dimension), np.nan, self.dtype)
+        points[self._core.order()] = self._core.points()
+        return points
+
+    def __reduce__(self) -> tuple:
+        """Pickles, copies and deep copies are the points; their trees are built again."""
+        return _remade, (self._points(), self._options)
 
     def knn(
         self,
@@ -208,6 +224,10 @@ class Points:
 
     def __repr__(self) -> str:
         return f"<raydix.Points: {len(self):,} points, {self.dimension}-D {self.dtype}>"
+
+
+def _remade(points: np.ndarray, options: dict[str, Any]) -> Points:
+    return Points(points, **options)
 
 
 def _padded(

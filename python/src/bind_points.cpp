@@ -182,6 +182,8 @@ struct PointCalls {
             .def("neighbours", &neighbours, nb::arg("radius"), nb::arg("full"),
                  nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
             .def("order", [](const Index& index) { return hand_over(index.order()); })
+            .def("points",
+                 [](const Index& index) { return hand_over_rows<Scalar>(index.points()); })
             .def("stats", &stats)
             .def("__len__", [](const Index& index) { return index.size(); });
     }

@@ -203,6 +203,23 @@ std::vector<std::uint32_t> PointIndex<T, Dim>::order() const {
     return ids;
 }
 
+template <class T, int Dim>
+std::vector<typename PointIndex<T, Dim>::Point> PointIndex<T, Dim>::points() const {
+    std::vector<Point> all;
+    all.reserve(size());
+    for (std::uint32_t leaf = 0; leaf < leaf_count(); ++leaf) {
+        const PointLeaf<T, Dim>& group = arrays().tree.leaves[leaf];
+        for (std::uint32_t i = 0; i < points_per_leaf; ++i) {
+            if (group.id[i] == no_primitive) continue;
+            if constexpr (Dim == 3)
+                all.push_back({group.at[0][i], group.at[1][i], group.at[2][i]});
+            else
+                all.push_back({group.at[0][i], group.at[1][i]});
+        }
+    }
+    return all;
+}
+
 template class PointIndex<float, 2>;
 template class PointIndex<float, 3>;
 template class PointIndex<double, 2>;
