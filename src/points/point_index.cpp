@@ -72,6 +72,7 @@ void forget(detail::PointArrays<T, Dim>& arrays) {
     std::fill_n(none.hi, Dim, -inf);
     set_bounds(none, arrays.bounds);
     arrays.tree = {};
+    arrays.forest = {};
     arrays.input_count = arrays.left_out = 0;
     arrays.ms = {};
 }
