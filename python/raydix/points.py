@@ -251,11 +251,12 @@ class Points:
 
 
 def _remade(points: np.ndarray, options: dict[str, Any]) -> Points:
-    removed = np.flatnonzero(np.isnan(points).any(axis=1)) if options["strict"] else ()
+    if not options["strict"]:
+        return Points(points, **options)
+    removed = np.flatnonzero(np.isnan(points).any(axis=1))
     points[removed] = 0
     index = Points(points, **options)
-    if len(removed):
-        index.remove(removed)
+    index.remove(removed)
     return index
 
 

@@ -26,7 +26,7 @@ class SavedScene:
     _attributes: dict[int, dict[str, np.ndarray]]
     _placed: dict[int, tuple[Any, np.ndarray]]
     _shapes: dict[int, tuple[str, tuple]]
-    _file: tuple[str, int, int] | None
+    _file: tuple[str, int, int, int] | None
 
     @property
     def options(self) -> dict[str, Any]:
@@ -123,16 +123,16 @@ def _from_mesh(mesh: tuple[np.ndarray, np.ndarray] | None, more: dict[str, Any])
     return _filled(_new(more, *mesh) if mesh else _new(more), more)
 
 
-def state_of(file: str) -> tuple[str, int, int] | None:
+def state_of(file: str) -> tuple[str, int, int, int] | None:
     """What a file that is replaced or written to does not have any more; None: it is gone."""
     try:
         found = os.stat(file)
     except OSError:
         return None
-    return file, found.st_size, found.st_mtime_ns
+    return file, found.st_size, found.st_mtime_ns, found.st_ino
 
 
-def _from_file(file: tuple[str, int, int], more: dict[str, Any]) -> Any:
+def _from_file(file: tuple[str, int, int, int], more: dict[str, Any]) -> Any:
     from .scene import load_scene
 
     if state_of(file[0]) != file:

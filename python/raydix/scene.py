@@ -150,7 +150,7 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
         self._attributes: dict[int, dict[str, np.ndarray]] = {}
         self._placed: dict[int, tuple[Any, np.ndarray]] = {}
         self._shapes: dict[int, tuple[str, tuple]] = {}
-        self._file: tuple[str, int, int] | None = None
+        self._file: tuple[str, int, int, int] | None = None
         self._options: dict[str, Any] = {
             "quality": quality,
             "builder": builder,

@@ -40,7 +40,6 @@ def test_batches_in_and_out(dimension, dtype, rng):
         there[at : at + len(batch)] = True
         at += len(batch)
         gone = rng.integers(0, at, int(rng.integers(1, 300)))
-
         assert points.remove(gone) == len(np.unique(gone[there[gone]]))
         there[gone] = False
         assert_as_fresh(points, array, there, queries)
