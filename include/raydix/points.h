@@ -111,10 +111,26 @@ public:
     void rebuild(std::span<const Point> points);
     void rebuild(std::span<const Point> points, const PointsOptions& options);
 
+    /// Adds points. Their numbers go on where those before ended: the first has the number
+    /// input_count(), which is returned. A number is never given again, also not that of a point
+    /// that was removed or left out. Answers are those of a fresh index over the same points, bit
+    /// for bit, but for the numbers; queries take up to twice its time. Of n points a batch of b
+    /// costs on average what building b * log(n / b) points does, within a small factor. Four bytes
+    /// are kept for each number ever given. Needs the index for itself. Throws InputError, and
+    /// nothing is added: 2^31 numbers or more; with options.strict the first point that would be
+    /// left out (it is named by its place in `points`).
+    std::uint32_t insert(std::span<const Point> points);
+    /// Removes points by their numbers. Those that are not in the index any more, or were left out,
+    /// are passed over. Returns how many were removed. All is built again when more than a quarter
+    /// of the points have gone. Needs the index for itself. Throws InputError, and nothing is
+    /// removed: a number that was never given.
+    std::uint32_t remove(std::span<const std::uint32_t> ids);
+
     /// Number of points in the index.
     [[nodiscard]] std::uint32_t size() const;
     [[nodiscard]] bool empty() const { return size() == 0; }
-    /// Number of points that the caller gave, and of those that were left out.
+    /// Number of points that the caller gave, those removed included, and of those that were left
+    /// out.
     [[nodiscard]] std::uint64_t input_count() const;
     [[nodiscard]] std::uint64_t left_out() const;
     /// The box around all points in the index; lo > hi if there are none.
@@ -133,6 +149,8 @@ public:
     [[nodiscard]] const PointsBuildMs& build_ms() const;
     /// Position in the index -> the caller's index of that point, [size()]: a copy.
     [[nodiscard]] std::vector<std::uint32_t> order() const;
+    /// Position in the index -> the point there, [size()]: a copy.
+    [[nodiscard]] std::vector<Point> points() const;
 
     /// What the queries read; for the library's own use.
     [[nodiscard]] const detail::PointArrays<Scalar, Dim_>& arrays() const;

@@ -39,6 +39,7 @@
 #include <raydix/simulate.h>         // IWYU pragma: export
 #include <raydix/solid.h>            // IWYU pragma: export
 #include <raydix/surface.h>          // IWYU pragma: export
+#include <raydix/thread_pool.h>      // IWYU pragma: export
 #include <raydix/trace.h>            // IWYU pragma: export
 #include <raydix/tree_view.h>        // IWYU pragma: export
 #include <raydix/types.h>            // IWYU pragma: export

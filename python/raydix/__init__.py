@@ -17,6 +17,7 @@ from ._core import (
 )
 from .cameras import Camera
 from .devices import Device, devices
+from .hits import Hits
 from .pictures import save_picture, to_png, to_srgb
 from .points import Points, load_points
 from .scene import Scene, load_scene
@@ -30,6 +31,7 @@ __all__ = [
     "Camera",
     "Device",
     "DeviceError",
+    "Hits",
     "InputError",
     "KdTree",
     "Octree",

@@ -10,14 +10,13 @@ from ._arrays import (
     ALL,
     FLOAT32,
     FLOAT64,
-    MISSING,
-    UINT32,
     describe,
     floats,
     to_numpy,
     uint32s,
     whole,
 )
+from .hits import COLUMNS, Hits
 
 
 def _limit(value: Any, name: str, lead: tuple[int, ...]) -> Any:
@@ -101,9 +100,6 @@ def ray_batch(
     return _columns(rays[..., :3], rays[..., 4:7], rays[..., 3], rays[..., 7])
 
 
-_COLUMNS = ("t", "prim", "u", "v", "geometry", "instance")
-
-
 def ray_masks(mask: Any, masks: Any, lead: tuple[int, ...]) -> tuple[int, np.ndarray | None]:
     """The mask of all rays, or one for each: (n,) uint32."""
     if masks is None and mask is ALL:
@@ -120,56 +116,31 @@ def ray_masks(mask: Any, masks: Any, lead: tuple[int, ...]) -> tuple[int, np.nda
     return ALL, np.ascontiguousarray(each).reshape(-1)
 
 
-def ray_rows(rays: Any, directions: Any, lead: tuple[int, ...]) -> np.ndarray:
-    """Rays of any form but their limits as rows (n, 8) float32."""
-    args, shape = ray_batch(rays, directions, None, None)
+def ray_rows(
+    rays: Any, directions: Any, lead: tuple[int, ...], dtype: np.dtype = FLOAT32
+) -> np.ndarray:
+    """Rays of any form but their limits as rows (n, 8) of the scene's type."""
+    args, shape = ray_batch(rays, directions, None, None, dtype)
     if shape != lead:
         raise ValueError(f"rays: expected one for each hit, shape {lead}, given {shape}")
     if len(args) == 1:
         return args[0]
-    made = np.zeros((len(args[0]), 8), FLOAT32)
+    made = np.zeros((len(args[0]), 8), dtype)
     made[:, :3], made[:, 4:7], made[:, 7] = args[0], args[1], np.inf
     return made
 
 
-def hit_columns(hits: np.ndarray, geometry: int | None = None) -> dict[str, np.ndarray]:
-    """Rows of hits, as the core writes them, as columns. Where they have no room for geometry and
-    instance, they are of one mesh, `geometry`."""
-    ids = hits.view(UINT32)
-    words = ids.shape[-1] // hits.shape[-1]  # a whole number in the room of a scalar
-    if hits.shape[-1] != 4:
-        return {
-            "t": hits[..., 0],
-            "prim": ids[..., words],
-            "u": hits[..., 2],
-            "v": hits[..., 3],
-            "geometry": ids[..., 4 * words],
-            "instance": ids[..., 4 * words + 1],
-        }
-    prim = ids[..., words]
-    named = np.full(prim.shape, MISSING, UINT32)
-    if geometry is not None:
-        named[prim != MISSING] = geometry
-    return {
-        "t": hits[..., 0],
-        "prim": prim,
-        "u": hits[..., 2],
-        "v": hits[..., 3],
-        "geometry": named,
-        "instance": np.zeros(prim.shape, UINT32),
-    }
-
-
-def hit_rows(hits: Any) -> np.ndarray:
-    """Columns of hits in float32 as rows, (..., 6): what `hit_columns` takes apart."""
+def hit_rows(hits: Any, dtype: np.dtype, columns: int) -> np.ndarray:
+    """Columns of hits as rows, (..., columns) of the scene's type, as the core writes them."""
+    if isinstance(hits, Hits) and hits._rows.dtype == dtype and hits._rows.shape[-1] == columns:
+        return np.ascontiguousarray(hits._rows)
     try:
-        columns = [np.asarray(hits[name]) for name in _COLUMNS]
-        rows = np.empty((*columns[0].shape, len(_COLUMNS)), FLOAT32)
-        ids = rows.view(UINT32)
-        for i, column in enumerate(columns):
-            (ids if column.dtype == UINT32 else rows)[..., i] = column
+        given = {name: np.asarray(hits[name]) for name in COLUMNS}
+        rows = np.zeros((*given["t"].shape, columns), dtype)
+        for name, column in Hits(rows).items():
+            column[...] = given[name]
     except (KeyError, IndexError, TypeError, ValueError):
         raise TypeError(
-            f"hits: expected a dict of arrays {', '.join(_COLUMNS)}, as of Scene.intersect"
+            f"hits: expected a dict of arrays {', '.join(COLUMNS)}, as of Scene.intersect"
         ) from None
     return rows

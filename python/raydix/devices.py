@@ -10,7 +10,8 @@ import numpy as np
 
 from . import _core
 from ._arrays import ALL, FLOAT32, cast
-from ._rays import hit_columns, ray_batch
+from ._rays import ray_batch
+from .hits import COLUMNS, Hits
 
 _CUDA = 2  # DLPack's number
 
@@ -96,19 +97,19 @@ class CudaRays:
         mask: Any,
         masks: Any,
         stream: int,
-    ) -> dict[str, Any]:
+    ) -> Any:
         _without_masks(mask, masks)
         if on_cuda(rays):
             flat, lead = self._there(rays, directions, tmin, tmax)
             columns = self._core.intersect_there(flat, stream)
-            names = ("t", "prim", "u", "v", "geometry", "instance")
             return {
-                name: _like(column, rays, lead) for name, column in zip(names, columns, strict=True)
+                name: _like(column, rays, lead)
+                for name, column in zip(COLUMNS, columns, strict=True)
             }
         packed, lead = _packed(rays, directions, tmin, tmax)
         hits = np.empty(lead + (6,), FLOAT32)
         self._core.intersect_here(packed, hits.reshape(-1, 6))
-        return hit_columns(hits)
+        return Hits(hits)
 
     def occluded(
         self,

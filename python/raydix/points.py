@@ -18,6 +18,7 @@ from ._arrays import (
     number,
     rows,
     thread_count,
+    uint32s,
     whole,
 )
 
@@ -50,7 +51,8 @@ class Points:
     with other such squares, at equal ones the lower index goes first; and with r * r, rounded, up
     to which a point is within r. Two distances may be equal whose squares are not. Answers are
     exact in this sense and the same for every number of
-    threads. The points are copied. Any number of threads may ask at once. Missing neighbours have
+    threads. The points are copied. Any number of threads may ask at once; `add` and `remove` change
+    what is there. Missing neighbours have
     the index 0xFFFFFFFF and an infinite distance; queries with NaN or infinity have none.
     """
 
@@ -69,7 +71,45 @@ class Points:
         self._core = _INDICES[self.dtype, self.dimension](
             cast(array, self.dtype), tree, strict, threads
         )
-        self._given = len(array)
+        self._options = {"tree": tree, "strict": bool(strict), "threads": threads}
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What the index was made with: a new dict of the arguments of `Points` by their names."""
+        return dict(self._options)
+
+    def _points(self) -> np.ndarray:
+        """The points as they were given; NaN for those that were left out."""
+        points = np.full((self._core.given(), self.dimension), np.nan, self.dtype)
+        points[self._core.order()] = self._core.points()
+        return points
+
+    def __reduce__(self) -> tuple:
+        """Pickles, copies and deep copies are the points; their trees are built again. Removed
+        points keep their numbers."""
+        return _remade, (self._points(), self._options)
+
+    def add(self, points: ArrayLike) -> np.ndarray:
+        """Adds points, shape (M, D) or (D,), in the type of the index. Returns their numbers, (M,)
+        uint32: they go on where those before ended, and none is given twice.
+
+        Queries then answer as a fresh index over all points does, but for the numbers, and take up
+        to twice its time. Larger batches cost less for each point. Waits for queries of other
+        threads. ValueError, and nothing is added: with `strict` the first point that is not finite
+        or beyond 1e12.
+        """
+        added, _ = rows(points, "points", (self.dimension,), self.dtype)
+        first = self._core.insert(added)
+        return np.arange(first, first + len(added), dtype=UINT32)
+
+    def remove(self, indices: ArrayLike) -> int:
+        """Removes points by their numbers, a whole number or shape (M,). Those that were removed
+        before or left out are passed over. Returns how many were removed. ValueError, and nothing
+        is removed: a number that was never given."""
+        numbers = np.atleast_1d(uint32s(indices, "indices"))
+        if numbers.ndim != 1:
+            raise ValueError(f"indices: expected shape (M,), given {describe(numbers)}")
+        return self._core.remove(np.ascontiguousarray(numbers))
 
     def knn(
         self,
@@ -208,6 +248,16 @@ class Points:
 
     def __repr__(self) -> str:
         return f"<raydix.Points: {len(self):,} points, {self.dimension}-D {self.dtype}>"
+
+
+def _remade(points: np.ndarray, options: dict[str, Any]) -> Points:
+    if not options["strict"]:
+        return Points(points, **options)
+    removed = np.flatnonzero(np.isnan(points).any(axis=1))
+    points[removed] = 0
+    index = Points(points, **options)
+    index.remove(removed)
+    return index
 
 
 def _padded(

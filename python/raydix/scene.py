@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,14 +27,17 @@ from ._arrays import (
     whole,
 )
 from ._filters import hit_filter
-from ._rays import floats_of, hit_columns, hit_rows, ray_batch, ray_masks, ray_rows
+from ._rays import floats_of, hit_rows, ray_batch, ray_masks, ray_rows
 from .cameras import Camera
 from .contents import QUALITIES, USAGES, SceneContents, mesh_of, one_of
 from .devices import CudaRays
+from .hits import Hits
 from .pictures import SceneViews
+from .saved import SavedScene, state_of
+from .surface import SurfaceOfHits
 
 
-class Scene(SceneContents, SceneViews):
+class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
     """What rays are traced through and queries ask: triangle meshes, spheres, capsules, and
     instances of other scenes.
 
@@ -104,11 +107,15 @@ class Scene(SceneContents, SceneViews):
     In float64 the first of `closest_point`, `touches`, `touched_by` and `sweep_spheres` after a
     commit makes one mesh in the world too, and a tree over it, which later ones ask.
 
-    With precision "float64" these raise NotImplementedError: compact=True, `positions`, `normals`,
-    `render`, `cameras`, `primary_rays`, `secondary_rays`, `save`, `info`, `wide_stats` and
-    `raydix.simulate`. There device="cuda" raises BackendUnavailable; files raise ValueError,
+    With precision "float64" these raise NotImplementedError: compact=True, `render`, `cameras`,
+    `primary_rays`, `secondary_rays`, `save`, `info`, `wide_stats` and `raydix.simulate`. There device="cuda" raises BackendUnavailable; files raise ValueError,
     because they are read in float32. Instances are of scenes in float64 too: others raise
     TypeError. Numbers other than 0 below 2**-500 count as 0.
+
+    Scenes can be pickled and copied: one of `load_scene` that has not changed goes over as the path
+    of its file, whose memory both processes then share; one mesh as its arrays, and its trees are
+    built again; all else as the bytes of a .rdx file, in float64 as its geometries. Vertex
+    attributes go along, but in float32 not those of scenes that stand in this one.
 
     Raises ValueError (InputError is one) and TypeError that name the argument, what was expected
     and what was given.
@@ -140,6 +147,23 @@ class Scene(SceneContents, SceneViews):
         """float32 or float64: what the scene computes in and its results are."""
         self.threads = threads = thread_count(threads)
         self.device = device
+        self._attributes: dict[int, dict[str, np.ndarray]] = {}
+        self._placed: dict[int, tuple[Any, np.ndarray]] = {}
+        self._shapes: dict[int, tuple[str, tuple]] = {}
+        self._file: tuple[str, int, int, int] | None = None
+        self._options: dict[str, Any] = {
+            "quality": quality,
+            "builder": builder,
+            "reinsertion_rounds": reinsertion_rounds,
+            "max_leaf": max_leaf,
+            "bits": bits,
+            "strict": bool(strict),
+            "threads": threads,
+            "device": device,
+            "precision": self.dtype.name,
+            "usage": usage,
+            "compact": bool(compact),
+        }
         self.name = ""
         self._cameras: list[Camera] = []
         self._fitted: Camera | None = None
@@ -191,7 +215,7 @@ class Scene(SceneContents, SceneViews):
 
     def _forget(self) -> None:
         """What was made of the last commit."""
-        self._cuda = self._fitted = None
+        self._cuda = self._fitted = self._file = None
 
     def _on_cuda(self) -> CudaRays:
         if self._cuda is None:
@@ -230,8 +254,9 @@ class Scene(SceneContents, SceneViews):
         masks: ArrayLike | None = None,
         keep: ArrayLike | Mapping[Any, ArrayLike] | None = None,
         skip: ArrayLike | Mapping[str, Any] | None = None,
+        also: Sequence[str] | str = (),
         stream: int = 0,
-    ) -> dict[str, np.ndarray]:
+    ) -> Hits:
         """The closest hit of each ray.
 
         Parameters
@@ -258,6 +283,9 @@ class Scene(SceneContents, SceneViews):
             What each ray leaves out: a dict of arrays "prim", "geometry" and "instance" with the
             leading shape of the rays, such as the hits that they start from; or an array of
             positions in the mesh of geometry 0.
+        also :
+            What else the hits are to have: "position", "normal", or names that `set_attributes`
+            gave vertices, such as "uv". One name or several. Computed on the processor.
         stream :
             Only with device="cuda" and rays that lie on the GPU, float32 of shape (..., 8): the
             CUDA stream to run on, as a number (`cupy.cuda.get_current_stream().ptr`). Results are
@@ -265,7 +293,8 @@ class Scene(SceneContents, SceneViews):
 
         Returns
         -------
-        dict of arrays with the leading shape of the rays: "t" (the scene's type; infinity: nothing
+        Hits, a dict of arrays with the leading shape of the rays, which are attributes too
+        (`hits.t`): "t" (the scene's type; infinity: nothing
         was hit), "prim" (uint32, the position in the mesh's `faces`; 0xFFFFFFFF: nothing), "u" and
         "v" (the scene's type): the point is (1-u-v)*v0 + u*v1 + v*v2; "geometry" (uint32, the
         mesh's id in its scene; 0xFFFFFFFF: nothing) and "instance" (uint32; 0: a geometry of the
@@ -277,9 +306,21 @@ class Scene(SceneContents, SceneViews):
         With device="cuda" all rays have the mask of 32 bits set, and hits are the same. Scenes with
         instances, `mask`, `masks`, `keep` and `skip` raise BackendUnavailable there.
         """
+        if (
+            directions is not None
+            and tmin is tmax is masks is keep is skip is None
+            and mask is ALL
+            and self.device == "cpu"
+        ):
+            row = np.empty(self._core.hit_columns, self.dtype)
+            dimensions = self._core.hit_of(rays, directions, row)
+            if dimensions:
+                found = Hits(row if dimensions == 1 else row[None])
+                return self._with(found, also, rays, directions) if also else found
         if self.device == "cuda":
             self._refuse_filter(keep, skip)
-            return self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)
+            found = self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)
+            return self._with(found, also, rays, directions) if also else found
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
         only = hit_filter(keep, skip, lead)
@@ -288,7 +329,8 @@ class Scene(SceneContents, SceneViews):
         self._core.intersect(
             *args, hits if hits.ndim == 2 else hits.reshape(-1, columns), *seen, self.threads, only
         )
-        return hit_columns(hits, 0)
+        found = Hits(hits)
+        return self._with(found, also, rays, directions) if also else found
 
     def occluded(
         self,
@@ -355,10 +397,10 @@ class Scene(SceneContents, SceneViews):
         keep: ArrayLike | Mapping[Any, ArrayLike] | None = None,
         skip: ArrayLike | Mapping[str, Any] | None = None,
         max_result_bytes: int = 0,
-    ) -> dict[str, np.ndarray]:
+    ) -> Hits:
         """Every hit of every ray, from one traversal. Rays as in `intersect`.
 
-        Returns a dict: "offsets" (uint64, one more than there are rays); those of ray i, counted in
+        Returns Hits with "offsets" too (uint64, one more than there are rays); those of ray i, counted in
         C order, stand at offsets[i] to offsets[i + 1] of the arrays of `intersect`, sorted by (t,
         instance, geometry, prim). Each triangle counts once a ray and path; an edge belongs to one
         of its two triangles, so that crossings of a closed mesh are counted exactly.
@@ -369,47 +411,11 @@ class Scene(SceneContents, SceneViews):
         seen = ray_masks(mask, masks, lead)
         only = hit_filter(keep, skip, lead)
         offsets, hits, _ = self._core.all_hits(*args, max_result_bytes, *seen, self.threads, only)
-        return {"offsets": offsets, **hit_columns(hits, 0)}
+        return Hits(hits, {"offsets": offsets})
 
     def _refuse_filter(self, keep: Any, skip: Any) -> None:
         if keep is not None or skip is not None:
             raise _core.BackendUnavailable("device='cuda': hits are not filtered there")
-
-    def positions(
-        self,
-        hits: Mapping[str, Any],
-        rays: ArrayLike | None = None,
-        directions: ArrayLike | None = None,
-    ) -> np.ndarray:
-        """Where hits are: shape (..., 3) float32, in this scene's space, through all instances.
-
-        `hits`: a dict as `intersect` and `all_hits` return it, of this scene as it is committed
-        now. Computed in float64 from the triangle, u and v, rounded once. NaN for those that hit
-        nothing. InputError: a path, geometry or triangle that the last commit does not have.
-        Hits of spheres and capsules need the rays, as `intersect` was given them: their points are
-        origin + t * direction.
-        """
-        return self._of_hits(hits, rays, directions, "positions")
-
-    def normals(
-        self,
-        hits: Mapping[str, Any],
-        rays: ArrayLike | None = None,
-        directions: ArrayLike | None = None,
-    ) -> np.ndarray:
-        """The geometric normal at each hit: shape (..., 3) float32, of unit length, in this scene's
-        space. Counter-clockwise corners face the viewer; the outside of a mesh stays outside where
-        an instance mirrors it. Of spheres and capsules, which need the rays, it points away from
-        the center or axis. `hits`, `rays`, NaN and errors as in `positions`."""
-        return self._of_hits(hits, rays, directions, "normals")
-
-    def _of_hits(self, hits: Mapping[str, Any], rays: Any, directions: Any, what: str) -> np.ndarray:
-        require_float32(self, what)
-        given = hit_rows(hits)
-        with_rays = None if rays is None else ray_rows(rays, directions, given.shape[:-1])
-        found = np.empty((*given.shape[:-1], 3), FLOAT32)
-        getattr(self._core, what)(given.reshape(-1, 6), with_rays, found.reshape(-1, 3), self.threads)
-        return found
 
     def closest_point(
         self, points: ArrayLike, *, max_distance: float = np.inf
@@ -622,17 +628,6 @@ class Scene(SceneContents, SceneViews):
         self._forget()
         return self._core.refit(corners, self.threads)
 
-    def save(self, file: str | os.PathLike) -> None:
-        """Writes the scene to a .rdx file, as its last commit left it: its trees, all scenes that
-        it places, each once, with ids and masks, its name and its cameras. `load_scene` reads it.
-
-        A reader never sees half a file. InputError: changes without a commit, a file that cannot be
-        written. NotImplementedError: a scene in float64.
-        """
-        require_float32(self, "save")
-        cameras = [camera._fields() for camera in self._cameras]
-        self._core.save_rdx(os.fspath(file), self.name, cameras)
-
     def info(self) -> dict[str, Any]:
         """Counts, bounds and degenerate elements of the mesh."""
         require_float32(self, "info")
@@ -676,4 +671,6 @@ def load_scene(file: str | os.PathLike, *, threads: int = 0, device: str = "cpu"
     scene = Scene(threads=threads, device=device)
     scene._core, scene.name, cameras = _core.SceneTrees.load_rdx(os.fspath(file), scene.threads)
     scene._cameras = [Camera(**camera) for camera in cameras]
+    scene._options.update(scene._core.commit_options())
+    scene._file = state_of(os.path.abspath(file))
     return scene

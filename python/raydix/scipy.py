@@ -4,7 +4,7 @@
 
 Euclidean distances in two or three dimensions, float64. Answers are exact, whatever `eps`. Of two
 neighbours at the same squared distance the one with the lower index comes first; SciPy promises no
-order. Coordinates go to 1e12; there are no `boxsize`, no `indices` and no pickling.
+order. Coordinates go to 1e12; there are no `boxsize` and no `indices`.
 """
 
 from __future__ import annotations
@@ -58,6 +58,13 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         self.maxes = self.data.max(axis=0) if self.n else np.zeros(self.m)
         self.mins = self.data.min(axis=0) if self.n else np.zeros(self.m)
         self._points = Points(self.data, strict=True)
+
+    def __reduce__(self) -> tuple:
+        """Pickles and copies are the data; the tree is built again."""
+        return cKDTree, (self.data, self.leafsize)
+
+    def __repr__(self) -> str:
+        return f"<raydix.scipy.cKDTree: {self.n:,} points, {self.m}-D>"
 
     @property
     def size(self) -> int:

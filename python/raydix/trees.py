@@ -50,12 +50,28 @@ def _mesh(vertices: Any, faces: Any) -> tuple[np.ndarray, np.ndarray]:
     return corners, np.zeros((0, 3), UINT32) if faces is None else mesh_faces(faces, len(corners))
 
 
+def _kept(part: Any) -> Any:
+    if not isinstance(part, np.ndarray):
+        return part
+    copy = part.copy()
+    copy.flags.writeable = False
+    return copy
+
+
 class _Tree:
     """What the three kinds have in common."""
 
-    def __init__(self, core: Any, node: np.dtype) -> None:
-        self._core = core
-        self._node = node
+    _core_type: Any
+    _node: np.dtype
+
+    def __init__(self, *made_of: Any) -> None:
+        self._core = self._core_type(*made_of)
+        # Kept for copies: read-only, and none of the caller's own memory.
+        self._made_of = tuple(_kept(part) for part in made_of)
+
+    def __reduce__(self) -> tuple:
+        """Pickles, copies and deep copies are vertices and faces; the tree is built again."""
+        return type(self), self._made_of
 
     @property
     def nodes(self) -> np.ndarray:
@@ -96,6 +112,9 @@ class Bvh(_Tree):
     """A binary bounding volume hierarchy, made by `raydix.bvh`. Its nodes are
     `raydix.trees.BVH_NODE`."""
 
+    _core_type = _core.Bvh
+    _node = BVH_NODE
+
     def stats(
         self, *, epo: bool = False, node_cost: float = 1.0, primitive_cost: float = 1.0
     ) -> dict[str, Any]:
@@ -107,6 +126,9 @@ class Bvh(_Tree):
 class Octree(_Tree):
     """An octree (Karras 2012, section 5), made by `raydix.octree`. Its nodes are
     `raydix.trees.OCTREE_NODE`."""
+
+    _core_type = _core.Octree
+    _node = OCTREE_NODE
 
     @property
     def points(self) -> np.ndarray:
@@ -145,6 +167,9 @@ class KdTree(_Tree):
     """A k-d tree (Karras 2012, section 5), made by `raydix.kdtree`. Its nodes are
     `raydix.trees.KD_NODE`."""
 
+    _core_type = _core.KdTree
+    _node = KD_NODE
+
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Lowest and highest corner of the primitives."""
@@ -167,9 +192,7 @@ def bvh(
     same tree bit for bit. The same tree for every number of threads. Arguments as in
     `raydix.Scene`.
     """
-    return Bvh(
-        _core.Bvh(*_mesh(vertices, faces), builder, bits, max_leaf, strict, threads), BVH_NODE
-    )
+    return Bvh(*_mesh(vertices, faces), builder, bits, max_leaf, strict, threads)
 
 
 def octree(
@@ -184,10 +207,7 @@ def octree(
 ) -> Octree:
     """An octree over points, or over the centres of triangles: nodes with more than `max_leaf` are
     divided, down to `max_level`."""
-    return Octree(
-        _core.Octree(*_mesh(vertices, faces), bits, max_level, max_leaf, strict, threads),
-        OCTREE_NODE,
-    )
+    return Octree(*_mesh(vertices, faces), bits, max_level, max_leaf, strict, threads)
 
 
 def kdtree(
@@ -201,4 +221,4 @@ def kdtree(
 ) -> KdTree:
     """A k-d tree over triangles or points. `max_leaf` 0: 8 points or 4 triangles. For neighbours
     use `raydix.Points`: it is faster."""
-    return KdTree(_core.KdTree(*_mesh(vertices, faces), bits, max_leaf, strict, threads), KD_NODE)
+    return KdTree(*_mesh(vertices, faces), bits, max_leaf, strict, threads)

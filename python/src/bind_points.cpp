@@ -6,20 +6,53 @@
 #include <raydix/points.h>
 
 #include <cstdint>
+#include <mutex>
+#include <shared_mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "arrays.h"
+#include "asking.h"
 #include "batch.h"
 #include "bindings.h"
 #include "lists.h"
+#include "locks.h"
 
 namespace raydix::python {
 namespace {
 
+/// An index that any number of threads ask and one changes.
+template <class Index>
+class SharedIndex {
+public:
+    explicit SharedIndex(Index index) : index_(std::move(index)) {}
+
+    /// Held while the index is asked; changes wait for those who hold it, and let no new ones past.
+    [[nodiscard]] Reading read() const {
+        if (Reading::held() != 0) return Reading(use_);
+        const std::lock_guard queue(queue_);
+        return Reading(use_);
+    }
+    /// While reading.
+    [[nodiscard]] const Index& index() const { return index_; }
+    /// call(index) alone, without the interpreter's lock. Throws InputError as Writing does.
+    template <class Call>
+    auto change(const char* name, const Call& call) {
+        const nb::gil_scoped_release unlocked;
+        const Writing lock(name, queue_, use_);
+        return call(index_);
+    }
+
+private:
+    Index index_;
+    mutable std::mutex queue_;  // without it, readers would keep a change waiting for ever
+    mutable std::shared_mutex use_;
+};
+
 template <class Index>
 struct PointCalls {
+    using Shared = SharedIndex<Index>;
     using Scalar = typename Index::Scalar;
     using Point = typename Index::Point;
     using Box = typename Index::Box;
@@ -29,13 +62,13 @@ struct PointCalls {
     using Values = In<Scalar, nb::ndim<1>>;
     using Lists = PointLists<Scalar>;
 
-    static void make(Index* self, const PointRows& points, const std::string& tree, bool strict,
+    static void make(Shared* self, const PointRows& points, const std::string& tree, bool strict,
                      int threads) {
         const PointsOptions options{
             .tree = points_tree_from_name(tree), .strict = strict, .threads = threads_for(threads)};
         const auto given = rows<Point>(points);
         const nb::gil_scoped_release unlocked;
-        new (self) Index(build_points(given, options));
+        new (self) Shared(build_points(given, options));
     }
 
     static PointQueryOptions query_options(int threads, std::uint64_t max_result_bytes = 0,
@@ -45,7 +78,7 @@ struct PointCalls {
     }
 
     static std::pair<std::uint64_t, std::uint64_t> nearest(
-        const Index& index, const PointRows& queries,
+        const Shared& shared, const PointRows& queries,
         const Out<std::uint32_t, nb::ndim<2>>& indices, const Out<Scalar, nb::ndim<2>>& distances,
         int threads) {
         const auto asked = rows<Point>(queries);
@@ -54,7 +87,8 @@ struct PointCalls {
             distances.shape(1) != k)
             throw nb::value_error("results have another shape than (queries, k)");
         std::pair<std::uint64_t, std::uint64_t> counts{0, 0};
-        in_pieces(asked.size(), [&](std::size_t begin, std::size_t end) {
+        const Index& index = shared.index();
+        read_in_pieces(shared, asked.size(), [&](std::size_t begin, std::size_t end) {
             const std::size_t first = begin * k, length = (end - begin) * k;
             const std::span ids(indices.data() + first, length);
             const std::span far(distances.data() + first, length);
@@ -73,11 +107,11 @@ struct PointCalls {
 
     /// search(options, begin, end) -> lists of these queries.
     template <class Search>
-    static nb::tuple lists_in_pieces(const char* what, std::size_t queries,
+    static nb::tuple lists_in_pieces(const Shared& shared, const char* what, std::size_t queries,
                                      PointQueryOptions options, const Search& search) {
         PieceLimit limit(what, options.max_result_bytes);
         std::vector<Lists> pieces;
-        in_pieces(queries, [&](std::size_t begin, std::size_t end) {
+        read_in_pieces(shared, queries, [&](std::size_t begin, std::size_t end) {
             pieces.push_back(limit.next([&](std::uint64_t bytes) {
                 options.max_result_bytes = bytes;
                 return search(options, begin, end);
@@ -96,14 +130,15 @@ struct PointCalls {
     }
 
     /// One radius for all, or one for each.
-    static nb::tuple radius(const Index& index, const PointRows& queries, const Values& radii,
+    static nb::tuple radius(const Shared& shared, const PointRows& queries, const Values& radii,
                             bool sort, std::uint64_t max_result_bytes, int threads) {
         const auto asked = rows<Point>(queries);
         const std::span all(radii.data(), radii.shape(0));
         if (all.size() != 1 && all.size() != asked.size())
             throw nb::value_error("radii have another length than the queries");
+        const Index& index = shared.index();
         return lists_in_pieces(
-            "radius", asked.size(), query_options(threads, max_result_bytes, sort),
+            shared, "radius", asked.size(), query_options(threads, max_result_bytes, sort),
             [&](const PointQueryOptions& options, std::size_t begin, std::size_t end) {
                 const auto part = asked.subspan(begin, end - begin);
                 return all.size() == 1
@@ -112,40 +147,67 @@ struct PointCalls {
             });
     }
 
-    static void count(const Index& index, const PointRows& queries, Scalar radius,
+    static void count(const Shared& shared, const PointRows& queries, Scalar radius,
                       const Out<std::uint32_t, nb::ndim<1>>& out, int threads) {
         const auto asked = rows<Point>(queries);
         const std::span counts(out.data(), out.shape(0));
         if (counts.size() != asked.size())
             throw nb::value_error("counts have another length than the queries");
-        in_pieces(asked.size(), [&](std::size_t begin, std::size_t end) {
-            radius_count(index, asked.subspan(begin, end - begin), radius,
+        read_in_pieces(shared, asked.size(), [&](std::size_t begin, std::size_t end) {
+            radius_count(shared.index(), asked.subspan(begin, end - begin), radius,
                          counts.subspan(begin, end - begin), query_options(threads));
         });
     }
 
-    static nb::tuple box(const Index& index, const BoxRows& boxes, std::uint64_t max_result_bytes,
+    static nb::tuple box(const Shared& shared, const BoxRows& boxes, std::uint64_t max_result_bytes,
                          int threads) {
         const auto asked = rows<Box>(boxes);
+        const Index& index = shared.index();
         return lists_in_pieces(
-            "box", asked.size(), query_options(threads, max_result_bytes),
+            shared, "box", asked.size(), query_options(threads, max_result_bytes),
             [&](const PointQueryOptions& options, std::size_t begin, std::size_t end) {
                 return box_search(index, asked.subspan(begin, end - begin), options);
             });
     }
 
-    static nb::tuple neighbours(const Index& index, Scalar radius, bool full,
+    static nb::tuple neighbours(const Shared& shared, Scalar radius, bool full,
                                 std::uint64_t max_result_bytes, int threads) {
         std::vector<Lists> pieces;
         {
             const nb::gil_scoped_release unlocked;
-            pieces.push_back(neighbour_lists(index, radius, full ? PairRows::full : PairRows::half,
+            const Reading lock = shared.read();
+            pieces.push_back(neighbour_lists(shared.index(), radius,
+                                             full ? PairRows::full : PairRows::half,
                                              query_options(threads, max_result_bytes)));
         }
         return lists_of(pieces);
     }
 
-    static nb::dict stats(const Index& index) {
+    static std::uint32_t insert(Shared& shared, const PointRows& points) {
+        const auto given = rows<Point>(points);
+        return shared.change("add", [&](Index& index) { return index.insert(given); });
+    }
+
+    static std::uint32_t remove(Shared& shared, const In<std::uint32_t, nb::ndim<1>>& ids) {
+        const std::span given(ids.data(), ids.shape(0));
+        return shared.change("remove", [&](Index& index) { return index.remove(given); });
+    }
+
+    /// What ask(index) gives, while it does not change.
+    template <class Ask>
+    static auto of_index(const Shared& shared, const Ask& ask) {
+        const nb::gil_scoped_release unlocked;
+        const Reading lock = shared.read();
+        return ask(shared.index());
+    }
+
+    static nb::dict stats(const Shared& shared) {
+        Reading lock;
+        {
+            const nb::gil_scoped_release unlocked;
+            lock = shared.read();
+        }
+        const Index& index = shared.index();
         nb::dict fields;
         fields["points"] = index.size();
         fields["left_out"] = index.left_out();
@@ -168,7 +230,7 @@ struct PointCalls {
     }
 
     static void bind(nb::module_& module, const char* name) {
-        nb::class_<Index>(module, name, "An index over points; raydix.Points is what to use.")
+        nb::class_<Shared>(module, name, "An index over points; raydix.Points is what to use.")
             .def("__init__", &make, nb::arg("points").noconvert(), nb::arg("tree"),
                  nb::arg("strict"), nb::arg("threads"))
             .def("knn", &nearest, nb::arg("queries").noconvert(), nb::arg("indices").noconvert(),
@@ -181,9 +243,25 @@ struct PointCalls {
                  nb::arg("threads") = 0)
             .def("neighbours", &neighbours, nb::arg("radius"), nb::arg("full"),
                  nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
-            .def("order", [](const Index& index) { return hand_over(index.order()); })
+            .def("order",
+                 [](const Shared& shared) {
+                     return hand_over(of_index(shared, [](const Index& i) { return i.order(); }));
+                 })
+            .def("points",
+                 [](const Shared& shared) {
+                     return hand_over_rows<Scalar>(
+                         of_index(shared, [](const Index& i) { return i.points(); }));
+                 })
+            .def("given",
+                 [](const Shared& shared) {
+                     return of_index(shared, [](const Index& i) { return i.input_count(); });
+                 })
+            .def("insert", &insert, nb::arg("points").noconvert())
+            .def("remove", &remove, nb::arg("ids").noconvert())
             .def("stats", &stats)
-            .def("__len__", [](const Index& index) { return index.size(); });
+            .def("__len__", [](const Shared& shared) {
+                return of_index(shared, [](const Index& i) { return i.size(); });
+            });
     }
 };
 

@@ -30,6 +30,7 @@
 #include "bindings.h"
 #include "figures.h"
 #include "lists.h"
+#include "one_ray.h"
 #include "ray_parts.h"
 #include "scene_changes.h"
 #include "scene_queries.h"
@@ -182,19 +183,23 @@ Counts count_hits(Scene& scene, Rays& rays, const Out<std::uint32_t, nb::ndim<1>
     return counts;
 }
 
-using PointsOut = Out<float, nb::shape<-1, 3>>;
-using HitsIn = In<float, nb::shape<-1, 6>>;
-using MaybeRays = std::optional<RaysIn>;
+template <class Scene>
+using PointsOut = Out<Scalar<Scene>, nb::shape<-1, 3>>;
+template <class Scene>
+using HitsIn = In<Scalar<Scene>, nb::shape<-1, hit_columns<Scene>>>;
+template <class Scene>
+using MaybeRays = std::optional<In<Scalar<Scene>, nb::shape<-1, 8>>>;
 
 /// call(scene, [rays,] hits, points, threads): points or normals of hits.
-template <class Call>
-void fill_for_hits(SceneTrees& scene, const HitsIn& hits, const MaybeRays& with,
-                   const PointsOut& out, int threads, const Call& call) {
-    const auto given = rows<Hit>(hits);
-    const auto points = rows_out<Vec3>(out);
+template <class Scene, class Call>
+void fill_for_hits(Scene& scene, const HitsIn<Scene>& hits, const MaybeRays<Scene>& with,
+                   const PointsOut<Scene>& out, int threads, const Call& call) {
+    using Ray = typename Scene::Types::Ray;
+    const auto given = rows<typename Scene::Types::Hit>(hits);
+    const auto points = rows_out<Point<Scene>>(out);
     require_length(points.size(), given.size());
     std::span<const Ray> rays;
-    if (with) rays = rows<Ray>(*with);
+    if (with) rays = raydix::python::rows<Ray>(*with);
     if (with) require_length(rays.size(), given.size());
     read_in_pieces(scene, given.size(), [&](std::size_t begin, std::size_t end) {
         const std::size_t n = end - begin;
@@ -207,14 +212,16 @@ void fill_for_hits(SceneTrees& scene, const HitsIn& hits, const MaybeRays& with,
     });
 }
 
-void positions_of(SceneTrees& scene, const HitsIn& hits, const MaybeRays& rays,
-                  const PointsOut& out, int threads) {
+template <class Scene>
+void positions_of(Scene& scene, const HitsIn<Scene>& hits, const MaybeRays<Scene>& rays,
+                  const PointsOut<Scene>& out, int threads) {
     fill_for_hits(scene, hits, rays, out, threads,
                   [](const auto&... arguments) { positions(arguments...); });
 }
 
-void normals_of(SceneTrees& scene, const HitsIn& hits, const MaybeRays& rays, const PointsOut& out,
-                int threads) {
+template <class Scene>
+void normals_of(Scene& scene, const HitsIn<Scene>& hits, const MaybeRays<Scene>& rays,
+                const PointsOut<Scene>& out, int threads) {
     fill_for_hits(scene, hits, rays, out, threads,
                   [](const auto&... arguments) { normals(arguments...); });
 }
@@ -365,6 +372,28 @@ auto view_of(std::shared_ptr<const std::vector<Row>> values) {
         owner_of(std::make_unique<std::shared_ptr<const std::vector<Row>>>(std::move(values))));
 }
 
+/// The arrays of a mesh, changes without a commit included; None of what is no mesh.
+template <class Scene>
+nb::object arrays_of(Scene& scene, std::uint32_t id) {
+    const auto arrays = reading(scene, [&] { return scene.mesh_arrays(id); });
+    if (!arrays) return nb::none();
+    return nb::make_tuple(view_of<Scalar<Scene>>(arrays->vertices),
+                          view_of<std::uint32_t>(arrays->triangles));
+}
+
+/// The closest hit of one ray, from its two arrays to the row of a hit. The shortest way here that
+/// there is: 1 or 2 says how many dimensions the arrays have, (3,) or (1, 3); 0: they are something
+/// else, and nothing was done.
+template <class Scene>
+int hit_of(Scene& scene, nb::handle origin, nb::handle direction, nb::handle row) {
+    typename Scene::Types::Ray ray;
+    const int dimensions = read_vector(origin, ray.origin);
+    if (dimensions == 0 || read_vector(direction, ray.direction) != dimensions) return 0;
+    const auto hit = reading(scene, [&] { return scene.closest_hit(ray, 0xFFFFFFFFu); });
+    write_bytes(row, &hit, sizeof(hit));
+    return dimensions;
+}
+
 /// What both types of scenes answer.
 template <class Scene>
 void bind_asking(nb::class_<Scene>& scene) {
@@ -385,6 +414,17 @@ void bind_asking(nb::class_<Scene>& scene) {
     scene.def("mesh_id", [](Scene& self) { return reading(self, [&] { return self.mesh_id(); }); });
     scene.attr("hit_columns") = static_cast<int>(hit_columns<Scene>);
     scene.def("stats", &stats<Scene>);
+    scene.def("mask_of", [](Scene& self, std::uint32_t id) {
+        return reading(self, [&] { return self.mask_of(id); });
+    });
+    scene.def("arrays_of", &arrays_of<Scene>);
+    scene.def("hit_of", &hit_of<Scene>, nb::arg("origin"), nb::arg("direction"), nb::arg("row"));
+    scene.def("positions", &positions_of<Scene>, nb::arg("hits").noconvert(),
+              nb::arg("rays").noconvert().none(), nb::arg("points").noconvert(),
+              nb::arg("threads") = 0);
+    scene.def("normals", &normals_of<Scene>, nb::arg("hits").noconvert(),
+              nb::arg("rays").noconvert().none(), nb::arg("normals").noconvert(),
+              nb::arg("threads") = 0);
     bind_rays(scene);
     bind_queries(scene);
 }
@@ -399,15 +439,7 @@ void bind_scene(nb::module_& module) {
     bind_files(scene);
     bind_shapes(scene);
     bind_asking(scene);
-    scene.def("wide_stats", &wide_stats)
-        .def("info", &mesh_info)
-        .def("check", &check_trees)
-        .def("positions", &positions_of, nb::arg("hits").noconvert(),
-             nb::arg("rays").noconvert().none(), nb::arg("points").noconvert(),
-             nb::arg("threads") = 0)
-        .def("normals", &normals_of, nb::arg("hits").noconvert(),
-             nb::arg("rays").noconvert().none(), nb::arg("normals").noconvert(),
-             nb::arg("threads") = 0);
+    scene.def("wide_stats", &wide_stats).def("info", &mesh_info).def("check", &check_trees);
     nb::class_<SceneTreesD> in_double(module, "SceneTreesD",
                                       "A scene in double; raydix.Scene is what to use.");
     bind_changes(in_double);

@@ -93,6 +93,19 @@ auto while_reading(Scene& scene, const Call& call) {
     return call();
 }
 
+/// Of the last commit, by the names that Python gives them.
+template <class Scene>
+nb::dict commit_options(Scene& scene) {
+    const SceneOptions options = while_reading(scene, [&] { return scene.commit_options(); });
+    nb::dict fields;
+    fields["quality"] = options.quality == Quality::fast   ? "fast"
+                        : options.quality == Quality::high ? "high"
+                                                           : "balanced";
+    fields["usage"] = options.usage == Usage::moving ? "moving" : "fixed";
+    fields["compact"] = options.compact;
+    return fields;
+}
+
 nb::tuple named(const std::shared_ptr<SceneTrees>& scene, const std::string& name,
                 const std::vector<Camera>& shown) {
     nb::list cameras;
@@ -259,6 +272,7 @@ void bind_commits(nb::class_<Scene>& scene) {
              nb::arg("compact").none(), nb::arg("refit_limit").none(), nb::arg("threads").none(),
              nb::arg("progress").none())
         .def("refit", &refit<Scene>, nb::arg("vertices").noconvert(), nb::arg("threads") = 0)
+        .def("commit_options", &commit_options<Scene>)
         .def("committed",
              [](Scene& self) { return while_reading(self, [&] { return self.committed(); }); })
         .def("bounds",

@@ -96,14 +96,28 @@ template <class Names>
 const typename BasicSceneTrees<Names>::Arrays& BasicSceneTrees<Names>::arrays_of(
     std::uint32_t id, Geometry& geometry) {
     if (geometry.is_in_file) {
-        const auto mesh = *scene_.mesh(id);
-        geometry.mesh = {
-            std::make_shared<const Vertices>(mesh.vertices.begin(), mesh.vertices.end()),
-            std::make_shared<const typename Arrays::Triangles>(mesh.triangles.begin(),
-                                                               mesh.triangles.end())};
+        geometry.mesh = copied(*scene_.mesh(id));
         geometry.is_in_file = false;
     }
     return geometry.mesh;
+}
+
+template <class Names>
+typename BasicSceneTrees<Names>::Arrays BasicSceneTrees<Names>::copied(
+    const typename Names::MeshView& mesh) {
+    using Triangles = typename Arrays::Triangles;
+    return {std::make_shared<const Vertices>(mesh.vertices.begin(), mesh.vertices.end()),
+            std::make_shared<const Triangles>(mesh.triangles.begin(), mesh.triangles.end())};
+}
+
+template <class Names>
+std::optional<typename BasicSceneTrees<Names>::Arrays> BasicSceneTrees<Names>::mesh_arrays(
+    std::uint32_t id) const {
+    const auto found = geometries_.find(id);
+    if (found == geometries_.end()) throw InputError("there is no " + name_of(id));
+    const Geometry& geometry = found->second;
+    if (geometry.is_instance || geometry.is_shapes) return std::nullopt;
+    return geometry.is_in_file ? copied(*scene_.mesh(id)) : geometry.mesh;
 }
 
 template <class Names>

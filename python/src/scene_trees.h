@@ -225,6 +225,10 @@ public:
     [[nodiscard]] std::optional<std::uint32_t> mesh_id() const { return mesh_id_; }
     /// Its mask; 0 if there is none.
     [[nodiscard]] std::uint32_t mesh_mask() const { return mesh_mask_; }
+    /// Of any geometry, changes without a commit included. Throws InputError: there is none.
+    [[nodiscard]] std::uint32_t mask_of(std::uint32_t id) const { return scene_.mask(id); }
+    /// Those of a mesh; a copy of what still lies in the file of the scene. None of all else.
+    [[nodiscard]] std::optional<Arrays> mesh_arrays(std::uint32_t id) const;
     /// As the last commit left it. Throws InputError, as its functions do, if there was none.
     [[nodiscard]] const Scene& traced();
 
@@ -280,6 +284,7 @@ private:
     Geometry& at(std::uint32_t id);
     /// Of a mesh: its arrays, copied if they are still those of a file.
     const Arrays& arrays_of(std::uint32_t id, Geometry& geometry);
+    [[nodiscard]] static Arrays copied(const typename Names::MeshView& mesh);
     /// While writing, or with `build_` locked: the first commit of a scene that was made from a
     /// mesh.
     void settle();

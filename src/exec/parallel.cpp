@@ -1,8 +1,9 @@
 // The loops of parallel.h on oneTBB. Every range runs in a plain floating-point environment.
-#if !defined(__SANITIZE_THREAD__)  // parallel_std.cpp serves there
+#if !defined(__SANITIZE_THREAD__) && !defined(RAYDIX_NO_TBB)  // parallel_std.cpp serves there
 
 #include "exec/parallel.h"
 
+#include <raydix/thread_pool.h>
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -14,6 +15,7 @@
 
 #include "base/float_env.h"
 #include "base/options.h"
+#include "exec/job_loop.h"
 #include "exec/progress.h"
 
 namespace raydix {
@@ -48,6 +50,10 @@ void run_here(const std::function<void()>& body) {
 void with_threads(int threads, const std::function<void()>& body) {
     check_threads(threads);
     const FloatEnvironment plain;
+    if (pool_is_used()) {
+        with_job_limit(threads, body);
+        return;
+    }
     if (threads == 0) {
         run_here(body);
         return;
@@ -70,9 +76,18 @@ void with_threads(int threads, const std::function<void()>& body) {
     });
 }
 
-void isolated(const std::function<void()>& body) { tbb::this_task_arena::isolate(body); }
+void isolated(const std::function<void()>& body) {
+    if (pool_is_used())
+        body();  // a job takes up nothing else
+    else
+        tbb::this_task_arena::isolate(body);
+}
 
-int thread_count() { return tbb::this_task_arena::max_concurrency(); }
+int thread_count() {
+    return pool_is_used() ? pool_threads() : tbb::this_task_arena::max_concurrency();
+}
+
+bool has_onetbb() { return true; }
 
 namespace detail {
 
@@ -82,6 +97,10 @@ void parallel_ranges(std::size_t n, std::size_t grain,
     if (n <= grain || thread_count() == 1) {
         const Range range;
         call(body, 0, n);
+        return;
+    }
+    if (pool_is_used()) {
+        run_on_pool(n, grain, call, body);
         return;
     }
     // A loop inside of another goes on when the other one ends by an exception. oneTBB would leave

@@ -13,6 +13,21 @@ namespace raydix {
 
 using PointCode = std::uint32_t;  // a place on the curve
 
+/// One of the trees of an index that changed (point_forest.h), in its arrays. The root stands
+/// apart, below the top node.
+struct PointLevel {
+    std::uint32_t first_leaf, leaves, first_node, nodes;
+    std::uint32_t built;  // points, those removed since included
+    std::uint32_t depth;
+};
+
+struct PointForestState {
+    bool begun = false;  // false: the index is one tree, as it was built
+    std::vector<PointLevel> levels;
+    std::vector<std::uint32_t> leaf_of;  // [input_count]: no_primitive for what is not in the index
+    std::vector<std::uint32_t> parent_of_leaf, parent_of_node;
+};
+
 namespace detail {
 
 template <class Scalar, int Dim>
@@ -26,6 +41,7 @@ struct PointArrays {
     PointsTree chosen = PointsTree::kdtree;
     std::uint64_t input_count = 0, left_out = 0, peak_bytes = 0;
     PointsBuildMs ms;
+    PointForestState forest;
     SortScratch<PointCode> sort_scratch;  // kept from the first rebuild on
 };
 

@@ -72,6 +72,7 @@ void forget(detail::PointArrays<T, Dim>& arrays) {
     std::fill_n(none.hi, Dim, -inf);
     set_bounds(none, arrays.bounds);
     arrays.tree = {};
+    arrays.forest = {};
     arrays.input_count = arrays.left_out = 0;
     arrays.ms = {};
 }
@@ -201,6 +202,23 @@ std::vector<std::uint32_t> PointIndex<T, Dim>::order() const {
         for (const std::uint32_t id : arrays().tree.leaves[leaf].id)
             if (id != no_primitive) ids.push_back(id);
     return ids;
+}
+
+template <class T, int Dim>
+std::vector<typename PointIndex<T, Dim>::Point> PointIndex<T, Dim>::points() const {
+    std::vector<Point> all;
+    all.reserve(size());
+    for (std::uint32_t leaf = 0; leaf < leaf_count(); ++leaf) {
+        const PointLeaf<T, Dim>& group = arrays().tree.leaves[leaf];
+        for (std::uint32_t i = 0; i < points_per_leaf; ++i) {
+            if (group.id[i] == no_primitive) continue;
+            if constexpr (Dim == 3)
+                all.push_back({group.at[0][i], group.at[1][i], group.at[2][i]});
+            else
+                all.push_back({group.at[0][i], group.at[1][i]});
+        }
+    }
+    return all;
 }
 
 template class PointIndex<float, 2>;

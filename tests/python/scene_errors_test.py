@@ -156,12 +156,9 @@ def test_strict_scenes_in_float64():
 
 def test_what_float64_scenes_lack():
     scene = raydix.Scene(*BOX, precision="float64")
-    hits = scene.intersect([DOWN, [9, 9, 9, 0, 0, -1]])
     for name, call in {
         "compact=True": lambda: raydix.Scene(*BOX, precision="float64", compact=True),
         "compact=True ": lambda: scene.commit(compact=True),
-        "positions": lambda: scene.positions(hits),
-        "normals": lambda: scene.normals(hits),
         "save": lambda: scene.save("scene.rdx"),
     }.items():
         text = f"^{name.strip()}: not there .* float64"

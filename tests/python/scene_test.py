@@ -356,16 +356,6 @@ def test_the_scene_has_its_own_copies(rng, precision):
     assert not scene.occluded(DOWN) and scene.bounds[0, 0] == 99
 
 
-def test_hits_of_trees_are_given_a_geometry():
-    """Rows of four, as a GPU gives them: t, prim, u, v."""
-    rows = np.zeros((2, 3, 4), np.float32)
-    rows.view(np.uint32)[..., 1] = [[0, raydix.MISSING, 5]] * 2
-    columns = raydix._rays.hit_columns(rows, 7)
-    assert columns["prim"].tolist() == [[0, raydix.MISSING, 5]] * 2
-    assert columns["geometry"].tolist() == [[7, raydix.MISSING, 7]] * 2
-    assert not columns["instance"].any() and columns["instance"].dtype == np.uint32
-
-
 def test_points_and_normals_of_hits(rng):
     """Against the triangles, moved to the world in float64."""
     world = random_world(rng)

@@ -1,0 +1,72 @@
+// What stands behind the handles of raydix_c.h, and how exceptions become statuses.
+#pragma once
+
+#include <raydix/raydix.h>
+#include <raydix_c.h>
+
+#include <cstddef>
+#include <cstring>
+#include <exception>
+#include <span>
+#include <string>
+
+struct raydix_scene {
+    raydix::Scene scene;
+};
+struct raydix_solid {
+    raydix::Solid solid;
+};
+struct raydix_points {
+    raydix::Points index;
+};
+struct raydix_lists {
+    raydix::PointLists<float> lists;
+};
+
+namespace raydix_c {
+
+/// The status of the exception that is being handled; keeps its message for this thread.
+raydix_status status_of_exception() noexcept;
+
+/// Runs the body of a call.
+template <class Body>
+raydix_status guarded(const Body& body) noexcept {
+    try {
+        body();
+        return RAYDIX_OK;
+    } catch (...) {
+        return status_of_exception();
+    }
+}
+
+/// Throws InputError that names the argument unless it is there.
+inline void require(const void* argument, const char* name) {
+    if (argument == nullptr) throw raydix::InputError(std::string(name) + " is NULL");
+}
+
+/// `count` things of type T at a caller's array, whose elements have the same layout.
+template <class T, class Element>
+std::span<const T> array_of(const Element* first, std::size_t count, const char* name) {
+    if (count > 0) require(first, name);
+    return {reinterpret_cast<const T*>(first), count};
+}
+template <class T, class Element>
+std::span<T> results_at(Element* first, std::size_t count, const char* name) {
+    if (count > 0) require(first, name);
+    return {reinterpret_cast<T*>(first), count};
+}
+
+/// A caller's options over the defaults: as many bytes as the caller's version of the struct has.
+template <class Options>
+Options options_over(const Options* given, Options defaults) {
+    if (given == nullptr) return defaults;
+    if (given->struct_size < sizeof(std::size_t) || given->struct_size > sizeof(Options))
+        throw raydix::InputError("struct_size of the options is " +
+                                 std::to_string(given->struct_size) + "; this version knows " +
+                                 std::to_string(sizeof(std::size_t)) + " to " +
+                                 std::to_string(sizeof(Options)));
+    std::memcpy(static_cast<void*>(&defaults), given, given->struct_size);
+    return defaults;
+}
+
+}  // namespace raydix_c

@@ -1,0 +1,163 @@
+"""Scenes as files, as bytes for other processes, and as copies."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._arrays import ALL, FLOAT32, require_float32
+from .cameras import Camera
+
+
+class SavedScene:
+    """How a Scene is written, pickled and copied."""
+
+    _core: Any
+    dtype: np.dtype
+    name: str
+    threads: int
+    device: str
+    _options: dict[str, Any]
+    _cameras: list[Camera]
+    _attributes: dict[int, dict[str, np.ndarray]]
+    _placed: dict[int, tuple[Any, np.ndarray]]
+    _shapes: dict[int, tuple[str, tuple]]
+    _file: tuple[str, int, int, int] | None
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What the scene was made with, and what `commit` changed since: a new dict of the
+        arguments of `Scene` by their names. Scenes with equal options are built alike."""
+        return dict(self._options)
+
+    def save(self, file: str | os.PathLike) -> None:
+        """Writes the scene to a .rdx file, as its last commit left it: its trees, all scenes that
+        it places, each once, with ids and masks, its name and its cameras. `load_scene` reads it.
+
+        A reader never sees half a file. InputError: changes without a commit, a file that cannot be
+        written. NotImplementedError: a scene in float64.
+        """
+        require_float32(self, "save")
+        cameras = [camera._fields() for camera in self._cameras]
+        self._core.save_rdx(os.fspath(file), self.name, cameras)
+
+    def __reduce_ex__(self, protocol: Any) -> tuple:
+        """Pickles, copies and deep copies.
+
+        - A scene of `load_scene` that has not changed is its file's path: the process that reads it
+          maps the same file, and both share its memory.
+        - A scene of one mesh is its arrays; its trees are built again.
+        - Any other is the bytes of its .rdx file, in float64 its geometries.
+
+        InputError: changes without a commit.
+        """
+        if not self.committed and len(self):  # type: ignore[attr-defined]
+            raise _core.InputError("the scene has changes without a commit: it cannot be copied")
+        more = {
+            "options": self._options,
+            "name": self.name,
+            "cameras": self._cameras,
+            "attributes": self._attributes,
+            "threads": self.threads,
+            "device": self.device,
+        }
+        if self._file is not None and self._file == state_of(self._file[0]):
+            return _from_file, (self._file, more)
+        if not len(self) or self._is_plain_mesh():  # type: ignore[arg-type]
+            mesh = self._core.arrays_of(0) if len(self) else None  # type: ignore[arg-type]
+            return _from_mesh, (mesh, more)
+        if self.dtype == FLOAT32:
+            return _from_bytes, (self._bytes(), more)
+        return _from_geometries, (self._geometries(), more)
+
+    def _is_plain_mesh(self) -> bool:
+        """Whether `Scene(vertices, faces)` makes the same."""
+        ids = self._core.ids()
+        return (
+            ids == [0]
+            and self._core.is_mesh()
+            and self._core.mask_of(0) == ALL
+            and self._core.arrays_of(0) is not None
+        )
+
+    def _bytes(self) -> bytes:
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "scene.rdx")
+            self.save(file)
+            with open(file, "rb") as saved:
+                return saved.read()
+
+    def _geometries(self) -> list[tuple]:
+        """(id, mask, kind, what it is made of): as `_add_geometry` takes them."""
+        made: list[tuple] = []
+        for id in self._core.ids():
+            mask = self._core.mask_of(id)
+            if id in self._placed:
+                scene, row = self._placed[id]
+                made.append((id, mask, "instance", (scene, row.reshape(3, 4))))
+            elif id in self._shapes:
+                made.append((id, mask, *self._shapes[id]))
+            else:
+                made.append((id, mask, "mesh", self._core.arrays_of(id)))
+        return made
+
+
+def _new(more: dict[str, Any], *mesh: np.ndarray) -> Any:
+    from .scene import Scene
+
+    return Scene(*mesh, **more["options"])
+
+
+def _filled(scene: Any, more: dict[str, Any]) -> Any:
+    scene.name, scene._cameras = more["name"], list(more["cameras"])
+    scene._options = dict(more["options"])
+    scene._attributes = {id: dict(own) for id, own in more["attributes"].items()}
+    return scene
+
+
+def _from_mesh(mesh: tuple[np.ndarray, np.ndarray] | None, more: dict[str, Any]) -> Any:
+    return _filled(_new(more, *mesh) if mesh else _new(more), more)
+
+
+def state_of(file: str) -> tuple[str, int, int, int] | None:
+    """What a file that is replaced or written to does not have any more; None: it is gone."""
+    try:
+        found = os.stat(file)
+    except OSError:
+        return None
+    return file, found.st_size, found.st_mtime_ns, found.st_ino
+
+
+def _from_file(file: tuple[str, int, int, int], more: dict[str, Any]) -> Any:
+    from .scene import load_scene
+
+    if state_of(file[0]) != file:
+        raise _core.InputError(f"{file[0]}: it has changed since the scene was pickled, or is gone")
+    return _filled(load_scene(file[0], threads=more["threads"], device=more["device"]), more)
+
+
+def _from_bytes(saved: bytes, more: dict[str, Any]) -> Any:
+    from .scene import load_scene
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = os.path.join(folder, "scene.rdx")
+        with open(file, "wb") as copy:
+            copy.write(saved)
+        scene = load_scene(file, threads=more["threads"], device=more["device"])
+    scene._file = None  # the file is gone: its pages stay for as long as they are mapped
+    return _filled(scene, more)
+
+
+def _from_geometries(geometries: list[tuple], more: dict[str, Any]) -> Any:
+    scene = _new(more)
+    for id, mask, kind, what in geometries:
+        if kind in ("mesh", "instance"):
+            scene.add(*what, mask=mask, id=id)
+        else:
+            getattr(scene, f"add_{kind}")(*what, mask=mask, id=id)
+    scene.commit()
+    return _filled(scene, more)

@@ -1,0 +1,168 @@
+// Loops on a pool of the caller's: all of a loop is done, within limits and on the pool's threads,
+// exceptions come out, and no answer changes.
+#include <gtest/gtest.h>
+#include <raydix/raydix.h>
+
+#include <atomic>
+#include <cstring>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/float_env.h"
+#include "exec/parallel.h"
+#include "support/message.h"
+
+namespace raydix {
+namespace {
+
+/// A thread for each job, and what was seen of them.
+struct Seen {
+    std::atomic<int> loops{0};
+    std::atomic<std::size_t> most_jobs{0};
+    std::mutex lock;
+    std::set<std::thread::id> threads;
+};
+
+/// In use for its lifetime.
+class PoolInUse {
+public:
+    explicit PoolInUse(int workers) {
+        use_thread_pool({.workers = [workers] { return workers; },
+                         .run = [this](std::size_t jobs, const auto& job) { run(jobs, job); }});
+    }
+    ~PoolInUse() { use_thread_pool({}); }
+    PoolInUse(const PoolInUse&) = delete;
+    PoolInUse& operator=(const PoolInUse&) = delete;
+
+    Seen seen;
+
+private:
+    void run(std::size_t jobs, const std::function<void(std::size_t)>& job) {
+        ++seen.loops;
+        for (std::size_t before = seen.most_jobs; jobs > before;)
+            if (seen.most_jobs.compare_exchange_weak(before, jobs)) break;
+        std::vector<std::thread> threads;
+        for (std::size_t i = 0; i < jobs; ++i)
+            threads.emplace_back([this, &job, i] {
+                {
+                    const std::scoped_lock held(seen.lock);
+                    seen.threads.insert(std::this_thread::get_id());
+                }
+                job(i);
+            });
+        for (std::thread& thread : threads) thread.join();
+    }
+};
+
+TEST(ThreadPool, RunsAllOfALoopOnItsThreads) {
+    PoolInUse pool(4);
+    EXPECT_EQ(thread_count(), 4);
+    std::vector<std::atomic<int>> visits(10'007);
+    std::atomic<int> elsewhere{0}, flushed{0};
+    for_each_index(
+        visits.size(),
+        [&](std::size_t i) {
+            ++visits[i];
+            flushed += !FloatEnvironment::is_plain();
+            const std::scoped_lock held(pool.seen.lock);
+            elsewhere += pool.seen.threads.count(std::this_thread::get_id()) == 0;
+        },
+        10);
+    for (std::size_t i = 0; i < visits.size(); ++i) ASSERT_EQ(visits[i], 1) << i;
+    EXPECT_EQ(elsewhere, 0);
+    EXPECT_EQ(flushed, 0);
+    EXPECT_EQ(pool.seen.loops, 1);
+    EXPECT_EQ(pool.seen.most_jobs, 4u);
+}
+
+TEST(ThreadPool, LoopsInsideOfAJobStayOnItsThread) {
+    PoolInUse pool(3);
+    std::atomic<std::uint64_t> sum{0};
+    std::atomic<int> strayed{0};
+    for_each_index(
+        16,
+        [&](std::size_t i) {
+            const auto here = std::this_thread::get_id();
+            EXPECT_EQ(thread_count(), 1);
+            for_each_index(
+                100,
+                [&](std::size_t k) {
+                    sum += i * k;
+                    strayed += std::this_thread::get_id() != here;
+                },
+                1);
+        },
+        1);
+    EXPECT_EQ(sum, (15u * 16 / 2) * (99 * 100 / 2));
+    EXPECT_EQ(strayed, 0);
+    EXPECT_EQ(pool.seen.loops, 1);
+}
+
+TEST(ThreadPool, LimitsHold) {
+    PoolInUse pool(6);
+    for (const int threads : {1, 2, 5, 64}) {
+        pool.seen.most_jobs = 0;
+        std::atomic<int> count{0};
+        with_threads(threads, [&] {
+            EXPECT_EQ(thread_count(), std::min(threads, 6));
+            for_each_index(
+                1000, [&](std::size_t) { ++count; }, 1);
+        });
+        EXPECT_EQ(count, 1000);
+        EXPECT_EQ(pool.seen.most_jobs, threads == 1 ? 0u : std::min<std::size_t>(threads, 6));
+    }
+}
+
+TEST(ThreadPool, ExceptionsComeOut) {
+    PoolInUse pool(3);
+    const auto loop = [] {
+        for_each_index(
+            100,
+            [](std::size_t i) {
+                if (i == 50) throw InputError("mine");
+            },
+            1);
+    };
+    EXPECT_EQ(test::message_of(loop), "mine");
+}
+
+TEST(ThreadPool, APoolThatSaysNoneHasOne) {
+    PoolInUse pool(0);
+    EXPECT_EQ(thread_count(), 1);
+    int count = 0;
+    for_each_index(
+        100, [&](std::size_t) { ++count; }, 1);
+    EXPECT_EQ(count, 100);
+}
+
+TEST(ThreadPool, HalfOfOneIsRefused) {
+    EXPECT_EQ(test::message_of([] { use_thread_pool({.workers = [] { return 2; }}); }),
+              "a thread pool needs both functions, workers and run; one is missing");
+}
+
+/// A scene's tree and hits, and neighbours of its vertices, as bytes.
+std::string answers() {
+    const Model model = load_model("builtin:figure?triangles=5000");
+    const Scene scene(model);
+    const auto rays = make_primary_rays(model.cameras.cameras[0], 64, 64);
+    const std::vector<Hit> hits = trace(scene, rays);
+    const Mesh mesh = load_flat_model("builtin:figure?triangles=5000").mesh();
+    const auto near = knn(build_points(mesh.vertices), mesh.vertices, 4);
+    std::string bytes(reinterpret_cast<const char*>(hits.data()), hits.size() * sizeof(Hit));
+    bytes.append(reinterpret_cast<const char*>(near.indices.data()),
+                 near.indices.size() * sizeof(std::uint32_t));
+    return bytes + tree_hash(build_bvh(mesh));
+}
+
+TEST(ThreadPool, NoAnswerDependsOnIt) {
+    const std::string own = answers();
+    PoolInUse pool(4);
+    EXPECT_EQ(answers(), own);
+    EXPECT_GT(pool.seen.loops, 10);
+}
+
+}  // namespace
+}  // namespace raydix
