@@ -23,4 +23,4 @@ set_target_properties(raydix_mpi PROPERTIES EXPORT_NAME mpi)
 add_library(raydix::mpi ALIAS raydix_mpi)
 target_include_directories(raydix_mpi PRIVATE ${PROJECT_SOURCE_DIR}/src)
 target_link_libraries(raydix_mpi PUBLIC raydix MPI::MPI_CXX
-    PRIVATE $<BUILD_INTERFACE:raydix_options> $<BUILD_INTERFACE:PkgConfig::XXHASH>)
+    PRIVATE $<BUILD_INTERFACE:raydix_options>)

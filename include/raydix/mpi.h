@@ -153,4 +153,106 @@ extern template class BasicDistributedPoints<double>;
 using DistributedPoints = BasicDistributedPoints<float>;
 using DistributedPointsD = BasicDistributedPoints<double>;
 
+struct SceneOptions : Options {
+    /// false: the meshes of all ranks are geometries 0, 1, 2, ... in rank order, and `prim` counts
+    /// within each. true: they are parts of one geometry, 0, and `prim` counts through all of them,
+    /// in rank order. For a mesh that no rank holds whole.
+    bool one_geometry = false;
+    Quality quality = Quality::balanced;  // of the tree on each rank. Hits do not depend on it
+};
+
+/// A raydix::Hit with a 64-bit prim. `instance` is 0: meshes stand where they are.
+template <class Scalar>
+struct BasicDistributedHit {
+    Scalar t = infinity;
+    Scalar u = 0, v = 0;
+    std::uint32_t geometry = no_primitive;
+    std::uint32_t instance = 0;
+    std::uint64_t prim = no_global;
+
+    [[nodiscard]] constexpr bool hit() const { return prim != no_global; }
+};
+using DistributedHit = BasicDistributedHit<float>;
+using DistributedHitD = BasicDistributedHit<double>;
+
+/// A raydix::SceneClosestPoint with a 64-bit prim.
+template <class Scalar>
+struct BasicDistributedClosest {
+    typename SceneTypes<Scalar>::Point position{infinity, infinity, infinity};
+    Scalar distance = infinity;
+    Scalar u = 0, v = 0;
+    std::uint32_t geometry = no_primitive;
+    std::uint32_t instance = 0;
+    std::uint64_t prim = no_global;
+
+    [[nodiscard]] constexpr bool found() const { return prim != no_global; }
+};
+
+/// Answers, one for each query of this rank.
+template <class Answer, class Counts>
+struct Answers {
+    std::vector<Answer> values;
+    Counts counts;  // of this rank's queries
+    CallReport report;
+};
+
+/// All hits: those of ray i are hits[offsets[i]] .. hits[offsets[i + 1]].
+template <class Scalar>
+struct HitRows {
+    Buffer<std::uint64_t> offsets;  // [rays + 1]
+    Buffer<BasicDistributedHit<Scalar>> hits;
+    TraceCounts counts;
+    CallReport report;
+};
+
+/// Triangle meshes spread over ranks, asked as a raydix::Scene of all of them. Move-only. To
+/// destroy it is collective too, while MPI runs.
+template <class Scalar>
+class BasicDistributedScene {
+public:
+    using Types = SceneTypes<Scalar>;
+    using MeshView = typename Types::MeshView;
+    using Ray = typename Types::Ray;
+    using Point = typename Types::Point;
+    using Hit = BasicDistributedHit<Scalar>;
+    using Closest = BasicDistributedClosest<Scalar>;
+
+    /// Collective. The meshes are copied. Triangles that are not finite or out of range are left
+    /// out and counted. Throws InputError: an index past the vertices, 2^31 triangles or more on
+    /// one rank, an option out of range.
+    BasicDistributedScene(MPI_Comm comm, std::span<const MeshView> meshes,
+                          const SceneOptions& options = {});
+    ~BasicDistributedScene();
+    BasicDistributedScene(BasicDistributedScene&&) noexcept;
+    BasicDistributedScene& operator=(BasicDistributedScene&&) noexcept;
+
+    /// Elements are triangles.
+    [[nodiscard]] const Holding& holding() const;
+
+    /// Collective. The closest hit of each ray: the least (t, geometry, prim), as raydix::trace.
+    [[nodiscard]] Answers<Hit, TraceCounts> trace(std::span<const Ray> rays) const;
+    /// Collective. Whether each ray hits anything: 1 or 0.
+    [[nodiscard]] Answers<std::uint8_t, TraceCounts> trace_any(std::span<const Ray> rays) const;
+    /// Collective. All hits of each ray, sorted by (t, geometry, prim), as raydix::trace_all.
+    [[nodiscard]] HitRows<Scalar> trace_all(std::span<const Ray> rays,
+                                            std::uint64_t max_result_bytes = 0) const;
+    /// Collective. The closest point of all triangles to each query, as raydix::closest_points. All
+    /// ranks give the same max_distance. Throws InputError if it is negative or NaN.
+    [[nodiscard]] Answers<Closest, ClosestCounts> closest_points(
+        std::span<const Point> queries, Scalar max_distance = infinity) const;
+    /// Collective. Whether each query is inside: 1 or 0. Inside means that the way to infinity
+    /// crosses an odd number of triangles, or that the query is on one: InsideRule::parity of all
+    /// meshes together. Exact for closed meshes. The first call makes a second tree on each rank.
+    [[nodiscard]] Answers<std::uint8_t, ClosestCounts> contains(
+        std::span<const Point> queries) const;
+
+private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+extern template class BasicDistributedScene<float>;
+extern template class BasicDistributedScene<double>;
+using DistributedScene = BasicDistributedScene<float>;
+using DistributedSceneD = BasicDistributedScene<double>;
+
 }  // namespace raydix::mpi
