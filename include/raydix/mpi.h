@@ -72,6 +72,9 @@ struct CallReport {
     std::uint64_t rounds = 0;
     std::uint64_t questions = 0;  // asked of ranks, this one included
     std::uint64_t answered = 0;   // questions of all ranks that this one answered
+    /// Questions that two rounds would take: of each query one to the nearest rank, then one to
+    /// every rank that its answer leaves, the nearest again. Counted, not asked.
+    std::uint64_t two_round_questions = 0;
     Traffic traffic;
     double compute_seconds = 0;  // processor time of all threads, waiting for others left out
 };

@@ -60,8 +60,11 @@ public:
         tree_.all(
             0,
             [&p](const RankBox<T>& box) {
-                const bool met = box.hi[0] >= p.x && box.lo[1] <= p.y && p.y <= box.hi[1] &&
-                                 box.lo[2] <= p.z && p.z <= box.hi[2];
+                // Trees of doubles take those below 2^-500 for 0.
+                constexpr T tiny = sizeof(T) == 4 ? T(0) : T(0x1p-500);
+                const bool met = box.hi[0] >= p.x - tiny && box.lo[1] <= p.y + tiny &&
+                                 p.y <= box.hi[1] + tiny && box.lo[2] <= p.z + tiny &&
+                                 p.z <= box.hi[2] + tiny;
                 return met ? T(0) : std::numeric_limits<T>::quiet_NaN();
             },
             found);

@@ -52,6 +52,7 @@ public:
 
     /// Collective. `error`: what already went wrong here. Errors of any rank are thrown on all.
     void run(std::exception_ptr error, CallReport& report) {
+        report_ = &report;
         compute(error, [&] {
             cursors_.resize(kind_.size());
             for (std::size_t i = 0; i < kind_.size(); ++i) active_.push_back(i);
@@ -77,6 +78,7 @@ private:
     struct Cursor {
         Candidate<Scalar> last{0, 0};
         std::uint32_t asked = 0;
+        bool is_counted = false;  // in two_round_questions
     };
     struct Waiting {
         std::size_t query;
@@ -110,16 +112,20 @@ private:
         if (!Kind::asks_all && cursor.asked == 0) {
             Candidate<Scalar> first;
             if (!kind_.first(query, first)) return true;
-            if (send(query, first.rank)) cursor = {first, 1};
+            if (send(query, first.rank)) cursor = {first, 1, false};
             return false;
         }
         kind_.reach(query, candidates_);
+        if (!Kind::asks_all && !cursor.is_counted) {
+            cursor.is_counted = true;
+            report_->two_round_questions += 1 + candidates_.size();
+        }
         std::uint32_t more = Kind::asks_all ? std::numeric_limits<std::uint32_t>::max()
                                             : std::max(cursor.asked, 1u);
         for (const Candidate<Scalar>& candidate : candidates_) {
             if (cursor.asked != 0 && !(cursor.last < candidate)) continue;
             if (more-- == 0 || !send(query, candidate.rank)) return false;
-            cursor = {candidate, cursor.asked + 1};
+            cursor = {candidate, cursor.asked + 1, cursor.is_counted};
         }
         return true;
     }
@@ -171,6 +177,7 @@ private:
     std::vector<Bytes> out_;                      // [ranks], questions
     std::vector<std::vector<std::size_t>> sent_;  // [ranks], the queries that they are of
     std::uint64_t packed_ = 0;
+    CallReport* report_ = nullptr;
     std::vector<Cursor> cursors_;        // [queries]
     std::vector<std::size_t> active_;    // queries that may ask more ranks
     std::vector<Waiting> again_;         // questions that were not answered

@@ -6,6 +6,7 @@
 #include <raydix/mpi.h>
 
 #include <cstring>
+#include <optional>
 #include <random>
 #include <span>
 #include <string>
