@@ -105,14 +105,14 @@ MpiFigures measure(const BenchCommand& options, const ComputeTokens& tokens, MPI
     MPI_Comm_rank(comm, &rank);
     MPI_Comm_size(comm, &ranks);
     const auto share = [&](std::uint64_t n) {
-        return options.weak ? n : n * std::uint64_t(rank + 1) / std::uint64_t(ranks) -
-                                      n * std::uint64_t(rank) / std::uint64_t(ranks);
+        return options.weak ? n
+                            : n * std::uint64_t(rank + 1) / std::uint64_t(ranks) -
+                                  n * std::uint64_t(rank) / std::uint64_t(ranks);
     };
     const std::vector<Vec3> points = make_points(options, rank, ranks, share(options.points), 1);
     const std::vector<Vec3> queries = make_points(options, rank, ranks, share(options.queries), 2);
     mpi::Options how;
-    how.partition = options.partition == "curve" ? mpi::Partition::curve
-                                                 : mpi::Partition::as_given;
+    how.partition = options.partition == "curve" ? mpi::Partition::curve : mpi::Partition::as_given;
     how.threads = 1;
     how.compute_gate = [&tokens](bool enters) { tokens.pass(enters); };
     const mpi::DistributedPoints spread(comm, points, how);
@@ -122,15 +122,14 @@ MpiFigures measure(const BenchCommand& options, const ComputeTokens& tokens, MPI
     mpi::NearestRows<float> rows;
     for (int i = 0; i < options.repeat; ++i) {
         rows = spread.knn(queries, options.k);
-        figures.compute_s =
-            std::min(figures.compute_s, most_of(rows.report.compute_seconds, comm));
+        figures.compute_s = std::min(figures.compute_s, most_of(rows.report.compute_seconds, comm));
     }
     const mpi::Holding& holding = spread.holding();
     figures.build_s = most_of(holding.report.compute_seconds, comm);
     figures.queries = sum_of(double(queries.size()), comm);
     figures.rows = sum_of(double(rows.counts.found), comm);
-    figures.imbalance = most_of(double(holding.local), comm) /
-                        (sum_of(double(holding.local), comm) / ranks);
+    figures.imbalance =
+        most_of(double(holding.local), comm) / (sum_of(double(holding.local), comm) / ranks);
     figures.rounds = double(rows.report.rounds);
     figures.messages = sum_of(double(rows.report.traffic.messages), comm);
     figures.bytes = sum_of(double(rows.report.traffic.bytes), comm);
@@ -166,11 +165,12 @@ void print_head() {
                "two-round", "broadcast", "replicated", "modelled s");
 }
 void print_row(const std::string& name, const MpiFigures& f, const MpiModel& model) {
-    fmt::print("{:>6} {:>9.3f} {:>9.3f} {:>9.3f} {:>7.1f} {:>9.0f} {:>12.0f} {:>8.3f} {:>10.3f} "
-               "{:>14.0f} {:>10.0f} {:>12.4f}\n",
-               name, f.build_s, f.compute_s, f.imbalance, f.rounds, f.messages, f.bytes, f.touched,
-               f.two_rounds, broadcast_bytes(f, query_bytes, row_bytes), f.replicated_bytes,
-               model.seconds(f));
+    fmt::print(
+        "{:>6} {:>9.3f} {:>9.3f} {:>9.3f} {:>7.1f} {:>9.0f} {:>12.0f} {:>8.3f} {:>10.3f} "
+        "{:>14.0f} {:>10.0f} {:>12.4f}\n",
+        name, f.build_s, f.compute_s, f.imbalance, f.rounds, f.messages, f.bytes, f.touched,
+        f.two_rounds, broadcast_bytes(f, query_bytes, row_bytes), f.replicated_bytes,
+        model.seconds(f));
 }
 
 /// Figures of 1, 2, 4, ... ranks, and of all.
@@ -207,11 +207,11 @@ void run_bench(const BenchCommand& options) {
         document["model"] = {{"latency_s", model.latency_s}, {"bytes_per_s", model.bytes_per_s}};
         const bool prints = options.common.prints_tables();
         if (prints) {
-            fmt::print("knn, k {}, {} points and {} queries {}, {}, {}, {}; processor seconds of "
-                       "the slowest rank\n",
-                       options.k, options.points, options.queries,
-                       options.weak ? "a rank" : "in all", options.cloud, options.given,
-                       options.partition);
+            fmt::print(
+                "knn, k {}, {} points and {} queries {}, {}, {}, {}; processor seconds of "
+                "the slowest rank\n",
+                options.k, options.points, options.queries, options.weak ? "a rank" : "in all",
+                options.cloud, options.given, options.partition);
             print_head();
         }
         std::vector<MpiFigures> fitted;
@@ -226,12 +226,13 @@ void run_bench(const BenchCommand& options) {
             if (prints) print_row("fit", predicted, model);
         }
         if (prints)
-            fmt::print("fit: predicted for {} ranks from 2 to {}. two-round: the nearest rank, then "
-                       "all that its answer leaves, itself again.\nbroadcast: bytes if every query "
-                       "went to every rank. modelled s: {} s a message, {:g} bytes a second, both "
-                       "chosen.\n",
-                       mpi_ranks(), fitted.empty() ? 0 : fitted.back().ranks, model.latency_s,
-                       model.bytes_per_s);
+            fmt::print(
+                "fit: predicted for {} ranks from 2 to {}. two-round: the nearest rank, then "
+                "all that its answer leaves, itself again.\nbroadcast: bytes if every query "
+                "went to every rank. modelled s: {} s a message, {:g} bytes a second, both "
+                "chosen.\n",
+                mpi_ranks(), fitted.empty() ? 0 : fitted.back().ranks, model.latency_s,
+                model.bytes_per_s);
         write_json(document, options.common);
     });
 }

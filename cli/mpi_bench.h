@@ -13,8 +13,8 @@ struct MpiFigures {
     double build_s = 0, compute_s = 0;  // processor seconds of the slowest rank
     double imbalance = 1;               // the most points of a rank over the mean
     double rounds = 0, messages = 0, bytes = 0;
-    double touched = 1;            // ranks that a query asks, on average
-    double two_rounds = 1;         // the same of two rounds that ask the nearest rank again
+    double touched = 1;     // ranks that a query asks, on average
+    double two_rounds = 1;  // the same of two rounds that ask the nearest rank again
     double replicated_bytes = 0, bytes_per_rank = 0;
     double queries = 0, rows = 0;  // of all ranks
 };

@@ -56,8 +56,7 @@ Json sum_and_most(std::uint64_t value) {
 
 mpi::Options MpiOptions::options() const {
     mpi::Options chosen;
-    chosen.partition =
-        partition == "curve" ? mpi::Partition::curve : mpi::Partition::as_given;
+    chosen.partition = partition == "curve" ? mpi::Partition::curve : mpi::Partition::as_given;
     chosen.threads = common.threads;
     chosen.exchange_bytes = exchange_bytes;
     return chosen;

@@ -24,8 +24,8 @@ double line_at(const std::vector<double>& x, const std::vector<double>& y, doubl
 
 double MpiModel::seconds(const MpiFigures& figures) const {
     const double ranks = figures.ranks;
-    return figures.compute_s + latency_s * (figures.messages / ranks + 3 * figures.rounds *
-                                                                           std::log2(ranks)) +
+    return figures.compute_s +
+           latency_s * (figures.messages / ranks + 3 * figures.rounds * std::log2(ranks)) +
            figures.bytes / ranks / bytes_per_s;
 }
 
@@ -43,13 +43,13 @@ MpiFigures predict(const std::vector<MpiFigures>& counted, int ranks) {
     };
     MpiFigures predicted;
     predicted.ranks = ranks;
-    for (const auto figure : {&MpiFigures::build_s, &MpiFigures::compute_s, &MpiFigures::imbalance,
-                              &MpiFigures::rounds, &MpiFigures::touched, &MpiFigures::two_rounds,
-                              &MpiFigures::bytes_per_rank})
+    for (const auto figure :
+         {&MpiFigures::build_s, &MpiFigures::compute_s, &MpiFigures::imbalance, &MpiFigures::rounds,
+          &MpiFigures::touched, &MpiFigures::two_rounds, &MpiFigures::bytes_per_rank})
         predicted.*figure = extend(figure, false);
-    for (const auto figure : {&MpiFigures::messages, &MpiFigures::bytes,
-                              &MpiFigures::replicated_bytes, &MpiFigures::queries,
-                              &MpiFigures::rows})
+    for (const auto figure :
+         {&MpiFigures::messages, &MpiFigures::bytes, &MpiFigures::replicated_bytes,
+          &MpiFigures::queries, &MpiFigures::rows})
         predicted.*figure = extend(figure, true);
     return predicted;
 }

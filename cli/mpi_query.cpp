@@ -56,8 +56,7 @@ public:
         options_.closest || options_.contains ? ask_scene() : ask_points();
         on_first([&] {
             if (options_.common.prints_tables()) {
-                fmt::print("queries      {}, {} found\n",
-                           document_["queries"].get<std::uint64_t>(),
+                fmt::print("queries      {}, {} found\n", document_["queries"].get<std::uint64_t>(),
                            document_["found"].get<std::uint64_t>());
                 print_report(document_["report"]);
             }
@@ -99,8 +98,7 @@ private:
             const Points index = build_points(model_.whole.mesh().vertices);
             require_verified(alone(index,
                                    [&](const auto& expected) {
-                                       return same_rows(indices, distances,
-                                                        expected.indices.view(),
+                                       return same_rows(indices, distances, expected.indices.view(),
                                                         expected.distances.view());
                                    }),
                              "rows", options_.common.prints_tables());
@@ -132,8 +130,7 @@ private:
             bool same = expected.size() == found.size();
             for (std::size_t i = 0; same && i < found.size(); ++i)
                 same = std::memcmp(&found[i].position, &expected[i].position, sizeof(Vec3)) == 0 &&
-                       found[i].prim ==
-                           (expected[i].found() ? expected[i].prim : mpi::no_global);
+                       found[i].prim == (expected[i].found() ? expected[i].prim : mpi::no_global);
             require_verified(same, "points", options_.common.prints_tables());
         });
     }

@@ -28,8 +28,7 @@ void run_info(const MpiOptions& options) {
     std::uint64_t triangles = model.part.triangles.size();
     MPI_Allreduce(MPI_IN_PLACE, &triangles, 1, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
     if (triangles == 0) {
-        const mpi::DistributedPoints points(MPI_COMM_WORLD, model.part.vertices,
-                                            options.options());
+        const mpi::DistributedPoints points(MPI_COMM_WORLD, model.part.vertices, options.options());
         document["holding"] = holding_json(points.holding());
     } else {
         const MeshView view(model.part);
@@ -53,16 +52,14 @@ struct TraceCommand : MpiOptions {
 std::vector<Ray> rays_of(const TraceCommand& options, const Model& model) {
     if (!options.rays_file.empty()) return load_rays(options.rays_file);
     if (options.camera >= model.cameras.cameras.size())
-        throw InputError(options.scene + ": there is no camera " +
-                         std::to_string(options.camera));
+        throw InputError(options.scene + ": there is no camera " + std::to_string(options.camera));
     const Size size = parse_size(options.size_text);
     return make_primary_rays(model.cameras.cameras[options.camera], size.width, size.height);
 }
 
 template <class AnyHit>
 bool same_hit(const mpi::DistributedHit& hit, const AnyHit& expected) {
-    const bool same_prim =
-        expected.hit() ? hit.prim == expected.prim : hit.prim == mpi::no_global;
+    const bool same_prim = expected.hit() ? hit.prim == expected.prim : hit.prim == mpi::no_global;
     return same_prim && std::memcmp(&hit.t, &expected.t, sizeof(float)) == 0 &&
            std::memcmp(&hit.u, &expected.u, sizeof(float)) == 0 &&
            std::memcmp(&hit.v, &expected.v, sizeof(float)) == 0;
@@ -95,8 +92,7 @@ void run_trace(const TraceCommand& options) {
     on_first([&] { rays = rays_of(options, model.whole); });
     const std::vector<Ray> mine = scatter(rays);
     const MeshView view(model.part);
-    const mpi::DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1),
-                                      options.scene_options());
+    const mpi::DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1), options.scene_options());
     Json document = mpi_document("mpi trace", options);
     document["holding"] = holding_json(scene.holding());
     document["mode"] = options.mode;

@@ -220,9 +220,9 @@ public:
     using Hit = BasicDistributedHit<Scalar>;
     using Closest = BasicDistributedClosest<Scalar>;
 
-    /// Collective. The meshes are copied. Triangles that are not finite or out of range are left
-    /// out and counted. Throws InputError: an index past the vertices, 2^31 triangles or more on
-    /// one rank, an option out of range.
+    /// Collective. The meshes are copied. One without triangles only takes a number. Triangles that
+    /// are not finite or out of range are left out and counted. Throws InputError: an index past
+    /// the vertices, 2^31 triangles or more on one rank, an option out of range.
     BasicDistributedScene(MPI_Comm comm, std::span<const MeshView> meshes,
                           const SceneOptions& options = {});
     ~BasicDistributedScene();

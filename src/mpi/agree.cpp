@@ -51,11 +51,16 @@ std::string packed(const std::exception_ptr& error) {
 [[noreturn]] void throw_packed(const std::string& error, std::uint64_t rank) {
     const std::string whose = "rank " + std::to_string(rank) + ": ", text = error.substr(1);
     switch (error.front()) {
-        case 'L': throw_too_large(text, whose);
-        case 'I': throw InputError(whose + text);
-        case 'B': throw BackendUnavailable(whose + text);
-        case 'M': throw RankOutOfMemory(whose + text);
-        default: throw std::runtime_error(whose + text);
+        case 'L':
+            throw_too_large(text, whose);
+        case 'I':
+            throw InputError(whose + text);
+        case 'B':
+            throw BackendUnavailable(whose + text);
+        case 'M':
+            throw RankOutOfMemory(whose + text);
+        default:
+            throw std::runtime_error(whose + text);
     }
 }
 

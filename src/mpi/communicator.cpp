@@ -16,8 +16,9 @@ void require_running() {
                                       : "MPI has ended: MPI_Finalize was called");
     MPI_Query_thread(&level);
     if (level < MPI_THREAD_FUNNELED)
-        throw InputError("MPI was started for one thread: call MPI_Init_thread with "
-                         "MPI_THREAD_FUNNELED or more");
+        throw InputError(
+            "MPI was started for one thread: call MPI_Init_thread with "
+            "MPI_THREAD_FUNNELED or more");
 }
 
 }  // namespace

@@ -54,8 +54,7 @@ private:
     template <class T>
     [[nodiscard]] std::uint32_t cell(const T* at, int d) const {
         constexpr double last = (1u << 21) - 1;
-        return static_cast<std::uint32_t>(
-            std::clamp((double(at[d]) - lo_[d]) * scale_, 0.0, last));
+        return static_cast<std::uint32_t>(std::clamp((double(at[d]) - lo_[d]) * scale_, 0.0, last));
     }
     double lo_[3], scale_ = 0;
 };
@@ -87,8 +86,7 @@ template <class Record>
     records = {};
     const Arrived arrived = exchange(comm, out, message_bytes);
     records.resize(arrived.all().size() / sizeof(Record));
-    if (!records.empty())
-        std::memcpy(records.data(), arrived.all().data(), arrived.all().size());
+    if (!records.empty()) std::memcpy(records.data(), arrived.all().data(), arrived.all().size());
     return records;
 }
 

@@ -58,9 +58,11 @@ std::vector<RankBox<T>> top_boxes(const PointTreeView<T, 3>& tree, std::size_t m
     if (!tree.empty()) add_children(tree.nodes[0], open);
     const auto side = [](const Child& child) { return child.box.extent(child.box.longest_axis()); };
     for (;;) {
-        const auto largest = std::max_element(open.begin(), open.end(), [&](const Child& a, const Child& b) {
-            return (a.node == nullptr ? T(-1) : side(a)) < (b.node == nullptr ? T(-1) : side(b));
-        });
+        const auto largest =
+            std::max_element(open.begin(), open.end(), [&](const Child& a, const Child& b) {
+                return (a.node == nullptr ? T(-1) : side(a)) <
+                       (b.node == nullptr ? T(-1) : side(b));
+            });
         if (largest == open.end() || largest->node == nullptr ||
             open.size() - 1 + largest->node->children > most)
             break;

@@ -39,7 +39,8 @@ struct BasicDistributedScene<Scalar>::State {
             for (const TriangleName& first : firsts) names.add_mesh(first);
             keep_error(error, [&] {
                 clock.run([&] {
-                    for (const MeshView& mesh : meshes) scene.add(mesh);
+                    for (const MeshView& mesh : meshes)
+                        scene.add(mesh.triangles.empty() ? MeshView() : mesh);
                 });
             });
         }
@@ -91,10 +92,9 @@ struct BasicDistributedScene<Scalar>::State {
         std::vector<TriangleName> names_of;
         std::uint64_t prim = holding.first;
         for (std::size_t m = 0; m < meshes.size(); ++m) {
-            names_of.push_back(
-                options.one_geometry
-                    ? TriangleName{0, prim}
-                    : TriangleName{static_cast<std::uint32_t>(geometries + m), 0});
+            names_of.push_back(options.one_geometry
+                                   ? TriangleName{0, prim}
+                                   : TriangleName{static_cast<std::uint32_t>(geometries + m), 0});
             prim += meshes[m].triangles.size();
         }
         return names_of;
@@ -168,8 +168,8 @@ struct BasicDistributedScene<Scalar>::State {
         for (const std::uint32_t id : scene.ids()) {
             const MeshView mesh = *scene.mesh(id);
             for (const Triangle& t : mesh.triangles)
-                boxes.push_back(box_of_corners<Scalar>(
-                    mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]));
+                boxes.push_back(box_of_corners<Scalar>(mesh.vertices[t[0]], mesh.vertices[t[1]],
+                                                       mesh.vertices[t[2]]));
         }
         return boxes;
     }
@@ -185,9 +185,7 @@ struct BasicDistributedScene<Scalar>::State {
         return crossings;
     }
 
-    [[nodiscard]] SceneParts<Scalar> parts() const {
-        return {scene, names, tree, options.threads};
-    }
+    [[nodiscard]] SceneParts<Scalar> parts() const { return {scene, names, tree, options.threads}; }
 
     /// A query whose answers have a fixed size.
     template <class Kind, class Answers, class Make>
@@ -240,8 +238,7 @@ template <class Scalar>
 auto BasicDistributedScene<Scalar>::trace(std::span<const Ray> rays) const
     -> Answers<Hit, TraceCounts> {
     return state_->template ask<ClosestHitKind<Scalar>, Answers<Hit, TraceCounts>>(
-        "trace",
-        [&](auto& kind, auto& answers) { kind.emplace(state_->parts(), rays, answers); });
+        "trace", [&](auto& kind, auto& answers) { kind.emplace(state_->parts(), rays, answers); });
 }
 
 template <class Scalar>

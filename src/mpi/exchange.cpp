@@ -44,11 +44,9 @@ Arrived exchange(const Communicator& comm, const std::vector<Bytes>& out,
             comm.count_message(std::uint64_t(size));
         });
     }
-    std::copy(out[me].begin(), out[me].end(),
-              in.begin() + static_cast<std::ptrdiff_t>(starts[me]));
-    check_mpi(
-        MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE),
-        "MPI_Waitall");
+    std::copy(out[me].begin(), out[me].end(), in.begin() + static_cast<std::ptrdiff_t>(starts[me]));
+    check_mpi(MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE),
+              "MPI_Waitall");
     return {std::move(in), std::move(starts)};
 }
 

@@ -58,8 +58,7 @@ public:
     }
     [[nodiscard]] std::size_t size() const { return queries_.size(); }
     [[nodiscard]] bool first(std::size_t i, Candidate<T>& found) const {
-        return is_finite_point(queries_[i]) &&
-               view_.tree.first(most_d2(i), bound_of(i), found);
+        return is_finite_point(queries_[i]) && view_.tree.first(most_d2(i), bound_of(i), found);
     }
     void reach(std::size_t i, std::vector<Candidate<T>>& found) const {
         view_.tree.all(most_d2(i), bound_of(i), found);
@@ -169,8 +168,7 @@ public:
         view_.tree.all(
             0,
             [&](const RankBox<T>& box) {
-                return region_.meets(queries_[i], box) ? T(0)
-                                                       : std::numeric_limits<T>::quiet_NaN();
+                return region_.meets(queries_[i], box) ? T(0) : std::numeric_limits<T>::quiet_NaN();
             },
             found);
     }

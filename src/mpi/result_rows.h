@@ -101,8 +101,9 @@ std::uint64_t answer_in_chunks(std::span<const Question> questions, std::uint64_
         const std::size_t size = std::min(in_chunk, questions.size() - done);
         try {
             search(questions.subspan(done, size),
-                   size == 1 ? limit : std::max(most - std::min<std::uint64_t>(most, out.size()),
-                                                least_room));
+                   size == 1
+                       ? limit
+                       : std::max(most - std::min<std::uint64_t>(most, out.size()), least_room));
             done += size;
         } catch (const ResultTooLarge&) {
             if (size == 1) throw;

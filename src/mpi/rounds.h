@@ -120,8 +120,8 @@ private:
             cursor.is_counted = true;
             report_->two_round_questions += 1 + candidates_.size();
         }
-        std::uint32_t more = Kind::asks_all ? std::numeric_limits<std::uint32_t>::max()
-                                            : std::max(cursor.asked, 1u);
+        std::uint32_t more =
+            Kind::asks_all ? std::numeric_limits<std::uint32_t>::max() : std::max(cursor.asked, 1u);
         for (const Candidate<Scalar>& candidate : candidates_) {
             if (cursor.asked != 0 && !(cursor.last < candidate)) continue;
             if (more-- == 0 || !send(query, candidate.rank)) return false;
@@ -159,7 +159,8 @@ private:
         for (int rank = 0; rank < comm_.size(); ++rank) {
             const auto& queries = sent_[std::size_t(rank)];
             Reader reader(answers.from(rank));
-            const std::uint64_t answered = reader.empty() ? 0 : reader.template take<std::uint64_t>();
+            const std::uint64_t answered =
+                reader.empty() ? 0 : reader.template take<std::uint64_t>();
             for (std::size_t k = 0; k < queries.size(); ++k) {
                 if (k < answered)
                     kind_.take(queries[k], reader);
@@ -178,9 +179,9 @@ private:
     std::vector<std::vector<std::size_t>> sent_;  // [ranks], the queries that they are of
     std::uint64_t packed_ = 0;
     CallReport* report_ = nullptr;
-    std::vector<Cursor> cursors_;        // [queries]
-    std::vector<std::size_t> active_;    // queries that may ask more ranks
-    std::vector<Waiting> again_;         // questions that were not answered
+    std::vector<Cursor> cursors_;      // [queries]
+    std::vector<std::size_t> active_;  // queries that may ask more ranks
+    std::vector<Waiting> again_;       // questions that were not answered
     std::vector<Candidate<Scalar>> candidates_;
 };
 

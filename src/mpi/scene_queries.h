@@ -196,7 +196,8 @@ public:
     [[nodiscard]] Question question(std::size_t i) const { return this->rays_[i]; }
     std::uint64_t answer(std::span<const Question> rays, std::uint64_t most, Bytes& out) {
         return answer_in_chunks(
-            rays, most, out, rows_.limit(), [&](std::span<const Question> chunk, std::uint64_t limit) {
+            rays, most, out, rows_.limit(),
+            [&](std::span<const Question> chunk, std::uint64_t limit) {
                 SceneTraceOptions options = this->parts_.trace_options();
                 options.max_result_bytes = limit;
                 const auto all = raydix::trace_all(this->parts_.scene, chunk, options);
@@ -261,7 +262,8 @@ public:
             put(out, std::uint8_t{one.found()});
             if (!one.found()) continue;
             const TriangleName name = parts_.names.of(one.geometry, one.prim);
-            put(out, Closest{one.position, one.distance, one.u, one.v, name.geometry, 0, name.prim});
+            put(out,
+                Closest{one.position, one.distance, one.u, one.v, name.geometry, 0, name.prim});
         }
         return questions.size();
     }

@@ -1,5 +1,5 @@
-// The queries of an index of points with d2 in place of distances, for callers that join the answers
-// of several indices: a rounded root makes ties where there are none.
+// The queries of an index of points with d2 in place of distances, for callers that join the
+// answers of several indices: a rounded root makes ties where there are none.
 #pragma once
 
 #include <raydix/points.h>

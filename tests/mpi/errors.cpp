@@ -39,8 +39,8 @@ TEST(ErrorsOverRanks, ARankThatThrowsIsNamedOnAll) {
     options.strict = true;
     auto bad = points;
     if (rank() == last()) bad[4].y = infinity;
-    const std::string message = message_of<InputError>(
-        [&] { const DistributedPoints made(MPI_COMM_WORLD, bad, options); });
+    const std::string message =
+        message_of<InputError>([&] { const DistributedPoints made(MPI_COMM_WORLD, bad, options); });
     EXPECT_TRUE(begins_with(message, "rank " + std::to_string(last()) + ": point 4 of this rank"))
         << message;
     // The communicator still works.
@@ -65,8 +65,7 @@ TEST(ErrorsOverRanks, ResultsThatAreTooLargeAreRefusedOnAll) {
     QueryOptions options;
     options.max_result_bytes = rank() == last() ? 1000 : 0;
     const std::string start = "rank " + std::to_string(last()) + ": ";
-    std::string message =
-        message_of<ResultTooLarge>([&] { (void)made.knn(points, 50, options); });
+    std::string message = message_of<ResultTooLarge>([&] { (void)made.knn(points, 50, options); });
     EXPECT_TRUE(begins_with(message, start + "knn: the result needs 60000 bytes")) << message;
     message = message_of<ResultTooLarge>([&] { (void)made.radius(points, 2.0f, options); });
     EXPECT_NE(message.find("max_result_bytes lets it have 1000"), std::string::npos) << message;
@@ -125,9 +124,8 @@ TEST(ErrorsOverRanks, OptionsOutOfRangeAreRefused) {
               std::string::npos);
     EXPECT_NE(message_of<InputError>([&] { (void)made.radius(points, -1.0f); }).find("radius"),
               std::string::npos);
-    EXPECT_EQ(message_of<InputError>([] {
-                  const DistributedPoints none(MPI_COMM_NULL, std::span<const Vec3>());
-              }),
+    EXPECT_EQ(message_of<InputError>(
+                  [] { const DistributedPoints none(MPI_COMM_NULL, std::span<const Vec3>()); }),
               "the communicator is MPI_COMM_NULL");
 }
 

@@ -58,8 +58,8 @@ struct Both {
 
     Both(const Cloud<T>& cloud, Division division, const Options& options, unsigned seed)
         : one(build_points(std::span<const Point>(cloud.points))),
-          many(MPI_COMM_WORLD,
-               mine(cloud.points, division_of(cloud.points.size(), division, seed)), options),
+          many(MPI_COMM_WORLD, mine(cloud.points, division_of(cloud.points.size(), division, seed)),
+               options),
           queries(mine(cloud.queries, division_of(cloud.queries.size(), division, seed + 1))) {}
 
     void expect_same_nearest(std::uint32_t k) const {
@@ -135,7 +135,7 @@ TYPED_TEST(PointsOverRanks, AnswerAsOneProcessInAnyCase) {
         std::mt19937 random(seed);
         Options options;
         options.partition = random() % 2 == 0 ? Partition::curve : Partition::as_given;
-        options.boxes_per_rank = 1 + random() % 40;
+        options.boxes_per_rank = static_cast<std::uint32_t>(1 + random() % 40);
         options.exchange_bytes = random() % 2 == 0 ? 4096 : std::uint64_t{1} << 20;
         options.message_bytes = 1 + random() % 200;
         options.threads = 1;
@@ -143,7 +143,7 @@ TYPED_TEST(PointsOverRanks, AnswerAsOneProcessInAnyCase) {
         const auto division = divisions[random() % 4];
         const auto cloud = make_cloud<TypeParam>(int(random() % 3), n, queries, seed);
         const Both<TypeParam> both(cloud, division, options, seed);
-        both.expect_same_nearest(1 + random() % 60);
+        both.expect_same_nearest(static_cast<std::uint32_t>(1 + random() % 60));
         both.expect_same_within(TypeParam(random() % 10) / 8, random() % 2 == 0);
     }
 }
