@@ -133,7 +133,7 @@ TEST(ErrorsOverRanks, SmallMessagesAndRoundsChangeNoAnswer) {
     const auto points = some_points(200);
     const DistributedPoints large(MPI_COMM_WORLD, points);
     Options options;
-    options.exchange_bytes = 200;  // a question or two between two ranks
+    options.exchange_bytes = 25 * std::uint64_t(ranks());  // one question between two ranks
     options.message_bytes = 7;
     const DistributedPoints small(MPI_COMM_WORLD, points, options);
     const auto queries = std::span<const Vec3>(points).first(30);
