@@ -29,9 +29,9 @@ struct MpiModel {
     [[nodiscard]] double seconds(const MpiFigures& figures) const;
 };
 
-/// Figures for `ranks` from those of fewer: a line through their logarithms over the logarithm of
-/// ranks for messages and bytes, a line over the logarithm of ranks for the others. From at least
-/// two figures with more than one rank.
+/// Figures for `ranks` from those of fewer: lines over the logarithm of the number of ranks. Of
+/// messages it is the number between two ranks that grows so, of bytes that of a query; replicated
+/// bytes and queries grow as powers. From at least two figures with more than one rank.
 [[nodiscard]] MpiFigures predict(const std::vector<MpiFigures>& counted, int ranks);
 
 /// Bytes that would travel if every query went to every rank, each with a full answer.

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "mpi_bench.h"
@@ -20,6 +21,9 @@ double line_at(const std::vector<double>& x, const std::vector<double>& y, doubl
     return (sy - slope * sx) / n + slope * at;
 }
 
+/// How many messages a round can send one way.
+double pairs_of(int ranks) { return double(ranks) * (ranks - 1.0); }
+
 }  // namespace
 
 double MpiModel::seconds(const MpiFigures& figures) const {
@@ -31,26 +35,29 @@ double MpiModel::seconds(const MpiFigures& figures) const {
 
 MpiFigures predict(const std::vector<MpiFigures>& counted, int ranks) {
     const double at = std::log2(double(ranks));
-    const auto extend = [&](double MpiFigures::*figure, bool grows_as_power) {
+    const auto extend = [&](const auto& value_of) {
         std::vector<double> x, y;
         for (const MpiFigures& one : counted) {
             if (one.ranks == 1) continue;  // nothing travels there
             x.push_back(std::log2(double(one.ranks)));
-            y.push_back(grows_as_power ? std::log2(std::max(one.*figure, 1.0)) : one.*figure);
+            y.push_back(value_of(one));
         }
-        const double value = line_at(x, y, at);
-        return grows_as_power ? std::exp2(value) : value;
+        return line_at(x, y, at);
     };
     MpiFigures predicted;
     predicted.ranks = ranks;
     for (const auto figure :
          {&MpiFigures::build_s, &MpiFigures::compute_s, &MpiFigures::imbalance, &MpiFigures::rounds,
           &MpiFigures::touched, &MpiFigures::two_rounds, &MpiFigures::bytes_per_rank})
-        predicted.*figure = extend(figure, false);
+        predicted.*figure = extend([&](const MpiFigures& f) { return f.*figure; });
     for (const auto figure :
-         {&MpiFigures::messages, &MpiFigures::bytes, &MpiFigures::replicated_bytes,
-          &MpiFigures::queries, &MpiFigures::rows})
-        predicted.*figure = extend(figure, true);
+         {&MpiFigures::replicated_bytes, &MpiFigures::queries, &MpiFigures::rows})
+        predicted.*figure = std::exp2(
+            extend([&](const MpiFigures& f) { return std::log2(std::max(f.*figure, 1.0)); }));
+    predicted.messages = pairs_of(ranks) *
+                         extend([](const MpiFigures& f) { return f.messages / pairs_of(f.ranks); });
+    predicted.bytes =
+        predicted.queries * extend([](const MpiFigures& f) { return f.bytes / f.queries; });
     return predicted;
 }
 

@@ -70,14 +70,13 @@ public:
             found);
     }
     [[nodiscard]] Question question(std::size_t i) const { return queries_[i]; }
-    std::uint64_t answer(std::span<const Question> points, std::uint64_t, Bytes& out) {
-        std::vector<std::uint8_t> bits(points.size(), 0);
+    void answer(std::span<const Question> points) {
+        bits_.assign(points.size(), 0);
         with_threads(threads_, [&] {
-            for (const Bvh& mesh : meshes_) add_crossings(mesh, points, bits);
+            for (const Bvh& mesh : meshes_) add_crossings(mesh, points, bits_);
         });
-        for (const std::uint8_t one : bits) put(out, one);
-        return points.size();
     }
+    void put_answer(std::size_t q, Bytes& out) const { put(out, bits_[q]); }
     void take(std::size_t i, Reader& reader) {
         join(answers_.values[i], reader.take<std::uint8_t>());
     }
@@ -113,6 +112,7 @@ private:
     int threads_;
     std::span<const Point> queries_;
     Answers<std::uint8_t, ClosestCounts>& answers_;
+    std::vector<std::uint8_t> bits_;  // of answers
 };
 
 }  // namespace raydix::mpi

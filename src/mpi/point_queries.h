@@ -65,11 +65,12 @@ public:
     }
     [[nodiscard]] Question question(std::size_t i) const { return {queries_[i], most_d2(i)}; }
 
-    std::uint64_t answer(std::span<const Question> questions, std::uint64_t, Bytes& out) {
+    void answer(std::span<const Question> questions) {
         const std::size_t n = questions.size();
         std::vector<Point> points(n);
-        std::vector<T> most(n), d2(n * k_);
-        std::vector<std::uint32_t> ids(n * k_);
+        std::vector<T> most(n);
+        ids_.resize(n * k_);
+        d2_.resize(n * k_);
         for (std::size_t q = 0; q < n; ++q) {
             points[q] = questions[q].at;
             most[q] = questions[q].most_d2;
@@ -77,18 +78,16 @@ public:
         PointQueryOptions options;
         options.threads = view_.threads;
         squared_nearest(view_.index, std::span<const Point>(points), most.data(), k_,
-                        std::span(ids), std::span(d2), options);
-        for (std::size_t q = 0; q < n; ++q) {
-            const std::uint32_t* row = ids.data() + q * k_;
-            const auto found =
-                static_cast<std::uint32_t>(std::find(row, row + k_, no_primitive) - row);
-            put(out, found);
-            for (std::uint32_t j = 0; j < found; ++j) {
-                put(out, view_.ids.of(row[j]));
-                put(out, d2[q * k_ + j]);
-            }
+                        std::span(ids_), std::span(d2_), options);
+    }
+    void put_answer(std::size_t q, Bytes& out) const {
+        const std::uint32_t* row = ids_.data() + q * k_;
+        const auto found = static_cast<std::uint32_t>(std::find(row, row + k_, no_primitive) - row);
+        put(out, found);
+        for (std::uint32_t j = 0; j < found; ++j) {
+            put(out, view_.ids.of(row[j]));
+            put(out, d2_[q * k_ + j]);
         }
-        return n;
     }
 
     /// Both rows ascend by (d2, number); the first k of both stay.
@@ -146,6 +145,8 @@ private:
     std::uint32_t k_;
     NearestRows<T>& rows_;
     Row merged_;
+    std::vector<std::uint32_t> ids_;  // of answers, [questions * k]
+    std::vector<T> d2_;
 };
 
 /// All within a radius or a box. Region says which.
@@ -174,7 +175,7 @@ public:
     }
     [[nodiscard]] Question question(std::size_t i) const { return queries_[i]; }
 
-    std::uint64_t answer(std::span<const Question> questions, std::uint64_t most, Bytes& out) {
+    std::uint64_t answer_some(std::span<const Question> questions, std::uint64_t most, Bytes& out) {
         return answer_in_chunks(questions, most, out, rows_.limit(),
                                 [&](std::span<const Question> chunk, std::uint64_t limit) {
                                     put_rows(region_.search(view_, chunk, limit), out);

@@ -10,8 +10,11 @@
 //   first(i, candidate)          the nearest rank; false if none is reached
 //   reach(i, candidates)         all ranks that its best answer so far leaves, in order
 //   question(i)
-//   answer(questions, most, out) answers some of the questions, at least one, and stops after
-//                                `most` bytes where answers have any length; returns how many
+//   answer(questions)            answers questions, of all ranks together, and keeps the answers
+//   put_answer(q, out)           writes the one of question q
+// or, where answers have any length,
+//   answer_some(questions, most, out)  answers questions of one rank, at least one, and stops after
+//                                `most` bytes; returns how many
 //   take(i, reader)              joins an answer to what is known
 #pragma once
 
@@ -38,6 +41,9 @@ template <class Kind>
 class Rounds {
     using Question = typename Kind::Question;
     using Scalar = typename Kind::Scalar;
+    static constexpr bool is_of_any_length = requires(Kind kind, Bytes out) {
+        kind.answer_some(std::span<const Question>(), std::uint64_t{}, out);
+    };
 
 public:
     Rounds(const Communicator& comm, Kind& kind, const RoundLimits& limits, ComputeClock& clock)
@@ -140,17 +146,27 @@ private:
     }
 
     void answer_all(const Arrived& questions, std::vector<Bytes>& replies, CallReport& report) {
-        std::vector<Question> asked;
+        // Sorting and vectors of queries do more for one large batch than for many small ones.
+        std::vector<Question> asked(questions.all().size() / sizeof(Question));
+        if (!asked.empty())
+            std::memcpy(asked.data(), questions.all().data(), questions.all().size());
+        if constexpr (!is_of_any_length) kind_.answer(asked);
+        std::size_t begin = 0;
         for (int rank = 0; rank < comm_.size(); ++rank) {
-            const auto bytes = questions.from(rank);
-            if (bytes.empty()) continue;
-            asked.resize(bytes.size() / sizeof(Question));
-            std::memcpy(asked.data(), bytes.data(), bytes.size());
+            const std::size_t n = questions.from(rank).size() / sizeof(Question);
+            if (n == 0) continue;
             Bytes& reply = replies[std::size_t(rank)];
-            put(reply, std::uint64_t{0});
-            const std::uint64_t answered = kind_.answer(asked, share_, reply);
-            std::memcpy(reply.data(), &answered, sizeof(answered));
-            report.answered += answered;
+            put(reply, std::uint64_t{n});
+            if constexpr (is_of_any_length) {
+                const std::uint64_t answered =
+                    kind_.answer_some(std::span(asked).subspan(begin, n), share_, reply);
+                std::memcpy(reply.data(), &answered, sizeof(answered));
+                report.answered += answered;
+            } else {
+                for (std::size_t q = begin; q < begin + n; ++q) kind_.put_answer(q, reply);
+                report.answered += n;
+            }
+            begin += n;
         }
     }
 

@@ -105,18 +105,19 @@ public:
         ray.tmax = most(i);
         return ray;
     }
-    std::uint64_t answer(std::span<const Question> rays, std::uint64_t, Bytes& out) {
-        for (const auto& found : trace(this->parts_.scene, rays, this->parts_.trace_options())) {
-            const Hit hit = this->parts_.named(found);
-            put(out, std::uint8_t{hit.hit()});
-            if (!hit.hit()) continue;
-            put(out, hit.t);
-            put(out, hit.u);
-            put(out, hit.v);
-            put(out, hit.geometry);
-            put(out, hit.prim);
-        }
-        return rays.size();
+    void answer(std::span<const Question> rays) {
+        found_.resize(rays.size());
+        raydix::trace(this->parts_.scene, rays, std::span(found_), this->parts_.trace_options());
+    }
+    void put_answer(std::size_t q, Bytes& out) const {
+        const Hit hit = this->parts_.named(found_[q]);
+        put(out, std::uint8_t{hit.hit()});
+        if (!hit.hit()) return;
+        put(out, hit.t);
+        put(out, hit.u);
+        put(out, hit.v);
+        put(out, hit.geometry);
+        put(out, hit.prim);
     }
     void take(std::size_t i, Reader& reader) {
         if (reader.take<std::uint8_t>() == 0) return;
@@ -139,6 +140,7 @@ private:
         return std::min(this->rays_[i].tmax, answers_.values[i].t);
     }
     Answers<Hit, TraceCounts>& answers_;
+    std::vector<typename SceneTypes<T>::Hit> found_;  // of answers
 };
 
 /// Any hit: one rank that says yes is enough.
@@ -161,13 +163,12 @@ public:
         if (answers_.values[i] == 0) this->reach_within(i, this->rays_[i].tmax, found);
     }
     [[nodiscard]] Question question(std::size_t i) const { return this->rays_[i]; }
-    std::uint64_t answer(std::span<const Question> rays, std::uint64_t, Bytes& out) {
-        std::vector<std::uint8_t> occluded(rays.size());
-        raydix::trace_any(this->parts_.scene, rays, std::span(occluded),
+    void answer(std::span<const Question> rays) {
+        occluded_.resize(rays.size());
+        raydix::trace_any(this->parts_.scene, rays, std::span(occluded_),
                           this->parts_.trace_options());
-        for (const std::uint8_t one : occluded) put(out, one);
-        return rays.size();
     }
+    void put_answer(std::size_t q, Bytes& out) const { put(out, occluded_[q]); }
     void take(std::size_t i, Reader& reader) { answers_.values[i] |= reader.take<std::uint8_t>(); }
     void finish() {
         this->count(answers_.counts);
@@ -176,6 +177,7 @@ public:
 
 private:
     Answers<std::uint8_t, TraceCounts>& answers_;
+    std::vector<std::uint8_t> occluded_;  // of answers
 };
 
 template <class T>
@@ -194,7 +196,7 @@ public:
         this->reach_within(i, this->rays_[i].tmax, found);
     }
     [[nodiscard]] Question question(std::size_t i) const { return this->rays_[i]; }
-    std::uint64_t answer(std::span<const Question> rays, std::uint64_t most, Bytes& out) {
+    std::uint64_t answer_some(std::span<const Question> rays, std::uint64_t most, Bytes& out) {
         return answer_in_chunks(
             rays, most, out, rows_.limit(),
             [&](std::span<const Question> chunk, std::uint64_t limit) {
@@ -246,26 +248,24 @@ public:
     }
     [[nodiscard]] Question question(std::size_t i) const { return {queries_[i], most(i)}; }
 
-    std::uint64_t answer(std::span<const Question> questions, std::uint64_t, Bytes& out) {
-        using Found = BasicSceneClosestPoint<T>;
-        std::vector<Found> found(questions.size());
+    void answer(std::span<const Question> questions) {
+        found_.resize(questions.size());
         with_threads(parts_.threads, [&] {
             for_each_index(
                 questions.size(),
                 [&](std::size_t q) {
-                    found[q] = closest_point(parts_.scene, questions[q].at,
-                                             radius_of(questions[q].most_d2));
+                    found_[q] = closest_point(parts_.scene, questions[q].at,
+                                              radius_of(questions[q].most_d2));
                 },
                 64);
         });
-        for (const Found& one : found) {
-            put(out, std::uint8_t{one.found()});
-            if (!one.found()) continue;
-            const TriangleName name = parts_.names.of(one.geometry, one.prim);
-            put(out,
-                Closest{one.position, one.distance, one.u, one.v, name.geometry, 0, name.prim});
-        }
-        return questions.size();
+    }
+    void put_answer(std::size_t q, Bytes& out) const {
+        const BasicSceneClosestPoint<T>& one = found_[q];
+        put(out, std::uint8_t{one.found()});
+        if (!one.found()) return;
+        const TriangleName name = parts_.names.of(one.geometry, one.prim);
+        put(out, Closest{one.position, one.distance, one.u, one.v, name.geometry, 0, name.prim});
     }
     void take(std::size_t i, Reader& reader) {
         if (reader.take<std::uint8_t>() == 0) return;
@@ -305,6 +305,7 @@ private:
     std::span<const Point> queries_;
     T most_d2_;
     Answers<Closest, ClosestCounts>& answers_;
+    std::vector<BasicSceneClosestPoint<T>> found_;  // of answers
 };
 
 }  // namespace raydix::mpi
