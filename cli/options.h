@@ -123,5 +123,6 @@ void add_scene_suite(CLI::App& bench);
 void add_points_suite(CLI::App& bench);
 void add_hierarchy_suite(CLI::App& bench);
 void add_report_command(CLI::App& app);
+void add_mpi_command(CLI::App& app);
 
 }  // namespace raydix::cli

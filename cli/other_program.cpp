@@ -12,14 +12,13 @@ namespace raydix::cli {
 namespace {
 
 /// Returns only by an exception.
-void become(const std::string& name, const std::string& needs, std::vector<std::string> arguments) {
+void become(const OtherProgram& other, std::vector<std::string> arguments) {
     std::error_code error;
     const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-    std::string program = (self.parent_path() / ("bench_" + name)).string();
+    std::string program = (self.parent_path() / other.program).string();
     if (error || !std::filesystem::exists(program))
-        throw BackendUnavailable("bench " + name + ": the program bench_" + name +
-                                 " is not beside raydix; it is built with RAYDIX_BENCH where " +
-                                 needs);
+        throw BackendUnavailable(other.command + ": the program " + other.program +
+                                 " is not beside raydix; it is built " + other.built_if);
     std::vector<char*> pointers{program.data()};
     for (std::string& argument : arguments) pointers.push_back(argument.data());
     pointers.push_back(nullptr);
@@ -29,13 +28,13 @@ void become(const std::string& name, const std::string& needs, std::vector<std::
 
 }  // namespace
 
-void add_other_program(CLI::App& bench, const std::string& name, const std::string& what,
-                       const std::string& needs) {
+void add_other_program(CLI::App& parent, const std::string& name, const std::string& what,
+                       const OtherProgram& other) {
     CLI::App* command =
-        bench.add_subcommand(name, what + " (needs the program bench_" + name + ")");
+        parent.add_subcommand(name, what + " (needs the program " + other.program + ")");
     command->set_help_flag();  // --help and everything else are for the other program
     command->prefix_command();
-    command->callback([command, name, needs] { become(name, needs, command->remaining()); });
+    command->callback([command, other] { become(other, command->remaining()); });
 }
 
 }  // namespace raydix::cli

@@ -6,9 +6,15 @@
 
 namespace raydix::cli {
 
-/// Adds `raydix bench NAME`, which becomes the program bench_NAME beside this one; all options are
-/// its own. `needs` ends the message where it is not there.
-void add_other_program(CLI::App& bench, const std::string& name, const std::string& what,
-                       const std::string& needs);
+/// A program beside this one that a command becomes.
+struct OtherProgram {
+    std::string command;   // as the user types it, "bench cpu"
+    std::string program;   // the file's name
+    std::string built_if;  // ends the message where it is not there
+};
+
+/// Adds the command `name`, which becomes the other program; all options are its own.
+void add_other_program(CLI::App& parent, const std::string& name, const std::string& what,
+                       const OtherProgram& other);
 
 }  // namespace raydix::cli

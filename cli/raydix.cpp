@@ -23,6 +23,7 @@ int run_raydix(int argc, char** argv) {
     add_query_command(app);
     add_simulate_command(app);
     add_bench_command(app);
+    add_mpi_command(app);
     add_report_command(app);
     add_completion_command(app);
     add_man_command(app);

@@ -3,6 +3,10 @@ include(CMakePackageConfigHelpers)
 install(TARGETS raydix EXPORT raydixTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/raydix DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+if(RAYDIX_HAVE_MPI)  # apart, so that programs without MPI do not look for one
+    install(TARGETS raydix_mpi EXPORT raydixMpiTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+    install(EXPORT raydixMpiTargets NAMESPACE raydix:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/raydix)
+endif()
 install(EXPORT raydixTargets NAMESPACE raydix:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/raydix)
 configure_package_config_file(cmake/raydixConfig.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/raydixConfig.cmake
     INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/raydix)

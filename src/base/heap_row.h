@@ -33,8 +33,9 @@ public:
         }
     }
     RAYDIX_HD void settle() const {}
-    /// Heap sort: ascending by (d2, id), distances instead of their squares; missing ones, infinity
-    /// and ~0, at the end. Returns how many there are.
+    /// Heap sort: ascending by (d2, id), distances instead of their squares unless `squared`;
+    /// missing ones, infinity and ~0, at the end. Returns how many there are.
+    template <bool squared = false>
     RAYDIX_HD std::uint32_t finish(std::uint32_t*, T*) {
         for (std::uint32_t end = size_; end > 1;) {
             const T d2 = d2_[--end];
@@ -43,7 +44,7 @@ public:
             sift_down(d2, id, end);
         }
         for (std::uint32_t i = 0; i < k_; ++i)
-            i < size_ ? put(i, std::sqrt(d2_[i]), ids_[i])
+            i < size_ ? put(i, squared ? d2_[i] : std::sqrt(d2_[i]), ids_[i])
                       : put(i, std::numeric_limits<T>::infinity(), ~std::uint32_t{0});
         return size_;
     }

@@ -6,6 +6,7 @@
 #define RAYDIX_POINTS_NEAREST_H
 #endif
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -29,8 +30,10 @@ class KeyRow {
     static constexpr int vectors = capacity / lanes;
 
 public:
-    KeyRow(std::uint32_t k, std::uint32_t*, float*) : k_(k) {
+    /// Points farther than `most_d2` are never in the row.
+    KeyRow(std::uint32_t k, std::uint32_t*, float*, float most_d2) : k_(k) {
         constexpr D d;
+        const std::uint64_t missing = nearness_key(most_d2, no_primitive);
         for (V& v : keys_) v = hn::Set(d, static_cast<std::int64_t>(missing));
         first_ = hn::FirstN(d, 1);
         alignas(64) std::int64_t from[lanes];
@@ -68,22 +71,22 @@ public:
         worst_ = keys[k_ - 1];
     }
 
+    template <bool squared>
     HWY_INLINE std::uint32_t finish(std::uint32_t* indices, float* distances) const {
         alignas(64) std::uint64_t keys[capacity];
         store(keys);
         std::uint32_t found = 0;
         for (std::uint32_t i = 0; i < k_; ++i) {
             indices[i] = static_cast<std::uint32_t>(keys[i]);
-            distances[i] =
-                std::sqrt(std::bit_cast<float>(static_cast<std::uint32_t>(keys[i] >> 32)));
-            found += indices[i] != no_primitive;
+            const float d2 = std::bit_cast<float>(static_cast<std::uint32_t>(keys[i] >> 32));
+            const bool is_found = indices[i] != no_primitive;
+            distances[i] = !is_found ? infinity : squared ? d2 : std::sqrt(d2);
+            found += is_found;
         }
         return found;
     }
 
 private:
-    static constexpr std::uint64_t missing = std::uint64_t{0x7F800000u} << 32 | no_primitive;
-
     HWY_INLINE void store(std::uint64_t* keys) const {
         constexpr hn::RebindToUnsigned<D> u;
         for (int i = 0; i < vectors; ++i) hn::Store(hn::BitCast(u, keys_[i]), u, keys + i * lanes);
@@ -100,11 +103,11 @@ private:
 template <class T>
 class SortedRow {
 public:
-    SortedRow(std::uint32_t k, std::uint32_t* indices, T* distances)
+    SortedRow(std::uint32_t k, std::uint32_t* indices, T* distances, T most_d2)
         : ids_(indices), d2_(distances), k_(k) {
         for (std::uint32_t i = 0; i < k; ++i) {
             ids_[i] = no_primitive;
-            d2_[i] = std::numeric_limits<T>::infinity();
+            d2_[i] = most_d2;
         }
     }
     [[nodiscard]] T worst_d2() const { return d2_[k_ - 1]; }
@@ -120,11 +123,13 @@ public:
         ids_[hole] = id;
     }
     void settle() const {}
+    template <bool squared>
     std::uint32_t finish(std::uint32_t*, T*) const {
         std::uint32_t found = 0;
         for (std::uint32_t i = 0; i < k_; ++i) {
-            d2_[i] = std::sqrt(d2_[i]);
-            found += ids_[i] != no_primitive;
+            const bool is_found = ids_[i] != no_primitive;
+            d2_[i] = !is_found ? T(infinity) : squared ? d2_[i] : std::sqrt(d2_[i]);
+            found += is_found;
         }
         return found;
     }
@@ -136,6 +141,18 @@ private:
     std::uint32_t* ids_;
     T* d2_;
     std::uint32_t k_;
+};
+
+/// The same for any k.
+template <class T>
+class LongRow : public HeapRow<T> {
+public:
+    LongRow(std::uint32_t k, std::uint32_t* indices, T* distances, T most_d2)
+        : HeapRow<T>(k, indices, distances), most_d2_(most_d2) {}
+    [[nodiscard]] T worst_d2() const { return std::min(most_d2_, HeapRow<T>::worst_d2()); }
+
+private:
+    T most_d2_;
 };
 
 /// One level of a walk: the node, how near its children are, and which are still to be entered.
@@ -267,17 +284,19 @@ void nearest_rows(const NearestJob<T, Dim>& job, PointJobCounts& counts) {
         const T* query = job.queries + place * Dim;
         std::uint32_t* indices = job.indices + place * job.k;
         T* distances = job.distances + place * job.k;
-        Row row(job.k, indices, distances);
+        Row row(job.k, indices, distances,
+                job.most_d2 == nullptr ? std::numeric_limits<T>::infinity() : job.most_d2[place]);
         const bool valid = is_finite<T, Dim>(query);
         counts.invalid += !valid;
         if (valid && !job.tree.empty()) NearestWalk<T, Dim, Row>(job.tree, query, row).run();
-        counts.found += row.finish(indices, distances);
+        counts.found += job.squared ? row.template finish<true>(indices, distances)
+                                    : row.template finish<false>(indices, distances);
     }
 }
 
 template <class T, int Dim>
 void nearest(const NearestJob<T, Dim>& job, PointJobCounts& counts) {
-    if (job.k > 32) return nearest_rows<HeapRow<T>>(job, counts);
+    if (job.k > 32) return nearest_rows<LongRow<T>>(job, counts);
     if constexpr (std::is_same_v<T, float>) {
         if (job.k <= 8) return nearest_rows<KeyRow<8>>(job, counts);
         if (job.k <= 16) return nearest_rows<KeyRow<16>>(job, counts);

@@ -27,6 +27,8 @@ struct PointJob {
 template <class T, int Dim>
 struct NearestJob : PointJob<T, Dim> {
     std::uint32_t k;
+    const T* most_d2;        // one of each query, beyond which no point counts; null: infinity
+    bool squared;            // d2 instead of distances
     std::uint32_t* indices;  // [queries * k]
     T* distances;            // [queries * k]
 };
@@ -39,6 +41,7 @@ struct WithinJob : PointJob<T, Dim> {
     const T* radii;  // one of each query; null: `radius` for all
     T radius;
     bool by_distance;
+    bool squared;                 // d2 instead of distances
     KeepPoints keep;              // else queries must be points of the index in its order, and
     const std::uint32_t* itself;  // their ids are here: [n]
     std::uint32_t* counts;        // [queries], out of a count, and what it gave for a fill

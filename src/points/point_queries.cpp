@@ -6,6 +6,7 @@
 #include "base/float_env.h"
 #include "base/options.h"
 #include "points/point_rows.h"
+#include "points/squared_queries.h"
 
 namespace raydix {
 namespace {
@@ -47,20 +48,27 @@ PointLists<typename Index::Scalar> lists_of(const Index& index, const Within<Ind
     return result;
 }
 
-/// order(queries) -> the order in which to take them.
-template <class Index, class Order>
-PointQueryCounts nearest(const Index& index, PointsOf<Index> queries, std::uint32_t k,
-                         std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
-                         const PointQueryOptions& options, const Order& order_of) {
-    using Scalar = typename Index::Scalar;
-    const KernelsOf<Index>& kernels = kernels_for<Index>(options.isa);
-    NearestJob<Scalar, Index::dimension> job{};
+template <class Index>
+using Nearest = NearestJob<typename Index::Scalar, Index::dimension>;
+
+template <class Index>
+Nearest<Index> nearest_job(const Index& index, PointsOf<Index> queries, std::uint32_t k,
+                           std::span<std::uint32_t> indices, ScalarsOf<Index> distances) {
+    Nearest<Index> job{};
     job.tree = index.arrays().tree;
-    job.queries = values_of<Scalar>(queries);
+    job.queries = values_of<typename Index::Scalar>(queries);
     job.n = queries.size();
     job.k = k;
     job.indices = indices.data();
     job.distances = distances.data();
+    return job;
+}
+
+/// order(queries) -> the order in which to take them.
+template <class Index, class Order>
+PointQueryCounts nearest(const Nearest<Index>& job, const PointQueryOptions& options,
+                         const Order& order_of) {
+    const KernelsOf<Index>& kernels = kernels_for<Index>(options.isa);
     std::vector<PointJobCounts> parts(blocks_of(job.n));
     with_threads(options.threads, [&] {
         const std::vector<std::uint32_t> order = order_of(job.queries);
@@ -68,8 +76,9 @@ PointQueryCounts nearest(const Index& index, PointsOf<Index> queries, std::uint3
                        [&](std::size_t b, std::size_t begin, std::size_t end) {
                            auto part = part_of(job, order, begin, end, Index::dimension);
                            if (order.empty()) {
-                               part.indices += begin * k;
-                               part.distances += begin * k;
+                               part.indices += begin * job.k;
+                               part.distances += begin * job.k;
+                               if (job.most_d2 != nullptr) part.most_d2 += begin;
                            }
                            kernels.nearest(part, parts[b]);
                        });
@@ -100,10 +109,11 @@ PointQueryCounts knn(const Index& index, PointsOf<Index> queries, std::uint32_t 
             throw InputError("knn: " + std::to_string(queries.size()) + " queries for " +
                              std::to_string(k) + " each, but room for " + std::to_string(room) +
                              " results");
-    return nearest(
-        index, queries, k, indices, distances, options, [&](const typename Index::Scalar* first) {
-            return order_for(index, first, queries.size(), Index::dimension, options.order);
-        });
+    return nearest<Index>(nearest_job(index, queries, k, indices, distances), options,
+                          [&](const typename Index::Scalar* first) {
+                              return order_for(index, first, queries.size(), Index::dimension,
+                                               options.order);
+                          });
 }
 
 template <class Index>
@@ -118,11 +128,12 @@ NearestPoints<typename Index::Scalar> knn(const Index& index, PointsOf<Index> qu
     NearestPoints<Scalar> result;
     result.indices.reset(queries.size() * k);
     result.distances.reset(queries.size() * k);
-    result.counts = nearest(index, queries, k, result.indices.span(), result.distances.span(),
-                            options, [&](const Scalar* first) {
-                                return order_within(budget, index, first, queries.size(),
-                                                    Index::dimension, options.order);
-                            });
+    result.counts = nearest<Index>(
+        nearest_job(index, queries, k, result.indices.span(), result.distances.span()), options,
+        [&](const Scalar* first) {
+            return order_within(budget, index, first, queries.size(), Index::dimension,
+                                options.order);
+        });
     return result;
 }
 
@@ -216,6 +227,31 @@ PointLists<typename Index::Scalar> box_search(
 }
 
 template <class Index>
+PointQueryCounts squared_nearest(const Index& index, PointsOf<Index> queries,
+                                 const typename Index::Scalar* most_d2, std::uint32_t k,
+                                 std::span<std::uint32_t> indices, ScalarsOf<Index> d2,
+                                 const PointQueryOptions& options) {
+    Nearest<Index> job = nearest_job(index, queries, k, indices, d2);
+    job.most_d2 = most_d2;
+    job.squared = true;
+    return nearest<Index>(job, options, [&](const typename Index::Scalar* first) {
+        return order_for(index, first, queries.size(), Index::dimension, options.order);
+    });
+}
+
+template <class Index>
+PointLists<typename Index::Scalar> squared_radius_search(
+    const Index& index, PointsOf<Index> queries,
+    std::type_identity_t<std::span<const typename Index::Scalar>> radii,
+    const PointQueryOptions& options) {
+    Within<Index> job =
+        within_job(index, values_of<typename Index::Scalar>(queries), queries.size(), options);
+    job.radii = radii.data();
+    job.squared = true;
+    return lists_of(index, job, Index::dimension, false, "radius_search", options);
+}
+
+template <class Index>
 PointLists<typename Index::Scalar> neighbour_lists(const Index& index, ScalarOf<Index> radius,
                                                    PairRows rows,
                                                    const PointQueryOptions& options) {
@@ -290,5 +326,15 @@ RAYDIX_POINT_QUERIES(Points2)
 RAYDIX_POINT_QUERIES(PointsD)
 RAYDIX_POINT_QUERIES(Points2D)
 #undef RAYDIX_POINT_QUERIES
+
+#define RAYDIX_SQUARED_QUERIES(Index)                                                              \
+    template PointQueryCounts squared_nearest(const Index&, PointsOf<Index>, const Index::Scalar*, \
+                                              std::uint32_t, std::span<std::uint32_t>,             \
+                                              ScalarsOf<Index>, const PointQueryOptions&);         \
+    template PointLists<Index::Scalar> squared_radius_search(                                      \
+        const Index&, PointsOf<Index>, std::span<const Index::Scalar>, const PointQueryOptions&);
+RAYDIX_SQUARED_QUERIES(Points)
+RAYDIX_SQUARED_QUERIES(PointsD)
+#undef RAYDIX_SQUARED_QUERIES
 
 }  // namespace raydix

@@ -182,10 +182,17 @@ public:
         size_ = at;
     }
 
-    /// By id, or by (d2, id); distances are true ones. Not for an empty row.
-    HWY_INLINE void write(bool by_distance, std::uint32_t* ids, T* distances) {
-        if (size_ > most_ranked) return write_long(by_distance, ids, distances);
-        by_distance ? write_ranked<true>(ids, distances) : write_ranked<false>(ids, distances);
+    /// By id, or by (d2, id); distances are true ones unless the job wants squares. Not for an
+    /// empty row.
+    template <int Dim>
+    HWY_INLINE void write(const WithinJob<T, Dim>& job, std::uint32_t* ids, T* distances) {
+        if (size_ > most_ranked)
+            write_long(job.by_distance, ids, distances);
+        else if (job.by_distance)
+            write_ranked<true>(ids, distances);
+        else
+            write_ranked<false>(ids, distances);
+        if (!job.squared) take_roots(distances);
     }
 
 private:
@@ -213,7 +220,6 @@ private:
     /// A point's place is the number of those before it.
     template <bool by_distance>
     HWY_INLINE void write_ranked(std::uint32_t* ids, T* distances) {
-        constexpr D d;
         constexpr Ids i;
         for (std::size_t from = 0; from < 16; from += hn::MaxLanes(i))
             hn::StoreU(hn::Set(i, no_primitive), i, &ids_[size_ + from]);
@@ -223,6 +229,9 @@ private:
             ids[rank] = ids_[k];
             distances[rank] = d2_[k];
         }
+    }
+    HWY_INLINE void take_roots(T* distances) const {
+        constexpr D d;
         std::size_t k = 0;
         for (; k + lanes_of<T> <= size_; k += lanes_of<T>)
             hn::StoreU(hn::Sqrt(hn::LoadU(d, distances + k)), d, distances + k);
@@ -250,7 +259,7 @@ private:
         by_distance ? sort_by_distance(long_) : sort_by_id(long_, spare_);
         for (std::size_t k = 0; k < size_; ++k) {
             ids[k] = long_[k].id;
-            distances[k] = std::sqrt(long_[k].d2);
+            distances[k] = long_[k].d2;
         }
     }
 
@@ -360,8 +369,7 @@ void collect_within(const WithinJob<T, Dim>& job, PointJobCounts& counts, RowChu
             job.counts[place] = static_cast<std::uint32_t>(row.size());
             if (row.size() == 0) return;
             rows.reserve(row.size());
-            row.write(job.by_distance, rows.ids.data() + rows.size,
-                      rows.distances.data() + rows.size);
+            row.write(job, rows.ids.data() + rows.size, rows.distances.data() + rows.size);
             rows.size += row.size();
             counts.found += row.size();
         },
@@ -379,7 +387,7 @@ void fill_within(const WithinJob<T, Dim>& job) {
             row.clear_for(job.counts[place]);
             find_row(job, region, k, std::numeric_limits<std::size_t>::max(), row);
             const std::uint64_t begin = job.offset_of(place);
-            row.write(job.by_distance, job.indices + begin, job.distances + begin);
+            row.write(job, job.indices + begin, job.distances + begin);
         },
         [](std::size_t) {});
 }

@@ -1,0 +1,146 @@
+#include "mpi_input.h"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <unordered_map>
+
+#include "mpi_ranks.h"
+
+namespace raydix::cli {
+namespace {
+
+/// Triangles [begin, end) and the vertices that they use.
+Mesh part_of(const Mesh& mesh, std::size_t begin, std::size_t end) {
+    Mesh part;
+    std::unordered_map<std::uint32_t, std::uint32_t> places;
+    for (std::size_t i = begin; i < end; ++i) {
+        Triangle& triangle = part.triangles.emplace_back(mesh.triangles[i]);
+        for (std::uint32_t& v : triangle) {
+            const auto [place, is_new] =
+                places.try_emplace(v, static_cast<std::uint32_t>(part.vertices.size()));
+            if (is_new) part.vertices.push_back(mesh.vertices[v]);
+            v = place->second;
+        }
+    }
+    return part;
+}
+
+Mesh scatter_triangles(const Mesh& whole) {
+    Mesh part;
+    if (mpi_rank() != 0) {
+        part.vertices = receive_array<Vec3>(0);
+        part.triangles = receive_array<Triangle>(0);
+        return part;
+    }
+    const std::size_t n = whole.triangles.size();
+    for (int r = mpi_ranks() - 1; r >= 0; --r) {
+        part = part_of(whole, part_begin(n, r), part_begin(n, r + 1));
+        if (r == 0) break;
+        send_array<Vec3>(part.vertices, r);
+        send_array<Triangle>(part.triangles, r);
+    }
+    return part;
+}
+
+std::uint64_t over_ranks(std::uint64_t value, MPI_Op op) {
+    MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_UINT64_T, op, MPI_COMM_WORLD);
+    return value;
+}
+
+Json sum_and_most(std::uint64_t value) {
+    return {{"sum", over_ranks(value, MPI_SUM)}, {"most", over_ranks(value, MPI_MAX)}};
+}
+
+}  // namespace
+
+mpi::Options MpiOptions::options() const {
+    mpi::Options chosen;
+    chosen.partition = partition == "curve" ? mpi::Partition::curve : mpi::Partition::as_given;
+    chosen.threads = common.threads;
+    chosen.exchange_bytes = exchange_bytes;
+    return chosen;
+}
+
+mpi::SceneOptions MpiOptions::scene_options() const {
+    mpi::SceneOptions chosen;
+    static_cast<mpi::Options&>(chosen) = options();
+    chosen.one_geometry = true;
+    return chosen;
+}
+
+void add_mpi_options(CLI::App& command, MpiOptions& options) {
+    add_common_options(command, options.common);
+    command.add_option("scene", options.scene, "File or built-in scene")->required();
+    command.add_option("--partition", options.partition, "Which rank holds what")
+        ->check(CLI::IsMember({"curve", "as_given"}))
+        ->capture_default_str();
+    command
+        .add_option("--exchange-bytes", options.exchange_bytes,
+                    "The most bytes that a rank takes in during a round")
+        ->capture_default_str();
+    command.add_flag("--verify", options.verify,
+                     "Rank 0 does the same alone and compares all bits");
+}
+
+SpreadModel spread_model(const MpiOptions& options) {
+    SpreadModel model;
+    on_first([&] {
+        if (options.common.prints_tables() && mpi_ranks() > 1)
+            fmt::print("reading      rank 0 reads all of {} and scatters it\n", options.scene);
+        model.whole = load_flat_model(options.scene, options.common.seed);
+    });
+    std::uint64_t triangles = mpi_rank() == 0 ? model.whole.mesh().triangles.size() : 0;
+    MPI_Bcast(&triangles, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
+    const Mesh none;
+    const Mesh& whole = mpi_rank() == 0 ? model.whole.mesh() : none;
+    if (triangles > 0)
+        model.part = scatter_triangles(whole);
+    else
+        model.part.vertices = scatter(whole.vertices);
+    return model;
+}
+
+Json mpi_document(const std::string& command, const MpiOptions& options) {
+    Json document = new_document(command);
+    document["ranks"] = mpi_ranks();
+    document["scene"] = options.scene;
+    document["partition"] = options.partition;
+    return document;
+}
+
+Json holding_json(const mpi::Holding& holding) {
+    return {{"elements", holding.size},
+            {"left_out", holding.left_out},
+            {"local", sum_and_most(holding.local)},
+            {"bytes", sum_and_most(holding.bytes)},
+            {"replicated_bytes", holding.replicated_bytes},
+            {"report", report_json(holding.report)}};
+}
+
+Json report_json(const mpi::CallReport& report) {
+    double compute = report.compute_seconds;
+    MPI_Allreduce(MPI_IN_PLACE, &compute, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
+    return {{"rounds", report.rounds},
+            {"questions", sum_and_most(report.questions)},
+            {"answered", sum_and_most(report.answered)},
+            {"messages", sum_and_most(report.traffic.messages)},
+            {"bytes", sum_and_most(report.traffic.bytes)},
+            {"collectives", report.traffic.collectives},
+            {"compute_s_most", compute}};
+}
+
+void print_report(const Json& report) {
+    fmt::print("rounds       {}, {} questions, {} messages, {} bytes\n",
+               report["rounds"].get<std::uint64_t>(),
+               report["questions"]["sum"].get<std::uint64_t>(),
+               report["messages"]["sum"].get<std::uint64_t>(),
+               report["bytes"]["sum"].get<std::uint64_t>());
+}
+
+void require_verified(bool is_same, const std::string& what, bool prints) {
+    if (!is_same) throw InputError("verify: " + what + " of all ranks differ from one process");
+    if (prints) fmt::print("verify       {} have the bits of one process\n", what);
+}
+
+}  // namespace raydix::cli

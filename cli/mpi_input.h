@@ -1,0 +1,46 @@
+// What the commands of raydix_mpi read: rank 0 reads the file and scatters it.
+#pragma once
+
+#include <raydix/mesh.h>
+#include <raydix/model.h>
+#include <raydix/mpi.h>
+
+#include <string>
+#include <vector>
+
+#include "output.h"
+
+namespace raydix::cli {
+
+struct MpiOptions {
+    CommonOptions common;
+    std::string scene, partition = "curve";
+    std::uint64_t exchange_bytes = std::uint64_t{64} << 20;
+    bool verify = false;
+
+    [[nodiscard]] mpi::Options options() const;
+    [[nodiscard]] mpi::SceneOptions scene_options() const;
+};
+void add_mpi_options(CLI::App& command, MpiOptions& options);
+
+/// Rank 0 has the whole, every rank its part.
+struct SpreadModel {
+    Model whole;  // of rank 0, flat
+    Mesh part;    // triangles and their vertices; or points
+
+    [[nodiscard]] bool is_cloud() const { return part.triangles.empty(); }
+};
+
+/// Collective. Says that rank 0 reads. Triangles, or else points, come in equal runs.
+[[nodiscard]] SpreadModel spread_model(const MpiOptions& options);
+
+/// {command, version, machine, ranks, partition}.
+[[nodiscard]] Json mpi_document(const std::string& command, const MpiOptions& options);
+/// Collective. The figures of all ranks: sums, and the greatest of what each has.
+[[nodiscard]] Json holding_json(const mpi::Holding& holding);
+[[nodiscard]] Json report_json(const mpi::CallReport& report);
+void print_report(const Json& report);
+/// On rank 0: throws InputError if they differ.
+void require_verified(bool is_same, const std::string& what, bool prints);
+
+}  // namespace raydix::cli

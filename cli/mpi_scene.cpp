@@ -1,0 +1,171 @@
+// raydix mpi info and trace.
+#include <fmt/format.h>
+#include <raydix/rays.h>
+
+#include <cstring>
+#include <memory>
+
+#include "mpi_commands.h"
+#include "mpi_input.h"
+#include "mpi_ranks.h"
+
+namespace raydix::cli {
+namespace {
+
+void print_holding(const Json& holding, const char* elements) {
+    fmt::print("holding      {} {}, at most {} on a rank of {}\n",
+               holding["elements"].get<std::uint64_t>(), elements,
+               holding["local"]["most"].get<std::uint64_t>(), mpi_ranks());
+    fmt::print("memory       at most {} bytes on a rank, {} of them on every rank\n",
+               holding["bytes"]["most"].get<std::uint64_t>(),
+               holding["replicated_bytes"].get<std::uint64_t>());
+}
+
+void run_info(const MpiOptions& options) {
+    const SpreadModel model = spread_model(options);
+    Json document = mpi_document("mpi info", options);
+    if (model.whole.name.empty() && mpi_rank() == 0) document["scene"] = options.scene;
+    std::uint64_t triangles = model.part.triangles.size();
+    MPI_Allreduce(MPI_IN_PLACE, &triangles, 1, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
+    if (triangles == 0) {
+        const mpi::DistributedPoints points(MPI_COMM_WORLD, model.part.vertices, options.options());
+        document["holding"] = holding_json(points.holding());
+    } else {
+        const MeshView view(model.part);
+        const mpi::DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1),
+                                          options.scene_options());
+        document["holding"] = holding_json(scene.holding());
+    }
+    on_first([&] {
+        if (options.common.prints_tables())
+            print_holding(document["holding"], triangles == 0 ? "points" : "triangles");
+        write_json(document, options.common);
+    });
+}
+
+struct TraceCommand : MpiOptions {
+    std::string rays_file, size_text = "512x384";
+    std::size_t camera = 0;
+    std::string mode = "closest";
+};
+
+std::vector<Ray> rays_of(const TraceCommand& options, const Model& model) {
+    if (!options.rays_file.empty()) return load_rays(options.rays_file);
+    if (options.camera >= model.cameras.cameras.size())
+        throw InputError(options.scene + ": there is no camera " + std::to_string(options.camera));
+    const Size size = parse_size(options.size_text);
+    return make_primary_rays(model.cameras.cameras[options.camera], size.width, size.height);
+}
+
+template <class AnyHit>
+bool same_hit(const mpi::DistributedHit& hit, const AnyHit& expected) {
+    const bool same_prim = expected.hit() ? hit.prim == expected.prim : hit.prim == mpi::no_global;
+    return same_prim && std::memcmp(&hit.t, &expected.t, sizeof(float)) == 0 &&
+           std::memcmp(&hit.u, &expected.u, sizeof(float)) == 0 &&
+           std::memcmp(&hit.v, &expected.v, sizeof(float)) == 0;
+}
+
+template <class Hits, class Expected>
+bool same_hits(const Hits& hits, const Expected& expected) {
+    if (hits.size() != expected.size()) return false;
+    for (std::size_t i = 0; i < hits.size(); ++i)
+        if (!same_hit(hits[i], expected[i])) return false;
+    return true;
+}
+
+/// The answers of all ranks on rank 0, and what one process says.
+template <class Gathered, class Alone>
+void verify(const TraceCommand& options, const SpreadModel& model, const std::vector<Ray>& rays,
+            const Gathered& gathered, const Alone& is_same) {
+    if (!options.verify) return;
+    const auto hits = gathered();
+    on_first([&] {
+        const Scene alone(model.whole.mesh());
+        require_verified(is_same(alone, std::span(rays), hits), "hits",
+                         options.common.prints_tables());
+    });
+}
+
+void run_trace(const TraceCommand& options) {
+    const SpreadModel model = spread_model(options);
+    std::vector<Ray> rays;
+    on_first([&] { rays = rays_of(options, model.whole); });
+    const std::vector<Ray> mine = scatter(rays);
+    const MeshView view(model.part);
+    const mpi::DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1), options.scene_options());
+    Json document = mpi_document("mpi trace", options);
+    document["holding"] = holding_json(scene.holding());
+    document["mode"] = options.mode;
+    TraceCounts counts;
+    const auto take = [&](const auto& answers) {
+        document["report"] = report_json(answers.report);
+        counts = answers.counts;
+    };
+    if (options.mode == "closest") {
+        const auto answers = scene.trace(mine);
+        take(answers);
+        verify(
+            options, model, rays,
+            [&] { return gather(std::span<const mpi::DistributedHit>(answers.values)); },
+            [](const Scene& alone, std::span<const Ray> all, const auto& hits) {
+                return same_hits(hits, trace(alone, all));
+            });
+    } else if (options.mode == "any") {
+        const auto answers = scene.trace_any(mine);
+        take(answers);
+        verify(
+            options, model, rays,
+            [&] { return gather(std::span<const std::uint8_t>(answers.values)); },
+            [](const Scene& alone, std::span<const Ray> all, const auto& occluded) {
+                std::vector<std::uint8_t> expected(all.size());
+                trace_any(alone, all, std::span(expected));
+                return expected == occluded;
+            });
+    } else {
+        const auto rows = scene.trace_all(mine);
+        take(rows);
+        verify(
+            options, model, rays, [&] { return gather(rows.hits.view()); },
+            [](const Scene& alone, std::span<const Ray> all, const auto& hits) {
+                return same_hits(hits, trace_all(alone, all).hits);
+            });
+    }
+    std::uint64_t sums[3] = {counts.rays, counts.hits, counts.invalid_rays};
+    MPI_Allreduce(MPI_IN_PLACE, sums, 3, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
+    document["rays"] = sums[0];
+    document["hits"] = sums[1];
+    document["invalid_rays"] = sums[2];
+    document["verified"] = options.verify;
+    on_first([&] {
+        if (options.common.prints_tables()) {
+            print_holding(document["holding"], "triangles");
+            fmt::print("rays         {}, {} hits\n", sums[0], sums[1]);
+            print_report(document["report"]);
+        }
+        write_json(document, options.common);
+    });
+}
+
+}  // namespace
+
+void add_mpi_info(CLI::App& app) {
+    CLI::App* command = app.add_subcommand("info", "Which rank holds how much of a scene");
+    auto options = std::make_shared<MpiOptions>();
+    add_mpi_options(*command, *options);
+    command->callback([options] { run_info(*options); });
+}
+
+void add_mpi_trace(CLI::App& app) {
+    CLI::App* command = app.add_subcommand("trace", "Rays through a scene spread over ranks");
+    auto options = std::make_shared<TraceCommand>();
+    add_mpi_options(*command, *options);
+    command->add_option("--rays", options->rays_file, "Rays from an (N, 8) .npy file");
+    command->add_option("--camera", options->camera, "Camera of the rays")->capture_default_str();
+    command->add_option("--size", options->size_text, "Pixels, WxH")->capture_default_str();
+    command->add_option("--mode", options->mode, "Which hits")
+        ->check(CLI::IsMember({"closest", "any", "all"}))
+        ->capture_default_str();
+    command->callback([options] { run_trace(*options); });
+}
+
+}  // namespace raydix::cli

@@ -1,0 +1,29 @@
+# raydix_mpi, a library beside raydix: scenes and points spread over the ranks of MPI. Everything else builds without.
+set(RAYDIX_HAVE_MPI OFF)
+if(NOT RAYDIX_MPI MATCHES "^(AUTO|ON|OFF)$")
+    message(FATAL_ERROR "RAYDIX_MPI is AUTO, ON or OFF, not ${RAYDIX_MPI}")
+endif()
+# The thread sanitizer would report the MPI library's own threads; a cross compiler would find the host's library.
+if(RAYDIX_MPI STREQUAL "OFF" OR (RAYDIX_MPI STREQUAL "AUTO" AND (RAYDIX_SANITIZE STREQUAL "thread" OR CMAKE_CROSSCOMPILING)))
+    return()
+endif()
+set(MPI_CXX_SKIP_MPICXX ON)  # the C calls alone
+find_package(MPI COMPONENTS CXX)
+if(NOT MPI_CXX_FOUND)
+    if(RAYDIX_MPI STREQUAL "ON")
+        message(FATAL_ERROR "RAYDIX_MPI is ON, but CMake finds no MPI (Debian: libopenmpi-dev openmpi-bin)")
+    endif()
+    message(STATUS "No MPI found: raydix_mpi is not built")
+    return()
+endif()
+set(RAYDIX_HAVE_MPI ON)
+file(GLOB raydix_mpi_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mpi/*.cpp)
+add_library(raydix_mpi STATIC ${raydix_mpi_sources})
+set_target_properties(raydix_mpi PROPERTIES EXPORT_NAME mpi)
+if(NOT RAYDIX_TOP_LEVEL)  # another project builds it if it links it
+    set_target_properties(raydix_mpi PROPERTIES EXCLUDE_FROM_ALL ON)
+endif()
+add_library(raydix::mpi ALIAS raydix_mpi)
+target_include_directories(raydix_mpi PRIVATE ${PROJECT_SOURCE_DIR}/src)
+target_link_libraries(raydix_mpi PUBLIC raydix MPI::MPI_CXX
+    PRIVATE $<BUILD_INTERFACE:raydix_options>)

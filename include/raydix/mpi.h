@@ -1,0 +1,261 @@
+// Points and scenes spread over the ranks of an MPI communicator. Answers have the bits of one
+// process that holds everything, for every number of ranks and every partition
+// (docs/distributed.md).
+//
+// This header needs <mpi.h> and the library raydix_mpi (CMake: raydix::mpi). MPI must have been
+// started with MPI_THREAD_FUNNELED or more; all calls come from the thread that started it.
+//
+// Every call that says "collective" must be made by all ranks of the communicator, in the same
+// order. Each rank gives its own queries, any number of them or none, and gets their answers in its
+// own order. An error on one rank is thrown on all: the same type, and a message that begins with
+// that rank. Ranks whose calls or options differ get an InputError that names two of them.
+#pragma once
+
+#include <mpi.h>
+#include <raydix/buffer.h>
+#include <raydix/error.h>
+#include <raydix/points.h>
+#include <raydix/scene.h>
+#include <raydix/scene_queries.h>
+#include <raydix/types.h>
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+namespace raydix::mpi {
+
+/// MPI itself failed. The message names the MPI call.
+class CommunicationError : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
+/// Stands in 64-bit numbers for "nothing was found".
+inline constexpr std::uint64_t no_global = std::numeric_limits<std::uint64_t>::max();
+
+/// Which rank holds what. Answers do not depend on it.
+enum class Partition : std::uint32_t {
+    as_given = 0,  // each rank keeps what it gave
+    curve = 1,     // all is sorted along one Morton curve; each rank holds a run of about equal
+                   // length. Queries then reach few ranks
+};
+
+struct Options {
+    Partition partition = Partition::curve;
+    bool strict = false;  // true: what would be left out is an InputError
+    int threads = 0;      // of each rank: 0 to 1,024; 0: all the machine has
+    /// The most bytes that a rank takes in during a round, questions or answers, one long answer
+    /// aside. Fewer bytes mean more rounds.
+    std::uint64_t exchange_bytes = std::uint64_t{64} << 20;
+    std::uint64_t message_bytes = std::uint64_t{1} << 20;  // the most of one message
+    /// Boxes around what a rank holds that every rank knows. More boxes make queries reach fewer
+    /// ranks for nothing, and cost memory on all: 1 to 4,096.
+    std::uint32_t boxes_per_rank = 32;
+    /// Called with true before a rank computes and with false after it; must not throw. For
+    /// programs with more ranks than processors, which may hold a rank back.
+    std::function<void(bool)> compute_gate = {};
+};
+
+/// What this rank sent to others.
+struct Traffic {
+    std::uint64_t messages = 0, bytes = 0;  // between two ranks, of questions, answers and parts
+    std::uint64_t collectives = 0;          // calls that all ranks take part in
+};
+
+/// What a call took, on this rank.
+struct CallReport {
+    std::uint64_t rounds = 0;
+    std::uint64_t questions = 0;  // asked of ranks, this one included
+    std::uint64_t answered = 0;   // questions of all ranks that this one answered
+    /// Questions that two rounds would take: of each query one to the nearest rank, then one to
+    /// every rank that its answer leaves, the nearest again. Counted, not asked.
+    std::uint64_t two_round_questions = 0;
+    Traffic traffic;
+    double compute_seconds = 0;  // processor time of all threads, waiting for others left out
+};
+
+/// What an object holds, on this rank and on all.
+struct Holding {
+    std::uint64_t size = 0, left_out = 0;  // of all ranks: elements given, and those left out
+    std::uint64_t local = 0;               // elements that this rank holds
+    std::uint64_t first = 0;               // the number of the first element that this rank gave
+    std::uint64_t replicated_bytes = 0;    // of the tree over the boxes of all ranks
+    std::uint64_t bytes = 0;               // that queries read on this rank
+    CallReport report;                     // of the construction
+};
+
+struct QueryOptions {
+    bool sort = false;  // true: rows by (distance, number). false: by number
+    /// The most bytes that the result may take on this rank. 0: half of what is left to the process
+    /// (result_limit.h).
+    std::uint64_t max_result_bytes = 0;
+};
+
+/// As raydix::NearestPoints, with numbers that count through the ranks.
+template <class Scalar>
+struct NearestRows {
+    Buffer<std::uint64_t> indices;  // [queries * k]; no_global behind the last point
+    Buffer<Scalar> distances;       // [queries * k]; infinity behind the last point
+    PointQueryCounts counts;        // of this rank's queries
+    CallReport report;
+};
+
+/// As raydix::PointLists, with numbers that count through the ranks.
+template <class Scalar>
+struct PointRows {
+    Buffer<std::uint64_t> offsets;  // [queries + 1]
+    Buffer<std::uint64_t> indices;
+    Buffer<Scalar> distances;
+    PointQueryCounts counts;
+    CallReport report;
+};
+
+/// Points in 3-D spread over ranks. Point i of rank r has the number i + (points that the ranks
+/// before r gave). Move-only. To destroy it is collective too, while MPI runs.
+template <class Scalar>
+class BasicDistributedPoints {
+public:
+    using Index = PointIndex<Scalar, 3>;
+    using Point = typename Index::Point;
+    using Box = typename Index::Box;
+
+    /// Collective. Points that are not finite or have a coordinate beyond 1e12 are left out and
+    /// counted. Throws InputError: 2^31 points or more on one rank, an option out of range.
+    BasicDistributedPoints(MPI_Comm comm, std::span<const Point> points,
+                           const Options& options = {});
+    ~BasicDistributedPoints();
+    BasicDistributedPoints(BasicDistributedPoints&&) noexcept;
+    BasicDistributedPoints& operator=(BasicDistributedPoints&&) noexcept;
+
+    [[nodiscard]] const Holding& holding() const;
+
+    /// Collective. The k nearest points of each query by (d2, number), as raydix::knn. All ranks
+    /// give the same k. Throws InputError: k = 0. Throws ResultTooLarge before the result is
+    /// allocated.
+    [[nodiscard]] NearestRows<Scalar> knn(std::span<const Point> queries, std::uint32_t k,
+                                          const QueryOptions& options = {}) const;
+    /// Collective. All points with d2 <= R*R, as raydix::radius_search. All ranks give the same
+    /// radius and `sort`.
+    [[nodiscard]] PointRows<Scalar> radius(std::span<const Point> queries, Scalar radius,
+                                           const QueryOptions& options = {}) const;
+    /// Collective. All points in each closed box, ascending, as raydix::box_search.
+    [[nodiscard]] PointRows<Scalar> box(std::span<const Box> boxes,
+                                        const QueryOptions& options = {}) const;
+
+private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+extern template class BasicDistributedPoints<float>;
+extern template class BasicDistributedPoints<double>;
+using DistributedPoints = BasicDistributedPoints<float>;
+using DistributedPointsD = BasicDistributedPoints<double>;
+
+struct SceneOptions : Options {
+    /// false: the meshes of all ranks are geometries 0, 1, 2, ... in rank order, and `prim` counts
+    /// within each. true: they are parts of one geometry, 0, and `prim` counts through all of them,
+    /// in rank order. For a mesh that no rank holds whole.
+    bool one_geometry = false;
+    Quality quality = Quality::balanced;  // of the tree on each rank. Hits do not depend on it
+};
+
+/// A raydix::Hit with a 64-bit prim. `instance` is 0: meshes stand where they are.
+template <class Scalar>
+struct BasicDistributedHit {
+    Scalar t = infinity;
+    Scalar u = 0, v = 0;
+    std::uint32_t geometry = no_primitive;
+    std::uint32_t instance = 0;
+    std::uint64_t prim = no_global;
+
+    [[nodiscard]] constexpr bool hit() const { return prim != no_global; }
+};
+using DistributedHit = BasicDistributedHit<float>;
+using DistributedHitD = BasicDistributedHit<double>;
+
+/// A raydix::SceneClosestPoint with a 64-bit prim.
+template <class Scalar>
+struct BasicDistributedClosest {
+    typename SceneTypes<Scalar>::Point position{infinity, infinity, infinity};
+    Scalar distance = infinity;
+    Scalar u = 0, v = 0;
+    std::uint32_t geometry = no_primitive;
+    std::uint32_t instance = 0;
+    std::uint64_t prim = no_global;
+
+    [[nodiscard]] constexpr bool found() const { return prim != no_global; }
+};
+
+/// Answers, one for each query of this rank.
+template <class Answer, class Counts>
+struct Answers {
+    std::vector<Answer> values;
+    Counts counts;  // of this rank's queries
+    CallReport report;
+};
+
+/// All hits: those of ray i are hits[offsets[i]] .. hits[offsets[i + 1]].
+template <class Scalar>
+struct HitRows {
+    Buffer<std::uint64_t> offsets;  // [rays + 1]
+    Buffer<BasicDistributedHit<Scalar>> hits;
+    TraceCounts counts;
+    CallReport report;
+};
+
+/// Triangle meshes spread over ranks, asked as a raydix::Scene of all of them. Move-only. To
+/// destroy it is collective too, while MPI runs.
+template <class Scalar>
+class BasicDistributedScene {
+public:
+    using Types = SceneTypes<Scalar>;
+    using MeshView = typename Types::MeshView;
+    using Ray = typename Types::Ray;
+    using Point = typename Types::Point;
+    using Hit = BasicDistributedHit<Scalar>;
+    using Closest = BasicDistributedClosest<Scalar>;
+
+    /// Collective. The meshes are copied. One without triangles only takes a number. Triangles that
+    /// are not finite or out of range are left out and counted. Throws InputError: an index past
+    /// the vertices, 2^31 triangles or more on one rank, an option out of range.
+    BasicDistributedScene(MPI_Comm comm, std::span<const MeshView> meshes,
+                          const SceneOptions& options = {});
+    ~BasicDistributedScene();
+    BasicDistributedScene(BasicDistributedScene&&) noexcept;
+    BasicDistributedScene& operator=(BasicDistributedScene&&) noexcept;
+
+    /// Elements are triangles.
+    [[nodiscard]] const Holding& holding() const;
+
+    /// Collective. The closest hit of each ray: the least (t, geometry, prim), as raydix::trace.
+    [[nodiscard]] Answers<Hit, TraceCounts> trace(std::span<const Ray> rays) const;
+    /// Collective. Whether each ray hits anything: 1 or 0.
+    [[nodiscard]] Answers<std::uint8_t, TraceCounts> trace_any(std::span<const Ray> rays) const;
+    /// Collective. All hits of each ray, sorted by (t, geometry, prim), as raydix::trace_all.
+    [[nodiscard]] HitRows<Scalar> trace_all(std::span<const Ray> rays,
+                                            std::uint64_t max_result_bytes = 0) const;
+    /// Collective. The closest point of all triangles to each query, as raydix::closest_points. All
+    /// ranks give the same max_distance. Throws InputError if it is negative or NaN.
+    [[nodiscard]] Answers<Closest, ClosestCounts> closest_points(
+        std::span<const Point> queries, Scalar max_distance = infinity) const;
+    /// Collective. Whether each query is inside: 1 or 0. Inside means that the way to infinity
+    /// crosses an odd number of triangles, or that the query is on one: InsideRule::parity of all
+    /// meshes together. Exact for closed meshes. The first call makes a second tree on each rank.
+    [[nodiscard]] Answers<std::uint8_t, ClosestCounts> contains(
+        std::span<const Point> queries) const;
+
+private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+extern template class BasicDistributedScene<float>;
+extern template class BasicDistributedScene<double>;
+using DistributedScene = BasicDistributedScene<float>;
+using DistributedSceneD = BasicDistributedScene<double>;
+
+}  // namespace raydix::mpi

@@ -1,0 +1,311 @@
+// Queries of scenes, as kinds for rounds.h.
+#pragma once
+
+#include <raydix/mpi.h>
+#include <raydix/scene.h>
+#include <raydix/scene_queries.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "base/distance.h"
+#include "exec/parallel.h"
+#include "mpi/rank_tree.h"
+#include "mpi/ray_reach.h"
+#include "mpi/result_rows.h"
+#include "mpi/rounds.h"
+#include "mpi/scene_parts.h"
+
+namespace raydix::mpi {
+
+/// What the queries of a scene read on a rank.
+template <class T>
+struct SceneParts {
+    const BasicScene<T>& scene;
+    const TriangleNames& names;
+    const RankTree<T>& tree;
+    int threads;
+
+    [[nodiscard]] SceneTraceOptions trace_options() const {
+        SceneTraceOptions options;
+        options.threads = threads;
+        return options;
+    }
+    template <class AnyHit>
+    [[nodiscard]] BasicDistributedHit<T> named(const AnyHit& hit) const {
+        if (!hit.hit()) return {};
+        const TriangleName name = names.of(hit.geometry, hit.prim);
+        return {hit.t, hit.u, hit.v, name.geometry, 0, name.prim};
+    }
+};
+
+template <class T>
+[[nodiscard]] auto order_of(const BasicDistributedHit<T>& hit) {
+    return std::tuple(hit.t, hit.geometry, hit.prim);
+}
+
+/// What all rays share: they reach the boxes that they go through.
+template <class T>
+class RayKind {
+public:
+    using Scalar = T;
+    using Question = typename SceneTypes<T>::Ray;
+
+    RayKind(const SceneParts<T>& parts, std::span<const Question> rays)
+        : parts_(parts), rays_(rays) {}
+    [[nodiscard]] std::size_t size() const { return rays_.size(); }
+
+protected:
+    [[nodiscard]] bool first_within(std::size_t i, T most, Candidate<T>& found) const {
+        if (!is_valid(rays_[i])) return false;
+        return parts_.tree.first(most, RayReach<T>(rays_[i], parts_.tree.bounds()), found);
+    }
+    void reach_within(std::size_t i, T most, std::vector<Candidate<T>>& found) const {
+        found.clear();
+        if (is_valid(rays_[i]))
+            parts_.tree.all(most, RayReach<T>(rays_[i], parts_.tree.bounds()), found);
+    }
+    void count(TraceCounts& counts) const {
+        counts.rays = rays_.size();
+        for (const Question& ray : rays_) counts.invalid_rays += !is_valid(ray);
+    }
+
+    SceneParts<T> parts_;
+    std::span<const Question> rays_;
+};
+
+/// The closest hit. Rays travel as long as their best hit so far leaves them.
+template <class T>
+class ClosestHitKind : public RayKind<T> {
+    using Hit = BasicDistributedHit<T>;
+
+public:
+    using Question = typename RayKind<T>::Question;
+    static constexpr bool asks_all = false;
+
+    ClosestHitKind(const SceneParts<T>& parts, std::span<const Question> rays,
+                   Answers<Hit, TraceCounts>& answers)
+        : RayKind<T>(parts, rays), answers_(answers) {}
+
+    void clear() { answers_.values.assign(this->rays_.size(), {}); }
+    [[nodiscard]] bool first(std::size_t i, Candidate<T>& found) const {
+        return this->first_within(i, most(i), found);
+    }
+    void reach(std::size_t i, std::vector<Candidate<T>>& found) const {
+        this->reach_within(i, most(i), found);
+    }
+    [[nodiscard]] Question question(std::size_t i) const {
+        Question ray = this->rays_[i];
+        ray.tmax = most(i);
+        return ray;
+    }
+    void answer(std::span<const Question> rays) {
+        found_.resize(rays.size());
+        raydix::trace(this->parts_.scene, rays, std::span(found_), this->parts_.trace_options());
+    }
+    void put_answer(std::size_t q, Bytes& out) const {
+        const Hit hit = this->parts_.named(found_[q]);
+        put(out, std::uint8_t{hit.hit()});
+        if (!hit.hit()) return;
+        put(out, hit.t);
+        put(out, hit.u);
+        put(out, hit.v);
+        put(out, hit.geometry);
+        put(out, hit.prim);
+    }
+    void take(std::size_t i, Reader& reader) {
+        if (reader.take<std::uint8_t>() == 0) return;
+        Hit hit;
+        hit.t = reader.take<T>();
+        hit.u = reader.take<T>();
+        hit.v = reader.take<T>();
+        hit.geometry = reader.take<std::uint32_t>();
+        hit.prim = reader.take<std::uint64_t>();
+        Hit& best = answers_.values[i];
+        if (!best.hit() || order_of(hit) < order_of(best)) best = hit;
+    }
+    void finish() {
+        this->count(answers_.counts);
+        for (const Hit& hit : answers_.values) answers_.counts.hits += hit.hit();
+    }
+
+private:
+    [[nodiscard]] T most(std::size_t i) const {
+        return std::min(this->rays_[i].tmax, answers_.values[i].t);
+    }
+    Answers<Hit, TraceCounts>& answers_;
+    std::vector<typename SceneTypes<T>::Hit> found_;  // of answers
+};
+
+/// Any hit: one rank that says yes is enough.
+template <class T>
+class AnyHitKind : public RayKind<T> {
+public:
+    using Question = typename RayKind<T>::Question;
+    static constexpr bool asks_all = false;
+
+    AnyHitKind(const SceneParts<T>& parts, std::span<const Question> rays,
+               Answers<std::uint8_t, TraceCounts>& answers)
+        : RayKind<T>(parts, rays), answers_(answers) {}
+
+    void clear() { answers_.values.assign(this->rays_.size(), 0); }
+    [[nodiscard]] bool first(std::size_t i, Candidate<T>& found) const {
+        return this->first_within(i, this->rays_[i].tmax, found);
+    }
+    void reach(std::size_t i, std::vector<Candidate<T>>& found) const {
+        found.clear();
+        if (answers_.values[i] == 0) this->reach_within(i, this->rays_[i].tmax, found);
+    }
+    [[nodiscard]] Question question(std::size_t i) const { return this->rays_[i]; }
+    void answer(std::span<const Question> rays) {
+        occluded_.resize(rays.size());
+        raydix::trace_any(this->parts_.scene, rays, std::span(occluded_),
+                          this->parts_.trace_options());
+    }
+    void put_answer(std::size_t q, Bytes& out) const { put(out, occluded_[q]); }
+    void take(std::size_t i, Reader& reader) { answers_.values[i] |= reader.take<std::uint8_t>(); }
+    void finish() {
+        this->count(answers_.counts);
+        for (const std::uint8_t one : answers_.values) answers_.counts.hits += one;
+    }
+
+private:
+    Answers<std::uint8_t, TraceCounts>& answers_;
+    std::vector<std::uint8_t> occluded_;  // of answers
+};
+
+template <class T>
+class AllHitsKind : public RayKind<T> {
+    using Hit = BasicDistributedHit<T>;
+
+public:
+    using Question = typename RayKind<T>::Question;
+    static constexpr bool asks_all = true;
+
+    AllHitsKind(const SceneParts<T>& parts, std::span<const Question> rays, RowStore<Hit>& rows)
+        : RayKind<T>(parts, rays), rows_(rows) {}
+
+    [[nodiscard]] bool first(std::size_t, Candidate<T>&) const { return false; }
+    void reach(std::size_t i, std::vector<Candidate<T>>& found) const {
+        this->reach_within(i, this->rays_[i].tmax, found);
+    }
+    [[nodiscard]] Question question(std::size_t i) const { return this->rays_[i]; }
+    std::uint64_t answer_some(std::span<const Question> rays, std::uint64_t most, Bytes& out) {
+        return answer_in_chunks(
+            rays, most, out, rows_.limit(),
+            [&](std::span<const Question> chunk, std::uint64_t limit) {
+                SceneTraceOptions options = this->parts_.trace_options();
+                options.max_result_bytes = limit;
+                const auto all = raydix::trace_all(this->parts_.scene, chunk, options);
+                for (std::size_t q = 0; q < chunk.size(); ++q) {
+                    put(out, all.offsets[q + 1] - all.offsets[q]);
+                    for (std::uint64_t k = all.offsets[q]; k < all.offsets[q + 1]; ++k)
+                        put(out, this->parts_.named(all.hits[k]));
+                }
+            });
+    }
+    void take(std::size_t i, Reader& reader) { rows_.take(i, reader); }
+    void finish(TraceCounts& counts) const { this->count(counts); }
+
+private:
+    RowStore<Hit>& rows_;
+};
+
+/// The closest point. Squares of distances follow from the points themselves.
+template <class T>
+class ClosestPointKind {
+    using Closest = BasicDistributedClosest<T>;
+    using Point = typename SceneTypes<T>::Point;
+
+public:
+    using Scalar = T;
+    struct Question {
+        Point at;
+        T most_d2;
+    };
+    static constexpr bool asks_all = false;
+
+    ClosestPointKind(const SceneParts<T>& parts, std::span<const Point> queries, T max_distance,
+                     Answers<Closest, ClosestCounts>& answers)
+        : parts_(parts),
+          queries_(queries),
+          most_d2_(max_distance * max_distance),
+          answers_(answers) {}
+
+    void clear() { answers_.values.assign(queries_.size(), {}); }
+    [[nodiscard]] std::size_t size() const { return queries_.size(); }
+    [[nodiscard]] bool first(std::size_t i, Candidate<T>& found) const {
+        return is_finite(queries_[i]) && parts_.tree.first(most(i), bound_of(i), found);
+    }
+    void reach(std::size_t i, std::vector<Candidate<T>>& found) const {
+        parts_.tree.all(most(i), bound_of(i), found);
+    }
+    [[nodiscard]] Question question(std::size_t i) const { return {queries_[i], most(i)}; }
+
+    void answer(std::span<const Question> questions) {
+        found_.resize(questions.size());
+        with_threads(parts_.threads, [&] {
+            for_each_index(
+                questions.size(),
+                [&](std::size_t q) {
+                    found_[q] = closest_point(parts_.scene, questions[q].at,
+                                              radius_of(questions[q].most_d2));
+                },
+                64);
+        });
+    }
+    void put_answer(std::size_t q, Bytes& out) const {
+        const BasicSceneClosestPoint<T>& one = found_[q];
+        put(out, std::uint8_t{one.found()});
+        if (!one.found()) return;
+        const TriangleName name = parts_.names.of(one.geometry, one.prim);
+        put(out, Closest{one.position, one.distance, one.u, one.v, name.geometry, 0, name.prim});
+    }
+    void take(std::size_t i, Reader& reader) {
+        if (reader.take<std::uint8_t>() == 0) return;
+        const auto one = reader.take<Closest>();
+        Closest& best = answers_.values[i];
+        if (!(d2_of(i, one) <= most_d2_)) return;
+        if (!best.found() || order(i, one) < order(i, best)) best = one;
+    }
+    void finish() {
+        answers_.counts.queries = queries_.size();
+        for (std::size_t i = 0; i < queries_.size(); ++i) {
+            answers_.counts.found += answers_.values[i].found();
+            answers_.counts.invalid_queries += !is_finite(queries_[i]);
+        }
+    }
+
+private:
+    [[nodiscard]] T d2_of(std::size_t i, const Closest& one) const {
+        return squared_distance(queries_[i], one.position);
+    }
+    [[nodiscard]] auto order(std::size_t i, const Closest& one) const {
+        return std::tuple(d2_of(i, one), one.geometry, one.prim);
+    }
+    [[nodiscard]] T most(std::size_t i) const {
+        const Closest& best = answers_.values[i];
+        return best.found() ? d2_of(i, best) : most_d2_;
+    }
+    /// A radius whose square is not below d2.
+    [[nodiscard]] static T radius_of(T d2) {
+        return std::nextafter(std::sqrt(d2), std::numeric_limits<T>::infinity());
+    }
+    [[nodiscard]] auto bound_of(std::size_t i) const {
+        return [query = &queries_[i].x](const RankBox<T>& box) { return least_d2(query, box); };
+    }
+
+    SceneParts<T> parts_;
+    std::span<const Point> queries_;
+    T most_d2_;
+    Answers<Closest, ClosestCounts>& answers_;
+    std::vector<BasicSceneClosestPoint<T>> found_;  // of answers
+};
+
+}  // namespace raydix::mpi

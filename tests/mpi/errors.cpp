@@ -1,0 +1,162 @@
+// What goes wrong on one rank comes out on all, and nobody waits for ever.
+#include <functional>
+
+#include "mpi/ranks.h"
+
+namespace raydix::mpi::test {
+namespace {
+
+/// The message of the error of type E that `call` throws on this rank.
+template <class E>
+std::string message_of(const std::function<void()>& call) {
+    try {
+        call();
+    } catch (const E& error) {
+        return error.what();
+    } catch (const std::exception& error) {
+        return std::string("another error: ") + error.what();
+    }
+    return "no error";
+}
+
+bool begins_with(const std::string& text, const std::string& start) {
+    return text.compare(0, start.size(), start) == 0;
+}
+
+std::vector<Vec3> some_points(std::size_t n) {
+    std::vector<Vec3> points(n);
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> unit(0, 1);
+    for (Vec3& p : points) p = {unit(random), unit(random), unit(random)};
+    return points;
+}
+
+int last() { return ranks() - 1; }
+
+TEST(ErrorsOverRanks, ARankThatThrowsIsNamedOnAll) {
+    const auto points = some_points(20);
+    Options options;
+    options.strict = true;
+    auto bad = points;
+    if (rank() == last()) bad[4].y = infinity;
+    const std::string message =
+        message_of<InputError>([&] { const DistributedPoints made(MPI_COMM_WORLD, bad, options); });
+    EXPECT_TRUE(begins_with(message, "rank " + std::to_string(last()) + ": point 4 of this rank"))
+        << message;
+    // The communicator still works.
+    const DistributedPoints made(MPI_COMM_WORLD, points, options);
+    EXPECT_EQ(made.holding().size, 20u * unsigned(ranks()));
+}
+
+TEST(ErrorsOverRanks, AMeshWithAWrongIndexIsNamedOnAll) {
+    Mesh mesh;
+    mesh.vertices = some_points(3);
+    mesh.triangles = {{0, 1, rank() == last() ? 3u : 2u}};
+    const MeshView view(mesh);
+    const std::string message = message_of<InputError>(
+        [&] { const DistributedScene made(MPI_COMM_WORLD, std::span(&view, 1)); });
+    EXPECT_TRUE(begins_with(message, "rank " + std::to_string(last()) + ": mesh 0, triangle 0"))
+        << message;
+}
+
+TEST(ErrorsOverRanks, ResultsThatAreTooLargeAreRefusedOnAll) {
+    const auto points = some_points(100);
+    const DistributedPoints made(MPI_COMM_WORLD, points);
+    QueryOptions options;
+    options.max_result_bytes = rank() == last() ? 1000 : 0;
+    const std::string start = "rank " + std::to_string(last()) + ": ";
+    std::string message = message_of<ResultTooLarge>([&] { (void)made.knn(points, 50, options); });
+    EXPECT_TRUE(begins_with(message, start + "knn: the result needs 60000 bytes")) << message;
+    message = message_of<ResultTooLarge>([&] { (void)made.radius(points, 2.0f, options); });
+    EXPECT_NE(message.find("max_result_bytes lets it have 1000"), std::string::npos) << message;
+    EXPECT_EQ(made.knn(points, 1).counts.found, 100u);
+}
+
+TEST(ErrorsOverRanks, RanksThatDifferAreFound) {
+    const auto points = some_points(10);
+    const bool other = rank() == last() && ranks() > 1;
+    const auto expect_difference = [&](const std::function<void()>& call) {
+        if (ranks() == 1) return call();
+        const std::string message = message_of<InputError>(call);
+        EXPECT_TRUE(begins_with(message, "the ranks differ: rank 0 calls ")) << message;
+        EXPECT_NE(message.find(", rank " + std::to_string(last()) + " calls "), std::string::npos)
+            << message;
+    };
+    expect_difference([&] {
+        Options options;
+        options.partition = other ? Partition::curve : Partition::as_given;
+        const DistributedPoints made(MPI_COMM_WORLD, points, options);
+    });
+    const DistributedPoints made(MPI_COMM_WORLD, points);
+    expect_difference([&] { (void)made.knn(points, other ? 3 : 4); });
+    expect_difference([&] { (void)made.radius(points, other ? 0.1f : 0.2f); });
+    expect_difference([&] {
+        if (other)
+            (void)made.knn(points, 3);
+        else
+            (void)made.radius(points, 0.2f);
+    });
+    EXPECT_EQ(made.knn(points, 1).counts.found, 10u);
+}
+
+TEST(ErrorsOverRanks, OptionsOutOfRangeAreRefused) {
+    const auto points = some_points(10);
+    const auto refusal = [&](const Options& options) {
+        return message_of<InputError>([&] {
+            const DistributedPoints made(MPI_COMM_WORLD, points, options);
+            (void)made.knn(points, 2);
+        });
+    };
+    Options options;
+    options.message_bytes = 0;
+    EXPECT_NE(refusal(options).find("message_bytes"), std::string::npos);
+    options = {};
+    options.boxes_per_rank = 0;
+    EXPECT_NE(refusal(options).find("boxes_per_rank"), std::string::npos);
+    options = {};
+    options.threads = -1;
+    EXPECT_NE(refusal(options).find("threads"), std::string::npos);
+    options = {};
+    options.exchange_bytes = 15;
+    EXPECT_NE(refusal(options).find("exchange_bytes is 15"), std::string::npos);
+    const DistributedPoints made(MPI_COMM_WORLD, points);
+    EXPECT_NE(message_of<InputError>([&] { (void)made.knn(points, 0); }).find("k is 0"),
+              std::string::npos);
+    EXPECT_NE(message_of<InputError>([&] { (void)made.radius(points, -1.0f); }).find("radius"),
+              std::string::npos);
+    EXPECT_EQ(message_of<InputError>(
+                  [] { const DistributedPoints none(MPI_COMM_NULL, std::span<const Vec3>()); }),
+              "the communicator is MPI_COMM_NULL");
+}
+
+TEST(ErrorsOverRanks, SmallMessagesAndRoundsChangeNoAnswer) {
+    const auto points = some_points(200);
+    const DistributedPoints large(MPI_COMM_WORLD, points);
+    Options options;
+    options.exchange_bytes = 25 * std::uint64_t(ranks());  // one question between two ranks
+    options.message_bytes = 7;
+    const DistributedPoints small(MPI_COMM_WORLD, points, options);
+    const auto queries = std::span<const Vec3>(points).first(30);
+    const auto a = large.knn(queries, 9), b = small.knn(queries, 9);
+    EXPECT_TRUE(same_bits(a.indices, b.indices));
+    EXPECT_TRUE(same_bits(a.distances, b.distances));
+    EXPECT_GT(b.report.rounds, a.report.rounds);
+    const auto c = large.radius(queries, 0.4f), d = small.radius(queries, 0.4f);
+    EXPECT_TRUE(same_bits(c.offsets, d.offsets));
+    EXPECT_TRUE(same_bits(c.indices, d.indices));
+    EXPECT_TRUE(same_bits(c.distances, d.distances));
+}
+
+TEST(CurveOverRanks, RanksHoldEquallyManyAndQueriesReachFew) {
+    const auto points = some_points(4000);  // the same on all ranks: each is there `ranks` times
+    const DistributedPoints made(MPI_COMM_WORLD, points);
+    const double fair = 4000;
+    EXPECT_LE(double(made.holding().local), 1.1 * fair);
+    EXPECT_GE(double(made.holding().local), 0.9 * fair);
+    const std::vector<Vec3> equal(100, Vec3{1, 2, 3});
+    const DistributedPoints same(MPI_COMM_WORLD, equal);
+    EXPECT_EQ(same.holding().local, 100u);
+}
+
+}  // namespace
+}  // namespace raydix::mpi::test

@@ -1,0 +1,158 @@
+"""raydix mpi and the example of docs/distributed.md under mpirun: answers, bad input, a rank that is killed."""
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import tempfile
+import textwrap
+import time
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MPIRUN = os.environ["RAYDIX_MPIRUN"].split()
+PROGRAM, EXAMPLE = os.environ["RAYDIX_PROGRAM"], os.environ["RAYDIX_EXAMPLE"]
+TIME_LIMIT_S = 60
+
+
+def command(ranks, *arguments):
+    return [*MPIRUN, "-n", str(ranks), PROGRAM, "mpi", *arguments]
+
+
+class Mpi(unittest.TestCase):
+    def run_on(self, ranks, *arguments):
+        return subprocess.run(command(ranks, *arguments), capture_output=True, text=True, timeout=TIME_LIMIT_S,
+                              cwd=self.folder)
+
+    @classmethod
+    def setUpClass(cls):
+        holder = tempfile.TemporaryDirectory(prefix="raydix-mpi-")
+        cls.addClassCleanup(holder.cleanup)
+        cls.folder = pathlib.Path(holder.name)
+
+    def document_of(self, ranks, *arguments):
+        done = self.run_on(ranks, *arguments, "--json", "-")
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        return json.loads(done.stdout)
+
+    def failure_of(self, ranks, *arguments):
+        """The lines of raydix; the launcher adds its own."""
+        done = self.run_on(ranks, *arguments)
+        self.assertNotEqual(done.returncode, 0, done.stdout)
+        return [line for line in done.stderr.splitlines() if line.startswith("raydix: ")]
+
+    def scene(self):
+        """A closed, bent cube whose faces are grids."""
+        file = self.folder / "solid.obj"
+        if not file.exists():
+            n, lines, corners = 12, [], {}
+
+            def corner(p):
+                if p not in corners:
+                    corners[p] = len(corners) + 1
+                    x, y, z = (c / n for c in p)
+                    lines.append(f"v {x + 0.1 * y * z:.6f} {y - 0.2 * x * x:.6f} {z + 0.05 * x * y:.6f}")
+                return corners[p]
+
+            faces = []
+            for axis in range(3):
+                for side in (0, n):
+                    for i in range(n):
+                        for j in range(n):
+                            quad = []
+                            for a, b in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)):
+                                p = [a, b]
+                                p.insert(axis, side)
+                                quad.append(corner(tuple(p)))
+                            if (side == 0) == (axis != 1):
+                                quad.reverse()
+                            faces += [f"f {quad[0]} {quad[1]} {quad[2]}", f"f {quad[0]} {quad[2]} {quad[3]}"]
+            file.write_text("\n".join(lines + faces) + "\n")
+        return str(file)
+
+
+class Answers(Mpi):
+    def test_verified_on_several_ranks(self):
+        for ranks, partition, arguments in ((3, "curve", ("trace", "--size", "48x32")),
+                                            (2, "as_given", ("trace", "--size", "24x16", "--mode", "all")),
+                                            (4, "curve", ("trace", "--size", "24x16", "--mode", "any")),
+                                            (3, "curve", ("query", "--knn", "5")),
+                                            (2, "as_given", ("query", "--radius", "0.05")),
+                                            (2, "curve", ("query", "--closest")),
+                                            (2, "curve", ("query", "--contains"))):
+            with self.subTest(ranks=ranks, arguments=arguments):
+                document = self.document_of(ranks, arguments[0], self.scene(), *arguments[1:], "--partition",
+                                            partition, "--verify")
+                self.assertTrue(document["verified"])
+                self.assertEqual(document["ranks"], ranks)
+                self.assertGreater(document["report"]["rounds"], 0)
+                self.assertGreater(document["report"]["messages"]["sum"], 0)
+
+    def test_says_who_reads_and_who_holds_what(self):
+        done = self.run_on(3, "info", self.scene())
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("rank 0 reads all of", done.stdout)
+        self.assertRegex(done.stdout, r"holding +1728 triangles, at most \d+ on a rank of 3")
+
+    def test_bench_counts_and_predicts(self):
+        document = self.document_of(8, "bench", "weak", "--per-rank", "2000", "--queries", "200", "--repeat", "1")
+        self.assertEqual([row["ranks"] for row in document["counted"]], [1, 2, 4, 8])
+        self.assertEqual(document["predicted"]["ranks"], 8)
+        alone, most = document["counted"][0], document["counted"][-1]
+        self.assertEqual(alone["messages"], 0)
+        self.assertGreater(most["bytes"], 0)
+        self.assertLess(most["bytes"], most["broadcast_bytes"])
+        self.assertGreaterEqual(most["two_round_ranks_touched"], most["ranks_touched"] + 1)
+
+    def test_the_example_of_the_page(self):
+        done = subprocess.run([*MPIRUN, "-n", "4", EXAMPLE], capture_output=True, text=True, timeout=TIME_LIMIT_S)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(sorted(done.stdout.splitlines()),
+                         [f"rank {r}: point {min(r + 1, 3) * 1000 + 500}" for r in range(4)])
+        source = (ROOT / "examples" / "mpi_points.cpp").read_text(encoding="utf-8")
+        shown = re.search(r"^ *// \[points\]\n(.*?)^ *// \[end\]\n", source, re.DOTALL | re.MULTILINE).group(1)
+        page = (ROOT / "docs" / "distributed.md").read_text(encoding="utf-8")
+        self.assertIn("```cpp\n" + textwrap.dedent(shown) + "```", page)
+
+
+class Failures(Mpi):
+    def test_one_line_and_no_hang(self):
+        for arguments, text in ((("info", "no_such_file.ply"), "no_such_file.ply"),
+                                (("query", self.scene(), "--knn", "1", "--exchange-bytes", "3"), "exchange_bytes is 3"),
+                                (("query", self.scene()), "Exactly 1 option"),
+                                (("nothing",), "'nothing' is not a command"),
+                                (("trace", self.scene(), "--camera", "9"), "there is no camera 9")):
+            with self.subTest(arguments=arguments):
+                lines = self.failure_of(3, *arguments)
+                self.assertEqual(len(lines), 1, lines)
+                self.assertIn(text, lines[0])
+
+    def test_a_killed_rank_ends_all(self):
+        run = subprocess.Popen(command(4, "bench", "weak", "--per-rank", "300000", "--repeat", "1000"),
+                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=self.folder)
+        ranks = self.children_of(run.pid, 4)
+        time.sleep(1)
+        os.kill(ranks[2], signal.SIGKILL)
+        text, _ = run.communicate(timeout=TIME_LIMIT_S)
+        self.assertNotEqual(run.returncode, 0)
+        self.assertIn("signal 9", text)
+        end = time.time() + TIME_LIMIT_S
+        while any(pathlib.Path(f"/proc/{rank}").exists() for rank in ranks):
+            self.assertLess(time.time(), end)
+            time.sleep(0.05)
+
+    def children_of(self, pid, wanted):
+        end = time.time() + TIME_LIMIT_S
+        while time.time() < end:
+            found = []
+            for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
+                found += [int(child) for child in (task / "children").read_text().split()]
+            if len(found) == wanted:
+                return found
+            time.sleep(0.05)
+        self.fail("the ranks do not start")
+
+
+if __name__ == "__main__":
+    unittest.main()
