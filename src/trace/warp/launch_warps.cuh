@@ -12,7 +12,7 @@
 namespace raydix {
 namespace kernels {
 
-inline constexpr std::uint32_t warps_per_block = warp_block_threads / device_warp_width;
+inline constexpr std::uint32_t warps_per_block = warp_block_threads / words::warp_width;
 
 /// Blocks of packets that a multiprocessor must be able to hold: a bound on their registers, within
 /// which the compiler of CUDA 13.0 spills none; left alone it stops at 40 and spills one.
@@ -20,8 +20,8 @@ inline constexpr std::uint32_t packet_blocks = 10;
 
 /// What a warp of work_queue has in shared memory.
 struct SpareRays {
-    Lane lanes[device_warp_width];
-    std::uint32_t slots[device_warp_width];
+    Lane lanes[words::warp_width];
+    std::uint32_t slots[words::warp_width];
 };
 
 /// Shared memory is dynamic: packets [warps][stack_entries], or SpareRays [warps].
@@ -30,7 +30,7 @@ extern __shared__ std::uint64_t shared_words[];
 /// All warps live until their kernel has no turn left, and all lanes as long as their warp.
 template <class Kernel, bool any_hit, class Warp>
 __device__ void run_warp(Warp& warp, const WarpJob& job) {
-    const std::uint32_t warp_index = (blockIdx.x * blockDim.x + threadIdx.x) / device_warp_width;
+    const std::uint32_t warp_index = (blockIdx.x * blockDim.x + threadIdx.x) / words::warp_width;
     Kernel kernel;
     while (kernel.template turn<any_hit>(warp, job, warp_index)) {
     }
@@ -51,7 +51,7 @@ __global__ void __launch_bounds__(warp_block_threads, packet_blocks)
     trace_packets(const WarpJob job, std::uint32_t stack_entries) {
     ThreadWarp<Lane> warp;
     warp.memory.packets = reinterpret_cast<PacketEntry*>(shared_words) +
-                          threadIdx.x / device_warp_width * stack_entries;
+                          threadIdx.x / words::warp_width * stack_entries;
     run_warp<Kernel, any_hit>(warp, job);
 }
 
@@ -60,7 +60,7 @@ template <class Kernel, bool any_hit>
 __global__ void __launch_bounds__(warp_block_threads)
     trace_queues(const WarpJob job, std::uint32_t stack_entries, std::int32_t* stacks) {
     ThreadWarp<Lane> warp;
-    SpareRays& spares = reinterpret_cast<SpareRays*>(shared_words)[threadIdx.x / device_warp_width];
+    SpareRays& spares = reinterpret_cast<SpareRays*>(shared_words)[threadIdx.x / words::warp_width];
     warp.memory.spares = spares.lanes;
     warp.memory.slots = spares.slots;
     const std::size_t thread = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x;
