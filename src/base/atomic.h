@@ -10,10 +10,10 @@
 namespace raydix {
 
 /// Leaves `value` (not 0) at `meeting` and returns what lay there: 0 for the first to come, who
-/// stops. The second gets the first one's value. Acquire-release on both sides: the second sees all
-/// that the first wrote before.
+/// stops. The second gets the first one's value; there is no third. Acquire-release on both sides:
+/// the second sees all that the first wrote before.
 RAYDIX_HD inline std::uint8_t arrive(std::uint8_t& meeting, std::uint8_t value) {
-    return words::exchange(meeting, value);
+    return words::exchange_zero(meeting, value);
 }
 
 /// The same for a word: returns what lay there before.

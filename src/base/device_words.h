@@ -19,6 +19,15 @@
 #include <atomic>
 #endif
 
+// RAYDIX_DEVICE_COMPILER: the compiler knows device code. RAYDIX_DEVICE_PASS: what it compiles now
+// is for the device.
+#if defined(__CUDACC__) || defined(__HIP__)
+#define RAYDIX_DEVICE_COMPILER 1
+#endif
+#if defined(__CUDA_ARCH__) || defined(__HIP_DEVICE_COMPILE__)
+#define RAYDIX_DEVICE_PASS 1
+#endif
+
 namespace raydix::words {
 
 #if defined(RAYDIX_DEVICE_COMPILER)
@@ -133,41 +142,23 @@ RAYDIX_HD inline std::uint32_t fetch_add(std::uint32_t& place, std::uint32_t val
 #endif
 }
 
-#if defined(RAYDIX_DEVICE_PASS)
-/// Leaves `wanted` at `place` if `seen` lies there; else `seen` becomes what does. Acquire-release;
-/// may fail without a reason.
-RAYDIX_HD inline bool compare_exchange(std::uint32_t& place, std::uint32_t& seen,
-                                       std::uint32_t wanted) {
-#if defined(__CUDA_ARCH__)
-    return cuda::atomic_ref<std::uint32_t, cuda::thread_scope_device>(place).compare_exchange_weak(
-        seen, wanted, cuda::memory_order_acq_rel);
-#else
-    return __scoped_atomic_compare_exchange_n(&place, &seen, wanted, true, __ATOMIC_ACQ_REL,
-                                              __ATOMIC_ACQUIRE, __MEMORY_SCOPE_DEVICE);
-#endif
-}
-/// Relaxed.
-[[nodiscard]] RAYDIX_HD inline std::uint32_t load(std::uint32_t& place) {
-#if defined(__CUDA_ARCH__)
-    return cuda::atomic_ref<std::uint32_t, cuda::thread_scope_device>(place).load(
-        cuda::memory_order_relaxed);
-#else
-    return __scoped_atomic_load_n(&place, __ATOMIC_RELAXED, __MEMORY_SCOPE_DEVICE);
-#endif
-}
-#endif
-
-/// The same as exchange for a byte. A device has no exchange of bytes: the byte's word is updated
-/// by compare-exchange, so the whole word must be the caller's.
-RAYDIX_HD inline std::uint8_t exchange(std::uint8_t& place, std::uint8_t value) {
+/// Returns the byte that lay at `place`, and leaves `value` there if that was 0; else something that
+/// is not 0. Acquire-release, for all threads of the device. A device has no exchange of bytes: bits
+/// are set in the byte's word, so the whole word must be the caller's.
+RAYDIX_HD inline std::uint8_t exchange_zero(std::uint8_t& place, std::uint8_t value) {
 #if defined(RAYDIX_DEVICE_PASS)
     const auto address = reinterpret_cast<std::uintptr_t>(&place);
     auto& word = *reinterpret_cast<std::uint32_t*>(address & ~std::uintptr_t{3});
     const unsigned shift = static_cast<unsigned>(address & 3) * 8;
-    std::uint32_t old = load(word);
-    while (!compare_exchange(word, old,
-                             (old & ~(0xFFu << shift)) | (std::uint32_t{value} << shift))) {
-    }
+    const std::uint32_t bits = std::uint32_t{value} << shift;
+#if defined(__CUDA_ARCH__)
+    const std::uint32_t old =
+        cuda::atomic_ref<std::uint32_t, cuda::thread_scope_device>(word).fetch_or(
+            bits, cuda::memory_order_acq_rel);
+#else
+    const std::uint32_t old =
+        __scoped_atomic_fetch_or(&word, bits, __ATOMIC_ACQ_REL, __MEMORY_SCOPE_DEVICE);
+#endif
     return static_cast<std::uint8_t>(old >> shift);
 #elif defined(__CUDACC__)
     return cuda::atomic_ref<std::uint8_t, cuda::thread_scope_system>(place).exchange(
