@@ -55,5 +55,5 @@ file(CONFIGURE OUTPUT ${raydix_spirv_folder}/modules.h CONTENT
     "#define RAYDIX_SPIRV_FOLDER \"${raydix_spirv_folder}\"\n#define RAYDIX_SPIRV_MODULES(X)${raydix_spirv_modules}\n" @ONLY)
 set_source_files_properties(src/exec/spirv_module.cpp PROPERTIES OBJECT_DEPENDS "${raydix_spirv_files}"
     COMPILE_DEFINITIONS "RAYDIX_HAVE_OPENCL=1;RAYDIX_SPIRV_LIST=\"${raydix_spirv_folder}/modules.h\"")
-set(raydix_opencl_sources src/exec/opencl_api.cpp src/exec/opencl_device.cpp src/gpu/opencl_backend.cpp)
+file(GLOB raydix_opencl_sources src/exec/opencl_*.cpp src/gpu/opencl_*.cpp)
 set_source_files_properties(${raydix_opencl_sources} PROPERTIES COMPILE_DEFINITIONS RAYDIX_HAVE_OPENCL=1)

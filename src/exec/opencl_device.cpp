@@ -53,6 +53,7 @@ OpenclTraits traits_of(cl_device_id device) {
     t.work_group_size = value_of<std::size_t>(device, CL_DEVICE_MAX_WORK_GROUP_SIZE);
     t.local_memory = value_of<cl_ulong>(device, CL_DEVICE_LOCAL_MEM_SIZE);
     t.address_bits = value_of<cl_uint>(device, CL_DEVICE_ADDRESS_BITS);
+    t.compute_units = value_of<cl_uint>(device, CL_DEVICE_MAX_COMPUTE_UNITS);
     t.available = value_of<cl_bool>(device, CL_DEVICE_AVAILABLE) != CL_FALSE;
     t.generic_pointers =
         value_of<cl_bool>(device, CL_DEVICE_GENERIC_ADDRESS_SPACE_SUPPORT) != CL_FALSE;

@@ -28,7 +28,7 @@ struct OpenclTraits {
     std::vector<std::size_t> sub_group_sizes;
     std::size_t work_group_size = 0;
     std::uint64_t local_memory = 0;
-    cl_uint address_bits = 0;
+    cl_uint address_bits = 0, compute_units = 0;
     bool available = false, generic_pointers = false;
 };
 /// What of the above a device lacks; "" if nothing.

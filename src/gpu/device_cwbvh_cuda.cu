@@ -38,17 +38,21 @@ unsigned resident_blocks(Kernel kernel, unsigned needed) {
 
 template <bool any, int stack_entries, class Store>
 void launch_with_stack(const Launch& launch, const Store& store) {
-    const CwbvhView view{launch.tree.nodes, launch.tree.triangles, launch.tree.bounds};
+    const kernels::CwbvhRays<Store> given{
+        {launch.tree.nodes, launch.tree.triangles, launch.tree.bounds},
+        launch.rays,
+        launch.count,
+        store};
     const unsigned blocks = (launch.count + block_threads - 1) / block_threads;
     if (launch.kernel == CwbvhKernel::persistent_cwbvh) {
         auto* next = reinterpret_cast<std::uint32_t*>(launch.scratch.data());
         RAYDIX_CUDA_TRY(cudaMemsetAsync(next, 0, sizeof(*next), launch.stream));
         const auto kernel = kernels::persistent_cwbvh_rays<any, stack_entries, Store>;
         kernel<<<resident_blocks(kernel, blocks), block_threads, 0, launch.stream>>>(
-            view, launch.rays, launch.count, store, next);
+            given, next);
     } else {
         kernels::cwbvh_rays<any, stack_entries, Store>
-            <<<blocks, block_threads, 0, launch.stream>>>(view, launch.rays, launch.count, store);
+            <<<blocks, block_threads, 0, launch.stream>>>(given);
     }
     RAYDIX_CUDA_TRY(cudaGetLastError());
 }

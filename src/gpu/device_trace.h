@@ -14,10 +14,9 @@
 #include "base/options.h"
 #include "exec/arena.h"
 #include "gpu/device_fetch.h"
+#include "gpu/trace_launches.h"
 #include "layout/warp_tree.h"
-#include "layout/woop48.h"
 #include "trace/warp/launch_warps.h"
-#include "trace/warp/prepare_rays.h"
 
 namespace raydix {
 
@@ -69,20 +68,6 @@ inline std::uint32_t blocks_of(const DeviceWarpTree::Arrays& tree, const WarpLau
         tree.resident_blocks[static_cast<std::size_t>(launch.kernel)][launch.any_hit ? 1 : 0];
     return resident < all ? resident : all;
 }
-
-/// No ray was handed out yet.
-struct StartPool {
-    std::uint32_t* next;
-    RAYDIX_HD void operator()(std::uint32_t) const { *next = 0; }
-};
-
-/// A tree without triangles: every ray misses.
-struct MissAll {
-    TreeHit* hits;  // [n], out
-    RAYDIX_HD void operator()(std::uint32_t i) const {
-        hits[i] = TreeHit{infinity, no_primitive, 0, 0};
-    }
-};
 
 template <class T>
 const T* upload_array(DeviceBuffer<std::byte>& to, const T* from, std::size_t count, Stream stream) {

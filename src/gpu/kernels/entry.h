@@ -6,17 +6,41 @@
 #define __host__ __attribute__((host))
 #define __device__ __attribute__((device))
 #define __global__ __attribute__((global))
+#define __shared__ __attribute__((shared))
 #define __forceinline__ inline __attribute__((always_inline))
 
-#include <cmath>
+#include <string.h>
+extern "C" __device__ inline void* memcpy(void* to, const void* from, size_t bytes) noexcept {
+    return __builtin_memcpy(to, from, bytes);
+}
 
-// clang knows the float functions of <cmath> on a device, because they are constexpr; these not.
+#include <cmath>
+#include <cstring>
+
+#include "base/binary_scale.h"
+
+// clang knows most float functions of <cmath> on a device, because they are constexpr; these not.
 namespace std {
 __device__ inline double sqrt(double x) { return __builtin_sqrt(x); }
-__device__ inline double fma(double a, double b, double c) {
-    return __builtin_fma(a, b, c);
+__device__ inline double fabs(double x) { return __builtin_fabs(x); }
+__device__ inline double fma(double a, double b, double c) { return __builtin_fma(a, b, c); }
+__device__ inline double frexp(double x, int* exponent) {
+    return raydix::split_exponent(x, exponent);
+}
+__device__ inline float frexp(float x, int* exponent) {
+    return static_cast<float>(raydix::split_exponent(x, exponent));
+}
+// That of float is known, but llc 22 does not know how to write it.
+__host__ __device__ inline double device_ldexp(double x, int n) {
+    return raydix::scale_exponent(x, n);
+}
+__host__ __device__ inline float device_ldexp(float x, int n) {
+    // Exponents that are far from a double's limits.
+    const int limited = n > 400 ? 400 : n < -400 ? -400 : n;
+    return static_cast<float>(raydix::scale_exponent(x, limited));
 }
 }  // namespace std
+#define ldexp device_ldexp
 
 #include "base/device_words.h"
 #include "exec/kernel_arguments.h"
