@@ -41,8 +41,13 @@ set(raydix_spirv_modules)
 foreach(source ${raydix_kernel_sources})
     get_filename_component(name ${source} NAME_WE)
     set(to ${raydix_spirv_folder}/${name})
+    # Intel's driver for processors wants whatever votes to be in the kernel itself, not in functions that it calls.
+    set(inlined)
+    if(name MATCHES "^(trace|queue|cwbvh)$")
+        set(inlined -mllvm -inline-threshold=100000)
+    endif()
     add_custom_command(OUTPUT ${to}.spv DEPENDS ${source} DEPFILE ${to}.d
-        COMMAND ${RAYDIX_KERNEL_CLANG} ${raydix_hip_flags} --offload=spirv64 -S -emit-llvm
+        COMMAND ${RAYDIX_KERNEL_CLANG} ${raydix_hip_flags} ${inlined} --offload=spirv64 -S -emit-llvm
             -Xclang -dependency-file -Xclang ${to}.d -Xclang -MT -Xclang ${to}.spv ${source} -o ${to}.ll
         COMMAND ${RAYDIX_KERNEL_LLC} -O0 -mtriple=spirv64-unknown-unknown -filetype=obj
             --spirv-ext=+SPV_KHR_no_integer_wrap_decoration ${to}.ll -o ${to}.spv

@@ -178,7 +178,9 @@ void* OpenclDevice::allocate(std::size_t bytes) {
 }
 
 void OpenclDevice::free(void* memory) noexcept {
-    static_cast<void>(free_(context_, memory));  // waits for launches that use it
+    // The driver does not know which launches use it: they only hold pointers to it.
+    static_cast<void>(opencl_api().Finish(own_queue_));
+    static_cast<void>(free_(context_, memory));
 }
 
 void OpenclDevice::copy(cl_command_queue queue, void* to, const void* from, std::size_t bytes) {

@@ -68,6 +68,9 @@ struct TraceKernel;
 #include "gpu/kernels/trace.inc"
 #include "gpu/kernels/trace_around.inc"
 #undef RAYDIX_MODULE
+#define RAYDIX_MODULE "queue"
+#include "gpu/kernels/queue.inc"
+#undef RAYDIX_MODULE
 
 }  // namespace raydix
 

@@ -220,8 +220,16 @@ TEST_F(OpenclBuild, ScratchIsUsedAsAskedAndNotBeyond) {
                 DeviceBuffer<std::uint32_t> order(n);
                 DeviceBuffer<LeafTriangle> copies(n);
                 DeviceBuffer<DeviceCounts> counts(1);
-                const DeviceTree tree{nodes.data(),  order.data(),  copies.data(), nullptr,
-                                      nullptr,       counts.data(), nullptr,       nullptr};
+                DeviceBuffer<std::byte> pairs(64 * device_pair_capacity(n, options));
+                DeviceBuffer<std::uint32_t> pair_ids(n);
+                const DeviceTree tree{nodes.data(),
+                                      order.data(),
+                                      copies.data(),
+                                      nullptr,
+                                      nullptr,
+                                      counts.data(),
+                                      reinterpret_cast<NodePair*>(pairs.data()),
+                                      pair_ids.data()};
                 build_bvh_on_device(input.mesh, options, tree, {scratch.data() + guard, bytes},
                                     nullptr);
                 const Bvh built = download_bvh(tree, PrimitiveKind::triangles, options, nullptr);
@@ -231,11 +239,9 @@ TEST_F(OpenclBuild, ScratchIsUsedAsAskedAndNotBeyond) {
                 const auto untouched = [](std::byte b) { return b == std::byte{0x5A}; };
                 EXPECT_TRUE(std::all_of(after.begin(), after.begin() + guard, untouched));
                 EXPECT_TRUE(std::all_of(after.end() - guard, after.end(), untouched));
-                if (bytes > 256) {
-                    EXPECT_THROW(build_bvh_on_device(input.mesh, options, tree,
-                                                     {scratch.data(), bytes - 256}, nullptr),
-                                 InputError);
-                }
+                EXPECT_THROW(build_bvh_on_device(input.mesh, options, tree,
+                                                 {scratch.data(), bytes - 1}, nullptr),
+                             InputError);
             }
     }
 }
