@@ -41,9 +41,10 @@ set(raydix_spirv_modules)
 foreach(source ${raydix_kernel_sources})
     get_filename_component(name ${source} NAME_WE)
     set(to ${raydix_spirv_folder}/${name})
-    # Intel's driver for processors wants whatever votes to be in the kernel itself, not in functions that it calls.
+    # Intel's driver for processors wants lanes that vote to do so in the kernel itself, not in functions that it calls.
+    # Kernels without votes it takes for those of one lane if all is inlined.
     set(inlined)
-    if(name MATCHES "^(trace|queue|cwbvh)$")
+    if(name MATCHES "^(trace_votes|cwbvh)$")
         set(inlined -mllvm -inline-threshold=100000)
     endif()
     add_custom_command(OUTPUT ${to}.spv DEPENDS ${source} DEPFILE ${to}.d

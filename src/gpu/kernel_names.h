@@ -68,8 +68,8 @@ struct TraceKernel;
 #include "gpu/kernels/trace.inc"
 #include "gpu/kernels/trace_around.inc"
 #undef RAYDIX_MODULE
-#define RAYDIX_MODULE "queue"
-#include "gpu/kernels/queue.inc"
+#define RAYDIX_MODULE "trace_votes"
+#include "gpu/kernels/trace_votes.inc"
 #undef RAYDIX_MODULE
 
 }  // namespace raydix

@@ -1,7 +1,6 @@
-// Kernels of queries and of the names of hits, as clang compiles them to SPIR-V for OpenCL and to
+// Kernels of queries, as clang compiles them to SPIR-V for OpenCL and to
 // code objects for AMD.
 #include "gpu/kernels/entry.h"
-#include "engine/name_hit.h"
 #include "gpu/device_queries.h"
 
 namespace raydix {
