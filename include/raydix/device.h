@@ -1,6 +1,6 @@
-// Building on an NVIDIA GPU: device pointers in, device pointers out, on the caller's stream.
-// Memory belongs to the caller. Plain C++. In a build without CUDA every call that needs a device
-// throws BackendUnavailable.
+// Building on a device, an NVIDIA GPU or one with OpenCL: device pointers in, device pointers out,
+// on the caller's stream. Memory belongs to the caller. Plain C++. Where there is no such device
+// every call that needs one throws BackendUnavailable.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -9,25 +9,58 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace raydix {
 
-/// A cudaStream_t; null is the default stream.
+/// A cudaStream_t, null for the default stream; or an in-order cl_command_queue of the context that
+/// opencl_context() returns, null for the device's own.
 using Stream = void*;
 
-/// True if this build has CUDA and this machine a device that can run it. Never throws.
+/// A device that this build and this machine have, or why one that is there cannot be used.
+struct DeviceDescription {
+    std::string selector;  // as select_device takes it
+    std::string name;      // the driver's, or "" if there is no device
+    std::string driver;    // its version, or ""
+    std::string missing;   // "" if it can be used; else the reason
+};
+/// One at least for each kind of device that the library knows. Opens nothing. Never throws.
+[[nodiscard]] std::vector<DeviceDescription> list_devices();
+/// What the device calls of this thread run on from now on: "cuda", which is where a thread starts,
+/// "opencl" or "opencl:N". Memory and trees belong to the device that was selected when they were
+/// made, and calls with them need it selected. Opens an OpenCL device that was never selected
+/// before, which compiles a few kernels; others are compiled by the first call that runs them.
+/// Throws InputError for another word. Throws BackendUnavailable with what the device lacks. A
+/// call that throws has selected nothing.
+void select_device(std::string_view selector);
+/// As it was selected last, by this thread.
+[[nodiscard]] std::string selected_device();
+/// The cl_context and cl_device_id of the selected OpenCL device: queues and memory of the caller's
+/// are made in them. Memory is that of cl_intel_unified_shared_memory. Throws BackendUnavailable if
+/// another kind of device is selected.
+[[nodiscard]] void* opencl_context();
+[[nodiscard]] void* opencl_device_id();
+
+/// True if the selected device can be used. Never throws.
 [[nodiscard]] bool device_available() noexcept;
-/// The name of the current device. Throws BackendUnavailable, which says why, if there is none.
+/// The name of the selected device. Throws BackendUnavailable, which says why, if there is none.
 [[nodiscard]] std::string device_name();
 /// Waits until `stream` has done all that was put on it. Throws DeviceError if any of it failed.
 void synchronize(Stream stream);
 
+class DeviceBackend;  // of the library's own
+
 namespace detail {
+struct DeviceMemory {
+    void* data = nullptr;
+    DeviceBackend* owner = nullptr;
+};
 /// Aligned to 256 bytes. Throws BackendUnavailable or DeviceError.
-[[nodiscard]] void* device_allocate(std::size_t bytes);
-void device_free(void* memory) noexcept;
+[[nodiscard]] DeviceMemory device_allocate(std::size_t bytes);
+void device_free(const DeviceMemory& memory) noexcept;
 void copy_to_device(void* device, const void* host, std::size_t bytes, Stream stream);
 void copy_to_host(void* host, const void* device, std::size_t bytes, Stream stream);
 }  // namespace detail
@@ -50,14 +83,14 @@ public:
         swap(moved);
         return *this;
     }
-    ~DeviceBuffer() { detail::device_free(data_); }
+    ~DeviceBuffer() { detail::device_free(memory_); }
 
     /// Makes room for `size` elements. The old ones are lost. Keeps the memory if it is large
     /// enough. Throws BackendUnavailable, DeviceError.
     void reset(std::size_t size) {
         if (size > capacity_) {
             *this = DeviceBuffer();
-            data_ = static_cast<T*>(detail::device_allocate(size * sizeof(T)));
+            memory_ = detail::device_allocate(size * sizeof(T));
             capacity_ = size;
         }
         size_ = size;
@@ -65,28 +98,28 @@ public:
     /// Copies `values` and waits for the end: they may change once the call returns.
     void upload(std::span<const T> values, Stream stream = nullptr) {
         reset(values.size());
-        detail::copy_to_device(data_, values.data(), values.size_bytes(), stream);
+        detail::copy_to_device(memory_.data, values.data(), values.size_bytes(), stream);
         synchronize(stream);
     }
     /// Copies the first out.size() elements, after all that is on `stream`, and waits for the end.
     /// There must be so many.
     void download(std::span<T> out, Stream stream = nullptr) const {
-        detail::copy_to_host(out.data(), data_, out.size_bytes(), stream);
+        detail::copy_to_host(out.data(), memory_.data, out.size_bytes(), stream);
         synchronize(stream);
     }
 
-    [[nodiscard]] T* data() const { return data_; }
+    [[nodiscard]] T* data() const { return static_cast<T*>(memory_.data); }
     [[nodiscard]] std::size_t size() const { return size_; }
     [[nodiscard]] std::size_t bytes() const { return size_ * sizeof(T); }
 
 private:
     void swap(DeviceBuffer& other) noexcept {
-        std::swap(data_, other.data_);
+        std::swap(memory_, other.memory_);
         std::swap(size_, other.size_);
         std::swap(capacity_, other.capacity_);
     }
 
-    T* data_ = nullptr;
+    detail::DeviceMemory memory_;
     std::size_t size_ = 0;
     std::size_t capacity_ = 0;
 };
@@ -164,7 +197,7 @@ void build_bvh_on_device(const DeviceBoxList& boxes, const BuildOptions& options
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 
 /// The same, but waits for the end. Returns the milliseconds of the stages as the device saw them
-/// (CUDA events). `layout` includes the node pairs. For measurements.
+/// (CUDA events; with OpenCL the host's clock, which waits behind each stage). `layout` includes the node pairs. For measurements.
 BuildMs time_build_on_device(const DeviceMesh& mesh, const BuildOptions& options,
                              const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 BuildMs time_build_on_device(const DeviceBoxList& boxes, const BuildOptions& options,

@@ -62,7 +62,7 @@ template <class Work>
 __global__ void __launch_bounds__(warp_block_threads, 24)
     for_each_warp(Work work, const std::uint32_t* count) {
     const std::uint32_t w = (blockIdx.x * warp_block_threads + threadIdx.x) / warp_lanes;
-    if (w < warps_for(*count)) work(CudaWarp(), w);
+    if (w < warps_for(*count)) work(DeviceWarp(), w);
 }
 
 }  // namespace kernels

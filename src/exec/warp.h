@@ -1,13 +1,13 @@
 // Work that 32 lanes do together: what a lane keeps is a Var, and lanes speak to each other through
-// ballots and shuffles. HostWarp runs the lanes in a loop, CudaWarp is a warp of a GPU; one text
+// ballots and shuffles. HostWarp runs the lanes in a loop, DeviceWarp is a warp of a GPU; one text
 // serves both. All lanes take part in every call: control flow around calls depends on uniform
 // values only.
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstdint>
 
+#include "base/device_words.h"
 #include "base/hd.h"
 
 namespace raydix {
@@ -23,11 +23,7 @@ RAYDIX_HD inline std::uint32_t nth_set_bit(std::uint32_t mask, std::uint32_t ran
     std::uint32_t place = 0;
     for (std::uint32_t width = 16; width != 0; width /= 2) {
         const std::uint32_t low = mask & ((1u << width) - 1);
-#if defined(__CUDA_ARCH__)
-        const auto ones = static_cast<std::uint32_t>(__popc(low));
-#else
-        const auto ones = static_cast<std::uint32_t>(std::popcount(low));
-#endif
+        const std::uint32_t ones = words::count_ones(low);
         if (rank >= ones) {
             rank -= ones;
             mask >>= width;
@@ -79,9 +75,9 @@ struct HostWarp {
     void sync() const {}
 };
 
-#if defined(__CUDACC__)
-/// A warp of the device. Its functions do nothing in the host's pass of the compiler.
-struct CudaWarp {
+#if defined(RAYDIX_DEVICE_COMPILER)
+/// A warp of the device, on the words of base/device_words.h.
+struct DeviceWarp {
     template <class T>
     class Var {
     public:
@@ -92,49 +88,32 @@ struct CudaWarp {
         T value_{};
     };
 
-    RAYDIX_HD static std::uint32_t lane() {
-#if defined(__CUDA_ARCH__)
-        return threadIdx.x % warp_lanes;
-#else
-        return 0;
-#endif
-    }
     template <class Body>
     RAYDIX_HD void each(const Body& body) const {
-        body(lane());
-#if defined(__CUDA_ARCH__)
-        __syncwarp();
-#endif
+        body(words::lane_id());
+        words::meet(all_lanes);
     }
     template <class Vote>
     [[nodiscard]] RAYDIX_HD std::uint32_t ballot(const Vote& vote) const {
-        const bool yes = vote(lane());
-#if defined(__CUDA_ARCH__)
-        return __ballot_sync(0xFFFFFFFFu, yes);
-#else
-        return yes;
-#endif
+        return words::ballot(all_lanes, vote(words::lane_id()));
     }
     template <class T, class Source>
     [[nodiscard]] RAYDIX_HD Var<T> shuffle(const Var<T>& from, const Source& source) const {
         Var<T> to;
-        to[0] = broadcast(from, source(lane()) & 31);
+        to[0] = broadcast(from, source(words::lane_id()) & 31);
         return to;
     }
     template <class T>
     [[nodiscard]] RAYDIX_HD T broadcast(const Var<T>& from, std::uint32_t source) const {
-#if defined(__CUDA_ARCH__)
-        return __shfl_sync(0xFFFFFFFFu, from[0], static_cast<int>(source));
-#else
-        return from[source];
-#endif
+        return words::shuffle(all_lanes, from[0], source);
     }
     RAYDIX_HD void sync() const {
-#if defined(__CUDA_ARCH__)
-        __threadfence();
-        __syncwarp();
-#endif
+        words::fence();
+        words::meet(all_lanes);
     }
+
+private:
+    static constexpr std::uint32_t all_lanes = 0xFFFFFFFFu;
 };
 #endif
 

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 
+#include "gpu/device_run.h"
 #include "gpu/device_sorted.h"
 #include "layout/leaf_copies.h"
 #include "layout/pair64.h"
@@ -148,6 +149,21 @@ void with_device_build(const DeviceBoxList& boxes, const BuildOptions& options,
     else
         visit(DeviceBuild<std::uint64_t, BoxSource, Aabb>{source, boxes.count, options, tree,
                                                           tree.boxes});
+}
+
+/// The build as gpu/device_run.h takes it.
+template <class Input>
+auto build_of(const Input& input, const BuildOptions& options, const DeviceTree& tree) {
+    return [=](const auto& visit) { with_device_build(input, options, tree, visit); };
+}
+
+/// Bytes of scratch on a machine, whatever the primitives: they differ in their copies, which are
+/// the caller's.
+template <class Machine>
+std::size_t bvh_scratch_bytes(std::uint32_t n, const BuildOptions& options) {
+    DeviceTree tree;
+    tree.pairs = reinterpret_cast<NodePair*>(Arena::alignment);  // the larger case
+    return scratch_size<Machine>(build_of(DeviceBoxList{nullptr, n}, options, tree)).all;
 }
 
 }  // namespace raydix

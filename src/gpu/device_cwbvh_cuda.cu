@@ -3,6 +3,7 @@
 #include <raydix/error.h>
 
 #include "exec/cuda_error.cuh"
+#include "gpu/cuda_backend.h"
 #include "gpu/device_cwbvh.h"
 #include "trace/cwbvh_kernels.cuh"
 
@@ -37,17 +38,21 @@ unsigned resident_blocks(Kernel kernel, unsigned needed) {
 
 template <bool any, int stack_entries, class Store>
 void launch_with_stack(const Launch& launch, const Store& store) {
-    const CwbvhView view{launch.tree.nodes, launch.tree.triangles, launch.tree.bounds};
+    const kernels::CwbvhRays<Store> given{
+        {launch.tree.nodes, launch.tree.triangles, launch.tree.bounds},
+        launch.rays,
+        launch.count,
+        store};
     const unsigned blocks = (launch.count + block_threads - 1) / block_threads;
     if (launch.kernel == CwbvhKernel::persistent_cwbvh) {
         auto* next = reinterpret_cast<std::uint32_t*>(launch.scratch.data());
         RAYDIX_CUDA_TRY(cudaMemsetAsync(next, 0, sizeof(*next), launch.stream));
         const auto kernel = kernels::persistent_cwbvh_rays<any, stack_entries, Store>;
         kernel<<<resident_blocks(kernel, blocks), block_threads, 0, launch.stream>>>(
-            view, launch.rays, launch.count, store, next);
+            given, next);
     } else {
         kernels::cwbvh_rays<any, stack_entries, Store>
-            <<<blocks, block_threads, 0, launch.stream>>>(view, launch.rays, launch.count, store);
+            <<<blocks, block_threads, 0, launch.stream>>>(given);
     }
     RAYDIX_CUDA_TRY(cudaGetLastError());
 }
@@ -70,7 +75,7 @@ void store_misses(const Launch& launch, const kernels::StoreHit& store) {
 
 template <bool any, class Store>
 void launch_rays(const Launch& launch, const Store& store) {
-    static_cast<void>(device_name());  // says what is missing
+    static_cast<void>(cuda_backend().name());  // says what is missing
     check_cwbvh_launch(launch.tree, launch.count, launch.kernel, launch.scratch);
     if (launch.count == 0) return;
     if (launch.tree.node_count == 0)
@@ -99,45 +104,24 @@ private:
     cudaEvent_t event_ = nullptr;
 };
 
-template <bool any, class Store>
-double time_rays(const Launch& launch, const Store& store) {
-    static_cast<void>(device_name());
-    const Event start, stop;
-    start.record(launch.stream);
-    launch_rays<any>(launch, store);
-    stop.record(launch.stream);
-    return stop.ms_since(start);
-}
-
-cudaStream_t cuda(Stream stream) { return static_cast<cudaStream_t>(stream); }
-
 }  // namespace
 
-void trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count,
-                     TreeHit* hits, CwbvhKernel kernel, std::span<std::byte> scratch,
-                     Stream stream) {
-    launch_rays<false>({tree, rays, count, kernel, scratch, cuda(stream)}, kernels::StoreHit{hits});
+void CudaBackend::trace_cwbvh(const CwbvhCall& call) {
+    const Launch launch{call.tree,   call.rays,    call.count,
+                        call.kernel, call.scratch, static_cast<cudaStream_t>(call.stream)};
+    if (call.occluded == nullptr)
+        launch_rays<false>(launch, kernels::StoreHit{call.hits});
+    else
+        launch_rays<true>(launch, kernels::StoreOccluded{call.occluded});
 }
 
-void trace_any_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count,
-                         std::uint8_t* occluded, CwbvhKernel kernel, std::span<std::byte> scratch,
-                         Stream stream) {
-    launch_rays<true>({tree, rays, count, kernel, scratch, cuda(stream)},
-                      kernels::StoreOccluded{occluded});
-}
-
-double time_trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count,
-                            TreeHit* hits, CwbvhKernel kernel, std::span<std::byte> scratch,
-                            Stream stream) {
-    return time_rays<false>({tree, rays, count, kernel, scratch, cuda(stream)},
-                            kernels::StoreHit{hits});
-}
-
-double time_trace_any_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count,
-                                std::uint8_t* occluded, CwbvhKernel kernel,
-                                std::span<std::byte> scratch, Stream stream) {
-    return time_rays<true>({tree, rays, count, kernel, scratch, cuda(stream)},
-                           kernels::StoreOccluded{occluded});
+double CudaBackend::time_cwbvh(const CwbvhCall& call) {
+    static_cast<void>(name());
+    const Event start, stop;
+    start.record(static_cast<cudaStream_t>(call.stream));
+    trace_cwbvh(call);
+    stop.record(static_cast<cudaStream_t>(call.stream));
+    return stop.ms_since(start);
 }
 
 }  // namespace raydix

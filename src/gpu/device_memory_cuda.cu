@@ -1,21 +1,15 @@
-// Device memory and streams of raydix/device.h.
+// CUDA's row in the table of backends: the device, its memory and its streams.
 #include <raydix/device.h>
 #include <raydix/error.h>
 
 #include <algorithm>
 
 #include "exec/cuda_error.cuh"
+#include "gpu/cuda_backend.h"
 
 namespace raydix {
 
-bool device_available() noexcept {
-    int devices = 0;
-    const bool found = cudaGetDeviceCount(&devices) == cudaSuccess && devices > 0;
-    static_cast<void>(cudaGetLastError());  // a missing device is no error of the next call
-    return found;
-}
-
-std::string device_name() {
+std::string CudaBackend::name() {
     int devices = 0;
     const cudaError_t status = cudaGetDeviceCount(&devices);
     if (status != cudaSuccess || devices == 0) {
@@ -31,11 +25,11 @@ std::string device_name() {
     return properties.name;
 }
 
-void synchronize(Stream stream) {
+void CudaBackend::synchronize(Stream stream) {
     RAYDIX_CUDA_TRY(cudaStreamSynchronize(static_cast<cudaStream_t>(stream)));
 }
 
-double measure_device_copy(std::size_t bytes, int repeat) {
+double CudaBackend::measure_copy(std::size_t bytes, int repeat) {
     const DeviceBuffer<std::byte> from(bytes), to(bytes);
     cudaEvent_t start = nullptr, stop = nullptr;
     RAYDIX_CUDA_TRY(cudaEventCreate(&start));
@@ -55,11 +49,8 @@ double measure_device_copy(std::size_t bytes, int repeat) {
     return best;
 }
 
-namespace detail {
-
-void* device_allocate(std::size_t bytes) {
-    if (bytes == 0) return nullptr;
-    static_cast<void>(device_name());
+void* CudaBackend::allocate(std::size_t bytes) {
+    static_cast<void>(name());
     // Whole lines: byte-wide exchanges work on the word around a byte (base/atomic.h).
     constexpr std::size_t line = 256;
     void* memory = nullptr;
@@ -67,23 +58,39 @@ void* device_allocate(std::size_t bytes) {
     return memory;
 }
 
-void device_free(void* memory) noexcept {
+void CudaBackend::free(void* memory) noexcept {
     // An error of an earlier launch that shows up here has been or will be thrown where it is asked
     // for.
-    if (memory != nullptr) static_cast<void>(cudaFree(memory));
+    static_cast<void>(cudaFree(memory));
 }
 
-void copy_to_device(void* device, const void* host, std::size_t bytes, Stream stream) {
-    if (bytes == 0) return;
+void CudaBackend::copy_to_device(void* device, const void* host, std::size_t bytes, Stream stream) {
     RAYDIX_CUDA_TRY(cudaMemcpyAsync(device, host, bytes, cudaMemcpyHostToDevice,
                                     static_cast<cudaStream_t>(stream)));
 }
 
-void copy_to_host(void* host, const void* device, std::size_t bytes, Stream stream) {
-    if (bytes == 0) return;
+void CudaBackend::copy_to_host(void* host, const void* device, std::size_t bytes, Stream stream) {
     RAYDIX_CUDA_TRY(cudaMemcpyAsync(host, device, bytes, cudaMemcpyDeviceToHost,
                                     static_cast<cudaStream_t>(stream)));
 }
 
-}  // namespace detail
+DeviceBackend& cuda_backend() {
+    static CudaBackend backend;
+    return backend;
+}
+
+void list_cuda_devices(std::vector<DeviceDescription>& out) {
+    DeviceDescription found{"cuda", "", "", ""};
+    int driver = 0;
+    if (cudaDriverGetVersion(&driver) == cudaSuccess && driver != 0)
+        found.driver = "CUDA " + std::to_string(driver / 1000) + "." +
+                       std::to_string(driver % 1000 / 10);
+    try {
+        found.name = cuda_backend().name();
+    } catch (const std::exception& error) {
+        found.missing = error.what();
+    }
+    out.push_back(found);
+}
+
 }  // namespace raydix

@@ -2,6 +2,7 @@
 #include <raydix/device_queries.h>
 
 #include "exec/cuda_launcher.cuh"
+#include "gpu/cuda_backend.h"
 #include "gpu/device_queries.h"
 
 namespace raydix {
@@ -19,62 +20,62 @@ CudaLauncher scanning_launcher(std::span<std::byte> scratch, std::uint32_t rows,
 
 }  // namespace
 
-std::size_t device_offsets_scratch_bytes(std::uint32_t n) {
-    static_cast<void>(device_name());  // says what is missing
+std::size_t CudaBackend::offsets_scratch_bytes(std::uint32_t n) {
+    static_cast<void>(name());  // says what is missing
     CudaSizer sizer;
     sizer.exclusive_scan_wide("", nullptr, n + 1);
     return CudaLauncher::reserved_bytes + sizer.bytes();
 }
 
-void knn_on_device(const DevicePoints& tree, std::span<const Vec3> queries, std::uint32_t k,
+void CudaBackend::knn(const DevicePoints& tree, std::span<const Vec3> queries, std::uint32_t k,
                    std::span<std::uint32_t> indices, std::span<float> distances,
                    std::uint32_t* invalid, Stream stream) {
-    static_cast<void>(device_name());
+    static_cast<void>(name());
     check_knn(tree, queries, k, indices, distances);
     CudaLauncher launcher = plain_launcher(stream);
     launch_knn(launcher, tree, queries, k, indices, distances, invalid);
 }
 
-void radius_count_on_device(const DevicePoints& tree, std::span<const Vec3> queries, float radius,
+void CudaBackend::radius_count(const DevicePoints& tree, std::span<const Vec3> queries, float radius,
                             std::span<std::uint64_t> offsets, std::uint32_t* invalid,
                             std::span<std::byte> scratch, Stream stream) {
-    static_cast<void>(device_name());
+    static_cast<void>(name());
     check_radius(tree, queries, radius, offsets.size());
     CudaLauncher launcher = scanning_launcher(scratch, count_of(queries), stream);
     launch_radius_count(launcher, tree, queries, radius, offsets, invalid);
 }
 
-void radius_fill_on_device(const DevicePoints& tree, std::span<const Vec3> queries, float radius,
+void CudaBackend::radius_fill(const DevicePoints& tree, std::span<const Vec3> queries, float radius,
                            std::span<const std::uint64_t> offsets, bool by_distance,
                            std::span<std::uint32_t> indices, std::span<float> distances,
                            Stream stream) {
-    static_cast<void>(device_name());
+    static_cast<void>(name());
     check_radius(tree, queries, radius, offsets.size());
     check_rows(indices.size(), distances.size());
     CudaLauncher launcher = plain_launcher(stream);
     launch_radius_fill(launcher, tree, queries, radius, offsets, by_distance, indices, distances);
 }
 
-void closest_points_on_device(const DevicePrimitives& tree, std::span<const Vec3> queries,
+void CudaBackend::closest_points(const DevicePrimitives& tree, std::span<const Vec3> queries,
                               float max_distance, std::span<ClosestPoint> results,
                               std::uint32_t* invalid, Stream stream) {
-    static_cast<void>(device_name());
+    static_cast<void>(name());
     check_closest(tree, queries, max_distance, results.size());
     CudaLauncher launcher = plain_launcher(stream);
     launch_closest(launcher, tree, queries, max_distance, results, invalid);
 }
 
-void pairs_count_on_device(const DevicePairQuery& query, std::span<std::uint64_t> offsets,
+void CudaBackend::pairs_count(const DevicePairQuery& query, std::span<std::uint64_t> offsets,
                            std::span<std::byte> scratch, Stream stream) {
-    static_cast<void>(device_name());
+    static_cast<void>(name());
     check_pairs(query, offsets.size());
     CudaLauncher launcher = scanning_launcher(scratch, query.a.input_count, stream);
     launch_pairs_count(launcher, query, offsets);
 }
 
-void pairs_fill_on_device(const DevicePairQuery& query, std::span<const std::uint64_t> offsets,
+void CudaBackend::pairs_fill(const DevicePairQuery& query, std::span<const std::uint64_t> offsets,
                           std::span<PrimitivePair> pairs, Stream stream) {
-    static_cast<void>(device_name());
+    static_cast<void>(name());
     check_pairs(query, offsets.size());
     CudaLauncher launcher = plain_launcher(stream);
     launch_pairs_fill(launcher, query, offsets, pairs);

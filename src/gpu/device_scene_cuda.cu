@@ -4,12 +4,13 @@
 
 #include "engine/name_hit.h"
 #include "exec/cuda_launcher.cuh"
+#include "gpu/cuda_backend.h"
 
 namespace raydix {
 
-void name_hits_on_device(const DeviceMeshNames& names, std::span<const TreeHit> found,
+void CudaBackend::name_hits(const DeviceMeshNames& names, std::span<const TreeHit> found,
                          std::span<Hit> hits, Stream stream) {
-    static_cast<void>(device_name());  // says what is missing
+    static_cast<void>(name());  // says what is missing
     check_name_hits(found.size(), hits.size());
     if (found.size() >= 0x80000000u) throw InputError("2^31 hits or more in one launch");
     CudaLauncher launcher(static_cast<cudaStream_t>(stream), nullptr, CudaLauncher::reserved_bytes);

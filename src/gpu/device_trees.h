@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "build/octree_kdtree_options.h"
+#include "gpu/device_run.h"
 #include "gpu/device_sorted.h"
 #include "layout/leaf_copies.h"
 #include "tree/kdtree.h"
@@ -125,6 +126,35 @@ void with_device_octree(const DeviceMesh& mesh, const OctreeOptions& options,
         else
             visit(DeviceOctreeBuild<std::uint64_t, Source>{source, n, full, tree});
     });
+}
+
+// The builds as gpu/device_run.h takes them.
+inline auto build_of(const DeviceMesh& mesh, const KdTreeOptions& options,
+                     const DeviceKdArrays& tree) {
+    return [=](const auto& visit) { with_device_kdtree(mesh, options, tree, visit); };
+}
+inline auto build_of(const DeviceMesh& mesh, const OctreeOptions& options,
+                     const DeviceOctreeArrays& tree) {
+    return [=](const auto& visit) { with_device_octree(mesh, options, tree, visit); };
+}
+
+/// For a size: so many primitives and no arrays.
+inline DeviceMesh mesh_of(PrimitiveKind kind, std::uint32_t n) {
+    DeviceMesh mesh;
+    (kind == PrimitiveKind::points ? mesh.vertex_count : mesh.triangle_count) = n;
+    return mesh;
+}
+template <class Machine>
+std::size_t kdtree_scratch_bytes(std::uint32_t n, PrimitiveKind kind,
+                                 const KdTreeOptions& options) {
+    return scratch_size<Machine>(build_of(mesh_of(kind, n), options, DeviceKdArrays())).all;
+}
+template <class Machine>
+std::size_t octree_scratch_bytes(std::uint32_t n, std::uint32_t node_capacity,
+                                 const OctreeOptions& options) {
+    DeviceOctreeArrays tree;
+    tree.node_capacity = node_capacity;
+    return scratch_size<Machine>(build_of(mesh_of(PrimitiveKind::points, n), options, tree)).all;
 }
 
 }  // namespace raydix

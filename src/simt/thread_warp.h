@@ -13,6 +13,7 @@
 #include <cstdint>
 
 #include "base/atomic.h"
+#include "base/device_words.h"
 #include "base/hd.h"
 #include "simt/op.h"
 
@@ -30,17 +31,13 @@ inline constexpr bool lanes_in_step = false;
 using LaneMask = std::uint64_t;
 #endif
 
-#if defined(__CUDACC__)
-inline constexpr std::uint32_t device_warp_width = 32;
-#endif
-
 /// What a warp does with memory. It waits for what it reads, unless another read beside is waited
 /// for in any case.
 enum class Access : std::uint8_t { read, read_beside, write };
 
 /// The bits below `lane`.
 RAYDIX_HD static inline LaneMask lanes_below(std::uint32_t lane) {
-#if defined(__CUDA_ARCH__)
+#if defined(RAYDIX_DEVICE_PASS)
     return (1u << lane) - 1;  // a device's masks have 32 bits; half the instructions
 #else
     return (LaneMask{1} << lane) - 1;
@@ -50,42 +47,19 @@ RAYDIX_HD static inline LaneMask lanes_below(std::uint32_t lane) {
 /// What the hardware offers to the threads of a warp. `members`: the lanes that make this very
 /// call.
 struct WarpHardware {
-    [[nodiscard]] RAYDIX_HD static constexpr std::uint32_t width() {
-#if defined(__CUDACC__)
-        return device_warp_width;
-#else
-        return 1;
-#endif
-    }
-    [[nodiscard]] RAYDIX_HD static std::uint32_t lane_id() {
-#if defined(__CUDA_ARCH__)
-        return threadIdx.x % device_warp_width;
-#else
-        return 0;
-#endif
-    }
-    [[nodiscard]] RAYDIX_HD static LaneMask ballot([[maybe_unused]] LaneMask members, bool vote) {
-#if defined(__CUDA_ARCH__)
-        return __ballot_sync(static_cast<unsigned>(members), vote);
-#else
-        return vote ? 1 : 0;
-#endif
+    [[nodiscard]] RAYDIX_HD static constexpr std::uint32_t width() { return words::warp_width; }
+    [[nodiscard]] RAYDIX_HD static std::uint32_t lane_id() { return words::lane_id(); }
+    [[nodiscard]] RAYDIX_HD static LaneMask ballot(LaneMask members, bool vote) {
+        return words::ballot(static_cast<std::uint32_t>(members), vote);
     }
     /// The value of lane `from`, a member.
-    [[nodiscard]] RAYDIX_HD static std::uint32_t broadcast([[maybe_unused]] LaneMask members,
-                                                           std::uint32_t value,
-                                                           [[maybe_unused]] std::uint32_t from) {
-#if defined(__CUDA_ARCH__)
-        return __shfl_sync(static_cast<unsigned>(members), value, static_cast<int>(from));
-#else
-        return value;
-#endif
+    [[nodiscard]] RAYDIX_HD static std::uint32_t broadcast(LaneMask members, std::uint32_t value,
+                                                           std::uint32_t from) {
+        return words::shuffle(static_cast<std::uint32_t>(members), value, from);
     }
     /// Members wait for each other and see what each of them wrote before.
-    RAYDIX_HD static void meet([[maybe_unused]] LaneMask members) {
-#if defined(__CUDA_ARCH__)
-        __syncwarp(static_cast<unsigned>(members));
-#endif
+    RAYDIX_HD static void meet(LaneMask members) {
+        words::meet(static_cast<std::uint32_t>(members));
     }
 };
 
@@ -216,8 +190,8 @@ public:
 
 private:
     RAYDIX_HD std::uint32_t first_member() const {
-#if defined(__CUDA_ARCH__)
-        return static_cast<std::uint32_t>(__ffs(static_cast<int>(members_)) - 1);
+#if defined(RAYDIX_DEVICE_PASS)
+        return words::lowest_bit(static_cast<std::uint32_t>(members_));
 #else
         return static_cast<std::uint32_t>(std::countr_zero(members_));
 #endif

@@ -18,7 +18,7 @@
 #include "trace/ray_frame.h"
 
 // Never a call: vectors of doubles would go through memory.
-#if defined(__CUDACC__)
+#if defined(__CUDACC__) || defined(__HIP__)
 #define RAYDIX_WEIGHTS __host__ __device__ __forceinline__
 #else
 #define RAYDIX_WEIGHTS [[gnu::always_inline]] inline

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "device/device_test.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
@@ -28,16 +29,7 @@ BuildOptions host_options(BuildOptions options) {
     return options;
 }
 
-class GpuBuild : public ::testing::Test {
-protected:
-    void SetUp() override {
-        try {
-            static_cast<void>(device_name());
-        } catch (const BackendUnavailable& reason) {
-            GTEST_SKIP() << reason.what();
-        }
-    }
-};
+class GpuBuild : public DeviceTest {};
 
 std::string told(const BuildOptions& o) {
     return std::string(builder_name(o.builder)) + ", " + std::to_string(o.bits) +

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "device/device_test.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"
 #include "support/support.h"
@@ -17,16 +18,7 @@ namespace {
 constexpr std::uint64_t seed = 2017;
 constexpr CwbvhKernel kernels[] = {CwbvhKernel::cwbvh, CwbvhKernel::persistent_cwbvh};
 
-class GpuCwbvh : public ::testing::Test {
-protected:
-    void SetUp() override {
-        try {
-            static_cast<void>(device_name());
-        } catch (const BackendUnavailable& reason) {
-            GTEST_SKIP() << reason.what();
-        }
-    }
-};
+class GpuCwbvh : public DeviceTest {};
 
 struct Results {
     std::vector<TreeHit> hits;
@@ -72,15 +64,15 @@ void compare(const std::string& what, const Bvh& bvh, std::span<const Ray> rays)
 }
 
 TEST_F(GpuCwbvh, LikeScalar) {
-    for (const Model& scene : builtin_triangle_scenes(200'000))
-        compare(scene.name, build_bvh(scene.mesh()), make_mixed_rays(scene, 1'000'000, seed));
+    for (const Model& scene : fitting(builtin_triangle_scenes(fitting(200'000))))
+        compare(scene.name, build_bvh(scene.mesh()), make_mixed_rays(scene, fitting(1'000'000), seed));
     for (const float scale : {1e-9f, 1.0f, 1e12f}) {
         const Model scene = scene_of(scaled(random_soup(2000, 4), scale), "soup");
         compare("soup times " + std::to_string(scale), build_bvh(scene.mesh()),
-                make_mixed_rays(scene, 200'000, seed));
+                make_mixed_rays(scene, fitting(200'000), seed));
     }
     const Model lattice = scene_of(lattice_mesh(2000, 20, 5), "lattice");
-    compare("lattice", build_bvh(lattice.mesh()), make_mixed_rays(lattice, 200'000, seed));
+    compare("lattice", build_bvh(lattice.mesh()), make_mixed_rays(lattice, fitting(200'000), seed));
 }
 
 TEST_F(GpuCwbvh, FewTrianglesAndFewRays) {
@@ -99,7 +91,7 @@ TEST_F(GpuCwbvh, FewTrianglesAndFewRays) {
 
 TEST_F(GpuCwbvh, InvalidRaysMiss) {
     const Model scene = scene_of(random_soup(500, 3, 0.5f), "soup");
-    auto rays = make_mixed_rays(scene, 50'000, seed);
+    auto rays = make_mixed_rays(scene, fitting(50'000), seed);
     for (std::size_t i = 0; i < rays.size(); ++i) {
         if (i % 3 == 0) rays[i].direction = {0, 0, 0};
         if (i % 7 == 0) rays[i].origin.y = std::nanf("");
@@ -116,7 +108,7 @@ TEST_F(GpuCwbvh, ScenesOfMeshes) {
     scene.add(lattice_mesh(2000, 20, 5));
     scene.add(lattice_mesh(2000, 20, 5));
     scene.commit();
-    const auto rays = make_mixed_rays(scene_of(merge_meshes(scene).mesh, "meshes"), 500'000, seed);
+    const auto rays = make_mixed_rays(scene_of(merge_meshes(scene).mesh, "meshes"), fitting(500'000), seed);
     const DeviceBuffer<Ray> there{std::span<const Ray>(rays)};
     const auto n = static_cast<std::uint32_t>(rays.size());
     for (const std::uint32_t mask : {0xFFFFFFFFu, 1u, 0u}) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "device/device_test.h"
 #include "support/point_sets.h"
 #include "support/scenes.h"
 #include "support/support.h"
@@ -16,16 +17,7 @@ namespace {
 
 constexpr std::uint64_t seed = 31;
 
-class GpuQueries : public ::testing::Test {
-protected:
-    void SetUp() override {
-        try {
-            static_cast<void>(device_name());
-        } catch (const BackendUnavailable& reason) {
-            GTEST_SKIP() << reason.what();
-        }
-    }
-};
+class GpuQueries : public DeviceTest {};
 
 template <class T>
 std::vector<T> downloaded(const DeviceBuffer<T>& buffer) {
@@ -106,9 +98,9 @@ void compare_points(const std::string& name, const std::vector<Vec3>& points, st
 }
 
 TEST_F(GpuQueries, PointsLikeTheIndex) {
-    compare_points("uniform", random_soup(100'000, 1).vertices, 200'000);
+    compare_points("uniform", random_soup(fitting(100'000), 1).vertices, fitting(200'000));
     for (const PointSet& set : point_sets(5000, seed)) compare_points(set.name, set.points, 3000);
-    compare_points("all equal", std::vector<Vec3>(100'000, Vec3{1, 2, 3}), 2000);
+    compare_points("all equal", std::vector<Vec3>(fitting(100'000), Vec3{1, 2, 3}), fitting(2000));
 }
 
 TEST_F(GpuQueries, FewPoints) {
@@ -149,9 +141,9 @@ void compare_closest(const std::string& name, const Mesh& mesh, std::size_t coun
 }
 
 TEST_F(GpuQueries, ClosestPointsLikeTheHost) {
-    for (const Model& scene : builtin_triangle_scenes(100'000))
-        compare_closest(scene.name, scene.mesh(), 100'000);
-    compare_closest("lattice", lattice_mesh(2000, 8, seed), 50'000);
+    for (const Model& scene : fitting(builtin_triangle_scenes(fitting(100'000))))
+        compare_closest(scene.name, scene.mesh(), fitting(100'000));
+    compare_closest("lattice", lattice_mesh(2000, 8, seed), fitting(50'000));
 }
 
 TEST_F(GpuQueries, FewTriangles) {
@@ -186,8 +178,9 @@ void compare_pairs(const std::string& name, const Mesh& x, const Mesh& y) {
 }
 
 TEST_F(GpuQueries, PairsLikeTheHost) {
-    compare_pairs("soups", random_soup(50'000, 1, 0.03f), random_soup(40'000, 2, 0.02f));
-    compare_pairs("lattices", lattice_mesh(3000, 12, seed), lattice_mesh(2000, 12, seed + 1));
+    compare_pairs("soups", random_soup(fitting(50'000), 1, 0.03f), random_soup(fitting(40'000), 2, 0.02f));
+    compare_pairs("lattices", lattice_mesh(fitting(3000), 12, seed),
+                  lattice_mesh(fitting(2000), 12, seed + 1));
 }
 
 TEST_F(GpuQueries, FewPairs) {

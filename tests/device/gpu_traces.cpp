@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "device/device_test.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"
 #include "support/support.h"
@@ -17,16 +18,7 @@
 namespace raydix::test {
 namespace {
 
-class GpuTrace : public ::testing::Test {
-protected:
-    void SetUp() override {
-        try {
-            static_cast<void>(device_name());
-        } catch (const BackendUnavailable& reason) {
-            GTEST_SKIP() << reason.what();
-        }
-    }
-};
+class GpuTrace : public DeviceTest {};
 
 struct Traced {
     std::vector<TreeHit> hits;
@@ -92,9 +84,9 @@ TEST_F(GpuTrace, FewTrianglesAndFewRays) {
 }
 
 TEST_F(GpuTrace, EachBuiltinScene) {
-    for (const Model& scene : builtin_triangle_scenes(200'000)) {
+    for (const Model& scene : fitting(builtin_triangle_scenes(fitting(200'000)))) {
         const WarpTree host(build_bvh(scene.mesh(), {.builder = Builder::ploc}));
-        compare(scene.name, host, DeviceWarpTree(host), make_mixed_rays(scene, 200'000, 9));
+        compare(scene.name, host, DeviceWarpTree(host), make_mixed_rays(scene, fitting(200'000), 9));
     }
 }
 
@@ -107,7 +99,7 @@ TEST_F(GpuTrace, ATreeThatWasBuiltThere) {
                            triangles.data(), static_cast<std::uint32_t>(triangles.size())});
     const Model scene = scene_of(mesh, "soup");
     compare("built there", WarpTree(build_bvh(mesh, {})), DeviceWarpTree(built.tree()),
-            make_mixed_rays(scene, 100'000, 4));
+            make_mixed_rays(scene, fitting(100'000), 4));
     DeviceBvh without(PrimitiveKind::triangles, 60'000, {});
     EXPECT_THROW(DeviceWarpTree(without.tree()), InputError);
 }

@@ -8,33 +8,19 @@
 #include "exec/cuda_error.cuh"
 #include "simt/thread_warp.h"
 #include "trace/warp/launch_warps.h"
+#include "trace/warp/run_warp.h"
 
 namespace raydix {
 namespace kernels {
 
-inline constexpr std::uint32_t warps_per_block = warp_block_threads / device_warp_width;
+inline constexpr std::uint32_t warps_per_block = warp_block_threads / words::warp_width;
 
 /// Blocks of packets that a multiprocessor must be able to hold: a bound on their registers, within
 /// which the compiler of CUDA 13.0 spills none; left alone it stops at 40 and spills one.
 inline constexpr std::uint32_t packet_blocks = 10;
 
-/// What a warp of work_queue has in shared memory.
-struct SpareRays {
-    Lane lanes[device_warp_width];
-    std::uint32_t slots[device_warp_width];
-};
-
 /// Shared memory is dynamic: packets [warps][stack_entries], or SpareRays [warps].
 extern __shared__ std::uint64_t shared_words[];
-
-/// All warps live until their kernel has no turn left, and all lanes as long as their warp.
-template <class Kernel, bool any_hit, class Warp>
-__device__ void run_warp(Warp& warp, const WarpJob& job) {
-    const std::uint32_t warp_index = (blockIdx.x * blockDim.x + threadIdx.x) / device_warp_width;
-    Kernel kernel;
-    while (kernel.template turn<any_hit>(warp, job, warp_index)) {
-    }
-}
 
 /// The stack is the thread's own: local memory, which the hardware interleaves by lane.
 template <class Kernel, bool any_hit, std::uint32_t stack_entries>
@@ -42,7 +28,8 @@ __global__ void __launch_bounds__(warp_block_threads) trace_rays(const WarpJob j
     std::int32_t stack[stack_entries];
     ThreadWarp<Lane> warp;
     warp.lane.stack = stack;
-    run_warp<Kernel, any_hit>(warp, job);
+    run_warp<Kernel, any_hit>(warp, job,
+                              (blockIdx.x * blockDim.x + threadIdx.x) / words::warp_width);
 }
 
 /// One stack a warp.
@@ -51,8 +38,9 @@ __global__ void __launch_bounds__(warp_block_threads, packet_blocks)
     trace_packets(const WarpJob job, std::uint32_t stack_entries) {
     ThreadWarp<Lane> warp;
     warp.memory.packets = reinterpret_cast<PacketEntry*>(shared_words) +
-                          threadIdx.x / device_warp_width * stack_entries;
-    run_warp<Kernel, any_hit>(warp, job);
+                          threadIdx.x / words::warp_width * stack_entries;
+    run_warp<Kernel, any_hit>(warp, job,
+                              (blockIdx.x * blockDim.x + threadIdx.x) / words::warp_width);
 }
 
 /// Twice as many rays as lanes, each with a stack of its own wherever it goes.
@@ -60,13 +48,10 @@ template <class Kernel, bool any_hit>
 __global__ void __launch_bounds__(warp_block_threads)
     trace_queues(const WarpJob job, std::uint32_t stack_entries, std::int32_t* stacks) {
     ThreadWarp<Lane> warp;
-    SpareRays& spares = reinterpret_cast<SpareRays*>(shared_words)[threadIdx.x / device_warp_width];
-    warp.memory.spares = spares.lanes;
-    warp.memory.slots = spares.slots;
-    const std::size_t thread = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    warp.lane.stack = stacks + 2 * thread * stack_entries;
-    spares.lanes[warp.lane_id()].stack = warp.lane.stack + stack_entries;
-    run_warp<Kernel, any_hit>(warp, job);
+    lend_spares(warp, reinterpret_cast<SpareRays*>(shared_words)[threadIdx.x / words::warp_width],
+                stacks, std::size_t{blockIdx.x} * blockDim.x + threadIdx.x, stack_entries);
+    run_warp<Kernel, any_hit>(warp, job,
+                              (blockIdx.x * blockDim.x + threadIdx.x) / words::warp_width);
 }
 
 }  // namespace kernels
@@ -81,7 +66,7 @@ void with_global_function(const WarpLaunch& launch, std::int32_t* stacks, const 
             visit(kernels::trace_packets<Kernel, any_hit>, bytes, launch.stack_entries);
         } else if constexpr (Kernel::rays_per_lane == 2) {
             visit(kernels::trace_queues<Kernel, any_hit>,
-                  warps_per_block * sizeof(kernels::SpareRays), launch.stack_entries, stacks);
+                  warps_per_block * sizeof(SpareRays), launch.stack_entries, stacks);
         } else if (launch.stack_entries <= small_stack_entries) {
             visit(kernels::trace_rays<Kernel, any_hit, small_stack_entries>, std::size_t{0});
         } else {

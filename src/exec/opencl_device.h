@@ -1,0 +1,101 @@
+// An OpenCL device with its context, its programs and its own queue; and which devices there are.
+// Memory is that of cl_intel_unified_shared_memory, whose pointers are as good inside of a functor
+// as they are as a kernel's argument.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "exec/opencl_api.h"
+
+namespace raydix {
+
+/// A kernel of a module of SPIR-V.
+struct KernelName {
+    const char *module, *kernel;
+};
+
+/// What a device says of itself, as far as the library depends on it.
+struct OpenclTraits {
+    std::string name, driver, il_versions, extensions;
+    cl_device_fp_config single_precision = 0, double_precision = 0;
+    cl_device_atomic_capabilities atomics = 0;
+    std::vector<std::size_t> sub_group_sizes;
+    std::size_t work_group_size = 0;
+    std::uint64_t local_memory = 0;
+    cl_uint address_bits = 0, compute_units = 0;
+    bool available = false, generic_pointers = false;
+};
+/// What of the above a device lacks; "" if nothing.
+[[nodiscard]] std::string opencl_lacks(const OpenclTraits& traits);
+
+/// A device as it is found, before it is opened.
+struct OpenclFound {
+    cl_platform_id platform;
+    cl_device_id device;
+    OpenclTraits traits;
+};
+/// Those of all platforms, in the loader's order. Throws BackendUnavailable: no loader, no driver.
+[[nodiscard]] std::vector<OpenclFound> find_opencl_devices();
+
+class OpenclDevice {
+public:
+    static constexpr std::size_t group_threads = 128;
+    /// Groups of a counted launch: enough for the largest machine.
+    static constexpr std::size_t counted_groups = 132 * 16;
+
+    explicit OpenclDevice(const OpenclFound& found);
+    OpenclDevice(const OpenclDevice&) = delete;
+    OpenclDevice& operator=(const OpenclDevice&) = delete;
+
+    [[nodiscard]] const OpenclTraits& traits() const { return traits_; }
+    [[nodiscard]] cl_context context() const { return context_; }
+    [[nodiscard]] cl_device_id id() const { return device_; }
+    [[nodiscard]] bool is_cpu() const { return is_cpu_; }
+    /// Null: the device's own queue. Throws InputError: a queue of another context or device, or
+    /// one that may change the order of launches.
+    [[nodiscard]] cl_command_queue queue(void* given);
+
+    [[nodiscard]] void* allocate(std::size_t bytes);
+    void free(void* memory) noexcept;
+    void copy(cl_command_queue queue, void* to, const void* from, std::size_t bytes);
+    void clear(cl_command_queue queue, void* memory, std::size_t bytes);
+    void finish(cl_command_queue queue);
+
+    /// Puts `groups` groups of `threads` on the queue; the kernel gets `bytes` at `argument`. The
+    /// program of its module is built when the first of its kernels is asked for.
+    void launch(cl_command_queue queue, const KernelName& kernel, std::size_t groups,
+                std::size_t threads, const void* argument, std::size_t bytes);
+    /// Builds a module's program now, if it is not built.
+    void prepare(const char* module);
+
+private:
+    [[nodiscard]] cl_program program(const char* module);
+    [[nodiscard]] cl_kernel kernel(const KernelName& name);
+    void check_arithmetic();
+
+    cl_platform_id platform_;
+    cl_device_id device_;
+    OpenclTraits traits_;
+    bool is_cpu_ = false;
+    cl_context context_ = nullptr;
+    cl_command_queue own_queue_ = nullptr;
+    clDeviceMemAllocINTEL_fn allocate_ = nullptr;
+    clMemBlockingFreeINTEL_fn free_ = nullptr;
+    clEnqueueMemcpyINTEL_fn copy_ = nullptr;
+    clEnqueueMemFillINTEL_fn fill_ = nullptr;
+    std::mutex lock_;  // an argument that is set belongs to the next launch of its kernel
+    std::map<std::string, cl_program, std::less<>> programs_;
+    std::map<std::string, cl_kernel, std::less<>> kernels_;
+};
+
+/// The device with this number, opened when it is first asked for and kept to the end. Throws
+/// BackendUnavailable: there are fewer, or what it lacks.
+[[nodiscard]] OpenclDevice& opencl_device(std::uint32_t index);
+
+}  // namespace raydix

@@ -1,0 +1,22 @@
+# Tests on an OpenCL device. Each program is one test: drivers compile a module of kernels once a process. Where
+# scripts/setup --test has put Intel's driver for processors into build/opencl-rt they run on that; elsewhere on what the
+# system's loader finds.
+add_executable(device_opencl opencl_builds.cpp)
+target_link_libraries(device_opencl PRIVATE raydix_test_support GTest::gtest_main)
+
+set(raydix_opencl_environment RAYDIX_TEST_DEVICE=opencl)
+set(raydix_opencl_rt ${PROJECT_SOURCE_DIR}/build/opencl-rt/lib)
+if(EXISTS ${raydix_opencl_rt}/libintelocl.so)
+    file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/opencl_vendors/intel.icd CONTENT "${raydix_opencl_rt}/libintelocl.so\n")
+    # It is newer than the system's oneTBB.
+    list(APPEND raydix_opencl_environment OCL_ICD_VENDORS=${CMAKE_BINARY_DIR}/opencl_vendors
+        LD_LIBRARY_PATH=${raydix_opencl_rt})
+endif()
+foreach(test opencl:device_opencl opencl_trace:device_gpu_trace)
+    string(REPLACE ":" ";" test ${test})
+    list(GET test 0 name)
+    list(GET test 1 program)
+    add_test(NAME device.${name} COMMAND ${program})
+    set_tests_properties(device.${name} PROPERTIES LABELS device TIMEOUT 900 SKIP_REGULAR_EXPRESSION "SKIPPED TEST"
+        ENVIRONMENT "${raydix_opencl_environment}")
+endforeach()
