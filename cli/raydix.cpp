@@ -23,6 +23,7 @@ int run_raydix(int argc, char** argv) {
     add_simulate_command(app);
     add_bench_command(app);
     add_report_command(app);
+    add_doctor_command(app);
     return run_program(app, argc, argv);
 }
 

@@ -19,7 +19,9 @@ OpenclBackend& selected_opencl() {
 
 }  // namespace
 
-std::string OpenclBackend::name() { return device_.traits().name; }
+std::string OpenclBackend::name() {
+    return device_.traits().name + (device_.is_cpu() ? " (OpenCL on a CPU)" : "");
+}
 
 void OpenclBackend::synchronize(Stream stream) { device_.finish(device_.queue(stream)); }
 
