@@ -52,16 +52,17 @@ std::vector<Finding> examine() {
     std::vector<Finding> all = {
         {"processor", machine.cpu, "what --device cpu runs on"},
         {"instruction set", machine.isa, meaning_of_isa(machine.isa)},
-        {"threads", std::to_string(machine.cores), "so many run at most, unless --threads says less"},
+        {"threads", std::to_string(machine.cores),
+         "so many run at most, unless --threads says less"},
         {"huge pages", pages.empty() ? "unknown" : pages, meaning_of_huge_pages(pages)},
     };
     for (const DeviceDescription& device : list_devices())
-        all.push_back({"device " + device.selector,
-                       device.name.empty() ? "none"
-                                           : device.name + (device.driver.empty()
-                                                                ? ""
-                                                                : ", driver " + device.driver),
-                       meaning_of(device)});
+        all.push_back(
+            {"device " + device.selector,
+             device.name.empty()
+                 ? "none"
+                 : device.name + (device.driver.empty() ? "" : ", driver " + device.driver),
+             meaning_of(device)});
     return all;
 }
 

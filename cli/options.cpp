@@ -186,8 +186,9 @@ std::string device_fault(std::string& device) {
     for (const char* word : {"cpu", "cuda", "sim", "opencl"})
         if (device == word) return {};
     constexpr std::string_view numbered = "opencl:";
-    const bool number = device.size() > numbered.size() && device.size() < numbered.size() + 5 &&
-                        device.find_first_not_of("0123456789", numbered.size()) == std::string::npos;
+    const bool number =
+        device.size() > numbered.size() && device.size() < numbered.size() + 5 &&
+        device.find_first_not_of("0123456789", numbered.size()) == std::string::npos;
     if (device.starts_with(numbered) && number) return {};
     return "'" + device + "' is not cpu, cuda, opencl, opencl:N or sim";
 }
@@ -266,7 +267,7 @@ SceneTree tree_of(Model scene, const std::string& name, const TreeOptions& tree,
     result.bvh = about(name, [&] {
         const BuildOptions options = tree.build_options(common);
         return runs_on_device(tree.device) ? DeviceScene(result.scene.mesh(), options).build().bvh
-                                     : build_bvh(result.scene.mesh(), options);
+                                           : build_bvh(result.scene.mesh(), options);
     });
     return result;
 }
