@@ -12,6 +12,21 @@
 #include "output.h"
 
 namespace raydix::cli {
+namespace {
+
+/// "" or why --device may not be this.
+std::string device_fault(std::string& device) {
+    for (const char* word : {"cpu", "cuda", "sim", "opencl"})
+        if (device == word) return {};
+    constexpr std::string_view numbered = "opencl:";
+    const bool number =
+        device.size() > numbered.size() && device.size() < numbered.size() + 5 &&
+        device.find_first_not_of("0123456789", numbered.size()) == std::string::npos;
+    if (device.starts_with(numbered) && number) return {};
+    return "'" + device + "' is not cpu, cuda, opencl, opencl:N or sim";
+}
+
+}  // namespace
 
 void add_result_limit(CLI::App& command, std::uint64_t& max_result_bytes) {
     command
@@ -180,18 +195,6 @@ RdxFile load_tree_file(const std::string& file) {
 }
 
 namespace {
-
-/// "" or why --device may not be this.
-std::string device_fault(std::string& device) {
-    for (const char* word : {"cpu", "cuda", "sim", "opencl"})
-        if (device == word) return {};
-    constexpr std::string_view numbered = "opencl:";
-    const bool number =
-        device.size() > numbered.size() && device.size() < numbered.size() + 5 &&
-        device.find_first_not_of("0123456789", numbered.size()) == std::string::npos;
-    if (device.starts_with(numbered) && number) return {};
-    return "'" + device + "' is not cpu, cuda, opencl, opencl:N or sim";
-}
 
 void override_cameras(Model& scene, const TreeOptions& tree) {
     if (!tree.cameras_file.empty()) scene.cameras = load_cameras(tree.cameras_file);
