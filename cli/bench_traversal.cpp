@@ -233,7 +233,7 @@ public:
     }
 
 private:
-    [[nodiscard]] bool on_device() const { return options_.tree.device == "cuda"; }
+    [[nodiscard]] bool on_device() const { return runs_on_device(options_.tree.device); }
 
     /// The same tree, cameras and launches as are simulated, all of them.
     void measure(const SceneTree& input, const WarpTree& tree, RayKind kind,
@@ -343,7 +343,7 @@ void add_traversal_suite(CLI::App& bench) {
         ->capture_default_str();
     command->add_flag("--memory", options->memory,
                       "Also a first-order memory model, as a column of its own");
-    command->add_option("--repeat", options->repeat, "Timed launches with --device cuda")
+    command->add_option("--repeat", options->repeat, "Timed launches with --device cuda or opencl")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
     add_launch_options(*command, options->launches);
@@ -355,7 +355,7 @@ void add_traversal_suite(CLI::App& bench) {
         options->tree_of_machine = command->get_option("--builder")->count() == 0 &&
                                    command->get_option("--quality")->count() == 0;
         TreeOptions host_tree = options->tree;
-        if (host_tree.device == "cuda") host_tree.device = "cpu";
+        if (is_device(host_tree.device)) host_tree.device = "cpu";
         refuse_device(host_tree);
         TraversalStudy(*options).run();
     });

@@ -139,13 +139,16 @@ void run_build(const BuildCommand& options) {
     document["load_ms"] = scene.load_ms;
     const TimedBuilds timed = about(options.scene, [&] {
         const auto build =
-            options.tree.device == "cuda" ? build_repeatedly_on_device : build_repeatedly;
+            runs_on_device(options.tree.device) ? build_repeatedly_on_device : build_repeatedly;
         return build(scene.mesh(), options.tree.build_options(options.common), options.repeat);
     });
     const TreeStats stats = tree_stats(timed.bvh, stats_options(options.tree, options.common));
     Json build = build_json(timed.bvh, stats, timed.fresh);
     build["device"] = options.tree.device;
-    if (options.tree.device == "cuda") build["peak_bytes"] = timed.device_bytes;
+    if (is_device(options.tree.device)) {
+        build["peak_bytes"] = timed.device_bytes;
+        build["device_name"] = device_name();
+    }
     build["kept_ms"] = spread_json(totals(timed.kept));
     if (options.tree.layout == "cwbvh") add_cwbvh(build, timed.bvh, options.common);
     if (is_wide_layout(options.tree.layout))

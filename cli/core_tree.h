@@ -52,7 +52,7 @@ template <class Kind>
 CoreBuilds<typename Kind::Tree> build_core(const Mesh& mesh, const typename Kind::Options& options,
                                            const std::string& device, int repeat) {
     CoreBuilds<typename Kind::Tree> builds;
-    if (device == "cuda") {
+    if (runs_on_device(device)) {
         const DeviceInput input(mesh);
         auto memory = build_on_device(input, options, nullptr);
         for (int i = 0; i < repeat; ++i) {
@@ -96,7 +96,7 @@ void run_core_build(const std::string& scene_name, const TreeOptions& tree_optio
     Json build = core_build_json<Kind>(builds.tree, builds.ms);
     build["device"] = tree_options.device;
     CoreFigures figures = Kind::figures(builds.tree);
-    if (tree_options.device == "cuda")
+    if (is_device(tree_options.device))
         build["peak_bytes"] = figures.peak_bytes = builds.device_bytes;
     document["build"] = build;
     if (common.prints_tables()) {

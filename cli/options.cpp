@@ -12,6 +12,21 @@
 #include "output.h"
 
 namespace raydix::cli {
+namespace {
+
+/// "" or why --device may not be this.
+std::string device_fault(std::string& device) {
+    for (const char* word : {"cpu", "cuda", "sim", "opencl"})
+        if (device == word) return {};
+    constexpr std::string_view numbered = "opencl:";
+    const bool number =
+        device.size() > numbered.size() && device.size() < numbered.size() + 5 &&
+        device.find_first_not_of("0123456789", numbered.size()) == std::string::npos;
+    if (device.starts_with(numbered) && number) return {};
+    return "'" + device + "' is not cpu, cuda, opencl, opencl:N or sim";
+}
+
+}  // namespace
 
 void add_result_limit(CLI::App& command, std::uint64_t& max_result_bytes) {
     command
@@ -90,8 +105,8 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
             ->group(group);
     command
         .add_option("--device", options.device,
-                    "Where to build (cpu, cuda) and trace (cpu, cuda, sim)")
-        ->check(CLI::IsMember({"cpu", "cuda", "sim"}))
+                    "Where to build (cpu, cuda, opencl or opencl:N) and trace (these and sim)")
+        ->check(CLI::Validator(device_fault, "cpu|cuda|opencl[:N]|sim"))
         ->capture_default_str()
         ->group(group);
     of_the_build(
@@ -192,6 +207,14 @@ Model load_structured_model(const std::string& name, const TreeOptions& tree,
     return scene;
 }
 
+bool is_device(const std::string& device) { return device != "cpu" && device != "sim"; }
+
+bool runs_on_device(const std::string& device) {
+    if (!is_device(device)) return false;
+    select_device(device);
+    return true;
+}
+
 Model load_model_with_cameras(const std::string& name, const TreeOptions& tree,
                               const CommonOptions& common) {
     Model scene = load_structured_model(name, tree, common);
@@ -203,7 +226,7 @@ void refuse_simulator(const TreeOptions& tree) {
     if (tree.device == "sim")
         throw CLI::ValidationError("--device",
                                    "sim traces rays (trace); trees are built on the "
-                                   "cpu, or on cuda");
+                                   "cpu, or on cuda or opencl");
 }
 
 void refuse_layout(const TreeOptions& tree) {
@@ -244,8 +267,8 @@ SceneTree tree_of(Model scene, const std::string& name, const TreeOptions& tree,
     SceneTree result{std::move(scene), {}};
     result.bvh = about(name, [&] {
         const BuildOptions options = tree.build_options(common);
-        return tree.device == "cuda" ? DeviceScene(result.scene.mesh(), options).build().bvh
-                                     : build_bvh(result.scene.mesh(), options);
+        return runs_on_device(tree.device) ? DeviceScene(result.scene.mesh(), options).build().bvh
+                                           : build_bvh(result.scene.mesh(), options);
     });
     return result;
 }

@@ -73,6 +73,11 @@ void refuse_build_options(const std::string& scene, const TreeOptions& tree);
 void refuse_simulator(const TreeOptions& tree);
 /// For what knows no layout but its own: another one is a usage error, never ignored.
 void refuse_layout(const TreeOptions& tree);
+/// Whether --device names a device of raydix/device.h: not the cpu, not the simulator.
+[[nodiscard]] bool is_device(const std::string& device);
+/// The same, and selects it. Throws BackendUnavailable with what is missing.
+[[nodiscard]] bool runs_on_device(const std::string& device);
+
 /// For commands that run on the CPU only: another device or layout is a usage error, never ignored.
 void refuse_device(const TreeOptions& tree);
 [[nodiscard]] SceneTree load_scene_tree(const std::string& scene, const TreeOptions& tree,
@@ -124,5 +129,6 @@ void add_points_suite(CLI::App& bench);
 void add_hierarchy_suite(CLI::App& bench);
 void add_report_command(CLI::App& app);
 void add_mpi_command(CLI::App& app);
+void add_doctor_command(CLI::App& app);
 
 }  // namespace raydix::cli

@@ -25,6 +25,7 @@ int run_raydix(int argc, char** argv) {
     add_bench_command(app);
     add_mpi_command(app);
     add_report_command(app);
+    add_doctor_command(app);
     add_completion_command(app);
     add_man_command(app);
     group_options(app);

@@ -292,10 +292,12 @@ Json trace_json(const TraceCommand& options, const std::string& mode, const Tall
               {"node_visits_per_ray", per_ray(tally.counts.node_visits)},
               {"triangle_tests_per_ray", per_ray(tally.counts.triangle_tests)}};
     if (warps == nullptr) return json;
-    if (warps->is_simulated())
+    if (warps->is_simulated()) {
         json["simulated"] = warps->simulated_json();
-    else
+    } else {
+        json["device_name"] = device_name();
         json["mrays_per_s_end_to_end"] = rates_json(tally, tally.end_to_end);
+    }
     return json;
 }
 
@@ -304,7 +306,8 @@ void print_warps(const Json& trace) {
     const auto count = trace["count"].get<std::uint64_t>();
     const auto hits = trace["hits"].get<std::uint64_t>();
     fmt::print("\n{} rays, {} hits by {} on device {}\n", grouped(count), grouped(hits),
-               trace["kernel"].get<std::string>(), trace["device"].get<std::string>());
+               trace["kernel"].get<std::string>(),
+               trace.value("device_name", trace["device"].get<std::string>()));
     if (trace.contains("simulated")) {
         const Json& s = trace["simulated"];
         fmt::print(
@@ -385,7 +388,7 @@ TraceCommand with_device(TraceCommand options, Mode mode) {
     if (device == "sim")
         static_cast<void>(machine_from(options.machine));
     else
-        static_cast<void>(device_name());
+        select_device(device);
     return options;
 }
 
@@ -541,7 +544,7 @@ void add_trace_command(CLI::App& app) {
         ->add_option(
             "--kernel", options->kernel,
             "Traversal kernel (default: engine on the cpu, scalar for a kdtree or --layout binary, "
-            "speculative_while_while on cuda and sim)")
+            "speculative_while_while on cuda, opencl and sim)")
         ->check(CLI::IsMember(trace_kernel_names()));
     command->add_option("--machine", options->machine, "Simulated machine of --device sim")
         ->capture_default_str();

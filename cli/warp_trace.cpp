@@ -46,7 +46,7 @@ void check_kernel(const std::string& kernel, const std::string& device) {
     if (of_cpu == (device == "cpu")) return;
     throw CLI::ValidationError("--kernel",
                                kernel + " does not run on device " + device +
-                                   "; cpu goes with engine and scalar, cuda and sim go with " +
+                                   "; cpu goes with engine and scalar, the others go with " +
                                    joined(warp_kernel_names()));
 }
 

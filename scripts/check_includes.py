@@ -48,7 +48,7 @@ MPI_HEADER = "include/raydix/mpi.h"
 # Headers of one library -> the only files that may include them.
 PRIVATE_LIBRARIES = {
     r"(tbb|oneapi)/.*": r"src/exec/parallel\.cpp|tests/more_threads\.cpp",
-    r"(cuda|cub|thrust|nv|nvtx3)/.*|cuda.*\.h": r"(src|tests|bench)/.*\.cuh?|src/base/atomic\.h",
+    r"(cuda|cub|thrust|nv|nvtx3)/.*|cuda.*\.h": r"(src|tests|bench)/.*\.cuh?|src/base/device_words\.h",
     r"(embree\d?|nanoflann).*": r"(tests|bench)/.*",
     r"CGAL/.*": r"bench/.*",
     r"gtest/.*|gmock/.*": r"tests/.*",

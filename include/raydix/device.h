@@ -197,7 +197,8 @@ void build_bvh_on_device(const DeviceBoxList& boxes, const BuildOptions& options
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 
 /// The same, but waits for the end. Returns the milliseconds of the stages as the device saw them
-/// (CUDA events; with OpenCL the host's clock, which waits behind each stage). `layout` includes the node pairs. For measurements.
+/// (CUDA events; with OpenCL the host's clock, which waits behind each stage). `layout` includes
+/// the node pairs. For measurements.
 BuildMs time_build_on_device(const DeviceMesh& mesh, const BuildOptions& options,
                              const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 BuildMs time_build_on_device(const DeviceBoxList& boxes, const BuildOptions& options,

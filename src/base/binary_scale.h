@@ -29,8 +29,8 @@ RAYDIX_HD inline double split_exponent(double x, int* exponent) {
         shifted = 64;
     }
     *exponent = biased - 1022 - shifted;
-    return std::bit_cast<double>((bits & ~(std::uint64_t{0x7FF} << 52)) |
-                                 std::uint64_t{1022} << 52);
+    return std::bit_cast<double>((bits & ~(std::uint64_t{0x7FF} << 52)) | std::uint64_t{1022}
+                                                                              << 52);
 }
 
 /// x * 2^n, rounded once.

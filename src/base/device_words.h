@@ -142,9 +142,9 @@ RAYDIX_HD inline std::uint32_t fetch_add(std::uint32_t& place, std::uint32_t val
 #endif
 }
 
-/// Returns the byte that lay at `place`, and leaves `value` there if that was 0; else something that
-/// is not 0. Acquire-release, for all threads of the device. A device has no exchange of bytes: bits
-/// are set in the byte's word, so the whole word must be the caller's.
+/// Returns the byte that lay at `place`, and leaves `value` there if that was 0; else something
+/// that is not 0. Acquire-release, for all threads of the device. A device has no exchange of
+/// bytes: bits are set in the byte's word, so the whole word must be the caller's.
 RAYDIX_HD inline std::uint8_t exchange_zero(std::uint8_t& place, std::uint8_t value) {
 #if defined(RAYDIX_DEVICE_PASS)
     const auto address = reinterpret_cast<std::uintptr_t>(&place);

@@ -10,9 +10,8 @@ std::string first_wrong_case(std::span<const ArithmeticResults> results) {
         const char* what;
         std::uint32_t wrong = 0;
     };
-    Count counts[] = {{"division"},       {"square root"},
-                      {"a product and a sum apart"}, {"a sum"},
-                      {"division of doubles"},       {"square root of doubles"}};
+    Count counts[] = {{"division"}, {"square root"},         {"a product and a sum apart"},
+                      {"a sum"},    {"division of doubles"}, {"square root of doubles"}};
     const auto compare = [](Count& count, auto a, auto b) {
         if (std::memcmp(&a, &b, sizeof(a)) != 0 && !(std::isnan(a) && std::isnan(b))) ++count.wrong;
     };
@@ -27,9 +26,9 @@ std::string first_wrong_case(std::span<const ArithmeticResults> results) {
     }
     for (const Count& count : counts)
         if (count.wrong != 0)
-            return std::string("does not compute ") + count.what + " with the host's bits: " +
-                   std::to_string(count.wrong) + " of " + std::to_string(results.size()) +
-                   " cases differ";
+            return std::string("does not compute ") + count.what +
+                   " with the host's bits: " + std::to_string(count.wrong) + " of " +
+                   std::to_string(results.size()) + " cases differ";
     return {};
 }
 

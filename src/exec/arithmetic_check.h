@@ -31,7 +31,7 @@ private:
         if ((bits & 3u) == 0)
             bits &= 0x807FFFFFu;  // denormal
         else if ((bits & 3u) == 1)
-            bits = (bits & 0x83FFFFFFu) | 0x3C000000u;  // near 1
+            bits = (bits & 0x83FFFFFFu) | 0x3C000000u;                 // near 1
         if ((bits & 0x7F800000u) == 0x7F800000u) bits &= 0xBFFFFFFFu;  // finite
         float value;
         std::memcpy(&value, &bits, sizeof(value));

@@ -47,7 +47,8 @@ OpenclTraits traits_of(cl_device_id device) {
     t.double_precision = value_of<cl_device_fp_config>(device, CL_DEVICE_DOUBLE_FP_CONFIG);
     t.atomics =
         value_of<cl_device_atomic_capabilities>(device, CL_DEVICE_ATOMIC_MEMORY_CAPABILITIES);
-    const auto sizes = value_of<std::array<std::size_t, 16>>(device, CL_DEVICE_SUB_GROUP_SIZES_INTEL);
+    const auto sizes =
+        value_of<std::array<std::size_t, 16>>(device, CL_DEVICE_SUB_GROUP_SIZES_INTEL);
     std::copy_if(sizes.begin(), sizes.end(), std::back_inserter(t.sub_group_sizes),
                  [](std::size_t size) { return size != 0; });
     t.work_group_size = value_of<std::size_t>(device, CL_DEVICE_MAX_WORK_GROUP_SIZE);
@@ -163,11 +164,12 @@ cl_command_queue OpenclDevice::queue(void* given) {
 void* OpenclDevice::allocate(std::size_t bytes) {
     cl_int status = CL_SUCCESS;
     constexpr std::size_t line = 256;
-    void* memory = allocate_(context_, device_, nullptr, (bytes + line - 1) / line * line, line,
-                             &status);
+    void* memory =
+        allocate_(context_, device_, nullptr, (bytes + line - 1) / line * line, line, &status);
     if (status == CL_INVALID_VALUE || memory == nullptr) {  // an alignment it does not have
         status = CL_SUCCESS;
-        memory = allocate_(context_, device_, nullptr, (bytes + line - 1) / line * line, 0, &status);
+        memory =
+            allocate_(context_, device_, nullptr, (bytes + line - 1) / line * line, 0, &status);
     }
     opencl_try(status, "clDeviceMemAllocINTEL", std::to_string(bytes) + " bytes");
     if (reinterpret_cast<std::uintptr_t>(memory) % line != 0) {
@@ -184,8 +186,8 @@ void OpenclDevice::free(void* memory) noexcept {
 }
 
 void OpenclDevice::copy(cl_command_queue queue, void* to, const void* from, std::size_t bytes) {
-    opencl_try(copy_(queue, CL_FALSE, to, from, bytes, 0, nullptr, nullptr),
-               "clEnqueueMemcpyINTEL", std::to_string(bytes) + " bytes");
+    opencl_try(copy_(queue, CL_FALSE, to, from, bytes, 0, nullptr, nullptr), "clEnqueueMemcpyINTEL",
+               std::to_string(bytes) + " bytes");
 }
 
 void OpenclDevice::clear(cl_command_queue queue, void* memory, std::size_t bytes) {
@@ -204,15 +206,15 @@ cl_program OpenclDevice::program(const char* module) {
     const OpenclApi& cl = opencl_api();
     const std::vector<std::uint32_t> words = complete_spirv(spirv_module(module), warp_prefixes);
     cl_int status = CL_SUCCESS;
-    cl_program program = cl.CreateProgramWithIL(context_, words.data(),
-                                                words.size() * sizeof(words[0]), &status);
+    cl_program program =
+        cl.CreateProgramWithIL(context_, words.data(), words.size() * sizeof(words[0]), &status);
     opencl_try(status, "clCreateProgramWithIL", module);
     status = cl.BuildProgram(program, 1, &device_, "-cl-fp32-correctly-rounded-divide-sqrt",
                              nullptr, nullptr);
     if (status != CL_SUCCESS) {
         std::size_t bytes = 0;
-        static_cast<void>(cl.GetProgramBuildInfo(program, device_, CL_PROGRAM_BUILD_LOG, 0,
-                                                 nullptr, &bytes));
+        static_cast<void>(
+            cl.GetProgramBuildInfo(program, device_, CL_PROGRAM_BUILD_LOG, 0, nullptr, &bytes));
         std::string log(bytes, '\0');
         static_cast<void>(cl.GetProgramBuildInfo(program, device_, CL_PROGRAM_BUILD_LOG, bytes,
                                                  log.data(), nullptr));

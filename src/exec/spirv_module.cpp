@@ -12,13 +12,12 @@
 #include RAYDIX_SPIRV_LIST
 
 // The files as they are, as symbols: raydix_spirv_NAME and, behind them, raydix_spirv_NAME_end.
-#define RAYDIX_EMBED(name)                                                          \
-    asm(".pushsection .rodata\n.balign 4\n.hidden raydix_spirv_" #name              \
-        "\n.globl raydix_spirv_" #name "\nraydix_spirv_" #name                      \
-        ":\n.incbin \"" RAYDIX_SPIRV_FOLDER "/" #name                               \
-        ".spv\"\n.hidden raydix_spirv_" #name "_end\n.globl raydix_spirv_" #name    \
-        "_end\nraydix_spirv_" #name "_end:\n.popsection");                          \
-    extern "C" [[gnu::visibility("hidden")]] const std::uint32_t raydix_spirv_##name[]; \
+#define RAYDIX_EMBED(name)                                                                         \
+    asm(".pushsection .rodata\n.balign 4\n.hidden raydix_spirv_" #name                             \
+        "\n.globl raydix_spirv_" #name "\nraydix_spirv_" #name ":\n.incbin \"" RAYDIX_SPIRV_FOLDER \
+        "/" #name ".spv\"\n.hidden raydix_spirv_" #name "_end\n.globl raydix_spirv_" #name         \
+        "_end\nraydix_spirv_" #name "_end:\n.popsection");                                         \
+    extern "C" [[gnu::visibility("hidden")]] const std::uint32_t raydix_spirv_##name[];            \
     extern "C" [[gnu::visibility("hidden")]] const std::uint32_t raydix_spirv_##name##_end[];
 RAYDIX_SPIRV_MODULES(RAYDIX_EMBED)
 
@@ -55,8 +54,8 @@ std::vector<std::uint32_t> complete_spirv(std::span<const std::uint32_t> words,
         // Execution modes stand right behind the entry points.
         if (op == Op::execution_mode && !modes_written) {
             for (const std::uint32_t kernel : in_warps)
-                out.insert(out.end(), {4u << 16 | Op::execution_mode, kernel, subgroup_size_mode,
-                                       32u});
+                out.insert(out.end(),
+                           {4u << 16 | Op::execution_mode, kernel, subgroup_size_mode, 32u});
             modes_written = true;
         }
         const std::size_t start = out.size();

@@ -69,9 +69,9 @@ template <class T>
 struct ScanTiles {
     T* values;
     ItemCount items;
-    const T* starts;        // [tiles]: the sum of the tiles before each; null if there is one tile
-    T* total;               // [1], out: where the last tile leaves the sum of all; may be null
-    bool total_behind;      // it leaves the sum behind the last value instead
+    const T* starts;    // [tiles]: the sum of the tiles before each; null if there is one tile
+    T* total;           // [1], out: where the last tile leaves the sum of all; may be null
+    bool total_behind;  // it leaves the sum behind the last value instead
     std::uint32_t last_tile;
 
     template <class Warp>
@@ -143,11 +143,11 @@ void launch_scan(Launcher& launcher, const char* label, const ScanJob<T>& job,
     for (int k = top; k >= 0; --k) {
         const std::uint32_t tiles = tiles_for(levels[k].items.limit);
         const bool lowest = k == 0;
-        launcher.launch_tiles(label, tiles == 0 ? 1 : tiles,
-                              ScanTiles<T>{levels[k].values, levels[k].items,
-                                           k == top ? nullptr : levels[k + 1].values,
-                                           lowest ? job.total : nullptr,
-                                           lowest && job.total_behind, tiles == 0 ? 0 : tiles - 1});
+        launcher.launch_tiles(
+            label, tiles == 0 ? 1 : tiles,
+            ScanTiles<T>{levels[k].values, levels[k].items,
+                         k == top ? nullptr : levels[k + 1].values, lowest ? job.total : nullptr,
+                         lowest && job.total_behind, tiles == 0 ? 0 : tiles - 1});
     }
 }
 

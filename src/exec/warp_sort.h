@@ -19,8 +19,7 @@ template <class Key>
 struct Digit {
     std::uint32_t shift, bits;  // bits 0 to 5
     [[nodiscard]] RAYDIX_HD std::uint32_t of(Key key) const {
-        return bits == 0 ? 0u
-                         : static_cast<std::uint32_t>(key >> shift) & ((1u << bits) - 1);
+        return bits == 0 ? 0u : static_cast<std::uint32_t>(key >> shift) & ((1u << bits) - 1);
     }
 };
 
@@ -72,8 +71,8 @@ struct CountDigits {
             const std::uint64_t first = std::uint64_t{t} * tile_items + r * warp_lanes;
             const DigitRound<Key, Warp> round(warp, keys, digit, first, n);
             warp.each([&](std::uint32_t lane) {
-                count[lane] = count[lane] +
-                              words::count_ones(lanes_with(round.votes, round.there, lane));
+                count[lane] =
+                    count[lane] + words::count_ones(lanes_with(round.votes, round.there, lane));
             });
         }
         warp.each([&](std::uint32_t lane) { counts[lane * tiles + t] = count[lane]; });
@@ -107,8 +106,8 @@ struct MovePairs {
                     pairs.sorted_keys[at] = pairs.keys[first + lane];
                     pairs.sorted_values[at] = pairs.values[first + lane];
                 }
-                next[lane] = next[lane] +
-                             words::count_ones(lanes_with(round.votes, round.there, lane));
+                next[lane] =
+                    next[lane] + words::count_ones(lanes_with(round.votes, round.there, lane));
             });
         }
     }

@@ -36,8 +36,7 @@ public:
     virtual void free(void* memory) noexcept = 0;
     virtual void copy_to_device(void* device, const void* host, std::size_t bytes,
                                 Stream stream) = 0;
-    virtual void copy_to_host(void* host, const void* device, std::size_t bytes,
-                              Stream stream) = 0;
+    virtual void copy_to_host(void* host, const void* device, std::size_t bytes, Stream stream) = 0;
     [[nodiscard]] virtual double measure_copy(std::size_t bytes, int repeat) = 0;
 
     [[nodiscard]] virtual std::size_t scratch_bytes(std::uint32_t, const BuildOptions&) {

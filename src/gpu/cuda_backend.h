@@ -35,18 +35,16 @@ public:
                  Scratch scratch, Stream stream) override;
     std::size_t scratch_bytes(std::uint32_t n, std::uint32_t node_capacity,
                               const OctreeOptions& options) override;
-    void build(const DeviceMesh& mesh, const OctreeOptions& options,
-               const DeviceOctreeArrays& tree, Scratch scratch, Stream stream) override;
+    void build(const DeviceMesh& mesh, const OctreeOptions& options, const DeviceOctreeArrays& tree,
+               Scratch scratch, Stream stream) override;
     BuildMs time(const DeviceMesh& mesh, const OctreeOptions& options,
                  const DeviceOctreeArrays& tree, Scratch scratch, Stream stream) override;
 
-    std::unique_ptr<DeviceWarpTree::Arrays> warp_tree(const WarpTree& tree,
-                                                      Stream stream) override;
+    std::unique_ptr<DeviceWarpTree::Arrays> warp_tree(const WarpTree& tree, Stream stream) override;
     std::unique_ptr<DeviceWarpTree::Arrays> warp_tree(const DeviceTree& tree,
                                                       Stream stream) override;
-    void trace_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
-                     std::span<TreeHit> hits, const DeviceTraceOptions& options, Scratch scratch,
-                     Stream stream) override;
+    void trace_warps(const DeviceWarpTree& tree, std::span<const Ray> rays, std::span<TreeHit> hits,
+                     const DeviceTraceOptions& options, Scratch scratch, Stream stream) override;
     DeviceTraceMs time_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
                              std::span<TreeHit> hits, const DeviceTraceOptions& options,
                              Scratch scratch, Stream stream) override;
@@ -66,8 +64,8 @@ public:
                      std::span<std::uint32_t> indices, std::span<float> distances,
                      Stream stream) override;
     void closest_points(const DevicePrimitives& tree, std::span<const Vec3> queries,
-                        float max_distance, std::span<ClosestPoint> results,
-                        std::uint32_t* invalid, Stream stream) override;
+                        float max_distance, std::span<ClosestPoint> results, std::uint32_t* invalid,
+                        Stream stream) override;
     void pairs_count(const DevicePairQuery& query, std::span<std::uint64_t> offsets,
                      Scratch scratch, Stream stream) override;
     void pairs_fill(const DevicePairQuery& query, std::span<const std::uint64_t> offsets,

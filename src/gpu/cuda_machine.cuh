@@ -16,8 +16,7 @@ struct CudaMachine;
 /// Events at the ends of the stages.
 class CudaStageTimes {
 public:
-    CudaStageTimes(const CudaMachine&, Stream stream)
-        : stream_(static_cast<cudaStream_t>(stream)) {
+    CudaStageTimes(const CudaMachine&, Stream stream) : stream_(static_cast<cudaStream_t>(stream)) {
         (*this)("start");
     }
     CudaStageTimes(const CudaStageTimes&) = delete;

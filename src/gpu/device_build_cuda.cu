@@ -10,8 +10,8 @@ std::size_t CudaBackend::scratch_bytes(std::uint32_t n, const BuildOptions& opti
     return bvh_scratch_bytes<CudaMachine>(n, options);
 }
 
-void CudaBackend::build(const DeviceMesh& mesh, const BuildOptions& options,
-                        const DeviceTree& tree, Scratch scratch, Stream stream) {
+void CudaBackend::build(const DeviceMesh& mesh, const BuildOptions& options, const DeviceTree& tree,
+                        Scratch scratch, Stream stream) {
     run_on_stream(CudaMachine(), build_of(mesh, options, tree), scratch, stream);
 }
 

@@ -48,8 +48,7 @@ void launch_with_stack(const Launch& launch, const Store& store) {
         auto* next = reinterpret_cast<std::uint32_t*>(launch.scratch.data());
         RAYDIX_CUDA_TRY(cudaMemsetAsync(next, 0, sizeof(*next), launch.stream));
         const auto kernel = kernels::persistent_cwbvh_rays<any, stack_entries, Store>;
-        kernel<<<resident_blocks(kernel, blocks), block_threads, 0, launch.stream>>>(
-            given, next);
+        kernel<<<resident_blocks(kernel, blocks), block_threads, 0, launch.stream>>>(given, next);
     } else {
         kernels::cwbvh_rays<any, stack_entries, Store>
             <<<blocks, block_threads, 0, launch.stream>>>(given);

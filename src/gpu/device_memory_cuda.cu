@@ -83,8 +83,8 @@ void list_cuda_devices(std::vector<DeviceDescription>& out) {
     DeviceDescription found{"cuda", "", "", ""};
     int driver = 0;
     if (cudaDriverGetVersion(&driver) == cudaSuccess && driver != 0)
-        found.driver = "CUDA " + std::to_string(driver / 1000) + "." +
-                       std::to_string(driver % 1000 / 10);
+        found.driver =
+            "CUDA " + std::to_string(driver / 1000) + "." + std::to_string(driver % 1000 / 10);
     try {
         found.name = cuda_backend().name();
     } catch (const std::exception& error) {

@@ -28,17 +28,18 @@ std::size_t CudaBackend::offsets_scratch_bytes(std::uint32_t n) {
 }
 
 void CudaBackend::knn(const DevicePoints& tree, std::span<const Vec3> queries, std::uint32_t k,
-                   std::span<std::uint32_t> indices, std::span<float> distances,
-                   std::uint32_t* invalid, Stream stream) {
+                      std::span<std::uint32_t> indices, std::span<float> distances,
+                      std::uint32_t* invalid, Stream stream) {
     static_cast<void>(name());
     check_knn(tree, queries, k, indices, distances);
     CudaLauncher launcher = plain_launcher(stream);
     launch_knn(launcher, tree, queries, k, indices, distances, invalid);
 }
 
-void CudaBackend::radius_count(const DevicePoints& tree, std::span<const Vec3> queries, float radius,
-                            std::span<std::uint64_t> offsets, std::uint32_t* invalid,
-                            std::span<std::byte> scratch, Stream stream) {
+void CudaBackend::radius_count(const DevicePoints& tree, std::span<const Vec3> queries,
+                               float radius, std::span<std::uint64_t> offsets,
+                               std::uint32_t* invalid, std::span<std::byte> scratch,
+                               Stream stream) {
     static_cast<void>(name());
     check_radius(tree, queries, radius, offsets.size());
     CudaLauncher launcher = scanning_launcher(scratch, count_of(queries), stream);
@@ -46,9 +47,9 @@ void CudaBackend::radius_count(const DevicePoints& tree, std::span<const Vec3> q
 }
 
 void CudaBackend::radius_fill(const DevicePoints& tree, std::span<const Vec3> queries, float radius,
-                           std::span<const std::uint64_t> offsets, bool by_distance,
-                           std::span<std::uint32_t> indices, std::span<float> distances,
-                           Stream stream) {
+                              std::span<const std::uint64_t> offsets, bool by_distance,
+                              std::span<std::uint32_t> indices, std::span<float> distances,
+                              Stream stream) {
     static_cast<void>(name());
     check_radius(tree, queries, radius, offsets.size());
     check_rows(indices.size(), distances.size());
@@ -57,8 +58,8 @@ void CudaBackend::radius_fill(const DevicePoints& tree, std::span<const Vec3> qu
 }
 
 void CudaBackend::closest_points(const DevicePrimitives& tree, std::span<const Vec3> queries,
-                              float max_distance, std::span<ClosestPoint> results,
-                              std::uint32_t* invalid, Stream stream) {
+                                 float max_distance, std::span<ClosestPoint> results,
+                                 std::uint32_t* invalid, Stream stream) {
     static_cast<void>(name());
     check_closest(tree, queries, max_distance, results.size());
     CudaLauncher launcher = plain_launcher(stream);
@@ -66,7 +67,7 @@ void CudaBackend::closest_points(const DevicePrimitives& tree, std::span<const V
 }
 
 void CudaBackend::pairs_count(const DevicePairQuery& query, std::span<std::uint64_t> offsets,
-                           std::span<std::byte> scratch, Stream stream) {
+                              std::span<std::byte> scratch, Stream stream) {
     static_cast<void>(name());
     check_pairs(query, offsets.size());
     CudaLauncher launcher = scanning_launcher(scratch, query.a.input_count, stream);
@@ -74,7 +75,7 @@ void CudaBackend::pairs_count(const DevicePairQuery& query, std::span<std::uint6
 }
 
 void CudaBackend::pairs_fill(const DevicePairQuery& query, std::span<const std::uint64_t> offsets,
-                          std::span<PrimitivePair> pairs, Stream stream) {
+                             std::span<PrimitivePair> pairs, Stream stream) {
     static_cast<void>(name());
     check_pairs(query, offsets.size());
     CudaLauncher launcher = plain_launcher(stream);

@@ -50,8 +50,8 @@ void run_on_stream(const Machine& machine, const With& with, std::span<std::byte
         throw InputError("the scratch on the device is not aligned to 256 bytes");
     with([&](const auto& build) {
         Arena arena(scratch.data(), size.front);
-        auto launcher = machine.launcher(stream, scratch.data() + size.front,
-                                         scratch.size() - size.front);
+        auto launcher =
+            machine.launcher(stream, scratch.data() + size.front, scratch.size() - size.front);
         build.run(launcher, arena, mark);
     });
 }

@@ -9,7 +9,7 @@
 namespace raydix {
 
 void CudaBackend::name_hits(const DeviceMeshNames& names, std::span<const TreeHit> found,
-                         std::span<Hit> hits, Stream stream) {
+                            std::span<Hit> hits, Stream stream) {
     static_cast<void>(name());  // says what is missing
     check_name_hits(found.size(), hits.size());
     if (found.size() >= 0x80000000u) throw InputError("2^31 hits or more in one launch");

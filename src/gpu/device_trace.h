@@ -70,7 +70,8 @@ inline std::uint32_t blocks_of(const DeviceWarpTree::Arrays& tree, const WarpLau
 }
 
 template <class T>
-const T* upload_array(DeviceBuffer<std::byte>& to, const T* from, std::size_t count, Stream stream) {
+const T* upload_array(DeviceBuffer<std::byte>& to, const T* from, std::size_t count,
+                      Stream stream) {
     to.upload({reinterpret_cast<const std::byte*>(from), count * sizeof(T)}, stream);
     return reinterpret_cast<const T*>(to.data());
 }
@@ -112,8 +113,8 @@ std::unique_ptr<DeviceWarpTree::Arrays> take_warp_tree(Launcher& launcher, const
     return arrays;
 }
 
-inline void check_trace_memory(std::span<const Ray> rays, std::span<TreeHit> hits, std::span<std::byte> scratch,
-                  std::size_t needed) {
+inline void check_trace_memory(std::span<const Ray> rays, std::span<TreeHit> hits,
+                               std::span<std::byte> scratch, std::size_t needed) {
     const auto aligned = [](const void* at, std::uintptr_t to) {
         return reinterpret_cast<std::uintptr_t>(at) % to == 0;
     };

@@ -37,11 +37,14 @@ void trace_launches(const DeviceWarpTree& tree, std::span<const Ray> rays, std::
                     const Mark& mark) {
     const WarpTraceCall call(tree, rays, hits, options, scratch);
     CudaLauncher launcher = plain_launcher(stream, call.work().launcher);
-    call.launch(launcher, [&](const WarpLaunch& launch, const WarpJob& job, std::int32_t* stacks,
-                              std::uint32_t blocks) {
-        const ProfilerRange range("trace.warps");
-        launch_warps(launch, job, stacks, blocks, stream);
-    }, mark);
+    call.launch(
+        launcher,
+        [&](const WarpLaunch& launch, const WarpJob& job, std::int32_t* stacks,
+            std::uint32_t blocks) {
+            const ProfilerRange range("trace.warps");
+            launch_warps(launch, job, stacks, blocks, stream);
+        },
+        mark);
 }
 
 class Event {
@@ -84,14 +87,14 @@ std::unique_ptr<DeviceWarpTree::Arrays> CudaBackend::warp_tree(const DeviceTree&
 }
 
 void CudaBackend::trace_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
-                           std::span<TreeHit> hits, const DeviceTraceOptions& options,
-                           std::span<std::byte> scratch, Stream stream) {
+                              std::span<TreeHit> hits, const DeviceTraceOptions& options,
+                              std::span<std::byte> scratch, Stream stream) {
     trace_launches(tree, rays, hits, options, scratch, stream, [](int) {});
 }
 
 DeviceTraceMs CudaBackend::time_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
-                                   std::span<TreeHit> hits, const DeviceTraceOptions& options,
-                                   std::span<std::byte> scratch, Stream stream) {
+                                      std::span<TreeHit> hits, const DeviceTraceOptions& options,
+                                      std::span<std::byte> scratch, Stream stream) {
     Event start, before, behind, end;
     start.record(stream);
     trace_launches(tree, rays, hits, options, scratch, stream,

@@ -2,42 +2,41 @@
 // the device's side compiles from the same lines.
 #pragma once
 
+#include "engine/name_hit.h"
 #include "exec/arithmetic_check.h"
 #include "exec/opencl_launcher.h"
-#include "engine/name_hit.h"
 #include "gpu/device_build.h"
 #include "gpu/device_queries.h"
 #include "gpu/device_trees.h"
 #include "gpu/trace_launches.h"
 #include "trace/warp/kernel_list.h"
 
-#define RAYDIX_EACH(kernel_name, ...)                                           \
-    template <>                                                          \
-    struct EachKernel<__VA_ARGS__> {                                     \
+#define RAYDIX_EACH(kernel_name, ...)                                          \
+    template <>                                                                \
+    struct EachKernel<__VA_ARGS__> {                                           \
         static constexpr KernelName name{RAYDIX_MODULE, "each_" #kernel_name}; \
     };
-#define RAYDIX_COUNTED(kernel_name, ...)                                           \
-    template <>                                                             \
-    struct CountedKernel<__VA_ARGS__> {                                     \
+#define RAYDIX_COUNTED(kernel_name, ...)                                          \
+    template <>                                                                   \
+    struct CountedKernel<__VA_ARGS__> {                                           \
         static constexpr KernelName name{RAYDIX_MODULE, "counted_" #kernel_name}; \
     };
-#define RAYDIX_WARPS(kernel_name, ...)                                           \
-    template <>                                                           \
-    struct WarpsKernel<__VA_ARGS__> {                                     \
+#define RAYDIX_WARPS(kernel_name, ...)                                          \
+    template <>                                                                 \
+    struct WarpsKernel<__VA_ARGS__> {                                           \
         static constexpr KernelName name{RAYDIX_MODULE, "warps_" #kernel_name}; \
     };
-#define RAYDIX_TILES(kernel_name, ...)                                           \
-    template <>                                                           \
-    struct TilesKernel<__VA_ARGS__> {                                     \
+#define RAYDIX_TILES(kernel_name, ...)                                          \
+    template <>                                                                 \
+    struct TilesKernel<__VA_ARGS__> {                                           \
         static constexpr KernelName name{RAYDIX_MODULE, "tiles_" #kernel_name}; \
     };
 
-#define RAYDIX_TRACE(kernel_name, ...)                                               \
-    template <>                                                                      \
-    struct TraceKernel<__VA_ARGS__> {                                                \
-        static constexpr KernelName closest{RAYDIX_MODULE,                           \
-                                            "trace_" #kernel_name "_closest"};       \
-        static constexpr KernelName any{RAYDIX_MODULE, "trace_" #kernel_name "_any"}; \
+#define RAYDIX_TRACE(kernel_name, ...)                                                        \
+    template <>                                                                               \
+    struct TraceKernel<__VA_ARGS__> {                                                         \
+        static constexpr KernelName closest{RAYDIX_MODULE, "trace_" #kernel_name "_closest"}; \
+        static constexpr KernelName any{RAYDIX_MODULE, "trace_" #kernel_name "_any"};         \
     };
 
 namespace raydix {

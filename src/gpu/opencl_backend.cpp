@@ -19,7 +19,9 @@ OpenclBackend& selected_opencl() {
 
 }  // namespace
 
-std::string OpenclBackend::name() { return device_.traits().name; }
+std::string OpenclBackend::name() {
+    return device_.traits().name + (device_.is_cpu() ? " (OpenCL on a CPU)" : "");
+}
 
 void OpenclBackend::synchronize(Stream stream) { device_.finish(device_.queue(stream)); }
 
@@ -32,8 +34,7 @@ void OpenclBackend::copy_to_device(void* device, const void* host, std::size_t b
     device_.copy(device_.queue(stream), device, host, bytes);
 }
 
-void OpenclBackend::copy_to_host(void* host, const void* device, std::size_t bytes,
-                                 Stream stream) {
+void OpenclBackend::copy_to_host(void* host, const void* device, std::size_t bytes, Stream stream) {
     device_.copy(device_.queue(stream), host, device, bytes);
 }
 

@@ -12,26 +12,27 @@ std::size_t OpenclBackend::offsets_scratch_bytes(std::uint32_t n) {
 }
 
 void OpenclBackend::knn(const DevicePoints& tree, std::span<const Vec3> queries, std::uint32_t k,
-                   std::span<std::uint32_t> indices, std::span<float> distances,
-                   std::uint32_t* invalid, Stream stream) {
+                        std::span<std::uint32_t> indices, std::span<float> distances,
+                        std::uint32_t* invalid, Stream stream) {
     check_knn(tree, queries, k, indices, distances);
     OpenclLauncher launcher = plain_launcher(stream);
     launch_knn(launcher, tree, queries, k, indices, distances, invalid);
 }
 
-void OpenclBackend::radius_count(const DevicePoints& tree, std::span<const Vec3> queries, float radius,
-                            std::span<std::uint64_t> offsets, std::uint32_t* invalid,
-                            std::span<std::byte> scratch, Stream stream) {
+void OpenclBackend::radius_count(const DevicePoints& tree, std::span<const Vec3> queries,
+                                 float radius, std::span<std::uint64_t> offsets,
+                                 std::uint32_t* invalid, std::span<std::byte> scratch,
+                                 Stream stream) {
     check_radius(tree, queries, radius, offsets.size());
     check_offsets_scratch(scratch, offsets_scratch_bytes(count_of(queries)));
     OpenclLauncher launcher = machine_.launcher(stream, scratch.data(), scratch.size());
     launch_radius_count(launcher, tree, queries, radius, offsets, invalid);
 }
 
-void OpenclBackend::radius_fill(const DevicePoints& tree, std::span<const Vec3> queries, float radius,
-                           std::span<const std::uint64_t> offsets, bool by_distance,
-                           std::span<std::uint32_t> indices, std::span<float> distances,
-                           Stream stream) {
+void OpenclBackend::radius_fill(const DevicePoints& tree, std::span<const Vec3> queries,
+                                float radius, std::span<const std::uint64_t> offsets,
+                                bool by_distance, std::span<std::uint32_t> indices,
+                                std::span<float> distances, Stream stream) {
     check_radius(tree, queries, radius, offsets.size());
     check_rows(indices.size(), distances.size());
     OpenclLauncher launcher = plain_launcher(stream);
@@ -39,15 +40,15 @@ void OpenclBackend::radius_fill(const DevicePoints& tree, std::span<const Vec3> 
 }
 
 void OpenclBackend::closest_points(const DevicePrimitives& tree, std::span<const Vec3> queries,
-                              float max_distance, std::span<ClosestPoint> results,
-                              std::uint32_t* invalid, Stream stream) {
+                                   float max_distance, std::span<ClosestPoint> results,
+                                   std::uint32_t* invalid, Stream stream) {
     check_closest(tree, queries, max_distance, results.size());
     OpenclLauncher launcher = plain_launcher(stream);
     launch_closest(launcher, tree, queries, max_distance, results, invalid);
 }
 
 void OpenclBackend::pairs_count(const DevicePairQuery& query, std::span<std::uint64_t> offsets,
-                           std::span<std::byte> scratch, Stream stream) {
+                                std::span<std::byte> scratch, Stream stream) {
     check_pairs(query, offsets.size());
     check_offsets_scratch(scratch, offsets_scratch_bytes(query.a.input_count));
     OpenclLauncher launcher = machine_.launcher(stream, scratch.data(), scratch.size());
@@ -55,7 +56,7 @@ void OpenclBackend::pairs_count(const DevicePairQuery& query, std::span<std::uin
 }
 
 void OpenclBackend::pairs_fill(const DevicePairQuery& query, std::span<const std::uint64_t> offsets,
-                          std::span<PrimitivePair> pairs, Stream stream) {
+                               std::span<PrimitivePair> pairs, Stream stream) {
     check_pairs(query, offsets.size());
     OpenclLauncher launcher = plain_launcher(stream);
     launch_pairs_fill(launcher, query, offsets, pairs);

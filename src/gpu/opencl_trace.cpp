@@ -93,7 +93,8 @@ DeviceTraceMs OpenclBackend::time_warps(const DeviceWarpTree& tree, std::span<co
     double at[2] = {};
     const double start = now();
     trace_launches(device_, plain_launcher(stream),
-                   WarpTraceCall(tree, rays, hits, options, scratch), [&](int k) { at[k] = now(); });
+                   WarpTraceCall(tree, rays, hits, options, scratch),
+                   [&](int k) { at[k] = now(); });
     return {at[1] - at[0], now() - start};
 }
 

@@ -65,7 +65,8 @@ void compare(const std::string& what, const Bvh& bvh, std::span<const Ray> rays)
 
 TEST_F(GpuCwbvh, LikeScalar) {
     for (const Model& scene : fitting(builtin_triangle_scenes(fitting(200'000))))
-        compare(scene.name, build_bvh(scene.mesh()), make_mixed_rays(scene, fitting(1'000'000), seed));
+        compare(scene.name, build_bvh(scene.mesh()),
+                make_mixed_rays(scene, fitting(1'000'000), seed));
     for (const float scale : {1e-9f, 1.0f, 1e12f}) {
         const Model scene = scene_of(scaled(random_soup(2000, 4), scale), "soup");
         compare("soup times " + std::to_string(scale), build_bvh(scene.mesh()),
@@ -108,7 +109,8 @@ TEST_F(GpuCwbvh, ScenesOfMeshes) {
     scene.add(lattice_mesh(2000, 20, 5));
     scene.add(lattice_mesh(2000, 20, 5));
     scene.commit();
-    const auto rays = make_mixed_rays(scene_of(merge_meshes(scene).mesh, "meshes"), fitting(500'000), seed);
+    const auto rays =
+        make_mixed_rays(scene_of(merge_meshes(scene).mesh, "meshes"), fitting(500'000), seed);
     const DeviceBuffer<Ray> there{std::span<const Ray>(rays)};
     const auto n = static_cast<std::uint32_t>(rays.size());
     for (const std::uint32_t mask : {0xFFFFFFFFu, 1u, 0u}) {

@@ -178,7 +178,8 @@ void compare_pairs(const std::string& name, const Mesh& x, const Mesh& y) {
 }
 
 TEST_F(GpuQueries, PairsLikeTheHost) {
-    compare_pairs("soups", random_soup(fitting(50'000), 1, 0.03f), random_soup(fitting(40'000), 2, 0.02f));
+    compare_pairs("soups", random_soup(fitting(50'000), 1, 0.03f),
+                  random_soup(fitting(40'000), 2, 0.02f));
     compare_pairs("lattices", lattice_mesh(fitting(3000), 12, seed),
                   lattice_mesh(fitting(2000), 12, seed + 1));
 }

@@ -86,7 +86,8 @@ TEST_F(GpuTrace, FewTrianglesAndFewRays) {
 TEST_F(GpuTrace, EachBuiltinScene) {
     for (const Model& scene : fitting(builtin_triangle_scenes(fitting(200'000)))) {
         const WarpTree host(build_bvh(scene.mesh(), {.builder = Builder::ploc}));
-        compare(scene.name, host, DeviceWarpTree(host), make_mixed_rays(scene, fitting(200'000), 9));
+        compare(scene.name, host, DeviceWarpTree(host),
+                make_mixed_rays(scene, fitting(200'000), 9));
     }
 }
 

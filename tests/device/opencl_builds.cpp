@@ -81,9 +81,9 @@ void compare(const std::string& what, const MeshView& mesh, bool all_fits) {
         EXPECT_EQ(kd_hash(kd.download()), kd_hash(build_kdtree(mesh, kd_options)));
         const OctreeOptions octree_options{.bits = bits};
         const Octree expected = build_octree(mesh, octree_options);
-        DeviceOctree octree(input.kind(), input.count(), octree_options,
-                            std::max<std::uint32_t>(1, static_cast<std::uint32_t>(
-                                                           expected.nodes().size())));
+        DeviceOctree octree(
+            input.kind(), input.count(), octree_options,
+            std::max<std::uint32_t>(1, static_cast<std::uint32_t>(expected.nodes().size())));
         octree.build(input.mesh);
         EXPECT_EQ(tree_hash(octree.download()), tree_hash(expected));
     }
@@ -253,8 +253,8 @@ public:
         const cl_queue_properties list[] = {CL_QUEUE_PROPERTIES, properties, 0};
         cl_int status = CL_SUCCESS;
         queue_ = opencl_api().CreateCommandQueueWithProperties(
-            static_cast<cl_context>(opencl_context()), static_cast<cl_device_id>(opencl_device_id()),
-            list, &status);
+            static_cast<cl_context>(opencl_context()),
+            static_cast<cl_device_id>(opencl_device_id()), list, &status);
         opencl_try(status, "clCreateCommandQueueWithProperties");
     }
     Queue(const Queue&) = delete;

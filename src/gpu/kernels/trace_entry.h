@@ -45,10 +45,10 @@ __device__ void trace(const TraceArguments& given) {
 }  // namespace entry
 }  // namespace raydix
 
-#define RAYDIX_TRACE(name, ...)                                          \
-    RAYDIX_KERNEL trace_##name##_closest(TraceArguments given) {         \
-        entry::trace<__VA_ARGS__, false>(given);                         \
-    }                                                                    \
-    RAYDIX_KERNEL trace_##name##_any(TraceArguments given) {             \
-        entry::trace<__VA_ARGS__, true>(given);                          \
+#define RAYDIX_TRACE(name, ...)                                  \
+    RAYDIX_KERNEL trace_##name##_closest(TraceArguments given) { \
+        entry::trace<__VA_ARGS__, false>(given);                 \
+    }                                                            \
+    RAYDIX_KERNEL trace_##name##_any(TraceArguments given) {     \
+        entry::trace<__VA_ARGS__, true>(given);                  \
     }

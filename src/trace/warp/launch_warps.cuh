@@ -65,8 +65,8 @@ void with_global_function(const WarpLaunch& launch, std::int32_t* stacks, const 
             const std::size_t bytes = warps_per_block * launch.stack_entries * sizeof(PacketEntry);
             visit(kernels::trace_packets<Kernel, any_hit>, bytes, launch.stack_entries);
         } else if constexpr (Kernel::rays_per_lane == 2) {
-            visit(kernels::trace_queues<Kernel, any_hit>,
-                  warps_per_block * sizeof(SpareRays), launch.stack_entries, stacks);
+            visit(kernels::trace_queues<Kernel, any_hit>, warps_per_block * sizeof(SpareRays),
+                  launch.stack_entries, stacks);
         } else if (launch.stack_entries <= small_stack_entries) {
             visit(kernels::trace_rays<Kernel, any_hit, small_stack_entries>, std::size_t{0});
         } else {
