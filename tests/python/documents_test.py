@@ -10,8 +10,10 @@ import sys
 import pytest
 
 import raydix
+import raydix.open3d
 import raydix.scipy
 import raydix.trimesh
+from raydix.embree import mesh_construction, rtcore_scene
 
 DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs" / "python"
 
@@ -73,7 +75,8 @@ def test_the_reference_is_built_without_a_warning(tmp_path):
 
 
 def public_things():
-    for module in (raydix, raydix.scipy, raydix.trimesh):
+    stand_ins = (raydix.scipy, raydix.trimesh, raydix.open3d, rtcore_scene, mesh_construction)
+    for module in (raydix, *stand_ins):
         for name, thing in vars(module).items():
             if (
                 name.startswith("_")
