@@ -1,7 +1,6 @@
 // Test programs may have more threads at work than the machine has cores: where threads meet, more
 // of them meet in more ways. Without this, `threads` past the cores would count as the cores.
-#if !defined(__SANITIZE_THREAD__) && \
-    __has_include(<tbb/global_control.h>)  // else see src/exec/parallel_std.cpp
+#if !defined(__SANITIZE_THREAD__) && !defined(RAYDIX_NO_TBB)  // else see parallel_std.cpp
 
 #include <tbb/global_control.h>
 #include <tbb/info.h>

@@ -70,7 +70,6 @@ void with_job_limit(int threads, const std::function<void()>& body) {
 bool pool_is_used() { return used.load(std::memory_order_acquire); }
 
 int pool_threads() {
-    if (inside_job) return 1;
     const int workers = pool().workers();
     return jobs_at_once(workers, workers);
 }

@@ -104,7 +104,15 @@ void PointForest<T, Dim>::begin() {
         part.nodes = std::move(arrays_.nodes);
         part.tree = arrays_.tree;
         part.bounds = arrays_.bounds;
-        make_room(part.tree.leaf_count, part.tree.node_count);
+        try {
+            make_room(part.tree.leaf_count, part.tree.node_count);
+        } catch (...) {  // no memory: as it was
+            arrays_.leaves = std::move(part.leaves);
+            arrays_.nodes = std::move(part.nodes);
+            arrays_.tree = part.tree;
+            state_ = {};
+            throw;
+        }
         const PointLevel level{0,
                                part.tree.leaf_count,
                                first_node,
@@ -211,8 +219,11 @@ void PointForest<T, Dim>::make_room(std::size_t leaves, std::size_t nodes) {
         used_leaves = last.first_leaf + last.leaves;
         used_nodes = last.first_node + last.nodes;
     }
+    // The view follows at once: if there is no memory for what comes next, queries go on.
     grow(arrays_.leaves, used_leaves, leaves);
+    arrays_.tree.leaves = arrays_.leaves.data();
     grow(arrays_.nodes, used_nodes, nodes);
+    arrays_.tree.nodes = arrays_.nodes.data();
     if (leaves > state_.parent_of_leaf.size()) state_.parent_of_leaf.resize(arrays_.leaves.size());
     if (nodes > state_.parent_of_node.size()) state_.parent_of_node.resize(arrays_.nodes.size());
     if (first) {

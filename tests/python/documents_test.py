@@ -12,8 +12,10 @@ import sys
 import pytest
 
 import raydix
+import raydix.open3d
 import raydix.scipy
 import raydix.trimesh
+from raydix.embree import mesh_construction, rtcore_scene
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -69,7 +71,8 @@ def test_the_site_builds_without_a_warning():
 
 
 def public_things():
-    for module in (raydix, raydix.scipy, raydix.trimesh):
+    stand_ins = (raydix.scipy, raydix.trimesh, raydix.open3d, rtcore_scene, mesh_construction)
+    for module in (raydix, *stand_ins):
         for name, thing in vars(module).items():
             if (
                 name.startswith("_")
