@@ -42,7 +42,7 @@ MpiFigures predict(const std::vector<MpiFigures>& counted, int ranks) {
             x.push_back(std::log2(double(one.ranks)));
             y.push_back(value_of(one));
         }
-        return line_at(x, y, at);
+        return std::max(line_at(x, y, at), 0.0);
     };
     MpiFigures predicted;
     predicted.ranks = ranks;

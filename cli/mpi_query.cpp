@@ -2,8 +2,10 @@
 #include <fmt/format.h>
 #include <raydix/arrays.h>
 #include <raydix/points.h>
+#include <raydix/rays.h>
 #include <raydix/solid.h>
 
+#include <algorithm>
 #include <cstring>
 #include <memory>
 #include <optional>
@@ -16,7 +18,7 @@ namespace raydix::cli {
 namespace {
 
 struct MpiQueryCommand : MpiOptions {
-    std::string queries_file;
+    std::string queries_file, prefix;
     std::optional<std::uint32_t> k;
     std::optional<float> radius;
     bool closest = false, contains = false;
@@ -30,16 +32,66 @@ std::vector<Vec3> queries_of(const MpiQueryCommand& options, const Model& model)
     return queries;
 }
 
+using Closest = mpi::DistributedScene::Closest;
+
+/// The rows of all queries, on rank 0.
+struct WholeRows {
+    std::vector<std::uint64_t> offsets;  // of rows of any length
+    std::vector<std::uint64_t> indices;
+    std::vector<float> distances;
+};
+
+/// Collective. Offsets of all rows from those of each rank.
+std::vector<std::uint64_t> gather_offsets(std::span<const std::uint64_t> part) {
+    std::vector<std::uint64_t> lengths;
+    for (std::size_t i = 0; i + 1 < part.size(); ++i) lengths.push_back(part[i + 1] - part[i]);
+    std::vector<std::uint64_t> offsets{0};
+    for (const std::uint64_t length : gather(std::span<const std::uint64_t>(lengths)))
+        offsets.push_back(offsets.back() + length);
+    return offsets;
+}
+
 /// Numbers that count through the ranks against those of one index.
-bool same_rows(const std::vector<std::uint64_t>& indices, const std::vector<float>& distances,
-               std::span<const std::uint32_t> expected, std::span<const float> expected_distances) {
-    if (indices.size() != expected.size() || distances.size() != expected_distances.size())
-        return false;
-    for (std::size_t i = 0; i < expected.size(); ++i)
-        if (indices[i] != (expected[i] == no_primitive ? mpi::no_global : expected[i]))
+template <class Expected>
+bool same_rows(const WholeRows& rows, const Expected& expected) {
+    const auto& distances = expected.distances;
+    if (rows.indices.size() != expected.indices.size()) return false;
+    for (std::size_t i = 0; i < rows.indices.size(); ++i) {
+        const std::uint32_t index = expected.indices[i];
+        if (rows.indices[i] != (index == no_primitive ? mpi::no_global : index)) return false;
+    }
+    if constexpr (requires { expected.offsets; })
+        if (!std::equal(rows.offsets.begin(), rows.offsets.end(), expected.offsets.data(),
+                        expected.offsets.data() + expected.offsets.size()))
             return false;
-    return distances.empty() || std::memcmp(distances.data(), expected_distances.data(),
-                                            distances.size() * sizeof(float)) == 0;
+    return rows.distances.size() == distances.size() &&
+           (distances.empty() || std::memcmp(rows.distances.data(), distances.data(),
+                                             distances.size() * sizeof(float)) == 0);
+}
+
+bool same_points(const std::vector<Closest>& found,
+                 const std::vector<SceneClosestPoint>& expected) {
+    if (found.size() != expected.size()) return false;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        const std::uint64_t prim = expected[i].found() ? expected[i].prim : mpi::no_global;
+        if (found[i].prim != prim ||
+            std::memcmp(&found[i].position, &expected[i].position, sizeof(Vec3)) != 0)
+            return false;
+    }
+    return true;
+}
+
+void save_closest(const std::vector<Closest>& found, const std::string& prefix) {
+    std::vector<std::uint64_t> prims;
+    std::vector<float> distances, points;
+    for (const Closest& one : found) {
+        prims.push_back(one.prim);
+        distances.push_back(one.distance);
+        points.insert(points.end(), {one.position.x, one.position.y, one.position.z});
+    }
+    save_array(prefix + ".indices.npy", prims);
+    save_array(prefix + ".distances.npy", distances);
+    save_array(prefix + ".points.npy", points, 3);
 }
 
 class QueryRun {
@@ -75,33 +127,34 @@ private:
         if (options_.k) {
             const auto rows = points.knn(mine_, *options_.k);
             take(rows.counts.found, rows.report);
-            verify_points(rows, [&](const Points& alone, auto&& same) {
-                const auto expected = knn(alone, queries_, *options_.k);
-                return same(expected);
-            });
+            finish_rows(rows, {},
+                        [&](const Points& alone) { return knn(alone, queries_, *options_.k); });
         } else {
             const auto rows = points.radius(mine_, *options_.radius);
             take(rows.counts.found, rows.report);
-            verify_points(rows, [&](const Points& alone, auto&& same) {
-                const auto expected = radius_search(alone, queries_, *options_.radius);
-                return same(expected);
+            finish_rows(rows, rows.offsets.view(), [&](const Points& alone) {
+                return radius_search(alone, queries_, *options_.radius);
             });
         }
     }
 
+    /// offsets: of rows of any length.
     template <class Rows, class Alone>
-    void verify_points(const Rows& rows, const Alone& alone) {
-        if (!options_.verify) return;
-        const auto indices = gather(rows.indices.view());
-        const auto distances = gather(rows.distances.view());
+    void finish_rows(const Rows& part, std::span<const std::uint64_t> offsets, const Alone& alone) {
+        if (!wants_whole()) return;
+        WholeRows rows;
+        if (!offsets.empty()) rows.offsets = gather_offsets(offsets);
+        rows.indices = gather(part.indices.view());
+        rows.distances = gather(part.distances.view());
         on_first([&] {
-            const Points index = build_points(model_.whole.mesh().vertices);
-            require_verified(alone(index,
-                                   [&](const auto& expected) {
-                                       return same_rows(indices, distances, expected.indices.view(),
-                                                        expected.distances.view());
-                                   }),
-                             "rows", options_.common.prints_tables());
+            if (options_.verify)
+                require_verified(same_rows(rows, alone(build_points(model_.whole.mesh().vertices))),
+                                 "rows", options_.common.prints_tables());
+            if (options_.prefix.empty()) return;
+            const std::size_t columns = options_.k.value_or(0);
+            if (!offsets.empty()) save_array(options_.prefix + ".offsets.npy", rows.offsets);
+            save_array(options_.prefix + ".indices.npy", rows.indices, columns);
+            save_array(options_.prefix + ".distances.npy", rows.distances, columns);
         });
     }
 
@@ -113,41 +166,44 @@ private:
         if (options_.closest) {
             const auto answers = scene.closest_points(mine_);
             take(answers.counts.found, answers.report);
-            verify_closest(answers.values);
+            finish_closest(answers.values);
         } else {
             const auto answers = scene.contains(mine_);
             take(answers.counts.found, answers.report);
-            verify_inside(answers.values);
+            finish_inside(answers.values);
         }
     }
 
-    void verify_closest(const std::vector<mpi::DistributedScene::Closest>& part) {
-        if (!options_.verify) return;
+    void finish_closest(const std::vector<Closest>& part) {
+        if (!wants_whole()) return;
         const auto found = gather(std::span(part));
         on_first([&] {
-            const Scene alone(model_.whole.mesh());
-            const auto expected = closest_points(alone, queries_);
-            bool same = expected.size() == found.size();
-            for (std::size_t i = 0; same && i < found.size(); ++i)
-                same = std::memcmp(&found[i].position, &expected[i].position, sizeof(Vec3)) == 0 &&
-                       found[i].prim == (expected[i].found() ? expected[i].prim : mpi::no_global);
-            require_verified(same, "points", options_.common.prints_tables());
+            if (options_.verify)
+                require_verified(
+                    same_points(found, closest_points(Scene(model_.whole.mesh()), queries_)),
+                    "points", options_.common.prints_tables());
+            if (!options_.prefix.empty()) save_closest(found, options_.prefix);
         });
     }
 
-    void verify_inside(const std::vector<std::uint8_t>& part) {
-        if (!options_.verify) return;
+    void finish_inside(const std::vector<std::uint8_t>& part) {
+        if (!wants_whole()) return;
         const auto inside = gather(std::span(part));
         on_first([&] {
-            SolidOptions parity;
-            parity.rule = InsideRule::parity;
-            const Bvh tree = build_bvh(model_.whole.mesh());
-            const Solid solid(tree, parity);
-            std::vector<std::uint8_t> expected(queries_.size());
-            contains(solid, queries_, std::span(expected));
-            require_verified(expected == inside, "answers", options_.common.prints_tables());
+            if (options_.verify) {
+                SolidOptions parity;
+                parity.rule = InsideRule::parity;
+                const Bvh tree = build_bvh(model_.whole.mesh());
+                const Solid solid(tree, parity);
+                std::vector<std::uint8_t> expected(queries_.size());
+                contains(solid, queries_, std::span(expected));
+                require_verified(expected == inside, "answers", options_.common.prints_tables());
+            }
+            if (!options_.prefix.empty()) save_occluded(options_.prefix + ".inside.npy", inside);
         });
     }
+
+    [[nodiscard]] bool wants_whole() const { return options_.verify || !options_.prefix.empty(); }
 
     void take(std::uint64_t found, const mpi::CallReport& report) {
         std::uint64_t sums[2] = {mine_.size(), found};
@@ -172,6 +228,8 @@ void add_mpi_query(CLI::App& app) {
     add_mpi_options(*command, *options);
     command->add_option("--queries", options->queries_file,
                         "(Q, 3) .npy file; without it the scene's own vertices");
+    command->add_option("--out", options->prefix,
+                        "Rank 0 writes PREFIX.indices.npy and others, numbers in 64 bits");
     CLI::Option_group* kind = command->add_option_group("Kind");
     kind->add_option("--knn", options->k, "The K nearest vertices")->check(CLI::PositiveNumber);
     kind->add_option("--radius", options->radius, "All vertices within R");

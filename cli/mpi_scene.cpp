@@ -1,5 +1,6 @@
 // raydix mpi info and trace.
 #include <fmt/format.h>
+#include <raydix/arrays.h>
 #include <raydix/rays.h>
 
 #include <cstring>
@@ -24,7 +25,6 @@ void print_holding(const Json& holding, const char* elements) {
 void run_info(const MpiOptions& options) {
     const SpreadModel model = spread_model(options);
     Json document = mpi_document("mpi info", options);
-    if (model.whole.name.empty() && mpi_rank() == 0) document["scene"] = options.scene;
     std::uint64_t triangles = model.part.triangles.size();
     MPI_Allreduce(MPI_IN_PLACE, &triangles, 1, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
     if (triangles == 0) {
@@ -46,7 +46,7 @@ void run_info(const MpiOptions& options) {
 struct TraceCommand : MpiOptions {
     std::string rays_file, size_text = "512x384";
     std::size_t camera = 0;
-    std::string mode = "closest";
+    std::string mode = "closest", prefix;
 };
 
 std::vector<Ray> rays_of(const TraceCommand& options, const Model& model) {
@@ -73,20 +73,41 @@ bool same_hits(const Hits& hits, const Expected& expected) {
     return true;
 }
 
-/// The answers of all ranks on rank 0, and what one process says.
+void save_answers(const std::vector<mpi::DistributedHit>& hits, const std::string& prefix) {
+    std::vector<std::uint64_t> prims;
+    std::vector<float> t, uv;
+    for (const mpi::DistributedHit& hit : hits) {
+        prims.push_back(hit.prim);
+        t.push_back(hit.t);
+        uv.insert(uv.end(), {hit.u, hit.v});
+    }
+    save_array(prefix + ".prims.npy", prims);
+    save_array(prefix + ".t.npy", t);
+    save_array(prefix + ".uv.npy", uv, 2);
+}
+void save_answers(const std::vector<std::uint8_t>& occluded, const std::string& prefix) {
+    save_occluded(prefix + ".occluded.npy", occluded);
+}
+
+/// The answers of all ranks on rank 0: compared with those of one process, and written.
 template <class Gathered, class Alone>
-void verify(const TraceCommand& options, const SpreadModel& model, const std::vector<Ray>& rays,
+void finish(const TraceCommand& options, const SpreadModel& model, const std::vector<Ray>& rays,
             const Gathered& gathered, const Alone& is_same) {
-    if (!options.verify) return;
-    const auto hits = gathered();
+    if (!options.verify && options.prefix.empty()) return;
+    const auto answers = gathered();
     on_first([&] {
-        const Scene alone(model.whole.mesh());
-        require_verified(is_same(alone, std::span(rays), hits), "hits",
-                         options.common.prints_tables());
+        if (options.verify) {
+            const Scene alone(model.whole.mesh());
+            require_verified(is_same(alone, std::span(rays), answers), "hits",
+                             options.common.prints_tables());
+        }
+        if (!options.prefix.empty()) save_answers(answers, options.prefix);
     });
 }
 
 void run_trace(const TraceCommand& options) {
+    if (options.mode == "all" && !options.prefix.empty())
+        throw CLI::ValidationError("--out", "writes one hit a ray; not with --mode all");
     const SpreadModel model = spread_model(options);
     std::vector<Ray> rays;
     on_first([&] { rays = rays_of(options, model.whole); });
@@ -104,7 +125,7 @@ void run_trace(const TraceCommand& options) {
     if (options.mode == "closest") {
         const auto answers = scene.trace(mine);
         take(answers);
-        verify(
+        finish(
             options, model, rays,
             [&] { return gather(std::span<const mpi::DistributedHit>(answers.values)); },
             [](const Scene& alone, std::span<const Ray> all, const auto& hits) {
@@ -113,7 +134,7 @@ void run_trace(const TraceCommand& options) {
     } else if (options.mode == "any") {
         const auto answers = scene.trace_any(mine);
         take(answers);
-        verify(
+        finish(
             options, model, rays,
             [&] { return gather(std::span<const std::uint8_t>(answers.values)); },
             [](const Scene& alone, std::span<const Ray> all, const auto& occluded) {
@@ -124,7 +145,7 @@ void run_trace(const TraceCommand& options) {
     } else {
         const auto rows = scene.trace_all(mine);
         take(rows);
-        verify(
+        finish(
             options, model, rays, [&] { return gather(rows.hits.view()); },
             [](const Scene& alone, std::span<const Ray> all, const auto& hits) {
                 return same_hits(hits, trace_all(alone, all).hits);
@@ -165,6 +186,9 @@ void add_mpi_trace(CLI::App& app) {
     command->add_option("--mode", options->mode, "Which hits")
         ->check(CLI::IsMember({"closest", "any", "all"}))
         ->capture_default_str();
+    command->add_option(
+        "--out", options->prefix,
+        "Rank 0 writes PREFIX.prims.npy (64 bits), .t.npy, .uv.npy; or .occluded.npy");
     command->callback([options] { run_trace(*options); });
 }
 

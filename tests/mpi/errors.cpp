@@ -147,6 +147,21 @@ TEST(ErrorsOverRanks, SmallMessagesAndRoundsChangeNoAnswer) {
     EXPECT_TRUE(same_bits(c.distances, d.distances));
 }
 
+TEST(ErrorsOverRanks, AnswersThatFillARoundAreGivenInSeveral) {
+    // The questions of a rank fit into a round, their answers do not.
+    const auto points = some_points(40), queries = some_points(1300);
+    const DistributedPoints large(MPI_COMM_WORLD, points);
+    Options options;
+    options.exchange_bytes = 16384 * std::uint64_t(ranks());
+    const DistributedPoints small(MPI_COMM_WORLD, points, options);
+    const auto a = large.radius(queries, 0.5f), b = small.radius(queries, 0.5f);
+    EXPECT_TRUE(same_bits(a.offsets, b.offsets));
+    EXPECT_TRUE(same_bits(a.indices, b.indices));
+    EXPECT_TRUE(same_bits(a.distances, b.distances));
+    EXPECT_EQ(a.report.rounds, 1u);
+    EXPECT_GT(b.report.rounds, 1u);
+}
+
 TEST(CurveOverRanks, RanksHoldEquallyManyAndQueriesReachFew) {
     const auto points = some_points(4000);  // the same on all ranks: each is there `ranks` times
     const DistributedPoints made(MPI_COMM_WORLD, points);
