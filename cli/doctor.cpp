@@ -3,13 +3,14 @@
 #include <raydix/device.h>
 #include <raydix/machine.h>
 
-#include <algorithm>
+#include <array>
 #include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "options.h"
+#include "other_program.h"
 #include "output.h"
 
 namespace raydix::cli {
@@ -63,6 +64,15 @@ std::vector<Finding> examine() {
                  ? "none"
                  : device.name + (device.driver.empty() ? "" : ", driver " + device.driver),
              meaning_of(device)});
+    for (const auto& [what, program, use] :
+         {std::array{"MPI", "raydix_mpi", "mpirun -n N raydix mpi"},
+          std::array{"Embree", "bench_cpu", "raydix bench cpu and bench scene"},
+          std::array{"nanoflann", "bench_points", "raydix bench points"}}) {
+        const bool there = !program_beside(program).empty();
+        all.push_back({what, there ? "built in" : "none",
+                       there ? std::string(use) + " can be used"
+                             : std::string(use) + " cannot: " + program + " was not built"});
+    }
     return all;
 }
 

@@ -5,18 +5,24 @@
 
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
+#include <system_error>
 #include <vector>
 
 namespace raydix::cli {
+
+std::filesystem::path program_beside(const std::string& name) {
+    std::error_code error;
+    const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+    const std::filesystem::path program = self.parent_path() / name;
+    return error || !std::filesystem::exists(program) ? std::filesystem::path() : program;
+}
+
 namespace {
 
 /// Returns only by an exception.
 void become(const OtherProgram& other, std::vector<std::string> arguments) {
-    std::error_code error;
-    const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-    std::string program = (self.parent_path() / other.program).string();
-    if (error || !std::filesystem::exists(program))
+    std::string program = program_beside(other.program).string();
+    if (program.empty())
         throw BackendUnavailable(other.command + ": the program " + other.program +
                                  " is not beside raydix; it is built " + other.built_if);
     std::vector<char*> pointers{program.data()};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <string>
 
 namespace raydix::cli {
@@ -12,6 +13,9 @@ struct OtherProgram {
     std::string program;   // the file's name
     std::string built_if;  // ends the message where it is not there
 };
+
+/// Where the program of this name is, beside this one. Empty: it was not built.
+[[nodiscard]] std::filesystem::path program_beside(const std::string& name);
 
 /// Adds the command `name`, which becomes the other program; all options are its own.
 void add_other_program(CLI::App& parent, const std::string& name, const std::string& what,
