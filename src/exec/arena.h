@@ -30,7 +30,7 @@ public:
 
 private:
     std::byte* memory_ = nullptr;
-    std::size_t capacity_ = 0;
+    [[maybe_unused]] std::size_t capacity_ = 0;  // of checks
     std::size_t bytes_ = 0;
 };
 

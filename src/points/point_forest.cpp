@@ -380,13 +380,14 @@ std::uint32_t PointIndex<T, Dim>::remove(std::span<const std::uint32_t> ids) {
     return removed;
 }
 
-#define RAYDIX_POINT_FOREST(Index)                                                \
-    template std::uint32_t Index::insert(std::span<const typename Index::Point>); \
-    template std::uint32_t Index::remove(std::span<const std::uint32_t>);
-RAYDIX_POINT_FOREST(Points)
-RAYDIX_POINT_FOREST(Points2)
-RAYDIX_POINT_FOREST(PointsD)
-RAYDIX_POINT_FOREST(Points2D)
+#define RAYDIX_POINT_FOREST(T, Dim)                                \
+    template std::uint32_t PointIndex<T, Dim>::insert(             \
+        std::span<const typename detail::PointOf<T, Dim>::Point>); \
+    template std::uint32_t PointIndex<T, Dim>::remove(std::span<const std::uint32_t>);
+RAYDIX_POINT_FOREST(float, 3)
+RAYDIX_POINT_FOREST(float, 2)
+RAYDIX_POINT_FOREST(double, 3)
+RAYDIX_POINT_FOREST(double, 2)
 #undef RAYDIX_POINT_FOREST
 
 }  // namespace raydix
