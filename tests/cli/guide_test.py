@@ -17,6 +17,7 @@ class Guides(ProgramTest):
                               env={**os.environ, "PATH": path}, capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertIn("blocks of sh", done.stdout)
+        ProgramTest.runs += done.stdout.count("blocks")
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ class WarpTrace(ProgramTest):
             self.fail_with_usage("trace", SOUP, "--device", device, "--kernel", "scalar", names=["--kernel", *KERNELS])
             self.fail_with_usage("trace", SOUP, "--device", device, "--mode", "all", names=["--mode"])
         for kernel in KERNELS:
-            self.fail_with_usage("trace", SOUP, "--kernel", kernel, names=["--kernel", "cpu", "scalar", "cuda"])
+            self.fail_with_usage("trace", SOUP, "--kernel", kernel, names=["--kernel", "cpu", "scalar", "the others", "while_while"])
         self.fail_with_usage("trace", SOUP, "--device", "sim", "--tree", "kdtree", names=["--tree"])
         for command in ("build", "check", "render"):
             more = ["-o", "x.png"] if command == "render" else []
