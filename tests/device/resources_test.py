@@ -30,7 +30,7 @@ EXPECTED = {"kernels.cu": dict.fromkeys(PLAIN, 255), "device_build_cuda.cu": BUI
 # Traversal: 40 registers leave room for 1536 threads, which the h200 of src/simt/machine_models.cpp has in flight.
 KERNELS = {"trace_rays": 40, "trace_packets": 48, "trace_queues": 72}
 EXPECTED |= {"launch_warps_closest.cu": KERNELS, "launch_warps_any.cu": KERNELS,
-             "device_trace_cuda.cu": {"PrepareRay": 32, "RescaleHit": 32, "MissAll": 32, "EmitWoopTriangle": 48, "ClearUnusedValues": 32,
+             "device_trace_cuda.cu": {"StartPool": 32, "PrepareRay": 32, "RescaleHit": 32, "MissAll": 32, "EmitWoopTriangle": 48, "ClearUnusedValues": 32,
                                    "SaveLastValue": 32, "AddLastValue": 32, "SetWord": 32}}
 # The traversal stack itself, of the larger size: an array that the kernel indexes. Exactly that, so that a spill shows.
 STACK_BYTES = {"trace_rays": 4 * 128, "cwbvh_rays": 8 * 128, "persistent_cwbvh_rays": 8 * 128}
