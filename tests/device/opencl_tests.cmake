@@ -17,6 +17,6 @@ foreach(test opencl:device_opencl opencl_trace:device_gpu_trace)
     list(GET test 0 name)
     list(GET test 1 program)
     add_test(NAME device.${name} COMMAND ${program})
-    set_tests_properties(device.${name} PROPERTIES LABELS device TIMEOUT 900 SKIP_REGULAR_EXPRESSION "SKIPPED TEST"
+    set_tests_properties(device.${name} PROPERTIES LABELS device TIMEOUT 900 SKIP_REGULAR_EXPRESSION "PASSED  . 0 tests"
         ENVIRONMENT "${raydix_opencl_environment}")
 endforeach()
