@@ -1,6 +1,7 @@
 // Rays at a sphere of triangles, from Rust through the C interface. Each distance is compared with
 // that to a perfect sphere.
-use std::ffi::{c_char, c_int, CStr};
+use std::ffi::CStr;
+use std::os::raw::{c_char, c_int}; // in std::ffi since Rust 1.64
 use std::ptr;
 
 #[repr(C)]
