@@ -20,6 +20,7 @@
 #include "base/probe.h"
 #include "exec/cuda_error.cuh"
 #include "exec/host_launcher.h"
+#include "exec/launch_sizer.h"
 #include "exec/warp.h"
 
 namespace raydix {
@@ -125,17 +126,8 @@ std::size_t cub_sort_bytes(std::uint32_t limit, int key_bits) {
     return bytes;
 }
 
-/// Goes through a pipeline's launches for the largest piece of memory that one of them needs.
-class CudaSizer {
+class CudaSizer : public LaunchSizer {
 public:
-    using Probe = NoProbe;
-
-    template <class Work>
-    void launch(const char*, std::uint32_t, const Work&) {}
-    template <class Work>
-    void launch_counted(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
-    template <class Work>
-    void launch_warps(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
     void exclusive_scan(const char*, std::uint32_t*, std::uint32_t n, std::uint32_t*) {
         if (n != 0) grow(cub_scan_bytes(n));
     }
@@ -151,13 +143,6 @@ public:
                     int key_bits) {
         if (limit != 0) grow(cub_sort_bytes<Key>(limit, key_bits));
     }
-    [[nodiscard]] bool maybe_any(const std::uint32_t*) const { return true; }
-
-    [[nodiscard]] std::size_t bytes() const { return bytes_; }
-
-private:
-    void grow(std::size_t bytes) { bytes_ = std::max(bytes_, bytes); }
-    std::size_t bytes_ = 0;
 };
 
 class CudaLauncher {

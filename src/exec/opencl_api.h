@@ -14,10 +14,9 @@ namespace raydix {
 // clang-format off
 #define RAYDIX_OPENCL_CALLS(X)                                                                     \
     X(GetPlatformIDs) X(GetPlatformInfo) X(GetDeviceIDs) X(GetDeviceInfo) X(CreateContext)         \
-    X(CreateCommandQueueWithProperties) X(RetainCommandQueue) X(ReleaseCommandQueue)               \
-    X(GetCommandQueueInfo) X(CreateProgramWithIL) X(BuildProgram) X(GetProgramBuildInfo)           \
-    X(CreateKernel) X(SetKernelArg) X(SetKernelExecInfo) X(EnqueueNDRangeKernel) X(Finish) X(Flush)\
-    X(GetExtensionFunctionAddressForPlatform)
+    X(CreateCommandQueueWithProperties) X(ReleaseCommandQueue) X(GetCommandQueueInfo)              \
+    X(CreateProgramWithIL) X(BuildProgram) X(GetProgramBuildInfo) X(CreateKernel) X(SetKernelArg)  \
+    X(SetKernelExecInfo) X(EnqueueNDRangeKernel) X(Finish) X(GetExtensionFunctionAddressForPlatform)
 // clang-format on
 
 struct OpenclApi {

@@ -6,7 +6,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <memory>
 
 #include "exec/arithmetic_check.h"
 #include "exec/kernel_arguments.h"
@@ -164,13 +163,10 @@ cl_command_queue OpenclDevice::queue(void* given) {
 void* OpenclDevice::allocate(std::size_t bytes) {
     cl_int status = CL_SUCCESS;
     constexpr std::size_t line = 256;
-    void* memory =
-        allocate_(context_, device_, nullptr, (bytes + line - 1) / line * line, line, &status);
-    if (status == CL_INVALID_VALUE || memory == nullptr) {  // an alignment it does not have
-        status = CL_SUCCESS;
-        memory =
-            allocate_(context_, device_, nullptr, (bytes + line - 1) / line * line, 0, &status);
-    }
+    const std::size_t lines = (bytes + line - 1) / line * line;
+    void* memory = allocate_(context_, device_, nullptr, lines, line, &status);
+    if (memory == nullptr)  // perhaps an alignment that it does not take
+        memory = allocate_(context_, device_, nullptr, lines, 0, &status);
     opencl_try(status, "clDeviceMemAllocINTEL", std::to_string(bytes) + " bytes");
     if (reinterpret_cast<std::uintptr_t>(memory) % line != 0) {
         free(memory);
@@ -238,11 +234,6 @@ cl_kernel OpenclDevice::kernel(const KernelName& name) {
     return kernels_.emplace(name.kernel, kernel).first->second;
 }
 
-void OpenclDevice::prepare(const char* module) {
-    const std::lock_guard lock(lock_);
-    static_cast<void>(program(module));
-}
-
 void OpenclDevice::launch(cl_command_queue queue, const KernelName& name, std::size_t groups,
                           std::size_t threads, const void* argument, std::size_t bytes) {
     const OpenclApi& cl = opencl_api();
@@ -277,18 +268,12 @@ void OpenclDevice::check_arithmetic() {
     if (!wrong.empty()) throw BackendUnavailable("device opencl: " + traits_.name + " " + wrong);
 }
 
-OpenclDevice& opencl_device(std::uint32_t index) {
-    static std::mutex lock;
-    static std::map<std::uint32_t, std::unique_ptr<OpenclDevice>> open;
-    const std::lock_guard guard(lock);
-    std::unique_ptr<OpenclDevice>& device = open[index];
-    if (device != nullptr) return *device;
+std::unique_ptr<OpenclDevice> open_opencl_device(std::uint32_t index) {
     const std::vector<OpenclFound> found = find_opencl_devices();
     if (index >= found.size())
         throw BackendUnavailable("device opencl:" + std::to_string(index) + ": there are " +
                                  std::to_string(found.size()) + " OpenCL devices");
-    device = std::make_unique<OpenclDevice>(found[index]);
-    return *device;
+    return std::make_unique<OpenclDevice>(found[index]);
 }
 
 }  // namespace raydix

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <string_view>
@@ -71,8 +72,6 @@ public:
     /// program of its module is built when the first of its kernels is asked for.
     void launch(cl_command_queue queue, const KernelName& kernel, std::size_t groups,
                 std::size_t threads, const void* argument, std::size_t bytes);
-    /// Builds a module's program now, if it is not built.
-    void prepare(const char* module);
 
 private:
     [[nodiscard]] cl_program program(const char* module);
@@ -94,8 +93,7 @@ private:
     std::map<std::string, cl_kernel, std::less<>> kernels_;
 };
 
-/// The device with this number, opened when it is first asked for and kept to the end. Throws
-/// BackendUnavailable: there are fewer, or what it lacks.
-[[nodiscard]] OpenclDevice& opencl_device(std::uint32_t index);
+/// Opens the device with this number. Throws BackendUnavailable: there are fewer, or what it lacks.
+[[nodiscard]] std::unique_ptr<OpenclDevice> open_opencl_device(std::uint32_t index);
 
 }  // namespace raydix

@@ -12,6 +12,7 @@
 #include "exec/arena.h"
 #include "exec/host_launcher.h"
 #include "exec/kernel_arguments.h"
+#include "exec/launch_sizer.h"
 #include "exec/opencl_device.h"
 #include "exec/warp_sort.h"
 
@@ -28,44 +29,31 @@ struct WarpsKernel;
 template <class Work>
 struct TilesKernel;
 
-/// Goes through a pipeline's launches for the largest piece of memory that one of them needs.
-class OpenclSizer {
+class OpenclSizer : public LaunchSizer {
 public:
-    using Probe = NoProbe;
-
-    template <class Work>
-    void launch(const char*, std::uint32_t, const Work&) {}
-    template <class Work>
-    void launch_counted(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
-    template <class Work>
-    void launch_warps(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
     void exclusive_scan(const char*, std::uint32_t*, std::uint32_t n, std::uint32_t*) {
-        grow<ScanScratch<std::uint32_t>>(n);
+        grow_for<ScanScratch<std::uint32_t>>(n);
     }
     void exclusive_scan_counted(const char*, std::uint32_t*, const std::uint32_t*,
                                 std::uint32_t limit) {
-        grow<ScanScratch<std::uint32_t>>(limit);
+        grow_for<ScanScratch<std::uint32_t>>(limit);
     }
     void exclusive_scan_wide(const char*, std::uint64_t*, std::uint32_t n) {
-        grow<ScanScratch<std::uint64_t>>(n);
+        grow_for<ScanScratch<std::uint64_t>>(n);
     }
     template <class Key>
     void sort_pairs(const char*, const SortArrays<Key>&, std::uint32_t limit, const std::uint32_t*,
                     int) {
-        grow<SortScratch>(limit);
+        grow_for<SortScratch>(limit);
     }
-    [[nodiscard]] bool maybe_any(const std::uint32_t*) const { return true; }
-
-    [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
 private:
     template <class Scratch>
-    void grow(std::uint32_t n) {
+    void grow_for(std::uint32_t n) {
         Arena arena;
         static_cast<void>(Scratch(arena, n));
-        bytes_ = std::max(bytes_, arena.bytes());
+        grow(arena.bytes());
     }
-    std::size_t bytes_ = 0;
 };
 
 class OpenclLauncher {

@@ -3,65 +3,46 @@
 
 #include <raydix/device.h>
 
+#include <deque>
 #include <string_view>
-#include <vector>
 
+#include "exec/cuda_event.cuh"
 #include "exec/cuda_launcher.cuh"
+#include "gpu/cuda_backend.h"
 #include "gpu/device_run.h"
 
 namespace raydix {
 
-struct CudaMachine;
+static_assert(CudaMachine::reserved_bytes == CudaLauncher::reserved_bytes);
+
+inline CudaLauncher CudaMachine::launcher(Stream stream, void* memory, std::size_t bytes) const {
+    return {static_cast<cudaStream_t>(stream), memory, bytes};
+}
 
 /// Events at the ends of the stages.
 class CudaStageTimes {
 public:
-    CudaStageTimes(const CudaMachine&, Stream stream) : stream_(static_cast<cudaStream_t>(stream)) {
-        (*this)("start");
-    }
-    CudaStageTimes(const CudaStageTimes&) = delete;
-    CudaStageTimes& operator=(const CudaStageTimes&) = delete;
-    ~CudaStageTimes() {
-        for (const Mark& mark : marks_) static_cast<void>(cudaEventDestroy(mark.event));
-    }
+    CudaStageTimes(const CudaMachine&, Stream stream) : stream_(stream) { (*this)("start"); }
     void operator()(const char* stage) {
-        Mark mark{stage, nullptr};
-        RAYDIX_CUDA_TRY(cudaEventCreate(&mark.event));
-        marks_.push_back(mark);
-        RAYDIX_CUDA_TRY(cudaEventRecord(mark.event, stream_));
+        marks_.emplace_back().stage = stage;
+        marks_.back().event.record(stream_);
     }
     /// Waits for the last stage.
     [[nodiscard]] BuildMs read() const {
-        RAYDIX_CUDA_TRY(cudaEventSynchronize(marks_.back().event));
         BuildMs ms;
+        ms.total = marks_.back().event.ms_since(marks_.front().event);
         for (std::size_t k = 1; k < marks_.size(); ++k)
-            stage_ms(ms, marks_[k].stage) += between(marks_[k - 1], marks_[k]);
-        ms.total = between(marks_.front(), marks_.back());
+            stage_ms(ms, marks_[k].stage) += marks_[k].event.ms_since(marks_[k - 1].event);
         return ms;
     }
 
 private:
     struct Mark {
         std::string_view stage;
-        cudaEvent_t event;
+        CudaEvent event;
     };
-    static double between(const Mark& from, const Mark& to) {
-        float ms = 0;
-        RAYDIX_CUDA_TRY(cudaEventElapsedTime(&ms, from.event, to.event));
-        return ms;
-    }
-    cudaStream_t stream_;
-    std::vector<Mark> marks_;
-};
-
-struct CudaMachine {
-    using Sizer = CudaSizer;
-    using StageTimes = CudaStageTimes;
-    static constexpr std::size_t reserved_bytes = CudaLauncher::reserved_bytes;
-
-    [[nodiscard]] CudaLauncher launcher(Stream stream, void* memory, std::size_t bytes) const {
-        return {static_cast<cudaStream_t>(stream), memory, bytes};
-    }
+    Stream stream_;
+    std::deque<Mark> marks_;
 };
 
 }  // namespace raydix

@@ -2,7 +2,7 @@
 #include <raydix/device_cwbvh.h>
 #include <raydix/error.h>
 
-#include "exec/cuda_error.cuh"
+#include "exec/cuda_event.cuh"
 #include "gpu/cuda_backend.h"
 #include "gpu/device_cwbvh.h"
 #include "trace/cwbvh_kernels.cuh"
@@ -85,24 +85,6 @@ void launch_rays(const Launch& launch, const Store& store) {
         launch_with_stack<any, device_cwbvh_max_depth>(launch, store);
 }
 
-class Event {
-public:
-    Event() { RAYDIX_CUDA_TRY(cudaEventCreate(&event_)); }
-    Event(const Event&) = delete;
-    Event& operator=(const Event&) = delete;
-    ~Event() { static_cast<void>(cudaEventDestroy(event_)); }
-    void record(cudaStream_t stream) const { RAYDIX_CUDA_TRY(cudaEventRecord(event_, stream)); }
-    [[nodiscard]] double ms_since(const Event& start) const {
-        float ms = 0;
-        RAYDIX_CUDA_TRY(cudaEventSynchronize(event_));
-        RAYDIX_CUDA_TRY(cudaEventElapsedTime(&ms, start.event_, event_));
-        return ms;
-    }
-
-private:
-    cudaEvent_t event_ = nullptr;
-};
-
 }  // namespace
 
 void CudaBackend::trace_cwbvh(const CwbvhCall& call) {
@@ -116,10 +98,10 @@ void CudaBackend::trace_cwbvh(const CwbvhCall& call) {
 
 double CudaBackend::time_cwbvh(const CwbvhCall& call) {
     static_cast<void>(name());
-    const Event start, stop;
-    start.record(static_cast<cudaStream_t>(call.stream));
+    CudaEvent start, stop;
+    start.record(call.stream);
     trace_cwbvh(call);
-    stop.record(static_cast<cudaStream_t>(call.stream));
+    stop.record(call.stream);
     return stop.ms_since(start);
 }
 

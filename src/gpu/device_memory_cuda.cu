@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "exec/cuda_error.cuh"
+#include "exec/cuda_event.cuh"
 #include "gpu/cuda_backend.h"
 
 namespace raydix {
@@ -31,21 +31,15 @@ void CudaBackend::synchronize(Stream stream) {
 
 double CudaBackend::measure_copy(std::size_t bytes, int repeat) {
     const DeviceBuffer<std::byte> from(bytes), to(bytes);
-    cudaEvent_t start = nullptr, stop = nullptr;
-    RAYDIX_CUDA_TRY(cudaEventCreate(&start));
-    RAYDIX_CUDA_TRY(cudaEventCreate(&stop));
+    CudaEvent start, stop;
     double best = 0;
     for (int turn = 0; turn <= repeat; ++turn) {
-        RAYDIX_CUDA_TRY(cudaEventRecord(start));
+        start.record(nullptr);
         RAYDIX_CUDA_TRY(cudaMemcpyAsync(to.data(), from.data(), bytes, cudaMemcpyDeviceToDevice));
-        RAYDIX_CUDA_TRY(cudaEventRecord(stop));
-        RAYDIX_CUDA_TRY(cudaEventSynchronize(stop));
-        float ms = 0;
-        RAYDIX_CUDA_TRY(cudaEventElapsedTime(&ms, start, stop));
+        stop.record(nullptr);
+        const double ms = stop.ms_since(start);
         if (turn > 0) best = std::max(best, 2.0 * static_cast<double>(bytes) / (1e-3 * ms));
     }
-    RAYDIX_CUDA_TRY(cudaEventDestroy(start));
-    RAYDIX_CUDA_TRY(cudaEventDestroy(stop));
     return best;
 }
 

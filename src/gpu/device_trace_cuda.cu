@@ -7,8 +7,8 @@
 #include <memory>
 #include <string>
 
-#include "exec/cuda_launcher.cuh"
-#include "gpu/cuda_backend.h"
+#include "exec/cuda_event.cuh"
+#include "gpu/cuda_machine.cuh"
 #include "gpu/device_trace.h"
 #include "layout/warp_tree.h"
 #include "layout/woop48.h"
@@ -25,18 +25,14 @@ void find_resident_blocks(DeviceWarpTree::Arrays& tree) {
                     resident_blocks(tree.launch(kernel, any_hit));
 }
 
-/// For a few launches of functors, none of which scans or sorts.
-CudaLauncher plain_launcher(Stream stream, std::byte* line) {
-    return {static_cast<cudaStream_t>(stream), line, CudaLauncher::reserved_bytes};
-}
-
 /// `mark(k)` is called before (0) and behind (1) the traversal kernel.
 template <class Mark>
 void trace_launches(const DeviceWarpTree& tree, std::span<const Ray> rays, std::span<TreeHit> hits,
                     const DeviceTraceOptions& options, std::span<std::byte> scratch, Stream stream,
                     const Mark& mark) {
     const WarpTraceCall call(tree, rays, hits, options, scratch);
-    CudaLauncher launcher = plain_launcher(stream, call.work().launcher);
+    CudaLauncher launcher(static_cast<cudaStream_t>(stream), call.work().launcher,
+                          CudaLauncher::reserved_bytes);
     call.launch(
         launcher,
         [&](const WarpLaunch& launch, const WarpJob& job, std::int32_t* stacks,
@@ -46,26 +42,6 @@ void trace_launches(const DeviceWarpTree& tree, std::span<const Ray> rays, std::
         },
         mark);
 }
-
-class Event {
-public:
-    Event() { RAYDIX_CUDA_TRY(cudaEventCreate(&event_)); }
-    Event(const Event&) = delete;
-    Event& operator=(const Event&) = delete;
-    ~Event() { static_cast<void>(cudaEventDestroy(event_)); }
-    void record(Stream stream) {
-        RAYDIX_CUDA_TRY(cudaEventRecord(event_, static_cast<cudaStream_t>(stream)));
-    }
-    [[nodiscard]] double ms_since(const Event& start) const {
-        RAYDIX_CUDA_TRY(cudaEventSynchronize(event_));
-        float ms = 0;
-        RAYDIX_CUDA_TRY(cudaEventElapsedTime(&ms, start.event_, event_));
-        return ms;
-    }
-
-private:
-    cudaEvent_t event_ = nullptr;
-};
 
 }  // namespace
 
@@ -80,7 +56,7 @@ std::unique_ptr<DeviceWarpTree::Arrays> CudaBackend::warp_tree(const WarpTree& t
 std::unique_ptr<DeviceWarpTree::Arrays> CudaBackend::warp_tree(const DeviceTree& tree,
                                                                Stream stream) {
     static_cast<void>(name());
-    CudaLauncher launcher = plain_launcher(stream, nullptr);
+    CudaLauncher launcher = plain_launcher(stream);
     auto arrays = take_warp_tree(launcher, tree, stream);
     if (arrays->scene.pairs != nullptr) find_resident_blocks(*arrays);
     return arrays;
@@ -95,7 +71,7 @@ void CudaBackend::trace_warps(const DeviceWarpTree& tree, std::span<const Ray> r
 DeviceTraceMs CudaBackend::time_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
                                       std::span<TreeHit> hits, const DeviceTraceOptions& options,
                                       std::span<std::byte> scratch, Stream stream) {
-    Event start, before, behind, end;
+    CudaEvent start, before, behind, end;
     start.record(stream);
     trace_launches(tree, rays, hits, options, scratch, stream,
                    [&](int k) { (k == 0 ? before : behind).record(stream); });

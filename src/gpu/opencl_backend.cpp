@@ -20,32 +20,32 @@ OpenclBackend& selected_opencl() {
 }  // namespace
 
 std::string OpenclBackend::name() {
-    return device_.traits().name + (device_.is_cpu() ? " (OpenCL on a CPU)" : "");
+    return device_->traits().name + (device_->is_cpu() ? " (OpenCL on a CPU)" : "");
 }
 
-void OpenclBackend::synchronize(Stream stream) { device_.finish(device_.queue(stream)); }
+void OpenclBackend::synchronize(Stream stream) { device_->finish(device_->queue(stream)); }
 
-void* OpenclBackend::allocate(std::size_t bytes) { return device_.allocate(bytes); }
+void* OpenclBackend::allocate(std::size_t bytes) { return device_->allocate(bytes); }
 
-void OpenclBackend::free(void* memory) noexcept { device_.free(memory); }
+void OpenclBackend::free(void* memory) noexcept { device_->free(memory); }
 
 void OpenclBackend::copy_to_device(void* device, const void* host, std::size_t bytes,
                                    Stream stream) {
-    device_.copy(device_.queue(stream), device, host, bytes);
+    device_->copy(device_->queue(stream), device, host, bytes);
 }
 
 void OpenclBackend::copy_to_host(void* host, const void* device, std::size_t bytes, Stream stream) {
-    device_.copy(device_.queue(stream), host, device, bytes);
+    device_->copy(device_->queue(stream), host, device, bytes);
 }
 
 double OpenclBackend::measure_copy(std::size_t bytes, int repeat) {
     const DeviceBuffer<std::byte> from(bytes), to(bytes);
-    cl_command_queue queue = device_.queue(nullptr);
+    cl_command_queue queue = device_->queue(nullptr);
     double best = 0;
     for (int turn = 0; turn <= repeat; ++turn) {
         const double start = opencl_clock_ms();
-        device_.copy(queue, to.data(), from.data(), bytes);
-        device_.finish(queue);
+        device_->copy(queue, to.data(), from.data(), bytes);
+        device_->finish(queue);
         const double ms = opencl_clock_ms() - start;
         if (turn > 0) best = std::max(best, 2.0 * static_cast<double>(bytes) / (1e-3 * ms));
     }
@@ -57,7 +57,8 @@ DeviceBackend& opencl_backend(std::uint32_t index) {
     static std::map<std::uint32_t, std::unique_ptr<OpenclBackend>> backends;
     const std::lock_guard guard(lock);
     std::unique_ptr<OpenclBackend>& backend = backends[index];
-    if (backend == nullptr) backend = std::make_unique<OpenclBackend>(index, opencl_device(index));
+    if (backend == nullptr)
+        backend = std::make_unique<OpenclBackend>(index, open_opencl_device(index));
     return *backend;
 }
 

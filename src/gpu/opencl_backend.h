@@ -2,17 +2,18 @@
 // opencl_*.cpp of this folder.
 #pragma once
 
-#include "gpu/backend.h"
+#include "gpu/launched_backend.h"
 #include "gpu/opencl_machine.h"
 
 namespace raydix {
 
-class OpenclBackend final : public DeviceBackend {
+class OpenclBackend final : public LaunchedQueries<OpenclMachine> {
 public:
-    OpenclBackend(std::uint32_t index, OpenclDevice& device)
-        : DeviceBackend("opencl:" + std::to_string(index)), device_(device), machine_{&device} {}
+    OpenclBackend(std::uint32_t index, std::unique_ptr<OpenclDevice> device)
+        : LaunchedQueries("opencl:" + std::to_string(index), OpenclMachine{device.get()}),
+          device_(std::move(device)) {}
 
-    [[nodiscard]] OpenclDevice& device() const { return device_; }
+    [[nodiscard]] OpenclDevice& device() const { return *device_; }
 
     std::string name() override;
     void synchronize(Stream stream) override;
@@ -21,29 +22,6 @@ public:
     void copy_to_device(void* device, const void* host, std::size_t bytes, Stream stream) override;
     void copy_to_host(void* host, const void* device, std::size_t bytes, Stream stream) override;
     double measure_copy(std::size_t bytes, int repeat) override;
-
-    std::size_t scratch_bytes(std::uint32_t n, const BuildOptions& options) override;
-    void build(const DeviceMesh& mesh, const BuildOptions& options, const DeviceTree& tree,
-               Scratch scratch, Stream stream) override;
-    void build(const DeviceBoxList& boxes, const BuildOptions& options, const DeviceTree& tree,
-               Scratch scratch, Stream stream) override;
-    BuildMs time(const DeviceMesh& mesh, const BuildOptions& options, const DeviceTree& tree,
-                 Scratch scratch, Stream stream) override;
-    BuildMs time(const DeviceBoxList& boxes, const BuildOptions& options, const DeviceTree& tree,
-                 Scratch scratch, Stream stream) override;
-
-    std::size_t scratch_bytes(std::uint32_t n, PrimitiveKind kind,
-                              const KdTreeOptions& options) override;
-    void build(const DeviceMesh& mesh, const KdTreeOptions& options, const DeviceKdArrays& tree,
-               Scratch scratch, Stream stream) override;
-    BuildMs time(const DeviceMesh& mesh, const KdTreeOptions& options, const DeviceKdArrays& tree,
-                 Scratch scratch, Stream stream) override;
-    std::size_t scratch_bytes(std::uint32_t n, std::uint32_t node_capacity,
-                              const OctreeOptions& options) override;
-    void build(const DeviceMesh& mesh, const OctreeOptions& options, const DeviceOctreeArrays& tree,
-               Scratch scratch, Stream stream) override;
-    BuildMs time(const DeviceMesh& mesh, const OctreeOptions& options,
-                 const DeviceOctreeArrays& tree, Scratch scratch, Stream stream) override;
 
     std::unique_ptr<DeviceWarpTree::Arrays> warp_tree(const WarpTree& tree, Stream stream) override;
     std::unique_ptr<DeviceWarpTree::Arrays> warp_tree(const DeviceTree& tree,
@@ -57,36 +35,8 @@ public:
     void trace_cwbvh(const CwbvhCall& call) override;
     double time_cwbvh(const CwbvhCall& call) override;
 
-    std::size_t offsets_scratch_bytes(std::uint32_t n) override;
-    void knn(const DevicePoints& tree, std::span<const Vec3> queries, std::uint32_t k,
-             std::span<std::uint32_t> indices, std::span<float> distances, std::uint32_t* invalid,
-             Stream stream) override;
-    void radius_count(const DevicePoints& tree, std::span<const Vec3> queries, float radius,
-                      std::span<std::uint64_t> offsets, std::uint32_t* invalid, Scratch scratch,
-                      Stream stream) override;
-    void radius_fill(const DevicePoints& tree, std::span<const Vec3> queries, float radius,
-                     std::span<const std::uint64_t> offsets, bool by_distance,
-                     std::span<std::uint32_t> indices, std::span<float> distances,
-                     Stream stream) override;
-    void closest_points(const DevicePrimitives& tree, std::span<const Vec3> queries,
-                        float max_distance, std::span<ClosestPoint> results, std::uint32_t* invalid,
-                        Stream stream) override;
-    void pairs_count(const DevicePairQuery& query, std::span<std::uint64_t> offsets,
-                     Scratch scratch, Stream stream) override;
-    void pairs_fill(const DevicePairQuery& query, std::span<const std::uint64_t> offsets,
-                    std::span<PrimitivePair> pairs, Stream stream) override;
-
-    void name_hits(const DeviceMeshNames& names, std::span<const TreeHit> found,
-                   std::span<Hit> hits, Stream stream) override;
-
 private:
-    /// For launches that neither scan nor sort.
-    [[nodiscard]] OpenclLauncher plain_launcher(Stream stream) const {
-        return machine_.launcher(stream, nullptr, 0);
-    }
-
-    OpenclDevice& device_;
-    OpenclMachine machine_;
+    std::unique_ptr<OpenclDevice> device_;
 };
 
 }  // namespace raydix

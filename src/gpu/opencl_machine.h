@@ -18,7 +18,6 @@ inline double opencl_clock_ms() {
 
 class OpenclStageTimes;
 
-/// OpenCL as gpu/device_run.h wants a machine.
 struct OpenclMachine {
     using Sizer = OpenclSizer;
     using StageTimes = OpenclStageTimes;

@@ -30,23 +30,21 @@ KernelName kernel_of(const WarpLaunch& launch) {
 }
 
 template <class Mark>
-void trace_launches(OpenclDevice& device, OpenclLauncher launcher, const WarpTraceCall& call,
-                    const Mark& mark) {
+void trace_launches(OpenclLauncher launcher, const WarpTraceCall& call, const Mark& mark) {
     call.launch(
         launcher,
         [&](const WarpLaunch& launch, const WarpJob& job, std::int32_t* stacks,
             std::uint32_t groups) {
             const TraceArguments given{job, launch.stack_entries, stacks};
-            device.launch(launcher.queue(), kernel_of(launch), groups, warp_block_threads, &given,
-                          sizeof(given));
+            launcher.device().launch(launcher.queue(), kernel_of(launch), groups,
+                                     warp_block_threads, &given, sizeof(given));
         },
         mark);
 }
 
 template <class Store>
-void launch_cwbvh(OpenclDevice& device, OpenclLauncher launcher,
-                  const DeviceBackend::CwbvhCall& call, const Store& store, const char* one,
-                  const char* pool) {
+void launch_cwbvh(OpenclLauncher launcher, const DeviceBackend::CwbvhCall& call, const Store& store,
+                  const char* one, const char* pool) {
     constexpr std::uint32_t threads = 128;
     auto* next = reinterpret_cast<std::uint32_t*>(call.scratch.data());
     const CwbvhArguments<Store> given{
@@ -56,44 +54,43 @@ void launch_cwbvh(OpenclDevice& device, OpenclLauncher launcher,
     const bool persistent = call.kernel == CwbvhKernel::persistent_cwbvh;
     if (persistent) {
         launcher.launch("trace.start", 1, StartPool{next});
-        groups = std::min(groups, resident_groups(device));
+        groups = std::min(groups, resident_groups(launcher.device()));
     }
-    device.launch(launcher.queue(), {"cwbvh", persistent ? pool : one}, groups, threads, &given,
-                  sizeof(given));
+    launcher.device().launch(launcher.queue(), {"cwbvh", persistent ? pool : one}, groups, threads,
+                             &given, sizeof(given));
 }
 
 }  // namespace
 
 std::unique_ptr<DeviceWarpTree::Arrays> OpenclBackend::warp_tree(const WarpTree& tree,
                                                                  Stream stream) {
-    return with_groups(upload_warp_tree(tree, stream), device_);
+    return with_groups(upload_warp_tree(tree, stream), *device_);
 }
 
 std::unique_ptr<DeviceWarpTree::Arrays> OpenclBackend::warp_tree(const DeviceTree& tree,
                                                                  Stream stream) {
     OpenclLauncher launcher = plain_launcher(stream);
-    return with_groups(take_warp_tree(launcher, tree, stream), device_);
+    return with_groups(take_warp_tree(launcher, tree, stream), *device_);
 }
 
 void OpenclBackend::trace_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
                                 std::span<TreeHit> hits, const DeviceTraceOptions& options,
                                 Scratch scratch, Stream stream) {
-    trace_launches(device_, plain_launcher(stream),
-                   WarpTraceCall(tree, rays, hits, options, scratch), [](int) {});
+    trace_launches(plain_launcher(stream), WarpTraceCall(tree, rays, hits, options, scratch),
+                   [](int) {});
 }
 
 DeviceTraceMs OpenclBackend::time_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
                                         std::span<TreeHit> hits, const DeviceTraceOptions& options,
                                         Scratch scratch, Stream stream) {
-    cl_command_queue queue = device_.queue(stream);
+    cl_command_queue queue = device_->queue(stream);
     const auto now = [&] {
-        device_.finish(queue);
+        device_->finish(queue);
         return opencl_clock_ms();
     };
     double at[2] = {};
     const double start = now();
-    trace_launches(device_, plain_launcher(stream),
-                   WarpTraceCall(tree, rays, hits, options, scratch),
+    trace_launches(plain_launcher(stream), WarpTraceCall(tree, rays, hits, options, scratch),
                    [&](int k) { at[k] = now(); });
     return {at[1] - at[0], now() - start};
 }
@@ -105,24 +102,24 @@ void OpenclBackend::trace_cwbvh(const CwbvhCall& call) {
     const bool any = call.occluded != nullptr;
     if (call.tree.node_count == 0) {
         if (any)
-            device_.clear(launcher.queue(), call.occluded, call.count);
+            device_->clear(launcher.queue(), call.occluded, call.count);
         else
             launcher.launch("trace.miss", call.count, MissAll{call.hits});
     } else if (any) {
-        launch_cwbvh(device_, launcher, call, kernels::StoreOccluded{call.occluded}, "cwbvh_any",
+        launch_cwbvh(launcher, call, kernels::StoreOccluded{call.occluded}, "cwbvh_any",
                      "trace_cwbvh_any");
     } else {
-        launch_cwbvh(device_, launcher, call, kernels::StoreHit{call.hits}, "cwbvh_closest",
+        launch_cwbvh(launcher, call, kernels::StoreHit{call.hits}, "cwbvh_closest",
                      "trace_cwbvh_closest");
     }
 }
 
 double OpenclBackend::time_cwbvh(const CwbvhCall& call) {
-    cl_command_queue queue = device_.queue(call.stream);
-    device_.finish(queue);
+    cl_command_queue queue = device_->queue(call.stream);
+    device_->finish(queue);
     const double start = opencl_clock_ms();
     trace_cwbvh(call);
-    device_.finish(queue);
+    device_->finish(queue);
     return opencl_clock_ms() - start;
 }
 

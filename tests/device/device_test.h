@@ -6,8 +6,10 @@
 #include <gtest/gtest.h>
 #include <raydix/device.h>
 #include <raydix/error.h>
+#include <raydix/mesh.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <string>
 #include <vector>
@@ -29,6 +31,24 @@ protected:
             if (environment("RAYDIX_DEVICE_REQUIRED", "") == device) FAIL() << reason.what();
             GTEST_SKIP() << reason.what();
         }
+    }
+};
+
+/// A mesh on the device.
+struct Uploaded {
+    DeviceBuffer<Vec3> vertices;
+    DeviceBuffer<Triangle> triangles;
+    DeviceMesh mesh;
+
+    explicit Uploaded(const MeshView& view) : vertices(view.vertices), triangles(view.triangles) {
+        mesh = {vertices.data(), static_cast<std::uint32_t>(vertices.size()), triangles.data(),
+                static_cast<std::uint32_t>(triangles.size())};
+    }
+    [[nodiscard]] PrimitiveKind kind() const {
+        return mesh.triangle_count != 0 ? PrimitiveKind::triangles : PrimitiveKind::points;
+    }
+    [[nodiscard]] std::uint32_t count() const {
+        return mesh.triangle_count != 0 ? mesh.triangle_count : mesh.vertex_count;
     }
 };
 

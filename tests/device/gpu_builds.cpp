@@ -37,24 +37,6 @@ std::string told(const BuildOptions& o) {
            std::to_string(static_cast<int>(o.fit));
 }
 
-/// A mesh on the device.
-struct Uploaded {
-    DeviceBuffer<Vec3> vertices;
-    DeviceBuffer<Triangle> triangles;
-    DeviceMesh mesh;
-
-    explicit Uploaded(const MeshView& view) : vertices(view.vertices), triangles(view.triangles) {
-        mesh = {vertices.data(), static_cast<std::uint32_t>(vertices.size()), triangles.data(),
-                static_cast<std::uint32_t>(triangles.size())};
-    }
-    [[nodiscard]] PrimitiveKind kind() const {
-        return mesh.triangle_count != 0 ? PrimitiveKind::triangles : PrimitiveKind::points;
-    }
-    [[nodiscard]] std::uint32_t count() const {
-        return mesh.triangle_count != 0 ? mesh.triangle_count : mesh.vertex_count;
-    }
-};
-
 void expect_same(const Bvh& built, const Bvh& expected) {
     ASSERT_EQ(check_same(built, expected).broken, "");
     EXPECT_EQ(check(built).broken, "");

@@ -27,24 +27,6 @@ constexpr Builder builders[] = {Builder::karras, Builder::lauterbach, Builder::g
 
 class OpenclBuild : public DeviceTest {};
 
-/// A mesh on the device.
-struct Uploaded {
-    DeviceBuffer<Vec3> vertices;
-    DeviceBuffer<Triangle> triangles;
-    DeviceMesh mesh;
-
-    explicit Uploaded(const MeshView& view) : vertices(view.vertices), triangles(view.triangles) {
-        mesh = {vertices.data(), static_cast<std::uint32_t>(vertices.size()), triangles.data(),
-                static_cast<std::uint32_t>(triangles.size())};
-    }
-    [[nodiscard]] PrimitiveKind kind() const {
-        return mesh.triangle_count != 0 ? PrimitiveKind::triangles : PrimitiveKind::points;
-    }
-    [[nodiscard]] std::uint32_t count() const {
-        return mesh.triangle_count != 0 ? mesh.triangle_count : mesh.vertex_count;
-    }
-};
-
 std::string told(const BuildOptions& o) {
     return std::string(builder_name(o.builder)) + ", " + std::to_string(o.bits) + " bits, fit " +
            std::to_string(static_cast<int>(o.fit));

@@ -11,28 +11,21 @@
 #include <memory>
 #include <vector>
 
+#include "exec/launch_sizer.h"
 #include "gpu/device_build.h"
 #include "support/shuffled_launcher.h"
 #include "tree/bvh_internals.h"
 
 namespace raydix::test {
 
-/// Runs nothing: for the sizes.
-struct IdleLauncher {
-    using Probe = NoProbe;
-    template <class Work>
-    void launch(const char*, std::uint32_t, const Work&) {}
-    template <class Work>
-    void launch_counted(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
-    template <class Work>
-    void launch_warps(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
+/// Runs nothing: for the sizes. Its scans and sort need no memory either.
+struct IdleLauncher : LaunchSizer {
     void exclusive_scan(const char*, std::uint32_t*, std::uint32_t, std::uint32_t*) {}
     void exclusive_scan_counted(const char*, std::uint32_t*, const std::uint32_t*, std::uint32_t) {}
     void exclusive_scan_wide(const char*, std::uint64_t*, std::uint32_t) {}
     template <class Key>
     void sort_pairs(const char*, const SortArrays<Key>&, std::uint32_t, const std::uint32_t*, int) {
     }
-    [[nodiscard]] bool maybe_any(const std::uint32_t*) const { return true; }
 };
 
 /// Scratch of exactly this size, filled with `garbage`, which also stands behind it.
