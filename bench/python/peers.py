@@ -103,8 +103,9 @@ def agreement(ours, theirs):
     return same
 
 
-def bench_rays(scene, wanted, repeat):
-    """Closest hits. embreex gives ids, with output=1 also t, u, v; ours always gives all four."""
+def bench_rays(scene, in_double, wanted, repeat):
+    """Closest hits. embreex gives ids, with output=1 also t, u, v; ours always gives all four. The
+    scene in float64 gets the same rays as float64 arrays."""
     embree, (open3d, o3d) = embree_scene(scene), open3d_scene(scene)
     for kind, rays in ray_kinds(scene, wanted).items():
         origins, directions = rays[:, :3].copy(), rays[:, 4:7].copy()
@@ -113,6 +114,9 @@ def bench_rays(scene, wanted, repeat):
         calls["raydix, origins and directions"] = lambda o=origins, d=directions: scene.intersect(
             o, d
         )
+        wide = rays.astype(np.float64)
+        agreement(ours, in_double.intersect(wide)["prim"])
+        calls["raydix, float64"] = lambda wide=wide: in_double.intersect(wide)
         if embree is not None:
             agreement(ours, embree.run(origins, directions).astype(np.int64).astype(np.uint32))
             calls["embreex, ids"] = lambda o=origins, d=directions: embree.run(o, d)
@@ -143,6 +147,12 @@ def bench_one_ray(scene, repeat):
         "raydix, occluded": often(lambda: scene.occluded(ray)),
     }
     calls["raydix, origins and directions"] = often(lambda: scene.intersect(origin, direction))
+
+    def read():
+        hits = scene.intersect(origin, direction)
+        return hits["t"], hits["prim"], hits["u"], hits["v"]
+
+    calls["raydix, and t prim u v read"] = often(read)
     if embree is not None:
         calls["embreex, ids"] = often(lambda: embree.run(origin, direction))
         calls["embreex, ids t u v"] = often(lambda: embree.run(origin, direction, output=1))
@@ -177,6 +187,35 @@ def bench_points(cloud, k, repeat):
     for name, queries in (("in the cloud's order", cloud), ("shuffled", shuffled)):
         calls = {who: (lambda ask=ask, q=queries: ask(q)) for who, ask in asks.items()}
         yield from row(f"{size:,} x {k} nearest, {name}", "raydix", in_turn(calls, repeat), size)
+
+
+def bench_changing(cloud, k, repeat):
+    """Queries of an index that was built from half of the points, the others put in in batches,
+    beside a fresh index over the points that are in it at the end."""
+    cloud = np.ascontiguousarray(cloud, np.float32)
+    half, radius = len(cloud) // 2, 1.5 / len(cloud) ** (1 / 3)
+    for batch, gone in ((10_000, 0.0), (1_000, 0.0), (10_000, 0.18)):
+        index = raydix.Points(cloud[:half])
+        start = time.perf_counter()
+        for begin in range(half, len(cloud), batch):
+            index.add(cloud[begin : begin + batch])
+        added_us = (time.perf_counter() - start) * 1e6 / (len(cloud) - half)
+        stays = np.random.default_rng(2).uniform(size=len(cloud)) >= gone
+        index.remove(np.flatnonzero(~stays))
+        fresh = raydix.Points(cloud[stays])
+        numbers = np.flatnonzero(stays)
+        queries = cloud[::7]
+        assert (numbers[fresh.knn(queries, k)["indices"]] == index.knn(queries, k)["indices"]).all()
+        what = f"half in by {batch:,}, {gone:.0%} removed"
+        print(f"{what}: {added_us:.2f} us a point put in", flush=True)
+        for name, ask in (
+            (f"{k} nearest", lambda of: of.knn(queries, k)),
+            ("radius", lambda of: of.radius(queries, radius)),
+        ):
+            calls = {"raydix, fresh": lambda a=ask, f=fresh: a(f), what: lambda a=ask: a(index)}
+            yield from row(
+                f"{len(queries):,} x {name}", "raydix, fresh", in_turn(calls, repeat), len(queries)
+            )
 
 
 def machine():
@@ -225,14 +264,18 @@ def main():
 
     result = {"machine": machine(), "scene": options.scene, "quality": options.quality, "rows": []}
     scene = raydix.Scene(options.scene, quality=options.quality)
+    in_double = raydix.Scene(
+        scene.vertices.astype(np.float64), scene.faces, precision="float64", quality=options.quality
+    )
     if options.points.isdigit():
         cloud = np.random.default_rng(1).uniform(size=(int(options.points), 3))
     else:
         cloud = load_points(options.points)
     for lines in (
-        bench_rays(scene, options.rays, options.repeat),
+        bench_rays(scene, in_double, options.rays, options.repeat),
         bench_one_ray(scene, options.repeat),
         bench_points(cloud, options.k, options.repeat),
+        bench_changing(cloud, options.k, options.repeat),
     ):
         for line in lines:
             result["rows"].append(line)

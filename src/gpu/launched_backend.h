@@ -13,8 +13,8 @@ class LaunchedBuilds : public DeviceBackend {
 public:
     LaunchedBuilds(std::string selector, const Machine& machine)
         : DeviceBackend(std::move(selector)), machine_(machine) {}
-    using DeviceBackend::scratch_bytes;
     using DeviceBackend::build;
+    using DeviceBackend::scratch_bytes;
     using DeviceBackend::time;
 
     std::size_t scratch_bytes(std::uint32_t n, const BuildOptions& options) override;
