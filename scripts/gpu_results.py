@@ -2,6 +2,7 @@
 the lines that bench_gpu printed, and the measured rows of `raydix bench traversal --device cuda`. Exit code 1 unless every
 test ran and passed and, where there are benchmarks, every check of gpu_checks.py is met."""
 import json
+import os
 import pathlib
 import re
 import subprocess
@@ -15,6 +16,10 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 def first_line_of(*command):
     return subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()[0].strip()
+
+
+def commit():
+    return os.environ.get("RAYDIX_COMMIT") or first_line_of("git", "rev-parse", "HEAD")
 
 
 def status_of(case):
@@ -37,26 +42,30 @@ def traversal_of(files):
     return [row for file in files for row in json.loads(pathlib.Path(file).read_text(encoding="utf-8"))["measured"]]
 
 
+def text_of(line):
+    """A line of a benchmark, for reading."""
+    if line["bench"] == "gpu_cwbvh":
+        rates = [f"{rays} {kernel} {line[rays][kernel]['mrays_per_s']['median']:.0f}"
+                 for rays in ("primary", "diffuse") for kernel in ("cwbvh", "persistent_cwbvh")]
+        return f"{line['scene']:<40}Mrays/s: {', '.join(rates)}"
+    if line["bench"] == "gpu_trace":
+        return f"{line['scene']:<40}{line['rays']:<18}{line['kernel']:<36}{line['mrays_per_s']['median']:8.1f} Mrays/s"
+    share = f", hierarchy and boxes at {100 * line['of_copy_rate']:5.1f} % of the copy rate" if "of_copy_rate" in line else ""
+    return (f"{line['scene']:<40}{line.get('builder', line['tree']):<12}{line['bits']:>3} bits, leaves of {line['max_leaf']}: "
+            f"{line['ms']['total']['median']:8.3f} ms, {line['gprims_per_s']:6.2f} Gprims/s{share}")
+
+
 def main(junit, bench=None, *traversal):
     name, driver = first_line_of("nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader").split(", ")
     tests = tests_of(junit)
-    document = {"gpu": name, "driver": driver, "commit": first_line_of("git", "rev-parse", "HEAD"), "tests": tests,
+    document = {"gpu": name, "driver": driver, "commit": commit(), "tests": tests,
                 "bench": bench_of(bench) if bench else [], "traversal": traversal_of(traversal)}
     out = ROOT / "bench" / "results" / (re.sub(r"[^A-Za-z0-9.]+", "-", name) + ".json")
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
     passed = sum(test["status"] == "passed" for test in tests)
     for line in document["bench"]:
-        if line["bench"] == "gpu_cwbvh":
-            rates = [f"{rays} {kernel} {line[rays][kernel]['mrays_per_s']['median']:.0f}"
-                     for rays in ("primary", "diffuse") for kernel in ("cwbvh", "persistent_cwbvh")]
-            print(f"{line['scene']:<40}Mrays/s: {', '.join(rates)}")
-        if line["bench"] == "gpu_trace":
-            print(f"{line['scene']:<40}{line['rays']:<18}{line['kernel']:<36}{line['mrays_per_s']['median']:8.1f} Mrays/s")
-            continue
-        share = f", hierarchy and boxes at {100 * line['of_copy_rate']:5.1f} % of the copy rate" if "of_copy_rate" in line else ""
-        print(f"{line['scene']:<40}{line.get('builder', line['tree']):<12}{line['bits']:>3} bits, leaves of "
-              f"{line['max_leaf']}: {line['ms']['total']['median']:8.3f} ms, {line['gprims_per_s']:6.2f} Gprims/s{share}")
+        print(text_of(line))
     print(f"{passed} of {len(tests)} GPU tests passed on {name}; written: {out.relative_to(ROOT)}")
     targets = gpu_checks.main(out) if bench else 0
     return 0 if tests and passed == len(tests) and targets == 0 else 1

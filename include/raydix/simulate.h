@@ -113,8 +113,8 @@ struct MachineModel {
     std::vector<OperationCost> costs;  // of every operation: one for all kernels, or one for each
 };
 
-/// A machine by its name: `gtx285`, `gtx285_enum_popc`, `gtx480`, `gtx680` or `h200`. Throws
-/// InputError that lists the known names.
+/// A machine by its name: `gtx285`, `gtx285_enum_popc`, `gtx480`, `gtx680`, `h100` or `h200`.
+/// Throws InputError that lists the known names.
 [[nodiscard]] MachineModel machine_model(std::string_view name);
 [[nodiscard]] std::span<const std::string_view> machine_model_names();
 /// Reads a JSON file with the fields of MachineModel. What it leaves out comes from the machine

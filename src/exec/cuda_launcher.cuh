@@ -66,6 +66,13 @@ __global__ void __launch_bounds__(warp_block_threads, 24)
     if (w < warps_for(*count)) work(DeviceWarp(), w);
 }
 
+/// One warp for each t of [0, n).
+template <class Work>
+__global__ void for_each_tile(Work work, std::uint32_t n) {
+    const std::uint32_t t = (blockIdx.x * blockDim.x + threadIdx.x) / warp_lanes;
+    if (t < n) work(DeviceWarp(), t);
+}
+
 }  // namespace kernels
 
 /// The highest key behind the pairs that count: there the sort leaves what it finds.
@@ -188,6 +195,15 @@ public:
         const ProfilerRange range(label);
         const unsigned blocks = (limit - 1) / kernels::warp_block_threads + 1;
         kernels::for_each_warp<<<blocks, kernels::warp_block_threads, 0, stream_>>>(work, count);
+        RAYDIX_CUDA_TRY(cudaGetLastError());
+    }
+
+    template <class Work>
+    void launch_tiles(const char* label, std::uint32_t n, const Work& work) {
+        if (n == 0) return;
+        const ProfilerRange range(label);
+        const unsigned blocks = (n - 1) / (block_threads / warp_lanes) + 1;
+        kernels::for_each_tile<<<blocks, block_threads, 0, stream_>>>(work, n);
         RAYDIX_CUDA_TRY(cudaGetLastError());
     }
 

@@ -8,6 +8,8 @@
 //   launch_warps(label, count, limit, work)
 //                               work(warp, w) for w in [0, *count / 32), rounded up: 32 lanes that
 //                               work together (exec/warp.h); *count <= limit
+//   launch_tiles(label, n, work)
+//                               work(warp, t) for t in [0, n): 32 lanes for each
 //   exclusive_scan(label, values, n, total)
 //                               each value becomes the sum of those before it; *total, if not
 //                               null, the sum of all
@@ -99,6 +101,11 @@ public:
             warps, [&](std::size_t w) { work(HostWarp(), static_cast<std::uint32_t>(w)); },
             grain / 16);
         note({label, std::uint64_t{warps} * warp_lanes}, start);
+    }
+
+    template <class Work>
+    void launch_tiles(const char* label, std::uint32_t n, const Work& work) {
+        launch(label, n, [&](std::uint32_t t) { work(HostWarp(), t); });
     }
 
     void exclusive_scan(const char* label, std::uint32_t* values, std::uint32_t n,

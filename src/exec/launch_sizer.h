@@ -21,6 +21,8 @@ public:
     void launch_counted(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
     template <class Work>
     void launch_warps(const char*, const std::uint32_t*, std::uint32_t, const Work&) {}
+    template <class Work>
+    void launch_tiles(const char*, std::uint32_t, const Work&) {}
     [[nodiscard]] bool maybe_any(const std::uint32_t*) const { return true; }
 
     [[nodiscard]] std::size_t bytes() const { return bytes_; }

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 
+#include "base/bits.h"
 #include "base/device_words.h"
 #include "base/hd.h"
 
@@ -16,6 +17,11 @@ inline constexpr std::uint32_t warp_lanes = 32;
 /// Warps that have a lane for each of so many items.
 [[nodiscard]] RAYDIX_HD constexpr std::uint32_t warps_for(std::uint32_t items) {
     return items / warp_lanes + (items % warp_lanes != 0 ? 1 : 0);
+}
+
+/// The place of the highest set bit of `mask`, which has one.
+RAYDIX_HD inline std::uint32_t highest_set_bit(std::uint32_t mask) {
+    return 31 - static_cast<std::uint32_t>(leading_zeros(mask));
 }
 
 /// The place of the `rank`-th set bit of `mask`, counted from 0; 31 if there is none.

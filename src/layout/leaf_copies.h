@@ -9,20 +9,21 @@
 
 #include "base/hd.h"
 #include "base/math.h"
+#include "exec/warp.h"
 #include "primitives/sources.h"
 
 namespace raydix {
 
-RAYDIX_HD inline LeafTriangle leaf_copy(const TriangleSource& source, std::uint32_t i) {
-    return {source.corner(i, 0), source.corner(i, 1), source.corner(i, 2)};
+// Word w of the copy of primitive i: a coordinate without -0.
+RAYDIX_HD inline float copied_word(const TriangleSource& source, std::uint32_t i, std::uint32_t w) {
+    const std::size_t vertex = source.triangles[i][w / 3];
+    return reinterpret_cast<const float*>(source.vertices)[3 * vertex + w % 3] + 0.0f;
 }
-RAYDIX_HD inline Aabb leaf_copy(const BoxSource& source, std::uint32_t i) {
-    Aabb box;
-    source.box(i, box);
-    return box;
+RAYDIX_HD inline float copied_word(const BoxSource& source, std::uint32_t i, std::uint32_t w) {
+    return reinterpret_cast<const float*>(source.boxes)[6 * std::size_t{i} + w] + 0.0f;
 }
-RAYDIX_HD inline Vec3 leaf_copy(const PointSource& source, std::uint32_t i) {
-    return without_negative_zero(source.points[i]);
+RAYDIX_HD inline float copied_word(const PointSource& source, std::uint32_t i, std::uint32_t w) {
+    return reinterpret_cast<const float*>(source.points)[3 * std::size_t{i} + w] + 0.0f;
 }
 
 RAYDIX_HD inline Aabb box_of_copy(const LeafTriangle& t) { return box_of(t.v0, t.v1, t.v2); }
@@ -41,12 +42,36 @@ struct BoxOfLeaf {
     }
 };
 
+/// A warp copies 32 primitives, and each lane words that lie 32 apart: what lanes write together is
+/// one piece of memory.
 template <class Source, class Copy>
 struct CopyToLeafOrder {
+    static constexpr std::uint32_t words = sizeof(Copy) / sizeof(float);
+
     Source source;
-    const std::uint32_t* order;
-    Copy* copies;
-    RAYDIX_HD void operator()(std::uint32_t k) const { copies[k] = leaf_copy(source, order[k]); }
+    const std::uint32_t* order;  // [*count]
+    const std::uint32_t* count;
+    Copy* copies;  // [*count], out
+
+    template <class Warp>
+    RAYDIX_HD void operator()(const Warp& warp, std::uint32_t w) const {
+        const std::uint32_t begin = w * warp_lanes, left = *count - begin;
+        const std::uint32_t have = words * (left < warp_lanes ? left : warp_lanes);
+        auto* out = reinterpret_cast<float*>(copies) + std::size_t{begin} * words;
+        // All are read before the first is written: then the device waits for them once.
+        typename Warp::template Var<float> values[words];
+        for (std::uint32_t k = 0; k < words; ++k)
+            warp.each([&](std::uint32_t lane) {
+                const std::uint32_t at = k * warp_lanes + lane;
+                if (at < have)
+                    values[k][lane] = copied_word(source, order[begin + at / words], at % words);
+            });
+        for (std::uint32_t k = 0; k < words; ++k)
+            warp.each([&](std::uint32_t lane) {
+                const std::uint32_t at = k * warp_lanes + lane;
+                if (at < have) out[at] = values[k][lane];
+            });
+    }
 };
 
 /// Boxes of primitives in an order.
@@ -75,8 +100,8 @@ struct CenterInOrder {
 template <class Launcher, class Source, class Copy>
 void launch_copies(Launcher& launcher, const Source& source, const std::uint32_t* count,
                    std::uint32_t limit, const std::uint32_t* order, Copy* copies) {
-    launcher.launch_counted("layout.copies", count, limit,
-                            CopyToLeafOrder<Source, Copy>{source, order, copies});
+    launcher.launch_warps("layout.copies", count, limit,
+                          CopyToLeafOrder<Source, Copy>{source, order, count, copies});
 }
 
 }  // namespace raydix

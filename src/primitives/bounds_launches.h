@@ -1,6 +1,6 @@
 // Primitives -> the box around all valid ones and how many are not, as launches for any backend:
-// what scene_bounds (bounds.h) does in one loop. primitives [n] -> 65536 parts at most -> 256 ->
-// one.
+// what scene_bounds (bounds.h) does in one loop. primitives [n] -> 8192 parts at most -> 64 -> one,
+// a warp for each.
 #pragma once
 
 #include <raydix/types.h>
@@ -11,6 +11,7 @@
 #include "base/hd.h"
 #include "base/math.h"
 #include "exec/arena.h"
+#include "exec/warp.h"
 #include "primitives/sources.h"
 
 namespace raydix {
@@ -42,45 +43,119 @@ struct BoundsPart {
     }
 };
 
-/// Part p is made of primitives p, p + part_count, ...: neighbouring threads read neighbours.
+/// Parts of 32 lanes -> one part that every lane has.
+template <class Warp>
+struct WarpBounds {
+    template <class T>
+    using Var = typename Warp::template Var<T>;
+
+    Var<float> lo_x, lo_y, lo_z, hi_x, hi_y, hi_z;
+    Var<std::uint32_t> valid, left_out, first_left_out, unreadable, first_unreadable;
+
+    RAYDIX_HD BoundsPart get(std::uint32_t lane) const {
+        return {{{lo_x[lane], lo_y[lane], lo_z[lane]}, {hi_x[lane], hi_y[lane], hi_z[lane]}},
+                valid[lane],
+                left_out[lane],
+                first_left_out[lane],
+                unreadable[lane],
+                first_unreadable[lane]};
+    }
+    RAYDIX_HD void set(std::uint32_t lane, const BoundsPart& part) {
+        lo_x[lane] = part.box.lo.x;
+        lo_y[lane] = part.box.lo.y;
+        lo_z[lane] = part.box.lo.z;
+        hi_x[lane] = part.box.hi.x;
+        hi_y[lane] = part.box.hi.y;
+        hi_z[lane] = part.box.hi.z;
+        valid[lane] = part.valid;
+        left_out[lane] = part.left_out;
+        first_left_out[lane] = part.first_left_out;
+        unreadable[lane] = part.unreadable;
+        first_unreadable[lane] = part.first_unreadable;
+    }
+    RAYDIX_HD void merge(const Warp& warp) {
+        for (std::uint32_t step = warp_lanes / 2; step != 0; step /= 2) {
+            const auto partner = [&](std::uint32_t lane) { return lane ^ step; };
+            WarpBounds other;
+            other.lo_x = warp.shuffle(lo_x, partner);
+            other.lo_y = warp.shuffle(lo_y, partner);
+            other.lo_z = warp.shuffle(lo_z, partner);
+            other.hi_x = warp.shuffle(hi_x, partner);
+            other.hi_y = warp.shuffle(hi_y, partner);
+            other.hi_z = warp.shuffle(hi_z, partner);
+            other.valid = warp.shuffle(valid, partner);
+            other.left_out = warp.shuffle(left_out, partner);
+            other.first_left_out = warp.shuffle(first_left_out, partner);
+            other.unreadable = warp.shuffle(unreadable, partner);
+            other.first_unreadable = warp.shuffle(first_unreadable, partner);
+            warp.each([&](std::uint32_t lane) {
+                BoundsPart part = get(lane);
+                part.merge(other.get(lane));
+                set(lane, part);
+            });
+        }
+    }
+};
+
+/// Writes the part that `part_of(place)` makes for each place of tile t.
+template <class Warp, class PartOf>
+RAYDIX_HD void write_part(const Warp& warp, std::uint32_t t, BoundsPart* parts,
+                          const PartOf& part_of) {
+    WarpBounds<Warp> lanes;
+    warp.each([&](std::uint32_t lane) { lanes.set(lane, part_of(t * warp_lanes + lane)); });
+    lanes.merge(warp);
+    warp.each([&](std::uint32_t lane) {
+        if (lane == 0) parts[t] = lanes.get(lane);
+    });
+}
+
+/// A lane takes primitives k, k + 32 tiles, ...: neighbouring lanes read neighbours.
 template <class Source>
 struct BoundPrimitives {
     Source source;
-    std::uint32_t n, part_count;
-    BoundsPart* parts;  // [part_count], out
+    std::uint32_t n, tiles;
+    BoundsPart* parts;  // [tiles], out
 
-    RAYDIX_HD void operator()(std::uint32_t p) const {
-        BoundsPart part = BoundsPart::empty();
-        for (std::uint64_t k = p; k < n; k += part_count) {
-            const auto i = static_cast<std::uint32_t>(k);
-            Aabb box;
-            if (!source.readable(i)) {
-                part.add_unreadable(i);
-            } else if (source.box(i, box)) {
-                part.box = unite(part.box, box);
-                ++part.valid;
-            } else {
-                part.add_left_out(i);
-            }
+    template <class Warp>
+    RAYDIX_HD void operator()(const Warp& warp, std::uint32_t t) const {
+        write_part(warp, t, parts, [&](std::uint32_t place) {
+            BoundsPart part = BoundsPart::empty();
+            for (std::uint64_t k = place; k < n; k += tiles * warp_lanes)
+                add(part, static_cast<std::uint32_t>(k));
+            return part;
+        });
+    }
+    RAYDIX_HD void add(BoundsPart& part, std::uint32_t i) const {
+        Aabb box;
+        if (!source.readable(i)) {
+            part.add_unreadable(i);
+        } else if (source.box(i, box)) {
+            part.box = unite(part.box, box);
+            ++part.valid;
+        } else {
+            part.add_left_out(i);
         }
-        parts[p] = part;
     }
 };
 
 struct MergeParts {
     const BoundsPart* in;  // [in_count]
-    std::uint32_t in_count, out_count;
-    BoundsPart* out;  // [out_count]
+    std::uint32_t in_count, tiles;
+    BoundsPart* out;  // [tiles]
 
-    RAYDIX_HD void operator()(std::uint32_t p) const {
-        BoundsPart part = BoundsPart::empty();
-        for (std::uint32_t k = p; k < in_count; k += out_count) part.merge(in[k]);
-        out[p] = part;
+    template <class Warp>
+    RAYDIX_HD void operator()(const Warp& warp, std::uint32_t t) const {
+        write_part(warp, t, out, [&](std::uint32_t place) {
+            BoundsPart part = BoundsPart::empty();
+            for (std::uint32_t k = place; k < in_count; k += tiles * warp_lanes) part.merge(in[k]);
+            return part;
+        });
     }
 };
 
 struct BoundsScratch {
-    static constexpr std::uint32_t first_parts = 65536, second_parts = 256;
+    /// Tiles of the first launch: as many threads as a GPU of today has in flight.
+    static constexpr std::uint32_t first_parts = 8192, second_parts = 64;
     BoundsPart *first, *second;
     explicit BoundsScratch(Arena& arena)
         : first(arena.take<BoundsPart>(first_parts)),
@@ -91,13 +166,13 @@ struct BoundsScratch {
 template <class Launcher, class Source>
 void launch_bounds(Launcher& launcher, const Source& source, std::uint32_t n,
                    const BoundsScratch& scratch, BoundsPart* bounds) {
-    const std::uint32_t first = std::min(n, BoundsScratch::first_parts);
-    const std::uint32_t second = std::min(first, BoundsScratch::second_parts);
-    launcher.launch("bounds.primitives", first,
-                    BoundPrimitives<Source>{source, n, first, scratch.first});
-    launcher.launch("bounds.parts", second,
-                    MergeParts{scratch.first, first, second, scratch.second});
-    launcher.launch("bounds.all", 1, MergeParts{scratch.second, second, 1, bounds});
+    const std::uint32_t first = std::clamp(warps_for(n), 1u, BoundsScratch::first_parts);
+    const std::uint32_t second = std::min(warps_for(first), BoundsScratch::second_parts);
+    launcher.launch_tiles("bounds.primitives", first,
+                          BoundPrimitives<Source>{source, n, first, scratch.first});
+    launcher.launch_tiles("bounds.parts", second,
+                          MergeParts{scratch.first, first, second, scratch.second});
+    launcher.launch_tiles("bounds.all", 1, MergeParts{scratch.second, second, 1, bounds});
 }
 
 }  // namespace raydix

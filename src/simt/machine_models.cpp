@@ -151,12 +151,22 @@ MachineModel h200() {
     return m;
 }
 
+/// The same multiprocessors behind slower memory.
+MachineModel h100() {
+    MachineModel m = h200();
+    m.name = "h100";
+    m.origin = "h200 with memory of 3.35 TB/s: " + m.origin;
+    m.dram_gb_per_s = 3350;
+    return m;
+}
+
 struct Named {
     std::string_view name;
     MachineModel (*make)();
 };
 constexpr std::array models{Named{"gtx285", gtx285}, Named{"gtx285_enum_popc", gtx285_enum_popc},
-                            Named{"gtx480", gtx480}, Named{"gtx680", gtx680}, Named{"h200", h200}};
+                            Named{"gtx480", gtx480}, Named{"gtx680", gtx680},
+                            Named{"h100", h100},     Named{"h200", h200}};
 
 }  // namespace
 

@@ -102,6 +102,11 @@ public:
         return launcher_.maybe_any(count);
     }
 
+    // Addresses only: the host may not read what they point to.
+    [[nodiscard]] const std::uint32_t* exact() const { return word(0); }
+    [[nodiscard]] const std::uint32_t* pairs() const { return word(1); }
+    [[nodiscard]] const std::uint32_t* unused() const { return word(2); }
+
 private:
     template <class Work>
     auto patched(const Work& work) const {
@@ -110,13 +115,9 @@ private:
         else
             return work;
     }
-    // Addresses only: the host may not read what they point to.
     [[nodiscard]] const std::uint32_t* word(std::size_t k) const {
         return counts_ == nullptr ? nullptr : reinterpret_cast<const std::uint32_t*>(counts_) + k;
     }
-    [[nodiscard]] const std::uint32_t* exact() const { return word(0); }
-    [[nodiscard]] const std::uint32_t* pairs() const { return word(1); }
-    [[nodiscard]] const std::uint32_t* unused() const { return word(2); }
 
     Launcher& launcher_;
     std::uint32_t capacity_;

@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "base/atomic.h"
+#include "base/wide_store.h"
 #include "exec/warp.h"
 #include "tree/cluster.h"
 #include "tree/radix_tree.h"
@@ -85,26 +86,16 @@ public:
 
     RAYDIX_HD void run(std::uint32_t warp_index) {
         const std::uint32_t n = a_.keys.count;
-        warp_.each([&](std::uint32_t lane) {
-            first_[lane] = last_[lane] = warp_index * warp_lanes + lane;
-            climbing_[lane] = first_[lane] < n && n > 1 ? 1 : 0;
+        first_key_ = warp_index * warp_lanes;
+        climbing_ = warp_.ballot([&](std::uint32_t lane) {
+            first_[lane] = last_[lane] = first_key_ + lane;
+            return first_[lane] < n && n > 1;
         });
-        while (warp_.ballot([&](std::uint32_t lane) { return climbing_[lane] != 0; }) != 0) {
-            warp_.each([&](std::uint32_t lane) {
-                if (climbing_[lane] != 0) climb(lane);
-            });
-            std::uint32_t merging = warp_.ballot([&](std::uint32_t lane) {
-                return climbing_[lane] != 0 &&
-                       (last_[lane] - first_[lane] + 1 > hploc_list || is_root(lane));
-            });
-            for (; merging != 0; merging &= merging - 1) {
-                const std::uint32_t lane = nth_set_bit(merging, 0);
-                merge_children(warp_.broadcast(first_, lane), warp_.broadcast(split_, lane),
-                               warp_.broadcast(last_, lane));
-            }
-            warp_.each([&](std::uint32_t lane) {
-                if (climbing_[lane] != 0 && is_root(lane)) climbing_[lane] = 0;
-            });
+        join_children();
+        while (climbing_ != 0) {
+            climbing_ = warp_.ballot(
+                [&](std::uint32_t lane) { return (climbing_ >> lane & 1) != 0 && climb(lane); });
+            merge(climbing_);
         }
     }
 
@@ -113,24 +104,75 @@ private:
         return first_[lane] == 0 && last_[lane] == a_.keys.count - 1;
     }
 
-    /// To the parent, whose split lies on the side with the longer common prefix. The first child
-    /// to come stops.
-    RAYDIX_HD void climb(std::uint32_t lane) {
+    /// Of the lanes that came to a new node, those merge that have much to merge. The root climbs
+    /// no further.
+    RAYDIX_HD void merge(std::uint32_t arrived) {
+        std::uint32_t merging = warp_.ballot([&](std::uint32_t lane) {
+            return (arrived >> lane & 1) != 0 &&
+                   (last_[lane] - first_[lane] + 1 > hploc_list || is_root(lane));
+        });
+        for (; merging != 0; merging &= merging - 1) {
+            const std::uint32_t lane = nth_set_bit(merging, 0);
+            merge_children(warp_.broadcast(first_, lane), warp_.broadcast(split_, lane),
+                           warp_.broadcast(last_, lane));
+        }
+        climbing_ &= ~warp_.ballot([&](std::uint32_t lane) { return is_root(lane); });
+    }
+
+    /// As far up as both children of a node end in this warp: they meet by shuffles, the left one
+    /// goes on.
+    RAYDIX_HD void join_children() {
+        const auto index = [&](std::uint32_t lane) { return std::int64_t{first_key_} + lane; };
+        const int outside = a_.keys.common_prefix(index(0), index(0) - 1);
+        Var<int> prefix;  // with the next key
+        warp_.each([&](std::uint32_t lane) {
+            prefix[lane] = a_.keys.common_prefix(index(lane), index(lane) + 1);
+        });
+        const Var<int> before = warp_.shuffle(prefix, [&](std::uint32_t lane) { return lane - 1; });
+        for (;;) {
+            const Var<int> behind =
+                warp_.shuffle(prefix, [&](std::uint32_t lane) { return last_[lane] - first_key_; });
+            const std::uint32_t lefts = climbing_ & warp_.ballot([&](std::uint32_t lane) {
+                return behind[lane] > (lane == 0 ? outside : before[lane]);
+            });
+            const auto partner = [&](std::uint32_t lane) { return last_[lane] + 1 - first_key_; };
+            const std::uint32_t joins = lefts & warp_.ballot([&](std::uint32_t lane) {
+                const std::uint32_t right = partner(lane);
+                return right < warp_lanes && (climbing_ & ~lefts) >> right & 1;
+            });
+            if (joins == 0) return;
+            const Var<std::uint32_t> end = warp_.shuffle(last_, partner);
+            const std::uint32_t rights = climbing_ & ~lefts & warp_.ballot([&](std::uint32_t lane) {
+                // The left child is that of the next lane below that climbs.
+                const std::uint32_t below = climbing_ & ((1u << lane) - 1);
+                return below != 0 && (joins >> highest_set_bit(below) & 1) != 0;
+            });
+            warp_.each([&](std::uint32_t lane) {
+                if ((joins >> lane & 1) == 0) return;
+                split_[lane] = last_[lane] + 1;
+                last_[lane] = end[lane];
+            });
+            climbing_ &= ~rights;
+            merge(joins);
+        }
+    }
+
+    /// To the parent, whose split lies on the side with the longer common prefix. False for the
+    /// first child to come.
+    RAYDIX_HD bool climb(std::uint32_t lane) {
         const std::int64_t first = first_[lane], last = last_[lane];
         const bool left_child =
             a_.keys.common_prefix(last, last + 1) > a_.keys.common_prefix(first, first - 1);
         const std::uint32_t parent = left_child ? last_[lane] : first_[lane] - 1;
         const std::uint32_t own_end = left_child ? first_[lane] : last_[lane];
         const std::uint32_t other_end = arrive(a_.meeting[parent], own_end + 1);
-        if (other_end == 0) {
-            climbing_[lane] = 0;
-            return;
-        }
+        if (other_end == 0) return false;
         if (left_child)
             last_[lane] = other_end - 1;
         else
             first_[lane] = other_end - 1;
         split_[lane] = parent + 1;
+        return true;
     }
 
     /// The node over [first, last], whose right child begins at `split`.
@@ -196,7 +238,7 @@ private:
             const std::uint32_t node_index =
                 mine.sum.least > its.sum.least ? mine.sum.least : its.sum.least;
             const ClusterNode node = merge_clusters(mine, its, a_.max_leaf);
-            a_.nodes[node_index] = node;
+            store_whole(a_.nodes + node_index, node);
             merged.ref[lane] = node_index;
             merged.set_box(lane, {node.lo, node.hi});
         });
@@ -258,7 +300,8 @@ private:
 
     Warp warp_;
     HplocArrays<Key, Boxes> a_;
-    Var<std::uint32_t> first_, last_, split_, climbing_;
+    std::uint32_t first_key_ = 0, climbing_ = 0;  // bit k: lane k
+    Var<std::uint32_t> first_, last_, split_;
 };
 
 }  // namespace raydix

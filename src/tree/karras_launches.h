@@ -6,6 +6,8 @@
 
 #include <cstdint>
 
+#include "tree/climb_warps.h"
+#include "tree/device_key_count.h"
 #include "tree/lbvh_launches.h"
 
 namespace raydix {
@@ -81,6 +83,70 @@ void launch_karras(Launcher& launcher, const LbvhInput<Key>& in, const KarrasScr
     launcher.launch(
         "karras.emit", in.count - 1,
         EmitKeptNode<Key, Probe>{keys, {{scratch.kept}, in.max_leaf, out.nodes, out.parent_slot}});
+}
+
+/// MarkKeptNode where boxes are fitted by ClimbWarps.
+template <class Key>
+struct MarkKeptSlot {
+    const Key* keys;
+    std::uint32_t max_leaf;
+    std::uint32_t* kept;  // [n], out
+    ParentSlots slots;
+
+    RAYDIX_HD void operator()(std::uint32_t node) const {
+        slots.of_leaf[node] = ParentSlots::no_leaf;
+        MarkKeptNode<Key, NoProbe>{{keys, *slots.key_count}, max_leaf, kept}(node);
+    }
+};
+
+/// EmitKeptNode where ClimbWarps writes the nodes: finds the range of a kept node, and tells its
+/// children where they belong.
+template <class Key>
+struct EmitKeptSlots {
+    const Key* keys;
+    std::uint32_t max_leaf;
+    ParentSlots slots;
+    std::uint32_t* inner_count;  // [1], out where all are kept
+
+    RAYDIX_HD void child(std::uint32_t slot, std::uint32_t first, std::uint32_t last,
+                         std::uint32_t radix_node) const {
+        const std::uint32_t count = last - first + 1;
+        if (count > max_leaf) {
+            slots.of_inner[slots.kept_before(radix_node)] = slot;
+            return;
+        }
+        slots.of_leaf[first] = slot;
+        if (slots.kept != nullptr) slots.leaf_count[first] = static_cast<std::uint8_t>(count);
+    }
+    RAYDIX_HD void operator()(std::uint32_t node) const {
+        const SortedKeys<Key> sorted{keys, *slots.key_count};
+        if (node == 0) {
+            slots.of_inner[0] = 0;
+            if (slots.kept == nullptr) *inner_count = sorted.count - 1;
+        }
+        const std::uint32_t rank = slots.kept_before(node);
+        if (slots.kept != nullptr && slots.kept[node + 1] == rank) return;
+        slots.meeting[rank] = 0;
+        const RadixRange range = find_range(sorted, node);
+        child(pair_slot(rank), range.first, range.split, range.split);
+        child(pair_slot(rank) + 1, range.split + 1, range.last, range.split + 1);
+    }
+};
+
+/// Karras 2012 for a fit by ClimbWarps: more than max_leaf keys -> slots of parents. Where every
+/// key is a leaf nothing is marked or counted, and slots.kept is null.
+template <class Launcher, class Key>
+void launch_karras_slots(Launcher& launcher, const LbvhInput<Key>& in, const KeyCounts* counts,
+                         const ParentSlots& slots, std::uint32_t* kept,
+                         std::uint32_t* inner_count) {
+    CountedKeys<Launcher> counted(launcher, in.count, counts);
+    if (in.max_leaf > 1) {
+        launcher.launch_counted("karras.mark", counted.exact(), in.count,
+                                MarkKeptSlot<Key>{in.keys, in.max_leaf, kept, slots});
+        counted.exclusive_scan("karras.rank", kept, in.count, inner_count);
+    }
+    launcher.launch_counted("karras.emit", counted.pairs(), in.count - 1,
+                            EmitKeptSlots<Key>{in.keys, in.max_leaf, slots, inner_count});
 }
 
 }  // namespace raydix

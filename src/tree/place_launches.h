@@ -13,6 +13,7 @@
 #include <bit>
 #include <cstdint>
 
+#include "base/wide_store.h"
 #include "exec/arena.h"
 #include "tree/cluster.h"
 #include "tree/lbvh_launches.h"
@@ -67,10 +68,10 @@ struct ClusterPlacing {
                          std::uint32_t first) const {
         const Aabb box = box_of_cluster(ref);
         if (is_leaf(ref)) {
-            nodes[slot] = {box.lo, first, box.hi, count_of(ref)};
+            store_whole(nodes + slot, BvhNode{box.lo, first, box.hi, count_of(ref)});
             list_primitives(ref, order + first);
         } else {
-            nodes[slot] = {box.lo, pair_slot(rank), box.hi, 0};
+            store_whole(nodes + slot, BvhNode{box.lo, pair_slot(rank), box.hi, 0});
         }
     }
 

@@ -44,28 +44,59 @@ struct RadixRange {
     std::uint32_t first, last, split;
 };
 
-/// The range of inner node i by galloping and two binary searches.
+/// Which keys share more than so many bits with key i: as common_prefix, with one comparison in
+/// place of counting zeros.
+template <class Key, class Probe>
+class SharesMore {
+public:
+    RAYDIX_HD SharesMore(const SortedKeys<Key, Probe>& keys, std::uint32_t i, int shared)
+        : keys_(keys.keys), i_(i), shared_(shared), own_(keys.keys[i]) {
+        constexpr int bits = CodeFormat<Key>::bits;
+        least_difference_ = shared < bits ? Key{1} << (bits - 1 - shared) : Key{0};
+    }
+    /// j: one of the keys.
+    [[nodiscard]] RAYDIX_HD bool operator()(std::uint32_t j) const {
+        Probe::bytes(2 * sizeof(Key));
+        Probe::step();
+        const Key differs = own_ ^ keys_[j];
+        if (differs != 0) return differs < least_difference_;
+        return CodeFormat<Key>::bits + leading_zeros(i_ ^ j) > shared_;
+    }
+
+private:
+    const Key* keys_;
+    std::uint32_t i_;
+    int shared_;
+    Key own_;
+    Key least_difference_;  // of two keys that share no more
+};
+
+/// The range of inner node i by galloping and two binary searches. Fewer than 2^31 keys.
 template <class Key, class Probe>
 RAYDIX_HD RadixRange find_range(const SortedKeys<Key, Probe>& keys, std::uint32_t node) {
     const std::int64_t i = node;
-    const int d = keys.common_prefix(i, i + 1) > keys.common_prefix(i, i - 1) ? 1 : -1;
-    const int outside = keys.common_prefix(i, i - d);  // delta_min in the paper
-    std::int64_t bound = 2;
-    while (keys.common_prefix(i, i + bound * d) > outside) bound *= 4;
-    std::int64_t length = 0;
-    for (std::int64_t step = bound / 2; step > 0; step /= 2)
-        if (keys.common_prefix(i, i + (length + step) * d) > outside) length += step;
-    const std::int64_t j = i + length * d;
-    const std::int64_t first = d > 0 ? i : j, last = d > 0 ? j : i;
+    const bool forward = keys.common_prefix(i, i + 1) > keys.common_prefix(i, i - 1);
+    const int outside = keys.common_prefix(i, forward ? i - 1 : i + 1);  // delta_min in the paper
+    const SharesMore<Key, Probe> inside(keys, node, outside);
+    const std::uint32_t room = forward ? keys.count - 1 - node : node;
+    const auto at = [&](std::uint32_t distance) {
+        return forward ? node + distance : node - distance;
+    };
+    std::uint32_t bound = 2;
+    while (bound <= room && inside(at(bound))) bound = bound < 1u << 29 ? 4 * bound : 1u << 31;
+    std::uint32_t length = 0;
+    for (std::uint32_t step = bound / 2; step > 0; step /= 2)
+        if (length + step <= room && inside(at(length + step))) length += step;
+    const std::uint32_t end = at(length);
+    const std::uint32_t first = forward ? node : end, last = forward ? end : node;
     // The split is the last key that shares more with the first than the whole range does.
-    const int shared = keys.common_prefix(first, last);
-    std::int64_t split = first, step = last - first;
+    const SharesMore<Key, Probe> left(keys, first, keys.common_prefix(first, last));
+    std::uint32_t split = first, step = last - first;
     do {
         step = (step + 1) / 2;
-        if (split + step < last && keys.common_prefix(first, split + step) > shared) split += step;
+        if (split + step < last && left(split + step)) split += step;
     } while (step > 1);
-    return {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
-            static_cast<std::uint32_t>(split)};
+    return {first, last, split};
 }
 
 /// Node slots: the root in 0, padding in 1, then the pair of children of inner node r (r counts the

@@ -12,6 +12,7 @@
 
 #include "exec/arena.h"
 #include "tree/apetrei.h"
+#include "tree/climb_warps.h"
 #include "tree/device_key_count.h"
 #include "tree/fit.h"
 #include "tree/fit_levels.h"
@@ -23,6 +24,11 @@
 
 namespace raydix {
 
+/// How a device goes through the leaves of karras unless told otherwise.
+[[nodiscard]] constexpr bool climbs_in_warps(const BuildOptions& options) {
+    return options.builder == Builder::karras && options.fit == Fit::as_published;
+}
+
 /// Scratch of a fit, and what it shares with the builder.
 struct TreeScratch {
     KeyCounts* key_counts;
@@ -30,21 +36,29 @@ struct TreeScratch {
     TreeLevels levels;
     std::uint32_t* ranks;  // of a fit by levels, which may have to find them
     FitLevelsScratch by_levels;
-    std::uint8_t* meeting;  // of a fit in one pass
+    std::uint8_t* meeting;     // of a fit in one pass
+    std::uint32_t* leaf_slot;  // of a climb in warps
+    std::uint8_t* leaf_count;
+    std::uint32_t* kept;
 
     TreeScratch(Arena& arena, std::uint32_t n, const BuildOptions& options)
         : TreeScratch(arena, inner_node_limit(n, static_cast<std::uint32_t>(options.max_leaf)),
-                      lbvh_depth_bound(options.bits, std::max(n, 1u)), fits_by_levels(options)) {}
+                      lbvh_depth_bound(options.bits, std::max(n, 1u)), fits_by_levels(options),
+                      climbs_in_warps(options) ? n : 0, options.max_leaf > 1) {}
 
 private:
-    TreeScratch(Arena& arena, std::uint32_t inner, std::uint32_t level_limit, bool fit_levels)
+    TreeScratch(Arena& arena, std::uint32_t inner, std::uint32_t level_limit, bool fit_levels,
+                std::uint32_t leaves, bool many_in_leaf)
         : key_counts(arena.take<KeyCounts>(1)),
           parent_slot(arena.take<std::uint32_t>(inner)),
           levels{arena.take<std::uint32_t>(level_limit + 1),
                  arena.take<std::uint32_t>(level_limit + 1), level_limit, nullptr},
           ranks(arena.take<std::uint32_t>(fit_levels ? inner : 0)),
           by_levels(arena, fit_levels ? inner : 0),
-          meeting(arena.take<std::uint8_t>(fit_levels ? 0 : inner)) {}
+          meeting(arena.take<std::uint8_t>(fit_levels ? 0 : inner)),
+          leaf_slot(arena.take<std::uint32_t>(leaves)),
+          leaf_count(arena.take<std::uint8_t>(many_in_leaf ? leaves : 0)),
+          kept(arena.take<std::uint32_t>(many_in_leaf ? leaves : 0)) {}
 };
 
 /// A tree of no more keys than a leaf may hold, which the builders leave to those who know it. Of
@@ -85,6 +99,14 @@ struct TreeRun {
     return options.builder == Builder::apetrei && options.fit == Fit::as_published;
 }
 
+template <class Key>
+ParentSlots parent_slots(const TreeRun<Key>& run, const TreeScratch& scratch) {
+    return {scratch.leaf_slot,   scratch.leaf_count,
+            run.out.parent_slot, run.options.max_leaf > 1 ? scratch.kept : nullptr,
+            scratch.meeting,     run.key_count,
+            run.out.inner_count};
+}
+
 /// Throws InputError for builders that do not run as launches.
 template <class Launcher, class Key, class LeafBox>
 void launch_hierarchy(Launcher& plain, const TreeRun<Key>& run, const TreeScratch& scratch,
@@ -96,7 +118,11 @@ void launch_hierarchy(Launcher& plain, const TreeRun<Key>& run, const TreeScratc
     CountedKeys<Launcher> launcher(plain, n, scratch.key_counts);
     switch (run.options.builder) {
         case Builder::karras:
-            launch_karras(launcher, in, KarrasScratch(arena, n), run.out);
+            if (climbs_in_warps(run.options) && n > max_leaf)
+                launch_karras_slots(plain, in, scratch.key_counts, parent_slots(run, scratch),
+                                    scratch.kept, run.out.inner_count);
+            else
+                launch_karras(launcher, in, KarrasScratch(arena, n), run.out);
             break;
         case Builder::lauterbach: {
             // No wider for small n, which would have room for more: scratch for n serves fewer,
@@ -138,6 +164,12 @@ void launch_fit(Launcher& launcher, const TreeRun<Key>& run, const TreeScratch& 
                     FitIfOnlyLeaf<LeafBox>{
                         {leaf_box, nodes, run.max_depth}, run.key_count, run.out.inner_count});
     if (limit == 0 || fits_while_building(run.options)) return;
+    if (climbs_in_warps(run.options)) {
+        launcher.launch_warps(
+            "fit.climb", run.key_count, run.capacity,
+            ClimbWarps<LeafBox>{leaf_box, parent_slots(run, scratch), nodes, run.max_depth});
+        return;
+    }
     if (fits_by_levels(run.options)) {
         const Builder builder = run.options.builder;
         TreeLevels levels = scratch.levels;

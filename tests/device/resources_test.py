@@ -14,7 +14,7 @@ EVERY = {
     "BoundPrimitives": 40, "MergeParts": 40, "PublishCounts": 40, "EncodeInScene": 32, "CopyToLeafOrder": 32,
     "FillUnusedKeys": 32, "ClearUnusedValues": 32, "SaveLastValue": 32, "AddLastValue": 32, "SetWord": 32}
 BUILD = EVERY | {
-    "MarkKeptNode": 32, "EmitKeptNode": 32, "CountSplits": 32, "EmitSplits": 32, "FindSplitLevels": 32,
+    "MarkKeptNode": 32, "EmitKeptNode": 32, "MarkKeptSlot": 32, "EmitKeptSlots": 32, "ClimbWarps": 42, "CountSplits": 32, "EmitSplits": 32, "FindSplitLevels": 32,
     "KeepTwoChildren": 32, "NoteLevelNodes": 32, "LinkLevel": 32, "StartQueue": 32, "SplitTask": 32,
     "StartSplitLists": 32, "EmitOnlyLeaf": 32,
     "MarkKeptSplit": 32, "ClimbFromLeaf": 32, "LinkFewKeys": 32, "FitIfOnlyLeaf": 40, "FitBoxes": 32, "FitLevel": 40,

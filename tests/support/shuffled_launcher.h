@@ -52,6 +52,11 @@ public:
                [&](std::uint32_t w) { work(HostWarp(), w); });
     }
 
+    template <class Work>
+    void launch_tiles(const char* label, std::uint32_t n, const Work& work) {
+        launch(label, n, [&](std::uint32_t t) { work(HostWarp(), t); });
+    }
+
     void exclusive_scan(const char* label, std::uint32_t* values, std::uint32_t n,
                         std::uint32_t* total) {
         host_.exclusive_scan(label, values, n, total);
