@@ -38,7 +38,7 @@ enum class Builder : std::uint32_t {
 
 /// How boxes are fitted. `levels` takes one launch per level, from the deepest up. `atomic` takes
 /// one pass, in which the second child to arrive goes on. `as_published` is what the builder's
-/// source does. The boxes are the same.
+/// source does; on a device, leaves of `karras` climb 32 together. The boxes are the same.
 enum class Fit : std::uint32_t { as_published = 0, levels = 1, atomic = 2 };
 
 /// Costs of the surface area heuristic: one inner node, one primitive of a leaf.

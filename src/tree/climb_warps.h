@@ -87,11 +87,7 @@ public:
 
     RAYDIX_HD WarpClimb(const Warp& warp, const LeafBox& leaf_box, const ParentSlots& slots,
                         BvhNode* nodes, std::uint32_t* max_depth)
-        : warp_(warp),
-          leaf_box_(leaf_box),
-          slots_(slots),
-          nodes_(nodes),
-          max_depth_(max_depth) {}
+        : warp_(warp), leaf_box_(leaf_box), slots_(slots), nodes_(nodes), max_depth_(max_depth) {}
 
     RAYDIX_HD void run(std::uint32_t first_key) {
         first_key_ = first_key;
@@ -138,8 +134,8 @@ private:
     RAYDIX_HD bool join_children() {
         const Var<std::uint32_t> other_slot =
             warp_.shuffle(at_.slot, [&](std::uint32_t lane) { return partner_of(lane); });
-        // The key behind a subtree's last begins another one, or there is none: no lane's slot is an
-        // old one.
+        // The key behind a subtree's last begins another one, or there is none: no lane's slot is
+        // an old one.
         const std::uint32_t lefts = warp_.ballot([&](std::uint32_t lane) {
             return partner_of(lane) != lane && other_slot[lane] == at_.slot[lane] + 1;
         });

@@ -1,0 +1,65 @@
+"""docs/performance/gpu.md against bench/results/NVIDIA-H100-80GB-HBM3.json: every row of its tables of builds and rays."""
+import json
+import pathlib
+import re
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+STAGES = ("bounds", "codes", "sort", "layout", "hierarchy", "fit", "total")
+SCENES = ("conference", "figure")
+SECONDARY = ("ao", "diffuse", "diffuse_shuffled")
+
+
+def rows_of(page, first_cell):
+    """Cells of the table rows whose first cell matches."""
+    cells = ([cell.strip() for cell in line.strip("|").split("|")] for line in page.splitlines() if line.startswith("|"))
+    return [row for row in cells if re.fullmatch(first_cell, row[0])]
+
+
+class GpuPage(unittest.TestCase):
+    def setUp(self):
+        self.page = (ROOT / "docs" / "performance" / "gpu.md").read_text(encoding="utf-8")
+        document = json.loads((ROOT / "bench" / "results" / "NVIDIA-H100-80GB-HBM3.json").read_text(encoding="utf-8"))
+        self.tests, self.lines = document["tests"], document["bench"]
+
+    def only(self, bench, **wanted):
+        found = [line for line in self.lines if line["bench"] == bench and all(line.get(k) == v for k, v in wanted.items())]
+        self.assertEqual(len(found), 1, wanted)
+        return found[0]
+
+    def test_tests_passed(self):
+        self.assertEqual({test["status"] for test in self.tests}, {"passed"})
+        self.assertIn(f"all {len(self.tests)} tests", self.page)
+
+    def test_builds(self):
+        rows = [row for row in rows_of(self.page, "[0-9,]+") if len(row) == 12]
+        self.assertGreaterEqual(len(rows), 28)
+        for count, tree, bits, *times, rate, share in rows:
+            tree = tree.strip("`")
+            kind = {"tree": tree} if tree in ("octree", "kdtree") else {"tree": "bvh", "builder": tree}
+            line = self.only("gpu_build", triangles=int(count.replace(",", "")), bits=int(bits), max_leaf=1, **kind)
+            self.assertEqual(times, [f"{line['ms'][stage]['median']:.2f}" for stage in STAGES])
+            self.assertEqual(rate, f"{line['gprims_per_s']:.2f}")
+            self.assertEqual(share, f"{100 * line['of_copy_rate']:.1f} %" if "of_copy_rate" in line else "-")
+
+    def test_rays(self):
+        kernels = {line["kernel"] for line in self.lines if line["bench"] == "gpu_trace"}
+        rows = [row for row in rows_of(self.page, "`[a-z_]+`") if len(row) == 7]
+        self.assertEqual({row[0].strip("`") for row in rows}, kernels)
+        for kernel, *rates in rows:
+            expected = [line["mrays_per_s"]["median"] for scene in SCENES for rays in SECONDARY for line in self.lines
+                        if line["bench"] == "gpu_trace" and scene in line["scene"] and line["rays"] == rays
+                        and line["kernel"] == kernel.strip("`")]
+            self.assertEqual(rates, [f"{rate:.0f}" for rate in expected])
+
+    def test_compressed_trees(self):
+        rows = [row for row in rows_of(self.page, "[0-9,]+") if len(row) == 5]
+        self.assertEqual(len(rows), 4)
+        for count, *rates in rows:
+            line = self.only("gpu_cwbvh", triangles=int(count.replace(",", "")))
+            self.assertEqual(rates, [f"{line[rays][kernel]['mrays_per_s']['median']:.0f}" for rays in ("primary", "diffuse")
+                                     for kernel in ("cwbvh", "persistent_cwbvh")])
+
+
+if __name__ == "__main__":
+    unittest.main()
