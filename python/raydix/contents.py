@@ -243,7 +243,7 @@ class SceneContents:
         self._keep_shapes(which, "points", np.array(made), _radius(radius))
 
     def _keep_shapes(self, id: int, kind: str, *made: Any) -> int:
-        """In float64 there are no files that the library writes: copies are made of this."""
+        """Of a scene in float64: copies for other processes are made of this."""
         if self.dtype == FLOAT64:
             self._shapes[id] = (kind, made)
         return id

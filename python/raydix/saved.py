@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._arrays import ALL, FLOAT32, require_float32
+from ._arrays import ALL, FLOAT32
 from .cameras import Camera
 
 
@@ -38,10 +38,10 @@ class SavedScene:
         """Writes the scene to a .rdx file, as its last commit left it: its trees, all scenes that
         it places, each once, with ids and masks, its name and its cameras. `load_scene` reads it.
 
+        In float64 the file holds no trees, and every number as it is: `load_scene` builds them.
         A reader never sees half a file. InputError: changes without a commit, a file that cannot be
-        written. NotImplementedError: a scene in float64.
+        written.
         """
-        require_float32(self, "save")
         cameras = [camera._fields() for camera in self._cameras]
         self._core.save_rdx(os.fspath(file), self.name, cameras)
 

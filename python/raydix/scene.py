@@ -26,7 +26,7 @@ from ._filters import hit_filter
 from ._rays import ray_batch, ray_masks
 from .cameras import Camera
 from .contents import QUALITIES, USAGES, SceneContents, mesh_of, one_of
-from .devices import CudaRays
+from .devices import DeviceRays, device_name
 from .hits import Hits
 from .pictures import SceneViews
 from .queries import SceneQueries
@@ -73,9 +73,11 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     threads :
         Threads for builds and queries; 0: all the machine has. No result depends on it.
     device :
-        "cpu", or "cuda" for an NVIDIA GPU: `intersect` and `occluded` then run there and take
-        arrays of CuPy, PyTorch and others that lie there. All other queries run on the processor.
-        Meshes are traced there, instances are not.
+        "cpu"; "cuda", an NVIDIA GPU; "opencl" or "opencl:N", the first or another OpenCL device of
+        `raydix.devices()`. `intersect` and `occluded` then run there, with the same hits, and with
+        "cuda" take arrays of CuPy, PyTorch and others that lie there. All other queries run on the
+        processor. Meshes are traced there, instances are not. What is missing is named by the first
+        such call: BackendUnavailable.
     precision :
         "float32" (also None), or "float64": coordinates as they are given, and all answers computed
         and returned in float64. For meshes far from the origin (float32 has steps of half a metre
@@ -104,10 +106,10 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     In float64 the first of `closest_point`, `touches`, `touched_by` and `sweep_spheres` after a
     commit makes one mesh in the world too, and a tree over it, which later ones ask.
 
-    With precision "float64" these raise NotImplementedError: compact=True, `render`, `cameras`,
-    `primary_rays`, `secondary_rays`, `save`, `info`, `wide_stats` and `raydix.simulate`. There device="cuda" raises BackendUnavailable; files raise ValueError,
-    because they are read in float32. Instances are of scenes in float64 too: others raise
-    TypeError. Numbers other than 0 below 2**-500 count as 0.
+    With precision "float64" compact=True raises NotImplementedError: there is no such layout. Another
+    device than "cpu" raises BackendUnavailable. Files other than .rdx raise ValueError, because they
+    are read in float32. Instances are of scenes in float64 too: others raise TypeError. Numbers other
+    than 0 below 2**-500 count as 0.
 
     Scenes can be pickled and copied: one of `load_scene` that has not changed goes over as the path
     of its file, whose memory both processes then share; one mesh as its arrays, and its trees are
@@ -138,8 +140,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         one_of(quality, "quality", QUALITIES)
         one_of(usage, "usage", USAGES)
         asked_builder, asked_rounds = (builder, 0) if builder else QUALITIES[quality]
-        if device not in ("cpu", "cuda"):
-            raise ValueError(f"device: expected 'cpu' or 'cuda', given {device!r}")
+        device = device_name(device)
         self.dtype = float_type(precision, "precision")
         """float32 or float64: what the scene computes in and its results are."""
         self.threads = threads = thread_count(threads)
@@ -164,9 +165,9 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         self.name = ""
         self._cameras: list[Camera] = []
         self._fitted: Camera | None = None
-        self._cuda: CudaRays | None = None
-        if device == "cuda" and self.dtype != FLOAT32:
-            raise _core.BackendUnavailable("device='cuda': scenes in float64 are not traced there")
+        self._there: DeviceRays | None = None
+        if device != "cpu" and self.dtype != FLOAT32:
+            raise _core.BackendUnavailable(f"device={device!r}: scenes in float64 are not traced there")
         if compact:
             require_float32(self, "compact=True")
         if reinsertion_rounds is not None:
@@ -212,12 +213,12 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
 
     def _forget(self) -> None:
         """What was made of the last commit."""
-        self._cuda = self._fitted = self._file = None
+        self._there = self._fitted = self._file = None
 
-    def _on_cuda(self) -> CudaRays:
-        if self._cuda is None:
-            self._cuda = CudaRays(self._core)
-        return self._cuda
+    def _on_device(self) -> DeviceRays:
+        if self._there is None:
+            self._there = DeviceRays(self._core, self.device)
+        return self._there
 
     @property
     def vertices(self) -> np.ndarray:
@@ -300,8 +301,9 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         through an edge hit at least one of its triangles (Woop, Benthin, Wald 2013). Rays with NaN,
         a zero direction or tmin > tmax miss. All are views of one array.
 
-        With device="cuda" all rays have the mask of 32 bits set, and hits are the same. Scenes with
-        instances, `mask`, `masks`, `keep` and `skip` raise BackendUnavailable there.
+        On a device (`Scene(device=...)`) all rays have the mask of 32 bits set, and hits are the
+        same, bit for bit. Scenes with instances, spheres or capsules, `mask`, `masks`, `keep` and
+        `skip` raise BackendUnavailable there.
         """
         if (
             directions is not None
@@ -314,9 +316,9 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
             if dimensions:
                 found = Hits(row if dimensions == 1 else row[None])
                 return self._with(found, also, rays, directions) if also else found
-        if self.device == "cuda":
+        if self.device != "cpu":
             self._refuse_filter(keep, skip)
-            found = self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)
+            found = self._on_device().intersect(rays, directions, tmin, tmax, mask, masks, stream)
             return self._with(found, also, rays, directions) if also else found
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
@@ -347,9 +349,9 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
 
         For rays that lie on a GPU: uint8, 1 or 0, there.
         """
-        if self.device == "cuda":
+        if self.device != "cpu":
             self._refuse_filter(keep, skip)
-            return self._on_cuda().occluded(rays, directions, tmin, tmax, mask, masks, stream)
+            return self._on_device().occluded(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
         only = hit_filter(keep, skip, lead)
@@ -412,7 +414,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
 
     def _refuse_filter(self, keep: Any, skip: Any) -> None:
         if keep is not None or skip is not None:
-            raise _core.BackendUnavailable("device='cuda': hits are not filtered there")
+            raise _core.BackendUnavailable(f"device={self.device!r}: hits are not filtered there")
 
     def refit(self, vertices: ArrayLike) -> dict[str, float]:
         """Moves the vertices, shape (V, 3) as before, converted to the scene's type, and commits;
@@ -435,7 +437,6 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
 
     def info(self) -> dict[str, Any]:
         """Counts, bounds and degenerate elements of the mesh."""
-        require_float32(self, "info")
         return self._core.info()
 
     def stats(self) -> dict[str, Any]:
@@ -445,7 +446,6 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     def wide_stats(self) -> dict[str, Any]:
         """Figures of the wide tree that rays go through, built for this call as a commit builds
         it."""
-        require_float32(self, "wide_stats")
         return self._core.wide_stats()
 
     def closure(self) -> dict[str, Any]:
@@ -465,16 +465,21 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
 
 def load_scene(file: str | os.PathLike, *, threads: int = 0, device: str = "cpu") -> Scene:
     """The scene that `Scene.save` wrote, committed: with its name, its cameras, and the options of
-    its last commit. Nothing is built; rays have the same hits.
+    its last commit. Rays have the same hits. A scene in float64 is one again, with every number as it
+    was, to the bit.
 
-    The file is checked and mapped: processes that load it share the memory of its trees. It may be
-    deleted, but not changed, while a scene uses it. `threads` and `device` as in `Scene`.
+    The file is checked and mapped. Of a scene in float32 nothing is built, and processes that load it
+    share the memory of its trees; of one in float64 they share vertices and triangles, and its trees
+    are built. The file may be deleted, but not changed, while a scene uses it. `threads` and `device`
+    as in `Scene`.
 
     InputError that names the file and what is wrong with it; so for a .rdx file that holds a tree
     and no scene.
     """
-    scene = Scene(threads=threads, device=device)
-    scene._core, scene.name, cameras = _core.SceneTrees.load_rdx(os.fspath(file), scene.threads)
+    path = os.fspath(file)
+    precision = "float64" if _core.holds_scene_double(path) else "float32"
+    scene = Scene(threads=threads, device=device, precision=precision)
+    scene._core, scene.name, cameras = type(scene._core).load_rdx(path, scene.threads)
     scene._cameras = [Camera(**camera) for camera in cameras]
     scene._options.update(scene._core.commit_options())
     scene._file = state_of(os.path.abspath(file))
