@@ -113,8 +113,8 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
 
     Scenes can be pickled and copied: one of `load_scene` that has not changed goes over as the path
     of its file, whose memory both processes then share; one mesh as its arrays, and its trees are
-    built again; all else as the bytes of a .rdx file, in float64 as its geometries. Vertex
-    attributes go along, but in float32 not those of scenes that stand in this one.
+    built again; all else as the bytes of a .rdx file. Vertex attributes go along, but not those of
+    scenes that stand in this one.
 
     Raises ValueError (InputError is one) and TypeError that name the argument, what was expected
     and what was given.
@@ -146,8 +146,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         self.threads = threads = thread_count(threads)
         self.device = device
         self._attributes: dict[int, dict[str, np.ndarray]] = {}
-        self._placed: dict[int, tuple[Any, np.ndarray]] = {}
-        self._shapes: dict[int, tuple[str, tuple]] = {}
+        self._placed: dict[int, Any] = {}
         self._file: tuple[str, int, int, int] | None = None
         self._options: dict[str, Any] = {
             "quality": quality,

@@ -32,8 +32,7 @@ using Fields = CameraFields<Scalar<Scene>>;
 template <class Scene>
 nb::dict fit(const Coordinates<Scalar<Scene>>& lo, const Coordinates<Scalar<Scene>>& hi,
              Scalar<Scene> vfov) {
-    return camera_figures(
-        fit_camera(typename Scene::Types::Box{point_of(lo), point_of(hi)}, vfov));
+    return camera_figures(fit_camera(typename Scene::Types::Box{point_of(lo), point_of(hi)}, vfov));
 }
 
 template <class Scene>
@@ -57,8 +56,7 @@ RayKind ray_kind(const std::string& name) {
 
 /// From what these rays hit: traced here, so that rays and hits belong together.
 template <class Scene>
-Array2<Scalar<Scene>> secondary_rays(Scene& scene,
-                                     const In<Scalar<Scene>, nb::shape<-1, 8>>& rays,
+Array2<Scalar<Scene>> secondary_rays(Scene& scene, const In<Scalar<Scene>, nb::shape<-1, 8>>& rays,
                                      const std::string& kind, int samples, float radius,
                                      std::uint64_t seed, int threads) {
     using Ray = typename Scene::Types::Ray;
@@ -121,9 +119,9 @@ void bind_views(nb::class_<Scene>& scene) {
     scene.def("secondary_rays", &secondary_rays<Scene>, nb::arg("rays").noconvert(),
               nb::arg("kind"), nb::arg("samples"), nb::arg("radius"), nb::arg("seed"),
               nb::arg("threads"));
-    scene.def("render", &render_scene<Scene>, nb::arg("camera"), nb::arg("view"),
-              nb::arg("width"), nb::arg("height"), nb::arg("samples"), nb::arg("ao_radius"),
-              nb::arg("seed"), nb::arg("threads"));
+    scene.def("render", &render_scene<Scene>, nb::arg("camera"), nb::arg("view"), nb::arg("width"),
+              nb::arg("height"), nb::arg("samples"), nb::arg("ao_radius"), nb::arg("seed"),
+              nb::arg("threads"));
 }
 
 template void bind_views(nb::class_<SceneTrees>& scene);

@@ -1,5 +1,5 @@
-// Tables of scenes -> what they hold, each thing checked before it is used; of either number type. How a
-// scene comes to its trees is the caller's.
+// Tables of scenes -> what they hold, each thing checked before it is used; of either number type.
+// How a scene comes to its trees is the caller's.
 #pragma once
 
 #include <raydix/error.h>
@@ -35,7 +35,7 @@ public:
     std::span<const T> take(std::uint64_t count, const std::string& whose) {
         if (count > rest_.size())
             fail_in(section_, whose + " has " + std::to_string(count) + ", but " +
-                               std::to_string(rest_.size()) + " are left");
+                                  std::to_string(rest_.size()) + " are left");
         const std::span<const T> out = rest_.first(count);
         rest_ = rest_.subspan(count);
         return out;
@@ -62,8 +62,9 @@ protected:
     template <class T>
     using Supply = TableSupply<T>;
 
-    /// read_trees(): when the meshes are there. commit(k, geometries, options, state): gives scene k
-    /// its tree. `explained`: placed parts that a file of this size may have beside its geometries.
+    /// read_trees(): when the meshes are there. commit(k, geometries, options, state): gives scene
+    /// k its tree. `explained`: placed parts that a file of this size may have beside its
+    /// geometries.
     template <class ReadTrees, class Commit>
     std::shared_ptr<State> read(const ReadTrees& read_trees, const Commit& commit,
                                 std::size_t explained) {
@@ -108,7 +109,7 @@ private:
         for (const StoredMesh& mesh : in_.meshes) {
             const std::string name = "mesh " + std::to_string(meshes_.size());
             const View view(vertices.take(mesh.vertices, name),
-                                triangles.take(mesh.triangles, name));
+                            triangles.take(mesh.triangles, name));
             if (view.triangles.empty()) fail("meshes", name + " has no triangles");
             meshes_.push_back(view);
         }
@@ -142,7 +143,8 @@ private:
             else
                 fail("shapes", name + " are of an unknown kind");
             if constexpr (std::is_same_v<Scalar, double>)
-                if (stored.reserved != 0) fail("shapes", name + " have reserved bytes that are not zero");
+                if (stored.reserved != 0)
+                    fail("shapes", name + " have reserved bytes that are not zero");
             if (stored.kind != 2 && stored.radius != 0)
                 fail("shapes", name + " have a radius each, and one more");
         }

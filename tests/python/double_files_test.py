@@ -92,7 +92,7 @@ def test_numbers_are_the_same_to_the_bit(rng, tmp_path):
 
 
 def test_cameras_go_along(tmp_path):
-    scene = raydix.Scene("builtin:atrium?triangles=2000", precision="float64")
+    scene = raydix.Scene("builtin:figure?triangles=5000", precision="float64")
     camera = raydix.Camera((1 / 3, 4.5e6, -0.1), (0, 1 / 7, 0), (0, 1, 0), 100 / 3, "south")
     scene._cameras = [camera]
     scene.save(tmp_path / "scene.rdx")

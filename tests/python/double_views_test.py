@@ -24,6 +24,13 @@ def ball(count=24):
     return np.round(vertices.reshape(-1, 3) * 2**12) / 2**12, faces
 
 
+def ball_on_floor():
+    vertices, faces = ball()
+    floor = np.array([[-3, -1, -3], [-3, -1, 3], [3, -1, 3], [3, -1, -3]])
+    more = len(vertices) + np.array([[0, 1, 2], [0, 2, 3]])
+    return np.concatenate([vertices, floor]), np.concatenate([faces, more])
+
+
 def moved_camera(camera, by):
     return dataclasses.replace(
         camera,
@@ -64,8 +71,10 @@ def test_primary_rays_are_those_of_float32_before_rounding(pair):
 
 
 @pytest.mark.parametrize("view", ["shaded", "normal", "depth", "primitive", "ao", "diffuse"])
-def test_pictures_are_those_of_float32(pair, view):
-    near, far = pair
+def test_pictures_are_those_of_float32(view):
+    vertices, faces = ball_on_floor()
+    near = raydix.Scene(vertices, faces)
+    far = raydix.Scene(vertices + UTM, faces, precision="float64")
     camera, size = near.cameras[0], (64, 48)
     wanted = near.render(camera, view=view, size=size, samples=8)
     found = far.render(moved_camera(camera, UTM), view=view, size=size, samples=8)
@@ -102,7 +111,7 @@ def test_secondary_rays(pair):
         found = far.secondary_rays(there, kind, samples=4)
         assert found.dtype == np.float64
         # A ray at the silhouette may hit in one of them alone.
-        assert abs(len(found) - len(wanted)) <= 4 * 4 and len(found) > 1000
+        assert abs(len(found) - len(wanted)) <= 4 * 4 and len(found) > 800
         radii = np.linalg.norm(found[:, :3] - UTM, axis=1)
         assert 0.98 < radii.min() and radii.max() < 1.0001
         if kind == "ao":

@@ -60,6 +60,13 @@ def meshes_are_named(device, rng):
     assert not empty.intersect(rays).hit.any() and not empty.occluded(rays).any()
 
 
+def within(scene, device):
+    whole = raydix.Scene(device=device)
+    whole.add(scene, np.eye(4))
+    whole.commit()
+    return whole
+
+
 def what_is_not_there_is_named(device):
     scene = raydix.Scene(*support.box_mesh([0, 0, 0], [1, 1, 1]), device=device)
     ray = np.float32([[0.5, 0.4, 9, 0, 0, 0, -1, np.inf]])
@@ -67,15 +74,9 @@ def what_is_not_there_is_named(device):
         "mask: rays on a device": lambda: scene.intersect(ray, mask=1),
         "hits are not filtered": lambda: scene.intersect(ray, keep=np.ones(12, bool)),
         "float64 are not traced": lambda: raydix.Scene(precision="float64", device=device),
-        "is an instance": lambda: within(scene).intersect(ray),
+        "is an instance": lambda: within(scene, device).intersect(ray),
         "999": lambda: raydix.Scene(scene.vertices, scene.faces, device="opencl:999").occluded(ray),
     }
-
-    def within(inner):
-        whole = raydix.Scene(device=device)
-        whole.add(inner, np.eye(4))
-        whole.commit()
-        return whole
 
     for words, call in refused.items():
         try:
