@@ -1,5 +1,5 @@
-// Cameras, rays and pictures of scenes in double beside those in float: the same at the origin and far from
-// it, where float has steps of half a unit.
+// Cameras, rays and pictures of scenes in double beside those in float: the same at the origin and
+// far from it, where float has steps of half a unit.
 #include <gtest/gtest.h>
 #include <raydix/error.h>
 #include <raydix/picture.h>
@@ -40,16 +40,16 @@ TEST(RenderDouble, PicturesAreThoseOfFloatWhereverTheSceneLies) {
             const RenderOptions options = options_for(view);
             const CameraD camera = moved_camera(camera_before_ball(), by);
             if (view == View::steps) {
-                EXPECT_NE(message_of([&] { static_cast<void>(render(there, camera, options)); })
-                              .find("steps"),
+                EXPECT_NE(message_of([&] {
+                              static_cast<void>(render(there, camera, options));
+                          }).find("steps"),
                           std::string::npos);
                 continue;
             }
             const Picture wanted = render(scene, camera_before_ball(), options);
             const Picture found = render(there, camera, options);
             // Rays at edges, and the noise of light that is gathered from a little elsewhere.
-            EXPECT_LE(count_different(wanted, found), found.pixels.size() / 20)
-                << view_name(view);
+            EXPECT_LE(count_different(wanted, found), found.pixels.size() / 20) << view_name(view);
             RenderOptions alone = options;
             alone.threads = 1;
             EXPECT_TRUE(same_pixels(found, render(there, camera, alone)));
@@ -61,8 +61,7 @@ TEST(RenderDouble, PrimaryRaysAreNotRounded) {
     const CameraD camera = moved_camera(camera_before_ball(), utm_place);
     std::vector<std::uint32_t> pixels, wanted_pixels;
     const std::vector<RayD> rays = make_primary_rays(camera, 16, 9, &pixels);
-    const std::vector<Ray> wanted =
-        make_primary_rays(camera_before_ball(), 16, 9, &wanted_pixels);
+    const std::vector<Ray> wanted = make_primary_rays(camera_before_ball(), 16, 9, &wanted_pixels);
     EXPECT_EQ(pixels, wanted_pixels);
     ASSERT_EQ(rays.size(), wanted.size());
     std::size_t finer = 0;
@@ -123,7 +122,8 @@ TEST(RenderDouble, TheFittedCameraSeesAll) {
 
 TEST(RenderDouble, FiguresOfTheWideTree) {
     const Mesh mesh = random_soup(3000, 5);
-    const WideBvhStats found = wide_stats_of(in_double(mesh)), wanted = build_wide_bvh(mesh).stats();
+    const WideBvhStats found = wide_stats_of(in_double(mesh)),
+                       wanted = build_wide_bvh(mesh).stats();
     EXPECT_EQ(found.references, wanted.references);
     EXPECT_EQ(found.width, 8);
     EXPECT_NEAR(found.sah, wanted.sah, 0.1 * wanted.sah);
