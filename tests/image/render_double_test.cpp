@@ -20,8 +20,6 @@
 namespace raydix::test {
 namespace {
 
-constexpr Vec3d utm_place{500'000, 4'500'000, 120};
-
 CameraD moved_camera(const Camera& camera, Vec3d by) {
     const auto at = [&](Vec3 p) { return Vec3d{p.x + by.x, p.y + by.y, p.z + by.z}; };
     return {camera.name,
