@@ -19,11 +19,27 @@ struct Camera {
     float vfov = 45.0f;
 };
 
+/// The same in double, for scenes in double.
+struct CameraD {
+    std::string name;
+    Vec3d position{0, 0, 1};
+    Vec3d target{0, 0, 0};
+    Vec3d up{0, 1, 0};
+    double vfov = 45.0;
+};
+
 /// What a cameras.json file holds (docs/scenes.md).
 struct CameraSet {
     std::uint32_t width = 1024, height = 768;  // pixels
     float ao_radius = 0.0f;  // 0: not given, which means 5 % of the diagonal of the scene's box
     std::vector<Camera> cameras;
+};
+
+/// The same with cameras in double.
+struct CameraSetD {
+    std::uint32_t width = 1024, height = 768;
+    float ao_radius = 0.0f;
+    std::vector<CameraD> cameras;
 };
 
 /// Reads an object {width?, height?, ao_radius?, cameras: [...]} or a bare list of cameras. Throws
@@ -35,5 +51,6 @@ struct CameraSet {
 /// give the place and target of a default Camera. Throws InputError if vfov is not between 0 and
 /// 180.
 [[nodiscard]] Camera fit_camera(const Aabb& bounds, float vfov = 45.0f);
+[[nodiscard]] CameraD fit_camera(const AabbD& bounds, double vfov = 45.0);
 
 }  // namespace raydix

@@ -51,24 +51,28 @@ struct MeshViewD {
 
 /// What `inspect` counts. "Out of range" are coordinates beyond 1e12 and boxes with a diagonal in
 /// (0, 1e-12). Builders leave out what is out of range or not finite (docs/contract.md 1).
-struct MeshInfo {
+template <class Box>
+struct BasicMeshInfo {
     std::uint64_t vertices = 0;
     std::uint64_t triangles = 0;
     std::uint64_t points = 0;  // vertices, if there are no triangles
-    Aabb bounds{};             // of all finite, in-range vertices; lo > hi if there are none
+    Box bounds{};              // of all finite, in-range vertices; lo > hi if there are none
     std::uint64_t non_finite_vertices = 0;    // NaN or Inf in a coordinate
     std::uint64_t out_of_range_vertices = 0;  // finite, but |coordinate| > 1e12
     std::uint64_t unreferenced_vertices = 0;  // in no triangle (0 for point clouds)
     std::uint64_t zero_area_triangles =
-        0;  // exact cross product in double is 0 (repeated indices included)
+        0;  // the exact cross product is 0 (repeated indices included); in double, of those in range
     std::uint64_t repeated_index_triangles = 0;
     std::uint64_t left_out_triangles =
         0;                    // a vertex is non-finite or out of range, or the box is too small
     std::uint64_t bytes = 0;  // of the two arrays
 };
+using MeshInfo = BasicMeshInfo<Aabb>;
+using MeshInfoD = BasicMeshInfo<AabbD>;
 
 /// Counts the elements that a user should know about. Throws InputError if an index is past the
 /// vertices.
 [[nodiscard]] MeshInfo inspect(const MeshView& mesh);
+[[nodiscard]] MeshInfoD inspect(const MeshViewD& mesh);
 
 }  // namespace raydix

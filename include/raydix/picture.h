@@ -57,6 +57,10 @@ struct RenderOptions {
 /// scene that was never committed, a camera that shows nothing, options out of range.
 [[nodiscard]] Picture render(const Scene& scene, const Camera& camera,
                              const RenderOptions& options = {});
+/// The same of a scene in double, wherever it lies: rays meet it in double. All views but `steps`;
+/// that throws InputError.
+[[nodiscard]] Picture render(const SceneD& scene, const CameraD& camera,
+                             const RenderOptions& options = {});
 /// Renders one tree over triangles. All views but `steps` show what they show of a scene of the one
 /// mesh. Throws InputError for a tree of boxes or points, and as above.
 [[nodiscard]] Picture render(const Bvh& bvh, const Camera& camera,

@@ -24,6 +24,9 @@ enum class RayKind : std::uint32_t { primary, ao, diffuse, diffuse_shuffled };
 [[nodiscard]] std::vector<Ray> make_primary_rays(const Camera& camera, std::uint32_t width,
                                                  std::uint32_t height,
                                                  std::vector<std::uint32_t>* pixels = nullptr);
+[[nodiscard]] std::vector<RayD> make_primary_rays(const CameraD& camera, std::uint32_t width,
+                                                  std::uint32_t height,
+                                                  std::vector<std::uint32_t>* pixels = nullptr);
 
 struct SecondaryOptions {
     RayKind kind = RayKind::ao;
@@ -57,6 +60,13 @@ struct SecondaryOptions {
                                                    std::span<const Hit> hits,
                                                    std::span<const std::uint32_t> pixels,
                                                    const SecondaryOptions& options);
+
+/// The same from hits in double. Origins have an error of 2^-24 of the scene's box's diagonal at
+/// most, a fiftieth of the distance that they move back; directions are floats.
+[[nodiscard]] std::vector<RayD> make_secondary_rays(const SceneD& scene, std::span<const RayD> rays,
+                                                    std::span<const HitD> hits,
+                                                    std::span<const std::uint32_t> pixels,
+                                                    const SecondaryOptions& options);
 
 /// NumPy files of shape (N, 8), float32: ox oy oz tmin dx dy dz tmax (docs/contract.md 5). Reading
 /// takes float64 too and rounds it. Throws InputError that names the file.

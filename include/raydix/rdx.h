@@ -38,6 +38,11 @@ struct RdxFile {
 void save_rdx(const std::filesystem::path& file, const Scene& scene, const std::string& name = {},
               const CameraSet& cameras = {});
 
+/// The same of a scene in double. Every double of it is in the file as it is; trees are not, and
+/// loading builds them.
+void save_rdx(const std::filesystem::path& file, const SceneD& scene, const std::string& name = {},
+              const CameraSetD& cameras = {});
+
 /// What a file of a scene holds, each thing counted once.
 struct RdxCounts {
     std::uint64_t scenes = 0;     // the whole and those that stand in it
@@ -61,12 +66,25 @@ struct RdxScene {
     double load_ms = 0;
 };
 
+struct RdxSceneD {
+    SceneD scene;  // committed. Its meshes and shapes view the mapped file; its trees were built
+    SceneOptions options;
+    std::string name;
+    CameraSetD cameras;
+    RdxCounts counts;  // without nodes
+    std::vector<std::uint32_t> shape_ids;
+    double load_ms = 0;
+};
+
 /// Loads a scene. Maps the file and validates it as load_rdx does. Rays have the hits of the scene
 /// that was saved, bit for bit. Throws InputError: "FILE: SECTION: reason".
 [[nodiscard]] RdxScene load_rdx_scene(const std::filesystem::path& file);
+[[nodiscard]] RdxSceneD load_rdx_scene_double(const std::filesystem::path& file);
 
 /// Whether an .rdx file holds a scene (load_rdx_scene), not a tree (load_rdx). Reads its header
 /// alone. Throws InputError if it is no .rdx file.
 [[nodiscard]] bool holds_scene(const std::filesystem::path& file);
+/// Whether it holds a scene in double (load_rdx_scene_double).
+[[nodiscard]] bool holds_scene_double(const std::filesystem::path& file);
 
 }  // namespace raydix

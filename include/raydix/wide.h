@@ -97,6 +97,11 @@ private:
     const Mesh& mesh, const BuildOptions& options = build_options_for(Quality::balanced),
     const WideBvhOptions& wide = {});
 
+/// The figures of the wide tree that a SceneD makes of the mesh, which is built for this call.
+/// Throws InputError as build_bvh does.
+[[nodiscard]] WideBvhStats wide_stats_of(
+    const MeshViewD& mesh, const BuildOptions& options = build_options_for(Quality::balanced));
+
 /// As trace(), trace_any() and trace_all() of a Bvh, bit for bit. rays [n] -> hits, occluded [n].
 /// options.path says how rays go through the tree, and options.isa with which instructions.
 /// options.kernel has no effect. Throws InputError: sizes that differ, an instruction set that this

@@ -1,6 +1,7 @@
 """The C++ library, array by array. Use the package raydix."""
 
 from collections.abc import Callable, Sequence
+import os
 from typing import Annotated, overload
 
 import numpy
@@ -27,9 +28,6 @@ def require_result_bytes(what: str, bytes: int, max_result_bytes: int) -> None:
 
 def machine() -> dict:
     """The processor, cores this process may use, instruction set."""
-
-def cuda_device() -> tuple[bool, str]:
-    """(whether a GPU can be used, its name or the reason)."""
 
 def simd_instruction_sets() -> list[str]:
     """Instruction sets that rays can be traced with here, best first."""
@@ -88,7 +86,7 @@ class SceneTrees:
 
     @staticmethod
     def load_rdx(file: str, threads: int) -> tuple:
-        """As load, of a .rdx file."""
+        """The scene of a .rdx file, its name, and its cameras' fields."""
 
     @staticmethod
     def load(spec: str, seed: int, builder: str, reinsertion_rounds: int, bits: int, max_leaf: int, strict: bool, threads: int, quality: str, usage: str, compact: bool) -> tuple:
@@ -113,6 +111,10 @@ class SceneTrees:
     def faces(self) -> Annotated[NDArray[numpy.uint32], dict(shape=(None, None), writable=False)]: ...
 
     def mesh_id(self) -> int | None: ...
+
+    def wide_stats(self) -> dict: ...
+
+    def info(self) -> dict: ...
 
     hit_columns: int = 6
 
@@ -176,9 +178,15 @@ class SceneTrees:
 
     def touched_by_segments(self, segments: Annotated[NDArray[numpy.float32], dict(shape=(None, 6), order='C', device='cpu', writable=False)], max_result_bytes: int = 0, threads: int = 0) -> tuple: ...
 
-    def wide_stats(self) -> dict: ...
+    @staticmethod
+    def fit_camera(lo: tuple[float, float, float], hi: tuple[float, float, float], vfov: float) -> dict: ...
 
-    def info(self) -> dict: ...
+    @staticmethod
+    def primary_rays(camera: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], float, str], width: int, height: int) -> tuple: ...
+
+    def secondary_rays(self, rays: Annotated[NDArray[numpy.float32], dict(shape=(None, 8), order='C', device='cpu', writable=False)], kind: str, samples: int, radius: float, seed: int, threads: int) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None))]: ...
+
+    def render(self, camera: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], float, str], view: str, width: int, height: int, samples: int, ao_radius: float, seed: int, threads: int) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None, None))]: ...
 
     def check(self) -> tuple[bool, str]: ...
 
@@ -223,6 +231,12 @@ class SceneTreesD:
 
     def path(self, number: int) -> list[int]: ...
 
+    def save_rdx(self, file: str, name: str, cameras: Sequence[tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], float, str]]) -> None: ...
+
+    @staticmethod
+    def load_rdx(file: str, threads: int) -> tuple:
+        """The scene of a .rdx file, its name, and its cameras' fields."""
+
     def add_spheres(self, shapes: Annotated[NDArray[numpy.float64], dict(shape=(None, 4), order='C', device='cpu', writable=False)], mask: int, id: int | None) -> int: ...
 
     def update_spheres(self, id: int, shapes: Annotated[NDArray[numpy.float64], dict(shape=(None, 4), order='C', device='cpu', writable=False)]) -> None: ...
@@ -242,6 +256,10 @@ class SceneTreesD:
     def faces(self) -> Annotated[NDArray[numpy.uint32], dict(shape=(None, None), writable=False)]: ...
 
     def mesh_id(self) -> int | None: ...
+
+    def wide_stats(self) -> dict: ...
+
+    def info(self) -> dict: ...
 
     hit_columns: int = 5
 
@@ -304,6 +322,16 @@ class SceneTreesD:
     def touched_by_spheres(self, spheres: Annotated[NDArray[numpy.float64], dict(shape=(None, 4), order='C', device='cpu', writable=False)], max_result_bytes: int = 0, threads: int = 0) -> tuple: ...
 
     def touched_by_segments(self, segments: Annotated[NDArray[numpy.float64], dict(shape=(None, 6), order='C', device='cpu', writable=False)], max_result_bytes: int = 0, threads: int = 0) -> tuple: ...
+
+    @staticmethod
+    def fit_camera(lo: tuple[float, float, float], hi: tuple[float, float, float], vfov: float) -> dict: ...
+
+    @staticmethod
+    def primary_rays(camera: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], float, str], width: int, height: int) -> tuple: ...
+
+    def secondary_rays(self, rays: Annotated[NDArray[numpy.float64], dict(shape=(None, 8), order='C', device='cpu', writable=False)], kind: str, samples: int, radius: float, seed: int, threads: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]: ...
+
+    def render(self, camera: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], float, str], view: str, width: int, height: int, samples: int, ao_radius: float, seed: int, threads: int) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None, None))]: ...
 
     def check(self) -> tuple[bool, str]: ...
 
@@ -423,10 +451,13 @@ class PointIndex2d:
 
     def __len__(self) -> int: ...
 
-class DeviceScene:
-    """A tree on a GPU; raydix.Scene with device='cuda' is what to use."""
+def devices() -> list[tuple[str, str, str]]:
+    """(selector, name, why it cannot be used or '') of each."""
 
-    def __init__(self, scene: SceneTrees) -> None: ...
+class DeviceScene:
+    """A tree on a device; raydix.Scene(device=...) is what to use."""
+
+    def __init__(self, scene: SceneTrees, device: str) -> None: ...
 
     def intersect_there(self, rays: Annotated[NDArray[numpy.float32], dict(shape=(None, 8), order='C', device='cuda', writable=False)], stream: int) -> tuple[Annotated[NDArray[numpy.float32], dict(shape=(None,), device='cuda')], Annotated[NDArray[numpy.uint32], dict(shape=(None,), device='cuda')], Annotated[NDArray[numpy.float32], dict(shape=(None,), device='cuda')], Annotated[NDArray[numpy.float32], dict(shape=(None,), device='cuda')], Annotated[NDArray[numpy.uint32], dict(shape=(None,), device='cuda')], Annotated[NDArray[numpy.uint32], dict(shape=(None,), device='cuda')]]: ...
 
@@ -438,16 +469,11 @@ class DeviceScene:
 
 def load_scene(spec: str, seed: int) -> dict: ...
 
+def holds_scene_double(file: str | os.PathLike) -> bool:
+    """Whether a .rdx file holds a scene in float64."""
+
 def scenes() -> list:
     """The built-in scenes and their parameters."""
-
-def primary_rays(camera: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], float, str], width: int, height: int) -> tuple: ...
-
-def secondary_rays(scene: SceneTrees, rays: Annotated[NDArray[numpy.float32], dict(shape=(None, 8), order='C', device='cpu', writable=False)], kind: str, samples: int, radius: float, seed: int, threads: int) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None))]: ...
-
-def fit_camera(lo: tuple[float, float, float], hi: tuple[float, float, float], vfov: float) -> dict: ...
-
-def render(scene: SceneTrees, camera: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], float, str], view: str, width: int, height: int, samples: int, ao_radius: float, seed: int, threads: int) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None, None))]: ...
 
 def save_picture(file: str, picture: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)], tone_map: bool) -> None: ...
 

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ._arrays import (
     ALL,
-    FLOAT64,
     MISSING,
     UINT32,
     cast,
@@ -110,8 +109,7 @@ class SceneContents:
     _core: Any
     dtype: np.dtype
     _options: dict[str, Any]
-    _placed: dict[int, tuple[Any, np.ndarray]]
-    _shapes: dict[int, tuple[str, tuple]]
+    _placed: dict[int, Any]  # the scene of each instance that was added here
     _attributes: dict[int, dict[str, np.ndarray]]
 
     def _forget(self) -> None: ...
@@ -178,7 +176,7 @@ class SceneContents:
         if len(masks) != 1 and (one or len(masks) != len(rows)):
             raise ValueError(f"mask: expected one or {len(rows)}, given {len(masks)}")
         ids = self._core.add_instances(source._core, rows, masks, wanted)
-        self._placed.update((added, (source, row)) for added, row in zip(ids, rows, strict=True))
+        self._placed.update((added, source) for added in ids)
         return ids[0] if one else np.array(ids, UINT32)
 
     def add_spheres(
@@ -192,8 +190,7 @@ class SceneContents:
         Copied, in the scene's type. `mask`, `id` and the result as in `add`.
         """
         made = self._spheres(centers, radii)
-        added = self._core.add_spheres(made, *_mask_and_id(mask, id))
-        return self._keep_shapes(added, "spheres", made[:, :3], made[:, 3])
+        return self._core.add_spheres(made, *_mask_and_id(mask, id))
 
     def add_capsules(
         self,
@@ -208,8 +205,7 @@ class SceneContents:
         `ends` of shape (N, 3). "u" of a hit is the place along the axis, 0 at the start. All else
         as in `add_spheres`."""
         made = self._capsules(starts, ends, radii)
-        added = self._core.add_capsules(made, *_mask_and_id(mask, id))
-        return self._keep_shapes(added, "capsules", made[:, :3], made[:, 3:6], made[:, 6])
+        return self._core.add_capsules(made, *_mask_and_id(mask, id))
 
     def add_points(
         self, points: ArrayLike, radius: float, *, mask: int = ALL, id: int | None = None
@@ -217,36 +213,23 @@ class SceneContents:
         """Adds points of one radius as one geometry: `points` of shape (N, 3), `radius` a number,
         0 or more. Rays hit them as spheres. All else as in `add_spheres`."""
         made = _points(points, "points", self.dtype)
-        added = self._core.add_points(made, _radius(radius), *_mask_and_id(mask, id))
-        return self._keep_shapes(added, "points", np.array(made), _radius(radius))
+        return self._core.add_points(made, _radius(radius), *_mask_and_id(mask, id))
 
     def update_spheres(self, id: int, centers: ArrayLike, radii: ArrayLike) -> None:
         """Gives a geometry of spheres others, from the next `commit` on. InputError: no such
         geometry, or another kind of it."""
-        which, made = whole(id, "id", 0, ALL), self._spheres(centers, radii)
-        self._core.update_spheres(which, made)
-        self._keep_shapes(which, "spheres", made[:, :3], made[:, 3])
+        self._core.update_spheres(whole(id, "id", 0, ALL), self._spheres(centers, radii))
 
     def update_capsules(
         self, id: int, starts: ArrayLike, ends: ArrayLike, radii: ArrayLike
     ) -> None:
         """As `update_spheres`."""
-        which, made = whole(id, "id", 0, ALL), self._capsules(starts, ends, radii)
-        self._core.update_capsules(which, made)
-        self._keep_shapes(which, "capsules", made[:, :3], made[:, 3:6], made[:, 6])
+        self._core.update_capsules(whole(id, "id", 0, ALL), self._capsules(starts, ends, radii))
 
     def update_points(self, id: int, points: ArrayLike, radius: float) -> None:
         """As `update_spheres`."""
         made = _points(points, "points", self.dtype)
-        which = whole(id, "id", 0, ALL)
-        self._core.update_points(which, made, _radius(radius))
-        self._keep_shapes(which, "points", np.array(made), _radius(radius))
-
-    def _keep_shapes(self, id: int, kind: str, *made: Any) -> int:
-        """In float64 there are no files that the library writes: copies are made of this."""
-        if self.dtype == FLOAT64:
-            self._shapes[id] = (kind, made)
-        return id
+        self._core.update_points(whole(id, "id", 0, ALL), made, _radius(radius))
 
     def _spheres(self, centers: ArrayLike, radii: ArrayLike) -> np.ndarray:
         return _with_radii(radii, _points(centers, "centers", self.dtype))
@@ -271,7 +254,7 @@ class SceneContents:
         """Takes a geometry out, from the next `commit` on. Its id is not given again."""
         which = whole(id, "id", 0, ALL)
         self._core.remove(which)
-        for kept in (self._placed, self._shapes, self._attributes):
+        for kept in (self._placed, self._attributes):
             kept.pop(which, None)
 
     def set_transform(self, id: ArrayLike, transform: ArrayLike) -> None:
@@ -286,9 +269,6 @@ class SceneContents:
         if len(ids) != len(rows):
             raise ValueError(f"transform: expected {len(ids)}, one for each id, given {len(rows)}")
         self._core.set_transforms(ids, rows)
-        for moved, row in zip(ids.tolist(), rows, strict=True):
-            if moved in self._placed:
-                self._placed[moved] = (self._placed[moved][0], row)
 
     def set_mask(self, id: ArrayLike, mask: ArrayLike) -> None:
         """Gives a geometry another mask, from the next `commit` on. Or several: ids of shape (M,),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import re
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,8 @@ _CUDA = 2  # DLPack's number
 
 @dataclasses.dataclass(frozen=True)
 class Device:
-    """`name` is what `Scene(device=...)` takes; `detail` the processor or GPU, or why the device
-    cannot be used."""
+    """`name` is what `Scene(device=...)` takes; `detail` the processor or device, or why it cannot
+    be used."""
 
     name: str
     available: bool
@@ -27,13 +28,19 @@ class Device:
 
 
 def devices() -> list[Device]:
-    """All devices that this library knows, and which of them this build and this machine have."""
+    """All devices that this library knows, and which of them this build and this machine have: "cpu",
+    then one of "cuda" and one of "opencl" at least. Those of OpenCL are "opencl:0", "opencl:1" and so
+    on; where there is none, "opencl" says why."""
     machine = _core.machine()
-    available, detail = _core.cuda_device()
-    return [
-        Device("cpu", True, f"{machine['cpu']}, {machine['isa']}"),
-        Device("cuda", available, detail),
-    ]
+    others = [Device(name, not lacks, lacks or what) for name, what, lacks in _core.devices()]
+    return [Device("cpu", True, f"{machine['cpu']}, {machine['isa']}"), *others]
+
+
+def device_name(value: Any) -> str:
+    """What `Scene(device=...)` was given. ValueError: no name of a device."""
+    if isinstance(value, str) and re.fullmatch(r"cpu|cuda|opencl(:[0-9]{1,9})?", value):
+        return value
+    raise ValueError(f"device: expected 'cpu', 'cuda', 'opencl' or 'opencl:N', given {value!r}")
 
 
 def on_cuda(array: Any) -> bool:
@@ -67,14 +74,15 @@ def _packed(rays: Any, directions: Any, tmin: Any, tmax: Any) -> tuple[np.ndarra
 
 def _without_masks(mask: Any, masks: Any) -> None:
     if masks is not None or mask != ALL:
-        raise _core.BackendUnavailable("mask: rays on a GPU have none")
+        raise _core.BackendUnavailable("mask: rays on a device have none")
 
 
-class CudaRays:
-    """The two calls of a Scene that run on a GPU."""
+class DeviceRays:
+    """The two calls of a Scene that run on a device."""
 
-    def __init__(self, core: Any) -> None:
-        self._core = _core.DeviceScene(core)
+    def __init__(self, core: Any, device: str) -> None:
+        self._core = _core.DeviceScene(core, device)
+        self._is_cuda = device == "cuda"
 
     def _there(
         self, rays: Any, directions: Any, tmin: Any, tmax: Any
@@ -99,7 +107,7 @@ class CudaRays:
         stream: int,
     ) -> Any:
         _without_masks(mask, masks)
-        if on_cuda(rays):
+        if self._is_cuda and on_cuda(rays):
             flat, lead = self._there(rays, directions, tmin, tmax)
             columns = self._core.intersect_there(flat, stream)
             return {
@@ -122,7 +130,7 @@ class CudaRays:
         stream: int,
     ) -> Any:
         _without_masks(mask, masks)
-        if on_cuda(rays):
+        if self._is_cuda and on_cuda(rays):
             flat, lead = self._there(rays, directions, tmin, tmax)
             return _like(self._core.occluded_there(flat, stream), rays, lead)
         packed, lead = _packed(rays, directions, tmin, tmax)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import FLOAT32, cast, describe, floats, require_float32, rows
+from ._arrays import FLOAT32, cast, describe, floats, rows
 from .cameras import Camera
 
 VIEWS = ("shaded", "normal", "depth", "primitive", "ao", "diffuse", "steps")
@@ -31,7 +31,6 @@ class SceneViews:
     def cameras(self) -> list[Camera]:
         """Those that came with the file or the built-in scene, else one that sees all of the
         scene."""
-        require_float32(self, "cameras")
         if self._cameras:
             return list(self._cameras)
         if self._fitted is None:
@@ -39,7 +38,7 @@ class SceneViews:
             lo, hi = self._core.info()["bounds"] if is_mesh else self._core.bounds()
             if not lo[0] <= hi[0]:
                 return [Camera()]
-            self._fitted = Camera(**_core.fit_camera(lo, hi, 45.0))
+            self._fitted = Camera(**self._core.fit_camera(lo, hi, 45.0))
         return [self._fitted]
 
     def _camera(self, camera: Camera | int | None) -> Camera:
@@ -64,11 +63,12 @@ class SceneViews:
         `samples`: rays a pixel that gather light, 1 to 4096; 0: 64 for "ao", 32 for "shaded" and
         "diffuse". `ao_radius`: 0 means 5 % of the diagonal. The same picture for every number of
         threads. Ctrl-C ends it. `raydix.to_srgb` makes 8-bit colours of it.
+
+        A scene in float64 is met in float64, wherever it lies; light is then gathered in float32 about
+        the middle of its box. It does not count steps: ValueError for that view.
         """
-        require_float32(self, "render")
         width, height = size
-        return _core.render(
-            self._core,
+        return self._core.render(
             self._camera(camera)._fields(),
             view,
             width,
@@ -85,10 +85,10 @@ class SceneViews:
         """One ray for each pixel centre, pixels in 2-D Morton order (neighbours in the picture are
         neighbours in the batch).
 
-        Returns "rays" (N, 8) float32 with unit directions, and "pixels" (N,) uint32: y * width + x.
+        Returns "rays" (N, 8) in the scene's type with unit directions, and "pixels" (N,) uint32:
+        y * width + x.
         """
-        require_float32(self, "primary_rays")
-        rays, pixels = _core.primary_rays(self._camera(camera)._fields(), *size)
+        rays, pixels = self._core.primary_rays(self._camera(camera)._fields(), *size)
         return {"rays": rays, "pixels": pixels}
 
     def secondary_rays(
@@ -100,17 +100,16 @@ class SceneViews:
         ao_radius: float = 0.0,
         seed: int = 1,
     ) -> np.ndarray:
-        """Rays from where `rays` hit, `samples` each, (M, 8) float32: "ao", "diffuse" or
+        """Rays from where `rays` hit, `samples` each, (M, 8) in the scene's type: "ao", "diffuse" or
         "diffuse_shuffled".
 
         Halton points, cosine-weighted about the normal (Aila, Laine 2009), sorted by origin and
-        direction. Rays that miss have none.
+        direction. Rays that miss have none. Those of a scene in float64 have directions of float32
+        numbers, and origins with an error of 2**-24 of the diagonal of the scene's box at most: a
+        fiftieth of the distance that they keep from the surface.
         """
-        require_float32(self, "secondary_rays")
-        primary, _ = rows(rays, "rays", (8,), FLOAT32)
-        return _core.secondary_rays(
-            self._core, primary, kind, samples, ao_radius, seed, self.threads
-        )
+        primary, _ = rows(rays, "rays", (8,), self.dtype)
+        return self._core.secondary_rays(primary, kind, samples, ao_radius, seed, self.threads)
 
     def _facts(self) -> tuple[list[tuple[str, str]], Any]:
         """What a notebook shows in a table, and the corners of the box around what can be seen."""
@@ -131,8 +130,6 @@ class SceneViews:
 
     def _repr_html_(self) -> str | None:
         """Statistics and a small picture, for notebooks, which show `repr` for None."""
-        if self.dtype != FLOAT32:
-            return None
         try:
             lines, (lo, hi) = self._facts()
         except _core.InputError:  # it was never committed

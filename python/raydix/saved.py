@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._arrays import ALL, FLOAT32, require_float32
+from ._arrays import ALL
 from .cameras import Camera
 
 
@@ -24,8 +24,6 @@ class SavedScene:
     _options: dict[str, Any]
     _cameras: list[Camera]
     _attributes: dict[int, dict[str, np.ndarray]]
-    _placed: dict[int, tuple[Any, np.ndarray]]
-    _shapes: dict[int, tuple[str, tuple]]
     _file: tuple[str, int, int, int] | None
 
     @property
@@ -38,10 +36,10 @@ class SavedScene:
         """Writes the scene to a .rdx file, as its last commit left it: its trees, all scenes that
         it places, each once, with ids and masks, its name and its cameras. `load_scene` reads it.
 
+        In float64 the file holds no trees, and every number as it is: `load_scene` builds them.
         A reader never sees half a file. InputError: changes without a commit, a file that cannot be
-        written. NotImplementedError: a scene in float64.
+        written.
         """
-        require_float32(self, "save")
         cameras = [camera._fields() for camera in self._cameras]
         self._core.save_rdx(os.fspath(file), self.name, cameras)
 
@@ -51,7 +49,7 @@ class SavedScene:
         - A scene of `load_scene` that has not changed is its file's path: the process that reads it
           maps the same file, and both share its memory.
         - A scene of one mesh is its arrays; its trees are built again.
-        - Any other is the bytes of its .rdx file, in float64 its geometries.
+        - Any other is the bytes of its .rdx file.
 
         InputError: changes without a commit.
         """
@@ -70,9 +68,7 @@ class SavedScene:
         if not len(self) or self._is_plain_mesh():  # type: ignore[arg-type]
             mesh = self._core.arrays_of(0) if len(self) else None  # type: ignore[arg-type]
             return _from_mesh, (mesh, more)
-        if self.dtype == FLOAT32:
-            return _from_bytes, (self._bytes(), more)
-        return _from_geometries, (self._geometries(), more)
+        return _from_bytes, (self._bytes(), more)
 
     def _is_plain_mesh(self) -> bool:
         """Whether `Scene(vertices, faces)` makes the same."""
@@ -90,20 +86,6 @@ class SavedScene:
             self.save(file)
             with open(file, "rb") as saved:
                 return saved.read()
-
-    def _geometries(self) -> list[tuple]:
-        """(id, mask, kind, what it is made of): as `_add_geometry` takes them."""
-        made: list[tuple] = []
-        for id in self._core.ids():
-            mask = self._core.mask_of(id)
-            if id in self._placed:
-                scene, row = self._placed[id]
-                made.append((id, mask, "instance", (scene, row.reshape(3, 4))))
-            elif id in self._shapes:
-                made.append((id, mask, *self._shapes[id]))
-            else:
-                made.append((id, mask, "mesh", self._core.arrays_of(id)))
-        return made
 
 
 def _new(more: dict[str, Any], *mesh: np.ndarray) -> Any:
@@ -149,15 +131,4 @@ def _from_bytes(saved: bytes, more: dict[str, Any]) -> Any:
             copy.write(saved)
         scene = load_scene(file, threads=more["threads"], device=more["device"])
     scene._file = None  # the file is gone: its pages stay for as long as they are mapped
-    return _filled(scene, more)
-
-
-def _from_geometries(geometries: list[tuple], more: dict[str, Any]) -> Any:
-    scene = _new(more)
-    for id, mask, kind, what in geometries:
-        if kind in ("mesh", "instance"):
-            scene.add(*what, mask=mask, id=id)
-        else:
-            getattr(scene, f"add_{kind}")(*what, mask=mask, id=id)
-    scene.commit()
     return _filled(scene, more)

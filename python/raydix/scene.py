@@ -13,31 +13,28 @@ from . import _core
 from ._arrays import (
     ALL,
     FLOAT32,
-    FLOAT64,
-    MISSING,
     UINT32,
     float_type,
     mesh_faces,
     mesh_vertices,
     number,
-    require_dtype,
     require_float32,
-    rows,
     thread_count,
     whole,
 )
 from ._filters import hit_filter
-from ._rays import floats_of, hit_rows, ray_batch, ray_masks, ray_rows
+from ._rays import ray_batch, ray_masks
 from .cameras import Camera
 from .contents import QUALITIES, USAGES, SceneContents, mesh_of, one_of
-from .devices import CudaRays
+from .devices import DeviceRays, device_name
 from .hits import Hits
 from .pictures import SceneViews
+from .queries import SceneQueries
 from .saved import SavedScene, state_of
 from .surface import SurfaceOfHits
 
 
-class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
+class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     """What rays are traced through and queries ask: triangle meshes, spheres, capsules, and
     instances of other scenes.
 
@@ -76,9 +73,11 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
     threads :
         Threads for builds and queries; 0: all the machine has. No result depends on it.
     device :
-        "cpu", or "cuda" for an NVIDIA GPU: `intersect` and `occluded` then run there and take
-        arrays of CuPy, PyTorch and others that lie there. All other queries run on the processor.
-        Meshes are traced there, instances are not.
+        "cpu"; "cuda", an NVIDIA GPU; "opencl" or "opencl:N", the first or another OpenCL device of
+        `raydix.devices()`. `intersect` and `occluded` then run there, with the same hits, and with
+        "cuda" take arrays of CuPy, PyTorch and others that lie there. All other queries run on the
+        processor. Meshes are traced there, instances are not. What is missing is named by the first
+        such call: BackendUnavailable.
     precision :
         "float32" (also None), or "float64": coordinates as they are given, and all answers computed
         and returned in float64. For meshes far from the origin (float32 has steps of half a metre
@@ -107,15 +106,15 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
     In float64 the first of `closest_point`, `touches`, `touched_by` and `sweep_spheres` after a
     commit makes one mesh in the world too, and a tree over it, which later ones ask.
 
-    With precision "float64" these raise NotImplementedError: compact=True, `render`, `cameras`,
-    `primary_rays`, `secondary_rays`, `save`, `info`, `wide_stats` and `raydix.simulate`. There device="cuda" raises BackendUnavailable; files raise ValueError,
-    because they are read in float32. Instances are of scenes in float64 too: others raise
-    TypeError. Numbers other than 0 below 2**-500 count as 0.
+    With precision "float64" compact=True raises NotImplementedError: there is no such layout. Another
+    device than "cpu" raises BackendUnavailable. Files other than .rdx raise ValueError, because they
+    are read in float32. Instances are of scenes in float64 too: others raise TypeError. Numbers other
+    than 0 below 2**-500 count as 0.
 
     Scenes can be pickled and copied: one of `load_scene` that has not changed goes over as the path
     of its file, whose memory both processes then share; one mesh as its arrays, and its trees are
-    built again; all else as the bytes of a .rdx file, in float64 as its geometries. Vertex
-    attributes go along, but in float32 not those of scenes that stand in this one.
+    built again; all else as the bytes of a .rdx file. Vertex attributes go along, but not those of
+    scenes that stand in this one.
 
     Raises ValueError (InputError is one) and TypeError that name the argument, what was expected
     and what was given.
@@ -141,15 +140,13 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
         one_of(quality, "quality", QUALITIES)
         one_of(usage, "usage", USAGES)
         asked_builder, asked_rounds = (builder, 0) if builder else QUALITIES[quality]
-        if device not in ("cpu", "cuda"):
-            raise ValueError(f"device: expected 'cpu' or 'cuda', given {device!r}")
+        device = device_name(device)
         self.dtype = float_type(precision, "precision")
         """float32 or float64: what the scene computes in and its results are."""
         self.threads = threads = thread_count(threads)
         self.device = device
         self._attributes: dict[int, dict[str, np.ndarray]] = {}
-        self._placed: dict[int, tuple[Any, np.ndarray]] = {}
-        self._shapes: dict[int, tuple[str, tuple]] = {}
+        self._placed: dict[int, Any] = {}
         self._file: tuple[str, int, int, int] | None = None
         self._options: dict[str, Any] = {
             "quality": quality,
@@ -167,9 +164,9 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
         self.name = ""
         self._cameras: list[Camera] = []
         self._fitted: Camera | None = None
-        self._cuda: CudaRays | None = None
-        if device == "cuda" and self.dtype != FLOAT32:
-            raise _core.BackendUnavailable("device='cuda': scenes in float64 are not traced there")
+        self._there: DeviceRays | None = None
+        if device != "cpu" and self.dtype != FLOAT32:
+            raise _core.BackendUnavailable(f"device={device!r}: scenes in float64 are not traced there")
         if compact:
             require_float32(self, "compact=True")
         if reinsertion_rounds is not None:
@@ -215,12 +212,12 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
 
     def _forget(self) -> None:
         """What was made of the last commit."""
-        self._cuda = self._fitted = self._file = None
+        self._there = self._fitted = self._file = None
 
-    def _on_cuda(self) -> CudaRays:
-        if self._cuda is None:
-            self._cuda = CudaRays(self._core)
-        return self._cuda
+    def _on_device(self) -> DeviceRays:
+        if self._there is None:
+            self._there = DeviceRays(self._core, self.device)
+        return self._there
 
     @property
     def vertices(self) -> np.ndarray:
@@ -303,8 +300,9 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
         through an edge hit at least one of its triangles (Woop, Benthin, Wald 2013). Rays with NaN,
         a zero direction or tmin > tmax miss. All are views of one array.
 
-        With device="cuda" all rays have the mask of 32 bits set, and hits are the same. Scenes with
-        instances, `mask`, `masks`, `keep` and `skip` raise BackendUnavailable there.
+        On a device (`Scene(device=...)`) all rays have the mask of 32 bits set, and hits are the
+        same, bit for bit. Scenes with instances, spheres or capsules, `mask`, `masks`, `keep` and
+        `skip` raise BackendUnavailable there.
         """
         if (
             directions is not None
@@ -317,9 +315,9 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
             if dimensions:
                 found = Hits(row if dimensions == 1 else row[None])
                 return self._with(found, also, rays, directions) if also else found
-        if self.device == "cuda":
+        if self.device != "cpu":
             self._refuse_filter(keep, skip)
-            found = self._on_cuda().intersect(rays, directions, tmin, tmax, mask, masks, stream)
+            found = self._on_device().intersect(rays, directions, tmin, tmax, mask, masks, stream)
             return self._with(found, also, rays, directions) if also else found
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
@@ -350,9 +348,9 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
 
         For rays that lie on a GPU: uint8, 1 or 0, there.
         """
-        if self.device == "cuda":
+        if self.device != "cpu":
             self._refuse_filter(keep, skip)
-            return self._on_cuda().occluded(rays, directions, tmin, tmax, mask, masks, stream)
+            return self._on_device().occluded(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
         only = hit_filter(keep, skip, lead)
@@ -415,199 +413,7 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
 
     def _refuse_filter(self, keep: Any, skip: Any) -> None:
         if keep is not None or skip is not None:
-            raise _core.BackendUnavailable("device='cuda': hits are not filtered there")
-
-    def closest_point(
-        self, points: ArrayLike, *, max_distance: float = np.inf
-    ) -> dict[str, np.ndarray]:
-        """The point of the scene that is closest to each query.
-
-        `points`: shape (..., 3), converted to the scene's type. Beyond `max_distance` (its square
-        decides, rounded) nothing is found. Returns a dict of arrays with the leading shape of the
-        queries: "point" (..., 3), "distance", "u" and "v" in the scene's type; "prim", "geometry"
-        and "instance" as those of a hit. At equal distances the lower (instance, geometry, prim)
-        wins; nothing found: infinity and 0xFFFFFFFF. ValueError for a negative or NaN
-        `max_distance`.
-
-        Triangles of instances are those that their vertices make in the world, moved in float64 and
-        rounded once. Within spheres and capsules the distance is 0.
-        """
-        asked, lead = rows(points, "points", (3,), self.dtype)
-        reach = number(max_distance, "max_distance")
-        # prim, geometry and instance are uint32 behind the distance, padded to whole scalars.
-        places = np.empty((len(asked), 9 if self.dtype == FLOAT32 else 8), self.dtype)
-        self._core.closest(asked, places, reach, self.threads)
-        places = places.reshape(lead + (places.shape[1],))
-        first = self.dtype.itemsize
-        ids = places.view(UINT32)[..., first : first + 3]
-        return {
-            "point": places[..., :3],
-            "distance": places[..., 3],
-            "prim": ids[..., 0],
-            "geometry": ids[..., 1],
-            "instance": ids[..., 2],
-            "u": places[..., -2],
-            "v": places[..., -1],
-        }
-
-    def signed_distance(
-        self, points: ArrayLike, *, max_distance: float = np.inf, rule: str = "automatic"
-    ) -> np.ndarray:
-        """Distance of each point from the mesh, negative inside: in the scene's type, with the
-        leading shape of the queries.
-
-        (`trimesh.proximity.signed_distance` has the other sign.) `rule` as in `contains`. Beyond
-        `max_distance` the answer is infinite, with its sign; for points with NaN or infinity it is
-        infinite.
-        """
-        asked, lead = rows(points, "points", (3,), self.dtype)
-        distances = np.empty(lead, self.dtype)
-        reach = number(max_distance, "max_distance")
-        self._core.signed_distance(asked, distances.reshape(-1), reach, rule, self.threads)
-        return distances
-
-    def contains(self, points: ArrayLike, *, rule: str = "automatic") -> np.ndarray:
-        """Whether each point is inside of the mesh: bool, with the leading shape of the queries.
-
-        `rule`: "crossings" (signed crossings to infinity are not 0), "parity" (their number is
-        odd), "winding" (generalized winding number of 1/2 or more, Jacobson et al. 2013: for meshes
-        with holes; parts far away count by a series, Barill et al. 2018, with errors below 0.01),
-        or "automatic": the first of these that the mesh is closed enough for. The
-        first two are decided without rounding, at edges and vertices too, and points of the surface
-        are inside. Points with NaN or infinity are outside.
-        """
-        asked, lead = rows(points, "points", (3,), self.dtype)
-        flags = np.empty(lead, np.bool_)
-        self._core.contains(asked, flags.reshape(-1), rule, self.threads)
-        return flags
-
-    def winding_number(self, points: ArrayLike, *, rule: str = "automatic") -> np.ndarray:
-        """The number that `contains` decides by: float64, with the leading shape; NaN for points
-        with NaN or infinity."""
-        asked, lead = rows(points, "points", (3,), self.dtype)
-        numbers = np.empty(lead, FLOAT64)
-        self._core.winding(asked, numbers.reshape(-1), rule, self.threads)
-        return numbers
-
-    def overlaps(
-        self, other: Scene | None = None, *, narrow: bool = False, max_result_bytes: int = 0
-    ) -> np.ndarray | dict[str, np.ndarray]:
-        """All pairs of triangles whose boxes overlap: shape (P, 2) uint32, sorted.
-
-        Within this scene (i < j; pairs that share a corner are left out), or between it and `other`
-        (i of this one, j of `other`). With `narrow` the triangles themselves must meet, decided
-        without rounding. `max_result_bytes` as in `all_hits`: no pair is ever dropped. TypeError
-        for scenes of different types.
-
-        If one of the scenes is more than one mesh, a dict of such arrays: "prim", "geometry" and
-        "instance", as those of a hit. Pairs are then sorted by (instance, geometry, prim) of the
-        first, then of the second. The memory of the call holds a copy of all triangles, those of
-        instances on every path. InputError names spheres and capsules.
-        """
-        pairs = self._core.overlaps(self._partner(other), narrow, max_result_bytes, self.threads)
-        if pairs.shape[1] == 2:
-            return pairs
-        columns = pairs.reshape(-1, 2, 3)
-        return {"prim": columns[..., 2], "geometry": columns[..., 1], "instance": columns[..., 0]}
-
-    def _partner(self, other: Scene | None) -> Any:
-        """The core of a scene that this one can be held against."""
-        if other is None:
-            return None
-        if not isinstance(other, Scene):
-            raise TypeError(f"other: expected a Scene, given {other!r}")
-        require_dtype(other, self.dtype, "other")
-        return other._core
-
-    def count_overlaps(self, other: Scene | None = None, *, narrow: bool = False) -> int:
-        """How many pairs `overlaps` would give, without keeping them."""
-        return self._core.count_overlaps(self._partner(other), narrow, self.threads)
-
-    def touched_by(
-        self,
-        *,
-        spheres: ArrayLike | None = None,
-        segments: ArrayLike | None = None,
-        max_result_bytes: int = 0,
-    ) -> dict[str, np.ndarray]:
-        """All triangles and shapes that each ball (x y z radius, shape (..., 4)) or segment (two
-        points, shape (..., 6)) touches.
-
-        Returns a dict: "offsets" (uint64, one more than queries); "prim", "geometry" and "instance"
-        as those of a hit, ascending by (instance, geometry, prim) in each row. `max_result_bytes`
-        as in `all_hits`.
-        """
-        kind, shapes, _ = self._touching(spheres, segments, "touched_by")
-        call = getattr(self._core, f"touched_by_{kind}")
-        offsets, names = call(shapes, max_result_bytes, self.threads)
-        return {
-            "offsets": offsets,
-            "prim": names[:, 2],
-            "geometry": names[:, 1],
-            "instance": names[:, 0],
-        }
-
-    def touches(
-        self, *, spheres: ArrayLike | None = None, segments: ArrayLike | None = None
-    ) -> np.ndarray:
-        """Whether each ball or segment, as for `touched_by`, touches anything: bool, with their
-        leading shape."""
-        kind, shapes, lead = self._touching(spheres, segments, "touches")
-        flags = np.empty(lead, np.bool_)
-        getattr(self._core, f"touches_{kind}")(shapes, flags.reshape(-1), self.threads)
-        return flags
-
-    def _touching(self, spheres: Any, segments: Any, call: str) -> tuple[str, np.ndarray, tuple]:
-        """Which of both there is, its rows, and their leading shape."""
-        if (spheres is None) == (segments is None):
-            raise ValueError(f"{call}: expected either spheres or segments")
-        if spheres is not None:
-            return ("spheres", *rows(spheres, "spheres", (4,), self.dtype))
-        return ("segments", *rows(segments, "segments", (6,), self.dtype))
-
-    def sweep_spheres(
-        self,
-        rays: ArrayLike,
-        directions: ArrayLike | None = None,
-        *,
-        radii: ArrayLike,
-        tmin: Any = None,
-        tmax: Any = None,
-    ) -> dict[str, np.ndarray]:
-        """Where balls whose centers move along rays first touch a triangle.
-
-        Rays as in `intersect`; `radii`: a number, or an array that fits their leading shape.
-        Returns a dict of arrays with that shape: "t" of the center at the first contact (infinity:
-        there is none), "point" (..., 3), the point that is touched, "u", "v", and "prim",
-        "geometry" and "instance" as those of a hit. At equal t the lower (instance, geometry, prim)
-        wins. A ball that touches at the start has t = tmin. Those with a negative radius or one
-        that is not finite touch nothing, as rays that are invalid hit nothing. InputError names
-        spheres and capsules, which have no answer.
-        """
-        args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
-        balls = np.empty((len(args[0]), 9), self.dtype)
-        if len(args) == 1:
-            balls[:, :8] = args[0]
-        else:
-            balls[:, :3], balls[:, 4:7], balls[:, 3], balls[:, 7] = (args[i] for i in (0, 1, 2, 3))
-        given = floats_of(radii, "radii", lead)
-        balls[:, 8] = given.reshape(-1)
-        # prim, geometry and instance as in closest_point, behind t.
-        columns = 9 if self.dtype == FLOAT32 else 8
-        hits = np.empty((len(balls), columns), self.dtype)
-        self._core.sweep(balls, hits, self.threads)
-        hits = hits.reshape(lead + (columns,))
-        first = self.dtype.itemsize // 4
-        ids = hits.view(UINT32)[..., first : first + 3]
-        return {
-            "t": hits[..., 0],
-            "point": hits[..., -5:-2],
-            "prim": ids[..., 0],
-            "geometry": ids[..., 1],
-            "instance": ids[..., 2],
-            "u": hits[..., -2],
-            "v": hits[..., -1],
-        }
+            raise _core.BackendUnavailable(f"device={self.device!r}: hits are not filtered there")
 
     def refit(self, vertices: ArrayLike) -> dict[str, float]:
         """Moves the vertices, shape (V, 3) as before, converted to the scene's type, and commits;
@@ -630,7 +436,6 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
 
     def info(self) -> dict[str, Any]:
         """Counts, bounds and degenerate elements of the mesh."""
-        require_float32(self, "info")
         return self._core.info()
 
     def stats(self) -> dict[str, Any]:
@@ -640,7 +445,6 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
     def wide_stats(self) -> dict[str, Any]:
         """Figures of the wide tree that rays go through, built for this call as a commit builds
         it."""
-        require_float32(self, "wide_stats")
         return self._core.wide_stats()
 
     def closure(self) -> dict[str, Any]:
@@ -660,16 +464,21 @@ class Scene(SceneContents, SurfaceOfHits, SavedScene, SceneViews):
 
 def load_scene(file: str | os.PathLike, *, threads: int = 0, device: str = "cpu") -> Scene:
     """The scene that `Scene.save` wrote, committed: with its name, its cameras, and the options of
-    its last commit. Nothing is built; rays have the same hits.
+    its last commit. Rays have the same hits. A scene in float64 is one again, with every number as it
+    was, to the bit.
 
-    The file is checked and mapped: processes that load it share the memory of its trees. It may be
-    deleted, but not changed, while a scene uses it. `threads` and `device` as in `Scene`.
+    The file is checked and mapped. Of a scene in float32 nothing is built, and processes that load it
+    share the memory of its trees; of one in float64 they share vertices and triangles, and its trees
+    are built. The file may be deleted, but not changed, while a scene uses it. `threads` and `device`
+    as in `Scene`.
 
     InputError that names the file and what is wrong with it; so for a .rdx file that holds a tree
     and no scene.
     """
-    scene = Scene(threads=threads, device=device)
-    scene._core, scene.name, cameras = _core.SceneTrees.load_rdx(os.fspath(file), scene.threads)
+    path = os.fspath(file)
+    precision = "float64" if _core.holds_scene_double(path) else "float32"
+    scene = Scene(threads=threads, device=device, precision=precision)
+    scene._core, scene.name, cameras = type(scene._core).load_rdx(path, scene.threads)
     scene._cameras = [Camera(**camera) for camera in cameras]
     scene._options.update(scene._core.commit_options())
     scene._file = state_of(os.path.abspath(file))

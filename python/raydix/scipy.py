@@ -26,6 +26,13 @@ def _threads(workers: int) -> int:
     return workers
 
 
+def _real(value: ArrayLike, name: str) -> np.ndarray:
+    array = np.asarray(value)
+    if np.iscomplexobj(array):
+        raise TypeError(f"{name}: complex data is not supported")
+    return array.astype(np.float64, copy=False)
+
+
 def _euclidean(p: float) -> None:
     if p != 2:
         raise ValueError(f"p: only 2 (Euclidean distances), given {p}")
@@ -46,9 +53,9 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
     ) -> None:
         if boxsize is not None:
             raise ValueError("boxsize: periodic boxes are not supported")
-        self.data = (
-            np.array(data, np.float64, copy=True) if copy_data else np.asarray(data, np.float64)
-        )
+        self.data = _real(data, "data")
+        if copy_data:
+            self.data = self.data.copy()
         if self.data.ndim != 2 or self.data.shape[1] not in (2, 3):
             raise ValueError(f"data: expected shape (n, 2) or (n, 3), given {self.data.shape}")
         if not np.isfinite(self.data).all():
@@ -72,7 +79,7 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         return self._points.stats()["nodes"]
 
     def _queries(self, x: ArrayLike) -> np.ndarray:
-        queries = np.asarray(x, np.float64)
+        queries = _real(x, "x")
         if queries.ndim == 0 or queries.shape[-1] != self.m:
             raise ValueError(f"x: expected shape (..., {self.m}), given {queries.shape}")
         if not np.isfinite(queries).all():
@@ -91,6 +98,8 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         """(distances, indices) of the k nearest; missing ones have infinity and the index n. k may
         list which neighbours: [1, 3]."""
         _euclidean(p)
+        if k is None:
+            raise ValueError("k must be an integer or a sequence of integers")
         queries = self._queries(x)
         ranks = None if np.ndim(k) == 0 else np.asarray(k, np.int64)
         most = int(k) if ranks is None else int(ranks.max(initial=0))  # type: ignore[arg-type]

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import FLOAT32, require_float32, rows
+from ._arrays import FLOAT32, cast, rows
 from .scene import Scene
 
 
@@ -52,16 +53,32 @@ def simulate(
     "mrays_per_s_memory" is None without the memory model. "simd_efficiency", "issues_per_ray" by
     operation, "histogram" of warp times (8 bins an octave). All rates are simulated ones. Triangles
     are tested with Woop's test, as in the paper.
+
+    Machines and kernels are those of float32. A scene in float64 is simulated as a user of them would
+    have to give it: vertices and rays are moved so that the middle of the scene's box is the origin,
+    in float64, and rounded to float32 once. The scene itself stays as it is. "hits" may then differ
+    from those of `Scene.intersect` by rays at edges.
     """
-    require_float32(scene, "simulate")
     if rays is None:
         rays = scene.primary_rays(size=(256, 192))["rays"]
-    launch, _ = rows(rays, "rays", (8,), FLOAT32)
+    launch, _ = rows(rays, "rays", (8,), scene.dtype)
+    vertices = scene.vertices
+    if scene.dtype != FLOAT32:
+        vertices, launch = _about_the_middle(scene, launch)
     if kernels is None:
         kernels = _core.kernels()
     elif isinstance(kernels, str):
         kernels = [kernels]
-    tree = _core.Bvh(scene.vertices, scene.faces, builder, 63, max_leaf, False, scene.threads)
+    tree = _core.Bvh(vertices, scene.faces, builder, 63, max_leaf, False, scene.threads)
     return _core.simulate(
         tree, launch, list(kernels), machine, width, any_hit, memory, scene.threads
     )
+
+
+def _about_the_middle(scene: Scene, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and rays of a scene in float64 as float32 kernels can take them."""
+    lo, hi = scene.info()["bounds"]
+    middle = (np.array(lo) + np.array(hi)) / 2 if lo[0] <= hi[0] else np.zeros(3)
+    moved = rays.copy()
+    moved[:, :3] -= middle
+    return cast(scene.vertices - middle, FLOAT32), cast(moved, FLOAT32)

@@ -23,7 +23,7 @@ class SurfaceOfHits:
     dtype: np.dtype
     threads: int
     _attributes: dict[int, dict[str, np.ndarray]]
-    _placed: dict[int, tuple[Any, np.ndarray]]
+    _placed: dict[int, Any]
 
     def positions(
         self,
@@ -147,7 +147,7 @@ class SurfaceOfHits:
         for step in self._core.path(path):
             if scene is None or step not in scene._placed:
                 return None
-            scene = scene._placed[step][0]
+            scene = scene._placed[step]
         values = scene._attributes.get(id, {}).get(name)
         mesh = None if values is None else scene._core.arrays_of(id)
         if values is None or mesh is None:

@@ -1,7 +1,9 @@
-// Rays on an NVIDIA GPU: arrays that lie there go in and come out as they are (DLPack).
+// Rays on devices. On an NVIDIA GPU arrays that lie there go in and come out as they are (DLPack).
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 #include <raydix/cwbvh.h>
 #include <raydix/device.h>
 #include <raydix/device_cwbvh.h>
@@ -11,6 +13,8 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -43,7 +47,8 @@ struct HitsThere {
 /// scene is refitted.
 class DeviceScene {
 public:
-    explicit DeviceScene(SceneTrees& scene) {
+    /// `device`: as select_device takes it.
+    DeviceScene(SceneTrees& scene, std::string device) : device_(std::move(device)) {
         const auto lock = scene.read();
         // The binary tree of one mesh is the scene's own. Rays see it unless its mask is 0.
         const bool one = scene.is_mesh() && scene.mesh_mask() != 0;
@@ -52,13 +57,17 @@ public:
             merged.names = {{0}, {*scene.mesh_id()}};
         else
             merged = merge_meshes(scene.traced());
-        static_cast<void>(device_name());  // before more work: says why there is no device
+        select();  // before more work: says why there is no device
         BuildOptions options = scene.options();
         options.threads = threads_for(options.threads);
-        tree_ = DeviceCwbvh(one ? Cwbvh(scene.bvh("device='cuda'"), options.threads)
+        tree_ = DeviceCwbvh(one ? Cwbvh(scene.bvh("device"), options.threads)
                                 : Cwbvh(build_bvh(merged.mesh, options), options.threads));
         names_ = DeviceMeshNames(merged.names);
     }
+
+    /// What this thread does on devices from now on is done on the one of this scene: first in all
+    /// calls below.
+    void select() const { select_device(device_); }
 
     /// Nothing is waited for.
     void trace(const Ray* rays, std::size_t count, const HitsThere& out, Stream stream) const {
@@ -78,6 +87,7 @@ private:
         return static_cast<std::uint32_t>(count);
     }
 
+    std::string device_;
     DeviceCwbvh tree_;
     DeviceMeshNames names_;
 };
@@ -94,6 +104,7 @@ Stream stream_of(std::uintptr_t handle) { return reinterpret_cast<Stream>(handle
 /// for, so that the hits before they were named are kept with it.
 DeviceHits intersect_there(const DeviceScene& self, const DeviceRays& rays, std::uintptr_t stream) {
     const std::size_t count = rays.shape(0);
+    self.select();
     auto hits = std::make_unique<HitsThere>(count);
     self.trace(aligned_rays(rays), count, *hits, stream_of(stream));
     float* const floats = reinterpret_cast<float*>(hits->hits.data());
@@ -110,6 +121,7 @@ DeviceHits intersect_there(const DeviceScene& self, const DeviceRays& rays, std:
 DeviceArray<std::uint8_t> occluded_there(const DeviceScene& self, const DeviceRays& rays,
                                          std::uintptr_t stream) {
     const std::size_t count = rays.shape(0);
+    self.select();
     auto flags = std::make_unique<DeviceBuffer<std::uint8_t>>(count);
     self.trace_any(aligned_rays(rays), count, flags->data(), stream_of(stream));
     std::uint8_t* const data = flags->data();
@@ -124,6 +136,7 @@ void intersect_here(const DeviceScene& self, const RaysIn& rays, const HitsOut& 
     if (results.size() != given.size())
         throw nb::value_error("a result has another length than its queries");
     in_pieces(given.size(), [&](std::size_t begin, std::size_t end) {
+        self.select();
         const DeviceBuffer<Ray> there(given.subspan(begin, end - begin));
         const HitsThere hits(end - begin);
         self.trace(there.data(), end - begin, hits, nullptr);
@@ -137,6 +150,7 @@ void occluded_here(const DeviceScene& self, const RaysIn& rays, const FlagsOut& 
     if (results.size() != given.size())
         throw nb::value_error("a result has another length than its queries");
     in_pieces(given.size(), [&](std::size_t begin, std::size_t end) {
+        self.select();
         const DeviceBuffer<Ray> there(given.subspan(begin, end - begin));
         const DeviceBuffer<std::uint8_t> flags(end - begin);
         self.trace_any(there.data(), end - begin, flags.data(), nullptr);
@@ -144,12 +158,23 @@ void occluded_here(const DeviceScene& self, const RaysIn& rays, const FlagsOut& 
     });
 }
 
+/// (how Scene(device=...) names it, the driver's name, why it cannot be used or "") of each.
+std::vector<std::tuple<std::string, std::string, std::string>> known_devices() {
+    std::vector<std::tuple<std::string, std::string, std::string>> all;
+    for (const DeviceDescription& device : list_devices())
+        all.emplace_back(device.selector, device.name, device.missing);
+    return all;
+}
+
 }  // namespace
 
 void bind_device(nb::module_& module) {
+    module.def("devices", &known_devices, nb::call_guard<nb::gil_scoped_release>(),
+               "(selector, name, why it cannot be used or '') of each.");
     nb::class_<DeviceScene>(module, "DeviceScene",
-                            "A tree on a GPU; raydix.Scene with device='cuda' is what to use.")
-        .def(nb::init<SceneTrees&>(), nb::arg("scene"), nb::call_guard<nb::gil_scoped_release>())
+                            "A tree on a device; raydix.Scene(device=...) is what to use.")
+        .def(nb::init<SceneTrees&, std::string>(), nb::arg("scene"), nb::arg("device"),
+             nb::call_guard<nb::gil_scoped_release>())
         .def("intersect_there", &intersect_there, nb::arg("rays").noconvert(), nb::arg("stream"))
         .def("occluded_there", &occluded_there, nb::arg("rays").noconvert(), nb::arg("stream"))
         .def("intersect_here", &intersect_here, nb::arg("rays").noconvert(),

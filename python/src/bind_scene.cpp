@@ -35,6 +35,7 @@
 #include "scene_changes.h"
 #include "scene_queries.h"
 #include "scene_trees.h"
+#include "scene_views.h"
 
 namespace raydix::python {
 namespace {
@@ -227,14 +228,18 @@ void normals_of(Scene& scene, const HitsIn<Scene>& hits, const MaybeRays<Scene>&
 }
 
 /// The wide tree of the one mesh, made as a commit makes it.
-nb::dict wide_stats(SceneTrees& scene) {
+template <class Scene>
+nb::dict wide_stats(Scene& scene) {
     return wide_figures(reading(scene, [&] {
-        const MeshView mesh = scene.mesh("wide_stats").view();
+        const auto mesh = scene.mesh("wide_stats").view();
         if (mesh.triangles.empty()) return WideBvh().stats();
         const SceneOptions& commits = scene.commit_options();
         BuildOptions options = build_options_for(commits.quality);
         options.threads = threads_for(commits.threads);
-        return build_wide_bvh(mesh, options, {.compact = commits.compact}).stats();
+        if constexpr (std::is_same_v<Scene, SceneTreesD>)
+            return wide_stats_of(mesh, options);
+        else
+            return build_wide_bvh(mesh, options, {.compact = commits.compact}).stats();
     }));
 }
 
@@ -262,10 +267,11 @@ nb::dict stats(Scene& scene) {
     return fields;
 }
 
-nb::dict mesh_info(SceneTrees& scene) {
+template <class Scene>
+nb::dict mesh_info(Scene& scene) {
     return mesh_figures(reading(scene, [&] {
         const auto& mesh = scene.mesh("info");
-        return inspect({*mesh.vertices, *mesh.triangles});
+        return inspect(typename Scene::Types::MeshView{*mesh.vertices, *mesh.triangles});
     }));
 }
 
@@ -412,6 +418,7 @@ void bind_asking(nb::class_<Scene>& scene) {
         },
         nb::rv_policy::automatic);
     scene.def("mesh_id", [](Scene& self) { return reading(self, [&] { return self.mesh_id(); }); });
+    scene.def("wide_stats", &wide_stats<Scene>).def("info", &mesh_info<Scene>);
     scene.attr("hit_columns") = static_cast<int>(hit_columns<Scene>);
     scene.def("stats", &stats<Scene>);
     scene.def("mask_of", [](Scene& self, std::uint32_t id) {
@@ -427,6 +434,7 @@ void bind_asking(nb::class_<Scene>& scene) {
               nb::arg("threads") = 0);
     bind_rays(scene);
     bind_queries(scene);
+    bind_views(scene);
 }
 
 }  // namespace
@@ -436,13 +444,15 @@ void bind_scene(nb::module_& module) {
     nb::class_<SceneTrees> scene(module, "SceneTrees",
                                  "A scene in float; raydix.Scene is what to use.");
     bind_changes(scene);
+    bind_saving(scene);
     bind_files(scene);
     bind_shapes(scene);
     bind_asking(scene);
-    scene.def("wide_stats", &wide_stats).def("info", &mesh_info).def("check", &check_trees);
+    scene.def("check", &check_trees);
     nb::class_<SceneTreesD> in_double(module, "SceneTreesD",
                                       "A scene in double; raydix.Scene is what to use.");
     bind_changes(in_double);
+    bind_saving(in_double);
     bind_shapes(in_double);
     bind_asking(in_double);
     in_double.def("check", &check_boxes);

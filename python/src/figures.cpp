@@ -54,7 +54,8 @@ nb::tuple corners_of(const Box& box) {
 nb::tuple corners(const Aabb& box) { return corners_of(box); }
 nb::tuple corners(const AabbD& box) { return corners_of(box); }
 
-nb::dict mesh_figures(const MeshInfo& info) {
+template <class Box>
+nb::dict mesh_figures(const BasicMeshInfo<Box>& info) {
     nb::dict fields;
     fields["vertices"] = info.vertices;
     fields["triangles"] = info.triangles;
@@ -69,6 +70,8 @@ nb::dict mesh_figures(const MeshInfo& info) {
     fields["bytes"] = info.bytes;
     return fields;
 }
+template nb::dict mesh_figures(const MeshInfo& info);
+template nb::dict mesh_figures(const MeshInfoD& info);
 
 nb::dict commit_figures(const CommitReport& report) {
     nb::dict fields;
@@ -88,8 +91,11 @@ nb::dict commit_figures(const CommitReport& report) {
     return fields;
 }
 
-nb::dict camera_figures(const Camera& camera) {
-    const auto coordinates = [](Vec3 v) { return nb::make_tuple(v.x, v.y, v.z); };
+namespace {
+
+template <class AnyCamera>
+nb::dict figures_of(const AnyCamera& camera) {
+    const auto coordinates = [](const auto& v) { return nb::make_tuple(v.x, v.y, v.z); };
     nb::dict fields;
     fields["position"] = coordinates(camera.position);
     fields["target"] = coordinates(camera.target);
@@ -99,15 +105,22 @@ nb::dict camera_figures(const Camera& camera) {
     return fields;
 }
 
-Vec3 vec3(const Coordinates& c) { return {std::get<0>(c), std::get<1>(c), std::get<2>(c)}; }
-
-Camera camera_of(const CameraFields& fields) {
+template <class AnyCamera, class Fields>
+AnyCamera camera_from(const Fields& fields) {
     return {.name = std::get<4>(fields),
-            .position = vec3(std::get<0>(fields)),
-            .target = vec3(std::get<1>(fields)),
-            .up = vec3(std::get<2>(fields)),
+            .position = point_of(std::get<0>(fields)),
+            .target = point_of(std::get<1>(fields)),
+            .up = point_of(std::get<2>(fields)),
             .vfov = std::get<3>(fields)};
 }
+
+}  // namespace
+
+nb::dict camera_figures(const Camera& camera) { return figures_of(camera); }
+nb::dict camera_figures(const CameraD& camera) { return figures_of(camera); }
+
+Camera camera_of(const CameraFields<float>& fields) { return camera_from<Camera>(fields); }
+CameraD camera_of(const CameraFields<double>& fields) { return camera_from<CameraD>(fields); }
 
 nb::dict stage_ms(const BuildMs& ms) {
     nb::dict fields;

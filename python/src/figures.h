@@ -17,14 +17,27 @@ namespace raydix::python {
 
 [[nodiscard]] nanobind::dict tree_figures(const TreeStats& stats);
 [[nodiscard]] nanobind::dict wide_figures(const WideBvhStats& stats);
-[[nodiscard]] nanobind::dict mesh_figures(const MeshInfo& info);
+template <class Box>
+[[nodiscard]] nanobind::dict mesh_figures(const BasicMeshInfo<Box>& info);
+extern template nanobind::dict mesh_figures(const MeshInfo& info);
+extern template nanobind::dict mesh_figures(const MeshInfoD& info);
 [[nodiscard]] nanobind::dict commit_figures(const CommitReport& report);
 [[nodiscard]] nanobind::dict camera_figures(const Camera& camera);
+[[nodiscard]] nanobind::dict camera_figures(const CameraD& camera);
 /// The same in the order of raydix.Camera: position, target, up, vfov, name.
-using Coordinates = std::tuple<float, float, float>;
-using CameraFields = std::tuple<Coordinates, Coordinates, Coordinates, float, std::string>;
-[[nodiscard]] Vec3 vec3(const Coordinates& c);
-[[nodiscard]] Camera camera_of(const CameraFields& fields);
+template <class Scalar>
+using Coordinates = std::tuple<Scalar, Scalar, Scalar>;
+template <class Scalar>
+using CameraFields =
+    std::tuple<Coordinates<Scalar>, Coordinates<Scalar>, Coordinates<Scalar>, Scalar, std::string>;
+[[nodiscard]] inline Vec3 point_of(const Coordinates<float>& c) {
+    return {std::get<0>(c), std::get<1>(c), std::get<2>(c)};
+}
+[[nodiscard]] inline Vec3d point_of(const Coordinates<double>& c) {
+    return {std::get<0>(c), std::get<1>(c), std::get<2>(c)};
+}
+[[nodiscard]] Camera camera_of(const CameraFields<float>& fields);
+[[nodiscard]] CameraD camera_of(const CameraFields<double>& fields);
 [[nodiscard]] nanobind::dict stage_ms(const BuildMs& ms);
 [[nodiscard]] nanobind::tuple corners(const Aabb& box);
 [[nodiscard]] nanobind::tuple corners(const AabbD& box);

@@ -1,10 +1,8 @@
 // The module raydix._core: errors, the machine, and what the other files bind.
 #include <nanobind/nanobind.h>
-#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 #include <pthread.h>
-#include <raydix/device.h>
 #include <raydix/error.h>
 #include <raydix/machine.h>
 #include <raydix/result_limit.h>
@@ -14,7 +12,6 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
-#include <utility>
 
 #include "batch.h"
 #include "bindings.h"
@@ -63,18 +60,6 @@ nb::dict machine() {
     return fields;
 }
 
-/// The name of the GPU, or why there is none to use.
-std::pair<bool, std::string> cuda_device() {
-    if (!device_available()) {
-        try {
-            return {false, device_name()};
-        } catch (const std::exception& error) {
-            return {false, error.what()};
-        }
-    }
-    return {true, device_name()};
-}
-
 }  // namespace
 
 int threads_for(int asked) {
@@ -97,7 +82,6 @@ NB_MODULE(_core, module) {
     bind_errors(module);
     bind_limits(module);
     module.def("machine", &machine, "The processor, cores this process may use, instruction set.");
-    module.def("cuda_device", &cuda_device, "(whether a GPU can be used, its name or the reason).");
     module.def("simd_instruction_sets", &raydix::simd_instruction_sets,
                "Instruction sets that rays can be traced with here, best first.");
     bind_scene(module);

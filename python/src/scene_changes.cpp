@@ -106,10 +106,11 @@ nb::dict commit_options(Scene& scene) {
     return fields;
 }
 
-nb::tuple named(const std::shared_ptr<SceneTrees>& scene, const std::string& name,
-                const std::vector<Camera>& shown) {
+template <class Scene, class AnyCamera>
+nb::tuple named(const std::shared_ptr<Scene>& scene, const std::string& name,
+                const std::vector<AnyCamera>& shown) {
     nb::list cameras;
-    for (const Camera& camera : shown) cameras.append(camera_figures(camera));
+    for (const AnyCamera& camera : shown) cameras.append(camera_figures(camera));
     return nb::make_tuple(scene, name, cameras);
 }
 
@@ -133,29 +134,37 @@ nb::tuple load(const std::string& spec, std::uint64_t seed, const std::string& b
     return named(scene, name, shown);
 }
 
+RdxScene load_rdx(const std::string& file, const SceneTrees*) { return load_rdx_scene(file); }
+RdxSceneD load_rdx(const std::string& file, const SceneTreesD*) {
+    return load_rdx_scene_double(file);
+}
+
 /// The same of a .rdx file, with the options that it was saved with.
-nb::tuple load_rdx(const std::string& file, int threads) {
+template <class Scene>
+nb::tuple load_saved(const std::string& file, int threads) {
+    using Names = typename Scene::Types;
     std::string name;
-    std::vector<Camera> shown;
-    std::shared_ptr<SceneTrees> scene;
+    decltype(Names::CameraSet::cameras) shown;
+    std::shared_ptr<Scene> scene;
     {
         const nb::gil_scoped_release unlocked;
-        RdxScene loaded = load_rdx_scene(file);
+        auto loaded = load_rdx(file, static_cast<const Scene*>(nullptr));
         name = loaded.name;
         shown = std::move(loaded.cameras.cameras);
         loaded.options.threads = threads;
         BuildOptions trees = build_options_for(loaded.options.quality);
         trees.threads = threads;
-        scene = SceneFiles::scene_of(std::move(loaded), trees);
+        scene = SceneFiles::scene_of_rdx<Names>(std::move(loaded), trees);
     }
     return named(scene, name, shown);
 }
 
-void save_rdx(SceneTrees& self, const std::string& file, const std::string& name,
-              const std::vector<CameraFields>& cameras) {
-    CameraSet shown;
-    for (const CameraFields& camera : cameras) shown.cameras.push_back(camera_of(camera));
-    while_reading(self, [&] { raydix::save_rdx(file, self.traced(), name, shown); });
+template <class Scene>
+void save(Scene& self, const std::string& file, const std::string& name,
+          const std::vector<CameraFields<typename Scene::Types::Scalar>>& cameras) {
+    typename Scene::Types::CameraSet shown;
+    for (const auto& camera : cameras) shown.cameras.push_back(camera_of(camera));
+    while_reading(self, [&] { save_rdx(file, self.traced(), name, shown); });
 }
 
 template <class Scene>
@@ -428,13 +437,20 @@ template void bind_shapes(nb::class_<SceneTrees>& scene);
 template void bind_shapes(nb::class_<SceneTreesD>& scene);
 
 void bind_files(nb::class_<SceneTrees>& scene) {
-    scene.def("save_rdx", &save_rdx, nb::arg("file"), nb::arg("name"), nb::arg("cameras"))
-        .def_static("load_rdx", &load_rdx, nb::arg("file"), nb::arg("threads"),
-                    "As load, of a .rdx file.")
-        .def_static("load", &load, nb::arg("spec"), nb::arg("seed"), nb::arg("builder"),
-                    nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
-                    nb::arg("strict"), nb::arg("threads"), nb::arg("quality"), nb::arg("usage"),
-                    nb::arg("compact"), "The scene, its name, and its cameras' fields.");
+    scene.def_static("load", &load, nb::arg("spec"), nb::arg("seed"), nb::arg("builder"),
+                     nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
+                     nb::arg("strict"), nb::arg("threads"), nb::arg("quality"), nb::arg("usage"),
+                     nb::arg("compact"), "The scene, its name, and its cameras' fields.");
 }
+
+template <class Scene>
+void bind_saving(nb::class_<Scene>& scene) {
+    scene.def("save_rdx", &save<Scene>, nb::arg("file"), nb::arg("name"), nb::arg("cameras"))
+        .def_static("load_rdx", &load_saved<Scene>, nb::arg("file"), nb::arg("threads"),
+                    "The scene of a .rdx file, its name, and its cameras' fields.");
+}
+
+template void bind_saving(nb::class_<SceneTrees>& scene);
+template void bind_saving(nb::class_<SceneTreesD>& scene);
 
 }  // namespace raydix::python

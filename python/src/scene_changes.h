@@ -11,7 +11,12 @@ template <class Scene>
 void bind_changes(nanobind::class_<Scene>& scene);
 extern template void bind_changes(nanobind::class_<SceneTrees>& scene);
 extern template void bind_changes(nanobind::class_<SceneTreesD>& scene);
-/// Scenes of files are in float32.
+/// .rdx files.
+template <class Scene>
+void bind_saving(nanobind::class_<Scene>& scene);
+extern template void bind_saving(nanobind::class_<SceneTrees>& scene);
+extern template void bind_saving(nanobind::class_<SceneTreesD>& scene);
+/// Other files, which are read in float32.
 void bind_files(nanobind::class_<SceneTrees>& scene);
 /// Spheres, capsules and points of one radius.
 template <class Scene>

@@ -36,8 +36,10 @@ std::shared_ptr<SceneTrees> SceneFiles::scene_of(Model model, const BuildOptions
     return scene;
 }
 
-std::shared_ptr<SceneTrees> SceneFiles::scene_of(RdxScene file, const BuildOptions& trees) {
-    auto scene = std::make_shared<SceneTrees>(trees, file.options);
+template <class Names>
+std::shared_ptr<BasicSceneTrees<Names>> SceneFiles::scene_of_rdx(typename Names::Rdx file,
+                                                                 const BuildOptions& trees) {
+    auto scene = std::make_shared<BasicSceneTrees<Names>>(trees, file.options);
     scene->scene_ = std::move(file.scene);
     for (const std::uint32_t id : scene->scene_.ids()) {
         const bool is_mesh = scene->scene_.mesh(id).has_value();
@@ -50,5 +52,10 @@ std::shared_ptr<SceneTrees> SceneFiles::scene_of(RdxScene file, const BuildOptio
     scene->look_for_mesh();
     return scene;
 }
+
+template std::shared_ptr<SceneTrees> SceneFiles::scene_of_rdx<InFloat>(RdxScene,
+                                                                       const BuildOptions&);
+template std::shared_ptr<SceneTreesD> SceneFiles::scene_of_rdx<InDouble>(RdxSceneD,
+                                                                         const BuildOptions&);
 
 }  // namespace raydix::python

@@ -64,6 +64,8 @@ struct InFloat {
     using Segment = raydix::Segment;
     using Sphere = raydix::Sphere;
     using Capsule = raydix::Capsule;
+    using CameraSet = raydix::CameraSet;
+    using Rdx = RdxScene;
 };
 
 /// The same in double.
@@ -87,6 +89,8 @@ struct InDouble {
     using Segment = SegmentD;
     using Sphere = SphereD;
     using Capsule = CapsuleD;
+    using CameraSet = CameraSetD;
+    using Rdx = RdxSceneD;
 };
 
 /// A mesh in memory that stays where it is for as long as somebody looks at it. Never null.
@@ -326,7 +330,7 @@ extern template class BasicSceneTrees<InDouble>;
 using SceneTrees = BasicSceneTrees<InFloat>;
 using SceneTreesD = BasicSceneTrees<InDouble>;
 
-/// Scenes of files, which are in float.
+/// Scenes of files: in float, but for those of .rdx files, which may be in double.
 struct SceneFiles {
     /// What a file holds, committed: with ids as raydix::Scene gives them. One mesh, or several
     /// without nodes, wait for their first ray or change as a scene of one mesh does.
@@ -334,8 +338,9 @@ struct SceneFiles {
                                                               const BuildOptions& trees,
                                                               const SceneOptions& commits);
     /// What a .rdx file holds, with the options of its commits.
-    [[nodiscard]] static std::shared_ptr<SceneTrees> scene_of(RdxScene file,
-                                                              const BuildOptions& trees);
+    template <class Names>
+    [[nodiscard]] static std::shared_ptr<BasicSceneTrees<Names>> scene_of_rdx(
+        typename Names::Rdx file, const BuildOptions& trees);
 };
 
 }  // namespace raydix::python

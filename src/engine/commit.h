@@ -13,8 +13,8 @@ inline constexpr std::size_t usually_placed = std::size_t{1} << 15;
 [[nodiscard]] std::shared_ptr<const SceneTree> make_scene_tree(
     const SceneInternals::State& state, const SceneOptions& options, CommitReport& report,
     std::size_t most_placed = usually_placed);
-[[nodiscard]] std::shared_ptr<const SceneTreeD> make_scene_tree(const SceneInternalsD::State& state,
-                                                                const SceneOptions& options,
-                                                                CommitReport& report);
+[[nodiscard]] std::shared_ptr<const SceneTreeD> make_scene_tree(
+    const SceneInternalsD::State& state, const SceneOptions& options, CommitReport& report,
+    std::size_t most_placed = usually_placed);
 
 }  // namespace raydix

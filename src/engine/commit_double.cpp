@@ -43,9 +43,11 @@ void unite_with(AabbD& box, const AabbD& other) {
 
 class CommitD {
 public:
-    CommitD(const SceneInternalsD::State& state, const SceneOptions& options, CommitReport& report)
-        : state_(state), options_(options), report_(report) {
+    CommitD(const SceneInternalsD::State& state, const SceneOptions& options, CommitReport& report,
+            std::size_t most_placed)
+        : state_(state), options_(options), report_(report), most_placed_(most_placed) {
         tree_->quality = options.quality;
+        tree_->usage = options.usage;
         tree_->compact = options.compact;
     }
 
@@ -121,7 +123,7 @@ private:
             tree_->stack_size = std::max(tree_->stack_size, part.scene->stack_size);
         };
         if (inner.instances.empty() ||
-            tree_->placed.size() + inner.placed.size() + 1 > usually_placed) {
+            tree_->placed.size() + inner.placed.size() + 1 > most_placed_) {
             add(whole, inner.parts.around);
             return;
         }
@@ -183,15 +185,16 @@ private:
     const SceneInternalsD::State& state_;
     const SceneOptions& options_;
     CommitReport& report_;
+    std::size_t most_placed_;
     std::shared_ptr<SceneTreeD> tree_ = std::make_shared<SceneTreeD>();
 };
 
 }  // namespace
 
 std::shared_ptr<const SceneTreeD> make_scene_tree(const SceneInternalsD::State& state,
-                                                  const SceneOptions& options,
-                                                  CommitReport& report) {
-    return run_commit(options, [&] { return CommitD(state, options, report).run(); });
+                                                  const SceneOptions& options, CommitReport& report,
+                                                  std::size_t most_placed) {
+    return run_commit(options, [&] { return CommitD(state, options, report, most_placed).run(); });
 }
 
 }  // namespace raydix

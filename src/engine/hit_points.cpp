@@ -316,8 +316,13 @@ std::uint32_t follow_path(const SceneTree& scene, std::uint32_t number,
 bool find_triangle(const SceneTree& scene, const Hit& hit, HitTriangle& triangle) {
     return find(scene, hit, triangle);
 }
+bool find_triangle(const SceneTreeD& scene, const HitD& hit,
+                   BasicHitTriangle<SceneTreeD>& triangle) {
+    return find(scene, hit, triangle);
+}
 
 void check_hits(const SceneTree& scene, std::span<const Hit> hits) { check(scene, hits); }
+void check_hits(const SceneTreeD& scene, std::span<const HitD> hits) { check(scene, hits); }
 
 template <class Tree>
 Double3 BasicHitTriangle<Tree>::point(double u, double v) const {

@@ -9,6 +9,7 @@
 
 #include "base/double3.h"
 #include "engine/scene_tree.h"
+#include "engine/scene_tree_double.h"
 
 namespace raydix {
 
@@ -35,8 +36,11 @@ std::uint32_t follow_path(const SceneTree& scene, std::uint32_t number,
 
 /// False: there is no such path, mesh or triangle. The hit is no miss.
 [[nodiscard]] bool find_triangle(const SceneTree& scene, const Hit& hit, HitTriangle& triangle);
+[[nodiscard]] bool find_triangle(const SceneTreeD& scene, const HitD& hit,
+                                 BasicHitTriangle<SceneTreeD>& triangle);
 
 /// Throws InputError that names the first hit without a triangle, if there is one.
 void check_hits(const SceneTree& scene, std::span<const Hit> hits);
+void check_hits(const SceneTreeD& scene, std::span<const HitD> hits);
 
 }  // namespace raydix

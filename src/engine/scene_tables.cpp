@@ -16,23 +16,31 @@
 namespace raydix {
 namespace {
 
+template <class Scalar>
 class TableWriter {
+    using Types = SceneTypes<Scalar>;
+    using Transform = typename Types::Transform;
+    using Tree = typename SceneKind<Scalar>::Tree;
+    using ShapeTree = typename SceneKind<Scalar>::ShapeTree;
+    using Stored = BasicStoredGeometry<Scalar>;
+
 public:
     /// As its last commit left it. Returns its number.
-    std::uint32_t add(const SceneTree& scene) {
+    std::uint32_t add(const Tree& scene) {
         const auto known = scenes_.find(&scene);
         if (known != scenes_.end()) return known->second;
-        std::vector<StoredGeometry> geometries;
-        for (const InstanceName& instance : scene.instances)
+        const auto none = no_transform<Transform>();
+        std::vector<Stored> geometries;
+        for (const auto& instance : scene.instances)
             geometries.push_back({instance.id, instance.mask, stored_instance, add(*instance.scene),
                                   instance.transform});
-        for (const MeshName& mesh : scene.mesh_names)
-            geometries.push_back({mesh.id, mesh.mask, stored_mesh, stored_none, no_transform()});
+        for (const auto& mesh : scene.mesh_names)
+            geometries.push_back({mesh.id, mesh.mask, stored_mesh, stored_none, none});
         for (const auto& shapes : scene.shapes)
             geometries.push_back(
-                {shapes->id, shapes->mask, stored_shapes, add_shapes(*shapes), no_transform()});
-        std::ranges::sort(geometries, {}, &StoredGeometry::id);
-        for (const auto& mesh : scene.meshes) number_meshes(scene, *mesh, geometries);
+                {shapes->id, shapes->mask, stored_shapes, add_shapes(*shapes), none});
+        std::ranges::sort(geometries, {}, &Stored::id);
+        number_meshes(scene, geometries);
         const auto number = static_cast<std::uint32_t>(out_.scenes.size());
         out_.scenes.push_back({static_cast<std::uint32_t>(geometries.size()),
                                static_cast<std::uint32_t>(scene.quality),
@@ -42,7 +50,7 @@ public:
         return number;
     }
 
-    SceneTables finish() { return std::move(out_); }
+    BasicSceneTables<Scalar> finish() { return std::move(out_); }
 
 private:
     /// Returns their number.
@@ -50,15 +58,17 @@ private:
         if (tree.user() != nullptr)
             throw InputError("scenes: geometry " + std::to_string(tree.id) + " holds " +
                              kind_of(tree.shapes) + ", which files have no place for");
-        StoredShapes stored{static_cast<std::uint32_t>(tree.shapes.index()), 0,
-                            count_of(tree.shapes)};
-        if (const auto* const spheres = std::get_if<std::span<const Sphere>>(&tree.shapes)) {
+        BasicStoredShapes<Scalar> stored{};
+        stored.kind = static_cast<std::uint32_t>(tree.shapes.index());
+        stored.count = count_of(tree.shapes);
+        using Spheres = std::span<const typename Types::Sphere>;
+        using Capsules = std::span<const typename Types::Capsule>;
+        if (const auto* const spheres = std::get_if<Spheres>(&tree.shapes)) {
             out_.spheres.push_back(*spheres);
-        } else if (const auto* const capsules =
-                       std::get_if<std::span<const Capsule>>(&tree.shapes)) {
+        } else if (const auto* const capsules = std::get_if<Capsules>(&tree.shapes)) {
             out_.capsules.push_back(*capsules);
         } else {
-            const auto& balls = std::get<BasicBalls<float>>(tree.shapes);
+            const auto& balls = std::get<BasicBalls<Scalar>>(tree.shapes);
             out_.points.push_back(balls.centers);
             stored.radius = balls.radius;
         }
@@ -66,11 +76,26 @@ private:
         return static_cast<std::uint32_t>(out_.shapes.size() - 1);
     }
 
-    void number_meshes(const SceneTree& scene, const MeshTree& mesh,
-                       std::vector<StoredGeometry>& geometries) {
-        std::uint32_t number = first_mesh(scene, mesh);
-        for (const std::uint32_t id : mesh.ids)
-            std::ranges::lower_bound(geometries, id, {}, &StoredGeometry::id)->number = number++;
+    /// In float the meshes of a tree follow each other.
+    void number_meshes(const SceneTree& scene, std::vector<Stored>& geometries) {
+        for (const auto& mesh : scene.meshes) {
+            std::uint32_t number = first_mesh(scene, *mesh);
+            for (const std::uint32_t id : mesh->ids) at(geometries, id).number = number++;
+        }
+    }
+    void number_meshes(const SceneTreeD& scene, std::vector<Stored>& geometries) {
+        for (const MeshNameD& name : scene.mesh_names)
+            if (!name.mesh.triangles.empty()) at(geometries, name.id).number = add_mesh(name.mesh);
+    }
+
+    static Stored& at(std::vector<Stored>& geometries, std::uint32_t id) {
+        return *std::ranges::lower_bound(geometries, id, {}, &Stored::id);
+    }
+
+    std::uint32_t add_mesh(const typename Types::MeshView& view) {
+        out_.views.push_back(view);
+        out_.meshes.push_back({view.vertices.size(), view.triangles.size()});
+        return static_cast<std::uint32_t>(out_.meshes.size() - 1);
     }
 
     /// The number of a tree's first mesh. Scenes that share a tree share its meshes.
@@ -79,12 +104,8 @@ private:
             trees_.emplace(mesh.tree.get(), static_cast<std::uint32_t>(out_.meshes.size()));
         if (!is_new) return known->second;
         const std::size_t first = out_.views.size();
-        for (const std::uint32_t id : mesh.ids) {
-            const MeshView& view =
-                std::ranges::lower_bound(scene.mesh_names, id, {}, &MeshName::id)->mesh;
-            out_.views.push_back(view);
-            out_.meshes.push_back({view.vertices.size(), view.triangles.size()});
-        }
+        for (const std::uint32_t id : mesh.ids)
+            add_mesh(std::ranges::lower_bound(scene.mesh_names, id, {}, &MeshName::id)->mesh);
         const WideBvh::Arrays& arrays = mesh.tree->arrays();
         WideBvhStats stats;
         if (const Fault fault =
@@ -100,20 +121,20 @@ private:
         return known->second;
     }
 
-    SceneTables out_;
-    std::unordered_map<const SceneTree*, std::uint32_t> scenes_;
+    BasicSceneTables<Scalar> out_;
+    std::unordered_map<const Tree*, std::uint32_t> scenes_;
     std::unordered_map<const WideBvh*, std::uint32_t> trees_;  // their first meshes
 };
 
-}  // namespace
-
-SceneTables tables_of(const Scene& scene) {
-    const SceneTree& tree = *SceneInternals::tree(scene);
-    const SceneInternals::State& state = *SceneInternals::shared_state(scene);
+template <class Scalar>
+BasicSceneTables<Scalar> tables_of_scene(const BasicScene<Scalar>& scene) {
+    using Internals = BasicSceneInternals<Scalar>;
+    const auto& tree = *Internals::tree(scene);
+    const auto& state = *Internals::shared_state(scene);
     if (state.changed) throw InputError("scenes: it has changes that no commit has taken in");
-    SceneTables out;
+    BasicSceneTables<Scalar> out;
     with_threads(0, [&] {
-        TableWriter writer;
+        TableWriter<Scalar> writer;
         writer.add(tree);
         out = writer.finish();
     });
@@ -121,5 +142,10 @@ SceneTables tables_of(const Scene& scene) {
     out.taken.assign(state.taken.begin(), state.taken.end());
     return out;
 }
+
+}  // namespace
+
+SceneTables tables_of(const Scene& scene) { return tables_of_scene(scene); }
+SceneTablesD tables_of(const SceneD& scene) { return tables_of_scene(scene); }
 
 }  // namespace raydix

@@ -1,7 +1,8 @@
 // A committed scene and those that stand in it as flat tables, each scene and each tree once: what
-// files hold of scenes (docs/rdx-format.md), and the way back.
+// files hold of scenes (docs/rdx-format.md), and the way back. In double without trees.
 #pragma once
 
+#include <raydix/double.h>
 #include <raydix/mesh.h>
 #include <raydix/scene.h>
 #include <raydix/shapes.h>
@@ -10,6 +11,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "layout/wide_bvh.h"
@@ -27,7 +29,8 @@ struct StoredScene {
 static_assert(sizeof(StoredScene) == 16);
 
 /// Of what is no instance: zeros.
-inline Transform no_transform() {
+template <class Transform>
+Transform no_transform() {
     Transform none;
     none.m = {};
     return none;
@@ -37,13 +40,16 @@ inline Transform no_transform() {
 enum StoredKind : std::uint32_t { stored_mesh, stored_instance, stored_shapes };
 
 /// In the order of their ids, scene by scene.
-struct StoredGeometry {
+template <class Scalar>
+struct BasicStoredGeometry {
     std::uint32_t id, mask;
     std::uint32_t kind;    // StoredKind
     std::uint32_t number;  // of the mesh, or none if it has no triangles; of the scene; of shapes
-    Transform transform;   // of an instance
+    typename SceneTypes<Scalar>::Transform transform;  // of an instance
 };
-static_assert(sizeof(StoredGeometry) == 64);
+using StoredGeometry = BasicStoredGeometry<float>;
+using StoredGeometryD = BasicStoredGeometry<double>;
+static_assert(sizeof(StoredGeometry) == 64 && sizeof(StoredGeometryD) == 112);
 
 /// Their triangles and vertices follow each other.
 struct StoredMesh {
@@ -58,6 +64,15 @@ struct StoredShapes {
     std::uint64_t count;
 };
 static_assert(sizeof(StoredShapes) == 16);
+struct StoredShapesD {
+    std::uint32_t kind, reserved;  // 0 behind it
+    double radius;
+    std::uint64_t count;
+};
+static_assert(sizeof(StoredShapesD) == 24);
+template <class Scalar>
+using BasicStoredShapes =
+    std::conditional_t<std::is_same_v<Scalar, float>, StoredShapes, StoredShapesD>;
 
 /// The meshes of a tree follow each other, and so do those of all trees.
 struct StoredTree {
@@ -69,48 +84,61 @@ struct StoredTree {
 static_assert(sizeof(StoredTree) == 80);
 
 /// What is written. Views of `scene` and of what it was made of, which must not change meanwhile.
-struct SceneTables {
+template <class Scalar>
+struct BasicSceneTables {
+    using Types = SceneTypes<Scalar>;
     std::vector<StoredScene> scenes;
-    std::vector<StoredGeometry> geometries;
-    std::vector<StoredTree> trees;
+    std::vector<BasicStoredGeometry<Scalar>> geometries;
     std::vector<StoredMesh> meshes;
-    std::vector<StoredShapes> shapes;
-    std::uint64_t next_id = 0;                     // of the whole: all below were given once
-    std::vector<std::uint32_t> taken;              // those above, ascending
-    std::vector<const WideBvh*> wide;              // [trees]
-    std::vector<MeshView> views;                   // [meshes]
-    std::vector<std::span<const Sphere>> spheres;  // of each shapes of the kind
-    std::vector<std::span<const Capsule>> capsules;
-    std::vector<std::span<const Vec3>> points;
+    std::vector<BasicStoredShapes<Scalar>> shapes;
+    std::uint64_t next_id = 0;                    // of the whole: all below were given once
+    std::vector<std::uint32_t> taken;             // those above, ascending
+    std::vector<typename Types::MeshView> views;  // [meshes]
+    std::vector<std::span<const typename Types::Sphere>> spheres;  // of each shapes of the kind
+    std::vector<std::span<const typename Types::Capsule>> capsules;
+    std::vector<std::span<const typename Types::Point>> points;
+    // In float alone:
+    std::vector<StoredTree> trees;
+    std::vector<const WideBvh*> wide;  // [trees]
 };
-/// Throws InputError if there is no commit that holds all changes, or if shared arrays are no
-/// longer those of the commit, or for user geometry: "SECTION: reason".
+using SceneTables = BasicSceneTables<float>;
+using SceneTablesD = BasicSceneTables<double>;
+/// Throws InputError if there is no commit that holds all changes, or for user geometry; in float
+/// also if shared arrays are no longer those of the commit: "SECTION: reason".
 [[nodiscard]] SceneTables tables_of(const Scene& scene);
+[[nodiscard]] SceneTablesD tables_of(const SceneD& scene);
 
 /// What is read, wherever it lies.
-struct SceneArrays {
+template <class Scalar>
+struct BasicSceneArrays {
+    using Types = SceneTypes<Scalar>;
     std::span<const StoredScene> scenes;
-    std::span<const StoredGeometry> geometries;
-    std::span<const StoredTree> trees;
+    std::span<const BasicStoredGeometry<Scalar>> geometries;
     std::span<const StoredMesh> meshes;
-    std::span<const StoredShapes> shapes;
+    std::span<const BasicStoredShapes<Scalar>> shapes;
     std::uint64_t next_id = 0;
     std::span<const std::uint32_t> taken;
-    std::span<const WideNode> nodes;
-    std::span<const TriangleBlock> blocks;
-    std::span<const CompactNode> compact_nodes;
-    std::span<const CompactBlock> compact_blocks;
-    std::span<const Vec3> corners;
-    std::span<const Vec3> vertices;
+    std::span<const typename Types::Point> vertices;
     std::span<const Triangle> triangles;
-    std::span<const Sphere> spheres;
-    std::span<const Capsule> capsules;
-    std::span<const Vec3> points;
+    std::span<const typename Types::Sphere> spheres;
+    std::span<const typename Types::Capsule> capsules;
+    std::span<const typename Types::Point> points;
     std::shared_ptr<void> owner;  // keeps all of it alive
+    // In float alone:
+    std::span<const StoredTree> trees = {};
+    std::span<const WideNode> nodes = {};
+    std::span<const TriangleBlock> blocks = {};
+    std::span<const CompactNode> compact_nodes = {};
+    std::span<const CompactBlock> compact_blocks = {};
+    std::span<const Vec3> corners = {};
 };
-/// A committed scene whose trees of triangles, meshes and shapes view the arrays. Arrays may hold
-/// anything: all of it is checked first, in time and memory linear in them. The same hits as the
-/// scene that was stored, bit for bit. Throws InputError("SECTION: reason").
+using SceneArrays = BasicSceneArrays<float>;
+using SceneArraysD = BasicSceneArrays<double>;
+/// A committed scene whose meshes and shapes, and in float trees of triangles, view the arrays.
+/// Arrays may hold anything: all of it is checked first, in time and memory linear in them. The
+/// same hits as the scene that was stored, bit for bit. Throws InputError("SECTION: reason").
 [[nodiscard]] Scene scene_of(const SceneArrays& arrays);
+/// The same; trees are built.
+[[nodiscard]] SceneD scene_of(const SceneArraysD& arrays);
 
 }  // namespace raydix

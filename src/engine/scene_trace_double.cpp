@@ -2,6 +2,7 @@
 #include <raydix/error.h>
 #include <raydix/scene.h>
 
+#include <algorithm>
 #include <limits>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "engine/scene_batch.h"
 #include "engine/scene_job_double.h"
 #include "engine/scene_state.h"
+#include "engine/trace_on_this_thread.h"
 #include "exec/parallel.h"
 #include "exec/path_rates.h"
 #include "exec/thread_own.h"
@@ -146,6 +148,16 @@ TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
     return sum_of(parts, n);
 }
 
+void trace_on_this_thread(const SceneTreeD& tree, const Batch& batch) {
+    const PathWay way = plan_for(tree, batch).ways.ways[0];
+    const ThreadOwn<SceneJobD> own;
+    for (std::size_t begin = 0; begin < batch.rays.size(); begin += max_job_rays) {
+        set_job(*own, tree, batch, {}, begin, std::min(begin + max_job_rays, batch.rays.size()));
+        own->way = way;
+        scene_kernels_double_for({}).trace(*own);
+    }
+}
+
 /// For any hit only prim has a meaning.
 HitD trace_one(const SceneD& scene, const RayD& ray, std::uint32_t mask, const HitFilterD* filter,
                bool any) {
@@ -164,6 +176,20 @@ HitD trace_one(const SceneD& scene, const RayD& ray, std::uint32_t mask, const H
 }
 
 }  // namespace
+
+void closest_on_this_thread(const SceneTreeD& scene, std::span<const RayD> rays,
+                            std::span<HitD> hits) {
+    check_sizes(rays.size(), hits.size());
+    const SceneTraceOptions options;
+    trace_on_this_thread(scene, {rays, hits.data(), nullptr, options});
+}
+
+void occluded_on_this_thread(const SceneTreeD& scene, std::span<const RayD> rays,
+                             std::span<std::uint8_t> occluded) {
+    check_sizes(rays.size(), occluded.size());
+    const SceneTraceOptions options;
+    trace_on_this_thread(scene, {rays, nullptr, occluded.data(), options});
+}
 
 TraceCounts trace(const SceneD& scene, std::span<const RayD> rays, std::span<HitD> hits,
                   const SceneTraceOptions& options) {

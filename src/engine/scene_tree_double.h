@@ -81,7 +81,8 @@ struct SceneTreeD {
     PartTreeD parts;
     AabbD bounds = nothing_d;  // without what rays may miss it by
     Quality quality{};         // what it was made with
-    bool compact = false;      // as the commit had it; without effect
+    Usage usage{};
+    bool compact = false;  // as the commit had it; without effect
     std::uint64_t paths = 0;
     std::uint32_t levels = 0;    // of instances, below this scene
     std::size_t stack_size = 0;  // of a ray: children still to visit, on all levels

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "engine/scene_tree.h"
+#include "engine/scene_tree_double.h"
 
 namespace raydix {
 
@@ -14,6 +15,10 @@ namespace raydix {
 /// floating-point environment must be plain, as in the loops of parallel.h.
 void closest_on_this_thread(const SceneTree& scene, std::span<const Ray> rays, std::span<Hit> hits);
 void occluded_on_this_thread(const SceneTree& scene, std::span<const Ray> rays,
+                             std::span<std::uint8_t> occluded);
+void closest_on_this_thread(const SceneTreeD& scene, std::span<const RayD> rays,
+                            std::span<HitD> hits);
+void occluded_on_this_thread(const SceneTreeD& scene, std::span<const RayD> rays,
                              std::span<std::uint8_t> occluded);
 
 /// How many nodes each ray visits on the way to its closest hit, going alone: those of trees over

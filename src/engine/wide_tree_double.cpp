@@ -1,7 +1,10 @@
 #include "engine/wide_tree_double.h"
 
+#include <raydix/wide.h>
+
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -283,6 +286,22 @@ std::shared_ptr<const WideTreeD> build_wide_tree(const MeshViewD& mesh,
     out.set_view();
     out.suits_packets = is_compact_place(mesh, out);
     return made;
+}
+
+WideBvhStats wide_stats_of(const MeshViewD& mesh, const BuildOptions& options) {
+    const auto start = std::chrono::steady_clock::now();
+    std::shared_ptr<const WideTreeD> tree;
+    with_threads(options.threads, [&] { tree = build_wide_tree(mesh, options); });
+    WideBvhStats stats = tree->arrays.stats;
+    stats.width = quantised_width;
+    stats.widening = 1.0;
+    stats.node_bytes = tree->arrays.nodes.size() * sizeof(WideNode);
+    stats.triangle_bytes = tree->blocks.size() * sizeof(TriangleBlockD);
+    stats.bytes = tree->bytes();
+    stats.input_count = tree->input_count;
+    const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
+    stats.ms = ms.count();
+    return stats;
 }
 
 std::shared_ptr<const WideTreeD> refit_wide_tree(const WideTreeD& tree, const MeshViewD& mesh) {

@@ -197,14 +197,14 @@ void render_tiles(const RenderScene& scene, Picture& picture) {
     listener.finish();
 }
 
-/// `take` calls picture_of(tracer, surface) once.
+/// `take` calls picture_of(tracer, surface) once. `frame` is in the space of both.
 template <class Take>
-Picture render_frame(const Camera& camera, const RenderOptions& options, const Take& take) {
-    const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
+Picture render_frame(const CameraFrame& frame, Vec3 camera_up, const RenderOptions& options,
+                     const Take& take) {
     Picture picture{options.width, options.height, {}};
     with_threads(options.threads, [&] {
         take([&](const Tracer& tracer, const Surface& surface) {
-            const RenderScene scene = make_scene(tracer, surface, frame, camera.up, options);
+            const RenderScene scene = make_scene(tracer, surface, frame, camera_up, options);
             picture.pixels.resize(std::size_t{options.width} * options.height);
             render_tiles(scene, picture);
         });
@@ -258,7 +258,8 @@ View view_from_name(std::string_view name) {
 Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& options) {
     check_options(options);
     require_triangles(bvh, "render");
-    return render_frame(camera, options, [&](const auto& picture_of) {
+    const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
+    return render_frame(frame, camera.up, options, [&](const auto& picture_of) {
         const std::uint64_t rays = options.view == View::steps ? 0 : rays_of(options);
         picture_of(BvhTracer(bvh, rays), BvhSurface(bvh));
     });
@@ -266,8 +267,20 @@ Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& option
 
 Picture render(const Scene& scene, const Camera& camera, const RenderOptions& options) {
     check_options(options);
-    return render_frame(camera, options, [&](const auto& picture_of) {
+    const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
+    return render_frame(frame, camera.up, options, [&](const auto& picture_of) {
         picture_of(SceneTracer(scene), SceneSurface(scene));
+    });
+}
+
+Picture render(const SceneD& scene, const CameraD& camera, const RenderOptions& options) {
+    check_options(options);
+    CameraFrame frame = make_camera_frame(camera, options.width, options.height);
+    const SceneSurfaceD surface(scene);
+    frame.position = frame.position - surface.middle();
+    const Vec3 up = normalized(Double3(camera.up)).rounded();
+    return render_frame(frame, up, options, [&](const auto& picture_of) {
+        picture_of(SceneTracerD(scene, surface.middle()), surface);
     });
 }
 

@@ -186,8 +186,8 @@ Lights make_lights(const Tracer& tracer, const CameraFrame& frame, Vec3 camera_u
     const Double3 left = normalized(up * dot(frame.right, up) - frame.right);
     const Double3 backward = cross(up, left);
     const Double3 sun = up * 0.75 + left * 0.62 + backward * 0.38;
-    return {up.rounded(), normalized(sun).rounded(), frame.position,
-            enclosed_part(tracer, frame.position)};
+    const Vec3 place = frame.position.rounded();
+    return {up.rounded(), normalized(sun).rounded(), place, enclosed_part(tracer, place)};
 }
 
 Vec3 sky_colour(const Lights& lights, Vec3 direction) {

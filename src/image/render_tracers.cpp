@@ -1,11 +1,13 @@
 #include "image/render_tracers.h"
 
+#include <raydix/error.h>
 #include <raydix/trace.h>
 
 #include <vector>
 
 #include "engine/scene_state.h"
 #include "engine/trace_on_this_thread.h"
+#include "image/surface_points.h"
 #include "trace/scalar.h"
 #include "trace/simd/trace_on_this_thread.h"
 
@@ -54,6 +56,32 @@ void SceneTracer::occluded(std::span<const Ray> rays, std::span<std::uint8_t> fo
 
 void SceneTracer::count_steps(std::span<const Ray> rays, std::span<std::uint32_t> visits) const {
     count_steps_on_this_thread(*tree_, rays, visits);
+}
+
+SceneTracerD::SceneTracerD(const SceneD& scene, Double3 middle)
+    : tree_(SceneInternalsD::tree(scene)), middle_(middle) {}
+
+void SceneTracerD::closest(std::span<const Ray> rays, std::span<Hit> hits) const {
+    std::vector<HitD> found(rays.size());
+    closest_on_this_thread(*tree_, in_space_around(middle_, rays), found);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        const HitD& hit = found[i];
+        hits[i].t = static_cast<float>(hit.t);
+        hits[i].prim = hit.prim;
+        hits[i].u = static_cast<float>(hit.u);
+        hits[i].v = static_cast<float>(hit.v);
+        hits[i].geometry = hit.geometry;
+        hits[i].instance = hit.instance;
+    }
+}
+
+void SceneTracerD::occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const {
+    occluded_on_this_thread(*tree_, in_space_around(middle_, rays), found);
+}
+
+void SceneTracerD::count_steps(std::span<const Ray>, std::span<std::uint32_t>) const {
+    throw InputError(
+        "render: the view steps counts nodes in scenes in float; this one is in double");
 }
 
 }  // namespace raydix

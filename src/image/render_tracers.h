@@ -10,7 +10,9 @@
 #include <optional>
 #include <span>
 
+#include "base/double3.h"
 #include "engine/scene_tree.h"
+#include "engine/scene_tree_double.h"
 
 namespace raydix {
 
@@ -49,6 +51,20 @@ public:
 
 private:
     std::shared_ptr<const SceneTree> tree_;
+};
+
+/// A scene in double, whose tracing space has `middle` of it as its origin. It counts no steps:
+/// that throws InputError.
+class SceneTracerD final : public Tracer {
+public:
+    SceneTracerD(const SceneD& scene, Double3 middle);
+    void closest(std::span<const Ray> rays, std::span<Hit> hits) const override;
+    void occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const override;
+    void count_steps(std::span<const Ray> rays, std::span<std::uint32_t> visits) const override;
+
+private:
+    std::shared_ptr<const SceneTreeD> tree_;
+    Double3 middle_;
 };
 
 }  // namespace raydix

@@ -34,7 +34,7 @@ public:
 
     /// In the camera's axes: right and up in halves of the screen at distance 1, and distance.
     [[nodiscard]] Double3 seen(const Double3& p) const {
-        const Double3 from = p - Double3(frame_.position);
+        const Double3 from = p - frame_.position;
         return {dot(from, frame_.right) * per_right_, dot(from, frame_.up) * per_up_,
                 dot(from, frame_.forward)};
     }

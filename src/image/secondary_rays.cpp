@@ -25,12 +25,12 @@ float far_of(const Aabb& bounds) {
     return 1.5f * std::max({size.x, size.y, size.z});
 }
 
-void check_arguments(std::span<const Ray> rays, std::span<const Hit> hits,
-                     std::span<const std::uint32_t> pixels, const SecondaryOptions& options) {
-    if (hits.size() != rays.size() || pixels.size() != rays.size())
-        throw InputError("make_secondary_rays: " + std::to_string(rays.size()) + " rays, " +
-                         std::to_string(hits.size()) + " hits and " +
-                         std::to_string(pixels.size()) + " pixels; the three must be equally many");
+void check_arguments(std::size_t rays, std::size_t hits, std::size_t pixels,
+                     const SecondaryOptions& options) {
+    if (hits != rays || pixels != rays)
+        throw InputError("make_secondary_rays: " + std::to_string(rays) + " rays, " +
+                         std::to_string(hits) + " hits and " + std::to_string(pixels) +
+                         " pixels; the three must be equally many");
     if (options.samples < 1 || options.samples > max_samples)
         throw InputError("samples is " + std::to_string(options.samples) + "; it must be 1.." +
                          std::to_string(max_samples));
@@ -38,21 +38,19 @@ void check_arguments(std::span<const Ray> rays, std::span<const Hit> hits,
     if (options.kind != RayKind::ao && options.kind != RayKind::diffuse &&
         options.kind != RayKind::diffuse_shuffled)
         throw InputError("make_secondary_rays makes ao, diffuse and diffuse_shuffled rays");
-    if (rays.size() * static_cast<std::size_t>(options.samples) > no_primitive)
+    if (rays * static_cast<std::size_t>(options.samples) > no_primitive)
         throw InputError("make_secondary_rays: 2^32 rays or more in one call; give fewer hits");
 }
 
-std::vector<Ray> make_rays(const Surface& surface, std::span<const Ray> rays,
-                           std::span<const Hit> hits, std::span<const std::uint32_t> pixels,
-                           const SecondaryOptions& options) {
-    surface.check(hits);
+/// point_of(i, step_back): the surface point of ray i, which hit.
+template <class AnyHit, class PointOf>
+std::vector<Ray> make_rays(const Surface& surface, std::span<const AnyHit> hits,
+                           const SecondaryOptions& options, const PointOf& point_of) {
     const double step_back = step_back_part * diagonal_of(surface.bounds());
     const std::vector<std::uint32_t> positions = positions_of_hits(hits);
     std::vector<SurfacePoint> points(positions.size());
-    for_each_index(points.size(), [&](std::size_t k) {
-        const std::uint32_t i = positions[k];
-        points[k] = surface_point(surface, rays[i], hits[i], pixels[i], step_back);
-    });
+    for_each_index(points.size(),
+                   [&](std::size_t k) { points[k] = point_of(positions[k], step_back); });
 
     HemisphereOptions hemisphere;
     hemisphere.samples = static_cast<std::uint32_t>(options.samples);
@@ -66,6 +64,21 @@ std::vector<Ray> make_rays(const Surface& surface, std::span<const Ray> rays,
     } else if (options.sorted) {
         sort_rays(secondary, far_of(surface.bounds()));
     }
+    return secondary;
+}
+
+template <class AnySurface>
+std::vector<Ray> make_float_rays(const AnySurface& surface, std::span<const Ray> rays,
+                                 std::span<const Hit> hits, std::span<const std::uint32_t> pixels,
+                                 const SecondaryOptions& options) {
+    check_arguments(rays.size(), hits.size(), pixels.size(), options);
+    std::vector<Ray> secondary;
+    with_threads(options.threads, [&] {
+        surface.check(hits);
+        secondary = make_rays(surface, hits, options, [&](std::uint32_t i, double step_back) {
+            return surface_point(surface, rays[i], hits[i], pixels[i], step_back);
+        });
+    });
     return secondary;
 }
 
@@ -90,22 +103,31 @@ std::vector<Ray> make_secondary_rays(const Bvh& bvh, std::span<const Ray> rays,
                                      std::span<const std::uint32_t> pixels,
                                      const SecondaryOptions& options) {
     require_triangles(bvh, "make_secondary_rays");
-    check_arguments(rays, hits, pixels, options);
-    std::vector<Ray> secondary;
-    with_threads(options.threads,
-                 [&] { secondary = make_rays(BvhSurface(bvh), rays, hits, pixels, options); });
-    return secondary;
+    return make_float_rays(BvhSurface(bvh), rays, hits, pixels, options);
 }
 
 std::vector<Ray> make_secondary_rays(const Scene& scene, std::span<const Ray> rays,
                                      std::span<const Hit> hits,
                                      std::span<const std::uint32_t> pixels,
                                      const SecondaryOptions& options) {
-    const SceneSurface surface(scene);
-    check_arguments(rays, hits, pixels, options);
-    std::vector<Ray> secondary;
-    with_threads(options.threads,
-                 [&] { secondary = make_rays(surface, rays, hits, pixels, options); });
+    return make_float_rays(SceneSurface(scene), rays, hits, pixels, options);
+}
+
+std::vector<RayD> make_secondary_rays(const SceneD& scene, std::span<const RayD> rays,
+                                      std::span<const HitD> hits,
+                                      std::span<const std::uint32_t> pixels,
+                                      const SecondaryOptions& options) {
+    const SceneSurfaceD surface(scene);
+    check_arguments(rays.size(), hits.size(), pixels.size(), options);
+    std::vector<RayD> secondary;
+    with_threads(options.threads, [&] {
+        surface.check(hits);
+        const std::vector<Ray> made =
+            make_rays(surface, hits, options, [&](std::uint32_t i, double step_back) {
+                return surface.point(rays[i], hits[i], pixels[i], step_back);
+            });
+        secondary = in_space_around(surface.middle(), made);
+    });
     return secondary;
 }
 

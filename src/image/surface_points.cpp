@@ -41,6 +41,39 @@ Double3 SceneSurface::normal(const Hit& hit) const {
 
 void SceneSurface::check(std::span<const Hit> hits) const { check_hits(*tree_, hits); }
 
+SceneSurfaceD::SceneSurfaceD(const SceneD& scene)
+    : tree_(SceneInternalsD::tree(scene)), bounds_(empty_box()) {
+    const AabbD& box = tree_->bounds;
+    if (!(box.lo.x <= box.hi.x)) return;
+    middle_ = (Double3(box.lo) + Double3(box.hi)) * 0.5;
+    bounds_ = {(Double3(box.lo) - middle_).rounded(), (Double3(box.hi) - middle_).rounded()};
+}
+
+Double3 SceneSurfaceD::normal_of(std::uint32_t prim, std::uint32_t geometry,
+                                 std::uint32_t instance) const {
+    HitD hit;
+    hit.prim = prim;
+    hit.geometry = geometry;
+    hit.instance = instance;
+    BasicHitTriangle<SceneTreeD> triangle;
+    return find_triangle(*tree_, hit, triangle) ? triangle.normal() : Double3();
+}
+
+Double3 SceneSurfaceD::normal(const Hit& hit) const {
+    return normal_of(hit.prim, hit.geometry, hit.instance);
+}
+
+void SceneSurfaceD::check(std::span<const HitD> hits) const { check_hits(*tree_, hits); }
+
+SurfacePoint SceneSurfaceD::point(const RayD& ray, const HitD& hit, std::uint32_t pixel,
+                                  double step_back) const {
+    const Double3 direction(ray.direction);
+    const double t = hit.t - step_back / length(direction);
+    const Double3 place = (Double3(ray.origin) - middle_) + direction * t;
+    const Double3 normal = normal_of(hit.prim, hit.geometry, hit.instance);
+    return {place.rounded(), turned_against(normal, direction).rounded(), pixel, 0};
+}
+
 void require_triangles(const Bvh& bvh, std::string_view call) {
     if (bvh.empty() || bvh.kind() == PrimitiveKind::triangles) return;
     throw InputError(std::string(call) + " needs a tree over triangles; this one holds " +
@@ -60,12 +93,15 @@ double step_back_distance(const Aabb& box) {
     return std::max(step_back_part * diagonal_of(box), 8.0 * 0x1p-23 * largest);
 }
 
-std::vector<std::uint32_t> positions_of_hits(std::span<const Hit> hits) {
-    std::vector<std::uint32_t> positions;
-    positions.reserve(hits.size());
-    for (std::size_t i = 0; i < hits.size(); ++i)
-        if (hits[i].hit()) positions.push_back(static_cast<std::uint32_t>(i));
-    return positions;
+std::vector<RayD> in_space_around(Double3 middle, std::span<const Ray> rays) {
+    std::vector<RayD> out(rays.size());
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        (Double3(rays[i].origin) + middle).round_to(out[i].origin);
+        Double3(rays[i].direction).round_to(out[i].direction);
+        out[i].tmin = rays[i].tmin;
+        out[i].tmax = rays[i].tmax;
+    }
+    return out;
 }
 
 SurfacePoint surface_point(const Surface& surface, const Ray& ray, const Hit& hit,

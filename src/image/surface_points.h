@@ -13,6 +13,7 @@
 
 #include "base/double3.h"
 #include "engine/scene_tree.h"
+#include "engine/scene_tree_double.h"
 #include "image/primitive_lookup.h"
 #include "rays/hemisphere_rays.h"
 
@@ -26,8 +27,6 @@ public:
     [[nodiscard]] virtual Aabb bounds() const = 0;
     /// Geometric, in the world, of any length and on either side; 0 if there is none.
     [[nodiscard]] virtual Double3 normal(const Hit& hit) const = 0;
-    /// Throws InputError that names the first hit that is not on this surface.
-    virtual void check(std::span<const Hit> hits) const = 0;
 
     [[nodiscard]] bool empty() const { return !(bounds().lo.x <= bounds().hi.x); }
 };
@@ -38,7 +37,8 @@ public:
     explicit BvhSurface(const Bvh& bvh) : bvh_(bvh), lookup_(bvh) {}
     [[nodiscard]] Aabb bounds() const override;
     [[nodiscard]] Double3 normal(const Hit& hit) const override;
-    void check(std::span<const Hit> hits) const override;
+    /// Throws InputError that names the first hit that is not on this surface.
+    void check(std::span<const Hit> hits) const;
 
 private:
     const Bvh& bvh_;
@@ -51,10 +51,35 @@ public:
     explicit SceneSurface(const Scene& scene);
     [[nodiscard]] Aabb bounds() const override;
     [[nodiscard]] Double3 normal(const Hit& hit) const override;
-    void check(std::span<const Hit> hits) const override;
+    /// As above.
+    void check(std::span<const Hit> hits) const;
 
 private:
     std::shared_ptr<const SceneTree> tree_;
+};
+
+/// A scene in double in the space of its pictures, whose origin is the middle of the scene's box:
+/// there floats are fine enough for all that is drawn. Otherwise as above.
+class SceneSurfaceD final : public Surface {
+public:
+    explicit SceneSurfaceD(const SceneD& scene);
+    [[nodiscard]] Aabb bounds() const override { return bounds_; }
+    [[nodiscard]] Double3 normal(const Hit& hit) const override;
+    void check(std::span<const HitD> hits) const;
+
+    /// The origin of that space in the scene's.
+    [[nodiscard]] Double3 middle() const { return middle_; }
+    /// surface_point for a ray and a hit in the scene's own space.
+    [[nodiscard]] SurfacePoint point(const RayD& ray, const HitD& hit, std::uint32_t pixel,
+                                     double step_back) const;
+
+private:
+    [[nodiscard]] Double3 normal_of(std::uint32_t prim, std::uint32_t geometry,
+                                    std::uint32_t instance) const;
+
+    std::shared_ptr<const SceneTreeD> tree_;
+    Double3 middle_;
+    Aabb bounds_{};
 };
 
 /// Throws InputError "CALL needs a tree over triangles; this one holds ..." unless the tree is
@@ -70,7 +95,17 @@ void require_triangles(const Bvh& bvh, std::string_view call);
 [[nodiscard]] double step_back_distance(const Aabb& box);
 
 /// Positions of the rays that hit something, ascending.
-[[nodiscard]] std::vector<std::uint32_t> positions_of_hits(std::span<const Hit> hits);
+template <class Hits>
+[[nodiscard]] std::vector<std::uint32_t> positions_of_hits(const Hits& hits) {
+    std::vector<std::uint32_t> positions;
+    positions.reserve(hits.size());
+    for (std::size_t i = 0; i < hits.size(); ++i)
+        if (hits[i].hit()) positions.push_back(static_cast<std::uint32_t>(i));
+    return positions;
+}
+
+/// Rays of a space whose origin is at `middle` of another one -> the same there.
+[[nodiscard]] std::vector<RayD> in_space_around(Double3 middle, std::span<const Ray> rays);
 
 /// Origin `step_back` before the hit, geometric normal turned toward the ray.
 [[nodiscard]] SurfacePoint surface_point(const Surface& surface, const Ray& ray, const Hit& hit,

@@ -1,6 +1,6 @@
 // The layout of .rdx files (docs/rdx-format.md): one header with a table of sections, then the
 // sections, each at the next multiple of 64 bytes. Little-endian throughout. Version 1 holds a
-// tree, versions 2 and 3 a scene (rdx_scene_format.h).
+// tree, versions 2 and 3 a scene, version 4 one in double (rdx_scene_format.h).
 #pragma once
 
 #include <raydix/bvh.h>
@@ -17,7 +17,8 @@ namespace raydix::rdx {
 
 /// The first byte is no ASCII, and a transfer that alters line ends breaks the rest.
 inline constexpr std::array<unsigned char, 8> magic{0x89, 'r', 'd', 'x', '\r', '\n', 0x1a, '\n'};
-inline constexpr std::uint32_t version = 1, scene_version = 2, shapes_version = 3;
+inline constexpr std::uint32_t version = 1, scene_version = 2, shapes_version = 3,
+                               double_version = 4;
 inline constexpr std::size_t alignment = 64;
 
 /// Of version 1, in the order of the file.
@@ -82,6 +83,14 @@ struct Camera {
     std::uint32_t name_bytes;
 };
 static_assert(sizeof(Camera) == 44);
+
+/// Of version 4.
+struct CameraD {
+    Vec3d position, target, up;
+    double vfov;
+    std::uint32_t name_bytes, reserved;  // 0 behind it
+};
+static_assert(sizeof(CameraD) == 88);
 
 [[nodiscard]] constexpr std::uint64_t aligned(std::uint64_t offset) {
     return (offset + alignment - 1) / alignment * alignment;

@@ -38,9 +38,22 @@ RdxScene load_rdx_scene(const std::filesystem::path& file) {
     return result;
 }
 
+RdxSceneD load_rdx_scene_double(const std::filesystem::path& file) {
+    Stopwatch watch;
+    const MappedFile whole = mapped(file);
+    RdxSceneD result = rdx::parse_scene_double(printable(file), whole.bytes, whole.owner);
+    result.load_ms = watch.lap();
+    return result;
+}
+
 bool holds_scene(const std::filesystem::path& file) {
     const MappedFile whole = mapped(file);
     return rdx::version_of(printable(file), whole.bytes) != rdx::version;
+}
+
+bool holds_scene_double(const std::filesystem::path& file) {
+    const MappedFile whole = mapped(file);
+    return rdx::version_of(printable(file), whole.bytes) == rdx::double_version;
 }
 
 }  // namespace raydix

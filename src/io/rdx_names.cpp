@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <utility>
 
 namespace raydix::rdx {
 
@@ -28,20 +27,34 @@ void NameReader::finish() const {
         sections_.fail("names", fmt::format("{} bytes belong to no name", rest_.size()));
 }
 
-PackedCameras::PackedCameras(std::string first_names, const std::vector<raydix::Camera>& from)
-    : names(std::move(first_names)) {
-    for (const raydix::Camera& c : from) {
-        cameras.push_back({c.position, c.target, c.up, c.vfov, length_of(c.name)});
-        names += c.name;
+std::vector<raydix::CameraD> NameReader::cameras(std::span<const CameraD> packed) {
+    std::vector<raydix::CameraD> out;
+    for (const CameraD& c : packed) {
+        if (c.reserved != 0) sections_.fail("cameras", "the reserved bytes are not zero");
+        out.push_back({next(c.name_bytes), c.position, c.target, c.up, c.vfov});
     }
+    return out;
 }
 
-Fault name_fault(std::span<const std::string> own, const CameraSet& cameras) {
+namespace {
+
+template <class Set>
+Fault long_name(std::span<const std::string> own, const Set& cameras) {
     const auto too_long = [](const std::string& name) { return name.size() > UINT32_MAX; };
     if (!std::ranges::any_of(own, too_long) &&
-        !std::ranges::any_of(cameras.cameras, too_long, &raydix::Camera::name))
+        !std::ranges::any_of(cameras.cameras,
+                             [&](const auto& camera) { return too_long(camera.name); }))
         return {};
     return fmt::format("names: one has more than {} bytes", UINT32_MAX);
+}
+
+}  // namespace
+
+Fault name_fault(std::span<const std::string> own, const CameraSet& cameras) {
+    return long_name(own, cameras);
+}
+Fault name_fault(std::span<const std::string> own, const CameraSetD& cameras) {
+    return long_name(own, cameras);
 }
 
 }  // namespace raydix::rdx

@@ -16,8 +16,13 @@ namespace raydix::rdx {
 [[nodiscard]] RdxFile parse(const std::string& file, std::span<const std::byte> bytes,
                             const std::shared_ptr<void>& owner);
 
-/// The same for files of scenes (version 2).
+/// The same for files of scenes (versions 2 and 3).
 [[nodiscard]] RdxScene parse_scene(const std::string& file, std::span<const std::byte> bytes,
                                    const std::shared_ptr<void>& owner);
+
+/// Of version 4.
+[[nodiscard]] RdxSceneD parse_scene_double(const std::string& file,
+                                           std::span<const std::byte> bytes,
+                                           const std::shared_ptr<void>& owner);
 
 }  // namespace raydix::rdx

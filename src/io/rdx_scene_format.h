@@ -1,5 +1,5 @@
-// The layout of .rdx files, versions 2 and 3 (docs/rdx-format.md): a committed scene. Version 3 has
-// shapes too.
+// The layout of .rdx files, versions 2 to 4 (docs/rdx-format.md): a committed scene. Version 3 has
+// shapes too; version 4 is in double, without trees.
 #pragma once
 
 #include <array>
@@ -59,8 +59,43 @@ inline constexpr std::array<SectionKind, shapes_section_count> scene_kinds{{
     {"points", {sizeof(Vec3)}},
 }};
 
+/// Of version 4, in the order of the file.
+enum SceneSectionIdD : std::uint32_t {
+    double_info,  // as above, with elements in double
+    double_scenes,
+    double_geometries,
+    double_taken,
+    double_meshes,
+    double_vertices,
+    double_triangles,
+    double_cameras,
+    double_names,
+    double_shapes,
+    double_spheres,
+    double_capsules,
+    double_points,
+    double_section_count
+};
+
+inline constexpr std::array<SectionKind, double_section_count> double_kinds{{
+    {"info", {32}},
+    {"scenes", {sizeof(StoredScene)}},
+    {"geometries", {sizeof(StoredGeometryD)}},
+    {"taken", {sizeof(std::uint32_t)}},
+    {"meshes", {sizeof(StoredMesh)}},
+    {"vertices", {sizeof(Vec3d)}},
+    {"triangles", {sizeof(Triangle)}},
+    {"cameras", {sizeof(CameraD)}},
+    {"names", {1}},
+    {"shapes", {sizeof(StoredShapesD)}},
+    {"spheres", {sizeof(SphereD)}},
+    {"capsules", {sizeof(CapsuleD)}},
+    {"points", {sizeof(Vec3d)}},
+}};
+
 /// Of a file that holds a scene.
 [[nodiscard]] inline std::span<const SectionKind> scene_kinds_of(std::uint32_t file_version) {
+    if (file_version == double_version) return double_kinds;
     return std::span(scene_kinds)
         .first(file_version == shapes_version ? shapes_section_count : scene_section_count);
 }

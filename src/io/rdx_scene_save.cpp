@@ -54,33 +54,70 @@ std::array<rdx::SectionContent, rdx::shapes_section_count> contents_of(
             pieces_of<Vec3>(tables.points, std::identity())};
 }
 
-}  // namespace
+std::array<rdx::SectionContent, rdx::double_section_count> contents_of(
+    const rdx::SceneInfo& info, const SceneTablesD& tables, const rdx::PackedCamerasD& packed) {
+    using View = const MeshViewD&;
+    return {rdx::content_of(std::span<const rdx::SceneInfo>(&info, 1)),
+            list_of(tables.scenes),
+            list_of(tables.geometries),
+            list_of(tables.taken),
+            list_of(tables.meshes),
+            pieces_of<Vec3d>(tables.views, [](View mesh) { return mesh.vertices; }),
+            pieces_of<Triangle>(tables.views, [](View mesh) { return mesh.triangles; }),
+            list_of(packed.cameras),
+            rdx::content_of(std::span<const char>(packed.names)),
+            list_of(tables.shapes),
+            pieces_of<SphereD>(tables.spheres, std::identity()),
+            pieces_of<CapsuleD>(tables.capsules, std::identity()),
+            pieces_of<Vec3d>(tables.points, std::identity())};
+}
 
-void save_rdx(const std::filesystem::path& file, const Scene& scene, const std::string& name,
-              const CameraSet& cameras) {
+/// write(info, tables): when all is known to be right.
+template <class AnyScene, class Set, class Write>
+void save_scene(const std::filesystem::path& file, const AnyScene& scene, const std::string& name,
+                const Set& cameras, const Write& write) {
     if (!rdx::supported) throw BackendUnavailable(std::string(rdx::unsupported_text));
     Fault fault = rdx::name_fault(std::span(&name, 1), cameras);
     if (!fault) fault = rdx::camera_fault(cameras);
     if (fault) input_error(printable(file), "not written", *fault);
-    SceneTables tables;
+    decltype(tables_of(scene)) tables;
     try {
         tables = tables_of(scene);
     } catch (const InputError& error) {
         input_error(printable(file), "not written", error.what());
     }
-    const rdx::PackedCameras packed(name, cameras.cameras);
     const rdx::SceneInfo info{.picture_width = cameras.width,
                               .picture_height = cameras.height,
                               .ao_radius = cameras.ao_radius,
                               .name_bytes = rdx::length_of(name),
                               .next_id = tables.next_id,
                               .reserved = 0};
-    const auto contents = contents_of(info, tables, packed);
-    if (tables.shapes.empty())
-        rdx::write_sections(file, rdx::scene_version,
-                            std::span(contents).first(rdx::scene_section_count));
-    else
-        rdx::write_sections(file, rdx::shapes_version, contents);
+    write(info, tables);
+}
+
+}  // namespace
+
+void save_rdx(const std::filesystem::path& file, const Scene& scene, const std::string& name,
+              const CameraSet& cameras) {
+    save_scene(file, scene, name, cameras,
+               [&](const rdx::SceneInfo& info, const SceneTables& tables) {
+                   const rdx::PackedCameras packed(name, cameras.cameras);
+                   const auto contents = contents_of(info, tables, packed);
+                   if (tables.shapes.empty())
+                       rdx::write_sections(file, rdx::scene_version,
+                                           std::span(contents).first(rdx::scene_section_count));
+                   else
+                       rdx::write_sections(file, rdx::shapes_version, contents);
+               });
+}
+
+void save_rdx(const std::filesystem::path& file, const SceneD& scene, const std::string& name,
+              const CameraSetD& cameras) {
+    save_scene(
+        file, scene, name, cameras, [&](const rdx::SceneInfo& info, const SceneTablesD& tables) {
+            const rdx::PackedCamerasD packed(name, cameras.cameras);
+            rdx::write_sections(file, rdx::double_version, contents_of(info, tables, packed));
+        });
 }
 
 }  // namespace raydix

@@ -27,10 +27,10 @@ std::uint32_t version_of(const std::string& file, std::span<const std::byte> byt
     HeaderStart start;
     std::memcpy(&start, bytes.data(), sizeof(start));
     if (start.magic != magic) input_error(file, "header", "this is no .rdx file");
-    if (start.version < version || start.version > shapes_version)
+    if (start.version < version || start.version > double_version)
         input_error(file, "header",
                     fmt::format("version {}; this program reads {} to {}", start.version, version,
-                                shapes_version));
+                                double_version));
     return start.version;
 }
 
@@ -54,8 +54,12 @@ void Sections::fail(std::string_view section, const std::string& reason) const {
 void Sections::read_header(std::uint32_t wanted) {
     const std::uint32_t actual = version_of(file_, bytes_);
     if (actual != wanted)
-        fail("header", actual != version ? "this file holds a scene, not a tree (load_rdx_scene)"
-                                         : "this file holds a tree, not a scene (load_rdx)");
+        fail("header", actual == version ? "this file holds a tree, not a scene (load_rdx)"
+                       : actual == double_version
+                           ? "this file holds a scene in double (load_rdx_scene_double)"
+                       : wanted == double_version
+                           ? "this file holds a scene in float (load_rdx_scene)"
+                           : "this file holds a scene, not a tree (load_rdx_scene)");
     const std::size_t whole = header_bytes(kinds_.size());
     if (bytes_.size() < whole)
         fail("header", fmt::format("the file has {} bytes, a header has {}", bytes_.size(), whole));

@@ -8,24 +8,33 @@
 #include <vector>
 
 #include "base/math.h"
+#include "primitives/double_sources.h"
 #include "primitives/sources.h"
+#include "primitives/zero_area.h"
 
 namespace raydix {
 namespace {
 
-bool is_finite(Vec3 p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
-
-bool has_zero_area(Vec3 a, Vec3 b, Vec3 c) {
-    const double ux = double(b.x) - a.x, uy = double(b.y) - a.y, uz = double(b.z) - a.z;
-    const double vx = double(c.x) - a.x, vy = double(c.y) - a.y, vz = double(c.z) - a.z;
-    return uy * vz == uz * vy && uz * vx == ux * vz && ux * vy == uy * vx;
+template <class Point>
+bool is_finite(Point p) {
+    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
 }
 
-void inspect_vertices(std::span<const Vec3> vertices, MeshInfo& info) {
-    for (const Vec3& vertex : vertices) {
-        const Vec3 p = without_negative_zero(vertex);
+bool is_flat(const TriangleSource& source, std::uint32_t i) {
+    return has_zero_area(source.corners(i));
+}
+/// The exact test is for numbers in range.
+bool is_flat(const TriangleSourceD& source, std::uint32_t i) {
+    const LeafTriangleD t = source.corners(i);
+    return in_range(t.v0) && in_range(t.v1) && in_range(t.v2) && has_zero_area(t);
+}
+
+template <class Point, class Info>
+void inspect_vertices(std::span<const Point> vertices, Info& info) {
+    for (const Point& vertex : vertices) {
+        const Point p = without_negative_zero(vertex);
         if (in_range(p))
-            info.bounds = unite(info.bounds, {p, p});
+            info.bounds = {min_of(info.bounds.lo, p), max_of(info.bounds.hi, p)};
         else if (is_finite(p))
             ++info.out_of_range_vertices;
         else
@@ -33,9 +42,10 @@ void inspect_vertices(std::span<const Vec3> vertices, MeshInfo& info) {
     }
 }
 
-void inspect_triangles(const MeshView& mesh, MeshInfo& info) {
+template <class Source, class View, class Box>
+void inspect_triangles(const View& mesh, BasicMeshInfo<Box>& info) {
     std::vector<bool> is_used(mesh.vertices.size());
-    const TriangleSource source{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()};
+    const Source source{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()};
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
         const auto& [a, b, c] = mesh.triangles[i];
         const std::uint32_t highest = std::max({a, b, c});
@@ -44,28 +54,32 @@ void inspect_triangles(const MeshView& mesh, MeshInfo& info) {
                                          mesh.vertices.size()));
         is_used[a] = is_used[b] = is_used[c] = true;
         const bool repeats = a == b || b == c || c == a;
-        Aabb box;
+        const auto number = static_cast<std::uint32_t>(i);
+        Box box;
         info.repeated_index_triangles += repeats ? 1 : 0;
-        info.zero_area_triangles +=
-            repeats || has_zero_area(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]) ? 1 : 0;
-        info.left_out_triangles += source.box(static_cast<std::uint32_t>(i), box) ? 0 : 1;
+        info.zero_area_triangles += repeats || is_flat(source, number) ? 1 : 0;
+        info.left_out_triangles += source.box(number, box) ? 0 : 1;
     }
     info.unreferenced_vertices =
         static_cast<std::uint64_t>(std::count(is_used.begin(), is_used.end(), false));
 }
 
-}  // namespace
-
-MeshInfo inspect(const MeshView& mesh) {
-    MeshInfo info;
+template <class Source, class Box, class View>
+BasicMeshInfo<Box> inspect_mesh(const View& mesh) {
+    BasicMeshInfo<Box> info;
     info.vertices = mesh.vertices.size();
     info.triangles = mesh.triangles.size();
     info.points = mesh.triangles.empty() ? mesh.vertices.size() : 0;
-    info.bounds = empty_box();
+    info.bounds = {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
     info.bytes = mesh.vertices.size_bytes() + mesh.triangles.size_bytes();
     inspect_vertices(mesh.vertices, info);
-    if (!mesh.triangles.empty()) inspect_triangles(mesh, info);
+    if (!mesh.triangles.empty()) inspect_triangles<Source>(mesh, info);
     return info;
 }
+
+}  // namespace
+
+MeshInfo inspect(const MeshView& mesh) { return inspect_mesh<TriangleSource, Aabb>(mesh); }
+MeshInfoD inspect(const MeshViewD& mesh) { return inspect_mesh<TriangleSourceD, AabbD>(mesh); }
 
 }  // namespace raydix

@@ -14,7 +14,7 @@ namespace raydix {
 inline constexpr std::uint32_t max_screen_side = 16384;
 
 struct CameraFrame {
-    Vec3 position;
+    Double3 position;
     Double3 forward;    // unit
     Double3 right, up;  // from the middle of the screen at distance 1 to its right and upper edge
     double width, height;  // pixels
@@ -24,9 +24,12 @@ struct CameraFrame {
 /// along the view, vfov outside (0, 180), a side of the screen outside 1..16384.
 [[nodiscard]] CameraFrame make_camera_frame(const Camera& camera, std::uint32_t width,
                                             std::uint32_t height);
+[[nodiscard]] CameraFrame make_camera_frame(const CameraD& camera, std::uint32_t width,
+                                            std::uint32_t height);
 
-/// The ray through (x, y), in pixels from the upper left corner; pixel centres lie at .5. The
-/// direction is unit.
+/// From the camera to (x, y), in pixels from the upper left corner; pixel centres lie at .5. Unit.
+[[nodiscard]] Double3 direction_through(const CameraFrame& frame, double x, double y);
+/// The ray there, rounded.
 [[nodiscard]] Ray ray_through(const CameraFrame& frame, double x, double y);
 
 }  // namespace raydix

@@ -27,12 +27,12 @@ double fitting_distance(Double3 half, Double3 forward, double tangent) {
     return distance;
 }
 
-}  // namespace
-
-Camera fit_camera(const Aabb& bounds, float vfov) {
-    if (!(vfov > 0.0f && vfov < 180.0f))
+/// `step`: numbers of the camera's type are this part of themselves apart, at most.
+template <class AnyCamera, class Box>
+AnyCamera fitted(const Box& bounds, decltype(AnyCamera::vfov) vfov, double step) {
+    if (!(vfov > 0 && vfov < 180))
         throw InputError("vfov is " + std::to_string(vfov) + "; it must lie between 0 and 180");
-    Camera camera;
+    AnyCamera camera;
     camera.name = "fitted";
     camera.vfov = vfov;
     const Double3 lo(bounds.lo), hi(bounds.hi);
@@ -44,13 +44,21 @@ Camera fit_camera(const Aabb& bounds, float vfov) {
     const double tangent = std::tan(vfov * (std::numbers::pi / 360.0));
     double distance = margin * fitting_distance(half, backward * -1.0, tangent);
     if (distance == 0.0) distance = 1.0;  // a single point
-    // Position and target are float32: far from the origin they must not round to the same point.
+    // Far from the origin position and target must not round to the same point.
     const double largest = std::max({std::abs(center.x), std::abs(center.y), std::abs(center.z)});
-    distance = std::max(distance, largest * 0x1p-16);
+    distance = std::max(distance, largest * (0x1p7 * step));
 
-    camera.target = center.rounded();
-    camera.position = (center + backward * distance).rounded();
+    center.round_to(camera.target);
+    (center + backward * distance).round_to(camera.position);
     return camera;
+}
+
+}  // namespace
+
+Camera fit_camera(const Aabb& bounds, float vfov) { return fitted<Camera>(bounds, vfov, 0x1p-23); }
+
+CameraD fit_camera(const AabbD& bounds, double vfov) {
+    return fitted<CameraD>(bounds, vfov, 0x1p-52);
 }
 
 }  // namespace raydix

@@ -36,10 +36,14 @@ Double3 normal_of(Vec3 v0, Vec3 v1, Vec3 v2) {
     return cross(Double3(v1) - corner, Double3(v2) - corner);
 }
 
+Double3 turned_against(Double3 normal, Double3 direction) {
+    const Double3 against = direction * -1.0;
+    if (!(length(normal) > 0.0)) return normalized(against);
+    return normalized(dot(normal, against) < 0.0 ? normal * -1.0 : normal);
+}
+
 Vec3 normal_toward(Double3 normal, Vec3 direction) {
-    const Double3 against = Double3(direction) * -1.0;
-    if (!(length(normal) > 0.0)) return normalized(against).rounded();
-    return normalized(dot(normal, against) < 0.0 ? normal * -1.0 : normal).rounded();
+    return turned_against(normal, Double3(direction)).rounded();
 }
 
 Vec3 point_before(const Ray& ray, float t, double step_back) {

@@ -32,6 +32,9 @@ inline constexpr double ao_radius_part = 0.05;
 /// A normal of any length, of unit length and turned against `direction`; -direction instead of 0.
 [[nodiscard]] Vec3 normal_toward(Double3 normal, Vec3 direction);
 
+/// The same before it is rounded.
+[[nodiscard]] Double3 turned_against(Double3 normal, Double3 direction);
+
 /// The point at `t` along the ray, moved back toward its origin by the distance `step_back`.
 [[nodiscard]] Vec3 point_before(const Ray& ray, float t, double step_back);
 

@@ -356,10 +356,10 @@ TEST_F(Rdx, WrongVersionIsSaid) {
     const Model scene = make_scene(3);
     Bytes bytes = saved(folder_, build_bvh(scene.mesh()), scene);
     rdx::Header header = header_of(bytes);
-    header.version = 4;
+    header.version = 5;
     header.checksum = rdx::header_checksum(std::as_bytes(std::span(&header, 1)));
     std::memcpy(bytes.data(), &header, sizeof(header));
-    EXPECT_EQ(verdict(bytes), "x.rdx: header: version 4; this program reads 1 to 3");
+    EXPECT_EQ(verdict(bytes), "x.rdx: header: version 5; this program reads 1 to 4");
 }
 
 TEST_F(Rdx, SectionsAreAligned) {

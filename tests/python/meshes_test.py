@@ -332,7 +332,7 @@ def test_options_are_checked_and_invalid_triangles_left_out():
         raydix.Scene(*BOX, quality="best")
     with pytest.raises(raydix.InputError, match="karras"):
         raydix.Scene(*BOX, builder="carrots")
-    with pytest.raises(ValueError, match="device: expected 'cpu' or 'cuda'"):
+    with pytest.raises(ValueError, match="device: expected 'cpu', 'cuda', 'opencl'"):
         raydix.Scene(*BOX, device="tpu")
 
 

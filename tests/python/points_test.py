@@ -287,6 +287,15 @@ def test_pykdtree_agrees(rng):
     np.testing.assert_allclose(found["distances"], d, rtol=1e-14)
 
 
+def test_the_stand_in_refuses_what_scipy_refuses():
+    tree = cKDTree(np.eye(3))
+    with pytest.raises(ValueError, match="k must be an integer or a sequence"):
+        tree.query([0, 0, 0], k=None)
+    for call in (cKDTree, tree.query, lambda x: tree.query_ball_point(x, 1)):
+        with pytest.raises(TypeError, match="complex data"):
+            call(np.eye(3) * 1j)
+
+
 def test_shared_cloud_as_scipy():
     spatial = support.peer("scipy.spatial")
     cloud = support.shared_cloud("kitti_frame")

@@ -159,7 +159,6 @@ def test_what_float64_scenes_lack():
     for name, call in {
         "compact=True": lambda: raydix.Scene(*BOX, precision="float64", compact=True),
         "compact=True ": lambda: scene.commit(compact=True),
-        "save": lambda: scene.save("scene.rdx"),
     }.items():
         text = f"^{name.strip()}: not there .* float64"
         with pytest.raises(NotImplementedError, match=text):

@@ -17,7 +17,7 @@ inline void seal_rdx(std::span<std::byte> file) {
     rdx::HeaderStart start;
     std::memcpy(&start, file.data(), sizeof(start));
     start.magic = rdx::magic;
-    const bool scene = start.version == rdx::scene_version || start.version == rdx::shapes_version;
+    const bool scene = start.version >= rdx::scene_version && start.version <= rdx::double_version;
     if (!scene) start.version = rdx::version;
     start.file_bytes = file.size();
     std::memcpy(file.data(), &start, sizeof(start));
