@@ -52,6 +52,22 @@ class GpuPage(unittest.TestCase):
                         and line["kernel"] == kernel.strip("`")]
             self.assertEqual(rates, [f"{rate:.0f}" for rate in expected])
 
+    def test_simulated_bounds(self):
+        bounds = json.loads((ROOT / "bench" / "results" / "bounds-h100.json").read_text(encoding="utf-8"))["rows"]
+        rows = [row for row in rows_of(self.page, "`[a-z_]+`") if len(row) == 9]
+        self.assertEqual({row[0].strip("`") for row in rows}, {bound["kernel"] for bound in bounds})
+        for kernel, *cells in rows:
+            expected = []
+            for scene in SCENES:
+                for rays in SECONDARY[:2]:
+                    bound, = (line["mrays_per_s_bound"] for line in bounds
+                              if scene in line["scene"] and line["rays"] == rays and line["kernel"] == kernel.strip("`"))
+                    rate, = (line["mrays_per_s"]["median"] for line in self.lines if line["bench"] == "gpu_trace"
+                             and scene in line["scene"] and line["rays"] == rays and line["kernel"] == kernel.strip("`"))
+                    self.assertLess(rate, bound)
+                    expected += [f"{bound:.0f}", f"{100 * rate / bound:.0f} %"]
+            self.assertEqual(cells, expected)
+
     def test_compressed_trees(self):
         rows = [row for row in rows_of(self.page, "[0-9,]+") if len(row) == 5]
         self.assertEqual(len(rows), 4)
