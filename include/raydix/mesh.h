@@ -60,8 +60,8 @@ struct BasicMeshInfo {
     std::uint64_t non_finite_vertices = 0;    // NaN or Inf in a coordinate
     std::uint64_t out_of_range_vertices = 0;  // finite, but |coordinate| > 1e12
     std::uint64_t unreferenced_vertices = 0;  // in no triangle (0 for point clouds)
-    std::uint64_t zero_area_triangles =
-        0;  // the exact cross product is 0 (repeated indices included); in double, of those in range
+    std::uint64_t zero_area_triangles = 0;    // the exact cross product is 0 (repeated indices
+                                              // included); in double, of those in range
     std::uint64_t repeated_index_triangles = 0;
     std::uint64_t left_out_triangles =
         0;                    // a vertex is non-finite or out of range, or the box is too small
