@@ -14,6 +14,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "engine/scene_calls.h"
 #include "engine/scene_walk.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -4,7 +4,6 @@
 #include <raydix/error.h>
 #include <raydix/overlap.h>
 #include <raydix/scene_queries.h>
-#include <raydix/user_geometry.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,9 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/extent.h"
 #include "engine/float_world.h"
-#include "engine/near_shapes.h"
 #include "primitives/exact_overlap.h"
 #include "proximity/sweep_walk.h"
 #include "proximity/touch_walk.h"
@@ -499,150 +496,6 @@ TEST(Near, ThreadsMayAskFirstTogether) {
         });
     for (std::thread& thread : threads) thread.join();
     EXPECT_EQ(wrong, std::vector<std::size_t>(4, 0));
-}
-
-// ---- Shapes
-
-TEST(NearShapes, SpheresAndCapsulesAreClosedSets) {
-    Scene scene;
-    const std::vector<Sphere> spheres{{{0, 0, 0}, 1}, {{10, 0, 0}, 0}, {{0, 0, 0}, -1}};
-    const std::vector<Capsule> capsules{{{0, 5, 0}, {4, 5, 0}, 1}};
-    const std::vector<Vec3> points{{0, -9, 0}};
-    scene.add(std::span<const Sphere>(spheres));
-    scene.add(std::span<const Capsule>(capsules));
-    scene.add(std::span<const Vec3>(points), 0.5f);
-    scene.commit();
-    const SceneClosestPoint outside = closest_point(scene, {-3, 0, 0});
-    EXPECT_EQ(outside.distance, 2.0f);
-    EXPECT_EQ(outside.position.x, -1.0f);
-    EXPECT_EQ(outside.geometry, 0u);
-    const SceneClosestPoint inside = closest_point(scene, {0.25f, 0.5f, 0});
-    EXPECT_EQ(inside.distance, 0.0f);
-    EXPECT_EQ(inside.position.y, 0.5f);
-    const SceneClosestPoint along = closest_point(scene, {3, 8, 0});
-    EXPECT_EQ(along.geometry, 1u);
-    EXPECT_EQ(along.distance, 2.0f);
-    EXPECT_EQ(along.u, 0.75f);
-    EXPECT_EQ(closest_point(scene, {0, -8, 0}).geometry, 2u);
-    EXPECT_EQ(closest_point(scene, {10, 0.5f, 0}).prim, 1u);
-    EXPECT_TRUE(touches(scene, Segment{{-3, 1, 0}, {3, 1, 0}}));
-    EXPECT_FALSE(touches(scene, Segment{{-3, 1.01f, 0}, {3, 1.01f, 0}}));
-    EXPECT_TRUE(touches(scene, Segment{{2, 5, -9}, {2, 5, 9}}));
-    EXPECT_TRUE(touches(scene, Sphere{{-3, 0, 0}, 2}));
-    EXPECT_FALSE(touches(scene, Sphere{{-3, 0, 0}, 1.99f}));
-}
-
-/// In a world of instances: each shape by itself gives the answer of all.
-TEST(NearShapes, ImagesAnswerAsEachOfThemDoes) {
-    RandomScenes random(12);
-    for (int round = 0; round < static_cast<int>(1 + thorough / 3); ++round) {
-        std::vector<Capsule> capsules;
-        for (int k = 0; k < 30; ++k) {
-            capsules.push_back({random.in(-1, 1), random.in(-1, 1), random.between(0, 0.3f)});
-            if (k % 3 == 0) capsules.back().b = capsules.back().a;
-        }
-        Scene inner, scene;
-        inner.add(std::span<const Capsule>(capsules));
-        inner.commit();
-        std::vector<Transform> transforms;
-        for (int k = 0; k < 4; ++k) {
-            transforms.push_back(random.transform(3, round % 2 == 0 ? 0.0f : 20.0f));
-            scene.add(inner, transforms.back());
-        }
-        scene.commit();
-        std::vector<Vec3> queries;
-        for (int k = 0; k < 100; ++k) queries.push_back(random.in(-5, 5));
-        const auto found = closest_points(scene, queries);
-        for (std::size_t i = 0; i < queries.size(); ++i) {
-            float best = infinity;
-            for (const Transform& t : transforms)
-                for (const Capsule& capsule : capsules)
-                    best = std::min(best, closest_on_image(affine_of(t), capsule, queries[i]).d2);
-            ASSERT_EQ(found[i].distance, std::sqrt(best)) << "round " << round << ", query " << i;
-        }
-    }
-}
-
-/// The point is in the image, and none in it is much nearer: neither at random nor around it.
-TEST(NearShapes, PointsOfImagesAreTheClosest) {
-    RandomScenes random(13);
-    for (int round = 0; round < 100 * static_cast<int>(thorough); ++round) {
-        const Transform transform = random.transform(2, round % 3 == 0 ? 5.0f : 0.0f);
-        const Affine map = affine_of(transform), inverse = *inverse_of(map);
-        Capsule capsule{random.in(-1, 1), random.in(-1, 1), random.between(0.05f, 0.5f)};
-        if (round % 4 == 0) capsule.b = capsule.a;
-        const Vec3 q = random.in(-4, 4);
-        const ShapePoint p = closest_on_image(map, capsule, q);
-        const auto within = [&](Double3 inside) {
-            const Double3 a(capsule.a), axis = Double3(capsule.b) - a;
-            const double length2 = dot(axis, axis);
-            const double u =
-                length2 > 0 ? std::clamp(dot(inside - a, axis) / length2, 0.0, 1.0) : 0.0;
-            return length(inside - a - axis * u) / capsule.radius;
-        };
-        // The map may flatten to a part of 2^-12 or so: rounding of the point counts as much more.
-        const double stretch = norm_of(inverse);
-        ASSERT_LE(within(inverse.point(Double3(p.position))),
-                  1 + 1e-5 * stretch * (1 + norm_of(map)) / capsule.radius);
-        const double d = std::sqrt(double{p.d2});
-        for (int k = 0; k < 300; ++k) {
-            const double s = random.between(0, 1);
-            Double3 w(random.in(-1, 1));
-            w = w * (double{capsule.radius} / std::max(length(w), 1e-9));
-            if (k % 2 == 0) {
-                // Near the point that was found.
-                const Double3 on_axis =
-                    Double3(capsule.a) + (Double3(capsule.b) - Double3(capsule.a)) * double{p.u};
-                const Double3 off = inverse.point(Double3(p.position)) - on_axis + w * 0.02;
-                w = off * std::min(1.0, double{capsule.radius} / std::max(length(off), 1e-9));
-                const Double3 other = map.point(on_axis + w);
-                ASSERT_GE(length(other - Double3(q)), d - 1e-5);
-            } else {
-                const Double3 on_axis =
-                    Double3(capsule.a) + (Double3(capsule.b) - Double3(capsule.a)) * s;
-                ASSERT_GE(length(map.point(on_axis + w) - Double3(q)), d - 1e-5);
-            }
-        }
-    }
-}
-
-std::string message_of(const auto& call) {
-    try {
-        call();
-    } catch (const InputError& error) {
-        return error.what();
-    }
-    return {};
-}
-
-TEST(NearShapes, WhatHasNoAnswerIsNamed) {
-    Scene inner, scene;
-    const std::vector<Sphere> spheres{{{0, 0, 0}, 1}};
-    const std::vector<Aabb> boxes{{{0, 0, 0}, {1, 1, 1}}};
-    inner.add(one_triangle(0));
-    inner.add(std::span<const Sphere>(spheres), {.mask = 6, .id = 3});
-    inner.commit();
-    scene.add(inner, moved(1, 0, 0), {.mask = 3});
-    scene.commit();
-    const SphereSweep sweep{{{0, 0, 9}, 0, {0, 0, -1}}, 1};
-    EXPECT_NE(message_of([&] {
-                  static_cast<void>(sweep_sphere(scene, sweep));
-              }).find("geometry 3 (spheres)"),
-              std::string::npos);
-    EXPECT_TRUE(sweep_sphere(scene, sweep, 1).hit());  // does not see them
-    EXPECT_EQ(closest_point(scene, {1, 0, 5}).geometry, 3u);
-    inner.add(UserGeometry(boxes, [](std::uint32_t, const Ray&, Hit&) { return false; }),
-              {.mask = 2, .id = 8});
-    inner.commit();
-    scene.commit();
-    for (const std::string& message : {message_of([&] {
-                                           static_cast<void>(closest_point(scene, {0, 0, 0}));
-                                       }),
-                                       message_of([&] {
-                                           static_cast<void>(touches(scene, Sphere{{0, 0, 0}, 1}));
-                                       })})
-        EXPECT_NE(message.find("geometry 8 (user geometry)"), std::string::npos) << message;
-    EXPECT_EQ(closest_point(scene, {1, 0, 5}, infinity, 1).geometry, 0u);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-"""docs/performance/gpu.md against bench/results/NVIDIA-H100-80GB-HBM3.json: every row of its tables of builds and rays."""
+"""docs/performance/gpu.md and docs/k12.md against bench/results/NVIDIA-H100-80GB-HBM3.json: every row of their tables of builds and rays."""
 import json
 import pathlib
 import re
@@ -67,6 +67,18 @@ class GpuPage(unittest.TestCase):
                     self.assertLess(rate, bound)
                     expected += [f"{bound:.0f}", f"{100 * rate / bound:.0f} %"]
             self.assertEqual(cells, expected)
+
+    def test_page_of_karras_2012(self):
+        page = (ROOT / "docs" / "k12.md").read_text(encoding="utf-8")
+        page = page[page.index("## On a GPU of today"):page.index("## How good the model is")]
+        times = {}
+        for builder in ("karras", "garanzha", "lauterbach"):
+            lines = [self.only("gpu_build", tree="bvh", builder=builder, bits=30, max_leaf=1, triangles=count)["ms"]
+                     for count in (173552, 999708, 1765932, 9992928)]
+            times[builder] = [ms["hierarchy"]["median"] + ms["fit"]["median"] for ms in lines]
+            self.assertEqual(rows_of(page, f"`{builder}`")[0][1:], [f"{ms:.2f}" for ms in times[builder]])
+        ratios = [f"{a / b:.1f}" for a, b in zip(times["garanzha"], times["karras"])]
+        self.assertEqual(rows_of(page, "`garanzha` over `karras`")[0][1:], ratios)
 
     def test_compressed_trees(self):
         rows = [row for row in rows_of(self.page, "[0-9,]+") if len(row) == 5]

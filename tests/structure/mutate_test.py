@@ -1,6 +1,6 @@
 """scripts/mutate.py: every fault that it plants still applies, and changes something."""
 import fnmatch
-import importlib.util
+import importlib
 import pathlib
 import re
 import sys
@@ -10,11 +10,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 def mutate():
-    spec = importlib.util.spec_from_file_location("mutate", ROOT / "scripts" / "mutate.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["mutate"] = module  # where its dataclass looks itself up
-    spec.loader.exec_module(module)
-    return module
+    sys.dont_write_bytecode = True
+    sys.path.insert(0, str(ROOT / "scripts"))
+    return importlib.import_module("mutate")
 
 
 class Faults(unittest.TestCase):
