@@ -1,4 +1,5 @@
-// Distance and overlap on scenes of spheres and capsules, as they are and as images under instances.
+// Distance and overlap on scenes of spheres and capsules, as they are and as images under
+// instances.
 #include <gtest/gtest.h>
 #include <raydix/error.h>
 #include <raydix/overlap.h>

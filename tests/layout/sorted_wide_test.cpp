@@ -20,6 +20,7 @@
 #include "primitives/bounds.h"
 #include "sort/radix_sort.h"
 #include "support/random.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 #include "tree/kept_splits.h"
@@ -88,10 +89,13 @@ Mesh without_area(std::size_t count) {
 
 std::vector<NamedMesh> meshes() {
     std::vector<NamedMesh> all;
-    for (const std::size_t n : {0u, 1u, 2u, 3u, 4u, 5u, 8u, 9u, 63u, 64u, 65u, 1000u, 4095u, 4096u,
-                                4097u, 30'000u, 80'000u})
+    for (const std::size_t size : {0u, 1u, 2u, 3u, 4u, 5u, 8u, 9u, 63u, 64u, 65u, 1000u, 4095u,
+                                   4096u, 4097u, 30'000u, 80'000u}) {
+        const std::size_t n = size > 4097 ? fewer(size, 3) : size;
         all.push_back({"soup of " + std::to_string(n), random_soup(n, n)});
-    for (const std::size_t n : {4u, 5u, 300u, 40'000u}) {
+    }
+    for (const std::size_t size : {4u, 5u, 300u, 40'000u}) {
+        const std::size_t n = size > 300 ? fewer(size, 3) : size;
         all.push_back({"copies", copies_of_one(n)});
         all.push_back({"splinters", splinters(n)});
         all.push_back({"halving cells", halving_cells(n)});
@@ -102,7 +106,9 @@ std::vector<NamedMesh> meshes() {
     all.push_back({"huge", scaled(random_soup(6000, 3), 9e11f)});
     all.push_back({"tiny", scaled(random_soup(6000, 3), 1e-9f)});
     all.push_back({"far away", moved(random_soup(6000, 3), {1e9f, -1e9f, 1e3f})});
-    all.push_back({"figure", load_model("builtin:figure?triangles=70000").mesh()});
+    all.push_back(
+        {"figure",
+         load_model("builtin:figure?triangles=" + std::to_string(fewer(70'000, 3))).mesh()});
     return all;
 }
 
