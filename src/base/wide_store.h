@@ -30,19 +30,4 @@ RAYDIX_HD inline void store_whole(T* place, const T& value) {
 #endif
 }
 
-/// The first or the second half of a record of 32 bytes, by one of two threads.
-template <class T>
-RAYDIX_HD inline void store_half(T* place, bool second, const T& value) {
-    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) == 2 * sizeof(Quad));
-    Quad halves[2];
-    memcpy(halves, &value, sizeof(T));
-    const Quad half = second ? halves[1] : halves[0];
-#if defined(__CUDA_ARCH__) || defined(__HIP_DEVICE_COMPILE__)
-    reinterpret_cast<Quad*>(place)[second ? 1 : 0] = half;
-#else
-    std::memcpy(reinterpret_cast<std::byte*>(place) + (second ? sizeof(Quad) : 0), &half,
-                sizeof(Quad));
-#endif
-}
-
 }  // namespace raydix

@@ -12,6 +12,7 @@
 #include "base/math.h"
 #include "exec/arena.h"
 #include "exec/warp.h"
+#include "exec/warp_boxes.h"
 #include "primitives/sources.h"
 
 namespace raydix {
@@ -49,24 +50,15 @@ struct WarpBounds {
     template <class T>
     using Var = typename Warp::template Var<T>;
 
-    Var<float> lo_x, lo_y, lo_z, hi_x, hi_y, hi_z;
+    WarpBoxes<Warp> boxes;
     Var<std::uint32_t> valid, left_out, first_left_out, unreadable, first_unreadable;
 
     RAYDIX_HD BoundsPart get(std::uint32_t lane) const {
-        return {{{lo_x[lane], lo_y[lane], lo_z[lane]}, {hi_x[lane], hi_y[lane], hi_z[lane]}},
-                valid[lane],
-                left_out[lane],
-                first_left_out[lane],
-                unreadable[lane],
-                first_unreadable[lane]};
+        return {boxes.get(lane),      valid[lane],      left_out[lane],
+                first_left_out[lane], unreadable[lane], first_unreadable[lane]};
     }
     RAYDIX_HD void set(std::uint32_t lane, const BoundsPart& part) {
-        lo_x[lane] = part.box.lo.x;
-        lo_y[lane] = part.box.lo.y;
-        lo_z[lane] = part.box.lo.z;
-        hi_x[lane] = part.box.hi.x;
-        hi_y[lane] = part.box.hi.y;
-        hi_z[lane] = part.box.hi.z;
+        boxes.set(lane, part.box);
         valid[lane] = part.valid;
         left_out[lane] = part.left_out;
         first_left_out[lane] = part.first_left_out;
@@ -77,12 +69,7 @@ struct WarpBounds {
         for (std::uint32_t step = warp_lanes / 2; step != 0; step /= 2) {
             const auto partner = [&](std::uint32_t lane) { return lane ^ step; };
             WarpBounds other;
-            other.lo_x = warp.shuffle(lo_x, partner);
-            other.lo_y = warp.shuffle(lo_y, partner);
-            other.lo_z = warp.shuffle(lo_z, partner);
-            other.hi_x = warp.shuffle(hi_x, partner);
-            other.hi_y = warp.shuffle(hi_y, partner);
-            other.hi_z = warp.shuffle(hi_z, partner);
+            other.boxes = boxes.taken_from(warp, partner);
             other.valid = warp.shuffle(valid, partner);
             other.left_out = warp.shuffle(left_out, partner);
             other.first_left_out = warp.shuffle(first_left_out, partner);

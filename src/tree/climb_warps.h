@@ -12,8 +12,8 @@
 #include "base/hd.h"
 #include "base/math.h"
 #include "base/wide_store.h"
-#include "exec/arena.h"
 #include "exec/warp.h"
+#include "exec/warp_boxes.h"
 #include "tree/fit.h"
 #include "tree/lbvh_launches.h"
 
@@ -42,39 +42,13 @@ struct WarpSubtrees {
     template <class T>
     using Var = typename Warp::template Var<T>;
 
-    Var<std::uint32_t> slot, last, height, link, count;  // as `first` and `count` of a node
-    Var<float> lo_x, lo_y, lo_z, hi_x, hi_y, hi_z;
+    Var<std::uint32_t> slot, last, height;
+    Var<std::uint32_t> link, count;  // `first` and `count` of the node
+    WarpBoxes<Warp> boxes;
 
-    [[nodiscard]] RAYDIX_HD Aabb box(std::uint32_t lane) const {
-        return {{lo_x[lane], lo_y[lane], lo_z[lane]}, {hi_x[lane], hi_y[lane], hi_z[lane]}};
-    }
-    RAYDIX_HD void set_box(std::uint32_t lane, const Aabb& box) {
-        lo_x[lane] = box.lo.x;
-        lo_y[lane] = box.lo.y;
-        lo_z[lane] = box.lo.z;
-        hi_x[lane] = box.hi.x;
-        hi_y[lane] = box.hi.y;
-        hi_z[lane] = box.hi.z;
-    }
-    /// Lane k gets what lane source(k) has, but for the slot.
-    template <class Source>
-    [[nodiscard]] RAYDIX_HD WarpSubtrees taken_from(const Warp& warp, const Source& source) const {
-        WarpSubtrees to;
-        to.last = warp.shuffle(last, source);
-        to.height = warp.shuffle(height, source);
-        to.link = warp.shuffle(link, source);
-        to.count = warp.shuffle(count, source);
-        to.lo_x = warp.shuffle(lo_x, source);
-        to.lo_y = warp.shuffle(lo_y, source);
-        to.lo_z = warp.shuffle(lo_z, source);
-        to.hi_x = warp.shuffle(hi_x, source);
-        to.hi_y = warp.shuffle(hi_y, source);
-        to.hi_z = warp.shuffle(hi_z, source);
-        return to;
-    }
     [[nodiscard]] RAYDIX_HD BvhNode node(std::uint32_t lane) const {
-        const Aabb own = box(lane);
-        return {own.lo, link[lane], own.hi, count[lane]};
+        const Aabb box = boxes.get(lane);
+        return {box.lo, link[lane], box.hi, count[lane]};
     }
 };
 
@@ -119,7 +93,7 @@ private:
             at_.height[lane] = 0;
             at_.link[lane] = key;
             at_.count[lane] = count;
-            at_.set_box(lane, leaf_box_(key, count));
+            at_.boxes.set(lane, leaf_box_(key, count));
         });
     }
 
@@ -144,25 +118,19 @@ private:
             const std::uint32_t before = active_before(lane);
             return (active_ >> lane & 1) != 0 && before != lane && (lefts >> before & 1) != 0;
         });
-        const WarpSubtrees<Warp> other = at_.taken_from(warp_, [&](std::uint32_t lane) {
-            return (rights >> lane & 1) != 0 ? active_before(lane) : partner_of(lane);
-        });
+        const auto partner = [&](std::uint32_t lane) { return partner_of(lane); };
+        const Var<std::uint32_t> last = warp_.shuffle(at_.last, partner);
+        const Var<std::uint32_t> height = warp_.shuffle(at_.height, partner);
+        const WarpBoxes<Warp> boxes = at_.boxes.taken_from(warp_, partner);
         warp_.each([&](std::uint32_t lane) {
-            if (((lefts | rights) >> lane & 1) == 0) return;
-            // Both lanes write one half of both nodes: each goes out in one piece.
-            const bool right = (rights >> lane & 1) != 0;
-            BvhNode* pair = nodes_ + (at_.slot[lane] & ~1u);
-            store_half(pair, right, (right ? other : at_).node(lane));
-            store_half(pair + 1, right, (right ? at_ : other).node(lane));
-        });
-        warp_.each([&](std::uint32_t lane) {
+            if (((lefts | rights) >> lane & 1) != 0)
+                store_whole(nodes_ + at_.slot[lane], at_.node(lane));
             if ((lefts >> lane & 1) == 0) return;
-            const std::uint32_t rank = rank_of_slot(at_.slot[lane]);
-            at_.link[lane] = pair_slot(rank);
+            at_.link[lane] = pair_slot(rank_of_slot(at_.slot[lane]));
             at_.count[lane] = 0;
-            at_.last[lane] = other.last[lane];
-            at_.height[lane] = 1 + larger(at_.height[lane], other.height[lane]);
-            at_.set_box(lane, unite(at_.box(lane), other.box(lane)));
+            at_.last[lane] = last[lane];
+            at_.height[lane] = 1 + larger(at_.height[lane], height[lane]);
+            at_.boxes.set(lane, unite(at_.boxes.get(lane), boxes.get(lane)));
         });
         active_ &= ~rights;
         // An inner node's index is its first or its last key: the warp has its slot.

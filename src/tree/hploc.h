@@ -10,6 +10,7 @@
 #include "base/atomic.h"
 #include "base/wide_store.h"
 #include "exec/warp.h"
+#include "exec/warp_boxes.h"
 #include "tree/cluster.h"
 #include "tree/radix_tree.h"
 
@@ -45,32 +46,12 @@ struct WarpClusters {
 
     std::uint32_t count = 0;
     Var<ClusterRef> ref;
-    Var<float> lo_x, lo_y, lo_z, hi_x, hi_y, hi_z;
+    WarpBoxes<Warp> boxes;
 
-    RAYDIX_HD Aabb box(std::uint32_t lane) const {
-        return {{lo_x[lane], lo_y[lane], lo_z[lane]}, {hi_x[lane], hi_y[lane], hi_z[lane]}};
-    }
-    RAYDIX_HD void set_box(std::uint32_t lane, const Aabb& box) {
-        lo_x[lane] = box.lo.x;
-        lo_y[lane] = box.lo.y;
-        lo_z[lane] = box.lo.z;
-        hi_x[lane] = box.hi.x;
-        hi_y[lane] = box.hi.y;
-        hi_z[lane] = box.hi.z;
-    }
     /// Lane k gets the cluster of lane source(k).
     template <class Source>
     RAYDIX_HD WarpClusters taken_from(const Warp& warp, const Source& source) const {
-        WarpClusters to;
-        to.count = count;
-        to.ref = warp.shuffle(ref, source);
-        to.lo_x = warp.shuffle(lo_x, source);
-        to.lo_y = warp.shuffle(lo_y, source);
-        to.lo_z = warp.shuffle(lo_z, source);
-        to.hi_x = warp.shuffle(hi_x, source);
-        to.hi_y = warp.shuffle(hi_y, source);
-        to.hi_z = warp.shuffle(hi_z, source);
-        return to;
+        return {count, warp.shuffle(ref, source), boxes.taken_from(warp, source)};
     }
 };
 
@@ -207,7 +188,7 @@ private:
             return lane < left ? lane : lane - left + hploc_list;
         });
         warp_.each([&](std::uint32_t lane) {
-            if (lane < list.count) list.set_box(lane, box_of_cluster(list.ref[lane]));
+            if (lane < list.count) list.boxes.set(lane, box_of_cluster(list.ref[lane]));
         });
         return list;
     }
@@ -240,7 +221,7 @@ private:
             const ClusterNode node = merge_clusters(mine, its, a_.max_leaf);
             store_whole(a_.nodes + node_index, node);
             merged.ref[lane] = node_index;
-            merged.set_box(lane, {node.lo, node.hi});
+            merged.boxes.set(lane, {node.lo, node.hi});
         });
         warp_.sync();
         Clusters next =
@@ -264,7 +245,7 @@ private:
             Var<float> right;
             warp_.each([&](std::uint32_t lane) {
                 right[lane] = lane + d < list.count
-                                  ? cluster_area(unite(list.box(lane), ahead.box(lane)))
+                                  ? cluster_area(unite(list.boxes.get(lane), ahead.boxes.get(lane)))
                                   : infinity;
             });
             const Var<float> behind =
@@ -289,7 +270,7 @@ private:
     }
     RAYDIX_HD ClusterPart part(const Clusters& list, std::uint32_t lane) const {
         const ClusterRef ref = list.ref[lane];
-        const Aabb box = list.box(lane);
+        const Aabb box = list.boxes.get(lane);
         return {ref, box,
                 is_primitive(ref) ? sum_of_primitive(a_.ids[ref & ~primitive_cluster], box)
                                   : a_.nodes[ref].sum};
