@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "support/double_scenes.h"
+#include "support/exact.h"
 #include "support/message.h"
 #include "support/sanitized.h"
 #include "support/support.h"

@@ -18,6 +18,7 @@
 #include "engine/affine.h"
 #include "engine/affine_double.h"
 #include "support/double_scenes.h"
+#include "support/exact.h"
 #include "support/random.h"
 #include "support/sanitized.h"
 #include "support/scenes.h"

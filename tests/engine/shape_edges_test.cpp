@@ -21,6 +21,7 @@
 
 #include "engine/shape_tree.h"
 #include "support/double_scenes.h"
+#include "support/exact.h"
 #include "support/support.h"
 
 namespace raydix::test {

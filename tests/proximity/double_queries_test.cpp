@@ -12,6 +12,7 @@
 #include "proximity/closest_on_triangle.h"
 #include "proximity/winding_tree.h"
 #include "support/double_scenes.h"
+#include "support/exact.h"
 #include "support/random.h"
 #include "support/sanitized.h"
 #include "support/support.h"

@@ -14,6 +14,7 @@
 #include "base/double3.h"
 #include "proximity/shape_hits.h"
 #include "support/double_scenes.h"
+#include "support/exact.h"
 #include "support/random.h"
 #include "support/support.h"
 

@@ -183,13 +183,4 @@ std::vector<RayD> mixed_rays(const MeshD& mesh, std::size_t count, std::uint64_t
     return rays;
 }
 
-ExactPoint exact(Vec3d p) { return {Exact(p.x), Exact(p.y), Exact(p.z)}; }
-ExactPoint operator-(const ExactPoint& a, const ExactPoint& b) {
-    return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-Exact dot(const ExactPoint& a, const ExactPoint& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-ExactPoint cross(const ExactPoint& a, const ExactPoint& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
 }  // namespace raydix::test

@@ -1,10 +1,8 @@
-// Scenes and rays in double, and exact arithmetic to judge them with.
+// Scenes and rays in double.
 #pragma once
 
 #include <raydix/double.h>
 #include <raydix/mesh.h>
-
-#include <boost/multiprecision/cpp_int.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -58,15 +56,5 @@ AabbD box_of_mesh(const MeshD& mesh);
 /// Rays of ten kinds in turn: anywhere, at corners and middles of edges, along axes through
 /// corners, with a component of 0 or -0, with limits, from surfaces, of any length, along edges.
 std::vector<RayD> mixed_rays(const MeshD& mesh, std::size_t count, std::uint64_t seed);
-
-using Exact = boost::multiprecision::cpp_rational;
-
-struct ExactPoint {
-    Exact x, y, z;
-};
-ExactPoint exact(Vec3d p);
-ExactPoint operator-(const ExactPoint& a, const ExactPoint& b);
-Exact dot(const ExactPoint& a, const ExactPoint& b);
-ExactPoint cross(const ExactPoint& a, const ExactPoint& b);
 
 }  // namespace raydix::test

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "support/double_scenes.h"
+#include "support/exact.h"
 
 namespace raydix::test {
 

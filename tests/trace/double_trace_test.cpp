@@ -9,6 +9,7 @@
 
 #include "primitives/double_sources.h"
 #include "support/double_scenes.h"
+#include "support/exact.h"
 #include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
