@@ -1,8 +1,10 @@
-// What stands behind the handles of raydix_c.h, and how exceptions become statuses.
+// What stands behind the handles of raydix_c.h and raydix_c_double.h, and how exceptions become
+// statuses.
 #pragma once
 
 #include <raydix/raydix.h>
 #include <raydix_c.h>
+#include <raydix_c_double.h>
 
 #include <cstddef>
 #include <cstring>
@@ -13,14 +15,32 @@
 struct raydix_scene {
     raydix::Scene scene;
 };
+struct raydix_scene_d {
+    raydix::SceneD scene;
+};
+struct raydix_hit_lists {
+    raydix::AllHits lists;
+};
+struct raydix_hit_lists_d {
+    raydix::AllHitsD lists;
+};
 struct raydix_solid {
     raydix::Solid solid;
+};
+struct raydix_solid_d {
+    raydix::SolidD solid;
 };
 struct raydix_points {
     raydix::Points index;
 };
+struct raydix_points_d {
+    raydix::PointsD index;
+};
 struct raydix_lists {
     raydix::PointLists<float> lists;
+};
+struct raydix_lists_d {
+    raydix::PointLists<double> lists;
 };
 
 namespace raydix_c {
@@ -47,11 +67,13 @@ inline void require(const void* argument, const char* name) {
 /// `count` things of type T at a caller's array, whose elements have the same layout.
 template <class T, class Element>
 std::span<const T> array_of(const Element* first, std::size_t count, const char* name) {
+    static_assert(sizeof(T) % sizeof(Element) == 0 && alignof(T) == alignof(Element));
     if (count > 0) require(first, name);
     return {reinterpret_cast<const T*>(first), count};
 }
 template <class T, class Element>
 std::span<T> results_at(Element* first, std::size_t count, const char* name) {
+    static_assert(sizeof(T) % sizeof(Element) == 0 && alignof(T) == alignof(Element));
     if (count > 0) require(first, name);
     return {reinterpret_cast<T*>(first), count};
 }

@@ -1,39 +1,34 @@
-// Points of the C interface.
+// Points of the C interface, in float and double.
 #include <limits>
 
 #include "inside.h"
 
-using raydix_c::array_of;
-using raydix_c::guarded;
-using raydix_c::require;
-using raydix_c::results_at;
+namespace raydix_c {
 
-namespace {
-
-std::size_t times(std::size_t count, std::size_t k) {
-    if (k != 0 && count > std::numeric_limits<std::size_t>::max() / k)
-        throw raydix::InputError("count * k is more than an array can have");
-    return count * k;
+raydix::PointQueryOptions with_threads(int threads) {
+    raydix::PointQueryOptions options;
+    options.threads = threads;
+    return options;
 }
 
-}  // namespace
+template <class Scalar>
+std::span<const typename raydix::SceneTypes<Scalar>::Point> points_at(const Scalar* numbers,
+                                                                      std::size_t count,
+                                                                      const char* name) {
+    return array_of<typename raydix::SceneTypes<Scalar>::Point>(numbers, count, name);
+}
 
-extern "C" {
-
-raydix_status raydix_points_create(const float* points, size_t count, int threads,
-                                   raydix_points** index) {
+template <class Handle, class Scalar>
+raydix_status create_points(const Scalar* points, std::size_t count, int threads, Handle** index) {
     return guarded([&] {
         require(index, "index");
         raydix::PointsOptions options;
         options.threads = threads;
-        *index = new raydix_points{
-            raydix::build_points(array_of<raydix::Vec3>(points, count, "points"), options)};
+        *index = new Handle{raydix::build_points(points_at(points, count, "points"), options)};
     });
 }
 
-void raydix_points_destroy(raydix_points* index) { delete index; }
-
-raydix_status raydix_points_size(const raydix_points* index, size_t* size) {
+raydix_status size_of_points(const auto* index, std::size_t* size) {
     return guarded([&] {
         require(index, "index");
         require(size, "size");
@@ -41,48 +36,47 @@ raydix_status raydix_points_size(const raydix_points* index, size_t* size) {
     });
 }
 
-raydix_status raydix_points_knn(const raydix_points* index, const float* queries, size_t count,
-                                uint32_t k, uint32_t* indices, float* distances, int threads) {
+template <class Scalar>
+raydix_status knn(const auto* index, const Scalar* queries, std::size_t count, std::uint32_t k,
+                  std::uint32_t* indices, Scalar* distances, int threads) {
     return guarded([&] {
         require(index, "index");
-        const std::size_t size = times(count, k);
-        const auto asked = array_of<raydix::Vec3>(queries, count, "queries");
-        const auto ids = results_at<std::uint32_t>(indices, size, "indices");
-        const auto far = results_at<float>(distances, size, "distances");
-        raydix::PointQueryOptions options;
-        options.threads = threads;
-        raydix::knn(index->index, asked, k, ids, far, options);
+        if (k != 0 && count > std::numeric_limits<std::size_t>::max() / k)
+            throw raydix::InputError("count * k is more than an array can have");
+        const std::size_t size = count * k;
+        raydix::knn(index->index, points_at(queries, count, "queries"), k,
+                    results_at<std::uint32_t>(indices, size, "indices"),
+                    results_at<Scalar>(distances, size, "distances"), with_threads(threads));
     });
 }
 
-raydix_status raydix_points_count(const raydix_points* index, const float* queries, size_t count,
-                                  float radius, uint32_t* counts, int threads) {
+template <class Scalar>
+raydix_status count_points(const auto* index, const Scalar* queries, std::size_t count,
+                           Scalar radius, std::uint32_t* counts, int threads) {
     return guarded([&] {
         require(index, "index");
-        raydix::PointQueryOptions options;
-        options.threads = threads;
-        raydix::radius_count(index->index, array_of<raydix::Vec3>(queries, count, "queries"),
-                             radius, results_at<std::uint32_t>(counts, count, "counts"), options);
+        raydix::radius_count(index->index, points_at(queries, count, "queries"), radius,
+                             results_at<std::uint32_t>(counts, count, "counts"),
+                             with_threads(threads));
     });
 }
 
-raydix_status raydix_points_radius(const raydix_points* index, const float* queries, size_t count,
-                                   float radius, int sorted, int threads, raydix_lists** lists) {
+template <class Lists, class Scalar>
+raydix_status points_within(const auto* index, const Scalar* queries, std::size_t count,
+                            Scalar radius, bool sorted, int threads, Lists** lists) {
     return guarded([&] {
         require(index, "index");
         require(lists, "lists");
-        raydix::PointQueryOptions options;
-        options.threads = threads;
-        options.sort = sorted != 0;
-        const auto asked = array_of<raydix::Vec3>(queries, count, "queries");
-        *lists = new raydix_lists{raydix::radius_search(index->index, asked, radius, options)};
+        raydix::PointQueryOptions options = with_threads(threads);
+        options.sort = sorted;
+        const auto asked = points_at(queries, count, "queries");
+        *lists = new Lists{raydix::radius_search(index->index, asked, radius, options)};
     });
 }
 
-void raydix_lists_destroy(raydix_lists* lists) { delete lists; }
-
-raydix_status raydix_lists_arrays(const raydix_lists* lists, size_t* rows, const uint64_t** offsets,
-                                  const uint32_t** indices, const float** distances) {
+template <class Scalar>
+raydix_status arrays_of_lists(const auto* lists, std::size_t* rows, const std::uint64_t** offsets,
+                              const std::uint32_t** indices, const Scalar** distances) {
     return guarded([&] {
         require(lists, "lists");
         if (rows != nullptr) *rows = lists->lists.offsets.size() - 1;
@@ -90,6 +84,78 @@ raydix_status raydix_lists_arrays(const raydix_lists* lists, size_t* rows, const
         if (indices != nullptr) *indices = lists->lists.indices.data();
         if (distances != nullptr) *distances = lists->lists.distances.data();
     });
+}
+
+}  // namespace raydix_c
+
+extern "C" {
+
+raydix_status raydix_points_create(const float* points, size_t count, int threads,
+                                   raydix_points** index) {
+    return raydix_c::create_points(points, count, threads, index);
+}
+
+raydix_status raydix_points_create_d(const double* points, size_t count, int threads,
+                                     raydix_points_d** index) {
+    return raydix_c::create_points(points, count, threads, index);
+}
+
+void raydix_points_destroy(raydix_points* index) { delete index; }
+
+void raydix_points_destroy_d(raydix_points_d* index) { delete index; }
+
+raydix_status raydix_points_size(const raydix_points* index, size_t* size) {
+    return raydix_c::size_of_points(index, size);
+}
+
+raydix_status raydix_points_size_d(const raydix_points_d* index, size_t* size) {
+    return raydix_c::size_of_points(index, size);
+}
+
+raydix_status raydix_points_knn(const raydix_points* index, const float* queries, size_t count,
+                                uint32_t k, uint32_t* indices, float* distances, int threads) {
+    return raydix_c::knn(index, queries, count, k, indices, distances, threads);
+}
+
+raydix_status raydix_points_knn_d(const raydix_points_d* index, const double* queries, size_t count,
+                                  uint32_t k, uint32_t* indices, double* distances, int threads) {
+    return raydix_c::knn(index, queries, count, k, indices, distances, threads);
+}
+
+raydix_status raydix_points_count(const raydix_points* index, const float* queries, size_t count,
+                                  float radius, uint32_t* counts, int threads) {
+    return raydix_c::count_points(index, queries, count, radius, counts, threads);
+}
+
+raydix_status raydix_points_count_d(const raydix_points_d* index, const double* queries,
+                                    size_t count, double radius, uint32_t* counts, int threads) {
+    return raydix_c::count_points(index, queries, count, radius, counts, threads);
+}
+
+raydix_status raydix_points_radius(const raydix_points* index, const float* queries, size_t count,
+                                   float radius, int sorted, int threads, raydix_lists** lists) {
+    return raydix_c::points_within(index, queries, count, radius, sorted != 0, threads, lists);
+}
+
+raydix_status raydix_points_radius_d(const raydix_points_d* index, const double* queries,
+                                     size_t count, double radius, int sorted, int threads,
+                                     raydix_lists_d** lists) {
+    return raydix_c::points_within(index, queries, count, radius, sorted != 0, threads, lists);
+}
+
+void raydix_lists_destroy(raydix_lists* lists) { delete lists; }
+
+void raydix_lists_destroy_d(raydix_lists_d* lists) { delete lists; }
+
+raydix_status raydix_lists_arrays(const raydix_lists* lists, size_t* rows, const uint64_t** offsets,
+                                  const uint32_t** indices, const float** distances) {
+    return raydix_c::arrays_of_lists(lists, rows, offsets, indices, distances);
+}
+
+raydix_status raydix_lists_arrays_d(const raydix_lists_d* lists, size_t* rows,
+                                    const uint64_t** offsets, const uint32_t** indices,
+                                    const double** distances) {
+    return raydix_c::arrays_of_lists(lists, rows, offsets, indices, distances);
 }
 
 }  // extern "C"

@@ -13,9 +13,10 @@
    Threads: any number of threads may ask one handle at once (const in the declaration). Calls that
    change a handle need it for themselves.
 
-   Units: coordinates are float, in the caller's unit; distances are in that unit, and never
-   squared. t of a ray is in units of its direction, which need not have length 1. Coordinates
-   beyond 1e12, infinite ones and NaN are out of range: what has them is left out and never found.
+   Units: coordinates are float, in the caller's unit (raydix_c_double.h has the same calls in
+   double); distances are in that unit, and never squared. t of a ray is in units of its direction,
+   which need not have length 1. Coordinates beyond 1e12, infinite ones and NaN are out of range:
+   what has them is left out and never found.
 
    Options may be NULL: all defaults. Otherwise start from the macro that sets the defaults:
        raydix_trace_options options = RAYDIX_TRACE_OPTIONS;
@@ -101,6 +102,26 @@ RAYDIX_C_API raydix_status raydix_scene_create(raydix_scene** scene);
 RAYDIX_C_API raydix_status raydix_scene_load(const char* path, const raydix_commit_options* options,
                                              raydix_scene** scene);
 RAYDIX_C_API void raydix_scene_destroy(raydix_scene* scene);
+/* Writes a scene as its last commit left it, with the scenes that stand in it, to a file of type
+   .rdx, which loads without building trees. Changes that no commit has taken in and geometry of the
+   caller's own are errors. */
+RAYDIX_C_API raydix_status raydix_scene_save(const raydix_scene* scene, const char* path);
+
+/* Points origin + t * direction for t in [tmin, tmax]. Rays that are not finite, have direction 0
+   or tmin > tmax miss. tmax may be INFINITY. */
+typedef struct raydix_ray {
+    float origin[3], tmin, direction[3], tmax;
+} raydix_ray;
+
+/* The point (1-u-v)*v0 + u*v1 + v*v2 of triangle `prim` of geometry `geometry`. instance 0: of the
+   scene itself; else a number for raydix_scene_path. A miss has t INFINITY, prim and geometry
+   RAYDIX_MISSING. */
+typedef struct raydix_hit {
+    float t;
+    uint32_t prim;
+    float u, v;
+    uint32_t geometry, instance;
+} raydix_hit;
 
 /* Geometries. `id`, may be NULL: receives the new geometry's number: 0, 1, 2, ... in the order of
    calls, never given again. A ray sees a geometry if mask & the ray's mask is not 0. */
@@ -116,6 +137,20 @@ RAYDIX_C_API raydix_status raydix_scene_add_spheres(raydix_scene* scene, const f
 /* capsules [7 * count]: both ends of the axis, radius. */
 RAYDIX_C_API raydix_status raydix_scene_add_capsules(raydix_scene* scene, const float* capsules,
                                                      size_t count, uint32_t mask, uint32_t* id);
+/* points [3 * count], all with this radius. */
+RAYDIX_C_API raydix_status raydix_scene_add_points(raydix_scene* scene, const float* points,
+                                                   size_t count, float radius, uint32_t mask,
+                                                   uint32_t* id);
+/* Where a ray hits a primitive of the caller's own: sets t, u and v of `hit` and returns 1, or
+   returns 0. The ray is in the geometry's own space. t outside [tmin, tmax] is no hit; tmax is the
+   best hit so far. Comes from several threads at once and in any order; the answer may depend on
+   the arguments alone. It may trace and query, and must return. */
+typedef int (*raydix_user_test)(void* user, uint32_t prim, const raydix_ray* ray, raydix_hit* hit);
+/* Primitives that `test` intersects. boxes [6 * count]: low and high corner of the box around each.
+   `user` must stay valid as long as a scene holds the geometry. */
+RAYDIX_C_API raydix_status raydix_scene_add_user(raydix_scene* scene, const float* boxes,
+                                                 size_t count, raydix_user_test test, void* user,
+                                                 uint32_t mask, uint32_t* id);
 /* An instance of `child` as its own last commit left it. transform [12]: three rows of four; x' =
    t[0]*x + t[1]*y + t[2]*z + t[3]. The child may be destroyed afterwards. */
 RAYDIX_C_API raydix_status raydix_scene_add_instance(raydix_scene* scene, const raydix_scene* child,
@@ -126,6 +161,14 @@ RAYDIX_C_API raydix_status raydix_scene_update_mesh(raydix_scene* scene, uint32_
                                                     const float* vertices, size_t vertex_count,
                                                     const uint32_t* triangles,
                                                     size_t triangle_count);
+/* Other shapes of the same kind; as many or not. */
+RAYDIX_C_API raydix_status raydix_scene_update_spheres(raydix_scene* scene, uint32_t id,
+                                                       const float* spheres, size_t count);
+RAYDIX_C_API raydix_status raydix_scene_update_capsules(raydix_scene* scene, uint32_t id,
+                                                        const float* capsules, size_t count);
+RAYDIX_C_API raydix_status raydix_scene_update_points(raydix_scene* scene, uint32_t id,
+                                                      const float* points, size_t count,
+                                                      float radius);
 RAYDIX_C_API raydix_status raydix_scene_set_transform(raydix_scene* scene, uint32_t id,
                                                       const float* transform);
 RAYDIX_C_API raydix_status raydix_scene_set_mask(raydix_scene* scene, uint32_t id, uint32_t mask);
@@ -146,30 +189,24 @@ RAYDIX_C_API raydix_status raydix_scene_path(const raydix_scene* scene, uint32_t
 
 /* ---- Rays ------------------------------------------------------------------------------- */
 
-/* Points origin + t * direction for t in [tmin, tmax]. Rays that are not finite, have direction 0
-   or tmin > tmax miss. tmax may be INFINITY. */
-typedef struct raydix_ray {
-    float origin[3], tmin, direction[3], tmax;
-} raydix_ray;
-
-/* The point (1-u-v)*v0 + u*v1 + v*v2 of triangle `prim` of geometry `geometry`. instance 0: of the
-   scene itself; else a number for raydix_scene_path. A miss has t INFINITY, prim and geometry
-   RAYDIX_MISSING. */
-typedef struct raydix_hit {
-    float t;
-    uint32_t prim;
-    float u, v;
-    uint32_t geometry, instance;
-} raydix_hit;
+/* Whether a hit counts: 1 or 0. `place` is the number of the ray in the call. Comes from several
+   threads at once, in any order and any number of times, also for hits that turn out not to be the
+   closest: the answer may depend on the arguments alone. It may trace and query, and must return.
+ */
+typedef int (*raydix_hit_filter)(void* user, size_t place, const raydix_ray* ray,
+                                 const raydix_hit* hit);
 
 typedef struct raydix_trace_options {
     size_t struct_size;
-    uint32_t mask;         /* of all rays */
-    int threads;           /* 0 to 1024; 0: all there are. No hit depends on it */
-    const uint32_t* masks; /* [count] one for each ray instead of mask; or NULL */
+    uint32_t mask;             /* of all rays */
+    int threads;               /* 0 to 1024; 0: all there are. No hit depends on it */
+    const uint32_t* masks;     /* [count] one for each ray instead of mask; or NULL */
+    raydix_hit_filter filter;  /* NULL: all hits count */
+    void* user;                /* given to the filter */
+    uint64_t max_result_bytes; /* of raydix_trace_all; 0: half of the memory that is left */
 } raydix_trace_options;
 #define RAYDIX_TRACE_OPTIONS \
-    { sizeof(raydix_trace_options), RAYDIX_ALL, 0, NULL }
+    { sizeof(raydix_trace_options), RAYDIX_ALL, 0, NULL, NULL, NULL, 0 }
 
 /* The closest hit of each ray: rays [count] -> hits [count]. At equal t the lower instance wins,
    then geometry, then prim. One ray alone goes through on the calling thread. */
@@ -180,8 +217,28 @@ RAYDIX_C_API raydix_status raydix_trace_closest(const raydix_scene* scene, const
 RAYDIX_C_API raydix_status raydix_trace_any(const raydix_scene* scene, const raydix_ray* rays,
                                             size_t count, uint8_t* occluded,
                                             const raydix_trace_options* options);
+/* All hits of all rays: those of ray i are [offsets[i], offsets[i + 1]) of `hits`, sorted by (t,
+   instance, geometry, prim). Each primitive comes at most once a ray. An edge belongs to one of its
+   triangles here, so that a closed mesh is crossed an even number of times from outside. */
+typedef struct raydix_hit_lists raydix_hit_lists;
+/* Too many hits for max_result_bytes: RAYDIX_RESULT_TOO_LARGE, and no list. */
+RAYDIX_C_API raydix_status raydix_trace_all(const raydix_scene* scene, const raydix_ray* rays,
+                                            size_t count, raydix_hit_lists** lists,
+                                            const raydix_trace_options* options);
+RAYDIX_C_API void raydix_hit_lists_destroy(raydix_hit_lists* lists);
+/* The arrays, which belong to `lists` and live as long as it does. Each of the last three may be
+   NULL: not asked for. rays: their number; offsets [rays + 1]. */
+RAYDIX_C_API raydix_status raydix_hit_lists_arrays(const raydix_hit_lists* lists, size_t* rays,
+                                                   const uint64_t** offsets,
+                                                   const raydix_hit** hits);
+/* The point of each hit in world space: for triangles by u and v, else from the ray; NaN for a
+   miss. rays [count], hits [count] -> positions [3 * count]. */
+RAYDIX_C_API raydix_status raydix_hit_positions(const raydix_scene* scene, const raydix_ray* rays,
+                                                const raydix_hit* hits, size_t count,
+                                                float* positions, int threads);
 /* The unit normal at each hit, from which side the corners appear counter-clockwise; NaN for a
-   miss. rays [count], hits [count] -> normals [3 * count]. */
+   miss. A hit on geometry of the caller's own is an error. rays [count], hits [count] -> normals [3
+   * count]. */
 RAYDIX_C_API raydix_status raydix_hit_normals(const raydix_scene* scene, const raydix_ray* rays,
                                               const raydix_hit* hits, size_t count, float* normals,
                                               int threads);

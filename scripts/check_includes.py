@@ -69,7 +69,8 @@ def includes_of(file):
 
 
 def library_fault(where, name):
-    c_header = where == "include/raydix_c.h" and name in ("math.h", "stddef.h", "stdint.h")
+    c_header = (where == "include/raydix_c.h" and name in ("math.h", "stddef.h", "stdint.h") or
+                where == "include/raydix_c_double.h" and name == "raydix_c.h")
     own = re.fullmatch(r"raydix/.*|[a-z_]+", name) or c_header or where == MPI_HEADER
     if where.startswith("include/") and not own:
         return f"a public header includes the standard library and <raydix/...> only, not <{name}>"

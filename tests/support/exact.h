@@ -1,4 +1,5 @@
-// Exact arithmetic to judge scenes in double with. Apart, because its headers take seconds to compile.
+// Exact arithmetic to judge scenes in double with. Apart, because its headers take seconds to
+// compile.
 #pragma once
 
 #include <raydix/types.h>

@@ -1,5 +1,6 @@
 /* A ray from above onto a square of two triangles. */
 #include <raydix_c.h>
+#include <raydix_c_double.h>
 #include <stdio.h>
 
 int main(void) {

@@ -1,0 +1,273 @@
+// Calls of scenes and rays, once for float and double.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "inside.h"
+
+namespace raydix_c {
+
+/// The types of the C interface that belong to a number type.
+template <class Scalar>
+struct CTypes {
+    using Scene = raydix_scene;
+    using Ray = raydix_ray;
+    using Hit = raydix_hit;
+    using HitLists = raydix_hit_lists;
+    using TraceOptions = raydix_trace_options;
+    using UserTest = raydix_user_test;
+    static constexpr TraceOptions trace_defaults = RAYDIX_TRACE_OPTIONS;
+};
+template <>
+struct CTypes<double> {
+    using Scene = raydix_scene_d;
+    using Ray = raydix_ray_d;
+    using Hit = raydix_hit_d;
+    using HitLists = raydix_hit_lists_d;
+    using TraceOptions = raydix_trace_options_d;
+    using UserTest = raydix_user_test_d;
+    static constexpr TraceOptions trace_defaults = RAYDIX_TRACE_OPTIONS_D;
+};
+
+template <class Scalar>
+struct SceneCalls {
+    using C = CTypes<Scalar>;
+    using Handle = typename C::Scene;
+    using CRay = typename C::Ray;
+    using CHit = typename C::Hit;
+    using COptions = typename C::TraceOptions;
+    using Types = raydix::SceneTypes<Scalar>;
+    using Scene = raydix::BasicScene<Scalar>;
+    using Point = typename Types::Point;
+    using Ray = typename Types::Ray;
+    using Hit = typename Types::Hit;
+    using Sphere = typename Types::Sphere;
+    using Capsule = typename Types::Capsule;
+    static_assert(sizeof(CRay) == sizeof(Ray) && sizeof(CHit) == sizeof(Hit));
+    static_assert(offsetof(CHit, u) == 2 * sizeof(Scalar) &&
+                  offsetof(CHit, v) == 3 * sizeof(Scalar));
+    static_assert(offsetof(CHit, geometry) == sizeof(typename Types::TreeHit));
+
+    static raydix::SceneOptions scene_options(const raydix_commit_options* given) {
+        const raydix_commit_options options = options_over(given, RAYDIX_COMMIT_OPTIONS);
+        raydix::SceneOptions result;
+        result.quality = static_cast<raydix::Quality>(options.quality);
+        result.usage = options.moving != 0 ? raydix::Usage::moving : raydix::Usage::fixed;
+        result.compact = options.compact != 0;
+        result.strict = options.strict != 0;
+        result.threads = options.threads;
+        return result;
+    }
+    static typename Types::MeshView mesh_view(const Scalar* vertices, std::size_t vertex_count,
+                                              const std::uint32_t* triangles,
+                                              std::size_t triangle_count) {
+        return {array_of<Point>(vertices, vertex_count, "vertices"),
+                array_of<raydix::Triangle>(triangles, triangle_count, "triangles")};
+    }
+    static typename Types::Transform transform_of(const Scalar* numbers) {
+        require(numbers, "transform");
+        typename Types::Transform transform;
+        for (std::size_t i = 0; i < 12; ++i) transform.m[i / 4][i % 4] = numbers[i];
+        return transform;
+    }
+
+    static Scene load_scene(const std::string& name, const raydix::SceneOptions& options) {
+        if (name.ends_with(".rdx")) {
+            if constexpr (std::is_same_v<Scalar, float>) {
+                if (raydix::holds_scene(name)) return raydix::load_rdx_scene(name).scene;
+            } else {
+                if (raydix::holds_scene_double(name))
+                    return raydix::load_rdx_scene_double(name).scene;
+            }
+        }
+        return Scene(raydix::load_model(name), options);
+    }
+
+    static raydix_status create(Handle** scene) {
+        return guarded([&] {
+            require(scene, "scene");
+            *scene = new Handle{};
+        });
+    }
+    static raydix_status load(const char* path, const raydix_commit_options* options,
+                              Handle** scene) {
+        return guarded([&] {
+            require(path, "path");
+            require(scene, "scene");
+            *scene = new Handle{load_scene(path, scene_options(options))};
+        });
+    }
+    static raydix_status save(const Handle* scene, const char* path) {
+        return guarded([&] {
+            require(scene, "scene");
+            require(path, "path");
+            raydix::save_rdx(path, scene->scene);
+        });
+    }
+
+    /// Adds a geometry and says which id it has.
+    static raydix_status add(Handle* scene, std::uint32_t mask, std::uint32_t* id,
+                             const auto& make) {
+        return guarded([&] {
+            require(scene, "scene");
+            const std::uint32_t given = make(raydix::GeometryOptions{.mask = mask});
+            if (id != nullptr) *id = given;
+        });
+    }
+    static raydix_status add_user(Handle* scene, const Scalar* boxes, std::size_t count,
+                                  typename C::UserTest test, void* user, std::uint32_t mask,
+                                  std::uint32_t* id) {
+        return add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
+            if (test == nullptr) throw raydix::InputError("test is NULL");
+            const auto intersect = [test, user](std::uint32_t prim, const Ray& ray, Hit& hit) {
+                return test(user, prim, reinterpret_cast<const CRay*>(&ray),
+                            reinterpret_cast<CHit*>(&hit)) != 0;
+            };
+            return scene->scene.add(
+                raydix::BasicUserGeometry<Scalar>(
+                    array_of<typename Types::Box>(boxes, count, "boxes"), intersect),
+                options);
+        });
+    }
+    /// Runs a call that changes a scene.
+    static raydix_status change(Handle* scene, const auto& body) {
+        return guarded([&] {
+            require(scene, "scene");
+            body(scene->scene);
+        });
+    }
+
+    static raydix_status bounds(const Handle* scene, Scalar* lo, Scalar* hi) {
+        return guarded([&] {
+            require(scene, "scene");
+            require(lo, "lo");
+            require(hi, "hi");
+            const typename Types::Box box = scene->scene.bounds();
+            std::copy_n(&box.lo.x, 3, lo);
+            std::copy_n(&box.hi.x, 3, hi);
+        });
+    }
+    static raydix_status size(const Handle* scene, std::uint32_t* count) {
+        return guarded([&] {
+            require(scene, "scene");
+            require(count, "size");
+            *count = scene->scene.size();
+        });
+    }
+    static raydix_status path(const Handle* scene, std::uint32_t instance, std::uint32_t* ids,
+                              std::size_t capacity, std::size_t* count) {
+        return guarded([&] {
+            require(scene, "scene");
+            require(count, "count");
+            const auto room = results_at<std::uint32_t>(ids, capacity, "ids");
+            const std::vector<std::uint32_t> path = scene->scene.path(instance);
+            std::copy_n(path.begin(), std::min(path.size(), room.size()), room.begin());
+            *count = path.size();
+        });
+    }
+
+    static raydix::SceneTraceOptions trace_options(const COptions* given, std::size_t rays) {
+        const COptions options = options_over(given, C::trace_defaults);
+        raydix::SceneTraceOptions result;
+        result.mask = options.mask;
+        result.threads = options.threads;
+        result.max_result_bytes = options.max_result_bytes;
+        if (options.masks != nullptr) result.masks = {options.masks, rays};
+        if (options.filter != nullptr) {
+            const auto filter = [accepts = options.filter, user = options.user](
+                                    std::size_t place, const Ray& ray, const Hit& hit) {
+                return accepts(user, place, reinterpret_cast<const CRay*>(&ray),
+                               reinterpret_cast<const CHit*>(&hit)) != 0;
+            };
+            if constexpr (std::is_same_v<Scalar, float>)
+                result.filter = filter;
+            else
+                result.filter_d = filter;
+        }
+        return result;
+    }
+    static const auto& filter_of(const raydix::SceneTraceOptions& options) {
+        if constexpr (std::is_same_v<Scalar, float>)
+            return options.filter;
+        else
+            return options.filter_d;
+    }
+    /// Whether the call is one ray that needs no thread but this one.
+    static bool is_single(std::size_t count, const raydix::SceneTraceOptions& options) {
+        return count == 1 && options.masks.empty();
+    }
+
+    static raydix_status closest(const Handle* scene, const CRay* rays, std::size_t count,
+                                 CHit* hits, const COptions* options) {
+        return guarded([&] {
+            require(scene, "scene");
+            const auto asked = array_of<Ray>(rays, count, "rays");
+            const auto found = results_at<Hit>(hits, count, "hits");
+            const raydix::SceneTraceOptions how = trace_options(options, count);
+            if (!is_single(count, how))
+                raydix::trace(scene->scene, asked, found, how);
+            else if (filter_of(how))
+                found[0] = raydix::closest_hit(scene->scene, asked[0], filter_of(how), how.mask);
+            else
+                found[0] = raydix::closest_hit(scene->scene, asked[0], how.mask);
+        });
+    }
+    static raydix_status any(const Handle* scene, const CRay* rays, std::size_t count,
+                             std::uint8_t* occluded, const COptions* options) {
+        return guarded([&] {
+            require(scene, "scene");
+            const auto asked = array_of<Ray>(rays, count, "rays");
+            const auto found = results_at<std::uint8_t>(occluded, count, "occluded");
+            const raydix::SceneTraceOptions how = trace_options(options, count);
+            if (!is_single(count, how))
+                raydix::trace_any(scene->scene, asked, found, how);
+            else if (filter_of(how))
+                found[0] = raydix::any_hit(scene->scene, asked[0], filter_of(how), how.mask);
+            else
+                found[0] = raydix::any_hit(scene->scene, asked[0], how.mask);
+        });
+    }
+    static raydix_status all(const Handle* scene, const CRay* rays, std::size_t count,
+                             typename C::HitLists** lists, const COptions* options) {
+        return guarded([&] {
+            require(scene, "scene");
+            require(lists, "lists");
+            const auto asked = array_of<Ray>(rays, count, "rays");
+            *lists = new typename C::HitLists{
+                raydix::trace_all(scene->scene, asked, trace_options(options, count))};
+        });
+    }
+    static raydix_status arrays(const typename C::HitLists* lists, std::size_t* rays,
+                                const std::uint64_t** offsets, const CHit** hits) {
+        return guarded([&] {
+            require(lists, "lists");
+            if (rays != nullptr) *rays = lists->lists.offsets.size() - 1;
+            if (offsets != nullptr) *offsets = lists->lists.offsets.data();
+            if (hits != nullptr) *hits = reinterpret_cast<const CHit*>(lists->lists.hits.data());
+        });
+    }
+    static raydix_status positions(const Handle* scene, const CRay* rays, const CHit* hits,
+                                   std::size_t count, Scalar* points, int threads) {
+        return guarded([&] {
+            require(scene, "scene");
+            raydix::positions(scene->scene, array_of<Ray>(rays, count, "rays"),
+                              array_of<Hit>(hits, count, "hits"),
+                              results_at<Point>(points, count, "positions"), threads);
+        });
+    }
+    static raydix_status normals(const Handle* scene, const CRay* rays, const CHit* hits,
+                                 std::size_t count, Scalar* normals, int threads) {
+        return guarded([&] {
+            require(scene, "scene");
+            raydix::normals(scene->scene, array_of<Ray>(rays, count, "rays"),
+                            array_of<Hit>(hits, count, "hits"),
+                            results_at<Point>(normals, count, "normals"), threads);
+        });
+    }
+};
+
+}  // namespace raydix_c
