@@ -110,7 +110,7 @@ void print_cwbvh_table(const Json& cwbvh) {
 }
 
 /// --tree octree or kdtree.
-void run_core_tree(const BuildCommand& options) {
+void run_octree_or_kdtree(const BuildCommand& options) {
     const bool octree = options.tree.tree == "octree";
     if (!options.out_file.empty())
         throw CLI::ValidationError("--output", std::string(".rdx files hold a bvh; ") +
@@ -128,7 +128,7 @@ void run_build(const BuildCommand& options) {
                                    ".rdx files hold the binary layout, or scenes of wide8 or "
                                    "compact, not " +
                                        options.tree.layout);
-    if (options.tree.tree != "bvh") return run_core_tree(options);
+    if (options.tree.tree != "bvh") return run_octree_or_kdtree(options);
     Model scene = load_structured_model(options.scene, options.tree, options.common);
     if (!options.out_file.empty() && saves_a_scene(scene, options.tree, options.common))
         return build_scene_file(std::move(scene), options.scene, options.out_file, options.repeat,

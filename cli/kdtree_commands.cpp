@@ -1,6 +1,6 @@
 #include "kdtree_commands.h"
 
-#include "core_tree.h"
+#include "octree_or_kdtree.h"
 
 namespace raydix::cli {
 namespace {
@@ -19,7 +19,7 @@ struct KdKind {
         return build_kdtree(mesh, options);
     }
     static CheckReport check(const KdTree& tree, const Mesh& mesh) { return kd_check(tree, mesh); }
-    static CoreFigures figures(const KdTree& tree) {
+    static TreeFigures figures(const KdTree& tree) {
         const TreeStats stats = kd_stats(tree);
         const KdTreeOptions& options = tree.options();
         return {"kdtree",
@@ -63,19 +63,19 @@ KdTreeOptions kdtree_options(const TreeOptions& tree, const CommonOptions& commo
 }
 
 Json kdtree_json(const KdTree& tree, const std::vector<BuildMs>& builds) {
-    return core_build_json<KdKind>(tree, builds);
+    return tree_build_json<KdKind>(tree, builds);
 }
 
 void run_kdtree_build(const std::string& scene, const TreeOptions& tree,
                       const CommonOptions& common, int repeat) {
     refuse_rdx(scene);
-    run_core_build<KdKind>(scene, tree, kdtree_options(tree, common), common, repeat);
+    run_tree_build<KdKind>(scene, tree, kdtree_options(tree, common), common, repeat);
 }
 
 void run_kdtree_check(const std::string& scene, const TreeOptions& tree,
                       const CommonOptions& common) {
     refuse_rdx(scene);
-    run_core_check<KdKind>(scene, tree, kdtree_options(tree, common), common);
+    run_tree_check<KdKind>(scene, tree, kdtree_options(tree, common), common);
 }
 
 KdTraced load_kdtree_traced(const std::string& scene_name, const TreeOptions& tree,

@@ -2,7 +2,7 @@
 
 #include <fmt/ranges.h>
 
-#include "core_tree.h"
+#include "octree_or_kdtree.h"
 
 namespace raydix::cli {
 namespace {
@@ -17,7 +17,7 @@ struct OctreeKind {
     static CheckReport check(const Octree& octree, const Mesh& mesh) {
         return raydix::check(octree, mesh);
     }
-    static CoreFigures figures(const Octree& octree) {
+    static TreeFigures figures(const Octree& octree) {
         const OctreeStats stats = octree_stats(octree);
         const OctreeOptions& options = octree.options();
         return {"octree",
@@ -73,13 +73,13 @@ OctreeOptions octree_options(const TreeOptions& tree, const CommonOptions& commo
 void run_octree_build(const std::string& scene, const TreeOptions& tree,
                       const CommonOptions& common, int repeat) {
     refuse_rdx(scene);
-    run_core_build<OctreeKind>(scene, tree, octree_options(tree, common), common, repeat);
+    run_tree_build<OctreeKind>(scene, tree, octree_options(tree, common), common, repeat);
 }
 
 void run_octree_check(const std::string& scene, const TreeOptions& tree,
                       const CommonOptions& common) {
     refuse_rdx(scene);
-    run_core_check<OctreeKind>(scene, tree, octree_options(tree, common), common);
+    run_tree_check<OctreeKind>(scene, tree, octree_options(tree, common), common);
 }
 
 }  // namespace raydix::cli

@@ -56,7 +56,7 @@ private:
     template <class Take>
     void cut(const Whole& triangle, const Part& part, std::uint32_t cuts, const Take& take) const {
         std::pair<Aabb, Aabb> halves;
-        if (cuts == 0 || !halve(part.box, halves)) return take(part.box);
+        if (cuts == 0 || !cut_in_middle(part.box, halves)) return take(part.box);
         const Part a = part_in(triangle, halves.first), b = part_in(triangle, halves.second);
         const double weight_a = std::sqrt(a.waste), weight_b = std::sqrt(b.waste);
         const double sum = weight_a + weight_b;
@@ -74,7 +74,7 @@ private:
     }
 
     /// At the coarsest plane of the grid inside the longest side; false if there is none.
-    bool halve(const Aabb& box, std::pair<Aabb, Aabb>& halves) const {
+    bool cut_in_middle(const Aabb& box, std::pair<Aabb, Aabb>& halves) const {
         std::size_t axis = 0;
         const Vec3 size = box.hi - box.lo;
         if (size.y > (&size.x)[axis]) axis = 1;

@@ -50,7 +50,7 @@ bool SbvhDivider::is_object_only(const SbvhList& list) const {
     return !(sah_area(box) > least_overlap_);
 }
 
-SbvhChildren SbvhDivider::halve(const SbvhList& list) const {
+SbvhChildren SbvhDivider::divide_in_middle(const SbvhList& list) const {
     const Places places(list, list.count / 2, list.count - list.count / 2);
     std::copy_n(list.at, places.lower, list.other);
     std::copy_n(list.at + places.lower, places.upper, list.other + places.upper_begin());
@@ -58,13 +58,13 @@ SbvhChildren SbvhDivider::halve(const SbvhList& list) const {
 }
 
 SbvhChildren SbvhDivider::divide(const SbvhList& list) {
-    if (list.depth >= deepest_sbvh_split) return halve(list);
+    if (list.depth >= deepest_sbvh_split) return divide_in_middle(list);
     if (list.count > 2 && list.count <= small_boxes) return divide_few(list);
     const bool wide = width_ >= 8;
     const BinGrid grid(list.references(), options_.object_bins);
     SplitSides object;
     const auto split = find_split(list.references(), grid, wide, &object);
-    if (!split) return halve(list);
+    if (!split) return divide_in_middle(list);
     if (choose_spatial(list, object)) return divide_by_plane(list);
     const Places places(list, split->left_boxes, list.count - split->left_boxes);
     divide_boxes(list.references(), grid, *split, list.other, places.upper_begin(), wide);

@@ -55,7 +55,7 @@ public:
     [[nodiscard]] bool is_object_only(const SbvhList& list) const;
 
 private:
-    [[nodiscard]] SbvhChildren halve(const SbvhList& list) const;
+    [[nodiscard]] SbvhChildren divide_in_middle(const SbvhList& list) const;
     [[nodiscard]] SbvhChildren divide_few(const SbvhList& list);
     /// The spatial split is in sides_ if it is better and there is room for it.
     [[nodiscard]] bool choose_spatial(const SbvhList& list, const SplitSides& object);

@@ -21,7 +21,7 @@
 namespace raydix::cli {
 
 /// Figures that both kinds have.
-struct CoreFigures {
+struct TreeFigures {
     const char *tree, *layout, *element;  // "kdtree", "binary", "primitive"
     PrimitiveKind kind;
     int bits, max_leaf, threads;
@@ -31,9 +31,9 @@ struct CoreFigures {
     std::string tree_hash;
 };
 /// The `build` object of a document without its times.
-[[nodiscard]] Json core_tree_json(const CoreFigures& figures);
-void print_core_head(const CoreFigures& figures);
-void print_core_tail(const CoreFigures& figures);
+[[nodiscard]] Json tree_figures_json(const TreeFigures& figures);
+void print_tree_head(const TreeFigures& figures);
+void print_tree_tail(const TreeFigures& figures);
 
 /// Usage errors: a .rdx file, which holds a BVH, and options that belong to one.
 void refuse_rdx(const std::string& scene);
@@ -41,7 +41,7 @@ void refuse_bvh_options(const TreeOptions& tree);
 
 /// Times of the repeats, and the tree of the last.
 template <class Tree>
-struct CoreBuilds {
+struct TreeBuilds {
     Tree tree;
     std::vector<BuildMs> ms;
     std::uint64_t device_bytes = 0;  // held on a device, tree included
@@ -49,9 +49,10 @@ struct CoreBuilds {
 
 /// One warm-up, then `repeat` builds into new memory.
 template <class Kind>
-CoreBuilds<typename Kind::Tree> build_core(const Mesh& mesh, const typename Kind::Options& options,
-                                           const std::string& device, int repeat) {
-    CoreBuilds<typename Kind::Tree> builds;
+TreeBuilds<typename Kind::Tree> build_repeatedly(const Mesh& mesh,
+                                                 const typename Kind::Options& options,
+                                                 const std::string& device, int repeat) {
+    TreeBuilds<typename Kind::Tree> builds;
     if (runs_on_device(device)) {
         const DeviceInput input(mesh);
         auto memory = build_on_device(input, options, nullptr);
@@ -75,15 +76,15 @@ CoreBuilds<typename Kind::Tree> build_core(const Mesh& mesh, const typename Kind
 }
 
 template <class Kind>
-Json core_build_json(const typename Kind::Tree& tree, const std::vector<BuildMs>& builds) {
-    Json build = core_tree_json(Kind::figures(tree));
+Json tree_build_json(const typename Kind::Tree& tree, const std::vector<BuildMs>& builds) {
+    Json build = tree_figures_json(Kind::figures(tree));
     Kind::add(build, tree);
     add_build_ms(build, builds);
     return build;
 }
 
 template <class Kind>
-void run_core_build(const std::string& scene_name, const TreeOptions& tree_options,
+void run_tree_build(const std::string& scene_name, const TreeOptions& tree_options,
                     const typename Kind::Options& options, const CommonOptions& common,
                     int repeat) {
     Json document = new_document("build");
@@ -91,11 +92,11 @@ void run_core_build(const std::string& scene_name, const TreeOptions& tree_optio
     document["scene"] = scene_json(scene);
     document["load_ms"] = scene.load_ms;
     const auto builds = about(scene_name, [&] {
-        return build_core<Kind>(scene.mesh(), options, tree_options.device, repeat);
+        return build_repeatedly<Kind>(scene.mesh(), options, tree_options.device, repeat);
     });
-    Json build = core_build_json<Kind>(builds.tree, builds.ms);
+    Json build = tree_build_json<Kind>(builds.tree, builds.ms);
     build["device"] = tree_options.device;
-    CoreFigures figures = Kind::figures(builds.tree);
+    TreeFigures figures = Kind::figures(builds.tree);
     if (is_device(tree_options.device))
         build["peak_bytes"] = figures.peak_bytes = builds.device_bytes;
     document["build"] = build;
@@ -104,21 +105,22 @@ void run_core_build(const std::string& scene_name, const TreeOptions& tree_optio
                    grouped(scene.mesh().triangles.size()), grouped(scene.mesh().vertices.size()),
                    scene.load_ms);
         print_stages(document["build"], builds.ms.size());
-        print_core_head(figures);
+        print_tree_head(figures);
         Kind::print_more(builds.tree);
-        print_core_tail(figures);
+        print_tree_tail(figures);
     }
     write_json(document, common);
 }
 
 template <class Kind>
-void run_core_check(const std::string& scene_name, const TreeOptions& tree_options,
+void run_tree_check(const std::string& scene_name, const TreeOptions& tree_options,
                     const typename Kind::Options& options, const CommonOptions& common) {
     Json document = new_document("check");
     const Model scene = load_model_with_cameras(scene_name, tree_options, common);
     const CheckReport report = about(scene_name, [&] {
-        return Kind::check(build_core<Kind>(scene.mesh(), options, tree_options.device, 0).tree,
-                           scene.mesh());
+        return Kind::check(
+            build_repeatedly<Kind>(scene.mesh(), options, tree_options.device, 0).tree,
+            scene.mesh());
     });
     document["check"] = {{"ok", report.ok},
                          {"broken", report.ok ? Json(nullptr) : Json(report.broken)},

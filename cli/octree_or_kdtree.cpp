@@ -1,8 +1,8 @@
-#include "core_tree.h"
+#include "octree_or_kdtree.h"
 
 namespace raydix::cli {
 
-Json core_tree_json(const CoreFigures& f) {
+Json tree_figures_json(const TreeFigures& f) {
     return {{"tree", f.tree},
             {"builder", "karras"},
             {"bits", f.bits},
@@ -27,13 +27,13 @@ Json core_tree_json(const CoreFigures& f) {
             {"tree_hash", f.tree_hash}};
 }
 
-void print_core_head(const CoreFigures& f) {
+void print_tree_head(const TreeFigures& f) {
     fmt::print("\ntree         {} over {} {} ({} left out), {} nodes, {} leaves\n", f.tree,
                grouped(f.references), f.kind == PrimitiveKind::points ? "points" : "triangles",
                grouped(f.left_out), grouped(f.nodes), grouped(f.leaves));
 }
 
-void print_core_tail(const CoreFigures& f) {
+void print_tree_tail(const TreeFigures& f) {
     const double each =
         f.references ? static_cast<double>(f.bytes) / static_cast<double>(f.references) : 0;
     fmt::print("memory       {:.2f} MB ({:.1f} bytes a {}), peak while building {:.2f} MB\n",
