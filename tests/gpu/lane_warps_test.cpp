@@ -71,8 +71,7 @@ struct HplocResult {
     HplocResult(Launcher& launcher, const HplocInput& input)
         : lists(input.keys.size()), meeting(input.keys.size()), nodes(input.keys.size()) {
         const auto n = static_cast<std::uint32_t>(input.keys.size());
-        if (n != 0)
-            std::memset(static_cast<void*>(nodes.data()), 0xA5, n * sizeof(ClusterNode));
+        if (n != 0) std::memset(static_cast<void*>(nodes.data()), 0xA5, n * sizeof(ClusterNode));
         launch_hploc(launcher,
                      HplocArrays<std::uint32_t, BoxArray>{{input.keys.data(), n},
                                                           input.ids.data(),

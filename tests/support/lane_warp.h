@@ -28,9 +28,9 @@ public:
                    orders_memory ? std::memory_order_release : std::memory_order_relaxed);
         std::array<std::uint32_t, warp_lanes> values;
         for (std::uint32_t other = 0; other < warp_lanes; ++other)
-            values[other] = wait_for(place(other, turn), turn,
-                                     orders_memory ? std::memory_order_acquire
-                                                   : std::memory_order_relaxed);
+            values[other] =
+                wait_for(place(other, turn), turn,
+                         orders_memory ? std::memory_order_acquire : std::memory_order_relaxed);
         return values;
     }
 
@@ -100,9 +100,7 @@ public:
         }
     }
     /// A release and an acquire of every lane.
-    void sync() const {
-        static_cast<void>(self.board->exchange(self.lane, ++self.turn, 0, true));
-    }
+    void sync() const { static_cast<void>(self.board->exchange(self.lane, ++self.turn, 0, true)); }
 
     static inline thread_local LaneIdentity self;
 
