@@ -40,15 +40,29 @@ Words module_of(const std::vector<Words>& instructions) {
 }
 
 TEST(CompleteSpirv, KernelsOfWarpsRunInSubGroupsOf32) {
-    const Words given = module_of({capability(6), memory_model(), entry_point(1, "each_a"),
-                                   entry_point(2, "warps_b"), entry_point(3, "tiles_of_more"),
-                                   entry_point(4, "a_warps_"), execution_mode(1, 31),
-                                   execution_mode(2, 31), source(3, 200000), {5u << 16 | 19, 1, 2, 3, 4}});
-    const Words expected = module_of(
-        {capability(58), capability(6), memory_model(), entry_point(1, "each_a"),
-         entry_point(2, "warps_b"), entry_point(3, "tiles_of_more"), entry_point(4, "a_warps_"),
-         sub_groups_of_32(2), sub_groups_of_32(3), execution_mode(1, 31), execution_mode(2, 31),
-         source(4, 100000), {5u << 16 | 19, 1, 2, 3, 4}});
+    const Words given = module_of({capability(6),
+                                   memory_model(),
+                                   entry_point(1, "each_a"),
+                                   entry_point(2, "warps_b"),
+                                   entry_point(3, "tiles_of_more"),
+                                   entry_point(4, "a_warps_"),
+                                   execution_mode(1, 31),
+                                   execution_mode(2, 31),
+                                   source(3, 200000),
+                                   {5u << 16 | 19, 1, 2, 3, 4}});
+    const Words expected = module_of({capability(58),
+                                      capability(6),
+                                      memory_model(),
+                                      entry_point(1, "each_a"),
+                                      entry_point(2, "warps_b"),
+                                      entry_point(3, "tiles_of_more"),
+                                      entry_point(4, "a_warps_"),
+                                      sub_groups_of_32(2),
+                                      sub_groups_of_32(3),
+                                      execution_mode(1, 31),
+                                      execution_mode(2, 31),
+                                      source(4, 100000),
+                                      {5u << 16 | 19, 1, 2, 3, 4}});
     EXPECT_EQ(complete_spirv(given, prefixes), expected);
 }
 
