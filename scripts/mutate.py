@@ -4,7 +4,8 @@ scripts/mutate.py --commit-results: writes what the last run of each fault gave 
 
 Works on a copy of the tree in build/mutate. A fault is noticed if something no longer builds, or if a test program
 fails, crashes or runs out of time: first those of `tests`, then all others; of each, tests that take long last. Exit
-code 1 if a fault goes unnoticed or no longer applies (its old text must stand exactly once in the file).
+code 1 if a fault goes unnoticed or no longer applies (its old text must stand exactly once in the file). Faults of the
+order of memory are seen by the thread sanitizer alone: the programs of their folders are built a second time, with it.
 """
 import fcntl
 import json
@@ -19,9 +20,13 @@ from planted_faults import FAULTS, LONG
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 WORK = ROOT / "build" / "mutate"
-SOURCE, BUILD = WORK / "source", WORK / "build"
+SOURCE, BUILD, BUILD_THREADS = WORK / "source", WORK / "build", WORK / "build-threads"
 RESULTS, COMMITTED = WORK / "results.json", ROOT / "bench" / "results" / "mutations.json"
 LEAST_TIME_LIMIT_S = 60
+# Faults change answers, not speed: what compiles sooner will do. At -O1, GCC 12 warns of what is not so.
+OPTIONS = {BUILD: ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -w -DNDEBUG"],
+           BUILD_THREADS: ["-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1 -w -DNDEBUG",
+                           "-DRAYDIX_SANITIZE=thread"]}
 JOBS = os.environ.get("RAYDIX_JOBS", str(os.cpu_count() or 1))
 MPIRUN = ["mpirun", "--oversubscribe", "--bind-to", "none", "--mca", "mpi_yield_when_idle", "1",
           *(["--allow-run-as-root"] if os.geteuid() == 0 else []), "-n", "4"]
@@ -67,8 +72,21 @@ def test_programs():
     return programs
 
 
-def build(targets):
-    return run(["cmake", "--build", str(BUILD), "--parallel", JOBS, "--target", *targets]) == 0
+def thread_programs(faults):
+    """The same for the thread sanitizer, of the folders that such faults name alone."""
+    folders = {folder for fault in faults if fault.by_threads for folder in fault.tests.split()}
+    return {folder: BUILD_THREADS / "bin" / f"{folder}_test" for folder in sorted(folders)}
+
+
+def build(programs):
+    """Of one build folder."""
+    folder = programs[0].parent.parent
+    return run(["cmake", "--build", str(folder), "--parallel", JOBS, "--target", *(p.name for p in programs)]) == 0
+
+
+def configure(folder):
+    return run(["cmake", "-G", "Ninja", "-S", str(SOURCE), "-B", str(folder), *OPTIONS[folder], "-DRAYDIX_INSTRUCTION_SETS=ONE",
+                "-DRAYDIX_BENCH=OFF", "-DRAYDIX_CLI=OFF", "-DRAYDIX_ATTACK=OFF", "-DRAYDIX_CUDA=OFF"]) == 0
 
 
 def looks_of(folders):
@@ -93,36 +111,35 @@ def prepare(faults):
         sys.exit("another run is at work in build/mutate")
     SOURCE.mkdir(exist_ok=True)
     copy_tree()
-    # Faults change answers, not speed: what compiles sooner will do. At -O1, GCC 12 warns of what is not so.
-    configured = run(["cmake", "-G", "Ninja", "-S", str(SOURCE), "-B", str(BUILD), "-DCMAKE_BUILD_TYPE=Release",
-                      "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -w -DNDEBUG", "-DRAYDIX_INSTRUCTION_SETS=ONE", "-DRAYDIX_BENCH=OFF",
-                      "-DRAYDIX_CLI=OFF", "-DRAYDIX_ATTACK=OFF", "-DRAYDIX_CUDA=OFF"]) == 0
-    programs = test_programs()
-    first = {folder for fault in faults for folder in fault.tests.split()}
-    if not configured or not build([program.name for folder, program in programs.items() if folder in first]):
-        sys.exit(f"without any fault, the tests do not build:\n{last_lines()}")
-    return programs, lock
+    programs, with_threads = test_programs(), thread_programs(faults)
+    first = {folder for fault in faults if not fault.by_threads for folder in fault.tests.split()}
+    for folder, wanted in ((BUILD, [program for name, program in programs.items() if name in first]),
+                           (BUILD_THREADS, list(with_threads.values()))):
+        if wanted and not (configure(folder) and build(wanted)):
+            sys.exit(f"without any fault, the tests do not build:\n{last_lines()}")
+    return programs, with_threads, lock
 
 
 def set_limits(looks, programs, limits):
     """Without a fault every look must pass, and its time sets its limit. Each is taken once, when it is first needed."""
     for folder, tests in looks:
-        if (folder, tests) in limits:
+        if (programs[folder], tests) in limits:
             continue
         start = time.monotonic()
-        if not build([programs[folder].name]) or run_program(programs[folder], tests, None) is not None:
+        if not build([programs[folder]]) or run_program(programs[folder], tests, None) is not None:
             sys.exit(f"without any fault, {programs[folder].name} fails:\n{last_lines()}")
-        limits[folder, tests] = LEAST_TIME_LIMIT_S + 5 * (time.monotonic() - start)
+        limits[programs[folder], tests] = LEAST_TIME_LIMIT_S + 5 * (time.monotonic() - start)
 
 
 def noticed_in(looks, programs, limits):
     """Which of these looks notices what is planted, or None."""
-    if looks and not build([programs[folder].name for folder, _ in looks]):
+    if looks and not build([programs[folder] for folder, _ in looks]):
         return "the compiler"
     for folder, tests in looks:
-        reason = run_program(programs[folder], tests, limits[folder, tests])
+        reason = run_program(programs[folder], tests, limits[programs[folder], tests])
         if reason:
-            return f"{folder}_test" + (" (time)" if reason == "time" else "")
+            with_threads = programs[folder].is_relative_to(BUILD_THREADS)
+            return f"{folder}_test" + (" (time)" if reason == "time" else " (thread sanitizer)" if with_threads else "")
     return None
 
 
@@ -182,7 +199,7 @@ def main(arguments):
     if arguments == ["--commit-results"]:
         return commit_results()
     chosen = [int(a) for a in arguments] or list(range(1, len(FAULTS) + 1))
-    programs, _lock = prepare([FAULTS[number - 1] for number in chosen])  # the lock lasts as long as the run
+    programs, with_threads, _lock = prepare([FAULTS[number - 1] for number in chosen])  # the lock lasts as long as the run
     limits = {}
     bad = []
     for number in chosen:
@@ -194,7 +211,7 @@ def main(arguments):
             outcome = f"DOES NOT APPLY: the old text stands {times} times in the file"
             bad.append(number)
         else:
-            who = noticed_by(fault, programs, limits)
+            who = noticed_by(fault, with_threads if fault.by_threads else programs, limits)
             keep_result(fault, who)
             outcome = f"noticed by {who}" if who else "NOT NOTICED"
             bad += [] if who else [number]

@@ -28,6 +28,7 @@ class Fault:
     new: str
     breaks: str
     tests: str  # folders of tests/, those most likely to notice first
+    by_threads: bool = False  # only the thread sanitizer can notice it
 
 
 FAULTS = [
@@ -423,4 +424,26 @@ FAULTS = [
           "ranks: rays that go down an axis reach no box", "mpi"),
     Fault("src/mpi/inside_query.h", "((bits | more) & 2u)", "((bits | more) & 0u)",
           "ranks: a point on a triangle is inside or outside by chance", "mpi"),
+    Fault("src/base/device_words.h", "return std::atomic_ref<std::uint32_t>(place).exchange(value, std::memory_order_acq_rel);",
+          "return std::atomic_ref<std::uint32_t>(place).exchange(value, std::memory_order_relaxed);",
+          "arrive: the second child at a word does not see what the first one wrote", "gpu", by_threads=True),
+    Fault("src/base/device_words.h", "return std::atomic_ref<std::uint8_t>(place).exchange(value, std::memory_order_acq_rel);",
+          "return std::atomic_ref<std::uint8_t>(place).exchange(value, std::memory_order_relaxed);",
+          "arrive: the second child at a byte does not see what the first one wrote", "gpu", by_threads=True),
+    Fault("src/tree/hploc.h", "        warp_.sync();\n        Clusters next =", "        Clusters next =",
+          "hploc: lanes read merged clusters that other lanes may not have written yet", "gpu", by_threads=True),
+    Fault("src/tree/hploc.h", "*a_.root = list.ref[lane];\n        });\n        warp_.sync();", "*a_.root = list.ref[lane];\n        });",
+          "hploc: a list of clusters is read by a lane that did not wait for it", "gpu", by_threads=True),
+    Fault("src/exec/warp.h", "to[lane] = from[source(lane) & 31];", "to[lane] = from[(source(lane) + 1) & 31];",
+          "warps of the host: a shuffle takes the next lane's value", "exec"),
+    Fault("src/exec/spirv_module.cpp", "subgroup_size_mode, 32u});", "subgroup_size_mode, 16u});",
+          "kernels of warps run in sub-groups of 16", "exec"),
+    Fault("src/exec/warp_sort.h", "counts(arena.take<std::uint32_t>(digit_values * tiles_for(limit))),",
+          "counts(arena.take<std::uint32_t>(digit_values / 2 * tiles_for(limit))),",
+          "sort by warps: scratch has room for half of the counts", "exec"),
+    Fault("src/exec/warp_scan.h", "if (first + lane < n) values[first + lane] = start + (sum[lane] - own[lane]);",
+          "if (first + lane < n) values[first + lane] = start + sum[lane];",
+          "scan by warps: each sum has its own value in it", "exec"),
+    Fault("src/tree/climb_warps.h", "rank < inner ? slots_.of_inner[rank] : 0;", "slots_.of_inner[rank];",
+          "a climb in warps: slots behind the last inner node are read, though nobody needs them", "gpu"),
 ]

@@ -41,22 +41,24 @@ bool is_of_warps(const std::uint32_t* entry, std::span<const std::string_view> p
 
 std::vector<std::uint32_t> complete_spirv(std::span<const std::uint32_t> words,
                                           std::span<const std::string_view> warp_prefixes) {
+    const auto broken = [](bool is) {
+        if (is) throw DeviceError("a SPIR-V module of this build is broken");
+    };
+    broken(words.size() < header_words);
     std::vector<std::uint32_t> out(words.begin(), words.begin() + header_words);
     out.insert(out.end(), {2u << 16 | Op::capability, subgroup_dispatch});
     std::vector<std::uint32_t> in_warps;
-    bool modes_written = false;
     for (std::size_t at = header_words; at < words.size();) {
         const std::uint32_t size = words[at] >> 16, op = words[at] & 0xFFFF;
-        if (size == 0 || size > words.size() - at)
-            throw DeviceError("a SPIR-V module of this build is broken");
-        if (op == Op::entry_point && is_of_warps(&words[at], warp_prefixes))
-            in_warps.push_back(words[at + 2]);
-        // Execution modes stand right behind the entry points.
-        if (op == Op::execution_mode && !modes_written) {
+        broken(size == 0 || size > words.size() - at);
+        if (op == Op::entry_point) {
+            if (is_of_warps(&words[at], warp_prefixes)) in_warps.push_back(words[at + 2]);
+        } else {
+            // Execution modes stand right behind the entry points.
             for (const std::uint32_t kernel : in_warps)
                 out.insert(out.end(),
                            {4u << 16 | Op::execution_mode, kernel, subgroup_size_mode, 32u});
-            modes_written = true;
+            in_warps.clear();
         }
         const std::size_t start = out.size();
         out.insert(out.end(), words.begin() + static_cast<std::ptrdiff_t>(at),

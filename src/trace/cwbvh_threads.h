@@ -24,7 +24,8 @@ struct StoreOccluded {
     }
 };
 
-RAYDIX_HD inline Ray load_ray(const Ray* ray) {
+/// Through the read-only cache, where there is one.
+RAYDIX_HD inline Ray fetch_ray(const Ray* ray) {
 #if defined(__CUDA_ARCH__)
     const float4* from = reinterpret_cast<const float4*>(ray);
     const float4 a = __ldg(from), b = __ldg(from + 1);
@@ -47,7 +48,7 @@ struct CwbvhRays {
 template <bool any, int stack_entries, class Store>
 RAYDIX_HD void trace_cwbvh_ray(const CwbvhRays<Store>& given, std::uint32_t i) {
     TreeHit hit;
-    const Ray ray_given = load_ray(given.rays + i);
+    const Ray ray_given = fetch_ray(given.rays + i);
     if (is_valid(ray_given)) {
         CwbvhGroup stack[stack_entries];
         NoCwbvhSteps steps;
@@ -88,7 +89,7 @@ RAYDIX_HD void trace_cwbvh_pool(const CwbvhRays<Store>& pool, std::uint32_t* nex
         if (more) {
             index = replace_ended(!at_work, index, next);
             if (!at_work && index < count) {
-                const Ray given = load_ray(pool.rays + index);
+                const Ray given = fetch_ray(pool.rays + index);
                 if (is_valid(given)) {
                     ray = make_cwbvh_ray(make_frame(given), tree.bounds);
                     best = {ray.frame.tmax};

@@ -9,8 +9,10 @@
 
 #include <cmath>
 #include <cstring>
+#include <iostream>
 
 #include "device/device_test.h"
+#include "measure/stopwatch.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"
 #include "support/support.h"
@@ -88,6 +90,24 @@ TEST_F(GpuTrace, EachBuiltinScene) {
         const WarpTree host(build_bvh(scene.mesh(), {.builder = Builder::ploc}));
         compare(scene.name, host, DeviceWarpTree(host),
                 make_mixed_rays(scene, fitting(200'000), 9));
+    }
+}
+
+TEST_F(GpuTrace, AMillionRaysThroughEachKernel) {
+    const Model scene = scene_of(random_soup(30'000, 11, 0.05f), "soup");
+    const WarpTree host(build_bvh(scene.mesh(), {.builder = Builder::ploc}));
+    const DeviceWarpTree tree(host);
+    const std::vector<Ray> rays = make_mixed_rays(scene, 1'000'000, 12);
+    std::vector<TreeHit> expected(rays.size());
+    trace_reference(host, rays, expected, false);
+    for (const WarpKernel kernel : warp_kernels()) {
+        Stopwatch watch;
+        const Traced traced = trace_there(tree, rays, kernel, false);
+        std::cout << warp_kernel_name(kernel) << ": " << watch.lap() << " ms with copies, "
+                  << (on_opencl() ? "OpenCL on a CPU" : "CUDA") << "\n";
+        EXPECT_EQ(std::memcmp(traced.hits.data(), expected.data(), rays.size() * sizeof(TreeHit)),
+                  0)
+            << warp_kernel_name(kernel);
     }
 }
 

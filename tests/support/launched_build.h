@@ -7,12 +7,13 @@
 #include <raydix/device.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
-#include <memory>
 #include <vector>
 
 #include "exec/launch_sizer.h"
 #include "gpu/device_build.h"
+#include "support/guarded_memory.h"
 #include "support/shuffled_launcher.h"
 #include "tree/bvh_internals.h"
 
@@ -28,33 +29,28 @@ struct IdleLauncher : LaunchSizer {
     }
 };
 
-/// Scratch of exactly this size, filled with `garbage`, which also stands behind it.
+/// Scratch of exactly this size, filled with `garbage`, between pages that nobody may touch. One
+/// in two ends where such a page begins, the others begin where one ends.
 struct LentMemory {
-    static constexpr std::size_t guard = 1024;
-    std::size_t bytes;
-    unsigned char garbage;
-    std::vector<std::byte> memory;
+    GuardedMemory memory;
     Arena arena;
 
-    LentMemory(std::size_t size, unsigned char fill)
-        : bytes(size),
-          garbage(fill),
-          memory(size + Arena::alignment + guard, std::byte{fill}),
-          arena(start(), size) {}
+    LentMemory(std::size_t size, unsigned char garbage)
+        : memory(size, std::byte{garbage}, next_side()), arena(memory.data(), size) {
+        // Arrays of a device's builds begin at whole lines.
+        EXPECT_EQ(reinterpret_cast<std::uintptr_t>(memory.data()) % Arena::alignment, 0u);
+    }
 
-    /// All of it was given out, and nothing behind it was written.
-    void expect_exact_use() {
-        EXPECT_EQ(arena.bytes(), bytes);
-        const std::byte* behind = static_cast<std::byte*>(start()) + bytes;
-        EXPECT_TRUE(std::all_of(behind, behind + guard,
-                                [&](std::byte b) { return b == std::byte{garbage}; }));
+    /// All of it was given out, and nothing around it was written.
+    void expect_exact_use() const {
+        EXPECT_EQ(arena.bytes(), memory.size());
+        EXPECT_TRUE(memory.slack_untouched());
     }
 
 private:
-    void* start() {
-        void* at = memory.data();
-        std::size_t space = memory.size();
-        return std::align(Arena::alignment, bytes, at, space);
+    static GuardedMemory::Exact next_side() {
+        static std::atomic<unsigned> made{0};
+        return made++ % 2 == 0 ? GuardedMemory::Exact::end : GuardedMemory::Exact::begin;
     }
 };
 

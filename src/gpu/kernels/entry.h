@@ -46,7 +46,13 @@ __host__ __device__ inline float device_ldexp(float x, int n) {
 #include "exec/kernel_arguments.h"
 #include "exec/warp.h"
 
-#define RAYDIX_KERNEL extern "C" __global__ void
+// Groups have up to 128 threads. For AMD clang takes 1,024 where nobody says so, and spills.
+#if defined(__AMDGPU__)
+#define RAYDIX_GROUP_SIZE __attribute__((amdgpu_flat_work_group_size(1, 128)))
+#else
+#define RAYDIX_GROUP_SIZE
+#endif
+#define RAYDIX_KERNEL extern "C" __global__ RAYDIX_GROUP_SIZE void
 
 namespace raydix::entry {
 
