@@ -14,6 +14,7 @@
 #include <mpi.h>
 #include <raydix/buffer.h>
 #include <raydix/error.h>
+#include <raydix/picture.h>
 #include <raydix/points.h>
 #include <raydix/scene.h>
 #include <raydix/scene_queries.h>
@@ -250,6 +251,8 @@ public:
         std::span<const Point> queries) const;
 
 private:
+    template <class>
+    friend struct DistributedSceneInternals;
     struct State;
     std::unique_ptr<State> state_;
 };
@@ -257,5 +260,24 @@ extern template class BasicDistributedScene<float>;
 extern template class BasicDistributedScene<double>;
 using DistributedScene = BasicDistributedScene<float>;
 using DistributedSceneD = BasicDistributedScene<double>;
+
+/// Collective. Renders a scene that every rank holds whole, as raydix::render: the ranks take parts
+/// of the picture from a shared counter until none is left. Rank 0 gets the picture, with the bits
+/// of one process; the others get an empty one. All ranks give the same scene, camera and options,
+/// `threads` aside. Progress is told on rank 0 alone, by the calling thread. Throws InputError as
+/// raydix::render does, and if the boxes of the scenes or the arguments differ.
+[[nodiscard]] Picture render(MPI_Comm comm, const Scene& scene, const Camera& camera,
+                             const RenderOptions& options = {});
+[[nodiscard]] Picture render(MPI_Comm comm, const SceneD& scene, const CameraD& camera,
+                             const RenderOptions& options = {});
+
+/// Collective. Renders a scene that is spread over the ranks, as raydix::render: every rank makes
+/// the rays of its share of the picture on one thread, and all trace them together. All views but
+/// `steps`; that throws InputError. `threads` has no effect: rays take those of the scene.
+/// Otherwise as above.
+[[nodiscard]] Picture render(const DistributedScene& scene, const Camera& camera,
+                             const RenderOptions& options = {});
+[[nodiscard]] Picture render(const DistributedSceneD& scene, const CameraD& camera,
+                             const RenderOptions& options = {});
 
 }  // namespace raydix::mpi

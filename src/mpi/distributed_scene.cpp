@@ -11,6 +11,7 @@
 #include "mpi/call.h"
 #include "mpi/curve.h"
 #include "mpi/inside_query.h"
+#include "mpi/scene_internals.h"
 #include "mpi/scene_queries.h"
 
 namespace raydix::mpi {
@@ -54,6 +55,7 @@ struct BasicDistributedScene<Scalar>::State {
         });
         agree(comm, error);
         tree = RankTree<Scalar>(comm, boxes);
+        bounds = joined(scene.bounds());
         std::uint64_t sums[2] = {committed.triangles, committed.left_out};
         comm.reduce(sums, 2, MPI_SUM);
         holding.size = sums[0];
@@ -174,6 +176,17 @@ struct BasicDistributedScene<Scalar>::State {
         return boxes;
     }
 
+    /// Around what all ranks hold.
+    typename Types::Box joined(const typename Types::Box& mine) const {
+        double least[6] = {mine.lo.x,          mine.lo.y,          mine.lo.z,
+                           -double(mine.hi.x), -double(mine.hi.y), -double(mine.hi.z)};
+        comm.reduce(least, 6, MPI_MIN);
+        Point lo, hi;
+        Double3(least[0], least[1], least[2]).round_to(lo);
+        Double3(-least[3], -least[4], -least[5]).round_to(hi);
+        return {lo, hi};
+    }
+
     /// Trees for crossings, made by the first call that asks for them.
     const std::vector<typename CrossingTree<Scalar>::Bvh>& crossing_trees() {
         if (crossings.empty()) {
@@ -208,6 +221,7 @@ struct BasicDistributedScene<Scalar>::State {
     BasicScene<Scalar> scene;
     TriangleNames names;
     RankTree<Scalar> tree;
+    typename Types::Box bounds{};
     std::vector<typename CrossingTree<Scalar>::Bvh> crossings;
     Holding holding;
 };
@@ -309,7 +323,34 @@ Answers<std::uint8_t, ClosestCounts> BasicDistributedScene<Scalar>::contains(
         });
 }
 
+template <class Scalar>
+const Communicator& DistributedSceneInternals<Scalar>::communicator(const DistributedOf& scene) {
+    return scene.state_->comm;
+}
+
+template <class Scalar>
+auto DistributedSceneInternals<Scalar>::bounds(const DistributedOf& scene) -> Box {
+    return scene.state_->bounds;
+}
+
+template <class Scalar>
+auto DistributedSceneInternals<Scalar>::trace(const DistributedOf& scene, std::span<const Ray> rays,
+                                              std::span<Double3> normals) -> std::vector<Hit> {
+    auto& state = *scene.state_;
+    std::optional<HitNormals<Scalar>> of_hits;
+    return state
+        .template ask<ClosestHitKind<Scalar>, Answers<Hit, TraceCounts>>(
+            "trace for a picture",
+            [&](auto& kind, auto& answers) {
+                of_hits.emplace(state.scene, normals);
+                kind.emplace(state.parts(), rays, answers, &*of_hits);
+            })
+        .values;
+}
+
 template class BasicDistributedScene<float>;
 template class BasicDistributedScene<double>;
+template struct DistributedSceneInternals<float>;
+template struct DistributedSceneInternals<double>;
 
 }  // namespace raydix::mpi

@@ -12,10 +12,12 @@
 #include <optional>
 #include <span>
 #include <tuple>
+#include <type_traits>
 #include <vector>
 
 #include "base/distance.h"
 #include "exec/parallel.h"
+#include "image/surface_points.h"
 #include "mpi/rank_tree.h"
 #include "mpi/ray_reach.h"
 #include "mpi/result_rows.h"
@@ -80,6 +82,31 @@ protected:
     std::span<const Question> rays_;
 };
 
+/// Normals of hits at the queries of a call, for pictures.
+template <class T>
+class HitNormals {
+    using Surface = std::conditional_t<sizeof(T) == 4, SceneSurface, SceneSurfaceD>;
+
+public:
+    /// normals [rays of this rank]: set where a ray hits.
+    HitNormals(const BasicScene<T>& scene, std::span<Double3> normals)
+        : surface_(scene), normals_(normals) {}
+    /// Of a hit of this rank's part.
+    template <class AnyHit>
+    [[nodiscard]] Double3 of(const AnyHit& hit) const {
+        Hit named;
+        named.prim = hit.prim;
+        named.geometry = hit.geometry;
+        named.instance = hit.instance;
+        return surface_.normal(named);
+    }
+    void set(std::size_t i, const Double3& normal) { normals_[i] = normal; }
+
+private:
+    Surface surface_;
+    std::span<Double3> normals_;
+};
+
 /// The closest hit. Rays travel as long as their best hit so far leaves them.
 template <class T>
 class ClosestHitKind : public RayKind<T> {
@@ -89,9 +116,10 @@ public:
     using Question = typename RayKind<T>::Question;
     static constexpr bool asks_all = false;
 
+    /// normals: none, or what answers come with on all ranks.
     ClosestHitKind(const SceneParts<T>& parts, std::span<const Question> rays,
-                   Answers<Hit, TraceCounts>& answers)
-        : RayKind<T>(parts, rays), answers_(answers) {}
+                   Answers<Hit, TraceCounts>& answers, HitNormals<T>* normals = nullptr)
+        : RayKind<T>(parts, rays), answers_(answers), normals_(normals) {}
 
     void clear() { answers_.values.assign(this->rays_.size(), {}); }
     [[nodiscard]] bool first(std::size_t i, Candidate<T>& found) const {
@@ -118,6 +146,7 @@ public:
         put(out, hit.v);
         put(out, hit.geometry);
         put(out, hit.prim);
+        if (normals_ != nullptr) put(out, normals_->of(found_[q]));
     }
     void take(std::size_t i, Reader& reader) {
         if (reader.take<std::uint8_t>() == 0) return;
@@ -127,8 +156,11 @@ public:
         hit.v = reader.take<T>();
         hit.geometry = reader.take<std::uint32_t>();
         hit.prim = reader.take<std::uint64_t>();
+        const Double3 normal = normals_ != nullptr ? reader.take<Double3>() : Double3();
         Hit& best = answers_.values[i];
-        if (!best.hit() || order_of(hit) < order_of(best)) best = hit;
+        if (best.hit() && !(order_of(hit) < order_of(best))) return;
+        best = hit;
+        if (normals_ != nullptr) normals_->set(i, normal);
     }
     void finish() {
         this->count(answers_.counts);
@@ -140,6 +172,7 @@ private:
         return std::min(this->rays_[i].tmax, answers_.values[i].t);
     }
     Answers<Hit, TraceCounts>& answers_;
+    HitNormals<T>* normals_;
     std::vector<typename SceneTypes<T>::Hit> found_;  // of answers
 };
 
