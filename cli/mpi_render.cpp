@@ -44,9 +44,8 @@ Shot shot_of_first(const MpiRenderCommand& command, const Model& model) {
     Shot shot;
     on_first([&] {
         shot = shot_of(command, model);
-        plain = {shot.camera.position, shot.camera.target,      shot.camera.up,
-                 shot.camera.vfov,     shot.options.ao_radius, shot.options.width,
-                 shot.options.height};
+        plain = {shot.camera.position,   shot.camera.target, shot.camera.up,     shot.camera.vfov,
+                 shot.options.ao_radius, shot.options.width, shot.options.height};
     });
     MPI_Bcast(&plain, sizeof(plain), MPI_BYTE, 0, MPI_COMM_WORLD);
     if (mpi_rank() == 0) return shot;
@@ -102,8 +101,7 @@ Rendered render_distributed(const MpiRenderCommand& command) {
     const SpreadModel model = spread_model(command);
     rendered.shot = shot_of_first(command, model.whole);
     const MeshView view(model.part);
-    const mpi::DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1),
-                                      command.scene_options());
+    const mpi::DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1), command.scene_options());
     rendered.holding = holding_json(scene.holding());
     Progress progress("rendering", command.common);
     show_progress(rendered.shot, progress);

@@ -59,9 +59,9 @@ std::string call_text(const AnyCamera& camera, const RenderOptions& options) {
 
 template <class Box>
 std::string box_text(const Box& box) {
-    return std::string(", box ").append(joined({double(box.lo.x), double(box.lo.y),
-                                                double(box.lo.z), double(box.hi.x),
-                                                double(box.hi.y), double(box.hi.z)}));
+    return std::string(", box ").append(
+        joined({double(box.lo.x), double(box.lo.y), double(box.lo.z), double(box.hi.x),
+                double(box.hi.y), double(box.hi.z)}));
 }
 
 /// Where pictures are taken from: the space of the rays.
@@ -257,7 +257,8 @@ private:
 void render_shares(const Communicator& comm, const PictureParts& parts, ProgressListener& listener,
                    Bytes& mine) {
     const std::size_t all = parts.pixels().size(), ranks = std::size_t(comm.size()),
-                      step = std::min(parts.pixels_of_rays(rays_of_rank), (all + ranks - 1) / ranks);
+                      step =
+                          std::min(parts.pixels_of_rays(rays_of_rank), (all + ranks - 1) / ranks);
     for (std::size_t done = 0; done < all; done += step * ranks) {
         const std::size_t begin = std::min(all, done + step * std::size_t(comm.rank())),
                           end = std::min(all, begin + step);
