@@ -8,6 +8,7 @@ namespace raydix::cli {
 void add_mpi_info(CLI::App& app);
 void add_mpi_trace(CLI::App& app);
 void add_mpi_query(CLI::App& app);
+void add_mpi_render(CLI::App& app);
 void add_mpi_bench(CLI::App& app);
 
 }  // namespace raydix::cli

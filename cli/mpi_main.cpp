@@ -25,6 +25,7 @@ int run(int argc, char** argv) {
     add_mpi_info(app);
     add_mpi_trace(app);
     add_mpi_query(app);
+    add_mpi_render(app);
     add_mpi_bench(app);
     return run_program(app, argc, argv);
 }

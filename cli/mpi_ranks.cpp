@@ -38,12 +38,16 @@ void receive_bytes(void* data, std::uint64_t bytes, int from) {
     });
 }
 
-std::string text_of_first(std::string text) {
-    std::uint64_t size = text.size();
-    MPI_Bcast(&size, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
+void throw_on_all(const std::string& error) {
+    int failed = error.empty() ? mpi_ranks() : mpi_rank();
+    MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
+    if (failed == mpi_ranks()) return;
+    std::uint64_t size = error.size();
+    MPI_Bcast(&size, 1, MPI_UINT64_T, failed, MPI_COMM_WORLD);
+    std::string text = error;
     text.resize(size);
-    MPI_Bcast(text.data(), static_cast<int>(size), MPI_CHAR, 0, MPI_COMM_WORLD);
-    return text;
+    MPI_Bcast(text.data(), static_cast<int>(size), MPI_CHAR, failed, MPI_COMM_WORLD);
+    throw InputError(failed == 0 ? text : "rank " + std::to_string(failed) + ": " + text);
 }
 
 }  // namespace raydix::cli

@@ -67,23 +67,29 @@ template <class T>
     return whole;
 }
 
-/// Collective: the text of rank 0.
-[[nodiscard]] std::string text_of_first(std::string text);
+/// Collective. What went wrong on any rank is an InputError on all: that of the lowest rank, which
+/// it names unless it is rank 0. Empty: nothing.
+void throw_on_all(const std::string& error);
+
+/// Collective. All ranks run `body`.
+template <class Body>
+void on_each(const Body& body) {
+    std::string error;
+    try {
+        body();
+    } catch (const std::exception& e) {
+        error = e.what();
+        if (error.empty()) error = "unknown error";
+    }
+    throw_on_all(error);
+}
 
 /// Collective. Rank 0 runs `body`; what goes wrong there is an InputError on all ranks.
 template <class Body>
 void on_first(const Body& body) {
-    std::string error;
-    if (mpi_rank() == 0) {
-        try {
-            body();
-        } catch (const std::exception& e) {
-            error = e.what();
-            if (error.empty()) error = "unknown error";
-        }
-    }
-    error = text_of_first(error);
-    if (!error.empty()) throw InputError(error);
+    on_each([&] {
+        if (mpi_rank() == 0) body();
+    });
 }
 
 }  // namespace raydix::cli

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "output.h"
+#include "picture_options.h"
 #include "scene_file.h"
 #include "scene_trace.h"
 #include "tree_view.h"
@@ -15,34 +16,12 @@
 namespace raydix::cli {
 namespace {
 
-struct RenderCommand {
+struct RenderCommand : PictureOptions {
     CommonOptions common;
     TreeOptions tree;
-    std::string scene, out_file, view = "shaded", size_text;
-    std::size_t camera = 0;
-    std::vector<float> eye, target, up;
-    std::optional<float> fov;
-    int samples = 0;
-    float ao_radius = 0.0f;
+    std::string scene;
     TreeViewOptions tree_view;
 };
-
-Vec3 vec_of(const std::vector<float>& v) { return {v[0], v[1], v[2]}; }
-
-Camera chosen_camera(const RenderCommand& options, const Model& scene) {
-    Camera camera;
-    if (options.camera < scene.cameras.cameras.size())
-        camera = scene.cameras.cameras[options.camera];
-    else
-        throw InputError(scene.name + ": camera " + std::to_string(options.camera) +
-                         " is past the last of " + std::to_string(scene.cameras.cameras.size()) +
-                         " cameras");
-    if (!options.eye.empty()) camera.position = vec_of(options.eye);
-    if (!options.target.empty()) camera.target = vec_of(options.target);
-    if (!options.up.empty()) camera.up = vec_of(options.up);
-    if (options.fov) camera.vfov = *options.fov;
-    return camera;
-}
 
 /// Without a binary tree, unless the options ask for one.
 SceneTree load_shown(const RenderCommand& options, std::optional<Scene>& scene, Json& about_it) {
@@ -73,20 +52,12 @@ void run_render(RenderCommand options) {
                                   options.common)
                 : TreeScene{load_shown(options, scene, about_scene), {}};
     const SceneTree& input = tree_scene.input;
-    const Size size = options.size_text.empty()
-                          ? Size{input.scene.cameras.width, input.scene.cameras.height}
-                          : parse_size(options.size_text);
-    const Camera camera = chosen_camera(options, input.scene);
-    Progress progress("rendering", options.common);
-    RenderOptions render_options;
+    const CameraSet& cameras = input.scene.cameras;
+    const Camera camera = options.chosen_camera(cameras, input.scene.name);
+    RenderOptions render_options = options.render_options(cameras, options.common);
     render_options.view = of_tree ? View::shaded : view_from_name(options.view);
-    render_options.width = size.width;
-    render_options.height = size.height;
-    render_options.samples = options.samples;
-    render_options.ao_radius =
-        options.ao_radius > 0 ? options.ao_radius : input.scene.cameras.ao_radius;
-    render_options.seed = options.common.seed;
-    render_options.threads = options.common.threads;
+    const Size size{render_options.width, render_options.height};
+    Progress progress("rendering", options.common);
     render_options.progress = [&](double part) { progress.show(part); };
     const auto start = std::chrono::steady_clock::now();
     const Picture picture = about(options.scene, [&] {
@@ -121,42 +92,9 @@ void add_render_command(CLI::App& app) {
     command
         ->add_option("SCENE", options->scene, "A file, builtin:NAME?key=value&..., or a .rdx file")
         ->required();
-    command
-        ->add_option("-o,--output", options->out_file,
-                     "Picture to write: .png, or .exr for linear values")
-        ->required()
-        ->type_name("PICTURE");
-    command->add_option("--view", options->view, "What to show")
-        ->check(CLI::IsMember(
-            {"shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps", "tree", "slice"}))
-        ->capture_default_str();
-    command
-        ->add_option("--size", options->size_text, "Pixels (default: of cameras.json, or 1024x768)")
-        ->type_name("WxH");
-    command->add_option("--camera", options->camera, "Number of a camera")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
-    command->add_option("--eye", options->eye, "Camera position x y z")
-        ->expected(3)
-        ->delimiter(',');
-    command->add_option("--target", options->target, "Point looked at x y z")
-        ->expected(3)
-        ->delimiter(',');
-    command->add_option("--up", options->up, "Direction that is up in the picture x y z")
-        ->expected(3)
-        ->delimiter(',');
-    command->add_option("--fov", options->fov, "Vertical field of view in degrees")
-        ->check(finite_number(false))
-        ->check(CLI::Range(0.01f, 179.0f));
-    command
-        ->add_option("--samples", options->samples,
-                     "Rays per pixel of views with chance (0: the view's own default)")
-        ->check(CLI::Range(0, 4096))
-        ->capture_default_str();
-    command
-        ->add_option("--ao-radius", options->ao_radius,
-                     "Reach of ao rays (default: of cameras.json, or 5 % of the diagonal)")
-        ->check(finite_number(false));
+    add_picture_options(
+        *command, *options,
+        {"shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps", "tree", "slice"});
     add_tree_view_options(*command, options->tree_view);
     add_tree_options(*command, options->tree);
     add_flatten_option(*command, options->common);

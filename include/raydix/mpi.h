@@ -14,6 +14,7 @@
 #include <mpi.h>
 #include <raydix/buffer.h>
 #include <raydix/error.h>
+#include <raydix/picture.h>
 #include <raydix/points.h>
 #include <raydix/scene.h>
 #include <raydix/scene_queries.h>
@@ -84,9 +85,12 @@ struct Holding {
     std::uint64_t size = 0, left_out = 0;  // of all ranks: elements given, and those left out
     std::uint64_t local = 0;               // elements that this rank holds
     std::uint64_t first = 0;               // the number of the first element that this rank gave
-    std::uint64_t replicated_bytes = 0;    // of the tree over the boxes of all ranks
-    std::uint64_t bytes = 0;               // that queries read on this rank
-    CallReport report;                     // of the construction
+    /// Of a scene: ways to instances on this rank, and on the ranks before it. Hits on this rank's
+    /// ways have the instances first_path + 1 to first_path + paths.
+    std::uint64_t paths = 0, first_path = 0;
+    std::uint64_t replicated_bytes = 0;  // of the tree over the boxes of all ranks
+    std::uint64_t bytes = 0;             // that queries read on this rank
+    CallReport report;                   // of the construction
 };
 
 struct QueryOptions {
@@ -157,14 +161,37 @@ using DistributedPoints = BasicDistributedPoints<float>;
 using DistributedPointsD = BasicDistributedPoints<double>;
 
 struct SceneOptions : Options {
-    /// false: the meshes of all ranks are geometries 0, 1, 2, ... in rank order, and `prim` counts
-    /// within each. true: they are parts of one geometry, 0, and `prim` counts through all of them,
-    /// in rank order. For a mesh that no rank holds whole.
+    /// false: what all ranks give are geometries 0, 1, 2, ... in rank order, and `prim` counts
+    /// within each. true: the meshes are parts of one geometry, 0, and `prim` counts through all of
+    /// them, in rank order. For a mesh that no rank holds whole.
     bool one_geometry = false;
     Quality quality = Quality::balanced;  // of the tree on each rank. Hits do not depend on it
 };
 
-/// A raydix::Hit with a 64-bit prim. `instance` is 0: meshes stand where they are.
+/// What a rank gives of a scene: a mesh, or an instance of a scene that it holds. An instance stays
+/// on that rank.
+template <class Scalar>
+struct BasicDistributedGeometry {
+    typename SceneTypes<Scalar>::MeshView mesh{};
+    /// Not null: an instance of this scene as its last commit left it; `mesh` is then empty. It
+    /// need not outlive the construction.
+    const BasicScene<Scalar>* scene = nullptr;
+    typename SceneTypes<Scalar>::Transform transform{};  // of an instance
+    std::uint32_t mask = 0xFFFFFFFFu;                    // as GeometryOptions::mask
+};
+using DistributedGeometry = BasicDistributedGeometry<float>;
+using DistributedGeometryD = BasicDistributedGeometry<double>;
+
+/// Of the rays of this rank.
+struct TraceOptions {
+    std::uint32_t mask = 0xFFFFFFFFu;           // of all of them
+    std::span<const std::uint32_t> masks = {};  // [rays], one for each ray instead; or empty
+    /// trace_all only: as QueryOptions::max_result_bytes.
+    std::uint64_t max_result_bytes = 0;
+};
+
+/// A raydix::Hit with a 64-bit prim. Paths to instances count from 1 through the ranks, in rank
+/// order; `geometry` of a hit in an instance is the id in the scene that stands there.
 template <class Scalar>
 struct BasicDistributedHit {
     Scalar t = infinity;
@@ -208,13 +235,14 @@ struct HitRows {
     CallReport report;
 };
 
-/// Triangle meshes spread over ranks, asked as a raydix::Scene of all of them. Move-only. To
-/// destroy it is collective too, while MPI runs.
+/// Triangle meshes and instances spread over ranks, asked as a raydix::Scene of all of them.
+/// Move-only. To destroy it is collective too, while MPI runs.
 template <class Scalar>
 class BasicDistributedScene {
 public:
     using Types = SceneTypes<Scalar>;
     using MeshView = typename Types::MeshView;
+    using Geometry = BasicDistributedGeometry<Scalar>;
     using Ray = typename Types::Ray;
     using Point = typename Types::Point;
     using Hit = BasicDistributedHit<Scalar>;
@@ -222,34 +250,48 @@ public:
 
     /// Collective. The meshes are copied. One without triangles only takes a number. Triangles that
     /// are not finite or out of range are left out and counted. Throws InputError: an index past
-    /// the vertices, 2^31 triangles or more on one rank, an option out of range.
+    /// the vertices, 2^31 triangles or more on one rank, 2^32 - 2 geometries or paths or more on
+    /// all, an option out of range, and as Scene::add and Scene::commit for instances.
+    BasicDistributedScene(MPI_Comm comm, std::span<const Geometry> geometries,
+                          const SceneOptions& options = {});
+    /// The same of meshes alone, which all rays see.
     BasicDistributedScene(MPI_Comm comm, std::span<const MeshView> meshes,
                           const SceneOptions& options = {});
     ~BasicDistributedScene();
     BasicDistributedScene(BasicDistributedScene&&) noexcept;
     BasicDistributedScene& operator=(BasicDistributedScene&&) noexcept;
 
-    /// Elements are triangles.
+    /// Elements are triangles of meshes, those of instances left out.
     [[nodiscard]] const Holding& holding() const;
 
-    /// Collective. The closest hit of each ray: the least (t, geometry, prim), as raydix::trace.
-    [[nodiscard]] Answers<Hit, TraceCounts> trace(std::span<const Ray> rays) const;
+    /// Collective. The closest hit of each ray: the least (t, instance, geometry, prim), as
+    /// raydix::trace. Throws InputError: masks that are not as many as rays.
+    [[nodiscard]] Answers<Hit, TraceCounts> trace(std::span<const Ray> rays,
+                                                  const TraceOptions& options = {}) const;
     /// Collective. Whether each ray hits anything: 1 or 0.
-    [[nodiscard]] Answers<std::uint8_t, TraceCounts> trace_any(std::span<const Ray> rays) const;
-    /// Collective. All hits of each ray, sorted by (t, geometry, prim), as raydix::trace_all.
+    [[nodiscard]] Answers<std::uint8_t, TraceCounts> trace_any(
+        std::span<const Ray> rays, const TraceOptions& options = {}) const;
+    /// Collective. All hits of each ray, sorted by (t, instance, geometry, prim), as
+    /// raydix::trace_all.
     [[nodiscard]] HitRows<Scalar> trace_all(std::span<const Ray> rays,
-                                            std::uint64_t max_result_bytes = 0) const;
+                                            const TraceOptions& options = {}) const;
     /// Collective. The closest point of all triangles to each query, as raydix::closest_points. All
-    /// ranks give the same max_distance. Throws InputError if it is negative or NaN.
+    /// ranks give the same max_distance and mask. Throws InputError if max_distance is negative or
+    /// NaN, and if the mask shows an instance of spheres or other shapes.
     [[nodiscard]] Answers<Closest, ClosestCounts> closest_points(
-        std::span<const Point> queries, Scalar max_distance = infinity) const;
+        std::span<const Point> queries, Scalar max_distance = infinity,
+        std::uint32_t mask = 0xFFFFFFFFu) const;
     /// Collective. Whether each query is inside: 1 or 0. Inside means that the way to infinity
     /// crosses an odd number of triangles, or that the query is on one: InsideRule::parity of all
-    /// meshes together. Exact for closed meshes. The first call makes a second tree on each rank.
+    /// meshes together, those in instances moved as raydix::contains moves them. Exact for closed
+    /// meshes. The first call makes a second tree on each rank. Throws InputError if a geometry
+    /// with a bit in its mask has spheres or other shapes.
     [[nodiscard]] Answers<std::uint8_t, ClosestCounts> contains(
         std::span<const Point> queries) const;
 
 private:
+    template <class>
+    friend struct DistributedSceneInternals;
     struct State;
     std::unique_ptr<State> state_;
 };
@@ -257,5 +299,24 @@ extern template class BasicDistributedScene<float>;
 extern template class BasicDistributedScene<double>;
 using DistributedScene = BasicDistributedScene<float>;
 using DistributedSceneD = BasicDistributedScene<double>;
+
+/// Collective. Renders a scene that every rank holds whole, as raydix::render: the ranks take parts
+/// of the picture from a shared counter until none is left. Rank 0 gets the picture, with the bits
+/// of one process; the others get an empty one. All ranks give the same scene, camera and options,
+/// `threads` aside. Progress is told on rank 0 alone, by the calling thread. Throws InputError as
+/// raydix::render does, and if the boxes of the scenes or the arguments differ.
+[[nodiscard]] Picture render(MPI_Comm comm, const Scene& scene, const Camera& camera,
+                             const RenderOptions& options = {});
+[[nodiscard]] Picture render(MPI_Comm comm, const SceneD& scene, const CameraD& camera,
+                             const RenderOptions& options = {});
+
+/// Collective. Renders a scene that is spread over the ranks, as raydix::render: every rank makes
+/// the rays of its share of the picture on one thread, and all trace them together. All views but
+/// `steps`; that throws InputError. `threads` has no effect: rays take those of the scene.
+/// Otherwise as above.
+[[nodiscard]] Picture render(const DistributedScene& scene, const Camera& camera,
+                             const RenderOptions& options = {});
+[[nodiscard]] Picture render(const DistributedSceneD& scene, const CameraD& camera,
+                             const RenderOptions& options = {});
 
 }  // namespace raydix::mpi

@@ -12,6 +12,7 @@
 #include "base/math.h"
 #include "base/options.h"
 #include "exec/progress.h"
+#include "image/picture_parts.h"
 #include "image/render_light.h"
 #include "image/render_scene.h"
 #include "rays/sampling.h"
@@ -21,7 +22,6 @@
 namespace raydix {
 namespace {
 
-constexpr std::size_t tile_rays = std::size_t{1} << 15;  // of a tile, secondary ones included
 constexpr int max_samples = 4096;
 constexpr std::array<std::string_view, 7> view_names = {"shaded", "normal",  "depth", "primitive",
                                                         "ao",     "diffuse", "steps"};
@@ -33,13 +33,6 @@ constexpr double four_places[][2] = {
 
 bool gathers_light(View view) {
     return view == View::shaded || view == View::ao || view == View::diffuse;
-}
-
-void check_options(const RenderOptions& options) {
-    check_enum("view", options.view, View::steps);
-    if (options.samples < 0 || options.samples > max_samples)
-        throw InputError("render: samples is " + std::to_string(options.samples) +
-                         "; it must be 0.." + std::to_string(max_samples));
 }
 
 /// Light of `shaded` comes from the sun and an even sky, and is smooth with few rays.
@@ -63,17 +56,18 @@ std::uint64_t rays_of(const RenderOptions& options) {
            (per_pixel.primary + per_pixel.secondary);
 }
 
-RenderScene make_scene(const Tracer& tracer, const Surface& surface, const CameraFrame& frame,
-                       Vec3 camera_up, const RenderOptions& options) {
+RenderScene make_scene(const Tracer& tracer, const CameraFrame& frame, Vec3 camera_up,
+                       const RenderOptions& options) {
     const PixelRays per_pixel = pixel_rays(options);
-    const Aabb box = surface.empty() ? Aabb{{0, 0, 0}, {0, 0, 0}} : surface.bounds();
+    Aabb box = tracer.bounds();
+    const bool empty = !(box.lo.x <= box.hi.x);
+    if (empty) box = {{0, 0, 0}, {0, 0, 0}};
     return {tracer,
-            surface,
             options,
             frame,
             make_lights(tracer, frame, camera_up),
             step_back_distance(box),
-            surface.empty() ? 1.0f : ao_radius_or_default(box, options.ao_radius),
+            empty ? 1.0f : ao_radius_or_default(box, options.ao_radius),
             per_pixel.primary,
             (per_pixel.secondary + per_pixel.primary - 1) / per_pixel.primary};
 }
@@ -88,7 +82,8 @@ std::uint32_t number_of(const Hit& hit) {
 
 /// Normal, depth and primitive: one value per pixel, from its hit alone. Depth stays a distance
 /// along the view for now.
-Vec3 surface_value(const RenderScene& scene, const Ray& ray, const Hit& hit) {
+Vec3 surface_value(const RenderScene& scene, const Ray& ray, const Hit& hit,
+                   const Double3& normal) {
     if (!hit.hit()) return scene.options.view == View::depth ? grey(infinity) : grey(0.0f);
     switch (scene.options.view) {
         case View::primitive:
@@ -97,14 +92,14 @@ Vec3 surface_value(const RenderScene& scene, const Ray& ray, const Hit& hit) {
             return grey(
                 static_cast<float>(hit.t * dot(Double3(ray.direction), scene.frame.forward)));
         default:
-            return 0.5f * (normal_toward(scene.surface.normal(hit), ray.direction) + grey(1.0f));
+            return 0.5f * (normal_toward(normal, ray.direction) + grey(1.0f));
     }
 }
 
 std::vector<Vec3> surface_values(const RenderScene& scene, const PrimarySamples& primary) {
     std::vector<Vec3> values(primary.rays.size());
     for (std::size_t i = 0; i < values.size(); ++i)
-        values[i] = surface_value(scene, primary.rays[i], primary.hits[i]);
+        values[i] = surface_value(scene, primary.rays[i], primary.hits[i], primary.normals[i]);
     return values;
 }
 
@@ -171,58 +166,82 @@ void colour_steps(Picture& picture) {
     for (Vec3& p : picture.pixels) p = heat_colour(p.x / top);
 }
 
-/// Fills these pixels of `picture`; a pixel is the mean of its samples.
-void render_tile(const RenderScene& scene, std::span<const std::uint32_t> pixels,
-                 Picture& picture) {
-    const std::size_t rays_per_pixel = scene.rays_per_pixel;
-    const std::vector<Vec3> samples = tile_samples(scene, pixels);
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-        Vec3 sum = samples[i * rays_per_pixel];
-        for (std::size_t k = 1; k < rays_per_pixel; ++k)
-            sum = sum + samples[i * rays_per_pixel + k];
-        picture.pixels[pixels[i]] = (1.0f / static_cast<float>(rays_per_pixel)) * sum;
-    }
-}
-
-void render_tiles(const RenderScene& scene, Picture& picture) {
-    const std::vector<std::uint32_t> order = pixels_in_morton_order(picture.width, picture.height);
-    const std::size_t per_pixel = scene.rays_per_pixel * (scene.samples_per_ray + 1);
-    const std::size_t tile = std::bit_floor(std::max<std::size_t>(16, tile_rays / per_pixel));
-    ProgressListener listener(scene.options.progress);
-    const ProgressCounter progress({&listener, 0, 1}, static_cast<double>(order.size()));
-    for_each_block(order.size(), tile, [&](std::size_t, std::size_t begin, std::size_t end) {
-        render_tile(scene, std::span(order).subspan(begin, end - begin), picture);
-        progress.add(static_cast<double>(end - begin));
-    });
+void render_tiles(const PictureParts& parts, const RenderOptions& options, Picture& picture) {
+    const std::span<const std::uint32_t> pixels = parts.pixels();
+    picture.pixels.resize(pixels.size());
+    ProgressListener listener(options.progress);
+    const ProgressCounter progress({&listener, 0, 1}, static_cast<double>(pixels.size()));
+    for_each_block(pixels.size(), parts.pixels_of_rays(PictureParts::rays_of_thread),
+                   [&](std::size_t, std::size_t begin, std::size_t end) {
+                       const std::vector<Vec3> colours = parts.render(begin, end);
+                       for (std::size_t i = begin; i < end; ++i)
+                           picture.pixels[pixels[i]] = colours[i - begin];
+                       progress.add(static_cast<double>(end - begin));
+                   });
     listener.finish();
 }
 
-/// `take` calls picture_of(tracer, surface) once. `frame` is in the space of both.
+/// `take` calls picture_of(tracer) once. `frame` is in its space.
 template <class Take>
 Picture render_frame(const CameraFrame& frame, Vec3 camera_up, const RenderOptions& options,
                      const Take& take) {
     Picture picture{options.width, options.height, {}};
     with_threads(options.threads, [&] {
-        take([&](const Tracer& tracer, const Surface& surface) {
-            const RenderScene scene = make_scene(tracer, surface, frame, camera_up, options);
-            picture.pixels.resize(std::size_t{options.width} * options.height);
-            render_tiles(scene, picture);
+        take([&](const Tracer& tracer) {
+            render_tiles(PictureParts(tracer, frame, camera_up, options), options, picture);
         });
     });
-    if (options.view == View::depth) scale_depth(picture);
-    if (options.view == View::steps) colour_steps(picture);
+    finish_picture(picture, options.view);
     return picture;
 }
 
 }  // namespace
 
+void check_render_options(const RenderOptions& options) {
+    check_enum("view", options.view, View::steps);
+    if (options.samples < 0 || options.samples > max_samples)
+        throw InputError("render: samples is " + std::to_string(options.samples) +
+                         "; it must be 0.." + std::to_string(max_samples));
+}
+
+PictureParts::PictureParts(const Tracer& tracer, const CameraFrame& frame, Vec3 camera_up,
+                           const RenderOptions& options)
+    : scene_(make_scene(tracer, frame, camera_up, options)),
+      order_(pixels_in_morton_order(options.width, options.height)) {}
+
+std::size_t PictureParts::pixels_of_rays(std::size_t rays) const {
+    const std::size_t per_pixel = scene_.rays_per_pixel * (scene_.samples_per_ray + 1);
+    return std::bit_floor(std::max<std::size_t>(16, rays / per_pixel));
+}
+
+/// A pixel is the mean of its samples.
+std::vector<Vec3> PictureParts::render(std::size_t begin, std::size_t end) const {
+    const std::size_t rays_per_pixel = scene_.rays_per_pixel;
+    const std::vector<Vec3> samples =
+        tile_samples(scene_, std::span(order_).subspan(begin, end - begin));
+    std::vector<Vec3> colours(end - begin);
+    for (std::size_t i = 0; i < colours.size(); ++i) {
+        Vec3 sum = samples[i * rays_per_pixel];
+        for (std::size_t k = 1; k < rays_per_pixel; ++k)
+            sum = sum + samples[i * rays_per_pixel + k];
+        colours[i] = (1.0f / static_cast<float>(rays_per_pixel)) * sum;
+    }
+    return colours;
+}
+
+void finish_picture(Picture& picture, View view) {
+    if (view == View::depth) scale_depth(picture);
+    if (view == View::steps) colour_steps(picture);
+}
+
 std::vector<SurfacePoint> points_of_hits(const RenderScene& scene, std::span<const Ray> rays,
                                          std::span<const Hit> hits,
+                                         std::span<const Double3> normals,
                                          std::span<const std::uint32_t> positions) {
     std::vector<SurfacePoint> points(positions.size());
     for (std::size_t k = 0; k < positions.size(); ++k) {
         const std::uint32_t i = positions[k];
-        points[k] = surface_point(scene.surface, rays[i], hits[i], 0, scene.step_back);
+        points[k] = surface_point(normals[i], rays[i], hits[i].t, 0, scene.step_back);
     }
     return points;
 }
@@ -231,9 +250,11 @@ PrimarySamples trace_primary(const RenderScene& scene, std::span<const std::uint
     PrimarySamples primary;
     primary.rays = primary_rays(scene, pixels);
     primary.hits.resize(primary.rays.size());
-    scene.tracer.closest(primary.rays, primary.hits);
+    primary.normals.resize(primary.rays.size());
+    scene.tracer.closest(primary.rays, primary.hits, primary.normals);
     primary.hit_positions = positions_of_hits(primary.hits);
-    primary.points = points_of_hits(scene, primary.rays, primary.hits, primary.hit_positions);
+    primary.points =
+        points_of_hits(scene, primary.rays, primary.hits, primary.normals, primary.hit_positions);
     for (std::size_t k = 0; k < primary.points.size(); ++k) {
         const std::uint32_t i = primary.hit_positions[k];
         primary.points[k].pixel = pixels[i / scene.rays_per_pixel];
@@ -256,32 +277,29 @@ View view_from_name(std::string_view name) {
 }
 
 Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& options) {
-    check_options(options);
+    check_render_options(options);
     require_triangles(bvh, "render");
     const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
     return render_frame(frame, camera.up, options, [&](const auto& picture_of) {
         const std::uint64_t rays = options.view == View::steps ? 0 : rays_of(options);
-        picture_of(BvhTracer(bvh, rays), BvhSurface(bvh));
+        picture_of(BvhTracer(bvh, rays));
     });
 }
 
 Picture render(const Scene& scene, const Camera& camera, const RenderOptions& options) {
-    check_options(options);
+    check_render_options(options);
     const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
-    return render_frame(frame, camera.up, options, [&](const auto& picture_of) {
-        picture_of(SceneTracer(scene), SceneSurface(scene));
-    });
+    return render_frame(frame, camera.up, options,
+                        [&](const auto& picture_of) { picture_of(SceneTracer(scene)); });
 }
 
 Picture render(const SceneD& scene, const CameraD& camera, const RenderOptions& options) {
-    check_options(options);
+    check_render_options(options);
     CameraFrame frame = make_camera_frame(camera, options.width, options.height);
-    const SceneSurfaceD surface(scene);
-    frame.position = frame.position - surface.middle();
+    const SceneTracerD tracer(scene);
+    frame.position = frame.position - tracer.middle();
     const Vec3 up = normalized(Double3(camera.up)).rounded();
-    return render_frame(frame, up, options, [&](const auto& picture_of) {
-        picture_of(SceneTracerD(scene, surface.middle()), surface);
-    });
+    return render_frame(frame, up, options, [&](const auto& picture_of) { picture_of(tracer); });
 }
 
 }  // namespace raydix

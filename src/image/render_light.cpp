@@ -120,9 +120,10 @@ std::vector<float> open_parts(const RenderScene& scene, std::span<const SurfaceP
 std::vector<Vec3> bounced_light(const RenderScene& scene, std::span<const SurfacePoint> points) {
     const std::vector<Ray> rays = hemisphere_rays(scene, points, infinity);
     std::vector<Hit> hits(rays.size());
-    scene.tracer.closest(rays, hits);
+    std::vector<Double3> normals(rays.size());
+    scene.tracer.closest(rays, hits, normals);
     const std::vector<std::uint32_t> positions = positions_of_hits(hits);
-    const std::vector<SurfacePoint> seen = points_of_hits(scene, rays, hits, positions);
+    const std::vector<SurfacePoint> seen = points_of_hits(scene, rays, hits, normals, positions);
     const std::vector<Vec3> light_on_seen = direct_light(scene, seen, SeenBy::reflection);
 
     std::vector<Vec3> arriving(rays.size());

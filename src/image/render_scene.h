@@ -24,7 +24,6 @@ struct Lights {
 
 struct RenderScene {
     const Tracer& tracer;
-    const Surface& surface;
     const RenderOptions& options;
     CameraFrame frame;
     Lights lights;
@@ -38,6 +37,7 @@ struct RenderScene {
 struct PrimarySamples {
     std::vector<Ray> rays;
     std::vector<Hit> hits;
+    std::vector<Double3> normals;              // of those that hit
     std::vector<std::uint32_t> hit_positions;  // of the samples that hit, ascending
     std::vector<SurfacePoint> points;          // [hit_positions]
 };
@@ -49,6 +49,7 @@ struct PrimarySamples {
 [[nodiscard]] std::vector<SurfacePoint> points_of_hits(const RenderScene& scene,
                                                        std::span<const Ray> rays,
                                                        std::span<const Hit> hits,
+                                                       std::span<const Double3> normals,
                                                        std::span<const std::uint32_t> positions);
 
 }  // namespace raydix

@@ -17,17 +17,24 @@ namespace {
 /// Making a wide tree takes about as long as tracing so many rays per triangle without it.
 constexpr std::uint64_t rays_per_triangle = 1;
 
+void fill_normals(const Surface& surface, std::span<const Hit> hits, std::span<Double3> normals) {
+    for (std::size_t i = 0; i < hits.size(); ++i)
+        if (hits[i].hit()) normals[i] = surface.normal(hits[i]);
+}
+
 }  // namespace
 
-BvhTracer::BvhTracer(const Bvh& bvh, std::uint64_t rays) : bvh_(bvh) {
+BvhTracer::BvhTracer(const Bvh& bvh, std::uint64_t rays) : bvh_(bvh), surface_(bvh) {
     if (rays > bvh.order().size() * rays_per_triangle) wide_.emplace(bvh);
 }
 
-void BvhTracer::closest(std::span<const Ray> rays, std::span<Hit> hits) const {
+void BvhTracer::closest(std::span<const Ray> rays, std::span<Hit> hits,
+                        std::span<Double3> normals) const {
     if (wide_)
         closest_on_this_thread(*wide_, rays, hits);
     else
         trace(bvh_, rays, hits);
+    fill_normals(surface_, hits, normals);
 }
 
 void BvhTracer::occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const {
@@ -44,10 +51,13 @@ void BvhTracer::count_steps(std::span<const Ray> rays, std::span<std::uint32_t> 
     for (std::size_t i = 0; i < visits.size(); ++i) visits[i] = steps[i].node_visits;
 }
 
-SceneTracer::SceneTracer(const Scene& scene) : tree_(SceneInternals::tree(scene)) {}
+SceneTracer::SceneTracer(const Scene& scene)
+    : tree_(SceneInternals::tree(scene)), surface_(scene) {}
 
-void SceneTracer::closest(std::span<const Ray> rays, std::span<Hit> hits) const {
+void SceneTracer::closest(std::span<const Ray> rays, std::span<Hit> hits,
+                          std::span<Double3> normals) const {
     closest_on_this_thread(*tree_, rays, hits);
+    fill_normals(surface_, hits, normals);
 }
 
 void SceneTracer::occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const {
@@ -58,12 +68,13 @@ void SceneTracer::count_steps(std::span<const Ray> rays, std::span<std::uint32_t
     count_steps_on_this_thread(*tree_, rays, visits);
 }
 
-SceneTracerD::SceneTracerD(const SceneD& scene, Double3 middle)
-    : tree_(SceneInternalsD::tree(scene)), middle_(middle) {}
+SceneTracerD::SceneTracerD(const SceneD& scene)
+    : tree_(SceneInternalsD::tree(scene)), surface_(scene) {}
 
-void SceneTracerD::closest(std::span<const Ray> rays, std::span<Hit> hits) const {
+void SceneTracerD::closest(std::span<const Ray> rays, std::span<Hit> hits,
+                           std::span<Double3> normals) const {
     std::vector<HitD> found(rays.size());
-    closest_on_this_thread(*tree_, in_space_around(middle_, rays), found);
+    closest_on_this_thread(*tree_, in_space_around(middle(), rays), found);
     for (std::size_t i = 0; i < found.size(); ++i) {
         const HitD& hit = found[i];
         hits[i].t = static_cast<float>(hit.t);
@@ -73,10 +84,11 @@ void SceneTracerD::closest(std::span<const Ray> rays, std::span<Hit> hits) const
         hits[i].geometry = hit.geometry;
         hits[i].instance = hit.instance;
     }
+    fill_normals(surface_, hits, normals);
 }
 
 void SceneTracerD::occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const {
-    occluded_on_this_thread(*tree_, in_space_around(middle_, rays), found);
+    occluded_on_this_thread(*tree_, in_space_around(middle(), rays), found);
 }
 
 void SceneTracerD::count_steps(std::span<const Ray>, std::span<std::uint32_t>) const {

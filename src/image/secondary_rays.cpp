@@ -76,7 +76,7 @@ std::vector<Ray> make_float_rays(const AnySurface& surface, std::span<const Ray>
     with_threads(options.threads, [&] {
         surface.check(hits);
         secondary = make_rays(surface, hits, options, [&](std::uint32_t i, double step_back) {
-            return surface_point(surface, rays[i], hits[i], pixels[i], step_back);
+            return surface_point(surface.normal(hits[i]), rays[i], hits[i].t, pixels[i], step_back);
         });
     });
     return secondary;

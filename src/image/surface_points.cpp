@@ -104,10 +104,9 @@ std::vector<RayD> in_space_around(Double3 middle, std::span<const Ray> rays) {
     return out;
 }
 
-SurfacePoint surface_point(const Surface& surface, const Ray& ray, const Hit& hit,
-                           std::uint32_t pixel, double step_back) {
-    return {point_before(ray, hit.t, step_back), normal_toward(surface.normal(hit), ray.direction),
-            pixel, 0};
+SurfacePoint surface_point(const Double3& normal, const Ray& ray, float t, std::uint32_t pixel,
+                           double step_back) {
+    return {point_before(ray, t, step_back), normal_toward(normal, ray.direction), pixel, 0};
 }
 
 }  // namespace raydix

@@ -27,8 +27,6 @@ public:
     [[nodiscard]] virtual Aabb bounds() const = 0;
     /// Geometric, in the world, of any length and on either side; 0 if there is none.
     [[nodiscard]] virtual Double3 normal(const Hit& hit) const = 0;
-
-    [[nodiscard]] bool empty() const { return !(bounds().lo.x <= bounds().hi.x); }
 };
 
 /// The tree must outlive it.
@@ -107,8 +105,9 @@ template <class Hits>
 /// Rays of a space whose origin is at `middle` of another one -> the same there.
 [[nodiscard]] std::vector<RayD> in_space_around(Double3 middle, std::span<const Ray> rays);
 
-/// Origin `step_back` before the hit, geometric normal turned toward the ray.
-[[nodiscard]] SurfacePoint surface_point(const Surface& surface, const Ray& ray, const Hit& hit,
+/// Origin `step_back` before the hit, geometric normal turned toward the ray. `normal`: of the
+/// surface that was hit at t, on either side.
+[[nodiscard]] SurfacePoint surface_point(const Double3& normal, const Ray& ray, float t,
                                          std::uint32_t pixel, double step_back);
 
 }  // namespace raydix

@@ -105,8 +105,8 @@ void agree_on(const Communicator& comm, const std::string& call, const std::exce
     const std::uint64_t hash = hash_of(call);
     std::uint64_t values[3] = {hash, ~hash, failed_rank(comm, error)};
     comm.reduce(values, 3, MPI_MIN);
-    if (values[0] != ~values[1]) throw_mismatch(comm, call);
     if (values[2] != none) throw_error_of(comm, values[2], error);
+    if (values[0] != ~values[1]) throw_mismatch(comm, call);
 }
 
 std::uint64_t agree_on_work(const Communicator& comm, std::uint64_t work,

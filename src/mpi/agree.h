@@ -15,8 +15,8 @@ namespace raydix::mpi {
 /// std::runtime_error; its message begins with that rank.
 void agree(const Communicator& comm, const std::exception_ptr& error);
 
-/// As `agree`, and throws InputError on all ranks if `call` is not the same text on each: the name
-/// of a call and those of its arguments that must not differ.
+/// As `agree`; and without an error, throws InputError on all ranks if `call` is not the same text
+/// on each: the name of a call and those of its arguments that must not differ.
 void agree_on(const Communicator& comm, const std::string& call, const std::exception_ptr& error);
 
 /// Collective. The sum of `work` over all ranks; throws as `agree`.

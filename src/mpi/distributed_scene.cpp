@@ -1,5 +1,5 @@
-// Meshes spread over ranks: partition, a scene of raydix on each rank, a tree over the boxes of
-// all; then queries in rounds.
+// Meshes and instances spread over ranks: partition, a scene of raydix on each rank, a tree over
+// the boxes of all; then queries in rounds.
 #include <raydix/error.h>
 #include <raydix/mpi.h>
 #include <raydix/result_limit.h>
@@ -8,9 +8,12 @@
 #include <string>
 
 #include "base/options.h"
+#include "engine/flat_scene.h"
+#include "engine/scene_state.h"
 #include "mpi/call.h"
 #include "mpi/curve.h"
 #include "mpi/inside_query.h"
+#include "mpi/scene_internals.h"
 #include "mpi/scene_queries.h"
 
 namespace raydix::mpi {
@@ -23,27 +26,26 @@ struct BasicDistributedScene<Scalar>::State {
 
     State(MPI_Comm given, const SceneOptions& chosen) : comm(given), options(chosen) {}
 
-    void build(std::span<const MeshView> meshes) {
+    void build(std::span<const Geometry> given) {
         ComputeClock clock(options.compute_gate);
         std::exception_ptr error;
-        keep_error(error, [&] { clock.run([&] { check(meshes); }); });
+        keep_error(error, [&] { clock.run([&] { check(given); }); });
         agree_on(comm,
                  "DistributedScene, " + describe<Scalar>(options) +
                      (options.one_geometry ? ", one geometry" : ""),
                  error);
-        const std::vector<TriangleName> firsts = name_meshes(meshes);
-        if (options.partition == Partition::curve) {
-            const Mesh held = move_along_curve(meshes, firsts, clock);
-            keep_error(error, [&] { clock.run([&] { scene.add(held); }); });
-        } else {
-            for (const TriangleName& first : firsts) names.add_mesh(first);
-            keep_error(error, [&] {
-                clock.run([&] {
-                    for (const MeshView& mesh : meshes)
-                        scene.add(mesh.triangles.empty() ? MeshView() : mesh);
-                });
+        const std::vector<TriangleName> firsts = name_meshes(given);
+        Triangles moved;
+        if (options.partition == Partition::curve) moved = move_along_curve(given, firsts, clock);
+        keep_error(error, [&] {
+            clock.run([&] {
+                if (options.partition == Partition::curve)
+                    hold_moved(moved, given);
+                else
+                    hold_as_given(given, firsts);
+                moved = {};
             });
-        }
+        });
         CommitReport committed;
         std::vector<Box> boxes;
         keep_error(error, [&] {
@@ -54,6 +56,11 @@ struct BasicDistributedScene<Scalar>::State {
         });
         agree(comm, error);
         tree = RankTree<Scalar>(comm, boxes);
+        comm.reduce(&ray_error, 1, MPI_MAX);
+        holding.paths = committed.paths;
+        holding.first_path = comm.sum_before(committed.paths);
+        require_few(committed.paths, "paths to instances");
+        bounds = joined(scene.bounds());
         std::uint64_t sums[2] = {committed.triangles, committed.left_out};
         comm.reduce(sums, 2, MPI_SUM);
         holding.size = sums[0];
@@ -65,54 +72,68 @@ struct BasicDistributedScene<Scalar>::State {
         holding.report.compute_seconds = clock.seconds();
     }
 
-    void check(std::span<const MeshView> meshes) const {
+    void check(std::span<const Geometry> given) const {
         check_options(options);
         std::uint64_t triangles = 0;
-        for (std::size_t m = 0; m < meshes.size(); ++m) {
-            triangles += meshes[m].triangles.size();
-            for (std::size_t i = 0; i < meshes[m].triangles.size(); ++i)
-                for (const std::uint32_t v : meshes[m].triangles[i])
-                    if (v >= meshes[m].vertices.size())
+        for (std::size_t m = 0; m < given.size(); ++m) {
+            const MeshView& mesh = given[m].mesh;
+            if (given[m].scene != nullptr && !mesh.triangles.empty())
+                throw InputError("geometry " + std::to_string(m) +
+                                 " has a scene and a mesh; it can be one of them");
+            triangles += mesh.triangles.size();
+            for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+                for (const std::uint32_t v : mesh.triangles[i])
+                    if (v >= mesh.vertices.size())
                         throw InputError("mesh " + std::to_string(m) + ", triangle " +
                                          std::to_string(i) + ": vertex " + std::to_string(v) +
-                                         ", but there are " +
-                                         std::to_string(meshes[m].vertices.size()));
+                                         ", but there are " + std::to_string(mesh.vertices.size()));
         }
         if (triangles > std::uint64_t(std::numeric_limits<std::int32_t>::max()))
             throw InputError(std::to_string(triangles) +
                              " triangles; a rank holds fewer than 2^31");
     }
 
-    /// The names of the first triangle of each mesh of this rank.
-    std::vector<TriangleName> name_meshes(std::span<const MeshView> meshes) {
+    /// Collective. Throws InputError on all ranks if they have too many together for 32 bits.
+    void require_few(std::uint64_t mine, const char* what) const {
+        std::uint64_t all = mine;
+        comm.reduce(&all, 1, MPI_SUM);
+        if (all >= no_primitive - 1)
+            throw InputError("DistributedScene: " + std::to_string(all) + " " + what +
+                             "; there may be less than 2^32 - 2");
+    }
+
+    /// Collective. The names of the first triangle of each mesh of this rank. Instances have one
+    /// too, without a meaning.
+    std::vector<TriangleName> name_meshes(std::span<const Geometry> given) {
         std::uint64_t triangles = 0;
-        for (const MeshView& mesh : meshes) triangles += mesh.triangles.size();
+        for (const Geometry& one : given) triangles += one.mesh.triangles.size();
         holding.first = comm.sum_before(triangles);
-        const std::uint64_t geometries = comm.sum_before(meshes.size());
+        const std::uint64_t geometries = comm.sum_before(given.size());
+        require_few(given.size(), "geometries");
         std::vector<TriangleName> names_of;
         std::uint64_t prim = holding.first;
-        for (std::size_t m = 0; m < meshes.size(); ++m) {
+        for (std::size_t m = 0; m < given.size(); ++m) {
             names_of.push_back(options.one_geometry
                                    ? TriangleName{0, prim}
                                    : TriangleName{static_cast<std::uint32_t>(geometries + m), 0});
-            prim += meshes[m].triangles.size();
+            prim += given[m].mesh.triangles.size();
         }
         return names_of;
     }
 
-    /// The triangles that this rank is to hold, in the order of their names.
-    Mesh move_along_curve(std::span<const MeshView> meshes, const std::vector<TriangleName>& firsts,
-                          ComputeClock& clock) {
+    /// Collective. The triangles that this rank is to hold, in the order of their names.
+    Triangles move_along_curve(std::span<const Geometry> given,
+                               const std::vector<TriangleName>& firsts, ComputeClock& clock) {
         std::exception_ptr error;
         Triangles triangles;
         Box around = Box::empty();
         keep_error(error, [&] {
             clock.run([&] {
-                for (std::size_t m = 0; m < meshes.size(); ++m) {
+                for (std::size_t m = 0; m < given.size(); ++m) {
                     TriangleName name = firsts[m];
-                    for (const Triangle& t : meshes[m].triangles) {
-                        const auto& v = meshes[m].vertices;
-                        triangles.push_back({{v[t[0]], v[t[1]], v[t[2]]}, name});
+                    const auto& v = given[m].mesh.vertices;
+                    for (const Triangle& t : given[m].mesh.triangles) {
+                        triangles.push_back({{v[t[0]], v[t[1]], v[t[2]]}, given[m].mask, name});
                         around.unite(box_of(triangles.back()));
                         ++name.prim;
                     }
@@ -129,18 +150,54 @@ struct BasicDistributedScene<Scalar>::State {
         });
         agree(comm, error);
         triangles = partition_by_curve(comm, std::move(triangles), keys, options.message_bytes);
-        Mesh held;
         clock.run([&] {
             std::sort(triangles.begin(), triangles.end(),
                       [](const auto& a, const auto& b) { return a.name < b.name; });
-            for (const MovingTriangle<Scalar>& triangle : triangles) {
-                const auto v = static_cast<std::uint32_t>(held.vertices.size());
-                held.vertices.insert(held.vertices.end(), triangle.corners, triangle.corners + 3);
-                held.triangles.push_back({v, v + 1, v + 2});
-                names.add_triangle(triangle.name);
-            }
         });
-        return held;
+        return triangles;
+    }
+
+    void add_instance(const Geometry& given) {
+        GeometryOptions of_instance;
+        of_instance.mask = given.mask;
+        scene.add(*given.scene, given.transform, of_instance);
+        names.skip();
+    }
+
+    void hold_as_given(std::span<const Geometry> given, const std::vector<TriangleName>& firsts) {
+        for (std::size_t m = 0; m < given.size(); ++m) {
+            if (given[m].scene != nullptr) {
+                add_instance(given[m]);
+                continue;
+            }
+            GeometryOptions of_mesh;
+            of_mesh.mask = given[m].mask;
+            scene.add(given[m].mesh.triangles.empty() ? MeshView() : given[m].mesh, of_mesh);
+            names.add_mesh(firsts[m]);
+        }
+    }
+
+    /// Runs of one mask, so that ids here are in the order of names: ties go as they do in the
+    /// whole. Instances come later in ties anyway.
+    void hold_moved(const Triangles& triangles, std::span<const Geometry> given) {
+        for (std::size_t begin = 0, end = 0; begin < triangles.size(); begin = end) {
+            Mesh mesh;
+            std::vector<TriangleName> of_mesh;
+            for (end = begin;
+                 end < triangles.size() && triangles[end].mask == triangles[begin].mask; ++end) {
+                const auto& corners = triangles[end].corners;
+                const auto v = static_cast<std::uint32_t>(mesh.vertices.size());
+                mesh.vertices.insert(mesh.vertices.end(), corners, corners + 3);
+                mesh.triangles.push_back({v, v + 1, v + 2});
+                of_mesh.push_back(triangles[end].name);
+            }
+            GeometryOptions with_mask;
+            with_mask.mask = triangles[begin].mask;
+            scene.add(mesh, with_mask);
+            names.add_mesh(of_mesh);
+        }
+        for (const Geometry& one : given)
+            if (one.scene != nullptr) add_instance(one);
     }
 
     static Box box_of(const MovingTriangle<Scalar>& t) {
@@ -163,29 +220,56 @@ struct BasicDistributedScene<Scalar>::State {
         return scene.commit(of_scene);
     }
 
-    std::vector<Box> boxes_of_scene() const {
+    /// Of all triangles, and of all instances with what rays may miss them by.
+    std::vector<Box> boxes_of_scene() {
         std::vector<Box> boxes;
         for (const std::uint32_t id : scene.ids()) {
-            const MeshView mesh = *scene.mesh(id);
-            for (const Triangle& t : mesh.triangles)
-                boxes.push_back(box_of_corners<Scalar>(mesh.vertices[t[0]], mesh.vertices[t[1]],
-                                                       mesh.vertices[t[2]]));
+            const std::optional<MeshView> mesh = scene.mesh(id);
+            if (!mesh) continue;
+            for (const Triangle& t : mesh->triangles)
+                boxes.push_back(box_of_corners<Scalar>(mesh->vertices[t[0]], mesh->vertices[t[1]],
+                                                       mesh->vertices[t[2]]));
+        }
+        const auto& committed = *BasicSceneInternals<Scalar>::tree(scene);
+        for (std::size_t i = committed.own_part_count(); i < committed.extents.size(); ++i) {
+            const auto& [box, error] = committed.extents[i];
+            if (!(box.lo.x <= box.hi.x)) continue;
+            boxes.push_back({{box.lo.x, box.lo.y, box.lo.z}, {box.hi.x, box.hi.y, box.hi.z}});
+            ray_error = std::max(ray_error, error);
         }
         return boxes;
     }
 
-    /// Trees for crossings, made by the first call that asks for them.
-    const std::vector<typename CrossingTree<Scalar>::Bvh>& crossing_trees() {
-        if (crossings.empty()) {
-            BuildOptions of_tree;
-            of_tree.threads = options.threads;
-            for (const std::uint32_t id : scene.ids())
-                crossings.push_back(build_bvh(*scene.mesh(id), of_tree));
-        }
-        return crossings;
+    /// Around what all ranks hold.
+    typename Types::Box joined(const typename Types::Box& mine) const {
+        double least[6] = {mine.lo.x,          mine.lo.y,          mine.lo.z,
+                           -double(mine.hi.x), -double(mine.hi.y), -double(mine.hi.z)};
+        comm.reduce(least, 6, MPI_MIN);
+        Point lo, hi;
+        Double3(least[0], least[1], least[2]).round_to(lo);
+        Double3(-least[3], -least[4], -least[5]).round_to(hi);
+        return {lo, hi};
     }
 
-    [[nodiscard]] SceneParts<Scalar> parts() const { return {scene, names, tree, options.threads}; }
+    /// All triangles in the world, made by the first call that asks for them.
+    const typename CrossingTree<Scalar>::Bvh& crossing_tree() {
+        if (!crossings)
+            crossings = FlatPlan<Scalar>(scene, 0xFFFFFFFFu, "contains").tree(options.threads);
+        return crossings->tree;
+    }
+
+    [[nodiscard]] SceneParts<Scalar> parts() const {
+        return {
+            scene,          names, tree, ray_error, static_cast<std::uint32_t>(holding.first_path),
+            options.threads};
+    }
+
+    /// Throws InputError for shapes of instances: their d2 do not follow from the points alone.
+    void require_triangles(std::uint32_t mask) const {
+        if (holding.paths != 0)
+            static_cast<void>(
+                FlatPlan<Scalar>(scene, mask, "closest_points of a distributed scene"));
+    }
 
     /// A query whose answers have a fixed size.
     template <class Kind, class Answers, class Make>
@@ -208,18 +292,38 @@ struct BasicDistributedScene<Scalar>::State {
     BasicScene<Scalar> scene;
     TriangleNames names;
     RankTree<Scalar> tree;
-    std::vector<typename CrossingTree<Scalar>::Bvh> crossings;
+    typename Types::Box bounds{};
+    double ray_error = 0;  // the greatest of the extents of instances, on all ranks
+    std::optional<FlatTree<Scalar>> crossings;
     Holding holding;
 };
 
 template <class Scalar>
 BasicDistributedScene<Scalar>::BasicDistributedScene(MPI_Comm comm,
-                                                     std::span<const MeshView> meshes,
+                                                     std::span<const Geometry> geometries,
                                                      const SceneOptions& options)
     : state_(std::make_unique<State>(comm, options)) {
     const FloatEnvironment plain;
-    state_->build(meshes);
+    state_->build(geometries);
 }
+
+namespace {
+
+template <class Scalar>
+auto geometries_of(std::span<const typename SceneTypes<Scalar>::MeshView> meshes) {
+    std::vector<BasicDistributedGeometry<Scalar>> geometries(meshes.size());
+    for (std::size_t m = 0; m < meshes.size(); ++m) geometries[m].mesh = meshes[m];
+    return geometries;
+}
+
+}  // namespace
+
+template <class Scalar>
+BasicDistributedScene<Scalar>::BasicDistributedScene(MPI_Comm comm,
+                                                     std::span<const MeshView> meshes,
+                                                     const SceneOptions& options)
+    : BasicDistributedScene(comm, std::span<const Geometry>(geometries_of<Scalar>(meshes)),
+                            options) {}
 
 template <class Scalar>
 BasicDistributedScene<Scalar>::~BasicDistributedScene() = default;
@@ -235,18 +339,26 @@ const Holding& BasicDistributedScene<Scalar>::holding() const {
 }
 
 template <class Scalar>
-auto BasicDistributedScene<Scalar>::trace(std::span<const Ray> rays) const
+auto BasicDistributedScene<Scalar>::trace(std::span<const Ray> rays,
+                                          const TraceOptions& options) const
     -> Answers<Hit, TraceCounts> {
+    const GivenRays<Scalar> given{rays, options};
     return state_->template ask<ClosestHitKind<Scalar>, Answers<Hit, TraceCounts>>(
-        "trace", [&](auto& kind, auto& answers) { kind.emplace(state_->parts(), rays, answers); });
+        "trace", [&](auto& kind, auto& answers) {
+            given.check();
+            kind.emplace(state_->parts(), given, answers);
+        });
 }
 
 template <class Scalar>
 Answers<std::uint8_t, TraceCounts> BasicDistributedScene<Scalar>::trace_any(
-    std::span<const Ray> rays) const {
+    std::span<const Ray> rays, const TraceOptions& options) const {
+    const GivenRays<Scalar> given{rays, options};
     return state_->template ask<AnyHitKind<Scalar>, Answers<std::uint8_t, TraceCounts>>(
-        "trace_any",
-        [&](auto& kind, auto& answers) { kind.emplace(state_->parts(), rays, answers); });
+        "trace_any", [&](auto& kind, auto& answers) {
+            given.check();
+            kind.emplace(state_->parts(), given, answers);
+        });
 }
 
 namespace {
@@ -268,12 +380,13 @@ struct PlaceHits {
 
 template <class Scalar>
 HitRows<Scalar> BasicDistributedScene<Scalar>::trace_all(std::span<const Ray> rays,
-                                                         std::uint64_t max_result_bytes) const {
+                                                         const TraceOptions& options) const {
     HitRows<Scalar> rows;
-    RowStore<Hit> store("trace_all", rays.size(), max_result_bytes);
-    AllHitsKind<Scalar> kind(state_->parts(), rays, store);
+    const GivenRays<Scalar> given{rays, options};
+    RowStore<Hit> store("trace_all", rays.size(), options.max_result_bytes);
+    AllHitsKind<Scalar> kind(state_->parts(), given, store);
     Call call(state_->comm, state_->options);
-    call.template begin<AllHitsKind<Scalar>>("trace_all", [] {});
+    call.template begin<AllHitsKind<Scalar>>("trace_all", [&] { given.check(); });
     call.run(kind);
     call.finish([&] {
         store.finish(
@@ -288,14 +401,16 @@ HitRows<Scalar> BasicDistributedScene<Scalar>::trace_all(std::span<const Ray> ra
 
 template <class Scalar>
 auto BasicDistributedScene<Scalar>::closest_points(std::span<const Point> queries,
-                                                   Scalar max_distance) const
+                                                   Scalar max_distance, std::uint32_t mask) const
     -> Answers<Closest, ClosestCounts> {
     return state_->template ask<ClosestPointKind<Scalar>, Answers<Closest, ClosestCounts>>(
-        "closest_points, " + exact_text(max_distance), [&](auto& kind, auto& answers) {
+        "closest_points, " + exact_text(max_distance) + ", mask " + std::to_string(mask),
+        [&](auto& kind, auto& answers) {
             if (!(max_distance >= 0))
                 throw InputError("max_distance is " + std::to_string(max_distance) +
                                  "; it must be 0 or more");
-            kind.emplace(state_->parts(), queries, max_distance, answers);
+            state_->require_triangles(mask);
+            kind.emplace(state_->parts(), queries, max_distance, mask, answers);
         });
 }
 
@@ -305,11 +420,38 @@ Answers<std::uint8_t, ClosestCounts> BasicDistributedScene<Scalar>::contains(
     State& s = *state_;
     return s.template ask<InsideKind<Scalar>, Answers<std::uint8_t, ClosestCounts>>(
         "contains", [&](auto& kind, auto& answers) {
-            kind.emplace(s.crossing_trees(), s.tree, s.options.threads, queries, answers);
+            kind.emplace(s.crossing_tree(), s.tree, s.options.threads, queries, answers);
         });
+}
+
+template <class Scalar>
+const Communicator& DistributedSceneInternals<Scalar>::communicator(const DistributedOf& scene) {
+    return scene.state_->comm;
+}
+
+template <class Scalar>
+auto DistributedSceneInternals<Scalar>::bounds(const DistributedOf& scene) -> Box {
+    return scene.state_->bounds;
+}
+
+template <class Scalar>
+auto DistributedSceneInternals<Scalar>::trace(const DistributedOf& scene, std::span<const Ray> rays,
+                                              std::span<Double3> normals) -> std::vector<Hit> {
+    auto& state = *scene.state_;
+    std::optional<HitNormals<Scalar>> of_hits;
+    return state
+        .template ask<ClosestHitKind<Scalar>, Answers<Hit, TraceCounts>>(
+            "trace for a picture",
+            [&](auto& kind, auto& answers) {
+                of_hits.emplace(state.scene, normals);
+                kind.emplace(state.parts(), GivenRays<Scalar>{rays, {}}, answers, &*of_hits);
+            })
+        .values;
 }
 
 template class BasicDistributedScene<float>;
 template class BasicDistributedScene<double>;
+template struct DistributedSceneInternals<float>;
+template struct DistributedSceneInternals<double>;
 
 }  // namespace raydix::mpi

@@ -45,9 +45,13 @@ public:
     using Question = Point;
     static constexpr bool asks_all = true;
 
-    InsideKind(const std::vector<Bvh>& meshes, const RankTree<T>& tree, int threads,
+    InsideKind(const Bvh& triangles, const RankTree<T>& tree, int threads,
                std::span<const Point> queries, Answers<std::uint8_t, ClosestCounts>& answers)
-        : meshes_(meshes), tree_(tree), threads_(threads), queries_(queries), answers_(answers) {}
+        : triangles_(triangles),
+          tree_(tree),
+          threads_(threads),
+          queries_(queries),
+          answers_(answers) {}
 
     /// Bit 0: an odd number of crossings. Bit 1: on a triangle.
     void clear() { answers_.values.assign(queries_.size(), 0); }
@@ -72,9 +76,7 @@ public:
     [[nodiscard]] Question question(std::size_t i) const { return queries_[i]; }
     void answer(std::span<const Question> points) {
         bits_.assign(points.size(), 0);
-        with_threads(threads_, [&] {
-            for (const Bvh& mesh : meshes_) add_crossings(mesh, points, bits_);
-        });
+        with_threads(threads_, [&] { add_crossings(triangles_, points, bits_); });
     }
     void put_answer(std::size_t q, Bytes& out) const { put(out, bits_[q]); }
     void take(std::size_t i, Reader& reader) {
@@ -93,9 +95,9 @@ private:
     static void join(std::uint8_t& bits, unsigned more) {
         bits = static_cast<std::uint8_t>(((bits ^ more) & 1u) | ((bits | more) & 2u));
     }
-    static void add_crossings(const Bvh& mesh, std::span<const Question> points,
+    static void add_crossings(const Bvh& triangles, std::span<const Question> points,
                               std::vector<std::uint8_t>& bits) {
-        const typename CrossingTree<T>::View tree(mesh);
+        const typename CrossingTree<T>::View tree(triangles);
         if (tree.empty) return;
         for_each_range(points.size(), 64, [&](std::size_t begin, std::size_t end) {
             BasicWalkStack<T> stack(tree.max_depth);
@@ -107,7 +109,7 @@ private:
         });
     }
 
-    const std::vector<Bvh>& meshes_;
+    const Bvh& triangles_;
     const RankTree<T>& tree_;
     int threads_;
     std::span<const Point> queries_;

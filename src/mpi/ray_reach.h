@@ -25,9 +25,11 @@ inline const RayD& widened(const RayD& ray) { return ray; }
 template <class T>
 class RayReach {
 public:
-    /// `ray` must be valid; `whole` is around all boxes.
+    /// `ray` must be valid; `whole` is around all boxes. `error`: the greatest of the extents in
+    /// them (engine/extent.h), of instances.
     template <class AnyRay>
-    RayReach(const AnyRay& ray, const RankBox<T>& whole) : frame_(make_frame(widened(ray))) {
+    RayReach(const AnyRay& ray, const RankBox<T>& whole, double error)
+        : frame_(make_frame(widened(ray))) {
         const double origin[3] = {frame_.origin.x, frame_.origin.y, frame_.origin.z};
         double far[3];
         for (int d = 0; d < 3; ++d) {
@@ -37,7 +39,9 @@ public:
         }
         // The point of a hit is within 12 roundings of a float from the ray, or 45 of a double.
         constexpr double roundings = sizeof(T) == 4 ? 32 * 0x1p-24 : 256 * 0x1p-53;
-        for (int d = 0; d < 3; ++d) pad_[d] = roundings * (far[d] + far[frame_.kz]) + 0x1p-120;
+        const double beside = 1.0625 * error * std::max({far[0], far[1], far[2]});
+        for (int d = 0; d < 3; ++d)
+            pad_[d] = roundings * (far[d] + far[frame_.kz]) + beside + 0x1p-120;
         inverse_[0] = frame_.inverse.x;
         inverse_[1] = frame_.inverse.y;
         inverse_[2] = frame_.inverse.z;

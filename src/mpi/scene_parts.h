@@ -26,22 +26,35 @@ struct TriangleName {
     friend auto operator<=>(const TriangleName&, const TriangleName&) = default;
 };
 
-/// Names of what this rank holds. Either whole meshes, or triangles of any: then one mesh.
+/// Names of the triangles of a rank's own meshes, by their ids there.
 class TriangleNames {
 public:
-    void add_mesh(TriangleName first) { meshes_.push_back(first); }
-    void add_triangle(TriangleName name) { triangles_.push_back(name); }
+    /// A mesh whose triangles count on from `first`.
+    void add_mesh(TriangleName first) { meshes_.push_back({first, none}); }
+    /// A mesh whose triangles have names of their own.
+    void add_mesh(std::span<const TriangleName> names) {
+        meshes_.push_back({{}, triangles_.size()});
+        triangles_.insert(triangles_.end(), names.begin(), names.end());
+    }
+    /// An id that no mesh has.
+    void skip() { add_mesh(TriangleName{}); }
     [[nodiscard]] TriangleName of(std::uint32_t geometry, std::uint32_t prim) const {
-        if (!triangles_.empty()) return triangles_[prim];
-        const TriangleName& first = meshes_[geometry];
-        return {first.geometry, first.prim + prim};
+        const NamesOfMesh& mesh = meshes_[geometry];
+        if (mesh.begin != none) return triangles_[mesh.begin + prim];
+        return {mesh.first.geometry, mesh.first.prim + prim};
     }
     [[nodiscard]] std::uint64_t bytes() const {
-        return (meshes_.size() + triangles_.size()) * sizeof(TriangleName);
+        return meshes_.size() * sizeof(NamesOfMesh) + triangles_.size() * sizeof(TriangleName);
     }
 
 private:
-    std::vector<TriangleName> meshes_, triangles_;
+    static constexpr std::size_t none = std::size_t(-1);
+    struct NamesOfMesh {
+        TriangleName first;
+        std::size_t begin;  // in triangles_
+    };
+    std::vector<NamesOfMesh> meshes_;
+    std::vector<TriangleName> triangles_;
 };
 
 /// A triangle that moves to another rank.
@@ -49,6 +62,7 @@ template <class T>
 struct MovingTriangle {
     using Point = typename SceneTypes<T>::Point;
     Point corners[3];
+    std::uint32_t mask;
     TriangleName name;
 };
 

@@ -1,6 +1,7 @@
 // Queries of scenes, as kinds for rounds.h.
 #pragma once
 
+#include <raydix/error.h>
 #include <raydix/mpi.h>
 #include <raydix/scene.h>
 #include <raydix/scene_queries.h>
@@ -11,11 +12,14 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
 #include <tuple>
+#include <type_traits>
 #include <vector>
 
 #include "base/distance.h"
 #include "exec/parallel.h"
+#include "image/surface_points.h"
 #include "mpi/rank_tree.h"
 #include "mpi/ray_reach.h"
 #include "mpi/result_rows.h"
@@ -30,24 +34,89 @@ struct SceneParts {
     const BasicScene<T>& scene;
     const TriangleNames& names;
     const RankTree<T>& tree;
+    double ray_error;          // the greatest of the extents of instances, on all ranks
+    std::uint32_t first_path;  // paths on the ranks before this one
     int threads;
 
-    [[nodiscard]] SceneTraceOptions trace_options() const {
-        SceneTraceOptions options;
-        options.threads = threads;
-        return options;
+    /// Where a hit or a closest point of this rank's part is in the whole.
+    template <class Place, class Named>
+    void set_names(const Place& place, Named& out) const {
+        if (place.instance == 0) {
+            const TriangleName name = names.of(place.geometry, place.prim);
+            out.geometry = name.geometry;
+            out.prim = name.prim;
+        } else {  // names within a scene that stands somewhere are its own
+            out.geometry = place.geometry;
+            out.instance = first_path + place.instance;
+            out.prim = place.prim;
+        }
     }
     template <class AnyHit>
     [[nodiscard]] BasicDistributedHit<T> named(const AnyHit& hit) const {
-        if (!hit.hit()) return {};
-        const TriangleName name = names.of(hit.geometry, hit.prim);
-        return {hit.t, hit.u, hit.v, name.geometry, 0, name.prim};
+        BasicDistributedHit<T> out;
+        if (!hit.hit()) return out;
+        out.t = hit.t;
+        out.u = hit.u;
+        out.v = hit.v;
+        set_names(hit, out);
+        return out;
     }
+};
+
+/// The rays that this rank gave to a call, and what they see.
+template <class T>
+struct GivenRays {
+    std::span<const typename SceneTypes<T>::Ray> rays;
+    TraceOptions options;
+
+    [[nodiscard]] std::uint32_t mask(std::size_t i) const {
+        return options.masks.empty() ? options.mask : options.masks[i];
+    }
+    void check() const {
+        if (!options.masks.empty() && options.masks.size() != rays.size())
+            throw InputError(std::to_string(options.masks.size()) + " masks for " +
+                             std::to_string(rays.size()) + " rays");
+    }
+};
+
+/// A ray that travels.
+template <class T>
+struct MaskedRay {
+    typename SceneTypes<T>::Ray ray;
+    std::uint32_t mask;
+};
+/// Rays that came from other ranks, as a scene takes them.
+template <class T>
+class ArrivedRays {
+public:
+    explicit ArrivedRays(std::span<const MaskedRay<T>> given) {
+        rays_.reserve(given.size());
+        for (const MaskedRay<T>& one : given) rays_.push_back(one.ray);
+        const auto is_other = [&](const MaskedRay<T>& one) { return one.mask != given[0].mask; };
+        if (given.empty() || std::none_of(given.begin(), given.end(), is_other)) {
+            if (!given.empty()) options_.mask = given[0].mask;
+            return;
+        }
+        masks_.reserve(given.size());
+        for (const MaskedRay<T>& one : given) masks_.push_back(one.mask);
+    }
+    [[nodiscard]] std::span<const typename SceneTypes<T>::Ray> rays() const { return rays_; }
+    [[nodiscard]] SceneTraceOptions options(int threads) const {
+        SceneTraceOptions options = options_;
+        options.masks = masks_;
+        options.threads = threads;
+        return options;
+    }
+
+private:
+    std::vector<typename SceneTypes<T>::Ray> rays_;
+    std::vector<std::uint32_t> masks_;  // empty where one serves all
+    SceneTraceOptions options_;
 };
 
 template <class T>
 [[nodiscard]] auto order_of(const BasicDistributedHit<T>& hit) {
-    return std::tuple(hit.t, hit.geometry, hit.prim);
+    return std::tuple(hit.t, hit.instance, hit.geometry, hit.prim);
 }
 
 /// What all rays share: they reach the boxes that they go through.
@@ -55,29 +124,58 @@ template <class T>
 class RayKind {
 public:
     using Scalar = T;
-    using Question = typename SceneTypes<T>::Ray;
+    using Question = MaskedRay<T>;
 
-    RayKind(const SceneParts<T>& parts, std::span<const Question> rays)
-        : parts_(parts), rays_(rays) {}
+    RayKind(const SceneParts<T>& parts, const GivenRays<T>& given)
+        : parts_(parts), given_(given), rays_(given.rays) {}
     [[nodiscard]] std::size_t size() const { return rays_.size(); }
+    [[nodiscard]] Question question(std::size_t i) const { return {rays_[i], given_.mask(i)}; }
 
 protected:
     [[nodiscard]] bool first_within(std::size_t i, T most, Candidate<T>& found) const {
         if (!is_valid(rays_[i])) return false;
-        return parts_.tree.first(most, RayReach<T>(rays_[i], parts_.tree.bounds()), found);
+        return parts_.tree.first(most, reach_of(i), found);
     }
     void reach_within(std::size_t i, T most, std::vector<Candidate<T>>& found) const {
         found.clear();
-        if (is_valid(rays_[i]))
-            parts_.tree.all(most, RayReach<T>(rays_[i], parts_.tree.bounds()), found);
+        if (is_valid(rays_[i])) parts_.tree.all(most, reach_of(i), found);
+    }
+    [[nodiscard]] RayReach<T> reach_of(std::size_t i) const {
+        return {rays_[i], parts_.tree.bounds(), parts_.ray_error};
     }
     void count(TraceCounts& counts) const {
         counts.rays = rays_.size();
-        for (const Question& ray : rays_) counts.invalid_rays += !is_valid(ray);
+        for (const auto& ray : rays_) counts.invalid_rays += !is_valid(ray);
     }
 
     SceneParts<T> parts_;
-    std::span<const Question> rays_;
+    GivenRays<T> given_;
+    std::span<const typename SceneTypes<T>::Ray> rays_;
+};
+
+/// Normals of hits at the queries of a call, for pictures.
+template <class T>
+class HitNormals {
+    using Surface = std::conditional_t<sizeof(T) == 4, SceneSurface, SceneSurfaceD>;
+
+public:
+    /// normals [rays of this rank]: set where a ray hits.
+    HitNormals(const BasicScene<T>& scene, std::span<Double3> normals)
+        : surface_(scene), normals_(normals) {}
+    /// Of a hit of this rank's part.
+    template <class AnyHit>
+    [[nodiscard]] Double3 of(const AnyHit& hit) const {
+        Hit named;
+        named.prim = hit.prim;
+        named.geometry = hit.geometry;
+        named.instance = hit.instance;
+        return surface_.normal(named);
+    }
+    void set(std::size_t i, const Double3& normal) { normals_[i] = normal; }
+
+private:
+    Surface surface_;
+    std::span<Double3> normals_;
 };
 
 /// The closest hit. Rays travel as long as their best hit so far leaves them.
@@ -89,9 +187,10 @@ public:
     using Question = typename RayKind<T>::Question;
     static constexpr bool asks_all = false;
 
-    ClosestHitKind(const SceneParts<T>& parts, std::span<const Question> rays,
-                   Answers<Hit, TraceCounts>& answers)
-        : RayKind<T>(parts, rays), answers_(answers) {}
+    /// normals: none, or what answers come with on all ranks.
+    ClosestHitKind(const SceneParts<T>& parts, const GivenRays<T>& given,
+                   Answers<Hit, TraceCounts>& answers, HitNormals<T>* normals = nullptr)
+        : RayKind<T>(parts, given), answers_(answers), normals_(normals) {}
 
     void clear() { answers_.values.assign(this->rays_.size(), {}); }
     [[nodiscard]] bool first(std::size_t i, Candidate<T>& found) const {
@@ -101,13 +200,15 @@ public:
         this->reach_within(i, most(i), found);
     }
     [[nodiscard]] Question question(std::size_t i) const {
-        Question ray = this->rays_[i];
-        ray.tmax = most(i);
-        return ray;
+        Question question = RayKind<T>::question(i);
+        question.ray.tmax = most(i);
+        return question;
     }
-    void answer(std::span<const Question> rays) {
-        found_.resize(rays.size());
-        raydix::trace(this->parts_.scene, rays, std::span(found_), this->parts_.trace_options());
+    void answer(std::span<const Question> questions) {
+        const ArrivedRays<T> arrived(questions);
+        found_.resize(questions.size());
+        raydix::trace(this->parts_.scene, arrived.rays(), std::span(found_),
+                      arrived.options(this->parts_.threads));
     }
     void put_answer(std::size_t q, Bytes& out) const {
         const Hit hit = this->parts_.named(found_[q]);
@@ -117,7 +218,9 @@ public:
         put(out, hit.u);
         put(out, hit.v);
         put(out, hit.geometry);
+        put(out, hit.instance);
         put(out, hit.prim);
+        if (normals_ != nullptr) put(out, normals_->of(found_[q]));
     }
     void take(std::size_t i, Reader& reader) {
         if (reader.take<std::uint8_t>() == 0) return;
@@ -126,9 +229,13 @@ public:
         hit.u = reader.take<T>();
         hit.v = reader.take<T>();
         hit.geometry = reader.take<std::uint32_t>();
+        hit.instance = reader.take<std::uint32_t>();
         hit.prim = reader.take<std::uint64_t>();
+        const Double3 normal = normals_ != nullptr ? reader.take<Double3>() : Double3();
         Hit& best = answers_.values[i];
-        if (!best.hit() || order_of(hit) < order_of(best)) best = hit;
+        if (best.hit() && !(order_of(hit) < order_of(best))) return;
+        best = hit;
+        if (normals_ != nullptr) normals_->set(i, normal);
     }
     void finish() {
         this->count(answers_.counts);
@@ -140,6 +247,7 @@ private:
         return std::min(this->rays_[i].tmax, answers_.values[i].t);
     }
     Answers<Hit, TraceCounts>& answers_;
+    HitNormals<T>* normals_;
     std::vector<typename SceneTypes<T>::Hit> found_;  // of answers
 };
 
@@ -150,9 +258,9 @@ public:
     using Question = typename RayKind<T>::Question;
     static constexpr bool asks_all = false;
 
-    AnyHitKind(const SceneParts<T>& parts, std::span<const Question> rays,
+    AnyHitKind(const SceneParts<T>& parts, const GivenRays<T>& given,
                Answers<std::uint8_t, TraceCounts>& answers)
-        : RayKind<T>(parts, rays), answers_(answers) {}
+        : RayKind<T>(parts, given), answers_(answers) {}
 
     void clear() { answers_.values.assign(this->rays_.size(), 0); }
     [[nodiscard]] bool first(std::size_t i, Candidate<T>& found) const {
@@ -162,11 +270,11 @@ public:
         found.clear();
         if (answers_.values[i] == 0) this->reach_within(i, this->rays_[i].tmax, found);
     }
-    [[nodiscard]] Question question(std::size_t i) const { return this->rays_[i]; }
-    void answer(std::span<const Question> rays) {
-        occluded_.resize(rays.size());
-        raydix::trace_any(this->parts_.scene, rays, std::span(occluded_),
-                          this->parts_.trace_options());
+    void answer(std::span<const Question> questions) {
+        const ArrivedRays<T> arrived(questions);
+        occluded_.resize(questions.size());
+        raydix::trace_any(this->parts_.scene, arrived.rays(), std::span(occluded_),
+                          arrived.options(this->parts_.threads));
     }
     void put_answer(std::size_t q, Bytes& out) const { put(out, occluded_[q]); }
     void take(std::size_t i, Reader& reader) { answers_.values[i] |= reader.take<std::uint8_t>(); }
@@ -188,21 +296,21 @@ public:
     using Question = typename RayKind<T>::Question;
     static constexpr bool asks_all = true;
 
-    AllHitsKind(const SceneParts<T>& parts, std::span<const Question> rays, RowStore<Hit>& rows)
-        : RayKind<T>(parts, rays), rows_(rows) {}
+    AllHitsKind(const SceneParts<T>& parts, const GivenRays<T>& given, RowStore<Hit>& rows)
+        : RayKind<T>(parts, given), rows_(rows) {}
 
     [[nodiscard]] bool first(std::size_t, Candidate<T>&) const { return false; }
     void reach(std::size_t i, std::vector<Candidate<T>>& found) const {
         this->reach_within(i, this->rays_[i].tmax, found);
     }
-    [[nodiscard]] Question question(std::size_t i) const { return this->rays_[i]; }
     std::uint64_t answer_some(std::span<const Question> rays, std::uint64_t most, Bytes& out) {
         return answer_in_chunks(
             rays, most, out, rows_.limit(),
             [&](std::span<const Question> chunk, std::uint64_t limit) {
-                SceneTraceOptions options = this->parts_.trace_options();
+                const ArrivedRays<T> arrived(chunk);
+                SceneTraceOptions options = arrived.options(this->parts_.threads);
                 options.max_result_bytes = limit;
-                const auto all = raydix::trace_all(this->parts_.scene, chunk, options);
+                const auto all = raydix::trace_all(this->parts_.scene, arrived.rays(), options);
                 for (std::size_t q = 0; q < chunk.size(); ++q) {
                     put(out, all.offsets[q + 1] - all.offsets[q]);
                     for (std::uint64_t k = all.offsets[q]; k < all.offsets[q + 1]; ++k)
@@ -232,10 +340,11 @@ public:
     static constexpr bool asks_all = false;
 
     ClosestPointKind(const SceneParts<T>& parts, std::span<const Point> queries, T max_distance,
-                     Answers<Closest, ClosestCounts>& answers)
+                     std::uint32_t mask, Answers<Closest, ClosestCounts>& answers)
         : parts_(parts),
           queries_(queries),
           most_d2_(max_distance * max_distance),
+          mask_(mask),
           answers_(answers) {}
 
     void clear() { answers_.values.assign(queries_.size(), {}); }
@@ -255,7 +364,7 @@ public:
                 questions.size(),
                 [&](std::size_t q) {
                     found_[q] = closest_point(parts_.scene, questions[q].at,
-                                              radius_of(questions[q].most_d2));
+                                              radius_of(questions[q].most_d2), mask_);
                 },
                 64);
         });
@@ -264,8 +373,9 @@ public:
         const BasicSceneClosestPoint<T>& one = found_[q];
         put(out, std::uint8_t{one.found()});
         if (!one.found()) return;
-        const TriangleName name = parts_.names.of(one.geometry, one.prim);
-        put(out, Closest{one.position, one.distance, one.u, one.v, name.geometry, 0, name.prim});
+        Closest named{one.position, one.distance, one.u, one.v};
+        parts_.set_names(one, named);
+        put(out, named);
     }
     void take(std::size_t i, Reader& reader) {
         if (reader.take<std::uint8_t>() == 0) return;
@@ -287,7 +397,7 @@ private:
         return squared_distance(queries_[i], one.position);
     }
     [[nodiscard]] auto order(std::size_t i, const Closest& one) const {
-        return std::tuple(d2_of(i, one), one.geometry, one.prim);
+        return std::tuple(d2_of(i, one), one.instance, one.geometry, one.prim);
     }
     [[nodiscard]] T most(std::size_t i) const {
         const Closest& best = answers_.values[i];
@@ -304,6 +414,7 @@ private:
     SceneParts<T> parts_;
     std::span<const Point> queries_;
     T most_d2_;
+    std::uint32_t mask_;
     Answers<Closest, ClosestCounts>& answers_;
     std::vector<BasicSceneClosestPoint<T>> found_;  // of answers
 };

@@ -95,6 +95,22 @@ class Answers(Mpi):
         self.assertIn("rank 0 reads all of", done.stdout)
         self.assertRegex(done.stdout, r"holding +1728 triangles, at most \d+ on a rank of 3")
 
+    def test_pictures_have_the_bytes_of_raydix_render(self):
+        alone, many = self.folder / "alone.png", self.folder / "many.png"
+        for ranks, view, more in ((3, "shaded", ()), (2, "steps", ()), (3, "diffuse", ("--distributed",)),
+                                  (2, "depth", ("--distributed", "--partition", "as_given"))):
+            with self.subTest(ranks=ranks, view=view, more=more):
+                picture = ("--view", view, "--size", "40x30", "--samples", "4")
+                done = subprocess.run([PROGRAM, "render", self.scene(), "-o", str(alone), *picture],
+                                      capture_output=True, text=True)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                many.unlink(missing_ok=True)
+                document = self.document_of(ranks, "render", self.scene(), "-o", str(many), *picture, *more,
+                                            "--verify")
+                self.assertTrue(document["verified"])
+                self.assertEqual(document["render"]["scene"], "distributed" if more else "replicated")
+                self.assertEqual(many.read_bytes(), alone.read_bytes())
+
     def test_bench_counts_and_predicts(self):
         document = self.document_of(8, "bench", "weak", "--per-rank", "2000", "--queries", "200", "--repeat", "1")
         self.assertEqual([row["ranks"] for row in document["counted"]], [1, 2, 4, 8])
@@ -122,6 +138,10 @@ class Failures(Mpi):
                                 (("query", self.scene(), "--knn", "1", "--exchange-bytes", "3"), "exchange_bytes is 3"),
                                 (("query", self.scene()), "Exactly 1 option"),
                                 (("nothing",), "'nothing' is not a command"),
+                                (("render", "no_such_file.ply", "-o", "x.png"), "no_such_file.ply"),
+                                (("render", self.scene(), "-o", "none/x.png", "--size", "8x8"), "none/x.png"),
+                                (("render", self.scene(), "-o", "x.png", "--distributed", "--view", "steps"), "steps"),
+                                (("render", self.scene(), "-o", "x.png", "--camera", "9"), "camera 9"),
                                 (("trace", self.scene(), "--camera", "9"), "there is no camera 9")):
             with self.subTest(arguments=arguments):
                 lines = self.failure_of(3, *arguments)

@@ -1,0 +1,75 @@
+#include "picture_options.h"
+
+#include <raydix/error.h>
+
+namespace raydix::cli {
+namespace {
+
+Vec3 vec_of(const std::vector<float>& v) { return {v[0], v[1], v[2]}; }
+
+}  // namespace
+
+Camera PictureOptions::chosen_camera(const CameraSet& cameras, const std::string& scene) const {
+    if (camera >= cameras.cameras.size())
+        throw InputError(scene + ": camera " + std::to_string(camera) + " is past the last of " +
+                         std::to_string(cameras.cameras.size()) + " cameras");
+    Camera chosen = cameras.cameras[camera];
+    if (!eye.empty()) chosen.position = vec_of(eye);
+    if (!target.empty()) chosen.target = vec_of(target);
+    if (!up.empty()) chosen.up = vec_of(up);
+    if (fov) chosen.vfov = *fov;
+    return chosen;
+}
+
+RenderOptions PictureOptions::render_options(const CameraSet& cameras,
+                                             const CommonOptions& common) const {
+    const Size size =
+        size_text.empty() ? Size{cameras.width, cameras.height} : parse_size(size_text);
+    RenderOptions chosen;
+    chosen.width = size.width;
+    chosen.height = size.height;
+    chosen.samples = samples;
+    chosen.ao_radius = ao_radius > 0 ? ao_radius : cameras.ao_radius;
+    chosen.seed = common.seed;
+    chosen.threads = common.threads;
+    return chosen;
+}
+
+void add_picture_options(CLI::App& command, PictureOptions& options,
+                         const std::vector<std::string>& views) {
+    command
+        .add_option("-o,--output", options.out_file,
+                    "Picture to write: .png, or .exr for linear values")
+        ->required()
+        ->type_name("PICTURE");
+    command.add_option("--view", options.view, "What to show")
+        ->check(CLI::IsMember(views))
+        ->capture_default_str();
+    command
+        .add_option("--size", options.size_text, "Pixels (default: of cameras.json, or 1024x768)")
+        ->type_name("WxH");
+    command.add_option("--camera", options.camera, "Number of a camera")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    command.add_option("--eye", options.eye, "Camera position x y z")->expected(3)->delimiter(',');
+    command.add_option("--target", options.target, "Point looked at x y z")
+        ->expected(3)
+        ->delimiter(',');
+    command.add_option("--up", options.up, "Direction that is up in the picture x y z")
+        ->expected(3)
+        ->delimiter(',');
+    command.add_option("--fov", options.fov, "Vertical field of view in degrees")
+        ->check(finite_number(false))
+        ->check(CLI::Range(0.01f, 179.0f));
+    command
+        .add_option("--samples", options.samples,
+                    "Rays per pixel of views with chance (0: the view's own default)")
+        ->check(CLI::Range(0, 4096))
+        ->capture_default_str();
+    command
+        .add_option("--ao-radius", options.ao_radius,
+                    "Reach of ao rays (default: of cameras.json, or 5 % of the diagonal)")
+        ->check(finite_number(false));
+}
+
+}  // namespace raydix::cli

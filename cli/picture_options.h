@@ -1,0 +1,32 @@
+// What commands that render share: camera, view, size, and the file.
+#pragma once
+
+#include <raydix/picture.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "options.h"
+
+namespace raydix::cli {
+
+struct PictureOptions {
+    std::string out_file, view = "shaded", size_text;
+    std::size_t camera = 0;
+    std::vector<float> eye, target, up;
+    std::optional<float> fov;
+    int samples = 0;
+    float ao_radius = 0.0f;
+
+    /// Of these cameras the one that was asked for, moved as it was asked for. Throws InputError
+    /// that names the scene.
+    [[nodiscard]] Camera chosen_camera(const CameraSet& cameras, const std::string& scene) const;
+    /// All but the view.
+    [[nodiscard]] RenderOptions render_options(const CameraSet& cameras,
+                                               const CommonOptions& common) const;
+};
+void add_picture_options(CLI::App& command, PictureOptions& options,
+                         const std::vector<std::string>& views);
+
+}  // namespace raydix::cli
