@@ -167,8 +167,9 @@ TEST_F(OpenclBuild, ManyTriangles) {
             DeviceBvh tree(input.kind(), input.count(), options);
             const BuildMs ms = tree.build_timed(input.mesh);
             EXPECT_EQ(tree_hash(tree.download()), expected_hash(mesh, options)) << told(options);
-            std::cout << n << " triangles, " << told(options) << ": " << ms.total
-                      << " ms, OpenCL on a CPU\n";
+            if (n == 1'000'000)  // by now the driver has compiled the kernels
+                std::cout << n << " triangles, " << told(options) << ": " << ms.total
+                          << " ms, OpenCL on a CPU\n";
         }
     }
 }

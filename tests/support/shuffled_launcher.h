@@ -26,16 +26,7 @@ public:
 
     template <class Work>
     void launch(const char*, std::uint32_t n, const Work& work) {
-        if (n == 0) return;
-        const std::uint64_t launch_seed = random_();
-        const std::vector<std::uint32_t> blocks = shuffled((n - 1) / block_size + 1, launch_seed);
-        std::atomic<std::size_t> next{0};
-        const auto run_blocks = [&] {
-            for (std::size_t k; (k = next.fetch_add(1, std::memory_order_relaxed)) < blocks.size();)
-                run_block(blocks[k], n, launch_seed, work);
-        };
-        const std::size_t helpers = std::min(blocks.size(), static_cast<std::size_t>(threads_)) - 1;
-        crew_.run(helpers, run_blocks);
+        run_blocks(n, block_size, work);
     }
 
     template <class Work>
@@ -48,13 +39,12 @@ public:
     template <class Work>
     void launch_warps(const char* label, const std::uint32_t* count, std::uint32_t limit,
                       const Work& work) {
-        launch(label, warps_for(std::min(*count, limit)),
-               [&](std::uint32_t w) { work(HostWarp(), w); });
+        launch_tiles(label, warps_for(std::min(*count, limit)), work);
     }
 
     template <class Work>
-    void launch_tiles(const char* label, std::uint32_t n, const Work& work) {
-        launch(label, n, [&](std::uint32_t t) { work(HostWarp(), t); });
+    void launch_tiles(const char*, std::uint32_t n, const Work& work) {
+        run_blocks(n, block_size / warp_lanes, [&](std::uint32_t t) { work(HostWarp(), t); });
     }
 
     void exclusive_scan(const char* label, std::uint32_t* values, std::uint32_t n,
@@ -93,12 +83,28 @@ private:
         return order;
     }
 
+    /// Each thread has its share of the blocks, however late it comes: what is wrong between blocks
+    /// is wrong between threads, where the thread sanitizer sees it.
     template <class Work>
-    static void run_block(std::uint32_t block, std::uint32_t n, std::uint64_t launch_seed,
+    void run_blocks(std::uint32_t n, std::uint32_t size, const Work& work) {
+        if (n == 0) return;
+        const std::uint64_t launch_seed = random_();
+        const std::vector<std::uint32_t> blocks = shuffled((n - 1) / size + 1, launch_seed);
+        const std::size_t threads = std::min(blocks.size(), static_cast<std::size_t>(threads_));
+        std::atomic<std::size_t> next_thread{0};
+        crew_.run(threads - 1, [&] {
+            std::size_t k = next_thread.fetch_add(1, std::memory_order_relaxed);
+            for (; k < blocks.size(); k += threads) {
+                const std::uint32_t begin = blocks[k] * size;
+                run_block(begin, std::min(size, n - begin), launch_seed + blocks[k], work);
+            }
+        });
+    }
+
+    template <class Work>
+    static void run_block(std::uint32_t begin, std::uint32_t size, std::uint64_t seed,
                           const Work& work) {
-        const std::uint32_t begin = block * block_size;
-        const std::uint32_t size = std::min(block_size, n - begin);
-        for (const std::uint32_t k : shuffled(size, launch_seed + block)) work(begin + k);
+        for (const std::uint32_t k : shuffled(size, seed)) work(begin + k);
     }
 
     std::mt19937_64 random_;
