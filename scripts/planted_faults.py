@@ -444,6 +444,4 @@ FAULTS = [
     Fault("src/exec/warp_scan.h", "if (first + lane < n) values[first + lane] = start + (sum[lane] - own[lane]);",
           "if (first + lane < n) values[first + lane] = start + sum[lane];",
           "scan by warps: each sum has its own value in it", "exec"),
-    Fault("src/tree/climb_warps.h", "rank < inner ? slots_.of_inner[rank] : 0;", "slots_.of_inner[rank];",
-          "a climb in warps: slots behind the last inner node are read, though nobody needs them", "gpu"),
 ]
