@@ -423,4 +423,10 @@ FAULTS = [
           "ranks: rays that go down an axis reach no box", "mpi"),
     Fault("src/mpi/inside_query.h", "((bits | more) & 2u)", "((bits | more) & 0u)",
           "ranks: a point on a triangle is inside or outside by chance", "mpi"),
+    Fault("src/mpi/scene_queries.h", "out.instance = first_path + place.instance;", "out.instance = place.instance;",
+          "ranks: instances count from 1 on each of them", "mpi"),
+    Fault("src/mpi/scene_queries.h", "if (normals_ != nullptr) normals_->set(i, normal);", "static_cast<void>(normal);",
+          "ranks: pictures of scenes that are spread have no normals", "mpi"),
+    Fault("src/mpi/file_parts.cpp", "used[k] - first)", "used[k] - used[0])",
+          "ranks: vertices that are read later come from elsewhere in the file", "mpi"),
 ]
