@@ -2,8 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <map>
+#include <optional>
 #include <unordered_map>
+#include <utility>
 
 #include "mpi_ranks.h"
 
@@ -85,20 +86,32 @@ void add_mpi_options(CLI::App& command, MpiOptions& options) {
 
 SpreadModel spread_model(const MpiOptions& options) {
     SpreadModel model;
-    on_first([&] {
-        if (options.common.prints_tables() && mpi_ranks() > 1)
-            fmt::print("reading      rank 0 reads all of {} and scatters it\n", options.scene);
-        model.whole = load_flat_model(options.scene, options.common.seed);
-    });
-    std::uint64_t triangles = mpi_rank() == 0 ? model.whole.mesh().triangles.size() : 0;
-    MPI_Bcast(&triangles, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
+    const bool says = options.common.prints_tables() && mpi_rank() == 0 && mpi_ranks() > 1;
+    const bool is_builtin = options.scene.rfind("builtin:", 0) == 0;
+    auto read = is_builtin ? std::nullopt : mpi::load_part(MPI_COMM_WORLD, options.scene);
+    if (read) {
+        if (says) fmt::print("reading      each rank reads its part of {}\n", options.scene);
+        model.part = std::move(read->mesh);
+        model.triangles = read->triangles;
+        return model;
+    }
+    if (says) fmt::print("reading      rank 0 reads all of {} and scatters it\n", options.scene);
+    read_whole(model, options);
+    model.triangles = mpi_rank() == 0 ? model.whole.mesh().triangles.size() : 0;
+    MPI_Bcast(&model.triangles, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
     const Mesh none;
     const Mesh& whole = mpi_rank() == 0 ? model.whole.mesh() : none;
-    if (triangles > 0)
+    if (model.triangles > 0)
         model.part = scatter_triangles(whole);
     else
         model.part.vertices = scatter(whole.vertices);
     return model;
+}
+
+void read_whole(SpreadModel& model, const MpiOptions& options) {
+    if (model.is_whole_read) return;
+    on_first([&] { model.whole = load_flat_model(options.scene, options.common.seed); });
+    model.is_whole_read = true;
 }
 
 Json mpi_document(const std::string& command, const MpiOptions& options) {

@@ -1,4 +1,5 @@
-// What the commands of raydix_mpi read: rank 0 reads the file and scatters it.
+// What the commands of raydix_mpi read: each rank its part of a file, or rank 0 all of it, which it
+// scatters.
 #pragma once
 
 #include <raydix/mesh.h>
@@ -23,16 +24,17 @@ struct MpiOptions {
 };
 void add_mpi_options(CLI::App& command, MpiOptions& options);
 
-/// Rank 0 has the whole, every rank its part.
 struct SpreadModel {
-    Model whole;  // of rank 0, flat
-    Mesh part;    // triangles and their vertices; or points
-
-    [[nodiscard]] bool is_cloud() const { return part.triangles.empty(); }
+    Model whole;                  // of rank 0, flat, if it has been read
+    bool is_whole_read = false;   // the same on all ranks
+    Mesh part;                    // triangles and their vertices; or points
+    std::uint64_t triangles = 0;  // of all ranks
 };
 
-/// Collective. Says that rank 0 reads. Triangles, or else points, come in equal runs.
+/// Collective. Says who reads. Triangles, or else points, come in equal runs.
 [[nodiscard]] SpreadModel spread_model(const MpiOptions& options);
+/// Collective. For what rank 0 does alone: it reads all of the file unless it has.
+void read_whole(SpreadModel& model, const MpiOptions& options);
 
 /// {command, version, machine, ranks, partition}.
 [[nodiscard]] Json mpi_document(const std::string& command, const MpiOptions& options);

@@ -100,6 +100,8 @@ public:
         : options_(options),
           model_(spread_model(options)),
           document_(mpi_document("mpi query", options)) {
+        if (options.verify || options.queries_file.empty() || asks_vertices())
+            read_whole(model_, options);
         on_first([&] { queries_ = queries_of(options_, model_.whole); });
         mine_ = scatter(queries_);
     }
@@ -118,10 +120,11 @@ public:
 
 private:
     void ask_points() {
-        // Vertices of meshes are points too: rank 0 spreads them apart from their triangles.
         const Mesh none;
         const std::vector<Vec3> part =
-            scatter(mpi_rank() == 0 ? model_.whole.mesh().vertices : none.vertices);
+            asks_vertices()
+                ? scatter(mpi_rank() == 0 ? model_.whole.mesh().vertices : none.vertices)
+                : model_.part.vertices;
         const mpi::DistributedPoints points(MPI_COMM_WORLD, part, options_.options());
         document_["holding"] = holding_json(points.holding());
         if (options_.k) {
@@ -203,6 +206,10 @@ private:
         });
     }
 
+    /// Vertices of meshes are points too: rank 0 spreads them apart from their triangles.
+    [[nodiscard]] bool asks_vertices() const {
+        return model_.triangles > 0 && !options_.closest && !options_.contains;
+    }
     [[nodiscard]] bool wants_whole() const { return options_.verify || !options_.prefix.empty(); }
 
     void take(std::uint64_t found, const mpi::CallReport& report) {

@@ -98,7 +98,8 @@ Rendered render_replicated(const MpiRenderCommand& command) {
 
 Rendered render_distributed(const MpiRenderCommand& command) {
     Rendered rendered;
-    const SpreadModel model = spread_model(command);
+    SpreadModel model = spread_model(command);
+    read_whole(model, command);  // its cameras
     rendered.shot = shot_of_first(command, model.whole);
     const MeshView view(model.part);
     const mpi::DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1), command.scene_options());

@@ -25,9 +25,7 @@ void print_holding(const Json& holding, const char* elements) {
 void run_info(const MpiOptions& options) {
     const SpreadModel model = spread_model(options);
     Json document = mpi_document("mpi info", options);
-    std::uint64_t triangles = model.part.triangles.size();
-    MPI_Allreduce(MPI_IN_PLACE, &triangles, 1, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
-    if (triangles == 0) {
+    if (model.triangles == 0) {
         const mpi::DistributedPoints points(MPI_COMM_WORLD, model.part.vertices, options.options());
         document["holding"] = holding_json(points.holding());
     } else {
@@ -38,7 +36,7 @@ void run_info(const MpiOptions& options) {
     }
     on_first([&] {
         if (options.common.prints_tables())
-            print_holding(document["holding"], triangles == 0 ? "points" : "triangles");
+            print_holding(document["holding"], model.triangles == 0 ? "points" : "triangles");
         write_json(document, options.common);
     });
 }
@@ -108,7 +106,8 @@ void finish(const TraceCommand& options, const SpreadModel& model, const std::ve
 void run_trace(const TraceCommand& options) {
     if (options.mode == "all" && !options.prefix.empty())
         throw CLI::ValidationError("--out", "writes one hit a ray; not with --mode all");
-    const SpreadModel model = spread_model(options);
+    SpreadModel model = spread_model(options);
+    if (options.verify || options.rays_file.empty()) read_whole(model, options);
     std::vector<Ray> rays;
     on_first([&] { rays = rays_of(options, model.whole); });
     const std::vector<Ray> mine = scatter(rays);

@@ -444,4 +444,10 @@ FAULTS = [
     Fault("src/exec/warp_scan.h", "if (first + lane < n) values[first + lane] = start + (sum[lane] - own[lane]);",
           "if (first + lane < n) values[first + lane] = start + sum[lane];",
           "scan by warps: each sum has its own value in it", "exec"),
+    Fault("src/mpi/scene_queries.h", "out.instance = first_path + place.instance;", "out.instance = place.instance;",
+          "ranks: instances count from 1 on each of them", "mpi"),
+    Fault("src/mpi/scene_queries.h", "if (normals_ != nullptr) normals_->set(i, normal);", "static_cast<void>(normal);",
+          "ranks: pictures of scenes that are spread have no normals", "mpi"),
+    Fault("src/mpi/file_parts.cpp", "used[k] - first)", "used[k] - used[0])",
+          "ranks: vertices that are read later come from elsewhere in the file", "mpi"),
 ]

@@ -14,6 +14,7 @@
 #include <mpi.h>
 #include <raydix/buffer.h>
 #include <raydix/error.h>
+#include <raydix/mesh.h>
 #include <raydix/picture.h>
 #include <raydix/points.h>
 #include <raydix/scene.h>
@@ -21,9 +22,11 @@
 #include <raydix/types.h>
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <vector>
@@ -299,6 +302,21 @@ extern template class BasicDistributedScene<float>;
 extern template class BasicDistributedScene<double>;
 using DistributedScene = BasicDistributedScene<float>;
 using DistributedSceneD = BasicDistributedScene<double>;
+
+/// This rank's part of a file.
+struct FilePart {
+    Mesh mesh;                                  // a run of triangles and the vertices they use; or
+                                                // a run of points
+    std::uint64_t vertices = 0, triangles = 0;  // of the whole file
+};
+
+/// Collective. Each rank reads its part of a file by offset: equal runs of triangles, or of points
+/// where there are none, in rank order, as raydix::load_model numbers them. For uncompressed binary
+/// .ply files with triangles alone or no faces, and uncompressed .npy files in C order. Gives
+/// nothing, on all ranks, for any other file: one rank must read that. All ranks give the same
+/// file. Throws InputError that names the file: one that cannot be read, a vertex that is not
+/// there, an array of other than three columns or more.
+[[nodiscard]] std::optional<FilePart> load_part(MPI_Comm comm, const std::filesystem::path& file);
 
 /// Collective. Renders a scene that every rank holds whole, as raydix::render: the ranks take parts
 /// of the picture from a shared counter until none is left. Rank 0 gets the picture, with the bits

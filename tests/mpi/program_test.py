@@ -4,6 +4,7 @@ import os
 import pathlib
 import re
 import signal
+import struct
 import subprocess
 import tempfile
 import textwrap
@@ -94,6 +95,29 @@ class Answers(Mpi):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("rank 0 reads all of", done.stdout)
         self.assertRegex(done.stdout, r"holding +1728 triangles, at most \d+ on a rank of 3")
+
+    def test_each_rank_reads_its_part_of_files_that_let_it(self):
+        mesh, points = self.folder / "solid.ply", self.folder / "points.npy"
+        lines = pathlib.Path(self.scene()).read_text().splitlines()
+        vertices = [[float(word) for word in line.split()[1:]] for line in lines if line.startswith("v ")]
+        faces = [[int(word) - 1 for word in line.split()[1:]] for line in lines if line.startswith("f ")]
+        head = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\nproperty float x\n"
+                f"property float y\nproperty float z\nelement face {len(faces)}\n"
+                "property list uchar int vertex_indices\nend_header\n")
+        mesh.write_bytes(head.encode() + b"".join(struct.pack("<3f", *v) for v in vertices)
+                         + b"".join(struct.pack("<B3i", 3, *f) for f in faces))
+        head = f"{{'descr': '<f4', 'fortran_order': False, 'shape': ({len(vertices)}, 3), }}".ljust(117) + "\n"
+        points.write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head.encode()
+                           + b"".join(struct.pack("<3f", *v) for v in vertices))
+        for file, arguments in ((mesh, ("info",)), (mesh, ("trace", "--size", "24x16", "--verify")),
+                                (mesh, ("query", "--closest", "--verify")), (mesh, ("query", "--knn", "3", "--verify")),
+                                (points, ("query", "--knn", "3", "--verify")),
+                                (points, ("query", "--radius", "0.1", "--queries", str(points)))):
+            with self.subTest(file=file.name, arguments=arguments):
+                done = self.run_on(3, arguments[0], str(file), *arguments[1:])
+                self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+                self.assertIn("each rank reads its part of", done.stdout)
+                self.assertEqual("have the bits of one process" in done.stdout, "--verify" in arguments)
 
     def test_pictures_have_the_bytes_of_raydix_render(self):
         alone, many = self.folder / "alone.png", self.folder / "many.png"

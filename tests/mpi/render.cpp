@@ -132,8 +132,8 @@ TEST(PicturesOverRanks, WhatARankThrowsIsThrownOnAll) {
     const MeshView whole(mesh);
     const DistributedScene many(MPI_COMM_WORLD, std::span(&whole, rank() == 0 ? 1 : 0));
     RenderOptions options = small_picture(View::shaded);
-    options.width = 400;  // more than one step of all ranks
-    options.height = 300;
+    options.width = 500;  // more than one step of eight ranks
+    options.height = 400;
     expect_stopped(options, [&](const RenderOptions& stopping) {
         (void)render(MPI_COMM_WORLD, one, camera, stopping);
     });
