@@ -13,7 +13,9 @@ namespace raydix_c {
 
 /// The types of the C interface that belong to a number type.
 template <class Scalar>
-struct CTypes {
+struct CTypes;
+template <>
+struct CTypes<float> {
     using Scene = raydix_scene;
     using Ray = raydix_ray;
     using Hit = raydix_hit;
@@ -76,15 +78,11 @@ struct SceneCalls {
     }
 
     static Scene load_scene(const std::string& name, const raydix::SceneOptions& options) {
-        if (name.ends_with(".rdx")) {
-            if constexpr (std::is_same_v<Scalar, float>) {
-                if (raydix::holds_scene(name)) return raydix::load_rdx_scene(name).scene;
-            } else {
-                if (raydix::holds_scene_double(name))
-                    return raydix::load_rdx_scene_double(name).scene;
-            }
-        }
-        return Scene(raydix::load_model(name), options);
+        if (!name.ends_with(".rdx")) return Scene(raydix::load_model(name), options);
+        if constexpr (std::is_same_v<Scalar, float>)
+            return raydix::load_rdx_scene(name).scene;
+        else
+            return raydix::load_rdx_scene_double(name).scene;
     }
 
     static raydix_status create(Handle** scene) {
@@ -118,6 +116,35 @@ struct SceneCalls {
             if (id != nullptr) *id = given;
         });
     }
+    static raydix_status add_mesh(Handle* scene, const Scalar* vertices, std::size_t vertex_count,
+                                  const std::uint32_t* triangles, std::size_t triangle_count,
+                                  std::uint32_t mask, std::uint32_t* id) {
+        return add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
+            return scene->scene.add(mesh_view(vertices, vertex_count, triangles, triangle_count),
+                                    options);
+        });
+    }
+    /// Spheres or capsules.
+    template <class Shape>
+    static raydix_status add_shapes(Handle* scene, const Scalar* shapes, std::size_t count,
+                                    const char* name, std::uint32_t mask, std::uint32_t* id) {
+        return add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
+            return scene->scene.add(array_of<Shape>(shapes, count, name), options);
+        });
+    }
+    static raydix_status add_points(Handle* scene, const Scalar* points, std::size_t count,
+                                    Scalar radius, std::uint32_t mask, std::uint32_t* id) {
+        return add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
+            return scene->scene.add(array_of<Point>(points, count, "points"), radius, options);
+        });
+    }
+    static raydix_status add_instance(Handle* scene, const Handle* child, const Scalar* transform,
+                                      std::uint32_t mask, std::uint32_t* id) {
+        return add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
+            require(child, "child");
+            return scene->scene.add(child->scene, transform_of(transform), options);
+        });
+    }
     static raydix_status add_user(Handle* scene, const Scalar* boxes, std::size_t count,
                                   typename C::UserTest test, void* user, std::uint32_t mask,
                                   std::uint32_t* id) {
@@ -139,6 +166,40 @@ struct SceneCalls {
             require(scene, "scene");
             body(scene->scene);
         });
+    }
+
+    static raydix_status update_mesh(Handle* scene, std::uint32_t id, const Scalar* vertices,
+                                     std::size_t vertex_count, const std::uint32_t* triangles,
+                                     std::size_t triangle_count) {
+        return change(scene, [&](Scene& changed) {
+            changed.update(id, mesh_view(vertices, vertex_count, triangles, triangle_count));
+        });
+    }
+    template <class Shape>
+    static raydix_status update_shapes(Handle* scene, std::uint32_t id, const Scalar* shapes,
+                                       std::size_t count, const char* name) {
+        return change(scene, [&](Scene& changed) {
+            changed.update(id, array_of<Shape>(shapes, count, name));
+        });
+    }
+    static raydix_status update_points(Handle* scene, std::uint32_t id, const Scalar* points,
+                                       std::size_t count, Scalar radius) {
+        return change(scene, [&](Scene& changed) {
+            changed.update(id, array_of<Point>(points, count, "points"), radius);
+        });
+    }
+    static raydix_status set_transform(Handle* scene, std::uint32_t id, const Scalar* transform) {
+        return change(scene,
+                      [&](Scene& changed) { changed.set_transform(id, transform_of(transform)); });
+    }
+    static raydix_status set_mask(Handle* scene, std::uint32_t id, std::uint32_t mask) {
+        return change(scene, [&](Scene& changed) { changed.set_mask(id, mask); });
+    }
+    static raydix_status remove(Handle* scene, std::uint32_t id) {
+        return change(scene, [&](Scene& changed) { changed.remove(id); });
+    }
+    static raydix_status commit(Handle* scene, const raydix_commit_options* options) {
+        return change(scene, [&](Scene& changed) { changed.commit(scene_options(options)); });
     }
 
     static raydix_status bounds(const Handle* scene, Scalar* lo, Scalar* hi) {

@@ -1,7 +1,6 @@
 // Scenes and rays of the C interface, in float.
 #include "scene_calls.h"
 
-using raydix_c::array_of;
 using FloatCalls = raydix_c::SceneCalls<float>;
 
 extern "C" {
@@ -22,33 +21,23 @@ raydix_status raydix_scene_save(const raydix_scene* scene, const char* path) {
 raydix_status raydix_scene_add_mesh(raydix_scene* scene, const float* vertices, size_t vertex_count,
                                     const uint32_t* triangles, size_t triangle_count, uint32_t mask,
                                     uint32_t* id) {
-    return FloatCalls::add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
-        return scene->scene.add(
-            FloatCalls::mesh_view(vertices, vertex_count, triangles, triangle_count), options);
-    });
+    return FloatCalls::add_mesh(scene, vertices, vertex_count, triangles, triangle_count, mask, id);
 }
 
 raydix_status raydix_scene_add_spheres(raydix_scene* scene, const float* spheres, size_t count,
                                        uint32_t mask, uint32_t* id) {
-    return FloatCalls::add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
-        return scene->scene.add(array_of<FloatCalls::Sphere>(spheres, count, "spheres"), options);
-    });
+    return FloatCalls::add_shapes<FloatCalls::Sphere>(scene, spheres, count, "spheres", mask, id);
 }
 
 raydix_status raydix_scene_add_capsules(raydix_scene* scene, const float* capsules, size_t count,
                                         uint32_t mask, uint32_t* id) {
-    return FloatCalls::add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
-        return scene->scene.add(array_of<FloatCalls::Capsule>(capsules, count, "capsules"),
-                                options);
-    });
+    return FloatCalls::add_shapes<FloatCalls::Capsule>(scene, capsules, count, "capsules", mask,
+                                                       id);
 }
 
 raydix_status raydix_scene_add_points(raydix_scene* scene, const float* points, size_t count,
                                       float radius, uint32_t mask, uint32_t* id) {
-    return FloatCalls::add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
-        return scene->scene.add(array_of<FloatCalls::Point>(points, count, "points"), radius,
-                                options);
-    });
+    return FloatCalls::add_points(scene, points, count, radius, mask, id);
 }
 
 raydix_status raydix_scene_add_user(raydix_scene* scene, const float* boxes, size_t count,
@@ -59,61 +48,44 @@ raydix_status raydix_scene_add_user(raydix_scene* scene, const float* boxes, siz
 
 raydix_status raydix_scene_add_instance(raydix_scene* scene, const raydix_scene* child,
                                         const float* transform, uint32_t mask, uint32_t* id) {
-    return FloatCalls::add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
-        raydix_c::require(child, "child");
-        return scene->scene.add(child->scene, FloatCalls::transform_of(transform), options);
-    });
+    return FloatCalls::add_instance(scene, child, transform, mask, id);
 }
 
 raydix_status raydix_scene_update_mesh(raydix_scene* scene, uint32_t id, const float* vertices,
                                        size_t vertex_count, const uint32_t* triangles,
                                        size_t triangle_count) {
-    return FloatCalls::change(scene, [&](FloatCalls::Scene& changed) {
-        changed.update(id,
-                       FloatCalls::mesh_view(vertices, vertex_count, triangles, triangle_count));
-    });
+    return FloatCalls::update_mesh(scene, id, vertices, vertex_count, triangles, triangle_count);
 }
 
 raydix_status raydix_scene_update_spheres(raydix_scene* scene, uint32_t id, const float* spheres,
                                           size_t count) {
-    return FloatCalls::change(scene, [&](FloatCalls::Scene& changed) {
-        changed.update(id, array_of<FloatCalls::Sphere>(spheres, count, "spheres"));
-    });
+    return FloatCalls::update_shapes<FloatCalls::Sphere>(scene, id, spheres, count, "spheres");
 }
 
 raydix_status raydix_scene_update_capsules(raydix_scene* scene, uint32_t id, const float* capsules,
                                            size_t count) {
-    return FloatCalls::change(scene, [&](FloatCalls::Scene& changed) {
-        changed.update(id, array_of<FloatCalls::Capsule>(capsules, count, "capsules"));
-    });
+    return FloatCalls::update_shapes<FloatCalls::Capsule>(scene, id, capsules, count, "capsules");
 }
 
 raydix_status raydix_scene_update_points(raydix_scene* scene, uint32_t id, const float* points,
                                          size_t count, float radius) {
-    return FloatCalls::change(scene, [&](FloatCalls::Scene& changed) {
-        changed.update(id, array_of<FloatCalls::Point>(points, count, "points"), radius);
-    });
+    return FloatCalls::update_points(scene, id, points, count, radius);
 }
 
 raydix_status raydix_scene_set_transform(raydix_scene* scene, uint32_t id, const float* transform) {
-    return FloatCalls::change(scene, [&](FloatCalls::Scene& changed) {
-        changed.set_transform(id, FloatCalls::transform_of(transform));
-    });
+    return FloatCalls::set_transform(scene, id, transform);
 }
 
 raydix_status raydix_scene_set_mask(raydix_scene* scene, uint32_t id, uint32_t mask) {
-    return FloatCalls::change(scene,
-                              [&](FloatCalls::Scene& changed) { changed.set_mask(id, mask); });
+    return FloatCalls::set_mask(scene, id, mask);
 }
 
 raydix_status raydix_scene_remove(raydix_scene* scene, uint32_t id) {
-    return FloatCalls::change(scene, [&](FloatCalls::Scene& changed) { changed.remove(id); });
+    return FloatCalls::remove(scene, id);
 }
 
 raydix_status raydix_scene_commit(raydix_scene* scene, const raydix_commit_options* options) {
-    return FloatCalls::change(scene, [&](FloatCalls::Scene& changed) {
-        changed.commit(FloatCalls::scene_options(options));
-    });
+    return FloatCalls::commit(scene, options);
 }
 
 raydix_status raydix_scene_size(const raydix_scene* scene, uint32_t* size) {

@@ -1,7 +1,6 @@
 // Scenes and rays of the C interface, in double.
 #include "scene_calls.h"
 
-using raydix_c::array_of;
 using DoubleCalls = raydix_c::SceneCalls<double>;
 
 extern "C" {
@@ -22,33 +21,24 @@ raydix_status raydix_scene_save_d(const raydix_scene_d* scene, const char* path)
 raydix_status raydix_scene_add_mesh_d(raydix_scene_d* scene, const double* vertices,
                                       size_t vertex_count, const uint32_t* triangles,
                                       size_t triangle_count, uint32_t mask, uint32_t* id) {
-    return DoubleCalls::add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
-        return scene->scene.add(
-            DoubleCalls::mesh_view(vertices, vertex_count, triangles, triangle_count), options);
-    });
+    return DoubleCalls::add_mesh(scene, vertices, vertex_count, triangles, triangle_count, mask,
+                                 id);
 }
 
 raydix_status raydix_scene_add_spheres_d(raydix_scene_d* scene, const double* spheres, size_t count,
                                          uint32_t mask, uint32_t* id) {
-    return DoubleCalls::add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
-        return scene->scene.add(array_of<DoubleCalls::Sphere>(spheres, count, "spheres"), options);
-    });
+    return DoubleCalls::add_shapes<DoubleCalls::Sphere>(scene, spheres, count, "spheres", mask, id);
 }
 
 raydix_status raydix_scene_add_capsules_d(raydix_scene_d* scene, const double* capsules,
                                           size_t count, uint32_t mask, uint32_t* id) {
-    return DoubleCalls::add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
-        return scene->scene.add(array_of<DoubleCalls::Capsule>(capsules, count, "capsules"),
-                                options);
-    });
+    return DoubleCalls::add_shapes<DoubleCalls::Capsule>(scene, capsules, count, "capsules", mask,
+                                                         id);
 }
 
 raydix_status raydix_scene_add_points_d(raydix_scene_d* scene, const double* points, size_t count,
                                         double radius, uint32_t mask, uint32_t* id) {
-    return DoubleCalls::add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
-        return scene->scene.add(array_of<DoubleCalls::Point>(points, count, "points"), radius,
-                                options);
-    });
+    return DoubleCalls::add_points(scene, points, count, radius, mask, id);
 }
 
 raydix_status raydix_scene_add_user_d(raydix_scene_d* scene, const double* boxes, size_t count,
@@ -59,62 +49,45 @@ raydix_status raydix_scene_add_user_d(raydix_scene_d* scene, const double* boxes
 
 raydix_status raydix_scene_add_instance_d(raydix_scene_d* scene, const raydix_scene_d* child,
                                           const double* transform, uint32_t mask, uint32_t* id) {
-    return DoubleCalls::add(scene, mask, id, [&](const raydix::GeometryOptions& options) {
-        raydix_c::require(child, "child");
-        return scene->scene.add(child->scene, DoubleCalls::transform_of(transform), options);
-    });
+    return DoubleCalls::add_instance(scene, child, transform, mask, id);
 }
 
 raydix_status raydix_scene_update_mesh_d(raydix_scene_d* scene, uint32_t id, const double* vertices,
                                          size_t vertex_count, const uint32_t* triangles,
                                          size_t triangle_count) {
-    return DoubleCalls::change(scene, [&](DoubleCalls::Scene& changed) {
-        changed.update(id,
-                       DoubleCalls::mesh_view(vertices, vertex_count, triangles, triangle_count));
-    });
+    return DoubleCalls::update_mesh(scene, id, vertices, vertex_count, triangles, triangle_count);
 }
 
 raydix_status raydix_scene_update_spheres_d(raydix_scene_d* scene, uint32_t id,
                                             const double* spheres, size_t count) {
-    return DoubleCalls::change(scene, [&](DoubleCalls::Scene& changed) {
-        changed.update(id, array_of<DoubleCalls::Sphere>(spheres, count, "spheres"));
-    });
+    return DoubleCalls::update_shapes<DoubleCalls::Sphere>(scene, id, spheres, count, "spheres");
 }
 
 raydix_status raydix_scene_update_capsules_d(raydix_scene_d* scene, uint32_t id,
                                              const double* capsules, size_t count) {
-    return DoubleCalls::change(scene, [&](DoubleCalls::Scene& changed) {
-        changed.update(id, array_of<DoubleCalls::Capsule>(capsules, count, "capsules"));
-    });
+    return DoubleCalls::update_shapes<DoubleCalls::Capsule>(scene, id, capsules, count, "capsules");
 }
 
 raydix_status raydix_scene_update_points_d(raydix_scene_d* scene, uint32_t id, const double* points,
                                            size_t count, double radius) {
-    return DoubleCalls::change(scene, [&](DoubleCalls::Scene& changed) {
-        changed.update(id, array_of<DoubleCalls::Point>(points, count, "points"), radius);
-    });
+    return DoubleCalls::update_points(scene, id, points, count, radius);
 }
 
 raydix_status raydix_scene_set_transform_d(raydix_scene_d* scene, uint32_t id,
                                            const double* transform) {
-    return DoubleCalls::change(scene, [&](DoubleCalls::Scene& changed) {
-        changed.set_transform(id, DoubleCalls::transform_of(transform));
-    });
+    return DoubleCalls::set_transform(scene, id, transform);
 }
 
 raydix_status raydix_scene_set_mask_d(raydix_scene_d* scene, uint32_t id, uint32_t mask) {
-    return DoubleCalls::change(scene,
-                               [&](DoubleCalls::Scene& changed) { changed.set_mask(id, mask); });
+    return DoubleCalls::set_mask(scene, id, mask);
 }
 
 raydix_status raydix_scene_remove_d(raydix_scene_d* scene, uint32_t id) {
-    return DoubleCalls::change(scene, [&](DoubleCalls::Scene& changed) { changed.remove(id); });
+    return DoubleCalls::remove(scene, id);
 }
 
 raydix_status raydix_scene_commit_d(raydix_scene_d* scene, const raydix_commit_options* options) {
-    return DoubleCalls::change(scene, [&](DoubleCalls::Scene& changed) {
-        changed.commit(DoubleCalls::scene_options(options));
-    });
+    return DoubleCalls::commit(scene, options);
 }
 
 raydix_status raydix_scene_size_d(const raydix_scene_d* scene, uint32_t* size) {

@@ -1,9 +1,9 @@
 /* Scenes, rays, distances and points in double: every call of raydix_c.h that has coordinates, with
    _d at the end of its name and of its types. What raydix_c.h says of a call holds here.
 
-   Rays are tested in double: hits are right to the last bits far from the origin, where float has
-   steps of metres. Coordinates may reach 1e12. Points of shapes that a ray touches within 2^-50 of
-   (distance of the origin + size of the shape) may be hit or missed. */
+   For maps and CAD, whose coordinates float would round. Rays meet triangles and shapes in double.
+   A ray that passes a sphere, capsule or point within 2^-50 of (distance of its origin from the
+   shape + the shape's length and radius) may hit or miss it. */
 #ifndef RAYDIX_C_DOUBLE_H
 #define RAYDIX_C_DOUBLE_H
 
@@ -34,7 +34,8 @@ typedef int (*raydix_user_test_d)(void* user, uint32_t prim, const raydix_ray_d*
                                   raydix_hit_d* hit);
 
 RAYDIX_C_API raydix_status raydix_scene_create_d(raydix_scene_d** scene);
-/* Vertices of files in float are taken as they are. Files of type .rdx may hold either. */
+/* Of .rdx files it reads those of raydix_scene_save_d alone; raydix_scene_load reads none of them.
+   Other files hold floats, which are taken as they are. */
 RAYDIX_C_API raydix_status raydix_scene_load_d(const char* path,
                                                const raydix_commit_options* options,
                                                raydix_scene_d** scene);

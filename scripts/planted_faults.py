@@ -219,7 +219,7 @@ FAULTS = [
     Fault("src/engine/table_reader.h", "if (builds_trees && used_meshes_[stored.number])",
           "if (false && used_meshes_[stored.number])",
           "scenes of files in double: one mesh may stand in any number of geometries, each with a tree", "io"),
-    Fault("src/image/surface_points.cpp", "const Double3 place = (Double3(ray.origin) - middle_) + direction * t;",
+    Fault("src/image/surface_points.cpp", "const Double3 place = (Double3(ray.origin) - space_.middle) + direction * t;",
           "const Double3 place = Double3(ray.origin) + direction * t;",
           "secondary rays in double: points are rounded far from the origin", "image"),
     Fault("src/io/rdx_sections.cpp", "if (section.count > room / section.element_bytes)",

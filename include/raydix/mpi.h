@@ -314,8 +314,8 @@ struct FilePart {
 /// where there are none, in rank order, as raydix::load_model numbers them. For uncompressed binary
 /// .ply files with triangles alone or no faces, and uncompressed .npy files in C order. Gives
 /// nothing, on all ranks, for any other file: one rank must read that. All ranks give the same
-/// file. Throws InputError that names the file: one that cannot be read, a vertex that is not
-/// there, an array of other than three columns or more.
+/// file. Throws InputError that names the file: one that cannot be read, a header that is broken, a
+/// face with a vertex that is not there.
 [[nodiscard]] std::optional<FilePart> load_part(MPI_Comm comm, const std::filesystem::path& file);
 
 /// Collective. Renders a scene that every rank holds whole, as raydix::render: the ranks take parts

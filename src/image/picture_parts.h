@@ -14,15 +14,24 @@ namespace raydix {
 /// Throws InputError for a view or a number of samples out of range.
 void check_render_options(const RenderOptions& options);
 
+/// A camera in the space of a tracer.
+struct PictureCamera {
+    CameraFrame frame;
+    Vec3 up;
+};
+/// `middle`: the origin of that space in the camera's.
+[[nodiscard]] PictureCamera picture_camera(const Camera& camera, const RenderOptions& options,
+                                           Double3 middle = {});
+[[nodiscard]] PictureCamera picture_camera(const CameraD& camera, const RenderOptions& options,
+                                           Double3 middle);
+
 class PictureParts {
 public:
     /// Of a part that one thread renders: what it holds stays in a core's caches.
     static constexpr std::size_t rays_of_thread = std::size_t{1} << 15;
 
-    /// Traces a few rays for the light. `frame` is in the space of the tracer, which must outlive
-    /// this, as `options` must.
-    PictureParts(const Tracer& tracer, const CameraFrame& frame, Vec3 camera_up,
-                 const RenderOptions& options);
+    /// Traces a few rays for the light. The tracer and the options must outlive this.
+    PictureParts(const Tracer& tracer, const PictureCamera& camera, const RenderOptions& options);
 
     /// All pixels, in order.
     [[nodiscard]] std::span<const std::uint32_t> pixels() const { return order_; }

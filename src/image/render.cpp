@@ -56,7 +56,7 @@ std::uint64_t rays_of(const RenderOptions& options) {
            (per_pixel.primary + per_pixel.secondary);
 }
 
-RenderScene make_scene(const Tracer& tracer, const CameraFrame& frame, Vec3 camera_up,
+RenderScene make_scene(const Tracer& tracer, const PictureCamera& camera,
                        const RenderOptions& options) {
     const PixelRays per_pixel = pixel_rays(options);
     Aabb box = tracer.bounds();
@@ -64,8 +64,8 @@ RenderScene make_scene(const Tracer& tracer, const CameraFrame& frame, Vec3 came
     if (empty) box = {{0, 0, 0}, {0, 0, 0}};
     return {tracer,
             options,
-            frame,
-            make_lights(tracer, frame, camera_up),
+            camera.frame,
+            make_lights(tracer, camera.frame, camera.up),
             step_back_distance(box),
             empty ? 1.0f : ao_radius_or_default(box, options.ao_radius),
             per_pixel.primary,
@@ -181,14 +181,13 @@ void render_tiles(const PictureParts& parts, const RenderOptions& options, Pictu
     listener.finish();
 }
 
-/// `take` calls picture_of(tracer) once. `frame` is in its space.
+/// `take` calls picture_of(tracer) once.
 template <class Take>
-Picture render_frame(const CameraFrame& frame, Vec3 camera_up, const RenderOptions& options,
-                     const Take& take) {
+Picture render_with(const PictureCamera& camera, const RenderOptions& options, const Take& take) {
     Picture picture{options.width, options.height, {}};
     with_threads(options.threads, [&] {
         take([&](const Tracer& tracer) {
-            render_tiles(PictureParts(tracer, frame, camera_up, options), options, picture);
+            render_tiles(PictureParts(tracer, camera, options), options, picture);
         });
     });
     finish_picture(picture, options.view);
@@ -204,9 +203,21 @@ void check_render_options(const RenderOptions& options) {
                          "; it must be 0.." + std::to_string(max_samples));
 }
 
-PictureParts::PictureParts(const Tracer& tracer, const CameraFrame& frame, Vec3 camera_up,
+PictureCamera picture_camera(const Camera& camera, const RenderOptions& options, Double3 middle) {
+    CameraFrame frame = make_camera_frame(camera, options.width, options.height);
+    frame.position = frame.position - middle;
+    return {frame, camera.up};
+}
+
+PictureCamera picture_camera(const CameraD& camera, const RenderOptions& options, Double3 middle) {
+    CameraFrame frame = make_camera_frame(camera, options.width, options.height);
+    frame.position = frame.position - middle;
+    return {frame, normalized(Double3(camera.up)).rounded()};
+}
+
+PictureParts::PictureParts(const Tracer& tracer, const PictureCamera& camera,
                            const RenderOptions& options)
-    : scene_(make_scene(tracer, frame, camera_up, options)),
+    : scene_(make_scene(tracer, camera, options)),
       order_(pixels_in_morton_order(options.width, options.height)) {}
 
 std::size_t PictureParts::pixels_of_rays(std::size_t rays) const {
@@ -279,8 +290,7 @@ View view_from_name(std::string_view name) {
 Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& options) {
     check_render_options(options);
     require_triangles(bvh, "render");
-    const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
-    return render_frame(frame, camera.up, options, [&](const auto& picture_of) {
+    return render_with(picture_camera(camera, options), options, [&](const auto& picture_of) {
         const std::uint64_t rays = options.view == View::steps ? 0 : rays_of(options);
         picture_of(BvhTracer(bvh, rays));
     });
@@ -288,18 +298,15 @@ Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& option
 
 Picture render(const Scene& scene, const Camera& camera, const RenderOptions& options) {
     check_render_options(options);
-    const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
-    return render_frame(frame, camera.up, options,
-                        [&](const auto& picture_of) { picture_of(SceneTracer(scene)); });
+    return render_with(picture_camera(camera, options), options,
+                       [&](const auto& picture_of) { picture_of(SceneTracer(scene)); });
 }
 
 Picture render(const SceneD& scene, const CameraD& camera, const RenderOptions& options) {
     check_render_options(options);
-    CameraFrame frame = make_camera_frame(camera, options.width, options.height);
     const SceneTracerD tracer(scene);
-    frame.position = frame.position - tracer.middle();
-    const Vec3 up = normalized(Double3(camera.up)).rounded();
-    return render_frame(frame, up, options, [&](const auto& picture_of) { picture_of(tracer); });
+    return render_with(picture_camera(camera, options, tracer.middle()), options,
+                       [&](const auto& picture_of) { picture_of(tracer); });
 }
 
 }  // namespace raydix

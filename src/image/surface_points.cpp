@@ -41,13 +41,14 @@ Double3 SceneSurface::normal(const Hit& hit) const {
 
 void SceneSurface::check(std::span<const Hit> hits) const { check_hits(*tree_, hits); }
 
-SceneSurfaceD::SceneSurfaceD(const SceneD& scene)
-    : tree_(SceneInternalsD::tree(scene)), bounds_(empty_box()) {
-    const AabbD& box = tree_->bounds;
-    if (!(box.lo.x <= box.hi.x)) return;
-    middle_ = (Double3(box.lo) + Double3(box.hi)) * 0.5;
-    bounds_ = {(Double3(box.lo) - middle_).rounded(), (Double3(box.hi) - middle_).rounded()};
+SpaceAround space_around(const AabbD& box) {
+    if (!(box.lo.x <= box.hi.x)) return {{}, empty_box()};
+    const Double3 lo(box.lo), hi(box.hi), middle = (lo + hi) * 0.5;
+    return {middle, {(lo - middle).rounded(), (hi - middle).rounded()}};
 }
+
+SceneSurfaceD::SceneSurfaceD(const SceneD& scene)
+    : tree_(SceneInternalsD::tree(scene)), space_(space_around(tree_->bounds)) {}
 
 Double3 SceneSurfaceD::normal_of(std::uint32_t prim, std::uint32_t geometry,
                                  std::uint32_t instance) const {
@@ -69,7 +70,7 @@ SurfacePoint SceneSurfaceD::point(const RayD& ray, const HitD& hit, std::uint32_
                                   double step_back) const {
     const Double3 direction(ray.direction);
     const double t = hit.t - step_back / length(direction);
-    const Double3 place = (Double3(ray.origin) - middle_) + direction * t;
+    const Double3 place = (Double3(ray.origin) - space_.middle) + direction * t;
     const Double3 normal = normal_of(hit.prim, hit.geometry, hit.instance);
     return {place.rounded(), turned_against(normal, direction).rounded(), pixel, 0};
 }

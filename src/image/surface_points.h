@@ -56,17 +56,24 @@ private:
     std::shared_ptr<const SceneTree> tree_;
 };
 
+/// The space whose origin is in the middle of a box.
+struct SpaceAround {
+    Double3 middle;
+    Aabb bounds;  // the box in that space; lo > hi if it is empty
+};
+[[nodiscard]] SpaceAround space_around(const AabbD& box);
+
 /// A scene in double in the space of its pictures, whose origin is the middle of the scene's box:
 /// there floats are fine enough for all that is drawn. Otherwise as above.
 class SceneSurfaceD final : public Surface {
 public:
     explicit SceneSurfaceD(const SceneD& scene);
-    [[nodiscard]] Aabb bounds() const override { return bounds_; }
+    [[nodiscard]] Aabb bounds() const override { return space_.bounds; }
     [[nodiscard]] Double3 normal(const Hit& hit) const override;
     void check(std::span<const HitD> hits) const;
 
     /// The origin of that space in the scene's.
-    [[nodiscard]] Double3 middle() const { return middle_; }
+    [[nodiscard]] Double3 middle() const { return space_.middle; }
     /// surface_point for a ray and a hit in the scene's own space.
     [[nodiscard]] SurfacePoint point(const RayD& ray, const HitD& hit, std::uint32_t pixel,
                                      double step_back) const;
@@ -76,8 +83,7 @@ private:
                                     std::uint32_t instance) const;
 
     std::shared_ptr<const SceneTreeD> tree_;
-    Double3 middle_;
-    Aabb bounds_{};
+    SpaceAround space_;
 };
 
 /// Throws InputError "CALL needs a tree over triangles; this one holds ..." unless the tree is

@@ -64,18 +64,6 @@ std::string box_text(const Box& box) {
                 double(box.hi.y), double(box.hi.z)}));
 }
 
-/// Where pictures are taken from: the space of the rays.
-CameraFrame frame_of(const Camera& camera, const RenderOptions& options, Double3) {
-    return make_camera_frame(camera, options.width, options.height);
-}
-CameraFrame frame_of(const CameraD& camera, const RenderOptions& options, Double3 middle) {
-    CameraFrame frame = make_camera_frame(camera, options.width, options.height);
-    frame.position = frame.position - middle;
-    return frame;
-}
-Vec3 up_of(const Camera& camera) { return camera.up; }
-Vec3 up_of(const CameraD& camera) { return normalized(Double3(camera.up)).rounded(); }
-
 /// Pixels that this rank rendered, as it sends them: where they begin, their number, colours.
 void put_colours(Bytes& out, std::uint64_t begin, std::span<const Vec3> colours) {
     put(out, begin);
@@ -151,9 +139,8 @@ Picture render_replicated(MPI_Comm given, const AnyScene& scene, const AnyCamera
         check_render_options(options);
         tracer.emplace(scene);
         call += box_text(scene.bounds());
-        const CameraFrame frame = frame_of(camera, options, middle_of(*tracer));
-        with_threads(options.threads,
-                     [&] { parts.emplace(*tracer, frame, up_of(camera), options); });
+        const PictureCamera placed = picture_camera(camera, options, middle_of(*tracer));
+        with_threads(options.threads, [&] { parts.emplace(*tracer, placed, options); });
     });
     agree_on(comm, call, error);
     Bytes mine;
@@ -182,20 +169,12 @@ struct SpaceOfPictures<float> {
     Aabb bounds;
     Double3 middle;
 };
-/// As that of SceneSurfaceD: floats are fine enough around the middle.
 template <>
-struct SpaceOfPictures<double> {
-    explicit SpaceOfPictures(const AabbD& box) : bounds(empty_box()) {
-        if (!(box.lo.x <= box.hi.x)) return;
-        middle = (Double3(box.lo) + Double3(box.hi)) * 0.5;
-        bounds = {(Double3(box.lo) - middle).rounded(), (Double3(box.hi) - middle).rounded()};
-    }
+struct SpaceOfPictures<double> : SpaceAround {
+    explicit SpaceOfPictures(const AabbD& box) : SpaceAround(space_around(box)) {}
     [[nodiscard]] std::vector<RayD> rays(std::span<const Ray> given) const {
         return in_space_around(middle, given);
     }
-
-    Aabb bounds;
-    Double3 middle;
 };
 
 /// Its calls are collective. What they throw is thrown on all ranks.
@@ -273,18 +252,18 @@ Picture render_distributed(const BasicDistributedScene<T>& scene, const AnyCamer
     const FloatEnvironment plain;
     const Communicator& comm = DistributedSceneInternals<T>::communicator(scene);
     const DistributedTracer<T> tracer(scene);
-    CameraFrame frame;
+    PictureCamera placed;
     together_on(comm, call_text(camera, options), [&] {
         check_render_options(options);
         if (options.view == View::steps) tracer.count_steps({}, {});
-        frame = frame_of(camera, options, tracer.middle());
+        placed = picture_camera(camera, options, tracer.middle());
     });
     std::optional<PictureParts> parts;
     Bytes mine;
     ProgressListener listener(progress_of(comm, options));
     std::exception_ptr error;
     keep_error(error, [&] {
-        parts.emplace(tracer, frame, up_of(camera), options);
+        parts.emplace(tracer, placed, options);
         render_shares(comm, *parts, listener, mine);
     });
     if (tracer.failed_on_all()) std::rethrow_exception(error);

@@ -319,6 +319,47 @@ TEST(Answers, ScenesAreSavedAndLoaded) {
     EXPECT_EQ(none, nullptr);
 }
 
+TEST(Answers, DoubleScenesAreSavedAndLoaded) {
+    const TempFolder folder;
+    const std::string file = (folder.path() / "double.rdx").string(),
+                      in_float = (folder.path() / "float.rdx").string();
+    const MeshD mesh = random_soup_d(500, 3);
+    raydix_scene_d *scene = nullptr, *loaded = nullptr, *none_d = nullptr;
+    ASSERT_OK(raydix_scene_create_d(&scene));
+    ASSERT_OK(raydix_scene_add_mesh_d(scene, &mesh.vertices[0].x, mesh.vertices.size(),
+                                      mesh.triangles[0].data(), mesh.triangles.size(), RAYDIX_ALL,
+                                      nullptr));
+    ASSERT_OK(raydix_scene_commit_d(scene, nullptr));
+    ASSERT_OK(raydix_scene_save_d(scene, file.c_str()));
+    ASSERT_OK(raydix_scene_load_d(file.c_str(), nullptr, &loaded));
+    std::vector<RayD> rays(500);
+    RandomD random(6);
+    const AabbD cube{{0, 0, 0}, {1, 1, 1}};
+    for (RayD& ray : rays) ray = {random.in(cube), 0, random.direction(), infinity};
+    std::vector<raydix_hit_d> hits(rays.size()), again(rays.size());
+    ASSERT_OK(raydix_trace_closest_d(scene, c_rays(rays), rays.size(), hits.data(), nullptr));
+    ASSERT_OK(raydix_trace_closest_d(loaded, c_rays(rays), rays.size(), again.data(), nullptr));
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        EXPECT_TRUE(same_bits(hits[i].t, again[i].t));
+        EXPECT_EQ(hits[i].prim, again[i].prim);
+    }
+    raydix_scene_destroy_d(loaded);
+    raydix_scene_destroy_d(scene);
+
+    // Files of the other number type are refused, with what they hold.
+    raydix_scene *single = nullptr, *none = nullptr;
+    ASSERT_OK(raydix_scene_create(&single));
+    ASSERT_OK(raydix_scene_commit(single, nullptr));
+    ASSERT_OK(raydix_scene_save(single, in_float.c_str()));
+    raydix_scene_destroy(single);
+    EXPECT_EQ(raydix_scene_load(file.c_str(), nullptr, &none), RAYDIX_INPUT_ERROR);
+    EXPECT_NE(std::string(raydix_last_error()).find("holds a scene in double"), std::string::npos)
+        << raydix_last_error();
+    EXPECT_EQ(raydix_scene_load_d(in_float.c_str(), nullptr, &none_d), RAYDIX_INPUT_ERROR);
+    EXPECT_NE(std::string(raydix_last_error()).find("holds a scene in float"), std::string::npos)
+        << raydix_last_error();
+}
+
 TEST(Answers, WhatIsMissingIsNamed) {
     raydix_scene* scene = nullptr;
     ASSERT_OK(raydix_scene_create(&scene));
