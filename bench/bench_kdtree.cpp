@@ -2,6 +2,7 @@
 // scalar kernel, both trees in one run, in turns (A B A B). Answers are compared first. One JSON
 // line a question.
 #include <fmt/format.h>
+#include <raydix/kdtree.h>
 #include <raydix/machine.h>
 #include <raydix/raydix.h>
 

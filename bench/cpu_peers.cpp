@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <raydix/raydix.h>
+#include <raydix/wide.h>
 
 #include <algorithm>
 #include <stdexcept>

@@ -8,8 +8,11 @@
 // mesh goes through a triangle of the other, which segments on both sides of the edge share. So
 // there are as many pairs as such crossings, which another query counts. And the pairs are those of
 // trees built from scratch by another builder.
+#include <raydix/bvh.h>
+#include <raydix/overlap.h>
+#include <raydix/pairs.h>
 #include <raydix/raydix.h>
-#include <raydix/wide.h>
+#include <raydix/refit.h>
 
 #include <algorithm>
 #include <chrono>
@@ -157,8 +160,8 @@ raydix::Picture Scene::picture(const Pairs& pairs, std::uint32_t width) const {
     all.triangles.push_back({floor, floor + 1, floor + 2});
     all.triangles.push_back({floor, floor + 2, floor + 3});
     colours.resize(all.triangles.size(), Vec3{0.36f, 0.36f, 0.35f});
-    const raydix::WideBvh tree(raydix::build_bvh(all));
-    Subject subject = subject_of(all, tree, colours);
+    const raydix::Scene traced(all);
+    Subject subject = subject_of(all, traced, colours);
     subject.size = 2;
     return show(subject, {"front", {1.5f, 2.1f, 3.6f}, {0.05f, 0.92f, 0}, {0, 1, 0}, 32}, width,
                 width * 3 / 4, {0.5f, 0.9f, 0.6f});

@@ -2,6 +2,7 @@
 // the cells around those; and what the edges of a mesh say of it.
 #pragma once
 
+#include <raydix/octree.h>
 #include <raydix/raydix.h>
 
 #include <algorithm>

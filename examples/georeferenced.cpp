@@ -21,19 +21,20 @@ int main() {
             terrain.triangles.push_back({at + side + 1, at + side, at + 1});
         }
 
-    const raydix::BvhD bvh = raydix::build_bvh(terrain);
+    const raydix::SceneD scene(terrain);
     double worst = 0.0, float_worst = 0.0;
     for (std::uint32_t k = 0; k + 1 < side; ++k) {  // straight down beside the points
         const double x = k + 0.25;
         const raydix::RayD down{{corner.x + x, corner.y + k, 1000.0}, 0.0, {0.0, 0.0, -1.0}};
-        const raydix::HitD hit = raydix::closest_hit(bvh, down);
+        const raydix::HitD hit = raydix::closest_hit(scene, down);
         if (!hit.hit()) return 1;
         const double on_edge = 0.75 * height(k, k) + 0.25 * height(k + 1.0, k);
         worst = std::fmax(worst, std::fabs(1000.0 - hit.t - on_edge));
         const auto rounded = static_cast<double>(static_cast<float>(down.origin.y + 0.25));
         float_worst = std::fmax(float_worst, std::fabs(rounded - (down.origin.y + 0.25)));
     }
-    const double above = raydix::closest_point(bvh, {corner.x + 50, corner.y + 50, 60.0}).distance;
+    const double above =
+        raydix::closest_point(scene, {corner.x + 50, corner.y + 50, 60.0}).distance;
     std::printf("heights off by up to %.1e m; a float coordinate there is off by up to %.2f m\n",
                 worst, float_worst);
     std::printf("a bird at 60 m is %.9f m from the ground\n", above);

@@ -4,7 +4,6 @@
 // Before the picture it proves itself: energy is kept in a white furnace, the two ways to find the
 // lamp agree, and the number of threads changes no bit.
 #include <raydix/raydix.h>
-#include <raydix/wide.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -78,14 +77,14 @@ struct Path {
 
 class PathTracer {
 public:
-    PathTracer(const World& world, const raydix::WideBvh& tree, const Settings& settings)
-        : world_(world), tree_(tree), settings_(settings) {}
+    PathTracer(const World& world, const raydix::Scene& scene, const Settings& settings)
+        : world_(world), scene_(scene), settings_(settings) {}
 
     /// One more path through every pixel, added to `sum`.
     void add_sample(std::uint32_t sample, raydix::Picture& sum) {
         start(sample, sum);
         for (int bounce = 0; bounce < 64 && !rays_.empty(); ++bounce) {
-            const auto hits = raydix::trace(tree_, rays_, {.threads = settings_.threads});
+            const auto hits = raydix::trace(scene_, rays_, {.threads = settings_.threads});
             ray_count += rays_.size();
             next_rays_.clear(), next_paths_.clear(), shadow_rays_.clear(), lamp_light_.clear();
             for (std::size_t i = 0; i < hits.size(); ++i)
@@ -188,7 +187,7 @@ private:
 
     void add_lamp(raydix::Picture& sum) {
         hidden_.resize(shadow_rays_.size());
-        raydix::trace_any(tree_, shadow_rays_, hidden_, {.threads = settings_.threads});
+        raydix::trace_any(scene_, shadow_rays_, hidden_, {.threads = settings_.threads});
         ray_count += shadow_rays_.size();
         for (std::size_t i = 0; i < hidden_.size(); ++i)
             if (hidden_[i] == 0) sum.pixels[lamp_light_[i].pixel] += lamp_light_[i].light;
@@ -199,7 +198,7 @@ private:
         Vec3 light;
     };
     const World& world_;
-    const raydix::WideBvh& tree_;
+    const raydix::Scene& scene_;
     Settings settings_;
     std::vector<Ray> rays_, next_rays_, shadow_rays_;
     std::vector<Path> paths_, next_paths_;
@@ -221,15 +220,15 @@ double mean_of(const raydix::Picture& picture) {
     return sum / (3.0 * static_cast<double>(picture.pixels.size()));
 }
 
-bool prove(const World& world, const raydix::WideBvh& tree) {
-    const double furnace = mean_of(render({world, tree, {.furnace = true}}, 64, 8));
+bool prove(const World& world, const raydix::Scene& scene) {
+    const double furnace = mean_of(render({world, scene, {.furnace = true}}, 64, 8));
     std::printf("white furnace: %.5f of the light arrives (wanted 1)\n", furnace);
-    const double aimed = mean_of(render({world, tree, {.sky = false}}, 64, 256));
+    const double aimed = mean_of(render({world, scene, {.sky = false}}, 64, 256));
     const double met =
-        mean_of(render({world, tree, {.sample_lamp = false, .sky = false}}, 64, 256));
+        mean_of(render({world, scene, {.sample_lamp = false, .sky = false}}, 64, 256));
     std::printf("lamp aimed at: %.4f, met by chance: %.4f, ratio %.3f\n", aimed, met, aimed / met);
-    const auto one = render({world, tree, {.threads = 1}}, 64, 2);
-    const auto two = render({world, tree, {.threads = 3}}, 64, 2);
+    const auto one = render({world, scene, {.threads = 1}}, 64, 2);
+    const auto two = render({world, scene, {.threads = 3}}, 64, 2);
     const bool same =
         hash_of(std::span<const Vec3>(one.pixels)) == hash_of(std::span<const Vec3>(two.pixels));
     std::printf("one thread and three: %s pixels\n", same ? "the same" : "DIFFERENT");
@@ -246,9 +245,9 @@ int main(int argc, char** argv) {
               samples = argc > 3 ? std::atoi(argv[3]) : 8;
     if (width < 4 || samples < 1) return std::fprintf(stderr, "a width, a number of samples\n"), 2;
     const World world = make_world();
-    const raydix::WideBvh tree(raydix::build_bvh(world.mesh));
-    if (!prove(world, tree)) return 1;
-    PathTracer tracer(world, tree, {});
+    const raydix::Scene scene(world.mesh);
+    if (!prove(world, scene)) return 1;
+    PathTracer tracer(world, scene, {});
     raydix::Picture sum{
         static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(width * 3 / 4), {}};
     sum.pixels.resize(std::size_t{sum.width} * sum.height);

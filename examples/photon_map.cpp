@@ -164,7 +164,7 @@ std::vector<Vec3> direct(const Room& room, std::span<const Vec3> places,
             {from, 0, lamp_corner + random() * lamp_s + random() * lamp_t - from, 0.999f});
     }
     std::vector<std::uint8_t> hidden(rays.size());
-    raydix::trace_any(room.tree, rays, hidden);
+    raydix::trace_any(room.scene, rays, hidden);
     std::vector<Vec3> light(places.size(), Vec3{0, 0, 0});
     for (std::size_t i = 0; i < places.size(); ++i) {
         const Vec3 way = rays[i].direction;

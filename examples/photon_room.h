@@ -2,7 +2,6 @@
 #pragma once
 
 #include <raydix/raydix.h>
-#include <raydix/wide.h>
 
 #include <vector>
 
@@ -21,7 +20,7 @@ enum class Matter { white, red, green, lamp, glass };
 struct Room {
     raydix::Mesh mesh;
     std::vector<Matter> matter;
-    raydix::WideBvh tree;
+    raydix::Scene scene;
     Vec3 ball{0.45f, 0.36f, 0.35f};
     float ball_radius = 0.36f;
 
@@ -44,7 +43,7 @@ struct Room {
             for (int j = 0; j < 2 * rows; ++j)
                 add({at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)}, of);
     }
-    void finish() { tree = raydix::build_wide_bvh(mesh); }
+    void finish() { scene = raydix::Scene(mesh); }
 
     [[nodiscard]] Vec3 albedo(std::uint32_t prim) const {
         switch (matter[prim]) {
@@ -123,7 +122,7 @@ template <class Visit>
 void step(const Room& room, std::vector<Flight>& flights, const Visit& visit) {
     std::vector<Ray> rays;
     for (const Flight& f : flights) rays.push_back(f.ray);
-    const std::vector<Hit> hits = raydix::trace(room.tree, rays);
+    const std::vector<Hit> hits = raydix::trace(room.scene, rays);
     std::size_t kept = 0;
     for (std::size_t i = 0; i < flights.size(); ++i) {
         Flight f = flights[i];

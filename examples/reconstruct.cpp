@@ -10,7 +10,6 @@
 // file it tells how far its points are from the surface and how many edges are open; small pieces
 // are left out of the mesh.
 #include <raydix/raydix.h>
-#include <raydix/wide.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -28,9 +27,9 @@ namespace {
 struct Distances {
     double mean = 0, most = 0;
 };
-Distances distances_to(const raydix::Bvh& tree, std::span<const Vec3> points) {
+Distances distances_to(const raydix::Scene& scene, std::span<const Vec3> points) {
     Distances out;
-    for (const raydix::ClosestPoint& p : raydix::closest_points(tree, points)) {
+    for (const raydix::SceneClosestPoint& p : raydix::closest_points(scene, points)) {
         out.mean += p.distance / static_cast<double>(points.size());
         out.most = std::max(out.most, double{p.distance});
     }
@@ -128,8 +127,8 @@ raydix::Picture picture_of(const raydix::Mesh& mesh, std::uint32_t width, Vec3 u
         for (const std::uint32_t corner : t) normals[corner] += n;
     }
     const std::vector<Vec3> colours(mesh.triangles.size(), Vec3{0.52f, 0.46f, 0.38f});
-    const raydix::WideBvh tree = raydix::build_wide_bvh(mesh);
-    Subject subject = subject_of(mesh, tree, colours, normals);
+    const raydix::Scene scene(mesh);
+    Subject subject = subject_of(mesh, scene, colours, normals);
     subject.up = up;
     const raydix::Aabb box = raydix::inspect(mesh).bounds;
     const Vec3 middle = 0.5f * (box.lo + box.hi);
@@ -150,7 +149,7 @@ int run(const std::string& source, const std::filesystem::path& folder, std::uin
     const raydix::Mesh mesh = known ? contour.mesh() : large_pieces(contour.mesh());
     save_ply(folder / "reconstruct.ply", mesh);
     const EdgeCount edges = count_edges(mesh);
-    const Distances off = distances_to(raydix::build_bvh(contour.mesh()), cloud.points);
+    const Distances off = distances_to(raydix::Scene(contour.mesh()), cloud.points);
     std::printf("%zu points, spacing %.4f; %zu cells of %.4f -> %zu vertices, %zu triangles\n",
                 cloud.points.size(), double{cloud.spacing()}, contour.cells(),
                 double{contour.cell_size()}, mesh.vertices.size(), mesh.triangles.size());
@@ -161,7 +160,7 @@ int run(const std::string& source, const std::filesystem::path& folder, std::uin
     std::printf("points are %.5f from the surface in the mean, %.5f at most\n", off.mean, off.most);
     raydix::save_picture(folder / "reconstruct.png", picture_of(mesh, width, up, from), true);
     if (!known) return mesh.triangles.empty() || edges.crowded != 0 ? 1 : 0;
-    const Distances wrong = distances_to(raydix::build_bvh(truth), mesh.vertices);
+    const Distances wrong = distances_to(raydix::Scene(truth), mesh.vertices);
     const long long wanted = count_edges(truth).euler;
     std::printf(
         "vertices are %.5f from the true surface in the mean, %.5f at most; noise %.3f; "

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <raydix/raydix.h>
-#include <raydix/wide.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -100,14 +99,14 @@ inline raydix::Picture show(const Subject& subject, const raydix::Camera& camera
 
 /// A mesh as a subject: flat, or by normals of its vertices; colours by triangle. All must outlive
 /// the subject.
-inline Subject subject_of(const raydix::Mesh& mesh, const raydix::WideBvh& tree,
+inline Subject subject_of(const raydix::Mesh& mesh, const raydix::Scene& scene,
                           std::span<const Vec3> colours, std::span<const Vec3> normals = {}) {
     Subject subject;
-    subject.trace = [&tree](std::span<const raydix::Ray> rays) {
-        return raydix::trace(tree, rays);
+    subject.trace = [&scene](std::span<const raydix::Ray> rays) {
+        return raydix::trace(scene, rays);
     };
-    subject.occluded = [&tree](std::span<const raydix::Ray> rays, std::span<std::uint8_t> out) {
-        raydix::trace_any(tree, rays, out);
+    subject.occluded = [&scene](std::span<const raydix::Ray> rays, std::span<std::uint8_t> out) {
+        raydix::trace_any(scene, rays, out);
     };
     subject.surface = [&mesh, colours, normals](const raydix::Hit& hit, Vec3) -> Surface {
         const raydix::Triangle& t = mesh.triangles[hit.prim];

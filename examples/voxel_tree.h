@@ -1,8 +1,8 @@
 // The hall of example voxel_gi, and its surfaces as an octree of voxels that hold light.
 #pragma once
 
+#include <raydix/octree.h>
 #include <raydix/raydix.h>
-#include <raydix/wide.h>
 
 #include <algorithm>
 #include <array>
@@ -44,9 +44,7 @@ inline Vec3 albedo(Vec3 p) {
 
 class Hall {
 public:
-    Hall()
-        : scene(raydix::load_model("builtin:atrium?triangles=150000")),
-          tree_(raydix::build_bvh(scene.mesh())) {}
+    Hall() : scene(raydix::load_model("builtin:atrium?triangles=150000")), traced_(scene.mesh()) {}
 
     [[nodiscard]] Point point_of(std::uint32_t prim, float u, float v) const {
         const raydix::Triangle& t = scene.mesh().triangles[prim];
@@ -62,7 +60,7 @@ public:
                length(cross(scene.mesh().vertices[t[1]] - a, scene.mesh().vertices[t[2]] - a));
     }
     [[nodiscard]] std::vector<raydix::Hit> trace(std::span<const Ray> rays) const {
-        return raydix::trace(tree_, rays);
+        return raydix::trace(traced_, rays);
     }
 
     /// Irradiance of all points by one batch of shadow rays; normals turn to the lamp.
@@ -78,7 +76,7 @@ public:
             rays.push_back({p.place + start_off * p.normal, 0, to_lamp, light[i] > 0 ? 1.0f : -1});
         }
         std::vector<std::uint8_t> hidden(rays.size());
-        raydix::trace_any(tree_, rays, hidden);
+        raydix::trace_any(traced_, rays, hidden);
         for (std::size_t i = 0; i < points.size(); ++i)
             if (hidden[i] != 0) light[i] = 0;
         return light;
@@ -88,7 +86,7 @@ public:
     Spotlight lamp;
 
 private:
-    raydix::WideBvh tree_;
+    raydix::Scene traced_;
 };
 
 /// What a voxel sends toward +x, -x, +y, -y, +z, -z, times the part of that face it covers.

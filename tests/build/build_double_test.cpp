@@ -1,6 +1,7 @@
 // Trees in double: boxes that hold their triangles in exact arithmetic, input that is left out,
 // refits.
 #include <gtest/gtest.h>
+#include <raydix/check.h>
 #include <raydix/raydix.h>
 
 #include <algorithm>

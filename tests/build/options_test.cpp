@@ -1,7 +1,17 @@
 // Numbers that no caller can have meant, in every public call that takes them: threads below 0 or
 // above 1,024, and enumerations cast from anything.
 #include <gtest/gtest.h>
+#include <raydix/cwbvh.h>
+#include <raydix/device.h>
+#include <raydix/device_cwbvh.h>
+#include <raydix/device_trees.h>
+#include <raydix/hierarchy_study.h>
+#include <raydix/kdtree.h>
+#include <raydix/octree.h>
 #include <raydix/raydix.h>
+#include <raydix/simulate.h>
+#include <raydix/tree_view.h>
+#include <raydix/wide.h>
 
 #include <climits>
 #include <functional>

@@ -2,6 +2,10 @@
 // hit, both kernels, any number of rays; results beyond the last ray stay untouched. Skipped where
 // there is no device.
 #include <gtest/gtest.h>
+#include <raydix/cwbvh.h>
+#include <raydix/device.h>
+#include <raydix/device_cwbvh.h>
+#include <raydix/device_scene.h>
 #include <raydix/raydix.h>
 
 #include <cmath>

@@ -2,6 +2,9 @@
 // points.h, closest.h and pairs.h on the host: bit for bit, for more queries than fill a grid.
 // Skipped where there is no device.
 #include <gtest/gtest.h>
+#include <raydix/device.h>
+#include <raydix/device_queries.h>
+#include <raydix/device_trees.h>
 #include <raydix/raydix.h>
 
 #include <cmath>

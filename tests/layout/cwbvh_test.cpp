@@ -1,6 +1,7 @@
 // Compressed nodes: quantised boxes against exact arithmetic in integers, octant slots against all
 // assignments, and whole trees decoded again.
 #include <gtest/gtest.h>
+#include <raydix/cwbvh.h>
 #include <raydix/error.h>
 #include <raydix/raydix.h>
 

@@ -3,7 +3,10 @@
 // long. All memory of this program is counted.
 #include <gtest/gtest.h>
 #include <malloc.h>
+#include <raydix/kdtree.h>
+#include <raydix/octree.h>
 #include <raydix/raydix.h>
+#include <raydix/wide.h>
 
 #include <cstdlib>
 #include <functional>

@@ -1,6 +1,7 @@
 // The kernel `cwbvh` against `scalar`, bit for bit: scenes of every size, all kinds of rays, nasty
 // meshes; no leaks; and that its planes stay within their pad.
 #include <gtest/gtest.h>
+#include <raydix/cwbvh.h>
 #include <raydix/raydix.h>
 
 #include <algorithm>

@@ -1,6 +1,7 @@
 // kd_trace and kd_trace_any against trace_brute_force and against the BVH's trace, bit for bit.
 #include <gtest/gtest.h>
 #include <raydix/error.h>
+#include <raydix/kdtree.h>
 #include <raydix/raydix.h>
 
 #include <algorithm>

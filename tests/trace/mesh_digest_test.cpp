@@ -2,6 +2,7 @@
 // here. digest_test.cpp has the closest hits of float meshes, and the trees.
 #include <gtest/gtest.h>
 #include <raydix/cwbvh.h>
+#include <raydix/kdtree.h>
 #include <raydix/raydix.h>
 #include <raydix/wide.h>
 
