@@ -59,6 +59,7 @@ LineTree::LineTree(const MeshView& mesh) : mesh_(mesh) {
     }
     nodes_.reserve(ids_.size());
     if (!ids_.empty()) split(0, static_cast<std::uint32_t>(ids_.size()), centers);
+    for (const std::uint32_t i : ids_) corners_.push_back(corners_of(source, i));
 }
 
 std::uint32_t LineTree::split(std::uint32_t begin, std::uint32_t end,
@@ -103,7 +104,7 @@ void LineTree::visit_candidates(const Ray& ray, const Visit& visit) const {
         const Node& node = nodes_[index];
         if (!meets_line(node, o, inverse)) continue;
         if (node.right == 0) {
-            for (std::uint32_t i = node.begin; i < node.end; ++i) visit(ids_[i]);
+            for (std::uint32_t i = node.begin; i < node.end; ++i) visit(ids_[i], corners_[i]);
         } else {
             pending[top++] = node.right;
             pending[top++] = index + 1;
@@ -114,13 +115,11 @@ void LineTree::visit_candidates(const Ray& ray, const Visit& visit) const {
 Hit LineTree::closest(const Ray& ray) const {
     if (!is_valid(ray)) return {};
     const RayFrame frame = make_frame(ray);
-    const TriangleSource source = source_of(mesh_);
     Hit best;
     float nearest = frame.tmax;
-    visit_candidates(ray, [&](std::uint32_t i) {
+    visit_candidates(ray, [&](std::uint32_t i, const LeafTriangle& corners) {
         TriangleHit hit;
-        if (!intersect_triangle<EdgeRule::closed>(frame, corners_of(source, i), frame.tmax, hit))
-            return;
+        if (!intersect_triangle<EdgeRule::closed>(frame, corners, frame.tmax, hit)) return;
         if (hit.t > nearest || (hit.t == nearest && best.hit() && i > best.prim)) return;
         nearest = hit.t;
         best = hit_of_tree({hit.t * frame.t_scale, i, hit.u, hit.v});
@@ -132,10 +131,9 @@ std::vector<Hit> LineTree::all(const Ray& ray) const {
     std::vector<Hit> hits;
     if (!is_valid(ray)) return hits;
     const RayFrame frame = make_frame(ray);
-    const TriangleSource source = source_of(mesh_);
-    visit_candidates(ray, [&](std::uint32_t i) {
+    visit_candidates(ray, [&](std::uint32_t i, const LeafTriangle& corners) {
         TriangleHit hit;
-        if (intersect_triangle<EdgeRule::half_open>(frame, corners_of(source, i), frame.tmax, hit))
+        if (intersect_triangle<EdgeRule::half_open>(frame, corners, frame.tmax, hit))
             hits.push_back(hit_of_tree({hit.t * frame.t_scale, i, hit.u, hit.v}));
     });
     std::ranges::sort(hits, [](const Hit& a, const Hit& b) {

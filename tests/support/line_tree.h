@@ -4,6 +4,7 @@
 // through the library's triangle test.
 #pragma once
 
+#include <raydix/bvh.h>
 #include <raydix/mesh.h>
 #include <raydix/types.h>
 
@@ -35,6 +36,7 @@ private:
 
     MeshView mesh_;
     std::vector<std::uint32_t> ids_;
+    std::vector<LeafTriangle> corners_;  // of ids_
     std::vector<Node> nodes_;
 };
 
