@@ -11,7 +11,6 @@
 #include "primitives/exact_overlap.h"
 #include "proximity/sweep_walk.h"
 #include "proximity/touch_walk.h"
-#include "trace/simd/simd_kernels.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/near_kernels.cpp"
@@ -31,30 +30,13 @@ NearKernels near_kernels(std::string_view isa) {
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
+#include "trace/simd/kernels_by_set.h"
+
 namespace raydix {
 
 const NearKernels& near_kernels_for(std::string_view isa) {
-    static const std::vector<NearKernels> all = [] {
-        std::vector<NearKernels> found;
-        for (const SimdKernels& known : simd_kernels()) {
-#if HWY_TARGETS & HWY_AVX3
-            if (known.isa == "avx512") {
-                found.push_back(N_AVX3::near_kernels(known.isa));
-                continue;
-            }
-#endif
-#if HWY_TARGETS & HWY_AVX2
-            if (known.isa == "avx2") {
-                found.push_back(N_AVX2::near_kernels(known.isa));
-                continue;
-            }
-#endif
-            found.push_back(HWY_STATIC_DISPATCH(near_kernels)(known.isa));
-        }
-        return found;
-    }();
-    const auto at = std::ranges::find(all, isa, &NearKernels::isa);
-    return at == all.end() ? all.front() : *at;
+    static const KernelsBySet<NearKernels> all(RAYDIX_OF_EACH_SET(near_kernels));
+    return all.named(isa);
 }
 
 }  // namespace raydix

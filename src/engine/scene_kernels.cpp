@@ -33,30 +33,13 @@ SceneKernels scene_kernels(std::string_view isa) {
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
+#include "trace/simd/kernels_by_set.h"
+
 namespace raydix {
 
 const SceneKernels& scene_kernels_for(std::string_view isa) {
-    static const std::vector<SceneKernels> all = [] {
-        std::vector<SceneKernels> found;
-        for (const SimdKernels& known : simd_kernels()) {
-#if HWY_TARGETS & HWY_AVX3
-            if (known.isa == "avx512") {
-                found.push_back(N_AVX3::scene_kernels(known.isa));
-                continue;
-            }
-#endif
-#if HWY_TARGETS & HWY_AVX2
-            if (known.isa == "avx2") {
-                found.push_back(N_AVX2::scene_kernels(known.isa));
-                continue;
-            }
-#endif
-            found.push_back(HWY_STATIC_DISPATCH(scene_kernels)(known.isa));
-        }
-        return found;
-    }();
-    const auto at = std::ranges::find(all, isa, &SceneKernels::isa);
-    return at == all.end() ? all.front() : *at;
+    static const KernelsBySet<SceneKernels> all(RAYDIX_OF_EACH_SET(scene_kernels));
+    return all.named(isa);
 }
 
 }  // namespace raydix

@@ -27,30 +27,13 @@ SceneKernelsD scene_kernels_double(std::string_view isa) {
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
+#include "trace/simd/kernels_by_set.h"
+
 namespace raydix {
 
 const SceneKernelsD& scene_kernels_double_for(std::string_view isa) {
-    static const std::vector<SceneKernelsD> all = [] {
-        std::vector<SceneKernelsD> found;
-        for (const SimdKernels& known : simd_kernels()) {
-#if HWY_TARGETS & HWY_AVX3
-            if (known.isa == "avx512") {
-                found.push_back(N_AVX3::scene_kernels_double(known.isa));
-                continue;
-            }
-#endif
-#if HWY_TARGETS & HWY_AVX2
-            if (known.isa == "avx2") {
-                found.push_back(N_AVX2::scene_kernels_double(known.isa));
-                continue;
-            }
-#endif
-            found.push_back(HWY_STATIC_DISPATCH(scene_kernels_double)(known.isa));
-        }
-        return found;
-    }();
-    const auto at = std::ranges::find(all, isa, &SceneKernelsD::isa);
-    return at == all.end() ? all.front() : *at;
+    static const KernelsBySet<SceneKernelsD> all(RAYDIX_OF_EACH_SET(scene_kernels_double));
+    return all.named(isa);
 }
 
 }  // namespace raydix
