@@ -47,7 +47,7 @@ def mesh_of(source: Any) -> tuple[Any, Any]:
     )
 
 
-def _transforms(value: Any, dtype: np.dtype) -> tuple[np.ndarray, bool]:
+def transforms(value: Any, dtype: np.dtype) -> tuple[np.ndarray, bool]:
     """(M, 12) of `dtype`, and whether there was one alone."""
     array = to_numpy(value, "transform")
     expected = "transform: expected shape (3, 4), (4, 4), (M, 3, 4) or (M, 4, 4)"
@@ -169,7 +169,7 @@ class SceneContents:
         require_dtype(source, self.dtype, "scene")
         if where is None:
             raise TypeError("transform: expected shape (3, 4) or (4, 4), given None")
-        rows, one = _transforms(where, self.dtype)
+        rows, one = transforms(where, self.dtype)
         if wanted is not None and not one:
             raise ValueError(f"id: expected None for {len(rows)} transforms, given {id!r}")
         masks = _one_or_many(mask, "mask")
@@ -264,7 +264,7 @@ class SceneContents:
         InputError: no such geometry, a mesh, a transform that is singular or not finite; then none
         of them has moved.
         """
-        rows, _ = _transforms(transform, self.dtype)
+        rows, _ = transforms(transform, self.dtype)
         ids = _one_or_many(id, "id")
         if len(ids) != len(rows):
             raise ValueError(f"transform: expected {len(ids)}, one for each id, given {len(rows)}")
