@@ -206,7 +206,7 @@ def check_errors():
         ([(raydix.Scene(precision="float64"), np.eye(4))], TypeError, "geometries[0]: "),
         ([(raydix.Scene(), np.eye(4))], raydix.InputError, ""),
         ([(raydix.Scene(*mesh), np.zeros((3, 4)))], raydix.InputError, ""),
-        ([(raydix.Scene(*mesh), np.zeros((2, 3, 4)))], ValueError, "expected one transform"),
+        ([(raydix.Scene(*mesh), np.zeros((2, 3, 4)))], ValueError, "geometries[0]: expected one"),
     ]:
         refused(kind, where + text, lambda wrong=wrong: Scene(COMM, at(wrong, [mesh])))
     with Points(COMM, zeros) as points:
