@@ -13,6 +13,7 @@
 
 #include <mpi.h>
 #include <raydix/buffer.h>
+#include <raydix/bvh.h>
 #include <raydix/error.h>
 #include <raydix/mesh.h>
 #include <raydix/picture.h>
@@ -29,6 +30,7 @@
 #include <optional>
 #include <span>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace raydix::mpi {
@@ -317,6 +319,15 @@ struct FilePart {
 /// file. Throws InputError that names the file: one that cannot be read, a header that is broken, a
 /// face with a vertex that is not there.
 [[nodiscard]] std::optional<FilePart> load_part(MPI_Comm comm, const std::filesystem::path& file);
+
+/// Collective. raydix::tree_hash of the tree that build_bvh makes of one mesh: the triangles of all
+/// ranks in rank order. The ranks sort them along one Morton curve and make the nodes that begin on
+/// each; rank 0 hashes their words, rank by rank. All ranks give the same options, `threads` aside.
+/// Throws InputError: a builder whose trees do not follow from sorted codes alone (not karras,
+/// lauterbach, garanzha or apetrei, or with reinsertion), 2^31 triangles or more on all ranks, and
+/// as build_bvh.
+[[nodiscard]] std::string tree_hash(MPI_Comm comm, const MeshView& mesh,
+                                    const BuildOptions& options = {});
 
 /// Collective. Renders a scene that every rank holds whole, as raydix::render: the ranks take parts
 /// of the picture from a shared counter until none is left. Rank 0 gets the picture, with the bits

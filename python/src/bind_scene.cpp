@@ -426,8 +426,9 @@ void bind_asking(nb::class_<Scene>& scene) {
         return reading(self, [&] { return self.mask_of(id); });
     });
     scene.def("arrays_of", &arrays_of<Scene>);
-    scene.def("traced", [](Scene& self) {
-        return nb::capsule(reading(self, [&] { return &self.traced(); }), scene_name<Scalar<Scene>>);
+    scene.def("traced", [](Scene& self) -> nb::object {
+        return nb::capsule(reading(self, [&] { return &self.traced(); }),
+                           scene_name<Scalar<Scene>>);
     });
     scene.def("hit_of", &hit_of<Scene>, nb::arg("origin"), nb::arg("direction"), nb::arg("row"));
     scene.def("positions", &positions_of<Scene>, nb::arg("hits").noconvert(),

@@ -44,9 +44,8 @@ struct PointCalls {
     }
     static nb::tuple box(const Points& points, const BoxRows& boxes,
                          std::uint64_t max_result_bytes) {
-        return lists_of(unlocked([&] {
-            return points.box(rows<Box>(boxes), {.max_result_bytes = max_result_bytes});
-        }));
+        return lists_of(unlocked(
+            [&] { return points.box(rows<Box>(boxes), {.max_result_bytes = max_result_bytes}); }));
     }
 
     static void bind(nb::module_& module, const char* name) {

@@ -43,8 +43,8 @@ struct SceneCalls {
             if (nb::isinstance<nb::capsule>(one[1])) {
                 geometry.scene = static_cast<const BasicScene<T>*>(
                     nb::cast<nb::capsule>(one[1]).data(scene_name<T>));
-                geometry.transform = rows<typename Types::Transform>(
-                    nb::cast<TransformRow>(one[2]))[0];
+                geometry.transform =
+                    rows<typename Types::Transform>(nb::cast<TransformRow>(one[2]))[0];
                 return;
             }
             vertices.push_back(nb::cast<PointRows>(one[1]));
@@ -62,8 +62,8 @@ struct SceneCalls {
         Given given;
         for (const nb::handle one : geometries) given.add(nb::cast<nb::tuple>(one));
         const nb::gil_scoped_release released;
-        new (self) Scene(communicator_of(comm), std::span<const Geometry>(given.geometries),
-                         options);
+        new (self)
+            Scene(communicator_of(comm), std::span<const Geometry>(given.geometries), options);
     }
 
     static mpi::TraceOptions trace_options(std::uint32_t mask, const Masks& masks) {
@@ -74,9 +74,8 @@ struct SceneCalls {
 
     template <class Rays>
     static nb::tuple trace(const Scene& scene, Rays& rays, std::uint32_t mask, const Masks& masks) {
-        auto found = unlocked([&] {
-            return scene.trace(rays.piece(0, rays.size()), trace_options(mask, masks));
-        });
+        auto found = unlocked(
+            [&] { return scene.trace(rays.piece(0, rays.size()), trace_options(mask, masks)); });
         return nb::make_tuple(hand_over_rows<std::uint8_t>(std::move(found.values)),
                               figures_of(found.report));
     }
@@ -100,8 +99,8 @@ struct SceneCalls {
     }
     static nb::tuple closest(const Scene& scene, const PointRows& points, T max_distance,
                              std::uint32_t mask) {
-        auto found = unlocked(
-            [&] { return scene.closest_points(rows<Point>(points), max_distance, mask); });
+        auto found =
+            unlocked([&] { return scene.closest_points(rows<Point>(points), max_distance, mask); });
         return nb::make_tuple(hand_over_rows<std::uint8_t>(std::move(found.values)),
                               figures_of(found.report));
     }
@@ -118,8 +117,8 @@ struct SceneCalls {
             .def("__init__", &make, nb::arg("comm"), nb::arg("geometries"), nb::arg("options"),
                  nb::arg("one_geometry"), nb::arg("quality"))
             .def("holding", [](const Scene& self) { return figures_of(self.holding()); })
-            .def("closest_points", &closest, nb::arg("points").noconvert(),
-                 nb::arg("max_distance"), nb::arg("mask"))
+            .def("closest_points", &closest, nb::arg("points").noconvert(), nb::arg("max_distance"),
+                 nb::arg("mask"))
             .def("contains", &inside, nb::arg("points").noconvert());
         const auto mask = nb::arg("mask");
         const auto masks = nb::arg("masks").noconvert().none();
