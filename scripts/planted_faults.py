@@ -448,6 +448,10 @@ FAULTS = [
           "ranks: instances count from 1 on each of them", "mpi"),
     Fault("src/mpi/scene_queries.h", "if (normals_ != nullptr) normals_->set(i, normal);", "static_cast<void>(normal);",
           "ranks: pictures of scenes that are spread have no normals", "mpi"),
+    Fault("src/mpi/spread_lbvh.h", "begins || one.prefix < stretches.back().prefix", "begins || one.prefix > stretches.back().prefix",
+          "ranks: nodes of the LBVH end at the wrong split of another rank", "mpi"),
+    Fault("src/mpi/tree_hash.cpp", "skipped = node->count - 1;", "skipped = 0;",
+          "ranks: triangles of a leaf are put once more", "mpi"),
     Fault("src/mpi/file_parts.cpp", "used[k] - first)", "used[k] - used[0])",
           "ranks: vertices that are read later come from elsewhere in the file", "mpi"),
 ]

@@ -121,9 +121,9 @@ public:
         });
         if (comm_.rank() != 0) {
             std::uint32_t skipped = 0;
-            check_mpi(MPI_Recv(&skipped, 1, MPI_UINT32_T, 0, turn_tag, comm_.handle(),
-                               MPI_STATUS_IGNORE),
-                      "MPI_Recv");
+            check_mpi(
+                MPI_Recv(&skipped, 1, MPI_UINT32_T, 0, turn_tag, comm_.handle(), MPI_STATUS_IGNORE),
+                "MPI_Recv");
             skipped = put_nodes(*sender, skipped);
             sender->put(skipped);
             sender->send();

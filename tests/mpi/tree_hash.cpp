@@ -48,8 +48,8 @@ TEST(TreeHashOverRanks, IsThatOfOneProcess) {
                 options.bits = seed % 2 == 0 ? 30 : 63;
                 options.max_leaf = max_leaf;
                 options.threads = 1;
-                EXPECT_EQ(spread_hash(MPI_COMM_WORLD, mesh,
-                                      division_of(triangles, division, seed), options),
+                EXPECT_EQ(spread_hash(MPI_COMM_WORLD, mesh, division_of(triangles, division, seed),
+                                      options),
                           raydix::tree_hash(build_bvh(mesh, options)));
             }
 }
@@ -110,11 +110,10 @@ TEST(TreeHashOverRanks, RefusesWhatHasNoHash) {
               "");
     Mesh bad = mesh;
     bad.vertices[3].x = std::numeric_limits<float>::infinity();
-    EXPECT_EQ(has(refused(is_last ? MeshView(bad) : MeshView(), with([](auto& o) {
-                              o.strict = true;
-                          })),
-                  "not finite"),
-              "");
+    EXPECT_EQ(
+        has(refused(is_last ? MeshView(bad) : MeshView(), with([](auto& o) { o.strict = true; })),
+            "not finite"),
+        "");
     if (ranks() > 1) {
         EXPECT_EQ(has(refused(mesh, with([](auto& o) { o.max_leaf = 1 + rank() % 2; })),
                       "the ranks differ"),
