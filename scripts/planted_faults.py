@@ -193,7 +193,7 @@ FAULTS = [
           "SAH: a leaf costs as much as one primitive", "tree"),
     Fault("src/tree/epo.cpp", "(2 * i + 1) * n / (2 * sampled);", "i * n / (2 * sampled);",
           "EPO: only the first half of the triangles is looked at", "tree"),
-    Fault("src/tree/hash.cpp", "        hash.put(node.hi);\n", "", "tree hash: upper corners do not enter", "tree"),
+    Fault("src/tree/bvh_stream.h", "    out.put(hi);\n", "", "tree hash: upper corners do not enter", "tree"),
     Fault("src/tree/validate.cpp", "        if (used_[first / 2])\n", "        if (false)\n",
           "check: a subtree may hang below two nodes, or below itself", "tree build io"),
     Fault("src/tree/split_plane.h", "cell >> bits_below << bits_below)};", "cell)};",
