@@ -173,16 +173,27 @@ struct SceneOptions : Options {
     Quality quality = Quality::balanced;  // of the tree on each rank. Hits do not depend on it
 };
 
-/// What a rank gives of a scene: a mesh, or an instance of a scene that it holds. An instance stays
-/// on that rank.
+/// What a rank gives of a scene: one of a mesh, shapes, geometry of the caller's own, and an
+/// instance of a scene that the rank holds. Without any it only takes a number. All but triangles
+/// of meshes stay on that rank.
 template <class Scalar>
 struct BasicDistributedGeometry {
-    typename SceneTypes<Scalar>::MeshView mesh{};
-    /// Not null: an instance of this scene as its last commit left it; `mesh` is then empty. It
-    /// need not outlive the construction.
+    using Types = SceneTypes<Scalar>;
+
+    typename Types::MeshView mesh{};
+    /// Not null: an instance of this scene as its last commit left it. It need not outlive the
+    /// construction.
     const BasicScene<Scalar>* scene = nullptr;
-    typename SceneTypes<Scalar>::Transform transform{};  // of an instance
-    std::uint32_t mask = 0xFFFFFFFFu;                    // as GeometryOptions::mask
+    typename Types::Transform transform{};  // of an instance
+    std::uint32_t mask = 0xFFFFFFFFu;       // as GeometryOptions::mask
+    // As Scene::add takes them.
+    std::span<const typename Types::Sphere> spheres = {};
+    std::span<const typename Types::Capsule> capsules = {};
+    std::span<const typename Types::Point> points = {};
+    Scalar radius = 0;  // of points
+    /// Not null: geometry whose test answers by the ray alone. The place of a ray that it is told
+    /// has no meaning here.
+    const BasicUserGeometry<Scalar>* user = nullptr;
 };
 using DistributedGeometry = BasicDistributedGeometry<float>;
 using DistributedGeometryD = BasicDistributedGeometry<double>;
@@ -240,7 +251,7 @@ struct HitRows {
     CallReport report;
 };
 
-/// Triangle meshes and instances spread over ranks, asked as a raydix::Scene of all of them.
+/// Meshes, shapes and instances spread over ranks, asked as a raydix::Scene of all of them.
 /// Move-only. To destroy it is collective too, while MPI runs.
 template <class Scalar>
 class BasicDistributedScene {
@@ -256,7 +267,8 @@ public:
     /// Collective. The meshes are copied. One without triangles only takes a number. Triangles that
     /// are not finite or out of range are left out and counted. Throws InputError: an index past
     /// the vertices, 2^31 triangles or more on one rank, 2^32 - 2 geometries or paths or more on
-    /// all, an option out of range, and as Scene::add and Scene::commit for instances.
+    /// all, an option out of range, a geometry that is several things, shapes with one_geometry,
+    /// and as Scene::add and Scene::commit.
     BasicDistributedScene(MPI_Comm comm, std::span<const Geometry> geometries,
                           const SceneOptions& options = {});
     /// The same of meshes alone, which all rays see.
@@ -266,7 +278,7 @@ public:
     BasicDistributedScene(BasicDistributedScene&&) noexcept;
     BasicDistributedScene& operator=(BasicDistributedScene&&) noexcept;
 
-    /// Elements are triangles of meshes, those of instances left out.
+    /// Elements are triangles and shapes, those of instances left out.
     [[nodiscard]] const Holding& holding() const;
 
     /// Collective. The closest hit of each ray: the least (t, instance, geometry, prim), as
@@ -282,7 +294,7 @@ public:
                                             const TraceOptions& options = {}) const;
     /// Collective. The closest point of all triangles to each query, as raydix::closest_points. All
     /// ranks give the same max_distance and mask. Throws InputError if max_distance is negative or
-    /// NaN, and if the mask shows an instance of spheres or other shapes.
+    /// NaN, and if the mask shows spheres or other shapes.
     [[nodiscard]] Answers<Closest, ClosestCounts> closest_points(
         std::span<const Point> queries, Scalar max_distance = infinity,
         std::uint32_t mask = 0xFFFFFFFFu) const;

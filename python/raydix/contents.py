@@ -92,6 +92,27 @@ def _with_radii(radii: Any, *points: np.ndarray) -> np.ndarray:
     return np.column_stack((*points, np.broadcast_to(cast(given, points[0].dtype), count)))
 
 
+def sphere_rows(centers: ArrayLike, radii: ArrayLike, dtype: np.dtype) -> np.ndarray:
+    """Centers and radii, (N, 4)."""
+    return _with_radii(radii, _points(centers, "centers", dtype))
+
+
+def capsule_rows(
+    starts: ArrayLike, ends: ArrayLike, radii: ArrayLike, dtype: np.dtype
+) -> np.ndarray:
+    """Both ends and radii, (N, 7)."""
+    first, last = _points(starts, "starts", dtype), _points(ends, "ends", dtype)
+    if first.shape != last.shape:
+        raise ValueError(f"ends: expected shape {first.shape}, given {describe(last)}")
+    return _with_radii(radii, first, last)
+
+
+def point_rows(points: ArrayLike, radius: Any, dtype: np.dtype) -> np.ndarray:
+    """Points and their one radius, (N, 4)."""
+    given = _points(points, "points", dtype)
+    return _with_radii(np.asarray(_radius(radius), dtype), given)
+
+
 def _radius(value: Any) -> float:
     radius = number(value, "radius")
     if not 0 <= radius < np.inf:
@@ -232,13 +253,10 @@ class SceneContents:
         self._core.update_points(whole(id, "id", 0, ALL), made, _radius(radius))
 
     def _spheres(self, centers: ArrayLike, radii: ArrayLike) -> np.ndarray:
-        return _with_radii(radii, _points(centers, "centers", self.dtype))
+        return sphere_rows(centers, radii, self.dtype)
 
     def _capsules(self, starts: ArrayLike, ends: ArrayLike, radii: ArrayLike) -> np.ndarray:
-        first, last = _points(starts, "starts", self.dtype), _points(ends, "ends", self.dtype)
-        if first.shape != last.shape:
-            raise ValueError(f"ends: expected shape {first.shape}, given {describe(last)}")
-        return _with_radii(radii, first, last)
+        return capsule_rows(starts, ends, radii, self.dtype)
 
     def update(self, id: int, vertices: ArrayLike, faces: ArrayLike | None = None) -> None:
         """Gives a mesh other vertices, shape (V, 3), and other `faces`, or those that it has. Rays

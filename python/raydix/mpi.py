@@ -34,7 +34,15 @@ from ._arrays import (
     whole,
 )
 from ._rays import ray_batch, ray_masks
-from .contents import QUALITIES, mesh_of, one_of, transforms
+from .contents import (
+    QUALITIES,
+    capsule_rows,
+    mesh_of,
+    one_of,
+    point_rows,
+    sphere_rows,
+    transforms,
+)
 from .scene import Scene
 
 try:
@@ -350,9 +358,17 @@ def _fields(found: np.ndarray, layout: np.dtype, lead: tuple[int, ...]) -> dict[
     return {name: structs[name] for name in layout.names}
 
 
+_SHAPES = {
+    "spheres": (sphere_rows, ("centers", "radii")),
+    "capsules": (capsule_rows, ("starts", "ends", "radii")),
+    "points": (point_rows, ("points", "radius")),
+}
+
+
 class DistributedScene(_Distributed):
-    """Triangle meshes and instances spread over the ranks of a communicator, asked as one
-    `raydix.Scene` that got all of it by `add`, in rank order. Collective.
+    """Meshes, shapes and instances spread over the ranks of a communicator, asked as one
+    `raydix.Scene` that got all of it by `add` and `add_spheres`, `add_capsules` and `add_points`,
+    in rank order. Collective.
 
     Parameters
     ----------
@@ -366,12 +382,15 @@ class DistributedScene(_Distributed):
         - ``(scene, transform)``, an instance of a `raydix.Scene` as its last commit left it. It
           stays on this rank, and may hold whatever a scene holds. The transform is as in
           `raydix.Scene.add`, (3, 4) or (4, 4);
-        - a dict ``{"geometry": one of these, "mask": ...}`` for a mask other than all bits.
+        - ``{"spheres": (centers, radii)}``, ``{"capsules": (starts, ends, radii)}`` or ``{"points":
+          (points, radius)}``, as `raydix.Scene.add_spheres` and others take them. They stay on this
+          rank;
+        - ``{"geometry": a mesh or an instance}``; this and those of shapes may have a "mask" too.
 
         What all ranks give are geometries 0, 1, 2, ... in rank order. Copied.
     one_geometry :
         The meshes are parts of one geometry, 0, and "prim" counts through them, in rank order. For
-        a mesh that no rank holds whole.
+        a mesh that no rank holds whole; not with shapes.
     quality :
         Of the trees on each rank: "fast", "balanced" or "high". Hits do not depend on it.
     precision :
@@ -419,31 +438,45 @@ class DistributedScene(_Distributed):
         self._open(comm)
 
     def _given(self, one: Any, name: str) -> tuple:
-        """(mask, vertices, faces) or (mask, the library's scene, transform)."""
-        mask = ALL
-        if isinstance(one, dict):
-            if not {"geometry"} <= set(one) <= {"geometry", "mask"}:
-                raise TypeError(
-                    f"{name}: expected a dict of 'geometry' and 'mask', given {list(one)}"
-                )
-            mask = whole(one.get("mask", ALL), f"{name}, mask", 0, ALL)
-            one = one["geometry"]
+        """What it is, the mask, and its two arguments for the core."""
+        if not isinstance(one, dict):
+            return self._mesh_or_instance(one, name, ALL)
+        kinds = [kind for kind in one if kind != "mask"]
+        if len(kinds) != 1 or kinds[0] not in ("geometry", *_SHAPES):
+            raise TypeError(
+                f"{name}: expected a dict of one of 'geometry', 'spheres', 'capsules' and "
+                f"'points', and 'mask', given {list(one)}"
+            )
+        (kind,) = kinds
+        mask = whole(one.get("mask", ALL), f"{name}, mask", 0, ALL)
+        if kind == "geometry":
+            return self._mesh_or_instance(one[kind], name, mask)
+        to_rows, parts = _SHAPES[kind]
+        if not isinstance(one[kind], (list, tuple)) or len(one[kind]) != len(parts):
+            raise TypeError(f"{name}, {kind}: expected a tuple of {', '.join(parts)}")
+        try:
+            rows_of_shapes = to_rows(*one[kind], self.dtype)
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"{name}, {kind}: {error}") from None
+        return "capsules" if kind == "capsules" else "spheres", mask, rows_of_shapes, None
+
+    def _mesh_or_instance(self, one: Any, name: str, mask: int) -> tuple:
         if hasattr(one, "vertices") and not isinstance(one, Scene):
             one = mesh_of(one)
         if not isinstance(one, (list, tuple)) or len(one) != 2:
             raise TypeError(
-                f"{name}: expected (vertices, faces), (scene, transform), or a mesh with .vertices "
-                f"and .faces, given {type(one).__name__}"
+                f"{name}: expected (vertices, faces), (scene, transform), a mesh with .vertices "
+                f"and .faces, or a dict, given {type(one).__name__}"
             )
         first, second = one
         if not isinstance(first, Scene):
             corners = mesh_vertices(first, f"{name}, vertices", self.dtype)
-            return mask, corners, mesh_faces(second, len(corners), f"{name}, faces")
+            return "mesh", mask, corners, mesh_faces(second, len(corners), f"{name}, faces")
         require_dtype(first, self.dtype, name)
         places, is_one = transforms(second, self.dtype)
         if not is_one:
             raise ValueError(f"{name}: expected one transform, given {len(places)}")
-        return mask, first._core.traced(), places
+        return "instance", mask, first._core.traced(), places
 
     def _rays(
         self, rays: Any, directions: Any, tmin: Any, tmax: Any, mask: Any, masks: Any
@@ -517,7 +550,7 @@ class DistributedScene(_Distributed):
         `raydix.Scene.closest_point`. All ranks give the same `max_distance` and `mask`.
 
         Returns "point" (..., 3), "distance", "u", "v", "geometry", "instance" and "prim" (uint64).
-        InputError: an instance shows spheres or other shapes.
+        InputError: the mask shows spheres or other shapes.
         """
         with _on_all(self._open_comm()):
             asked, lead = rows(points, "points", (3,), self.dtype)

@@ -3,12 +3,14 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/variant.h>
 
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -27,6 +29,7 @@ struct SceneCalls {
     using Geometry = typename Scene::Geometry;
     using Point = typename Scene::Point;
     using PointRows = In<T, nb::shape<-1, 3>>;
+    using ShapeRows = In<T, nb::ndim<2>>;
     using TransformRow = In<T, nb::shape<1, 12>>;
     using Masks = std::optional<In<std::uint32_t, nb::ndim<1>>>;
 
@@ -35,21 +38,36 @@ struct SceneCalls {
         std::vector<Geometry> geometries;
         std::vector<PointRows> vertices;
         std::vector<FacesIn> faces;
+        std::vector<ShapeRows> shapes;
 
-        /// (mask, vertices, faces), or (mask, what traced() of a scene's core gave, transform).
+        /// What it is, the mask, and: vertices and faces; what traced() of a scene's core gave and
+        /// a transform; rows of spheres or capsules.
         void add(const nb::tuple& one) {
+            const auto kind = nb::cast<std::string>(one[0]);
             Geometry& geometry = geometries.emplace_back();
-            geometry.mask = nb::cast<std::uint32_t>(one[0]);
-            if (nb::isinstance<nb::capsule>(one[1])) {
+            geometry.mask = nb::cast<std::uint32_t>(one[1]);
+            if (kind == "instance") {
                 geometry.scene = static_cast<const BasicScene<T>*>(
-                    nb::cast<nb::capsule>(one[1]).data(scene_name<T>));
+                    nb::cast<nb::capsule>(one[2]).data(scene_name<T>));
                 geometry.transform =
-                    rows<typename Types::Transform>(nb::cast<TransformRow>(one[2]))[0];
-                return;
+                    rows<typename Types::Transform>(nb::cast<TransformRow>(one[3]))[0];
+            } else if (kind == "mesh") {
+                vertices.push_back(nb::cast<PointRows>(one[2]));
+                faces.push_back(nb::cast<FacesIn>(one[3]));
+                geometry.mesh = {rows<Point>(vertices.back()), rows<Triangle>(faces.back())};
+            } else {
+                shapes.push_back(nb::cast<ShapeRows>(one[2]));
+                if (kind == "capsules")
+                    geometry.capsules = shapes_of<typename Types::Capsule>(shapes.back());
+                else
+                    geometry.spheres = shapes_of<typename Types::Sphere>(shapes.back());
             }
-            vertices.push_back(nb::cast<PointRows>(one[1]));
-            faces.push_back(nb::cast<FacesIn>(one[2]));
-            geometry.mesh = {rows<Point>(vertices.back()), rows<Triangle>(faces.back())};
+        }
+        template <class Shape>
+        static std::span<const Shape> shapes_of(const ShapeRows& given) {
+            if (given.shape(1) * sizeof(T) != sizeof(Shape))
+                throw nb::value_error("a row has another length than the shape");
+            return rows<Shape>(given);
         }
     };
 

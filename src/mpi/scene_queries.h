@@ -34,7 +34,7 @@ struct SceneParts {
     const BasicScene<T>& scene;
     const TriangleNames& names;
     const RankTree<T>& tree;
-    double ray_error;          // the greatest of the extents of instances, on all ranks
+    double ray_error;          // the greatest of all shapes and instances, on all ranks
     std::uint32_t first_path;  // paths on the ranks before this one
     int threads;
 

@@ -106,15 +106,26 @@ def geometries_of(rank, dtype):
     inner.add_spheres(rng.uniform(-1, 1, (5, 3)), 0.1)
     inner.commit()
     place = np.array([[0.5, 0, 0, rank / 4], [0, 0.5, 0.1, 0], [0, 0, 0.5, 0.2]])
-    return [soup, {"geometry": box, "mask": 0x3}, {"geometry": (inner, place), "mask": 0x5}]
+    centers = rng.uniform(-1, 1, (8, 3))
+    return [
+        soup,
+        {"spheres": (centers, rng.uniform(0, 0.3, 8))},
+        {"geometry": box, "mask": 0x3},
+        {"capsules": (centers, centers[::-1], 0.05), "mask": 0x6},
+        {"geometry": (inner, place), "mask": 0x5},
+        {"points": (centers + 0.1, 0.1)},
+    ]
 
 
 def one_scene(dtype):
     scene = raydix.Scene(precision=dtype, threads=1)
     for rank in range(RANKS):
         for one in geometries_of(rank, dtype):
-            mask = one["mask"] if isinstance(one, dict) else raydix.mpi.ALL
-            scene.add(*(one["geometry"] if isinstance(one, dict) else one), mask=mask)
+            one = dict(one) if isinstance(one, dict) else {"geometry": one}
+            mask = one.pop("mask", 0xFFFFFFFF)
+            ((kind, arguments),) = one.items()
+            add = scene.add if kind == "geometry" else getattr(scene, f"add_{kind}")
+            add(*arguments, mask=mask)
     scene.commit()
     return scene
 
@@ -202,6 +213,10 @@ def check_errors():
         ([(zeros, [[0, 1, 4]])], ValueError, "geometries[0], faces: face 0"),
         ([mesh, (zeros,)], TypeError, "geometries[1]: "),
         ([{"geometry": mesh, "masks": 1}], TypeError, "geometries[0]: "),
+        ([{"spheres": (zeros, [1, 2])}], ValueError, "geometries[0], spheres: radii: "),
+        ([{"spheres": (zeros,)}], TypeError, "geometries[0], spheres: "),
+        ([{"points": (zeros, -1)}], ValueError, "geometries[0], points: radius: "),
+        ([{"spheres": (zeros, 1), "points": (zeros, 1)}], TypeError, "geometries[0]: "),
         ([{"geometry": mesh, "mask": -1}], ValueError, "geometries[0], mask: "),
         ([(raydix.Scene(precision="float64"), np.eye(4))], TypeError, "geometries[0]: "),
         ([(raydix.Scene(), np.eye(4))], raydix.InputError, ""),
