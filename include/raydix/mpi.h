@@ -198,14 +198,6 @@ struct BasicDistributedGeometry {
 using DistributedGeometry = BasicDistributedGeometry<float>;
 using DistributedGeometryD = BasicDistributedGeometry<double>;
 
-/// Of the rays of this rank.
-struct TraceOptions {
-    std::uint32_t mask = 0xFFFFFFFFu;           // of all of them
-    std::span<const std::uint32_t> masks = {};  // [rays], one for each ray instead; or empty
-    /// trace_all only: as QueryOptions::max_result_bytes.
-    std::uint64_t max_result_bytes = 0;
-};
-
 /// A raydix::Hit with a 64-bit prim. Paths to instances count from 1 through the ranks, in rank
 /// order; `geometry` of a hit in an instance is the id in the scene that stands there.
 template <class Scalar>
@@ -220,6 +212,22 @@ struct BasicDistributedHit {
 };
 using DistributedHit = BasicDistributedHit<float>;
 using DistributedHitD = BasicDistributedHit<double>;
+
+/// Says whether a hit counts, as raydix::HitFilter. It is called on the rank that holds what was
+/// hit, so all ranks give the same function, and the answer may depend on the arguments alone. tmax
+/// of the ray may be less than its caller gave: rays travel with their best hit so far.
+using DistributedFilter = std::function<bool(const Ray& ray, const DistributedHit& hit)>;
+using DistributedFilterD = std::function<bool(const RayD& ray, const DistributedHitD& hit)>;
+
+/// Of the rays of this rank.
+struct TraceOptions {
+    std::uint32_t mask = 0xFFFFFFFFu;           // of all of them
+    std::span<const std::uint32_t> masks = {};  // [rays], one for each ray instead; or empty
+    DistributedFilter filter = {};  // for a DistributedScene, on all ranks; empty: all hits count
+    DistributedFilterD filter_d = {};  // for a DistributedSceneD
+    /// trace_all only: as QueryOptions::max_result_bytes.
+    std::uint64_t max_result_bytes = 0;
+};
 
 /// A raydix::SceneClosestPoint with a 64-bit prim.
 template <class Scalar>
@@ -282,7 +290,8 @@ public:
     [[nodiscard]] const Holding& holding() const;
 
     /// Collective. The closest hit of each ray: the least (t, instance, geometry, prim), as
-    /// raydix::trace. Throws InputError: masks that are not as many as rays.
+    /// raydix::trace. Throws InputError: masks that are not as many as rays, a filter on some ranks
+    /// alone.
     [[nodiscard]] Answers<Hit, TraceCounts> trace(std::span<const Ray> rays,
                                                   const TraceOptions& options = {}) const;
     /// Collective. Whether each ray hits anything: 1 or 0.

@@ -424,7 +424,7 @@ auto BasicDistributedScene<Scalar>::trace(std::span<const Ray> rays,
     -> Answers<Hit, TraceCounts> {
     const GivenRays<Scalar> given{rays, options};
     return state_->template ask<ClosestHitKind<Scalar>, Answers<Hit, TraceCounts>>(
-        "trace", [&](auto& kind, auto& answers) {
+        given.name("trace"), [&](auto& kind, auto& answers) {
             given.check();
             kind.emplace(state_->parts(), given, answers);
         });
@@ -435,7 +435,7 @@ Answers<std::uint8_t, TraceCounts> BasicDistributedScene<Scalar>::trace_any(
     std::span<const Ray> rays, const TraceOptions& options) const {
     const GivenRays<Scalar> given{rays, options};
     return state_->template ask<AnyHitKind<Scalar>, Answers<std::uint8_t, TraceCounts>>(
-        "trace_any", [&](auto& kind, auto& answers) {
+        given.name("trace_any"), [&](auto& kind, auto& answers) {
             given.check();
             kind.emplace(state_->parts(), given, answers);
         });
@@ -466,7 +466,7 @@ HitRows<Scalar> BasicDistributedScene<Scalar>::trace_all(std::span<const Ray> ra
     RowStore<Hit> store("trace_all", rays.size(), options.max_result_bytes);
     AllHitsKind<Scalar> kind(state_->parts(), given, store);
     Call call(state_->comm, state_->options);
-    call.template begin<AllHitsKind<Scalar>>("trace_all", [&] { given.check(); });
+    call.template begin<AllHitsKind<Scalar>>(given.name("trace_all"), [&] { given.check(); });
     call.run(kind);
     call.finish([&] {
         store.finish(

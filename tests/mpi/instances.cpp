@@ -116,7 +116,8 @@ struct World {
             const auto lo = place();
             boxes.push_back({lo, {lo.x + 1, lo.y + 2, lo.z + 1}});
         }
-        spheres[3].radius = -1;  // left out
+        boxes[0] = {{0, 0, 0}, {1, 1, 1}};  // ties with a face of meshes
+        spheres[3].radius = -1;             // left out
         points[4].x = std::numeric_limits<T>::quiet_NaN();
         user.emplace(std::span<const Box>(boxes), Plates{boxes});
         for (std::size_t i = 0; i < 12; ++i) {
@@ -209,6 +210,12 @@ std::size_t different_hits(const auto& found, const auto& expected) {
     return different;
 }
 
+/// A filter that looks at all of a hit but its t.
+bool counts(const auto& ray, const auto& hit) {
+    return (hit.prim + 3 * hit.geometry + hit.instance) % 3 != 0 &&
+           (ray.direction.x > 0 || hit.u < decltype(hit.u)(0.5));
+}
+
 template <class T>
 void expect_same_rays(const BasicScene<T>& one, const BasicDistributedScene<T>& many,
                       std::span<const typename SceneTypes<T>::Ray> rays,
@@ -217,6 +224,12 @@ void expect_same_rays(const BasicScene<T>& one, const BasicDistributedScene<T>& 
     alone.threads = 1;
     alone.mask = options.mask;
     alone.masks = options.masks;
+    if (options.filter || options.filter_d) {
+        alone.filter = [](std::size_t, const Ray& ray, const Hit& hit) { return counts(ray, hit); };
+        alone.filter_d = [](std::size_t, const RayD& ray, const HitD& hit) {
+            return counts(ray, hit);
+        };
+    }
     EXPECT_EQ(different_hits<T>(many.trace(rays, options).values, trace(one, rays, alone)), 0u);
     std::vector<std::uint8_t> occluded(rays.size());
     trace_any(one, rays, std::span(occluded), alone);
@@ -305,6 +318,10 @@ TYPED_TEST(InstancesOverRanks, ShapesAnswerAsOneProcess) {
             TraceOptions masked;
             masked.mask = 2;
             expect_same_rays<T>(one, many, rays, masked);
+            TraceOptions filtered;
+            filtered.filter = [](const Ray& ray, const auto& hit) { return counts(ray, hit); };
+            filtered.filter_d = [](const RayD& ray, const auto& hit) { return counts(ray, hit); };
+            expect_same_rays<T>(one, many, rays, filtered);
         }
 }
 
@@ -399,6 +416,18 @@ TEST(InstancesOverRanks, WhatIsWrongIsSaidOnAll) {
                   (void)many.trace({&ray, 1}, options);
               }),
               "rank 0: 2 masks for 1 rays");
+    TraceOptions filtered;
+    filtered.filter = [](const Ray&, const DistributedHit&) -> bool {
+        throw InputError("not this one");
+    };
+    EXPECT_EQ(message_of([&] { (void)many.trace({&ray, 1}, filtered); }), "rank 0: not this one");
+    if (ranks() > 1) {
+        if (rank() == 0) filtered.filter = {};
+        EXPECT_EQ(message_of([&] {
+                      (void)many.trace_any({&ray, 1}, filtered);
+                  }),
+                  "the ranks differ: rank 0 calls trace_any, rank 1 calls trace_any, filtered");
+    }
 }
 
 }  // namespace
