@@ -29,7 +29,7 @@ struct InfoCommand : MpiOptions {
 
 /// The hash of the LBVH over the triangles of all ranks; with --verify also beside rank 0's.
 void add_tree_hash(SpreadModel& model, const InfoCommand& options, Json& document) {
-    if (model.triangles == 0) throw InputError(options.scene + ": points have no tree_hash");
+    if (model.triangles == 0) throw InputError(options.names() + ": points have no tree_hash");
     BuildOptions build;
     build.threads = options.common.threads;
     const std::string hash = mpi::tree_hash(MPI_COMM_WORLD, model.part, build);

@@ -452,6 +452,8 @@ FAULTS = [
           "ranks: shapes of a rank come before all meshes in ties", "mpi"),
     Fault("src/mpi/scene_queries.h", "return given_.filter()(ray, parts_.named(hit));", "return given_.filter()(ray, {});",
           "ranks: filters are told of no hit", "mpi"),
+    Fault("src/mpi/file_parts.cpp", "            before += count;\n", "",
+          "ranks: of several files each begins where the first does", "mpi"),
     Fault("src/mpi/spread_lbvh.h", "begins || one.prefix < stretches.back().prefix", "begins || one.prefix > stretches.back().prefix",
           "ranks: nodes of the LBVH end at the wrong split of another rank", "mpi"),
     Fault("src/mpi/tree_hash.cpp", "skipped = node->count - 1;", "skipped = 0;",

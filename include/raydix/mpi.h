@@ -330,7 +330,7 @@ using DistributedSceneD = BasicDistributedScene<double>;
 struct FilePart {
     Mesh mesh;                                  // a run of triangles and the vertices they use; or
                                                 // a run of points
-    std::uint64_t vertices = 0, triangles = 0;  // of the whole file
+    std::uint64_t vertices = 0, triangles = 0;  // of the whole file, or of all files
 };
 
 /// Collective. Each rank reads its part of a file by offset: equal runs of triangles, or of points
@@ -340,6 +340,10 @@ struct FilePart {
 /// file. Throws InputError that names the file: one that cannot be read, a header that is broken, a
 /// face with a vertex that is not there.
 [[nodiscard]] std::optional<FilePart> load_part(MPI_Comm comm, const std::filesystem::path& file);
+/// The same of several files, one after the other: their triangles, or points where none has any,
+/// count through. Every rank reads the head of each file.
+[[nodiscard]] std::optional<FilePart> load_part(MPI_Comm comm,
+                                                std::span<const std::filesystem::path> files);
 
 /// Collective. raydix::tree_hash of the tree that build_bvh makes of one mesh: the triangles of all
 /// ranks in rank order. The ranks sort them along one Morton curve and make the nodes that begin on

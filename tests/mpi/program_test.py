@@ -127,6 +127,12 @@ class Answers(Mpi):
                 self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
                 self.assertIn("each rank reads its part of", done.stdout)
                 self.assertEqual("have the bits of one process" in done.stdout, "--verify" in arguments)
+        done = self.run_on(3, "trace", str(mesh), self.scene(), str(mesh), "--size", "24x16", "--verify")
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn("rank 0 reads all of", done.stdout)
+        done = self.run_on(3, "info", str(mesh), str(mesh), "--verify")
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn(f"holding      {2 * len(faces)} triangles", done.stdout)
 
     def test_pictures_have_the_bytes_of_raydix_render(self):
         alone, many = self.folder / "alone.png", self.folder / "many.png"
