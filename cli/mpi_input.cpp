@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <optional>
 #include <unordered_map>
 #include <utility>
@@ -55,6 +56,12 @@ Json sum_and_most(std::uint64_t value) {
 
 }  // namespace
 
+std::string MpiOptions::names() const {
+    std::string names = scene;
+    for (const std::string& file : more) names.append(", ").append(file);
+    return names;
+}
+
 mpi::Options MpiOptions::options() const {
     mpi::Options chosen;
     chosen.partition = partition == "curve" ? mpi::Partition::curve : mpi::Partition::as_given;
@@ -73,6 +80,7 @@ mpi::SceneOptions MpiOptions::scene_options() const {
 void add_mpi_options(CLI::App& command, MpiOptions& options) {
     add_common_options(command, options.common);
     command.add_option("scene", options.scene, "File or built-in scene")->required();
+    command.add_option("more", options.more, "More files, whose elements count on as one mesh");
     command.add_option("--partition", options.partition, "Which rank holds what")
         ->check(CLI::IsMember({"curve", "as_given"}))
         ->capture_default_str();
@@ -88,14 +96,16 @@ SpreadModel spread_model(const MpiOptions& options) {
     SpreadModel model;
     const bool says = options.common.prints_tables() && mpi_rank() == 0 && mpi_ranks() > 1;
     const bool is_builtin = options.scene.rfind("builtin:", 0) == 0;
-    auto read = is_builtin ? std::nullopt : mpi::load_part(MPI_COMM_WORLD, options.scene);
+    std::vector<std::filesystem::path> files{options.scene};
+    files.insert(files.end(), options.more.begin(), options.more.end());
+    auto read = is_builtin ? std::nullopt : mpi::load_part(MPI_COMM_WORLD, files);
     if (read) {
-        if (says) fmt::print("reading      each rank reads its part of {}\n", options.scene);
+        if (says) fmt::print("reading      each rank reads its part of {}\n", options.names());
         model.part = std::move(read->mesh);
         model.triangles = read->triangles;
         return model;
     }
-    if (says) fmt::print("reading      rank 0 reads all of {} and scatters it\n", options.scene);
+    if (says) fmt::print("reading      rank 0 reads all of {} and scatters it\n", options.names());
     read_whole(model, options);
     model.triangles = mpi_rank() == 0 ? model.whole.mesh().triangles.size() : 0;
     MPI_Bcast(&model.triangles, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
@@ -110,14 +120,19 @@ SpreadModel spread_model(const MpiOptions& options) {
 
 void read_whole(SpreadModel& model, const MpiOptions& options) {
     if (model.is_whole_read) return;
-    on_first([&] { model.whole = load_flat_model(options.scene, options.common.seed); });
+    on_first([&] {
+        model.whole = load_flat_model(options.scene, options.common.seed);
+        for (const std::string& file : options.more)
+            model.whole.meshes.push_back(load_flat_model(file, options.common.seed).mesh());
+        if (!options.more.empty()) model.whole.flatten();
+    });
     model.is_whole_read = true;
 }
 
 Json mpi_document(const std::string& command, const MpiOptions& options) {
     Json document = new_document(command);
     document["ranks"] = mpi_ranks();
-    document["scene"] = options.scene;
+    document["scene"] = options.names();
     document["partition"] = options.partition;
     return document;
 }

@@ -16,9 +16,12 @@ namespace raydix::cli {
 struct MpiOptions {
     CommonOptions common;
     std::string scene, partition = "curve";
+    std::vector<std::string> more;  // files behind `scene`
     std::uint64_t exchange_bytes = std::uint64_t{64} << 20;
     bool verify = false;
 
+    /// All files, for messages.
+    [[nodiscard]] std::string names() const;
     [[nodiscard]] mpi::Options options() const;
     [[nodiscard]] mpi::SceneOptions scene_options() const;
 };
@@ -33,7 +36,8 @@ struct SpreadModel {
 
 /// Collective. Says who reads. Triangles, or else points, come in equal runs.
 [[nodiscard]] SpreadModel spread_model(const MpiOptions& options);
-/// Collective. For what rank 0 does alone: it reads all of the file unless it has.
+/// Collective. For what rank 0 does alone: it reads all of the files unless it has. Cameras are
+/// those of the first.
 void read_whole(SpreadModel& model, const MpiOptions& options);
 
 /// {command, version, machine, ranks, partition}.

@@ -81,6 +81,8 @@ void show_progress(Shot& shot, Progress& progress) {
 Rendered render_replicated(const MpiRenderCommand& command) {
     Rendered rendered;
     on_each([&] {
+        if (!command.more.empty())
+            throw InputError("render: several files need --distributed; given " + command.names());
         const Model model = load_model(command.scene, command.common.seed);
         rendered.shot = shot_of(command, model);
         SceneOptions options;

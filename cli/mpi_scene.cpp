@@ -1,6 +1,7 @@
 // raydix mpi info and trace.
 #include <fmt/format.h>
 #include <raydix/arrays.h>
+#include <raydix/bvh.h>
 #include <raydix/rays.h>
 
 #include <cstring>
@@ -22,8 +23,28 @@ void print_holding(const Json& holding, const char* elements) {
                holding["replicated_bytes"].get<std::uint64_t>());
 }
 
-void run_info(const MpiOptions& options) {
-    const SpreadModel model = spread_model(options);
+struct InfoCommand : MpiOptions {
+    bool with_hash = false;
+};
+
+/// The hash of the LBVH over the triangles of all ranks; with --verify also beside rank 0's.
+void add_tree_hash(SpreadModel& model, const InfoCommand& options, Json& document) {
+    if (model.triangles == 0) throw InputError(options.names() + ": points have no tree_hash");
+    BuildOptions build;
+    build.threads = options.common.threads;
+    const std::string hash = mpi::tree_hash(MPI_COMM_WORLD, model.part, build);
+    document["tree_hash"] = hash;
+    if (options.common.prints_tables() && mpi_rank() == 0) fmt::print("hash         {}\n", hash);
+    if (!options.verify) return;
+    read_whole(model, options);
+    on_first([&] {
+        require_verified(tree_hash(build_bvh(model.whole.mesh(), build)) == hash,
+                         "the nodes of the LBVH", options.common.prints_tables());
+    });
+}
+
+void run_info(const InfoCommand& options) {
+    SpreadModel model = spread_model(options);
     Json document = mpi_document("mpi info", options);
     if (model.triangles == 0) {
         const mpi::DistributedPoints points(MPI_COMM_WORLD, model.part.vertices, options.options());
@@ -37,8 +58,10 @@ void run_info(const MpiOptions& options) {
     on_first([&] {
         if (options.common.prints_tables())
             print_holding(document["holding"], model.triangles == 0 ? "points" : "triangles");
-        write_json(document, options.common);
     });
+    if (options.with_hash || options.verify) add_tree_hash(model, options, document);
+    document["verified"] = options.verify;
+    on_first([&] { write_json(document, options.common); });
 }
 
 struct TraceCommand : MpiOptions {
@@ -170,8 +193,11 @@ void run_trace(const TraceCommand& options) {
 
 void add_mpi_info(CLI::App& app) {
     CLI::App* command = app.add_subcommand("info", "Which rank holds how much of a scene");
-    auto options = std::make_shared<MpiOptions>();
+    auto options = std::make_shared<InfoCommand>();
     add_mpi_options(*command, *options);
+    command->add_flag("--tree-hash", options->with_hash,
+                      "The hash of the LBVH over the triangles of all ranks, as raydix build "
+                      "--builder karras prints it; --verify does it too");
     command->callback([options] { run_info(*options); });
 }
 

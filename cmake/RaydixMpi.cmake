@@ -26,4 +26,4 @@ endif()
 add_library(raydix::mpi ALIAS raydix_mpi)
 target_include_directories(raydix_mpi PRIVATE ${PROJECT_SOURCE_DIR}/src)
 target_link_libraries(raydix_mpi PUBLIC raydix MPI::MPI_CXX
-    PRIVATE $<BUILD_INTERFACE:raydix_options>)
+    PRIVATE $<BUILD_INTERFACE:raydix_options> $<BUILD_INTERFACE:fmt::fmt> $<BUILD_INTERFACE:PkgConfig::XXHASH>)

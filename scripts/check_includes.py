@@ -54,7 +54,7 @@ PRIVATE_LIBRARIES = {
     r"gtest/.*|gmock/.*": r"tests/.*",
     r"nanobind/.*": r"python/.*",
     r"CLI/.*": r"(cli|bench)/.*",
-    r"mpi\.h": r"include/raydix/mpi\.h|(src|tests)/mpi/.*|cli/mpi_.*|examples/mpi_.*",
+    r"mpi\.h": r"include/raydix/mpi\.h|(src|tests)/mpi/.*|cli/mpi_.*|examples/mpi_.*|python/src/mpi_.*",
 }
 MAX_LINES = 700
 SUFFIXES = {".h", ".cpp", ".cu", ".cuh"}

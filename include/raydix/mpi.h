@@ -13,6 +13,7 @@
 
 #include <mpi.h>
 #include <raydix/buffer.h>
+#include <raydix/bvh.h>
 #include <raydix/error.h>
 #include <raydix/mesh.h>
 #include <raydix/picture.h>
@@ -29,6 +30,7 @@
 #include <optional>
 #include <span>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace raydix::mpi {
@@ -171,27 +173,30 @@ struct SceneOptions : Options {
     Quality quality = Quality::balanced;  // of the tree on each rank. Hits do not depend on it
 };
 
-/// What a rank gives of a scene: a mesh, or an instance of a scene that it holds. An instance stays
-/// on that rank.
+/// What a rank gives of a scene: one of a mesh, shapes, geometry of the caller's own, and an
+/// instance of a scene that the rank holds. Without any it only takes a number. All but triangles
+/// of meshes stay on that rank.
 template <class Scalar>
 struct BasicDistributedGeometry {
-    typename SceneTypes<Scalar>::MeshView mesh{};
-    /// Not null: an instance of this scene as its last commit left it; `mesh` is then empty. It
-    /// need not outlive the construction.
+    using Types = SceneTypes<Scalar>;
+
+    typename Types::MeshView mesh{};
+    /// Not null: an instance of this scene as its last commit left it. It need not outlive the
+    /// construction.
     const BasicScene<Scalar>* scene = nullptr;
-    typename SceneTypes<Scalar>::Transform transform{};  // of an instance
-    std::uint32_t mask = 0xFFFFFFFFu;                    // as GeometryOptions::mask
+    typename Types::Transform transform{};  // of an instance
+    std::uint32_t mask = 0xFFFFFFFFu;       // as GeometryOptions::mask
+    // As Scene::add takes them.
+    std::span<const typename Types::Sphere> spheres = {};
+    std::span<const typename Types::Capsule> capsules = {};
+    std::span<const typename Types::Point> points = {};
+    Scalar radius = 0;  // of points
+    /// Not null: geometry whose test answers by the ray alone. The place of a ray that it is told
+    /// has no meaning here.
+    const BasicUserGeometry<Scalar>* user = nullptr;
 };
 using DistributedGeometry = BasicDistributedGeometry<float>;
 using DistributedGeometryD = BasicDistributedGeometry<double>;
-
-/// Of the rays of this rank.
-struct TraceOptions {
-    std::uint32_t mask = 0xFFFFFFFFu;           // of all of them
-    std::span<const std::uint32_t> masks = {};  // [rays], one for each ray instead; or empty
-    /// trace_all only: as QueryOptions::max_result_bytes.
-    std::uint64_t max_result_bytes = 0;
-};
 
 /// A raydix::Hit with a 64-bit prim. Paths to instances count from 1 through the ranks, in rank
 /// order; `geometry` of a hit in an instance is the id in the scene that stands there.
@@ -207,6 +212,22 @@ struct BasicDistributedHit {
 };
 using DistributedHit = BasicDistributedHit<float>;
 using DistributedHitD = BasicDistributedHit<double>;
+
+/// Says whether a hit counts, as raydix::HitFilter. It is called on the rank that holds what was
+/// hit, so all ranks give the same function, and the answer may depend on the arguments alone. tmax
+/// of the ray may be less than its caller gave: rays travel with their best hit so far.
+using DistributedFilter = std::function<bool(const Ray& ray, const DistributedHit& hit)>;
+using DistributedFilterD = std::function<bool(const RayD& ray, const DistributedHitD& hit)>;
+
+/// Of the rays of this rank.
+struct TraceOptions {
+    std::uint32_t mask = 0xFFFFFFFFu;           // of all of them
+    std::span<const std::uint32_t> masks = {};  // [rays], one for each ray instead; or empty
+    DistributedFilter filter = {};  // for a DistributedScene, on all ranks; empty: all hits count
+    DistributedFilterD filter_d = {};  // for a DistributedSceneD
+    /// trace_all only: as QueryOptions::max_result_bytes.
+    std::uint64_t max_result_bytes = 0;
+};
 
 /// A raydix::SceneClosestPoint with a 64-bit prim.
 template <class Scalar>
@@ -238,7 +259,7 @@ struct HitRows {
     CallReport report;
 };
 
-/// Triangle meshes and instances spread over ranks, asked as a raydix::Scene of all of them.
+/// Meshes, shapes and instances spread over ranks, asked as a raydix::Scene of all of them.
 /// Move-only. To destroy it is collective too, while MPI runs.
 template <class Scalar>
 class BasicDistributedScene {
@@ -254,7 +275,8 @@ public:
     /// Collective. The meshes are copied. One without triangles only takes a number. Triangles that
     /// are not finite or out of range are left out and counted. Throws InputError: an index past
     /// the vertices, 2^31 triangles or more on one rank, 2^32 - 2 geometries or paths or more on
-    /// all, an option out of range, and as Scene::add and Scene::commit for instances.
+    /// all, an option out of range, a geometry that is several things, shapes with one_geometry,
+    /// and as Scene::add and Scene::commit.
     BasicDistributedScene(MPI_Comm comm, std::span<const Geometry> geometries,
                           const SceneOptions& options = {});
     /// The same of meshes alone, which all rays see.
@@ -264,11 +286,12 @@ public:
     BasicDistributedScene(BasicDistributedScene&&) noexcept;
     BasicDistributedScene& operator=(BasicDistributedScene&&) noexcept;
 
-    /// Elements are triangles of meshes, those of instances left out.
+    /// Elements are triangles and shapes, those of instances left out.
     [[nodiscard]] const Holding& holding() const;
 
     /// Collective. The closest hit of each ray: the least (t, instance, geometry, prim), as
-    /// raydix::trace. Throws InputError: masks that are not as many as rays.
+    /// raydix::trace. Throws InputError: masks that are not as many as rays, a filter on some ranks
+    /// alone.
     [[nodiscard]] Answers<Hit, TraceCounts> trace(std::span<const Ray> rays,
                                                   const TraceOptions& options = {}) const;
     /// Collective. Whether each ray hits anything: 1 or 0.
@@ -280,7 +303,7 @@ public:
                                             const TraceOptions& options = {}) const;
     /// Collective. The closest point of all triangles to each query, as raydix::closest_points. All
     /// ranks give the same max_distance and mask. Throws InputError if max_distance is negative or
-    /// NaN, and if the mask shows an instance of spheres or other shapes.
+    /// NaN, and if the mask shows spheres or other shapes.
     [[nodiscard]] Answers<Closest, ClosestCounts> closest_points(
         std::span<const Point> queries, Scalar max_distance = infinity,
         std::uint32_t mask = 0xFFFFFFFFu) const;
@@ -307,7 +330,7 @@ using DistributedSceneD = BasicDistributedScene<double>;
 struct FilePart {
     Mesh mesh;                                  // a run of triangles and the vertices they use; or
                                                 // a run of points
-    std::uint64_t vertices = 0, triangles = 0;  // of the whole file
+    std::uint64_t vertices = 0, triangles = 0;  // of the whole file, or of all files
 };
 
 /// Collective. Each rank reads its part of a file by offset: equal runs of triangles, or of points
@@ -317,6 +340,19 @@ struct FilePart {
 /// file. Throws InputError that names the file: one that cannot be read, a header that is broken, a
 /// face with a vertex that is not there.
 [[nodiscard]] std::optional<FilePart> load_part(MPI_Comm comm, const std::filesystem::path& file);
+/// The same of several files, one after the other: their triangles, or points where none has any,
+/// count through. Every rank reads the head of each file.
+[[nodiscard]] std::optional<FilePart> load_part(MPI_Comm comm,
+                                                std::span<const std::filesystem::path> files);
+
+/// Collective. raydix::tree_hash of the tree that build_bvh makes of one mesh: the triangles of all
+/// ranks in rank order. The ranks sort them along one Morton curve and make the nodes that begin on
+/// each; rank 0 hashes their words, rank by rank. All ranks give the same options, `threads` aside.
+/// Throws InputError: a builder whose trees do not follow from sorted codes alone (not karras,
+/// lauterbach, garanzha or apetrei, or with reinsertion), 2^31 triangles or more on all ranks, and
+/// as build_bvh.
+[[nodiscard]] std::string tree_hash(MPI_Comm comm, const MeshView& mesh,
+                                    const BuildOptions& options = {});
 
 /// Collective. Renders a scene that every rank holds whole, as raydix::render: the ranks take parts
 /// of the picture from a shared counter until none is left. Rank 0 gets the picture, with the bits

@@ -47,7 +47,7 @@ def mesh_of(source: Any) -> tuple[Any, Any]:
     )
 
 
-def _transforms(value: Any, dtype: np.dtype) -> tuple[np.ndarray, bool]:
+def transforms(value: Any, dtype: np.dtype) -> tuple[np.ndarray, bool]:
     """(M, 12) of `dtype`, and whether there was one alone."""
     array = to_numpy(value, "transform")
     expected = "transform: expected shape (3, 4), (4, 4), (M, 3, 4) or (M, 4, 4)"
@@ -90,6 +90,27 @@ def _with_radii(radii: Any, *points: np.ndarray) -> np.ndarray:
     if given.shape not in ((), (count,)):
         raise ValueError(f"{expected}, given {describe(given)}")
     return np.column_stack((*points, np.broadcast_to(cast(given, points[0].dtype), count)))
+
+
+def sphere_rows(centers: ArrayLike, radii: ArrayLike, dtype: np.dtype) -> np.ndarray:
+    """Centers and radii, (N, 4)."""
+    return _with_radii(radii, _points(centers, "centers", dtype))
+
+
+def capsule_rows(
+    starts: ArrayLike, ends: ArrayLike, radii: ArrayLike, dtype: np.dtype
+) -> np.ndarray:
+    """Both ends and radii, (N, 7)."""
+    first, last = _points(starts, "starts", dtype), _points(ends, "ends", dtype)
+    if first.shape != last.shape:
+        raise ValueError(f"ends: expected shape {first.shape}, given {describe(last)}")
+    return _with_radii(radii, first, last)
+
+
+def point_rows(points: ArrayLike, radius: Any, dtype: np.dtype) -> np.ndarray:
+    """Points and their one radius, (N, 4)."""
+    given = _points(points, "points", dtype)
+    return _with_radii(np.asarray(_radius(radius), dtype), given)
 
 
 def _radius(value: Any) -> float:
@@ -169,7 +190,7 @@ class SceneContents:
         require_dtype(source, self.dtype, "scene")
         if where is None:
             raise TypeError("transform: expected shape (3, 4) or (4, 4), given None")
-        rows, one = _transforms(where, self.dtype)
+        rows, one = transforms(where, self.dtype)
         if wanted is not None and not one:
             raise ValueError(f"id: expected None for {len(rows)} transforms, given {id!r}")
         masks = _one_or_many(mask, "mask")
@@ -232,13 +253,10 @@ class SceneContents:
         self._core.update_points(whole(id, "id", 0, ALL), made, _radius(radius))
 
     def _spheres(self, centers: ArrayLike, radii: ArrayLike) -> np.ndarray:
-        return _with_radii(radii, _points(centers, "centers", self.dtype))
+        return sphere_rows(centers, radii, self.dtype)
 
     def _capsules(self, starts: ArrayLike, ends: ArrayLike, radii: ArrayLike) -> np.ndarray:
-        first, last = _points(starts, "starts", self.dtype), _points(ends, "ends", self.dtype)
-        if first.shape != last.shape:
-            raise ValueError(f"ends: expected shape {first.shape}, given {describe(last)}")
-        return _with_radii(radii, first, last)
+        return capsule_rows(starts, ends, radii, self.dtype)
 
     def update(self, id: int, vertices: ArrayLike, faces: ArrayLike | None = None) -> None:
         """Gives a mesh other vertices, shape (V, 3), and other `faces`, or those that it has. Rays
@@ -264,7 +282,7 @@ class SceneContents:
         InputError: no such geometry, a mesh, a transform that is singular or not finite; then none
         of them has moved.
         """
-        rows, _ = _transforms(transform, self.dtype)
+        rows, _ = transforms(transform, self.dtype)
         ids = _one_or_many(id, "id")
         if len(ids) != len(rows):
             raise ValueError(f"transform: expected {len(ids)}, one for each id, given {len(rows)}")

@@ -33,6 +33,7 @@
 #include "one_ray.h"
 #include "ray_parts.h"
 #include "scene_changes.h"
+#include "scene_handle.h"
 #include "scene_queries.h"
 #include "scene_trees.h"
 #include "scene_views.h"
@@ -425,6 +426,10 @@ void bind_asking(nb::class_<Scene>& scene) {
         return reading(self, [&] { return self.mask_of(id); });
     });
     scene.def("arrays_of", &arrays_of<Scene>);
+    scene.def("traced", [](Scene& self) -> nb::object {
+        return nb::capsule(reading(self, [&] { return &self.traced(); }),
+                           scene_name<Scalar<Scene>>);
+    });
     scene.def("hit_of", &hit_of<Scene>, nb::arg("origin"), nb::arg("direction"), nb::arg("row"));
     scene.def("positions", &positions_of<Scene>, nb::arg("hits").noconvert(),
               nb::arg("rays").noconvert().none(), nb::arg("points").noconvert(),

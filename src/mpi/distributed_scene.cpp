@@ -1,15 +1,19 @@
-// Meshes and instances spread over ranks: partition, a scene of raydix on each rank, a tree over
-// the boxes of all; then queries in rounds.
+// Meshes, shapes and instances spread over ranks: partition, a scene of raydix on each rank, a tree
+// over the boxes of all; then queries in rounds.
 #include <raydix/error.h>
 #include <raydix/mpi.h>
 #include <raydix/result_limit.h>
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "base/options.h"
 #include "engine/flat_scene.h"
 #include "engine/scene_state.h"
+#include "engine/shape_tree.h"
 #include "mpi/call.h"
 #include "mpi/curve.h"
 #include "mpi/inside_query.h"
@@ -40,7 +44,7 @@ struct BasicDistributedScene<Scalar>::State {
         keep_error(error, [&] {
             clock.run([&] {
                 if (options.partition == Partition::curve)
-                    hold_moved(moved, given);
+                    hold_moved(moved, given, firsts);
                 else
                     hold_as_given(given, firsts);
                 moved = {};
@@ -57,15 +61,16 @@ struct BasicDistributedScene<Scalar>::State {
         agree(comm, error);
         tree = RankTree<Scalar>(comm, boxes);
         comm.reduce(&ray_error, 1, MPI_MAX);
+        has_others = committed.paths != 0 || committed.shapes != 0;
         holding.paths = committed.paths;
         holding.first_path = comm.sum_before(committed.paths);
         require_few(committed.paths, "paths to instances");
         bounds = joined(scene.bounds());
-        std::uint64_t sums[2] = {committed.triangles, committed.left_out};
+        holding.local = committed.triangles + committed.primitives;
+        std::uint64_t sums[2] = {holding.local, committed.left_out};
         comm.reduce(sums, 2, MPI_SUM);
         holding.size = sums[0];
         holding.left_out = sums[1];
-        holding.local = committed.triangles;
         holding.replicated_bytes = tree.bytes();
         holding.bytes = committed.bytes + names.bytes() + tree.bytes();
         holding.report.traffic = comm.traffic();
@@ -77,9 +82,7 @@ struct BasicDistributedScene<Scalar>::State {
         std::uint64_t triangles = 0;
         for (std::size_t m = 0; m < given.size(); ++m) {
             const MeshView& mesh = given[m].mesh;
-            if (given[m].scene != nullptr && !mesh.triangles.empty())
-                throw InputError("geometry " + std::to_string(m) +
-                                 " has a scene and a mesh; it can be one of them");
+            check_kind(given[m], m);
             triangles += mesh.triangles.size();
             for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
                 for (const std::uint32_t v : mesh.triangles[i])
@@ -91,6 +94,29 @@ struct BasicDistributedScene<Scalar>::State {
         if (triangles > std::uint64_t(std::numeric_limits<std::int32_t>::max()))
             throw InputError(std::to_string(triangles) +
                              " triangles; a rank holds fewer than 2^31");
+    }
+
+    /// One thing, and one that options.one_geometry knows a number for.
+    void check_kind(const Geometry& given, std::size_t m) const {
+        const std::pair<bool, const char*> kinds[] = {
+            {given.scene != nullptr, "a scene"}, {!given.mesh.triangles.empty(), "a mesh"},
+            {!given.spheres.empty(), "spheres"}, {!given.capsules.empty(), "capsules"},
+            {!given.points.empty(), "points"},   {given.user != nullptr, "user geometry"}};
+        const char* first = nullptr;
+        for (const auto& kind : kinds) {
+            if (!kind.first) continue;
+            if (first != nullptr)
+                throw InputError("geometry " + std::to_string(m) + " has " + first + " and " +
+                                 kind.second + "; it can be one of them");
+            first = kind.second;
+        }
+        if (options.one_geometry && has_shapes(given))
+            throw InputError("geometry " + std::to_string(m) + " has " + first +
+                             "; with one_geometry there are meshes and instances alone");
+    }
+    static bool has_shapes(const Geometry& given) {
+        return !given.spheres.empty() || !given.capsules.empty() || !given.points.empty() ||
+               given.user != nullptr;
     }
 
     /// Collective. Throws InputError on all ranks if they have too many together for 32 bits.
@@ -157,47 +183,76 @@ struct BasicDistributedScene<Scalar>::State {
         return triangles;
     }
 
+    static GeometryOptions masked(std::uint32_t mask) {
+        GeometryOptions options;
+        options.mask = mask;
+        return options;
+    }
+
     void add_instance(const Geometry& given) {
-        GeometryOptions of_instance;
-        of_instance.mask = given.mask;
-        scene.add(*given.scene, given.transform, of_instance);
+        scene.add(*given.scene, given.transform, masked(given.mask));
         names.skip();
+    }
+
+    void add_shapes(const Geometry& given, TriangleName first) {
+        if (given.user != nullptr)
+            scene.add(*given.user, masked(given.mask));
+        else if (!given.spheres.empty())
+            scene.add(given.spheres, masked(given.mask));
+        else if (!given.capsules.empty())
+            scene.add(given.capsules, masked(given.mask));
+        else
+            scene.add(given.points, given.radius, masked(given.mask));
+        names.add_mesh(first);
     }
 
     void hold_as_given(std::span<const Geometry> given, const std::vector<TriangleName>& firsts) {
         for (std::size_t m = 0; m < given.size(); ++m) {
             if (given[m].scene != nullptr) {
                 add_instance(given[m]);
-                continue;
+            } else if (has_shapes(given[m])) {
+                add_shapes(given[m], firsts[m]);
+            } else {
+                scene.add(given[m].mesh.triangles.empty() ? MeshView() : given[m].mesh,
+                          masked(given[m].mask));
+                names.add_mesh(firsts[m]);
             }
-            GeometryOptions of_mesh;
-            of_mesh.mask = given[m].mask;
-            scene.add(given[m].mesh.triangles.empty() ? MeshView() : given[m].mesh, of_mesh);
-            names.add_mesh(firsts[m]);
         }
     }
 
-    /// Runs of one mask, so that ids here are in the order of names: ties go as they do in the
-    /// whole. Instances come later in ties anyway.
-    void hold_moved(const Triangles& triangles, std::span<const Geometry> given) {
-        for (std::size_t begin = 0, end = 0; begin < triangles.size(); begin = end) {
+    /// As meshes of one mask each, and shapes between them, so that ids here are in the order of
+    /// names: ties go as they do in the whole. Instances come later in ties anyway.
+    void hold_moved(const Triangles& triangles, std::span<const Geometry> given,
+                    const std::vector<TriangleName>& firsts) {
+        std::size_t held = 0;
+        for (std::size_t m = 0; m < given.size(); ++m) {
+            if (!has_shapes(given[m])) continue;
+            hold_meshes(triangles, held, firsts[m].geometry);
+            add_shapes(given[m], firsts[m]);
+        }
+        hold_meshes(triangles, held, no_primitive);
+        for (const Geometry& one : given)
+            if (one.scene != nullptr) add_instance(one);
+    }
+    /// Triangles from `begin` on, up to those of the whole's geometry `limit`; moves `begin` there.
+    void hold_meshes(const Triangles& triangles, std::size_t& begin, std::uint32_t limit) {
+        const auto is_before = [&](std::size_t i) {
+            return i < triangles.size() && triangles[i].name.geometry < limit;
+        };
+        while (is_before(begin)) {
+            const std::uint32_t mask = triangles[begin].mask;
             Mesh mesh;
             std::vector<TriangleName> of_mesh;
-            for (end = begin;
-                 end < triangles.size() && triangles[end].mask == triangles[begin].mask; ++end) {
-                const auto& corners = triangles[end].corners;
+            for (; is_before(begin) && triangles[begin].mask == mask; ++begin) {
+                const auto& corners = triangles[begin].corners;
                 const auto v = static_cast<std::uint32_t>(mesh.vertices.size());
                 mesh.vertices.insert(mesh.vertices.end(), corners, corners + 3);
                 mesh.triangles.push_back({v, v + 1, v + 2});
-                of_mesh.push_back(triangles[end].name);
+                of_mesh.push_back(triangles[begin].name);
             }
-            GeometryOptions with_mask;
-            with_mask.mask = triangles[begin].mask;
-            scene.add(mesh, with_mask);
+            scene.add(mesh, masked(mask));
             names.add_mesh(of_mesh);
         }
-        for (const Geometry& one : given)
-            if (one.scene != nullptr) add_instance(one);
     }
 
     static Box box_of(const MovingTriangle<Scalar>& t) {
@@ -220,7 +275,7 @@ struct BasicDistributedScene<Scalar>::State {
         return scene.commit(of_scene);
     }
 
-    /// Of all triangles, and of all instances with what rays may miss them by.
+    /// Of all triangles, and of all shapes and instances with what rays may miss them by.
     std::vector<Box> boxes_of_scene() {
         std::vector<Box> boxes;
         for (const std::uint32_t id : scene.ids()) {
@@ -231,13 +286,37 @@ struct BasicDistributedScene<Scalar>::State {
                                                        mesh->vertices[t[2]]));
         }
         const auto& committed = *BasicSceneInternals<Scalar>::tree(scene);
-        for (std::size_t i = committed.own_part_count(); i < committed.extents.size(); ++i) {
-            const auto& [box, error] = committed.extents[i];
-            if (!(box.lo.x <= box.hi.x)) continue;
-            boxes.push_back({{box.lo.x, box.lo.y, box.lo.z}, {box.hi.x, box.hi.y, box.hi.z}});
-            ray_error = std::max(ray_error, error);
+        const auto add = [&](const typename Types::Box& box) {
+            if (box.lo.x <= box.hi.x)
+                boxes.push_back({{box.lo.x, box.lo.y, box.lo.z}, {box.hi.x, box.hi.y, box.hi.z}});
+        };
+        for (std::size_t i = committed.meshes.size(); i < committed.extents.size(); ++i) {
+            const auto& extent = committed.extents[i];
+            if (extent.box.lo.x <= extent.box.hi.x) ray_error = std::max(ray_error, extent.error);
+            if (i >= committed.own_part_count())
+                add(extent.box);
+            else
+                add_boxes_of(*committed.shapes[i - committed.meshes.size()], extent.box, add);
         }
         return boxes;
+    }
+    /// Of each shape, as much larger as the box around all of them is than it need be.
+    template <class Shapes, class Add>
+    static void add_boxes_of(const Shapes& shapes, const typename Types::Box& widened,
+                             const Add& add) {
+        const typename Types::Box& tight = shapes.bounds;
+        const Scalar most = std::numeric_limits<Scalar>::max();
+        const Scalar by =
+            std::nextafter(std::max({tight.lo.x - widened.lo.x, tight.lo.y - widened.lo.y,
+                                     tight.lo.z - widened.lo.z, widened.hi.x - tight.hi.x,
+                                     widened.hi.y - tight.hi.y, widened.hi.z - tight.hi.z}),
+                           most);
+        const auto below = [&](Scalar x) { return std::nextafter(x - by, -most); };
+        const auto above = [&](Scalar x) { return std::nextafter(x + by, most); };
+        for (const auto& box : boxes_of<Scalar>(shapes.shapes))
+            if (is_in_range(box.lo) && is_in_range(box.hi))  // others are left out
+                add({{below(box.lo.x), below(box.lo.y), below(box.lo.z)},
+                     {above(box.hi.x), above(box.hi.y), above(box.hi.z)}});
     }
 
     /// Around what all ranks hold.
@@ -264,9 +343,9 @@ struct BasicDistributedScene<Scalar>::State {
             options.threads};
     }
 
-    /// Throws InputError for shapes of instances: their d2 do not follow from the points alone.
+    /// Throws InputError for shapes: their d2 do not follow from the points alone.
     void require_triangles(std::uint32_t mask) const {
-        if (holding.paths != 0)
+        if (has_others)
             static_cast<void>(
                 FlatPlan<Scalar>(scene, mask, "closest_points of a distributed scene"));
     }
@@ -293,7 +372,8 @@ struct BasicDistributedScene<Scalar>::State {
     TriangleNames names;
     RankTree<Scalar> tree;
     typename Types::Box bounds{};
-    double ray_error = 0;  // the greatest of the extents of instances, on all ranks
+    double ray_error = 0;     // the greatest of the extents of shapes and instances, on all ranks
+    bool has_others = false;  // than meshes, on this rank
     std::optional<FlatTree<Scalar>> crossings;
     Holding holding;
 };
@@ -344,7 +424,7 @@ auto BasicDistributedScene<Scalar>::trace(std::span<const Ray> rays,
     -> Answers<Hit, TraceCounts> {
     const GivenRays<Scalar> given{rays, options};
     return state_->template ask<ClosestHitKind<Scalar>, Answers<Hit, TraceCounts>>(
-        "trace", [&](auto& kind, auto& answers) {
+        given.name("trace"), [&](auto& kind, auto& answers) {
             given.check();
             kind.emplace(state_->parts(), given, answers);
         });
@@ -355,7 +435,7 @@ Answers<std::uint8_t, TraceCounts> BasicDistributedScene<Scalar>::trace_any(
     std::span<const Ray> rays, const TraceOptions& options) const {
     const GivenRays<Scalar> given{rays, options};
     return state_->template ask<AnyHitKind<Scalar>, Answers<std::uint8_t, TraceCounts>>(
-        "trace_any", [&](auto& kind, auto& answers) {
+        given.name("trace_any"), [&](auto& kind, auto& answers) {
             given.check();
             kind.emplace(state_->parts(), given, answers);
         });
@@ -386,7 +466,7 @@ HitRows<Scalar> BasicDistributedScene<Scalar>::trace_all(std::span<const Ray> ra
     RowStore<Hit> store("trace_all", rays.size(), options.max_result_bytes);
     AllHitsKind<Scalar> kind(state_->parts(), given, store);
     Call call(state_->comm, state_->options);
-    call.template begin<AllHitsKind<Scalar>>("trace_all", [&] { given.check(); });
+    call.template begin<AllHitsKind<Scalar>>(given.name("trace_all"), [&] { given.check(); });
     call.run(kind);
     call.finish([&] {
         store.finish(

@@ -1,5 +1,5 @@
-// A file -> the part of each rank, read by offset: rank r of R reads elements n r / R to
-// n (r + 1) / R, and of a mesh the vertices that these use.
+// Files -> the part of each rank, read by offset: rank r of R reads elements n r / R to
+// n (r + 1) / R of all files, and of meshes the vertices that these use.
 #include <raydix/error.h>
 #include <raydix/mpi.h>
 
@@ -9,6 +9,7 @@
 #include <cstring>
 #include <fstream>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -279,40 +280,90 @@ private:
     FileBytes bytes_;
 };
 
+/// Vertices are named by 32 bits.
+bool fits(const Plan& plan) {
+    return plan.vertices.count < no_primitive && plan.faces.count < no_primitive;
+}
+
+std::string name_of(std::span<const std::filesystem::path> files) {
+    std::string name = "load_part";
+    for (const std::filesystem::path& file : files) name.append(" ").append(file.string());
+    return name;
+}
+
+void append(Mesh&& more, Mesh& mesh) {
+    if (mesh.vertices.empty()) {
+        mesh = std::move(more);
+        return;
+    }
+    if (mesh.vertices.size() + more.vertices.size() >= no_primitive)
+        throw InputError("the vertices of this rank's part exceed 2^32");
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(), more.vertices.begin(), more.vertices.end());
+    for (const Triangle& t : more.triangles)
+        mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+}
+
+/// Elements [begin, end) of one file after the others. False if one of these faces is no triangle.
+bool append_part(const std::filesystem::path& file, const Plan& plan, bool are_points,
+                 std::uint64_t begin, std::uint64_t end, Mesh& mesh) {
+    if (begin == end) return true;
+    PartReader reader(file, plan);
+    if (are_points) {
+        reader.read_points(begin, end, mesh.vertices);
+        return true;
+    }
+    Mesh more;
+    if (!reader.read_triangles(begin, end, more.triangles)) return false;
+    reader.take_vertices(more);
+    append(std::move(more), mesh);
+    return true;
+}
+
 }  // namespace
 
-std::optional<FilePart> load_part(MPI_Comm given, const std::filesystem::path& file) {
+std::optional<FilePart> load_part(MPI_Comm given, std::span<const std::filesystem::path> files) {
     const Communicator comm(given);
-    std::optional<Plan> plan;
-    together_on(comm, "load_part " + file.string(), [&] {
-        plan = plan_of(file);
-        // Vertices are named by 32 bits.
-        if (plan && (plan->vertices.count >= no_primitive || plan->faces.count >= no_primitive))
-            plan.reset();
+    std::vector<Plan> plans;
+    std::uint64_t is_readable = 1;
+    together_on(comm, name_of(files), [&] {
+        for (const std::filesystem::path& file : files) {
+            const std::optional<Plan> plan = plan_of(file);
+            is_readable &= plan && fits(*plan) ? 1u : 0u;
+            plans.push_back(plan.value_or(Plan{}));
+        }
     });
-    std::uint64_t is_readable = plan ? 1 : 0;
     FilePart part;
     std::exception_ptr error;
-    if (plan) {
+    keep_error(error, [&] {
+        if (is_readable == 0) return;
+        for (const Plan& plan : plans) {
+            part.vertices += plan.vertices.count;
+            part.triangles += plan.faces.count;
+        }
         const auto rank = std::uint64_t(comm.rank()), ranks = std::uint64_t(comm.size());
-        part.vertices = plan->vertices.count;
-        part.triangles = plan->faces.count;
-        const std::uint64_t n = part.triangles > 0 ? part.triangles : part.vertices,
-                            begin = n * rank / ranks, end = n * (rank + 1) / ranks;
-        keep_error(error, [&] {
-            PartReader reader(file, *plan);
-            if (part.triangles == 0)
-                reader.read_points(begin, end, part.mesh.vertices);
-            else if (reader.read_triangles(begin, end, part.mesh.triangles))
-                reader.take_vertices(part.mesh);
-            else
+        const bool are_points = part.triangles == 0;
+        const std::uint64_t n = are_points ? part.vertices : part.triangles;
+        std::uint64_t before = 0;  // elements of the files before
+        for (std::size_t f = 0; f < files.size(); ++f) {
+            const std::uint64_t count = are_points ? plans[f].vertices.count : plans[f].faces.count;
+            const auto within = [&](std::uint64_t at) {
+                return std::clamp(at, before, before + count) - before;
+            };
+            if (!append_part(files[f], plans[f], are_points, within(n * rank / ranks),
+                             within(n * (rank + 1) / ranks), part.mesh))
                 is_readable = 0;
-        });
-    }
+            before += count;
+        }
+    });
     agree(comm, error);
     comm.reduce(&is_readable, 1, MPI_MIN);
     if (is_readable == 0) return {};
     return part;
+}
+
+std::optional<FilePart> load_part(MPI_Comm comm, const std::filesystem::path& file) {
+    return load_part(comm, std::span(&file, 1));
 }
 
 }  // namespace raydix::mpi

@@ -26,7 +26,7 @@ template <class T>
 class RayReach {
 public:
     /// `ray` must be valid; `whole` is around all boxes. `error`: the greatest of the extents in
-    /// them (engine/extent.h), of instances.
+    /// them (engine/extent.h), of shapes and instances.
     template <class AnyRay>
     RayReach(const AnyRay& ray, const RankBox<T>& whole, double error)
         : frame_(make_frame(widened(ray))) {

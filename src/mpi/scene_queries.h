@@ -34,7 +34,7 @@ struct SceneParts {
     const BasicScene<T>& scene;
     const TriangleNames& names;
     const RankTree<T>& tree;
-    double ray_error;          // the greatest of the extents of instances, on all ranks
+    double ray_error;          // the greatest of all shapes and instances, on all ranks
     std::uint32_t first_path;  // paths on the ranks before this one
     int threads;
 
@@ -71,6 +71,16 @@ struct GivenRays {
 
     [[nodiscard]] std::uint32_t mask(std::size_t i) const {
         return options.masks.empty() ? options.mask : options.masks[i];
+    }
+    [[nodiscard]] const auto& filter() const {
+        if constexpr (sizeof(T) == 4)
+            return options.filter;
+        else
+            return options.filter_d;
+    }
+    /// A call and what must not differ between ranks.
+    [[nodiscard]] std::string name(const char* call) const {
+        return std::string(call) + (filter() ? ", filtered" : "");
     }
     void check() const {
         if (!options.masks.empty() && options.masks.size() != rays.size())
@@ -140,6 +150,19 @@ protected:
         found.clear();
         if (is_valid(rays_[i])) parts_.tree.all(most, reach_of(i), found);
     }
+    /// What the scene of this rank is asked with.
+    [[nodiscard]] SceneTraceOptions options_of(const ArrivedRays<T>& arrived) const {
+        SceneTraceOptions options = arrived.options(parts_.threads);
+        if (!given_.filter()) return options;
+        const auto filter = [this](std::size_t, const auto& ray, const auto& hit) {
+            return given_.filter()(ray, parts_.named(hit));
+        };
+        if constexpr (sizeof(T) == 4)
+            options.filter = filter;
+        else
+            options.filter_d = filter;
+        return options;
+    }
     [[nodiscard]] RayReach<T> reach_of(std::size_t i) const {
         return {rays_[i], parts_.tree.bounds(), parts_.ray_error};
     }
@@ -208,7 +231,7 @@ public:
         const ArrivedRays<T> arrived(questions);
         found_.resize(questions.size());
         raydix::trace(this->parts_.scene, arrived.rays(), std::span(found_),
-                      arrived.options(this->parts_.threads));
+                      this->options_of(arrived));
     }
     void put_answer(std::size_t q, Bytes& out) const {
         const Hit hit = this->parts_.named(found_[q]);
@@ -274,7 +297,7 @@ public:
         const ArrivedRays<T> arrived(questions);
         occluded_.resize(questions.size());
         raydix::trace_any(this->parts_.scene, arrived.rays(), std::span(occluded_),
-                          arrived.options(this->parts_.threads));
+                          this->options_of(arrived));
     }
     void put_answer(std::size_t q, Bytes& out) const { put(out, occluded_[q]); }
     void take(std::size_t i, Reader& reader) { answers_.values[i] |= reader.take<std::uint8_t>(); }
@@ -308,7 +331,7 @@ public:
             rays, most, out, rows_.limit(),
             [&](std::span<const Question> chunk, std::uint64_t limit) {
                 const ArrivedRays<T> arrived(chunk);
-                SceneTraceOptions options = arrived.options(this->parts_.threads);
+                SceneTraceOptions options = this->options_of(arrived);
                 options.max_result_bytes = limit;
                 const auto all = raydix::trace_all(this->parts_.scene, arrived.rays(), options);
                 for (std::size_t q = 0; q < chunk.size(); ++q) {

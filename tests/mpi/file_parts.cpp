@@ -120,6 +120,31 @@ TEST(FileParts, AreThoseOfTheWholeFile) {
     expect_same_part(*part, load_mesh(file));
 }
 
+TEST(FileParts, OfSeveralFilesCountThrough) {
+    const SharedFolder folder;
+    const auto expect_same = [&](const std::vector<int>& triangles) {
+        std::vector<std::filesystem::path> files;
+        Mesh whole;
+        for (const int n : triangles) {
+            const std::string name = "part" + std::to_string(files.size()) + ".ply";
+            files.push_back(folder.write(name, rich_ply(50 + n, n, n % 2 == 0)));
+            const Mesh one = load_mesh(files.back());
+            const auto first = static_cast<std::uint32_t>(whole.vertices.size());
+            whole.vertices.insert(whole.vertices.end(), one.vertices.begin(), one.vertices.end());
+            for (const Triangle& t : one.triangles)
+                whole.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+        }
+        const auto part = load_part(MPI_COMM_WORLD, files);
+        ASSERT_TRUE(part.has_value());
+        expect_same_part(*part, whole);
+    };
+    expect_same({7, 0, 100, 1, 33});
+    expect_same({0, 0, 0});
+    const std::filesystem::path files[] = {folder.write("a.ply", rich_ply(9, 4, false)),
+                                           folder.write("b.obj", "v 0 0 0\n")};
+    EXPECT_FALSE(load_part(MPI_COMM_WORLD, files).has_value());
+}
+
 TEST(FileParts, OtherFilesAreForOneRank) {
     const SharedFolder folder;
     const std::string quads = [] {

@@ -2,6 +2,7 @@
 #include <raydix/double.h>
 #include <raydix/shapes.h>
 #include <raydix/solid.h>
+#include <raydix/user_geometry.h>
 
 #include <deque>
 
@@ -101,6 +102,36 @@ struct World {
         }
     }
 
+    /// Puts shapes of all kinds between the others, some of them twice.
+    void add_shapes(unsigned seed) {
+        std::mt19937 random(seed);
+        std::uniform_real_distribution<T> unit(-6, 6);
+        const auto place = [&] {
+            return typename SceneTypes<T>::Point{unit(random), unit(random), unit(random)};
+        };
+        for (int i = 0; i < 20; ++i) {
+            spheres.push_back({place(), T(0.1) * T(i % 8)});
+            capsules.push_back({place(), place(), T(0.05) * T(i % 3)});
+            points.push_back(place());
+            const auto lo = place();
+            boxes.push_back({lo, {lo.x + 1, lo.y + 2, lo.z + 1}});
+        }
+        boxes[0] = {{0, 0, 0}, {1, 1, 1}};  // ties with a face of meshes
+        spheres[3].radius = -1;             // left out
+        points[4].x = std::numeric_limits<T>::quiet_NaN();
+        user.emplace(std::span<const Box>(boxes), Plates{boxes});
+        for (std::size_t i = 0; i < 12; ++i) {
+            Item<T> item;
+            item.mask = i % 5 == 4 ? 2u : 0xFFFFFFFFu;
+            if (i % 4 == 0) item.spheres = spheres;
+            if (i % 4 == 1) item.capsules = capsules;
+            if (i % 4 == 2) item.points = points;
+            if (i % 4 == 3) item.user = &*user;
+            item.radius = T(0.25);
+            items.insert(items.begin() + std::ptrdiff_t(random() % (items.size() + 1)), item);
+        }
+    }
+
     BasicScene<T> in_one_process() const {
         BasicScene<T> scene;
         for (const Item<T>& item : items) {
@@ -108,6 +139,14 @@ struct World {
             options.mask = item.mask;
             if (item.scene != nullptr)
                 scene.add(*item.scene, item.transform, options);
+            else if (item.user != nullptr)
+                scene.add(*item.user, options);
+            else if (!item.spheres.empty())
+                scene.add(item.spheres, options);
+            else if (!item.capsules.empty())
+                scene.add(item.capsules, options);
+            else if (!item.points.empty())
+                scene.add(item.points, item.radius, options);
             else
                 scene.add(item.mesh, options);
         }
@@ -115,8 +154,27 @@ struct World {
         return scene;
     }
 
+    using Box = typename SceneTypes<T>::Box;
+    /// The lower faces of boxes.
+    struct Plates {
+        std::span<const Box> boxes;
+        bool operator()(std::uint32_t prim, const typename SceneTypes<T>::Ray& ray,
+                        typename SceneTypes<T>::Hit& hit) const {
+            const Box& box = boxes[prim];
+            hit.t = (box.lo.z - ray.origin.z) / ray.direction.z;
+            hit.u = ray.origin.x + hit.t * ray.direction.x;
+            hit.v = ray.origin.y + hit.t * ray.direction.y;
+            return hit.u >= box.lo.x && hit.u <= box.hi.x && hit.v >= box.lo.y && hit.v <= box.hi.y;
+        }
+    };
+
     std::deque<MeshOf<T>> meshes;
     std::deque<BasicScene<T>> things;
+    std::vector<typename SceneTypes<T>::Sphere> spheres;
+    std::vector<typename SceneTypes<T>::Capsule> capsules;
+    std::vector<typename SceneTypes<T>::Point> points;
+    std::vector<Box> boxes;
+    std::optional<BasicUserGeometry<T>> user;
     std::vector<Item<T>> items;
 };
 
@@ -152,6 +210,12 @@ std::size_t different_hits(const auto& found, const auto& expected) {
     return different;
 }
 
+/// A filter that looks at all of a hit but its t.
+bool counts(const auto& ray, const auto& hit) {
+    return (hit.prim + 3 * hit.geometry + hit.instance) % 3 != 0 &&
+           (ray.direction.x > 0 || hit.u < decltype(hit.u)(0.5));
+}
+
 template <class T>
 void expect_same_rays(const BasicScene<T>& one, const BasicDistributedScene<T>& many,
                       std::span<const typename SceneTypes<T>::Ray> rays,
@@ -160,6 +224,12 @@ void expect_same_rays(const BasicScene<T>& one, const BasicDistributedScene<T>& 
     alone.threads = 1;
     alone.mask = options.mask;
     alone.masks = options.masks;
+    if (options.filter || options.filter_d) {
+        alone.filter = [](std::size_t, const Ray& ray, const Hit& hit) { return counts(ray, hit); };
+        alone.filter_d = [](std::size_t, const RayD& ray, const HitD& hit) {
+            return counts(ray, hit);
+        };
+    }
     EXPECT_EQ(different_hits<T>(many.trace(rays, options).values, trace(one, rays, alone)), 0u);
     std::vector<std::uint8_t> occluded(rays.size());
     trace_any(one, rays, std::span(occluded), alone);
@@ -227,6 +297,34 @@ TYPED_TEST(InstancesOverRanks, AnswerAsOneProcess) {
         }
 }
 
+TYPED_TEST(InstancesOverRanks, ShapesAnswerAsOneProcess) {
+    using T = TypeParam;
+    unsigned seed = 500;
+    for (const Partition partition : {Partition::as_given, Partition::curve})
+        for (const Division division : {Division::random, Division::some_empty}) {
+            SCOPED_TRACE("seed " + std::to_string(++seed));
+            World<T> world(seed);
+            world.add_shapes(seed);
+            const BasicScene<T> one = world.in_one_process();
+            SceneOptions options;
+            options.partition = partition;
+            options.threads = 1;
+            const BasicDistributedScene<T> many(
+                MPI_COMM_WORLD, mine(world.items, division_of(world.items.size(), division, seed)),
+                options);
+            const auto all = make_rays<T>(300, seed);
+            const auto rays = mine(all, division_of(all.size(), division, seed + 1));
+            expect_same_rays<T>(one, many, rays, {});
+            TraceOptions masked;
+            masked.mask = 2;
+            expect_same_rays<T>(one, many, rays, masked);
+            TraceOptions filtered;
+            filtered.filter = [](const Ray& ray, const auto& hit) { return counts(ray, hit); };
+            filtered.filter_d = [](const RayD& ray, const auto& hit) { return counts(ray, hit); };
+            expect_same_rays<T>(one, many, rays, filtered);
+        }
+}
+
 TYPED_TEST(InstancesOverRanks, ContainAsOneProcess) {
     using T = TypeParam;
     const World<T> world(41);
@@ -280,6 +378,17 @@ TEST(InstancesOverRanks, WhatIsWrongIsSaidOnAll) {
     both.scene = &world.things[0];
     both.mesh = world.meshes[0];
     EXPECT_EQ(refusal_of(both), last + "geometry 0 has a scene and a mesh; it can be one of them");
+    const Sphere ball{{0, 0, 0}, 1};
+    DistributedGeometry shapes;
+    shapes.spheres = {&ball, 1};
+    SceneOptions of_one;
+    of_one.one_geometry = true;
+    EXPECT_EQ(message_of([&] {
+                  const DistributedScene made(
+                      MPI_COMM_WORLD, std::span<const DistributedGeometry>(&shapes, 1), of_one);
+              }),
+              "rank 0: geometry 0 has spheres; with one_geometry there are meshes and instances "
+              "alone");
     DistributedGeometry flat;
     flat.scene = &world.things[0];
     flat.transform.m[0][0] = 0;
@@ -290,7 +399,6 @@ TEST(InstancesOverRanks, WhatIsWrongIsSaidOnAll) {
     EXPECT_EQ(refusal_of(early).find(last), 0u) << refusal_of(early);
 
     Scene balls;
-    const Sphere ball{{0, 0, 0}, 1};
     balls.add(std::span(&ball, 1));
     balls.commit();
     DistributedGeometry round;
@@ -308,6 +416,18 @@ TEST(InstancesOverRanks, WhatIsWrongIsSaidOnAll) {
                   (void)many.trace({&ray, 1}, options);
               }),
               "rank 0: 2 masks for 1 rays");
+    TraceOptions filtered;
+    filtered.filter = [](const Ray&, const DistributedHit&) -> bool {
+        throw InputError("not this one");
+    };
+    EXPECT_EQ(message_of([&] { (void)many.trace({&ray, 1}, filtered); }), "rank 0: not this one");
+    if (ranks() > 1) {
+        if (rank() == 0) filtered.filter = {};
+        EXPECT_EQ(message_of([&] {
+                      (void)many.trace_any({&ray, 1}, filtered);
+                  }),
+                  "the ranks differ: rank 0 calls trace_any, rank 1 calls trace_any, filtered");
+    }
 }
 
 }  // namespace

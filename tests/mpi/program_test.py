@@ -96,6 +96,15 @@ class Answers(Mpi):
         self.assertIn("rank 0 reads all of", done.stdout)
         self.assertRegex(done.stdout, r"holding +1728 triangles, at most \d+ on a rank of 3")
 
+    def test_the_tree_over_all_ranks_is_that_of_one_process(self):
+        alone = subprocess.run([PROGRAM, "build", self.scene(), "--builder", "karras"], capture_output=True, text=True)
+        hash_alone = re.search(r"^hash +(\w{32})$", alone.stdout, re.MULTILINE).group(1)
+        done = self.run_on(3, "info", self.scene(), "--verify")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(hash_alone, done.stdout)
+        self.assertIn("the nodes of the LBVH have the bits of one process", done.stdout)
+        self.assertEqual(self.document_of(2, "info", self.scene(), "--tree-hash")["tree_hash"], hash_alone)
+
     def test_each_rank_reads_its_part_of_files_that_let_it(self):
         mesh, points = self.folder / "solid.ply", self.folder / "points.npy"
         lines = pathlib.Path(self.scene()).read_text().splitlines()
@@ -118,6 +127,12 @@ class Answers(Mpi):
                 self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
                 self.assertIn("each rank reads its part of", done.stdout)
                 self.assertEqual("have the bits of one process" in done.stdout, "--verify" in arguments)
+        done = self.run_on(3, "trace", str(mesh), self.scene(), str(mesh), "--size", "24x16", "--verify")
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn("rank 0 reads all of", done.stdout)
+        done = self.run_on(3, "info", str(mesh), str(mesh), "--verify")
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn(f"holding      {2 * len(faces)} triangles", done.stdout)
 
     def test_pictures_have_the_bytes_of_raydix_render(self):
         alone, many = self.folder / "alone.png", self.folder / "many.png"
