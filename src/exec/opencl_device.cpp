@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdlib>
 
 #include "exec/arithmetic_check.h"
 #include "exec/kernel_arguments.h"
@@ -67,6 +68,37 @@ Function extension(cl_platform_id platform, const char* name) {
         throw BackendUnavailable(std::string("device opencl: the driver has no ") + name);
     return reinterpret_cast<Function>(address);
 }
+
+/// Devices to close when the process ends. A driver's threads that still run commands then use
+/// what its static destructors destroy: Intel's ends with "Pure virtual function called!".
+class OpenDevices {
+public:
+    static OpenDevices& all() {
+        static auto* devices = new OpenDevices;  // never destroyed: end() is called late
+        return *devices;
+    }
+    void add(OpenclDevice* device) {
+        const std::lock_guard lock(lock_);
+        devices_.push_back(device);
+        end_before_driver();
+    }
+    void remove(OpenclDevice* device) {
+        const std::lock_guard lock(lock_);
+        std::erase(devices_, device);
+    }
+    /// What was registered last is called first, and a driver registers destructors when it is
+    /// loaded and when it first compiles: so this is asked for after each program.
+    static void end_before_driver() { static_cast<void>(std::atexit(end)); }
+
+private:
+    static void end() {
+        const std::lock_guard lock(all().lock_);
+        for (OpenclDevice* device : all().devices_) device->close();
+    }
+
+    std::mutex lock_;
+    std::vector<OpenclDevice*> devices_;
+};
 
 }  // namespace
 
@@ -132,15 +164,27 @@ OpenclDevice::OpenclDevice(const OpenclFound& found)
     copy_ = extension<clEnqueueMemcpyINTEL_fn>(platform_, "clEnqueueMemcpyINTEL");
     fill_ = extension<clEnqueueMemFillINTEL_fn>(platform_, "clEnqueueMemFillINTEL");
     cl_int status = CL_SUCCESS;
-    context_ = cl.CreateContext(nullptr, 1, &device_, OpenclNotes::note, nullptr, &status);
+    context_ = OpenclContext(
+        cl.CreateContext(nullptr, 1, &device_, OpenclNotes::note, nullptr, &status));
     opencl_try(status, "clCreateContext", traits_.name);
-    own_queue_ = cl.CreateCommandQueueWithProperties(context_, device_, nullptr, &status);
+    own_queue_ = OpenclQueue(
+        cl.CreateCommandQueueWithProperties(context(), device_, nullptr, &status));
     opencl_try(status, "clCreateCommandQueueWithProperties", traits_.name);
     check_arithmetic();
+    OpenDevices::all().add(this);
+}
+
+OpenclDevice::~OpenclDevice() {
+    OpenDevices::all().remove(this);
+    close();
+}
+
+void OpenclDevice::close() noexcept {
+    if (!closed_.exchange(true)) static_cast<void>(opencl_api().Finish(own_queue()));
 }
 
 cl_command_queue OpenclDevice::queue(void* given) {
-    if (given == nullptr) return own_queue_;
+    if (given == nullptr) return own_queue();
     const OpenclApi& cl = opencl_api();
     auto* queue = static_cast<cl_command_queue>(given);
     cl_context context = nullptr;
@@ -153,7 +197,7 @@ cl_command_queue OpenclDevice::queue(void* given) {
     opencl_try(cl.GetCommandQueueInfo(queue, CL_QUEUE_PROPERTIES, sizeof(properties), &properties,
                                       nullptr),
                "clGetCommandQueueInfo");
-    if (context != context_ || device != device_)
+    if (context != this->context() || device != device_)
         throw InputError("the queue is of another OpenCL context or device than the selected one");
     if ((properties & CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE) != 0)
         throw InputError("the OpenCL queue may change the order of launches");
@@ -164,9 +208,9 @@ void* OpenclDevice::allocate(std::size_t bytes) {
     cl_int status = CL_SUCCESS;
     constexpr std::size_t line = 256;
     const std::size_t lines = (bytes + line - 1) / line * line;
-    void* memory = allocate_(context_, device_, nullptr, lines, line, &status);
+    void* memory = allocate_(context(), device_, nullptr, lines, line, &status);
     if (memory == nullptr)  // perhaps an alignment that it does not take
-        memory = allocate_(context_, device_, nullptr, lines, 0, &status);
+        memory = allocate_(context(), device_, nullptr, lines, 0, &status);
     opencl_try(status, "clDeviceMemAllocINTEL", std::to_string(bytes) + " bytes");
     if (reinterpret_cast<std::uintptr_t>(memory) % line != 0) {
         free(memory);
@@ -176,9 +220,10 @@ void* OpenclDevice::allocate(std::size_t bytes) {
 }
 
 void OpenclDevice::free(void* memory) noexcept {
+    if (closed_) return;
     // The driver does not know which launches use it: they only hold pointers to it.
-    static_cast<void>(opencl_api().Finish(own_queue_));
-    static_cast<void>(free_(context_, memory));
+    static_cast<void>(opencl_api().Finish(own_queue()));
+    static_cast<void>(free_(context(), memory));
 }
 
 void OpenclDevice::copy(cl_command_queue queue, void* to, const void* from, std::size_t bytes) {
@@ -198,15 +243,17 @@ void OpenclDevice::finish(cl_command_queue queue) {
 
 cl_program OpenclDevice::program(const char* module) {
     const auto known = programs_.find(std::string_view(module));
-    if (known != programs_.end()) return known->second;
+    if (known != programs_.end()) return known->second.get();
     const OpenclApi& cl = opencl_api();
     const std::vector<std::uint32_t> words = complete_spirv(spirv_module(module), warp_prefixes);
     cl_int status = CL_SUCCESS;
-    cl_program program =
-        cl.CreateProgramWithIL(context_, words.data(), words.size() * sizeof(words[0]), &status);
+    OpenclProgram owned(
+        cl.CreateProgramWithIL(context(), words.data(), words.size() * sizeof(words[0]), &status));
     opencl_try(status, "clCreateProgramWithIL", module);
+    cl_program program = owned.get();
     status = cl.BuildProgram(program, 1, &device_, "-cl-fp32-correctly-rounded-divide-sqrt",
                              nullptr, nullptr);
+    OpenDevices::end_before_driver();
     if (status != CL_SUCCESS) {
         std::size_t bytes = 0;
         static_cast<void>(
@@ -216,22 +263,22 @@ cl_program OpenclDevice::program(const char* module) {
                                                  log.data(), nullptr));
         opencl_failed(status, "clBuildProgram", std::string(module) + " (" + log.c_str() + ")");
     }
-    return programs_.emplace(module, program).first->second;
+    return programs_.emplace(module, std::move(owned)).first->second.get();
 }
 
 cl_kernel OpenclDevice::kernel(const KernelName& name) {
     const auto known = kernels_.find(std::string_view(name.kernel));
-    if (known != kernels_.end()) return known->second;
+    if (known != kernels_.end()) return known->second.get();
     const OpenclApi& cl = opencl_api();
     cl_int status = CL_SUCCESS;
-    cl_kernel kernel = cl.CreateKernel(program(name.module), name.kernel, &status);
+    OpenclKernel kernel(cl.CreateKernel(program(name.module), name.kernel, &status));
     opencl_try(status, "clCreateKernel", name.kernel);
     // Its argument holds pointers to memory that the driver is not told of otherwise.
     const cl_bool yes = CL_TRUE;
-    opencl_try(cl.SetKernelExecInfo(kernel, CL_KERNEL_EXEC_INFO_INDIRECT_DEVICE_ACCESS_INTEL,
+    opencl_try(cl.SetKernelExecInfo(kernel.get(), CL_KERNEL_EXEC_INFO_INDIRECT_DEVICE_ACCESS_INTEL,
                                     sizeof(yes), &yes),
                "clSetKernelExecInfo", name.kernel);
-    return kernels_.emplace(name.kernel, kernel).first->second;
+    return kernels_.emplace(name.kernel, std::move(kernel)).first->second.get();
 }
 
 void OpenclDevice::launch(cl_command_queue queue, const KernelName& name, std::size_t groups,
@@ -259,11 +306,11 @@ void OpenclDevice::check_arithmetic() {
         Memory& operator=(const Memory&) = delete;
     } memory(*this);
     const EachArguments<ComputeCases> given{{static_cast<ArithmeticResults*>(memory.bytes)}, n};
-    launch(own_queue_, {"sort", "each_compute_cases"}, (n + group_threads - 1) / group_threads,
+    launch(own_queue(), {"sort", "each_compute_cases"}, (n + group_threads - 1) / group_threads,
            group_threads, &given, sizeof(given));
     std::vector<ArithmeticResults> results(n);
-    copy(own_queue_, results.data(), memory.bytes, n * sizeof(ArithmeticResults));
-    finish(own_queue_);
+    copy(own_queue(), results.data(), memory.bytes, n * sizeof(ArithmeticResults));
+    finish(own_queue());
     const std::string wrong = first_wrong_case(results);
     if (!wrong.empty()) throw BackendUnavailable("device opencl: " + traits_.name + " " + wrong);
 }

@@ -3,6 +3,7 @@
 // as they are as a kernel's argument.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -51,11 +52,16 @@ public:
     static constexpr std::size_t counted_groups = 132 * 16;
 
     explicit OpenclDevice(const OpenclFound& found);
+    /// Waits for its queue. Queues of the caller's must have finished, and memory must be free.
+    ~OpenclDevice();
     OpenclDevice(const OpenclDevice&) = delete;
     OpenclDevice& operator=(const OpenclDevice&) = delete;
+    /// For the end of the process: waits for its queue. From then on free() leaves memory to the
+    /// system, because the driver may be gone.
+    void close() noexcept;
 
     [[nodiscard]] const OpenclTraits& traits() const { return traits_; }
-    [[nodiscard]] cl_context context() const { return context_; }
+    [[nodiscard]] cl_context context() const { return context_.get(); }
     [[nodiscard]] cl_device_id id() const { return device_; }
     [[nodiscard]] bool is_cpu() const { return is_cpu_; }
     /// Null: the device's own queue. Throws InputError: a queue of another context or device, or
@@ -74,6 +80,7 @@ public:
                 std::size_t threads, const void* argument, std::size_t bytes);
 
 private:
+    [[nodiscard]] cl_command_queue own_queue() const { return own_queue_.get(); }
     [[nodiscard]] cl_program program(const char* module);
     [[nodiscard]] cl_kernel kernel(const KernelName& name);
     void check_arithmetic();
@@ -82,15 +89,17 @@ private:
     cl_device_id device_;
     OpenclTraits traits_;
     bool is_cpu_ = false;
-    cl_context context_ = nullptr;
-    cl_command_queue own_queue_ = nullptr;
+    // What is made later is released first.
+    OpenclContext context_;
+    OpenclQueue own_queue_;
     clDeviceMemAllocINTEL_fn allocate_ = nullptr;
     clMemBlockingFreeINTEL_fn free_ = nullptr;
     clEnqueueMemcpyINTEL_fn copy_ = nullptr;
     clEnqueueMemFillINTEL_fn fill_ = nullptr;
     std::mutex lock_;  // an argument that is set belongs to the next launch of its kernel
-    std::map<std::string, cl_program, std::less<>> programs_;
-    std::map<std::string, cl_kernel, std::less<>> kernels_;
+    std::map<std::string, OpenclProgram, std::less<>> programs_;
+    std::map<std::string, OpenclKernel, std::less<>> kernels_;
+    std::atomic<bool> closed_ = false;
 };
 
 /// Opens the device with this number. Throws BackendUnavailable: there are fewer, or what it lacks.

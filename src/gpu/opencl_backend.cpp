@@ -54,7 +54,8 @@ double OpenclBackend::measure_copy(std::size_t bytes, int repeat) {
 
 DeviceBackend& opencl_backend(std::uint32_t index) {
     static std::mutex lock;
-    static std::map<std::uint32_t, std::unique_ptr<OpenclBackend>> backends;
+    // Never destroyed: at the end of the process the driver may be gone before they are.
+    static auto& backends = *new std::map<std::uint32_t, std::unique_ptr<OpenclBackend>>;
     const std::lock_guard guard(lock);
     std::unique_ptr<OpenclBackend>& backend = backends[index];
     if (backend == nullptr)

@@ -20,3 +20,9 @@ foreach(test opencl:device_opencl opencl_trace:device_gpu_trace)
     set_tests_properties(device.${name} PROPERTIES LABELS device TIMEOUT 900 SKIP_REGULAR_EXPRESSION "PASSED  . 0 tests"
         ENVIRONMENT "${raydix_opencl_environment}")
 endforeach()
+# How a process ends that has left work on a device.
+add_executable(device_opencl_exit opencl_exit.cpp)
+target_link_libraries(device_opencl_exit PRIVATE raydix)
+add_test(NAME device.opencl_exit COMMAND device_opencl_exit)
+set_tests_properties(device.opencl_exit PROPERTIES LABELS device TIMEOUT 120 SKIP_RETURN_CODE 77
+    ENVIRONMENT "${raydix_opencl_environment}")
