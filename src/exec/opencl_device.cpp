@@ -6,10 +6,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstdlib>
 
-#include "exec/arithmetic_check.h"
-#include "exec/kernel_arguments.h"
 #include "exec/spirv_module.h"
 
 namespace raydix {
@@ -69,36 +66,7 @@ Function extension(cl_platform_id platform, const char* name) {
     return reinterpret_cast<Function>(address);
 }
 
-/// Devices to close when the process ends. A driver's threads that still run commands then use
-/// what its static destructors destroy: Intel's ends with "Pure virtual function called!".
-class OpenDevices {
-public:
-    static OpenDevices& all() {
-        static auto* devices = new OpenDevices;  // never destroyed: end() is called late
-        return *devices;
-    }
-    void add(OpenclDevice* device) {
-        const std::lock_guard lock(lock_);
-        devices_.push_back(device);
-        end_before_driver();
-    }
-    void remove(OpenclDevice* device) {
-        const std::lock_guard lock(lock_);
-        std::erase(devices_, device);
-    }
-    /// What was registered last is called first, and a driver registers destructors when it is
-    /// loaded and when it first compiles: so this is asked for after each program.
-    static void end_before_driver() { static_cast<void>(std::atexit(end)); }
-
-private:
-    static void end() {
-        const std::lock_guard lock(all().lock_);
-        for (OpenclDevice* device : all().devices_) device->close();
-    }
-
-    std::mutex lock_;
-    std::vector<OpenclDevice*> devices_;
-};
+cl_command_queue queue_of(Stream queue) { return static_cast<cl_command_queue>(queue); }
 
 }  // namespace
 
@@ -170,12 +138,13 @@ OpenclDevice::OpenclDevice(const OpenclFound& found)
     own_queue_ = OpenclQueue(
         cl.CreateCommandQueueWithProperties(context(), device_, nullptr, &status));
     opencl_try(status, "clCreateCommandQueueWithProperties", traits_.name);
-    check_arithmetic();
-    OpenDevices::all().add(this);
+    const std::string wrong = wrong_arithmetic();
+    if (!wrong.empty()) throw BackendUnavailable("device opencl: " + traits_.name + " " + wrong);
+    close_before_driver();
 }
 
 OpenclDevice::~OpenclDevice() {
-    OpenDevices::all().remove(this);
+    note_gone();
     close();
 }
 
@@ -183,7 +152,7 @@ void OpenclDevice::close() noexcept {
     if (!closed_.exchange(true)) static_cast<void>(opencl_api().Finish(own_queue()));
 }
 
-cl_command_queue OpenclDevice::queue(void* given) {
+Stream OpenclDevice::queue(Stream given) {
     if (given == nullptr) return own_queue();
     const OpenclApi& cl = opencl_api();
     auto* queue = static_cast<cl_command_queue>(given);
@@ -226,19 +195,19 @@ void OpenclDevice::free(void* memory) noexcept {
     static_cast<void>(free_(context(), memory));
 }
 
-void OpenclDevice::copy(cl_command_queue queue, void* to, const void* from, std::size_t bytes) {
-    opencl_try(copy_(queue, CL_FALSE, to, from, bytes, 0, nullptr, nullptr), "clEnqueueMemcpyINTEL",
+void OpenclDevice::copy(Stream queue, void* to, const void* from, std::size_t bytes) {
+    opencl_try(copy_(queue_of(queue), CL_FALSE, to, from, bytes, 0, nullptr, nullptr), "clEnqueueMemcpyINTEL",
                std::to_string(bytes) + " bytes");
 }
 
-void OpenclDevice::clear(cl_command_queue queue, void* memory, std::size_t bytes) {
+void OpenclDevice::clear(Stream queue, void* memory, std::size_t bytes) {
     const std::uint8_t zero = 0;
-    opencl_try(fill_(queue, memory, &zero, 1, bytes, 0, nullptr, nullptr), "clEnqueueMemFillINTEL",
+    opencl_try(fill_(queue_of(queue), memory, &zero, 1, bytes, 0, nullptr, nullptr), "clEnqueueMemFillINTEL",
                std::to_string(bytes) + " bytes");
 }
 
-void OpenclDevice::finish(cl_command_queue queue) {
-    opencl_try(opencl_api().Finish(queue), "clFinish", traits_.name);
+void OpenclDevice::finish(Stream queue) {
+    opencl_try(opencl_api().Finish(queue_of(queue)), "clFinish", traits_.name);
 }
 
 cl_program OpenclDevice::program(const char* module) {
@@ -253,7 +222,7 @@ cl_program OpenclDevice::program(const char* module) {
     cl_program program = owned.get();
     status = cl.BuildProgram(program, 1, &device_, "-cl-fp32-correctly-rounded-divide-sqrt",
                              nullptr, nullptr);
-    OpenDevices::end_before_driver();
+    close_before_driver();
     if (status != CL_SUCCESS) {
         std::size_t bytes = 0;
         static_cast<void>(
@@ -281,38 +250,16 @@ cl_kernel OpenclDevice::kernel(const KernelName& name) {
     return kernels_.emplace(name.kernel, std::move(kernel)).first->second.get();
 }
 
-void OpenclDevice::launch(cl_command_queue queue, const KernelName& name, std::size_t groups,
+void OpenclDevice::launch(Stream queue, const KernelName& name, std::size_t groups,
                           std::size_t threads, const void* argument, std::size_t bytes) {
     const OpenclApi& cl = opencl_api();
     const std::lock_guard lock(lock_);
     cl_kernel function = kernel(name);
     opencl_try(cl.SetKernelArg(function, 0, bytes, argument), "clSetKernelArg", name.kernel);
     const std::size_t global = groups * threads;
-    opencl_try(cl.EnqueueNDRangeKernel(queue, function, 1, nullptr, &global, &threads, 0, nullptr,
+    opencl_try(cl.EnqueueNDRangeKernel(queue_of(queue), function, 1, nullptr, &global, &threads, 0, nullptr,
                                        nullptr),
                "clEnqueueNDRangeKernel", name.kernel);
-}
-
-/// Drivers of CPUs compute right and do not claim it: what counts is what they compute.
-void OpenclDevice::check_arithmetic() {
-    constexpr std::uint32_t n = arithmetic_cases;
-    struct Memory {
-        OpenclDevice& device;
-        void* bytes;
-        explicit Memory(OpenclDevice& on)
-            : device(on), bytes(on.allocate(n * sizeof(ArithmeticResults))) {}
-        ~Memory() { device.free(bytes); }
-        Memory(const Memory&) = delete;
-        Memory& operator=(const Memory&) = delete;
-    } memory(*this);
-    const EachArguments<ComputeCases> given{{static_cast<ArithmeticResults*>(memory.bytes)}, n};
-    launch(own_queue(), {"sort", "each_compute_cases"}, (n + group_threads - 1) / group_threads,
-           group_threads, &given, sizeof(given));
-    std::vector<ArithmeticResults> results(n);
-    copy(own_queue(), results.data(), memory.bytes, n * sizeof(ArithmeticResults));
-    finish(own_queue());
-    const std::string wrong = first_wrong_case(results);
-    if (!wrong.empty()) throw BackendUnavailable("device opencl: " + traits_.name + " " + wrong);
 }
 
 std::unique_ptr<OpenclDevice> open_opencl_device(std::uint32_t index) {
