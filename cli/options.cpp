@@ -105,8 +105,9 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
             ->check(CLI::IsMember({"binary", "wide4", "wide8", "compact", "cwbvh"}))
             ->group(group);
     command
-        .add_option("--device", options.device,
-                    "Where to build (cpu, cuda, opencl, opencl:N, hip or hip:N) and trace (these and sim)")
+        .add_option(
+            "--device", options.device,
+            "Where to build (cpu, cuda, opencl, opencl:N, hip or hip:N) and trace (these and sim)")
         ->check(CLI::Validator(device_fault, "cpu|cuda|opencl[:N]|hip[:N]|sim"))
         ->capture_default_str()
         ->group(group);

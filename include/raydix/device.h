@@ -31,11 +31,11 @@ struct DeviceDescription {
 /// One at least for each kind of device that the library knows. Opens nothing. Never throws.
 [[nodiscard]] std::vector<DeviceDescription> list_devices();
 /// What the device calls of this thread run on from now on: "cuda", which is where a thread starts,
-/// "opencl", "opencl:N", "hip" or "hip:N". Memory and trees belong to the device that was selected when they were
-/// made, and calls with them need it selected. Opens a device that was never selected
-/// before, which compiles a few kernels; others are compiled by the first call that runs them.
-/// Throws InputError for another word. Throws BackendUnavailable with what the device lacks. A
-/// call that throws has selected nothing.
+/// "opencl", "opencl:N", "hip" or "hip:N". Memory and trees belong to the device that was selected
+/// when they were made, and calls with them need it selected. Opens a device that was never
+/// selected before, which compiles a few kernels; others are compiled by the first call that runs
+/// them. Throws InputError for another word. Throws BackendUnavailable with what the device lacks.
+/// A call that throws has selected nothing.
 void select_device(std::string_view selector);
 /// As it was selected last, by this thread.
 [[nodiscard]] std::string selected_device();

@@ -7,12 +7,12 @@
 #include RAYDIX_CODE_OBJECT_LIST
 
 // The files as they are, as symbols: raydix_code_NAME and, behind them, raydix_code_NAME_end.
-#define RAYDIX_EMBED(name)                                                                         \
-    asm(".pushsection .rodata\n.balign 4096\n.hidden raydix_code_" #name                           \
-        "\n.globl raydix_code_" #name "\nraydix_code_" #name                                       \
-        ":\n.incbin \"" RAYDIX_CODE_OBJECT_FOLDER "/" #name ".co\"\n.hidden raydix_code_" #name    \
-        "_end\n.globl raydix_code_" #name "_end\nraydix_code_" #name "_end:\n.popsection");        \
-    extern "C" [[gnu::visibility("hidden")]] const char raydix_code_##name[];                      \
+#define RAYDIX_EMBED(name)                                                                      \
+    asm(".pushsection .rodata\n.balign 4096\n.hidden raydix_code_" #name                        \
+        "\n.globl raydix_code_" #name "\nraydix_code_" #name                                    \
+        ":\n.incbin \"" RAYDIX_CODE_OBJECT_FOLDER "/" #name ".co\"\n.hidden raydix_code_" #name \
+        "_end\n.globl raydix_code_" #name "_end\nraydix_code_" #name "_end:\n.popsection");     \
+    extern "C" [[gnu::visibility("hidden")]] const char raydix_code_##name[];                   \
     extern "C" [[gnu::visibility("hidden")]] const char raydix_code_##name##_end[];
 RAYDIX_CODE_OBJECTS(RAYDIX_EMBED)
 

@@ -1,5 +1,5 @@
-// The calls of AMD's HIP runtime that the library makes, declared here: nothing of ROCm is needed to
-// build. The runtime, libamdhip64.so, is opened when the first of them is asked for.
+// The calls of AMD's HIP runtime that the library makes, declared here: nothing of ROCm is needed
+// to build. The runtime, libamdhip64.so, is opened when the first of them is asked for.
 #pragma once
 
 #include <raydix/error.h>

@@ -32,7 +32,8 @@ private:
 
 HipStream stream_of(Stream queue) { return static_cast<HipStream>(queue); }
 
-/// Without what may follow: "gfx90a" of "gfx90a:sramecc+:xnack-". Code objects are compiled for any.
+/// Without what may follow: "gfx90a" of "gfx90a:sramecc+:xnack-". Code objects are compiled for
+/// any.
 std::string architecture_of(int device) {
     const HipApi& hip = hip_api();
     std::array<char, 8192> properties{};  // the largest so far has 1,472 bytes
@@ -112,8 +113,7 @@ HipDevice::~HipDevice() {
 }
 
 void HipDevice::close() noexcept {
-    if (!closed_.exchange(true))
-        static_cast<void>(hip_api().StreamSynchronize(own_stream_.get()));
+    if (!closed_.exchange(true)) static_cast<void>(hip_api().StreamSynchronize(own_stream_.get()));
 }
 
 Stream HipDevice::queue(Stream given) { return given != nullptr ? given : own_stream_.get(); }
@@ -167,9 +167,9 @@ void HipDevice::launch(Stream queue, const KernelName& kernel, std::size_t group
     const auto word = [](HipLaunchParameter p) { return reinterpret_cast<void*>(p); };
     void* extra[] = {word(HipLaunchParameter::buffer_pointer), const_cast<void*>(argument),
                      word(HipLaunchParameter::buffer_size), &bytes, word(HipLaunchParameter::end)};
-    hip_try(hip_api().ModuleLaunchKernel(
-                function(kernel.kernel), static_cast<unsigned>(groups), 1, 1,
-                static_cast<unsigned>(threads), 1, 1, 0, stream_of(queue), nullptr, extra),
+    hip_try(hip_api().ModuleLaunchKernel(function(kernel.kernel), static_cast<unsigned>(groups), 1,
+                                         1, static_cast<unsigned>(threads), 1, 1, 0,
+                                         stream_of(queue), nullptr, extra),
             "hipModuleLaunchKernel", kernel.kernel);
 }
 

@@ -2,13 +2,13 @@
 // HIP (hip_device.h). What launches pipelines there (queue_launcher.h) knows this much of it.
 #pragma once
 
-#include <raydix/device.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <string>
 
 namespace raydix {
+
+using Stream = void*;  // as in raydix/device.h
 
 /// A kernel of a module of SPIR-V. A code object for AMD holds those of all modules.
 struct KernelName {

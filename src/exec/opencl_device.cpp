@@ -132,11 +132,11 @@ OpenclDevice::OpenclDevice(const OpenclFound& found)
     copy_ = extension<clEnqueueMemcpyINTEL_fn>(platform_, "clEnqueueMemcpyINTEL");
     fill_ = extension<clEnqueueMemFillINTEL_fn>(platform_, "clEnqueueMemFillINTEL");
     cl_int status = CL_SUCCESS;
-    context_ = OpenclContext(
-        cl.CreateContext(nullptr, 1, &device_, OpenclNotes::note, nullptr, &status));
+    context_ =
+        OpenclContext(cl.CreateContext(nullptr, 1, &device_, OpenclNotes::note, nullptr, &status));
     opencl_try(status, "clCreateContext", traits_.name);
-    own_queue_ = OpenclQueue(
-        cl.CreateCommandQueueWithProperties(context(), device_, nullptr, &status));
+    own_queue_ =
+        OpenclQueue(cl.CreateCommandQueueWithProperties(context(), device_, nullptr, &status));
     opencl_try(status, "clCreateCommandQueueWithProperties", traits_.name);
     const std::string wrong = wrong_arithmetic();
     if (!wrong.empty()) throw BackendUnavailable("device opencl: " + traits_.name + " " + wrong);
@@ -196,14 +196,14 @@ void OpenclDevice::free(void* memory) noexcept {
 }
 
 void OpenclDevice::copy(Stream queue, void* to, const void* from, std::size_t bytes) {
-    opencl_try(copy_(queue_of(queue), CL_FALSE, to, from, bytes, 0, nullptr, nullptr), "clEnqueueMemcpyINTEL",
-               std::to_string(bytes) + " bytes");
+    opencl_try(copy_(queue_of(queue), CL_FALSE, to, from, bytes, 0, nullptr, nullptr),
+               "clEnqueueMemcpyINTEL", std::to_string(bytes) + " bytes");
 }
 
 void OpenclDevice::clear(Stream queue, void* memory, std::size_t bytes) {
     const std::uint8_t zero = 0;
-    opencl_try(fill_(queue_of(queue), memory, &zero, 1, bytes, 0, nullptr, nullptr), "clEnqueueMemFillINTEL",
-               std::to_string(bytes) + " bytes");
+    opencl_try(fill_(queue_of(queue), memory, &zero, 1, bytes, 0, nullptr, nullptr),
+               "clEnqueueMemFillINTEL", std::to_string(bytes) + " bytes");
 }
 
 void OpenclDevice::finish(Stream queue) {
@@ -257,8 +257,8 @@ void OpenclDevice::launch(Stream queue, const KernelName& name, std::size_t grou
     cl_kernel function = kernel(name);
     opencl_try(cl.SetKernelArg(function, 0, bytes, argument), "clSetKernelArg", name.kernel);
     const std::size_t global = groups * threads;
-    opencl_try(cl.EnqueueNDRangeKernel(queue_of(queue), function, 1, nullptr, &global, &threads, 0, nullptr,
-                                       nullptr),
+    opencl_try(cl.EnqueueNDRangeKernel(queue_of(queue), function, 1, nullptr, &global, &threads, 0,
+                                       nullptr, nullptr),
                "clEnqueueNDRangeKernel", name.kernel);
 }
 

@@ -12,8 +12,8 @@
 #include "exec/arena.h"
 #include "exec/host_launcher.h"
 #include "exec/kernel_arguments.h"
-#include "exec/launch_sizer.h"
 #include "exec/kernel_device.h"
+#include "exec/launch_sizer.h"
 #include "exec/warp_sort.h"
 
 namespace raydix {
@@ -66,8 +66,7 @@ public:
 
     /// `memory`: the device's, aligned to 256 bytes, QueueSizer::bytes() at least; in use until
     /// the queue has passed the last launch.
-    QueueLauncher(KernelDevice& device, Stream queue, void* memory,
-                   std::size_t memory_bytes)
+    QueueLauncher(KernelDevice& device, Stream queue, void* memory, std::size_t memory_bytes)
         : device_(device), queue_(queue), memory_(memory), memory_bytes_(memory_bytes) {}
 
     template <class Work>
@@ -132,9 +131,7 @@ private:
     [[nodiscard]] static std::size_t groups_of(std::uint32_t items, std::size_t each) {
         return (items + each - 1) / each;
     }
-    [[nodiscard]] std::size_t most_groups() const {
-        return device_.is_cpu() ? 64 : counted_groups;
-    }
+    [[nodiscard]] std::size_t most_groups() const { return device_.is_cpu() ? 64 : counted_groups; }
     template <class Arguments>
     void put(const KernelName& kernel, std::size_t groups, std::size_t threads,
              const Arguments& arguments) {

@@ -17,7 +17,8 @@ void list_hip_devices(std::vector<DeviceDescription>& out) {
         for (const HipFound& device : found)
             out.push_back({"hip:" + std::to_string(device.index), device.name,
                            device.architecture + ", HIP " + device.runtime, hip_lacks(device)});
-        if (found.empty()) out.push_back({"hip", "", "", "device hip: the runtime found no device"});
+        if (found.empty())
+            out.push_back({"hip", "", "", "device hip: the runtime found no device"});
     } catch (const std::exception& error) {
         out.push_back({"hip", "", "", error.what()});
     }

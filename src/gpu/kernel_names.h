@@ -1,5 +1,5 @@
-// The kernels that stand for functors on devices of OpenCL and HIP: those of src/gpu/kernels/*.inc, which
-// the device's side compiles from the same lines.
+// The kernels that stand for functors on devices of OpenCL and HIP: those of src/gpu/kernels/*.inc,
+// which the device's side compiles from the same lines.
 #pragma once
 
 #include "engine/name_hit.h"

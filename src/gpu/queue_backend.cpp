@@ -18,7 +18,7 @@ void* QueueBackend::allocate(std::size_t bytes) { return device_->allocate(bytes
 void QueueBackend::free(void* memory) noexcept { device_->free(memory); }
 
 void QueueBackend::copy_to_device(void* device, const void* host, std::size_t bytes,
-                                   Stream stream) {
+                                  Stream stream) {
     device_->copy(device_->queue(stream), device, host, bytes);
 }
 

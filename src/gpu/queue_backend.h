@@ -53,8 +53,8 @@ public:
         const std::lock_guard guard(lock_);
         std::unique_ptr<QueueBackend>& backend = backends_[index];
         if (backend == nullptr)
-            backend = std::make_unique<QueueBackend>(kind + ':' + std::to_string(index),
-                                                     open(index));
+            backend =
+                std::make_unique<QueueBackend>(kind + ':' + std::to_string(index), open(index));
         return *backend;
     }
 

@@ -1,4 +1,5 @@
-// Rays on a queue of OpenCL or HIP: the kernels of Aila and Laine, and those of compressed wide trees.
+// Rays on a queue of OpenCL or HIP: the kernels of Aila and Laine, and those of compressed wide
+// trees.
 #if defined(RAYDIX_HAVE_QUEUES)
 
 #include <algorithm>
@@ -63,26 +64,26 @@ void launch_cwbvh(QueueLauncher launcher, const DeviceBackend::CwbvhCall& call, 
 }  // namespace
 
 std::unique_ptr<DeviceWarpTree::Arrays> QueueBackend::warp_tree(const WarpTree& tree,
-                                                                 Stream stream) {
+                                                                Stream stream) {
     return with_groups(upload_warp_tree(tree, stream), *device_);
 }
 
 std::unique_ptr<DeviceWarpTree::Arrays> QueueBackend::warp_tree(const DeviceTree& tree,
-                                                                 Stream stream) {
+                                                                Stream stream) {
     QueueLauncher launcher = plain_launcher(stream);
     return with_groups(take_warp_tree(launcher, tree, stream), *device_);
 }
 
 void QueueBackend::trace_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
-                                std::span<TreeHit> hits, const DeviceTraceOptions& options,
-                                Scratch scratch, Stream stream) {
+                               std::span<TreeHit> hits, const DeviceTraceOptions& options,
+                               Scratch scratch, Stream stream) {
     trace_launches(plain_launcher(stream), WarpTraceCall(tree, rays, hits, options, scratch),
                    [](int) {});
 }
 
 DeviceTraceMs QueueBackend::time_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
-                                        std::span<TreeHit> hits, const DeviceTraceOptions& options,
-                                        Scratch scratch, Stream stream) {
+                                       std::span<TreeHit> hits, const DeviceTraceOptions& options,
+                                       Scratch scratch, Stream stream) {
     const Stream queue = device_->queue(stream);
     const auto now = [&] {
         device_->finish(queue);

@@ -15,7 +15,10 @@ namespace {
 constexpr std::uint8_t last = 0xA7;
 std::array<std::uint8_t, 4096> arrived{};
 
-/// Made before the driver is loaded, so that it is destroyed after the library has waited.
+// Made before the driver is loaded, so that they are destroyed after the library has waited: the
+// verdict first, because buffers wait too when they are freed before.
+raydix::DeviceBuffer<std::uint8_t> from, between;
+
 struct Verdict {
     bool expected = false;
     ~Verdict() {
@@ -24,8 +27,6 @@ struct Verdict {
         std::_Exit(1);
     }
 } verdict;
-
-raydix::DeviceBuffer<std::uint8_t> of_static_storage;
 
 }  // namespace
 
@@ -38,11 +39,11 @@ int main() {
         return required != nullptr && std::string_view(required) == "opencl" ? 1 : 77;
     }
     constexpr std::size_t bytes = std::size_t{1} << 24;
-    of_static_storage = raydix::DeviceBuffer<std::uint8_t>(std::vector<std::uint8_t>(bytes, last));
-    static raydix::DeviceBuffer<std::uint8_t> between(bytes);
+    from = raydix::DeviceBuffer<std::uint8_t>(std::vector<std::uint8_t>(bytes, last));
+    between.reset(bytes);
     // 0.8 GB to copy, and nothing waits for it.
     for (int turn = 0; turn < 50; ++turn)
-        raydix::detail::copy_to_device(between.data(), of_static_storage.data(), bytes, nullptr);
+        raydix::detail::copy_to_device(between.data(), from.data(), bytes, nullptr);
     raydix::detail::copy_to_host(arrived.data(), between.data(), arrived.size(), nullptr);
     verdict.expected = true;
 }

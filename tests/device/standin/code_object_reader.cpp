@@ -52,20 +52,34 @@ public:
         if (head < 0xA0) return list(head & 0x0F);
         if (head < 0xC0) return {std::string(take(head & 0x1F))};
         switch (head) {
-            case 0xC2: return {std::uint64_t{0}};
-            case 0xC3: return {std::uint64_t{1}};
-            case 0xCC: return {number(1)};
-            case 0xCD: return {number(2)};
-            case 0xCE: return {number(4)};
-            case 0xCF: return {number(8)};
-            case 0xD9: return {std::string(take(number(1)))};
-            case 0xDA: return {std::string(take(number(2)))};
-            case 0xDB: return {std::string(take(number(4)))};
-            case 0xDC: return list(number(2));
-            case 0xDD: return list(number(4));
-            case 0xDE: return map(number(2));
-            case 0xDF: return map(number(4));
-            default: throw std::runtime_error("MessagePack of another kind");
+            case 0xC2:
+                return {std::uint64_t{0}};
+            case 0xC3:
+                return {std::uint64_t{1}};
+            case 0xCC:
+                return {number(1)};
+            case 0xCD:
+                return {number(2)};
+            case 0xCE:
+                return {number(4)};
+            case 0xCF:
+                return {number(8)};
+            case 0xD9:
+                return {std::string(take(number(1)))};
+            case 0xDA:
+                return {std::string(take(number(2)))};
+            case 0xDB:
+                return {std::string(take(number(4)))};
+            case 0xDC:
+                return list(number(2));
+            case 0xDD:
+                return list(number(4));
+            case 0xDE:
+                return map(number(2));
+            case 0xDF:
+                return map(number(4));
+            default:
+                throw std::runtime_error("MessagePack of another kind");
         }
     }
 
@@ -151,8 +165,7 @@ std::optional<CodeObject> read_code_object(const char* image) {
             for (const Value& argument : kernel.list(".args")) {
                 if (argument.text(".value_kind").starts_with("hidden")) continue;
                 ++note.arguments;
-                if (argument.number(".offset") == 0)
-                    note.argument_bytes = argument.number(".size");
+                if (argument.number(".offset") == 0) note.argument_bytes = argument.number(".size");
             }
             if (!symbols.contains(note.symbol)) return {};
             code.kernels.emplace(kernel.text(".name"), note);

@@ -10,11 +10,11 @@
 namespace raydix::standin {
 
 struct KernelNote {
-    std::uint64_t arguments = 0;        // of kernels
-    std::uint64_t argument_bytes = 0;   // of the first, which is given by value at offset 0
-    std::uint64_t argument_segment = 0; // .kernarg_segment_size: hidden ones included
-    std::uint64_t most_threads = 0;     // .max_flat_workgroup_size
-    std::string symbol;                 // of its descriptor: NAME.kd
+    std::uint64_t arguments = 0;         // of kernels
+    std::uint64_t argument_bytes = 0;    // of the first, which is given by value at offset 0
+    std::uint64_t argument_segment = 0;  // .kernarg_segment_size: hidden ones included
+    std::uint64_t most_threads = 0;      // .max_flat_workgroup_size
+    std::string symbol;                  // of its descriptor: NAME.kd
 };
 struct CodeObject {
     std::string target;  // amdgcn-amd-amdhsa--gfx90a

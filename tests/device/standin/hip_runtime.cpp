@@ -1,14 +1,13 @@
-// A stand-in for AMD's libamdhip64.so, for tests: it does for the library what a HIP runtime does, and
-// runs the kernels on an OpenCL device for processors. Modules must be code objects for the device's
-// architecture, with the kernels that are asked for; a launch must fit what the code object says of
-// its kernel: groups, one argument, its bytes. What runs then is the kernel of the same name that
-// clang made of the same source for OpenCL: so a test proves the library's calls and arguments, not
-// the code objects' instructions.
+// A stand-in for AMD's libamdhip64.so, for tests: it does for the library what a HIP runtime does,
+// and runs the kernels on an OpenCL device for processors. Modules must be code objects for the
+// device's architecture, with the kernels that are asked for; a launch must fit what the code
+// object says of its kernel: groups, one argument, its bytes. What runs then is the kernel of the
+// same name that clang made of the same source for OpenCL: so a test proves the library's calls and
+// arguments, not the code objects' instructions.
 #include <cstdlib>
 #include <cstring>
 #include <map>
 #include <mutex>
-#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
@@ -39,7 +38,7 @@ struct State {
     std::vector<std::string> architectures{"gfx90a", "gfx1100"};
     std::map<std::string, Failure, std::less<>> failures;
     std::set<void*> memory, modules, streams;
-    std::uint64_t launches = 0, kernels = 0, kernels_of_module = 0;
+    std::uint64_t launches = 0, kernels_of_module = 0;
 };
 State& state() {
     static auto& all = *new State;
@@ -71,8 +70,8 @@ HipStatus answer(const char* call, HipStatus otherwise, const Run& run) {
     }
 }
 
-/// The SPIR-V module that has a kernel of this name.
-std::optional<std::string> module_of(const std::string& kernel) {
+/// Kernel -> the SPIR-V module that has it.
+const std::map<std::string, std::string>& spirv_kernels() {
     static const std::map<std::string, std::string> all = [] {
         std::map<std::string, std::string> modules;
         for (const char* module : {"sort", "sorted", "build", "hploc", "trees", "queries", "trace",
@@ -84,8 +83,7 @@ std::optional<std::string> module_of(const std::string& kernel) {
         }
         return modules;
     }();
-    const auto found = all.find(kernel);
-    return found != all.end() ? std::optional(found->second) : std::nullopt;
+    return all;
 }
 
 struct Function {
@@ -139,8 +137,8 @@ void standin_heal() {
 }
 void standin_figures(Figures* figures) {
     const std::lock_guard guard(state().lock);
-    *figures = {state().memory.size(), state().modules.size(), state().streams.size(),
-                state().launches,      state().kernels,        state().kernels_of_module};
+    *figures = {state().memory.size(), state().modules.size(),    state().streams.size(),
+                state().launches,      state().kernels_of_module, spirv_kernels().size()};
 }
 
 HipStatus hipInit(unsigned) { return planned("hipInit"); }
@@ -179,15 +177,24 @@ HipStatus hipGetDevicePropertiesR0600(void* properties, int index) {
 }
 const char* hipGetErrorString(HipStatus status) {
     switch (status) {
-        case invalid_value: return "invalid argument";
-        case out_of_memory: return "out of memory";
-        case invalid_configuration: return "invalid configuration argument";
-        case hip_no_device: return "no ROCm-capable device is detected";
-        case invalid_image: return "device kernel image is invalid";
-        case no_binary: return "no kernel image is available for execution on the device";
-        case not_found: return "named symbol not found";
-        case launch_failure: return "unspecified launch failure";
-        default: return "unknown error";
+        case invalid_value:
+            return "invalid argument";
+        case out_of_memory:
+            return "out of memory";
+        case invalid_configuration:
+            return "invalid configuration argument";
+        case hip_no_device:
+            return "no ROCm-capable device is detected";
+        case invalid_image:
+            return "device kernel image is invalid";
+        case no_binary:
+            return "no kernel image is available for execution on the device";
+        case not_found:
+            return "named symbol not found";
+        case launch_failure:
+            return "unspecified launch failure";
+        default:
+            return "unknown error";
     }
 }
 
@@ -195,14 +202,16 @@ HipStatus hipModuleLoadData(HipModule* module, const void* image) {
     return answer("hipModuleLoadData", invalid_image, [&] {
         const auto code = read_code_object(static_cast<const char*>(image));
         if (!code) return invalid_image;
-        if (!code->target.ends_with("--" + state().architectures.at(
-                                               static_cast<std::size_t>(current))))
+        if (!code->target.ends_with("--" +
+                                    state().architectures.at(static_cast<std::size_t>(current))))
             return no_binary;
         auto* loaded = new Module{*code, {}};
         *module = reinterpret_cast<HipModule>(loaded);
         const std::lock_guard guard(state().lock);
         state().modules.insert(loaded);
-        state().kernels_of_module = code->kernels.size();
+        state().kernels_of_module = 0;
+        for (const auto& [name, note] : code->kernels)
+            state().kernels_of_module += spirv_kernels().contains(name);
         return hip_success;
     });
 }
@@ -216,12 +225,11 @@ HipStatus hipModuleGetFunction(HipFunction* function, HipModule module, const ch
     return answer("hipModuleGetFunction", not_found, [&] {
         auto& loaded = *reinterpret_cast<Module*>(module);
         const auto note = loaded.code.kernels.find(name);
-        const auto spirv = module_of(name);
-        if (note == loaded.code.kernels.end() || !spirv) return not_found;
+        const auto spirv = spirv_kernels().find(name);
+        if (note == loaded.code.kernels.end() || spirv == spirv_kernels().end()) return not_found;
         const std::lock_guard guard(state().lock);
-        auto& made = loaded.functions[name] = {name, *spirv, note->second};
+        auto& made = loaded.functions[name] = {name, spirv->second, note->second};
         *function = reinterpret_cast<HipFunction>(&made);
-        ++state().kernels;
         return hip_success;
     });
 }

@@ -1,5 +1,5 @@
-// What a test says to the stand-in for AMD's runtime (hip_runtime.cpp) and asks of it: C functions of
-// the same library, found with dlsym.
+// What a test says to the stand-in for AMD's runtime (hip_runtime.cpp) and asks of it: C functions
+// of the same library, found with dlsym.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,10 @@ namespace raydix::standin {
 
 struct Figures {
     std::uint64_t allocations, modules, streams;  // that live
-    std::uint64_t launches, kernels;              // so far; names that were looked up
-    std::uint64_t code_objects_kernels;           // of the last module that was loaded
+    std::uint64_t launches;                       // so far
+    std::uint64_t kernels_of_module;              // of the last one that was loaded, with a kernel
+                                                  // of SPIR-V each
+    std::uint64_t kernels_of_spirv;
 };
 
 }  // namespace raydix::standin
