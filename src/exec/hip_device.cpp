@@ -55,8 +55,8 @@ std::string runtime_version() {
 
 std::string hip_lacks(const HipFound& found) {
     if (!code_object(found.architecture).empty()) return {};
-    return found.name + " is " + found.architecture + "; this build has kernels for " +
-           code_object_names();
+    return "device hip: " + found.name + " is " + found.architecture +
+           "; this build has kernels for " + code_object_names();
 }
 
 std::vector<HipFound> find_hip_devices() {
@@ -90,7 +90,7 @@ void HipDevice::Release::operator()(HipStream stream) const {
 
 HipDevice::HipDevice(const HipFound& found) : found_(found) {
     const std::string lacks = hip_lacks(found_);
-    if (!lacks.empty()) throw BackendUnavailable("device hip: " + lacks);
+    if (!lacks.empty()) throw BackendUnavailable(lacks);
     const HipApi& hip = hip_api();
     const OnDevice on(found_.index);
     HipModule module = nullptr;
@@ -104,7 +104,7 @@ HipDevice::HipDevice(const HipFound& found) : found_(found) {
     own_stream_.reset(stream);
     const std::string wrong = wrong_arithmetic();
     if (!wrong.empty()) throw BackendUnavailable("device hip: " + found_.name + " " + wrong);
-    close_before_driver();
+    note_open();
 }
 
 HipDevice::~HipDevice() {

@@ -1,6 +1,5 @@
 #include "exec/kernel_device.h"
 
-#include <algorithm>
 #include <cstdlib>
 #include <mutex>
 #include <vector>
@@ -21,27 +20,30 @@ public:
     }
     void add(KernelDevice* device) {
         const std::lock_guard lock(lock_);
-        if (std::ranges::find(devices_, device) == devices_.end()) devices_.push_back(device);
-        static_cast<void>(std::atexit(end));
+        devices_.push_back(device);
     }
     void remove(KernelDevice* device) {
         const std::lock_guard lock(lock_);
         std::erase(devices_, device);
     }
 
-private:
     static void end() {
         const std::lock_guard lock(all().lock_);
         for (KernelDevice* device : all().devices_) device->close();
     }
 
+private:
     std::mutex lock_;
     std::vector<KernelDevice*> devices_;
 };
 
 }  // namespace
 
-void KernelDevice::close_before_driver() { OpenDevices::all().add(this); }
+void KernelDevice::close_before_driver() { static_cast<void>(std::atexit(OpenDevices::end)); }
+void KernelDevice::note_open() {
+    OpenDevices::all().add(this);
+    close_before_driver();
+}
 void KernelDevice::note_gone() noexcept { OpenDevices::all().remove(this); }
 
 std::string KernelDevice::wrong_arithmetic() {

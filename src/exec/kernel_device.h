@@ -49,11 +49,12 @@ public:
     virtual void close() noexcept = 0;
 
 protected:
-    /// close() is called when the process ends, until note_gone(). What was asked for last comes
-    /// first then, and a driver asks for its own end when it is loaded and when it first compiles:
-    /// so this is called again after such a step.
-    void close_before_driver();
+    /// From here to note_gone() close() is called when the process ends: the last step of opening.
+    void note_open();
     void note_gone() noexcept;
+    /// What was asked for last comes first when a process ends, and a driver asks for its own end
+    /// when it is loaded and when it first compiles: so this is called after each such step.
+    static void close_before_driver();
     /// Whether it computes as the host does (arithmetic_check.h); "" or what is wrong. Runs on its
     /// own queue. Drivers of CPUs compute right and do not claim it: what counts is this.
     [[nodiscard]] std::string wrong_arithmetic();

@@ -140,7 +140,7 @@ OpenclDevice::OpenclDevice(const OpenclFound& found)
     opencl_try(status, "clCreateCommandQueueWithProperties", traits_.name);
     const std::string wrong = wrong_arithmetic();
     if (!wrong.empty()) throw BackendUnavailable("device opencl: " + traits_.name + " " + wrong);
-    close_before_driver();
+    note_open();
 }
 
 OpenclDevice::~OpenclDevice() {
