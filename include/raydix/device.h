@@ -75,8 +75,8 @@ class DeviceBuffer {
 public:
     DeviceBuffer() = default;
     explicit DeviceBuffer(std::size_t size) { reset(size); }
-    explicit DeviceBuffer(std::span<const T> values, Stream stream = nullptr) {
-        upload(values, stream);
+    explicit DeviceBuffer(std::span<const T> values, Stream stream = nullptr) : DeviceBuffer() {
+        upload(values, stream);  // if it throws, the memory is freed: the first constructor is done
     }
     DeviceBuffer(DeviceBuffer&& other) noexcept { swap(other); }
     DeviceBuffer& operator=(DeviceBuffer&& other) noexcept {

@@ -289,10 +289,12 @@ HipStatus hipStreamCreateWithFlags(HipStream* stream, unsigned flags) {
     });
 }
 HipStatus hipStreamSynchronize(HipStream stream) {
-    return answer("hipStreamSynchronize", launch_failure, [&] {
+    try {  // a wait that a test makes fail has waited too
         device().finish(queue_of(stream));
-        return hip_success;
-    });
+    } catch (const std::exception&) {
+        return launch_failure;
+    }
+    return planned("hipStreamSynchronize");
 }
 HipStatus hipStreamDestroy(HipStream stream) {
     const std::lock_guard guard(state().lock);
