@@ -22,7 +22,7 @@ from planted_faults import FAULTS, LONG
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 WORK = ROOT / "build" / "mutate"
 SOURCE, BUILD, BUILD_THREADS = WORK / "source", WORK / "build", WORK / "build-threads"
-DEVICE_PROGRAM = BUILD / "bin" / "device_opencl"
+DEVICE_PROGRAMS = {name: BUILD / "bin" / f"device_{name}" for name in ("opencl", "opencl_exit")}
 RESULTS, COMMITTED = WORK / "results.json", ROOT / "bench" / "results" / "mutations.json"
 LEAST_TIME_LIMIT_S = 60
 # Faults change answers, not speed: what compiles sooner will do. At -O1, GCC 12 warns of what is not so.
@@ -107,7 +107,7 @@ def looks_of(folders):
 
 def run_program(program, tests, limit):
     launcher = MPIRUN if program.name == "mpi_ranks" else []
-    environment = device_environment() if program == DEVICE_PROGRAM else None
+    environment = device_environment() if program in DEVICE_PROGRAMS.values() else None
     code = run([*launcher, str(program), "--gtest_brief=1", "--gtest_fail_fast=1", f"--gtest_filter={tests}"], limit, cwd=WORK,
                env=environment)
     return {0: None, None: "time"}.get(code, "test")
@@ -125,7 +125,7 @@ def prepare(faults):
     copy_tree()
     programs, with_threads = test_programs(), thread_programs(faults)
     first = {folder for fault in faults if not fault.by_threads for folder in fault.tests.split()}
-    of_devices = [DEVICE_PROGRAM] if any(fault.by_device for fault in faults) else []
+    of_devices = [program for name, program in DEVICE_PROGRAMS.items() if name in first]
     for folder, wanted in ((BUILD, [program for name, program in programs.items() if name in first] + of_devices),
                            (BUILD_THREADS, list(with_threads.values()))):
         if wanted and not (configure(folder) and build(wanted)):
@@ -224,7 +224,7 @@ def main(arguments):
             outcome = f"DOES NOT APPLY: the old text stands {times} times in the file"
             bad.append(number)
         else:
-            looked_at = {"opencl": DEVICE_PROGRAM} if fault.by_device else with_threads if fault.by_threads else programs
+            looked_at = DEVICE_PROGRAMS if fault.by_device else with_threads if fault.by_threads else programs
             who = noticed_by(fault, looked_at, limits)
             keep_result(fault, who)
             outcome = f"noticed by {who}" if who else "NOT NOTICED"

@@ -445,6 +445,8 @@ FAULTS = [
           "devices: a shuffle takes the next lane's value", "opencl", by_device=True),
     Fault("src/base/device_words.h", "__gpu_ballot(hardware_lanes(members), vote)", "__gpu_ballot(hardware_lanes(members), !vote)",
           "devices: lanes vote for the opposite", "opencl", by_device=True),
+    Fault("src/exec/kernel_device.cpp", "static_cast<void>(std::atexit(OpenDevices::end));", "",
+          "devices: a process ends before the work on its device", "opencl_exit", by_device=True),
     Fault("src/exec/spirv_module.cpp", "subgroup_size_mode, 32u});", "subgroup_size_mode, 16u});",
           "kernels of warps run in sub-groups of 16", "exec"),
     Fault("src/exec/warp_sort.h", "counts(arena.take<std::uint32_t>(digit_values * tiles_for(limit))),",
