@@ -343,7 +343,9 @@ void add_traversal_suite(CLI::App& bench) {
         ->capture_default_str();
     command->add_flag("--memory", options->memory,
                       "Also a first-order memory model, as a column of its own");
-    command->add_option("--repeat", options->repeat, "Timed launches with --device cuda or opencl")
+    command
+        ->add_option("--repeat", options->repeat,
+                     "Timed launches with --device cuda, opencl or hip")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
     add_launch_options(*command, options->launches);

@@ -16,14 +16,15 @@ namespace {
 
 /// "" or why --device may not be this.
 std::string device_fault(std::string& device) {
-    for (const char* word : {"cpu", "cuda", "sim", "opencl"})
+    for (const char* word : {"cpu", "cuda", "sim", "opencl", "hip"})
         if (device == word) return {};
-    constexpr std::string_view numbered = "opencl:";
-    const bool number =
-        device.size() > numbered.size() && device.size() < numbered.size() + 5 &&
-        device.find_first_not_of("0123456789", numbered.size()) == std::string::npos;
-    if (device.starts_with(numbered) && number) return {};
-    return "'" + device + "' is not cpu, cuda, opencl, opencl:N or sim";
+    for (const std::string_view numbered : {"opencl:", "hip:"}) {
+        const bool number =
+            device.size() > numbered.size() && device.size() < numbered.size() + 5 &&
+            device.find_first_not_of("0123456789", numbered.size()) == std::string::npos;
+        if (device.starts_with(numbered) && number) return {};
+    }
+    return "'" + device + "' is not cpu, cuda, opencl, opencl:N, hip, hip:N or sim";
 }
 
 }  // namespace
@@ -104,9 +105,10 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
             ->check(CLI::IsMember({"binary", "wide4", "wide8", "compact", "cwbvh"}))
             ->group(group);
     command
-        .add_option("--device", options.device,
-                    "Where to build (cpu, cuda, opencl or opencl:N) and trace (these and sim)")
-        ->check(CLI::Validator(device_fault, "cpu|cuda|opencl[:N]|sim"))
+        .add_option(
+            "--device", options.device,
+            "Where to build (cpu, cuda, opencl, opencl:N, hip or hip:N) and trace (these and sim)")
+        ->check(CLI::Validator(device_fault, "cpu|cuda|opencl[:N]|hip[:N]|sim"))
         ->capture_default_str()
         ->group(group);
     of_the_build(
@@ -226,7 +228,7 @@ void refuse_simulator(const TreeOptions& tree) {
     if (tree.device == "sim")
         throw CLI::ValidationError("--device",
                                    "sim traces rays (trace); trees are built on the "
-                                   "cpu, or on cuda or opencl");
+                                   "cpu, or on cuda, opencl or hip");
 }
 
 void refuse_layout(const TreeOptions& tree) {

@@ -544,7 +544,7 @@ void add_trace_command(CLI::App& app) {
         ->add_option(
             "--kernel", options->kernel,
             "Traversal kernel (default: engine on the cpu, scalar for a kdtree or --layout binary, "
-            "speculative_while_while on cuda, opencl and sim)")
+            "speculative_while_while on cuda, opencl, hip and sim)")
         ->check(CLI::IsMember(trace_kernel_names()));
     command->add_option("--machine", options->machine, "Simulated machine of --device sim")
         ->capture_default_str();

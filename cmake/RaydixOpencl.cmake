@@ -63,3 +63,6 @@ set_source_files_properties(src/exec/spirv_module.cpp PROPERTIES OBJECT_DEPENDS 
     COMPILE_DEFINITIONS "RAYDIX_HAVE_OPENCL=1;RAYDIX_SPIRV_LIST=\"${raydix_spirv_folder}/modules.h\"")
 file(GLOB raydix_opencl_sources src/exec/opencl_*.cpp src/gpu/opencl_*.cpp)
 set_source_files_properties(${raydix_opencl_sources} PROPERTIES COMPILE_DEFINITIONS RAYDIX_HAVE_OPENCL=1)
+# What launches kernels of any queue; HIP is a second one (RaydixHip.cmake).
+file(GLOB raydix_queue_sources src/gpu/queue_*.cpp)
+set_source_files_properties(${raydix_queue_sources} PROPERTIES COMPILE_DEFINITIONS RAYDIX_HAVE_QUEUES=1)

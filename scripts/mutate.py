@@ -6,6 +6,7 @@ Works on a copy of the tree in build/mutate. A fault is noticed if something no 
 fails, crashes or runs out of time: first those of `tests`, then all others; of each, tests that take long last. Exit
 code 1 if a fault goes unnoticed or no longer applies (its old text must stand exactly once in the file). Faults of the
 order of memory are seen by the thread sanitizer alone: the programs of their folders are built a second time, with it.
+Faults of code for devices alone are seen by the tests of OpenCL devices, on the driver that scripts/setup --test fetches.
 """
 import fcntl
 import json
@@ -21,6 +22,7 @@ from planted_faults import FAULTS, LONG
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 WORK = ROOT / "build" / "mutate"
 SOURCE, BUILD, BUILD_THREADS = WORK / "source", WORK / "build", WORK / "build-threads"
+DEVICE_PROGRAMS = {name: BUILD / "bin" / f"device_{name}" for name in ("opencl", "opencl_exit")}
 RESULTS, COMMITTED = WORK / "results.json", ROOT / "bench" / "results" / "mutations.json"
 LEAST_TIME_LIMIT_S = 60
 # Faults change answers, not speed: what compiles sooner will do. At -O1, GCC 12 warns of what is not so.
@@ -78,6 +80,14 @@ def thread_programs(faults):
     return {folder: BUILD_THREADS / "bin" / f"{folder}_test" for folder in sorted(folders)}
 
 
+def device_environment():
+    """For tests of OpenCL devices: they fail where there is none."""
+    driver = ROOT / "build" / "opencl-rt" / "lib"
+    (WORK / "intel.icd").write_text(f"{driver / 'libintelocl.so'}\n", encoding="utf-8")
+    return {**os.environ, "OCL_ICD_VENDORS": str(WORK), "LD_LIBRARY_PATH": str(driver), "RAYDIX_TEST_DEVICE": "opencl",
+            "RAYDIX_DEVICE_REQUIRED": "opencl"}
+
+
 def build(programs):
     """Of one build folder."""
     folder = programs[0].parent.parent
@@ -86,7 +96,7 @@ def build(programs):
 
 def configure(folder):
     return run(["cmake", "-G", "Ninja", "-S", str(SOURCE), "-B", str(folder), *OPTIONS[folder], "-DRAYDIX_INSTRUCTION_SETS=ONE",
-                "-DRAYDIX_BENCH=OFF", "-DRAYDIX_CLI=OFF", "-DRAYDIX_ATTACK=OFF", "-DRAYDIX_CUDA=OFF"]) == 0
+                "-DRAYDIX_BENCH=OFF", "-DRAYDIX_CLI=OFF", "-DRAYDIX_ATTACK=OFF", "-DRAYDIX_CUDA=OFF", "-DRAYDIX_HIP=OFF"]) == 0
 
 
 def looks_of(folders):
@@ -97,7 +107,9 @@ def looks_of(folders):
 
 def run_program(program, tests, limit):
     launcher = MPIRUN if program.name == "mpi_ranks" else []
-    code = run([*launcher, str(program), "--gtest_brief=1", "--gtest_fail_fast=1", f"--gtest_filter={tests}"], limit, cwd=WORK)
+    environment = device_environment() if program in DEVICE_PROGRAMS.values() else None
+    code = run([*launcher, str(program), "--gtest_brief=1", "--gtest_fail_fast=1", f"--gtest_filter={tests}"], limit, cwd=WORK,
+               env=environment)
     return {0: None, None: "time"}.get(code, "test")
 
 
@@ -113,7 +125,8 @@ def prepare(faults):
     copy_tree()
     programs, with_threads = test_programs(), thread_programs(faults)
     first = {folder for fault in faults if not fault.by_threads for folder in fault.tests.split()}
-    for folder, wanted in ((BUILD, [program for name, program in programs.items() if name in first]),
+    of_devices = [program for name, program in DEVICE_PROGRAMS.items() if name in first]
+    for folder, wanted in ((BUILD, [program for name, program in programs.items() if name in first] + of_devices),
                            (BUILD_THREADS, list(with_threads.values()))):
         if wanted and not (configure(folder) and build(wanted)):
             sys.exit(f"without any fault, the tests do not build:\n{last_lines()}")
@@ -211,7 +224,8 @@ def main(arguments):
             outcome = f"DOES NOT APPLY: the old text stands {times} times in the file"
             bad.append(number)
         else:
-            who = noticed_by(fault, with_threads if fault.by_threads else programs, limits)
+            looked_at = DEVICE_PROGRAMS if fault.by_device else with_threads if fault.by_threads else programs
+            who = noticed_by(fault, looked_at, limits)
             keep_result(fault, who)
             outcome = f"noticed by {who}" if who else "NOT NOTICED"
             bad += [] if who else [number]

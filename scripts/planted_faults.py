@@ -29,6 +29,7 @@ class Fault:
     breaks: str
     tests: str  # folders of tests/, those most likely to notice first
     by_threads: bool = False  # only the thread sanitizer can notice it
+    by_device: bool = False  # only a device can notice it: the tests of OpenCL
 
 
 FAULTS = [
@@ -436,6 +437,16 @@ FAULTS = [
           "hploc: a list of clusters is read by a lane that did not wait for it", "gpu", by_threads=True),
     Fault("src/exec/warp.h", "to[lane] = from[source(lane) & 31];", "to[lane] = from[(source(lane) + 1) & 31];",
           "warps of the host: a shuffle takes the next lane's value", "exec"),
+    Fault("src/base/device_words.h",
+          "__scoped_atomic_fetch_or(&word, bits, __ATOMIC_ACQ_REL", "__scoped_atomic_exchange_n(&word, bits, __ATOMIC_ACQ_REL",
+          "devices: who arrives at a byte wipes the three beside it", "opencl", by_device=True),
+    Fault("src/base/device_words.h", "from, std::bit_cast<std::uint32_t>(value), warp_width",
+          "(from + 1) % warp_width, std::bit_cast<std::uint32_t>(value), warp_width",
+          "devices: a shuffle takes the next lane's value", "opencl", by_device=True),
+    Fault("src/base/device_words.h", "__gpu_ballot(hardware_lanes(members), vote)", "__gpu_ballot(hardware_lanes(members), !vote)",
+          "devices: lanes vote for the opposite", "opencl", by_device=True),
+    Fault("src/exec/kernel_device.cpp", "static_cast<void>(std::atexit(OpenDevices::end));", "",
+          "devices: a process ends before the work on its device", "opencl_exit", by_device=True),
     Fault("src/exec/spirv_module.cpp", "subgroup_size_mode, 32u});", "subgroup_size_mode, 16u});",
           "kernels of warps run in sub-groups of 16", "exec"),
     Fault("src/exec/warp_sort.h", "counts(arena.take<std::uint32_t>(digit_values * tiles_for(limit))),",

@@ -1,6 +1,6 @@
-// Building on a device, an NVIDIA GPU or one with OpenCL: device pointers in, device pointers out,
-// on the caller's stream. Memory belongs to the caller. Plain C++. Where there is no such device
-// every call that needs one throws BackendUnavailable.
+// Building on a device, an NVIDIA GPU or one with OpenCL or AMD's HIP: device pointers in, device
+// pointers out, on the caller's stream. Memory belongs to the caller. Plain C++. Where there is no
+// such device every call that needs one throws BackendUnavailable.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -17,7 +17,8 @@
 namespace raydix {
 
 /// A cudaStream_t, null for the default stream; or an in-order cl_command_queue of the context that
-/// opencl_context() returns, null for the device's own.
+/// opencl_context() returns, null for the device's own; or a hipStream_t of the selected device,
+/// null for its own, which does not wait for others.
 using Stream = void*;
 
 /// A device that this build and this machine have, or why one that is there cannot be used.
@@ -30,11 +31,11 @@ struct DeviceDescription {
 /// One at least for each kind of device that the library knows. Opens nothing. Never throws.
 [[nodiscard]] std::vector<DeviceDescription> list_devices();
 /// What the device calls of this thread run on from now on: "cuda", which is where a thread starts,
-/// "opencl" or "opencl:N". Memory and trees belong to the device that was selected when they were
-/// made, and calls with them need it selected. Opens an OpenCL device that was never selected
-/// before, which compiles a few kernels; others are compiled by the first call that runs them.
-/// Throws InputError for another word. Throws BackendUnavailable with what the device lacks. A
-/// call that throws has selected nothing.
+/// "opencl", "opencl:N", "hip" or "hip:N". Memory and trees belong to the device that was selected
+/// when they were made, and calls with them need it selected. Opens a device that was never
+/// selected before, which compiles a few kernels; others are compiled by the first call that runs
+/// them. Throws InputError for another word. Throws BackendUnavailable with what the device lacks.
+/// A call that throws has selected nothing.
 void select_device(std::string_view selector);
 /// As it was selected last, by this thread.
 [[nodiscard]] std::string selected_device();
@@ -74,8 +75,8 @@ class DeviceBuffer {
 public:
     DeviceBuffer() = default;
     explicit DeviceBuffer(std::size_t size) { reset(size); }
-    explicit DeviceBuffer(std::span<const T> values, Stream stream = nullptr) {
-        upload(values, stream);
+    explicit DeviceBuffer(std::span<const T> values, Stream stream = nullptr) : DeviceBuffer() {
+        upload(values, stream);  // if it throws, the memory is freed: the first constructor is done
     }
     DeviceBuffer(DeviceBuffer&& other) noexcept { swap(other); }
     DeviceBuffer& operator=(DeviceBuffer&& other) noexcept {
@@ -197,7 +198,7 @@ void build_bvh_on_device(const DeviceBoxList& boxes, const BuildOptions& options
                          const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);
 
 /// The same, but waits for the end. Returns the milliseconds of the stages as the device saw them
-/// (CUDA events; with OpenCL the host's clock, which waits behind each stage). `layout` includes
+/// (CUDA events; with others the host's clock, which waits behind each stage). `layout` includes
 /// the node pairs. For measurements.
 BuildMs time_build_on_device(const DeviceMesh& mesh, const BuildOptions& options,
                              const DeviceTree& tree, std::span<std::byte> scratch, Stream stream);

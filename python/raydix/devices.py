@@ -29,8 +29,8 @@ class Device:
 
 def devices() -> list[Device]:
     """All devices that this library knows, and which of them this build and this machine have: "cpu",
-    then one of "cuda" and one of "opencl" at least. Those of OpenCL are "opencl:0", "opencl:1" and so
-    on; where there is none, "opencl" says why."""
+    then one of "cuda", one of "opencl" and one of "hip" (AMD) at least. Those of OpenCL are "opencl:0",
+    "opencl:1" and so on; where there is none, "opencl" says why. So it is with "hip"."""
     machine = _core.machine()
     others = [Device(name, not lacks, lacks or what) for name, what, lacks in _core.devices()]
     return [Device("cpu", True, f"{machine['cpu']}, {machine['isa']}"), *others]
@@ -38,9 +38,12 @@ def devices() -> list[Device]:
 
 def device_name(value: Any) -> str:
     """What `Scene(device=...)` was given. ValueError: no name of a device."""
-    if isinstance(value, str) and re.fullmatch(r"cpu|cuda|opencl(:[0-9]{1,9})?", value):
+    if isinstance(value, str) and re.fullmatch(r"cpu|cuda|(opencl|hip)(:[0-9]{1,9})?", value):
         return value
-    raise ValueError(f"device: expected 'cpu', 'cuda', 'opencl' or 'opencl:N', given {value!r}")
+    raise ValueError(
+        "device: expected 'cpu', 'cuda', 'opencl', 'opencl:N', 'hip' or 'hip:N', "
+        f"given {value!r}"
+    )
 
 
 def on_cuda(array: Any) -> bool:

@@ -74,7 +74,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         Threads for builds and queries; 0: all the machine has. No result depends on it.
     device :
         "cpu"; "cuda", an NVIDIA GPU; "opencl" or "opencl:N", the first or another OpenCL device of
-        `raydix.devices()`. `intersect` and `occluded` then run there, with the same hits, and with
+        `raydix.devices()`; "hip" or "hip:N", a GPU of AMD. `intersect` and `occluded` then run there, with the same hits, and with
         "cuda" take arrays of CuPy, PyTorch and others that lie there. All other queries run on the
         processor. Meshes are traced there, instances are not. What is missing is named by the first
         such call: BackendUnavailable.

@@ -8,15 +8,17 @@
 #include <raydix/error.h>
 
 #include <string>
+#include <utility>
 
 namespace raydix {
 
 // clang-format off
 #define RAYDIX_OPENCL_CALLS(X)                                                                     \
     X(GetPlatformIDs) X(GetPlatformInfo) X(GetDeviceIDs) X(GetDeviceInfo) X(CreateContext)         \
-    X(CreateCommandQueueWithProperties) X(ReleaseCommandQueue) X(GetCommandQueueInfo)              \
-    X(CreateProgramWithIL) X(BuildProgram) X(GetProgramBuildInfo) X(CreateKernel) X(SetKernelArg)  \
-    X(SetKernelExecInfo) X(EnqueueNDRangeKernel) X(Finish) X(GetExtensionFunctionAddressForPlatform)
+    X(ReleaseContext) X(CreateCommandQueueWithProperties) X(ReleaseCommandQueue)                   \
+    X(GetCommandQueueInfo) X(CreateProgramWithIL) X(BuildProgram) X(GetProgramBuildInfo)           \
+    X(ReleaseProgram) X(CreateKernel) X(ReleaseKernel) X(SetKernelArg) X(SetKernelExecInfo)        \
+    X(EnqueueNDRangeKernel) X(Finish) X(GetExtensionFunctionAddressForPlatform)
 // clang-format on
 
 struct OpenclApi {
@@ -27,6 +29,30 @@ struct OpenclApi {
 
 /// Throws BackendUnavailable with the text of the system's linker.
 [[nodiscard]] const OpenclApi& opencl_api();
+
+/// A context, queue, program or kernel, released once.
+template <class Handle, auto Release>
+class OpenclOwned {
+public:
+    OpenclOwned() = default;
+    explicit OpenclOwned(Handle handle) : handle_(handle) {}
+    OpenclOwned(OpenclOwned&& other) noexcept : handle_(std::exchange(other.handle_, nullptr)) {}
+    OpenclOwned& operator=(OpenclOwned&& other) noexcept {
+        std::swap(handle_, other.handle_);
+        return *this;
+    }
+    ~OpenclOwned() {
+        if (handle_ != nullptr) static_cast<void>((opencl_api().*Release)(handle_));
+    }
+    [[nodiscard]] Handle get() const { return handle_; }
+
+private:
+    Handle handle_ = nullptr;
+};
+using OpenclContext = OpenclOwned<cl_context, &OpenclApi::ReleaseContext>;
+using OpenclQueue = OpenclOwned<cl_command_queue, &OpenclApi::ReleaseCommandQueue>;
+using OpenclProgram = OpenclOwned<cl_program, &OpenclApi::ReleaseProgram>;
+using OpenclKernel = OpenclOwned<cl_kernel, &OpenclApi::ReleaseKernel>;
 
 /// The name that OpenCL gives a status, with its number.
 [[nodiscard]] std::string opencl_status_name(cl_int status);

@@ -7,8 +7,6 @@
 #include <bit>
 #include <cmath>
 
-#include "exec/arithmetic_check.h"
-#include "exec/kernel_arguments.h"
 #include "exec/spirv_module.h"
 
 namespace raydix {
@@ -67,6 +65,8 @@ Function extension(cl_platform_id platform, const char* name) {
         throw BackendUnavailable(std::string("device opencl: the driver has no ") + name);
     return reinterpret_cast<Function>(address);
 }
+
+cl_command_queue queue_of(Stream queue) { return static_cast<cl_command_queue>(queue); }
 
 }  // namespace
 
@@ -132,15 +132,28 @@ OpenclDevice::OpenclDevice(const OpenclFound& found)
     copy_ = extension<clEnqueueMemcpyINTEL_fn>(platform_, "clEnqueueMemcpyINTEL");
     fill_ = extension<clEnqueueMemFillINTEL_fn>(platform_, "clEnqueueMemFillINTEL");
     cl_int status = CL_SUCCESS;
-    context_ = cl.CreateContext(nullptr, 1, &device_, OpenclNotes::note, nullptr, &status);
+    context_ =
+        OpenclContext(cl.CreateContext(nullptr, 1, &device_, OpenclNotes::note, nullptr, &status));
     opencl_try(status, "clCreateContext", traits_.name);
-    own_queue_ = cl.CreateCommandQueueWithProperties(context_, device_, nullptr, &status);
+    own_queue_ =
+        OpenclQueue(cl.CreateCommandQueueWithProperties(context(), device_, nullptr, &status));
     opencl_try(status, "clCreateCommandQueueWithProperties", traits_.name);
-    check_arithmetic();
+    const std::string wrong = wrong_arithmetic();
+    if (!wrong.empty()) throw BackendUnavailable("device opencl: " + traits_.name + " " + wrong);
+    note_open();
 }
 
-cl_command_queue OpenclDevice::queue(void* given) {
-    if (given == nullptr) return own_queue_;
+OpenclDevice::~OpenclDevice() {
+    note_gone();
+    close();
+}
+
+void OpenclDevice::close() noexcept {
+    if (!closed_.exchange(true)) static_cast<void>(opencl_api().Finish(own_queue()));
+}
+
+Stream OpenclDevice::queue(Stream given) {
+    if (given == nullptr) return own_queue();
     const OpenclApi& cl = opencl_api();
     auto* queue = static_cast<cl_command_queue>(given);
     cl_context context = nullptr;
@@ -153,7 +166,7 @@ cl_command_queue OpenclDevice::queue(void* given) {
     opencl_try(cl.GetCommandQueueInfo(queue, CL_QUEUE_PROPERTIES, sizeof(properties), &properties,
                                       nullptr),
                "clGetCommandQueueInfo");
-    if (context != context_ || device != device_)
+    if (context != this->context() || device != device_)
         throw InputError("the queue is of another OpenCL context or device than the selected one");
     if ((properties & CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE) != 0)
         throw InputError("the OpenCL queue may change the order of launches");
@@ -164,9 +177,9 @@ void* OpenclDevice::allocate(std::size_t bytes) {
     cl_int status = CL_SUCCESS;
     constexpr std::size_t line = 256;
     const std::size_t lines = (bytes + line - 1) / line * line;
-    void* memory = allocate_(context_, device_, nullptr, lines, line, &status);
+    void* memory = allocate_(context(), device_, nullptr, lines, line, &status);
     if (memory == nullptr)  // perhaps an alignment that it does not take
-        memory = allocate_(context_, device_, nullptr, lines, 0, &status);
+        memory = allocate_(context(), device_, nullptr, lines, 0, &status);
     opencl_try(status, "clDeviceMemAllocINTEL", std::to_string(bytes) + " bytes");
     if (reinterpret_cast<std::uintptr_t>(memory) % line != 0) {
         free(memory);
@@ -176,37 +189,40 @@ void* OpenclDevice::allocate(std::size_t bytes) {
 }
 
 void OpenclDevice::free(void* memory) noexcept {
+    if (closed_) return;
     // The driver does not know which launches use it: they only hold pointers to it.
-    static_cast<void>(opencl_api().Finish(own_queue_));
-    static_cast<void>(free_(context_, memory));
+    static_cast<void>(opencl_api().Finish(own_queue()));
+    static_cast<void>(free_(context(), memory));
 }
 
-void OpenclDevice::copy(cl_command_queue queue, void* to, const void* from, std::size_t bytes) {
-    opencl_try(copy_(queue, CL_FALSE, to, from, bytes, 0, nullptr, nullptr), "clEnqueueMemcpyINTEL",
-               std::to_string(bytes) + " bytes");
+void OpenclDevice::copy(Stream queue, void* to, const void* from, std::size_t bytes) {
+    opencl_try(copy_(queue_of(queue), CL_FALSE, to, from, bytes, 0, nullptr, nullptr),
+               "clEnqueueMemcpyINTEL", std::to_string(bytes) + " bytes");
 }
 
-void OpenclDevice::clear(cl_command_queue queue, void* memory, std::size_t bytes) {
+void OpenclDevice::clear(Stream queue, void* memory, std::size_t bytes) {
     const std::uint8_t zero = 0;
-    opencl_try(fill_(queue, memory, &zero, 1, bytes, 0, nullptr, nullptr), "clEnqueueMemFillINTEL",
-               std::to_string(bytes) + " bytes");
+    opencl_try(fill_(queue_of(queue), memory, &zero, 1, bytes, 0, nullptr, nullptr),
+               "clEnqueueMemFillINTEL", std::to_string(bytes) + " bytes");
 }
 
-void OpenclDevice::finish(cl_command_queue queue) {
-    opencl_try(opencl_api().Finish(queue), "clFinish", traits_.name);
+void OpenclDevice::finish(Stream queue) {
+    opencl_try(opencl_api().Finish(queue_of(queue)), "clFinish", traits_.name);
 }
 
 cl_program OpenclDevice::program(const char* module) {
     const auto known = programs_.find(std::string_view(module));
-    if (known != programs_.end()) return known->second;
+    if (known != programs_.end()) return known->second.get();
     const OpenclApi& cl = opencl_api();
     const std::vector<std::uint32_t> words = complete_spirv(spirv_module(module), warp_prefixes);
     cl_int status = CL_SUCCESS;
-    cl_program program =
-        cl.CreateProgramWithIL(context_, words.data(), words.size() * sizeof(words[0]), &status);
+    OpenclProgram owned(
+        cl.CreateProgramWithIL(context(), words.data(), words.size() * sizeof(words[0]), &status));
     opencl_try(status, "clCreateProgramWithIL", module);
+    cl_program program = owned.get();
     status = cl.BuildProgram(program, 1, &device_, "-cl-fp32-correctly-rounded-divide-sqrt",
                              nullptr, nullptr);
+    close_before_driver();
     if (status != CL_SUCCESS) {
         std::size_t bytes = 0;
         static_cast<void>(
@@ -216,56 +232,34 @@ cl_program OpenclDevice::program(const char* module) {
                                                  log.data(), nullptr));
         opencl_failed(status, "clBuildProgram", std::string(module) + " (" + log.c_str() + ")");
     }
-    return programs_.emplace(module, program).first->second;
+    return programs_.emplace(module, std::move(owned)).first->second.get();
 }
 
 cl_kernel OpenclDevice::kernel(const KernelName& name) {
     const auto known = kernels_.find(std::string_view(name.kernel));
-    if (known != kernels_.end()) return known->second;
+    if (known != kernels_.end()) return known->second.get();
     const OpenclApi& cl = opencl_api();
     cl_int status = CL_SUCCESS;
-    cl_kernel kernel = cl.CreateKernel(program(name.module), name.kernel, &status);
+    OpenclKernel kernel(cl.CreateKernel(program(name.module), name.kernel, &status));
     opencl_try(status, "clCreateKernel", name.kernel);
     // Its argument holds pointers to memory that the driver is not told of otherwise.
     const cl_bool yes = CL_TRUE;
-    opencl_try(cl.SetKernelExecInfo(kernel, CL_KERNEL_EXEC_INFO_INDIRECT_DEVICE_ACCESS_INTEL,
+    opencl_try(cl.SetKernelExecInfo(kernel.get(), CL_KERNEL_EXEC_INFO_INDIRECT_DEVICE_ACCESS_INTEL,
                                     sizeof(yes), &yes),
                "clSetKernelExecInfo", name.kernel);
-    return kernels_.emplace(name.kernel, kernel).first->second;
+    return kernels_.emplace(name.kernel, std::move(kernel)).first->second.get();
 }
 
-void OpenclDevice::launch(cl_command_queue queue, const KernelName& name, std::size_t groups,
+void OpenclDevice::launch(Stream queue, const KernelName& name, std::size_t groups,
                           std::size_t threads, const void* argument, std::size_t bytes) {
     const OpenclApi& cl = opencl_api();
     const std::lock_guard lock(lock_);
     cl_kernel function = kernel(name);
     opencl_try(cl.SetKernelArg(function, 0, bytes, argument), "clSetKernelArg", name.kernel);
     const std::size_t global = groups * threads;
-    opencl_try(cl.EnqueueNDRangeKernel(queue, function, 1, nullptr, &global, &threads, 0, nullptr,
-                                       nullptr),
+    opencl_try(cl.EnqueueNDRangeKernel(queue_of(queue), function, 1, nullptr, &global, &threads, 0,
+                                       nullptr, nullptr),
                "clEnqueueNDRangeKernel", name.kernel);
-}
-
-/// Drivers of CPUs compute right and do not claim it: what counts is what they compute.
-void OpenclDevice::check_arithmetic() {
-    constexpr std::uint32_t n = arithmetic_cases;
-    struct Memory {
-        OpenclDevice& device;
-        void* bytes;
-        explicit Memory(OpenclDevice& on)
-            : device(on), bytes(on.allocate(n * sizeof(ArithmeticResults))) {}
-        ~Memory() { device.free(bytes); }
-        Memory(const Memory&) = delete;
-        Memory& operator=(const Memory&) = delete;
-    } memory(*this);
-    const EachArguments<ComputeCases> given{{static_cast<ArithmeticResults*>(memory.bytes)}, n};
-    launch(own_queue_, {"sort", "each_compute_cases"}, (n + group_threads - 1) / group_threads,
-           group_threads, &given, sizeof(given));
-    std::vector<ArithmeticResults> results(n);
-    copy(own_queue_, results.data(), memory.bytes, n * sizeof(ArithmeticResults));
-    finish(own_queue_);
-    const std::string wrong = first_wrong_case(results);
-    if (!wrong.empty()) throw BackendUnavailable("device opencl: " + traits_.name + " " + wrong);
 }
 
 std::unique_ptr<OpenclDevice> open_opencl_device(std::uint32_t index) {

@@ -3,6 +3,7 @@
 // as they are as a kernel's argument.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -12,14 +13,10 @@
 #include <string_view>
 #include <vector>
 
+#include "exec/kernel_device.h"
 #include "exec/opencl_api.h"
 
 namespace raydix {
-
-/// A kernel of a module of SPIR-V.
-struct KernelName {
-    const char *module, *kernel;
-};
 
 /// What a device says of itself, as far as the library depends on it.
 struct OpenclTraits {
@@ -44,53 +41,52 @@ struct OpenclFound {
 /// Those of all platforms, in the loader's order. Throws BackendUnavailable: no loader, no driver.
 [[nodiscard]] std::vector<OpenclFound> find_opencl_devices();
 
-class OpenclDevice {
+class OpenclDevice final : public KernelDevice {
 public:
-    static constexpr std::size_t group_threads = 128;
-    /// Groups of a counted launch: enough for the largest machine.
-    static constexpr std::size_t counted_groups = 132 * 16;
-
     explicit OpenclDevice(const OpenclFound& found);
-    OpenclDevice(const OpenclDevice&) = delete;
-    OpenclDevice& operator=(const OpenclDevice&) = delete;
+    /// Waits for its queue. Queues of the caller's must have finished, and memory must be free.
+    ~OpenclDevice() override;
+    void close() noexcept override;
 
-    [[nodiscard]] const OpenclTraits& traits() const { return traits_; }
-    [[nodiscard]] cl_context context() const { return context_; }
+    [[nodiscard]] cl_context context() const { return context_.get(); }
     [[nodiscard]] cl_device_id id() const { return device_; }
-    [[nodiscard]] bool is_cpu() const { return is_cpu_; }
-    /// Null: the device's own queue. Throws InputError: a queue of another context or device, or
-    /// one that may change the order of launches.
-    [[nodiscard]] cl_command_queue queue(void* given);
 
-    [[nodiscard]] void* allocate(std::size_t bytes);
-    void free(void* memory) noexcept;
-    void copy(cl_command_queue queue, void* to, const void* from, std::size_t bytes);
-    void clear(cl_command_queue queue, void* memory, std::size_t bytes);
-    void finish(cl_command_queue queue);
+    [[nodiscard]] std::string name() const override { return traits_.name; }
+    [[nodiscard]] std::uint32_t compute_units() const override { return traits_.compute_units; }
+    [[nodiscard]] bool is_cpu() const override { return is_cpu_; }
+    /// A cl_command_queue. Throws InputError: a queue of another context or device, or one that may
+    /// change the order of launches.
+    [[nodiscard]] Stream queue(Stream given) override;
 
-    /// Puts `groups` groups of `threads` on the queue; the kernel gets `bytes` at `argument`. The
-    /// program of its module is built when the first of its kernels is asked for.
-    void launch(cl_command_queue queue, const KernelName& kernel, std::size_t groups,
-                std::size_t threads, const void* argument, std::size_t bytes);
+    [[nodiscard]] void* allocate(std::size_t bytes) override;
+    void free(void* memory) noexcept override;
+    void copy(Stream queue, void* to, const void* from, std::size_t bytes) override;
+    void clear(Stream queue, void* memory, std::size_t bytes) override;
+    /// The program of its module is built when the first of its kernels is asked for.
+    void launch(Stream queue, const KernelName& kernel, std::size_t groups, std::size_t threads,
+                const void* argument, std::size_t bytes) override;
+    void finish(Stream queue) override;
 
 private:
+    [[nodiscard]] cl_command_queue own_queue() const { return own_queue_.get(); }
     [[nodiscard]] cl_program program(const char* module);
     [[nodiscard]] cl_kernel kernel(const KernelName& name);
-    void check_arithmetic();
 
     cl_platform_id platform_;
     cl_device_id device_;
     OpenclTraits traits_;
     bool is_cpu_ = false;
-    cl_context context_ = nullptr;
-    cl_command_queue own_queue_ = nullptr;
+    // What is made later is released first.
+    OpenclContext context_;
+    OpenclQueue own_queue_;
     clDeviceMemAllocINTEL_fn allocate_ = nullptr;
     clMemBlockingFreeINTEL_fn free_ = nullptr;
     clEnqueueMemcpyINTEL_fn copy_ = nullptr;
     clEnqueueMemFillINTEL_fn fill_ = nullptr;
     std::mutex lock_;  // an argument that is set belongs to the next launch of its kernel
-    std::map<std::string, cl_program, std::less<>> programs_;
-    std::map<std::string, cl_kernel, std::less<>> kernels_;
+    std::map<std::string, OpenclProgram, std::less<>> programs_;
+    std::map<std::string, OpenclKernel, std::less<>> kernels_;
+    std::atomic<bool> closed_ = false;
 };
 
 /// Opens the device with this number. Throws BackendUnavailable: there are fewer, or what it lacks.

@@ -159,7 +159,9 @@ private:
 // The rows of the table: each in files of its own, or a BackendUnavailable of this build.
 [[nodiscard]] DeviceBackend& cuda_backend();
 [[nodiscard]] DeviceBackend& opencl_backend(std::uint32_t index);
+[[nodiscard]] DeviceBackend& hip_backend(std::uint32_t index);
 void list_cuda_devices(std::vector<DeviceDescription>& out);
 void list_opencl_devices(std::vector<DeviceDescription>& out);
+void list_hip_devices(std::vector<DeviceDescription>& out);
 
 }  // namespace raydix

@@ -1,10 +1,10 @@
-// The kernels that stand for functors on an OpenCL device: those of src/gpu/kernels/*.inc, which
-// the device's side compiles from the same lines.
+// The kernels that stand for functors on devices of OpenCL and HIP: those of src/gpu/kernels/*.inc,
+// which the device's side compiles from the same lines.
 #pragma once
 
 #include "engine/name_hit.h"
 #include "exec/arithmetic_check.h"
-#include "exec/opencl_launcher.h"
+#include "exec/queue_launcher.h"
 #include "gpu/device_build.h"
 #include "gpu/device_queries.h"
 #include "gpu/device_trees.h"

@@ -1,8 +1,6 @@
 // The rows of backends that this build was made without.
 #include "gpu/backend.h"
 
-#if !defined(RAYDIX_HAVE_CUDA) || !defined(RAYDIX_HAVE_OPENCL)
-
 namespace raydix {
 
 #if !defined(RAYDIX_HAVE_CUDA)
@@ -55,6 +53,17 @@ void* opencl_device_id() { throw BackendUnavailable(no_opencl); }
 
 #endif
 
-}  // namespace raydix
+#if !defined(RAYDIX_HAVE_HIP)
+
+namespace {
+constexpr const char* no_hip = "device hip: this build of raydix has no kernels for HIP";
+}
+
+DeviceBackend& hip_backend(std::uint32_t) { throw BackendUnavailable(no_hip); }
+void list_hip_devices(std::vector<DeviceDescription>& out) {
+    out.push_back({"hip", "", "", no_hip});
+}
 
 #endif
+
+}  // namespace raydix

@@ -20,3 +20,26 @@ foreach(test opencl:device_opencl opencl_trace:device_gpu_trace)
     set_tests_properties(device.${name} PROPERTIES LABELS device TIMEOUT 900 SKIP_REGULAR_EXPRESSION "PASSED  . 0 tests"
         ENVIRONMENT "${raydix_opencl_environment}")
 endforeach()
+# How a process ends that has left work on a device.
+add_executable(device_opencl_exit opencl_exit.cpp)
+target_link_libraries(device_opencl_exit PRIVATE raydix)
+add_test(NAME device.opencl_exit COMMAND device_opencl_exit)
+set_tests_properties(device.opencl_exit PROPERTIES LABELS device TIMEOUT 120 SKIP_RETURN_CODE 77
+    ENVIRONMENT "${raydix_opencl_environment}")
+# HIP over a stand-in for AMD's runtime, which executes on the same driver.
+if(RAYDIX_HAVE_HIP)
+    add_library(device_standin_hip SHARED standin/hip_runtime.cpp standin/code_object_reader.cpp)
+    target_include_directories(device_standin_hip PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
+    target_link_libraries(device_standin_hip PRIVATE raydix)
+    target_link_options(device_standin_hip PRIVATE -Wl,--exclude-libs,ALL)
+    set_target_properties(device_standin_hip PROPERTIES OUTPUT_NAME amdhip64 CXX_STANDARD 20
+        LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/standin)
+    add_executable(device_hip hip_test.cpp)
+    target_link_libraries(device_hip PRIVATE raydix_test_support GTest::gtest_main)
+    add_dependencies(device_hip device_standin_hip)
+    set(raydix_hip_environment ${raydix_opencl_environment})
+    list(FILTER raydix_hip_environment EXCLUDE REGEX "^LD_LIBRARY_PATH=")
+    add_test(NAME device.hip COMMAND device_hip)
+    set_tests_properties(device.hip PROPERTIES LABELS device TIMEOUT 900 SKIP_REGULAR_EXPRESSION "PASSED  . 0 tests"
+        ENVIRONMENT "${raydix_hip_environment};LD_LIBRARY_PATH=${CMAKE_CURRENT_BINARY_DIR}/standin:${raydix_opencl_rt}")
+endif()

@@ -40,11 +40,13 @@ def test_rays_on_a_device(tmp_path):
 def test_names_of_devices():
     names = [device.name for device in raydix.devices()]
     assert names[:2] == ["cpu", "cuda"] and names[2] in ("opencl", "opencl:0")
+    assert names[-1].split(":")[0] == "hip"
     for device in raydix.devices():
         assert device.detail
         assert raydix.Scene(device=device.name).device == device.name
-    for wrong in ("opencl:", "opencl:x", "opencl:-1", "opencl: 0", "OpenCL", "gpu", None, 0):
-        with pytest.raises(ValueError, match="device: expected 'cpu', 'cuda', 'opencl' or"):
+    wrong_names = ("opencl:", "opencl:x", "opencl:-1", "opencl: 0", "OpenCL", "hip:", "hip:-1", "gpu")
+    for wrong in (*wrong_names, None, 0):
+        with pytest.raises(ValueError, match="device: expected 'cpu', .* 'hip' or 'hip:N'"):
             raydix.Scene(device=wrong)
 
 

@@ -1,6 +1,6 @@
 // Runs a pipeline's launches (the interface is told in host_launcher.h) as kernels on an in-order
-// OpenCL queue. Nothing is allocated here and the host waits for nothing: scans and sorts
-// (warp_scan.h, warp_sort.h) work in memory that the caller lent, whose size OpenclSizer finds by
+// queue of OpenCL or HIP. Nothing is allocated here and the host waits for nothing: scans and sorts
+// (warp_scan.h, warp_sort.h) work in memory that the caller lent, whose size QueueSizer finds by
 // going through the same launches without running any.
 #pragma once
 
@@ -12,8 +12,8 @@
 #include "exec/arena.h"
 #include "exec/host_launcher.h"
 #include "exec/kernel_arguments.h"
+#include "exec/kernel_device.h"
 #include "exec/launch_sizer.h"
-#include "exec/opencl_device.h"
 #include "exec/warp_sort.h"
 
 namespace raydix {
@@ -29,7 +29,7 @@ struct WarpsKernel;
 template <class Work>
 struct TilesKernel;
 
-class OpenclSizer : public LaunchSizer {
+class QueueSizer : public LaunchSizer {
 public:
     void exclusive_scan(const char*, std::uint32_t*, std::uint32_t n, std::uint32_t*) {
         grow_for<ScanScratch<std::uint32_t>>(n);
@@ -56,23 +56,24 @@ private:
     }
 };
 
-class OpenclLauncher {
+class QueueLauncher {
 public:
     using Probe = NoProbe;
     /// A slow warp holds up only one other.
     static constexpr std::size_t warp_group_threads = 64;
+    /// Groups of a counted launch: enough for the largest machine.
+    static constexpr std::size_t counted_groups = 132 * 16;
 
-    /// `memory`: the device's, aligned to 256 bytes, OpenclSizer::bytes() at least; in use until
+    /// `memory`: the device's, aligned to 256 bytes, QueueSizer::bytes() at least; in use until
     /// the queue has passed the last launch.
-    OpenclLauncher(OpenclDevice& device, cl_command_queue queue, void* memory,
-                   std::size_t memory_bytes)
+    QueueLauncher(KernelDevice& device, Stream queue, void* memory, std::size_t memory_bytes)
         : device_(device), queue_(queue), memory_(memory), memory_bytes_(memory_bytes) {}
 
     template <class Work>
     void launch(const char*, std::uint32_t n, const Work& work) {
         if (n == 0) return;
-        put(EachKernel<Work>::name, groups_of(n, OpenclDevice::group_threads),
-            OpenclDevice::group_threads, EachArguments<Work>{work, n});
+        put(EachKernel<Work>::name, groups_of(n, KernelDevice::group_threads),
+            KernelDevice::group_threads, EachArguments<Work>{work, n});
     }
 
     template <class Work>
@@ -80,8 +81,8 @@ public:
                         const Work& work) {
         if (limit == 0) return;
         put(CountedKernel<Work>::name,
-            std::min(groups_of(limit, OpenclDevice::group_threads), most_groups()),
-            OpenclDevice::group_threads, CountedArguments<Work>{work, count, limit});
+            std::min(groups_of(limit, KernelDevice::group_threads), most_groups()),
+            KernelDevice::group_threads, CountedArguments<Work>{work, count, limit});
     }
 
     template <class Work>
@@ -123,16 +124,14 @@ public:
     /// The host does not wait to look.
     [[nodiscard]] bool maybe_any(const std::uint32_t*) const { return true; }
 
-    [[nodiscard]] OpenclDevice& device() const { return device_; }
-    [[nodiscard]] cl_command_queue queue() const { return queue_; }
+    [[nodiscard]] KernelDevice& device() const { return device_; }
+    [[nodiscard]] Stream queue() const { return queue_; }
 
 private:
     [[nodiscard]] static std::size_t groups_of(std::uint32_t items, std::size_t each) {
         return (items + each - 1) / each;
     }
-    [[nodiscard]] std::size_t most_groups() const {
-        return device_.is_cpu() ? 64 : OpenclDevice::counted_groups;
-    }
+    [[nodiscard]] std::size_t most_groups() const { return device_.is_cpu() ? 64 : counted_groups; }
     template <class Arguments>
     void put(const KernelName& kernel, std::size_t groups, std::size_t threads,
              const Arguments& arguments) {
@@ -144,8 +143,8 @@ private:
         launch_scan(*this, label, job, ScanScratch<T>(arena, job.items.limit));
     }
 
-    OpenclDevice& device_;
-    cl_command_queue queue_;
+    KernelDevice& device_;
+    Stream queue_;
     void* memory_;
     std::size_t memory_bytes_;
 };

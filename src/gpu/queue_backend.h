@@ -1,19 +1,24 @@
-// The rows of OpenCL's devices in the table of backends. Their functions lie in the files
-// opencl_*.cpp of this folder.
+// The rows of OpenCL's and HIP's devices in the table of backends. Their functions lie in the files
+// queue_*.cpp of this folder.
 #pragma once
 
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
 #include "gpu/launched_backend.h"
-#include "gpu/opencl_machine.h"
+#include "gpu/queue_machine.h"
 
 namespace raydix {
 
-class OpenclBackend final : public LaunchedQueries<OpenclMachine> {
+class QueueBackend final : public LaunchedQueries<QueueMachine> {
 public:
-    OpenclBackend(std::uint32_t index, std::unique_ptr<OpenclDevice> device)
-        : LaunchedQueries("opencl:" + std::to_string(index), OpenclMachine{device.get()}),
+    QueueBackend(std::string selector, std::unique_ptr<KernelDevice> device)
+        : LaunchedQueries(std::move(selector), QueueMachine{device.get()}),
           device_(std::move(device)) {}
 
-    [[nodiscard]] OpenclDevice& device() const { return *device_; }
+    [[nodiscard]] KernelDevice& device() const { return *device_; }
 
     std::string name() override;
     void synchronize(Stream stream) override;
@@ -36,7 +41,26 @@ public:
     double time_cwbvh(const CwbvhCall& call) override;
 
 private:
-    std::unique_ptr<OpenclDevice> device_;
+    std::unique_ptr<KernelDevice> device_;
+};
+
+/// The backend of a kind of device with this number, opened when it is first asked for. Never
+/// destroyed: at the end of the process the driver may be gone before it is.
+class QueueBackends {
+public:
+    template <class Open>
+    [[nodiscard]] QueueBackend& at(const std::string& kind, std::uint32_t index, const Open& open) {
+        const std::lock_guard guard(lock_);
+        std::unique_ptr<QueueBackend>& backend = backends_[index];
+        if (backend == nullptr)
+            backend =
+                std::make_unique<QueueBackend>(kind + ':' + std::to_string(index), open(index));
+        return *backend;
+    }
+
+private:
+    std::mutex lock_;
+    std::map<std::uint32_t, std::unique_ptr<QueueBackend>> backends_;
 };
 
 }  // namespace raydix

@@ -1,24 +1,25 @@
-// Rays on an OpenCL queue: the kernels of Aila and Laine, and those of compressed wide trees.
-#if defined(RAYDIX_HAVE_OPENCL)
+// Rays on a queue of OpenCL or HIP: the kernels of Aila and Laine, and those of compressed wide
+// trees.
+#if defined(RAYDIX_HAVE_QUEUES)
 
 #include <algorithm>
 
 #include "gpu/cwbvh_arguments.h"
 #include "gpu/device_cwbvh.h"
 #include "gpu/device_trace.h"
-#include "gpu/opencl_backend.h"
+#include "gpu/queue_backend.h"
 #include "gpu/trace_arguments.h"
 
 namespace raydix {
 namespace {
 
 /// Groups that keep a device busy; a persistent kernel needs no more.
-std::uint32_t resident_groups(const OpenclDevice& device) {
-    return device.traits().compute_units * (device.is_cpu() ? 2 : 16);
+std::uint32_t resident_groups(const KernelDevice& device) {
+    return device.compute_units() * (device.is_cpu() ? 2 : 16);
 }
 
 std::unique_ptr<DeviceWarpTree::Arrays> with_groups(std::unique_ptr<DeviceWarpTree::Arrays> arrays,
-                                                    const OpenclDevice& device) {
+                                                    const KernelDevice& device) {
     for (auto& of_kernel : arrays->resident_blocks) of_kernel.fill(resident_groups(device));
     return arrays;
 }
@@ -30,7 +31,7 @@ KernelName kernel_of(const WarpLaunch& launch) {
 }
 
 template <class Mark>
-void trace_launches(OpenclLauncher launcher, const WarpTraceCall& call, const Mark& mark) {
+void trace_launches(QueueLauncher launcher, const WarpTraceCall& call, const Mark& mark) {
     call.launch(
         launcher,
         [&](const WarpLaunch& launch, const WarpJob& job, std::int32_t* stacks,
@@ -43,7 +44,7 @@ void trace_launches(OpenclLauncher launcher, const WarpTraceCall& call, const Ma
 }
 
 template <class Store>
-void launch_cwbvh(OpenclLauncher launcher, const DeviceBackend::CwbvhCall& call, const Store& store,
+void launch_cwbvh(QueueLauncher launcher, const DeviceBackend::CwbvhCall& call, const Store& store,
                   const char* one, const char* pool) {
     constexpr std::uint32_t threads = 128;
     auto* next = reinterpret_cast<std::uint32_t*>(call.scratch.data());
@@ -62,31 +63,31 @@ void launch_cwbvh(OpenclLauncher launcher, const DeviceBackend::CwbvhCall& call,
 
 }  // namespace
 
-std::unique_ptr<DeviceWarpTree::Arrays> OpenclBackend::warp_tree(const WarpTree& tree,
-                                                                 Stream stream) {
+std::unique_ptr<DeviceWarpTree::Arrays> QueueBackend::warp_tree(const WarpTree& tree,
+                                                                Stream stream) {
     return with_groups(upload_warp_tree(tree, stream), *device_);
 }
 
-std::unique_ptr<DeviceWarpTree::Arrays> OpenclBackend::warp_tree(const DeviceTree& tree,
-                                                                 Stream stream) {
-    OpenclLauncher launcher = plain_launcher(stream);
+std::unique_ptr<DeviceWarpTree::Arrays> QueueBackend::warp_tree(const DeviceTree& tree,
+                                                                Stream stream) {
+    QueueLauncher launcher = plain_launcher(stream);
     return with_groups(take_warp_tree(launcher, tree, stream), *device_);
 }
 
-void OpenclBackend::trace_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
-                                std::span<TreeHit> hits, const DeviceTraceOptions& options,
-                                Scratch scratch, Stream stream) {
+void QueueBackend::trace_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
+                               std::span<TreeHit> hits, const DeviceTraceOptions& options,
+                               Scratch scratch, Stream stream) {
     trace_launches(plain_launcher(stream), WarpTraceCall(tree, rays, hits, options, scratch),
                    [](int) {});
 }
 
-DeviceTraceMs OpenclBackend::time_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
-                                        std::span<TreeHit> hits, const DeviceTraceOptions& options,
-                                        Scratch scratch, Stream stream) {
-    cl_command_queue queue = device_->queue(stream);
+DeviceTraceMs QueueBackend::time_warps(const DeviceWarpTree& tree, std::span<const Ray> rays,
+                                       std::span<TreeHit> hits, const DeviceTraceOptions& options,
+                                       Scratch scratch, Stream stream) {
+    const Stream queue = device_->queue(stream);
     const auto now = [&] {
         device_->finish(queue);
-        return opencl_clock_ms();
+        return queue_clock_ms();
     };
     double at[2] = {};
     const double start = now();
@@ -95,10 +96,10 @@ DeviceTraceMs OpenclBackend::time_warps(const DeviceWarpTree& tree, std::span<co
     return {at[1] - at[0], now() - start};
 }
 
-void OpenclBackend::trace_cwbvh(const CwbvhCall& call) {
+void QueueBackend::trace_cwbvh(const CwbvhCall& call) {
     check_cwbvh_launch(call.tree, call.count, call.kernel, call.scratch);
     if (call.count == 0) return;
-    OpenclLauncher launcher = plain_launcher(call.stream);
+    QueueLauncher launcher = plain_launcher(call.stream);
     const bool any = call.occluded != nullptr;
     if (call.tree.node_count == 0) {
         if (any)
@@ -114,13 +115,13 @@ void OpenclBackend::trace_cwbvh(const CwbvhCall& call) {
     }
 }
 
-double OpenclBackend::time_cwbvh(const CwbvhCall& call) {
-    cl_command_queue queue = device_->queue(call.stream);
+double QueueBackend::time_cwbvh(const CwbvhCall& call) {
+    const Stream queue = device_->queue(call.stream);
     device_->finish(queue);
-    const double start = opencl_clock_ms();
+    const double start = queue_clock_ms();
     trace_cwbvh(call);
     device_->finish(queue);
-    return opencl_clock_ms() - start;
+    return queue_clock_ms() - start;
 }
 
 }  // namespace raydix
