@@ -41,8 +41,7 @@ const HitFilterD* filter_of(const SceneTraceOptions& options) {
 const SceneTreeD& checked_tree(const SceneD& scene, std::size_t rays,
                                const SceneTraceOptions& options) {
     const SceneTreeD& tree = *SceneInternalsD::tree(scene);
-    check_enum("path", options.path, SimdPath::sorted);
-    check_masks(rays, options);
+    check_options<double>(rays, options);
     static_cast<void>(kernels_for(options.isa));
     return tree;
 }
