@@ -230,7 +230,7 @@ TEST(ModelScene, QueriesHaveTheBitsOfTheFlattenedModel) {
                   count_overlapping_pairs(one, {.narrow = true}));
     }
     EXPECT_GT(found, 5000u);
-    EXPECT_GT(turned, 500u);
+    EXPECT_GT(turned, 50u);
 }
 
 TEST(ModelScene, FlatteningKeepsWhatFloatsCannotHold) {
