@@ -348,6 +348,8 @@ FAULTS = [
     Fault("src/engine/grouped_meshes.h", "std::upper_bound(first.begin(), first.end(), prim) - first.begin() - 1));",
           "std::lower_bound(first.begin(), first.end(), prim) - first.begin()));", "scenes: triangles belong to the next mesh",
           "engine"),
+    Fault("src/engine/scene.cpp", "for (const auto& shapes : state_->tree->shapes) state_->at(shapes->id).changed = false;", "",
+          "scenes: each commit builds all shapes again", "engine"),
     Fault("src/engine/scene_trace_double.cpp", "hits == nullptr ? nullptr : hits + first,", "hits,",
           "scenes in double: hits of a part of a batch are written over those of its beginning", "engine"),
     Fault("src/scene/model_nodes.h", "return std::isnormal(rounded) ? rounded : value;", "return value;",
