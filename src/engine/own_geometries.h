@@ -12,8 +12,7 @@ namespace raydix {
 /// By ascending id. Scenes often hold many instances beside few of these, so that what a commit
 /// asks of them should not look at all geometries.
 template <class Scalar>
-using OwnGeometries =
-    std::vector<std::pair<std::uint32_t,
-                          const typename BasicSceneInternals<Scalar>::State::Geometry*>>;
+using OwnGeometries = std::vector<
+    std::pair<std::uint32_t, const typename BasicSceneInternals<Scalar>::State::Geometry*>>;
 
 }  // namespace raydix
