@@ -172,7 +172,8 @@ public:
     std::uint32_t add(const MeshView& mesh, const GeometryOptions& options = {});
     std::uint32_t add(const Mesh& mesh, const GeometryOptions& options = {});
     /// The same without a copy. The caller keeps the arrays as they are, as long as the scene lives
-    /// or until it is committed without them. To change them, call `update`.
+    /// or until it is committed without them. Scenes in which this one stands read them too, until
+    /// they are committed again after that. To change the arrays, call `update`.
     std::uint32_t share(const MeshView& mesh, const GeometryOptions& options = {});
     /// Adds spheres, capsules, or points of one radius, of which the scene keeps a copy. `prim`
     /// counts them. Rays hit their surfaces from both sides. A ray that starts inside hits where it
@@ -293,7 +294,7 @@ struct SceneTraceOptions {
 /// Invalid rays (types.h) miss and are counted.
 ///
 /// Throws InputError: sizes that differ, a scene that was never committed, an option out of range,
-/// an instruction set that this processor does not have.
+/// an instruction set that this processor does not have, a filter of the other number type alone.
 TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<Hit> hits,
                   const SceneTraceOptions& options = {});
 TraceCounts trace(const SceneD& scene, std::span<const RayD> rays, std::span<HitD> hits,

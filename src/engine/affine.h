@@ -4,7 +4,6 @@
 #include <raydix/transform.h>
 #include <raydix/types.h>
 
-#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -44,17 +43,6 @@ inline std::optional<Affine> inverse_of(const Affine& a) {
         !is_finite(inverse.move) || !is_finite(a.move))
         return {};
     return inverse;
-}
-
-/// Whether a map that does not flatten mirrors; its rows may be of any size.
-inline bool mirrors(Double3 x, Double3 y, Double3 z) {
-    const auto of_unit_size = [](Double3 row) {
-        int exponent;
-        std::frexp(std::max({std::fabs(row.x), std::fabs(row.y), std::fabs(row.z)}), &exponent);
-        // In two steps: 2^1074 is no double.
-        return row * std::ldexp(1.0, -exponent / 2) * std::ldexp(1.0, -exponent - -exponent / 2);
-    };
-    return dot(of_unit_size(x), cross(of_unit_size(y), of_unit_size(z))) < 0;
 }
 
 /// A ray in double; t keeps its meaning from space to space.

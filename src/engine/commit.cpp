@@ -71,12 +71,12 @@ public:
 
     std::shared_ptr<const SceneTree> run() {
         for (const auto& [id, geometry] : state_.geometries)
-            if (geometry.is_instance())
-                instances_.emplace_back(id, &geometry);
-            else if (geometry.is_mesh())
-                tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
-        MeshCommit<float, WideMaker> meshes(state_, options_, report_);
-        ShapeCommit<float> shapes(state_, options_, report_);
+            (geometry.is_instance() ? instances_ : own_).emplace_back(id, &geometry);
+        for (const auto& [id, geometry] : own_)
+            if (geometry->is_mesh())
+                tree_->mesh_names.push_back({id, geometry->mask, geometry->mesh, geometry->own});
+        MeshCommit<float, WideMaker> meshes(state_, own_, options_, report_);
+        ShapeCommit<float> shapes(state_, own_, options_, report_);
         const double other_work = shapes.work() + parts_of_instances();
         tree_->meshes = meshes.run(other_work);
         for (const auto& mesh : tree_->meshes) {
@@ -260,7 +260,8 @@ private:
     const std::size_t most_placed_;
     std::shared_ptr<SceneTree> tree_ = std::make_shared<SceneTree>();
     std::vector<std::pair<std::uint32_t, const Geometry*>> instances_;  // by ascending id
-    std::vector<Source> sources_;                                       // [placed scenes]
+    OwnGeometries<float> own_;
+    std::vector<Source> sources_;  // [placed scenes]
 };
 
 }  // namespace

@@ -52,14 +52,16 @@ public:
     }
 
     std::shared_ptr<const SceneTreeD> run() {
-        std::size_t instances = 0;
-        for (const auto& [id, geometry] : state_.geometries)
-            if (geometry.is_instance())
-                ++instances;
-            else if (geometry.is_mesh())
+        OwnGeometries<double> own;
+        for (const auto& [id, geometry] : state_.geometries) {
+            if (geometry.is_instance()) continue;
+            own.emplace_back(id, &geometry);
+            if (geometry.is_mesh())
                 tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
-        MeshCommit<double, WideMakerD> meshes(state_, options_, report_);
-        ShapeCommit<double> shapes(state_, options_, report_);
+        }
+        const std::size_t instances = state_.geometries.size() - own.size();
+        MeshCommit<double, WideMakerD> meshes(state_, own, options_, report_);
+        ShapeCommit<double> shapes(state_, own, options_, report_);
         const double other_work = shapes.work() + static_cast<double>(instances);
         tree_->meshes = meshes.run(other_work);
         for (const auto& mesh : tree_->meshes) add_extent(*mesh->tree);

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "base/mirrors.h"
 #include "engine/affine.h"
 #include "engine/affine_double.h"
 #include "engine/merge.h"

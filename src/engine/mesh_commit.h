@@ -16,6 +16,7 @@
 
 #include "engine/left_out.h"
 #include "engine/merge.h"
+#include "engine/own_geometries.h"
 #include "engine/scene_state.h"
 #include "exec/parallel.h"
 #include "exec/progress.h"
@@ -37,8 +38,9 @@ public:
     using MeshView = typename SceneTypes<Scalar>::MeshView;
     using MeshTree = typename SceneKind<Scalar>::MeshTree;
 
-    MeshCommit(const State& state, const SceneOptions& options, CommitReport& report)
-        : state_(state), options_(options), report_(report) {
+    MeshCommit(const State& state, const OwnGeometries<Scalar>& own, const SceneOptions& options,
+               CommitReport& report)
+        : state_(state), own_(own), options_(options), report_(report) {
         if (state.tree == nullptr || options.quality != state.tree->quality ||
             options.compact != state.tree->compact)
             return;
@@ -81,14 +83,14 @@ private:
     [[nodiscard]] std::vector<Group> groups_of(Usage usage) const {
         std::vector<Group> groups;
         std::map<std::uint32_t, std::size_t> by_mask;
-        for (const auto& [id, geometry] : state_.geometries) {
-            if (!geometry.is_mesh() || geometry.mesh.triangles.empty()) continue;
-            const auto found = by_mask.find(geometry.mask);
+        for (const auto& [id, geometry] : own_) {
+            if (!geometry->is_mesh() || geometry->mesh.triangles.empty()) continue;
+            const auto found = by_mask.find(geometry->mask);
             if (usage == Usage::fixed && found != by_mask.end()) {
                 groups[found->second].ids.push_back(id);
             } else {
-                by_mask[geometry.mask] = groups.size();
-                groups.push_back({geometry.mask, {id}});
+                by_mask[geometry->mask] = groups.size();
+                groups.push_back({geometry->mask, {id}});
             }
         }
         return groups;
@@ -178,6 +180,7 @@ private:
     }
 
     const State& state_;
+    const OwnGeometries<Scalar>& own_;
     const SceneOptions& options_;
     CommitReport& report_;
     std::unordered_map<std::uint32_t, const MeshTree*> last_;  // by their first mesh

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <numbers>
 
+#include "base/mirrors.h"
 #include "engine/hit_points.h"
 #include "engine/part_tree.h"
 #include "exec/parallel.h"

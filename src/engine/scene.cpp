@@ -382,7 +382,8 @@ CommitReport BasicScene<Scalar>::commit(const SceneOptions& options) {
     CommitReport report;
     auto tree = make_scene_tree(*state_, options, report);
     state_->tree = std::move(tree);
-    for (auto& [id, geometry] : state_->geometries) geometry.changed = false;
+    for (const auto& mesh : state_->tree->mesh_names) state_->at(mesh.id).changed = false;
+    for (const auto& shapes : state_->tree->shapes) state_->at(shapes->id).changed = false;
     state_->changed = false;
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
     report.ms = ms.count();

@@ -20,6 +20,7 @@
 #include "trace/all_hits.h"
 #include "trace/batch.h"
 #include "trace/ray_frame.h"
+#include "trace/simd/ray_order.h"
 #include "trace/simd/wide_batch.h"
 
 namespace raydix {
@@ -31,6 +32,12 @@ struct Batch {
     HitD* hits;
     std::uint8_t* occluded;
     const SceneTraceOptions& options;
+
+    /// Rays first to last - 1, of a batch without masks, or all.
+    [[nodiscard]] Batch part(std::size_t first, std::size_t last) const {
+        return {rays.subspan(first, last - first), hits == nullptr ? nullptr : hits + first,
+                occluded == nullptr ? nullptr : occluded + first, options};
+    }
 };
 
 /// Null: all hits count.
@@ -41,8 +48,7 @@ const HitFilterD* filter_of(const SceneTraceOptions& options) {
 const SceneTreeD& checked_tree(const SceneD& scene, std::size_t rays,
                                const SceneTraceOptions& options) {
     const SceneTreeD& tree = *SceneInternalsD::tree(scene);
-    check_enum("path", options.path, SimdPath::sorted);
-    check_masks(rays, options);
+    check_options<double>(rays, options);
     static_cast<void>(kernels_for(options.isa));
     return tree;
 }
@@ -63,12 +69,6 @@ void set_job(SceneJobD& job, const SceneTreeD& tree, const Batch& batch,
     job.occluded = batch.occluded == nullptr ? nullptr : batch.occluded + from;
 }
 
-/// How a batch goes.
-struct Plan {
-    JobWays ways{};
-    bool sorted = false;  // by where they start
-};
-
 /// look_at for rays about the center of a tree.
 BatchLook look_at(const WideTreeD& tree, std::span<const RayD> rays) {
     constexpr std::size_t window = 64, windows = 32;
@@ -87,34 +87,64 @@ BatchLook look_at(const WideTreeD& tree, std::span<const RayD> rays) {
     return look;
 }
 
-Plan plan_for(const SceneTreeD& tree, const Batch& batch) {
-    const MeshTreeD* const mesh = tree.only_mesh();
-    const SceneTraceOptions& options = batch.options;
-    const bool automatic = options.path == SimdPath::automatic;
-    BatchLook look{options.path, {}, false};
-    Plan plan;
-    if (options.filter_d) {
-        plan.ways.add(PathWay::alone);
-    } else if (mesh == nullptr || mesh->tree->empty()) {
-        plan.ways.add(PathWay::turns);
-        plan.ways.add(
-            PathWay::alone);  // rays that follow each other through little gain by no turns
-    } else {
-        const bool may_go_together =
-            mesh->tree->suits_packets && options.masks.empty() && (mesh->mask & options.mask) != 0;
-        if (automatic && may_go_together) look = look_at(*mesh->tree, batch.rays);
-        const bool packets = may_go_together && look.path == SimdPath::packet;
-        plan.sorted = may_go_together && look.path == SimdPath::sorted &&
-                      batch.rays.size() <= std::size_t{std::numeric_limits<std::int32_t>::max()};
-        plan.ways.add(packets ? PathWay::packets : PathWay::turns);
-        if (may_go_together) plan.ways.add(packets ? PathWay::turns : PathWay::packets);
+/// How a batch goes.
+class Plan {
+public:
+    Plan(const SceneTreeD& tree, const Batch& batch)
+        : tree_(tree),
+          automatic_(batch.options.path == SimdPath::automatic),
+          filtered_(bool(batch.options.filter_d)),
+          look_{batch.options.path, {}, false} {
+        const MeshTreeD* const mesh = tree.only_mesh();
+        of_mesh_ = mesh != nullptr && !mesh->tree->empty();
+        together_ = of_mesh_ && !filtered_ && mesh->tree->suits_packets &&
+                    batch.options.masks.empty() && (mesh->mask & batch.options.mask) != 0;
+        if (automatic_ && together_) look_ = look_at(*mesh->tree, batch.rays);
+        look_.kind.any = batch.hits == nullptr;
     }
-    if (!automatic || plan.ways.count < 2) return plan;
-    look.kind.any = batch.hits == nullptr;
-    look.kind.sorted = plan.sorted;
-    plan.ways.rates = &tree.rates.ways(look.kind);
-    return plan;
-}
+
+    /// Rays 0 to n - 1 by trace(order, begin, end). Only rays through one mesh, without masks and
+    /// filters, are sorted or come in several parts.
+    template <class Trace>
+    void run_in_order(std::size_t n, const Trace& trace) const {
+        const bool can_sort = together_ && look_.path == SimdPath::sorted &&
+                              n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
+        if (!can_sort || (automatic_ && n < least_rays_to_sort))
+            trace(RayOrder::given, 0, n);
+        else if (!automatic_)
+            trace(RayOrder::sorted, 0, n);
+        else
+            run_in_better_order(tree_.rates.orders(look_.kind), n, trace);
+    }
+
+    /// Of jobs in this order.
+    [[nodiscard]] JobWays ways(RayOrder order) const {
+        JobWays ways;
+        if (filtered_) {
+            ways.add(PathWay::alone);
+        } else if (!of_mesh_) {
+            ways.add(PathWay::turns);
+            // Rays that follow each other through little gain by no turns.
+            ways.add(PathWay::alone);
+        } else {
+            const bool packets = together_ && look_.path == SimdPath::packet;
+            ways.add(packets ? PathWay::packets : PathWay::turns);
+            if (together_) ways.add(packets ? PathWay::turns : PathWay::packets);
+        }
+        if (!automatic_ || ways.count < 2) return ways;
+        BatchKind kind = look_.kind;
+        kind.sorted = order == RayOrder::sorted;
+        ways.rates = &tree_.rates.ways(kind);
+        return ways;
+    }
+
+private:
+    const SceneTreeD& tree_;
+    bool automatic_, filtered_;
+    bool of_mesh_;   // one mesh with triangles is all there is
+    bool together_;  // packets may take the rays
+    BatchLook look_;
+};
 
 /// Rays along a curve through where they start.
 std::vector<std::uint32_t> order_by_place(const WideTreeD& tree, std::span<const RayD> rays) {
@@ -129,27 +159,36 @@ TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
     const SceneTreeD& tree = checked_tree(scene, batch.rays.size(), batch.options);
     const SceneKernelsD& kernels = scene_kernels_double_for(batch.options.isa);
     const std::size_t n = batch.rays.size(), job_size = rays_per_job(n, SimdPath::packet);
-    std::vector<JobCounts> parts((n + job_size - 1) / job_size);
-    const Plan plan = plan_for(tree, batch);
+    const Plan plan(tree, batch);
+    JobCounts sum;
     with_threads(batch.options.threads, [&] {
-        std::vector<std::uint32_t> order;
-        if (plan.sorted) order = order_by_place(*tree.only_mesh()->tree, batch.rays);
-        for_each_block(n, job_size, [&](std::size_t part, std::size_t begin, std::size_t end) {
-            plan.ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
-                const ThreadOwn<SceneJobD> own;
-                SceneJobD& job = *own;
-                set_job(job, tree, batch, order, from, to);
-                job.way = way;
-                kernels.trace(job);
-                parts[part] += {job.hit_count, job.invalid};
-            });
+        plan.run_in_order(n, [&](RayOrder ray_order, std::size_t first, std::size_t last) {
+            const Batch part = batch.part(first, last);
+            std::vector<std::uint32_t> order;
+            if (ray_order == RayOrder::sorted)
+                order = order_by_place(*tree.only_mesh()->tree, part.rays);
+            const JobWays ways = plan.ways(ray_order);
+            std::vector<JobCounts> jobs((part.rays.size() + job_size - 1) / job_size);
+            for_each_block(part.rays.size(), job_size,
+                           [&](std::size_t number, std::size_t begin, std::size_t end) {
+                               ways.run(begin, end,
+                                        [&](PathWay way, std::size_t from, std::size_t to) {
+                                            const ThreadOwn<SceneJobD> own;
+                                            SceneJobD& job = *own;
+                                            set_job(job, tree, part, order, from, to);
+                                            job.way = way;
+                                            kernels.trace(job);
+                                            jobs[number] += {job.hit_count, job.invalid};
+                                        });
+                           });
+            for (const JobCounts& job : jobs) sum += job;
         });
     });
-    return sum_of(parts, n);
+    return sum_of({sum}, n);
 }
 
 void trace_on_this_thread(const SceneTreeD& tree, const Batch& batch) {
-    const PathWay way = plan_for(tree, batch).ways.ways[0];
+    const PathWay way = Plan(tree, batch).ways(RayOrder::given).ways[0];
     const ThreadOwn<SceneJobD> own;
     for (std::size_t begin = 0; begin < batch.rays.size(); begin += max_job_rays) {
         set_job(*own, tree, batch, {}, begin, std::min(begin + max_job_rays, batch.rays.size()));

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/left_out.h"
+#include "engine/own_geometries.h"
 #include "engine/scene_state.h"
 #include "engine/shape_tree.h"
 #include "exec/progress.h"
@@ -23,14 +24,15 @@ public:
     using State = typename BasicSceneInternals<Scalar>::State;
     using ShapeTree = typename SceneKind<Scalar>::ShapeTree;
 
-    ShapeCommit(const State& state, const SceneOptions& options, CommitReport& report)
-        : state_(state), options_(options), report_(report) {}
+    ShapeCommit(const State& state, const OwnGeometries<Scalar>& own, const SceneOptions& options,
+                CommitReport& report)
+        : state_(state), own_(own), options_(options), report_(report) {}
 
     /// How many primitives there are.
     [[nodiscard]] double work() const {
         double sum = 0;
-        for (const auto& [id, geometry] : state_.geometries)
-            if (geometry.shapes) sum += static_cast<double>(count_of(*geometry.shapes));
+        for (const auto& [id, geometry] : own_)
+            if (geometry->shapes) sum += static_cast<double>(count_of(*geometry->shapes));
         return sum;
     }
 
@@ -39,12 +41,12 @@ public:
     template <class Take>
     double run(double all, const Take& take) {
         double done = 0;
-        for (const auto& [id, geometry] : state_.geometries) {
-            if (!geometry.shapes) continue;
-            const std::size_t count = count_of(*geometry.shapes);
+        for (const auto& [id, geometry] : own_) {
+            if (!geometry->shapes) continue;
+            const std::size_t count = count_of(*geometry->shapes);
             const double after = done + static_cast<double>(count);
             const ProgressStage stage(done / all, after / all);
-            const auto shapes = shapes_of(id, geometry);
+            const auto shapes = shapes_of(id, *geometry);
             done = after;
             progress_at(1);
             take(shapes);
@@ -53,7 +55,7 @@ public:
             report_.bytes += shapes->bytes();
             const std::uint64_t left_out = count - shapes->part.size();
             report_.left_out += left_out;
-            if (options_.strict && left_out != 0) refuse(id, *geometry.shapes, left_out);
+            if (options_.strict && left_out != 0) refuse(id, *geometry->shapes, left_out);
         }
         return all > 0 ? done / all : 0;
     }
@@ -93,6 +95,7 @@ private:
     }
 
     const State& state_;
+    const OwnGeometries<Scalar>& own_;
     const SceneOptions& options_;
     CommitReport& report_;
 };

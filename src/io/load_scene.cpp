@@ -28,24 +28,24 @@ void trace_mesh(const Mesh& mesh, std::span<const Ray> rays, std::span<Hit> hits
 /// Around all vertices where the model shows them.
 Aabb finite_bounds(const Model& model) {
     Aabb box = empty_box();
-    const auto add = [&](const Mesh& mesh, const NodeMap& map) {
+    const NodeWays ways(model);
+    const auto add = [&](const Mesh& mesh, std::uint32_t node) {
         std::vector<Vec3> world;
         const std::vector<Vec3>* vertices = &mesh.vertices;
-        if (!map.is_identity()) {
+        if (!ways.stays(node)) {
             world.resize(mesh.vertices.size());
             for_each_index(world.size(),
-                           [&](std::size_t i) { world[i] = moved(map, false, (*vertices)[i]); });
+                           [&](std::size_t i) { world[i] = ways.moved(node, (*vertices)[i]); });
             vertices = &world;
         }
         const PointSource source{vertices->data()};
         box = unite(box, scene_bounds(source, static_cast<std::uint32_t>(vertices->size())).box);
     };
     if (model.nodes.empty())
-        for (const Mesh& mesh : model.meshes) add(mesh, NodeMap());
-    const std::vector<NodeMap> maps = node_maps(model);
-    for (std::size_t k = 0; k < maps.size(); ++k)
+        for (const Mesh& mesh : model.meshes) add(mesh, NodeWays::world);
+    for (std::uint32_t k = 0; k < model.nodes.size(); ++k)
         for (std::uint32_t i = 0; i < model.nodes[k].mesh_count; ++i)
-            add(model.meshes[model.nodes[k].first_mesh + i], maps[k]);
+            add(model.meshes[model.nodes[k].first_mesh + i], k);
     return box;
 }
 

@@ -17,15 +17,14 @@ namespace {
 /// Copies of a model's meshes, behind each other.
 class Flattening {
 public:
-    explicit Flattening(const Model& model) : model_(model) {
+    explicit Flattening(const Model& model) : model_(model), ways_(model) {
         if (model.nodes.empty()) {
-            for (std::size_t i = 0; i < model.meshes.size(); ++i) plan(i, NodeMap());
+            for (std::size_t i = 0; i < model.meshes.size(); ++i) plan(i, NodeWays::world);
             return;
         }
-        const std::vector<NodeMap> maps = node_maps(model);
-        for (std::size_t k = 0; k < maps.size(); ++k)
+        for (std::uint32_t k = 0; k < model.nodes.size(); ++k)
             for (std::uint32_t i = 0; i < model.nodes[k].mesh_count; ++i)
-                plan(model.nodes[k].first_mesh + i, maps[k]);
+                plan(model.nodes[k].first_mesh + i, k);
     }
 
     [[nodiscard]] Mesh run() const {
@@ -38,20 +37,19 @@ public:
 private:
     struct Copy {
         MeshView mesh;
-        NodeMap map;
+        const NodeWays* ways;
+        std::uint32_t node;
         std::uint64_t first_vertex, first_triangle;
 
-        [[nodiscard]] bool mirrors() const { return map.mirrors(); }
+        [[nodiscard]] bool mirrors() const { return ways->mirrors(node); }
         [[nodiscard]] auto mover() const {
-            return [this, stays = map.is_identity()](Vec3 vertex) {
-                return moved(map, stays, vertex);
-            };
+            return [this](Vec3 vertex) { return ways->moved(node, vertex); };
         }
     };
 
-    void plan(std::size_t mesh, const NodeMap& map) {
+    void plan(std::size_t mesh, std::uint32_t node) {
         const Mesh& source = model_.meshes.at(mesh);
-        copies_.push_back({source, map, vertices_, triangles_});
+        copies_.push_back({source, &ways_, node, vertices_, triangles_});
         vertices_ += source.vertices.size();
         triangles_ += source.triangles.size();
     }
@@ -75,6 +73,7 @@ private:
     }
 
     const Model& model_;
+    const NodeWays ways_;
     std::vector<Copy> copies_;
     std::uint64_t vertices_ = 0, triangles_ = 0;
 };

@@ -309,6 +309,9 @@ TEST(DoubleScene, CallsRefuseWhatScenesInFloatRefuse) {
     EXPECT_EQ(message([&] { trace(one, two, room); }), "trace: 2 rays, but room for 1 results");
     const Scene of_floats(in_float(one_triangle(0)));
     const std::vector<Ray> floats(2);
+    Scene placed;
+    placed.add(of_floats, Transform{});
+    placed.commit();
     for (const SceneTraceOptions& options :
          {SceneTraceOptions{.threads = -1}, SceneTraceOptions{.isa = "mmx"},
           SceneTraceOptions{.path = static_cast<SimdPath>(9)}}) {
@@ -316,6 +319,9 @@ TEST(DoubleScene, CallsRefuseWhatScenesInFloatRefuse) {
             message([&] { static_cast<void>(trace(of_floats, floats, options)); });
         EXPECT_NE(said, "no error");
         EXPECT_EQ(message([&] { static_cast<void>(trace(one, two, options)); }), said);
+        EXPECT_EQ(message([&] { static_cast<void>(trace_all(one, two, options)); }), said);
+        EXPECT_EQ(message([&] { static_cast<void>(trace_all(of_floats, floats, options)); }), said);
+        EXPECT_EQ(message([&] { static_cast<void>(trace_all(placed, floats, options)); }), said);
     }
     room.resize(3);
     const TraceCounts counts = trace(one, std::vector<RayD>{down, {}, down}, room);
@@ -325,6 +331,29 @@ TEST(DoubleScene, CallsRefuseWhatScenesInFloatRefuse) {
     EXPECT_THROW(static_cast<void>(
                      trace_all(one, std::vector<RayD>(1000, down), {.max_result_bytes = 20000})),
                  ResultTooLarge);
+}
+
+TEST(DoubleScene, AFilterOfTheOtherNumberTypeIsRefused) {
+    const SceneD one(one_triangle(0));
+    const Scene of_floats(in_float(one_triangle(0)));
+    const std::vector<RayD> doubles(2);
+    const std::vector<Ray> floats(2);
+    const HitFilter in_floats = [](std::size_t, const Ray&, const Hit&) { return false; };
+    const HitFilterD in_doubles = [](std::size_t, const RayD&, const HitD&) { return false; };
+    const SceneTraceOptions wrong{.filter_d = in_doubles}, wrong_d{.filter = in_floats};
+    const char* const said = "trace: filter_d is of a SceneD; a Scene asks filter";
+    const char* const said_d = "trace: filter is of a Scene; a SceneD asks filter_d";
+    std::vector<std::uint8_t> any(2);
+    EXPECT_EQ(message_of([&] { static_cast<void>(trace(of_floats, floats, wrong)); }), said);
+    EXPECT_EQ(message_of([&] { trace_any(of_floats, floats, any, wrong); }), said);
+    EXPECT_EQ(message_of([&] { static_cast<void>(trace_all(of_floats, floats, wrong)); }), said);
+    EXPECT_EQ(message_of([&] { static_cast<void>(trace(one, doubles, wrong_d)); }), said_d);
+    EXPECT_EQ(message_of([&] { trace_any(one, doubles, any, wrong_d); }), said_d);
+    EXPECT_EQ(message_of([&] { static_cast<void>(trace_all(one, doubles, wrong_d)); }), said_d);
+    // Options for scenes of both types have both.
+    const SceneTraceOptions both{.filter = in_floats, .filter_d = in_doubles};
+    EXPECT_EQ(message_of([&] { static_cast<void>(trace(of_floats, floats, both)); }), "no error");
+    EXPECT_EQ(message_of([&] { static_cast<void>(trace_all(one, doubles, both)); }), "no error");
 }
 
 }  // namespace

@@ -4,6 +4,9 @@
 #include <raydix/error.h>
 #include <raydix/model.h>
 #include <raydix/scene.h>
+#include <raydix/scene_pairs.h>
+#include <raydix/scene_queries.h>
+#include <raydix/solid.h>
 #include <raydix/trace.h>
 
 #include <algorithm>
@@ -195,6 +198,58 @@ TEST(ModelScene, FlattenedHitsAreThoseOfTheNodesButForRounding) {
     }
     EXPECT_GT(compared, 1000u);
     EXPECT_LE(other, compared / 500);  // rays past edges
+}
+
+TEST(ModelScene, QueriesHaveTheBitsOfTheFlattenedModel) {
+    Random random(8);
+    std::size_t found = 0, turned = 0;
+    for (int round = 0; round < 40; ++round) {
+        const SomeModel model(random);
+        Model flat = model;
+        flat.flatten();
+        if (flat.mesh().triangles.empty()) continue;
+        const Scene scene(model);
+        const Scene one(flat);
+        std::vector<Vec3> queries;
+        for (int i = 0; i < 200; ++i) queries.push_back(random.in(-4, 4));
+        const std::vector<SceneClosestPoint> points = closest_points(scene, queries);
+        const std::vector<SceneClosestPoint> of_flat = closest_points(one, queries);
+        for (std::size_t i = 0; i < queries.size(); ++i) {
+            found += points[i].found();
+            ASSERT_EQ(points[i].distance, of_flat[i].distance) << "round " << round;
+            ASSERT_EQ(points[i].position.x, of_flat[i].position.x);
+            ASSERT_EQ(points[i].position.y, of_flat[i].position.y);
+            ASSERT_EQ(points[i].position.z, of_flat[i].position.z);
+        }
+        const Solid body(scene, {.rule = InsideRule::crossings});
+        const Solid of_one(one, {.rule = InsideRule::crossings});
+        const std::vector<double> numbers = winding_numbers(body, queries);
+        EXPECT_EQ(numbers, winding_numbers(of_one, queries)) << "round " << round;
+        turned += std::ranges::count_if(numbers, [](double n) { return n != 0; });
+        EXPECT_EQ(count_overlapping_pairs(scene, {.narrow = true}),
+                  count_overlapping_pairs(one, {.narrow = true}));
+    }
+    EXPECT_GT(found, 5000u);
+    EXPECT_GT(turned, 50u);
+}
+
+TEST(ModelScene, FlatteningKeepsWhatFloatsCannotHold) {
+    Model model;
+    model.name = "scales";
+    model.meshes.push_back({"", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}});
+    // 40 pairs of nodes: one makes all smaller than floats are, the one below it larger again.
+    for (std::uint32_t k = 0; k < 80; ++k) {
+        ModelNode node;
+        node.parent = k == 0 ? ModelNode::none : k - 1;
+        const double scale = k % 2 == 0 ? 0x1p-200 : 0x1p200;
+        for (std::size_t r = 0; r < 3; ++r) node.transform.m[r][r] = k == 2 ? -scale : scale;
+        model.nodes.push_back(node);
+    }
+    model.nodes.back().mesh_count = 1;
+    model.flatten();
+    EXPECT_EQ(model.mesh().vertices[1].x, -1.0f);
+    EXPECT_EQ(model.mesh().vertices[2].y, -1.0f);
+    EXPECT_EQ(model.mesh().triangles[0], (Triangle{0, 2, 1}));
 }
 
 TEST(ModelScene, WhatShowsNothingMayBeDeepAndFlat) {

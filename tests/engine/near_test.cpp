@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/mirrors.h"
 #include "engine/float_world.h"
 #include "primitives/exact_overlap.h"
 #include "proximity/sweep_walk.h"

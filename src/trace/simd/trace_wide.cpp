@@ -18,6 +18,7 @@
 #include "trace/all_hits.h"
 #include "trace/batch.h"
 #include "trace/simd/one_ray.h"
+#include "trace/simd/ray_order.h"
 #include "trace/simd/scaled_rays.h"
 #include "trace/simd/simd_kernels.h"
 #include "trace/simd/trace_on_this_thread.h"
@@ -96,18 +97,14 @@ struct Plan {
     /// Rays 0 to n - 1 by trace(order, begin, end).
     template <class Trace>
     void run_in_order(std::size_t n, const Trace& trace) const {
-        // With fewer rays than this, to sort them takes longer than it saves, most often.
-        constexpr std::size_t least = 8192, many = 65536;
         const bool can_sort = streams && look.path == SimdPath::sorted &&
                               n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
-        if (!can_sort || (automatic && n < 2 * least)) {
+        if (!can_sort || (automatic && n < least_rays_to_sort)) {
             trace(RayOrder::given, 0, n);
         } else if (!learns) {
             trace(RayOrder::sorted, 0, n);
         } else {
-            constexpr RayOrder orders[] = {RayOrder::given, RayOrder::sorted, RayOrder::given};
-            tree.arrays().rates.orders(look.kind).run(
-                std::span(orders).subspan(n < many ? 0 : 1, 2), 0, n, trace, least);
+            run_in_better_order(tree.arrays().rates.orders(look.kind), n, trace);
         }
     }
 

@@ -1,0 +1,23 @@
+// Which order a batch of rays goes in whose neighbours start far apart: as given, or sorted.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "exec/path_rates.h"
+
+namespace raydix {
+
+/// With fewer rays than this, to sort them takes longer than it saves, most often.
+inline constexpr std::size_t least_rays_to_sort = 16384;
+
+/// Rays 0 to n - 1, least_rays_to_sort or more, by trace(order, begin, end). Batches that are alike
+/// try both orders and go on with the faster one; large ones begin with sorted rays.
+template <class Trace>
+void run_in_better_order(OrderRates& rates, std::size_t n, const Trace& trace) {
+    constexpr std::size_t many = 65536;
+    constexpr RayOrder orders[] = {RayOrder::given, RayOrder::sorted, RayOrder::given};
+    rates.run(std::span(orders).subspan(n < many ? 0 : 1, 2), 0, n, trace, least_rays_to_sort / 2);
+}
+
+}  // namespace raydix
