@@ -60,10 +60,9 @@ struct Model {
     [[nodiscard]] Mesh mesh() &&;
     [[nodiscard]] bool is_flat() const { return nodes.empty() && meshes.size() <= 1; }
 
-    /// Makes one mesh of all, without nodes: node by node, mesh by mesh, triangles and vertices in
-    /// their order. Vertices are moved through each node's transform in turn, as instances of a
-    /// Scene have it, in double, and rounded once: queries of the Scene have the same bits. Where a
-    /// node mirrors, two corners change places, so that the outside stays outside. Throws
+    /// Makes one mesh of all, without nodes: node by node, mesh by mesh, in their order. Vertices
+    /// go through each transform in turn in double and are rounded once: the bits of queries on a
+    /// Scene. Where a node mirrors, two corners change places: the outside stays outside. Throws
     /// InputError, the model stays as it is: copies that take more than 64 MiB and 1,000 times the
     /// memory of the meshes, too many vertices or triangles for one mesh.
     void flatten();

@@ -171,9 +171,8 @@ public:
     /// given before.
     std::uint32_t add(const MeshView& mesh, const GeometryOptions& options = {});
     std::uint32_t add(const Mesh& mesh, const GeometryOptions& options = {});
-    /// The same without a copy. The caller keeps the arrays as they are, as long as the scene lives
-    /// or until it is committed without them. Scenes in which this one stands read them too, until
-    /// they are committed again after that. To change the arrays, call `update`.
+    /// The same without a copy. The caller keeps the arrays until the scene ends or is committed
+    /// without them, and those in which it stands are committed after that. `update` changes them.
     std::uint32_t share(const MeshView& mesh, const GeometryOptions& options = {});
     /// Adds spheres, capsules, or points of one radius, of which the scene keeps a copy. `prim`
     /// counts them. Rays hit their surfaces from both sides. A ray that starts inside hits where it

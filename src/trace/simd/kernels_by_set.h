@@ -10,7 +10,8 @@
 
 #include "trace/simd/simd_kernels.h"
 
-// The functions of this name for AVX-512, for AVX2 and for the rest; null where it was not compiled.
+// The functions of this name for AVX-512, for AVX2 and for the rest; null where it was not
+// compiled.
 #if HWY_TARGETS & HWY_AVX3
 #define RAYDIX_WITH_AVX512(function) N_AVX3::function
 #else
