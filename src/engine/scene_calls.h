@@ -19,7 +19,7 @@ HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
 /// All hits of the rays of a job, one ray after the other.
-inline void all_scene_hits(SceneJob& job) {
+inline void all_hits_one_by_one(SceneJob& job) {
     job.invalid = 0;
     job.single_stack.reserve_words(job.tree->stack_size);
     for (std::size_t k = 0; k < job.n; ++k) {

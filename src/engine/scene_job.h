@@ -59,6 +59,8 @@ struct SceneLevel {
     std::vector<TreeHit> hits;
     std::vector<std::uint8_t> occluded;
     std::vector<std::uint32_t> seen;  // those of a list that may see something
+    std::vector<Ray> listed;          // of all hits: the rays of a list
+    std::vector<std::uint64_t> hit_counts;
     StreamMemory parts_memory, mesh_memory;
     StackMemory parts_stack, mesh_stack;
 

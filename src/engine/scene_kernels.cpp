@@ -20,6 +20,22 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
+inline void trace_scene(SceneJob& job) {
+    if (job.any)
+        SceneWalk<true>(job).run();
+    else
+        SceneWalk<false>(job).run();
+}
+
+/// All hits of the rays of a job. One after the other if they go alone, have a filter, or their
+/// numbers have no room beside those of paths.
+inline void all_scene_hits(SceneJob& job) {
+    if (job.single || job.filter != nullptr || !HitsOfJob::has_room(job))
+        all_hits_one_by_one(job);
+    else
+        SceneWalk<false, true>(job).run();
+}
+
 SceneKernels scene_kernels(std::string_view isa) {
     return {isa,
             trace_scene,

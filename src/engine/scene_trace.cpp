@@ -134,6 +134,46 @@ TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
     return sum_of(parts, n);
 }
 
+/// How all hits of a batch are found. Together or alone: which is faster depends on the scene.
+JobWays ways_of_all_hits(const SceneTree& tree, const Batch& batch) {
+    const SimdPath path = batch.options.path;
+    const bool automatic = path == SimdPath::automatic;
+    BatchLook look{path, {}, false};
+    if (automatic) look = look_at(tree.extent.box, batch.rays);
+    JobWays ways;
+    if (!batch.options.filter && look.path == SimdPath::packet) ways.add(PathWay::packets);
+    if (!batch.options.filter && look.path == SimdPath::stream) ways.add(PathWay::streams);
+    if (automatic || ways.count == 0) ways.add(PathWay::alone);
+    if (ways.count < 2) return ways;
+    look.kind.sorted = true;  // no rays are sorted here: this keeps them apart from closest hits
+    ways.rates = &tree.rates.ways(look.kind);
+    return ways;
+}
+
+/// All hits of rays begin to end - 1, behind those of their block. How many rays are invalid.
+std::uint64_t find_all(const SceneTree& tree, const Kernels& kernels, PathWay way,
+                       const Batch& batch, HitBlocks<AllHits>& found, std::size_t begin,
+                       std::size_t end) {
+    const ThreadOwn<SceneJob> own;
+    SceneJob& job = *own;
+    job.tree = &tree;
+    job.kernels = kernels.tree;
+    job.rays = batch.rays.data() + begin;
+    job.order = nullptr;
+    job.n = end - begin;
+    job.first = begin;
+    job.mask = batch.options.mask;
+    job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + begin;
+    job.filter = filter_of(batch.options);
+    job.packets = way == PathWay::packets;
+    job.single = way == PathWay::alone;
+    job.turns = false;
+    job.found = &found.hits_with(begin);
+    job.hit_counts = found.hit_counts() + begin;
+    kernels.scene->all_hits(job);
+    return job.invalid;
+}
+
 /// Asks a filter about hits of the only mesh tree.
 struct FilterOfMesh {
     const MeshTree& mesh;
@@ -304,25 +344,17 @@ AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTrac
     constexpr std::size_t block_size = 1024;
     HitBlocks<AllHits> found(rays.size(), block_size, options.max_result_bytes);
     std::vector<JobCounts> parts((rays.size() + block_size - 1) / block_size);
-    const SceneKernels& kernels = scene_kernels_for(options.isa);
+    const Kernels kernels{&kernels_for(options.isa), &scene_kernels_for(options.isa)};
+    const Batch batch{rays, nullptr, nullptr, options};
+    const JobWays ways = ways_of_all_hits(tree, batch);
     AllHits all;
     with_threads(options.threads, [&] {
         for_each_block(
             rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
-                const ThreadOwn<SceneJob> own;
-                SceneJob& job = *own;
-                job.tree = &tree;
-                job.rays = rays.data() + begin;
-                job.order = nullptr;
-                job.n = end - begin;
-                job.first = begin;
-                job.mask = options.mask;
-                job.masks = options.masks.empty() ? nullptr : options.masks.data() + begin;
-                job.filter = filter_of(options);
-                job.found = &found.hits(block);
-                job.hit_counts = found.hit_counts() + begin;
-                kernels.all_hits(job);
-                parts[block] = {found.hits(block).size(), job.invalid};
+                ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
+                    parts[block].invalid += find_all(tree, kernels, way, batch, found, from, to);
+                });
+                parts[block].hits = found.hits(block).size();
                 found.finish(block);
             });
         all = found.join();

@@ -14,6 +14,7 @@
 #include <limits>
 #include <numeric>
 
+#include "engine/scene_all_hits.h"
 #include "engine/scene_job.h"
 #include "engine/scene_moves.h"
 #include "engine/scene_ray.h"
@@ -24,10 +25,15 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-template <bool any>
+/// `all`: all hits, not the closest; without a filter.
+template <bool any, bool all = false>
 class SceneWalk {
+    struct Nothing {
+        explicit Nothing(SceneJob&) {}
+    };
+
 public:
-    explicit SceneWalk(SceneJob& job) : job_(job) {}
+    explicit SceneWalk(SceneJob& job) : job_(job), hits_(job) {}
 
     void run() {
         job_.hits.assign(job_.n, {});
@@ -38,6 +44,7 @@ public:
             one_by_one();
         else
             together();
+        if constexpr (all) hits_.put_in_order();
     }
 
 private:
@@ -92,7 +99,13 @@ private:
     HWY_INLINE void alone(std::uint32_t id, bool nearest_first, const Walk& walk) {
         const WideStackView stack = job_.single_stack.view();
         const SceneJob::Limits& limits = job_.limits[id];
-        if (job_.filter == nullptr) {
+        if constexpr (all) {
+            const std::size_t before = hits_.found().size();
+            SceneRay<Wanted::all> one(limits, job_.place(id), {}, stack, &hits_.found(),
+                                      nearest_first);
+            walk(one);
+            hits_.give(before, id);
+        } else if (job_.filter == nullptr) {
             SceneRay<wanted> one(limits, job_.place(id), job_.hits[id], stack, nullptr,
                                  nearest_first);
             walk(one);
@@ -211,6 +224,10 @@ private:
         /// Whether it counts, and is the best.
         HWY_INLINE bool take(std::uint32_t ray, const TreeHit& hit, double scale) {
             const std::uint32_t id = level_.sources[ray].id;
+            if constexpr (all) {
+                walk_.hits_.add(tree_, place_.number, scale, hit, id);
+                return false;
+            }
             if (walk_.job_.filter != nullptr &&
                 !walk_.job_.accepts(id, hit_in_scene(tree_, place_.number, scale, hit)))
                 return false;
@@ -220,23 +237,24 @@ private:
         /// The rays of a list that still go on, to one primitive.
         HWY_NOINLINE void visit_user(const UserGeometry& user, std::uint32_t prim,
                                      const std::uint32_t* rays, std::uint32_t count) {
-            UserRays& all = walk_.job_.user_rays;
-            all.begin(count);
+            UserRays& listed = walk_.job_.user_rays;
+            listed.begin(count);
             for (std::uint32_t k = 0; k < count; ++k) {
                 const SceneRaySource& source = level_.sources[rays[k]];
                 const SceneJob::Limits& limits = walk_.job_.limits[source.id];
                 const UserRay given(level_.rays[rays[k]], source.scale, limits.tmin, limits.reach);
                 if (given.ray.tmin <= given.ray.tmax)
-                    all.add(given.ray, given.scale, rays[k], walk_.job_.place(source.id));
+                    listed.add(given.ray, given.scale, rays[k], walk_.job_.place(source.id));
             }
-            if (all.count() == 0) return;
-            RaysAtPrimitive at = all.at_primitive();
+            if (listed.count() == 0) return;
+            RaysAtPrimitive at = listed.at_primitive();
             user.test(prim, at);
-            for (std::uint32_t k = 0; k < all.count(); ++k) {
-                TreeHit hit = all.hit(k);
+            for (std::uint32_t k = 0; k < listed.count(); ++k) {
+                TreeHit hit = listed.hit(k);
                 if (!hit.hit()) continue;
                 hit.prim = prim;
-                if (take(all.number(k), hit, all.scale(k))) walk_.shorten(level_, all.number(k));
+                if (take(listed.number(k), hit, listed.scale(k)))
+                    walk_.shorten(level_, listed.number(k));
             }
         }
 
@@ -504,7 +522,7 @@ private:
         const std::size_t stack_size = wide_stack_capacity(mesh.tree->stats().max_depth);
         level.mesh_stack.reserve_words(stack_size * rays_in_turn);
         if (any && level.occluded.size() < level.count) level.occluded.resize(level.count);
-        if (!any && level.hits.size() < level.count) level.hits.resize(level.count);
+        if (!any && !all && level.hits.size() < level.count) level.hits.resize(level.count);
         TriangleBlock room{};
         WideView view = mesh.view;
         view.room = &room;
@@ -525,6 +543,11 @@ private:
                           nullptr,
                           job_.filter == nullptr ? nullptr : &check};
         SimdCounts counts;
+        if constexpr (all) {
+            hits_.trace_mesh(job, level, mesh, place.number,
+                             count < least_together ? job_.kernels->single : job_.kernels->packets);
+            return;
+        }
         // Streams have no checks.
         (count < least_together                   ? job_.kernels->single
          : job_.packets || job_.filter != nullptr ? job_.kernels->packets
@@ -565,14 +588,8 @@ private:
     }
 
     SceneJob& job_;
+    [[no_unique_address]] std::conditional_t<all, HitsOfJob, Nothing> hits_;
 };
-
-inline void trace_scene(SceneJob& job) {
-    if (job.any)
-        SceneWalk<true>(job).run();
-    else
-        SceneWalk<false>(job).run();
-}
 
 }  // namespace raydix::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

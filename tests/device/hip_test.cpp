@@ -4,6 +4,10 @@
 // none is used.
 #include <dlfcn.h>
 #include <gtest/gtest.h>
+#include <raydix/cwbvh.h>
+#include <raydix/device_cwbvh.h>
+#include <raydix/device_queries.h>
+#include <raydix/device_trace.h>
 #include <raydix/raydix.h>
 
 #include <cstring>

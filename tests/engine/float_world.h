@@ -270,6 +270,23 @@ inline std::vector<Ray> random_rays(RandomScenes& random, std::size_t count) {
     return rays;
 }
 
+/// Bundles of rays that go much the same way, so that many reach a part together.
+inline std::vector<Ray> bundles_of_rays(RandomScenes& random, std::size_t bundles,
+                                        std::size_t rays_each) {
+    std::vector<Ray> rays;
+    for (std::size_t b = 0; b < bundles; ++b) {
+        const Ray middle{random.in(-6, 6), 0, {}, infinity};
+        const Vec3 to = random.in(0, 1);
+        for (std::size_t k = 0; k < rays_each; ++k) {
+            Ray ray = middle;
+            ray.direction = to + 0.2f * random.in(-1, 1) - middle.origin;
+            if (k % 3 == 0) ray.tmax = random.between(0.5f, 1.5f);
+            rays.push_back(ray);
+        }
+    }
+    return rays;
+}
+
 /// Rays that end, or begin, where they hit: the bounds of boxes decide.
 inline std::vector<Ray> rays_to_hits(std::span<const Ray> rays, std::span<const Hit> hits) {
     std::vector<Ray> out;

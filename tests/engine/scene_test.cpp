@@ -95,27 +95,92 @@ TEST(Scene, AllHitsAreThoseOfEveryMeshOnEveryPath) {
         recipe.options.quality = seed % 2 == 0 ? Quality::balanced : Quality::high;
         recipe.options.compact = seed % 3 == 0;
         const auto world = random_world(random, recipe);
-        const std::vector<Ray> rays = random_rays(random, 150);
+        std::vector<Ray> rays = random_rays(random, 150);
+        const std::vector<Ray> together = bundles_of_rays(random, 3, 50);
+        rays.insert(rays.end(), together.begin(), together.end());
         const std::uint32_t mask = seed % 5 == 0 ? 2u : every_mask;
         const auto rows = look_for_all(*world, rays, mask);
+        for (const std::string& isa : simd_instruction_sets())
+            for (const SimdPath path :
+                 {SimdPath::automatic, SimdPath::single, SimdPath::packet, SimdPath::stream}) {
+                SceneTraceOptions options;
+                options.mask = mask, options.isa = isa, options.path = path;
+                options.threads = 1 + static_cast<int>(seed % 2);
+                const AllHits hits = trace_all(world->scene, rays, options);
+                ASSERT_EQ(hits.offsets.size(), rays.size() + 1);
+                EXPECT_EQ(hits.counts.hits, hits.hits.size());
+                for (std::size_t i = 0; i < rays.size(); ++i) {
+                    const std::span<const Hit> row(hits.hits.data() + hits.offsets[i],
+                                                   hits.offsets[i + 1] - hits.offsets[i]);
+                    EXPECT_TRUE(std::ranges::equal(row, rows[i], same))
+                        << "seed " << seed << ", ray " << i << ", " << simd_path_name(path);
+                    found += row.size();
+                }
+            }
+    }
+    EXPECT_GT(found, 400u * thorough);  // with one instruction set
+}
+
+/// All hits by all ways are those of rays that go alone.
+void expect_all_hits_by_every_path(const Scene& scene, std::span<const Ray> rays,
+                                   SceneTraceOptions options) {
+    options.path = SimdPath::single;
+    const AllHits alone = trace_all(scene, rays, options);
+    EXPECT_GT(alone.hits.size(), 0u);
+    for (const SimdPath path : {SimdPath::automatic, SimdPath::packet, SimdPath::stream}) {
+        options.path = path;
+        const AllHits hits = trace_all(scene, rays, options);
+        EXPECT_EQ(hits.offsets, alone.offsets) << simd_path_name(path);
+        EXPECT_TRUE(std::ranges::equal(hits.hits, alone.hits, same)) << simd_path_name(path);
+        EXPECT_EQ(hits.counts.invalid_rays, alone.counts.invalid_rays);
+    }
+}
+
+TEST(Scene, AllHitsOfShapesTogetherAreThoseOfRaysAlone) {
+    for (std::uint32_t levels = 0; levels < 4; ++levels) {
+        RandomScenes random(1300 + levels);
+        Recipe recipe{levels, 5, 0};
+        recipe.shapes = true;
+        const auto world = random_world(random, recipe);
+        std::vector<Ray> rays = bundles_of_rays(random, 20, 100);
+        const std::vector<Ray> others = random_rays(random, 400);
+        rays.insert(rays.end(), others.begin(), others.end());
+        std::vector<std::uint32_t> masks(rays.size());
+        for (std::size_t i = 0; i < rays.size(); ++i) masks[i] = i % 9 == 0 ? 2u : every_mask;
         for (const std::string& isa : simd_instruction_sets()) {
             SceneTraceOptions options;
-            options.mask = mask, options.isa = isa,
-            options.threads = 1 + static_cast<int>(seed % 2);
-            const AllHits hits = trace_all(world->scene, rays, options);
-            ASSERT_EQ(hits.offsets.size(), rays.size() + 1);
-            EXPECT_EQ(hits.counts.hits, hits.hits.size());
-            for (std::size_t i = 0; i < rays.size(); ++i) {
-                const auto first = hits.hits.begin() + static_cast<std::ptrdiff_t>(hits.offsets[i]);
-                const std::vector<Hit> row(
-                    first, hits.hits.begin() + static_cast<std::ptrdiff_t>(hits.offsets[i + 1]));
-                EXPECT_TRUE(std::ranges::equal(row, rows[i], same))
-                    << "seed " << seed << ", ray " << i;
-                found += row.size();
-            }
+            options.isa = isa;
+            expect_all_hits_by_every_path(world->scene, rays, options);
+            options.masks = masks;
+            expect_all_hits_by_every_path(world->scene, rays, options);
         }
     }
-    EXPECT_GT(found, 40u * thorough);  // with one instruction set
+}
+
+/// Numbers of paths and of rays have no room beside each other in 32 bits.
+TEST(Scene, AllHitsThroughFourMillionPaths) {
+    constexpr std::uint32_t side = 2100;
+    const auto row_of = [](const Scene& what, Vec3 step) {
+        Scene row;
+        for (std::uint32_t k = 0; k < side; ++k) {
+            Transform at;
+            at.m[0][3] = step.x * static_cast<float>(k);
+            at.m[1][3] = step.y * static_cast<float>(k);
+            row.add(what, at);
+        }
+        row.commit();
+        return row;
+    };
+    const Scene all = row_of(row_of(Scene(random_soup(20, 3, 1.0f)), {1, 0, 0}), {0, 1, 0});
+    std::vector<Ray> rays;
+    for (int k = 0; k < 200; ++k) {
+        const float x = 2090 + 0.02f * static_cast<float>(k);
+        rays.push_back({{x, 2095, 9}, 0, {0, 0.001f, -1}});
+    }
+    expect_all_hits_by_every_path(all, rays, {});
+    const AllHits hits = trace_all(all, rays);
+    const auto last = std::ranges::max_element(hits.hits, {}, &Hit::instance);
+    EXPECT_GT(last->instance, 1u << 22);
 }
 
 TEST(Scene, AllHitsKeepToTheirMemory) {
