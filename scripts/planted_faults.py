@@ -479,4 +479,8 @@ FAULTS = [
           "ranks: triangles of a leaf are put once more", "mpi"),
     Fault("src/mpi/file_parts.cpp", "used[k] - first)", "used[k] - used[0])",
           "ranks: vertices that are read later come from elsewhere in the file", "mpi"),
+    Fault("src/engine/scene_all_hits.h", "level.listed[k] = rays.rays[rays.order[k]];", "level.listed[k] = rays.rays[k];",
+          "all hits: rays of a list are the first ones of their level", "engine"),
+    Fault("src/engine/scene_all_hits.h", "static_cast<int>(std::bit_width(job.n - 1)) <= 32;", "static_cast<int>(std::bit_width(job.n - 1)) <= 40;",
+          "all hits: numbers of rays and of paths run into each other", "engine"),
 ]
