@@ -34,7 +34,7 @@ if(RAYDIX_HAVE_HIP)
     target_link_options(device_standin_hip PRIVATE -Wl,--exclude-libs,ALL)
     set_target_properties(device_standin_hip PROPERTIES OUTPUT_NAME amdhip64 CXX_STANDARD 20
         LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/standin)
-    add_executable(device_hip hip_test.cpp)
+    add_executable(device_hip hip_standin.cpp)
     target_link_libraries(device_hip PRIVATE raydix_test_support GTest::gtest_main)
     add_dependencies(device_hip device_standin_hip)
     set(raydix_hip_environment ${raydix_opencl_environment})
