@@ -17,6 +17,8 @@ DRIVER = CHECKS.parents[2] / "build" / "opencl-rt" / "lib"
 def environment(folder):
     """With the driver, if it is there."""
     found = dict(os.environ)
+    # open3d sets it where it is imported. Intel's driver then spoils memory when a process ends (docs/gpu.md).
+    found.pop("TCM_ENABLE", None)
     if (DRIVER / "libintelocl.so").exists() and "OCL_ICD_VENDORS" not in found:
         (folder / "intel.icd").write_text(f"{DRIVER / 'libintelocl.so'}\n")
         found["OCL_ICD_VENDORS"] = str(folder)
