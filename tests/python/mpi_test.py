@@ -2,8 +2,8 @@
 
 import importlib.util
 import os
-import re
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
