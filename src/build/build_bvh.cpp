@@ -22,6 +22,7 @@
 #include "sort/radix_sort.h"
 #include "tree/apetrei_cpu.h"
 #include "tree/bvh_internals.h"
+#include "tree/code_options.h"
 #include "tree/fit.h"
 #include "tree/fit_levels.h"
 #include "tree/hierarchy.h"
@@ -77,12 +78,7 @@ std::uint64_t bytes_held(const Scratch& s, const BvhInternals& tree) {
 void check_options(const BuildOptions& options, std::size_t n) {
     check_enum("builder", options.builder, Builder::sbvh);
     check_enum("fit", options.fit, Fit::atomic);
-    if (options.bits != 30 && options.bits != 63)
-        throw InputError("build option bits is " + std::to_string(options.bits) +
-                         "; it must be 30 or 63");
-    if (options.max_leaf < 1 || options.max_leaf > 255)
-        throw InputError("build option max_leaf is " + std::to_string(options.max_leaf) +
-                         "; it must be 1 to 255");
+    check_code_options(options);
     if (options.reinsertion_rounds < 0 || options.reinsertion_rounds > 255)
         throw InputError("build option reinsertion_rounds is " +
                          std::to_string(options.reinsertion_rounds) + "; it must be 0 to 255");

@@ -8,6 +8,7 @@
 #include "gpu/device_build.h"
 #include "gpu/device_fetch.h"
 #include "tree/bvh_internals.h"
+#include "tree/code_options.h"
 
 namespace raydix {
 
@@ -15,12 +16,7 @@ void check_device_options(const BuildOptions& options, std::uint64_t n) {
     check_enum("builder", options.builder, Builder::sbvh);
     check_enum("fit", options.fit, Fit::atomic);
     check_threads(options.threads);
-    if (options.bits != 30 && options.bits != 63)
-        throw InputError("build option bits is " + std::to_string(options.bits) +
-                         "; it must be 30 or 63");
-    if (options.max_leaf < 1 || options.max_leaf > 255)
-        throw InputError("build option max_leaf is " + std::to_string(options.max_leaf) +
-                         "; it must be 1 to 255");
+    check_code_options(options);
     if (!in_lbvh_family(options.builder) && options.builder != Builder::hploc)
         throw InputError("builder " + std::string(builder_name(options.builder)) +
                          " does not run on a device");

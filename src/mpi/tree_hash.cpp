@@ -13,6 +13,7 @@
 #include "mpi/spread_lbvh.h"
 #include "primitives/bounds.h"
 #include "tree/bvh_stream.h"
+#include "tree/code_options.h"
 #include "tree/lbvh_family.h"
 #include "tree/word_hash.h"
 
@@ -28,12 +29,7 @@ void check_tree_options(const BuildOptions& options) {
         throw InputError(
             "tree_hash over ranks: the builder must be karras, lauterbach, garanzha or apetrei, "
             "without reinsertion; others look at more than sorted codes");
-    if (options.bits != 30 && options.bits != 63)
-        throw InputError("build option bits is " + std::to_string(options.bits) +
-                         "; it must be 30 or 63");
-    if (options.max_leaf < 1 || options.max_leaf > 255)
-        throw InputError("build option max_leaf is " + std::to_string(options.max_leaf) +
-                         "; it must be 1 to 255");
+    check_code_options(options);
 }
 
 /// Around what all ranks have.
