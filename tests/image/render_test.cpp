@@ -223,8 +223,7 @@ TEST(ViewNames, GoThereAndBack) {
 
 /// RAYDIX_UPDATE_GOLDEN=1 writes the pictures anew: look at them before they are committed.
 TEST(Render, GoldenPictures) {
-    const std::filesystem::path folder =
-        std::filesystem::path(RAYDIX_SOURCE_DIR) / "tests" / "golden";
+    const std::filesystem::path folder = test::source_file("tests/golden");
     const char* const update = std::getenv("RAYDIX_UPDATE_GOLDEN");
     const test::TempFolder scratch;
     const Bvh bvh = build_bvh(test::ball_and_boxes());

@@ -237,8 +237,7 @@ std::size_t count_different(const Picture& a, const Picture& b) {
 /// RAYDIX_UPDATE_GOLDEN=1 writes the picture anew: look at it before it is committed.
 void expect_golden(const std::string& name, const Picture& picture) {
     SCOPED_TRACE(name);
-    const std::filesystem::path golden_file =
-        std::filesystem::path(RAYDIX_SOURCE_DIR) / "tests" / "golden" / name;
+    const std::filesystem::path golden_file = test::source_file("tests/golden/" + name);
     const char* const update = std::getenv("RAYDIX_UPDATE_GOLDEN");
     if (update && std::string_view(update) == "1") save_picture(golden_file, picture, false);
     const test::TempFolder scratch;

@@ -39,7 +39,7 @@ bool holds(const std::string& html, const std::string& part) {
 }
 
 std::string shared_document(const std::string& name) {
-    std::ifstream in(std::string(RAYDIX_SOURCE_DIR) + "/tests/report/documents/" + name);
+    std::ifstream in(test::source_file("tests/report/documents/" + name));
     std::ostringstream text;
     text << in.rdbuf();
     return text.str();
@@ -305,8 +305,7 @@ TEST(MakeReport, DamagedDocumentsStillGiveAPage) {
     const std::uint32_t seed = std::random_device{}();
     SCOPED_TRACE(fmt::format("seed {}", seed));
     std::mt19937 random(seed);
-    std::ifstream study(std::string(RAYDIX_SOURCE_DIR) +
-                        "/bench/results/hierarchy-Milan-2-cores.json");
+    std::ifstream study(test::source_file("bench/results/hierarchy-Milan-2-cores.json"));
     Json hierarchy = Json::parse(study);
     Json& runs = hierarchy["runs"];
     while (runs.size() > 12) runs.erase(runs.size() / 2);  // enough of each kind, and quick

@@ -63,8 +63,7 @@ Mesh small_builtin(const char* spec) {
     std::string name = spec;
     std::ranges::replace_if(
         name, [](char c) { return std::isalnum(c) == 0; }, '-');
-    const std::filesystem::path folder = RAYDIX_BINARY_DIR "/builtin",
-                                file = folder / (name + ".ply");
+    const std::filesystem::path folder = built_file("builtin"), file = folder / (name + ".ply");
     if (!std::filesystem::exists(file)) {
         std::filesystem::create_directories(folder);
         const auto own = folder / (name + "." + std::to_string(getpid()));

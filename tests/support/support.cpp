@@ -6,6 +6,14 @@ std::filesystem::path shared_scene(const std::string& name) {
     return std::filesystem::path(RAYDIX_SHARED_SCENES) / name;
 }
 
+std::filesystem::path source_file(const std::string& name) {
+    return std::filesystem::path(RAYDIX_SOURCE_DIR) / name;
+}
+
+std::filesystem::path built_file(const std::string& name) {
+    return std::filesystem::path(RAYDIX_BINARY_DIR) / name;
+}
+
 TempFolder::TempFolder() : TempPath("raydix-test-") { std::filesystem::create_directories(path()); }
 
 Mesh random_soup(std::size_t count, std::uint64_t seed, float size) {

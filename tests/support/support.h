@@ -17,6 +17,10 @@ namespace raydix::test {
 
 /// A file below the shared scenes folder; `skip_without` skips the test if it is not there.
 std::filesystem::path shared_scene(const std::string& name);
+/// A file of the project.
+std::filesystem::path source_file(const std::string& name);
+/// A file of the folder that the tests are built in.
+std::filesystem::path built_file(const std::string& name);
 
 #define RAYDIX_SKIP_WITHOUT(path)       \
     if (!std::filesystem::exists(path)) \
