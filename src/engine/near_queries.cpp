@@ -78,9 +78,9 @@ public:
          ResultBudget* = nullptr)
         : tree_(tree_for(scene, mask, call)), mask_(mask), kernels_(kernels_of(isa)) {}
 
-    [[nodiscard]] std::vector<std::uint32_t> order(std::span<const Vec3> places) const {
+    [[nodiscard]] Buffer<std::uint32_t> order(std::span<const Vec3> places) const {
         const Aabb bounds = bounds_of(tree_);
-        return is_empty(bounds) ? std::vector<std::uint32_t>() : order_by_place(bounds, places);
+        return is_empty(bounds) ? Buffer<std::uint32_t>() : order_by_place(bounds, places);
     }
 
     class Thread {

@@ -9,6 +9,7 @@
 //     sweep(sweep)              of a valid sweep
 #pragma once
 
+#include <raydix/buffer.h>
 #include <raydix/error.h>
 #include <raydix/scene_queries.h>
 
@@ -56,11 +57,11 @@ inline bool is_ordered(std::size_t queries) {
     return queries >= worth_ordering && queries < std::size_t{1} << 31;
 }
 template <class Near, class Query>
-std::vector<std::uint32_t> order_in(const Near& near, std::span<const Query> queries) {
+Buffer<std::uint32_t> order_in(const Near& near, std::span<const Query> queries) {
     if (!is_ordered(queries.size())) return {};
-    std::vector<decltype(place_of(queries[0]))> places(queries.size());
+    Buffer<decltype(place_of(queries[0]))> places(queries.size());
     for_each_index(queries.size(), [&](std::size_t i) { places[i] = place_of(queries[i]); });
-    return near.order(places);
+    return near.order(places.view());
 }
 /// Bytes that ordering a query takes: its place, that around the center of a tree in double, and
 /// what a sort holds (radix_sort.h).
@@ -100,10 +101,10 @@ ClosestCounts closest_batch(const Scene& scene, std::span<const Query> queries,
     std::vector<ClosestCounts> parts(block_count(queries.size()));
     with_threads(options.threads, [&] {
         const Near near(scene, options.mask, NearCall::closest, options.isa);
-        std::vector<std::uint32_t> order;
+        Buffer<std::uint32_t> order;
         if (is_ordered(queries.size())) order = near.order(queries);
         for_each_query_block(
-            queries.size(), order,
+            queries.size(), order.view(),
             [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
                 typename Near::Thread thread(near);
                 constexpr std::size_t ahead = 8;
@@ -133,9 +134,9 @@ OverlapCounts touch_any_batch(const Scene& scene, std::span<const Query> queries
     with_threads(options.threads, [&] {
         const Near near(scene, options.mask, NearCall::overlap, options.isa);
         std::fill(touched.begin(), touched.end(), std::uint8_t{0});
-        const std::vector<std::uint32_t> order = order_in(near, queries);
+        const Buffer<std::uint32_t> order = order_in(near, queries);
         counts = for_each_query(
-            near, queries, std::span<const std::uint32_t>(order),
+            near, queries, order.view(),
             [&](auto& thread, std::size_t, std::size_t i) {
                 touched[i] = thread.touch(queries[i], nullptr);
                 return std::uint64_t{touched[i]};
@@ -155,13 +156,13 @@ SceneOverlapLists touch_all_batch(const Scene& scene, std::span<const Query> que
         const Near near(scene, options.mask, NearCall::overlap, options.isa, &budget);
         RowBlocks<SceneOverlapLists> rows(queries.size(), true, budget);
         // Without room to put the queries in order they are taken as they come.
-        std::vector<std::uint32_t> order;
+        Buffer<std::uint32_t> order;
         const std::uint64_t bytes = bytes_of_ordering<Query> * queries.size();
         if (budget.try_take(bytes)) {
             order = order_in(near, queries);
             budget.give_back(bytes - order.size() * sizeof(std::uint32_t));
         }
-        const std::span<const std::uint32_t> in_order(order);
+        const std::span<const std::uint32_t> in_order = order.view();
         const OverlapCounts counts = for_each_query(
             near, queries, in_order,
             [&](auto& thread, std::size_t block, std::size_t i) {

@@ -24,7 +24,7 @@ public:
          ResultBudget* budget = nullptr)
         : body_(near_body_of(scene, mask, call, budget)) {}
 
-    [[nodiscard]] std::vector<std::uint32_t> order(std::span<const Vec3d> places) const {
+    [[nodiscard]] Buffer<std::uint32_t> order(std::span<const Vec3d> places) const {
         return query_order(body_->triangles.tree, places);
     }
 

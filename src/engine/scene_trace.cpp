@@ -1,4 +1,5 @@
 // Batches and single rays through scenes.
+#include <raydix/buffer.h>
 #include <raydix/scene.h>
 
 #include <algorithm>
@@ -56,7 +57,7 @@ struct Kernels {
 
 /// Rays begin to end - 1, or order[begin] to order[end - 1].
 JobCounts trace_job(const SceneTree& tree, const Kernels& kernels, PathWay way, const Batch& batch,
-                    const std::vector<std::uint32_t>& order, std::size_t begin, std::size_t end) {
+                    std::span<const std::uint32_t> order, std::size_t begin, std::size_t end) {
     const ThreadOwn<SceneJob> own;
     SceneJob& job = *own;
     const std::size_t from = order.empty() ? begin : 0;
@@ -119,15 +120,16 @@ TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
     const Plan plan(tree, batch);
     const bool sorted =
         plan.path == SimdPath::sorted && n <= std::size_t{std::numeric_limits<std::int32_t>::max()};
-    const std::size_t job_size = rays_per_job(n, SimdPath::stream);
-    std::vector<JobCounts> parts((n + job_size - 1) / job_size);
+    std::vector<JobCounts> parts;
     const Kernels kernels{&kernels_for(batch.options.isa), &scene_kernels_for(batch.options.isa)};
     with_threads(batch.options.threads, [&] {
-        std::vector<std::uint32_t> order;
+        Buffer<std::uint32_t> order;
         if (sorted) order = order_by_place(tree.extent.box, batch.rays);
-        for_each_block(n, job_size, [&](std::size_t job, std::size_t begin, std::size_t end) {
+        const JobBlocks jobs = jobs_of(n, SimdPath::stream);
+        parts.resize(jobs.count());
+        jobs.run([&](std::size_t job, std::size_t begin, std::size_t end) {
             plan.ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
-                parts[job] += trace_job(tree, kernels, way, batch, order, from, to);
+                parts[job] += trace_job(tree, kernels, way, batch, order.view(), from, to);
             });
         });
     });
@@ -343,20 +345,20 @@ AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTrac
         return all_hits_of(*mesh, rays, options);
     constexpr std::size_t block_size = 1024;
     HitBlocks<AllHits> found(rays.size(), block_size, options.max_result_bytes);
-    std::vector<JobCounts> parts((rays.size() + block_size - 1) / block_size);
+    const JobBlocks blocks = JobBlocks::fixed(rays.size(), block_size);
+    std::vector<JobCounts> parts(blocks.count());
     const Kernels kernels{&kernels_for(options.isa), &scene_kernels_for(options.isa)};
     const Batch batch{rays, nullptr, nullptr, options};
     const JobWays ways = ways_of_all_hits(tree, batch);
     AllHits all;
     with_threads(options.threads, [&] {
-        for_each_block(
-            rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
-                ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
-                    parts[block].invalid += find_all(tree, kernels, way, batch, found, from, to);
-                });
-                parts[block].hits = found.hits(block).size();
-                found.finish(block);
+        blocks.run([&](std::size_t block, std::size_t begin, std::size_t end) {
+            ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
+                parts[block].invalid += find_all(tree, kernels, way, batch, found, from, to);
             });
+            parts[block].hits = found.hits(block).size();
+            found.finish(block);
+        });
         all = found.join();
     });
     all.counts = sum_of(parts, rays.size());

@@ -1,4 +1,5 @@
 // Batches and single rays in double through scenes.
+#include <raydix/buffer.h>
 #include <raydix/error.h>
 #include <raydix/scene.h>
 
@@ -55,7 +56,7 @@ const SceneTreeD& checked_tree(const SceneD& scene, std::size_t rays,
 
 /// Rays begin to end - 1 of a batch, or order[begin] to order[end - 1].
 void set_job(SceneJobD& job, const SceneTreeD& tree, const Batch& batch,
-             const std::vector<std::uint32_t>& order, std::size_t begin, std::size_t end) {
+             std::span<const std::uint32_t> order, std::size_t begin, std::size_t end) {
     const std::size_t from = order.empty() ? begin : 0;
     job.tree = &tree;
     job.rays = batch.rays.data() + from;
@@ -147,41 +148,40 @@ private:
 };
 
 /// Rays along a curve through where they start.
-std::vector<std::uint32_t> order_by_place(const WideTreeD& tree, std::span<const RayD> rays) {
-    std::vector<Vec3> places(rays.size());
+Buffer<std::uint32_t> order_by_place(const WideTreeD& tree, std::span<const RayD> rays) {
+    Buffer<Vec3> places(rays.size());
     for_each_index(rays.size(), [&](std::size_t i) {
         places[i] = Double3(tree.space.local(rays[i].origin)).rounded();
     });
-    return raydix::order_by_place(tree.arrays.bounds, places);
+    return raydix::order_by_place(tree.arrays.bounds, places.view());
 }
 
 TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
     const SceneTreeD& tree = checked_tree(scene, batch.rays.size(), batch.options);
     const SceneKernelsD& kernels = scene_kernels_double_for(batch.options.isa);
-    const std::size_t n = batch.rays.size(), job_size = rays_per_job(n, SimdPath::packet);
+    const std::size_t n = batch.rays.size();
     const Plan plan(tree, batch);
     JobCounts sum;
     with_threads(batch.options.threads, [&] {
         plan.run_in_order(n, [&](RayOrder ray_order, std::size_t first, std::size_t last) {
             const Batch part = batch.part(first, last);
-            std::vector<std::uint32_t> order;
+            Buffer<std::uint32_t> order;
             if (ray_order == RayOrder::sorted)
                 order = order_by_place(*tree.only_mesh()->tree, part.rays);
             const JobWays ways = plan.ways(ray_order);
-            std::vector<JobCounts> jobs((part.rays.size() + job_size - 1) / job_size);
-            for_each_block(part.rays.size(), job_size,
-                           [&](std::size_t number, std::size_t begin, std::size_t end) {
-                               ways.run(begin, end,
-                                        [&](PathWay way, std::size_t from, std::size_t to) {
-                                            const ThreadOwn<SceneJobD> own;
-                                            SceneJobD& job = *own;
-                                            set_job(job, tree, part, order, from, to);
-                                            job.way = way;
-                                            kernels.trace(job);
-                                            jobs[number] += {job.hit_count, job.invalid};
-                                        });
-                           });
-            for (const JobCounts& job : jobs) sum += job;
+            const JobBlocks blocks = jobs_of(part.rays.size(), SimdPath::packet);
+            std::vector<JobCounts> counts(blocks.count());
+            blocks.run([&](std::size_t number, std::size_t begin, std::size_t end) {
+                ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
+                    const ThreadOwn<SceneJobD> own;
+                    SceneJobD& job = *own;
+                    set_job(job, tree, part, order.view(), from, to);
+                    job.way = way;
+                    kernels.trace(job);
+                    counts[number] += {job.hit_count, job.invalid};
+                });
+            });
+            for (const JobCounts& job : counts) sum += job;
         });
     });
     return sum_of({sum}, n);

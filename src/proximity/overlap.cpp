@@ -1,4 +1,5 @@
 // Batches of segments and spheres against the triangles of a tree, in float and in double.
+#include <raydix/buffer.h>
 #include <raydix/double.h>
 #include <raydix/overlap.h>
 
@@ -29,7 +30,7 @@ auto places_of(std::span<const Query> queries) {
 
 /// Positions of queries in the order in which to take them; empty: as they come.
 template <class AnyBvh, class Query>
-std::vector<std::uint32_t> order_of(const AnyBvh& bvh, std::span<const Query> queries) {
+Buffer<std::uint32_t> order_of(const AnyBvh& bvh, std::span<const Query> queries) {
     const auto places = places_of(queries);
     return query_order(bvh, std::span(places));
 }
@@ -86,7 +87,7 @@ OverlapCounts any_batch(const AnyBvh& bvh, std::span<const Query> queries,
     const auto tree = padded_tree(bvh);
     with_threads(options.threads, [&] {
         counts = for_each_query(
-            tree, queries, std::span<const std::uint32_t>(order_of(bvh, queries)),
+            tree, queries, order_of(bvh, queries).view(),
             [&](std::size_t, std::size_t i, auto& stack) {
                 touched[i] = touches_any(tree, queries[i], stack);
                 return std::uint64_t{touched[i]};
@@ -106,13 +107,13 @@ OverlapLists all_batch(const AnyBvh& bvh, std::span<const Query> queries,
         ResultBudget budget("touch_all", options.max_result_bytes);
         RowBlocks<OverlapLists> rows(queries.size(), has_parts(bvh), budget);
         // Without room to put the queries in order they are taken as they come.
-        std::vector<std::uint32_t> order;
+        Buffer<std::uint32_t> order;
         const std::uint64_t bytes = ordering_bytes<Query> * queries.size();
         if (budget.try_take(bytes)) {
             order = order_of(bvh, queries);
             budget.give_back(bytes - order.size() * sizeof(std::uint32_t));
         }
-        const std::span<const std::uint32_t> in_order(order);
+        const std::span<const std::uint32_t> in_order = order.view();
         const OverlapCounts counts = for_each_query(
             tree, queries, in_order,
             [&](std::size_t block, std::size_t i, auto& stack) {

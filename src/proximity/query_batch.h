@@ -2,6 +2,7 @@
 // fixed blocks.
 #pragma once
 
+#include <raydix/buffer.h>
 #include <raydix/bvh.h>
 #include <raydix/double.h>
 #include <raydix/error.h>
@@ -39,20 +40,20 @@ inline void require_room(const char* what, std::size_t queries, std::size_t resu
 }
 
 /// Positions of queries in the order in which to take them; empty: as they come.
-[[nodiscard]] inline std::vector<std::uint32_t> query_order(const Bvh& bvh,
-                                                            std::span<const Vec3> places) {
+[[nodiscard]] inline Buffer<std::uint32_t> query_order(const Bvh& bvh,
+                                                       std::span<const Vec3> places) {
     if (places.size() < worth_ordering || places.size() >= std::size_t{1} << 31 || bvh.empty())
         return {};
     return order_by_place(bvh.bounds(), places);
 }
-[[nodiscard]] inline std::vector<std::uint32_t> query_order(const BvhD& bvh,
-                                                            std::span<const Vec3d> places) {
+[[nodiscard]] inline Buffer<std::uint32_t> query_order(const BvhD& bvh,
+                                                       std::span<const Vec3d> places) {
     if (places.size() < worth_ordering) return {};
     const TreeSpace space{bvh.center(), bvh.scale()};
-    std::vector<Vec3> local(places.size());
+    Buffer<Vec3> local(places.size());
     for_each_index(places.size(),
                    [&](std::size_t i) { Double3(space.local(places[i])).round_to(local[i]); });
-    return query_order(bvh.tree(), local);
+    return query_order(bvh.tree(), local.view());
 }
 
 /// Calls one(block, begin, end, at) with at(k) = the query that is k-th in line; `order` as
@@ -67,8 +68,7 @@ void for_each_query_block(std::size_t queries, std::span<const std::uint32_t> or
 }
 template <class AnyBvh, class Vec, class One>
 void for_each_query_block(const AnyBvh& bvh, std::span<const Vec> places, const One& one) {
-    for_each_query_block(places.size(), std::span<const std::uint32_t>(query_order(bvh, places)),
-                         one);
+    for_each_query_block(places.size(), query_order(bvh, places).view(), one);
 }
 
 [[nodiscard]] inline std::size_t block_count(std::size_t queries) {

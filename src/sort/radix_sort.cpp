@@ -16,7 +16,7 @@ constexpr std::size_t insertion_limit = 24;  // shorter runs: insertion sort bea
 constexpr int max_digit_bits = 11;  // 2048 counters, 8 KB: half of a first-level cache is left
 constexpr std::size_t alone_limit = 1u << 18;  // larger buckets are split again by all threads
 constexpr std::size_t max_blocks = 64;
-constexpr std::size_t min_block = 1u << 13;
+constexpr std::size_t min_block = 1u << 11;
 
 template <class Key>
 using Record = SortRecord<Key>;

@@ -1,4 +1,5 @@
 // Batches of rays through a wide tree on threads of the CPU: the kernel `simd`.
+#include <raydix/buffer.h>
 #include <raydix/error.h>
 #include <raydix/wide.h>
 
@@ -37,13 +38,15 @@ const SimdKernels& kernels_for(const std::string& isa) {
     throw InputError("instruction set " + isa + ": this processor and build have " + known);
 }
 
-/// Rays of a job: as many as give full vectors deep in the tree and still lie in the second-level
-/// cache; fewer where the batch would not keep many threads busy. Depends on the batch alone, so
-/// that counts do not depend on the threads.
-std::size_t rays_per_job(std::size_t n, SimdPath path) {
-    constexpr std::size_t smallest = 1024, jobs = 32;
-    if (path != SimdPath::stream && path != SimdPath::sorted) return smallest;
-    return std::clamp(n / jobs / smallest * smallest, smallest, max_job_rays);
+JobBlocks jobs_of(std::size_t n, SimdPath path, bool counted) {
+    constexpr std::size_t usual = 1024, jobs = 32;
+    const bool streams = path == SimdPath::stream || path == SimdPath::sorted;
+    if (n <= undivided_rays) return JobBlocks::fixed(n, undivided_rays);
+    if (counted)
+        return JobBlocks::fixed(
+            n, streams ? std::clamp(n / jobs / usual * usual, usual, max_job_rays) : usual);
+    return JobBlocks::guided(n, usual / 2, streams ? max_job_rays : usual,
+                             static_cast<std::size_t>(thread_count()));
 }
 
 namespace {
@@ -73,8 +76,7 @@ void add_counts(const std::vector<SimdCounts>& parts, bool counters, TraceCounts
 struct Plan {
     const WideBvh& tree;
     BatchLook look;
-    bool automatic, learns, streams;
-    std::size_t job_rays;
+    bool automatic, learns, streams, counted;
 
     /// `streams`: whether they can answer. `any`: what is asked.
     Plan(const WideBvh& through, std::span<const Ray> rays, const TraceOptions& options, bool any,
@@ -84,14 +86,15 @@ struct Plan {
           automatic(options.path == SimdPath::automatic),
           // Counters are those of one way: they do not depend on times.
           learns(automatic && !options.counters),
-          streams(can_stream) {
+          streams(can_stream),
+          counted(options.counters) {
         if (automatic) look = look_at(tree.arrays().bounds, rays);
         look.kind.any = any;
-        job_rays = rays_per_job(rays.size(), streams ? look.path : SimdPath::packet);
     }
 
-    [[nodiscard]] std::size_t jobs(std::size_t rays) const {
-        return (rays + job_rays - 1) / job_rays;
+    /// On the threads of the calling context.
+    [[nodiscard]] JobBlocks jobs(std::size_t rays) const {
+        return jobs_of(rays, streams ? look.path : SimdPath::packet, counted);
     }
 
     /// Rays 0 to n - 1 by trace(order, begin, end).
@@ -144,7 +147,7 @@ struct Batch {
     HitRows hits;
     std::uint8_t* occluded;
     bool counters;
-    std::vector<std::uint32_t> order{};  // of the path `sorted`
+    Buffer<std::uint32_t> order{};  // of the path `sorted`
     HitBlocks<AllHits>* all = nullptr;
     const HitCheck* check = nullptr;
     bool scaled = false;  // many rays have directions far from unit length
@@ -218,21 +221,22 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
             batch.scaled = plan.look.scaled;
             if (order == RayOrder::sorted) batch.order = order_by_place(tree.arrays().bounds, part);
             const JobWays ways = plan.ways(order);
-            std::vector<SimdCounts> parts(plan.jobs(part.size()));
-            for_each_block(
-                part.size(), plan.job_rays,
-                [&](std::size_t job, std::size_t begin, std::size_t end) {
-                    ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
-                        batch.run(way, from, to, parts[job]);
-                    });
-                    if (done)
-                        done(first, order == RayOrder::sorted ? batch.order.data() : nullptr, begin,
-                             end);
+            const JobBlocks jobs = plan.jobs(part.size());
+            std::vector<SimdCounts> parts(jobs.count());
+            jobs.run([&](std::size_t job, std::size_t begin, std::size_t end) {
+                SimdCounts counts;  // on this thread's stack: kernels count ray by ray
+                ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
+                    batch.run(way, from, to, counts);
                 });
+                parts[job] = counts;
+                if (done)
+                    done(first, order == RayOrder::sorted ? batch.order.data() : nullptr, begin,
+                         end);
+            });
             add_counts(parts, options.counters, sum);
         });
     };
-    if (rays.size() <= plan.job_rays) {  // one job: no other thread has a part in it
+    if (rays.size() <= undivided_rays) {  // one job: no other thread has a part in it
         check_threads(options.threads);
         run();
     } else {
@@ -336,17 +340,19 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
     }
     const Plan plan(tree, rays, options, false, false);
     const JobWays ways = plan.ways(RayOrder::given);
-    std::vector<SimdCounts> parts(plan.jobs(rays.size()));
+    const JobBlocks jobs = JobBlocks::fixed(rays.size(), block_size);
+    std::vector<SimdCounts> parts(jobs.count());
     Batch batch{tree, kernels, rays, {}, nullptr, options.counters};
     batch.all = &found;
     with_threads(options.threads, [&] {
-        for_each_block(rays.size(), plan.job_rays,
-                       [&](std::size_t job, std::size_t begin, std::size_t end) {
-                           ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
-                               batch.run(way, from, to, parts[job]);
-                           });
-                           found.finish(job);
-                       });
+        jobs.run([&](std::size_t job, std::size_t begin, std::size_t end) {
+            SimdCounts counts;
+            ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
+                batch.run(way, from, to, counts);
+            });
+            parts[job] = counts;
+            found.finish(job);
+        });
         all = found.join();
     });
     all.counts.rays = rays.size();

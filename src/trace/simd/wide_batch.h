@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "exec/job_blocks.h"
 #include "exec/path_rates.h"
 #include "trace/simd/simd_kernels.h"
 
@@ -26,8 +27,14 @@ struct BatchLook {
 };
 [[nodiscard]] BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays);
 
-/// So many rays are a job of this path.
-[[nodiscard]] std::size_t rays_per_job(std::size_t n, SimdPath path);
+/// To wake other threads up for so few rays takes longer than to trace them.
+inline constexpr std::size_t undivided_rays = 1024;
+
+/// Rays 0 to n - 1 as jobs of this path, on the threads of the calling context. Streams have as
+/// many in a job as give full vectors deep in the tree and still lie in the second-level cache;
+/// fewer where the batch would not keep all threads busy. `counted`: visits are, so that jobs may
+/// depend on the batch alone.
+[[nodiscard]] JobBlocks jobs_of(std::size_t n, SimdPath path, bool counted = false);
 
 /// Stacks for the deepest path of a tree.
 class StackMemory {
