@@ -89,18 +89,19 @@ TEST(JobBlocks, FewThreadsStillDoAll) {
 TEST(JobBlocks, WhatABlockThrowsComesOut) {
     for (const int threads : {1, 2})
         with_threads(threads, [] {
-            EXPECT_THROW(JobBlocks::fixed(5000, 512).run([](std::size_t b, std::size_t, std::size_t) {
-                if (b == 3) throw std::runtime_error("block 3");
-            }),
-                         std::runtime_error);
+            EXPECT_THROW(
+                JobBlocks::fixed(5000, 512).run([](std::size_t b, std::size_t, std::size_t) {
+                    if (b == 3) throw std::runtime_error("block 3");
+                }),
+                std::runtime_error);
         });
 }
 
 TEST(JobBlocks, MayRunInsideOfEachOther) {
     std::atomic<std::uint64_t> sum{0};
     JobBlocks::fixed(8, 1).run([&](std::size_t, std::size_t, std::size_t) {
-        JobBlocks::guided(3000, 100, 500, 4).run(
-            [&](std::size_t, std::size_t begin, std::size_t end) { sum += end - begin; });
+        JobBlocks::guided(3000, 100, 500, 4)
+            .run([&](std::size_t, std::size_t begin, std::size_t end) { sum += end - begin; });
     });
     EXPECT_EQ(sum, 8u * 3000u);
 }

@@ -91,11 +91,11 @@ std::vector<NamedMesh> meshes() {
     std::vector<NamedMesh> all;
     for (const std::size_t size : {0u, 1u, 2u, 3u, 4u, 5u, 8u, 9u, 63u, 64u, 65u, 1000u, 4095u,
                                    4096u, 4097u, 30'000u, 80'000u}) {
-        const std::size_t n = size > 4097 ? fewer(size, 3) : size;
+        const std::size_t n = size > 4097 ? fewer(size, 8) : size;
         all.push_back({"soup of " + std::to_string(n), random_soup(n, n)});
     }
     for (const std::size_t size : {4u, 5u, 300u, 40'000u}) {
-        const std::size_t n = size > 300 ? fewer(size, 3) : size;
+        const std::size_t n = size > 300 ? fewer(size, 8) : size;
         all.push_back({"copies", copies_of_one(n)});
         all.push_back({"splinters", splinters(n)});
         all.push_back({"halving cells", halving_cells(n)});
