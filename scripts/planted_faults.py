@@ -483,4 +483,7 @@ FAULTS = [
           "all hits: rays of a list are the first ones of their level", "engine"),
     Fault("src/engine/scene_all_hits.h", "static_cast<int>(std::bit_width(job.n - 1)) <= 32;", "static_cast<int>(std::bit_width(job.n - 1)) <= 40;",
           "all hits: numbers of rays and of paths run into each other", "engine"),
+    Fault("src/exec/job_blocks.h", "return ends_.empty() ? std::min((b + 1) * block_, n_) : ends_[b];",
+          "return ends_.empty() ? (b + 1) * block_ : ends_[b];", "jobs: the last block ends behind the last ray", "exec"),
+    Fault("src/exec/job_blocks.h", "(n - end) / (2 * threads)", "n / (2 * threads)", "jobs: the last ones are as large as the first", "exec"),
 ]

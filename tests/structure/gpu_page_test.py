@@ -1,4 +1,4 @@
-"""docs/performance/gpu.md and docs/k12.md against bench/results/NVIDIA-H100-80GB-HBM3.json: every row of their tables of builds and rays."""
+"""docs/performance/gpu.md and docs/k12.md against the results of scripts/gpu in bench/results: every row of their tables of builds and rays."""
 import json
 import pathlib
 import re
@@ -87,6 +87,28 @@ class GpuPage(unittest.TestCase):
             line = self.only("gpu_cwbvh", triangles=int(count.replace(",", "")))
             self.assertEqual(rates, [f"{line[rays][kernel]['mrays_per_s']['median']:.0f}" for rays in ("primary", "diffuse")
                                      for kernel in ("cwbvh", "persistent_cwbvh")])
+
+    def test_h200(self):
+        document = json.loads((ROOT / "bench" / "results" / "NVIDIA-H200.json").read_text(encoding="utf-8"))
+        self.assertIn(f"All {len(document['tests'])} tests", self.page)
+        self.assertEqual({test["status"] for test in document["tests"]}, {"passed"})
+        large = [line for line in document["bench"] if line["bench"] == "gpu_build" and line["max_leaf"] == 1
+                 and line["triangles"] > 9_900_000]
+        rows = rows_of(self.page, "10 M: `[a-z]+`")
+        self.assertEqual(len(rows), 7)
+        for name, *cells in rows:
+            tree = name[7:-1]
+            lines = {line["bits"]: line for line in large if line.get("builder", line["tree"]) == tree}
+            self.assertEqual(cells, [f"{lines[30]['ms']['total']['median']:.2f}", f"{lines[63]['ms']['total']['median']:.2f}",
+                                     f"{lines[63]['gprims_per_s']:.2f}"])
+        rows = rows_of(self.page, r"2\^24: `[a-z_]+`")
+        self.assertEqual(len(rows), 11)
+        for name, *cells in rows:
+            expected = []
+            for rays in ("primary", "ao"):
+                row, = (row for row in document["traversal"] if row["rays"] == rays and row["kernel"] == name[7:-1])
+                expected += [f"{row['mrays_per_s']['median']:.0f}", f"{row['percent_of_simulated']:.1f} %"]
+            self.assertEqual(cells, expected)
 
 
 if __name__ == "__main__":
