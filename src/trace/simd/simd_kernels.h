@@ -52,6 +52,8 @@ struct SimdJob {
     std::uint64_t* hit_counts = nullptr;
     /// Closest or any of the hits that it accepts; not in streams. null: of all.
     const HitCheck* check = nullptr;
+    /// Rays that take turns are first put to the root's bounds: many pass them by.
+    bool passing = false;
 };
 
 /// `tree` need not have room for blocks of a compact tree.

@@ -39,14 +39,13 @@ const SimdKernels& kernels_for(const std::string& isa) {
 }
 
 JobBlocks jobs_of(std::size_t n, SimdPath path, bool counted) {
-    constexpr std::size_t usual = 1024, jobs = 32;
+    constexpr std::size_t unit = 512, usual = 1024, jobs = 32;
     const bool streams = path == SimdPath::stream || path == SimdPath::sorted;
-    if (n <= undivided_rays) return JobBlocks::fixed(n, undivided_rays);
-    if (counted)
-        return JobBlocks::fixed(
-            n, streams ? std::clamp(n / jobs / usual * usual, usual, max_job_rays) : usual);
-    return JobBlocks::guided(n, usual / 2, streams ? max_job_rays : usual,
-                             static_cast<std::size_t>(thread_count()));
+    // Jobs are also what ways are tried on: so many that a batch learns from its own first ones.
+    const std::size_t largest =
+        streams ? std::clamp(n / jobs / usual * usual, usual, max_job_rays) : usual;
+    if (counted || n <= undivided_rays) return JobBlocks::fixed(n, largest);
+    return JobBlocks::guided(n, unit, largest, static_cast<std::size_t>(thread_count()));
 }
 
 namespace {
@@ -150,7 +149,8 @@ struct Batch {
     Buffer<std::uint32_t> order{};  // of the path `sorted`
     HitBlocks<AllHits>* all = nullptr;
     const HitCheck* check = nullptr;
-    bool scaled = false;  // many rays have directions far from unit length
+    bool scaled = false;   // many rays have directions far from unit length
+    bool passing = false;  // many rays pass the tree's bounds by
 
     void run(PathWay way, std::size_t begin, std::size_t end, SimdCounts& counts) const {
         const ThreadOwn<JobMemory> own;
@@ -172,7 +172,8 @@ struct Batch {
                           stack_size,
                           all == nullptr ? nullptr : &all->hits_with(begin),
                           all == nullptr ? nullptr : all->hit_counts() + begin,
-                          check};
+                          check,
+                          passing};
         if (way == PathWay::alone) {
             run_alone(job, counts);
         } else if (scaled && all == nullptr && check == nullptr) {
@@ -219,6 +220,7 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
                         options.counters};
             batch.check = check;
             batch.scaled = plan.look.scaled;
+            batch.passing = plan.look.passing && !options.counters;
             if (order == RayOrder::sorted) batch.order = order_by_place(tree.arrays().bounds, part);
             const JobWays ways = plan.ways(order);
             const JobBlocks jobs = plan.jobs(part.size());
@@ -389,6 +391,19 @@ std::uint32_t beyond(const float (&limits)[n], float x) {
     return count;
 }
 
+/// As far as a plain test tells.
+bool passes_by(const Aabb& box, const Ray& ray) {
+    float in = ray.tmin, out = ray.tmax;
+    const auto cut = [&](float lo, float hi, float origin, float direction) {
+        const float to_lo = (lo - origin) / direction, to_hi = (hi - origin) / direction;
+        in = max_of(in, min_of(to_lo, to_hi)), out = min_of(out, max_of(to_lo, to_hi));
+    };
+    cut(box.lo.x, box.hi.x, ray.origin.x, ray.direction.x);
+    cut(box.lo.y, box.hi.y, ray.origin.y, ray.direction.y);
+    cut(box.lo.z, box.hi.z, ray.origin.z, ray.direction.z);
+    return in > out;
+}
+
 }  // namespace
 
 BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
@@ -399,7 +414,8 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
     const Vec3 size = bounds.hi - bounds.lo;
     const float longest_side = max_of(max_of(size.x, size.y), size.z);
     const std::size_t windows = std::clamp<std::size_t>(rays.size() / 256, 1, 32);
-    std::size_t looked_at = 0, coherent = 0, close = 0, apart = 0, spread = 0, odd = 0;
+    constexpr std::size_t put_to_bounds = 8;  // of a window
+    std::size_t looked_at = 0, coherent = 0, close = 0, apart = 0, spread = 0, odd = 0, passing = 0;
     for (std::size_t w = 0; w < windows; ++w) {
         const std::size_t begin = rays.size() / windows * w;
         if (begin + window > rays.size()) break;
@@ -414,6 +430,8 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
             directions = unite(directions, {scaled, scaled});
         }
         ++looked_at;
+        for (std::size_t k = 0; k < put_to_bounds; ++k)
+            passing += passes_by(bounds, rays[begin + k * (window / put_to_bounds)]);
         const Vec3 o = origins.hi - origins.lo, d = directions.hi - directions.lo;
         const float from = max_of(max_of(o.x, o.y), o.z), to = max_of(max_of(d.x, d.y), d.z);
         const bool here = from <= small_part * longest_side;
@@ -428,6 +446,7 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
         look.kind.apart = static_cast<std::uint32_t>((apart + looked_at / 2) / looked_at);
         look.kind.spread = static_cast<std::uint32_t>((spread + looked_at / 2) / looked_at);
         look.scaled = 8 * odd >= window * looked_at;
+        look.passing = 8 * passing >= put_to_bounds * looked_at;
     }
     if (4 * coherent < 3 * looked_at)
         look.path = 2 * close >= looked_at ? SimdPath::stream : SimdPath::sorted;

@@ -87,7 +87,12 @@ class RayTurns {
     static constexpr bool any = wants_any(query), all = query == Wanted::all;
 
 public:
-    RayTurns(const SimdJob& job, SimdCounts& counts) : job_(job), counts_(counts) {}
+    RayTurns(const SimdJob& job, SimdCounts& counts) : job_(job), counts_(counts) {
+        const V4 middle = hn::Load(f4, job.tree.middle),
+                 half = hn::Max(hn::Sub(hn::Load(f4, job.tree.hi), middle),
+                                hn::Sub(middle, hn::Load(f4, job.tree.lo)));
+        hn::Store(hn::Mul(half, hn::Set(f4, 1.0f + 0x1p-20f)), f4, half_);  // and its rounding
+    }
 
     void trace() {
         std::array<Turn, rays_in_turn> turns;
@@ -134,13 +139,24 @@ private:
                 if constexpr (all) turn.ray->collect(*job_.all);
                 if constexpr (wants_accepted(query))
                     turn.ray->check_by(*job_.check, job_.rays + turn.i);
-                if (turn.ray->begin(turn.frame.tmax)) return true;
+                if ((!job_.passing || meets_bounds(turn.frame)) && turn.ray->begin(turn.frame.tmax))
+                    return true;
             } else {
                 ++counts_.invalid;
             }
             set(turn.i, {});
         }
         return false;
+    }
+    /// False only for rays that pass the root's bounds by, widened as boxes of nodes are.
+    HWY_INLINE bool meets_bounds(const SingleFrame& frame) const {
+        if (frame.careful) return true;
+        const V4 reach = hn::Mul(hn::Abs(hn::Load(f4, frame.inverse)), hn::Load(f4, half_));
+        alignas(16) float in[4], out[4];
+        hn::Store(hn::Sub(hn::Load(f4, frame.near), reach), f4, in);
+        hn::Store(hn::Add(hn::Load(f4, frame.far), reach), f4, out);
+        return max_of(max_of(in[0], in[1]), max_of(in[2], frame.tmin)) <=
+               min_of(min_of(out[0], out[1]), min_of(out[2], frame.tmax));
     }
     /// In an order of their own rays and hits lie anywhere.
     HWY_INLINE void ask_for_ray(std::size_t i) const {
@@ -175,6 +191,7 @@ private:
     const SimdJob& job_;
     SimdCounts& counts_;
     std::size_t next_ = 0;
+    alignas(16) float half_[4];  // of the root's sides
 };
 
 inline void single(const SimdJob& job, SimdCounts& counts) {

@@ -22,8 +22,9 @@ namespace raydix {
 /// What rays through anything with these bounds are like: choose_simd_path, and more.
 struct BatchLook {
     SimdPath path;
-    BatchKind kind;       // `any` and `sorted` are left to the caller
-    bool scaled = false;  // many directions are far from unit length: scaled_rays.h
+    BatchKind kind;        // `any` and `sorted` are left to the caller
+    bool scaled = false;   // many directions are far from unit length: scaled_rays.h
+    bool passing = false;  // many rays pass the bounds by
 };
 [[nodiscard]] BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays);
 
