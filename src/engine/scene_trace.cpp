@@ -345,20 +345,20 @@ AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTrac
         return all_hits_of(*mesh, rays, options);
     constexpr std::size_t block_size = 1024;
     HitBlocks<AllHits> found(rays.size(), block_size, options.max_result_bytes);
-    const JobBlocks blocks = JobBlocks::fixed(rays.size(), block_size);
-    std::vector<JobCounts> parts(blocks.count());
+    std::vector<JobCounts> parts((rays.size() + block_size - 1) / block_size);
     const Kernels kernels{&kernels_for(options.isa), &scene_kernels_for(options.isa)};
     const Batch batch{rays, nullptr, nullptr, options};
     const JobWays ways = ways_of_all_hits(tree, batch);
     AllHits all;
     with_threads(options.threads, [&] {
-        blocks.run([&](std::size_t block, std::size_t begin, std::size_t end) {
-            ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
-                parts[block].invalid += find_all(tree, kernels, way, batch, found, from, to);
+        for_each_block(
+            rays.size(), block_size, [&](std::size_t block, std::size_t begin, std::size_t end) {
+                ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
+                    parts[block].invalid += find_all(tree, kernels, way, batch, found, from, to);
+                });
+                parts[block].hits = found.hits(block).size();
+                found.finish(block);
             });
-            parts[block].hits = found.hits(block).size();
-            found.finish(block);
-        });
         all = found.join();
     });
     all.counts = sum_of(parts, rays.size());

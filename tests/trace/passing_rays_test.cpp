@@ -18,16 +18,8 @@
 namespace raydix::test {
 namespace {
 
-Aabb bounds_of(const Mesh& mesh) {
-    Aabb box = empty_box();
-    for (const Triangle& t : mesh.triangles)
-        for (const std::uint32_t v : t)
-            box = unite(box, {mesh.vertices[v], mesh.vertices[v]});
-    return box;
-}
-
-/// From a sphere about the box to points in and around it; some along a side of the box, in it or
-/// just beside it.
+/// From a cube about the box to points in and around it; some along an axis, on a plane of the box
+/// or a step of floats beside it.
 std::vector<Ray> rays_from_outside(const Aabb& box, std::size_t count, std::uint64_t seed) {
     std::mt19937_64 random(seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
@@ -40,10 +32,11 @@ std::vector<Ray> rays_from_outside(const Aabb& box, std::size_t count, std::uint
         };
         Ray& ray = rays[i];
         ray.origin = middle + reach * off(3.0f);
-        const Vec3 to = middle + Vec3{size.x * (1.5f * unit() - 0.75f), size.y * (1.5f * unit() - 0.75f),
-                                      size.z * (1.5f * unit() - 0.75f)};
+        const Vec3 to =
+            middle + Vec3{size.x * (1.5f * unit() - 0.75f), size.y * (1.5f * unit() - 0.75f),
+                          size.z * (1.5f * unit() - 0.75f)};
         ray.direction = to - ray.origin;
-        if (i % 4 == 1) {  // along an axis, on a plane of the box or a step of floats beside it
+        if (i % 4 == 1) {
             const int along = static_cast<int>(random() % 3), across = (along + 1) % 3;
             ray.direction = {0, 0, 0};
             (&ray.direction.x)[along] = random() % 2 == 0 ? 1.0f : -1.0f;
@@ -62,9 +55,9 @@ std::vector<Ray> rays_from_outside(const Aabb& box, std::size_t count, std::uint
 
 void expect_hits_of_brute_force(const std::string& name, const Mesh& mesh, std::uint64_t seed) {
     SCOPED_TRACE(name);
-    const std::vector<Ray> rays = rays_from_outside(bounds_of(mesh), 2000, seed);
-    const std::vector<Hit> wanted = trace_brute_force(mesh, rays);
     const Scene scene(mesh);
+    const std::vector<Ray> rays = rays_from_outside(scene.bounds(), 2000, seed);
+    const std::vector<Hit> wanted = trace_brute_force(mesh, rays);
     EXPECT_TRUE(look_at(scene.bounds(), rays).passing);
     const std::vector<Hit> hits = trace(scene, rays);
     std::vector<std::uint8_t> occluded(rays.size());
@@ -102,9 +95,8 @@ TEST(PassingRays, HaveTheHitsOfBruteForce) {
 }
 
 TEST(PassingRays, OnlyWhereManyDo) {
-    const Mesh soup = random_soup(500, 5, 0.2f);
-    const Scene scene(soup);
-    std::vector<Ray> rays = rays_from_outside(bounds_of(soup), 2000, 1);
+    const Scene scene(random_soup(500, 5, 0.2f));
+    std::vector<Ray> rays = rays_from_outside(scene.bounds(), 2000, 1);
     for (Ray& ray : rays) ray.origin = {0.5f, 0.5f, 0.5f}, ray.tmax = infinity;
     EXPECT_FALSE(look_at(scene.bounds(), rays).passing);
     EXPECT_FALSE(look_at(scene.bounds(), std::span(rays).first(0)).passing);

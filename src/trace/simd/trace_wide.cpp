@@ -226,7 +226,7 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
             const JobBlocks jobs = plan.jobs(part.size());
             std::vector<SimdCounts> parts(jobs.count());
             jobs.run([&](std::size_t job, std::size_t begin, std::size_t end) {
-                SimdCounts counts;  // on this thread's stack: kernels count ray by ray
+                SimdCounts counts;  // this thread's alone: kernels count ray by ray
                 ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
                     batch.run(way, from, to, counts);
                 });
@@ -342,19 +342,19 @@ AllHits trace_all(const WideBvh& tree, std::span<const Ray> rays, const TraceOpt
     }
     const Plan plan(tree, rays, options, false, false);
     const JobWays ways = plan.ways(RayOrder::given);
-    const JobBlocks jobs = JobBlocks::fixed(rays.size(), block_size);
-    std::vector<SimdCounts> parts(jobs.count());
+    std::vector<SimdCounts> parts((rays.size() + block_size - 1) / block_size);
     Batch batch{tree, kernels, rays, {}, nullptr, options.counters};
     batch.all = &found;
     with_threads(options.threads, [&] {
-        jobs.run([&](std::size_t job, std::size_t begin, std::size_t end) {
-            SimdCounts counts;
-            ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
-                batch.run(way, from, to, counts);
-            });
-            parts[job] = counts;
-            found.finish(job);
-        });
+        for_each_block(rays.size(), block_size,
+                       [&](std::size_t block, std::size_t begin, std::size_t end) {
+                           SimdCounts counts;
+                           ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {
+                               batch.run(way, from, to, counts);
+                           });
+                           parts[block] = counts;
+                           found.finish(block);
+                       });
         all = found.join();
     });
     all.counts.rays = rays.size();

@@ -28,7 +28,7 @@ struct BatchLook {
 };
 [[nodiscard]] BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays);
 
-/// To wake other threads up for so few rays takes longer than to trace them.
+/// A batch of so many rays or fewer is one job, on the caller's thread.
 inline constexpr std::size_t undivided_rays = 1024;
 
 /// Rays 0 to n - 1 as jobs of this path, on the threads of the calling context. Streams have as
