@@ -2,6 +2,7 @@
 // JSON on standard output. bench/build_vs_embree.py runs the peers in turn, since peers in one
 // process disturb each other's memory.
 #include <fmt/format.h>
+#include <raydix/bvh.h>
 #include <raydix/machine.h>
 #include <raydix/raydix.h>
 #include <sys/resource.h>

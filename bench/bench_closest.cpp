@@ -9,6 +9,8 @@
 #include <CGAL/Simple_cartesian.h>
 #include <CGAL/Surface_mesh.h>
 #include <fmt/format.h>
+#include <raydix/bvh.h>
+#include <raydix/closest.h>
 #include <raydix/machine.h>
 #include <raydix/raydix.h>
 

@@ -1,8 +1,11 @@
 // What does motion cost? A refit beside Embree's of the same mesh, in one run, in turns (A B A B).
 // Hits are compared first. Wall-clock and processor time in a JSON line.
 #include <fmt/format.h>
+#include <raydix/bvh.h>
 #include <raydix/machine.h>
 #include <raydix/raydix.h>
+#include <raydix/refit.h>
+#include <raydix/trace.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

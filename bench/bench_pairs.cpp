@@ -5,6 +5,7 @@
 #include <CGAL/box_intersection_d.h>
 #include <fmt/format.h>
 #include <raydix/machine.h>
+#include <raydix/pairs.h>
 #include <raydix/raydix.h>
 
 #include <CLI/CLI.hpp>

@@ -12,10 +12,9 @@ raydix::PointQueryOptions with_threads(int threads) {
 }
 
 template <class Scalar>
-std::span<const typename raydix::SceneTypes<Scalar>::Point> points_at(const Scalar* numbers,
-                                                                      std::size_t count,
-                                                                      const char* name) {
-    return array_of<typename raydix::SceneTypes<Scalar>::Point>(numbers, count, name);
+std::span<const raydix::BasicVec3<Scalar>> points_at(const Scalar* numbers, std::size_t count,
+                                                     const char* name) {
+    return array_of<raydix::BasicVec3<Scalar>>(numbers, count, name);
 }
 
 template <class Handle, class Scalar>

@@ -14,7 +14,7 @@ raydix_status closest_points(const Handle* scene, const Scalar* queries, std::si
         const COptions asked = options_over(options, defaults);
         const raydix::BasicSceneClosestOptions<Scalar> how{
             .max_distance = asked.max_distance, .mask = asked.mask, .threads = asked.threads};
-        using Point = typename raydix::SceneTypes<Scalar>::Point;
+        using Point = raydix::BasicVec3<Scalar>;
         raydix::closest_points(scene->scene, array_of<Point>(queries, count, "queries"),
                                results_at<Result>(results, count, "results"), how);
     });
@@ -44,7 +44,7 @@ raydix_status signed_distances(const auto* solid, const Scalar* queries, std::si
         require(solid, "solid");
         Options how;
         how.threads = threads;
-        using Point = typename raydix::SceneTypes<Scalar>::Point;
+        using Point = raydix::BasicVec3<Scalar>;
         raydix::signed_distances(solid->solid, array_of<Point>(queries, count, "queries"),
                                  results_at<Scalar>(distances, count, "distances"), how);
     });
@@ -55,7 +55,7 @@ raydix_status contains(const auto* solid, const Scalar* queries, std::size_t cou
                        std::uint8_t* inside, int threads) {
     return guarded([&] {
         require(solid, "solid");
-        using Point = typename raydix::SceneTypes<Scalar>::Point;
+        using Point = raydix::BasicVec3<Scalar>;
         raydix::contains(solid->solid, array_of<Point>(queries, count, "queries"),
                          results_at<std::uint8_t>(inside, count, "inside"), threads);
     });

@@ -42,17 +42,17 @@ struct SceneCalls {
     using CRay = typename C::Ray;
     using CHit = typename C::Hit;
     using COptions = typename C::TraceOptions;
-    using Types = raydix::SceneTypes<Scalar>;
     using Scene = raydix::BasicScene<Scalar>;
-    using Point = typename Types::Point;
-    using Ray = typename Types::Ray;
-    using Hit = typename Types::Hit;
-    using Sphere = typename Types::Sphere;
-    using Capsule = typename Types::Capsule;
+    using Options = raydix::BasicSceneTraceOptions<Scalar>;
+    using Point = raydix::BasicVec3<Scalar>;
+    using Ray = raydix::BasicRay<Scalar>;
+    using Hit = raydix::BasicHit<Scalar>;
+    using Sphere = raydix::BasicSphere<Scalar>;
+    using Capsule = raydix::BasicCapsule<Scalar>;
     static_assert(sizeof(CRay) == sizeof(Ray) && sizeof(CHit) == sizeof(Hit));
     static_assert(offsetof(CHit, u) == 2 * sizeof(Scalar) &&
                   offsetof(CHit, v) == 3 * sizeof(Scalar));
-    static_assert(offsetof(CHit, geometry) == sizeof(typename Types::TreeHit));
+    static_assert(offsetof(CHit, geometry) == sizeof(raydix::BasicTreeHit<Scalar>));
 
     static raydix::SceneOptions scene_options(const raydix_commit_options* given) {
         const raydix_commit_options options = options_over(given, RAYDIX_COMMIT_OPTIONS);
@@ -64,15 +64,15 @@ struct SceneCalls {
         result.threads = options.threads;
         return result;
     }
-    static typename Types::MeshView mesh_view(const Scalar* vertices, std::size_t vertex_count,
-                                              const std::uint32_t* triangles,
-                                              std::size_t triangle_count) {
+    static raydix::BasicMeshView<Scalar> mesh_view(const Scalar* vertices, std::size_t vertex_count,
+                                                   const std::uint32_t* triangles,
+                                                   std::size_t triangle_count) {
         return {array_of<Point>(vertices, vertex_count, "vertices"),
                 array_of<raydix::Triangle>(triangles, triangle_count, "triangles")};
     }
-    static typename Types::Transform transform_of(const Scalar* numbers) {
+    static raydix::BasicTransform<Scalar> transform_of(const Scalar* numbers) {
         require(numbers, "transform");
-        typename Types::Transform transform;
+        raydix::BasicTransform<Scalar> transform;
         for (std::size_t i = 0; i < 12; ++i) transform.m[i / 4][i % 4] = numbers[i];
         return transform;
     }
@@ -156,7 +156,7 @@ struct SceneCalls {
             };
             return scene->scene.add(
                 raydix::BasicUserGeometry<Scalar>(
-                    array_of<typename Types::Box>(boxes, count, "boxes"), intersect),
+                    array_of<raydix::BasicAabb<Scalar>>(boxes, count, "boxes"), intersect),
                 options);
         });
     }
@@ -207,7 +207,7 @@ struct SceneCalls {
             require(scene, "scene");
             require(lo, "lo");
             require(hi, "hi");
-            const typename Types::Box box = scene->scene.bounds();
+            const raydix::BasicAabb<Scalar> box = scene->scene.bounds();
             std::copy_n(&box.lo.x, 3, lo);
             std::copy_n(&box.hi.x, 3, hi);
         });
@@ -231,34 +231,24 @@ struct SceneCalls {
         });
     }
 
-    static raydix::SceneTraceOptions trace_options(const COptions* given, std::size_t rays) {
+    static Options trace_options(const COptions* given, std::size_t rays) {
         const COptions options = options_over(given, C::trace_defaults);
-        raydix::SceneTraceOptions result;
+        Options result;
         result.mask = options.mask;
         result.threads = options.threads;
         result.max_result_bytes = options.max_result_bytes;
         if (options.masks != nullptr) result.masks = {options.masks, rays};
         if (options.filter != nullptr) {
-            const auto filter = [accepts = options.filter, user = options.user](
-                                    std::size_t place, const Ray& ray, const Hit& hit) {
+            result.filter = [accepts = options.filter, user = options.user](
+                                std::size_t place, const Ray& ray, const Hit& hit) {
                 return accepts(user, place, reinterpret_cast<const CRay*>(&ray),
                                reinterpret_cast<const CHit*>(&hit)) != 0;
             };
-            if constexpr (std::is_same_v<Scalar, float>)
-                result.filter = filter;
-            else
-                result.filter_d = filter;
         }
         return result;
     }
-    static const auto& filter_of(const raydix::SceneTraceOptions& options) {
-        if constexpr (std::is_same_v<Scalar, float>)
-            return options.filter;
-        else
-            return options.filter_d;
-    }
     /// Whether the call is one ray that needs no thread but this one.
-    static bool is_single(std::size_t count, const raydix::SceneTraceOptions& options) {
+    static bool is_single(std::size_t count, const Options& options) {
         return count == 1 && options.masks.empty();
     }
 
@@ -268,11 +258,11 @@ struct SceneCalls {
             require(scene, "scene");
             const auto asked = array_of<Ray>(rays, count, "rays");
             const auto found = results_at<Hit>(hits, count, "hits");
-            const raydix::SceneTraceOptions how = trace_options(options, count);
+            const Options how = trace_options(options, count);
             if (!is_single(count, how))
                 raydix::trace(scene->scene, asked, found, how);
-            else if (filter_of(how))
-                found[0] = raydix::closest_hit(scene->scene, asked[0], filter_of(how), how.mask);
+            else if (how.filter)
+                found[0] = raydix::closest_hit(scene->scene, asked[0], how.filter, how.mask);
             else
                 found[0] = raydix::closest_hit(scene->scene, asked[0], how.mask);
         });
@@ -283,11 +273,11 @@ struct SceneCalls {
             require(scene, "scene");
             const auto asked = array_of<Ray>(rays, count, "rays");
             const auto found = results_at<std::uint8_t>(occluded, count, "occluded");
-            const raydix::SceneTraceOptions how = trace_options(options, count);
+            const Options how = trace_options(options, count);
             if (!is_single(count, how))
                 raydix::trace_any(scene->scene, asked, found, how);
-            else if (filter_of(how))
-                found[0] = raydix::any_hit(scene->scene, asked[0], filter_of(how), how.mask);
+            else if (how.filter)
+                found[0] = raydix::any_hit(scene->scene, asked[0], how.filter, how.mask);
             else
                 found[0] = raydix::any_hit(scene->scene, asked[0], how.mask);
         });

@@ -4,6 +4,7 @@
 #include <raydix/arrays.h>
 #include <raydix/closest.h>
 #include <raydix/pairs.h>
+#include <raydix/rdx_tree.h>
 #include <raydix/solid.h>
 
 #include <optional>
@@ -37,7 +38,7 @@ SceneTree load_tree(const std::string& scene, const QueryCommand& options) {
 QueryFigures answer_closest(const QueryCommand& options, const SceneTree& tree) {
     const std::vector<Vec3> queries = load_queries(options, tree.scene);
     std::vector<ClosestPoint> points(queries.size());
-    ClosestCounts counts;
+    QueryCounts counts;
     QueryFigures figures;
     figures.kind = "closest";
     figures.seconds = timed_repeats(options.repeat, [&] {
@@ -115,7 +116,7 @@ Json solid_json(const Solid& solid) {
 QueryFigures answer_signed(const QueryCommand& options, const Solid& solid,
                            const std::vector<Vec3>& queries) {
     std::vector<float> distances(queries.size());
-    ClosestCounts counts;
+    QueryCounts counts;
     QueryFigures figures;
     figures.kind = "signed_distance";
     figures.seconds = timed_repeats(options.repeat, [&] {

@@ -33,7 +33,7 @@ std::vector<Aabb> load_boxes(const QueryCommand& options) {
     return rows_of<Aabb>(options.queries_file);
 }
 
-void take_counts(const PointQueryCounts& counts, QueryFigures& figures) {
+void take_counts(const QueryCounts& counts, QueryFigures& figures) {
     figures.queries = counts.queries;
     figures.invalid_queries = counts.invalid_queries;
     figures.found = counts.found;

@@ -65,7 +65,7 @@ void save_closest(const QueryCommand& options, const std::vector<SceneClosestPoi
 QueryFigures closest_of_scene(const QueryCommand& options, const QueriedScene& queried) {
     const std::vector<Vec3> queries = queries_of(options, queried);
     std::vector<SceneClosestPoint> points(queries.size());
-    ClosestCounts counts;
+    QueryCounts counts;
     QueryFigures figures;
     figures.kind = "closest";
     figures.seconds = timed_repeats(options.repeat, [&] {

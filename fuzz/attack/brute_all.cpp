@@ -24,7 +24,7 @@ All all_of(const View& mesh, std::span<const AnyRay> rays) {
         if (is_valid(ray)) {
             const BasicRayFrame<Scalar> frame = make_frame(ray);
             for (std::uint32_t i = 0; i < count; ++i) {
-                BoxOf<Scalar> box;
+                BasicAabb<Scalar> box;
                 BasicTriangleHit<Scalar> hit;
                 if (source.box(i, box) && intersect_triangle<EdgeRule::half_open>(
                                               frame, source.corners(i), frame.tmax, hit))

@@ -169,10 +169,10 @@ private:
 
     void rays() {
         const std::vector<std::string> sets = simd_instruction_sets();
-        const SceneTraceOptions options{.masks = masks_,
-                                        .threads = 1,
-                                        .path = static_cast<SimdPath>(random().below(5)),
-                                        .isa = sets[random().below(sets.size())]};
+        const SceneTraceOptionsD options{.masks = masks_,
+                                         .threads = 1,
+                                         .path = static_cast<SimdPath>(random().below(5)),
+                                         .isa = sets[random().below(sets.size())]};
         const std::vector<HitD> closest = trace(scene(), rays_, options);
         const AllHitsD all = trace_all(scene(), rays_, options);
         std::vector<std::uint8_t> any(rays_.size());

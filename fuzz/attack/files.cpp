@@ -4,6 +4,7 @@
 #include <raydix/check.h>
 #include <raydix/error.h>
 #include <raydix/rdx.h>
+#include <raydix/rdx_tree.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
 

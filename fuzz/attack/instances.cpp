@@ -127,10 +127,10 @@ public:
         const std::vector<AnyHit> wanted = least_of_all_paths();
         const std::vector<std::string> sets = simd_instruction_sets();
         Random& random = case_.random;
-        const SceneTraceOptions way{.masks = masks_,
-                                    .threads = 1,
-                                    .path = static_cast<SimdPath>(random.below(5)),
-                                    .isa = sets[random.below(sets.size())]};
+        const typename Kit::Scene::TraceOptions way{.masks = masks_,
+                                                    .threads = 1,
+                                                    .path = static_cast<SimdPath>(random.below(5)),
+                                                    .isa = sets[random.below(sets.size())]};
         const typename Kit::Scene& scene = scenes_.back();
         const std::vector<AnyHit> hits = trace(scene, rays_, way);
         std::vector<std::uint8_t> any(rays_.size());

@@ -1,6 +1,7 @@
 // Distance, overlap, solids and pairs of whole scenes, nested, mirrored, sheared and masked,
 // against the same calls on one tree over all triangles, which are moved to the world by a walk of
 // its own. In float and in double.
+#include <raydix/overlap.h>
 #include <raydix/pairs.h>
 #include <raydix/scene.h>
 #include <raydix/scene_pairs.h>
@@ -30,7 +31,7 @@ struct Holder {
 
     struct Placed {
         std::size_t holder;
-        typename SceneTypes<Scalar>::Transform transform;
+        BasicTransform<Scalar> transform;
         std::uint32_t id, mask;
     };
     struct Held {
@@ -47,7 +48,7 @@ template <class In>
 class SceneDuel {
     using Scalar = typename In::Scalar;
     using Point = typename In::Point;
-    using Map = typename SceneTypes<Scalar>::Transform;
+    using Map = BasicTransform<Scalar>;
     using Tree = typename In::Tree;
 
 public:

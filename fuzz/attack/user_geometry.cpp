@@ -63,8 +63,8 @@ public:
     using Scalar = typename In::Scalar;
     using Scene = BasicScene<Scalar>;
     using AnyRay = typename In::AnyRay;
-    using AnyHit = typename Scene::Types::Hit;
-    using Box = typename Scene::Types::Box;
+    using AnyHit = typename Scene::Hit;
+    using Box = typename Scene::Box;
     using Intersect = std::function<bool(std::uint32_t prim, const AnyRay& ray, AnyHit& hit)>;
     using Filter = std::function<bool(std::size_t place, const AnyRay& ray, const AnyHit& hit)>;
 
@@ -125,14 +125,11 @@ private:
         std::vector<bool> kept = kept_;
         for (std::uint32_t i = 0; i < kept.size(); ++i) kept[i] = kept[i] && accepts(i);
         const std::vector<std::string> sets = simd_instruction_sets();
-        SceneTraceOptions options;
+        typename Scene::TraceOptions options;
         options.threads = 1;
         options.path = static_cast<SimdPath>(case_.random.below(5));
         options.isa = sets[case_.random.below(sets.size())];
-        if constexpr (std::is_same_v<Filter, HitFilter>)
-            options.filter = filter;
-        else
-            options.filter_d = filter;
+        options.filter = filter;
         const std::vector<AnyHit> hits = trace(scene, rays_, options);
         std::vector<std::uint8_t> any(rays_.size());
         trace_any(scene, rays_, any, options);
@@ -199,7 +196,7 @@ void attack_in(Case& c) {
             break;
         }
         case 1: {
-            using AnyCapsule = typename SceneTypes<Scalar>::Capsule;
+            using AnyCapsule = BasicCapsule<Scalar>;
             std::vector<AnyCapsule> capsules;
             for (int i = 0; i < 20; ++i)
                 capsules.push_back({scenery.place(c.random), scenery.place(c.random), radius()});

@@ -3,6 +3,7 @@
 
 #include <raydix/buffer.h>
 #include <raydix/mesh.h>
+#include <raydix/quality.h>
 #include <raydix/types.h>
 
 #include <cstdint>
@@ -61,9 +62,6 @@ struct BuildOptions {
                                  // at less of the tree (docs/algorithms/reinsertion.md)
 };
 
-/// What a tree is for: built each frame, built once for some million rays, built once for many.
-enum class Quality { fast, balanced, high };
-
 namespace detail {
 [[noreturn]] void refuse_quality(int number);
 }
@@ -99,10 +97,13 @@ struct BvhNode {
 static_assert(sizeof(BvhNode) == 32);
 
 /// A triangle's three corners, copied into the order of leaves, so that a leaf lies in one piece.
-struct LeafTriangle {
-    Vec3 v0, v1, v2;
+template <class Scalar>
+struct BasicLeafTriangle {
+    BasicVec3<Scalar> v0, v1, v2;
 };
-static_assert(sizeof(LeafTriangle) == 36);
+using LeafTriangle = BasicLeafTriangle<float>;
+using LeafTriangleD = BasicLeafTriangle<double>;
+static_assert(sizeof(LeafTriangle) == 36 && sizeof(LeafTriangleD) == 72);
 
 enum class PrimitiveKind : std::uint32_t { triangles = 0, boxes = 1, points = 2 };
 

@@ -11,36 +11,26 @@ namespace raydix {
 
 /// A pinhole camera. Right is cross(target - position, up). `vfov` is the vertical angle in
 /// degrees, between 0 and 180.
-struct Camera {
+template <class Scalar>
+struct BasicCamera {
     std::string name;
-    Vec3 position{0, 0, 1};
-    Vec3 target{0, 0, 0};
-    Vec3 up{0, 1, 0};
-    float vfov = 45.0f;
+    BasicVec3<Scalar> position{0, 0, 1};
+    BasicVec3<Scalar> target{0, 0, 0};
+    BasicVec3<Scalar> up{0, 1, 0};
+    Scalar vfov = 45;
 };
-
-/// The same in double, for scenes in double.
-struct CameraD {
-    std::string name;
-    Vec3d position{0, 0, 1};
-    Vec3d target{0, 0, 0};
-    Vec3d up{0, 1, 0};
-    double vfov = 45.0;
-};
+using Camera = BasicCamera<float>;
+using CameraD = BasicCamera<double>;
 
 /// What a cameras.json file holds (docs/scenes.md).
-struct CameraSet {
+template <class Scalar>
+struct BasicCameraSet {
     std::uint32_t width = 1024, height = 768;  // pixels
     float ao_radius = 0.0f;  // 0: not given, which means 5 % of the diagonal of the scene's box
-    std::vector<Camera> cameras;
+    std::vector<BasicCamera<Scalar>> cameras;
 };
-
-/// The same with cameras in double.
-struct CameraSetD {
-    std::uint32_t width = 1024, height = 768;
-    float ao_radius = 0.0f;
-    std::vector<CameraD> cameras;
-};
+using CameraSet = BasicCameraSet<float>;
+using CameraSetD = BasicCameraSet<double>;
 
 /// Reads an object {width?, height?, ao_radius?, cameras: [...]} or a bare list of cameras. Throws
 /// InputError that names the file and what is at fault: the camera and its field, or the setting.

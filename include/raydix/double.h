@@ -15,7 +15,7 @@
 #include <raydix/overlap.h>
 #include <raydix/pairs.h>
 #include <raydix/refit.h>
-#include <raydix/solid.h>
+#include <raydix/shapes.h>
 #include <raydix/trace.h>
 #include <raydix/types.h>
 
@@ -27,11 +27,6 @@
 #include <vector>
 
 namespace raydix {
-
-struct LeafTriangleD {
-    Vec3d v0, v1, v2;
-};
-static_assert(sizeof(LeafTriangleD) == 72);
 
 /// A tree over triangles in double. Its leaves hold the corners as the caller gave them. Its nodes
 /// are those of a float tree over boxes around the triangles or, with the builders split and sbvh,
@@ -106,85 +101,21 @@ TraceCounts trace_any(const BvhD& bvh, std::span<const RayD> rays, std::span<std
 [[nodiscard]] std::vector<HitD> trace_brute_force(const MeshViewD& mesh, std::span<const RayD> rays,
                                                   int threads = 0);
 
-/// As ClosestPoint: `position` is rounded to double and within the triangle's box, `distance` is
-/// sqrt(d2) with d2 = (dx*dx + dy*dy) + dz*dz from the query to `position`, without FMA.
-struct ClosestPointD {
-    Vec3d position{infinity, infinity, infinity};
-    double distance = infinity;
-    std::uint32_t prim = no_primitive;
-    double u = 0.0, v = 0.0;
-
-    [[nodiscard]] constexpr bool found() const { return prim != no_primitive; }
-};
-
-struct ClosestOptionsD {
-    double max_distance = infinity;  // d2 <= R*R, closed
-    int threads = 0;                 // 0 to 1,024; 0: all the machine has
-};
-
 /// Finds for each query the least (d2, prim). queries [n] -> results [n]. Throws InputError: sizes
 /// that differ, a max_distance that is negative or NaN.
-ClosestCounts closest_points(const BvhD& bvh, std::span<const Vec3d> queries,
-                             std::span<ClosestPointD> results, const ClosestOptionsD& options = {});
+QueryCounts closest_points(const BvhD& bvh, std::span<const Vec3d> queries,
+                           std::span<ClosestPointD> results, const ClosestOptionsD& options = {});
 [[nodiscard]] std::vector<ClosestPointD> closest_points(const BvhD& bvh,
                                                         std::span<const Vec3d> queries,
                                                         const ClosestOptionsD& options = {});
 [[nodiscard]] ClosestPointD closest_point(const BvhD& bvh, Vec3d query,
                                           double max_distance = infinity);
 
-/// As Solid. Crossings and their signs are exact in double.
-class SolidD {
-public:
-    explicit SolidD(const BvhD& bvh, const SolidOptions& options = {});
-    explicit SolidD(std::shared_ptr<const BvhD> bvh, const SolidOptions& options = {});
-    explicit SolidD(const BasicScene<double>& scene, const SceneSolidOptions& options = {});
-    ~SolidD();
-    SolidD(SolidD&&) noexcept;
-    SolidD& operator=(SolidD&&) noexcept;
-
-    [[nodiscard]] Closure closure() const;
-    [[nodiscard]] InsideRule rule() const;
-    [[nodiscard]] std::uint64_t open_edges() const;
-    [[nodiscard]] const BvhD& bvh() const;
-
-private:
-    friend struct SolidInternals;
-    struct State;
-    std::unique_ptr<State> state_;
-};
-
-ClosestCounts contains(const SolidD& solid, std::span<const Vec3d> queries,
-                       std::span<std::uint8_t> inside, int threads = 0);
-[[nodiscard]] bool contains(const SolidD& solid, Vec3d query);
-ClosestCounts signed_distances(const SolidD& solid, std::span<const Vec3d> queries,
-                               std::span<double> distances, const ClosestOptionsD& options = {});
-[[nodiscard]] std::vector<double> signed_distances(const SolidD& solid,
-                                                   std::span<const Vec3d> queries,
-                                                   const ClosestOptionsD& options = {});
-[[nodiscard]] double signed_distance(const SolidD& solid, Vec3d query);
-[[nodiscard]] std::vector<double> winding_numbers(const SolidD& solid,
-                                                  std::span<const Vec3d> queries, int threads = 0);
-
-/// As Segment and Sphere. A segment with an end beyond 1e12 is invalid here too: its signs would
-/// overflow.
-struct SegmentD {
-    Vec3d a, b;
-};
-struct SphereD {
-    Vec3d center;
-    double radius;
-};
-/// As Capsule.
-struct CapsuleD {
-    Vec3d a, b;
-    double radius;
-};
-
 /// As the calls in <raydix/overlap.h>.
-OverlapCounts touch_any(const BvhD& bvh, std::span<const SegmentD> queries,
-                        std::span<std::uint8_t> touched, const OverlapOptions& options = {});
-OverlapCounts touch_any(const BvhD& bvh, std::span<const SphereD> queries,
-                        std::span<std::uint8_t> touched, const OverlapOptions& options = {});
+QueryCounts touch_any(const BvhD& bvh, std::span<const SegmentD> queries,
+                      std::span<std::uint8_t> touched, const OverlapOptions& options = {});
+QueryCounts touch_any(const BvhD& bvh, std::span<const SphereD> queries,
+                      std::span<std::uint8_t> touched, const OverlapOptions& options = {});
 [[nodiscard]] bool touches(const BvhD& bvh, const SegmentD& segment);
 [[nodiscard]] bool touches(const BvhD& bvh, const SphereD& sphere);
 [[nodiscard]] OverlapLists touch_all(const BvhD& bvh, std::span<const SegmentD> queries,
@@ -192,28 +123,11 @@ OverlapCounts touch_any(const BvhD& bvh, std::span<const SphereD> queries,
 [[nodiscard]] OverlapLists touch_all(const BvhD& bvh, std::span<const SphereD> queries,
                                      const OverlapOptions& options = {});
 
-/// As SphereSweep. A start or a radius beyond 1e150 is invalid here too: its square would overflow.
-struct SphereSweepD {
-    RayD path;
-    double radius;
-};
-
-/// As SweepHit; `position` is the point of the triangle closest to the ball's center at t, as
-/// closest_points has it.
-struct SweepHitD {
-    double t = infinity;
-    std::uint32_t prim = no_primitive;
-    Vec3d position{infinity, infinity, infinity};
-    double u = 0.0, v = 0.0;
-
-    [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
-};
-
 /// Finds the first contact of each sweep, as in <raydix/overlap.h>: the least (t, prim). sweeps [n]
 /// -> hits [n]. Lengths are measured from the start, so that t and the place of the contact are as
 /// exact far from the origin as the corners are. Throws InputError if the sizes differ.
-OverlapCounts sweep_spheres(const BvhD& bvh, std::span<const SphereSweepD> sweeps,
-                            std::span<SweepHitD> hits, const OverlapOptions& options = {});
+QueryCounts sweep_spheres(const BvhD& bvh, std::span<const SphereSweepD> sweeps,
+                          std::span<SweepHitD> hits, const OverlapOptions& options = {});
 [[nodiscard]] std::vector<SweepHitD> sweep_spheres(const BvhD& bvh,
                                                    std::span<const SphereSweepD> sweeps,
                                                    const OverlapOptions& options = {});

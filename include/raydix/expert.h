@@ -20,6 +20,7 @@
 #include <raydix/octree.h>           // IWYU pragma: export
 #include <raydix/overlap.h>          // IWYU pragma: export
 #include <raydix/pairs.h>            // IWYU pragma: export
+#include <raydix/rdx_tree.h>         // IWYU pragma: export
 #include <raydix/refit.h>            // IWYU pragma: export
 #include <raydix/report.h>           // IWYU pragma: export
 #include <raydix/simulate.h>         // IWYU pragma: export

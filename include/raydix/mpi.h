@@ -110,7 +110,7 @@ template <class Scalar>
 struct NearestRows {
     Buffer<std::uint64_t> indices;  // [queries * k]; no_global behind the last point
     Buffer<Scalar> distances;       // [queries * k]; infinity behind the last point
-    PointQueryCounts counts;        // of this rank's queries
+    QueryCounts counts;             // of this rank's queries
     CallReport report;
 };
 
@@ -120,7 +120,7 @@ struct PointRows {
     Buffer<std::uint64_t> offsets;  // [queries + 1]
     Buffer<std::uint64_t> indices;
     Buffer<Scalar> distances;
-    PointQueryCounts counts;
+    QueryCounts counts;
     CallReport report;
 };
 
@@ -178,18 +178,16 @@ struct SceneOptions : Options {
 /// of meshes stay on that rank.
 template <class Scalar>
 struct BasicDistributedGeometry {
-    using Types = SceneTypes<Scalar>;
-
-    typename Types::MeshView mesh{};
+    BasicMeshView<Scalar> mesh{};
     /// Not null: an instance of this scene as its last commit left it. It need not outlive the
     /// construction.
     const BasicScene<Scalar>* scene = nullptr;
-    typename Types::Transform transform{};  // of an instance
-    std::uint32_t mask = 0xFFFFFFFFu;       // as GeometryOptions::mask
+    BasicTransform<Scalar> transform{};  // of an instance
+    std::uint32_t mask = 0xFFFFFFFFu;    // as GeometryOptions::mask
     // As Scene::add takes them.
-    std::span<const typename Types::Sphere> spheres = {};
-    std::span<const typename Types::Capsule> capsules = {};
-    std::span<const typename Types::Point> points = {};
+    std::span<const BasicSphere<Scalar>> spheres = {};
+    std::span<const BasicCapsule<Scalar>> capsules = {};
+    std::span<const BasicVec3<Scalar>> points = {};
     Scalar radius = 0;  // of points
     /// Not null: geometry whose test answers by the ray alone. The place of a ray that it is told
     /// has no meaning here.
@@ -216,23 +214,28 @@ using DistributedHitD = BasicDistributedHit<double>;
 /// Says whether a hit counts, as raydix::HitFilter. It is called on the rank that holds what was
 /// hit, so all ranks give the same function, and the answer may depend on the arguments alone. tmax
 /// of the ray may be less than its caller gave: rays travel with their best hit so far.
-using DistributedFilter = std::function<bool(const Ray& ray, const DistributedHit& hit)>;
-using DistributedFilterD = std::function<bool(const RayD& ray, const DistributedHitD& hit)>;
+template <class Scalar>
+using BasicDistributedFilter =
+    std::function<bool(const BasicRay<Scalar>& ray, const BasicDistributedHit<Scalar>& hit)>;
+using DistributedFilter = BasicDistributedFilter<float>;
+using DistributedFilterD = BasicDistributedFilter<double>;
 
 /// Of the rays of this rank.
-struct TraceOptions {
-    std::uint32_t mask = 0xFFFFFFFFu;           // of all of them
-    std::span<const std::uint32_t> masks = {};  // [rays], one for each ray instead; or empty
-    DistributedFilter filter = {};  // for a DistributedScene, on all ranks; empty: all hits count
-    DistributedFilterD filter_d = {};  // for a DistributedSceneD
+template <class Scalar>
+struct BasicTraceOptions {
+    std::uint32_t mask = 0xFFFFFFFFu;            // of all of them
+    std::span<const std::uint32_t> masks = {};   // [rays], one for each ray instead; or empty
+    BasicDistributedFilter<Scalar> filter = {};  // on all ranks; empty: all hits count
     /// trace_all only: as QueryOptions::max_result_bytes.
     std::uint64_t max_result_bytes = 0;
 };
+using TraceOptions = BasicTraceOptions<float>;
+using TraceOptionsD = BasicTraceOptions<double>;
 
 /// A raydix::SceneClosestPoint with a 64-bit prim.
 template <class Scalar>
 struct BasicDistributedClosest {
-    typename SceneTypes<Scalar>::Point position{infinity, infinity, infinity};
+    BasicVec3<Scalar> position{infinity, infinity, infinity};
     Scalar distance = infinity;
     Scalar u = 0, v = 0;
     std::uint32_t geometry = no_primitive;
@@ -264,13 +267,13 @@ struct HitRows {
 template <class Scalar>
 class BasicDistributedScene {
 public:
-    using Types = SceneTypes<Scalar>;
-    using MeshView = typename Types::MeshView;
+    using MeshView = BasicMeshView<Scalar>;
     using Geometry = BasicDistributedGeometry<Scalar>;
-    using Ray = typename Types::Ray;
-    using Point = typename Types::Point;
+    using Ray = BasicRay<Scalar>;
+    using Point = BasicVec3<Scalar>;
     using Hit = BasicDistributedHit<Scalar>;
     using Closest = BasicDistributedClosest<Scalar>;
+    using TraceOptions = BasicTraceOptions<Scalar>;
 
     /// Collective. The meshes are copied. One without triangles only takes a number. Triangles that
     /// are not finite or out of range are left out and counted. Throws InputError: an index past
@@ -304,7 +307,7 @@ public:
     /// Collective. The closest point of all triangles to each query, as raydix::closest_points. All
     /// ranks give the same max_distance and mask. Throws InputError if max_distance is negative or
     /// NaN, and if the mask shows spheres or other shapes.
-    [[nodiscard]] Answers<Closest, ClosestCounts> closest_points(
+    [[nodiscard]] Answers<Closest, QueryCounts> closest_points(
         std::span<const Point> queries, Scalar max_distance = infinity,
         std::uint32_t mask = 0xFFFFFFFFu) const;
     /// Collective. Whether each query is inside: 1 or 0. Inside means that the way to infinity
@@ -312,8 +315,7 @@ public:
     /// meshes together, those in instances moved as raydix::contains moves them. Exact for closed
     /// meshes. The first call makes a second tree on each rank. Throws InputError if a geometry
     /// with a bit in its mask has spheres or other shapes.
-    [[nodiscard]] Answers<std::uint8_t, ClosestCounts> contains(
-        std::span<const Point> queries) const;
+    [[nodiscard]] Answers<std::uint8_t, QueryCounts> contains(std::span<const Point> queries) const;
 
 private:
     template <class>

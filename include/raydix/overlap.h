@@ -1,6 +1,7 @@
 // What a segment or a sphere touches of a mesh, and where a moving sphere first does.
 #pragma once
 
+#include <raydix/batch.h>
 #include <raydix/bvh.h>
 #include <raydix/shapes.h>
 #include <raydix/types.h>
@@ -18,22 +19,14 @@ struct OverlapOptions {
     int threads = 0;  // 0 to 1,024; 0: all the machine has. Results do not depend on it
 };
 
-/// What a batch met.
-struct OverlapCounts {
-    std::uint64_t queries = 0;
-    std::uint64_t found = 0;            // queries that touch something; for lists: ids in them
-    std::uint64_t invalid_queries = 0;  // a number is not finite, or a radius is negative: they
-                                        // touch nothing
-};
-
 /// Says whether each query has a point in common with any triangle: 1 or 0. queries [n] -> touched
 /// [n]. Segments are decided without rounding, triangles in their plane and triangles without area
 /// included. A sphere touches a triangle if d2 <= radius * radius with the d2 of closest_points.
 /// Throws InputError: sizes that differ, a tree that holds boxes or points.
-OverlapCounts touch_any(const Bvh& bvh, std::span<const Segment> queries,
-                        std::span<std::uint8_t> touched, const OverlapOptions& options = {});
-OverlapCounts touch_any(const Bvh& bvh, std::span<const Sphere> queries,
-                        std::span<std::uint8_t> touched, const OverlapOptions& options = {});
+QueryCounts touch_any(const Bvh& bvh, std::span<const Segment> queries,
+                      std::span<std::uint8_t> touched, const OverlapOptions& options = {});
+QueryCounts touch_any(const Bvh& bvh, std::span<const Sphere> queries,
+                      std::span<std::uint8_t> touched, const OverlapOptions& options = {});
 [[nodiscard]] bool touches(const Bvh& bvh, const Segment& segment);
 [[nodiscard]] bool touches(const Bvh& bvh, const Sphere& sphere);
 
@@ -42,7 +35,7 @@ OverlapCounts touch_any(const Bvh& bvh, std::span<const Sphere> queries,
 struct OverlapLists {
     std::vector<std::uint64_t> offsets;  // [queries + 1]
     std::vector<std::uint32_t> prims;
-    OverlapCounts counts;
+    QueryCounts counts;
 };
 
 /// As touch_any, but lists all triangles that each query touches. None is ever dropped. Throws
@@ -52,30 +45,26 @@ struct OverlapLists {
 [[nodiscard]] OverlapLists touch_all(const Bvh& bvh, std::span<const Sphere> queries,
                                      const OverlapOptions& options = {});
 
-/// A ball whose center moves along a ray, for t in [tmin, tmax]. Radius 0 is a ray. A sweep is
-/// invalid if its ray is, or if its radius is negative or not finite.
-struct SphereSweep {
-    Ray path;
-    float radius;
-};
-
 /// The first contact. The ball touches triangle `prim` at `position`, which is
 /// (1-u-v)*v0 + u*v1 + v*v2, when its center is at t. A ball that touches at the start has t =
 /// tmin.
-struct SweepHit {
-    float t = infinity;
+template <class Scalar>
+struct BasicSweepHit {
+    Scalar t = infinity;
     std::uint32_t prim = no_primitive;
-    Vec3 position{infinity, infinity, infinity};
-    float u = 0.0f, v = 0.0f;
+    BasicVec3<Scalar> position{infinity, infinity, infinity};
+    Scalar u = 0, v = 0;
 
     [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
 };
+using SweepHit = BasicSweepHit<float>;
+using SweepHitD = BasicSweepHit<double>;
 
 /// Finds the first contact of each sweep: the least (t, prim) with a finite t. sweeps [n] -> hits
 /// [n]. The answers have the same bits for every builder and number of threads. They are computed
 /// in double. Throws InputError: sizes that differ, a tree that holds boxes or points.
-OverlapCounts sweep_spheres(const Bvh& bvh, std::span<const SphereSweep> sweeps,
-                            std::span<SweepHit> hits, const OverlapOptions& options = {});
+QueryCounts sweep_spheres(const Bvh& bvh, std::span<const SphereSweep> sweeps,
+                          std::span<SweepHit> hits, const OverlapOptions& options = {});
 [[nodiscard]] std::vector<SweepHit> sweep_spheres(const Bvh& bvh,
                                                   std::span<const SphereSweep> sweeps,
                                                   const OverlapOptions& options = {});

@@ -1,7 +1,6 @@
 // Pictures: rendered views, and files to keep them in.
 #pragma once
 
-#include <raydix/bvh.h>
 #include <raydix/camera.h>
 #include <raydix/scene.h>
 #include <raydix/types.h>
@@ -13,6 +12,8 @@
 #include <vector>
 
 namespace raydix {
+
+class Bvh;  // <raydix/bvh.h>
 
 /// Linear RGB. pixels [height * width], rows from the top.
 struct Picture {

@@ -8,6 +8,7 @@
 // index at once.
 #pragma once
 
+#include <raydix/batch.h>
 #include <raydix/buffer.h>
 #include <raydix/types.h>
 
@@ -22,12 +23,12 @@
 
 namespace raydix {
 
-struct Vec2 {
-    float x, y;
+template <class Scalar>
+struct BasicVec2 {
+    Scalar x, y;
 };
-struct Vec2d {
-    double x, y;
-};
+using Vec2 = BasicVec2<float>;
+using Vec2d = BasicVec2<double>;
 
 /// A closed box between two points of a type.
 template <class Point>
@@ -195,19 +196,13 @@ struct PointQueryOptions {
 /// Instruction sets that batches can run in here, best first.
 [[nodiscard]] std::vector<std::string> point_instruction_sets();
 
-struct PointQueryCounts {
-    std::uint64_t queries = 0;
-    std::uint64_t invalid_queries = 0;  // a coordinate is NaN or Inf: nothing is near
-    std::uint64_t found = 0;            // points, over all queries
-};
-
 /// The k nearest of each query. Row i is [i * k, (i + 1) * k) of both arrays. Where there are fewer
 /// than k points the row ends with no_primitive and infinity.
 template <class Scalar>
 struct NearestPoints {
     Buffer<std::uint32_t> indices;  // [queries * k]
     Buffer<Scalar> distances;       // [queries * k]
-    PointQueryCounts counts;
+    QueryCounts counts;
 };
 
 /// Rows of any length. That of query i is [offsets[i], offsets[i + 1]) of the other two arrays.
@@ -216,7 +211,7 @@ struct PointLists {
     Buffer<std::uint64_t> offsets;  // [queries + 1]
     Buffer<std::uint32_t> indices;
     Buffer<Scalar> distances;
-    PointQueryCounts counts;
+    QueryCounts counts;
 };
 
 // The functions below are templates over the four kinds of index, instantiated in the library.
@@ -233,9 +228,9 @@ using ScalarOf = std::type_identity_t<typename Index::Scalar>;
 /// Throws InputError: k = 0, sizes that do not fit. The form that returns NearestPoints throws
 /// ResultTooLarge before it makes room for more than options.max_result_bytes.
 template <class Index>
-PointQueryCounts knn(const Index& index, PointsOf<Index> queries, std::uint32_t k,
-                     std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
-                     const PointQueryOptions& options = {});
+QueryCounts knn(const Index& index, PointsOf<Index> queries, std::uint32_t k,
+                std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
+                const PointQueryOptions& options = {});
 template <class Index>
 [[nodiscard]] NearestPoints<typename Index::Scalar> knn(const Index& index, PointsOf<Index> queries,
                                                         std::uint32_t k,
@@ -262,9 +257,8 @@ template <class Index>
     const PointQueryOptions& options = {});
 /// Counts the points within the radius: queries [n] -> counts [n].
 template <class Index>
-PointQueryCounts radius_count(const Index& index, PointsOf<Index> queries, ScalarOf<Index> radius,
-                              std::span<std::uint32_t> counts,
-                              const PointQueryOptions& options = {});
+QueryCounts radius_count(const Index& index, PointsOf<Index> queries, ScalarOf<Index> radius,
+                         std::span<std::uint32_t> counts, const PointQueryOptions& options = {});
 /// One query.
 template <class Index>
 [[nodiscard]] std::uint32_t radius_count(const Index& index, const typename Index::Point& query,

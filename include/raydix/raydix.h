@@ -4,6 +4,7 @@
 #pragma once
 
 #include <raydix/arrays.h>         // IWYU pragma: export
+#include <raydix/batch.h>          // IWYU pragma: export
 #include <raydix/buffer.h>         // IWYU pragma: export
 #include <raydix/camera.h>         // IWYU pragma: export
 #include <raydix/error.h>          // IWYU pragma: export
@@ -12,6 +13,7 @@
 #include <raydix/model.h>          // IWYU pragma: export
 #include <raydix/picture.h>        // IWYU pragma: export
 #include <raydix/points.h>         // IWYU pragma: export
+#include <raydix/quality.h>        // IWYU pragma: export
 #include <raydix/rays.h>           // IWYU pragma: export
 #include <raydix/rdx.h>            // IWYU pragma: export
 #include <raydix/result_limit.h>   // IWYU pragma: export

@@ -2,7 +2,6 @@
 // release).
 #pragma once
 
-#include <raydix/bvh.h>
 #include <raydix/camera.h>
 #include <raydix/scene.h>
 #include <raydix/types.h>
@@ -14,6 +13,8 @@
 #include <vector>
 
 namespace raydix {
+
+class Bvh;  // <raydix/bvh.h>
 
 enum class RayKind : std::uint32_t { primary, ao, diffuse, diffuse_shuffled };
 [[nodiscard]] std::string_view ray_kind_name(RayKind kind);

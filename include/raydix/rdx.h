@@ -1,10 +1,7 @@
-// .rdx files: a tree with its geometry, or a whole scene.
+// .rdx files that hold a whole scene. Those of one tree: raydix/rdx_tree.h.
 #pragma once
 
-#include <raydix/bvh.h>
 #include <raydix/camera.h>
-#include <raydix/mesh.h>
-#include <raydix/model.h>
 #include <raydix/scene.h>
 
 #include <cstdint>
@@ -13,22 +10,6 @@
 #include <vector>
 
 namespace raydix {
-
-/// Saves a tree with the model that it was built from (docs/rdx-format.md). Writes as write_file of
-/// files.h, so that a reader never sees half a file. Throws InputError: a tree that does not belong
-/// to the model, a file that cannot be written.
-void save_rdx(const std::filesystem::path& file, const Bvh& bvh, const Model& scene);
-
-struct RdxFile {
-    Model scene;
-    Bvh bvh;  // views the mapped file, which stays mapped as long as the tree lives
-};
-
-/// Loads a tree. Maps the file, compares lengths and checksums, then validates children, ranges,
-/// acyclicity and geometry in O(n) before anything is used. The file must not be changed in place
-/// while the tree lives; to replace it by renaming is safe. Throws InputError: "FILE: SECTION:
-/// reason".
-[[nodiscard]] RdxFile load_rdx(const std::filesystem::path& file);
 
 /// Saves a scene as its last commit left it, with all scenes that stand in it, each of them once,
 /// with the vertices and triangles of its meshes, and with its spheres, capsules and points. Ids
@@ -54,30 +35,26 @@ struct RdxCounts {
     std::uint64_t bytes = 0;   // of the file
 };
 
-struct RdxScene {
-    Scene scene;  // committed. Its meshes and their trees view the mapped file, which stays mapped
-                  // as long as one of them is in use: processes that load it share its memory
-    SceneOptions options;  // quality, usage and compact as its last commit had them
+/// What such a file gives back.
+template <class Scalar>
+struct BasicRdxScene {
+    BasicScene<Scalar> scene;  // committed. Its arrays view the mapped file, which stays mapped as
+                               // long as one of them is in use: processes that load it share its
+                               // memory. So do its trees; a scene in double builds them
+    SceneOptions options;      // quality, usage and compact as its last commit had them
     std::string name;
-    CameraSet cameras;
-    RdxCounts counts;
+    BasicCameraSet<Scalar> cameras;
+    RdxCounts counts;                      // in double without nodes
     std::vector<std::uint32_t> shape_ids;  // ascending: geometries of the scene itself that hold
                                            // spheres, capsules or points
     double load_ms = 0;
 };
+using RdxScene = BasicRdxScene<float>;
+using RdxSceneD = BasicRdxScene<double>;
 
-struct RdxSceneD {
-    SceneD scene;  // committed. Its meshes and shapes view the mapped file; its trees were built
-    SceneOptions options;
-    std::string name;
-    CameraSetD cameras;
-    RdxCounts counts;  // without nodes
-    std::vector<std::uint32_t> shape_ids;
-    double load_ms = 0;
-};
-
-/// Loads a scene. Maps the file and validates it as load_rdx does. Rays have the hits of the scene
-/// that was saved, bit for bit. Throws InputError: "FILE: SECTION: reason".
+/// Loads a scene. Maps the file and validates lengths, checksums and what they say before anything
+/// is used. Rays have the hits of the scene that was saved, bit for bit. Throws InputError: "FILE:
+/// SECTION: reason".
 [[nodiscard]] RdxScene load_rdx_scene(const std::filesystem::path& file);
 [[nodiscard]] RdxSceneD load_rdx_scene_double(const std::filesystem::path& file);
 

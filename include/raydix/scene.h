@@ -3,9 +3,10 @@
 // double. Exact rules: docs/contract.md 1 and 3. Common questions: docs/questions.md.
 #pragma once
 
-#include <raydix/bvh.h>
+#include <raydix/batch.h>
 #include <raydix/mesh.h>
-#include <raydix/trace.h>
+#include <raydix/quality.h>
+#include <raydix/shapes.h>
 #include <raydix/transform.h>
 #include <raydix/types.h>
 
@@ -20,44 +21,10 @@
 namespace raydix {
 
 struct Model;
-struct Sphere;
-struct Capsule;
-struct SphereD;
-struct CapsuleD;
 template <class Scalar>
 class BasicUserGeometry;  // <raydix/user_geometry.h>
-
-/// What scenes of a number type take and give.
 template <class Scalar>
-struct SceneTypes;
-template <>
-struct SceneTypes<float> {
-    using Transform = raydix::Transform;
-    using Mesh = raydix::Mesh;
-    using MeshView = raydix::MeshView;
-    using Box = Aabb;
-    using Point = Vec3;
-    using Sphere = raydix::Sphere;
-    using Capsule = raydix::Capsule;
-    using Ray = raydix::Ray;
-    using TreeHit = raydix::TreeHit;
-    using Hit = raydix::Hit;
-    using AllHits = raydix::AllHits;
-};
-template <>
-struct SceneTypes<double> {
-    using Transform = TransformD;
-    using Mesh = MeshD;
-    using MeshView = MeshViewD;
-    using Box = AabbD;
-    using Point = Vec3d;
-    using Sphere = SphereD;
-    using Capsule = CapsuleD;
-    using Ray = RayD;
-    using TreeHit = TreeHitD;
-    using Hit = HitD;
-    using AllHits = AllHitsD;
-};
+struct BasicSceneTraceOptions;
 
 /// How much a scene changes after its first commit. Hits do not depend on it.
 enum class Usage : std::uint32_t {
@@ -142,15 +109,17 @@ struct CommitReport {
 template <class Scalar>
 class BasicScene {
 public:
-    using Types = SceneTypes<Scalar>;
-    using Mesh = typename Types::Mesh;
-    using MeshView = typename Types::MeshView;
-    using Transform = typename Types::Transform;
-    using Box = typename Types::Box;
-    using Point = typename Types::Point;
-    using Sphere = typename Types::Sphere;
-    using Capsule = typename Types::Capsule;
+    using Mesh = BasicMesh<Scalar>;
+    using MeshView = BasicMeshView<Scalar>;
+    using Transform = BasicTransform<Scalar>;
+    using Box = BasicAabb<Scalar>;
+    using Point = BasicVec3<Scalar>;
+    using Sphere = BasicSphere<Scalar>;
+    using Capsule = BasicCapsule<Scalar>;
+    using Ray = BasicRay<Scalar>;
+    using Hit = BasicHit<Scalar>;
     using UserGeometry = BasicUserGeometry<Scalar>;
+    using TraceOptions = BasicSceneTraceOptions<Scalar>;
 
     /// Most levels of instances in each other.
     static constexpr std::uint32_t max_levels = 32;
@@ -265,23 +234,26 @@ using SceneD = BasicScene<double>;
 ///
 /// Each triangle or shape has one hit on a ray, the first within [tmin, tmax]. Where that one is
 /// refused, the ray goes on to other triangles and shapes.
-using HitFilter = std::function<bool(std::size_t place, const Ray& ray, const Hit& hit)>;
+template <class Scalar>
+using BasicHitFilter = std::function<bool(std::size_t place, const BasicRay<Scalar>& ray,
+                                          const BasicHit<Scalar>& hit)>;
+using HitFilter = BasicHitFilter<float>;
+using HitFilterD = BasicHitFilter<double>;
 
-/// The same in double.
-using HitFilterD = std::function<bool(std::size_t place, const RayD& ray, const HitD& hit)>;
-
-struct SceneTraceOptions {
+template <class Scalar>
+struct BasicSceneTraceOptions {
     std::uint32_t mask = 0xFFFFFFFFu;           // of all rays
     std::span<const std::uint32_t> masks = {};  // [rays], one for each ray instead; or empty
     int threads = 0;                            // 0 to 1,024; 0: all the machine has
     SimdPath path = SimdPath::automatic;        // hits do not depend on it
     std::string isa = {};                       // one of simd_instruction_sets(); empty: the best
-    HitFilter filter = {};                      // for a Scene; empty: all hits count
-    HitFilterD filter_d = {};                   // for a SceneD
+    BasicHitFilter<Scalar> filter = {};         // empty: all hits count
     /// trace_all only: the most bytes that the call may hold. 0: half of what is left to the
     /// process (result_limit.h).
     std::uint64_t max_result_bytes = 0;
 };
+using SceneTraceOptions = BasicSceneTraceOptions<float>;
+using SceneTraceOptionsD = BasicSceneTraceOptions<double>;
 
 /// Finds the closest hit of each ray: the least (t, instance, geometry, prim). rays [n] -> hits
 /// [n]. The hits have the same bits for every quality, layout, path, instruction set and number of
@@ -293,20 +265,20 @@ struct SceneTraceOptions {
 /// Invalid rays (types.h) miss and are counted.
 ///
 /// Throws InputError: sizes that differ, a scene that was never committed, an option out of range,
-/// an instruction set that this processor does not have, a filter of the other number type alone.
+/// an instruction set that this processor does not have.
 TraceCounts trace(const Scene& scene, std::span<const Ray> rays, std::span<Hit> hits,
                   const SceneTraceOptions& options = {});
 TraceCounts trace(const SceneD& scene, std::span<const RayD> rays, std::span<HitD> hits,
-                  const SceneTraceOptions& options = {});
+                  const SceneTraceOptionsD& options = {});
 [[nodiscard]] std::vector<Hit> trace(const Scene& scene, std::span<const Ray> rays,
                                      const SceneTraceOptions& options = {});
 [[nodiscard]] std::vector<HitD> trace(const SceneD& scene, std::span<const RayD> rays,
-                                      const SceneTraceOptions& options = {});
+                                      const SceneTraceOptionsD& options = {});
 /// Says whether each ray hits anything at all: 1 or 0. rays [n] -> occluded [n]. Errors as above.
 TraceCounts trace_any(const Scene& scene, std::span<const Ray> rays,
                       std::span<std::uint8_t> occluded, const SceneTraceOptions& options = {});
 TraceCounts trace_any(const SceneD& scene, std::span<const RayD> rays,
-                      std::span<std::uint8_t> occluded, const SceneTraceOptions& options = {});
+                      std::span<std::uint8_t> occluded, const SceneTraceOptionsD& options = {});
 
 /// Finds all hits of all rays, those of one ray sorted by (t, instance, geometry, prim). Each
 /// triangle or shape comes at most once on every path. An edge belongs to one of its triangles
@@ -316,7 +288,7 @@ TraceCounts trace_any(const SceneD& scene, std::span<const RayD> rays,
 [[nodiscard]] AllHits trace_all(const Scene& scene, std::span<const Ray> rays,
                                 const SceneTraceOptions& options = {});
 [[nodiscard]] AllHitsD trace_all(const SceneD& scene, std::span<const RayD> rays,
-                                 const SceneTraceOptions& options = {});
+                                 const SceneTraceOptionsD& options = {});
 
 /// One ray, on the caller's thread: the same bits as in a batch. Throws InputError if the scene was
 /// never committed.

@@ -1,7 +1,6 @@
 // All pairs of triangles that overlap: within one scene, or between two.
 #pragma once
 
-#include <raydix/pairs.h>
 #include <raydix/scene.h>
 #include <raydix/scene_queries.h>
 

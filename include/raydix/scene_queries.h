@@ -3,9 +3,7 @@
 // double.
 #pragma once
 
-#include <raydix/closest.h>
-#include <raydix/double.h>
-#include <raydix/overlap.h>
+#include <raydix/batch.h>
 #include <raydix/scene.h>
 #include <raydix/shapes.h>
 #include <raydix/types.h>
@@ -48,7 +46,7 @@ namespace raydix {
 /// nothing is found prim is no_primitive and the distance infinity.
 template <class Scalar>
 struct BasicSceneClosestPoint {
-    typename SceneTypes<Scalar>::Point position{infinity, infinity, infinity};
+    BasicVec3<Scalar> position{infinity, infinity, infinity};
     Scalar distance = infinity;
     std::uint32_t prim = no_primitive;
     std::uint32_t geometry = no_primitive;
@@ -74,14 +72,14 @@ using SceneClosestOptionsD = BasicSceneClosestOptions<double>;
 /// Finds for each query the least (d2, instance, geometry, prim) over all triangles and shapes, d2
 /// as in closest.h. queries [n] -> results [n], in any order. Throws InputError also for sizes that
 /// differ and for a max_distance that is negative or NaN.
-ClosestCounts closest_points(const Scene& scene, std::span<const Vec3> queries,
-                             std::span<SceneClosestPoint> results,
-                             const SceneClosestOptions& options = {});
+QueryCounts closest_points(const Scene& scene, std::span<const Vec3> queries,
+                           std::span<SceneClosestPoint> results,
+                           const SceneClosestOptions& options = {});
 [[nodiscard]] std::vector<SceneClosestPoint> closest_points(
     const Scene& scene, std::span<const Vec3> queries, const SceneClosestOptions& options = {});
-ClosestCounts closest_points(const SceneD& scene, std::span<const Vec3d> queries,
-                             std::span<SceneClosestPointD> results,
-                             const SceneClosestOptionsD& options = {});
+QueryCounts closest_points(const SceneD& scene, std::span<const Vec3d> queries,
+                           std::span<SceneClosestPointD> results,
+                           const SceneClosestOptionsD& options = {});
 [[nodiscard]] std::vector<SceneClosestPointD> closest_points(
     const SceneD& scene, std::span<const Vec3d> queries, const SceneClosestOptionsD& options = {});
 /// One query, on the caller's thread.
@@ -104,14 +102,14 @@ struct SceneOverlapOptions {
 /// touched [n]. Triangles are decided as by touch_any of overlap.h. A sphere touches a shape if
 /// d2 <= radius * radius with the d2 of closest_points. A segment and a shape are decided in
 /// double. Throws InputError also for sizes that differ.
-OverlapCounts touch_any(const Scene& scene, std::span<const Segment> queries,
-                        std::span<std::uint8_t> touched, const SceneOverlapOptions& options = {});
-OverlapCounts touch_any(const Scene& scene, std::span<const Sphere> queries,
-                        std::span<std::uint8_t> touched, const SceneOverlapOptions& options = {});
-OverlapCounts touch_any(const SceneD& scene, std::span<const SegmentD> queries,
-                        std::span<std::uint8_t> touched, const SceneOverlapOptions& options = {});
-OverlapCounts touch_any(const SceneD& scene, std::span<const SphereD> queries,
-                        std::span<std::uint8_t> touched, const SceneOverlapOptions& options = {});
+QueryCounts touch_any(const Scene& scene, std::span<const Segment> queries,
+                      std::span<std::uint8_t> touched, const SceneOverlapOptions& options = {});
+QueryCounts touch_any(const Scene& scene, std::span<const Sphere> queries,
+                      std::span<std::uint8_t> touched, const SceneOverlapOptions& options = {});
+QueryCounts touch_any(const SceneD& scene, std::span<const SegmentD> queries,
+                      std::span<std::uint8_t> touched, const SceneOverlapOptions& options = {});
+QueryCounts touch_any(const SceneD& scene, std::span<const SphereD> queries,
+                      std::span<std::uint8_t> touched, const SceneOverlapOptions& options = {});
 [[nodiscard]] bool touches(const Scene& scene, const Segment& segment,
                            std::uint32_t mask = 0xFFFFFFFFu);
 [[nodiscard]] bool touches(const Scene& scene, const Sphere& sphere,
@@ -134,7 +132,7 @@ struct ScenePrimitive {
 struct SceneOverlapLists {
     std::vector<std::uint64_t> offsets;  // [queries + 1]
     std::vector<ScenePrimitive> prims;
-    OverlapCounts counts;
+    QueryCounts counts;
 };
 
 /// As touch_any, but lists all that each query touches, each once. None is ever dropped. Throws
@@ -155,7 +153,7 @@ struct BasicSceneSweepHit {
     std::uint32_t prim = no_primitive;
     std::uint32_t geometry = no_primitive;
     std::uint32_t instance = 0;
-    typename SceneTypes<Scalar>::Point position{infinity, infinity, infinity};
+    BasicVec3<Scalar> position{infinity, infinity, infinity};
     Scalar u = 0, v = 0;
 
     [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
@@ -167,14 +165,13 @@ using SceneSweepHitD = BasicSceneSweepHit<double>;
 /// with a finite t, as sweep_spheres of overlap.h. sweeps [n] -> hits [n]. A sweep without a radius
 /// is a ray through the triangles as they are in the world. Throws InputError also for sizes that
 /// differ and for spheres, capsules or points that the mask shows (they are named).
-OverlapCounts sweep_spheres(const Scene& scene, std::span<const SphereSweep> sweeps,
-                            std::span<SceneSweepHit> hits, const SceneOverlapOptions& options = {});
+QueryCounts sweep_spheres(const Scene& scene, std::span<const SphereSweep> sweeps,
+                          std::span<SceneSweepHit> hits, const SceneOverlapOptions& options = {});
 [[nodiscard]] std::vector<SceneSweepHit> sweep_spheres(const Scene& scene,
                                                        std::span<const SphereSweep> sweeps,
                                                        const SceneOverlapOptions& options = {});
-OverlapCounts sweep_spheres(const SceneD& scene, std::span<const SphereSweepD> sweeps,
-                            std::span<SceneSweepHitD> hits,
-                            const SceneOverlapOptions& options = {});
+QueryCounts sweep_spheres(const SceneD& scene, std::span<const SphereSweepD> sweeps,
+                          std::span<SceneSweepHitD> hits, const SceneOverlapOptions& options = {});
 [[nodiscard]] std::vector<SceneSweepHitD> sweep_spheres(const SceneD& scene,
                                                         std::span<const SphereSweepD> sweeps,
                                                         const SceneOverlapOptions& options = {});

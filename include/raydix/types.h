@@ -1,5 +1,8 @@
 // The plain structs that every other header speaks in: points, boxes, rays, hits.
-// In float32, and those that end in `d` or `D` in double. All may be copied byte for byte.
+//
+// What has coordinates is one template over their type, here and in all headers: BasicRay<float> is
+// Ray, and BasicRay<double> is RayD. What is said of one holds for both, each in its own type,
+// unless it says so. The structs of this header may be copied byte for byte.
 #pragma once
 
 #include <array>
@@ -9,21 +12,20 @@
 
 namespace raydix {
 
-struct Vec3 {
-    float x, y, z;
+template <class Scalar>
+struct BasicVec3 {
+    Scalar x, y, z;
 };
+using Vec3 = BasicVec3<float>;
+using Vec3d = BasicVec3<double>;
 
 /// Axis-aligned box, closed on all sides. `lo > hi` on any axis means "empty".
-struct Aabb {
-    Vec3 lo, hi;
+template <class Scalar>
+struct BasicAabb {
+    BasicVec3<Scalar> lo, hi;
 };
-
-struct Vec3d {
-    double x, y, z;
-};
-struct AabbD {
-    Vec3d lo, hi;
-};
+using Aabb = BasicAabb<float>;
+using AabbD = BasicAabb<double>;
 
 /// Three vertex indices.
 using Triangle = std::array<std::uint32_t, 3>;
@@ -37,70 +39,53 @@ inline constexpr std::uint32_t no_primitive = 0xFFFFFFFFu;
 /// its units. A negative tmin counts as 0. Invalid are rays with tmin > tmax, tmax < 0, a limit
 /// that is NaN, a direction of 0, or an origin or direction that is not finite. Invalid rays miss
 /// and are counted.
-struct Ray {
-    Vec3 origin;
-    float tmin = 0.0f;
-    Vec3 direction;
-    float tmax = infinity;
+template <class Scalar>
+struct BasicRay {
+    BasicVec3<Scalar> origin;
+    Scalar tmin = 0;
+    BasicVec3<Scalar> direction;
+    Scalar tmax = std::numeric_limits<Scalar>::infinity();
 };
-static_assert(sizeof(Ray) == 32);
+using Ray = BasicRay<float>;
+using RayD = BasicRay<double>;
+static_assert(sizeof(Ray) == 32 && sizeof(RayD) == 64);
 
 /// What a ray hits in one tree: the point (1-u-v)*v0 + u*v1 + v*v2 of triangle `prim`, at `t` along
 /// the ray, in units of its direction. A miss has t infinity and prim no_primitive.
-struct TreeHit {
-    float t = infinity;
+template <class Scalar>
+struct BasicTreeHit {
+    Scalar t = std::numeric_limits<Scalar>::infinity();
     std::uint32_t prim = no_primitive;
-    float u = 0.0f, v = 0.0f;
+    Scalar u = 0, v = 0;
 
     [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
+    friend constexpr bool operator==(const BasicTreeHit&, const BasicTreeHit&) = default;
 };
-static_assert(sizeof(TreeHit) == 16);
+using TreeHit = BasicTreeHit<float>;
+using TreeHitD = BasicTreeHit<double>;
+static_assert(sizeof(TreeHit) == 16 && sizeof(TreeHitD) == 32);
 
 /// A hit and where in a scene it is. `prim` counts within `geometry`, whose id is that of the scene
 /// that holds it. `instance` 0: that is the scene itself. Else `instance` is the number of the path
 /// of instances that leads there: paths count from 1, depth first, by ascending id (Scene::path). t
 /// is always in units of the caller's direction, whatever an instance scales. A hit of one tree
 /// alone has geometry 0; a miss has no_primitive.
-struct Hit : TreeHit {
+template <class Scalar>
+struct BasicHit : BasicTreeHit<Scalar> {
     std::uint32_t geometry = no_primitive;
     std::uint32_t instance = 0;
+
+    friend constexpr bool operator==(const BasicHit&, const BasicHit&) = default;
 };
-static_assert(sizeof(Hit) == 24);
+using Hit = BasicHit<float>;
+using HitD = BasicHit<double>;
+static_assert(sizeof(Hit) == 24 && sizeof(HitD) == 40);
 
 /// A hit of the only geometry there is.
 [[nodiscard]] constexpr Hit hit_of_tree(const TreeHit& hit) {
     return {hit, hit.hit() ? 0 : no_primitive, 0};
 }
-
-/// As Ray, TreeHit and Hit, in double.
-struct RayD {
-    Vec3d origin;
-    double tmin = 0.0;
-    Vec3d direction;
-    double tmax = std::numeric_limits<double>::infinity();
-};
-static_assert(sizeof(RayD) == 64);
-
-struct TreeHitD {
-    double t = std::numeric_limits<double>::infinity();
-    std::uint32_t prim = no_primitive;
-    double u = 0.0, v = 0.0;
-
-    [[nodiscard]] constexpr bool hit() const { return prim != no_primitive; }
-    friend constexpr bool operator==(const TreeHitD&, const TreeHitD&) = default;
-};
-static_assert(sizeof(TreeHitD) == 32);
-
-struct HitD : TreeHitD {
-    std::uint32_t geometry = no_primitive;
-    std::uint32_t instance = 0;
-
-    friend constexpr bool operator==(const HitD&, const HitD&) = default;
-};
-static_assert(sizeof(HitD) == 40);
-
-/// The same in double. Braces alone mean a TreeHit.
-template <std::derived_from<TreeHitD> AnyHit>
+template <std::derived_from<TreeHitD> AnyHit>  // braces alone mean a TreeHit
 [[nodiscard]] constexpr HitD hit_of_tree(const AnyHit& hit) {
     return {hit, hit.hit() ? 0 : no_primitive, 0};
 }

@@ -20,8 +20,8 @@ namespace raydix {
 template <class Scalar>
 class BasicRaysAtPrimitive {
 public:
-    using Ray = typename SceneTypes<Scalar>::Ray;
-    using TreeHit = typename SceneTypes<Scalar>::TreeHit;
+    using Ray = BasicRay<Scalar>;
+    using TreeHit = BasicTreeHit<Scalar>;
 
     /// For the library. Arrays [count]; a place is the number of a ray among the caller's.
     BasicRaysAtPrimitive(const Ray* rays, const std::size_t* places, TreeHit* hits,
@@ -60,9 +60,9 @@ using RaysAtPrimitiveD = BasicRaysAtPrimitive<double>;
 template <class Scalar>
 class BasicUserGeometry {
 public:
-    using Ray = typename SceneTypes<Scalar>::Ray;
-    using Hit = typename SceneTypes<Scalar>::Hit;
-    using Box = typename SceneTypes<Scalar>::Box;
+    using Ray = BasicRay<Scalar>;
+    using Hit = BasicHit<Scalar>;
+    using Box = BasicAabb<Scalar>;
     using Rays = BasicRaysAtPrimitive<Scalar>;
 
     /// `boxes` [primitives] are around each primitive, in the geometry's own space. The caller

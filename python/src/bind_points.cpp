@@ -96,7 +96,7 @@ struct PointCalls {
                 counts.first += knn(index, asked[0], ids, far);
                 return;
             }
-            const PointQueryCounts met =
+            const QueryCounts met =
                 knn(index, asked.subspan(begin, end - begin), static_cast<std::uint32_t>(k), ids,
                     far, query_options(threads));
             counts.first += met.found;

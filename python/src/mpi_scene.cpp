@@ -24,7 +24,6 @@ namespace {
 
 template <class T>
 struct SceneCalls {
-    using Types = SceneTypes<T>;
     using Scene = mpi::BasicDistributedScene<T>;
     using Geometry = typename Scene::Geometry;
     using Point = typename Scene::Point;
@@ -49,8 +48,7 @@ struct SceneCalls {
             if (kind == "instance") {
                 geometry.scene = static_cast<const BasicScene<T>*>(
                     nb::cast<nb::capsule>(one[2]).data(scene_name<T>));
-                geometry.transform =
-                    rows<typename Types::Transform>(nb::cast<TransformRow>(one[3]))[0];
+                geometry.transform = rows<BasicTransform<T>>(nb::cast<TransformRow>(one[3]))[0];
             } else if (kind == "mesh") {
                 vertices.push_back(nb::cast<PointRows>(one[2]));
                 faces.push_back(nb::cast<FacesIn>(one[3]));
@@ -58,9 +56,9 @@ struct SceneCalls {
             } else {
                 shapes.push_back(nb::cast<ShapeRows>(one[2]));
                 if (kind == "capsules")
-                    geometry.capsules = shapes_of<typename Types::Capsule>(shapes.back());
+                    geometry.capsules = shapes_of<BasicCapsule<T>>(shapes.back());
                 else
-                    geometry.spheres = shapes_of<typename Types::Sphere>(shapes.back());
+                    geometry.spheres = shapes_of<BasicSphere<T>>(shapes.back());
             }
         }
         template <class Shape>
@@ -84,8 +82,8 @@ struct SceneCalls {
             Scene(communicator_of(comm), std::span<const Geometry>(given.geometries), options);
     }
 
-    static mpi::TraceOptions trace_options(std::uint32_t mask, const Masks& masks) {
-        mpi::TraceOptions options{.mask = mask};
+    static mpi::BasicTraceOptions<T> trace_options(std::uint32_t mask, const Masks& masks) {
+        mpi::BasicTraceOptions<T> options{.mask = mask};
         if (masks) options.masks = {masks->data(), masks->shape(0)};
         return options;
     }
@@ -108,7 +106,7 @@ struct SceneCalls {
     template <class Rays>
     static nb::tuple trace_all(const Scene& scene, Rays& rays, std::uint32_t mask,
                                const Masks& masks, std::uint64_t max_result_bytes) {
-        mpi::TraceOptions options = trace_options(mask, masks);
+        mpi::BasicTraceOptions<T> options = trace_options(mask, masks);
         options.max_result_bytes = max_result_bytes;
         auto found = unlocked([&] { return scene.trace_all(rays.piece(0, rays.size()), options); });
         return nb::make_tuple(hand_over(std::move(found.offsets)),

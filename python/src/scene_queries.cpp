@@ -47,9 +47,9 @@ Counts closest(Scene& scene, const PointRows<Scene>& points, const PlaceRows<Sce
     require_length(results.size(), queries.size());
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const ClosestCounts met = scene.closest_points(queries.subspan(begin, end - begin),
-                                                       results.subspan(begin, end - begin),
-                                                       max_distance, threads_for(threads));
+        const QueryCounts met = scene.closest_points(queries.subspan(begin, end - begin),
+                                                     results.subspan(begin, end - begin),
+                                                     max_distance, threads_for(threads));
         counts.first += met.found;
         counts.second += met.invalid_queries;
     });
@@ -78,9 +78,9 @@ Counts signed_distance(Scene& scene, const PointRows<Scene>& points, const Value
                                                         .threads = threads_for(threads)};
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const ClosestCounts met = signed_distances(scene.solid(rule, "signed_distance"),
-                                                   queries.subspan(begin, end - begin),
-                                                   distances.subspan(begin, end - begin), options);
+        const QueryCounts met = signed_distances(scene.solid(rule, "signed_distance"),
+                                                 queries.subspan(begin, end - begin),
+                                                 distances.subspan(begin, end - begin), options);
         counts.first += met.found;
         counts.second += met.invalid_queries;
     });
@@ -96,7 +96,7 @@ Counts inside(Scene& scene, const PointRows<Scene>& points, const FlagsOut& out,
     const InsideRule rule = inside_rule(rule_name);
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const ClosestCounts met =
+        const QueryCounts met =
             contains(scene.solid(rule, "contains"), queries.subspan(begin, end - begin),
                      flags.subspan(begin, end - begin), threads_for(threads));
         counts.first += met.found;
@@ -192,7 +192,7 @@ Counts touches(Scene& scene, const Array& shapes, const FlagsOut& out, int threa
     require_length(flags.size(), queries.size());
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const OverlapCounts met =
+        const QueryCounts met =
             scene.touch_any(queries.subspan(begin, end - begin), flags.subspan(begin, end - begin),
                             threads_for(threads));
         counts.first += met.found;
@@ -222,7 +222,7 @@ Counts sweeps(Scene& scene, const SweepRows<Scene>& balls, const ContactRows<Sce
     require_length(hits.size(), queries.size());
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const OverlapCounts met =
+        const QueryCounts met =
             scene.sweep_spheres(queries.subspan(begin, end - begin),
                                 hits.subspan(begin, end - begin), threads_for(threads));
         counts.first += met.found;

@@ -21,19 +21,18 @@ std::mutex& structure() {
 
 namespace {
 
-SceneTraceOptions trace_options(const RayOptions& options) {
-    SceneTraceOptions out;
+template <class Scalar>
+BasicSceneTraceOptions<Scalar> trace_options(const RayOptions& options) {
+    BasicSceneTraceOptions<Scalar> out;
     out.mask = options.mask;
     out.masks = options.masks;
     out.threads = options.threads;
     out.max_result_bytes = options.max_result_bytes;
     if (options.filter != nullptr) {
-        const auto takes = [filter = options.filter, first = options.first](
-                               std::size_t place, const auto&, const auto& hit) {
+        out.filter = [filter = options.filter, first = options.first](
+                         std::size_t place, const auto&, const auto& hit) {
             return filter->takes(first + place, hit);
         };
-        out.filter = takes;
-        out.filter_d = takes;
     }
     return out;
 }
@@ -367,9 +366,10 @@ const typename Names::Scene& BasicSceneTrees<Names>::traced() {
 }
 
 template <class Names>
-ClosestCounts BasicSceneTrees<Names>::closest_points(
-    std::span<const Point> queries, std::span<typename Names::ClosestPoint> results,
-    typename Names::Scalar max_distance, int threads) {
+QueryCounts BasicSceneTrees<Names>::closest_points(std::span<const Point> queries,
+                                                   std::span<typename Names::ClosestPoint> results,
+                                                   typename Names::Scalar max_distance,
+                                                   int threads) {
     return raydix::closest_points(traced(), queries, results,
                                   {.max_distance = max_distance, .threads = threads});
 }
@@ -384,15 +384,15 @@ SceneOverlapLists BasicSceneTrees<Names>::touch_all(std::span<const Shape> queri
 
 template <class Names>
 template <class Shape>
-OverlapCounts BasicSceneTrees<Names>::touch_any(std::span<const Shape> queries,
-                                                std::span<std::uint8_t> touched, int threads) {
+QueryCounts BasicSceneTrees<Names>::touch_any(std::span<const Shape> queries,
+                                              std::span<std::uint8_t> touched, int threads) {
     return raydix::touch_any(traced(), queries, touched, {.threads = threads});
 }
 
 template <class Names>
-OverlapCounts BasicSceneTrees<Names>::sweep_spheres(std::span<const typename Names::Sweep> sweeps,
-                                                    std::span<typename Names::SweepHit> hits,
-                                                    int threads) {
+QueryCounts BasicSceneTrees<Names>::sweep_spheres(std::span<const typename Names::Sweep> sweeps,
+                                                  std::span<typename Names::SweepHit> hits,
+                                                  int threads) {
     return raydix::sweep_spheres(traced(), sweeps, hits, {.threads = threads});
 }
 
@@ -417,20 +417,21 @@ const typename Names::Solid& BasicSceneTrees<Names>::solid(InsideRule rule, cons
 template <class Names>
 TraceCounts BasicSceneTrees<Names>::trace(std::span<const Ray> rays, std::span<Hit> hits,
                                           const RayOptions& options) {
-    return raydix::trace(traced(), rays, hits, trace_options(options));
+    return raydix::trace(traced(), rays, hits, trace_options<typename Names::Scalar>(options));
 }
 
 template <class Names>
 TraceCounts BasicSceneTrees<Names>::trace_any(std::span<const Ray> rays,
                                               std::span<std::uint8_t> occluded,
                                               const RayOptions& options) {
-    return raydix::trace_any(traced(), rays, occluded, trace_options(options));
+    return raydix::trace_any(traced(), rays, occluded,
+                             trace_options<typename Names::Scalar>(options));
 }
 
 template <class Names>
 typename Names::AllHits BasicSceneTrees<Names>::trace_all(std::span<const Ray> rays,
                                                           const RayOptions& options) {
-    return raydix::trace_all(traced(), rays, trace_options(options));
+    return raydix::trace_all(traced(), rays, trace_options<typename Names::Scalar>(options));
 }
 
 template <class Names>
@@ -445,13 +446,11 @@ bool BasicSceneTrees<Names>::any_hit(const Ray& ray, std::uint32_t mask) {
 
 template class BasicSceneTrees<InFloat>;
 template class BasicSceneTrees<InDouble>;
-template OverlapCounts SceneTrees::touch_any(std::span<const Segment>, std::span<std::uint8_t>,
-                                             int);
-template OverlapCounts SceneTrees::touch_any(std::span<const Sphere>, std::span<std::uint8_t>, int);
-template OverlapCounts SceneTreesD::touch_any(std::span<const SegmentD>, std::span<std::uint8_t>,
-                                              int);
-template OverlapCounts SceneTreesD::touch_any(std::span<const SphereD>, std::span<std::uint8_t>,
-                                              int);
+template QueryCounts SceneTrees::touch_any(std::span<const Segment>, std::span<std::uint8_t>, int);
+template QueryCounts SceneTrees::touch_any(std::span<const Sphere>, std::span<std::uint8_t>, int);
+template QueryCounts SceneTreesD::touch_any(std::span<const SegmentD>, std::span<std::uint8_t>,
+                                            int);
+template QueryCounts SceneTreesD::touch_any(std::span<const SphereD>, std::span<std::uint8_t>, int);
 template SceneOverlapLists SceneTrees::touch_all(std::span<const Segment>, std::uint64_t, int);
 template SceneOverlapLists SceneTrees::touch_all(std::span<const Sphere>, std::uint64_t, int);
 template SceneOverlapLists SceneTreesD::touch_all(std::span<const SegmentD>, std::uint64_t, int);

@@ -23,6 +23,7 @@
 #include <shared_mutex>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "array_filter.h"
@@ -43,55 +44,34 @@ private:
     std::optional<double> sah_at_build_;
 };
 
-/// The library's names of things in float32.
-struct InFloat {
-    using Scalar = float;
-    using Point = Vec3;
-    using Box = Aabb;
-    using Transform = raydix::Transform;
-    using Scene = raydix::Scene;
-    using MeshView = raydix::MeshView;
-    using Bvh = raydix::Bvh;
-    using Refitter = raydix::Refitter;
-    using Solid = raydix::Solid;
-    using Ray = raydix::Ray;
-    using Hit = raydix::Hit;
-    using AllHits = raydix::AllHits;
-    using ClosestPoint = SceneClosestPoint;
-    using ClosestOptions = raydix::ClosestOptions;
-    using Sweep = SphereSweep;
-    using SweepHit = SceneSweepHit;
-    using Segment = raydix::Segment;
-    using Sphere = raydix::Sphere;
-    using Capsule = raydix::Capsule;
-    using CameraSet = raydix::CameraSet;
-    using Rdx = RdxScene;
+/// The library's names of things in one number type.
+template <class Scalar_>
+struct NamesIn {
+    using Scalar = Scalar_;
+    static constexpr bool in_float = std::is_same_v<Scalar, float>;
+    using Point = BasicVec3<Scalar>;
+    using Box = BasicAabb<Scalar>;
+    using Transform = BasicTransform<Scalar>;
+    using Scene = BasicScene<Scalar>;
+    using MeshView = BasicMeshView<Scalar>;
+    using Bvh = std::conditional_t<in_float, raydix::Bvh, BvhD>;
+    using Refitter = std::conditional_t<in_float, raydix::Refitter, RefitterD>;
+    using Solid = BasicSolid<Scalar>;
+    using Ray = BasicRay<Scalar>;
+    using Hit = BasicHit<Scalar>;
+    using AllHits = BasicAllHits<Scalar>;
+    using ClosestPoint = BasicSceneClosestPoint<Scalar>;
+    using ClosestOptions = BasicClosestOptions<Scalar>;
+    using Sweep = BasicSphereSweep<Scalar>;
+    using SweepHit = BasicSceneSweepHit<Scalar>;
+    using Segment = BasicSegment<Scalar>;
+    using Sphere = BasicSphere<Scalar>;
+    using Capsule = BasicCapsule<Scalar>;
+    using CameraSet = BasicCameraSet<Scalar>;
+    using Rdx = BasicRdxScene<Scalar>;
 };
-
-/// The same in double.
-struct InDouble {
-    using Scalar = double;
-    using Point = Vec3d;
-    using Box = AabbD;
-    using Transform = TransformD;
-    using Scene = SceneD;
-    using MeshView = MeshViewD;
-    using Bvh = BvhD;
-    using Refitter = RefitterD;
-    using Solid = SolidD;
-    using Ray = RayD;
-    using Hit = HitD;
-    using AllHits = AllHitsD;
-    using ClosestPoint = SceneClosestPointD;
-    using ClosestOptions = ClosestOptionsD;
-    using Sweep = SphereSweepD;
-    using SweepHit = SceneSweepHitD;
-    using Segment = SegmentD;
-    using Sphere = SphereD;
-    using Capsule = CapsuleD;
-    using CameraSet = CameraSetD;
-    using Rdx = RdxSceneD;
-};
+using InFloat = NamesIn<float>;
+using InDouble = NamesIn<double>;
 
 /// A mesh in memory that stays where it is for as long as somebody looks at it. Never null.
 template <class Names>
@@ -237,17 +217,17 @@ public:
     [[nodiscard]] const Scene& traced();
 
     using Point = typename Names::Point;
-    ClosestCounts closest_points(std::span<const Point> queries,
-                                 std::span<typename Names::ClosestPoint> results,
-                                 typename Names::Scalar max_distance, int threads);
+    QueryCounts closest_points(std::span<const Point> queries,
+                               std::span<typename Names::ClosestPoint> results,
+                               typename Names::Scalar max_distance, int threads);
     template <class Shape>
     [[nodiscard]] SceneOverlapLists touch_all(std::span<const Shape> queries,
                                               std::uint64_t max_result_bytes, int threads);
     template <class Shape>
-    OverlapCounts touch_any(std::span<const Shape> queries, std::span<std::uint8_t> touched,
-                            int threads);
-    OverlapCounts sweep_spheres(std::span<const typename Names::Sweep> sweeps,
-                                std::span<typename Names::SweepHit> hits, int threads);
+    QueryCounts touch_any(std::span<const Shape> queries, std::span<std::uint8_t> touched,
+                          int threads);
+    QueryCounts sweep_spheres(std::span<const typename Names::Sweep> sweeps,
+                              std::span<typename Names::SweepHit> hits, int threads);
     /// All meshes as one body, whatever else there is. Throws InputError, which names the call:
     /// what raydix::Solid throws.
     [[nodiscard]] const typename Names::Solid& solid(InsideRule rule, const char* call);

@@ -44,10 +44,10 @@ struct WayOut {
 /// A mesh on a path.
 template <class Scalar>
 struct FlatCopy {
-    using Transform = typename SceneTypes<Scalar>::Transform;
+    using Transform = BasicTransform<Scalar>;
     using Way = WayOut<decltype(affine_of(std::declval<Transform>()))>;
 
-    typename SceneTypes<Scalar>::MeshView mesh;
+    BasicMeshView<Scalar> mesh;
     std::uint64_t first_vertex, first_triangle;
     const std::vector<Way>* ways;
     std::size_t way;  // the innermost one
@@ -56,7 +56,7 @@ struct FlatCopy {
     [[nodiscard]] bool counts(std::uint32_t triangle) const {
         using Source =
             std::conditional_t<std::is_same_v<Scalar, float>, TriangleSource, TriangleSourceD>;
-        typename SceneTypes<Scalar>::Box box;
+        BasicAabb<Scalar> box;
         return Source{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()}.box(
             triangle, box);
     }
@@ -77,8 +77,7 @@ struct FlatCopy {
 /// What a mesh leaves out is nowhere, however near an instance brings it and however large it makes
 /// it: such triangles get the last vertex of `out`, which is no place.
 template <class Scalar>
-void drop_what_meshes_leave_out(std::span<const FlatCopy<Scalar>> copies,
-                                typename SceneTypes<Scalar>::Mesh& out) {
+void drop_what_meshes_leave_out(std::span<const FlatCopy<Scalar>> copies, BasicMesh<Scalar>& out) {
     const auto nowhere = static_cast<std::uint32_t>(out.vertices.size());
     out.vertices.push_back({NAN, NAN, NAN});
     for_each_part_of_copies(
@@ -212,8 +211,8 @@ std::uint64_t FlatPlan<Scalar>::bytes() const {
         saturating_product(all.instances, sizeof(typename FlatCopy<Scalar>::Way)));
     if (is_one_mesh()) return sum;
     sum = saturating_sum(sum, saturating_product(all.triangles, sizeof(Triangle)));
-    return saturating_sum(sum, saturating_product(saturating_sum(all.vertices, 1),
-                                                  sizeof(typename SceneTypes<Scalar>::Point)));
+    return saturating_sum(
+        sum, saturating_product(saturating_sum(all.vertices, 1), sizeof(BasicVec3<Scalar>)));
 }
 
 template <class Scalar>

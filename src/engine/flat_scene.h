@@ -38,8 +38,8 @@ struct FlatNames {
 /// In float or in double.
 template <class Scalar>
 struct FlatScene {
-    using Mesh = typename SceneTypes<Scalar>::Mesh;
-    using MeshView = typename SceneTypes<Scalar>::MeshView;
+    using Mesh = BasicMesh<Scalar>;
+    using MeshView = BasicMeshView<Scalar>;
 
     Mesh own;       // empty if the scene is one mesh that stands where it is
     MeshView mesh;  // of `own`, or of the scene's arrays

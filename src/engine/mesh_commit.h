@@ -34,8 +34,8 @@ class MeshCommit {
 public:
     using State = typename BasicSceneInternals<Scalar>::State;
     using Geometry = typename State::Geometry;
-    using Mesh = typename SceneTypes<Scalar>::Mesh;
-    using MeshView = typename SceneTypes<Scalar>::MeshView;
+    using Mesh = BasicMesh<Scalar>;
+    using MeshView = BasicMeshView<Scalar>;
     using MeshTree = typename SceneKind<Scalar>::MeshTree;
 
     MeshCommit(const State& state, const OwnGeometries<Scalar>& own, const SceneOptions& options,
@@ -152,7 +152,7 @@ private:
     }
 
     void refuse(const MeshTree& tree) const {
-        using Box = typename SceneTypes<Scalar>::Box;
+        using Box = BasicAabb<Scalar>;
         for (const std::uint32_t id : tree.ids) {
             const MeshView& mesh = mesh_of(id);
             refuse_left_out<Box>(id, "triangle", source_of(mesh), mesh.triangles.size(),

@@ -12,7 +12,7 @@ namespace raydix {
 template <class Scalar>
 struct BasicMeshName {
     std::uint32_t id, mask;
-    typename SceneTypes<Scalar>::MeshView mesh;
+    BasicMeshView<Scalar> mesh;
     std::shared_ptr<const void> own;  // its arrays; null if they are the caller's
 };
 using MeshName = BasicMeshName<float>;

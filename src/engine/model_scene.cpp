@@ -18,8 +18,8 @@ namespace {
 
 /// A node's transform and a mesh in the numbers of a scene.
 template <class Scalar>
-typename SceneTypes<Scalar>::Transform transform_as(const TransformD& t) {
-    typename SceneTypes<Scalar>::Transform out;
+BasicTransform<Scalar> transform_as(const TransformD& t) {
+    BasicTransform<Scalar> out;
     for (std::size_t r = 0; r < 3; ++r)
         for (std::size_t c = 0; c < 4; ++c) out.m[r][c] = static_cast<Scalar>(t.m[r][c]);
     return out;
@@ -41,7 +41,7 @@ template <class Scalar>
 void add_mesh(BasicScene<Scalar>& scene, const Model& model, std::uint32_t i) {
     const Mesh& mesh = model.meshes[i];
     if (mesh.triangles.empty())
-        scene.add(typename SceneTypes<Scalar>::MeshView(), {.id = i});
+        scene.add(BasicMeshView<Scalar>(), {.id = i});
     else
         scene.add(mesh_as<Scalar>(mesh), {.id = i});
 }

@@ -117,9 +117,9 @@ private:
 
 }  // namespace
 
-ClosestCounts closest_points(const Scene& scene, std::span<const Vec3> queries,
-                             std::span<SceneClosestPoint> results,
-                             const SceneClosestOptions& options) {
+QueryCounts closest_points(const Scene& scene, std::span<const Vec3> queries,
+                           std::span<SceneClosestPoint> results,
+                           const SceneClosestOptions& options) {
     return closest_batch<Near>(scene, queries, results, options);
 }
 std::vector<SceneClosestPoint> closest_points(const Scene& scene, std::span<const Vec3> queries,
@@ -138,12 +138,12 @@ SceneClosestPoint closest_point(const Scene& scene, Vec3 query, float max_distan
     return Near::Thread(near).closest(query, limit);
 }
 
-OverlapCounts touch_any(const Scene& scene, std::span<const Segment> queries,
-                        std::span<std::uint8_t> touched, const SceneOverlapOptions& options) {
+QueryCounts touch_any(const Scene& scene, std::span<const Segment> queries,
+                      std::span<std::uint8_t> touched, const SceneOverlapOptions& options) {
     return touch_any_batch<Near>(scene, queries, touched, options);
 }
-OverlapCounts touch_any(const Scene& scene, std::span<const Sphere> queries,
-                        std::span<std::uint8_t> touched, const SceneOverlapOptions& options) {
+QueryCounts touch_any(const Scene& scene, std::span<const Sphere> queries,
+                      std::span<std::uint8_t> touched, const SceneOverlapOptions& options) {
     return touch_any_batch<Near>(scene, queries, touched, options);
 }
 bool touches(const Scene& scene, const Segment& segment, std::uint32_t mask) {
@@ -162,8 +162,8 @@ SceneOverlapLists touch_all(const Scene& scene, std::span<const Sphere> queries,
     return touch_all_batch<Near>(scene, queries, options);
 }
 
-OverlapCounts sweep_spheres(const Scene& scene, std::span<const SphereSweep> sweeps,
-                            std::span<SceneSweepHit> hits, const SceneOverlapOptions& options) {
+QueryCounts sweep_spheres(const Scene& scene, std::span<const SphereSweep> sweeps,
+                          std::span<SceneSweepHit> hits, const SceneOverlapOptions& options) {
     return sweep_batch<Near>(scene, sweeps, hits, options);
 }
 std::vector<SceneSweepHit> sweep_spheres(const Scene& scene, std::span<const SphereSweep> sweeps,

@@ -72,10 +72,9 @@ constexpr std::uint64_t bytes_of_ordering = sizeof(place_of(std::declval<Query>(
 /// Calls one(thread, block, i) -> how many were found, for each valid query; done(block) after
 /// those of a block.
 template <class Near, class Query, class One, class Done>
-OverlapCounts for_each_query(const Near& near, std::span<const Query> queries,
-                             std::span<const std::uint32_t> order, const One& one,
-                             const Done& done) {
-    std::vector<OverlapCounts> parts(block_count(queries.size()));
+QueryCounts for_each_query(const Near& near, std::span<const Query> queries,
+                           std::span<const std::uint32_t> order, const One& one, const Done& done) {
+    std::vector<QueryCounts> parts(block_count(queries.size()));
     for_each_query_block(
         queries.size(), order,
         [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
@@ -93,12 +92,12 @@ OverlapCounts for_each_query(const Near& near, std::span<const Query> queries,
 }
 
 template <class Near, class Scene, class Query, class Result, class Options>
-ClosestCounts closest_batch(const Scene& scene, std::span<const Query> queries,
-                            std::span<Result> results, const Options& options) {
+QueryCounts closest_batch(const Scene& scene, std::span<const Query> queries,
+                          std::span<Result> results, const Options& options) {
     require_room(name_of(NearCall::closest), queries.size(), results.size());
     const auto limit = square_limit_of(options.max_distance);
     static_cast<void>(kernels_for(options.isa));  // throws
-    std::vector<ClosestCounts> parts(block_count(queries.size()));
+    std::vector<QueryCounts> parts(block_count(queries.size()));
     with_threads(options.threads, [&] {
         const Near near(scene, options.mask, NearCall::closest, options.isa);
         Buffer<std::uint32_t> order;
@@ -126,11 +125,11 @@ ClosestCounts closest_batch(const Scene& scene, std::span<const Query> queries,
 }
 
 template <class Near, class Scene, class Query>
-OverlapCounts touch_any_batch(const Scene& scene, std::span<const Query> queries,
-                              std::span<std::uint8_t> touched, const SceneOverlapOptions& options) {
+QueryCounts touch_any_batch(const Scene& scene, std::span<const Query> queries,
+                            std::span<std::uint8_t> touched, const SceneOverlapOptions& options) {
     require_room(name_of(NearCall::overlap), queries.size(), touched.size());
     static_cast<void>(kernels_for(options.isa));  // throws
-    OverlapCounts counts;
+    QueryCounts counts;
     with_threads(options.threads, [&] {
         const Near near(scene, options.mask, NearCall::overlap, options.isa);
         std::fill(touched.begin(), touched.end(), std::uint8_t{0});
@@ -163,7 +162,7 @@ SceneOverlapLists touch_all_batch(const Scene& scene, std::span<const Query> que
             budget.give_back(bytes - order.size() * sizeof(std::uint32_t));
         }
         const std::span<const std::uint32_t> in_order = order.view();
-        const OverlapCounts counts = for_each_query(
+        const QueryCounts counts = for_each_query(
             near, queries, in_order,
             [&](auto& thread, std::size_t block, std::size_t i) {
                 return rows.add_row(block, i,
@@ -184,11 +183,11 @@ bool touches_one(const Scene& scene, const Query& query, std::uint32_t mask) {
 }
 
 template <class Near, class Scene, class Sweep, class Hit>
-OverlapCounts sweep_batch(const Scene& scene, std::span<const Sweep> sweeps, std::span<Hit> hits,
-                          const SceneOverlapOptions& options) {
+QueryCounts sweep_batch(const Scene& scene, std::span<const Sweep> sweeps, std::span<Hit> hits,
+                        const SceneOverlapOptions& options) {
     require_room(name_of(NearCall::sweep), sweeps.size(), hits.size());
     static_cast<void>(kernels_for(options.isa));  // throws
-    OverlapCounts counts;
+    QueryCounts counts;
     with_threads(options.threads, [&] {
         const Near near(scene, options.mask, NearCall::sweep, options.isa);
         std::fill(hits.begin(), hits.end(), Hit{});

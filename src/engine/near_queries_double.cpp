@@ -112,9 +112,9 @@ private:
 
 }  // namespace
 
-ClosestCounts closest_points(const SceneD& scene, std::span<const Vec3d> queries,
-                             std::span<SceneClosestPointD> results,
-                             const SceneClosestOptionsD& options) {
+QueryCounts closest_points(const SceneD& scene, std::span<const Vec3d> queries,
+                           std::span<SceneClosestPointD> results,
+                           const SceneClosestOptionsD& options) {
     return closest_batch<Near>(scene, queries, results, options);
 }
 std::vector<SceneClosestPointD> closest_points(const SceneD& scene, std::span<const Vec3d> queries,
@@ -132,12 +132,12 @@ SceneClosestPointD closest_point(const SceneD& scene, Vec3d query, double max_di
     return Near::Thread(near).closest(query, limit);
 }
 
-OverlapCounts touch_any(const SceneD& scene, std::span<const SegmentD> queries,
-                        std::span<std::uint8_t> touched, const SceneOverlapOptions& options) {
+QueryCounts touch_any(const SceneD& scene, std::span<const SegmentD> queries,
+                      std::span<std::uint8_t> touched, const SceneOverlapOptions& options) {
     return touch_any_batch<Near>(scene, queries, touched, options);
 }
-OverlapCounts touch_any(const SceneD& scene, std::span<const SphereD> queries,
-                        std::span<std::uint8_t> touched, const SceneOverlapOptions& options) {
+QueryCounts touch_any(const SceneD& scene, std::span<const SphereD> queries,
+                      std::span<std::uint8_t> touched, const SceneOverlapOptions& options) {
     return touch_any_batch<Near>(scene, queries, touched, options);
 }
 bool touches(const SceneD& scene, const SegmentD& segment, std::uint32_t mask) {
@@ -156,8 +156,8 @@ SceneOverlapLists touch_all(const SceneD& scene, std::span<const SphereD> querie
     return touch_all_batch<Near>(scene, queries, options);
 }
 
-OverlapCounts sweep_spheres(const SceneD& scene, std::span<const SphereSweepD> sweeps,
-                            std::span<SceneSweepHitD> hits, const SceneOverlapOptions& options) {
+QueryCounts sweep_spheres(const SceneD& scene, std::span<const SphereSweepD> sweeps,
+                          std::span<SceneSweepHitD> hits, const SceneOverlapOptions& options) {
     return sweep_batch<Near>(scene, sweeps, hits, options);
 }
 std::vector<SceneSweepHitD> sweep_spheres(const SceneD& scene, std::span<const SphereSweepD> sweeps,

@@ -21,7 +21,7 @@ namespace raydix {
 
 template <class Scalar>
 struct BasicShapePoint {
-    VecOf<Scalar> position;
+    BasicVec3<Scalar> position;
     Scalar u;  // along the axis
     Scalar d2;
 };

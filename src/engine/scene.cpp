@@ -243,8 +243,7 @@ auto BasicSceneInternals<Scalar>::tree(const Scene& scene) -> const std::shared_
 }
 
 template <class Scalar>
-void BasicSceneInternals<Scalar>::place(std::uint32_t id,
-                                        const typename SceneTypes<Scalar>::Transform& transform,
+void BasicSceneInternals<Scalar>::place(std::uint32_t id, const BasicTransform<Scalar>& transform,
                                         typename State::Geometry& geometry) {
     const auto back = way_back(transform);
     if (!back)
@@ -436,7 +435,7 @@ std::uint32_t BasicScene<Scalar>::mask(std::uint32_t id) const {
 }
 
 template <class Scalar>
-typename SceneTypes<Scalar>::Box BasicScene<Scalar>::bounds() const {
+BasicAabb<Scalar> BasicScene<Scalar>::bounds() const {
     return BasicSceneInternals<Scalar>::tree(*this)->bounds;
 }
 

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "base/options.h"
@@ -27,19 +26,13 @@ inline TraceCounts sum_of(const std::vector<JobCounts>& parts, std::size_t rays)
     return sum;
 }
 
-/// Throws InputError: an option out of range, masks for another number of rays, a filter of the
-/// other number type alone, which would have no effect.
+/// Throws InputError: an option out of range, masks for another number of rays.
 template <class Scalar>
-void check_options(std::size_t rays, const SceneTraceOptions& options) {
+void check_options(std::size_t rays, const BasicSceneTraceOptions<Scalar>& options) {
     check_enum("path", options.path, SimdPath::sorted);
     if (!options.masks.empty() && options.masks.size() != rays)
         throw InputError("trace: " + std::to_string(rays) + " rays, but " +
                          std::to_string(options.masks.size()) + " masks");
-    constexpr bool in_float = std::is_same_v<Scalar, float>;
-    const bool mine = in_float ? bool(options.filter) : bool(options.filter_d);
-    if (!mine && (options.filter || options.filter_d))
-        throw InputError(in_float ? "trace: filter_d is of a SceneD; a Scene asks filter"
-                                  : "trace: filter is of a Scene; a SceneD asks filter_d");
 }
 
 }  // namespace raydix

@@ -40,10 +40,12 @@ auto tree_of_body(const BasicScene<Scalar>& scene, const SceneSolidOptions& opti
 
 }  // namespace
 
-Solid::Solid(const BasicScene<float>& scene, const SceneSolidOptions& options)
-    : Solid(tree_of_body(scene, options), {.rule = options.rule, .threads = options.threads}) {}
+template <class Scalar>
+BasicSolid<Scalar>::BasicSolid(const BasicScene<Scalar>& scene, const SceneSolidOptions& options)
+    : BasicSolid(tree_of_body(scene, options), {.rule = options.rule, .threads = options.threads}) {
+}
 
-SolidD::SolidD(const BasicScene<double>& scene, const SceneSolidOptions& options)
-    : SolidD(tree_of_body(scene, options), {.rule = options.rule, .threads = options.threads}) {}
+template Solid::BasicSolid(const Scene& scene, const SceneSolidOptions& options);
+template SolidD::BasicSolid(const SceneD& scene, const SceneSolidOptions& options);
 
 }  // namespace raydix

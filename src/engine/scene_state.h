@@ -44,7 +44,7 @@ struct SceneKind<double> {
 /// A copy of a mesh. Where only vertices move, the triangles stay.
 template <class Scalar>
 struct OwnMesh {
-    using Point = typename SceneTypes<Scalar>::Point;
+    using Point = BasicVec3<Scalar>;
     std::shared_ptr<const std::vector<Triangle>> triangles;
     std::shared_ptr<const std::vector<Point>> vertices;
     Recycler<std::vector<Point>> memory;  // of vertices
@@ -98,7 +98,7 @@ struct BasicSceneInternals {
     /// Throws InputError if there is none.
     static const std::shared_ptr<const Tree>& tree(const Scene& scene);
     /// Gives an instance its transform. Throws InputError if that is singular or not finite.
-    static void place(std::uint32_t id, const typename SceneTypes<Scalar>::Transform& transform,
+    static void place(std::uint32_t id, const BasicTransform<Scalar>& transform,
                       typename State::Geometry& geometry);
 };
 using SceneInternals = BasicSceneInternals<float>;

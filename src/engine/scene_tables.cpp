@@ -18,8 +18,7 @@ namespace {
 
 template <class Scalar>
 class TableWriter {
-    using Types = SceneTypes<Scalar>;
-    using Transform = typename Types::Transform;
+    using Transform = BasicTransform<Scalar>;
     using Tree = typename SceneKind<Scalar>::Tree;
     using ShapeTree = typename SceneKind<Scalar>::ShapeTree;
     using Stored = BasicStoredGeometry<Scalar>;
@@ -61,8 +60,8 @@ private:
         BasicStoredShapes<Scalar> stored{};
         stored.kind = static_cast<std::uint32_t>(tree.shapes.index());
         stored.count = count_of(tree.shapes);
-        using Spheres = std::span<const typename Types::Sphere>;
-        using Capsules = std::span<const typename Types::Capsule>;
+        using Spheres = std::span<const BasicSphere<Scalar>>;
+        using Capsules = std::span<const BasicCapsule<Scalar>>;
         if (const auto* const spheres = std::get_if<Spheres>(&tree.shapes)) {
             out_.spheres.push_back(*spheres);
         } else if (const auto* const capsules = std::get_if<Capsules>(&tree.shapes)) {
@@ -92,7 +91,7 @@ private:
         return *std::ranges::lower_bound(geometries, id, {}, &Stored::id);
     }
 
-    std::uint32_t add_mesh(const typename Types::MeshView& view) {
+    std::uint32_t add_mesh(const BasicMeshView<Scalar>& view) {
         out_.views.push_back(view);
         out_.meshes.push_back({view.vertices.size(), view.triangles.size()});
         return static_cast<std::uint32_t>(out_.meshes.size() - 1);

@@ -45,7 +45,7 @@ struct BasicStoredGeometry {
     std::uint32_t id, mask;
     std::uint32_t kind;    // StoredKind
     std::uint32_t number;  // of the mesh, or none if it has no triangles; of the scene; of shapes
-    typename SceneTypes<Scalar>::Transform transform;  // of an instance
+    BasicTransform<Scalar> transform;  // of an instance
 };
 using StoredGeometry = BasicStoredGeometry<float>;
 using StoredGeometryD = BasicStoredGeometry<double>;
@@ -86,17 +86,16 @@ static_assert(sizeof(StoredTree) == 80);
 /// What is written. Views of `scene` and of what it was made of, which must not change meanwhile.
 template <class Scalar>
 struct BasicSceneTables {
-    using Types = SceneTypes<Scalar>;
     std::vector<StoredScene> scenes;
     std::vector<BasicStoredGeometry<Scalar>> geometries;
     std::vector<StoredMesh> meshes;
     std::vector<BasicStoredShapes<Scalar>> shapes;
-    std::uint64_t next_id = 0;                    // of the whole: all below were given once
-    std::vector<std::uint32_t> taken;             // those above, ascending
-    std::vector<typename Types::MeshView> views;  // [meshes]
-    std::vector<std::span<const typename Types::Sphere>> spheres;  // of each shapes of the kind
-    std::vector<std::span<const typename Types::Capsule>> capsules;
-    std::vector<std::span<const typename Types::Point>> points;
+    std::uint64_t next_id = 0;                 // of the whole: all below were given once
+    std::vector<std::uint32_t> taken;          // those above, ascending
+    std::vector<BasicMeshView<Scalar>> views;  // [meshes]
+    std::vector<std::span<const BasicSphere<Scalar>>> spheres;  // of each shapes of the kind
+    std::vector<std::span<const BasicCapsule<Scalar>>> capsules;
+    std::vector<std::span<const BasicVec3<Scalar>>> points;
     // In float alone:
     std::vector<StoredTree> trees;
     std::vector<const WideBvh*> wide;  // [trees]
@@ -111,18 +110,17 @@ using SceneTablesD = BasicSceneTables<double>;
 /// What is read, wherever it lies.
 template <class Scalar>
 struct BasicSceneArrays {
-    using Types = SceneTypes<Scalar>;
     std::span<const StoredScene> scenes;
     std::span<const BasicStoredGeometry<Scalar>> geometries;
     std::span<const StoredMesh> meshes;
     std::span<const BasicStoredShapes<Scalar>> shapes;
     std::uint64_t next_id = 0;
     std::span<const std::uint32_t> taken;
-    std::span<const typename Types::Point> vertices;
+    std::span<const BasicVec3<Scalar>> vertices;
     std::span<const Triangle> triangles;
-    std::span<const typename Types::Sphere> spheres;
-    std::span<const typename Types::Capsule> capsules;
-    std::span<const typename Types::Point> points;
+    std::span<const BasicSphere<Scalar>> spheres;
+    std::span<const BasicCapsule<Scalar>> capsules;
+    std::span<const BasicVec3<Scalar>> points;
     std::shared_ptr<void> owner;  // keeps all of it alive
     // In float alone:
     std::span<const StoredTree> trees = {};

@@ -237,7 +237,7 @@ const MeshTree* visible_mesh(const SceneTree& tree, const SceneTraceOptions& opt
 TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
     const SceneTree& tree = *SceneInternals::tree(scene);
     const SceneTraceOptions& options = batch.options;
-    check_options<float>(batch.rays.size(), options);
+    check_options(batch.rays.size(), options);
     static_cast<void>(kernels_for(options.isa));
     const MeshTree* const mesh = visible_mesh(tree, options);
     return mesh != nullptr ? trace_mesh(*mesh, batch) : trace_scene(tree, batch);
@@ -339,7 +339,7 @@ void count_steps_on_this_thread(const SceneTree& scene, std::span<const Ray> ray
 
 AllHits trace_all(const Scene& scene, std::span<const Ray> rays, const SceneTraceOptions& options) {
     const SceneTree& tree = *SceneInternals::tree(scene);
-    check_options<float>(rays.size(), options);
+    check_options(rays.size(), options);
     static_cast<void>(kernels_for(options.isa));
     if (const MeshTree* const mesh = visible_mesh(tree, options); mesh && !options.filter)
         return all_hits_of(*mesh, rays, options);

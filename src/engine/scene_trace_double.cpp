@@ -32,7 +32,7 @@ struct Batch {
     std::span<const RayD> rays;
     HitD* hits;
     std::uint8_t* occluded;
-    const SceneTraceOptions& options;
+    const SceneTraceOptionsD& options;
 
     /// Rays first to last - 1, of a batch without masks, or all.
     [[nodiscard]] Batch part(std::size_t first, std::size_t last) const {
@@ -42,14 +42,14 @@ struct Batch {
 };
 
 /// Null: all hits count.
-const HitFilterD* filter_of(const SceneTraceOptions& options) {
-    return options.filter_d ? &options.filter_d : nullptr;
+const HitFilterD* filter_of(const SceneTraceOptionsD& options) {
+    return options.filter ? &options.filter : nullptr;
 }
 
 const SceneTreeD& checked_tree(const SceneD& scene, std::size_t rays,
-                               const SceneTraceOptions& options) {
+                               const SceneTraceOptionsD& options) {
     const SceneTreeD& tree = *SceneInternalsD::tree(scene);
-    check_options<double>(rays, options);
+    check_options(rays, options);
     static_cast<void>(kernels_for(options.isa));
     return tree;
 }
@@ -94,7 +94,7 @@ public:
     Plan(const SceneTreeD& tree, const Batch& batch)
         : tree_(tree),
           automatic_(batch.options.path == SimdPath::automatic),
-          filtered_(bool(batch.options.filter_d)),
+          filtered_(bool(batch.options.filter)),
           look_{batch.options.path, {}, false} {
         const MeshTreeD* const mesh = tree.only_mesh();
         of_mesh_ = mesh != nullptr && !mesh->tree->empty();
@@ -219,38 +219,38 @@ HitD trace_one(const SceneD& scene, const RayD& ray, std::uint32_t mask, const H
 void closest_on_this_thread(const SceneTreeD& scene, std::span<const RayD> rays,
                             std::span<HitD> hits) {
     check_sizes(rays.size(), hits.size());
-    const SceneTraceOptions options;
+    const SceneTraceOptionsD options;
     trace_on_this_thread(scene, {rays, hits.data(), nullptr, options});
 }
 
 void occluded_on_this_thread(const SceneTreeD& scene, std::span<const RayD> rays,
                              std::span<std::uint8_t> occluded) {
     check_sizes(rays.size(), occluded.size());
-    const SceneTraceOptions options;
+    const SceneTraceOptionsD options;
     trace_on_this_thread(scene, {rays, nullptr, occluded.data(), options});
 }
 
 TraceCounts trace(const SceneD& scene, std::span<const RayD> rays, std::span<HitD> hits,
-                  const SceneTraceOptions& options) {
+                  const SceneTraceOptionsD& options) {
     check_sizes(rays.size(), hits.size());
     return trace_batch(scene, {rays, hits.data(), nullptr, options});
 }
 
 std::vector<HitD> trace(const SceneD& scene, std::span<const RayD> rays,
-                        const SceneTraceOptions& options) {
+                        const SceneTraceOptionsD& options) {
     std::vector<HitD> hits(rays.size());
     trace(scene, rays, hits, options);
     return hits;
 }
 
 TraceCounts trace_any(const SceneD& scene, std::span<const RayD> rays,
-                      std::span<std::uint8_t> occluded, const SceneTraceOptions& options) {
+                      std::span<std::uint8_t> occluded, const SceneTraceOptionsD& options) {
     check_sizes(rays.size(), occluded.size());
     return trace_batch(scene, {rays, nullptr, occluded.data(), options});
 }
 
 AllHitsD trace_all(const SceneD& scene, std::span<const RayD> rays,
-                   const SceneTraceOptions& options) {
+                   const SceneTraceOptionsD& options) {
     const SceneTreeD& tree = checked_tree(scene, rays.size(), options);
     const SceneKernelsD& kernels = scene_kernels_double_for(options.isa);
     const Batch batch{rays, nullptr, nullptr, options};

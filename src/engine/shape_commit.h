@@ -81,7 +81,7 @@ private:
     }
     static void refuse(std::uint32_t id, const BasicShapes<Scalar>& shapes,
                        std::uint64_t left_out) {
-        using Box = typename SceneTypes<Scalar>::Box;
+        using Box = BasicAabb<Scalar>;
         const std::vector<Box> boxes = boxes_of<Scalar>(shapes);
         constexpr const char* kinds[] = {"sphere", "capsule", "point", "primitive"};
         refuse_left_out<Box>(id, kinds[shapes.index()], source_of(std::span<const Box>(boxes)),

@@ -79,7 +79,7 @@ Scalar above(Scalar x, Scalar y) {
 
 /// Around the balls at both ends; NaN if they are none.
 template <class Point, class Scalar>
-typename SceneTypes<Scalar>::Box box_around(Point a, Point b, Scalar r) {
+BasicAabb<Scalar> box_around(Point a, Point b, Scalar r) {
     constexpr Scalar nan = std::numeric_limits<Scalar>::quiet_NaN();
     if (!is_finite(a) || !is_finite(b) || !(r >= 0 && r < std::numeric_limits<Scalar>::infinity()))
         return {{nan, nan, nan}, {nan, nan, nan}};
@@ -105,11 +105,11 @@ ExtentD extent_of_shape(const AabbD& box, bool is_users) {
 }  // namespace
 
 template <class Scalar>
-std::vector<typename SceneTypes<Scalar>::Box> boxes_of(const BasicShapes<Scalar>& shapes) {
+std::vector<BasicAabb<Scalar>> boxes_of(const BasicShapes<Scalar>& shapes) {
     if (count_of(shapes) >= most_primitives)
         throw InputError(std::to_string(count_of(shapes)) + " " + kind_of(shapes) +
                          " are too many for one geometry: fewer than 2^28 are allowed");
-    std::vector<typename SceneTypes<Scalar>::Box> boxes;
+    std::vector<BasicAabb<Scalar>> boxes;
     boxes.reserve(count_of(shapes));
     std::visit(
         [&](const auto& all) {

@@ -22,15 +22,15 @@ namespace raydix {
 /// Points with one radius.
 template <class Scalar>
 struct BasicBalls {
-    std::span<const typename SceneTypes<Scalar>::Point> centers;
+    std::span<const BasicVec3<Scalar>> centers;
     Scalar radius;
 };
 
 /// What was added; whose the arrays are its owner knows.
 template <class Scalar>
-using BasicShapes = std::variant<std::span<const typename SceneTypes<Scalar>::Sphere>,
-                                 std::span<const typename SceneTypes<Scalar>::Capsule>,
-                                 BasicBalls<Scalar>, BasicUserGeometry<Scalar>>;
+using BasicShapes =
+    std::variant<std::span<const BasicSphere<Scalar>>, std::span<const BasicCapsule<Scalar>>,
+                 BasicBalls<Scalar>, BasicUserGeometry<Scalar>>;
 using Shapes = BasicShapes<float>;
 
 /// In the order of BasicShapes.
@@ -65,8 +65,7 @@ template <class AnyShapes>
 /// Rounded outward; of what is no shape, a box that builders leave out. Throws InputError: 2^28
 /// primitives or more.
 template <class Scalar>
-[[nodiscard]] std::vector<typename SceneTypes<Scalar>::Box> boxes_of(
-    const BasicShapes<Scalar>& shapes);
+[[nodiscard]] std::vector<BasicAabb<Scalar>> boxes_of(const BasicShapes<Scalar>& shapes);
 extern template std::vector<Aabb> boxes_of<float>(const BasicShapes<float>&);
 extern template std::vector<AabbD> boxes_of<double>(const BasicShapes<double>&);
 

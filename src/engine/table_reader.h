@@ -56,8 +56,7 @@ public:
 
 protected:
     using State = typename BasicSceneInternals<Scalar>::State;
-    using Types = SceneTypes<Scalar>;
-    using View = typename Types::MeshView;
+    using View = BasicMeshView<Scalar>;
     using Stored = BasicStoredGeometry<Scalar>;
     template <class T>
     using Supply = TableSupply<T>;
@@ -104,7 +103,7 @@ private:
     static constexpr bool builds_trees = std::is_same_v<Scalar, double>;
 
     void read_meshes() {
-        Supply<typename Types::Point> vertices("vertices", in_.vertices);
+        Supply<BasicVec3<Scalar>> vertices("vertices", in_.vertices);
         Supply<Triangle> triangles("triangles", in_.triangles);
         for (const StoredMesh& mesh : in_.meshes) {
             const std::string name = "mesh " + std::to_string(meshes_.size());
@@ -128,9 +127,9 @@ private:
     }
 
     void read_shapes() {
-        Supply<typename Types::Sphere> spheres("spheres", in_.spheres);
-        Supply<typename Types::Capsule> capsules("capsules", in_.capsules);
-        Supply<typename Types::Point> points("points", in_.points);
+        Supply<BasicSphere<Scalar>> spheres("spheres", in_.spheres);
+        Supply<BasicCapsule<Scalar>> capsules("capsules", in_.capsules);
+        Supply<BasicVec3<Scalar>> points("points", in_.points);
         for (const BasicStoredShapes<Scalar>& stored : in_.shapes) {
             const std::string name = "shapes " + std::to_string(shapes_.size());
             if (stored.kind == 0)
@@ -198,7 +197,7 @@ private:
             }
             return out;
         }
-        if (const auto zeros = no_transform<typename Types::Transform>();
+        if (const auto zeros = no_transform<BasicTransform<Scalar>>();
             std::memcmp(&stored.transform, &zeros, sizeof(zeros)) != 0)
             fail("geometries", name + " is no instance, but has a transform");
         if (stored.kind == stored_shapes) {

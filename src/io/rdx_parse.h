@@ -2,6 +2,7 @@
 #pragma once
 
 #include <raydix/rdx.h>
+#include <raydix/rdx_tree.h>
 
 #include <cstddef>
 #include <memory>

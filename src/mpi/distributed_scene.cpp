@@ -24,7 +24,7 @@ namespace raydix::mpi {
 
 template <class Scalar>
 struct BasicDistributedScene<Scalar>::State {
-    using Mesh = typename Types::Mesh;
+    using Mesh = BasicMesh<Scalar>;
     using Triangles = std::vector<MovingTriangle<Scalar>>;
     using Box = RankBox<Scalar>;
 
@@ -286,7 +286,7 @@ struct BasicDistributedScene<Scalar>::State {
                                                        mesh->vertices[t[2]]));
         }
         const auto& committed = *BasicSceneInternals<Scalar>::tree(scene);
-        const auto add = [&](const typename Types::Box& box) {
+        const auto add = [&](const BasicAabb<Scalar>& box) {
             if (box.lo.x <= box.hi.x)
                 boxes.push_back({{box.lo.x, box.lo.y, box.lo.z}, {box.hi.x, box.hi.y, box.hi.z}});
         };
@@ -302,9 +302,9 @@ struct BasicDistributedScene<Scalar>::State {
     }
     /// Of each shape, as much larger as the box around all of them is than it need be.
     template <class Shapes, class Add>
-    static void add_boxes_of(const Shapes& shapes, const typename Types::Box& widened,
+    static void add_boxes_of(const Shapes& shapes, const BasicAabb<Scalar>& widened,
                              const Add& add) {
-        const typename Types::Box& tight = shapes.bounds;
+        const BasicAabb<Scalar>& tight = shapes.bounds;
         const Scalar most = std::numeric_limits<Scalar>::max();
         const Scalar by =
             std::nextafter(std::max({tight.lo.x - widened.lo.x, tight.lo.y - widened.lo.y,
@@ -320,7 +320,7 @@ struct BasicDistributedScene<Scalar>::State {
     }
 
     /// Around what all ranks hold.
-    typename Types::Box joined(const typename Types::Box& mine) const {
+    BasicAabb<Scalar> joined(const BasicAabb<Scalar>& mine) const {
         double least[6] = {mine.lo.x,          mine.lo.y,          mine.lo.z,
                            -double(mine.hi.x), -double(mine.hi.y), -double(mine.hi.z)};
         comm.reduce(least, 6, MPI_MIN);
@@ -371,7 +371,7 @@ struct BasicDistributedScene<Scalar>::State {
     BasicScene<Scalar> scene;
     TriangleNames names;
     RankTree<Scalar> tree;
-    typename Types::Box bounds{};
+    BasicAabb<Scalar> bounds{};
     double ray_error = 0;     // the greatest of the extents of shapes and instances, on all ranks
     bool has_others = false;  // than meshes, on this rank
     std::optional<FlatTree<Scalar>> crossings;
@@ -390,7 +390,7 @@ BasicDistributedScene<Scalar>::BasicDistributedScene(MPI_Comm comm,
 namespace {
 
 template <class Scalar>
-auto geometries_of(std::span<const typename SceneTypes<Scalar>::MeshView> meshes) {
+auto geometries_of(std::span<const BasicMeshView<Scalar>> meshes) {
     std::vector<BasicDistributedGeometry<Scalar>> geometries(meshes.size());
     for (std::size_t m = 0; m < meshes.size(); ++m) geometries[m].mesh = meshes[m];
     return geometries;
@@ -482,8 +482,8 @@ HitRows<Scalar> BasicDistributedScene<Scalar>::trace_all(std::span<const Ray> ra
 template <class Scalar>
 auto BasicDistributedScene<Scalar>::closest_points(std::span<const Point> queries,
                                                    Scalar max_distance, std::uint32_t mask) const
-    -> Answers<Closest, ClosestCounts> {
-    return state_->template ask<ClosestPointKind<Scalar>, Answers<Closest, ClosestCounts>>(
+    -> Answers<Closest, QueryCounts> {
+    return state_->template ask<ClosestPointKind<Scalar>, Answers<Closest, QueryCounts>>(
         "closest_points, " + exact_text(max_distance) + ", mask " + std::to_string(mask),
         [&](auto& kind, auto& answers) {
             if (!(max_distance >= 0))
@@ -495,10 +495,10 @@ auto BasicDistributedScene<Scalar>::closest_points(std::span<const Point> querie
 }
 
 template <class Scalar>
-Answers<std::uint8_t, ClosestCounts> BasicDistributedScene<Scalar>::contains(
+Answers<std::uint8_t, QueryCounts> BasicDistributedScene<Scalar>::contains(
     std::span<const Point> queries) const {
     State& s = *state_;
-    return s.template ask<InsideKind<Scalar>, Answers<std::uint8_t, ClosestCounts>>(
+    return s.template ask<InsideKind<Scalar>, Answers<std::uint8_t, QueryCounts>>(
         "contains", [&](auto& kind, auto& answers) {
             kind.emplace(s.crossing_tree(), s.tree, s.options.threads, queries, answers);
         });

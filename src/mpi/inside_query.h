@@ -37,7 +37,7 @@ struct CrossingTree<double> {
 
 template <class T>
 class InsideKind {
-    using Point = typename SceneTypes<T>::Point;
+    using Point = BasicVec3<T>;
     using Bvh = typename CrossingTree<T>::Bvh;
 
 public:
@@ -46,7 +46,7 @@ public:
     static constexpr bool asks_all = true;
 
     InsideKind(const Bvh& triangles, const RankTree<T>& tree, int threads,
-               std::span<const Point> queries, Answers<std::uint8_t, ClosestCounts>& answers)
+               std::span<const Point> queries, Answers<std::uint8_t, QueryCounts>& answers)
         : triangles_(triangles),
           tree_(tree),
           threads_(threads),
@@ -113,7 +113,7 @@ private:
     const RankTree<T>& tree_;
     int threads_;
     std::span<const Point> queries_;
-    Answers<std::uint8_t, ClosestCounts>& answers_;
+    Answers<std::uint8_t, QueryCounts>& answers_;
     std::vector<std::uint8_t> bits_;  // of answers
 };
 

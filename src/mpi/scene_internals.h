@@ -14,7 +14,7 @@ namespace raydix::mpi {
 template <class Scalar>
 struct DistributedSceneInternals {
     using DistributedOf = BasicDistributedScene<Scalar>;
-    using Box = typename SceneTypes<Scalar>::Box;
+    using Box = BasicAabb<Scalar>;
     using Ray = typename DistributedOf::Ray;
     using Hit = typename DistributedOf::Hit;
 

@@ -60,7 +60,7 @@ private:
 /// A triangle that moves to another rank.
 template <class T>
 struct MovingTriangle {
-    using Point = typename SceneTypes<T>::Point;
+    using Point = BasicVec3<T>;
     Point corners[3];
     std::uint32_t mask;
     TriangleName name;

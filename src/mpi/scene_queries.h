@@ -66,18 +66,13 @@ struct SceneParts {
 /// The rays that this rank gave to a call, and what they see.
 template <class T>
 struct GivenRays {
-    std::span<const typename SceneTypes<T>::Ray> rays;
-    TraceOptions options;
+    std::span<const BasicRay<T>> rays;
+    BasicTraceOptions<T> options;
 
     [[nodiscard]] std::uint32_t mask(std::size_t i) const {
         return options.masks.empty() ? options.mask : options.masks[i];
     }
-    [[nodiscard]] const auto& filter() const {
-        if constexpr (sizeof(T) == 4)
-            return options.filter;
-        else
-            return options.filter_d;
-    }
+    [[nodiscard]] const auto& filter() const { return options.filter; }
     /// A call and what must not differ between ranks.
     [[nodiscard]] std::string name(const char* call) const {
         return std::string(call) + (filter() ? ", filtered" : "");
@@ -92,7 +87,7 @@ struct GivenRays {
 /// A ray that travels.
 template <class T>
 struct MaskedRay {
-    typename SceneTypes<T>::Ray ray;
+    BasicRay<T> ray;
     std::uint32_t mask;
 };
 /// Rays that came from other ranks, as a scene takes them.
@@ -110,18 +105,18 @@ public:
         masks_.reserve(given.size());
         for (const MaskedRay<T>& one : given) masks_.push_back(one.mask);
     }
-    [[nodiscard]] std::span<const typename SceneTypes<T>::Ray> rays() const { return rays_; }
-    [[nodiscard]] SceneTraceOptions options(int threads) const {
-        SceneTraceOptions options = options_;
+    [[nodiscard]] std::span<const BasicRay<T>> rays() const { return rays_; }
+    [[nodiscard]] BasicSceneTraceOptions<T> options(int threads) const {
+        BasicSceneTraceOptions<T> options = options_;
         options.masks = masks_;
         options.threads = threads;
         return options;
     }
 
 private:
-    std::vector<typename SceneTypes<T>::Ray> rays_;
+    std::vector<BasicRay<T>> rays_;
     std::vector<std::uint32_t> masks_;  // empty where one serves all
-    SceneTraceOptions options_;
+    BasicSceneTraceOptions<T> options_;
 };
 
 template <class T>
@@ -151,16 +146,12 @@ protected:
         if (is_valid(rays_[i])) parts_.tree.all(most, reach_of(i), found);
     }
     /// What the scene of this rank is asked with.
-    [[nodiscard]] SceneTraceOptions options_of(const ArrivedRays<T>& arrived) const {
-        SceneTraceOptions options = arrived.options(parts_.threads);
+    [[nodiscard]] BasicSceneTraceOptions<T> options_of(const ArrivedRays<T>& arrived) const {
+        BasicSceneTraceOptions<T> options = arrived.options(parts_.threads);
         if (!given_.filter()) return options;
-        const auto filter = [this](std::size_t, const auto& ray, const auto& hit) {
+        options.filter = [this](std::size_t, const auto& ray, const auto& hit) {
             return given_.filter()(ray, parts_.named(hit));
         };
-        if constexpr (sizeof(T) == 4)
-            options.filter = filter;
-        else
-            options.filter_d = filter;
         return options;
     }
     [[nodiscard]] RayReach<T> reach_of(std::size_t i) const {
@@ -173,7 +164,7 @@ protected:
 
     SceneParts<T> parts_;
     GivenRays<T> given_;
-    std::span<const typename SceneTypes<T>::Ray> rays_;
+    std::span<const BasicRay<T>> rays_;
 };
 
 /// Normals of hits at the queries of a call, for pictures.
@@ -271,7 +262,7 @@ private:
     }
     Answers<Hit, TraceCounts>& answers_;
     HitNormals<T>* normals_;
-    std::vector<typename SceneTypes<T>::Hit> found_;  // of answers
+    std::vector<BasicHit<T>> found_;  // of answers
 };
 
 /// Any hit: one rank that says yes is enough.
@@ -331,7 +322,7 @@ public:
             rays, most, out, rows_.limit(),
             [&](std::span<const Question> chunk, std::uint64_t limit) {
                 const ArrivedRays<T> arrived(chunk);
-                SceneTraceOptions options = this->options_of(arrived);
+                BasicSceneTraceOptions<T> options = this->options_of(arrived);
                 options.max_result_bytes = limit;
                 const auto all = raydix::trace_all(this->parts_.scene, arrived.rays(), options);
                 for (std::size_t q = 0; q < chunk.size(); ++q) {
@@ -352,7 +343,7 @@ private:
 template <class T>
 class ClosestPointKind {
     using Closest = BasicDistributedClosest<T>;
-    using Point = typename SceneTypes<T>::Point;
+    using Point = BasicVec3<T>;
 
 public:
     using Scalar = T;
@@ -363,7 +354,7 @@ public:
     static constexpr bool asks_all = false;
 
     ClosestPointKind(const SceneParts<T>& parts, std::span<const Point> queries, T max_distance,
-                     std::uint32_t mask, Answers<Closest, ClosestCounts>& answers)
+                     std::uint32_t mask, Answers<Closest, QueryCounts>& answers)
         : parts_(parts),
           queries_(queries),
           most_d2_(max_distance * max_distance),
@@ -438,7 +429,7 @@ private:
     std::span<const Point> queries_;
     T most_d2_;
     std::uint32_t mask_;
-    Answers<Closest, ClosestCounts>& answers_;
+    Answers<Closest, QueryCounts>& answers_;
     std::vector<BasicSceneClosestPoint<T>> found_;  // of answers
 };
 

@@ -66,8 +66,8 @@ Nearest<Index> nearest_job(const Index& index, PointsOf<Index> queries, std::uin
 
 /// order(queries) -> the order in which to take them.
 template <class Index, class Order>
-PointQueryCounts nearest(const Nearest<Index>& job, const PointQueryOptions& options,
-                         const Order& order_of) {
+QueryCounts nearest(const Nearest<Index>& job, const PointQueryOptions& options,
+                    const Order& order_of) {
     const KernelsOf<Index>& kernels = kernels_for<Index>(options.isa);
     std::vector<PointJobCounts> parts(blocks_of(job.n));
     with_threads(options.threads, [&] {
@@ -99,9 +99,9 @@ std::vector<std::string> point_instruction_sets() {
 }
 
 template <class Index>
-PointQueryCounts knn(const Index& index, PointsOf<Index> queries, std::uint32_t k,
-                     std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
-                     const PointQueryOptions& options) {
+QueryCounts knn(const Index& index, PointsOf<Index> queries, std::uint32_t k,
+                std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
+                const PointQueryOptions& options) {
     check_enum("order", options.order, QueryOrder::sorted);
     require_neighbours(k);
     for (const std::size_t room : {indices.size(), distances.size()})
@@ -185,8 +185,8 @@ PointLists<typename Index::Scalar> radius_search(
 }
 
 template <class Index>
-PointQueryCounts radius_count(const Index& index, PointsOf<Index> queries, ScalarOf<Index> radius,
-                              std::span<std::uint32_t> counts, const PointQueryOptions& options) {
+QueryCounts radius_count(const Index& index, PointsOf<Index> queries, ScalarOf<Index> radius,
+                         std::span<std::uint32_t> counts, const PointQueryOptions& options) {
     check_enum("order", options.order, QueryOrder::sorted);
     check_radius(radius, "");
     if (counts.size() != queries.size())
@@ -196,7 +196,7 @@ PointQueryCounts radius_count(const Index& index, PointsOf<Index> queries, Scala
         within_job(index, values_of<typename Index::Scalar>(queries), queries.size(), options);
     job.radius = radius;
     job.counts = counts.data();
-    PointQueryCounts sum;
+    QueryCounts sum;
     with_threads(options.threads, [&] {
         sum = RowBatch<Index>(index, job, Index::dimension, false, options).count();
     });
@@ -227,10 +227,10 @@ PointLists<typename Index::Scalar> box_search(
 }
 
 template <class Index>
-PointQueryCounts squared_nearest(const Index& index, PointsOf<Index> queries,
-                                 const typename Index::Scalar* most_d2, std::uint32_t k,
-                                 std::span<std::uint32_t> indices, ScalarsOf<Index> d2,
-                                 const PointQueryOptions& options) {
+QueryCounts squared_nearest(const Index& index, PointsOf<Index> queries,
+                            const typename Index::Scalar* most_d2, std::uint32_t k,
+                            std::span<std::uint32_t> indices, ScalarsOf<Index> d2,
+                            const PointQueryOptions& options) {
     Nearest<Index> job = nearest_job(index, queries, k, indices, d2);
     job.most_d2 = most_d2;
     job.squared = true;
@@ -301,9 +301,9 @@ bool visit_radius(const Index& index, const typename Index::Point& query,
 }  // namespace detail
 
 #define RAYDIX_POINT_QUERIES(Index)                                                               \
-    template PointQueryCounts knn(const Index&, PointsOf<Index>, std::uint32_t,                   \
-                                  std::span<std::uint32_t>, ScalarsOf<Index>,                     \
-                                  const PointQueryOptions&);                                      \
+    template QueryCounts knn(const Index&, PointsOf<Index>, std::uint32_t,                        \
+                             std::span<std::uint32_t>, ScalarsOf<Index>,                          \
+                             const PointQueryOptions&);                                           \
     template NearestPoints<Index::Scalar> knn(const Index&, PointsOf<Index>, std::uint32_t,       \
                                               const PointQueryOptions&);                          \
     template std::uint32_t knn(const Index&, const Index::Point&, std::span<std::uint32_t>,       \
@@ -312,8 +312,8 @@ bool visit_radius(const Index& index, const typename Index::Point& query,
                                                      ScalarOf<Index>, const PointQueryOptions&);  \
     template PointLists<Index::Scalar> radius_search(                                             \
         const Index&, PointsOf<Index>, std::span<const Index::Scalar>, const PointQueryOptions&); \
-    template PointQueryCounts radius_count(const Index&, PointsOf<Index>, ScalarOf<Index>,        \
-                                           std::span<std::uint32_t>, const PointQueryOptions&);   \
+    template QueryCounts radius_count(const Index&, PointsOf<Index>, ScalarOf<Index>,             \
+                                      std::span<std::uint32_t>, const PointQueryOptions&);        \
     template std::uint32_t radius_count(const Index&, const Index::Point&, ScalarOf<Index>);      \
     template PointLists<Index::Scalar> box_search(const Index&, std::span<const Index::Box>,      \
                                                   const PointQueryOptions&);                      \
@@ -327,11 +327,11 @@ RAYDIX_POINT_QUERIES(PointsD)
 RAYDIX_POINT_QUERIES(Points2D)
 #undef RAYDIX_POINT_QUERIES
 
-#define RAYDIX_SQUARED_QUERIES(Index)                                                              \
-    template PointQueryCounts squared_nearest(const Index&, PointsOf<Index>, const Index::Scalar*, \
-                                              std::uint32_t, std::span<std::uint32_t>,             \
-                                              ScalarsOf<Index>, const PointQueryOptions&);         \
-    template PointLists<Index::Scalar> squared_radius_search(                                      \
+#define RAYDIX_SQUARED_QUERIES(Index)                                                         \
+    template QueryCounts squared_nearest(const Index&, PointsOf<Index>, const Index::Scalar*, \
+                                         std::uint32_t, std::span<std::uint32_t>,             \
+                                         ScalarsOf<Index>, const PointQueryOptions&);         \
+    template PointLists<Index::Scalar> squared_radius_search(                                 \
         const Index&, PointsOf<Index>, std::span<const Index::Scalar>, const PointQueryOptions&);
 RAYDIX_SQUARED_QUERIES(Points)
 RAYDIX_SQUARED_QUERIES(PointsD)

@@ -74,8 +74,8 @@ Job part_of(Job job, const std::vector<std::uint32_t>& order, std::size_t begin,
     return job;
 }
 
-inline PointQueryCounts sum_of(const std::vector<PointJobCounts>& parts, std::size_t queries) {
-    PointQueryCounts sum;
+inline QueryCounts sum_of(const std::vector<PointJobCounts>& parts, std::size_t queries) {
+    QueryCounts sum;
     sum.queries = queries;
     for (const PointJobCounts& part : parts) {
         sum.invalid_queries += part.invalid;
@@ -105,7 +105,7 @@ public:
           options_(options),
           kernels_(kernels_for<Index>(options.isa)) {}
 
-    PointQueryCounts count() {
+    QueryCounts count() {
         order_ = order_for(index_, job_.queries, job_.n, values_, options_.order);
         parts_.assign(blocks_of(job_.n), {});
         for_each_block(job_.n, queries_per_block,

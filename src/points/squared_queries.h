@@ -11,10 +11,10 @@ namespace raydix {
 
 /// As knn. Of query i only points with d2 <= most_d2[i] count. The caller checks sizes and k.
 template <class Index>
-PointQueryCounts squared_nearest(const Index& index, PointsOf<Index> queries,
-                                 const typename Index::Scalar* most_d2, std::uint32_t k,
-                                 std::span<std::uint32_t> indices, ScalarsOf<Index> d2,
-                                 const PointQueryOptions& options);
+QueryCounts squared_nearest(const Index& index, PointsOf<Index> queries,
+                            const typename Index::Scalar* most_d2, std::uint32_t k,
+                            std::span<std::uint32_t> indices, ScalarsOf<Index> d2,
+                            const PointQueryOptions& options);
 
 /// As radius_search. The caller checks the radii.
 template <class Index>

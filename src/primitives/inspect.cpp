@@ -42,8 +42,8 @@ void inspect_vertices(std::span<const Point> vertices, Info& info) {
     }
 }
 
-template <class Source, class View, class Box>
-void inspect_triangles(const View& mesh, BasicMeshInfo<Box>& info) {
+template <class Source, class Scalar>
+void inspect_triangles(const BasicMeshView<Scalar>& mesh, BasicMeshInfo<Scalar>& info) {
     std::vector<bool> is_used(mesh.vertices.size());
     const Source source{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()};
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
@@ -55,7 +55,7 @@ void inspect_triangles(const View& mesh, BasicMeshInfo<Box>& info) {
         is_used[a] = is_used[b] = is_used[c] = true;
         const bool repeats = a == b || b == c || c == a;
         const auto number = static_cast<std::uint32_t>(i);
-        Box box;
+        BasicAabb<Scalar> box;
         info.repeated_index_triangles += repeats ? 1 : 0;
         info.zero_area_triangles += repeats || is_flat(source, number) ? 1 : 0;
         info.left_out_triangles += source.box(number, box) ? 0 : 1;
@@ -64,9 +64,9 @@ void inspect_triangles(const View& mesh, BasicMeshInfo<Box>& info) {
         static_cast<std::uint64_t>(std::count(is_used.begin(), is_used.end(), false));
 }
 
-template <class Source, class Box, class View>
-BasicMeshInfo<Box> inspect_mesh(const View& mesh) {
-    BasicMeshInfo<Box> info;
+template <class Source, class Scalar>
+BasicMeshInfo<Scalar> inspect_mesh(const BasicMeshView<Scalar>& mesh) {
+    BasicMeshInfo<Scalar> info;
     info.vertices = mesh.vertices.size();
     info.triangles = mesh.triangles.size();
     info.points = mesh.triangles.empty() ? mesh.vertices.size() : 0;
@@ -79,7 +79,7 @@ BasicMeshInfo<Box> inspect_mesh(const View& mesh) {
 
 }  // namespace
 
-MeshInfo inspect(const MeshView& mesh) { return inspect_mesh<TriangleSource, Aabb>(mesh); }
-MeshInfoD inspect(const MeshViewD& mesh) { return inspect_mesh<TriangleSourceD, AabbD>(mesh); }
+MeshInfo inspect(const MeshView& mesh) { return inspect_mesh<TriangleSource>(mesh); }
+MeshInfoD inspect(const MeshViewD& mesh) { return inspect_mesh<TriangleSourceD>(mesh); }
 
 }  // namespace raydix

@@ -26,11 +26,11 @@ Result public_point(const BasicClosestTriangle<Scalar>& best) {
 
 /// Tree: PaddedTree of a Bvh, PaddedTreeD of a BvhD.
 template <class Tree, class AnyBvh, class Vec, class Result>
-ClosestCounts closest_batch(const AnyBvh& bvh, std::span<const Vec> queries,
-                            std::span<Result> results, typename Tree::Scalar limit) {
+QueryCounts closest_batch(const AnyBvh& bvh, std::span<const Vec> queries,
+                          std::span<Result> results, typename Tree::Scalar limit) {
     using Scalar = typename Tree::Scalar;
     const Tree tree(bvh);
-    std::vector<ClosestCounts> parts(block_count(queries.size()));
+    std::vector<QueryCounts> parts(block_count(queries.size()));
     for_each_query_block(
         bvh, queries, [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
             BasicWalkStack<Scalar> stack(tree.max_depth);
@@ -50,9 +50,9 @@ ClosestCounts closest_batch(const AnyBvh& bvh, std::span<const Vec> queries,
                 }
             }
         });
-    ClosestCounts sum;
+    QueryCounts sum;
     sum.queries = queries.size();
-    for (const ClosestCounts& part : parts) {
+    for (const QueryCounts& part : parts) {
         sum.found += part.found;
         sum.invalid_queries += part.invalid_queries;
     }
@@ -72,22 +72,22 @@ Result closest_one(const AnyBvh& bvh, Vec query, typename Tree::Scalar max_dista
 
 }  // namespace
 
-ClosestCounts closest_points(const Bvh& bvh, std::span<const Vec3> queries,
-                             std::span<ClosestPoint> results, const ClosestOptions& options) {
+QueryCounts closest_points(const Bvh& bvh, std::span<const Vec3> queries,
+                           std::span<ClosestPoint> results, const ClosestOptions& options) {
     require_triangles(bvh, "closest points need");
     require_room("closest points", queries.size(), results.size());
     const float limit = square_limit(options.max_distance);
-    ClosestCounts counts;
+    QueryCounts counts;
     with_threads(options.threads,
                  [&] { counts = closest_batch<PaddedTree>(bvh, queries, results, limit); });
     return counts;
 }
 
-ClosestCounts closest_points(const BvhD& bvh, std::span<const Vec3d> queries,
-                             std::span<ClosestPointD> results, const ClosestOptionsD& options) {
+QueryCounts closest_points(const BvhD& bvh, std::span<const Vec3d> queries,
+                           std::span<ClosestPointD> results, const ClosestOptionsD& options) {
     require_room("closest points", queries.size(), results.size());
     const double limit = square_limit(options.max_distance);
-    ClosestCounts counts;
+    QueryCounts counts;
     with_threads(options.threads,
                  [&] { counts = closest_batch<PaddedTreeD>(bvh, queries, results, limit); });
     return counts;

@@ -32,7 +32,7 @@ inline double squared_distance_to_box(const AabbD& box, Vec3d q) {
 
 template <class Scalar>
 struct BasicTrianglePoint {
-    VecOf<Scalar> position;
+    BasicVec3<Scalar> position;
     Scalar u, v;  // weights of v1 and v2
     Scalar d2;
 };
@@ -165,7 +165,7 @@ RAYDIX_HD inline auto closest_on_triangle(const Corners& t, Vec q) {
     using Scalar = decltype(q.x);
     const CandidatePoint best = closest_candidate(t, Double3(q));
     // Rounding must not carry the point out of the boxes that the tree has around the triangle.
-    const BoxOf<Scalar> box = box_of(t.v0, t.v1, t.v2);
+    const BasicAabb<Scalar> box = box_of(t.v0, t.v1, t.v2);
     Vec position;
     best.position.round_to(position);
     position = without_negative_zero(min_of(max_of(position, box.lo), box.hi));

@@ -64,8 +64,8 @@ struct PaddedTreeD : TriangleTreeD {
 
 /// Takes the triangle at `position` if its (d2, prim) is less.
 template <class Tree, class Scalar>
-RAYDIX_HD inline void try_triangle(const Tree& tree, std::uint32_t position, VecOf<Scalar> query,
-                                   BasicClosestTriangle<Scalar>& best) {
+RAYDIX_HD inline void try_triangle(const Tree& tree, std::uint32_t position,
+                                   BasicVec3<Scalar> query, BasicClosestTriangle<Scalar>& best) {
     const auto& t = tree.triangles[position];
     if (squared_distance_to_box(box_of(t.v0, t.v1, t.v2), query) > best.point.d2) return;
     const BasicTrianglePoint<Scalar> point = closest_on_triangle(t, query);
@@ -79,7 +79,7 @@ RAYDIX_HD inline void try_triangle(const Tree& tree, std::uint32_t position, Vec
 /// empty. Tree: TriangleTree, PaddedTree or PaddedTreeD; distances and stack go with it.
 template <class Tree, class Distances, class Stack>
 RAYDIX_HD BasicClosestTriangle<typename Tree::Scalar> find_closest_triangle(
-    const Tree& tree, const Distances& distances, VecOf<typename Tree::Scalar> query,
+    const Tree& tree, const Distances& distances, BasicVec3<typename Tree::Scalar> query,
     typename Tree::Scalar limit, std::uint32_t guess, Stack& stack) {
     BasicClosestTriangle<typename Tree::Scalar> best{{{}, 0, 0, limit}};
     if (guess != no_primitive) try_triangle(tree, guess, query, best);
@@ -95,7 +95,7 @@ RAYDIX_HD BasicClosestTriangle<typename Tree::Scalar> find_closest_triangle(
 
 template <class Tree, class Stack>
 BasicClosestTriangle<typename Tree::Scalar> find_closest_triangle(
-    const Tree& tree, VecOf<typename Tree::Scalar> query, typename Tree::Scalar limit,
+    const Tree& tree, BasicVec3<typename Tree::Scalar> query, typename Tree::Scalar limit,
     std::uint32_t guess, Stack& stack) {
     return find_closest_triangle(tree, tree.distances(query), query, limit, guess, stack);
 }

@@ -44,10 +44,9 @@ constexpr std::uint64_t ordering_bytes = sizeof(place_of(std::declval<Query>()))
 /// Calls one(block, i, stack) -> how many were found, for each valid query; done(block) after those
 /// of a block. `order` as order_of() gives it.
 template <class Tree, class Query, class One, class Done>
-OverlapCounts for_each_query(const Tree& tree, std::span<const Query> queries,
-                             std::span<const std::uint32_t> order, const One& one,
-                             const Done& done) {
-    std::vector<OverlapCounts> parts(block_count(queries.size()));
+QueryCounts for_each_query(const Tree& tree, std::span<const Query> queries,
+                           std::span<const std::uint32_t> order, const One& one, const Done& done) {
+    std::vector<QueryCounts> parts(block_count(queries.size()));
     for_each_query_block(
         queries.size(), order,
         [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
@@ -61,9 +60,9 @@ OverlapCounts for_each_query(const Tree& tree, std::span<const Query> queries,
             }
             done(block);
         });
-    OverlapCounts sum;
+    QueryCounts sum;
     sum.queries = queries.size();
-    for (const OverlapCounts& part : parts) {
+    for (const QueryCounts& part : parts) {
         sum.found += part.found;
         sum.invalid_queries += part.invalid_queries;
     }
@@ -78,12 +77,12 @@ bool touches_any(const Tree& tree, const Query& query, Stack& stack) {
 }
 
 template <class AnyBvh, class Query>
-OverlapCounts any_batch(const AnyBvh& bvh, std::span<const Query> queries,
-                        std::span<std::uint8_t> touched, const OverlapOptions& options) {
+QueryCounts any_batch(const AnyBvh& bvh, std::span<const Query> queries,
+                      std::span<std::uint8_t> touched, const OverlapOptions& options) {
     require_triangles(bvh, what);
     require_room("overlap queries", queries.size(), touched.size());
     std::fill(touched.begin(), touched.end(), std::uint8_t{0});
-    OverlapCounts counts;
+    QueryCounts counts;
     const auto tree = padded_tree(bvh);
     with_threads(options.threads, [&] {
         counts = for_each_query(
@@ -114,7 +113,7 @@ OverlapLists all_batch(const AnyBvh& bvh, std::span<const Query> queries,
             budget.give_back(bytes - order.size() * sizeof(std::uint32_t));
         }
         const std::span<const std::uint32_t> in_order = order.view();
-        const OverlapCounts counts = for_each_query(
+        const QueryCounts counts = for_each_query(
             tree, queries, in_order,
             [&](std::size_t block, std::size_t i, auto& stack) {
                 return rows.add_row(block, i, [&](auto& ids) {
@@ -144,12 +143,12 @@ bool touches_one(const AnyBvh& bvh, const Query& query) {
 
 }  // namespace
 
-OverlapCounts touch_any(const Bvh& bvh, std::span<const Segment> queries,
-                        std::span<std::uint8_t> touched, const OverlapOptions& options) {
+QueryCounts touch_any(const Bvh& bvh, std::span<const Segment> queries,
+                      std::span<std::uint8_t> touched, const OverlapOptions& options) {
     return any_batch(bvh, queries, touched, options);
 }
-OverlapCounts touch_any(const Bvh& bvh, std::span<const Sphere> queries,
-                        std::span<std::uint8_t> touched, const OverlapOptions& options) {
+QueryCounts touch_any(const Bvh& bvh, std::span<const Sphere> queries,
+                      std::span<std::uint8_t> touched, const OverlapOptions& options) {
     return any_batch(bvh, queries, touched, options);
 }
 bool touches(const Bvh& bvh, const Segment& segment) { return touches_one(bvh, segment); }
@@ -164,12 +163,12 @@ OverlapLists touch_all(const Bvh& bvh, std::span<const Sphere> queries,
     return all_batch(bvh, queries, options);
 }
 
-OverlapCounts touch_any(const BvhD& bvh, std::span<const SegmentD> queries,
-                        std::span<std::uint8_t> touched, const OverlapOptions& options) {
+QueryCounts touch_any(const BvhD& bvh, std::span<const SegmentD> queries,
+                      std::span<std::uint8_t> touched, const OverlapOptions& options) {
     return any_batch(bvh, queries, touched, options);
 }
-OverlapCounts touch_any(const BvhD& bvh, std::span<const SphereD> queries,
-                        std::span<std::uint8_t> touched, const OverlapOptions& options) {
+QueryCounts touch_any(const BvhD& bvh, std::span<const SphereD> queries,
+                      std::span<std::uint8_t> touched, const OverlapOptions& options) {
     return any_batch(bvh, queries, touched, options);
 }
 bool touches(const BvhD& bvh, const SegmentD& segment) { return touches_one(bvh, segment); }

@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include "base/float_env.h"
@@ -75,8 +76,10 @@ struct SolidState {
 
 }  // namespace
 
-struct Solid::State : SolidState<TriangleTree, Bvh> {};
-struct SolidD::State : SolidState<TriangleTreeD, BvhD> {};
+template <class Scalar>
+struct BasicSolid<Scalar>::State
+    : SolidState<std::conditional_t<std::is_same_v<Scalar, float>, TriangleTree, TriangleTreeD>,
+                 Tree> {};
 
 struct SolidInternals {
     template <class AnySolid>
@@ -102,7 +105,7 @@ public:
         : inside_(*state.inside), tree_(state.single()), stack_(tree_.max_depth) {}
 
     /// `query` must be finite.
-    Winding operator()(VecOf<typename Tree::Scalar> query) {
+    Winding operator()(BasicVec3<typename Tree::Scalar> query) {
         if (tree_.empty) return {0.0, false};
         if (inside_.rule == InsideRule::winding) {
             const double number = inside_.winding->at(tree_, query, stack_);
@@ -131,9 +134,9 @@ Winding test_one(const AnySolid& solid, Vec query) {
 
 /// Calls one(i, winding) for each query and bad(i) for those that are not finite.
 template <class AnySolid, class Vec, class One, class Bad>
-ClosestCounts for_each_query(const AnySolid& solid, std::span<const Vec> queries, const One& one,
-                             const Bad& bad) {
-    std::vector<ClosestCounts> parts(block_count(queries.size()));
+QueryCounts for_each_query(const AnySolid& solid, std::span<const Vec> queries, const One& one,
+                           const Bad& bad) {
+    std::vector<QueryCounts> parts(block_count(queries.size()));
     for_each_query_block(
         solid.bvh(), queries,
         [&](std::size_t block, std::size_t begin, std::size_t end, const auto& at) {
@@ -150,9 +153,9 @@ ClosestCounts for_each_query(const AnySolid& solid, std::span<const Vec> queries
                 one(i, winding);
             }
         });
-    ClosestCounts sum;
+    QueryCounts sum;
     sum.queries = queries.size();
-    for (const ClosestCounts& part : parts) {
+    for (const QueryCounts& part : parts) {
         sum.found += part.found;
         sum.invalid_queries += part.invalid_queries;
     }
@@ -165,10 +168,10 @@ Scalar with_sign(Scalar distance, bool inside) {
 }
 
 template <class AnySolid, class Vec>
-ClosestCounts contains_batch(const AnySolid& solid, std::span<const Vec> queries,
-                             std::span<std::uint8_t> inside, int threads) {
+QueryCounts contains_batch(const AnySolid& solid, std::span<const Vec> queries,
+                           std::span<std::uint8_t> inside, int threads) {
     require_room("contains", queries.size(), inside.size());
-    ClosestCounts counts;
+    QueryCounts counts;
     with_threads(threads, [&] {
         counts = for_each_query(
             solid, queries, [&](std::size_t i, Winding w) { inside[i] = w.inside; },
@@ -178,11 +181,11 @@ ClosestCounts contains_batch(const AnySolid& solid, std::span<const Vec> queries
 }
 
 template <class Result, class AnySolid, class Vec, class Scalar, class Options>
-ClosestCounts signed_batch(const AnySolid& solid, std::span<const Vec> queries,
-                           std::span<Scalar> distances, const Options& options) {
+QueryCounts signed_batch(const AnySolid& solid, std::span<const Vec> queries,
+                         std::span<Scalar> distances, const Options& options) {
     require_room("signed distances", queries.size(), distances.size());
     std::vector<Result> points(queries.size());
-    const ClosestCounts counts =
+    const QueryCounts counts =
         closest_points(solid.bvh(), queries, std::span<Result>(points), options);
     with_threads(options.threads, [&] {
         for_each_query(
@@ -209,44 +212,50 @@ std::vector<double> winding_batch(const AnySolid& solid, std::span<const Vec> qu
 
 }  // namespace
 
-Solid::Solid(const Bvh& bvh, const SolidOptions& options) : state_(std::make_unique<State>()) {
-    require_triangles(bvh, "a solid needs");
+template <class Scalar>
+BasicSolid<Scalar>::BasicSolid(const Tree& bvh, const SolidOptions& options)
+    : state_(std::make_unique<State>()) {
+    if constexpr (std::is_same_v<Tree, Bvh>) require_triangles(bvh, "a solid needs");
     with_threads(options.threads, [&] { state_->prepare(bvh, options.rule); });
 }
-Solid::Solid(std::shared_ptr<const Bvh> bvh, const SolidOptions& options) : Solid(*bvh, options) {
+template <class Scalar>
+BasicSolid<Scalar>::BasicSolid(std::shared_ptr<const Tree> bvh, const SolidOptions& options)
+    : BasicSolid(*bvh, options) {
     state_->kept = std::move(bvh);
 }
-Solid::~Solid() = default;
-Solid::Solid(Solid&&) noexcept = default;
-Solid& Solid::operator=(Solid&&) noexcept = default;
+template <class Scalar>
+BasicSolid<Scalar>::~BasicSolid() = default;
+template <class Scalar>
+BasicSolid<Scalar>::BasicSolid(BasicSolid&&) noexcept = default;
+template <class Scalar>
+BasicSolid<Scalar>& BasicSolid<Scalar>::operator=(BasicSolid&&) noexcept = default;
 
-SolidD::SolidD(const BvhD& bvh, const SolidOptions& options) : state_(std::make_unique<State>()) {
-    with_threads(options.threads, [&] { state_->prepare(bvh, options.rule); });
+template <class Scalar>
+Closure BasicSolid<Scalar>::closure() const {
+    return state_->inside->closure();
 }
-SolidD::SolidD(std::shared_ptr<const BvhD> bvh, const SolidOptions& options)
-    : SolidD(*bvh, options) {
-    state_->kept = std::move(bvh);
+template <class Scalar>
+InsideRule BasicSolid<Scalar>::rule() const {
+    return state_->inside->rule;
 }
-SolidD::~SolidD() = default;
-SolidD::SolidD(SolidD&&) noexcept = default;
-SolidD& SolidD::operator=(SolidD&&) noexcept = default;
+template <class Scalar>
+std::uint64_t BasicSolid<Scalar>::open_edges() const {
+    return state_->inside->edges.odd;
+}
+template <class Scalar>
+const typename BasicSolid<Scalar>::Tree& BasicSolid<Scalar>::bvh() const {
+    return *state_->bvh;
+}
 
-Closure Solid::closure() const { return state_->inside->closure(); }
-InsideRule Solid::rule() const { return state_->inside->rule; }
-std::uint64_t Solid::open_edges() const { return state_->inside->edges.odd; }
-const Bvh& Solid::bvh() const { return *state_->bvh; }
+template class BasicSolid<float>;
+template class BasicSolid<double>;
 
-Closure SolidD::closure() const { return state_->inside->closure(); }
-InsideRule SolidD::rule() const { return state_->inside->rule; }
-std::uint64_t SolidD::open_edges() const { return state_->inside->edges.odd; }
-const BvhD& SolidD::bvh() const { return *state_->bvh; }
-
-ClosestCounts contains(const Solid& solid, std::span<const Vec3> queries,
-                       std::span<std::uint8_t> inside, int threads) {
+QueryCounts contains(const Solid& solid, std::span<const Vec3> queries,
+                     std::span<std::uint8_t> inside, int threads) {
     return contains_batch(solid, queries, inside, threads);
 }
-ClosestCounts contains(const SolidD& solid, std::span<const Vec3d> queries,
-                       std::span<std::uint8_t> inside, int threads) {
+QueryCounts contains(const SolidD& solid, std::span<const Vec3d> queries,
+                     std::span<std::uint8_t> inside, int threads) {
     return contains_batch(solid, queries, inside, threads);
 }
 
@@ -259,12 +268,12 @@ bool contains(const SolidD& solid, Vec3d query) {
     return is_finite(query) && test_one(solid, query).inside;
 }
 
-ClosestCounts signed_distances(const Solid& solid, std::span<const Vec3> queries,
-                               std::span<float> distances, const ClosestOptions& options) {
+QueryCounts signed_distances(const Solid& solid, std::span<const Vec3> queries,
+                             std::span<float> distances, const ClosestOptions& options) {
     return signed_batch<ClosestPoint>(solid, queries, distances, options);
 }
-ClosestCounts signed_distances(const SolidD& solid, std::span<const Vec3d> queries,
-                               std::span<double> distances, const ClosestOptionsD& options) {
+QueryCounts signed_distances(const SolidD& solid, std::span<const Vec3d> queries,
+                             std::span<double> distances, const ClosestOptionsD& options) {
     return signed_batch<ClosestPointD>(solid, queries, distances, options);
 }
 

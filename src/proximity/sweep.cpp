@@ -15,10 +15,10 @@ namespace {
 constexpr const char* what = "sweeps need";
 
 template <class Kind, class AnyBvh, class Sweep>
-OverlapCounts sweep_batch(const AnyBvh& bvh, std::span<const Sweep> sweeps,
-                          std::span<typename Kind::Hit> hits) {
+QueryCounts sweep_batch(const AnyBvh& bvh, std::span<const Sweep> sweeps,
+                        std::span<typename Kind::Hit> hits) {
     const typename Kind::Tree tree(bvh);
-    std::vector<OverlapCounts> parts(block_count(sweeps.size()));
+    std::vector<QueryCounts> parts(block_count(sweeps.size()));
     for_each_block(sweeps.size(), queries_per_block,
                    [&](std::size_t block, std::size_t begin, std::size_t end) {
                        BasicWalkStack<typename Kind::Tree::Scalar> stack(tree.max_depth);
@@ -31,9 +31,9 @@ OverlapCounts sweep_batch(const AnyBvh& bvh, std::span<const Sweep> sweeps,
                            parts[block].found += hits[i].hit();
                        }
                    });
-    OverlapCounts sum;
+    QueryCounts sum;
     sum.queries = sweeps.size();
-    for (const OverlapCounts& part : parts) {
+    for (const QueryCounts& part : parts) {
         sum.found += part.found;
         sum.invalid_queries += part.invalid_queries;
     }
@@ -41,11 +41,11 @@ OverlapCounts sweep_batch(const AnyBvh& bvh, std::span<const Sweep> sweeps,
 }
 
 template <class AnyBvh, class Sweep, class AnyHit>
-OverlapCounts sweep_all(const AnyBvh& bvh, std::span<const Sweep> sweeps, std::span<AnyHit> hits,
-                        const OverlapOptions& options) {
+QueryCounts sweep_all(const AnyBvh& bvh, std::span<const Sweep> sweeps, std::span<AnyHit> hits,
+                      const OverlapOptions& options) {
     require_triangles(bvh, what);
     require_room("sweeps", sweeps.size(), hits.size());
-    OverlapCounts counts;
+    QueryCounts counts;
     with_threads(options.threads, [&] {
         counts = sweep_batch<SweepsOf<std::remove_cvref_t<decltype(bvh)>>>(bvh, sweeps, hits);
     });
@@ -64,8 +64,8 @@ auto sweep_single(const AnyBvh& bvh, const Sweep& sweep) {
 
 }  // namespace
 
-OverlapCounts sweep_spheres(const Bvh& bvh, std::span<const SphereSweep> sweeps,
-                            std::span<SweepHit> hits, const OverlapOptions& options) {
+QueryCounts sweep_spheres(const Bvh& bvh, std::span<const SphereSweep> sweeps,
+                          std::span<SweepHit> hits, const OverlapOptions& options) {
     return sweep_all(bvh, sweeps, hits, options);
 }
 std::vector<SweepHit> sweep_spheres(const Bvh& bvh, std::span<const SphereSweep> sweeps,
@@ -76,8 +76,8 @@ std::vector<SweepHit> sweep_spheres(const Bvh& bvh, std::span<const SphereSweep>
 }
 SweepHit sweep_sphere(const Bvh& bvh, const SphereSweep& sweep) { return sweep_single(bvh, sweep); }
 
-OverlapCounts sweep_spheres(const BvhD& bvh, std::span<const SphereSweepD> sweeps,
-                            std::span<SweepHitD> hits, const OverlapOptions& options) {
+QueryCounts sweep_spheres(const BvhD& bvh, std::span<const SphereSweepD> sweeps,
+                          std::span<SweepHitD> hits, const OverlapOptions& options) {
     return sweep_all(bvh, sweeps, hits, options);
 }
 std::vector<SweepHitD> sweep_spheres(const BvhD& bvh, std::span<const SphereSweepD> sweeps,

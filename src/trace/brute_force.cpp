@@ -20,7 +20,7 @@ void closest_of_all(const Source& source, std::uint32_t count, const AnyRay& ray
     const BasicRayFrame<Scalar> frame = make_frame(ray);
     best.t = frame.tmax;
     for (std::uint32_t i = 0; i < count; ++i) {
-        BoxOf<Scalar> box;
+        BasicAabb<Scalar> box;
         if (!source.box(i, box)) continue;
         BasicTriangleHit<Scalar> hit;
         if (!intersect_triangle<EdgeRule::closed>(frame, source.corners(i), best.t, hit)) continue;

@@ -24,7 +24,7 @@ RAYDIX_HD inline double component(Vec3d v, int axis) {
 /// What the triangle test reads.
 template <class Scalar>
 struct BasicTriangleRay {
-    VecOf<Scalar> origin, direction;  // the direction scaled
+    BasicVec3<Scalar> origin, direction;  // the direction scaled
     int kx, ky, kz;  // kz: the longest axis of the direction; kx, ky keep the winding
     Scalar shear_x, shear_y;
     Scalar tmin;  // in units of the scaled direction, within [0, largest number], as tmax is
@@ -34,7 +34,7 @@ using TriangleRayD = BasicTriangleRay<double>;
 
 template <class Scalar>
 struct BasicRayFrame : BasicTriangleRay<Scalar> {
-    VecOf<Scalar> inverse;  // 1 / direction; Inf for components of 0, with their sign
+    BasicVec3<Scalar> inverse;  // 1 / direction; Inf for components of 0, with their sign
     Scalar tmax;
     Scalar t_scale;  // t of the caller = t_scale * t of this frame; a power of two
 };
@@ -46,7 +46,7 @@ template <class AnyRay>
 RAYDIX_HD inline bool is_valid_ray(const AnyRay& ray) {
     using Scalar = decltype(ray.tmin);
     const auto finite = [](Scalar x) { return std::fabs(x) <= std::numeric_limits<Scalar>::max(); };
-    const VecOf<Scalar> o = ray.origin, d = ray.direction;
+    const BasicVec3<Scalar> o = ray.origin, d = ray.direction;
     return finite(o.x) && finite(o.y) && finite(o.z) && finite(d.x) && finite(d.y) && finite(d.z) &&
            (d.x != 0 || d.y != 0 || d.z != 0) && ray.tmin <= ray.tmax && ray.tmax >= 0;
 }
@@ -80,7 +80,7 @@ RAYDIX_HD inline BasicRayFrame<Scalar> make_frame(const AnyRay& ray) {
                  az = std::fabs(ray.direction.z);
     const Scalar longest = max_of(max_of(ax, ay), az);
     const Scalar scale = direction_scale(longest);
-    const VecOf<Scalar> d = ray.direction * scale;
+    const BasicVec3<Scalar> d = ray.direction * scale;
     frame.kz = az == longest ? 2 : ay == longest ? 1 : 0;
     frame.kx = frame.kz == 2 ? 0 : frame.kz + 1;
     frame.ky = frame.kx == 2 ? 0 : frame.kx + 1;

@@ -22,8 +22,8 @@ namespace raydix {
 /// the origin on its way to that point 1), and the pad is 64.
 template <class Scalar>
 struct BasicSlabFrame {
-    VecOf<Scalar> origin, inverse;
-    VecOf<Scalar> near_pad,
+    BasicVec3<Scalar> origin, inverse;
+    BasicVec3<Scalar> near_pad,
         far_pad;  // with sign: near planes move toward the ray's start, far planes away from it
     int near_x, near_y,
         near_z;  // offset of the near plane in the eight floats of a node: 0 lo, 4 hi
@@ -47,17 +47,17 @@ RAYDIX_HD inline BasicSlabFrame<Scalar> make_slab_frame(const BasicRayFrame<Scal
     const auto reach = [](float lo, float hi, Scalar o) {
         return max_of(std::fabs(lo - o), std::fabs(hi - o));
     };
-    const VecOf<Scalar> far{reach(root.lo.x, root.hi.x, ray.origin.x),
-                            reach(root.lo.y, root.hi.y, ray.origin.y),
-                            reach(root.lo.z, root.hi.z, ray.origin.z)};
+    const BasicVec3<Scalar> far{reach(root.lo.x, root.hi.x, ray.origin.x),
+                                reach(root.lo.y, root.hi.y, ray.origin.y),
+                                reach(root.lo.z, root.hi.z, ray.origin.z)};
     const Scalar far_z = component(far, ray.kz);
     const auto pad_of = [&](Scalar far_a) {
         return slab_pad_of<Scalar> * (far_a + far_z) + least_slab_pad;
     };
-    const VecOf<Scalar> pad{pad_of(far.x), pad_of(far.y), pad_of(far.z)};
+    const BasicVec3<Scalar> pad{pad_of(far.x), pad_of(far.y), pad_of(far.z)};
     const bool nx = std::signbit(ray.inverse.x), ny = std::signbit(ray.inverse.y),
                nz = std::signbit(ray.inverse.z);
-    const VecOf<Scalar> near_pad{nx ? pad.x : -pad.x, ny ? pad.y : -pad.y, nz ? pad.z : -pad.z};
+    const BasicVec3<Scalar> near_pad{nx ? pad.x : -pad.x, ny ? pad.y : -pad.y, nz ? pad.z : -pad.z};
     return {ray.origin, ray.inverse, near_pad,  Scalar(-1) * near_pad,
             nx ? 4 : 0, ny ? 4 : 0,  nz ? 4 : 0};
 }

@@ -50,8 +50,8 @@ using ShearedVertexD = BasicShearedVertex<double>;
 
 template <class Scalar>
 RAYDIX_HD inline BasicShearedVertex<Scalar> shear(const BasicTriangleRay<Scalar>& ray,
-                                                  VecOf<Scalar> vertex) {
-    const VecOf<Scalar> v = vertex - ray.origin;
+                                                  BasicVec3<Scalar> vertex) {
+    const BasicVec3<Scalar> v = vertex - ray.origin;
     const Scalar z = component(v, ray.kz);
     return {component(v, ray.kx) - ray.shear_x * z, component(v, ray.ky) - ray.shear_y * z, z};
 }

@@ -5,6 +5,7 @@
 #include <raydix/device.h>
 #include <raydix/device_cwbvh.h>
 #include <raydix/device_trees.h>
+#include <raydix/double.h>
 #include <raydix/hierarchy_study.h>
 #include <raydix/kdtree.h>
 #include <raydix/octree.h>

@@ -431,10 +431,10 @@ TEST(Answers, DoubleIsDouble) {
         options.mask = filtered ? 1u : RAYDIX_ALL;
         options.filter = filtered ? refuse_thirds_d : nullptr;
         options.user = &user;
-        SceneTraceOptions how;
+        SceneTraceOptionsD how;
         how.mask = options.mask;
         if (filtered)
-            how.filter_d = [](std::size_t, const RayD&, const HitD& hit) {
+            how.filter = [](std::size_t, const RayD&, const HitD& hit) {
                 return counts_prim(hit.prim);
             };
         ASSERT_OK(raydix_trace_closest_d(scene, c_rays(rays), rays.size(), hits.data(), &options));

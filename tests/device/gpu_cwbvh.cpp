@@ -7,6 +7,7 @@
 #include <raydix/device_cwbvh.h>
 #include <raydix/device_scene.h>
 #include <raydix/raydix.h>
+#include <raydix/trace.h>
 
 #include <cmath>
 #include <cstring>

@@ -2,6 +2,7 @@
 // that a tree built and traced on either is the same. Needs no device.
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
+#include <raydix/trace.h>
 
 #include <algorithm>
 #include <cstring>

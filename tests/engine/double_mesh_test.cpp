@@ -71,7 +71,7 @@ std::vector<RayD> rays_to_hits(std::span<const RayD> rays, std::span<const HitD>
 }
 
 std::size_t differences(const SceneD& scene, std::span<const RayD> rays,
-                        std::span<const HitD> wanted, const SceneTraceOptions& options) {
+                        std::span<const HitD> wanted, const SceneTraceOptionsD& options) {
     std::vector<HitD> hits(rays.size());
     std::vector<std::uint8_t> occluded(rays.size(), 7);
     const TraceCounts closest = trace(scene, rays, hits, options),
@@ -94,7 +94,7 @@ void expect_hits_of_all_triangles(const MeshD& mesh, std::span<const RayD> rays)
         SCOPED_TRACE(static_cast<int>(quality));
         const SceneD scene(mesh, {.quality = quality});
         for (const std::string& isa : simd_instruction_sets()) {
-            SceneTraceOptions options;
+            SceneTraceOptionsD options;
             options.isa = isa, options.threads = 1;
             for (const SimdPath path : {SimdPath::single, SimdPath::packet, SimdPath::sorted}) {
                 options.path = path;
@@ -205,7 +205,7 @@ TEST(DoubleMesh, RaysThatAreNoneCountAsInvalid) {
     const SceneD scene(mesh);
     const std::vector<HitD> wanted = trace_brute_force(mesh, rays);
     for (const SimdPath path : {SimdPath::automatic, SimdPath::single, SimdPath::packet}) {
-        SceneTraceOptions options;
+        SceneTraceOptionsD options;
         options.path = path;
         EXPECT_EQ(differences(scene, rays, wanted, options), 0u);
         std::vector<HitD> hits(rays.size());

@@ -191,7 +191,7 @@ std::size_t wrong_points(const WorldD& world, const FlatWorldD& flat, std::uint3
         for (const Vec3d& q : queries) expected.push_back(brute_closest(flat, q, most));
         for (const int threads : {1, 2}) {
             std::vector<SceneClosestPointD> found(queries.size());
-            const ClosestCounts counts =
+            const QueryCounts counts =
                 closest_points(world.scene, queries, found,
                                {.max_distance = most, .mask = mask, .threads = threads});
             std::uint64_t found_count = 0, invalid = 0;

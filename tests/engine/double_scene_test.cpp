@@ -119,9 +119,9 @@ TEST(DoubleScene, FiltersSayWhichHitsCount) {
                           options_of(static_cast<int>(seed))});
         const std::vector<RayD> rays = random.rays(150, world->home);
         const std::vector<HitD> wanted = look_at_taken(*world, rays);
-        SceneTraceOptions options;
+        SceneTraceOptionsD options;
         options.threads = 1 + static_cast<int>(seed % 2);
-        options.filter_d = [&](std::size_t place, const RayD& ray, const HitD& hit) {
+        options.filter = [&](std::size_t place, const RayD& ray, const HitD& hit) {
             EXPECT_TRUE(ray.origin == rays[place].origin && ray.tmax == rays[place].tmax);
             EXPECT_TRUE(hit.t <= ray.tmax && hit.t >= ray.tmin);
             return takes(place, hit);
@@ -152,8 +152,8 @@ TEST(DoubleScene, FiltersSayWhichHitsCount) {
     EXPECT_GT(found, 10u * thorough);
     const SceneD scene(one_triangle());
     struct Refusal {};
-    SceneTraceOptions options;
-    options.filter_d = [](std::size_t, const RayD&, const HitD&) -> bool { throw Refusal{}; };
+    SceneTraceOptionsD options;
+    options.filter = [](std::size_t, const RayD&, const HitD&) -> bool { throw Refusal{}; };
     EXPECT_THROW(static_cast<void>(trace(scene, std::vector<RayD>(3, down), options)), Refusal);
     EXPECT_EQ(closest_hit(scene, down, HitFilterD()).t, 10);
 }
@@ -312,14 +312,22 @@ TEST(DoubleScene, CallsRefuseWhatScenesInFloatRefuse) {
     Scene placed;
     placed.add(of_floats, Transform{});
     placed.commit();
-    for (const SceneTraceOptions& options :
-         {SceneTraceOptions{.threads = -1}, SceneTraceOptions{.isa = "mmx"},
-          SceneTraceOptions{.path = static_cast<SimdPath>(9)}}) {
+    struct Wrong {
+        int threads = 0;
+        SimdPath path = SimdPath::automatic;
+        const char* isa = "";
+    };
+    for (const Wrong& wrong :
+         {Wrong{.threads = -1}, Wrong{.isa = "mmx"}, Wrong{.path = static_cast<SimdPath>(9)}}) {
+        const SceneTraceOptions options{
+            .threads = wrong.threads, .path = wrong.path, .isa = wrong.isa};
+        const SceneTraceOptionsD in_double{
+            .threads = wrong.threads, .path = wrong.path, .isa = wrong.isa};
         const std::string said =
             message([&] { static_cast<void>(trace(of_floats, floats, options)); });
         EXPECT_NE(said, "no error");
-        EXPECT_EQ(message([&] { static_cast<void>(trace(one, two, options)); }), said);
-        EXPECT_EQ(message([&] { static_cast<void>(trace_all(one, two, options)); }), said);
+        EXPECT_EQ(message([&] { static_cast<void>(trace(one, two, in_double)); }), said);
+        EXPECT_EQ(message([&] { static_cast<void>(trace_all(one, two, in_double)); }), said);
         EXPECT_EQ(message([&] { static_cast<void>(trace_all(of_floats, floats, options)); }), said);
         EXPECT_EQ(message([&] { static_cast<void>(trace_all(placed, floats, options)); }), said);
     }
@@ -331,29 +339,6 @@ TEST(DoubleScene, CallsRefuseWhatScenesInFloatRefuse) {
     EXPECT_THROW(static_cast<void>(
                      trace_all(one, std::vector<RayD>(1000, down), {.max_result_bytes = 20000})),
                  ResultTooLarge);
-}
-
-TEST(DoubleScene, AFilterOfTheOtherNumberTypeIsRefused) {
-    const SceneD one(one_triangle(0));
-    const Scene of_floats(in_float(one_triangle(0)));
-    const std::vector<RayD> doubles(2);
-    const std::vector<Ray> floats(2);
-    const HitFilter in_floats = [](std::size_t, const Ray&, const Hit&) { return false; };
-    const HitFilterD in_doubles = [](std::size_t, const RayD&, const HitD&) { return false; };
-    const SceneTraceOptions wrong{.filter_d = in_doubles}, wrong_d{.filter = in_floats};
-    const char* const said = "trace: filter_d is of a SceneD; a Scene asks filter";
-    const char* const said_d = "trace: filter is of a Scene; a SceneD asks filter_d";
-    std::vector<std::uint8_t> any(2);
-    EXPECT_EQ(message_of([&] { static_cast<void>(trace(of_floats, floats, wrong)); }), said);
-    EXPECT_EQ(message_of([&] { trace_any(of_floats, floats, any, wrong); }), said);
-    EXPECT_EQ(message_of([&] { static_cast<void>(trace_all(of_floats, floats, wrong)); }), said);
-    EXPECT_EQ(message_of([&] { static_cast<void>(trace(one, doubles, wrong_d)); }), said_d);
-    EXPECT_EQ(message_of([&] { trace_any(one, doubles, any, wrong_d); }), said_d);
-    EXPECT_EQ(message_of([&] { static_cast<void>(trace_all(one, doubles, wrong_d)); }), said_d);
-    // Options for scenes of both types have both.
-    const SceneTraceOptions both{.filter = in_floats, .filter_d = in_doubles};
-    EXPECT_EQ(message_of([&] { static_cast<void>(trace(of_floats, floats, both)); }), "no error");
-    EXPECT_EQ(message_of([&] { static_cast<void>(trace_all(one, doubles, both)); }), "no error");
 }
 
 }  // namespace

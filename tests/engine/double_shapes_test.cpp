@@ -78,10 +78,10 @@ TEST(DoubleShapes, AllHitsAndFiltersTakeThemToo) {
             const auto world = random.world(recipe_of(levels, 2 + random.under(5), 0, k));
             const std::vector<RayD> rays = random.rays(150, world->home);
             const auto rows = look_for_all(*world, rays, every_mask);
-            SceneTraceOptions options;
+            SceneTraceOptionsD options;
             options.threads = 1 + k % 2;
             const AllHitsD all = trace_all(world->scene, rays, options);
-            options.filter_d = takes;
+            options.filter = takes;
             const AllHitsD some = trace_all(world->scene, rays, options);
             const std::vector<HitD> hits = trace(world->scene, rays, options);
             std::vector<std::uint8_t> occluded(rays.size());
@@ -127,7 +127,7 @@ TEST(DoubleUserShapes, WhatTheirFunctionThrowsComesOutOfTheCall) {
     for (const std::size_t n : {std::size_t{1}, std::size_t{100}, std::size_t{60000}})
         for (const int threads : {1, 2}) {
             const std::vector<RayD> rays(n, down);
-            SceneTraceOptions options;
+            SceneTraceOptionsD options;
             options.threads = threads;
             EXPECT_THROW(static_cast<void>(trace(scene, rays, options)), Stop);
             std::vector<std::uint8_t> occluded(n);

@@ -300,7 +300,7 @@ inline std::size_t differences(const WorldD& world, std::span<const RayD> rays,
     }
     std::size_t wrong = 0;
     for (const int threads : {1, 2}) {
-        SceneTraceOptions options;
+        SceneTraceOptionsD options;
         options.masks = masks, options.threads = threads;
         const std::vector<HitD> hits = trace(world.scene, rays, options);
         std::vector<std::uint8_t> occluded(rays.size(), 7);

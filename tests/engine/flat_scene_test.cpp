@@ -159,7 +159,7 @@ TEST(SceneSolid, IsTheSolidOfTheFlatMesh) {
                 EXPECT_EQ(solid.open_edges(), wanted.open_edges());
                 if (solid.rule() == InsideRule::winding) continue;  // a series, by the tree's nodes
                 std::vector<std::uint8_t> a(queries.size(), 7), b(queries.size(), 7);
-                const ClosestCounts counts = contains(solid, queries, a);
+                const QueryCounts counts = contains(solid, queries, a);
                 contains(wanted, queries, b);
                 EXPECT_EQ(a, b);
                 EXPECT_EQ(counts.invalid_queries, 1u);

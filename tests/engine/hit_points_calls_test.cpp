@@ -22,8 +22,8 @@ struct KindOf {
     using Scene = BasicScene<Scalar>;
     using Mesh = typename Scene::Mesh;
     using Transform = typename Scene::Transform;
-    using Hit = typename Scene::Types::Hit;
-    using Point = std::conditional_t<std::is_same_v<Scalar, float>, Vec3, Vec3d>;
+    using Hit = typename Scene::Hit;
+    using Point = BasicVec3<Scalar>;
 
     static Hit hit_on(std::uint32_t geometry, std::uint32_t instance = 0, std::uint32_t prim = 0) {
         Hit hit;

@@ -120,7 +120,7 @@ public:
         return std::make_shared<Scene>(scene_of<Kind>(layout_, options));
     }
 
-    [[nodiscard]] Answer closest(const Scene& scene, SceneTraceOptions options) const {
+    [[nodiscard]] Answer closest(const Scene& scene, typename Scene::TraceOptions options) const {
         options.masks = masks_;
         return answer(trace(scene, rays_, options));
     }
@@ -161,7 +161,7 @@ public:
         }
         return hits;
     }
-    [[nodiscard]] Answer any(const Scene& scene, SceneTraceOptions options) const {
+    [[nodiscard]] Answer any(const Scene& scene, typename Scene::TraceOptions options) const {
         std::vector<std::uint8_t> occluded(rays_.size());
         options.masks = masks_;
         trace_any(scene, rays_, occluded, options);
@@ -230,7 +230,7 @@ void add_ways(Question& question, const std::shared_ptr<Traced<Kind>>& traced, c
     for (const auto& [name, quality] : qualities) {
         const auto built = traced->scene({.quality = quality});
         for (const SimdPath path : paths) {
-            SceneTraceOptions options;
+            typename Traced<Kind>::Scene::TraceOptions options;
             options.path = path;
             options.threads = 1 + static_cast<int>(path) % 2;
             const std::string way = fmt::format("{}, path {}", name, static_cast<int>(path));
@@ -242,10 +242,9 @@ void add_ways(Question& question, const std::shared_ptr<Traced<Kind>>& traced, c
 template <class Kind>
 Question closest_question(const std::shared_ptr<Traced<Kind>>& traced) {
     Question question{traced->input(), traced->rays() / 5, {}};
-    add_ways(question, traced,
-             [](const auto& all, const auto& scene, const SceneTraceOptions& options) {
-                 return all.closest(scene, options);
-             });
+    add_ways(question, traced, [](const auto& all, const auto& scene, const auto& options) {
+        return all.closest(scene, options);
+    });
     const auto built = traced->scene({.compact = true});
     question.ways.push_back({"one by one", [=] { return traced->closest_one_by_one(*built); }});
     question.ways.push_back({"a mask a call", [=] { return traced->closest_by_mask(*built); }});
@@ -257,10 +256,9 @@ Question closest_question(const std::shared_ptr<Traced<Kind>>& traced) {
 template <class Kind>
 Question any_question(const std::shared_ptr<Traced<Kind>>& traced) {
     Question question{traced->input(), traced->rays() / 5, {}};
-    add_ways(question, traced,
-             [](const auto& all, const auto& scene, const SceneTraceOptions& options) {
-                 return all.any(scene, options);
-             });
+    add_ways(question, traced, [](const auto& all, const auto& scene, const auto& options) {
+        return all.any(scene, options);
+    });
     question.ways.push_back({"each alone", [=] {
                                  std::vector<std::uint8_t> hit_or_miss;
                                  for (const auto& hit : traced->closest_of_each_alone())

@@ -104,13 +104,13 @@ TYPED_TEST(LeftOut, NothingIsLeft) {
 }
 
 TYPED_TEST(LeftOut, Shapes) {
-    using Types = typename TestFixture::Scene::Types;
-    const std::vector<typename Types::Sphere> spheres = {
+    const std::vector<BasicSphere<TypeParam>> spheres = {
         {{0, 0, 0}, 1}, {{0, 0, 0}, -1}, {{5, 0, 0}, 0}, {{this->nan, 0, 0}, 1}};
-    const std::vector<typename Types::Capsule> capsules = {{{0, 0, 0}, {0, 0, this->nan}, 1},
+    const std::vector<BasicCapsule<TypeParam>> capsules = {{{0, 0, 0}, {0, 0, this->nan}, 1},
                                                            {{0, 0, 0}, {0, 0, 0}, 1}};
-    const std::vector<typename Types::Point> points = {{0, 0, 0}, {TypeParam(2e12), 0, 0}};
-    const std::vector<typename Types::Box> boxes = {{{0, 0, 0}, {1, 1, 1}}, {{1, 0, 0}, {0, 1, 1}}};
+    const std::vector<BasicVec3<TypeParam>> points = {{0, 0, 0}, {TypeParam(2e12), 0, 0}};
+    const std::vector<BasicAabb<TypeParam>> boxes = {{{0, 0, 0}, {1, 1, 1}},
+                                                     {{1, 0, 0}, {0, 1, 1}}};
     const auto expect = [&](auto add, std::uint64_t left_out, const std::string& refused) {
         typename TestFixture::Scene scene;
         add(scene);
@@ -122,17 +122,17 @@ TYPED_TEST(LeftOut, Shapes) {
         EXPECT_EQ(this->refusal(scene, {}), wanted);
         EXPECT_EQ(this->refusal(scene, {.quality = Quality::high}), wanted);
     };
-    expect([&](auto& scene) { scene.add(std::span<const typename Types::Sphere>(spheres)); }, 2,
+    expect([&](auto& scene) { scene.add(std::span<const BasicSphere<TypeParam>>(spheres)); }, 2,
            "sphere 1");
-    expect([&](auto& scene) { scene.add(std::span<const typename Types::Capsule>(capsules)); }, 1,
+    expect([&](auto& scene) { scene.add(std::span<const BasicCapsule<TypeParam>>(capsules)); }, 1,
            "capsule 0");
-    expect([&](auto& scene) { scene.add(std::span<const typename Types::Point>(points), 1); }, 1,
+    expect([&](auto& scene) { scene.add(std::span<const BasicVec3<TypeParam>>(points), 1); }, 1,
            "point 1");
     expect(
         [&](auto& scene) {
             using User = BasicUserGeometry<TypeParam>;
-            scene.add(User(boxes, [](std::uint32_t, const typename Types::Ray&,
-                                     typename Types::Hit&) { return false; }));
+            scene.add(User(boxes, [](std::uint32_t, const BasicRay<TypeParam>&,
+                                     BasicHit<TypeParam>&) { return false; }));
         },
         1, "primitive 1");
 }

@@ -446,7 +446,7 @@ TEST(Near, CountsAndLimitsAreChecked) {
     const float nan = std::numeric_limits<float>::quiet_NaN();
     const std::vector<Vec3> queries{{0, 0, 0}, {nan, 0, 0}, {0, infinity, 0}, {1, 1, 1}};
     std::vector<SceneClosestPoint> found(4);
-    const ClosestCounts counts = closest_points(world.scene, queries, found);
+    const QueryCounts counts = closest_points(world.scene, queries, found);
     EXPECT_EQ(counts.queries, 4u);
     EXPECT_EQ(counts.invalid_queries, 2u);
     EXPECT_EQ(counts.found, 2u);

@@ -19,9 +19,9 @@ namespace {
 constexpr std::uint32_t triangles = 300;
 
 template <class Scalar>
-using RayOf = typename SceneTypes<Scalar>::Ray;
+using RayOf = BasicRay<Scalar>;
 template <class Scalar>
-using HitOf = typename SceneTypes<Scalar>::Hit;
+using HitOf = BasicHit<Scalar>;
 
 template <class Scalar>
 RayOf<Scalar> ray_from(Vec3 from, Vec3 to) {
@@ -55,13 +55,6 @@ BasicScene<Scalar> scene_of(int meshes) {
     for (int k = 0; k < meshes; ++k) scene.add(mesh_of(Scalar{}, static_cast<std::uint64_t>(k)));
     scene.commit();
     return scene;
-}
-
-void set_filter(SceneTraceOptions& options, HitFilter filter) {
-    options.filter = std::move(filter);
-}
-void set_filter(SceneTraceOptions& options, HitFilterD filter) {
-    options.filter_d = std::move(filter);
 }
 
 /// Each triangle asks a ray, a batch and a point of its own of the scene.
@@ -100,14 +93,14 @@ TYPED_TEST(NestedCalls, FiltersMayTraceTheSceneThatTheyFilter) {
             known[i] = questions.answer(i / triangles, i % triangles);
         const auto rays = rays_to<Scalar>(10 * test::thorough + 100, 99);
         for (const int threads : {1, 8}) {
-            SceneTraceOptions by_table, by_asking;
+            BasicSceneTraceOptions<Scalar> by_table, by_asking;
             by_table.threads = by_asking.threads = threads;
-            set_filter(by_table, [&](std::size_t, const RayOf<Scalar>&, const HitOf<Scalar>& hit) {
+            by_table.filter = [&](std::size_t, const RayOf<Scalar>&, const HitOf<Scalar>& hit) {
                 return known[hit.geometry * triangles + hit.prim] != 0;
-            });
-            set_filter(by_asking, [&](std::size_t, const RayOf<Scalar>&, const HitOf<Scalar>& hit) {
+            };
+            by_asking.filter = [&](std::size_t, const RayOf<Scalar>&, const HitOf<Scalar>& hit) {
                 return questions.answer(hit.geometry, hit.prim);
-            });
+            };
             const auto expected = trace(scene, rays, by_table),
                        found = trace(scene, rays, by_asking);
             std::size_t hits = 0;
@@ -126,7 +119,7 @@ TYPED_TEST(NestedCalls, FiltersMayTraceTheSceneThatTheyFilter) {
 TYPED_TEST(NestedCalls, UserGeometryMayTraceAnotherScene) {
     using Scalar = TypeParam;
     const BasicScene<Scalar> inner = scene_of<Scalar>(2);
-    using Box = typename SceneTypes<Scalar>::Box;
+    using Box = BasicAabb<Scalar>;
     const std::vector<Box> boxes(5, Box{{-2, -2, -2}, {3, 3, 3}});
     BasicScene<Scalar> outer;
     // Hit where the scene within is hit, by a batch of one ray.
@@ -149,7 +142,7 @@ TYPED_TEST(NestedCalls, UserGeometryMayTraceAnotherScene) {
     }();
     const auto inner_hits = trace(inner, rays), mesh_hits = trace(mesh_alone, rays);
     for (const int threads : {1, 8}) {
-        SceneTraceOptions options;
+        BasicSceneTraceOptions<Scalar> options;
         options.threads = threads;
         const auto hits = trace(outer, rays, options);
         for (std::size_t i = 0; i < rays.size(); ++i)

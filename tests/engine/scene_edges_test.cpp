@@ -301,10 +301,9 @@ TEST(Scene, SmallComponentsOfLongDirectionsKeepTheirDigits) {
 /// it: in every query, in float and in double.
 template <class Scalar>
 void expect_small_triangles_nowhere() {
-    using Types = SceneTypes<Scalar>;
-    using Point = typename Types::Point;
+    using Point = BasicVec3<Scalar>;
     const auto small = static_cast<Scalar>(5e-13);
-    typename Types::Mesh mesh;
+    BasicMesh<Scalar> mesh;
     mesh.vertices = {{0, 0, 0}, {small, 0, 0}, {0, small, 0}};
     mesh.triangles = {{0, 1, 2}};
     BasicScene<Scalar> inner, scene;
@@ -312,7 +311,7 @@ void expect_small_triangles_nowhere() {
     mesh.vertices = {{7, 0, 0}, {8, 0, 0}, {7, 1, 0}};
     inner.add(mesh);
     inner.commit();
-    typename Types::Transform large;
+    BasicTransform<Scalar> large;
     for (std::size_t axis = 0; axis < 3; ++axis) large.m[axis][axis] = 1000;
     scene.add(inner, large);
     mesh.vertices = {{0, 0, -1}, {1, 0, 1}, {-1, 0, 1}};

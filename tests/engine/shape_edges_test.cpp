@@ -29,15 +29,14 @@ namespace {
 
 template <class Number>
 struct Of {
-    using Types = SceneTypes<Number>;
     using Scene = BasicScene<Number>;
     using UserGeometry = BasicUserGeometry<Number>;
-    using Box = typename Types::Box;
-    using Point = typename Types::Point;
-    using Sphere = typename Types::Sphere;
-    using Capsule = typename Types::Capsule;
-    using Ray = typename Types::Ray;
-    using Hit = typename Types::Hit;
+    using Box = BasicAabb<Number>;
+    using Point = BasicVec3<Number>;
+    using Sphere = BasicSphere<Number>;
+    using Capsule = BasicCapsule<Number>;
+    using Ray = BasicRay<Number>;
+    using Hit = BasicHit<Number>;
     static constexpr Number inf = std::numeric_limits<Number>::infinity();
     static constexpr Number nan = std::numeric_limits<Number>::quiet_NaN();
 

@@ -184,7 +184,7 @@ public:
         return scene;
     }
     [[nodiscard]] Answer ask(const Scene& scene, bool any, SimdPath path, int threads) const {
-        SceneTraceOptions options;
+        typename Scene::TraceOptions options;
         options.path = path, options.threads = threads;
         if (!any) return answer(trace(scene, rays_, options));
         std::vector<std::uint8_t> occluded(rays_.size());

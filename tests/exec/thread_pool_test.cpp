@@ -1,6 +1,7 @@
 // Loops on a pool of the caller's: all of a loop is done, within limits and on the pool's threads,
 // exceptions come out, and no answer changes.
 #include <gtest/gtest.h>
+#include <raydix/bvh.h>
 #include <raydix/raydix.h>
 
 #include <atomic>

@@ -145,7 +145,7 @@ void expect_closest(const std::string& name, const Mesh& mesh, std::size_t count
             const Bvh bvh = build_bvh(mesh, {.builder = builder_from_name(builder)});
             SCOPED_TRACE(name + ", " + builder + ", reach " + std::to_string(reach));
             std::vector<ClosestPoint> wanted(queries.size());
-            const ClosestCounts counts =
+            const QueryCounts counts =
                 closest_points(bvh, queries, wanted, {.max_distance = reach});
             with_launchers(seed, [&](auto& launcher) {
                 GuardedArray<ClosestPoint> results(queries.size());

@@ -3,8 +3,11 @@
 // long. All memory of this program is counted.
 #include <gtest/gtest.h>
 #include <malloc.h>
+#include <raydix/double.h>
 #include <raydix/kdtree.h>
 #include <raydix/octree.h>
+#include <raydix/overlap.h>
+#include <raydix/pairs.h>
 #include <raydix/raydix.h>
 #include <raydix/wide.h>
 

@@ -22,7 +22,7 @@ namespace {
 /// `copies` of a mesh on two levels, and the mesh itself.
 template <class Scalar, class AnyMesh>
 BasicScene<Scalar> scene_of_copies(const AnyMesh& mesh, int copies, Quality quality) {
-    typename SceneTypes<Scalar>::Transform place;
+    BasicTransform<Scalar> place;
     BasicScene<Scalar> pair, scene;
     for (int k = 0; k < 2; ++k) {
         place.m[0][3] = static_cast<Scalar>(k) * Scalar(0.25);

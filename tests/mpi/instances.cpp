@@ -12,9 +12,9 @@ namespace raydix::mpi::test {
 namespace {
 
 template <class T>
-using MeshOf = typename SceneTypes<T>::Mesh;
+using MeshOf = BasicMesh<T>;
 template <class T>
-using TransformOf = typename SceneTypes<T>::Transform;
+using TransformOf = BasicTransform<T>;
 template <class T>
 using Item = BasicDistributedGeometry<T>;
 
@@ -106,9 +106,7 @@ struct World {
     void add_shapes(unsigned seed) {
         std::mt19937 random(seed);
         std::uniform_real_distribution<T> unit(-6, 6);
-        const auto place = [&] {
-            return typename SceneTypes<T>::Point{unit(random), unit(random), unit(random)};
-        };
+        const auto place = [&] { return BasicVec3<T>{unit(random), unit(random), unit(random)}; };
         for (int i = 0; i < 20; ++i) {
             spheres.push_back({place(), T(0.1) * T(i % 8)});
             capsules.push_back({place(), place(), T(0.05) * T(i % 3)});
@@ -154,12 +152,11 @@ struct World {
         return scene;
     }
 
-    using Box = typename SceneTypes<T>::Box;
+    using Box = BasicAabb<T>;
     /// The lower faces of boxes.
     struct Plates {
         std::span<const Box> boxes;
-        bool operator()(std::uint32_t prim, const typename SceneTypes<T>::Ray& ray,
-                        typename SceneTypes<T>::Hit& hit) const {
+        bool operator()(std::uint32_t prim, const BasicRay<T>& ray, BasicHit<T>& hit) const {
             const Box& box = boxes[prim];
             hit.t = (box.lo.z - ray.origin.z) / ray.direction.z;
             hit.u = ray.origin.x + hit.t * ray.direction.x;
@@ -170,9 +167,9 @@ struct World {
 
     std::deque<MeshOf<T>> meshes;
     std::deque<BasicScene<T>> things;
-    std::vector<typename SceneTypes<T>::Sphere> spheres;
-    std::vector<typename SceneTypes<T>::Capsule> capsules;
-    std::vector<typename SceneTypes<T>::Point> points;
+    std::vector<BasicSphere<T>> spheres;
+    std::vector<BasicCapsule<T>> capsules;
+    std::vector<BasicVec3<T>> points;
     std::vector<Box> boxes;
     std::optional<BasicUserGeometry<T>> user;
     std::vector<Item<T>> items;
@@ -182,7 +179,7 @@ template <class T>
 auto make_rays(std::size_t n, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<T> unit(-1, 1);
-    std::vector<typename SceneTypes<T>::Ray> rays(n);
+    std::vector<BasicRay<T>> rays(n);
     for (std::size_t i = 0; i < n; ++i) {
         for (T* x : {&rays[i].origin.x, &rays[i].origin.y, &rays[i].origin.z})
             *x = unit(random) * 9;
@@ -218,18 +215,15 @@ bool counts(const auto& ray, const auto& hit) {
 
 template <class T>
 void expect_same_rays(const BasicScene<T>& one, const BasicDistributedScene<T>& many,
-                      std::span<const typename SceneTypes<T>::Ray> rays,
-                      const TraceOptions& options) {
-    SceneTraceOptions alone;
+                      std::span<const BasicRay<T>> rays, const BasicTraceOptions<T>& options) {
+    BasicSceneTraceOptions<T> alone;
     alone.threads = 1;
     alone.mask = options.mask;
     alone.masks = options.masks;
-    if (options.filter || options.filter_d) {
-        alone.filter = [](std::size_t, const Ray& ray, const Hit& hit) { return counts(ray, hit); };
-        alone.filter_d = [](std::size_t, const RayD& ray, const HitD& hit) {
+    if (options.filter)
+        alone.filter = [](std::size_t, const auto& ray, const auto& hit) {
             return counts(ray, hit);
         };
-    }
     EXPECT_EQ(different_hits<T>(many.trace(rays, options).values, trace(one, rays, alone)), 0u);
     std::vector<std::uint8_t> occluded(rays.size());
     trace_any(one, rays, std::span(occluded), alone);
@@ -242,7 +236,7 @@ void expect_same_rays(const BasicScene<T>& one, const BasicDistributedScene<T>& 
 
 template <class T>
 void expect_same_points(const BasicScene<T>& one, const BasicDistributedScene<T>& many,
-                        std::span<const typename SceneTypes<T>::Point> points) {
+                        std::span<const BasicVec3<T>> points) {
     for (const std::uint32_t mask : {0xFFFFFFFFu, 1u}) {
         BasicSceneClosestOptions<T> options;
         options.mask = mask;
@@ -284,14 +278,14 @@ TYPED_TEST(InstancesOverRanks, AnswerAsOneProcess) {
             const auto ray_begins = division_of(all.size(), division, seed + 1);
             const auto rays = mine(all, ray_begins);
             expect_same_rays<T>(one, many, rays, {});
-            TraceOptions masked;
+            BasicTraceOptions<T> masked;
             masked.mask = 2;
             expect_same_rays<T>(one, many, rays, masked);
             std::vector<std::uint32_t> masks;
             for (std::size_t i = 0; i < rays.size(); ++i) masks.push_back(std::uint32_t(i % 4));
             masked.masks = masks;
             expect_same_rays<T>(one, many, rays, masked);
-            std::vector<typename SceneTypes<T>::Point> points;
+            std::vector<BasicVec3<T>> points;
             for (const auto& ray : rays) points.push_back(ray.origin);
             expect_same_points<T>(one, many, points);
         }
@@ -315,12 +309,11 @@ TYPED_TEST(InstancesOverRanks, ShapesAnswerAsOneProcess) {
             const auto all = make_rays<T>(300, seed);
             const auto rays = mine(all, division_of(all.size(), division, seed + 1));
             expect_same_rays<T>(one, many, rays, {});
-            TraceOptions masked;
+            BasicTraceOptions<T> masked;
             masked.mask = 2;
             expect_same_rays<T>(one, many, rays, masked);
-            TraceOptions filtered;
-            filtered.filter = [](const Ray& ray, const auto& hit) { return counts(ray, hit); };
-            filtered.filter_d = [](const RayD& ray, const auto& hit) { return counts(ray, hit); };
+            BasicTraceOptions<T> filtered;
+            filtered.filter = [](const auto& ray, const auto& hit) { return counts(ray, hit); };
             expect_same_rays<T>(one, many, rays, filtered);
         }
 }
@@ -334,7 +327,7 @@ TYPED_TEST(InstancesOverRanks, ContainAsOneProcess) {
     const BasicDistributedScene<T> many(
         MPI_COMM_WORLD, mine(world.items, division_of(world.items.size(), Division::even, 1)),
         of_scene);
-    std::vector<typename SceneTypes<T>::Point> points;
+    std::vector<BasicVec3<T>> points;
     for (const auto& ray : make_rays<T>(300, 42)) points.push_back(ray.origin);
     points.push_back({T(0.5), T(0.5), 0});  // on a face of several boxes
     SceneSolidOptions options;

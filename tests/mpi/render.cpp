@@ -13,8 +13,8 @@ using CameraOf = std::conditional_t<sizeof(T) == 4, Camera, CameraD>;
 
 /// A floor with a heap of bent triangles on it, far from the origin where floats are coarse.
 template <class T>
-typename SceneTypes<T>::Mesh make_heap(T away) {
-    typename SceneTypes<T>::Mesh mesh;
+BasicMesh<T> make_heap(T away) {
+    BasicMesh<T> mesh;
     std::mt19937 random(3);
     std::uniform_real_distribution<T> unit(0, 1);
     const auto add = [&](T x, T y, T z) {
@@ -69,7 +69,7 @@ TYPED_TEST_SUITE(PicturesOverRanks, Scalars);
 
 TYPED_TEST(PicturesOverRanks, AreThoseOfOneProcess) {
     using T = TypeParam;
-    using Part = typename SceneTypes<T>::MeshView;
+    using Part = BasicMeshView<T>;
     const T away = sizeof(T) == 4 ? T(100) : T(1e7);
     const auto mesh = make_heap<T>(away);
     const auto camera = camera_at<T>(away);

@@ -23,18 +23,18 @@ struct Of<double> {
 /// Triangles anywhere, some twice so that hits tie across ranks, some without area or not finite;
 /// and closed boxes, so that points are inside.
 template <class T>
-typename SceneTypes<T>::Mesh make_soup(std::size_t n, unsigned seed) {
-    typename SceneTypes<T>::Mesh mesh;
+BasicMesh<T> make_soup(std::size_t n, unsigned seed) {
+    BasicMesh<T> mesh;
     std::mt19937 random(seed);
     std::uniform_real_distribution<T> unit(0, 1);
-    const auto add = [&](const std::vector<typename SceneTypes<T>::Point>& corners) {
+    const auto add = [&](const std::vector<BasicVec3<T>>& corners) {
         const auto v = static_cast<std::uint32_t>(mesh.vertices.size());
         mesh.vertices.insert(mesh.vertices.end(), corners.begin(), corners.end());
         mesh.triangles.push_back({v, v + 1, v + 2});
     };
     for (std::size_t i = 0; i < n; ++i) {
         const T x = unit(random) * 4, y = unit(random) * 4, z = unit(random) * 4;
-        const auto near = [&]() -> typename SceneTypes<T>::Point {
+        const auto near = [&]() -> BasicVec3<T> {
             return {x + unit(random), y + unit(random), z + unit(random)};
         };
         add({near(), near(), near()});
@@ -46,7 +46,7 @@ typename SceneTypes<T>::Mesh make_soup(std::size_t n, unsigned seed) {
 }
 
 template <class T>
-void add_box(typename SceneTypes<T>::Mesh& mesh, T lo, T hi) {
+void add_box(BasicMesh<T>& mesh, T lo, T hi) {
     const auto v = static_cast<std::uint32_t>(mesh.vertices.size());
     for (int i = 0; i < 8; ++i)
         mesh.vertices.push_back({i & 1 ? hi : lo, i & 2 ? hi : lo, i & 4 ? hi : lo});
@@ -59,10 +59,10 @@ void add_box(typename SceneTypes<T>::Mesh& mesh, T lo, T hi) {
 }
 
 template <class T>
-std::vector<typename SceneTypes<T>::Ray> make_rays(std::size_t n, unsigned seed) {
+std::vector<BasicRay<T>> make_rays(std::size_t n, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<T> unit(0, 1);
-    std::vector<typename SceneTypes<T>::Ray> rays(n);
+    std::vector<BasicRay<T>> rays(n);
     for (std::size_t i = 0; i < n; ++i) {
         auto& ray = rays[i];
         for (T* x : {&ray.origin.x, &ray.origin.y, &ray.origin.z}) *x = unit(random) * 6 - T(0.5);
@@ -85,10 +85,10 @@ std::uint64_t whole_prim(const Hit& hit) {
 
 template <class T>
 struct SceneOfBoth {
-    using Mesh = typename SceneTypes<T>::Mesh;
-    using View = typename SceneTypes<T>::MeshView;
-    using Point = typename SceneTypes<T>::Point;
-    using Ray = typename SceneTypes<T>::Ray;
+    using Mesh = BasicMesh<T>;
+    using View = BasicMeshView<T>;
+    using Point = BasicVec3<T>;
+    using Ray = BasicRay<T>;
 
     SceneOfBoth(const Mesh& whole, Division division, const SceneOptions& options, unsigned seed)
         : mesh(whole), one(whole), begins(division_of(whole.triangles.size(), division, seed)) {
@@ -158,7 +158,7 @@ struct SceneOfBoth {
         const auto tree = build_bvh(mesh);
         const typename Of<T>::Solid solid(tree, options);
         std::vector<std::uint8_t> expected(points.size());
-        const ClosestCounts counts = raydix::contains(solid, points, std::span(expected));
+        const QueryCounts counts = raydix::contains(solid, points, std::span(expected));
         const auto found = many->contains(points);
         EXPECT_TRUE(same_bits(expected, found.values));
         EXPECT_EQ(found.counts.found, counts.found);
@@ -193,7 +193,7 @@ TYPED_TEST(ScenesOverRanks, AnswerAsOneProcess) {
             const SceneOfBoth<T> both(mesh, division, options, seed);
             const auto rays = make_rays<T>(400, seed);
             both.expect_same_hits(mine(rays, division_of(rays.size(), division, seed + 1)));
-            std::vector<typename SceneTypes<T>::Point> points;
+            std::vector<BasicVec3<T>> points;
             for (const auto& ray : rays) points.push_back(ray.origin);
             points[3] = {T(0.5), T(1), T(1)};  // on a face, an edge and a corner
             points[4] = {T(1), T(1), T(1.5)};
@@ -207,7 +207,7 @@ TYPED_TEST(ScenesOverRanks, AnswerAsOneProcess) {
 
 TYPED_TEST(ScenesOverRanks, GeometriesNumberThroughTheRanks) {
     using T = TypeParam;
-    using View = typename SceneTypes<T>::MeshView;
+    using View = BasicMeshView<T>;
     // Rank r gives r % 3 meshes, all with the same triangles: every hit ties.
     const auto mesh = make_soup<T>(60, 7);
     const auto rays = make_rays<T>(100, 8);

@@ -210,7 +210,7 @@ TEST(Closest, MaxDistanceIsClosed) {
     EXPECT_TRUE(closest_point(bvh, queries[1], 0.0f).found());
     EXPECT_FALSE(closest_point(bvh, queries[0], 0.0f).found());
     std::vector<ClosestPoint> results(2);
-    const ClosestCounts counts = closest_points(bvh, queries, results, {.max_distance = 1.0f});
+    const QueryCounts counts = closest_points(bvh, queries, results, {.max_distance = 1.0f});
     EXPECT_EQ(counts.queries, 2u);
     EXPECT_EQ(counts.found, 1u);
     EXPECT_EQ(results[0].distance, infinity);
@@ -231,7 +231,7 @@ TEST(Closest, OddInput) {
     const std::vector<Vec3> queries{
         {nan, 0, 0}, {0, infinity, 0}, {0, 0, -infinity}, {0, 0, 1}, {0, 0, 1e30f}};
     std::vector<ClosestPoint> results(queries.size());
-    const ClosestCounts counts = closest_points(bvh, queries, results);
+    const QueryCounts counts = closest_points(bvh, queries, results);
     EXPECT_EQ(counts.invalid_queries, 3u);
     EXPECT_EQ(counts.found, 2u);
     for (int i = 0; i < 3; ++i) {

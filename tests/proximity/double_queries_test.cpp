@@ -187,7 +187,7 @@ TEST(DoubleQueries, InsideFarAwayAsAtHome) {
     for (const Vec3& q : queries) moved.push_back(Vec3d{q.x, q.y, q.z} + utm_place);
     std::vector<std::uint8_t> wanted(queries.size()), inside(queries.size());
     contains(home_solid, queries, wanted);
-    const ClosestCounts counts = contains(away_solid, moved, inside, 3);
+    const QueryCounts counts = contains(away_solid, moved, inside, 3);
     EXPECT_EQ(inside, wanted);
     EXPECT_GT(counts.found, queries.size() / 4);
     EXPECT_LT(counts.found, queries.size());

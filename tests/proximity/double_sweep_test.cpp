@@ -77,7 +77,7 @@ TEST(DoubleSweeps, LikeEveryTriangle) {
             wanted.push_back(first_of_all(mesh, any_tree, sweep));
         const auto found_in = [&](const BvhD& bvh, int threads) {
             std::vector<SweepHitD> hits_of_batch(sweeps.size());
-            const OverlapCounts counts =
+            const QueryCounts counts =
                 sweep_spheres(bvh, sweeps, hits_of_batch, {.threads = threads});
             EXPECT_EQ(counts.queries, sweeps.size());
             EXPECT_EQ(counts.found, static_cast<std::uint64_t>(std::ranges::count_if(
@@ -331,7 +331,7 @@ TEST(DoubleSweeps, BadInput) {
                                         {good, inf},
                                         {good, 2e150}};
     std::vector<SweepHitD> hits(bad.size());
-    const OverlapCounts counts = sweep_spheres(bvh, bad, hits);
+    const QueryCounts counts = sweep_spheres(bvh, bad, hits);
     EXPECT_EQ(counts.invalid_queries, bad.size());
     EXPECT_EQ(counts.found, 0u);
     for (const SweepHitD& hit : hits) EXPECT_FALSE(hit.hit());

@@ -292,7 +292,7 @@ TEST(Solid, OddInput) {
     const std::vector<Vec3> points{
         {nan, 0, 0}, {0, infinity, 0}, {0, 0, 1}, {50, 0, 0}, {3e38f, -3e38f, 3e38f}};
     std::vector<std::uint8_t> inside(points.size());
-    const ClosestCounts counts = contains(solid, points, inside);
+    const QueryCounts counts = contains(solid, points, inside);
     EXPECT_EQ(counts.invalid_queries, 2u);
     EXPECT_EQ(counts.found, 1u);
     EXPECT_EQ(inside, (std::vector<std::uint8_t>{0, 0, 1, 0, 0}));

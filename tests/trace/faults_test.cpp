@@ -3,6 +3,7 @@
 // and hits_test.
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
+#include <raydix/trace.h>
 
 #include <algorithm>
 #include <cmath>

@@ -2,6 +2,7 @@
 // built-in scenes; and that nothing but the input decides a bit.
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
+#include <raydix/trace.h>
 
 #include <algorithm>
 #include <cstring>

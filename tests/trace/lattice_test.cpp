@@ -3,6 +3,7 @@
 // through vertices. The tree must agree with every triangle tested by itself.
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
+#include <raydix/trace.h>
 
 #include <algorithm>
 #include <cstring>

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
+#include <raydix/trace.h>
 
 #include <cmath>
 #include <cstring>

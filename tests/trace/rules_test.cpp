@@ -1,7 +1,9 @@
 // The rules of a hit that a single fault can break: who wins a tie, where a ray begins, and that no
 // ray slips between triangles that share an edge.
 #include <gtest/gtest.h>
+#include <raydix/bvh.h>
 #include <raydix/raydix.h>
+#include <raydix/trace.h>
 
 #include <algorithm>
 #include <cmath>

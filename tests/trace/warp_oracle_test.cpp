@@ -5,6 +5,7 @@
 
 #include <raydix/raydix.h>
 #include <raydix/simulate.h>
+#include <raydix/trace.h>
 
 #include <algorithm>
 #include <cmath>

@@ -2,6 +2,7 @@
 // the depth allows.
 #include <gtest/gtest.h>
 #include <raydix/raydix.h>
+#include <raydix/trace.h>
 
 #include <cstring>
 

@@ -1,4 +1,5 @@
 // A ray from above onto a square of two triangles.
+#include <raydix/bvh.h>
 #include <raydix/raydix.h>
 
 #include <cstdio>
