@@ -6,7 +6,6 @@
 #include <raydix/error.h>
 #include <raydix/model.h>
 #include <raydix/rdx.h>
-#include <raydix/rdx_tree.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdint>

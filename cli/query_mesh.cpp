@@ -4,7 +4,7 @@
 #include <raydix/arrays.h>
 #include <raydix/closest.h>
 #include <raydix/pairs.h>
-#include <raydix/rdx_tree.h>
+#include <raydix/rdx.h>
 #include <raydix/solid.h>
 
 #include <optional>

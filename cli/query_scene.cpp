@@ -2,7 +2,7 @@
 // .npy files as contract.md 8 has them.
 #include <fmt/format.h>
 #include <raydix/arrays.h>
-#include <raydix/rdx.h>
+#include <raydix/rdx_scene.h>
 #include <raydix/scene.h>
 #include <raydix/scene_pairs.h>
 #include <raydix/scene_queries.h>

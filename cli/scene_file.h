@@ -1,7 +1,7 @@
 // .rdx files that hold a scene: built and written, read, described.
 #pragma once
 
-#include <raydix/rdx.h>
+#include <raydix/rdx_scene.h>
 
 #include <string>
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <raydix/rays.h>
-#include <raydix/rdx.h>
+#include <raydix/rdx_scene.h>
 #include <raydix/scene.h>
 
 #include <optional>

@@ -1,6 +1,8 @@
 // The answers of docs/questions.md as programs: each part between two marks stands there word for
 // word, and what it says of the library is asked here.
+#include <raydix/bvh.h>
 #include <raydix/raydix.h>
+#include <raydix/trace.h>
 #include <raydix/wide.h>
 
 #include <atomic>

@@ -1,7 +1,7 @@
 // Feeds bytes to the readers of .rdx files, of trees and of scenes. Checksums are made right first,
 // else no input would get past them.
 #include <raydix/error.h>
-#include <raydix/rdx_tree.h>
+#include <raydix/rdx.h>
 #include <raydix/surface.h>
 
 #include <cmath>

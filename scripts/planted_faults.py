@@ -469,7 +469,7 @@ FAULTS = [
           "ranks: pictures of scenes that are spread have no normals", "mpi"),
     Fault("src/mpi/distributed_scene.cpp", "            hold_meshes(triangles, held, firsts[m].geometry);\n", "",
           "ranks: shapes of a rank come before all meshes in ties", "mpi"),
-    Fault("src/mpi/scene_queries.h", "return given_.filter()(ray, parts_.named(hit));", "return given_.filter()(ray, {});",
+    Fault("src/mpi/scene_queries.h", "return given_.options.filter(ray, parts_.named(hit));", "return given_.options.filter(ray, {});",
           "ranks: filters are told of no hit", "mpi"),
     Fault("src/mpi/file_parts.cpp", "            before += count;\n", "",
           "ranks: of several files each begins where the first does", "mpi"),

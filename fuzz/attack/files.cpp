@@ -4,7 +4,6 @@
 #include <raydix/check.h>
 #include <raydix/error.h>
 #include <raydix/rdx.h>
-#include <raydix/rdx_tree.h>
 #include <raydix/trace.h>
 #include <raydix/wide.h>
 

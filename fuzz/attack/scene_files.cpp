@@ -2,7 +2,7 @@
 // mended, are refused or load to a scene with the hits of one that is made anew from the same
 // tables.
 #include <raydix/error.h>
-#include <raydix/rdx.h>
+#include <raydix/rdx_scene.h>
 #include <raydix/surface.h>
 
 #include <algorithm>

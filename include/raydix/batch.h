@@ -22,7 +22,7 @@ enum class SimdPath : std::uint32_t {
 /// Throws InputError that lists the known names.
 [[nodiscard]] SimdPath simd_path_from_name(std::string_view name);
 
-/// What a batch of rays met. The last two are 0 unless TraceOptions::counters asks for them.
+/// What a batch of rays met. The last two are of trees alone (trace.h, wide.h), if asked.
 struct TraceCounts {
     std::uint64_t rays = 0;
     std::uint64_t hits = 0;  // rays that hit (all-hits: hits)
@@ -46,10 +46,10 @@ using AllHitsD = BasicAllHits<double>;
 /// What a batch of queries met.
 struct QueryCounts {
     std::uint64_t queries = 0;
-    std::uint64_t found = 0;  // queries that found or touch something; where a call lists what is
-                              // found: entries of the lists
-    std::uint64_t invalid_queries = 0;  // a number is NaN or infinite, or a radius is negative:
-                                        // nothing is near them, and they touch nothing
+    std::uint64_t found = 0;  // queries that find or touch something, or are inside; of calls that
+                              // list or count what is found: all of that
+    std::uint64_t invalid_queries = 0;  // as their types say (types.h, shapes.h), or a coordinate
+                                        // is NaN or infinite: they find and touch nothing
 };
 
 /// Options of queries for the closest point of one tree, and for signed distances.

@@ -1,5 +1,5 @@
 // The expert's floor: builders and binary trees with their statistics and checks, octree and k-d
-// tree, layouts, refits, queries on one tree, devices, the simulator of traversal and the report.
+// tree, layouts, refits, files and queries of one tree, devices, the simulator and the report.
 // Scenes of raydix/raydix.h stand on it.
 #pragma once
 
@@ -20,7 +20,7 @@
 #include <raydix/octree.h>           // IWYU pragma: export
 #include <raydix/overlap.h>          // IWYU pragma: export
 #include <raydix/pairs.h>            // IWYU pragma: export
-#include <raydix/rdx_tree.h>         // IWYU pragma: export
+#include <raydix/rdx.h>              // IWYU pragma: export
 #include <raydix/refit.h>            // IWYU pragma: export
 #include <raydix/report.h>           // IWYU pragma: export
 #include <raydix/simulate.h>         // IWYU pragma: export

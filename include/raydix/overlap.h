@@ -45,9 +45,9 @@ struct OverlapLists {
 [[nodiscard]] OverlapLists touch_all(const Bvh& bvh, std::span<const Sphere> queries,
                                      const OverlapOptions& options = {});
 
-/// The first contact. The ball touches triangle `prim` at `position`, which is
-/// (1-u-v)*v0 + u*v1 + v*v2, when its center is at t. A ball that touches at the start has t =
-/// tmin.
+/// The first contact. The ball touches triangle `prim` at `position`, (1-u-v)*v0 + u*v1 + v*v2,
+/// when its center is at t; with a radius that is its closest point, as closest_points has it. A
+/// ball that touches at the start has t = tmin.
 template <class Scalar>
 struct BasicSweepHit {
     Scalar t = infinity;

@@ -15,7 +15,7 @@
 #include <raydix/points.h>         // IWYU pragma: export
 #include <raydix/quality.h>        // IWYU pragma: export
 #include <raydix/rays.h>           // IWYU pragma: export
-#include <raydix/rdx.h>            // IWYU pragma: export
+#include <raydix/rdx_scene.h>      // IWYU pragma: export
 #include <raydix/result_limit.h>   // IWYU pragma: export
 #include <raydix/scene.h>          // IWYU pragma: export
 #include <raydix/scene_pairs.h>    // IWYU pragma: export

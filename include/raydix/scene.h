@@ -1,6 +1,6 @@
 // What rays are traced through: triangle meshes, spheres, capsules, points with a radius, geometry
-// of the caller's own, and instances of other scenes. In float; meshes and instances also in
-// double. Exact rules: docs/contract.md 1 and 3. Common questions: docs/questions.md.
+// of the caller's own, and instances of other scenes. In float
+// or in double. Exact rules: docs/contract.md 1 and 3. Common questions: docs/questions.md.
 #pragma once
 
 #include <raydix/batch.h>
@@ -246,7 +246,7 @@ struct BasicSceneTraceOptions {
     std::span<const std::uint32_t> masks = {};  // [rays], one for each ray instead; or empty
     int threads = 0;                            // 0 to 1,024; 0: all the machine has
     SimdPath path = SimdPath::automatic;        // hits do not depend on it
-    std::string isa = {};                       // one of simd_instruction_sets(); empty: the best
+    std::string isa = {};                       // of simd_instruction_sets() (wide.h); empty: best
     BasicHitFilter<Scalar> filter = {};         // empty: all hits count
     /// trace_all only: the most bytes that the call may hold. 0: half of what is left to the
     /// process (result_limit.h).

@@ -41,9 +41,9 @@ namespace raydix {
 /// query throws ResultTooLarge, an InputError, before anything is made if that would take more than
 /// half of the memory that is left; touch_all if it would take more than its max_result_bytes.
 
-/// The closest point of a scene to a query. position, distance, u and v are as in ClosestPoint. Of
-/// a sphere u and v are 0. Of a capsule u is the place along its axis, from 0 at a to 1 at b. If
-/// nothing is found prim is no_primitive and the distance infinity.
+/// The closest point of a scene to a query. position, distance, u and v are as closest.h has
+/// them. Of a sphere u and v are 0. Of a capsule u is the place along its axis, from 0 at a to 1 at
+/// b. If nothing is found prim is no_primitive and the distance infinity.
 template <class Scalar>
 struct BasicSceneClosestPoint {
     BasicVec3<Scalar> position{infinity, infinity, infinity};
@@ -63,8 +63,8 @@ struct BasicSceneClosestOptions {
     Scalar max_distance = infinity;    // as in ClosestOptions
     std::uint32_t mask = 0xFFFFFFFFu;  // of all queries, as of rays
     int threads = 0;       // 0 to 1,024; 0: all the machine has. Results do not depend on it
-    std::string isa = {};  // one of simd_instruction_sets(); empty: the best. Results do not depend
-                           // on it
+    std::string isa = {};  // one of simd_instruction_sets() (wide.h); empty: the best. Results do
+                           // not depend on it
 };
 using SceneClosestOptions = BasicSceneClosestOptions<float>;
 using SceneClosestOptionsD = BasicSceneClosestOptions<double>;

@@ -82,8 +82,8 @@ public:
     [[nodiscard]] InsideRule rule() const;
     /// Number of edges that belong to an odd number of triangles.
     [[nodiscard]] std::uint64_t open_edges() const;
-    /// The tree that the solid asks. Of a scene it is that over all triangles, numbered by
-    /// (instance, geometry, prim).
+    /// The tree that the solid asks (bvh.h, in double double.h). Of a scene it is that over all
+    /// triangles, numbered by (instance, geometry, prim).
     [[nodiscard]] const Tree& bvh() const;
 
 private:

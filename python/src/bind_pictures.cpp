@@ -7,7 +7,7 @@
 #include <raydix/camera.h>
 #include <raydix/model.h>
 #include <raydix/picture.h>
-#include <raydix/rdx.h>
+#include <raydix/rdx_scene.h>
 #include <raydix/report.h>
 
 #include <cstdint>

@@ -54,8 +54,8 @@ nb::tuple corners_of(const Box& box) {
 nb::tuple corners(const Aabb& box) { return corners_of(box); }
 nb::tuple corners(const AabbD& box) { return corners_of(box); }
 
-template <class Box>
-nb::dict mesh_figures(const BasicMeshInfo<Box>& info) {
+template <class Scalar>
+nb::dict mesh_figures(const BasicMeshInfo<Scalar>& info) {
     nb::dict fields;
     fields["vertices"] = info.vertices;
     fields["triangles"] = info.triangles;

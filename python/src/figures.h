@@ -17,8 +17,8 @@ namespace raydix::python {
 
 [[nodiscard]] nanobind::dict tree_figures(const TreeStats& stats);
 [[nodiscard]] nanobind::dict wide_figures(const WideBvhStats& stats);
-template <class Box>
-[[nodiscard]] nanobind::dict mesh_figures(const BasicMeshInfo<Box>& info);
+template <class Scalar>
+[[nodiscard]] nanobind::dict mesh_figures(const BasicMeshInfo<Scalar>& info);
 extern template nanobind::dict mesh_figures(const MeshInfo& info);
 extern template nanobind::dict mesh_figures(const MeshInfoD& info);
 [[nodiscard]] nanobind::dict commit_figures(const CommitReport& report);

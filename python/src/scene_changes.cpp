@@ -11,7 +11,6 @@
 #include <raydix/error.h>
 #include <raydix/model.h>
 #include <raydix/rdx.h>
-#include <raydix/rdx_tree.h>
 
 #include <cstdint>
 #include <functional>

@@ -6,7 +6,7 @@
 #include <raydix/double.h>
 #include <raydix/mesh.h>
 #include <raydix/model.h>
-#include <raydix/rdx.h>
+#include <raydix/rdx_scene.h>
 #include <raydix/refit.h>
 #include <raydix/scene.h>
 #include <raydix/scene_queries.h>
@@ -54,7 +54,7 @@ struct NamesIn {
     using Transform = BasicTransform<Scalar>;
     using Scene = BasicScene<Scalar>;
     using MeshView = BasicMeshView<Scalar>;
-    using Bvh = std::conditional_t<in_float, raydix::Bvh, BvhD>;
+    using Bvh = typename BasicSolid<Scalar>::Tree;
     using Refitter = std::conditional_t<in_float, raydix::Refitter, RefitterD>;
     using Solid = BasicSolid<Scalar>;
     using Ray = BasicRay<Scalar>;

@@ -6,6 +6,7 @@
 #include <raydix/double.h>
 #include <raydix/scene.h>
 #include <raydix/scene_pairs.h>
+#include <raydix/solid.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -53,7 +54,7 @@ struct FlatScene {
 /// A tree over a flat mesh, each triangle in one leaf.
 template <class Scalar>
 struct FlatTree {
-    using Tree = std::conditional_t<std::is_same_v<Scalar, float>, Bvh, BvhD>;
+    using Tree = typename BasicSolid<Scalar>::Tree;
 
     Tree tree;
     FlatNames names;

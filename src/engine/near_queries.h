@@ -40,18 +40,6 @@ Scalar square_limit_of(Scalar max_distance) {
     return max_distance * max_distance;
 }
 
-/// Of parts of a batch.
-template <class Counts>
-Counts sum_of(const std::vector<Counts>& parts, std::size_t queries) {
-    Counts sum;
-    sum.queries = queries;
-    for (const Counts& part : parts) {
-        sum.found += part.found;
-        sum.invalid_queries += part.invalid_queries;
-    }
-    return sum;
-}
-
 /// Whether a batch is worth an order, and can have one.
 inline bool is_ordered(std::size_t queries) {
     return queries >= worth_ordering && queries < std::size_t{1} << 31;

@@ -45,7 +45,7 @@ BasicSolid<Scalar>::BasicSolid(const BasicScene<Scalar>& scene, const SceneSolid
     : BasicSolid(tree_of_body(scene, options), {.rule = options.rule, .threads = options.threads}) {
 }
 
-template Solid::BasicSolid(const Scene& scene, const SceneSolidOptions& options);
-template SolidD::BasicSolid(const SceneD& scene, const SceneSolidOptions& options);
+template BasicSolid<float>::BasicSolid(const Scene& scene, const SceneSolidOptions& options);
+template BasicSolid<double>::BasicSolid(const SceneD& scene, const SceneSolidOptions& options);
 
 }  // namespace raydix

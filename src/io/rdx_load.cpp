@@ -1,6 +1,5 @@
 // .rdx file -> scene and a tree, or a Scene, that view the mapped file.
 #include <raydix/rdx.h>
-#include <raydix/rdx_tree.h>
 
 #include <system_error>
 

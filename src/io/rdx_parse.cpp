@@ -3,7 +3,7 @@
 #include "io/rdx_parse.h"
 
 #include <raydix/error.h>
-#include <raydix/rdx_tree.h>
+#include <raydix/rdx.h>
 
 #include <fmt/format.h>
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <raydix/rdx.h>
-#include <raydix/rdx_tree.h>
 
 #include <cstddef>
 #include <memory>

@@ -1,6 +1,6 @@
 // Scene -> .rdx file.
 #include <raydix/error.h>
-#include <raydix/rdx.h>
+#include <raydix/rdx_scene.h>
 
 #include <array>
 #include <functional>

@@ -72,10 +72,9 @@ struct GivenRays {
     [[nodiscard]] std::uint32_t mask(std::size_t i) const {
         return options.masks.empty() ? options.mask : options.masks[i];
     }
-    [[nodiscard]] const auto& filter() const { return options.filter; }
     /// A call and what must not differ between ranks.
     [[nodiscard]] std::string name(const char* call) const {
-        return std::string(call) + (filter() ? ", filtered" : "");
+        return std::string(call) + (options.filter ? ", filtered" : "");
     }
     void check() const {
         if (!options.masks.empty() && options.masks.size() != rays.size())
@@ -148,9 +147,9 @@ protected:
     /// What the scene of this rank is asked with.
     [[nodiscard]] BasicSceneTraceOptions<T> options_of(const ArrivedRays<T>& arrived) const {
         BasicSceneTraceOptions<T> options = arrived.options(parts_.threads);
-        if (!given_.filter()) return options;
+        if (!given_.options.filter) return options;
         options.filter = [this](std::size_t, const auto& ray, const auto& hit) {
-            return given_.filter()(ray, parts_.named(hit));
+            return given_.options.filter(ray, parts_.named(hit));
         };
         return options;
     }

@@ -50,13 +50,7 @@ QueryCounts closest_batch(const AnyBvh& bvh, std::span<const Vec> queries,
                 }
             }
         });
-    QueryCounts sum;
-    sum.queries = queries.size();
-    for (const QueryCounts& part : parts) {
-        sum.found += part.found;
-        sum.invalid_queries += part.invalid_queries;
-    }
-    return sum;
+    return sum_of(parts, queries.size());
 }
 
 template <class Tree, class Result, class AnyBvh, class Vec>

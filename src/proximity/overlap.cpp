@@ -60,13 +60,7 @@ QueryCounts for_each_query(const Tree& tree, std::span<const Query> queries,
             }
             done(block);
         });
-    QueryCounts sum;
-    sum.queries = queries.size();
-    for (const QueryCounts& part : parts) {
-        sum.found += part.found;
-        sum.invalid_queries += part.invalid_queries;
-    }
-    return sum;
+    return sum_of(parts, queries.size());
 }
 
 template <class Tree, class Query, class Stack>

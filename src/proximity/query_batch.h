@@ -2,6 +2,7 @@
 // fixed blocks.
 #pragma once
 
+#include <raydix/batch.h>
 #include <raydix/buffer.h>
 #include <raydix/bvh.h>
 #include <raydix/double.h>
@@ -37,6 +38,18 @@ inline void require_room(const char* what, std::size_t queries, std::size_t resu
     if (queries != results)
         throw InputError(std::string(what) + ": " + std::to_string(queries) +
                          " queries, but room for " + std::to_string(results) + " results");
+}
+
+/// Of the parts of a batch.
+[[nodiscard]] inline QueryCounts sum_of(const std::vector<QueryCounts>& parts,
+                                        std::size_t queries) {
+    QueryCounts sum;
+    sum.queries = queries;
+    for (const QueryCounts& part : parts) {
+        sum.found += part.found;
+        sum.invalid_queries += part.invalid_queries;
+    }
+    return sum;
 }
 
 /// Positions of queries in the order in which to take them; empty: as they come.

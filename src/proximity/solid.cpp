@@ -153,13 +153,7 @@ QueryCounts for_each_query(const AnySolid& solid, std::span<const Vec> queries, 
                 one(i, winding);
             }
         });
-    QueryCounts sum;
-    sum.queries = queries.size();
-    for (const QueryCounts& part : parts) {
-        sum.found += part.found;
-        sum.invalid_queries += part.invalid_queries;
-    }
-    return sum;
+    return sum_of(parts, queries.size());
 }
 
 template <class Scalar>
@@ -215,7 +209,7 @@ std::vector<double> winding_batch(const AnySolid& solid, std::span<const Vec> qu
 template <class Scalar>
 BasicSolid<Scalar>::BasicSolid(const Tree& bvh, const SolidOptions& options)
     : state_(std::make_unique<State>()) {
-    if constexpr (std::is_same_v<Tree, Bvh>) require_triangles(bvh, "a solid needs");
+    require_triangles(bvh, "a solid needs");
     with_threads(options.threads, [&] { state_->prepare(bvh, options.rule); });
 }
 template <class Scalar>

@@ -31,13 +31,7 @@ QueryCounts sweep_batch(const AnyBvh& bvh, std::span<const Sweep> sweeps,
                            parts[block].found += hits[i].hit();
                        }
                    });
-    QueryCounts sum;
-    sum.queries = sweeps.size();
-    for (const QueryCounts& part : parts) {
-        sum.found += part.found;
-        sum.invalid_queries += part.invalid_queries;
-    }
-    return sum;
+    return sum_of(parts, sweeps.size());
 }
 
 template <class AnyBvh, class Sweep, class AnyHit>

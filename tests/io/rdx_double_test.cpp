@@ -2,7 +2,7 @@
 // wrong with a file is said.
 #include <gtest/gtest.h>
 #include <raydix/error.h>
-#include <raydix/rdx.h>
+#include <raydix/rdx_scene.h>
 #include <raydix/shapes.h>
 #include <raydix/surface.h>
 #include <raydix/user_geometry.h>

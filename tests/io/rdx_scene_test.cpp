@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <raydix/error.h>
 #include <raydix/rdx.h>
-#include <raydix/rdx_tree.h>
 #include <raydix/shapes.h>
 #include <raydix/surface.h>
 #include <raydix/user_geometry.h>

@@ -1,7 +1,7 @@
 // Scenes in .rdx files, as several tests make and read them.
 #pragma once
 
-#include <raydix/rdx.h>
+#include <raydix/rdx_scene.h>
 #include <raydix/surface.h>
 
 #include <cstring>

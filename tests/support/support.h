@@ -37,7 +37,7 @@ public:
 #if defined(RAYDIX_SANITIZED) || defined(RAYDIX_EMULATED)
 inline constexpr std::size_t thorough = 1;
 #else
-inline constexpr std::size_t thorough = 8;
+inline constexpr std::size_t thorough = 20;
 #endif
 
 /// `count` small triangles at random places in the unit cube.

@@ -3,7 +3,6 @@
 #include <raydix/check.h>
 #include <raydix/model.h>
 #include <raydix/rdx.h>
-#include <raydix/rdx_tree.h>
 #include <raydix/trace.h>
 
 #include <algorithm>

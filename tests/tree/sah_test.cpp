@@ -4,7 +4,6 @@
 #include <raydix/error.h>
 #include <raydix/model.h>
 #include <raydix/rdx.h>
-#include <raydix/rdx_tree.h>
 #include <raydix/trace.h>
 
 #include <algorithm>

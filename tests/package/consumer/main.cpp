@@ -1,6 +1,7 @@
 // A ray from above onto a square of two triangles.
 #include <raydix/bvh.h>
 #include <raydix/raydix.h>
+#include <raydix/trace.h>
 
 #include <cstdio>
 
