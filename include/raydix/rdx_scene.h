@@ -38,10 +38,10 @@ struct RdxCounts {
 /// What such a file gives back.
 template <class Scalar>
 struct BasicRdxScene {
-    BasicScene<Scalar>
-        scene;             // committed. Its arrays, and in float the trees of its meshes, view
-                           // the mapped file, which stays mapped as long as one of them is in
-                           // use: processes that load it share its memory. Other trees are built
+    /// Committed. Its arrays, and in float the trees of its meshes, view the mapped file, which
+    /// stays mapped as long as one of them is in use: processes that load it share its memory.
+    /// Other trees are built.
+    BasicScene<Scalar> scene;
     SceneOptions options;  // quality, usage and compact as its last commit had them
     std::string name;
     BasicCameraSet<Scalar> cameras;

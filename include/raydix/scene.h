@@ -1,6 +1,6 @@
 // What rays are traced through: triangle meshes, spheres, capsules, points with a radius, geometry
-// of the caller's own, and instances of other scenes. In float
-// or in double. Exact rules: docs/contract.md 1 and 3. Common questions: docs/questions.md.
+// of the caller's own, and instances of other scenes. In float or in double. Exact rules:
+// docs/contract.md 1 and 3. Common questions: docs/questions.md.
 #pragma once
 
 #include <raydix/batch.h>
