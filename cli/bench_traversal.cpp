@@ -15,6 +15,7 @@
 #include "published.h"
 #include "ray_launches.h"
 #include "simulation.h"
+#include "simulation_state.h"
 #include "traversal_claims.h"
 #include "traversal_measured.h"
 
@@ -32,6 +33,8 @@ struct TraversalBench {
     bool tree_of_machine = true;
     bool memory = false;
     int repeat = 10;  // timed launches on a device
+    double error = 0;
+    std::string state_file;
 };
 
 /// All kernels on each machine; where there is a gtx285, also the two kernels for which the authors
@@ -202,7 +205,9 @@ void print_by_machine(const std::vector<SimulationRow>& rows) {
 class TraversalStudy {
 public:
     explicit TraversalStudy(const TraversalBench& options)
-        : options_(options), document_(new_document("bench traversal")) {
+        : options_(options),
+          document_(new_document("bench traversal")),
+          state_(options.state_file) {
         for (const char* list : {"scenes", "builds", "machines", "simulate", "measured",
                                  "published", "claims", "width_sweep"})
             document_[list] = Json::array();
@@ -291,8 +296,9 @@ private:
                        stats.sah.value_or(0.0), stats.max_depth);
         const RayLaunches launches(options_.launches, input, options_.common);
         for (const RayKind kind : kinds_from(options_.rays)) {
-            const std::vector<SimulationRow> rows = simulate_kind(
-                input, tree, launches, kind, runs, options_.launches, options_.common);
+            const std::vector<SimulationRow> rows =
+                simulate_kind(input, tree, launches, kind, runs, options_.launches, options_.common,
+                              {options_.error, &state_});
             for (const SimulationRow& row : rows) {
                 document_["simulate"].push_back(simulation_json(row));
                 rows_.push_back(row);
@@ -309,6 +315,7 @@ private:
 
     const TraversalBench& options_;
     Json document_;
+    SimulationState state_;
     std::vector<MachineModel> machines_;
     std::vector<SimulateOptions> runs_;
     std::vector<SimulationRow> rows_;
@@ -348,6 +355,15 @@ void add_traversal_suite(CLI::App& bench) {
                      "Timed launches with --device cuda, opencl or hip")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
+    command
+        ->add_option("--error", options->error,
+                     "Ends a kind of rays when no sampling error is larger, 0.02 for 2 % (default: "
+                     "when all of --sample is traced)")
+        ->check(finite_number(false))
+        ->check(CLI::Range(0.0, 1.0));
+    command->add_option("--state", options->state_file,
+                        "Keeps what has been counted in this file after each launch, and goes on "
+                        "with what it holds");
     add_launch_options(*command, options->launches);
     options->tree.builder = "split";
     options->tree.max_leaf = 8;

@@ -28,10 +28,10 @@ const std::array<Head, 4>& heads() {
           {"--rays",    "--mode",      "--kernel", "--machine",     "--camera", "--size",
            "--samples", "--ao-radius", "--path",   "--isa",         "--view",   "--eye",
            "--target",  "--up",        "--fov",    "--launch-rays", "--sample", "--sweep-sample",
-           "--width",   "--memory",    "--any"}},
+           "--error",   "--width",     "--memory", "--any"}},
          {"Output",
           {"--json", "--quiet", "--output", "--out", "--hits", "--save-rays", "--explain"}},
-         {"Run", {"--threads", "--repeat", "--max-result-bytes", "--resume"}}}};
+         {"Run", {"--threads", "--repeat", "--max-result-bytes", "--resume", "--state"}}}};
     return all;
 }
 

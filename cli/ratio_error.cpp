@@ -111,7 +111,9 @@ struct SlowTime {
 SlowTime slow_time(const SimulationRow& row) {
     const double rank = 0.001 * static_cast<double>(warps_of(row.sum));
     const double spread = row.part_taken < 1.0 ? 2.0 * std::sqrt(rank) + 1.0 : 0.0;
-    const auto at = [](double bin) { return std::exp2(bin / 8.0); };
+    const auto at = [](double bin) {
+        return std::exp2(bin / static_cast<double>(Simulation::bins_per_octave));
+    };
     return {at(bin_of_rank(row.sum, rank) + 0.5), at(bin_of_rank(row.sum, rank + spread)),
             at(bin_of_rank(row.sum, std::max(0.0, rank - spread)) + 1.0)};
 }

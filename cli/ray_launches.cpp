@@ -95,6 +95,24 @@ RayLaunches::RayLaunches(const LaunchOptions& options, const Model& model, Trace
     }
 }
 
+namespace {
+
+/// 0 to n - 1 by multiples of the golden ratio, of which any run is spread evenly.
+std::vector<std::size_t> spread(std::size_t n) {
+    constexpr double golden = 0.61803398874989485;
+    std::vector<std::pair<double, std::size_t>> keys;
+    for (std::size_t k = 0; k < n; ++k) {
+        const double at = golden * static_cast<double>(k);
+        keys.emplace_back(at - std::floor(at), k);
+    }
+    std::sort(keys.begin(), keys.end());
+    std::vector<std::size_t> order;
+    for (const auto& [key, k] : keys) order.push_back(k);
+    return order;
+}
+
+}  // namespace
+
 std::vector<RayLaunches::Launch> RayLaunches::launches_of(RayKind kind) const {
     std::vector<Launch> launches;
     const auto samples = static_cast<std::size_t>(options_.samples);
@@ -136,8 +154,8 @@ std::vector<Ray> RayLaunches::rays_of(RayKind kind, const Launch& launch) const 
         traced_);
 }
 
-double RayLaunches::for_each(RayKind kind,
-                             const std::function<void(const RayUnit&, double)>& visit) const {
+double RayLaunches::for_each(RayKind kind, const std::function<void(const RayUnit&, double)>& visit,
+                             const std::function<bool(double)>& more, std::size_t done) const {
     struct Unit {
         std::size_t launch, begin, count;  // rays of the launch
     };
@@ -175,17 +193,23 @@ double RayLaunches::for_each(RayKind kind,
         }
         first = last;
     }
-    for (const Unit& unit : units) taken += unit.count;
-    std::size_t made = launches.size(), done = 0;
+    const auto part_taken = [&] {
+        return there > 0 ? static_cast<double>(taken) / static_cast<double>(there) : 1.0;
+    };
+    std::size_t made = launches.size(), k = 0;
     std::vector<Ray> rays;
-    for (const Unit& unit : units) {
+    for (const std::size_t at : spread(units.size())) {
+        const Unit& unit = units[at];
+        if (k >= done && !more(part_taken())) break;
+        taken += unit.count;
+        if (k++ < done) continue;
         if (made != unit.launch) rays = rays_of(kind, launches[unit.launch]);
         made = unit.launch;
         visit({std::span(rays).subspan(unit.begin, unit.count),
                static_cast<double>(unit.count) / static_cast<double>(rays.size())},
-              static_cast<double>(++done) / static_cast<double>(units.size()));
+              static_cast<double>(k) / static_cast<double>(units.size()));
     }
-    return there > 0 ? static_cast<double>(taken) / static_cast<double>(there) : 1.0;
+    return part_taken();
 }
 
 }  // namespace raydix::cli

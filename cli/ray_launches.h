@@ -42,9 +42,14 @@ public:
 
     /// Calls visit(unit, part of the work done) for the launches of one kind, or of those that
     /// `sample` picks: whole launches spread over all cameras if there are enough, else runs of
-    /// neighbouring rays, or everything where those would overlap; never single rays. Returns the
-    /// part of all rays that was visited.
-    double for_each(RayKind kind, const std::function<void(const RayUnit&, double)>& visit) const;
+    /// neighbouring rays, or everything where those would overlap; never single rays. The order
+    /// jumps about among them, so that the first ones are a sample of all. The first `done` are not
+    /// visited again. Ends before the first other one for which more(part of all rays so far) is
+    /// false. Returns that part.
+    double for_each(
+        RayKind kind, const std::function<void(const RayUnit&, double)>& visit,
+        const std::function<bool(double)>& more = [](double) { return true; },
+        std::size_t done = 0) const;
 
     [[nodiscard]] float ao_radius() const { return ao_radius_; }
     [[nodiscard]] std::size_t cameras() const { return views_.size(); }

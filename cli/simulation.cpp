@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulation_state.h"
+
 namespace raydix::cli {
 namespace {
 
@@ -55,7 +57,7 @@ Json or_null(bool known, double value) {
 
 /// Warp times by octave and half octave, without the empty ends.
 Json histogram_json(const Simulation& sum) {
-    constexpr std::size_t per_bin = 4, per_octave = 8;
+    constexpr std::size_t per_octave = Simulation::bins_per_octave, per_bin = per_octave / 2;
     std::vector<double> edges;
     std::vector<std::uint64_t> counts;
     std::size_t first = sum.warp_times.size(), last = 0;
@@ -118,8 +120,8 @@ std::optional<double> SimulationRow::sampling_error() const {
 std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree& tree,
                                          const RayLaunches& launches, RayKind kind,
                                          std::vector<SimulateOptions> runs,
-                                         const LaunchOptions& options,
-                                         const CommonOptions& common) {
+                                         const LaunchOptions& options, const CommonOptions& common,
+                                         const SimulationEnd& end) {
     std::vector<SimulationRow> rows;
     for (SimulateOptions& run : runs) {
         run.any_hit = kind == RayKind::ao;
@@ -132,11 +134,22 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
                         .sample = options.sample,
                         .units = {}});
     }
+    const Json figures = figures_of(input, rows, options, common.seed);
+    std::size_t done = end.state != nullptr ? end.state->restore(figures, rows) : 0;
     Progress progress(fmt::format("simulating {}", ray_kind_name(kind)), common);
-    const double taken = launches.for_each(kind, [&](const RayUnit& unit, double part) {
+    const auto visit = [&](const RayUnit& unit, double part) {
         add_unit(tree, unit, runs, rows, common);
+        if (end.state != nullptr) end.state->keep(figures, rows, ++done);
         progress.show(part);
-    });
+    };
+    const auto more = [&](double taken) {
+        return end.error <= 0 || !std::all_of(rows.begin(), rows.end(), [&](SimulationRow& row) {
+                   row.part_taken = taken;
+                   const std::optional<double> error = row.sampling_error();
+                   return error && *error <= end.error;
+               });
+    };
+    const double taken = launches.for_each(kind, visit, more, done);
     for (SimulationRow& row : rows) row.part_taken = taken;
     return rows;
 }

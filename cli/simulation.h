@@ -11,6 +11,8 @@
 
 namespace raydix::cli {
 
+class SimulationState;
+
 /// One kernel, kind and machine over all launches.
 struct SimulationRow {
     std::string scene;
@@ -35,12 +37,19 @@ struct SimulationRow {
     [[nodiscard]] std::optional<double> sampling_error() const;
 };
 
+/// When to end before all launches are done, and how to go on then.
+struct SimulationEnd {
+    double error = 0;                  // ends when no row's sampling error is larger; 0: never
+    SimulationState* state = nullptr;  // or null
+};
+
 /// Runs all `runs` over the launches of one kind; ao rays are any-hit rays.
 [[nodiscard]] std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree& tree,
                                                        const RayLaunches& launches, RayKind kind,
                                                        std::vector<SimulateOptions> runs,
                                                        const LaunchOptions& options,
-                                                       const CommonOptions& common);
+                                                       const CommonOptions& common,
+                                                       const SimulationEnd& end = {});
 
 /// The same over given rays, as one launch.
 [[nodiscard]] std::vector<SimulationRow> simulate_rays(const SceneTree& input, const WarpTree& tree,

@@ -152,8 +152,9 @@ struct Simulation {
     double idle_issues = 0;               // issue slots lost after the last ray or block was taken
     double issue_slots = 0;               // of all clocks of all launches
     // Times of warps in instructions: of a batch or, where rays are replaced, of a warp's whole
-    // life. Bin k counts those in [2^(k / 8), 2^((k + 1) / 8)).
-    std::array<std::uint64_t, 256> warp_times{};
+    // life. Bin k counts those in [2^(k / 64), 2^((k + 1) / 64)): 1.1 % wide.
+    static constexpr std::size_t bins_per_octave = 64;
+    std::array<std::uint64_t, 32 * bins_per_octave> warp_times{};
     // Of the memory model.
     std::uint64_t texture_fetches = 0, l1_transactions = 0, l2_bytes = 0, dram_bytes = 0;
     std::uint64_t replays = 0;

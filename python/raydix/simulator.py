@@ -51,7 +51,7 @@ def simulate(
     One dict for each kernel. "mrays_per_s_bound" is the issue limit alone, with infinitely fast
     memory; "mrays_per_s_scheduled" has the distribution of work and the tail of the launch too;
     "mrays_per_s_memory" is None without the memory model. "simd_efficiency", "issues_per_ray" by
-    operation, "histogram" of warp times (8 bins an octave). All rates are simulated ones. Triangles
+    operation, "histogram" of warp times (64 bins an octave). All rates are simulated ones. Triangles
     are tested with Woop's test, as in the paper.
 
     Machines and kernels are those of float32. A scene in float64 is simulated as a user of them would

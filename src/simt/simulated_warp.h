@@ -22,6 +22,13 @@ struct OpCount {
 };
 using OpCounts = std::array<OpCount, op_count>;
 
+inline void add_counts(OpCounts& sum, const OpCounts& more) {
+    for (std::size_t k = 0; k < op_count; ++k) {
+        sum[k].issues += more[k].issues;
+        sum[k].lanes += more[k].lanes;
+    }
+}
+
 /// Sees what the active lanes read or write in one go. Of memory models.
 class MemoryObserver {
 public:
@@ -35,13 +42,6 @@ protected:
     ~MemoryObserver() = default;
 };
 
-/// What warps did: counts of a whole launch, or of a part of it.
-struct WarpTally {
-    OpCounts counts{};
-    std::uint64_t issued = 0;  // native instructions, once for all lanes of a warp
-    double alone_clocks = 0;   // that they take if nobody else runs
-};
-
 /// `Isa` marks code that was compiled for certain processors, so that no two versions of it share a
 /// name.
 template <class Lane, int Width = 32, class Isa = void>
@@ -51,9 +51,7 @@ class SimulatedWarp {
 public:
     std::array<Lane, Width> lanes{};
     WarpMemory<Lane> memory{};
-    WarpTally* tally = nullptr;        // of this warp, or of several that run one after the other
-    const OpCosts* costs = nullptr;    // null: nothing is issued, only counted
-    const OpClocks* clocks = nullptr;  // null: no time is kept
+    OpCounts* tally = nullptr;  // of this warp, or of several that run one after the other
     MemoryObserver* observer = nullptr;
 
     [[nodiscard]] static constexpr std::uint32_t width() { return Width; }
@@ -184,11 +182,9 @@ private:
     }
     /// Policies run bodies for at least one lane, so a charged step always has one.
     void charge(Op op) {
-        OpCount& count = tally->counts[static_cast<std::size_t>(op)];
+        OpCount& count = (*tally)[static_cast<std::size_t>(op)];
         ++count.issues;
         count.lanes += static_cast<std::uint64_t>(std::popcount(active_));
-        if (costs != nullptr) tally->issued += (*costs)[static_cast<std::size_t>(op)];
-        if (clocks != nullptr) tally->alone_clocks += (*clocks)[static_cast<std::size_t>(op)];
     }
 
     LaneMask active_ = ~LaneMask{0} >> (64 - Width);

@@ -282,6 +282,27 @@ class Traversal(ProgramTest):
             self.assertIn(", scheduled", claim["found"])
         self.assertGreater(len(claims), len(needing))
 
+    def test_a_study_goes_on_where_it_ended(self):
+        arguments = ("bench", "traversal", SCENE, "--size", "128x96", "--samples", "8", "--launch-rays", "4096", "--machine",
+                     "gtx285,gtx480", "--kernel", "while_while,persistent_packet,dynamic_fetch", "--rays", "primary,diffuse",
+                     "--sweep-sample", "0", "--quiet")
+        whole = self.document(*arguments)
+        first = self.document(*arguments, "--state", "state.json", "--error", "1")
+        self.assertLess(first["simulate"][-1]["part_taken"], 1)
+        self.assertGreater(first["simulate"][-1]["sampling_error"], 0)
+        again = self.document(*arguments, "--state", "state.json", "--error", "1")  # nothing is left to do
+        self.assertEqual(first["simulate"], again["simulate"])
+        rest = self.document(*arguments, "--state", "state.json")
+        self.assertEqual(whole["simulate"], rest["simulate"])
+        self.assertEqual(whole["claims"], rest["claims"])
+        kept = json.loads((self.folder / "state.json").read_text(encoding="utf-8"))
+        del next(iter(kept["parts"].values()))["rows"][0]["operations"]
+        self.write("broken.json", json.dumps(kept))
+        self.fail_with_one_line(*arguments, "--state", "broken.json", names=["broken.json", "cannot be gone on with"])
+        self.fail_with_one_line(*arguments, "--ao-radius", "3", "--state", "state.json", names=["state.json", "other options"])
+        self.write("other.json", "{}")
+        self.fail_with_one_line(*arguments, "--state", "other.json", names=["other.json", "is no state of bench traversal"])
+
     def test_published_figures_of_the_papers_scenes(self):
         mesh = pathlib.Path(self.write("conference_copy.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
                                        "property float y\nproperty float z\nelement face 1\n"

@@ -102,6 +102,24 @@ TEST(ThreadPool, LoopsInsideOfAJobStayOnItsThread) {
     EXPECT_EQ(pool.seen.loops, 1);
 }
 
+TEST(ThreadPool, CallsInsideOfAJobGetNoMoreThreadsForTheAsking) {
+    PoolInUse pool(3);
+    std::atomic<int> strayed{0};
+    for_each_index(
+        16,
+        [&](std::size_t) {
+            const auto here = std::this_thread::get_id();
+            with_threads(2, [&] {
+                EXPECT_EQ(thread_count(), 1);
+                for_each_index(
+                    100, [&](std::size_t) { strayed += std::this_thread::get_id() != here; }, 1);
+            });
+        },
+        1);
+    EXPECT_EQ(strayed, 0);
+    EXPECT_EQ(pool.seen.loops, 1);
+}
+
 TEST(ThreadPool, LimitsHold) {
     PoolInUse pool(6);
     for (const int threads : {1, 2, 5, 64}) {

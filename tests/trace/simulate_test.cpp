@@ -302,29 +302,27 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
     const WarpTree tree(build_bvh(scene.mesh()));
     const PreparedRays rays(make_mixed_rays(scene, 640, 8));
     const auto& arrays = tree.arrays();
-    OpCosts costs;
-    costs.fill(1);
     for (const WarpKernel name : warp_kernels()) {
         std::vector<std::vector<TreeHit>> hits;
-        std::vector<std::uint64_t> issued;
+        std::vector<OpCounts> counts;
         for (const SimulatorIsa isa : {SimulatorIsa::base, SimulatorIsa::v3}) {
             const SimulatedKernel& kernel = *simulated_kernel(name, false, 32, isa);
-            WarpTally tally;
+            OpCounts tally{};
             Buffer<std::byte> memory(kernel.warp_bytes(tree.max_depth() + 1));
             std::uint32_t next = 0;
             hits.emplace_back(640);
             const WarpJob job{{arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
                               {rays.rays().data(), hits.back().data(), 640, &next}};
-            kernel.start_warp(memory.data(), {&costs, &tally, nullptr, tree.max_depth() + 1});
+            kernel.start_warp(memory.data(), {&tally, nullptr, tree.max_depth() + 1});
             for (std::uint32_t warp = 0; warp < 20; ++warp) {
                 KernelState state;
                 kernel.start_kernel(state);
                 while (kernel.turn(memory.data(), state, job, warp)) {
                 }
             }
-            issued.push_back(tally.issued);
+            counts.push_back(tally);
         }
-        EXPECT_EQ(issued[0], issued[1]) << warp_kernel_name(name);
+        EXPECT_EQ(counts[0], counts[1]) << warp_kernel_name(name);
         EXPECT_EQ(std::memcmp(hits[0].data(), hits[1].data(), 640 * sizeof(TreeHit)), 0)
             << warp_kernel_name(name);
     }
@@ -344,15 +342,13 @@ TEST(Simulate, PoolsLoseAndRepeatNoRayWhateverTheDelays) {
     const std::uint64_t visits =
         figure(simulate(tree, some, reference_run).front(), Op::visit_node).lanes;
     const auto& arrays = tree.arrays();
-    OpCosts costs;
-    costs.fill(1);
     for (const WarpKernel name :
          {WarpKernel::persistent_while_while, WarpKernel::ray_replacement, WarpKernel::work_queue,
           WarpKernel::dynamic_fetch, WarpKernel::persistent_packet}) {
         SCOPED_TRACE(warp_kernel_name(name));
         const SimulatedKernel& kernel = *simulated_kernel(name, false, 8);
         constexpr int warps = 6;
-        std::vector<WarpTally> tallies(warps);
+        std::vector<OpCounts> tallies(warps);
         std::vector<TreeHit> hits(count, TreeHit{-5.0f, 7u, 0, 0});
         std::uint32_t next = 0;
         const WarpJob job{{arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
@@ -362,8 +358,7 @@ TEST(Simulate, PoolsLoseAndRepeatNoRayWhateverTheDelays) {
             threads.emplace_back([&, w] {
                 std::mt19937 random(static_cast<unsigned>(w) + 100u);
                 Buffer<std::byte> memory(kernel.warp_bytes(tree.max_depth() + 1));
-                kernel.start_warp(memory.data(),
-                                  {&costs, &tallies[w], nullptr, tree.max_depth() + 1});
+                kernel.start_warp(memory.data(), {&tallies[w], nullptr, tree.max_depth() + 1});
                 KernelState state;
                 kernel.start_kernel(state);
                 while (kernel.turn(memory.data(), state, job, static_cast<std::uint32_t>(w)))
@@ -373,8 +368,8 @@ TEST(Simulate, PoolsLoseAndRepeatNoRayWhateverTheDelays) {
         for (std::thread& thread : threads) thread.join();
         rays.rescale(hits);
         std::uint64_t visited = 0;
-        for (const WarpTally& tally : tallies)
-            visited += tally.counts[static_cast<std::size_t>(Op::visit_node)].lanes;
+        for (const OpCounts& tally : tallies)
+            visited += tally[static_cast<std::size_t>(Op::visit_node)].lanes;
         if (name != WarpKernel::dynamic_fetch && name != WarpKernel::persistent_packet) {
             EXPECT_EQ(visited, visits) << "a ray was lost or traced twice";
         }

@@ -75,13 +75,18 @@ struct Persistent {
     static constexpr int rays_per_lane = 1;
     std::uint32_t next = 0, end = 0;  // rays taken and not yet started
 
-    template <bool any_hit, class Warp>
-    RAYDIX_HD bool turn(Warp& warp, const WarpJob& job, std::uint32_t) {
+    /// Whether there is a batch, from `next` on.
+    template <class Warp>
+    RAYDIX_HD bool fetch(Warp& warp, const RayLaunch& launch) {
         if (next == end) {
-            next = warp.take(Op::take_rays, *job.launch.next, batches_per_fetch * Warp::width());
+            next = warp.take(Op::take_rays, *launch.next, batches_per_fetch * Warp::width());
             end = next + batches_per_fetch * Warp::width();
         }
-        if (next >= job.launch.count) return false;
+        return next < launch.count;
+    }
+    template <bool any_hit, class Warp>
+    RAYDIX_HD bool turn(Warp& warp, const WarpJob& job, std::uint32_t) {
+        if (!fetch(warp, job.launch)) return false;
         start_batch(warp, job.launch, next);
         Body::template trace<any_hit>(warp, job.scene);
         store_hits(warp, job.launch);

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <string>
 
 #include "base/options.h"
 #include "exec/parallel.h"
 #include "layout/warp_tree.h"
+#include "trace/warp/batch_work.h"
 #include "trace/warp/kernel_list.h"
 #include "trace/warp/prepare_rays.h"
 #include "trace/warp/simulate_launch.h"
@@ -269,6 +271,37 @@ SimulatedRates simulated_rates(const Simulation& s, const SimulateOptions& optio
     return rates;
 }
 
+namespace {
+
+/// Whether all that a run asks of the rays is in a BatchWork.
+bool shares_batches(const SimulateOptions& run) { return !run.memory && batch_kernel(run.kernel); }
+
+/// Runs whose warps trace the same batches stand together, each other run alone.
+std::vector<std::vector<std::size_t>> groups_of(std::span<const SimulateOptions> runs) {
+    std::vector<std::vector<std::size_t>> groups;
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+        const auto same = [&](const std::vector<std::size_t>& group) {
+            const SimulateOptions& other = runs[group.front()];
+            return shares_batches(runs[k]) && shares_batches(other) &&
+                   batch_kernel(runs[k].kernel) == batch_kernel(other.kernel) &&
+                   runs[k].any_hit == other.any_hit && runs[k].width == other.width;
+        };
+        const auto found = std::find_if(groups.begin(), groups.end(), same);
+        (found != groups.end() ? *found : groups.emplace_back()).push_back(k);
+    }
+    return groups;
+}
+
+BatchWork batch_work(const WarpScene& scene, std::uint32_t stack_entries, std::span<const Ray> rays,
+                     std::span<TreeHit> hits, const SimulateOptions& run) {
+    const WarpJob job{scene,
+                      {rays.data(), hits.data(), static_cast<std::uint32_t>(rays.size()), nullptr}};
+    return trace_batches(*simulated_kernel(*batch_kernel(run.kernel), run.any_hit, run.width), job,
+                         run.width, stack_entries);
+}
+
+}  // namespace
+
 std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays,
                                  std::span<const SimulateOptions> runs,
                                  std::vector<std::vector<TreeHit>>* hits, int threads) {
@@ -290,19 +323,38 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
                     MemoryRange::Holds::triangles},
         MemoryRange{arrays.ids.data(), arrays.ids.view().size_bytes(),
                     MemoryRange::Holds::triangles}};
-    with_threads(threads, [&] {
+    const std::vector<std::vector<std::size_t>> groups = groups_of(runs);
+    const auto run = [&](const std::vector<std::size_t>& group) {
+        const WarpScene scene = scene_of(tree);
+        const std::uint32_t stack_entries = tree.max_depth() + 1;
+        std::vector<TreeHit>& first = found[group.front()];
+        first.assign(rays.size(), TreeHit{});
+        std::optional<BatchWork> batches;
+        if (shares_batches(runs[group.front()]))
+            batches = batch_work(scene, stack_entries, prepared.rays(), first, runs[group.front()]);
         for_each_index(
-            runs.size(),
-            [&](std::size_t k) {
-                found[k].assign(rays.size(), TreeHit{});
-                figures[k] = tree.empty()
-                                 ? without_tree(runs[k], rays.size())
-                                 : simulate_launch(scene_of(tree), tree.max_depth() + 1,
-                                                   prepared.rays(), found[k], runs[k], memory);
-                prepared.rescale(found[k]);
-                if (hits == nullptr) std::vector<TreeHit>().swap(found[k]);
+            group.size(),
+            [&](std::size_t i) {
+                const std::size_t k = group[i];
+                figures[k] = simulate_launch(scene, stack_entries, prepared.rays(), first, runs[k],
+                                             memory, batches ? &*batches : nullptr);
             },
             1);
+        prepared.rescale(first);
+        for (const std::size_t k : group)
+            if (hits != nullptr && k != group.front()) found[k] = first;
+        if (hits == nullptr) std::vector<TreeHit>().swap(first);
+    };
+    if (tree.empty()) {
+        for (std::size_t k = 0; k < runs.size(); ++k) {
+            found[k].assign(rays.size(), TreeHit{});
+            figures[k] = without_tree(runs[k], rays.size());
+        }
+        return figures;
+    }
+    with_threads(threads, [&] {
+        for_each_index(
+            groups.size(), [&](std::size_t g) { run(groups[g]); }, 1);
     });
     return figures;
 }

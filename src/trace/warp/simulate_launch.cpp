@@ -1,6 +1,7 @@
-// Warps of a launch -> their instructions -> clocks on a machine. Kernels whose warps have fixed
-// batches run over all threads, then their times are scheduled block by block; kernels that fetch
-// run in order of simulated time, because who fetches first decides who traces which ray.
+// Warps of a launch -> their instructions -> clocks on a machine. Batches that one warp traces
+// from their start to their end are scheduled from what they issue (batch_work.h). Kernels whose
+// lanes keep rays run in order of simulated time, because who fetches first decides who traces
+// which ray.
 #include "trace/warp/simulate_launch.h"
 
 #include <raydix/error.h>
@@ -15,36 +16,21 @@
 #include <utility>
 #include <vector>
 
-#include "exec/memory.h"
-#include "exec/parallel.h"
 #include "simt/memory_model.h"
 #include "simt/schedule.h"
+#include "trace/warp/batch_work.h"
 #include "trace/warp/simulated_kernels.h"
 
 namespace raydix {
 namespace {
 
-constexpr std::size_t warps_per_task = 256;
-
 std::size_t time_bin(std::uint64_t instructions) {
     if (instructions < 1) return 0;
-    const auto bin = static_cast<std::size_t>(8.0 * std::log2(static_cast<double>(instructions)));
-    return std::min<std::size_t>(bin, 255);
+    constexpr auto per_octave = static_cast<double>(Simulation::bins_per_octave);
+    const double bin = per_octave * std::log2(static_cast<double>(instructions));
+    return std::min(static_cast<std::size_t>(bin),
+                    std::tuple_size_v<decltype(Simulation::warp_times)> - 1);
 }
-
-/// Lanes and stacks of a number of warps.
-class WarpMemoryPool {
-public:
-    WarpMemoryPool(const SimulatedKernel& kernel, std::size_t warps, const WarpSetup& setup)
-        : stride_(kernel.warp_bytes(setup.stack_entries)), memory_(stride_ * warps) {
-        for (std::size_t k = 0; k < warps; ++k) kernel.start_warp(at(k), setup);
-    }
-    [[nodiscard]] std::byte* at(std::size_t k) { return memory_.data() + k * stride_; }
-
-private:
-    std::size_t stride_;
-    Buffer<std::byte> memory_;
-};
 
 /// The launch as all parts below see it.
 struct LaunchRun {
@@ -59,16 +45,25 @@ struct LaunchRun {
     [[nodiscard]] std::uint32_t width() const { return static_cast<std::uint32_t>(options.width); }
     /// Warp instructions per clock of one multiprocessor.
     [[nodiscard]] double slots() const { return options.machine.lanes_per_clock / options.width; }
-    [[nodiscard]] WarpSetup setup(WarpTally& tally) const {
-        return {&costs, &tally, memory.get(), stack_entries, &clocks};
+    /// What a warp does that issues operation k issues(k) times.
+    template <class Issues>
+    [[nodiscard]] WarpWork work_of(const Issues& issues) const {
+        WarpWork work{};
+        for (std::size_t k = 0; k < op_count; ++k) {
+            const auto times = static_cast<double>(issues(k));
+            work.instructions += times * costs[k];
+            work.alone_clocks += times * clocks[k];
+        }
+        return work;
     }
 };
 
-void add_tally(Simulation& figures, const WarpTally& tally) {
-    figures.instructions += tally.issued;
+void add_to_figures(Simulation& figures, const OpCounts& counts) {
     for (std::size_t k = 0; k < op_count; ++k) {
-        figures.operations[k].issues += tally.counts[k].issues;
-        figures.operations[k].lanes += tally.counts[k].lanes;
+        OperationFigure& figure = figures.operations[k];
+        figure.issues += counts[k].issues;
+        figure.lanes += counts[k].lanes;
+        figures.instructions += counts[k].issues * figure.instructions;
     }
 }
 
@@ -81,42 +76,27 @@ void add_times(Simulation& figures, const LaunchRun& run, double clocks, double 
     figures.idle_issues += std::max(0.0, (clocks - last_handed_out) * slots_per_clock - work_after);
 }
 
-WarpWork work_between(const WarpTally& before, const WarpTally& after) {
-    return {static_cast<double>(after.issued - before.issued),
-            after.alone_clocks - before.alone_clocks};
+/// What each warp does, in the order of the launch.
+std::vector<WarpWork> works_of(const LaunchRun& run, const BatchWork& batches,
+                               Simulation& figures) {
+    std::vector<WarpWork> works;
+    works.reserve(batches.batches.size());
+    for (const OpIssues& issues : batches.batches) {
+        works.push_back(run.work_of([&](std::size_t k) { return issues[k]; }));
+        ++figures.warp_times[time_bin(static_cast<std::uint64_t>(works.back().instructions))];
+    }
+    add_to_figures(figures, batches.counts);
+    return works;
 }
 
-/// What each warp does, in the order of the launch.
-std::vector<WarpWork> run_batches(const LaunchRun& run, Simulation& figures) {
-    const std::size_t warps = (run.job.launch.count + run.width() - 1) / run.width();
-    std::vector<WarpWork> works(warps);
-    const std::size_t tasks = (warps + warps_per_task - 1) / warps_per_task;
-    std::vector<WarpTally> tallies(tasks);
-    const auto task = [&](std::size_t index, std::size_t begin, std::size_t end) {
-        WarpTally& tally = tallies[index];
-        WarpMemoryPool memory(run.kernel, 1, run.setup(tally));
-        KernelState state;
-        for (std::size_t w = begin; w < end; ++w) {
-            const WarpTally before = tally;
-            run.kernel.start_kernel(state);
-            run.kernel.turn(memory.at(0), state, run.job, static_cast<std::uint32_t>(w));
-            if (run.memory)
-                run.memory->hand_over(
-                    static_cast<std::uint32_t>(w * run.width() / run.options.machine.block_lanes %
-                                               run.options.machine.multiprocessors));
-            works[w] = work_between(before, tally);
-        }
-    };
-    if (run.memory) {  // one cache, one order
-        for (std::size_t t = 0; t < tasks; ++t)
-            task(t, t * warps_per_task, std::min(warps, (t + 1) * warps_per_task));
-    } else {
-        for_each_block(warps, warps_per_task, task);
-    }
-    for (const WarpTally& tally : tallies) add_tally(figures, tally);
-    for (const WarpWork& work : works)
-        ++figures.warp_times[time_bin(static_cast<std::uint64_t>(work.instructions))];
-    return works;
+/// With the memory model: one cache, one order.
+BatchWork watched_batches(const LaunchRun& run) {
+    const MachineModel& m = run.options.machine;
+    return trace_batches_in_order(
+        run.kernel, run.job, run.options.width, run.stack_entries, *run.memory, [&](std::size_t w) {
+            run.memory->hand_over(
+                static_cast<std::uint32_t>(w * run.width() / m.block_lanes % m.multiprocessors));
+        });
 }
 
 /// When the warps of a launch end.
@@ -171,35 +151,48 @@ void add_batch_times(const LaunchRun& run, const std::vector<WarpWork>& works,
             : schedule_blocks(run, works, block_warps, BlockRelease::own).clocks;
 }
 
-/// Persistent warps, each turn at its time.
-void run_persistent(const LaunchRun& run, Simulation& figures) {
+/// Persistent warps, each turn at its time. `batches`: what they trace, if that is known; else they
+/// trace it.
+void run_persistent(const LaunchRun& run, const BatchWork* batches, Simulation& figures) {
     const MachineModel& m = run.options.machine;
     const std::uint32_t filling = std::max(1u, m.resident_lanes / run.width()) * m.multiprocessors;
     // No more warps than batches: those would only find the pool empty.
-    const std::uint32_t batches = (run.job.launch.count - 1) / run.width() + 1;
-    const std::uint32_t warps = std::clamp(
-        static_cast<std::uint32_t>(std::ceil(filling * run.options.part_of_launch)), 1u, batches);
-    WarpTally tally;
-    WarpMemoryPool memory(run.kernel, run.kernel.keeps_rays ? warps : 1, run.setup(tally));
+    const std::uint32_t batch_count = (run.job.launch.count - 1) / run.width() + 1;
+    const std::uint32_t warps =
+        std::clamp(static_cast<std::uint32_t>(std::ceil(filling * run.options.part_of_launch)), 1u,
+                   batch_count);
+    OpCounts tally{};
+    WarpMemoryPool memory(run.kernel, run.kernel.keeps_rays ? warps : 1,
+                          {&tally, run.memory.get(), run.stack_entries});
     std::vector<KernelState> states(warps);
-    std::vector<std::uint64_t> lives(warps);
+    std::vector<double> lives(warps);
     std::vector<bool> done(warps);
     Multiprocessors machine(m.multiprocessors, run.slots());
     const RayLaunch& launch = run.job.launch;
-    double last = 0, left_at_last = 0;
-    std::uint64_t issued_at_last = 0;
+    double last = 0, left_at_last = 0, issued = 0, issued_at_last = 0;
     const auto turn = [&](std::uint32_t place, std::uint32_t warp) {
-        const WarpTally before = tally;
+        const OpCounts before = tally;
         const bool more_rays = *launch.next < launch.count;
-        done[warp] = !run.kernel.turn(memory.at(run.kernel.keeps_rays ? warp : 0), states[warp],
-                                      run.job, warp);
+        const OpIssues* batch = nullptr;
+        if (batches != nullptr) {
+            std::uint32_t k = 0;
+            done[warp] = !run.kernel.next_batch(memory.at(0), states[warp], run.job, k);
+            if (!done[warp]) batch = &batches->batches[k];
+        } else {
+            done[warp] = !run.kernel.turn(memory.at(run.kernel.keeps_rays ? warp : 0), states[warp],
+                                          run.job, warp);
+        }
         if (run.memory) run.memory->hand_over(place);
-        const std::uint64_t time = tally.issued - before.issued;
-        lives[warp] += time;
-        if (!run.kernel.keeps_rays && !done[warp]) ++figures.warp_times[time_bin(time)];
-        machine.add(place, warp, work_between(before, tally));
+        const WarpWork work = run.work_of([&](std::size_t k) {
+            return tally[k].issues - before[k].issues + (batch != nullptr ? (*batch)[k] : 0u);
+        });
+        issued += work.instructions;
+        lives[warp] += work.instructions;
+        if (!run.kernel.keeps_rays && !done[warp])
+            ++figures.warp_times[time_bin(static_cast<std::uint64_t>(work.instructions))];
+        machine.add(place, warp, work);
         if (more_rays && *launch.next >= launch.count)
-            last = machine.now(), left_at_last = machine.work_left(), issued_at_last = tally.issued;
+            last = machine.now(), left_at_last = machine.work_left(), issued_at_last = issued;
     };
     for (std::uint32_t w = 0; w < warps; ++w) {
         run.kernel.start_kernel(states[w]);
@@ -210,10 +203,11 @@ void run_persistent(const LaunchRun& run, Simulation& figures) {
         if (!done[at.warp]) turn(at.place, at.warp);
     }
     if (run.kernel.keeps_rays)
-        for (const std::uint64_t life : lives) ++figures.warp_times[time_bin(life)];
-    add_tally(figures, tally);
-    add_times(figures, run, machine.now(), last,
-              left_at_last + static_cast<double>(tally.issued - issued_at_last));
+        for (const double life : lives)
+            ++figures.warp_times[time_bin(static_cast<std::uint64_t>(life))];
+    add_to_figures(figures, tally);
+    if (batches != nullptr) add_to_figures(figures, batches->counts);
+    add_times(figures, run, machine.now(), last, left_at_last + issued - issued_at_last);
     figures.single_warp_clocks = figures.free_block_clocks = figures.scheduled_clocks;
 }
 
@@ -267,7 +261,8 @@ OpCosts op_costs(const MachineModel& machine, WarpKernel kernel) {
 
 Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
                            std::span<const Ray> rays, std::span<TreeHit> hits,
-                           const SimulateOptions& options, std::span<const MemoryRange> memory) {
+                           const SimulateOptions& options, std::span<const MemoryRange> memory,
+                           const BatchWork* batches) {
     std::uint32_t next = 0;
     const MachineModel& m = options.machine;
     const SimulatedKernel& kernel =
@@ -292,9 +287,11 @@ Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
     figures.rays = rays.size();
     if (rays.empty()) return figures;
     if (run.kernel.persistent) {
-        run_persistent(run, figures);
+        run_persistent(run, batches, figures);
     } else {
-        add_batch_times(run, run_batches(run, figures), figures);
+        add_batch_times(
+            run, works_of(run, batches != nullptr ? *batches : watched_batches(run), figures),
+            figures);
     }
     for (const OperationFigure& op : figures.operations)
         figures.lane_instructions += op.lanes * op.instructions;

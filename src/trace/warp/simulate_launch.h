@@ -8,6 +8,7 @@
 
 #include "simt/memory_model.h"
 #include "simt/op.h"
+#include "trace/warp/batch_work.h"
 #include "trace/warp/lane.h"
 
 namespace raydix {
@@ -17,10 +18,12 @@ namespace raydix {
 [[nodiscard]] OpCosts op_costs(const MachineModel& machine, WarpKernel kernel);
 
 /// rays [n], prepared (prepare_rays.h), fewer than 2^31 -> hits [n]. `stack_entries`: at least the
-/// tree's depth. `memory`: the scene's arrays, for the memory model.
+/// tree's depth. `memory`: the scene's arrays, for the memory model. `batches`: what the rays make
+/// warps issue, if the kernel has a batch_kernel and there is no memory model; hits are there then.
 [[nodiscard]] Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
                                          std::span<const Ray> rays, std::span<TreeHit> hits,
                                          const SimulateOptions& options,
-                                         std::span<const MemoryRange> memory);
+                                         std::span<const MemoryRange> memory,
+                                         const BatchWork* batches = nullptr);
 
 }  // namespace raydix

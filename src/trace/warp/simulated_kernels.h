@@ -15,11 +15,9 @@ namespace raydix {
 
 /// What a simulated warp is given.
 struct WarpSetup {
-    const OpCosts* costs;
-    WarpTally* tally;
+    OpCounts* tally;
     MemoryObserver* observer;  // or null
     std::uint32_t stack_entries;
-    const OpClocks* clocks = nullptr;  // or null
 };
 
 /// A kernel's own state, the same in all lanes: a few words.
@@ -37,6 +35,10 @@ struct SimulatedKernel {
     void (*start_kernel)(KernelState& state);
     /// One turn; false when the warp is done.
     bool (*turn)(std::byte* warp, KernelState& state, const WarpJob& job, std::uint32_t warp_index);
+    /// Instead of a turn, where persistent warps have a batch a turn: which one is next. False when
+    /// the warp is done. Null for other kernels.
+    bool (*next_batch)(std::byte* warp, KernelState& state, const WarpJob& job,
+                       std::uint32_t& batch);
 };
 
 /// Null for a width that is not 1, 2, 4, 8, 16, 32 or 64. Takes the fastest code that the processor

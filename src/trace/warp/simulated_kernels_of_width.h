@@ -44,9 +44,7 @@ struct SimulatedKernelOf {
     static void start_warp(std::byte* memory, const WarpSetup& setup) {
         Warp& warp = *new (memory) Warp{};
         warp.tally = setup.tally;
-        warp.costs = setup.costs;
         warp.observer = setup.observer;
-        warp.clocks = setup.clocks;
         std::byte* shared = memory + rounded(sizeof(Warp));
         if (Kernel::one_stack) {
             warp.memory.packets = reinterpret_cast<PacketEntry*>(shared);
@@ -73,13 +71,27 @@ struct SimulatedKernelOf {
         Kernel& kernel = *std::launder(reinterpret_cast<Kernel*>(&state));
         return kernel.template turn<any_hit>(warp, job, warp_index);
     }
-    static constexpr SimulatedKernel table{Kernel::persistent,
-                                           Kernel::keeps_rays,
-                                           Kernel::one_stack,
-                                           &warp_bytes,
-                                           &start_warp,
-                                           &start_kernel,
-                                           &turn};
+    static bool next_batch(std::byte* memory, KernelState& state, const WarpJob& job,
+                           std::uint32_t& batch) {
+        if constexpr (Kernel::persistent && !Kernel::keeps_rays) {
+            Warp& warp = *std::launder(reinterpret_cast<Warp*>(memory));
+            Kernel& kernel = *std::launder(reinterpret_cast<Kernel*>(&state));
+            if (!kernel.fetch(warp, job.launch)) return false;
+            batch = kernel.next / Warp::width();
+            kernel.next += Warp::width();
+            return true;
+        }
+        return false;
+    }
+    static constexpr SimulatedKernel table{
+        Kernel::persistent,
+        Kernel::keeps_rays,
+        Kernel::one_stack,
+        &warp_bytes,
+        &start_warp,
+        &start_kernel,
+        &turn,
+        Kernel::persistent && !Kernel::keeps_rays ? &next_batch : nullptr};
 };
 
 template <class Isa, int Width>

@@ -1,0 +1,134 @@
+#include "simulation_state.h"
+
+#include <fmt/format.h>
+#include <raydix/error.h>
+#include <raydix/files.h>
+#include <raydix/version.h>
+
+#include <filesystem>
+#include <fstream>
+#include <span>
+#include <utility>
+
+namespace raydix::cli {
+namespace {
+
+constexpr const char* kind_of_file = "state of bench traversal";
+
+/// Calls field(name, member) for all numbers of a row that launches add to.
+template <class Row, class Field>
+void for_each_sum(Row& row, const Field& field) {
+    auto& s = row.sum;
+    field("rays", s.rays), field("launches", s.launches), field("hits", s.hits);
+    field("instructions", s.instructions), field("lane_instructions", s.lane_instructions);
+    field("scheduled_clocks", s.scheduled_clocks);
+    field("single_warp_clocks", s.single_warp_clocks);
+    field("free_block_clocks", s.free_block_clocks);
+    field("idle_issues", s.idle_issues), field("issue_slots", s.issue_slots);
+    field("texture_fetches", s.texture_fetches), field("l1_transactions", s.l1_transactions);
+    field("l2_bytes", s.l2_bytes), field("dram_bytes", s.dram_bytes), field("replays", s.replays);
+    field("memory_wait_clocks", s.memory_wait_clocks);
+    field("whole_launches", row.whole_launches), field("different_hits", row.different_hits);
+}
+
+Json row_json(const SimulationRow& row) {
+    Json out = Json::object();
+    for_each_sum(row, [&](const char* name, const auto& value) { out[name] = value; });
+    Json operations = Json::array(), times = Json::array(), units = Json::array();
+    for (const OperationFigure& op : row.sum.operations)
+        operations.push_back({op.issues, op.lanes});
+    for (std::size_t k = 0; k < row.sum.warp_times.size(); ++k)
+        if (row.sum.warp_times[k] != 0) times.push_back({k, row.sum.warp_times[k]});
+    for (const SimulatedRates& unit : row.units)
+        units.push_back({unit.bound, unit.scheduled, unit.single_warps, unit.free_blocks});
+    out["operations"] = operations, out["warp_times"] = times, out["units"] = units;
+    return out;
+}
+
+std::string part_name(const std::vector<SimulationRow>& rows) {
+    return fmt::format("{}, {}, {}", rows.front().scene, rows.front().builder, rows.front().rays);
+}
+
+void read_row(const Json& from, SimulationRow& row) {
+    row.sum = simulate(WarpTree(Bvh{}), {}, std::span(&row.options, 1)).front();  // names and costs
+    for_each_sum(row, [&](const char* name, auto& value) { from.at(name).get_to(value); });
+    const Json& operations = from.at("operations");
+    for (std::size_t k = 0; k < row.sum.operations.size(); ++k) {
+        operations.at(k).at(0).get_to(row.sum.operations[k].issues);
+        operations.at(k).at(1).get_to(row.sum.operations[k].lanes);
+    }
+    for (const Json& bin : from.at("warp_times"))
+        bin.at(1).get_to(row.sum.warp_times.at(bin.at(0).get<std::size_t>()));
+    for (const Json& unit : from.at("units"))
+        row.units.push_back({.bound = unit.at(0).get<double>(),
+                             .scheduled = unit.at(1).get<double>(),
+                             .single_warps = unit.at(2).get<double>(),
+                             .free_blocks = unit.at(3).get<double>()});
+}
+
+}  // namespace
+
+Json figures_of(const SceneTree& input, const std::vector<SimulationRow>& rows,
+                const LaunchOptions& launches, std::uint64_t seed) {
+    Json cameras = Json::array(), runs = Json::array();
+    for (const Camera& c : input.scene.cameras.cameras)
+        cameras.push_back({c.position.x, c.position.y, c.position.z, c.target.x, c.target.y,
+                           c.target.z, c.up.x, c.up.y, c.up.z, c.vfov});
+    for (const SimulationRow& row : rows)
+        runs.push_back({warp_kernel_name(row.options.kernel), row.options.width, row.options.memory,
+                        machine_model_json(row.options.machine)});
+    return {{"tree", tree_hash(input.bvh)},
+            {"cameras", cameras},
+            {"camera", launches.camera},
+            {"size", launches.size_text},
+            {"samples", launches.samples},
+            {"ao_radius", launches.ao_radius},
+            {"sample", launches.sample},
+            {"launch_rays", launches.launch_rays},
+            {"seed", seed},
+            {"runs", runs}};
+}
+
+SimulationState::SimulationState(std::string file) : file_(std::move(file)) {
+    document_ = {{"holds", kind_of_file}, {"version", version}, {"parts", Json::object()}};
+    if (file_.empty() || !std::filesystem::exists(file_)) return;
+    std::ifstream in(file_);
+    const Json found = Json::parse(in, nullptr, false);
+    if (!found.is_object() || found.value("holds", "") != kind_of_file ||
+        !found.contains("parts") || !found["parts"].is_object())
+        throw InputError(file_ + ": is no " + kind_of_file);
+    if (found.value("version", "") != document_["version"])
+        throw InputError(file_ + ": comes from another version of raydix");
+    document_ = found;
+}
+
+std::size_t SimulationState::restore(const Json& figures, std::vector<SimulationRow>& rows) const {
+    const std::string name = part_name(rows);
+    const auto part = document_["parts"].find(name);
+    if (part == document_["parts"].end()) return 0;
+    if (part->value("of", Json()) != figures)
+        throw InputError(file_ + ": '" + name +
+                         "' was counted with other options, cameras or machines");
+    std::vector<SimulationRow> read = rows;
+    try {
+        const Json& kept = part->at("rows");
+        for (std::size_t k = 0; k < read.size(); ++k) read_row(kept.at(k), read[k]);
+        const auto launches = part->at("launches").get<std::size_t>();
+        rows = std::move(read);
+        return launches;
+    } catch (const std::exception& error) {
+        throw InputError(file_ + ": '" + name + "' cannot be gone on with: " + error.what());
+    }
+}
+
+void SimulationState::keep(const Json& figures, const std::vector<SimulationRow>& rows,
+                           std::size_t launches) {
+    if (file_.empty()) return;
+    Json kept = Json::array();
+    for (const SimulationRow& row : rows) kept.push_back(row_json(row));
+    document_["parts"][part_name(rows)] = {{"of", figures}, {"launches", launches}, {"rows", kept}};
+    const std::string text = document_.dump() + "\n";
+    write_file(file_, std::as_bytes(std::span(text)));
+}
+
+}  // namespace raydix::cli

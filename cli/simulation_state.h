@@ -1,0 +1,36 @@
+// What a long simulation has counted so far, in a file: it can be ended and gone on with.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "output.h"
+#include "simulation.h"
+
+namespace raydix::cli {
+
+/// What figures of rows over launches of one kind depend on: not the threads, nor when to end.
+[[nodiscard]] Json figures_of(const SceneTree& input, const std::vector<SimulationRow>& rows,
+                              const LaunchOptions& launches, std::uint64_t seed);
+
+/// JSON: for each scene, builder and kind of ray the launches that are done and the sums over them.
+class SimulationState {
+public:
+    /// An empty name keeps nothing. Throws InputError: a file that is there and holds something
+    /// else.
+    explicit SimulationState(std::string file);
+
+    /// Puts what is kept of `figures` into rows that are new; how many launches that was. Throws
+    /// InputError if what is kept of scene, builder and kind depends on something else.
+    [[nodiscard]] std::size_t restore(const Json& figures, std::vector<SimulationRow>& rows) const;
+    /// Throws InputError if the file cannot be written; the file before it stays.
+    void keep(const Json& figures, const std::vector<SimulationRow>& rows, std::size_t launches);
+
+private:
+    std::string file_;
+    Json document_;
+};
+
+}  // namespace raydix::cli
