@@ -473,6 +473,8 @@ FAULTS = [
           "ranks: filters are told of no hit", "mpi"),
     Fault("src/mpi/file_parts.cpp", "            before += count;\n", "",
           "ranks: of several files each begins where the first does", "mpi"),
+    Fault("src/io/rdx_meshes.cpp", "        next.vertices_begin += mesh.vertices * sizeof(Vec3);\n", "",
+          "ranks: every mesh of a scene's file has the vertices of the first", "mpi"),
     Fault("src/mpi/spread_lbvh.h", "begins || one.prefix < stretches.back().prefix", "begins || one.prefix > stretches.back().prefix",
           "ranks: nodes of the LBVH end at the wrong split of another rank", "mpi"),
     Fault("src/mpi/tree_hash.cpp", "skipped = node->count - 1;", "skipped = 0;",

@@ -337,10 +337,12 @@ struct FilePart {
 
 /// Collective. Each rank reads its part of a file by offset: equal runs of triangles, or of points
 /// where there are none, in rank order, as raydix::load_model numbers them. For uncompressed binary
-/// .ply files with triangles alone or no faces, and uncompressed .npy files in C order. Gives
-/// nothing, on all ranks, for any other file: one rank must read that. All ranks give the same
-/// file. Throws InputError that names the file: one that cannot be read, a header that is broken, a
-/// face with a vertex that is not there.
+/// .ply files with triangles alone or no faces, uncompressed .npy files in C order, and .rdx files
+/// that hold a tree of triangles or points, or a scene of meshes alone in float (one after the
+/// other by their ids). Of .rdx files only the header's checksum is compared. Gives nothing, on all
+/// ranks, for any other file: one rank must read that. All ranks give the same file. Throws
+/// InputError that names the file: one that cannot be read, a header that is broken, a face with a
+/// vertex that is not there.
 [[nodiscard]] std::optional<FilePart> load_part(MPI_Comm comm, const std::filesystem::path& file);
 /// The same of several files, one after the other: their triangles, or points where none has any,
 /// count through. Every rank reads the head of each file.
