@@ -421,7 +421,7 @@ FAULTS = [
           "PLY: bytes in the wrong order", "scene"),
     Fault("src/report/plot_axis.cpp", "(std::log(value) - std::log(lo)) / (std::log(hi) - std::log(lo))",
           "std::log(value) / (std::log(hi) - std::log(lo))", "plots: logarithmic places begin at one", "report"),
-    Fault("src/mpi/rank_tree.h", "if (far.bound <= most) *top++ = far;", "if (far.bound < most) *top++ = far;",
+    Fault("src/mpi/rank_tree.h", "if (!(bounds[c] <= most)) continue;", "if (!(bounds[c] < most)) continue;",
           "ranks: one that is just as far as the best is not asked, though it may hold a lower number", "mpi"),
     Fault("src/mpi/point_queries.h", "merged_.d2[old] == at && merged_.ids[old] < id", "merged_.d2[old] == at && merged_.ids[old] > id",
           "ranks: of points that are equally near the higher number comes first", "mpi"),
