@@ -304,9 +304,9 @@ public:
     /// raydix::trace_all.
     [[nodiscard]] HitRows<Scalar> trace_all(std::span<const Ray> rays,
                                             const TraceOptions& options = {}) const;
-    /// Collective. The closest point of all triangles to each query, as raydix::closest_points. All
-    /// ranks give the same max_distance and mask. Throws InputError if max_distance is negative or
-    /// NaN, and if the mask shows spheres or other shapes.
+    /// Collective. The closest point of all triangles and shapes to each query, as
+    /// raydix::closest_points. All ranks give the same max_distance and mask. Throws InputError if
+    /// max_distance is negative or NaN, and if the mask shows user geometry.
     [[nodiscard]] Answers<Closest, QueryCounts> closest_points(
         std::span<const Point> queries, Scalar max_distance = infinity,
         std::uint32_t mask = 0xFFFFFFFFu) const;

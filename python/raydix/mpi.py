@@ -550,7 +550,7 @@ class DistributedScene(_Distributed):
         `raydix.Scene.closest_point`. All ranks give the same `max_distance` and `mask`.
 
         Returns "point" (..., 3), "distance", "u", "v", "geometry", "instance" and "prim" (uint64).
-        InputError: the mask shows spheres or other shapes.
+        Shapes count as `raydix.Scene.closest_point` has them.
         """
         with _on_all(self._open_comm()):
             asked, lead = rows(points, "points", (3,), self.dtype)
