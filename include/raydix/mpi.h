@@ -61,7 +61,7 @@ struct Options {
     std::uint64_t message_bytes = std::uint64_t{1} << 20;  // the most of one message
     /// Boxes around what a rank holds that every rank knows. More boxes make queries reach fewer
     /// ranks for nothing, and cost memory on all: 1 to 4,096.
-    std::uint32_t boxes_per_rank = 32;
+    std::uint32_t boxes_per_rank = 64;
     /// Called with true before a rank computes and with false after it; must not throw. For
     /// programs with more ranks than processors, which may hold a rank back.
     std::function<void(bool)> compute_gate = {};

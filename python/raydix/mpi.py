@@ -267,7 +267,7 @@ class DistributedPoints(_Distributed):
         threads: int = 0,
         exchange_bytes: int = 64 << 20,
         message_bytes: int = 1 << 20,
-        boxes_per_rank: int = 32,
+        boxes_per_rank: int = 64,
     ) -> None:
         self._core = None
         comm = _checked(comm)
@@ -417,7 +417,7 @@ class DistributedScene(_Distributed):
         threads: int = 0,
         exchange_bytes: int = 64 << 20,
         message_bytes: int = 1 << 20,
-        boxes_per_rank: int = 32,
+        boxes_per_rank: int = 64,
     ) -> None:
         self._core = None
         comm = _checked(comm)
