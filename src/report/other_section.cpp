@@ -13,9 +13,18 @@ namespace {
 
 /// Top-level fields that some section reads, by command.
 const std::map<std::string, std::set<std::string>>& known_fields() {
-    static const std::set<std::string> ranks_fields{"cloud",     "given",   "partition", "points",
-                                                    "queries",   "k",       "model",     "counted",
-                                                    "predicted", "modelled"};
+    static const std::set<std::string> ranks_fields{"cloud",
+                                                    "given",
+                                                    "partition",
+                                                    "points",
+                                                    "queries",
+                                                    "k",
+                                                    "model",
+                                                    "counted",
+                                                    "predicted",
+                                                    "seed",
+                                                    "alone_compute_s_most",
+                                                    "modelled"};
     static const std::map<std::string, std::set<std::string>> known{
         {"build", {"build"}},
         {"trace", {"build", "trace"}},

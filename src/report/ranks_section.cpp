@@ -49,11 +49,14 @@ LinePlot plot_over_ranks(const std::string& title, Origin origin) {
     return plot;
 }
 
-std::string measured_plot(const std::vector<const Json*>& counted) {
+std::string measured_plot(const Document& document, const std::vector<const Json*>& counted) {
     LinePlot plot = plot_over_ranks("Compute of the slowest rank", Origin::measured);
     plot.note =
         "Processor seconds of a call, within stretches in which a rank computes. At most as many "
         "ranks compute at a time as there are processors. The line is one rank's.";
+    if (const auto alone = number_at(document.root, "alone_compute_s_most"))
+        plot.note +=
+            fmt::format(" With every rank alone at the same time it is {} s.", significant(*alone));
     plot.y_label = "processor seconds";
     plot.y_unit = "s";
     plot.x_scale = LinePlot::Scale::log_at_points;
@@ -208,7 +211,8 @@ Section ranks_section(const Documents& documents) {
                    modelled = objects_at(document.root, "modelled");
         const std::string what = settings_of(document, weak);
         section.html += fmt::format("<h3>{}</h3>\n", breakable(what));
-        const std::string plots = modelled_plots(document, modelled) + measured_plot(counted);
+        const std::string plots =
+            modelled_plots(document, modelled) + measured_plot(document, counted);
         if (!plots.empty()) section.html += "<div class=\"plots\">" + plots + "</div>\n";
         section.html += counted_table(counted) + predicted_table(document, counted);
         say_counted(counted, what, section);

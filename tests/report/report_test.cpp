@@ -112,7 +112,7 @@ TEST(MakeReport, OnlyRowsThatMatchAreCompared) {
 
 Json ranks_document() {
     Json document = Json::parse(R"({"command": "mpi bench weak", "cloud": "uniform", "points": 1000,
-        "queries": 100, "k": 8, "model": {"latency_s": 2e-6, "bytes_per_s": 1e10},
+        "queries": 100, "k": 8, "seed": 1, "alone_compute_s_most": 1.25, "model": {"latency_s": 2e-6, "bytes_per_s": 1e10},
         "predicted": {"ranks": 4, "knn_compute_s_most": 1.3, "rounds": 5}})");
     for (const int ranks : {1, 2, 4})
         document["counted"].push_back({{"ranks", ranks},
@@ -131,6 +131,7 @@ TEST(MakeReport, RanksAreCountedAndModelled) {
     EXPECT_TRUE(holds(html, "<section id=\"ranks\">"));
     EXPECT_FALSE(holds(html, "<section id=\"other\">"));
     EXPECT_TRUE(holds(html, "the slowest of 4 ranks computes <strong>1.27</strong>"));
+    EXPECT_TRUE(holds(html, "With every rank alone at the same time it is 1.25 s"));
     EXPECT_TRUE(holds(html, "beyond the crossing at about 1,000 ranks"));
     EXPECT_TRUE(holds(html, "on 10,000 ranks the other way takes 2.00 times as long"));
     EXPECT_TRUE(holds(html, "seconds (log scale) (modelled)"));
