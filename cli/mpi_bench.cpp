@@ -159,6 +159,28 @@ Json figures_json(const MpiFigures& f, const MpiModel& model) {
             {"modelled_s", model.seconds(f)}};
 }
 
+constexpr int most_modelled_ranks = 10000;
+
+/// Seconds and bytes of both ways up to many more ranks than there are here.
+Json modelled_json(const std::vector<MpiFigures>& counted, const MpiModel& model) {
+    std::vector<int> sizes;
+    for (int p = 2; p < most_modelled_ranks; p *= 2) sizes.push_back(p);
+    sizes.push_back(most_modelled_ranks);
+    Json rows = Json::array();
+    for (const int ranks : sizes) {
+        const MpiFigures forward = predict(counted, ranks);
+        const MpiFigures other = broadcast(forward, counted.front(), query_bytes, row_bytes);
+        rows.push_back({{"ranks", ranks},
+                        {"forwarding_s", model.seconds(forward)},
+                        {"forwarding_compute_s", forward.compute_s},
+                        {"forwarding_bytes", forward.bytes},
+                        {"broadcast_s", model.seconds(other)},
+                        {"broadcast_compute_s", other.compute_s},
+                        {"broadcast_bytes", other.bytes}});
+    }
+    return rows;
+}
+
 void print_head() {
     fmt::print("{:>6} {:>9} {:>9} {:>9} {:>7} {:>9} {:>12} {:>8} {:>10} {:>14} {:>10} {:>12}\n",
                "ranks", "build s", "knn s", "imbalance", "rounds", "messages", "bytes", "touched",
@@ -173,9 +195,14 @@ void print_row(const std::string& name, const MpiFigures& f, const MpiModel& mod
         model.seconds(f));
 }
 
+/// Compute of the slowest rank where every rank is alone with what it gives, all at the same time:
+/// what sharing the machine costs without any messages.
+double measure_alone(const BenchCommand& options, const ComputeTokens& tokens) {
+    return most_of(measure(options, tokens, MPI_COMM_SELF).compute_s, MPI_COMM_WORLD);
+}
+
 /// Figures of 1, 2, 4, ... ranks, and of all.
-std::vector<MpiFigures> measure_all(const BenchCommand& options) {
-    const ComputeTokens tokens;
+std::vector<MpiFigures> measure_all(const BenchCommand& options, const ComputeTokens& tokens) {
     std::vector<MpiFigures> all;
     std::vector<int> sizes;
     for (int p = 1; p < mpi_ranks(); p *= 2) sizes.push_back(p);
@@ -194,7 +221,9 @@ std::vector<MpiFigures> measure_all(const BenchCommand& options) {
 
 void run_bench(const BenchCommand& options) {
     const MpiModel model;
-    const std::vector<MpiFigures> counted = measure_all(options);
+    const ComputeTokens tokens;
+    const double alone = options.weak ? measure_alone(options, tokens) : 0;
+    const std::vector<MpiFigures> counted = measure_all(options, tokens);
     on_first([&] {
         Json document = new_document(options.weak ? "mpi bench weak" : "mpi bench strong");
         document["cloud"] = options.cloud;
@@ -214,6 +243,7 @@ void run_bench(const BenchCommand& options) {
                 options.cloud, options.given, options.partition);
             print_head();
         }
+        if (options.weak) document["alone_compute_s_most"] = alone;
         std::vector<MpiFigures> fitted;
         for (const MpiFigures& f : counted) {
             if (prints) print_row(std::to_string(f.ranks), f, model);
@@ -225,6 +255,9 @@ void run_bench(const BenchCommand& options) {
             document["predicted"] = figures_json(predicted, model);
             if (prints) print_row("fit", predicted, model);
         }
+        if (counted.size() >= 3) document["modelled"] = modelled_json(counted, model);
+        if (prints && options.weak)
+            fmt::print("alone: {:.3f} s with every rank alone at the same time.\n", alone);
         if (prints)
             fmt::print(
                 "fit: predicted for {} ranks from 2 to {}. two-round: the nearest rank, then "

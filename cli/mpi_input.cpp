@@ -1,6 +1,7 @@
 #include "mpi_input.h"
 
 #include <fmt/format.h>
+#include <raydix/rdx.h>
 
 #include <filesystem>
 #include <optional>
@@ -8,6 +9,8 @@
 #include <utility>
 
 #include "mpi_ranks.h"
+#include "options.h"
+#include "scene_file.h"
 
 namespace raydix::cli {
 namespace {
@@ -43,6 +46,20 @@ Mesh scatter_triangles(const Mesh& whole) {
         send_array<Triangle>(part.triangles, r);
     }
     return part;
+}
+
+/// Of .rdx files all is checked, unlike where ranks read parts.
+Model load_whole(const std::string& name, const CommonOptions& common) {
+    if (!is_rdx(name)) return load_flat_model(name, common.seed);
+    if (!holds_scene(name)) return load_rdx(name).scene;
+    auto meshes = mpi::load_part(MPI_COMM_SELF, name);
+    if (!meshes)
+        throw InputError(name +
+                         ": it holds more than meshes in float; trace, render, check and "
+                         "info without mpi take it");
+    Model model = model_of(load_rdx_scene(name));
+    model.meshes = {std::move(meshes->mesh)};
+    return model;
 }
 
 std::uint64_t over_ranks(std::uint64_t value, MPI_Op op) {
@@ -121,9 +138,9 @@ SpreadModel spread_model(const MpiOptions& options) {
 void read_whole(SpreadModel& model, const MpiOptions& options) {
     if (model.is_whole_read) return;
     on_first([&] {
-        model.whole = load_flat_model(options.scene, options.common.seed);
+        model.whole = load_whole(options.scene, options.common);
         for (const std::string& file : options.more)
-            model.whole.meshes.push_back(load_flat_model(file, options.common.seed).mesh());
+            model.whole.meshes.push_back(load_whole(file, options.common).mesh());
         if (!options.more.empty()) model.whole.flatten();
     });
     model.is_whole_read = true;

@@ -36,7 +36,7 @@ MAY_INCLUDE = {
     "io": {"base", "exec", "scene", "primitives", "measure", "tree", "simt", "engine"},
     "image": {"base", "exec", "rays", "trace", "report", "engine"},
     # a library of its own on top: the same queries over ranks
-    "mpi": {"base", "exec", "primitives", "keys", "points", "rays", "tree", "trace", "engine", "proximity", "image", "scene"},
+    "mpi": {"base", "exec", "primitives", "keys", "points", "rays", "tree", "trace", "engine", "proximity", "image", "scene", "io"},
 }
 # The lowest folders know only the plain structs, errors and arrays of the public headers.
 PUBLIC_HEADERS = {"base": {"types.h", "error.h"},

@@ -61,7 +61,7 @@ struct Options {
     std::uint64_t message_bytes = std::uint64_t{1} << 20;  // the most of one message
     /// Boxes around what a rank holds that every rank knows. More boxes make queries reach fewer
     /// ranks for nothing, and cost memory on all: 1 to 4,096.
-    std::uint32_t boxes_per_rank = 32;
+    std::uint32_t boxes_per_rank = 64;
     /// Called with true before a rank computes and with false after it; must not throw. For
     /// programs with more ranks than processors, which may hold a rank back.
     std::function<void(bool)> compute_gate = {};
@@ -304,9 +304,9 @@ public:
     /// raydix::trace_all.
     [[nodiscard]] HitRows<Scalar> trace_all(std::span<const Ray> rays,
                                             const TraceOptions& options = {}) const;
-    /// Collective. The closest point of all triangles to each query, as raydix::closest_points. All
-    /// ranks give the same max_distance and mask. Throws InputError if max_distance is negative or
-    /// NaN, and if the mask shows spheres or other shapes.
+    /// Collective. The closest point of all triangles and shapes to each query, as
+    /// raydix::closest_points. All ranks give the same max_distance and mask. Throws InputError if
+    /// max_distance is negative or NaN, and if the mask shows user geometry.
     [[nodiscard]] Answers<Closest, QueryCounts> closest_points(
         std::span<const Point> queries, Scalar max_distance = infinity,
         std::uint32_t mask = 0xFFFFFFFFu) const;
@@ -337,10 +337,12 @@ struct FilePart {
 
 /// Collective. Each rank reads its part of a file by offset: equal runs of triangles, or of points
 /// where there are none, in rank order, as raydix::load_model numbers them. For uncompressed binary
-/// .ply files with triangles alone or no faces, and uncompressed .npy files in C order. Gives
-/// nothing, on all ranks, for any other file: one rank must read that. All ranks give the same
-/// file. Throws InputError that names the file: one that cannot be read, a header that is broken, a
-/// face with a vertex that is not there.
+/// .ply files with triangles alone or no faces, uncompressed .npy files in C order, and .rdx files
+/// that hold a tree of triangles or points, or a scene of meshes alone in float (one after the
+/// other by their ids). Of .rdx files only the header's checksum is compared. Gives nothing, on all
+/// ranks, for any other file: one rank must read that. All ranks give the same file. Throws
+/// InputError that names the file: one that cannot be read, a header that is broken, a face with a
+/// vertex that is not there.
 [[nodiscard]] std::optional<FilePart> load_part(MPI_Comm comm, const std::filesystem::path& file);
 /// The same of several files, one after the other: their triangles, or points where none has any,
 /// count through. Every rank reads the head of each file.

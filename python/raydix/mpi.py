@@ -267,7 +267,7 @@ class DistributedPoints(_Distributed):
         threads: int = 0,
         exchange_bytes: int = 64 << 20,
         message_bytes: int = 1 << 20,
-        boxes_per_rank: int = 32,
+        boxes_per_rank: int = 64,
     ) -> None:
         self._core = None
         comm = _checked(comm)
@@ -417,7 +417,7 @@ class DistributedScene(_Distributed):
         threads: int = 0,
         exchange_bytes: int = 64 << 20,
         message_bytes: int = 1 << 20,
-        boxes_per_rank: int = 32,
+        boxes_per_rank: int = 64,
     ) -> None:
         self._core = None
         comm = _checked(comm)
@@ -550,7 +550,7 @@ class DistributedScene(_Distributed):
         `raydix.Scene.closest_point`. All ranks give the same `max_distance` and `mask`.
 
         Returns "point" (..., 3), "distance", "u", "v", "geometry", "instance" and "prim" (uint64).
-        InputError: the mask shows spheres or other shapes.
+        Shapes count as `raydix.Scene.closest_point` has them.
         """
         with _on_all(self._open_comm()):
             asked, lead = rows(points, "points", (3,), self.dtype)

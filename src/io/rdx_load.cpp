@@ -1,30 +1,16 @@
 // .rdx file -> scene and a tree, or a Scene, that view the mapped file.
 #include <raydix/rdx.h>
 
-#include <system_error>
-
-#include "exec/mapped_file.h"
+#include "base/printable.h"
+#include "io/map_input.h"
 #include "io/rdx_parse.h"
 #include "io/rdx_sections.h"
 #include "measure/stopwatch.h"
-#include "scene/input_error.h"
 
 namespace raydix {
-namespace {
-
-MappedFile mapped(const std::filesystem::path& file) {
-    try {
-        return map_file(file);
-    } catch (const std::system_error& error) {
-        input_error(printable(file), "file", error.what());
-    }
-}
-
-}  // namespace
-
 RdxFile load_rdx(const std::filesystem::path& file) {
     Stopwatch watch;
-    const MappedFile whole = mapped(file);
+    const MappedFile whole = mapped_input(file);
     RdxFile result = rdx::parse(printable(file), whole.bytes, whole.owner);
     result.scene.load_ms = watch.lap();
     return result;
@@ -32,7 +18,7 @@ RdxFile load_rdx(const std::filesystem::path& file) {
 
 RdxScene load_rdx_scene(const std::filesystem::path& file) {
     Stopwatch watch;
-    const MappedFile whole = mapped(file);
+    const MappedFile whole = mapped_input(file);
     RdxScene result = rdx::parse_scene(printable(file), whole.bytes, whole.owner);
     result.load_ms = watch.lap();
     return result;
@@ -40,19 +26,19 @@ RdxScene load_rdx_scene(const std::filesystem::path& file) {
 
 RdxSceneD load_rdx_scene_double(const std::filesystem::path& file) {
     Stopwatch watch;
-    const MappedFile whole = mapped(file);
+    const MappedFile whole = mapped_input(file);
     RdxSceneD result = rdx::parse_scene_double(printable(file), whole.bytes, whole.owner);
     result.load_ms = watch.lap();
     return result;
 }
 
 bool holds_scene(const std::filesystem::path& file) {
-    const MappedFile whole = mapped(file);
+    const MappedFile whole = mapped_input(file);
     return rdx::version_of(printable(file), whole.bytes) != rdx::version;
 }
 
 bool holds_scene_double(const std::filesystem::path& file) {
-    const MappedFile whole = mapped(file);
+    const MappedFile whole = mapped_input(file);
     return rdx::version_of(printable(file), whole.bytes) == rdx::double_version;
 }
 

@@ -15,22 +15,11 @@
 namespace raydix::rdx {
 namespace {
 
-constexpr std::array<SectionKind, section_count> kinds{{
-    {"info", {sizeof(Info)}},
-    {"nodes", {sizeof(BvhNode)}},
-    {"order", {sizeof(std::uint32_t)}},
-    {"primitives", {sizeof(LeafTriangle), sizeof(Aabb), sizeof(Vec3)}},
-    {"vertices", {sizeof(Vec3)}},
-    {"triangles", {sizeof(Triangle)}},
-    {"cameras", {sizeof(Camera)}},
-    {"names", {1}},
-}};
-
 class Parser {
 public:
     Parser(const std::string& file, std::span<const std::byte> bytes,
            const std::shared_ptr<void>& owner)
-        : sections_(file, bytes, owner, version, kinds) {}
+        : sections_(file, bytes, owner, version, tree_kinds) {}
 
     RdxFile parse() {
         read_info();

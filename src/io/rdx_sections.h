@@ -23,6 +23,18 @@ struct SectionKind {
     std::array<std::uint32_t, 3> element_bytes;  // one of them; 0: none
 };
 
+/// Of version 1, in the order of the file.
+inline constexpr std::array<SectionKind, section_count> tree_kinds{{
+    {"info", {sizeof(Info)}},
+    {"nodes", {sizeof(BvhNode)}},
+    {"order", {sizeof(std::uint32_t)}},
+    {"primitives", {sizeof(LeafTriangle), sizeof(Aabb), sizeof(Vec3)}},
+    {"vertices", {sizeof(Vec3)}},
+    {"triangles", {sizeof(Triangle)}},
+    {"cameras", {sizeof(Camera)}},
+    {"names", {1}},
+}};
+
 /// The version that a file names in its header. Throws InputError if it is no .rdx file, or of a
 /// version that is unknown.
 [[nodiscard]] std::uint32_t version_of(const std::string& file, std::span<const std::byte> bytes);
@@ -31,9 +43,11 @@ struct SectionKind {
 /// allocated in proportion to what a header claims.
 class Sections {
 public:
-    /// Throws InputError("FILE: SECTION: reason").
+    enum class Checked { header, all };
+    /// `checked`: whose checksums are compared. Throws InputError("FILE: SECTION: reason").
     Sections(const std::string& file, std::span<const std::byte> bytes, std::shared_ptr<void> owner,
-             std::uint32_t wanted, std::span<const SectionKind> kinds);
+             std::uint32_t wanted, std::span<const SectionKind> kinds,
+             Checked checked = Checked::all);
 
     [[noreturn]] void fail(std::string_view section, const std::string& reason) const;
 

@@ -61,7 +61,6 @@ struct BasicDistributedScene<Scalar>::State {
         agree(comm, error);
         tree = RankTree<Scalar>(comm, boxes);
         comm.reduce(&ray_error, 1, MPI_MAX);
-        has_others = committed.paths != 0 || committed.shapes != 0;
         holding.paths = committed.paths;
         holding.first_path = comm.sum_before(committed.paths);
         require_few(committed.paths, "paths to instances");
@@ -343,11 +342,12 @@ struct BasicDistributedScene<Scalar>::State {
             options.threads};
     }
 
-    /// Throws InputError for shapes: their d2 do not follow from the points alone.
-    void require_triangles(std::uint32_t mask) const {
-        if (has_others)
-            static_cast<void>(
-                FlatPlan<Scalar>(scene, mask, "closest_points of a distributed scene"));
+    /// Throws InputError for geometry that has no closest points, and makes what queries need.
+    void require_closest_points(std::uint32_t mask) const {
+        BasicSceneClosestOptions<Scalar> seen;
+        seen.mask = mask;
+        seen.threads = options.threads;
+        static_cast<void>(raydix::closest_points(scene, std::span<const Point>(), seen));
     }
 
     /// A query whose answers have a fixed size.
@@ -372,8 +372,7 @@ struct BasicDistributedScene<Scalar>::State {
     TriangleNames names;
     RankTree<Scalar> tree;
     BasicAabb<Scalar> bounds{};
-    double ray_error = 0;     // the greatest of the extents of shapes and instances, on all ranks
-    bool has_others = false;  // than meshes, on this rank
+    double ray_error = 0;  // the greatest of the extents of shapes and instances, on all ranks
     std::optional<FlatTree<Scalar>> crossings;
     Holding holding;
 };
@@ -489,7 +488,7 @@ auto BasicDistributedScene<Scalar>::closest_points(std::span<const Point> querie
             if (!(max_distance >= 0))
                 throw InputError("max_distance is " + std::to_string(max_distance) +
                                  "; it must be 0 or more");
-            state_->require_triangles(mask);
+            state_->require_closest_points(mask);
             kind.emplace(state_->parts(), queries, max_distance, mask, answers);
         });
 }

@@ -17,8 +17,9 @@ using Bytes = std::vector<std::byte>;
 template <class T>
 void put(Bytes& bytes, const T& value) {
     static_assert(std::is_trivially_copyable_v<T>);
-    const auto* first = reinterpret_cast<const std::byte*>(&value);
-    bytes.insert(bytes.end(), first, first + sizeof(T));
+    const std::size_t size = bytes.size();
+    bytes.resize(size + sizeof(T));  // faster than to insert bytes
+    std::memcpy(bytes.data() + size, &value, sizeof(T));
 }
 
 /// Takes values out of bytes in the order in which they were put there.

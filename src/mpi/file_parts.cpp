@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "base/math.h"
+#include "io/rdx_meshes.h"
 #include "mpi/agree.h"
 #include "mpi/communicator.h"
 #include "scene/byte_source.h"
@@ -37,12 +38,14 @@ struct NumberPlace {
     std::size_t offset = 0;  // in its record
 };
 
-/// How a file is to be read.
+/// How a mesh of a file is to be read.
 struct Plan {
+    std::filesystem::path file = {};
     bool swapped = false;  // other byte order than this machine
     Records vertices, faces;
     std::array<NumberPlace, 3> position;
-    std::size_t list = 0;  // where the list of corners begins in a face
+    std::size_t list = 0;        // where the list of corners begins in a face
+    bool counts_corners = true;  // the list begins with their number
     PlyType count_type = PlyType::u8, index_type = PlyType::i32;
 };
 
@@ -163,14 +166,36 @@ std::optional<Plan> plan_npy(ByteSource& in, std::uint64_t size) {
     return plan;
 }
 
-/// Nothing if the file must be read from its beginning.
-std::optional<Plan> plan_of(const std::filesystem::path& file) {
+Plan plan_rdx(const rdx::MeshPlace& place) {
+    Plan plan;
+    for (std::size_t d = 0; d < 3; ++d) plan.position[d] = {PlyType::f32, d * sizeof(float)};
+    plan.vertices = {place.vertices_begin, place.vertices, sizeof(Vec3)};
+    plan.faces = {place.triangles_begin, place.triangles, sizeof(Triangle)};
+    plan.counts_corners = false;
+    plan.index_type = PlyType::u32;
+    return plan;
+}
+
+/// The meshes of a file; nothing if it must be read from its beginning.
+std::optional<std::vector<Plan>> plans_of(const std::filesystem::path& file) {
     std::string ending = file.extension().string();
     for (char& c : ending) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
-    if (ending != ".ply" && ending != ".npy") return {};
-    ByteSource in = ByteSource::from_file(file, Packing::none);
-    const std::uint64_t size = in.expected_rest();
-    return ending == ".ply" ? plan_ply(in, size) : plan_npy(in, size);
+    std::vector<Plan> plans;
+    if (ending == ".rdx") {
+        const auto places = rdx::mesh_places(file);
+        if (!places) return {};
+        for (const rdx::MeshPlace& place : *places) plans.push_back(plan_rdx(place));
+    } else if (ending == ".ply" || ending == ".npy") {
+        ByteSource in = ByteSource::from_file(file, Packing::none);
+        const std::uint64_t size = in.expected_rest();
+        const std::optional<Plan> plan = ending == ".ply" ? plan_ply(in, size) : plan_npy(in, size);
+        if (!plan) return {};
+        plans.push_back(*plan);
+    } else {
+        return {};
+    }
+    for (Plan& plan : plans) plan.file = file;
+    return plans;
 }
 
 class FileBytes {
@@ -196,8 +221,8 @@ private:
 
 class PartReader {
 public:
-    PartReader(const std::filesystem::path& file, const Plan& plan)
-        : plan_(plan), name_(file.string()), bytes_(file) {}
+    explicit PartReader(const Plan& plan)
+        : plan_(plan), name_(plan.file.string()), bytes_(plan.file) {}
 
     /// Points [begin, end), appended.
     void read_points(std::uint64_t begin, std::uint64_t end, std::vector<Vec3>& points) {
@@ -212,7 +237,7 @@ public:
     /// Triangles [begin, end) with indices of the whole file. False if one of these faces is no
     /// triangle.
     bool read_triangles(std::uint64_t begin, std::uint64_t end, std::vector<Triangle>& triangles) {
-        const std::size_t count_bytes = byte_size(plan_.count_type),
+        const std::size_t count_bytes = plan_.counts_corners ? byte_size(plan_.count_type) : 0,
                           index_bytes = byte_size(plan_.index_type);
         triangles.reserve(end - begin);
         for (std::uint64_t at = begin; at < end;) {
@@ -220,7 +245,9 @@ public:
             const char* record = bytes_.read(plan_.faces, at, next);
             for (; at < next; ++at, record += plan_.faces.bytes) {
                 const char* list = record + plan_.list;
-                if (whole_number(list, plan_.count_type, plan_.swapped) != 3) return false;
+                if (plan_.counts_corners &&
+                    whole_number(list, plan_.count_type, plan_.swapped) != 3)
+                    return false;
                 Triangle& triangle = triangles.emplace_back();
                 for (std::size_t c = 0; c < 3; ++c)
                     triangle[c] = index_of(list + count_bytes + c * index_bytes, at);
@@ -304,11 +331,11 @@ void append(Mesh&& more, Mesh& mesh) {
         mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
 }
 
-/// Elements [begin, end) of one file after the others. False if one of these faces is no triangle.
-bool append_part(const std::filesystem::path& file, const Plan& plan, bool are_points,
-                 std::uint64_t begin, std::uint64_t end, Mesh& mesh) {
+/// Elements [begin, end) of one mesh after the others. False if one of these faces is no triangle.
+bool append_part(const Plan& plan, bool are_points, std::uint64_t begin, std::uint64_t end,
+                 Mesh& mesh) {
     if (begin == end) return true;
-    PartReader reader(file, plan);
+    PartReader reader(plan);
     if (are_points) {
         reader.read_points(begin, end, mesh.vertices);
         return true;
@@ -328,9 +355,9 @@ std::optional<FilePart> load_part(MPI_Comm given, std::span<const std::filesyste
     std::uint64_t is_readable = 1;
     together_on(comm, name_of(files), [&] {
         for (const std::filesystem::path& file : files) {
-            const std::optional<Plan> plan = plan_of(file);
-            is_readable &= plan && fits(*plan) ? 1u : 0u;
-            plans.push_back(plan.value_or(Plan{}));
+            const auto of_file = plans_of(file);
+            is_readable &= of_file && std::ranges::all_of(*of_file, fits) ? 1u : 0u;
+            if (of_file) plans.insert(plans.end(), of_file->begin(), of_file->end());
         }
     });
     FilePart part;
@@ -344,13 +371,13 @@ std::optional<FilePart> load_part(MPI_Comm given, std::span<const std::filesyste
         const auto rank = std::uint64_t(comm.rank()), ranks = std::uint64_t(comm.size());
         const bool are_points = part.triangles == 0;
         const std::uint64_t n = are_points ? part.vertices : part.triangles;
-        std::uint64_t before = 0;  // elements of the files before
-        for (std::size_t f = 0; f < files.size(); ++f) {
-            const std::uint64_t count = are_points ? plans[f].vertices.count : plans[f].faces.count;
+        std::uint64_t before = 0;  // elements of the meshes before
+        for (const Plan& plan : plans) {
+            const std::uint64_t count = are_points ? plan.vertices.count : plan.faces.count;
             const auto within = [&](std::uint64_t at) {
                 return std::clamp(at, before, before + count) - before;
             };
-            if (!append_part(files[f], plans[f], are_points, within(n * rank / ranks),
+            if (!append_part(plan, are_points, within(n * rank / ranks),
                              within(n * (rank + 1) / ranks), part.mesh))
                 is_readable = 0;
             before += count;

@@ -84,9 +84,13 @@ public:
         const std::uint32_t* row = ids_.data() + q * k_;
         const auto found = static_cast<std::uint32_t>(std::find(row, row + k_, no_primitive) - row);
         put(out, found);
+        std::size_t at = out.size();
+        out.resize(at + found * (sizeof(std::uint64_t) + sizeof(T)));
         for (std::uint32_t j = 0; j < found; ++j) {
-            put(out, view_.ids.of(row[j]));
-            put(out, d2_[q * k_ + j]);
+            const std::uint64_t id = view_.ids.of(row[j]);
+            std::memcpy(out.data() + at, &id, sizeof(id));
+            std::memcpy(out.data() + at + sizeof(id), &d2_[q * k_ + j], sizeof(T));
+            at += sizeof(id) + sizeof(T);
         }
     }
 

@@ -61,7 +61,7 @@ public:
         leaves = comm.gather(leaves);
         bounds_ = RankBox<T>::empty();
         for (const Leaf& leaf : leaves) bounds_.unite(leaf.box);
-        if (!leaves.empty()) divide(leaves, 0, leaves.size());
+        if (!leaves.empty()) add_node(leaves, 0, leaves.size());
     }
 
     [[nodiscard]] const RankBox<T>& bounds() const { return bounds_; }
@@ -103,59 +103,99 @@ private:
         RankBox<T> box;
         std::uint32_t rank;
     };
-    /// Of an inner node the left child is the next node, and `right` the other; of a leaf, 0.
+    /// Children side by side, so that a loop over them becomes vector instructions.
+    static constexpr std::size_t width = 8;
     struct Node {
-        RankBox<T> box;
-        std::uint32_t right, rank;
+        T lo[3][width], hi[3][width];
+        std::uint32_t below[width];  // a node; or a rank and leaf_bit
+        std::uint32_t count;
     };
-    /// Halving keeps every path shorter than this.
-    static constexpr int most_depth = 40;
+    static constexpr std::uint32_t leaf_bit = std::uint32_t{1} << 31;
+    /// Paths are shorter than 12 nodes: children are full but for the last few.
+    static constexpr std::size_t most_pending = 12 * width;
+    struct Range {
+        std::size_t begin, end;
+    };
 
-    void divide(std::vector<Leaf>& leaves, std::size_t begin, std::size_t end) {
+    /// Of the leaves [begin, end), and all below it. Returns its index.
+    std::uint32_t add_node(std::vector<Leaf>& leaves, std::size_t begin, std::size_t end) {
+        // Children as large as full trees of their depth, and no more of them than that takes.
+        std::size_t most_below = 1;
+        while (most_below * width < end - begin) most_below *= width;
+        std::vector<Range> parts;
+        divide(leaves, {begin, end}, (end - begin + most_below - 1) / most_below, parts);
+        const auto index = static_cast<std::uint32_t>(nodes_.size());
+        nodes_.emplace_back();  // boxes of zeros where there is no child
+        nodes_[index].count = static_cast<std::uint32_t>(parts.size());
+        for (std::size_t c = 0; c < parts.size(); ++c) {
+            const RankBox<T> box = box_of(leaves, parts[c]);
+            for (int d = 0; d < 3; ++d) {
+                nodes_[index].lo[d][c] = box.lo[d];
+                nodes_[index].hi[d][c] = box.hi[d];
+            }
+            const auto [first, last] = parts[c];
+            const std::uint32_t below =
+                last - first == 1 ? leaves[first].rank | leaf_bit : add_node(leaves, first, last);
+            nodes_[index].below[c] = below;
+        }
+        return index;
+    }
+    static RankBox<T> box_of(const std::vector<Leaf>& leaves, const Range& range) {
         RankBox<T> box = RankBox<T>::empty();
-        for (std::size_t i = begin; i < end; ++i) box.unite(leaves[i].box);
-        const std::size_t node = nodes_.size();
-        nodes_.push_back({box, 0, leaves[begin].rank});
-        if (end - begin == 1) return;
-        const std::size_t middle = begin + (end - begin) / 2;
-        const int axis = box.longest_axis();
+        for (std::size_t i = range.begin; i < range.end; ++i) box.unite(leaves[i].box);
+        return box;
+    }
+    /// Into `count` parts of about equal size, across the longest axes.
+    static void divide(std::vector<Leaf>& leaves, const Range& range, std::size_t count,
+                       std::vector<Range>& parts) {
+        if (count == 1) {
+            parts.push_back(range);
+            return;
+        }
+        const std::size_t low = count / 2,
+                          middle = range.begin + (range.end - range.begin) * low / count;
+        const int axis = box_of(leaves, range).longest_axis();
         const auto at = [&](std::size_t i) {
             return leaves.begin() + static_cast<std::ptrdiff_t>(i);
         };
-        std::nth_element(at(begin), at(middle), at(end), [axis](const Leaf& a, const Leaf& b) {
-            const T x = a.box.lo[axis] + a.box.hi[axis], y = b.box.lo[axis] + b.box.hi[axis];
-            return x < y || (x == y && a.rank < b.rank);
-        });
-        divide(leaves, begin, middle);
-        nodes_[node].right = static_cast<std::uint32_t>(nodes_.size());
-        divide(leaves, middle, end);
+        std::nth_element(
+            at(range.begin), at(middle), at(range.end), [axis](const Leaf& a, const Leaf& b) {
+                const T x = a.box.lo[axis] + a.box.hi[axis], y = b.box.lo[axis] + b.box.hi[axis];
+                return x < y || (x == y && a.rank < b.rank);
+            });
+        divide(leaves, {range.begin, middle}, low, parts);
+        divide(leaves, {middle, range.end}, count - low, parts);
     }
 
-    /// Nearer children first. visit(candidate) gives the bound that still counts.
+    /// Nearer nodes first. visit(candidate) gives the bound that still counts.
     template <class BoundOf, class Visit>
     void walk(T most, const BoundOf& bound_of, const Visit& visit) const {
         if (nodes_.empty()) return;
         struct Pending {
             std::uint32_t node;
             T bound;
-        } stack[most_depth];
+        } stack[most_pending];
         Pending* top = stack;
-        const T root = bound_of(nodes_[0].box);
-        if (!(root <= most)) return;
-        *top++ = {0, root};
+        *top++ = {0, -std::numeric_limits<T>::infinity()};
         while (top != stack) {
             const Pending next = *--top;
             if (!(next.bound <= most)) continue;
             const Node& node = nodes_[next.node];
-            if (node.right == 0) {
-                most = visit(Candidate<T>{next.bound, node.rank});
-                continue;
+            T bounds[width];
+            for (std::size_t c = 0; c < width; ++c)
+                bounds[c] = bound_of(RankBox<T>{{node.lo[0][c], node.lo[1][c], node.lo[2][c]},
+                                                {node.hi[0][c], node.hi[1][c], node.hi[2][c]}});
+            Pending* const others = top;
+            for (std::size_t c = 0; c < node.count; ++c) {
+                if (!(bounds[c] <= most)) continue;
+                if ((node.below[c] & leaf_bit) != 0) {
+                    most = visit(Candidate<T>{bounds[c], node.below[c] & ~leaf_bit});
+                    continue;
+                }
+                Pending* place = top++;
+                for (; place != others && place[-1].bound < bounds[c]; --place) *place = place[-1];
+                *place = {node.below[c], bounds[c]};
             }
-            Pending near{next.node + 1, bound_of(nodes_[next.node + 1].box)},
-                far{node.right, bound_of(nodes_[node.right].box)};
-            if (!(near.bound <= far.bound)) std::swap(near, far);
-            if (far.bound <= most) *top++ = far;
-            if (near.bound <= most) *top++ = near;
         }
     }
 

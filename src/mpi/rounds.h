@@ -163,7 +163,11 @@ private:
                 std::memcpy(reply.data(), &answered, sizeof(answered));
                 report.answered += answered;
             } else {
-                for (std::size_t q = begin; q < begin + n; ++q) kind_.put_answer(q, reply);
+                for (std::size_t q = begin; q < begin + n; ++q) {
+                    kind_.put_answer(q, reply);
+                    // About as long as all: room for it at once, not by doubling.
+                    if (q == begin) reply.reserve(reply.size() * n + n);
+                }
                 report.answered += n;
             }
             begin += n;

@@ -338,7 +338,7 @@ private:
     RowStore<Hit>& rows_;
 };
 
-/// The closest point. Squares of distances follow from the points themselves.
+/// The closest point. Squares of distances follow from the points themselves, those of shapes too.
 template <class T>
 class ClosestPointKind {
     using Closest = BasicDistributedClosest<T>;

@@ -43,6 +43,8 @@ std::string badge(Origin origin) {
             return "<span class=\"badge measured\">measured</span>";
         case Origin::simulated:
             return "<span class=\"badge simulated\">simulated</span>";
+        case Origin::modelled:
+            return "<span class=\"badge simulated\">modelled</span>";
         case Origin::published:
             return "<span class=\"badge published\">published</span>";
         case Origin::none:
@@ -55,6 +57,8 @@ std::string origin_suffix(Origin origin) {
     switch (origin) {
         case Origin::simulated:
             return " (simulated)";
+        case Origin::modelled:
+            return " (modelled)";
         case Origin::published:
             return " (published)";
         case Origin::measured:

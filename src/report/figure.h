@@ -8,7 +8,7 @@
 namespace raydix::report {
 
 /// Where a figure is from. Whatever is not measured says so wherever it is shown.
-enum class Origin { none, measured, simulated, published };
+enum class Origin { none, measured, simulated, modelled, published };
 
 /// A small label, or nothing for Origin::none.
 [[nodiscard]] std::string badge(Origin origin);

@@ -13,6 +13,18 @@ namespace {
 
 /// Top-level fields that some section reads, by command.
 const std::map<std::string, std::set<std::string>>& known_fields() {
+    static const std::set<std::string> ranks_fields{"cloud",
+                                                    "given",
+                                                    "partition",
+                                                    "points",
+                                                    "queries",
+                                                    "k",
+                                                    "model",
+                                                    "counted",
+                                                    "predicted",
+                                                    "seed",
+                                                    "alone_compute_s_most",
+                                                    "modelled"};
     static const std::map<std::string, std::set<std::string>> known{
         {"build", {"build"}},
         {"trace", {"build", "trace"}},
@@ -21,6 +33,8 @@ const std::map<std::string, std::set<std::string>>& known_fields() {
          {"build", "simulate", "machines", "measured", "published", "claims", "width_sweep"}},
         {"bench hierarchy",
          {"max_leaf", "factors", "runs", "builds", "machines", "hierarchy_claims", "gpu"}},
+        {"mpi bench weak", ranks_fields},
+        {"mpi bench strong", ranks_fields},
         {"check", {"check"}},
         {"info", {"build"}},
         {"render", {"render"}}};

@@ -76,6 +76,7 @@ std::string make_report(const ReportInput& input) {
     page.sections.push_back(traversal_section(documents, colours));
     page.sections.push_back(simulate_section(documents, colours));
     page.sections.push_back(hierarchy_section(documents, colours));
+    page.sections.push_back(ranks_section(documents));
     page.sections.push_back(picture_section(input.pictures));
     page.sections.push_back(scene_section(documents));
     page.sections.push_back(other_section(documents));

@@ -39,6 +39,8 @@ struct PageColours {
 [[nodiscard]] Section traversal_section(const Documents& documents, PageColours& colours);
 /// Builders over sizes of scenes and machines.
 [[nodiscard]] Section hierarchy_section(const Documents& documents, PageColours& colours);
+/// Queries over MPI ranks, counted and modelled.
+[[nodiscard]] Section ranks_section(const Documents& documents);
 /// Documents of one command against the first of them.
 [[nodiscard]] Section compare_section(const Documents& documents);
 /// What `info` and `check` found.

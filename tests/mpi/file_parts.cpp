@@ -1,6 +1,9 @@
 // Files that each rank reads in part, against the same read whole.
 #include <raydix/arrays.h>
+#include <raydix/bvh.h>
 #include <raydix/model.h>
+#include <raydix/rdx.h>
+#include <raydix/scene.h>
 #include <unistd.h>
 
 #include <bit>
@@ -120,6 +123,79 @@ TEST(FileParts, AreThoseOfTheWholeFile) {
     expect_same_part(*part, load_mesh(file));
 }
 
+Mesh soup(int triangles, unsigned seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> unit(-1, 1);
+    Mesh mesh;
+    for (int i = 0; i < triangles + 3; ++i)
+        mesh.vertices.push_back({unit(random), unit(random), unit(random)});
+    for (int i = 0; i < triangles; ++i) {
+        Triangle& t = mesh.triangles.emplace_back();
+        for (std::uint32_t& v : t) v = static_cast<std::uint32_t>(random() % mesh.vertices.size());
+    }
+    return mesh;
+}
+
+/// Rank 0 saves.
+template <class Save>
+std::filesystem::path saved(const SharedFolder& folder, const Save& save) {
+    const auto file = folder.write("saved.rdx", "");
+    if (rank() == 0) save(file);
+    MPI_Barrier(MPI_COMM_WORLD);
+    return file;
+}
+
+TEST(FileParts, OfTreesAreThoseOfTheWholeFile) {
+    const SharedFolder folder;
+    for (const int triangles : {0, 1, 400}) {
+        Model model;
+        model.meshes.push_back(soup(triangles, 3));
+        const auto file = saved(folder, [&](const std::filesystem::path& to) {
+            save_rdx(to, build_bvh(model.mesh()), model);
+        });
+        const auto part = load_part(MPI_COMM_WORLD, file);
+        ASSERT_TRUE(part.has_value());
+        expect_same_part(*part, load_rdx(file).scene.mesh());
+    }
+}
+
+TEST(FileParts, OfScenesGoMeshByMesh) {
+    const SharedFolder folder;
+    const Mesh first = soup(90, 5), second = soup(41, 6);
+    Mesh both = first;
+    both.vertices.insert(both.vertices.end(), second.vertices.begin(), second.vertices.end());
+    for (const Triangle& t : second.triangles) {
+        const auto n = static_cast<std::uint32_t>(first.vertices.size());
+        both.triangles.push_back({t[0] + n, t[1] + n, t[2] + n});
+    }
+    const auto with = [&](const auto& add) {
+        return saved(folder, [&](const std::filesystem::path& to) {
+            Scene scene;
+            scene.add(first);
+            add(scene);
+            scene.commit();
+            save_rdx(to, scene);
+        });
+    };
+    const auto part = load_part(MPI_COMM_WORLD, with([&](Scene& s) { s.add(second); }));
+    ASSERT_TRUE(part.has_value());
+    expect_same_part(*part, both);
+    const auto has_part = [&](const auto& add) {
+        return load_part(MPI_COMM_WORLD, with(add)).has_value();
+    };
+    EXPECT_FALSE(has_part([&](Scene& s) { s.add(Scene(second), Transform()); }));
+    EXPECT_FALSE(has_part([&](Scene& s) { s.set_mask(s.add(second), 1); }));
+    EXPECT_FALSE(has_part([&](Scene& s) { s.add(std::vector<Sphere>{{{0, 0, 0}, 1}}); }));
+    EXPECT_FALSE(
+        load_part(MPI_COMM_WORLD, saved(folder,
+                                        [&](const std::filesystem::path& to) {
+                                            Aabb box{{0, 0, 0}, {1, 1, 1}};
+                                            save_rdx(to, build_bvh(std::span<const Aabb>(&box, 1)),
+                                                     Model());
+                                        }))
+            .has_value());
+}
+
 TEST(FileParts, OfSeveralFilesCountThrough) {
     const SharedFolder folder;
     const auto expect_same = [&](const std::vector<int>& triangles) {
@@ -179,6 +255,8 @@ TEST(FileParts, WhatIsWrongIsSaidOnAll) {
     const std::string missing = message_of(folder.write("x.obj", "").parent_path() / "none.ply");
     EXPECT_EQ(missing.find("rank 0: "), 0u) << missing;
     EXPECT_NE(missing.find("none.ply: cannot be opened"), std::string::npos) << missing;
+    const std::string no_rdx = message_of(folder.write("no.rdx", std::string(100, 'x')));
+    EXPECT_NE(no_rdx.find("no.rdx: header: this is no .rdx file"), std::string::npos) << no_rdx;
     // The last face is of the last rank.
     const std::string wrong = message_of(folder.write("bad.ply", rich_ply(20, 64, true, 63)));
     EXPECT_EQ(wrong.find("rank " + std::to_string(ranks() - 1) + ": "), 0u) << wrong;

@@ -102,8 +102,9 @@ struct World {
         }
     }
 
-    /// Puts shapes of all kinds between the others, some of them twice.
-    void add_shapes(unsigned seed) {
+    /// Puts shapes of all kinds between the others, some of them twice. User geometry has the mask
+    /// `of_user`.
+    void add_shapes(unsigned seed, std::uint32_t of_user = 0xFFFFFFFFu) {
         std::mt19937 random(seed);
         std::uniform_real_distribution<T> unit(-6, 6);
         const auto place = [&] { return BasicVec3<T>{unit(random), unit(random), unit(random)}; };
@@ -124,8 +125,27 @@ struct World {
             if (i % 4 == 0) item.spheres = spheres;
             if (i % 4 == 1) item.capsules = capsules;
             if (i % 4 == 2) item.points = points;
-            if (i % 4 == 3) item.user = &*user;
+            if (i % 4 == 3) {
+                item.user = &*user;
+                item.mask = of_user;
+            }
             item.radius = T(0.25);
+            items.insert(items.begin() + std::ptrdiff_t(random() % (items.size() + 1)), item);
+        }
+    }
+
+    /// Stretched spheres and capsules.
+    void add_images(unsigned seed, std::uint32_t mask) {
+        std::mt19937 random(seed);
+        BasicScene<T>& round = things.emplace_back();
+        round.add(std::span<const BasicSphere<T>>(spheres).first(5));
+        round.add(std::span<const BasicCapsule<T>>(capsules).first(5));
+        round.commit(on_one_thread());
+        for (int i = 0; i < 4; ++i) {
+            Item<T> item;
+            item.mask = mask;
+            item.scene = &round;
+            item.transform = anywhere<T>(random);
             items.insert(items.begin() + std::ptrdiff_t(random() % (items.size() + 1)), item);
         }
     }
@@ -236,8 +256,9 @@ void expect_same_rays(const BasicScene<T>& one, const BasicDistributedScene<T>& 
 
 template <class T>
 void expect_same_points(const BasicScene<T>& one, const BasicDistributedScene<T>& many,
-                        std::span<const BasicVec3<T>> points) {
-    for (const std::uint32_t mask : {0xFFFFFFFFu, 1u}) {
+                        std::span<const BasicVec3<T>> points,
+                        std::initializer_list<std::uint32_t> masks = {0xFFFFFFFFu, 1u}) {
+    for (const std::uint32_t mask : masks) {
         BasicSceneClosestOptions<T> options;
         options.mask = mask;
         options.threads = 1;
@@ -315,6 +336,33 @@ TYPED_TEST(InstancesOverRanks, ShapesAnswerAsOneProcess) {
             BasicTraceOptions<T> filtered;
             filtered.filter = [](const auto& ray, const auto& hit) { return counts(ray, hit); };
             expect_same_rays<T>(one, many, rays, filtered);
+        }
+}
+
+TYPED_TEST(InstancesOverRanks, ClosestPointsOfShapesAreThoseOfOneProcess) {
+    using T = TypeParam;
+    unsigned seed = 700;
+    for (const Partition partition : {Partition::as_given, Partition::curve})
+        for (const Division division : {Division::random, Division::some_empty}) {
+            SCOPED_TRACE("seed " + std::to_string(++seed));
+            World<T> world(seed);
+            constexpr std::uint32_t hidden = 4;
+            world.add_shapes(seed, hidden);
+            for (auto& item : world.items) item.mask &= item.user != nullptr ? hidden : ~hidden;
+            world.add_images(seed, ~hidden);
+            const BasicScene<T> one = world.in_one_process();
+            SceneOptions options;
+            options.partition = partition;
+            options.threads = 1;
+            const BasicDistributedScene<T> many(
+                MPI_COMM_WORLD, mine(world.items, division_of(world.items.size(), division, seed)),
+                options);
+            const auto all = make_rays<T>(300, seed);
+            std::vector<BasicVec3<T>> points;
+            for (const auto& ray : mine(all, division_of(all.size(), division, seed + 1)))
+                points.push_back(ray.origin);
+            expect_same_points<T>(one, many, points, {3u, 1u});
+            EXPECT_THROW((void)many.closest_points({}), InputError);  // shows user geometry
         }
 }
 
@@ -400,7 +448,8 @@ TEST(InstancesOverRanks, WhatIsWrongIsSaidOnAll) {
     const DistributedScene many(MPI_COMM_WORLD, std::span<const DistributedGeometry>(given));
     const Ray ray{{0, 0, -5}, 0, {0, 0, 1}, infinity};
     EXPECT_EQ(many.trace({&ray, 1}).values[0].t, 4.0f);
-    EXPECT_EQ(message_of([&] { (void)many.closest_points({}); }).find("rank 0: "), 0u);
+    const Vec3 beside{0, 0, 3};
+    EXPECT_EQ(many.closest_points({&beside, 1}).values[0].distance, 2.0f);
     EXPECT_EQ(message_of([&] { (void)many.contains({}); }).find("rank 0: "), 0u);
     TraceOptions options;
     const std::uint32_t masks[2] = {1, 1};

@@ -110,6 +110,37 @@ TEST(MakeReport, OnlyRowsThatMatchAreCompared) {
                        "<section id=\"comparison\">"));
 }
 
+Json ranks_document() {
+    Json document = Json::parse(R"({"command": "mpi bench weak", "cloud": "uniform", "points": 1000,
+        "queries": 100, "k": 8, "seed": 1, "alone_compute_s_most": 1.25, "model": {"latency_s": 2e-6, "bytes_per_s": 1e10},
+        "predicted": {"ranks": 4, "knn_compute_s_most": 1.3, "rounds": 5}})");
+    for (const int ranks : {1, 2, 4})
+        document["counted"].push_back({{"ranks", ranks},
+                                       {"knn_compute_s_most", 1 + 0.1 * ranks},
+                                       {"ranks_touched", 1.25},
+                                       {"rounds", ranks}});
+    // The lead of the other way falls from 1/2 to 2 over a factor of 100: they cross at the middle.
+    document["modelled"] = {{{"ranks", 100}, {"forwarding_s", 2.0}, {"broadcast_s", 1.0}},
+                            {{"ranks", 10000}, {"forwarding_s", 2.0}, {"broadcast_s", 4.0}}};
+    return document;
+}
+
+TEST(MakeReport, RanksAreCountedAndModelled) {
+    const std::string html = page_of({ranks_document()});
+    expect_whole(html);
+    EXPECT_TRUE(holds(html, "<section id=\"ranks\">"));
+    EXPECT_FALSE(holds(html, "<section id=\"other\">"));
+    EXPECT_TRUE(holds(html, "the slowest of 4 ranks computes <strong>1.27</strong>"));
+    EXPECT_TRUE(holds(html, "With every rank alone at the same time it is 1.25 s"));
+    EXPECT_TRUE(holds(html, "beyond the crossing at about 1,000 ranks"));
+    EXPECT_TRUE(holds(html, "on 10,000 ranks the other way takes 2.00 times as long"));
+    EXPECT_TRUE(holds(html, "seconds (log scale) (modelled)"));
+    EXPECT_TRUE(holds(html, "<span class=\"badge simulated\">modelled</span>"));
+    EXPECT_TRUE(holds(html, "1.25 \xC3\x97"));  // 5 rounds were predicted, 4 counted
+    Json bare = Json::parse(R"({"command": "mpi bench strong", "counted": 3, "modelled": [{}]})");
+    expect_whole(page_of({bare}));
+}
+
 TEST(MakeReport, MadeUpSimulationsAreShownAndLabelled) {
     for (const char* name : {"simulate.json", "traversal.json"}) {
         ReportInput input;
