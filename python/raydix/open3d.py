@@ -46,6 +46,10 @@ class RaycastingScene:
     def __repr__(self) -> str:
         return f"<raydix.open3d.RaycastingScene: {len(self._scene)} geometries>"
 
+    def __getstate__(self) -> dict[str, Any]:
+        self._ready(self._scene.threads)  # a scene with changes that no commit has seen has no copy
+        return self.__dict__
+
     def add_triangles(self, mesh: Any, triangle_indices: ArrayLike | None = None) -> int:
         """Adds a mesh and returns its geometry's number: vertices (N, 3) and triangles (M, 3); or an
         object that has them, as the meshes of Open3D do."""
@@ -140,7 +144,9 @@ class RaycastingScene:
             names = ("fov_deg", "center", "eye", "up", "width_px", "height_px")
         given = dict(zip(names, arguments, strict=False)) | named
         if set(given) != set(names) or len(arguments) + len(named) != len(names):
-            raise TypeError(f"create_rays_pinhole: expected {', '.join(names)}, given {list(given)}")
+            raise TypeError(
+                f"create_rays_pinhole: expected {', '.join(names)}, given {list(given)}"
+            )
         width, height = int(given["width_px"]), int(given["height_px"])
         if width < 1 or height < 1:
             raise ValueError(f"create_rays_pinhole: a picture of {width} x {height} pixels")
