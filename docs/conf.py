@@ -30,6 +30,7 @@ breathe_default_project = "raydix"
 breathe_show_include = False
 
 autodoc_typehints = "signature"
+autodoc_type_aliases = {name: name for name in ("ArrayLike", "DTypeLike")}  # else each is five lines
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
 napoleon_numpy_docstring = True

@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import FLOAT32, MISSING, mesh_faces, mesh_vertices, rows
+from ._arrays import FLOAT32, MISSING, UINT32, mesh_faces, mesh_vertices, rows
+from ._core import split_hits
 from .scene import Scene
 
 
@@ -71,7 +72,17 @@ class RaycastingScene:
         (..., 2); "primitive_normals" (..., 3) of unit length, 0 for none."""
         scene = self._ready(nthreads)
         hits = scene.intersect(_rays(rays))
-        return {"t_hit": _number(hits, "t"), **_surface(scene, hits)}
+        lead = hits._rows.shape[:-1]
+        found = {
+            "t_hit": np.empty(lead, FLOAT32),
+            "geometry_ids": np.empty(lead, UINT32),
+            "primitive_ids": np.empty(lead, UINT32),
+            "primitive_uvs": np.empty((*lead, 2), FLOAT32),
+            "primitive_normals": scene.normals(hits),
+        }
+        rows_of = [array.reshape(-1, *array.shape[len(lead) :]) for array in found.values()]
+        split_hits(hits._rows.reshape(-1, hits._rows.shape[-1]), *rows_of)
+        return found
 
     def test_occlusions(
         self, rays: ArrayLike, tnear: float = 0.0, tfar: float = np.inf, nthreads: int = 0
