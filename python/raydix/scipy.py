@@ -8,8 +8,8 @@ tree (`tree`) cannot be had.
 
 Euclidean distances in one, two or three dimensions take the short way: the index answers. With
 another `p`, a `boxsize` or more dimensions the index names candidates, and NumPy then measures
-them. That costs several times as much, and with every further dimension more: the index knows the
-three axes along which the data is widest.
+them. In three dimensions that takes up to twice SciPy's time. With four or more use SciPy's own
+class: the index knows three axes, those along which the data is widest.
 """
 
 from __future__ import annotations
