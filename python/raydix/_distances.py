@@ -156,7 +156,7 @@ class Neighbourhood:
             found = self.points.radius(
                 moved, reach[rows], max_result_bytes=max_bytes, threads=threads
             )
-            all_rows.append(np.repeat(rows, np.diff(found["offsets"].astype(np.intp))))
+            all_rows.append(np.repeat(rows, np.diff(found["offsets"]).astype(np.intp)))
             all_indices.append(found["indices"].astype(np.intp))
         if len(all_rows) == 1:
             return all_rows[0], all_indices[0]
