@@ -3,6 +3,7 @@ reference from the docstrings of the installed package. scripts/docs runs it."""
 
 import os
 import pathlib
+import re
 import sys
 import types
 
@@ -30,6 +31,7 @@ breathe_default_project = "raydix"
 breathe_show_include = False
 
 autodoc_typehints = "signature"
+autodoc_type_aliases = {name: name for name in ("ArrayLike", "DTypeLike")}  # else each is five lines
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
 napoleon_numpy_docstring = True
@@ -39,3 +41,12 @@ html_theme = "alabaster"
 html_title = "raydix"
 html_theme_options = {"page_width": "1100px", "sidebar_width": "260px", "fixed_sidebar": True}
 nitpicky = False
+
+
+def name_aliases(app, what, name, obj, options, signature, returns):
+    """A union with an alias says how the alias is stored."""
+    return tuple(text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) for text in (signature, returns))
+
+
+def setup(app):
+    app.connect("autodoc-process-signature", name_aliases)

@@ -22,6 +22,8 @@ import time
 import numpy as np
 
 import raydix
+import raydix.open3d
+import raydix.scipy
 from raydix.points import load_points
 
 
@@ -33,34 +35,54 @@ def optional(name):
         return None
 
 
+SHORTEST_MS = 5.0
+"""A call that takes less is made several times, and the time is divided."""
+
+
 def in_turn(calls, repeat):
-    """{name: call} -> {name: [milliseconds]}, after a warm-up of each."""
+    """{name: call} -> {name: [(milliseconds, milliseconds of processors)]}, one for each round.
+
+    Every round makes all calls, one after the other. Before that each is warmed up and tried."""
+    often = {}
+    for name, call in calls.items():
+        call()
+        start = time.perf_counter()
+        call()
+        often[name] = max(1, int(SHORTEST_MS / 1e3 / (time.perf_counter() - start)))
     times = {name: [] for name in calls}
-    for round_number in range(repeat + 1):
+    for _ in range(repeat):
         for name, call in calls.items():
-            start = time.perf_counter()
-            call()
-            if round_number:
-                times[name].append((time.perf_counter() - start) * 1e3)
+            start, processors = time.perf_counter(), time.process_time()
+            for _ in range(often[name]):
+                call()
+            wall = time.perf_counter() - start
+            processors = time.process_time() - processors
+            times[name].append((wall * 1e3 / often[name], processors * 1e3 / often[name]))
     return times
 
 
 def row(what, ours, times, unit_count=None):
-    """One line for each peer: medians in ms, spread, and how much faster we are."""
-    base = statistics.median(times[ours])
+    """One line for each peer: medians in ms, spread, and how much faster we are: the median of the
+    ratios of the rounds, since what else the machine does changes from round to round."""
     lines = []
     for name, values in times.items():
-        median = statistics.median(values)
+        wall = [value[0] for value in values]
+        ratios = sorted(value[0] / base[0] for value, base in zip(values, times[ours], strict=True))
         line = {
             "what": what,
             "who": name,
-            "ms": round(median, 5),
-            "min": round(min(values), 5),
-            "max": round(max(values), 5),
-            "ratio": round(median / base, 3),
+            "ms": round(statistics.median(wall), 5),
+            "min": round(min(wall), 5),
+            "max": round(max(wall), 5),
+            "processors_ms": round(statistics.median(value[1] for value in values), 5),
+            "ratio": round(statistics.median(ratios), 3),
+            "ratio_of_processors": round(
+                statistics.median(v[1] / b[1] for v, b in zip(values, times[ours], strict=True)), 3
+            ),
+            "ratio_quartiles": [round(ratios[(len(ratios) - 1) * q // 4], 3) for q in (1, 3)],
         }
         if unit_count:
-            line["million_per_s"] = round(unit_count / median / 1e3, 3)
+            line["million_per_s"] = round(unit_count / line["ms"] / 1e3, 3)
         lines.append(line)
     return lines
 
@@ -103,62 +125,72 @@ def agreement(ours, theirs):
     return same
 
 
+def stand_in(scene):
+    """`raydix.open3d.RaycastingScene` on the same tree options."""
+    peer = raydix.open3d.RaycastingScene()
+    peer._scene = scene
+    return peer
+
+
 def bench_rays(scene, in_double, wanted, repeat):
-    """Closest hits. embreex gives ids, with output=1 also t, u, v; ours always gives all four. The
-    scene in float64 gets the same rays as float64 arrays."""
+    """Closest hits. embreex gives ids, with output=1 also t, u, v; ours always gives all four, and
+    Open3D's class and its stand-in normals too. The scene in float64 gets the same rays as float64
+    arrays. Fewer rays are every n-th of the most."""
     embree, (open3d, o3d) = embree_scene(scene), open3d_scene(scene)
-    for kind, rays in ray_kinds(scene, wanted).items():
-        origins, directions = rays[:, :3].copy(), rays[:, 4:7].copy()
-        ours = scene.intersect(rays)["prim"]
-        calls = {"raydix": lambda rays=rays: scene.intersect(rays)}
-        calls["raydix, origins and directions"] = lambda o=origins, d=directions: scene.intersect(
-            o, d
-        )
-        wide = rays.astype(np.float64)
-        agreement(ours, in_double.intersect(wide)["prim"])
-        calls["raydix, float64"] = lambda wide=wide: in_double.intersect(wide)
-        if embree is not None:
-            agreement(ours, embree.run(origins, directions).astype(np.int64).astype(np.uint32))
-            calls["embreex, ids"] = lambda o=origins, d=directions: embree.run(o, d)
-            calls["embreex, ids t u v"] = lambda o=origins, d=directions: embree.run(o, d, output=1)
-        if open3d is not None:
-            six = o3d.core.Tensor(np.concatenate([origins, directions], axis=1))
-            agreement(ours, open3d.cast_rays(six)["primitive_ids"].numpy())
-            calls["open3d"] = lambda six=six: open3d.cast_rays(six)
-        yield from row(f"{len(rays):,} {kind} rays", "raydix", in_turn(calls, repeat), len(rays))
+    as_open3d = stand_in(scene)
+    for kind, every in ray_kinds(scene, wanted).items():
+        for count in sorted({len(every), *(n for n in (1_000, 10_000, 100_000) if n < wanted)})[
+            ::-1
+        ]:
+            rays = np.ascontiguousarray(every[:: max(1, len(every) // count)][:count])
+            origins, directions = rays[:, :3].copy(), rays[:, 4:7].copy()
+            six = np.concatenate([origins, directions], axis=1)
+            ours = scene.intersect(rays)["prim"]
+            calls = {"raydix": lambda r=rays: scene.intersect(r)}
+            calls["raydix, origins and directions"] = lambda o=origins, d=directions: (
+                scene.intersect(o, d)
+            )
+            calls["raydix.open3d"] = lambda r=six: as_open3d.cast_rays(r)
+            if open3d is not None:
+                tensor = o3d.core.Tensor(six)
+                theirs = open3d.cast_rays(tensor)
+                agreement(ours, theirs["primitive_ids"].numpy())
+                calls["open3d"] = lambda r=tensor: open3d.cast_rays(r)
+            if embree is not None:
+                agreement(ours, embree.run(origins, directions).astype(np.int64).astype(np.uint32))
+                calls["embreex, ids"] = lambda o=origins, d=directions: embree.run(o, d)
+                calls["embreex, ids t u v"] = lambda o=origins, d=directions: embree.run(
+                    o, d, output=1
+                )
+            if count == len(every):
+                wide = rays.astype(np.float64)
+                agreement(ours, in_double.intersect(wide)["prim"])
+                calls["raydix, float64"] = lambda w=wide: in_double.intersect(w)
+            yield from row(f"{count:,} {kind} rays", "raydix", in_turn(calls, repeat), count)
 
 
 def bench_one_ray(scene, repeat):
-    """What a call with one ray costs, in microseconds (the ms column holds ms of 10,000 calls,
-    divided)."""
+    """What a call with one ray costs, in microseconds."""
     embree = embree_scene(scene)
     ray = scene.primary_rays(size=(9, 9))["rays"][40:41].copy()
     origin, direction = ray[:, :3].copy(), ray[:, 4:7].copy()
-
-    def often(call):
-        def run():
-            for _ in range(10_000):
-                call()
-
-        return run
-
     calls = {
-        "raydix": often(lambda: scene.intersect(ray)),
-        "raydix, occluded": often(lambda: scene.occluded(ray)),
+        "raydix": lambda: scene.intersect(ray),
+        "raydix, occluded": lambda: scene.occluded(ray),
+        "raydix, origins and directions": lambda: scene.intersect(origin, direction),
     }
-    calls["raydix, origins and directions"] = often(lambda: scene.intersect(origin, direction))
 
     def read():
         hits = scene.intersect(origin, direction)
         return hits["t"], hits["prim"], hits["u"], hits["v"]
 
-    calls["raydix, and t prim u v read"] = often(read)
+    calls["raydix, and t prim u v read"] = read
     if embree is not None:
-        calls["embreex, ids"] = often(lambda: embree.run(origin, direction))
-        calls["embreex, ids t u v"] = often(lambda: embree.run(origin, direction, output=1))
-    lines = row("10,000 calls with one ray", "raydix", in_turn(calls, repeat))
-    for line in lines:
-        line["us_per_call"] = round(line["ms"] / 10, 3)
+        calls["embreex, ids"] = lambda: embree.run(origin, direction)
+        calls["embreex, ids t u v"] = lambda: embree.run(origin, direction, output=1)
+    for line in row("one ray", "raydix, origins and directions", in_turn(calls, 5 * repeat)):
+        line["us_per_call"] = round(line["ms"] * 1e3, 3)
+        line["us_of_processor"] = round(line["processors_ms"] * 1e3, 3)
         yield line
 
 
@@ -187,6 +219,32 @@ def bench_points(cloud, k, repeat):
     for name, queries in (("in the cloud's order", cloud), ("shuffled", shuffled)):
         calls = {who: (lambda ask=ask, q=queries: ask(q)) for who, ask in asks.items()}
         yield from row(f"{size:,} x {k} nearest, {name}", "raydix", in_turn(calls, repeat), size)
+
+
+def bench_long_way(k, repeat):
+    """The stand-in for cKDTree where the index names candidates only."""
+    spatial = optional("scipy.spatial")
+    if spatial is None:
+        return
+    for what, size, m, box, p in (
+        ("periodic box", 200_000, 3, 1.0, 2),
+        ("p = 1", 200_000, 3, None, 1),
+        ("p = infinity", 200_000, 3, None, np.inf),
+        ("4 dimensions", 200_000, 4, None, 2),
+        ("5 dimensions", 50_000, 5, None, 2),
+        ("8 dimensions", 10_000, 8, None, 2),
+    ):
+        data = np.random.default_rng(3).uniform(size=(size, m))
+        ours = raydix.scipy.cKDTree(data, boxsize=box)
+        theirs = spatial.cKDTree(data, boxsize=box)
+        queries = data[: size // 4]
+        found, wanted = (tree.query(queries, k, p=p, workers=-1)[0] for tree in (ours, theirs))
+        np.testing.assert_allclose(found, wanted, rtol=1e-12)
+        calls = {
+            who: (lambda t=tree, q=queries, p=p: t.query(q, k, p=p, workers=-1))
+            for who, tree in (("raydix.scipy", ours), ("cKDTree, workers=-1", theirs))
+        }
+        yield from row(f"{k} nearest, {what}", "raydix.scipy", in_turn(calls, repeat), len(queries))
 
 
 def bench_changing(cloud, k, repeat):
@@ -242,9 +300,11 @@ def show(line):
         else f"{line['million_per_s']:9.2f} M/s"
     )
     spread = f"({line['min']:.3f} to {line['max']:.3f})"
+    low, high = line["ratio_quartiles"]
     print(
         f"{line['what']:44} {line['who']:32} {line['ms']:10.3f} ms {spread:28} {rate}"
-        f"  x{line['ratio']:.2f}",
+        f"  x{line['ratio']:.2f} ({low:.2f} to {high:.2f})"
+        f" processors x{line['ratio_of_processors']:.2f}",
         flush=True,
     )
 
@@ -258,11 +318,13 @@ def main():
     parser.add_argument("--rays", type=int, default=1_000_000)
     parser.add_argument("--points", default="1000000", help="a file, or how many uniform ones")
     parser.add_argument("-k", type=int, default=8)
-    parser.add_argument("--repeat", type=int, default=5)
+    parser.add_argument("--repeat", type=int, default=9, help="rounds")
+    parser.add_argument("--only", nargs="*", help="rays, one, points, changing, dimensions")
     parser.add_argument("--json")
     options = parser.parse_args()
 
-    result = {"machine": machine(), "scene": options.scene, "quality": options.quality, "rows": []}
+    name = os.path.basename(options.scene)
+    result = {"machine": machine(), "scene": name, "quality": options.quality, "rows": []}
     scene = raydix.Scene(options.scene, quality=options.quality)
     in_double = raydix.Scene(
         scene.vertices.astype(np.float64), scene.faces, precision="float64", quality=options.quality
@@ -271,13 +333,15 @@ def main():
         cloud = np.random.default_rng(1).uniform(size=(int(options.points), 3))
     else:
         cloud = load_points(options.points)
-    for lines in (
-        bench_rays(scene, in_double, options.rays, options.repeat),
-        bench_one_ray(scene, options.repeat),
-        bench_points(cloud, options.k, options.repeat),
-        bench_changing(cloud, options.k, options.repeat),
-    ):
-        for line in lines:
+    parts = {
+        "rays": lambda n: bench_rays(scene, in_double, options.rays, n),
+        "one": lambda n: bench_one_ray(scene, n),
+        "points": lambda n: bench_points(cloud, options.k, n),
+        "changing": lambda n: bench_changing(cloud, options.k, n),
+        "dimensions": lambda n: bench_long_way(options.k, n),
+    }
+    for part in options.only or parts:
+        for line in parts[part](options.repeat):
             result["rows"].append(line)
             show(line)
     if options.json:

@@ -41,6 +41,8 @@ class HitFilter:
 
     def keep(self, instance: int, geometry: int, values: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
 
+def split_hits(hits: Annotated[NDArray[numpy.float32], dict(shape=(None, 6), order='C', device='cpu', writable=False)], t: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')], geometry: Annotated[NDArray[numpy.uint32], dict(shape=(None,), order='C', device='cpu')], prim: Annotated[NDArray[numpy.uint32], dict(shape=(None,), order='C', device='cpu')], uv: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu')], normals: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu')]) -> None: ...
+
 class SceneTrees:
     """A scene in float; raydix.Scene is what to use."""
 

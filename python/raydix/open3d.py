@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import FLOAT32, MISSING, mesh_faces, mesh_vertices, rows
+from ._arrays import FLOAT32, MISSING, UINT32, mesh_faces, mesh_vertices, rows
+from ._core import split_hits
 from .scene import Scene
 
 
@@ -46,6 +47,10 @@ class RaycastingScene:
     def __repr__(self) -> str:
         return f"<raydix.open3d.RaycastingScene: {len(self._scene)} geometries>"
 
+    def __getstate__(self) -> dict[str, Any]:
+        self._ready(self._scene.threads)  # a scene with changes that no commit has seen has no copy
+        return self.__dict__
+
     def add_triangles(self, mesh: Any, triangle_indices: ArrayLike | None = None) -> int:
         """Adds a mesh and returns its geometry's number: vertices (N, 3) and triangles (M, 3); or an
         object that has them, as the meshes of Open3D do."""
@@ -67,7 +72,17 @@ class RaycastingScene:
         (..., 2); "primitive_normals" (..., 3) of unit length, 0 for none."""
         scene = self._ready(nthreads)
         hits = scene.intersect(_rays(rays))
-        return {"t_hit": _number(hits, "t"), **_surface(scene, hits)}
+        lead = hits._rows.shape[:-1]
+        found = {
+            "t_hit": np.empty(lead, FLOAT32),
+            "geometry_ids": np.empty(lead, UINT32),
+            "primitive_ids": np.empty(lead, UINT32),
+            "primitive_uvs": np.empty((*lead, 2), FLOAT32),
+            "primitive_normals": scene.normals(hits),
+        }
+        rows_of = [array.reshape(-1, *array.shape[len(lead) :]) for array in found.values()]
+        split_hits(hits._rows.reshape(-1, hits._rows.shape[-1]), *rows_of)
+        return found
 
     def test_occlusions(
         self, rays: ArrayLike, tnear: float = 0.0, tfar: float = np.inf, nthreads: int = 0
@@ -140,7 +155,9 @@ class RaycastingScene:
             names = ("fov_deg", "center", "eye", "up", "width_px", "height_px")
         given = dict(zip(names, arguments, strict=False)) | named
         if set(given) != set(names) or len(arguments) + len(named) != len(names):
-            raise TypeError(f"create_rays_pinhole: expected {', '.join(names)}, given {list(given)}")
+            raise TypeError(
+                f"create_rays_pinhole: expected {', '.join(names)}, given {list(given)}"
+            )
         width, height = int(given["width_px"]), int(given["height_px"])
         if width < 1 or height < 1:
             raise ValueError(f"create_rays_pinhole: a picture of {width} x {height} pixels")

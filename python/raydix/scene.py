@@ -63,8 +63,10 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         Of the binary tree: rounds of reinsertion after the build, 0 to 255. Each moves large
         subtrees to cheaper places. None: what `quality` asks for (2 for "balanced", 4 for "high",
         else 0), and 0 where `builder` is given.
-    max_leaf, bits :
-        Of the binary tree: triangles in a leaf at most, and bits of the Morton codes (30 or 63).
+    max_leaf :
+        Of the binary tree: triangles in a leaf at most.
+    bits :
+        Of the binary tree: bits of the Morton codes, 30 or 63.
     strict :
         Triangles with a NaN, an infinite or a huge (beyond 1e12) vertex raise InputError; otherwise
         they are left out.
@@ -81,9 +83,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     precision :
         "float32" (also None), or "float64": coordinates as they are given, and all answers computed
         and returned in float64. For meshes far from the origin (float32 has steps of half a metre
-        at 5,000,000) and for more than seven digits. Rays then take three (scattered ones) to seven
-        times (those of a camera) as long, because they go through a binary tree and not through the
-        wide one.
+        at 5,000,000) and for more than seven digits. Rays then take up to about twice as long.
 
     Notes
     -----
@@ -166,7 +166,9 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         self._fitted: Camera | None = None
         self._there: DeviceRays | None = None
         if device != "cpu" and self.dtype != FLOAT32:
-            raise _core.BackendUnavailable(f"device={device!r}: scenes in float64 are not traced there")
+            raise _core.BackendUnavailable(
+                f"device={device!r}: scenes in float64 are not traced there"
+            )
         if compact:
             require_float32(self, "compact=True")
         if reinsertion_rounds is not None:

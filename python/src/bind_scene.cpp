@@ -228,6 +228,31 @@ void normals_of(Scene& scene, const HitsIn<Scene>& hits, const MaybeRays<Scene>&
                   [](const auto&... arguments) { normals(arguments...); });
 }
 
+/// Rows of hits -> a column for each part, as raydix.open3d gives them. Normals of misses, NaN, are
+/// set to 0. Of lengths that differ: ValueError.
+void split_hits(const HitsIn<SceneTrees>& rows_in, const Out<float, nb::shape<-1>>& t,
+                const Out<std::uint32_t, nb::shape<-1>>& geometry,
+                const Out<std::uint32_t, nb::shape<-1>>& prim,
+                const Out<float, nb::shape<-1, 2>>& uv,
+                const Out<float, nb::shape<-1, 3>>& normals) {
+    const auto hits = rows<Hit>(rows_in);
+    for (const std::size_t length :
+         {t.shape(0), geometry.shape(0), prim.shape(0), uv.shape(0), normals.shape(0)})
+        require_length(length, hits.size());
+    float* const uvs = uv.data();
+    float* const facing = normals.data();
+    const nb::gil_scoped_release unlocked;
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+        const Hit& hit = hits[i];
+        t.data()[i] = hit.t;
+        geometry.data()[i] = hit.geometry;
+        prim.data()[i] = hit.prim;
+        uvs[2 * i] = hit.u;
+        uvs[2 * i + 1] = hit.v;
+        if (!hit.hit()) facing[3 * i] = facing[3 * i + 1] = facing[3 * i + 2] = 0;
+    }
+}
+
 /// The wide tree of the one mesh, made as a commit makes it.
 template <class Scene>
 nb::dict wide_stats(Scene& scene) {
@@ -446,6 +471,9 @@ void bind_asking(nb::class_<Scene>& scene) {
 
 void bind_scene(nb::module_& module) {
     bind_filter(module);
+    module.def("split_hits", &split_hits, nb::arg("hits").noconvert(), nb::arg("t").noconvert(),
+               nb::arg("geometry").noconvert(), nb::arg("prim").noconvert(),
+               nb::arg("uv").noconvert(), nb::arg("normals").noconvert());
     nb::class_<SceneTrees> scene(module, "SceneTrees",
                                  "A scene in float; raydix.Scene is what to use.");
     bind_changes(scene);

@@ -3,6 +3,7 @@
 
 #include <cstring>
 #include <string>
+#include <type_traits>
 
 namespace raydix::python {
 
@@ -44,20 +45,32 @@ RayParts<RayType>::RayParts(const StridedRows& origins, const StridedRows& direc
 template <class RayType>
 template <class Scalar>
 void RayParts<RayType>::fill(std::size_t begin, std::size_t end) {
-    const auto read = [](const Column& column, std::size_t row, int axis) {
+    using To = decltype(RayType::tmin);
+    const auto read = [](const std::byte* at) {
         Scalar value;  // copied, because a caller's array may lie at any byte
-        std::memcpy(&value,
-                    column.data + static_cast<std::int64_t>(row) * column.row_bytes +
-                        axis * column.column_bytes,
-                    sizeof value);
-        return static_cast<decltype(RayType::tmin)>(value);
+        std::memcpy(&value, at, sizeof value);
+        return static_cast<To>(value);
     };
-    for (std::size_t i = begin; i < end; ++i)
-        rays_[i - begin] = {
-            {read(origins_, i, 0), read(origins_, i, 1), read(origins_, i, 2)},
-            read(tmin_, i, 0),
-            {read(directions_, i, 0), read(directions_, i, 1), read(directions_, i, 2)},
-            read(tmax_, i, 0)};
+    const auto row = [](const Column& column, std::size_t i) {
+        return column.data + static_cast<std::int64_t>(i) * column.row_bytes;
+    };
+    const auto fill_by = [&](auto origin_step, auto direction_step) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const std::byte* const origin = row(origins_, i);
+            const std::byte* const direction = row(directions_, i);
+            rays_[i - begin] = {
+                {read(origin), read(origin + origin_step), read(origin + 2 * origin_step)},
+                read(row(tmin_, i)),
+                {read(direction), read(direction + direction_step),
+                 read(direction + 2 * direction_step)},
+                read(row(tmax_, i))};
+        }
+    };
+    constexpr std::integral_constant<std::int64_t, sizeof(Scalar)> together;  // the usual case
+    if (origins_.column_bytes == together && directions_.column_bytes == together)
+        fill_by(together, together);
+    else
+        fill_by(origins_.column_bytes, directions_.column_bytes);
 }
 
 template <class RayType>

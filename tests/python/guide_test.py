@@ -1,4 +1,4 @@
-"""The Python in the guides and the README runs, page by page."""
+"""The Python in the guides, the tour and the README runs, page by page."""
 import pathlib
 import subprocess
 import sys
@@ -6,7 +6,7 @@ import sys
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs/guide").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "docs/tour.md", *sorted((ROOT / "docs/guide").glob("*.md"))]
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if "```python\n" in p.read_text("utf-8")], ids=lambda p: p.stem)

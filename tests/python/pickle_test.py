@@ -10,7 +10,10 @@ import support
 from worlds import BOX
 
 import raydix
+import raydix.open3d
 import raydix.scipy
+from raydix.embree import rtcore_scene
+from raydix.embree.mesh_construction import TriangleMesh
 
 RAYS = np.array([[0, 0, 9, 0, 0, 0, -1, np.inf], [9, 9, 9, 0, 0, 0, -1, np.inf]], np.float32)
 COPIES = {
@@ -97,8 +100,7 @@ def test_processes_that_are_spawned(rng, tmp_path):
     rays = support.random_rays(rng, 200)
     for_all = raydix.Points(points), raydix.scipy.cKDTree(points)
     jobs = [
-        ((scene, *for_all), rays)
-        for scene in (raydix.Scene(*BOX), mapped, mixed_world("float64"))
+        ((scene, *for_all), rays) for scene in (raydix.Scene(*BOX), mapped, mixed_world("float64"))
     ]
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         found = pool.starmap(in_worker, jobs)
@@ -161,3 +163,22 @@ def test_scipy_stand_in(made, rng):
     assert other.leafsize == 7 and repr(other) == repr(tree)
     for a, b in zip(other.query(data, 3), tree.query(data, 3), strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+@copies
+def test_stand_ins_for_open3d_and_embreex(made):
+    """Also before their first question, which builds the trees."""
+    vertices, faces = BOX
+    down = np.float32([[0.5, 0.25, 9, 0, 0, -2]])
+    casting = raydix.open3d.RaycastingScene(nthreads=1)
+    casting.add_triangles(vertices, faces)
+    embree = rtcore_scene.EmbreeScene()
+    TriangleMesh(embree, vertices, faces)
+    for _ in range(2):
+        other = made(casting)
+        assert repr(other) == repr(casting)
+        for name, found in other.cast_rays(down).items():
+            np.testing.assert_array_equal(found, casting.cast_rays(down)[name])
+        other = made(embree)
+        assert repr(other) == repr(embree)
+        assert other.run(down[:, :3], down[:, 3:]) == embree.run(down[:, :3], down[:, 3:]) >= 0

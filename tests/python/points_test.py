@@ -1,11 +1,10 @@
-"""Points against brute force, and the stand-ins for SciPy's trees against SciPy."""
+"""Points against brute force, SciPy and pykdtree."""
 
 import numpy as np
 import pytest
 import support
 
 import raydix
-from raydix.scipy import cKDTree
 
 KINDS = [(dtype, dimension) for dtype in (np.float32, np.float64) for dimension in (2, 3)]
 
@@ -201,83 +200,6 @@ def test_errors(error, text, call):
         call(raydix.Points(np.zeros((2, 3))))
 
 
-@pytest.fixture(params=[2, 3])
-def both(request, rng):
-    spatial = support.peer("scipy.spatial")
-    data = rng.normal(size=(2000, request.param))
-    return spatial.cKDTree(data), cKDTree(data), rng.normal(size=(30, 40, request.param)), data
-
-
-@pytest.mark.parametrize("k", [1, 2, 150, [1], [2, 5], 2001])
-def test_query_as_scipy(both, k):
-    theirs, ours, x, _ = both
-    for queries in (x, x[0], x[0, 0]):
-        (d, i), (d2, i2) = theirs.query(queries, k), ours.query(queries, k, workers=-1)
-        assert (
-            np.shape(d) == np.shape(d2)
-            and np.shape(i) == np.shape(i2)
-            and type(i) is type(i2)
-            or np.ndim(i) == 0
-        )
-        np.testing.assert_allclose(d2, d, rtol=1e-14)
-        np.testing.assert_array_equal(i2, i)
-    (d, i), (d2, i2) = (tree.query(x, 5, distance_upper_bound=0.1) for tree in (theirs, ours))
-    np.testing.assert_array_equal(i2, i)
-    np.testing.assert_allclose(d2, d, rtol=1e-14)
-
-
-def test_query_ball_point_as_scipy(both, rng):
-    theirs, ours, x, _ = both
-    for r in (0.2, rng.uniform(0, 0.4, (30, 40))):
-        a, b = theirs.query_ball_point(x, r, return_sorted=True), ours.query_ball_point(x, r)
-        assert (
-            a.shape == b.shape
-            and a.dtype == b.dtype
-            and all(m == n for m, n in zip(a.flat, b.flat, strict=True))
-        )
-        np.testing.assert_array_equal(
-            ours.query_ball_point(x, r, return_length=True),
-            theirs.query_ball_point(x, r, return_length=True),
-        )
-    assert ours.query_ball_point(x[0, 0], 0.5) == sorted(theirs.query_ball_point(x[0, 0], 0.5))
-    assert ours.query_ball_point(x[0, 0], 0.5, return_length=True) == len(
-        theirs.query_ball_point(x[0, 0], 0.5)
-    )
-
-
-def test_query_pairs_as_scipy(both):
-    theirs, ours, _, data = both
-    assert ours.query_pairs(0.1) == theirs.query_pairs(0.1) != set()
-    a = theirs.query_pairs(0.1, output_type="ndarray")
-    np.testing.assert_array_equal(
-        ours.query_pairs(0.1, output_type="ndarray"), a[np.lexsort(a.T[::-1])]
-    )
-    assert (
-        ours.n == theirs.n
-        and ours.m == theirs.m
-        and (ours.maxes == theirs.maxes).all()
-        and (ours.data == data).all()
-    )
-
-
-def test_what_the_stand_in_cannot_do():
-    tree = cKDTree(np.zeros((3, 3)))
-    for call in (
-        lambda: tree.query([0, 0, 0], p=1),
-        lambda: cKDTree(np.zeros((3, 4))),
-        lambda: cKDTree([[np.nan, 0, 0]]),
-    ):
-        with pytest.raises(ValueError):
-            call()
-    for call in (
-        lambda: tree.query([0, 0, np.inf]),
-        lambda: tree.query([0, 0, 0], k=0),
-        lambda: cKDTree([[0, 0]], boxsize=1),
-    ):
-        with pytest.raises(ValueError):
-            call()
-
-
 def test_pykdtree_agrees(rng):
     pykdtree = support.peer("pykdtree.kdtree")
     data, x = rng.normal(size=(3000, 3)), rng.normal(size=(500, 3))
@@ -287,20 +209,12 @@ def test_pykdtree_agrees(rng):
     np.testing.assert_allclose(found["distances"], d, rtol=1e-14)
 
 
-def test_the_stand_in_refuses_what_scipy_refuses():
-    tree = cKDTree(np.eye(3))
-    with pytest.raises(ValueError, match="k must be an integer or a sequence"):
-        tree.query([0, 0, 0], k=None)
-    for call in (cKDTree, tree.query, lambda x: tree.query_ball_point(x, 1)):
-        with pytest.raises(TypeError, match="complex data"):
-            call(np.eye(3) * 1j)
-
-
 def test_shared_cloud_as_scipy():
     spatial = support.peer("scipy.spatial")
     cloud = support.shared_cloud("kitti_frame")
-    (d, i), found = spatial.cKDTree(cloud).query(cloud, 9), raydix.Points(
-        cloud.astype(np.float64)
-    ).knn(cloud, 9)
+    (d, i), found = (
+        spatial.cKDTree(cloud).query(cloud, 9),
+        raydix.Points(cloud.astype(np.float64)).knn(cloud, 9),
+    )
     np.testing.assert_allclose(found["distances"], d, rtol=1e-13)
     assert (found["indices"] == i).mean() > 0.999  # equal distances: SciPy promises no order

@@ -1,7 +1,12 @@
 """Meshes and peers that several tests use."""
 
 import importlib
+import os
 import pathlib
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree
 
 import numpy as np
 import pytest
@@ -88,3 +93,30 @@ def shared_cloud(name):
     if not file.is_file():
         pytest.skip(f"no {file}")
     return raydix.load_points(file)
+
+
+def run_tests(*arguments, **options):
+    """Another project's tests in a process of their own, without our settings: {name: "passed",
+    "failed", "error" or "skipped"}."""
+    with tempfile.TemporaryDirectory() as folder:
+        report = pathlib.Path(folder) / "report.xml"
+        done = subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", "-c", os.devnull, f"--junitxml={report}"]
+            + [str(argument) for argument in arguments],
+            capture_output=True,
+            text=True,
+            **options,
+        )
+        assert report.is_file(), done.stdout + done.stderr
+        cases = xml.etree.ElementTree.parse(report).iter("testcase")
+        return {
+            f"{case.get('classname')}::{case.get('name')}": next(
+                (
+                    {"failure": "failed"}.get(part.tag, part.tag)
+                    for part in case
+                    if part.tag in ("failure", "error", "skipped")
+                ),
+                "passed",
+            )
+            for case in cases
+        }

@@ -10,4 +10,7 @@ answers; no ray slips through an edge, whatever `robust` is.
 
 from . import mesh_construction, rtcore_scene
 
+__version__ = "4.4.0"
+"""The version of embreex whose calls these are."""
+
 __all__ = ["mesh_construction", "rtcore_scene"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -26,6 +28,18 @@ class EmbreeScene:
     def is_committed(self) -> int:
         """1 if the trees are built."""
         return int(self._scene.committed)
+
+    def __repr__(self) -> str:
+        return f"<raydix.embree.EmbreeScene: {len(self._scene)} meshes>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        self._ready()  # a scene with changes that no commit has seen has no copy
+        return self.__dict__
+
+    def _ready(self) -> Scene:
+        if not self._scene.committed:
+            self._scene.commit()
+        return self._scene
 
     def _add(self, vertices: np.ndarray, indices: np.ndarray) -> int:
         return self._scene.add(vertices, mesh_faces(indices, len(vertices), "indices"))
@@ -57,14 +71,13 @@ class EmbreeScene:
                 "vec_origins, vec_directions: expected shapes (N, 3) and (N, 3) or (1, 3), "
                 f"given {np.shape(vec_origins)} and {np.shape(vec_directions)}"
             )
-        if not self._scene.committed:
-            self._scene.commit()
+        scene = self._ready()
         far = np.broadcast_to(np.asarray(FAR if dists is None else dists, FLOAT32), len(origins))
         along = np.broadcast_to(along, origins.shape)
         if query == "OCCLUDED":
-            hit = self._scene.occluded(origins, along, tmax=far)
+            hit = scene.occluded(origins, along, tmax=far)
             return np.where(hit, 0, -1).astype(np.int32)
-        hits = self._scene.intersect(origins, along, tmax=far)
+        hits = scene.intersect(origins, along, tmax=far)
         if output:
             return self._columns(hits, far)
         if query == "DISTANCE":
