@@ -255,6 +255,43 @@ bool same(const Simulation& a, const Simulation& b) {
     return equal;
 }
 
+/// Runs that trace the same batches share them; with the memory model each run traces its own.
+TEST(Simulate, SharedBatchesCostWhatTheyCostAlone) {
+    const Model scene = scene_of(random_soup(2000, 4, 0.1f), "soup");
+    const WarpTree tree(build_bvh(scene.mesh()));
+    const std::vector<Ray> rays = make_mixed_rays(scene, 1500, 8);
+    std::vector<SimulateOptions> runs;
+    for (const char* machine : {"gtx285", "h200"})
+        for (const WarpKernel kernel : warp_kernels())
+            for (const int width : {8, 32})
+                for (const bool any : {false, true})
+                    runs.push_back({.kernel = kernel,
+                                    .machine = machine_model(machine),
+                                    .width = width,
+                                    .any_hit = any});
+    std::vector<std::vector<TreeHit>> hits, own_hits;
+    const std::vector<Simulation> together = simulate(tree, rays, runs, &hits);
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+        const std::string name = std::string(warp_kernel_name(runs[k].kernel)) + " on " +
+                                 runs[k].machine.name + ", run " + std::to_string(k);
+        const Simulation alone = simulate(tree, rays, std::span(&runs[k], 1)).front();
+        EXPECT_TRUE(same(alone, together[k])) << name;
+        SimulateOptions watched = runs[k];
+        watched.memory = true;
+        const Simulation own = simulate(tree, rays, std::span(&watched, 1), &own_hits).front();
+        EXPECT_EQ(own.instructions, together[k].instructions) << name;
+        EXPECT_EQ(own.lane_instructions, together[k].lane_instructions) << name;
+        EXPECT_EQ(own.scheduled_clocks, together[k].scheduled_clocks) << name;
+        EXPECT_EQ(own.warp_times, together[k].warp_times) << name;
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            ASSERT_EQ(own_hits[0][i].hit(), hits[k][i].hit()) << name << ", ray " << i;
+            if (runs[k].any_hit) continue;
+            ASSERT_EQ(std::memcmp(&own_hits[0][i], &hits[k][i], sizeof(TreeHit)), 0)
+                << name << ", ray " << i;
+        }
+    }
+}
+
 TEST(Simulate, FiguresDoNotDependOnThreads) {
     const Model scene = scene_of(random_soup(3000, 4, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh()));
