@@ -1,4 +1,5 @@
-# raydix_sets: the versions of the kernels that this machine can use best. SSE4.2 comes along: all else is built on it.
+# Kernels for this machine alone: raydix_host_options, what they are compiled with, so that the one set that every
+# processor of the build has (raydix_sets, ONE) is this machine's best.
 include(CheckCXXSourceCompiles)
 set(CMAKE_REQUIRED_FLAGS -march=native)
 check_cxx_source_compiles("
@@ -12,10 +13,9 @@ check_cxx_source_compiles("
     #endif
     int main() {}" RAYDIX_HOST_AVX2)
 unset(CMAKE_REQUIRED_FLAGS)
+set(raydix_sets ONE)
 if(RAYDIX_HOST_AVX512)
-    set(raydix_sets ENDS)
+    set(raydix_host_options -march=x86-64-v4 -Wno-ignored-attributes)
 elseif(RAYDIX_HOST_AVX2)
-    set(raydix_sets AVX2)
-else()
-    set(raydix_sets ONE)
+    set(raydix_host_options -march=x86-64-v3 -Wno-ignored-attributes)
 endif()

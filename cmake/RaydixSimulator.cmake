@@ -8,8 +8,12 @@ if(NOT raydix_simulated)
     return()
 endif()
 set_source_files_properties(${raydix_simulated} PROPERTIES COMPILE_DEFINITIONS RAYDIX_SIMULATOR_ISA=base)
-# Under sanitizers the first version alone: they look at what the source does, which is the same.
-if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND NOT RAYDIX_SANITIZE)
+# Under sanitizers the first version alone: they look at what the source does, which is the same. And one for this
+# machine alone, if the build is (cmake/RaydixHost.cmake).
+if(raydix_host_options)
+    set_source_files_properties(${raydix_simulated} PROPERTIES COMPILE_OPTIONS "${raydix_host_options}"
+        SKIP_PRECOMPILE_HEADERS ON)
+elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND NOT RAYDIX_SANITIZE)
     set(raydix_v3_dir ${CMAKE_CURRENT_BINARY_DIR}/simulator_v3)
     set(raydix_simulated_v3)
     foreach(source ${raydix_simulated})

@@ -19,11 +19,11 @@ namespace raydix::HWY_NAMESPACE {
 
 /// Vectors of 4 to 64 bytes, lanes of 4 or 8. What lies behind the lanes kept has no meaning.
 template <class D>
-HWY_INLINE hwy::HWY_NAMESPACE::Vec<D> compress(D d, hwy::HWY_NAMESPACE::Vec<D> v,
+HWY_INLINE hwy::HWY_NAMESPACE::Vec<D> compress([[maybe_unused]] D d, hwy::HWY_NAMESPACE::Vec<D> v,
                                                std::uint32_t bits) {
     namespace hn = hwy::HWY_NAMESPACE;
-    constexpr std::size_t lanes = hn::MaxLanes(D()), bytes = lanes * sizeof(hn::TFromD<D>);
 #if HWY_TARGET != HWY_AVX3
+    constexpr std::size_t lanes = hn::MaxLanes(D()), bytes = lanes * sizeof(hn::TFromD<D>);
     const std::uint32_t words = sizeof(hn::TFromD<D>) == 8 ? twice_each_bit[bits] : bits;
     if constexpr (bytes == 32) {
         const hn::Repartition<std::uint32_t, D> u32;

@@ -16,6 +16,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "base/baseline_isa.h"
 #include "layout/sorted_part_writer.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -39,13 +40,13 @@ std::span<const PartKernel> part_kernels() {
     static const std::vector<PartKernel> all = [] {
         std::vector<PartKernel> found;
         [[maybe_unused]] const std::int64_t here = hwy::SupportedTargets();
-#if HWY_TARGETS & HWY_AVX3
+#if RAYDIX_CHOOSES_AVX512
         if (here & HWY_AVX3) found.push_back(N_AVX3::part_kernel("avx512"));
 #endif
-#if HWY_TARGETS & HWY_AVX2
+#if RAYDIX_CHOOSES_AVX2
         if (here & HWY_AVX2) found.push_back(N_AVX2::part_kernel("avx2"));
 #endif
-        found.push_back(HWY_STATIC_DISPATCH(part_kernel)("baseline"));
+        found.push_back(HWY_STATIC_DISPATCH(part_kernel)(runnable_baseline(here)));
         return found;
     }();
     return all;

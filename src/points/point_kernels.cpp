@@ -9,6 +9,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "base/baseline_isa.h"
 #include "points/nearest.h"
 #include "points/range_query.h"
 
@@ -40,38 +41,30 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace raydix {
 
-namespace {
-
-constexpr std::string_view baseline_name = HWY_STATIC_TARGET == HWY_SSE4    ? "sse4"
-                                           : HWY_STATIC_TARGET == HWY_SSSE3 ? "ssse3"
-                                           : HWY_STATIC_TARGET == HWY_NEON  ? "neon"
-                                                                            : "scalar";
-}
-
-#if HWY_TARGETS & HWY_AVX3
+#if RAYDIX_CHOOSES_AVX512
 #define RAYDIX_ADD_AVX3(name) \
     if (here & HWY_AVX3) found.push_back(N_AVX3::name("avx512"));
 #else
 #define RAYDIX_ADD_AVX3(name)
 #endif
-#if HWY_TARGETS & HWY_AVX2
+#if RAYDIX_CHOOSES_AVX2
 #define RAYDIX_ADD_AVX2(name) \
     if (here & HWY_AVX2) found.push_back(N_AVX2::name("avx2"));
 #else
 #define RAYDIX_ADD_AVX2(name)
 #endif
-#define RAYDIX_POINT_KERNELS(T, Dim, name)                                      \
-    template <>                                                                 \
-    std::span<const PointKernels<T, Dim>> point_kernels<T, Dim>() {             \
-        static const std::vector<PointKernels<T, Dim>> all = [] {               \
-            std::vector<PointKernels<T, Dim>> found;                            \
-            [[maybe_unused]] const std::int64_t here = hwy::SupportedTargets(); \
-            RAYDIX_ADD_AVX3(name)                                               \
-            RAYDIX_ADD_AVX2(name)                                               \
-            found.push_back(HWY_STATIC_DISPATCH(name)(baseline_name));          \
-            return found;                                                       \
-        }();                                                                    \
-        return all;                                                             \
+#define RAYDIX_POINT_KERNELS(T, Dim, name)                                       \
+    template <>                                                                  \
+    std::span<const PointKernels<T, Dim>> point_kernels<T, Dim>() {              \
+        static const std::vector<PointKernels<T, Dim>> all = [] {                \
+            std::vector<PointKernels<T, Dim>> found;                             \
+            [[maybe_unused]] const std::int64_t here = hwy::SupportedTargets();  \
+            RAYDIX_ADD_AVX3(name)                                                \
+            RAYDIX_ADD_AVX2(name)                                                \
+            found.push_back(HWY_STATIC_DISPATCH(name)(runnable_baseline(here))); \
+            return found;                                                        \
+        }();                                                                     \
+        return all;                                                              \
     }
 RAYDIX_POINT_KERNELS(float, 2, kernels_f2)
 RAYDIX_POINT_KERNELS(float, 3, kernels_f3)

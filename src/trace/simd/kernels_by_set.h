@@ -8,16 +8,17 @@
 #include <string_view>
 #include <vector>
 
+#include "base/baseline_isa.h"
 #include "trace/simd/simd_kernels.h"
 
 // The functions of this name for AVX-512, for AVX2 and for the rest; null where it was not
 // compiled.
-#if HWY_TARGETS & HWY_AVX3
+#if RAYDIX_CHOOSES_AVX512
 #define RAYDIX_WITH_AVX512(function) N_AVX3::function
 #else
 #define RAYDIX_WITH_AVX512(function) nullptr
 #endif
-#if HWY_TARGETS & HWY_AVX2
+#if RAYDIX_CHOOSES_AVX2
 #define RAYDIX_WITH_AVX2(function) N_AVX2::function
 #else
 #define RAYDIX_WITH_AVX2(function) nullptr

@@ -72,7 +72,7 @@ public:
         for (std::size_t i = 0; i < packet_size; i += lanes16)
             vectors += (active >> i & vector_bits) != 0;
         const auto ray_count = static_cast<std::uint32_t>(std::popcount(active));
-        const std::uint32_t quads = (ray_count + rays_a_quad - 1) / rays_a_quad;
+        const auto quads = static_cast<std::uint32_t>((ray_count + rays_a_quad - 1) / rays_a_quad);
         if (quads_pay(quads, vectors * count))
             return test_quads(block, ((1u << count) - 1) << lane, active);
         return p_.one_origin ? test_vectors<true>(block, lane, count, active)

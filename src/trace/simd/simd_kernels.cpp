@@ -14,6 +14,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "base/baseline_isa.h"
 #include "trace/simd/packet.h"
 #include "trace/simd/packets.h"
 #include "trace/simd/single.h"
@@ -36,16 +37,13 @@ std::span<const SimdKernels> simd_kernels() {
     static const std::vector<SimdKernels> all = [] {
         std::vector<SimdKernels> found;
         [[maybe_unused]] const std::int64_t here = hwy::SupportedTargets();
-#if HWY_TARGETS & HWY_AVX3
+#if RAYDIX_CHOOSES_AVX512
         if (here & HWY_AVX3) found.push_back(N_AVX3::kernels("avx512"));
 #endif
-#if HWY_TARGETS & HWY_AVX2
+#if RAYDIX_CHOOSES_AVX2
         if (here & HWY_AVX2) found.push_back(N_AVX2::kernels("avx2"));
 #endif
-        found.push_back(HWY_STATIC_DISPATCH(kernels)(HWY_STATIC_TARGET == HWY_SSE4    ? "sse4"
-                                                     : HWY_STATIC_TARGET == HWY_SSSE3 ? "ssse3"
-                                                     : HWY_ARCH_ARM                   ? "neon"
-                                                                                      : "scalar"));
+        found.push_back(HWY_STATIC_DISPATCH(kernels)(runnable_baseline(here)));
         return found;
     }();
     return all;

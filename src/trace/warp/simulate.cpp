@@ -309,6 +309,7 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
         check_options(options);
         static_cast<void>(op_costs(options.machine, options.kernel));
     }
+    check_threads(threads);
     if (rays.size() >= 0x7FFFFFFFu) throw InputError("simulate: 2^31 rays or more in one launch");
     std::vector<Simulation> figures(runs.size());
     std::vector<std::vector<TreeHit>> own;
