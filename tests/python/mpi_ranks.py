@@ -95,6 +95,15 @@ def compare_hits(found, expected, what):
     same(found["prim"], wide(expected["prim"]), f"{what}, prim")
 
 
+def compare_closest(spread, whole, points):
+    for reach in (np.inf, 0.3):
+        one = whole.closest_point(points, max_distance=reach)
+        many = spread.closest_points(points, max_distance=reach)
+        for name in ("point", "distance", "u", "v", "geometry", "instance"):
+            same(many[name], one[name], f"closest, {name}")
+        same(many["prim"], wide(one["prim"]), "closest, prim")
+
+
 def geometries_of(rank, dtype):
     """Ranks differ in how many they give: meshes that overlap, an instance, and on some nothing."""
     if rank % 4 == 3:
@@ -158,11 +167,7 @@ def check_scene(dtype, partition):
     assert first == COMM.scan(paths) - paths
     shaped = spread.trace(np.zeros((2, 0, 6), dtype))
     assert shaped["t"].shape == shaped["prim"].shape == (2, 0)
-    refused(
-        raydix.InputError,
-        "sphere",
-        lambda: spread.closest_points(np.zeros((1, 3))),
-    )
+    compare_closest(spread, whole, rng.uniform(-1.5, 1.5, (40, 3)).astype(dtype)[RANK::RANKS])
     spread.free()
     spread.free()
 
@@ -181,12 +186,7 @@ def check_one_mesh(dtype, partition, division):
         COMM, given, one_geometry=True, precision=dtype, partition=partition, threads=1
     ) as spread:
         assert spread.holding["size"] == 24 and "24 triangles" in repr(spread)
-        for reach in (np.inf, 0.3):
-            one = whole.closest_point(asked, max_distance=reach)
-            many = spread.closest_points(asked, max_distance=reach)
-            for name in ("point", "distance", "u", "v", "geometry", "instance"):
-                same(many[name], one[name], f"closest, {name}")
-            same(many["prim"], wide(one["prim"]), "closest, prim")
+        compare_closest(spread, whole, asked)
         same(spread.contains(asked), whole.contains(asked, rule="parity"), "contains")
         found = spread.trace(asked, np.ones_like(asked))
         compare_hits(found, whole.intersect(asked, np.ones_like(asked)), "one mesh")
