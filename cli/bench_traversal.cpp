@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cctype>
 #include <memory>
+#include <optional>
 
 #include "output.h"
 #include "published.h"
@@ -32,8 +33,8 @@ struct TraversalBench {
     double sweep_sample = 0.01;  // 0: no sweep
     bool tree_of_machine = true;
     bool memory = false;
-    int repeat = 10;  // timed launches on a device
-    double error = 0;
+    int repeat = 10;    // timed launches on a device
+    double error = -1;  // or the largest that is wanted
     std::string state_file;
 };
 
@@ -205,9 +206,8 @@ void print_by_machine(const std::vector<SimulationRow>& rows) {
 class TraversalStudy {
 public:
     explicit TraversalStudy(const TraversalBench& options)
-        : options_(options),
-          document_(new_document("bench traversal")),
-          state_(options.state_file) {
+        : options_(options), document_(new_document("bench traversal")) {
+        if (!options.state_file.empty()) state_.emplace(options.state_file);
         for (const char* list : {"scenes", "builds", "machines", "simulate", "measured",
                                  "published", "claims", "width_sweep"})
             document_[list] = Json::array();
@@ -298,7 +298,7 @@ private:
         for (const RayKind kind : kinds_from(options_.rays)) {
             const std::vector<SimulationRow> rows =
                 simulate_kind(input, tree, launches, kind, runs, options_.launches, options_.common,
-                              {options_.error, &state_});
+                              {options_.error, state_ ? &*state_ : nullptr});
             for (const SimulationRow& row : rows) {
                 document_["simulate"].push_back(simulation_json(row));
                 rows_.push_back(row);
@@ -315,7 +315,7 @@ private:
 
     const TraversalBench& options_;
     Json document_;
-    SimulationState state_;
+    std::optional<SimulationState> state_;
     std::vector<MachineModel> machines_;
     std::vector<SimulateOptions> runs_;
     std::vector<SimulationRow> rows_;

@@ -134,8 +134,12 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
                         .sample = options.sample,
                         .units = {}});
     }
-    const Json figures = figures_of(input, rows, options, common.seed);
-    std::size_t done = end.state != nullptr ? end.state->restore(figures, rows) : 0;
+    Json figures;
+    std::size_t done = 0;
+    if (end.state != nullptr) {
+        figures = figures_of(input, rows, options, common.seed);
+        done = end.state->restore(figures, rows);
+    }
     Progress progress(fmt::format("simulating {}", ray_kind_name(kind)), common);
     const auto visit = [&](const RayUnit& unit, double part) {
         add_unit(tree, unit, runs, rows, common);
@@ -143,11 +147,11 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
         progress.show(part);
     };
     const auto more = [&](double taken) {
-        return end.error <= 0 || !std::all_of(rows.begin(), rows.end(), [&](SimulationRow& row) {
-                   row.part_taken = taken;
-                   const std::optional<double> error = row.sampling_error();
-                   return error && *error <= end.error;
-               });
+        for (SimulationRow& row : rows) row.part_taken = taken;
+        return !std::ranges::all_of(rows, [&](const SimulationRow& row) {
+            const std::optional<double> error = row.sampling_error();
+            return error && *error <= end.error;
+        });
     };
     const double taken = launches.for_each(kind, visit, more, done);
     for (SimulationRow& row : rows) row.part_taken = taken;

@@ -39,7 +39,7 @@ struct SimulationRow {
 
 /// When to end before all launches are done, and how to go on then.
 struct SimulationEnd {
-    double error = 0;                  // ends when no row's sampling error is larger; 0: never
+    double error = -1;                 // ends when no row's sampling error is larger
     SimulationState* state = nullptr;  // or null
 };
 

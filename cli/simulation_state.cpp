@@ -91,7 +91,7 @@ Json figures_of(const SceneTree& input, const std::vector<SimulationRow>& rows,
 
 SimulationState::SimulationState(std::string file) : file_(std::move(file)) {
     document_ = {{"holds", kind_of_file}, {"version", version}, {"parts", Json::object()}};
-    if (file_.empty() || !std::filesystem::exists(file_)) return;
+    if (!std::filesystem::exists(file_)) return;
     std::ifstream in(file_);
     const Json found = Json::parse(in, nullptr, false);
     if (!found.is_object() || found.value("holds", "") != kind_of_file ||
@@ -123,7 +123,6 @@ std::size_t SimulationState::restore(const Json& figures, std::vector<Simulation
 
 void SimulationState::keep(const Json& figures, const std::vector<SimulationRow>& rows,
                            std::size_t launches) {
-    if (file_.empty()) return;
     Json kept = Json::array();
     for (const SimulationRow& row : rows) kept.push_back(row_json(row));
     document_["parts"][part_name(rows)] = {{"of", figures}, {"launches", launches}, {"rows", kept}};

@@ -18,8 +18,7 @@ namespace raydix::cli {
 /// JSON: for each scene, builder and kind of ray the launches that are done and the sums over them.
 class SimulationState {
 public:
-    /// An empty name keeps nothing. Throws InputError: a file that is there and holds something
-    /// else.
+    /// Reads the file if it is there. Throws InputError if it holds something else.
     explicit SimulationState(std::string file);
 
     /// Puts what is kept of `figures` into rows that are new; how many launches that was. Throws

@@ -195,6 +195,17 @@ struct World {
     std::vector<Item<T>> items;
 };
 
+/// Each rank gives its part of the world.
+template <class T>
+BasicDistributedScene<T> over_ranks(const World<T>& world, Partition partition, Division division,
+                                    unsigned seed) {
+    SceneOptions options;
+    options.partition = partition;
+    options.threads = 1;
+    const auto begins = division_of(world.items.size(), division, seed);
+    return {MPI_COMM_WORLD, mine(world.items, begins), options};
+}
+
 template <class T>
 auto make_rays(std::size_t n, unsigned seed) {
     std::mt19937 random(seed);
@@ -290,11 +301,7 @@ TYPED_TEST(InstancesOverRanks, AnswerAsOneProcess) {
                          std::to_string(++seed));
             const World<T> world(seed);
             const BasicScene<T> one = world.in_one_process();
-            const auto begins = division_of(world.items.size(), division, seed);
-            SceneOptions options;
-            options.partition = partition;
-            options.threads = 1;
-            const BasicDistributedScene<T> many(MPI_COMM_WORLD, mine(world.items, begins), options);
+            const auto many = over_ranks(world, partition, division, seed);
             const auto all = make_rays<T>(240, seed);
             const auto ray_begins = division_of(all.size(), division, seed + 1);
             const auto rays = mine(all, ray_begins);
@@ -321,12 +328,7 @@ TYPED_TEST(InstancesOverRanks, ShapesAnswerAsOneProcess) {
             World<T> world(seed);
             world.add_shapes(seed);
             const BasicScene<T> one = world.in_one_process();
-            SceneOptions options;
-            options.partition = partition;
-            options.threads = 1;
-            const BasicDistributedScene<T> many(
-                MPI_COMM_WORLD, mine(world.items, division_of(world.items.size(), division, seed)),
-                options);
+            const auto many = over_ranks(world, partition, division, seed);
             const auto all = make_rays<T>(300, seed);
             const auto rays = mine(all, division_of(all.size(), division, seed + 1));
             expect_same_rays<T>(one, many, rays, {});
@@ -351,12 +353,7 @@ TYPED_TEST(InstancesOverRanks, ClosestPointsOfShapesAreThoseOfOneProcess) {
             for (auto& item : world.items) item.mask &= item.user != nullptr ? hidden : ~hidden;
             world.add_images(seed, ~hidden);
             const BasicScene<T> one = world.in_one_process();
-            SceneOptions options;
-            options.partition = partition;
-            options.threads = 1;
-            const BasicDistributedScene<T> many(
-                MPI_COMM_WORLD, mine(world.items, division_of(world.items.size(), division, seed)),
-                options);
+            const auto many = over_ranks(world, partition, division, seed);
             const auto all = make_rays<T>(300, seed);
             std::vector<BasicVec3<T>> points;
             for (const auto& ray : mine(all, division_of(all.size(), division, seed + 1)))
@@ -370,11 +367,7 @@ TYPED_TEST(InstancesOverRanks, ContainAsOneProcess) {
     using T = TypeParam;
     const World<T> world(41);
     const BasicScene<T> one = world.in_one_process();
-    SceneOptions of_scene;
-    of_scene.threads = 1;
-    const BasicDistributedScene<T> many(
-        MPI_COMM_WORLD, mine(world.items, division_of(world.items.size(), Division::even, 1)),
-        of_scene);
+    const auto many = over_ranks(world, SceneOptions().partition, Division::even, 1);
     std::vector<BasicVec3<T>> points;
     for (const auto& ray : make_rays<T>(300, 42)) points.push_back(ray.origin);
     points.push_back({T(0.5), T(0.5), 0});  // on a face of several boxes

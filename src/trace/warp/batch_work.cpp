@@ -38,20 +38,17 @@ void trace_range(const SimulatedKernel& kernel, const WarpJob& job, WarpSetup se
 
 std::optional<WarpKernel> batch_kernel(WarpKernel kernel) {
     switch (kernel) {
-        case WarpKernel::packet:
         case WarpKernel::persistent_packet:
             return WarpKernel::packet;
-        case WarpKernel::while_while:
         case WarpKernel::persistent_while_while:
             return WarpKernel::while_while;
-        case WarpKernel::if_if:
         case WarpKernel::persistent_if_if:
             return WarpKernel::if_if;
-        case WarpKernel::speculative_while_while:
         case WarpKernel::persistent_speculative_while_while:
             return WarpKernel::speculative_while_while;
         default:
-            return std::nullopt;
+            if (simulated_kernel(kernel, false, 1)->persistent) return std::nullopt;
+            return kernel;
     }
 }
 

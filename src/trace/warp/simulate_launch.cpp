@@ -10,6 +10,7 @@
 #include <bit>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -289,9 +290,9 @@ Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
     if (run.kernel.persistent) {
         run_persistent(run, batches, figures);
     } else {
-        add_batch_times(
-            run, works_of(run, batches != nullptr ? *batches : watched_batches(run), figures),
-            figures);
+        std::optional<BatchWork> own;
+        if (batches == nullptr) batches = &own.emplace(watched_batches(run));
+        add_batch_times(run, works_of(run, *batches, figures), figures);
     }
     for (const OperationFigure& op : figures.operations)
         figures.lane_instructions += op.lanes * op.instructions;
