@@ -64,6 +64,11 @@ public:
         else
             now_->ask_for_next();
     }
+    template <TurnKind kind>
+    HWY_INLINE void look(std::integral_constant<TurnKind, kind>) {
+        if constexpr (kind == TurnKind::node) now_->look_at_node();
+        if constexpr (kind == TurnKind::leaf) now_->look_at_leaf();
+    }
     HWY_INLINE bool step(std::integral_constant<TurnKind, TurnKind::node>) {
         return now_->step_node() || leave();
     }

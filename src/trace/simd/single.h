@@ -78,17 +78,38 @@ public:
         top_ = 0;
         return frame_.tmin <= tmax;
     }
-    /// Visits the node that is next; whether there is another node or leaf. Few branches: those of
-    /// rays in turn cannot be foreseen.
+    /// The first half of a visit of the node that is next: its children that the ray meets go
+    /// behind the stack's top. Without branches.
+    HWY_INLINE void look_at_node() {
+        pushed_ = push_evenly(tree_.template node<compact>(word_));
+    }
+    /// The second half; whether there is another node or leaf. Few branches: those of rays in turn
+    /// cannot be foreseen.
     HWY_INLINE bool step_node() {
         std::size_t top = top_;
-        push_evenly(tree_.template node<compact>(word_), top);
+        order_pushed(pushed_, top);
         const bool on = pop(top, word_);
         top_ = top;
         return on;
     }
-    /// Tests the leaf that is next; whether there is another node or leaf.
-    HWY_INLINE bool step_leaf() { return !test_leaf(word_) && pop(top_, word_); }
+    /// The first half of a visit of the leaf that is next: which triangles may be hit.
+    HWY_INLINE void look_at_leaf() {
+        if constexpr (std::is_same_v<Parts, NoParts>) {
+            const auto [place, count] = leaf_of(word_);
+            if constexpr (counting) counts_.tests += count;
+            open_ = candidates_of(tree_.template block<compact>(place), lanes_of(place, count));
+        }
+    }
+    /// The second half; whether there is another node or leaf.
+    HWY_INLINE bool step_leaf() {
+        if constexpr (!std::is_same_v<Parts, NoParts>) {
+            if (test_leaf(word_)) return false;
+        } else if (!open_.none() &&
+                   finish(tree_.template block<compact>(leaf_of(word_).place), open_)) {
+            return false;
+        }
+        return pop(top_, word_);
+    }
     /// The next one: what a step visits.
     [[nodiscard]] std::uint32_t next() const { return word_; }
     HWY_INLINE void ask_for_next() const { ask_for<compact>(tree_, word_); }
@@ -265,30 +286,45 @@ private:
         return s;
     }
 
-    /// All children that the ray meets go onto the stack; the one to visit first is the last.
+    /// All children that the ray meets go behind the stack's top, for closest hits with the nearer
+    /// one of the first two second; how many.
     template <class Node>
-    HWY_INLINE void push_evenly(const Node& node, std::size_t& top) {
+    HWY_INLINE std::uint32_t push_evenly(const Node& node) {
         constexpr bool closest = wants_closest(wanted);
-        HWY_ALIGN float entries[8];
-        const std::uint32_t met = meet<closest>(node, plain_rates(), entries);
-        std::uint32_t* const words = stack_.words + top;
-        float* const at = stack_.entries + top;
-        std::size_t count = 0;
+        if constexpr (counting) ++counts_.visits;
+        const Rates about = plain_rates();
+        const auto& rates = rates_of(node, about);
+        std::uint32_t* const words = stack_.words + top_;
+        float* const at = stack_.entries + top_;
+        std::uint32_t count = 0;
         for (std::size_t l = 0; l < 8; l += lanes8) {
-            const std::uint32_t here = met >> l & ((1u << lanes8) - 1);
-            V word = compress(f8, hn::BitCast(f8, hn::Load(U8(), node.child + l)), here);
-            const auto more = static_cast<std::size_t>(std::popcount(here));
+            V entry, exit;
+            test_boxes(node, rates, l, entry, exit);
+            auto mask = hn::Le(entry, exit);
+            std::uint32_t here = bits_of(f8, mask);
+            if (always_careful || frame_.careful) {
+                here &= used_slots(node) >> l;
+                mask = mask_of(f8, here);
+            }
+            V word = compress(f8, hn::BitCast(f8, hn::Load(U8(), node.child + l)), mask, here);
+            const auto more = static_cast<std::uint32_t>(std::popcount(here));
             if constexpr (closest) {
-                V entry = compress(f8, hn::Load(f8, entries + l), here);
+                entry = compress(f8, entry, mask, here);
                 if constexpr (parts8 == 1) farther_first(more, entry, word);
                 hn::StoreU(entry, f8, at + count);
             }
             hn::StoreU(word, f8, reinterpret_cast<float*>(words + count));
             count += more;
         }
+        return count;
+    }
+    /// The `count` children behind the stack's top become part of it; the one to visit first is
+    /// the last.
+    HWY_INLINE void order_pushed(std::uint32_t count, std::size_t& top) {
+        if constexpr (wants_closest(wanted))
+            for (std::size_t k = parts8 == 1 ? 2 : 1; k < count; ++k)
+                insert(k, stack_.words + top, stack_.entries + top);
         top += count;
-        if constexpr (closest)
-            for (std::size_t k = parts8 == 1 ? 2 : 1; k < count; ++k) insert(k, words, at);
     }
     /// The first two of `count` by entry; the first of equals is the nearer one.
     static HWY_INLINE void farther_first(std::size_t count, V& entry, V& word) {
@@ -361,8 +397,15 @@ private:
         }
     }
 
+    struct Leaf {
+        std::uint32_t place, count;
+    };
+    static HWY_INLINE Leaf leaf_of(std::uint32_t word) {
+        return {(word & ~wide_leaf_bit) >> 3, (word & 7) + 1};
+    }
+
     HWY_INLINE bool test_leaf(std::uint32_t word) {
-        const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
+        const auto [place, count] = leaf_of(word);
         if constexpr (!std::is_same_v<Parts, NoParts>) {
             best_.t = parts_->visit_one(place, count, place_);
             return wants_any(wanted) && best_.t < 0;
@@ -372,10 +415,13 @@ private:
     }
 
     HWY_INLINE bool test_triangles(std::uint32_t place, std::uint32_t count) {
-        const TriangleBlock& block = tree_.template block<compact>(place);
         if constexpr (counting) counts_.tests += count;
-        const std::uint32_t lanes = ((1u << count) - 1) << place % block_lanes;
-        return test_lanes(block, lanes);
+        const TriangleBlock& block = tree_.template block<compact>(place);
+        const Candidates open = candidates_of(block, lanes_of(place, count));
+        return !open.none() && finish(block, open);
+    }
+    static HWY_INLINE std::uint32_t lanes_of(std::uint32_t place, std::uint32_t count) {
+        return ((1u << count) - 1) << place % block_lanes;
     }
 
     HWY_INLINE Sheared<F4> shear(const TriangleBlock& block, int vertex) const {
@@ -388,33 +434,40 @@ private:
                 hn::Sub(at(frame_.kind.ky), hn::Mul(hn::Set(f4, frame_.shear[1]), z)), z};
     }
 
-    /// intersect_triangle for the lanes in `tested`: the same bits. True: stop.
-    HWY_INLINE bool test_lanes(const TriangleBlock& block, std::uint32_t tested) {
+    /// Triangles of a block that may be hit; those that surely are, where any hit will do. `clear`:
+    /// lanes none of whose edge functions is 0 or NaN.
+    struct Candidates {
+        std::uint32_t open = 0, clear = 0, certain = 0;
+        [[nodiscard]] bool none() const { return (open | certain) == 0; }
+    };
+
+    /// What floats leave open of intersect_triangle for the lanes in `tested`.
+    HWY_INLINE Candidates candidates_of(const TriangleBlock& block, std::uint32_t tested) const {
         const Sheared<F4> a = shear(block, 0), b = shear(block, 1), c = shear(block, 2);
         const V4 u = edge(c, b), v = edge(a, c), w = edge(b, a);
         const V4 least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
-        std::uint32_t candidates = tested & ~bits_astride(least, largest);
-        if (candidates == 0) return false;
+        const std::uint32_t open = tested & ~bits_astride(least, largest);
+        if (open == 0) return {};
         const std::uint32_t clear = bits_of(f4, without_zero(f4, u, v, w));
         if constexpr (wanted == Wanted::any) {
             const auto kz = static_cast<int>(frame_.kind.kz);
             const Limits<F4> limits{hn::Set(f4, frame_.tmin), hn::Set(f4, best_.t),
                                     hn::Set(f4, frame_.direction[kz]),
                                     std::fabs(frame_.near_pad[kz]), frame_.kind.negative(kz)};
-            const AnyHit hit = any_hit(f4, limits, a, b, c, u, v, w, candidates, clear);
-            if (hit.certain != 0) {
-                best_.prim = 0;
-                return true;
-            }
-            candidates = hit.open;
-            if (candidates == 0) return false;
+            const AnyHit hit = any_hit(f4, limits, a, b, c, u, v, w, open, clear);
+            return {hit.open, clear, hit.certain};
         }
-        return finish(block, candidates, clear);
+        return {open, clear, 0};
     }
 
-    /// `clear`: lanes none of whose edge functions is 0 or NaN.
-    HWY_NOINLINE bool finish(const TriangleBlock& block, std::uint32_t candidates,
-                             std::uint32_t clear) {
+    /// The rest of intersect_triangle: the same bits. True: stop.
+    HWY_NOINLINE bool finish(const TriangleBlock& block, const Candidates& here) {
+        if (wanted == Wanted::any && here.certain != 0) {
+            best_.prim = 0;
+            return true;
+        }
+        std::uint32_t candidates = here.open;
+        const std::uint32_t clear = here.clear;
         for (; candidates != 0; candidates &= candidates - 1) {
             const auto lane = static_cast<std::uint32_t>(std::countr_zero(candidates));
             TriangleHit hit;
@@ -450,6 +503,10 @@ private:
     const Ray* given_ = nullptr;  // to the check
     std::uint32_t word_ = 0;
     std::size_t top_ = 0;
+    // Between the halves of a visit: how many children lie behind the stack's top, or what of the
+    // leaf may be hit.
+    std::uint32_t pushed_ = 0;
+    Candidates open_;
 };
 
 /// Whether the ray is probably like the next one: so many of the last have been like each other.

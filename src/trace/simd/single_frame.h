@@ -19,16 +19,18 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-/// By axis; what a fourth float holds has no meaning.
+/// By axis; what a fourth float holds has no meaning. Fours of floats first, which single_frames.h
+/// writes as such.
 struct SingleFrame {
     alignas(16) float origin[4];
     alignas(16) float direction[4];     // scaled
     alignas(16) float inverse[4];       // limited
     alignas(16) float near_pad[4];      // with the sign that moves near planes toward the start
     alignas(16) float near[4], far[4];  // starts of planes about the tree's middle
-    alignas(16) float shear[4];         // of x and y
+    alignas(16) float shear[2];         // of x and y
+    float tmin, tmax;
     RayClass kind;
-    float tmin, tmax, t_scale;
+    float t_scale;
     bool careful;  // planes of plain nodes may overflow
 
     /// For the triangle test of one triangle.
@@ -80,7 +82,7 @@ inline HWY_NOINLINE void fill_odd_frame(const WideView& tree, const Ray& ray, Si
     quad(o.x, o.y, o.z, out.origin);
     quad(d.x, d.y, d.z, out.direction);
     quad(i.x, i.y, i.z, out.inverse);
-    quad(frame.shear_x, frame.shear_y, 0.0f, out.shear);
+    out.shear[0] = frame.shear_x, out.shear[1] = frame.shear_y;
     const V4 origin = hn::Load(f4, out.origin), whole = hn::Load(f4, out.inverse);
     const auto negatives = static_cast<std::uint32_t>(std::signbit(i.x)) |
                            static_cast<std::uint32_t>(std::signbit(i.y)) << 1 |

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "trace/simd/single.h"
+#include "trace/simd/single_frames.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
@@ -55,6 +56,9 @@ private:
     template <class Kind>
     HWY_INLINE void step_all(const List& list, std::size_t& at, Kind kind) {
         const std::size_t count = std::exchange(at, 0);
+        // Both halves of all turns apart: a jump in the second one that was guessed wrong is found
+        // out at once, since nothing has to be waited for.
+        for (std::size_t k = 0; k < count; ++k) list[k]->look(kind);
         for (std::size_t k = 0; k < count; ++k) {
             Turn* const turn = list[k];
             if (turn->step(kind) || turn->start()) add(turn);
@@ -68,7 +72,8 @@ private:
 /// Rays that take turns. Turn has:
 ///   bool start()                  the next ray; whether there was one
 ///   TurnKind kind()               what is next
-///   bool step(constant of kind)   does it; whether the ray goes on
+///   void look(constant of kind)   does the first half of it
+///   bool step(constant of kind)   does the rest; whether the ray goes on
 ///   void ask()                    for the memory that it needs next
 template <class Turn, std::size_t n>
 HWY_INLINE void take_turns(std::array<Turn, n>& turns) {
@@ -119,6 +124,10 @@ private:
         [[nodiscard]] TurnKind kind() const { return static_cast<TurnKind>(ray->next() >> 31); }
         HWY_INLINE void ask() const { ray->ask_for_next(); }
         template <TurnKind kind>
+        HWY_INLINE void look(std::integral_constant<TurnKind, kind>) {
+            kind == TurnKind::node ? ray->look_at_node() : ray->look_at_leaf();
+        }
+        template <TurnKind kind>
         HWY_INLINE bool step(std::integral_constant<TurnKind, kind>) {
             const bool on = kind == TurnKind::node ? ray->step_node() : ray->step_leaf();
             return on || rays->finish(*this);
@@ -128,12 +137,12 @@ private:
 
     HWY_INLINE bool start(Turn& turn) {
         while (next_ < job_.n) {
-            turn.i = next_++;
-            if (job_.order != nullptr) {
-                turn.i = job_.order[turn.i];
-                ask_for_ray(job_.order[std::min(next_ + ahead, job_.n - 1)]);
-            }
-            if (fill_frame(job_.tree, job_.rays[turn.i], turn.frame)) {
+            const std::size_t k = next_ % lanes16;
+            if (k == 0) read_ahead();
+            ++next_;
+            turn.i = static_cast<std::size_t>(index_[k]);
+            if (frames_.take(k, turn.frame) ||
+                fill_frame(job_.tree, job_.rays[turn.i], turn.frame)) {
                 turn.ray.emplace(job_.tree, turn.frame, turn.stack, counts_, nullptr,
                                  static_cast<std::uint32_t>(turn.i));
                 if constexpr (all) turn.ray->collect(*job_.all);
@@ -147,6 +156,17 @@ private:
             set(turn.i, {});
         }
         return false;
+    }
+    /// The next lanes16 rays, the last one again to fill the vector.
+    HWY_INLINE void read_ahead() {
+        for (std::size_t l = 0; l < lanes16; ++l) {
+            const std::size_t k = std::min(next_ + l, job_.n - 1);
+            index_[l] = static_cast<std::int32_t>(job_.order != nullptr ? job_.order[k] : k);
+        }
+        if (job_.order != nullptr)
+            for (std::size_t l = 0; l < lanes16; ++l)
+                ask_for_ray(job_.order[std::min(next_ + l + lanes16, job_.n - 1)]);
+        frames_.fill(job_.rays, index_);
     }
     /// False only for rays that pass the root's bounds by, widened as boxes of nodes are.
     HWY_INLINE bool meets_bounds(const SingleFrame& frame) const {
@@ -187,10 +207,11 @@ private:
             *job_.hits.at(i) = hit;
     }
 
-    static constexpr std::size_t ahead = 16;
     const SimdJob& job_;
     SimdCounts& counts_;
     std::size_t next_ = 0;
+    HWY_ALIGN std::int32_t index_[lanes16];  // of the rays in frames_
+    SingleFrames frames_{job_.tree};
     alignas(16) float half_[4];  // of the root's sides
 };
 
