@@ -291,7 +291,7 @@ protected:
         if (!fill(tree.view, line, tree.growth, frame)) return;
         const WideStackView stack = stack_;
         const std::size_t taken = wide_stack_capacity(tree.arrays.stats.max_depth);
-        stack_ = {stack.words + taken, stack.entries + taken};
+        stack_ = stack.from(taken);
         Parts parts{*this, scene, tree, number, line, nearest_first_};
         SimdCounts counts;
         SingleRay<wanted, counting, false, false, Parts>(tree.view, frame, stack, counts, &parts, 0)

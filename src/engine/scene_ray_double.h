@@ -137,7 +137,7 @@ protected:
             return;
         const WideStackView stack = stack_;
         const std::size_t taken = wide_stack_capacity(scene.parts.arrays.stats.max_depth);
-        stack_ = {stack.words + taken, stack.entries + taken};
+        stack_ = stack.from(taken);
         Parts parts{*this, scene, number, line, frame.t_scale, distances};
         SimdCounts counts;
         SingleRay<wanted, false, false, false, Parts>(scene.parts.view, boxes, stack, counts,

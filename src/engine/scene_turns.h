@@ -23,7 +23,7 @@ namespace raydix::HWY_NAMESPACE {
 template <Wanted wanted>
 class StandingRay : SceneRay<wanted> {
     using Walk = SceneRay<wanted>;
-    using One = SingleRay<wanted, false, false>;
+    using One = TurnRay<wanted, false, false>;
     static constexpr bool any = wants_any(wanted);
 
 public:
@@ -38,7 +38,7 @@ public:
             return tree.empty() ? 0 : wide_stack_capacity(tree.arrays.stats.max_depth);
         };
         const std::size_t taken = std::max(room(scene.near), room(scene.wild));
-        this->stack_ = {stack.words + taken, stack.entries + taken};
+        this->stack_ = stack.from(taken);
     }
 
     /// Whether there is anything to do.
@@ -65,10 +65,13 @@ public:
             now_->ask_for_next();
     }
     template <TurnKind kind>
-    HWY_INLINE void look(std::integral_constant<TurnKind, kind>) {
+    HWY_INLINE bool look(std::integral_constant<TurnKind, kind>) {
         if constexpr (kind == TurnKind::node) now_->look_at_node();
-        if constexpr (kind == TurnKind::leaf) now_->look_at_leaf();
+        if constexpr (kind == TurnKind::leaf) return now_->look_at_leaf();
+        return false;
     }
+    HWY_INLINE void try_hit() { now_->try_hit(); }
+    HWY_INLINE void keep_hit() { now_->keep_hit(); }
     HWY_INLINE bool step(std::integral_constant<TurnKind, TurnKind::node>) {
         return now_->step_node() || leave();
     }
@@ -202,10 +205,8 @@ public:
     void trace() {
         std::array<Turn, rays_in_turn> turns;
         for (std::size_t k = 0; k < turns.size(); ++k) {
-            const WideStackView stack = job_.single_stack.view();
-            const std::size_t at = k * job_.tree->stack_size;
             turns[k].all = this;
-            turns[k].stack = {stack.words + at, stack.entries + at};
+            turns[k].stack = job_.single_stack.view().from(k * job_.tree->stack_size);
         }
         take_turns(turns);
     }
@@ -221,6 +222,12 @@ private:
         static constexpr bool has_parts = true;
         [[nodiscard]] TurnKind kind() const { return ray->kind(); }
         HWY_INLINE void ask() const { ray->ask(); }
+        template <TurnKind kind>
+        HWY_INLINE bool look(std::integral_constant<TurnKind, kind> what) {
+            return ray->look(what);
+        }
+        HWY_INLINE void try_hit() { ray->try_hit(); }
+        HWY_INLINE void keep_hit() { ray->keep_hit(); }
         template <TurnKind kind>
         HWY_INLINE bool step(std::integral_constant<TurnKind, kind> what) {
             if (ray->step(what)) return true;

@@ -29,7 +29,7 @@ class StandingRayD : SceneRayD<any ? Wanted::any : Wanted::closest> {
     using Walk = SceneRayD<wanted>;
     using Leaves = TriangleLeavesD<wanted>;
     // Through the parts too, whose leaves it does not visit.
-    using One = SingleRay<wanted, false, false, false, Leaves>;
+    using One = TurnRay<wanted, false, false, Leaves>;
 
 public:
     /// `scene` and `ray`, which must be valid, stay where they are; `stack` has room for
@@ -38,7 +38,7 @@ public:
                  const WideStackView& stack)
         : Walk(ray, place, mask, stack), scene_(scene), line_(ray), parts_stack_(stack) {
         const std::size_t taken = wide_stack_capacity(scene.parts.arrays.stats.max_depth);
-        this->stack_ = {stack.words + taken, stack.entries + taken};
+        this->stack_ = stack.from(taken);
     }
 
     using Walk::best;
@@ -70,10 +70,13 @@ public:
             ask_for_all(scene_.placed[part() - scene_.own_part_count()]);
     }
     template <TurnKind kind>
-    HWY_INLINE void look(std::integral_constant<TurnKind, kind>) {
+    HWY_INLINE bool look(std::integral_constant<TurnKind, kind>) {
         if constexpr (kind == TurnKind::node) now_->look_at_node();
-        if constexpr (kind == TurnKind::leaf) now_->look_at_leaf();
+        if constexpr (kind == TurnKind::leaf) return now_->look_at_leaf();
+        return false;
     }
+    HWY_INLINE void try_hit() { now_->try_hit(); }
+    HWY_INLINE void keep_hit() { now_->keep_hit(); }
     HWY_INLINE bool step(std::integral_constant<TurnKind, TurnKind::node>) {
         return now_->step_node() || leave();
     }
@@ -165,7 +168,7 @@ public:
         const WideStackView stack = job_.stack.view();
         for (std::size_t k = 0; k < turns.size(); ++k) {
             turns[k].all = this;
-            turns[k].stack = {stack.words + k * size, stack.entries + k * size};
+            turns[k].stack = stack.from(k * size);
         }
         take_turns(turns);
     }
@@ -180,6 +183,12 @@ private:
         static constexpr bool has_parts = true;
         [[nodiscard]] TurnKind kind() const { return ray->kind(); }
         HWY_INLINE void ask() const { ray->ask(); }
+        template <TurnKind kind>
+        HWY_INLINE bool look(std::integral_constant<TurnKind, kind> what) {
+            return ray->look(what);
+        }
+        HWY_INLINE void try_hit() { ray->try_hit(); }
+        HWY_INLINE void keep_hit() { ray->keep_hit(); }
         template <TurnKind kind>
         HWY_INLINE bool step(std::integral_constant<TurnKind, kind> what) {
             if (ray->step(what)) return true;

@@ -40,14 +40,6 @@ HWY_INLINE std::uint32_t used_slots(const WideNode& node) {
     return used;
 }
 
-/// [how many lanes have a meaning]: the first two, if both have.
-alignas(32) inline constexpr std::uint32_t first_two[9][8] = {
-    {}, {}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}, {~0u, ~0u}};
-
-/// The sign bits of every second lane.
-alignas(32) inline constexpr std::uint32_t odd_signs[8] = {0, 1u << 31, 0, 1u << 31,
-                                                           0, 1u << 31, 0, 1u << 31};
-
 /// `leaf` if `word` is one, else `node`; without a jump, which could not be foreseen.
 HWY_INLINE std::uintptr_t by_kind_of(std::uint32_t word, std::uintptr_t node, std::uintptr_t leaf) {
     static_assert(wide_leaf_bit == 1u << 31);
@@ -60,32 +52,43 @@ HWY_INLINE std::uintptr_t by_kind_of(std::uint32_t word, std::uintptr_t node, st
 #endif
 }
 
-/// Asks for the cache lines of a child, node or leaf, that will be visited soon. Without branches:
-/// which of both it is cannot be foreseen.
 template <bool compact>
-RAYDIX_PREFETCHING void ask_for(const WideView& tree, std::uint32_t word) {
-    using Node = std::conditional_t<compact, CompactNode, WideNode>;
-    using Block = std::conditional_t<compact, CompactBlock, TriangleBlock>;
-    constexpr std::size_t line = 64, node_lines = (sizeof(Node) + line - 1) / line,
-                          block_lines = (sizeof(Block) + line - 1) / line;
-    const bool leaf = (word & wide_leaf_bit) != 0;
-    const char *nodes, *blocks;
-    if constexpr (compact) {
-        nodes = reinterpret_cast<const char*>(tree.compact_nodes);
-        blocks = reinterpret_cast<const char*>(tree.compact_blocks);
-    } else {
-        nodes = reinterpret_cast<const char*>(tree.nodes);
-        blocks = reinterpret_cast<const char*>(tree.blocks);
-    }
+using NodeOf = std::conditional_t<compact, CompactNode, WideNode>;
+template <bool compact>
+using BlockOf = std::conditional_t<compact, CompactBlock, TriangleBlock>;
+
+/// Where a child, node or leaf, lies. Without branches: which of both it is cannot be foreseen.
+template <bool compact>
+HWY_INLINE std::uintptr_t place_of(std::uintptr_t nodes, std::uintptr_t blocks,
+                                   std::uint32_t word) {
     const std::size_t block = ((word & ~wide_leaf_bit) >> 3) / block_lanes;
-    const auto at_node = reinterpret_cast<std::uintptr_t>(nodes + std::size_t{word} * sizeof(Node)),
-               at_block = reinterpret_cast<std::uintptr_t>(blocks + block * sizeof(Block));
-    const auto* const place = reinterpret_cast<const char*>(by_kind_of(word, at_node, at_block));
+    return by_kind_of(word, nodes + std::size_t{word} * sizeof(NodeOf<compact>),
+                      blocks + block * sizeof(BlockOf<compact>));
+}
+
+/// Asks for the cache lines of the child `word` at `at`, which will be visited soon.
+template <bool compact>
+RAYDIX_PREFETCHING void ask_at(std::uintptr_t at, std::uint32_t word) {
+    constexpr std::size_t line = 64, node_lines = (sizeof(NodeOf<compact>) + line - 1) / line,
+                          block_lines = (sizeof(BlockOf<compact>) + line - 1) / line;
+    const bool leaf = (word & wide_leaf_bit) != 0;
+    const auto* const place = reinterpret_cast<const char*>(at);
     constexpr std::size_t least = std::min(node_lines, block_lines);
     for (std::size_t k = 0; k < least; ++k) hwy::Prefetch(place + k * line);
     // The rest of the larger kind; the first line once more for the other.
     for (std::size_t k = least; k < std::max(node_lines, block_lines); ++k)
         hwy::Prefetch(place + (leaf == (block_lines > least) ? k * line : 0));
+}
+
+template <bool compact>
+RAYDIX_PREFETCHING void ask_for(const WideView& tree, std::uint32_t word) {
+    const auto address = [](const void* p) { return reinterpret_cast<std::uintptr_t>(p); };
+    if constexpr (compact)
+        ask_at<compact>(place_of<compact>(address(tree.compact_nodes),
+                                          address(tree.compact_blocks), word),
+                        word);
+    else
+        ask_at<compact>(place_of<compact>(address(tree.nodes), address(tree.blocks), word), word);
 }
 
 /// For each of eight children a set of up to 64 rays.

@@ -57,4 +57,15 @@ inline constexpr auto plane_places = [] {
     return table;
 }();
 
+/// [RayClass::negatives], a byte each: where the near and the far plane of x are, then of y and z.
+inline constexpr auto packed_plane_places = [] {
+    std::array<std::uint64_t, 8> table{};
+    for (std::uint32_t negatives = 0; negatives < 8; ++negatives)
+        for (std::uint32_t axis = 0; axis < 3; ++axis)
+            table[negatives] |= std::uint64_t{plane_places[negatives].near[axis] |
+                                              plane_places[negatives].far[axis] << 8}
+                                << 16 * axis;
+    return table;
+}();
+
 }  // namespace raydix

@@ -71,56 +71,9 @@ public:
         return best_;
     }
 
-    /// For rays that take turns: from the root on; false if there is nothing to do.
-    HWY_INLINE bool begin(float tmax) {
-        best_ = {tmax};
-        word_ = 0;
-        top_ = 0;
-        return frame_.tmin <= tmax;
-    }
-    /// The first half of a visit of the node that is next: its children that the ray meets go
-    /// behind the stack's top. Without branches.
-    HWY_INLINE void look_at_node() {
-        pushed_ = push_evenly(tree_.template node<compact>(word_));
-    }
-    /// The second half; whether there is another node or leaf. Few branches: those of rays in turn
-    /// cannot be foreseen.
-    HWY_INLINE bool step_node() {
-        std::size_t top = top_;
-        order_pushed(pushed_, top);
-        const bool on = pop(top, word_);
-        top_ = top;
-        return on;
-    }
-    /// The first half of a visit of the leaf that is next: which triangles may be hit.
-    HWY_INLINE void look_at_leaf() {
-        if constexpr (std::is_same_v<Parts, NoParts>) {
-            const auto [place, count] = leaf_of(word_);
-            if constexpr (counting) counts_.tests += count;
-            open_ = candidates_of(tree_.template block<compact>(place), lanes_of(place, count));
-        }
-    }
-    /// The second half; whether there is another node or leaf.
-    HWY_INLINE bool step_leaf() {
-        if constexpr (!std::is_same_v<Parts, NoParts>) {
-            if (test_leaf(word_)) return false;
-        } else if (!open_.none() &&
-                   finish(tree_.template block<compact>(leaf_of(word_).place), open_)) {
-            return false;
-        }
-        return pop(top_, word_);
-    }
-    /// The next one: what a step visits.
-    [[nodiscard]] std::uint32_t next() const { return word_; }
-    HWY_INLINE void ask_for_next() const { ask_for<compact>(tree_, word_); }
     [[nodiscard]] const WideBest& best() const { return best_; }
-    /// Leaves the leaf that is next behind; the ray goes as far as `reach` from now on.
-    HWY_INLINE bool skip(float reach) {
-        best_.t = reach;
-        return pop(top_, word_);
-    }
 
-private:
+protected:
     using V = hn::Vec<F8>;
     struct Rates;
 
@@ -286,65 +239,6 @@ private:
         return s;
     }
 
-    /// All children that the ray meets go behind the stack's top, for closest hits with the nearer
-    /// one of the first two second; how many.
-    template <class Node>
-    HWY_INLINE std::uint32_t push_evenly(const Node& node) {
-        constexpr bool closest = wants_closest(wanted);
-        if constexpr (counting) ++counts_.visits;
-        const Rates about = plain_rates();
-        const auto& rates = rates_of(node, about);
-        std::uint32_t* const words = stack_.words + top_;
-        float* const at = stack_.entries + top_;
-        std::uint32_t count = 0;
-        for (std::size_t l = 0; l < 8; l += lanes8) {
-            V entry, exit;
-            test_boxes(node, rates, l, entry, exit);
-            auto mask = hn::Le(entry, exit);
-            std::uint32_t here = bits_of(f8, mask);
-            if (always_careful || frame_.careful) {
-                here &= used_slots(node) >> l;
-                mask = mask_of(f8, here);
-            }
-            V word = compress(f8, hn::BitCast(f8, hn::Load(U8(), node.child + l)), mask, here);
-            const auto more = static_cast<std::uint32_t>(std::popcount(here));
-            if constexpr (closest) {
-                entry = compress(f8, entry, mask, here);
-                if constexpr (parts8 == 1) farther_first(more, entry, word);
-                hn::StoreU(entry, f8, at + count);
-            }
-            hn::StoreU(word, f8, reinterpret_cast<float*>(words + count));
-            count += more;
-        }
-        return count;
-    }
-    /// The `count` children behind the stack's top become part of it; the one to visit first is
-    /// the last.
-    HWY_INLINE void order_pushed(std::uint32_t count, std::size_t& top) {
-        if constexpr (wants_closest(wanted))
-            for (std::size_t k = parts8 == 1 ? 2 : 1; k < count; ++k)
-                insert(k, stack_.words + top, stack_.entries + top);
-        top += count;
-    }
-    /// The first two of `count` by entry; the first of equals is the nearer one.
-    static HWY_INLINE void farther_first(std::size_t count, V& entry, V& word) {
-        const V other = hn::Shuffle2301(entry);
-        const V turned = hn::BitCast(f8, hn::Load(U8(), odd_signs));  // -a <= -b: b <= a
-        const auto two = hn::MaskFromVec(hn::BitCast(f8, hn::Load(U8(), first_two[count])));
-        const auto swap = hn::And(two, hn::Le(hn::Xor(entry, turned), hn::Xor(other, turned)));
-        word = hn::IfThenElse(swap, hn::Shuffle2301(word), word);
-        entry = hn::IfThenElse(swap, other, entry);
-    }
-    /// Child k to its place among those before it, which are in their order.
-    static HWY_INLINE void insert(std::size_t k, std::uint32_t* words, float* at) {
-        const float entry = at[k];
-        const std::uint32_t word = words[k];
-        if (entry < at[k - 1]) return;
-        at[k] = at[k - 1], words[k] = words[k - 1];
-        for (--k; k > 0 && at[k - 1] < entry; --k) at[k] = at[k - 1], words[k] = words[k - 1];
-        at[k] = entry, words[k] = word;
-    }
-
     /// Two children or more, in the order of their slots.
     HWY_INLINE void push_by_area(const std::uint32_t* child, std::uint32_t met, std::size_t& top,
                                  std::uint32_t& word) {
@@ -441,20 +335,38 @@ private:
         [[nodiscard]] bool none() const { return (open | certain) == 0; }
     };
 
+    /// A block as the ray sees it, and the three edge functions of each triangle.
+    struct Seen {
+        Sheared<F4> a, b, c;
+        V4 u, v, w;
+
+        /// Of the lanes in `tested` those that the ray may go through.
+        [[nodiscard]] HWY_INLINE std::uint32_t crossed(std::uint32_t tested) const {
+            const V4 least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
+            return tested & ~bits_astride(least, largest);
+        }
+        [[nodiscard]] HWY_INLINE std::uint32_t clear() const {
+            return bits_of(f4, without_zero(f4, u, v, w));
+        }
+    };
+    HWY_INLINE Seen seen(const TriangleBlock& block) const {
+        const Sheared<F4> a = shear(block, 0), b = shear(block, 1), c = shear(block, 2);
+        return {a, b, c, edge(c, b), edge(a, c), edge(b, a)};
+    }
+
     /// What floats leave open of intersect_triangle for the lanes in `tested`.
     HWY_INLINE Candidates candidates_of(const TriangleBlock& block, std::uint32_t tested) const {
-        const Sheared<F4> a = shear(block, 0), b = shear(block, 1), c = shear(block, 2);
-        const V4 u = edge(c, b), v = edge(a, c), w = edge(b, a);
-        const V4 least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
-        const std::uint32_t open = tested & ~bits_astride(least, largest);
+        const Seen here = seen(block);
+        const std::uint32_t open = here.crossed(tested);
         if (open == 0) return {};
-        const std::uint32_t clear = bits_of(f4, without_zero(f4, u, v, w));
+        const std::uint32_t clear = here.clear();
         if constexpr (wanted == Wanted::any) {
             const auto kz = static_cast<int>(frame_.kind.kz);
             const Limits<F4> limits{hn::Set(f4, frame_.tmin), hn::Set(f4, best_.t),
                                     hn::Set(f4, frame_.direction[kz]),
                                     std::fabs(frame_.near_pad[kz]), frame_.kind.negative(kz)};
-            const AnyHit hit = any_hit(f4, limits, a, b, c, u, v, w, open, clear);
+            const AnyHit hit = any_hit(f4, limits, here.a, here.b, here.c, here.u, here.v, here.w,
+                                       open, clear);
             return {hit.open, clear, hit.certain};
         }
         return {open, clear, 0};
@@ -501,12 +413,6 @@ private:
     BudgetVector<Hit>* all_ = nullptr;
     const HitCheck* check_ = nullptr;
     const Ray* given_ = nullptr;  // to the check
-    std::uint32_t word_ = 0;
-    std::size_t top_ = 0;
-    // Between the halves of a visit: how many children lie behind the stack's top, or what of the
-    // leaf may be hit.
-    std::uint32_t pushed_ = 0;
-    Candidates open_;
 };
 
 /// Whether the ray is probably like the next one: so many of the last have been like each other.

@@ -10,12 +10,12 @@
 #include <hwy/highway.h>
 
 #include <array>
+#include <bit>
 #include <optional>
 #include <type_traits>
-#include <utility>
 
-#include "trace/simd/single.h"
 #include "trace/simd/single_frames.h"
+#include "trace/simd/turn_ray.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
@@ -24,66 +24,71 @@ namespace raydix::HWY_NAMESPACE {
 enum class TurnKind { node, leaf, part };
 
 /// Rays that wait for their turn, each kind apart: jumps that depend on it could not be foreseen.
-template <class Turn, std::size_t n>
-class TurnLists {
+/// All in one register.
+class TurnSets {
 public:
-    HWY_INLINE void add(Turn* turn) {
-        turn->ask();
-        const TurnKind kind = turn->kind();
-        // Every list takes the ray, and one of them keeps it.
-        nodes_[at_nodes_] = turn;
-        leaves_[at_leaves_] = turn;
-        at_nodes_ += static_cast<std::size_t>(kind == TurnKind::node);
-        at_leaves_ += static_cast<std::size_t>(kind == TurnKind::leaf);
-        if constexpr (Turn::has_parts) {
-            parts_[at_parts_] = turn;
-            at_parts_ += static_cast<std::size_t>(kind == TurnKind::part);
-        }
+    static constexpr unsigned room = 21;  // rays of a kind
+
+    [[nodiscard]] bool empty() const { return bits_ == 0; }
+    HWY_INLINE void add(TurnKind kind, unsigned k) {
+        bits_ |= std::uint64_t{1} << (static_cast<unsigned>(kind) * room + k);
     }
-    [[nodiscard]] bool empty() const { return at_nodes_ + at_leaves_ + at_parts_ == 0; }
-    HWY_INLINE void step_nodes() {
-        step_all(nodes_, at_nodes_, std::integral_constant<TurnKind, TurnKind::node>());
-    }
-    HWY_INLINE void step_leaves() {
-        step_all(leaves_, at_leaves_, std::integral_constant<TurnKind, TurnKind::leaf>());
-    }
-    HWY_INLINE void step_parts() {
-        step_all(parts_, at_parts_, std::integral_constant<TurnKind, TurnKind::part>());
+    /// Bit k: ray k was there, and is not any more.
+    HWY_INLINE std::uint64_t take(TurnKind kind) {
+        const unsigned from = static_cast<unsigned>(kind) * room;
+        const std::uint64_t all = ((std::uint64_t{1} << room) - 1) << from, taken = bits_ & all;
+        bits_ &= ~all;
+        return taken >> from;
     }
 
 private:
-    using List = std::array<Turn*, n>;
-    template <class Kind>
-    HWY_INLINE void step_all(const List& list, std::size_t& at, Kind kind) {
-        const std::size_t count = std::exchange(at, 0);
-        // Both halves of all turns apart: a jump in the second one that was guessed wrong is found
-        // out at once, since nothing has to be waited for.
-        for (std::size_t k = 0; k < count; ++k) list[k]->look(kind);
-        for (std::size_t k = 0; k < count; ++k) {
-            Turn* const turn = list[k];
-            if (turn->step(kind) || turn->start()) add(turn);
-        }
-    }
-
-    List nodes_, leaves_, parts_;
-    std::size_t at_nodes_ = 0, at_leaves_ = 0, at_parts_ = 0;
+    std::uint64_t bits_ = 0;
 };
+
+/// Visits what all rays of the set `going` stand at. First the first halves of all visits, then the
+/// second ones: a jump that was guessed wrong is found out at once there, since all it depends on
+/// has been there for a while.
+template <class Turn, class Kind>
+HWY_INLINE void step_all(Turn* turns, std::uint64_t going, Kind kind, TurnSets& next) {
+    std::uint64_t hits = 0;
+    for (std::uint64_t left = going; left != 0; left &= left - 1) {
+        const int k = std::countr_zero(left);
+        hits |= std::uint64_t{turns[k].look(kind)} << k;
+    }
+    for (std::uint64_t left = hits; left != 0; left &= left - 1)
+        turns[std::countr_zero(left)].try_hit();
+    for (std::uint64_t left = hits; left != 0; left &= left - 1)
+        turns[std::countr_zero(left)].keep_hit();
+    for (std::uint64_t left = going; left != 0; left &= left - 1) {
+        const auto k = static_cast<unsigned>(std::countr_zero(left));
+        Turn& turn = turns[k];
+        if (!turn.step(kind) && !turn.start()) continue;
+        turn.ask();
+        next.add(turn.kind(), k);
+    }
+}
 
 /// Rays that take turns. Turn has:
 ///   bool start()                  the next ray; whether there was one
 ///   TurnKind kind()               what is next
-///   void look(constant of kind)   does the first half of it
+///   bool look(constant of kind)   does the first half of it; whether there is a hit to look at
+///   void try_hit(), keep_hit()    do so
 ///   bool step(constant of kind)   does the rest; whether the ray goes on
 ///   void ask()                    for the memory that it needs next
 template <class Turn, std::size_t n>
 HWY_INLINE void take_turns(std::array<Turn, n>& turns) {
-    TurnLists<Turn, n> lists;
-    for (Turn& turn : turns)
-        if (turn.start()) lists.add(&turn);
-    while (!lists.empty()) {
-        lists.step_nodes();
-        lists.step_leaves();
-        if constexpr (Turn::has_parts) lists.step_parts();
+    static_assert(n <= TurnSets::room);
+    TurnSets sets;
+    for (unsigned k = 0; k < n; ++k) {
+        if (!turns[k].start()) continue;
+        turns[k].ask();
+        sets.add(turns[k].kind(), k);
+    }
+    const auto step = [&](auto kind) { step_all(turns.data(), sets.take(kind), kind, sets); };
+    while (!sets.empty()) {
+        step(std::integral_constant<TurnKind, TurnKind::node>());
+        step(std::integral_constant<TurnKind, TurnKind::leaf>());
+        if constexpr (Turn::has_parts) step(std::integral_constant<TurnKind, TurnKind::part>());
     }
 }
 
@@ -103,8 +108,7 @@ public:
         std::array<Turn, rays_in_turn> turns;
         for (std::size_t k = 0; k < turns.size(); ++k) {
             turns[k].rays = this;
-            turns[k].stack = {job_.stack.words + k * job_.stack_size,
-                              job_.stack.entries + k * job_.stack_size};
+            turns[k].stack = job_.stack.from(k * job_.stack_size);
         }
         const std::size_t before = all ? job_.all->size() : 0;
         take_turns(turns);
@@ -112,7 +116,7 @@ public:
     }
 
 private:
-    using One = SingleRay<query, counting, compact>;
+    using One = TurnRay<query, counting, compact>;
     struct Turn {
         RayTurns* rays;
         WideStackView stack;
@@ -124,9 +128,13 @@ private:
         [[nodiscard]] TurnKind kind() const { return static_cast<TurnKind>(ray->next() >> 31); }
         HWY_INLINE void ask() const { ray->ask_for_next(); }
         template <TurnKind kind>
-        HWY_INLINE void look(std::integral_constant<TurnKind, kind>) {
-            kind == TurnKind::node ? ray->look_at_node() : ray->look_at_leaf();
+        HWY_INLINE bool look(std::integral_constant<TurnKind, kind>) {
+            if constexpr (kind == TurnKind::leaf) return ray->look_at_leaf();
+            ray->look_at_node();
+            return false;
         }
+        HWY_INLINE void try_hit() { ray->try_hit(); }
+        HWY_INLINE void keep_hit() { ray->keep_hit(); }
         template <TurnKind kind>
         HWY_INLINE bool step(std::integral_constant<TurnKind, kind>) {
             const bool on = kind == TurnKind::node ? ray->step_node() : ray->step_leaf();

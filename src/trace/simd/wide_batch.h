@@ -45,17 +45,17 @@ public:
     void reserve(std::uint32_t max_depth) { reserve_words(wide_stack_capacity(max_depth)); }
     void reserve_words(std::size_t n) {
         if (n <= words_.size()) return;
-        words_.resize(n), entries_.resize(n), active_.resize(n);
+        words_.resize(n), entries_.resize(n), pairs_.resize(n);
     }
-    [[nodiscard]] WideStackView view() { return {words_.data(), entries_.data()}; }
+    [[nodiscard]] WideStackView view() { return {words_.data(), entries_.data(), pairs_.data()}; }
     [[nodiscard]] PacketStackView packet_view() {
-        return {words_.data(), entries_.data(), active_.data()};
+        return {words_.data(), entries_.data(), pairs_.data()};
     }
 
 private:
     std::vector<std::uint32_t> words_;
     std::vector<float> entries_;
-    std::vector<std::uint64_t> active_;
+    std::vector<std::uint64_t> pairs_;  // or sets of active rays
 };
 
 /// Kernels write what one tree knows of a hit: the rest, where all of it is one geometry.

@@ -4,6 +4,7 @@
 #include <raydix/trace.h>
 #include <raydix/types.h>
 
+#include <bit>
 #include <cstdint>
 #include <cstring>
 
@@ -99,10 +100,17 @@ inline WideView view_of(const WideBvh::Arrays& arrays, TriangleBlock* room = nul
             arrays.frame.middle};
 }
 
-/// Children still to visit: words of WideNode::child and where the ray enters them.
+/// Children still to visit: words of WideNode::child and where the ray enters them. Rays in turn
+/// keep both in `pairs`, the word in the lower half; null where there are none.
 struct WideStackView {
     std::uint32_t* words;
     float* entries;
+    std::uint64_t* pairs = nullptr;
+
+    /// The part that begins `at` places behind this one.
+    [[nodiscard]] WideStackView from(std::size_t at) const {
+        return {words + at, entries + at, pairs + at};
+    }
 };
 
 /// As above, for packets: entries are those of the nearest ray, bit k of `active` is ray k.
@@ -166,6 +174,21 @@ struct WideBest {
     /// At equal t the lower primitive wins, whatever order the leaves come in.
     void take(float new_t, std::uint32_t new_prim, float new_u, float new_v) {
         if (new_t < t || (new_t == t && new_prim < prim)) *this = {new_t, new_prim, new_u, new_v};
+    }
+    /// The same without a jump, for hits that may not count.
+    void take_if(bool counts, float new_t, std::uint32_t new_prim, float new_u, float new_v) {
+        const bool better = counts & ((new_t < t) | ((new_t == t) & (new_prim < prim)));
+#if defined(__SSE2__)
+        const __m128i taken = _mm_set1_epi32(-static_cast<int>(better));
+        const __m128i found =
+            _mm_castps_si128(_mm_setr_ps(new_t, std::bit_cast<float>(new_prim), new_u, new_v));
+        auto* const all = reinterpret_cast<__m128i*>(this);
+        const __m128i old = _mm_loadu_si128(all);
+        _mm_storeu_si128(all,
+                         _mm_or_si128(_mm_and_si128(taken, found), _mm_andnot_si128(taken, old)));
+#else
+        if (better) *this = {new_t, new_prim, new_u, new_v};
+#endif
     }
 };
 
