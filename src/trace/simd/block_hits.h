@@ -56,8 +56,9 @@ struct Limits {
 struct AnyHit {
     std::uint32_t open, certain;  // certain: of the clear ones, those that surely hit
 };
-/// `clear`: lanes none of whose edge functions u, v, w is 0 or NaN.
-template <class D>
+/// `clear`: lanes none of whose edge functions u, v, w is 0 or NaN. `early`: with a jump where the
+/// depths of corners decide all.
+template <bool early = true, class D>
 HWY_INLINE AnyHit any_hit(D d, const Limits<D>& ray, const Sheared<D>& a, const Sheared<D>& b,
                           const Sheared<D>& c, hn::Vec<D> u, hn::Vec<D> v, hn::Vec<D> w,
                           std::uint32_t candidates, std::uint32_t clear) {
@@ -70,7 +71,7 @@ HWY_INLINE AnyHit any_hit(D d, const Limits<D>& ray, const Sheared<D>& a, const 
     // As slabs do for boxes, along one axis.
     candidates &=
         ~bits_of(d, hn::Or(hn::Gt(least, hn::Add(last, pad)), hn::Lt(most, hn::Sub(first, pad))));
-    if (candidates == 0) return {0, 0};
+    if (early && candidates == 0) return {0, 0};
     // (depth of the hit - least) * area is within `error` of `above`.
     const auto weighed = [&](V e, V z) { return hn::Mul(e, hn::Sub(z, least)); };
     const auto beside = [](const Sheared<D>& p) { return hn::Max(hn::Abs(p.x), hn::Abs(p.y)); };

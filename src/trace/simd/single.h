@@ -52,7 +52,7 @@ public:
           counts_(counts),
           parts_(parts),
           place_(place),
-          at_(plane_places[frame.kind.negatives]) {}
+          at_(&plane_places[frame.kind.negatives]) {}
 
     /// Where all hits go, in no order; the ray's place in the job stands for their instance.
     void collect(BudgetVector<Hit>& hits) { all_ = &hits; }
@@ -136,7 +136,7 @@ protected:
         entry = hn::Set(f8, frame_.tmin);
         exit = hn::Set(f8, best_.t);
         for (int axis = 0; axis < 3; ++axis) {
-            const V near = planes(boxes + at_.near[axis]), far = planes(boxes + at_.far[axis]);
+            const V near = planes(boxes + at_->near[axis]), far = planes(boxes + at_->far[axis]);
             entry = hn::Max(hn::MulAdd(near, rates.rate[axis], rates.near[axis]), entry);
             exit = hn::Min(hn::MulAdd(far, rates.rate[axis], rates.far[axis]), exit);
         }
@@ -335,41 +335,37 @@ protected:
         [[nodiscard]] bool none() const { return (open | certain) == 0; }
     };
 
-    /// A block as the ray sees it, and the three edge functions of each triangle.
-    struct Seen {
-        Sheared<F4> a, b, c;
-        V4 u, v, w;
-
-        /// Of the lanes in `tested` those that the ray may go through.
-        [[nodiscard]] HWY_INLINE std::uint32_t crossed(std::uint32_t tested) const {
-            const V4 least = hn::Min(hn::Min(u, v), w), largest = hn::Max(hn::Max(u, v), w);
-            return tested & ~bits_astride(least, largest);
-        }
-        [[nodiscard]] HWY_INLINE std::uint32_t clear() const {
-            return bits_of(f4, without_zero(f4, u, v, w));
-        }
-    };
-    HWY_INLINE Seen seen(const TriangleBlock& block) const {
+    /// Calls with(a, b, c, u, v, w): the corners of a block as the ray sees them, and the three edge
+    /// functions of each triangle.
+    template <class With>
+    HWY_INLINE auto see(const TriangleBlock& block, const With& with) const {
         const Sheared<F4> a = shear(block, 0), b = shear(block, 1), c = shear(block, 2);
-        return {a, b, c, edge(c, b), edge(a, c), edge(b, a)};
+        return with(a, b, c, edge(c, b), edge(a, c), edge(b, a));
+    }
+    /// Of the lanes in `tested` those that the ray may go through.
+    static HWY_INLINE std::uint32_t crossed(std::uint32_t tested, V4 u, V4 v, V4 w) {
+        return tested & ~bits_astride(hn::Min(hn::Min(u, v), w), hn::Max(hn::Max(u, v), w));
     }
 
-    /// What floats leave open of intersect_triangle for the lanes in `tested`.
+    /// What floats leave open of intersect_triangle for the lanes in `tested`. `early`: with jumps
+    /// where none is left.
+    template <bool early = true>
     HWY_INLINE Candidates candidates_of(const TriangleBlock& block, std::uint32_t tested) const {
-        const Seen here = seen(block);
-        const std::uint32_t open = here.crossed(tested);
-        if (open == 0) return {};
-        const std::uint32_t clear = here.clear();
-        if constexpr (wanted == Wanted::any) {
-            const auto kz = static_cast<int>(frame_.kind.kz);
-            const Limits<F4> limits{hn::Set(f4, frame_.tmin), hn::Set(f4, best_.t),
-                                    hn::Set(f4, frame_.direction[kz]),
-                                    std::fabs(frame_.near_pad[kz]), frame_.kind.negative(kz)};
-            const AnyHit hit = any_hit(f4, limits, here.a, here.b, here.c, here.u, here.v, here.w,
-                                       open, clear);
-            return {hit.open, clear, hit.certain};
-        }
-        return {open, clear, 0};
+        return see(block, [&](const auto& a, const auto& b, const auto& c, V4 u, V4 v,
+                              V4 w) -> Candidates {
+            const std::uint32_t open = crossed(tested, u, v, w);
+            if (early && open == 0) return {};
+            const std::uint32_t clear = bits_of(f4, without_zero(f4, u, v, w));
+            if constexpr (wanted == Wanted::any) {
+                const auto kz = static_cast<int>(frame_.kind.kz);
+                const Limits<F4> limits{hn::Set(f4, frame_.tmin), hn::Set(f4, best_.t),
+                                        hn::Set(f4, frame_.direction[kz]),
+                                        std::fabs(frame_.near_pad[kz]), frame_.kind.negative(kz)};
+                const AnyHit hit = any_hit<early>(f4, limits, a, b, c, u, v, w, open, clear);
+                return {hit.open, clear, hit.certain};
+            }
+            return {open, clear, 0};
+        });
     }
 
     /// The rest of intersect_triangle: the same bits. True: stop.
@@ -407,8 +403,8 @@ protected:
     const WideStackView stack_;
     SimdCounts& counts_;
     Parts* const parts_;
-    const std::uint32_t place_;
-    const PlanePlaces& at_;
+    std::uint32_t place_;
+    const PlanePlaces* at_;
     WideBest best_{};
     BudgetVector<Hit>* all_ = nullptr;
     const HitCheck* check_ = nullptr;

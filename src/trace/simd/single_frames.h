@@ -81,7 +81,7 @@ public:
     HWY_INLINE bool take(std::size_t k, SingleFrame& out) const {
         const auto code = static_cast<std::uint32_t>(codes_[k]);
         if (code == odd_ray_class) return false;
-        out = frames_[k];
+        copy(frames_[k], out);
         out.kind = ray_classes[code];
         out.t_scale = 1.0f;
         out.careful = (careful_ >> k & 1) != 0;
@@ -91,6 +91,14 @@ public:
 private:
     HWY_INLINE void store(const V16 (&from)[4], float (SingleFrame::*to)[4]) {
         store_quads(from, [&](std::size_t l) { return frames_[l].*to; });
+    }
+
+    /// What store wrote, in the same fours: other loads would have to wait for it.
+    static HWY_INLINE void copy(const SingleFrame& from, SingleFrame& to) {
+        constexpr std::size_t floats = offsetof(SingleFrame, kind) / sizeof(float);
+        const float* const in = from.origin;
+        float* const out = to.origin;
+        for (std::size_t f = 0; f < floats; f += 4) hn::Store(hn::Load(f4, in + f), f4, out + f);
     }
 
     const WideView& tree_;

@@ -108,7 +108,9 @@ public:
         std::array<Turn, rays_in_turn> turns;
         for (std::size_t k = 0; k < turns.size(); ++k) {
             turns[k].rays = this;
-            turns[k].stack = job_.stack.from(k * job_.stack_size);
+            turns[k].ray.emplace(job_.tree, turns[k].frame, job_.stack.from(k * job_.stack_size),
+                                 counts_);
+            if constexpr (all) turns[k].ray->collect(*job_.all);
         }
         const std::size_t before = all ? job_.all->size() : 0;
         take_turns(turns);
@@ -119,7 +121,6 @@ private:
     using One = TurnRay<query, counting, compact>;
     struct Turn {
         RayTurns* rays;
-        WideStackView stack;
         SingleFrame frame;
         std::optional<One> ray;
         std::size_t i;  // of the ray in the job
@@ -151,9 +152,7 @@ private:
             turn.i = static_cast<std::size_t>(index_[k]);
             if (frames_.take(k, turn.frame) ||
                 fill_frame(job_.tree, job_.rays[turn.i], turn.frame)) {
-                turn.ray.emplace(job_.tree, turn.frame, turn.stack, counts_, nullptr,
-                                 static_cast<std::uint32_t>(turn.i));
-                if constexpr (all) turn.ray->collect(*job_.all);
+                turn.ray->be(static_cast<std::uint32_t>(turn.i));
                 if constexpr (wants_accepted(query))
                     turn.ray->check_by(*job_.check, job_.rays + turn.i);
                 if ((!job_.passing || meets_bounds(turn.frame)) && turn.ray->begin(turn.frame.tmax))
