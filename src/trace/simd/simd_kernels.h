@@ -15,7 +15,7 @@ namespace raydix {
 
 inline constexpr std::size_t max_job_rays = 16384;
 /// So many rays that go alone take turns.
-inline constexpr std::size_t rays_in_turn = 16;
+inline constexpr std::size_t rays_in_turn = 20;
 
 struct SimdCounts {
     std::uint64_t hits = 0, invalid = 0, visits = 0, tests = 0;
