@@ -122,7 +122,7 @@ public:
             return;
         }
         const std::uint32_t others = open_.open & (open_.open - 1);
-        if (!is_sure_ || (open_.open & open_.clear) != (open_.open ^ others) ) {
+        if (!is_sure_ || others != 0 || (open_.open & open_.clear) == 0) {
             this->finish(block(), open_);
             return;
         }
