@@ -212,7 +212,12 @@ private:
             // Not -0, whose bits are large.
             const auto bits = hn::Add(hn::BitCast(I8(), hn::Abs(entry)), hn::Set(I8(), 1));
             entry = compress(f8, hn::BitCast(f8, bits), mask, met);
-            if constexpr (parts8 == 1) farther_first(entry, word);
+            if constexpr (parts8 == 1) {
+                // Only AVX-512 leaves zeros behind them.
+                if constexpr (HWY_TARGET != HWY_AVX3)
+                    entry = hn::IfThenElseZero(hn::FirstN(f8, count), entry);
+                farther_first(entry, word);
+            }
         }
         auto* const to = reinterpret_cast<float*>(top_ + pushed_);
         const V first = hn::InterleaveLower(f8, word, entry),
