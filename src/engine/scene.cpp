@@ -85,8 +85,8 @@ bool keeps_triangles(const Geometry& geometry, const AnyMeshView& mesh) {
 /// All threads touch the memory for the first time, which takes longer than copying.
 template <class T>
 void copy_to(Buffer<T>& copy, std::span<const T> from) {
+    const LargePages large;
     copy.reset(from.size());
-    prefer_large_pages(copy);
     for_each_range(from.size(), elements_a_range, [&](std::size_t begin, std::size_t end) {
         std::copy(from.data() + begin, from.data() + end, copy.data() + begin);
     });

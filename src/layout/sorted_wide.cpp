@@ -111,6 +111,7 @@ private:
         for_each_index(
             threads,
             [&](std::size_t thread) {
+                const LargePages large;  // of the other threads too
                 try {
                     for (std::size_t g = next++; g < groups_.size(); g = next++) {
                         const Group& group = groups_[g];
@@ -205,7 +206,6 @@ std::span<std::byte> memory_for_sorting(std::size_t triangles, std::size_t bytes
     const std::size_t blocks = std::max(
         guessed_blocks(triangles), (bytes + sizeof(TriangleBlock) - 1) / sizeof(TriangleBlock));
     out.blocks.reset(blocks);
-    prefer_large_pages(out.blocks);
     return std::as_writable_bytes(out.blocks.span());
 }
 
