@@ -23,7 +23,8 @@ MemoryCount& memory_count() {
 std::shared_ptr<void> allocate_bytes(std::size_t bytes) {
     if (bytes == 0) return nullptr;
     if (bytes > SIZE_MAX - cache_line) throw std::bad_alloc();
-    const bool large = bytes >= large_page / 2 && bytes <= SIZE_MAX / 2 && LargePages::wanted();
+    const bool large =
+        bytes >= large_page / 2 && bytes <= LargePages::most_bytes && LargePages::wanted();
     const std::size_t unit = large ? large_page : cache_line;
     void* memory = std::aligned_alloc(unit, (bytes + unit - 1) / unit * unit);
     if (!memory) throw std::bad_alloc();

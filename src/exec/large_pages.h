@@ -20,11 +20,15 @@ void prefer_large_pages(Buffer<T>& buffer) {
     prefer_large_pages(buffer.data(), buffer.capacity_bytes());
 }
 
-/// While one lives, arrays that its thread allocates, of half a large page and more, begin at one
-/// and ask for all those that are at least half theirs: the first touch of memory then takes a
+/// While one lives, arrays that its thread allocates, of half a large page to most_bytes, begin at
+/// one and ask for all those that are at least half theirs: the first touch of memory then takes a
 /// tenth of the page faults.
 class LargePages {
 public:
+    /// A virtual machine may have no memory behind large pages that were not used lately: much at
+    /// once can cost more than it saves.
+    static constexpr std::size_t most_bytes = 8 * large_page;
+
     LargePages();
     ~LargePages();
     LargePages(const LargePages&) = delete;

@@ -206,6 +206,7 @@ std::span<std::byte> memory_for_sorting(std::size_t triangles, std::size_t bytes
     const std::size_t blocks = std::max(
         guessed_blocks(triangles), (bytes + sizeof(TriangleBlock) - 1) / sizeof(TriangleBlock));
     out.blocks.reset(blocks);
+    prefer_large_pages(out.blocks);
     return std::as_writable_bytes(out.blocks.span());
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/math.h"
+#include "exec/large_pages.h"
 #include "exec/parallel.h"
 #include "exec/progress.h"
 #include "layout/wide_part_writer.h"
@@ -125,6 +126,7 @@ private:
                     vertex = numbers[vertex];
                 }
         out.vertices.reset(used.size());
+        prefer_large_pages(out.vertices);
         for_each_index(used.size(),
                        [&](std::size_t k) { out.vertices[k] = view_.vertex(used[k]); });
     }

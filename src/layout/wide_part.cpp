@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "exec/large_pages.h"
 #include "exec/parallel.h"
 
 namespace raydix {
@@ -115,6 +116,10 @@ void PartPlacer::make_room(Bases room) {
     out_.blocks.reset(compact_ ? 0 : room.block);
     out_.compact_nodes.reset(compact_ ? room.node : 0);
     out_.compact_blocks.reset(compact_ ? room.block : 0);
+    prefer_large_pages(out_.nodes);
+    prefer_large_pages(out_.blocks);
+    prefer_large_pages(out_.compact_nodes);
+    prefer_large_pages(out_.compact_blocks);
     // A tree that is built again may have more.
     room_ = compact_ ? Bases{room_for(out_.compact_nodes), room_for(out_.compact_blocks)}
                      : Bases{room_for(out_.nodes), room_for(out_.blocks)};
