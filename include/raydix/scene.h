@@ -29,8 +29,8 @@ struct BasicSceneTraceOptions;
 /// How much a scene changes after its first commit. Hits do not depend on it.
 enum class Usage : std::uint32_t {
     fixed = 0,  // little. Meshes share trees; a change of one builds their tree again
-    /// Much. Each mesh has a tree; a commit refits or builds those that changed. From the first
-    /// refit of a mesh on, memory of one more tree and one more copy of its vertices is kept.
+    /// Much. Each mesh has a tree; a commit refits or builds those that changed. With both, from a
+    /// mesh's second tree on, memory of one more, of its vertices and of its builds is kept.
     moving = 1,
 };
 

@@ -7,6 +7,7 @@
 #include "base/float_env.h"
 #include "base/options.h"
 #include "build/bvh_builder_internals.h"
+#include "exec/large_pages.h"
 #include "exec/parallel.h"
 #include "exec/progress.h"
 #include "layout/cluster_view.h"
@@ -51,6 +52,7 @@ WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
                          (bvh.kind() == PrimitiveKind::points ? "points" : "boxes"));
     const FloatEnvironment environment;
     with_threads(options.threads, [&] {
+        const LargePages large;
         Stopwatch watch;
         WideScratch scratch;
         make_wide_layout(bvh, collapse, *arrays_, scratch);
@@ -77,6 +79,7 @@ WideBvhBuilder& WideBvhBuilder::operator=(WideBvhBuilder&&) noexcept = default;
 void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, WideBvh& tree,
                            const WideBvhOptions& wide) {
     const FloatEnvironment environment;
+    const LargePages large;
     Stopwatch watch;
     const WideOptions collapse = collapse_options(wide);
     if (mesh.triangles.empty() && !mesh.vertices.empty())

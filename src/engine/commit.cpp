@@ -1,5 +1,6 @@
 #include "engine/commit.h"
 
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "engine/shape_commit.h"
 #include "engine/shape_tree.h"
 #include "exec/parallel.h"
+#include "exec/recycler.h"
 #include "layout/wide_refit.h"
 
 namespace raydix {
@@ -21,22 +23,32 @@ constexpr double wild_error = 0x1p-12;
 
 /// Trees of triangles in float (mesh_commit.h).
 struct WideMaker {
-    static void build(const MeshView& mesh, const SceneOptions& options, MeshTree& out) {
-        WideBvh built = build_by_quality(
+    Recycler<WideBvhBuilder> builders;  // copies share what is kept
+
+    /// A second build of the same meshes tells that more may come: from then on memory is kept.
+    void build(const MeshView& mesh, const SceneOptions& options, const MeshTree* last,
+               MeshTree& out) {
+        if (last != nullptr) out.memory = last->memory;
+        std::unique_ptr<WideBvh> built = build_by_quality(
             options, mesh.triangles.size(),
             [&](const BuildOptions& build) {
-                return build_wide_bvh(mesh, build, {.compact = options.compact});
+                std::unique_ptr<WideBvh> tree = taken_or_new(out.memory);
+                std::unique_ptr<WideBvhBuilder> builder = taken_or_new(builders);
+                builder->build(mesh, build, *tree, {.compact = options.compact});
+                if (last != nullptr) builders.give(std::move(builder));
+                return tree;
             },
-            [](const WideBvh& tree) { return tree.stats().sah; });
-        out.sah_at_build = built.stats().sah;
+            [](const auto& tree) { return tree->stats().sah; });
+        out.sah_at_build = built->stats().sah;
         out.refitter = nullptr;  // a refit that was tried had other links
-        finish(std::make_shared<const WideBvh>(std::move(built)), out);
+        finish(out.memory.share(std::move(built)), out);
     }
     static std::uint64_t left_out(const MeshTree& made) { return made.tree->stats().left_out; }
     static void keep(const MeshTree& old, MeshTree& out) {
         out.set_tree(old.tree);
         out.refitter = old.refitter;
         out.flats = old.flats;
+        out.memory = old.memory;
     }
     static void share_rates(const MeshTree& old, MeshTree& out) {
         if (out.tree == old.tree) return;  // others may be reading it
@@ -44,6 +56,7 @@ struct WideMaker {
     }
     static std::optional<double> refit(const MeshTree& old, const MeshView& mesh,
                                        const SceneOptions&, MeshTree& out) {
+        out.memory = old.memory;
         out.refitter = old.refitter != nullptr ? old.refitter : WideRefitter::of(*old.tree);
         if (out.refitter == nullptr) return {};
         std::shared_ptr<const WideBvh> tree = out.refitter->refit(*old.tree, mesh);
@@ -54,6 +67,11 @@ struct WideMaker {
     }
 
 private:
+    template <class T>
+    static std::unique_ptr<T> taken_or_new(Recycler<T>& kept) {
+        std::unique_ptr<T> taken = kept.take();
+        return taken != nullptr ? std::move(taken) : std::make_unique<T>();
+    }
     static void finish(std::shared_ptr<const WideBvh> tree, MeshTree& out) {
         out.set_tree(std::move(tree));
     }
@@ -75,7 +93,8 @@ public:
         for (const auto& [id, geometry] : own_)
             if (geometry->is_mesh())
                 tree_->mesh_names.push_back({id, geometry->mask, geometry->mesh, geometry->own});
-        MeshCommit<float, WideMaker> meshes(state_, own_, options_, report_);
+        if (state_.tree != nullptr) tree_->builders = state_.tree->builders;
+        MeshCommit<float, WideMaker> meshes(state_, own_, options_, report_, {tree_->builders});
         ShapeCommit<float> shapes(state_, own_, options_, report_);
         const double other_work = shapes.work() + parts_of_instances();
         tree_->meshes = meshes.run(other_work);

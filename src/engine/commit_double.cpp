@@ -17,7 +17,8 @@ namespace {
 
 /// Trees of triangles in double (mesh_commit.h).
 struct WideMakerD {
-    static void build(const MeshViewD& mesh, const SceneOptions& options, MeshTreeD& out) {
+    static void build(const MeshViewD& mesh, const SceneOptions& options, const MeshTreeD*,
+                      MeshTreeD& out) {
         out.tree = build_by_quality(
             options, mesh.triangles.size(),
             [&](const BuildOptions& build) { return build_wide_tree(mesh, build); },

@@ -24,7 +24,8 @@
 namespace raydix {
 
 /// Maker says how trees of triangles come about, MeshTree and MeshView being those of the type:
-///   build(mesh, options, out)         a new one: tree and sah_at_build, 0 if it is not known
+///   build(mesh, options, last, out)   a new one: tree and sah_at_build, 0 if it is not known;
+///                                     `last`: the tree of the same meshes so far, or null
 ///   left_out(out)                     how many of its triangles are invalid
 ///   keep(old, out)                    the same tree
 ///   share_rates(old, out)             which ways rays go is known from the old tree on
@@ -39,8 +40,8 @@ public:
     using MeshTree = typename SceneKind<Scalar>::MeshTree;
 
     MeshCommit(const State& state, const OwnGeometries<Scalar>& own, const SceneOptions& options,
-               CommitReport& report)
-        : state_(state), own_(own), options_(options), report_(report) {
+               CommitReport& report, Maker maker = {})
+        : state_(state), own_(own), options_(options), report_(report), maker_(std::move(maker)) {
         if (state.tree == nullptr || options.quality != state.tree->quality ||
             options.compact != state.tree->compact)
             return;
@@ -134,13 +135,13 @@ private:
                 const MeshView& mesh = mesh_of(group.ids.front());
                 out->first = {0};
                 out->triangles = mesh.triangles.size();
-                Maker::build(mesh, options_, *out);
+                maker_.build(mesh, options_, last_of(group), *out);
             } else {
                 std::vector<MeshView> meshes;
                 for (const std::uint32_t id : group.ids) meshes.push_back(mesh_of(id));
                 const Mesh mesh = merged<Mesh, MeshView>(meshes, out->first);
                 out->triangles = mesh.triangles.size();
-                Maker::build(mesh, options_, *out);
+                maker_.build(mesh, options_, last_of(group), *out);
             }
             ++report_.trees_built;
         }
@@ -183,6 +184,7 @@ private:
     const OwnGeometries<Scalar>& own_;
     const SceneOptions& options_;
     CommitReport& report_;
+    Maker maker_;
     std::unordered_map<std::uint32_t, const MeshTree*> last_;  // by their first mesh
     double done_ = 0;
 };

@@ -18,6 +18,7 @@
 #include "base/options.h"
 #include "engine/commit.h"
 #include "engine/scene_state.h"
+#include "exec/large_pages.h"
 #include "exec/parallel.h"
 
 namespace raydix {
@@ -36,6 +37,7 @@ const char* what_is(const Geometry& geometry) {
 }
 
 constexpr std::size_t triangles_a_range = 65536;
+constexpr std::size_t elements_a_range = 32768;
 
 /// Whether all indices are below `count`.
 bool are_below(std::span<const Triangle> triangles, std::size_t count) {
@@ -77,18 +79,25 @@ void check_mesh(const std::string& name, const AnyMeshView& mesh) {
 /// Whether these are the triangles that the geometry has a copy of.
 template <class Geometry, class AnyMeshView>
 bool keeps_triangles(const Geometry& geometry, const AnyMeshView& mesh) {
-    return geometry.arrays && are_equal(*geometry.arrays->triangles, mesh.triangles);
+    return geometry.arrays && are_equal(geometry.arrays->triangles->view(), mesh.triangles);
+}
+
+/// All threads touch the memory for the first time, which takes longer than copying.
+template <class T>
+void copy_to(Buffer<T>& copy, std::span<const T> from) {
+    const LargePages large;
+    copy.reset(from.size());
+    for_each_range(from.size(), elements_a_range, [&](std::size_t begin, std::size_t end) {
+        std::copy(from.data() + begin, from.data() + end, copy.data() + begin);
+    });
 }
 
 /// In memory of vertices that nobody holds any more, where there is some.
 template <class Arrays, class Point>
 auto copy_of_vertices(Arrays& arrays, std::span<const Point> from) {
     auto copy = arrays.memory.take();
-    if (copy == nullptr) copy = std::make_unique<std::vector<Point>>();
-    copy->resize(from.size());
-    for_each_range(from.size(), triangles_a_range, [&](std::size_t begin, std::size_t end) {
-        std::copy(from.data() + begin, from.data() + end, copy->data() + begin);
-    });
+    if (copy == nullptr) copy = std::make_unique<Buffer<Point>>();
+    copy_to(*copy, from);
     return arrays.memory.share(std::move(copy));
 }
 
@@ -101,14 +110,16 @@ void set_mesh(Geometry& geometry, const AnyMeshView& mesh, bool shared, bool sam
     } else {
         using Arrays = typename decltype(geometry.arrays)::value_type;
         Arrays arrays = geometry.arrays ? *geometry.arrays : Arrays{};
-        if (!same_triangles)
-            arrays.triangles = std::make_shared<const std::vector<Triangle>>(mesh.triangles.begin(),
-                                                                             mesh.triangles.end());
+        if (!same_triangles) {
+            const auto triangles = std::make_shared<Buffer<Triangle>>();
+            copy_to(*triangles, mesh.triangles);
+            arrays.triangles = triangles;
+        }
         arrays.vertices = copy_of_vertices(arrays, mesh.vertices);
         geometry.own = std::make_shared<
             const std::pair<decltype(arrays.triangles), decltype(arrays.vertices)>>(
             arrays.triangles, arrays.vertices);
-        geometry.mesh = {*arrays.vertices, *arrays.triangles};
+        geometry.mesh = {arrays.vertices->view(), arrays.triangles->view()};
         geometry.arrays = std::move(arrays);
     }
     geometry.shared = shared;

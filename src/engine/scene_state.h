@@ -1,6 +1,7 @@
 // The inside of a scene: what was added, and what the last commit made of it.
 #pragma once
 
+#include <raydix/buffer.h>
 #include <raydix/scene.h>
 
 #include <map>
@@ -8,7 +9,6 @@
 #include <optional>
 #include <set>
 #include <utility>
-#include <vector>
 
 #include "engine/scene_tree.h"
 #include "engine/scene_tree_double.h"
@@ -45,9 +45,9 @@ struct SceneKind<double> {
 template <class Scalar>
 struct OwnMesh {
     using Point = BasicVec3<Scalar>;
-    std::shared_ptr<const std::vector<Triangle>> triangles;
-    std::shared_ptr<const std::vector<Point>> vertices;
-    Recycler<std::vector<Point>> memory;  // of vertices
+    std::shared_ptr<const Buffer<Triangle>> triangles;
+    std::shared_ptr<const Buffer<Point>> vertices;
+    Recycler<Buffer<Point>> memory;  // of vertices
 };
 
 template <class Scalar>

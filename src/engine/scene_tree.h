@@ -18,6 +18,7 @@
 #include "engine/mesh_name.h"
 #include "engine/support.h"
 #include "exec/path_rates.h"
+#include "exec/recycler.h"
 #include "layout/wide_bvh.h"
 #include "trace/simd/wide_ray.h"
 
@@ -41,6 +42,7 @@ struct MeshTree : GroupedMeshes {
     std::size_t stack_size = 0;              // of the deepest path; 0: no ray hits anything
     std::shared_ptr<WideRefitter> refitter;  // null before the first refit
     std::shared_ptr<KeptFlatTriangles> flats = std::make_shared<KeptFlatTriangles>();
+    Recycler<WideBvh> memory;  // of trees that were built for the same meshes
 
     void set_tree(std::shared_ptr<const WideBvh> to) {
         tree = std::move(to);
@@ -130,6 +132,8 @@ struct SceneTree {
         return support_known;
     }
     mutable PathRates rates;  // of batches so far
+    /// What trees of meshes were built in, once a mesh's tree was built again.
+    Recycler<WideBvhBuilder> builders;
     mutable std::once_flag support_asked;
     mutable Support support_known;
     /// What queries of distance need besides, made when the first of them asks (near_scene_of).

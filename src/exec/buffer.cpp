@@ -1,10 +1,11 @@
-// Memory of the library's arrays: aligned and counted. Huge pages are not asked for: on a virtual
-// machine their first touch cost more than they gave back (docs/performance/building.md).
+// Memory of the library's arrays: aligned and counted. Large pages are asked for where somebody
+// wants them (docs/performance/building.md).
 #include <raydix/buffer.h>
 
 #include <cstdlib>
 #include <new>
 
+#include "exec/large_pages.h"
 #include "exec/memory.h"
 
 namespace raydix {
@@ -22,9 +23,12 @@ MemoryCount& memory_count() {
 std::shared_ptr<void> allocate_bytes(std::size_t bytes) {
     if (bytes == 0) return nullptr;
     if (bytes > SIZE_MAX - cache_line) throw std::bad_alloc();
-    const std::size_t rounded = (bytes + cache_line - 1) / cache_line * cache_line;
-    void* memory = std::aligned_alloc(cache_line, rounded);
+    const bool large =
+        bytes >= large_page / 2 && bytes <= LargePages::most_bytes && LargePages::wanted();
+    const std::size_t unit = large ? large_page : cache_line;
+    void* memory = std::aligned_alloc(unit, (bytes + unit - 1) / unit * unit);
     if (!memory) throw std::bad_alloc();
+    if (large) prefer_large_pages(memory, (bytes + large_page / 2) / large_page * large_page);
     try {
         std::shared_ptr<void> owner(memory, [bytes](void* p) {
             memory_count().give_back(bytes);

@@ -105,19 +105,28 @@ inline bool deposits_bits_fast() {
     return fast;
 }
 
-/// The bits of every third place, from the highest code bit down, by one instruction an axis.
-template <class Source, class Key>
-[[gnu::target("bmi2,sse4.1")]] void encode_valid_range_bmi2(const Source& source,
-                                                            const HostGrid& grid, std::size_t begin,
-                                                            std::size_t end, Key* out) {
+/// encode_range with the bits of every third place, from the highest code bit down, by one
+/// instruction an axis.
+template <bool all_valid, class Source, class Key>
+[[gnu::target("bmi2,sse4.1")]] void encode_range_bmi2(const Source& source, const HostGrid& grid,
+                                                      std::size_t begin, std::size_t end,
+                                                      Key* out) {
     constexpr auto third = static_cast<std::uint64_t>(0x1249249249249249);  // places of z
     for (std::size_t i = begin; i < end; ++i) {
-        const __m128i cell = grid.cell(valid_box(source, static_cast<std::uint32_t>(i)));
+        const auto k = static_cast<std::uint32_t>(i);
+        Box3 box;
+        bool valid = true;
+        if constexpr (all_valid)
+            box = valid_box(source, k);
+        else
+            valid = host_box(source, k, box);
+        const __m128i cell = grid.cell(box);
         const auto xy = static_cast<std::uint64_t>(_mm_cvtsi128_si64(cell));
         const auto z = static_cast<std::uint32_t>(_mm_extract_epi32(cell, 2));
         // The 21 lowest places are taken, so the upper half of xy does not get into x.
-        *out++ = static_cast<Key>(_pdep_u64(xy, third << 2) | _pdep_u64(xy >> 32, third << 1) |
-                                  _pdep_u64(z, third));
+        const auto code = static_cast<Key>(_pdep_u64(xy, third << 2) |
+                                           _pdep_u64(xy >> 32, third << 1) | _pdep_u64(z, third));
+        *out++ = valid ? code : left_out_key<Key>;
     }
 }
 
@@ -128,8 +137,9 @@ template <class Source, class Key>
 void host_encode_range(const Source& source, const HostGrid& grid, bool all_valid,
                        std::size_t begin, std::size_t end, Key* out) {
 #if defined(__x86_64__)
-    if (all_valid && deposits_bits_fast())
-        return encode_valid_range_bmi2(source, grid, begin, end, out);
+    if (deposits_bits_fast())
+        return all_valid ? encode_range_bmi2<true>(source, grid, begin, end, out)
+                         : encode_range_bmi2<false>(source, grid, begin, end, out);
 #endif
     if (all_valid)
         encode_range<true>(source, grid, begin, end, out);

@@ -9,6 +9,7 @@
 #include "base/float3.h"
 #include "layout/about_middle.h"
 #include "layout/leaf_order.h"
+#include "layout/node_slots.h"
 #include "layout/sorted_part.h"
 
 #undef HWY_TARGET_INCLUDE

@@ -48,8 +48,7 @@ public:
 private:
     using Entry = PartEntry<width>;
     static constexpr std::size_t most_open = 1 + 63 + 32;  // the prefixes that wait all differ
-    struct alignas(32) Order : std::array<std::uint32_t, quantised_width> {
-    };  // [slot]: which child
+    using Order = SlotOrder;
     /// In the place of a child that there is none of.
     static constexpr Entry no_entry{{infinity, infinity, infinity},
                                     wide_no_child,
@@ -199,77 +198,13 @@ private:
     Order write_slots(const std::array<std::uint32_t, width>& chosen, std::uint32_t count,
                       WideNode& node) const {
         static_assert(offsetof(Entry, plan) == sizeof(__m256));
-        std::array<__m256, 8> rows;
+        EightRows rows;
         for (std::uint32_t s = 0; s < 8; ++s) {
             const bool there = s < width && s < count;
             const Entry* const entry = there ? &entries_[chosen[s]] : &no_entry;
             rows[s] = _mm256_load_ps(reinterpret_cast<const float*>(entry));
         }
-        transpose(rows);
-        const __m256 area = rows[7];
-        const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-        __m256i rank = _mm256_setzero_si256();
-        for (int other = 0; other < 8; ++other) {
-            const __m256i which = _mm256_set1_epi32(other);
-            const __m256 its = _mm256_permutevar8x32_ps(area, which);
-            const __m256 equal =
-                _mm256_and_ps(_mm256_cmp_ps(its, area, _CMP_EQ_OQ),
-                              _mm256_castsi256_ps(_mm256_cmpgt_epi32(lane, which)));
-            const __m256 before = _mm256_or_ps(_mm256_cmp_ps(its, area, _CMP_LT_OQ), equal);
-            rank = _mm256_sub_epi32(rank, _mm256_castps_si256(before));
-        }
-        __m256i from = _mm256_setzero_si256();  // [slot]: the child whose rank it is
-        for (int child = 0; child < 8; ++child) {
-            const __m256i which = _mm256_set1_epi32(child);
-            const __m256i here = _mm256_cmpeq_epi32(_mm256_permutevar8x32_epi32(rank, which), lane);
-            from = _mm256_or_si256(from, _mm256_and_si256(here, which));
-        }
-        const float middle[3] = {in_.middle.x, in_.middle.y, in_.middle.z};
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            const __m256 about = _mm256_set1_ps(middle[axis]);
-            const __m256 lo = _mm256_permutevar8x32_ps(rows[axis], from),
-                         hi = _mm256_permutevar8x32_ps(rows[4 + axis], from);
-            _mm256_store_ps(node.lo[axis], below(lo, about));
-            _mm256_store_ps(node.hi[axis], _mm256_xor_ps(below(about, hi), _mm256_set1_ps(-0.0f)));
-        }
-        _mm256_store_ps(reinterpret_cast<float*>(node.child),
-                        _mm256_permutevar8x32_ps(rows[3], from));
-        Order order;
-        _mm256_store_si256(reinterpret_cast<__m256i*>(order.data()), from);
-        return order;
-    }
-
-    /// difference_below.
-    static __m256 below(__m256 a, __m256 b) {
-        const __m256 rounded = _mm256_sub_ps(a, b), of_b = _mm256_sub_ps(rounded, a);
-        const __m256 error =
-            _mm256_sub_ps(_mm256_sub_ps(a, _mm256_sub_ps(rounded, of_b)), _mm256_add_ps(b, of_b));
-        const __m256i bits = _mm256_castps_si256(rounded);
-        // 1 for negative ones, else -1.
-        const __m256i step =
-            _mm256_or_si256(_mm256_srli_epi32(bits, 31),
-                            _mm256_xor_si256(_mm256_srai_epi32(bits, 31), _mm256_set1_epi32(-1)));
-        const __m256i less =
-            _mm256_castps_si256(_mm256_cmp_ps(error, _mm256_setzero_ps(), _CMP_LT_OQ));
-        return _mm256_castsi256_ps(_mm256_add_epi32(bits, _mm256_and_si256(step, less)));
-    }
-
-    static void transpose(std::array<__m256, 8>& r) {
-        std::array<__m256, 8> pairs, quads;
-        for (std::size_t k = 0; k < 8; k += 2) {
-            pairs[k] = _mm256_unpacklo_ps(r[k], r[k + 1]);
-            pairs[k + 1] = _mm256_unpackhi_ps(r[k], r[k + 1]);
-        }
-        for (std::size_t k = 0; k < 8; k += 4) {
-            quads[k] = _mm256_shuffle_ps(pairs[k], pairs[k + 2], 0x44);
-            quads[k + 1] = _mm256_shuffle_ps(pairs[k], pairs[k + 2], 0xEE);
-            quads[k + 2] = _mm256_shuffle_ps(pairs[k + 1], pairs[k + 3], 0x44);
-            quads[k + 3] = _mm256_shuffle_ps(pairs[k + 1], pairs[k + 3], 0xEE);
-        }
-        for (std::size_t k = 0; k < 4; ++k) {
-            r[k] = _mm256_permute2f128_ps(quads[k], quads[k + 4], 0x20);
-            r[k + 4] = _mm256_permute2f128_ps(quads[k], quads[k + 4], 0x31);
-        }
+        return write_slots_within_avx2(rows, in_.middle, node);
     }
 #else
     Order write_slots(const std::array<std::uint32_t, width>& chosen, std::uint32_t count,

@@ -111,6 +111,7 @@ private:
         for_each_index(
             threads,
             [&](std::size_t thread) {
+                const LargePages large;  // of the other threads too
                 try {
                     for (std::size_t g = next++; g < groups_.size(); g = next++) {
                         const Group& group = groups_[g];

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "base/math.h"
 #include "layout/about_middle.h"
 #include "layout/collapse_plan.h"
+#include "layout/node_slots.h"
 #include "layout/wide_bvh.h"
 #include "layout/wide_part.h"
 
@@ -48,26 +50,17 @@ public:
                    const Wait& wait) {
         out_.sums.levels = std::max(out_.sums.levels, depth + 1);
         Aabb all = empty_box();
-        for (const WideChild& child : children) {
-            all = unite(all, child.box);
-            add_figures(child);
+        std::array<float, quantised_width> areas;
+        for (std::size_t k = 0; k < children.size(); ++k) {
+            const double area = half_area(children[k].box);
+            areas[k] = static_cast<float>(area);
+            all = unite(all, children[k].box);
+            add_figures(children[k], area);
         }
-        const auto order = by_area(children);
-        SlotBoxes by_slot;
-        for (std::uint32_t slot = 0; slot < children.size(); ++slot) {
-            const WideChild& child = children[order[slot]];
-            by_slot.set(static_cast<int>(slot), child.box);
-            set_child(w, slot, child.word);
-            if (child.word == WideChild::inner_word) wait(child.source, slot);
-        }
-        if (!compact_) {
-            set_boxes_about(middle_, by_slot, out_.nodes[w]);
-        } else if (!children.empty()) {
-            CompactNode& node = out_.compact_nodes[w];
-            node.used = static_cast<std::uint8_t>(by_slot.used);
-            set_boxes(node, quantise(by_slot, all));
-            out_.sums.decoded_area += decoded_area(node);
-        }
+        const SlotOrder order = write_slots(w, children, areas, all);
+        for (std::uint32_t slot = 0; slot < children.size(); ++slot)
+            if (children[order[slot]].word == WideChild::inner_word)
+                wait(children[order[slot]].source, slot);
         if (!children.empty()) out_.sums.node_area += half_area(all);
     }
 
@@ -123,19 +116,61 @@ public:
     void write_triangles() { compact_ ? list_corners() : copy_triangles(); }
 
 private:
+    /// Boxes and words of the children, in the order that is returned.
+    SlotOrder write_slots(std::uint32_t w, std::span<const WideChild> children,
+                          const std::array<float, quantised_width>& areas, const Aabb& all) {
+#if defined(RAYDIX_X86_INTRINSICS)
+        if (with_avx2_ && !compact_)
+            return write_slots_avx2(children, areas, middle_, out_.nodes[w]);
+#endif
+        const SlotOrder order = by_area(children.size(), areas);
+        SlotBoxes by_slot;
+        for (std::uint32_t slot = 0; slot < children.size(); ++slot) {
+            const WideChild& child = children[order[slot]];
+            by_slot.set(static_cast<int>(slot), child.box);
+            set_child(w, slot, child.word);
+        }
+        if (!compact_) {
+            set_boxes_about(middle_, by_slot, out_.nodes[w]);
+        } else if (!children.empty()) {
+            CompactNode& node = out_.compact_nodes[w];
+            node.used = static_cast<std::uint8_t>(by_slot.used);
+            set_boxes(node, quantise(by_slot, all));
+            out_.sums.decoded_area += decoded_area(node);
+        }
+        return order;
+    }
+
+#if defined(RAYDIX_X86_INTRINSICS)
+    __attribute__((target("avx2"))) static SlotOrder write_slots_avx2(
+        std::span<const WideChild> children, const std::array<float, quantised_width>& areas,
+        Vec3 middle, WideNode& node) {
+        EightRows rows;
+        for (std::size_t k = 0; k < 8; ++k) {
+            if (k >= children.size()) {
+                rows[k] = _mm256_setr_ps(infinity, infinity, infinity,
+                                         std::bit_cast<float>(wide_no_child), -infinity, -infinity,
+                                         -infinity, infinity);
+                continue;
+            }
+            const WideChild& child = children[k];
+            const __m128 lo_hi = _mm_loadu_ps(&child.box.lo.x),  // lo.x, lo.y, lo.z, hi.x
+                hi = _mm_setr_ps(child.box.hi.x, child.box.hi.y, child.box.hi.z, areas[k]);
+            const __m128i lo =
+                _mm_insert_epi32(_mm_castps_si128(lo_hi), static_cast<int>(child.word), 3);
+            rows[k] = _mm256_set_m128(hi, _mm_castsi128_ps(lo));
+        }
+        return write_slots_within_avx2(rows, middle, node);
+    }
+#endif
+
     /// The children's places, the smallest box first: rays that stop at any hit take the last slot
     /// first, where a hit is likeliest. Equal areas keep their order.
-    static std::array<std::uint32_t, quantised_width> by_area(std::span<const WideChild> children) {
-        std::array<std::uint32_t, quantised_width> order;
-        std::array<float, quantised_width> areas;
-        for (std::uint32_t k = 0; k < children.size(); ++k) {
-            const auto area = static_cast<float>(half_area(children[k].box));
+    static SlotOrder by_area(std::size_t count, const std::array<float, quantised_width>& areas) {
+        SlotOrder order{};
+        for (std::uint32_t k = 0; k < count; ++k) {
             std::uint32_t at = k;
-            for (; at > 0 && areas[at - 1] > area; --at) {
-                areas[at] = areas[at - 1];
-                order[at] = order[at - 1];
-            }
-            areas[at] = area;
+            for (; at > 0 && areas[order[at - 1]] > areas[k]; --at) order[at] = order[at - 1];
             order[at] = k;
         }
         return order;
@@ -176,8 +211,7 @@ private:
         }
     }
 
-    void add_figures(const WideChild& child) {
-        const double area = half_area(child.box);
+    void add_figures(const WideChild& child, double area) {
         ++out_.sums.children;
         out_.sums.child_area += area;
         if ((child.word & wide_leaf_bit) == 0) return;
@@ -205,6 +239,9 @@ private:
     const View& view_;
     bool compact_;
     Vec3 middle_;
+#if defined(RAYDIX_X86_INTRINSICS)
+    const bool with_avx2_ = __builtin_cpu_supports("avx2");
+#endif
     WidePart& out_;
     std::vector<Waiting> waiting_;
     std::vector<Copy> copies_;

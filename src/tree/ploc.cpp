@@ -7,6 +7,7 @@
 #include "exec/parallel.h"
 #include "exec/progress.h"
 #include "tree/nearest_cluster.h"
+#include "tree/survivors.h"
 
 namespace raydix {
 
@@ -125,55 +126,28 @@ private:
     /// takes the left place.
     void merge_partners(const From& from, ClusterList& next) {
         const ProgressCounter progress(count_, 0.5, 1);
-        for_each_block(count_, partner_block,
-                       [&](std::size_t b, std::size_t begin, std::size_t end) {
-                           const Survivors block = find_survivors(static_cast<std::uint32_t>(begin),
-                                                                  static_cast<std::uint32_t>(end));
-                           const std::uint32_t node_base = scratch_.block_sums[b];
-                           // A pair vanishes from the list at its right place: one that reaches
-                           // into this block is still due.
-                           const std::uint32_t at =
-                               static_cast<std::uint32_t>(begin) - node_base + crossing(begin);
-                           copy_survivors(from, block, next, at);
-                           merge_pairs(from, block, next, {nodes_ + node_base, at});
-                           progress.add(static_cast<double>(end - begin));
-                       });
+        for_each_block(
+            count_, partner_block, [&](std::size_t b, std::size_t begin, std::size_t end) {
+                const std::uint32_t node_base = scratch_.block_sums[b];
+                // A pair vanishes from the list at its right place: one that reaches
+                // into this block is still due.
+                const std::uint32_t at =
+                    static_cast<std::uint32_t>(begin) - node_base + crossing(begin);
+                Survivors block;
+                keep_survivors(scratch_.partners.data(), static_cast<std::uint32_t>(begin),
+                               static_cast<std::uint32_t>(end), copy_of(from, next, at), block);
+                merge_pairs(from, block, next, {nodes_ + node_base, at});
+                progress.add(static_cast<double>(end - begin));
+            });
     }
 
-    /// The places of a block that stay, and which of them merge, as positions in that list. Found
-    /// without a branch: nobody can guess which clusters merge.
-    struct Survivors {
-        std::array<std::uint32_t, partner_block + 1> places;
-        std::array<std::uint32_t, partner_block + 1> pairs;
-        std::uint32_t count = 0, pair_count = 0;
-    };
-    [[nodiscard]] Survivors find_survivors(std::uint32_t begin, std::uint32_t end) const {
-        const std::int8_t* partners = scratch_.partners.data();
-        Survivors s;
-        for (std::uint32_t i = begin; i < end; ++i) {
-            s.places[s.count] = i;
-            s.pairs[s.pair_count] = s.count;
-            s.pair_count += partners[i] > 0;
-            s.count += partners[i] >= 0;
-        }
-        return s;
-    }
-
-    static void copy_survivors(const From& from, const Survivors& block, ClusterList& next,
-                               std::uint32_t at) {
-        // All lanes at once: each is then one stream through memory, from block to block.
-        std::array<const float*, 6> lanes;
-        std::array<float*, 6> outs;
+    static ListCopy copy_of(const From& from, ClusterList& next, std::uint32_t at) {
+        ListCopy copy{{}, from.refs, {}, next.refs.data() + at};
         for (std::size_t c = 0; c < 6; ++c) {
-            lanes[c] = from.boxes.lane(c);
-            outs[c] = next.boxes.lane(c) + at;
+            copy.lanes[c] = from.boxes.lane(c);
+            copy.to_lanes[c] = next.boxes.lane(c) + at;
         }
-        ClusterRef* refs = next.refs.data() + at;
-        for (std::uint32_t k = 0; k < block.count; ++k) {
-            const std::uint32_t i = block.places[k];
-            for (std::size_t c = 0; c < 6; ++c) outs[c][k] = lanes[c][i];
-            refs[k] = ref_at(from, i);
-        }
+        return copy;
     }
 
     /// Where a block's nodes and its part of the next list begin.
@@ -210,7 +184,7 @@ private:
         const std::size_t first = begin > max_radius ? begin - max_radius : 0;
         std::uint32_t pairs = 0;
         for (std::size_t i = first; i < begin; ++i)
-            if (partners[i] > 0 && i + static_cast<std::size_t>(partners[i]) >= begin) ++pairs;
+            pairs += static_cast<int>(begin - i) <= partners[i];
         return pairs;
     }
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "engine/float_world.h"
+#include "exec/memory.h"
 #include "support/message.h"
 #include "support/support.h"
 
@@ -129,6 +130,45 @@ TEST(SceneChanges, MovingMeshesAreBuiltOnlyWhenTheyChange) {
     EXPECT_EQ(scene.commit(moving).trees_built, 1u);
     // Four meshes share a tree now; the one of another mask keeps its own.
     EXPECT_EQ(scene.commit({.usage = Usage::fixed}).trees_built, 1u);
+}
+
+TEST(SceneChanges, BuildsAgainInTheMemoryOfEarlierTrees) {
+    const auto hits_of = [](const Scene& scene, const std::vector<Ray>& rays) {
+        std::vector<Hit> hits(rays.size());
+        trace(scene, rays, hits);
+        std::vector<std::pair<float, std::uint32_t>> out;
+        for (const Hit& hit : hits) out.emplace_back(hit.t, hit.prim);
+        return out;
+    };
+    for (const Quality quality : {Quality::fast, Quality::balanced, Quality::high}) {
+        const SceneOptions options{.quality = quality};
+        RandomScenes random(static_cast<std::uint64_t>(quality));
+        const std::vector<Ray> rays = random_rays(random, 200);
+        Mesh mesh = random_soup(3000, 7, 0.3f);
+        Scene scene;
+        const std::uint32_t id = scene.add(mesh);
+        scene.commit(options);
+        Scene holder;  // goes on with the first tree
+        holder.add(scene, Transform{});
+        holder.commit(options);
+        const auto held = hits_of(holder, rays);
+        std::uint64_t bytes = 0;
+        for (int step = 0; step < 6; ++step) {
+            for (Vec3& v : mesh.vertices) v.x += 0.125f * v.y;
+            scene.update(id, mesh);
+            EXPECT_EQ(scene.commit(options).trees_built, 1u);
+            // The second tree takes new memory; later ones may have a few nodes more.
+            if (step > 1) {
+                EXPECT_LT(memory_count().now(), bytes + bytes / 10);
+            }
+            bytes = memory_count().now();
+            Scene fresh;
+            fresh.add(mesh);
+            fresh.commit(options);
+            EXPECT_EQ(hits_of(scene, rays), hits_of(fresh, rays)) << step;
+            EXPECT_EQ(hits_of(holder, rays), held) << step;
+        }
+    }
 }
 
 TEST(SceneChanges, RefusesWhatItCannotHold) {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <thread>
 
 namespace raydix {
 namespace {
@@ -26,6 +28,24 @@ TEST(LargePages, TakeRangesThatBeginAnywhere) {
     for (std::size_t i = 0; i < buffer.size(); i += 4093)
         ASSERT_EQ(buffer[i], static_cast<char>(i % 101));
     prefer_large_pages(nullptr, 0);
+}
+
+TEST(LargePages, AreWantedByTheThreadThatSaysSo) {
+    EXPECT_FALSE(LargePages::wanted());
+    {
+        const LargePages outer;
+        { const LargePages inner; }
+        EXPECT_TRUE(LargePages::wanted());
+        std::thread([] { EXPECT_FALSE(LargePages::wanted()); }).join();
+        for (const std::size_t bytes : {large_page / 2 - 1, large_page / 2, 3 * large_page + 5}) {
+            Buffer<char> buffer(bytes);
+            const auto place = reinterpret_cast<std::uintptr_t>(buffer.data());
+            EXPECT_EQ(place % (bytes < large_page / 2 ? 64 : large_page), 0) << bytes;
+            std::fill_n(buffer.data(), bytes, 'x');  // to the last byte
+            EXPECT_EQ(std::count(buffer.data(), buffer.data() + bytes, 'x'), bytes);
+        }
+    }
+    EXPECT_FALSE(LargePages::wanted());
 }
 
 }  // namespace
