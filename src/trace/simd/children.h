@@ -84,9 +84,9 @@ template <bool compact>
 RAYDIX_PREFETCHING void ask_for(const WideView& tree, std::uint32_t word) {
     const auto address = [](const void* p) { return reinterpret_cast<std::uintptr_t>(p); };
     if constexpr (compact)
-        ask_at<compact>(place_of<compact>(address(tree.compact_nodes),
-                                          address(tree.compact_blocks), word),
-                        word);
+        ask_at<compact>(
+            place_of<compact>(address(tree.compact_nodes), address(tree.compact_blocks), word),
+            word);
     else
         ask_at<compact>(place_of<compact>(address(tree.nodes), address(tree.blocks), word), word);
 }

@@ -335,8 +335,8 @@ protected:
         [[nodiscard]] bool none() const { return (open | certain) == 0; }
     };
 
-    /// Calls with(a, b, c, u, v, w): the corners of a block as the ray sees them, and the three edge
-    /// functions of each triangle.
+    /// Calls with(a, b, c, u, v, w): the corners of a block as the ray sees them, and the three
+    /// edge functions of each triangle.
     template <class With>
     HWY_INLINE auto see(const TriangleBlock& block, const With& with) const {
         const Sheared<F4> a = shear(block, 0), b = shear(block, 1), c = shear(block, 2);
@@ -351,21 +351,23 @@ protected:
     /// where none is left.
     template <bool early = true>
     HWY_INLINE Candidates candidates_of(const TriangleBlock& block, std::uint32_t tested) const {
-        return see(block, [&](const auto& a, const auto& b, const auto& c, V4 u, V4 v,
-                              V4 w) -> Candidates {
-            const std::uint32_t open = crossed(tested, u, v, w);
-            if (early && open == 0) return {};
-            const std::uint32_t clear = bits_of(f4, without_zero(f4, u, v, w));
-            if constexpr (wanted == Wanted::any) {
-                const auto kz = static_cast<int>(frame_.kind.kz);
-                const Limits<F4> limits{hn::Set(f4, frame_.tmin), hn::Set(f4, best_.t),
-                                        hn::Set(f4, frame_.direction[kz]),
-                                        std::fabs(frame_.near_pad[kz]), frame_.kind.negative(kz)};
-                const AnyHit hit = any_hit<early>(f4, limits, a, b, c, u, v, w, open, clear);
-                return {hit.open, clear, hit.certain};
-            }
-            return {open, clear, 0};
-        });
+        return see(
+            block,
+            [&](const auto& a, const auto& b, const auto& c, V4 u, V4 v, V4 w) -> Candidates {
+                const std::uint32_t open = crossed(tested, u, v, w);
+                if (early && open == 0) return {};
+                const std::uint32_t clear = bits_of(f4, without_zero(f4, u, v, w));
+                if constexpr (wanted == Wanted::any) {
+                    const auto kz = static_cast<int>(frame_.kind.kz);
+                    const Limits<F4> limits{hn::Set(f4, frame_.tmin), hn::Set(f4, best_.t),
+                                            hn::Set(f4, frame_.direction[kz]),
+                                            std::fabs(frame_.near_pad[kz]),
+                                            frame_.kind.negative(kz)};
+                    const AnyHit hit = any_hit<early>(f4, limits, a, b, c, u, v, w, open, clear);
+                    return {hit.open, clear, hit.certain};
+                }
+                return {open, clear, 0};
+            });
     }
 
     /// The rest of intersect_triangle: the same bits. True: stop.

@@ -31,8 +31,8 @@ public:
         for (int a = 0; a < 3; ++a) {
             origin[a] = hn::Add(ray.place[a], zero);  // -0 becomes +0
             const V16 limit = hn::Set(f16, wide_longest_inverse);
-            inverse[a] = hn::Max(hn::Min(hn::Div(hn::Set(f16, 1.0f), ray.way[a]), limit),
-                                 hn::Neg(limit));
+            inverse[a] =
+                hn::Max(hn::Min(hn::Div(hn::Set(f16, 1.0f), ray.way[a]), limit), hn::Neg(limit));
             reach[a] = hn::Max(hn::Abs(hn::Sub(hn::Set(f16, tree_.lo[a]), origin[a])),
                                hn::Abs(hn::Sub(hn::Set(f16, tree_.hi[a]), origin[a])));
         }
@@ -47,9 +47,9 @@ public:
         const V16 most = hn::Set(f16, std::numeric_limits<float>::max());
         auto plain = hn::Le(zero, zero);
         for (int a = 0; a < 3; ++a) {
-            const V16 pad = hn::Add(
-                hn::Mul(hn::Set(f16, wide_pad_factor * slab_pad), hn::Add(reach[a], depth)),
-                hn::Set(f16, least_slab_pad));
+            const V16 pad =
+                hn::Add(hn::Mul(hn::Set(f16, wide_pad_factor * slab_pad), hn::Add(reach[a], depth)),
+                        hn::Set(f16, least_slab_pad));
             near_pad[a] = hn::CopySignToAbs(pad, hn::Neg(ray.way[a]));
             const V16 from = hn::Sub(hn::Set(f16, tree_.middle[a]), origin[a]);
             near[a] = hn::Mul(hn::Add(from, near_pad[a]), inverse[a]);

@@ -93,10 +93,11 @@ public:
         if constexpr (counting) this->counts_.tests += count;
         const std::uint32_t lanes = this->lanes_of(place, count);
         if constexpr (tries) {
-            open_ = this->see(block(), [&](const auto&, const auto&, const auto&, V4 u, V4 v, V4 w) {
-                return typename Base::Candidates{Base::crossed(lanes, u, v, w),
-                                                 bits_of(f4, without_zero(f4, u, v, w)), 0};
-            });
+            open_ =
+                this->see(block(), [&](const auto&, const auto&, const auto&, V4 u, V4 v, V4 w) {
+                    return typename Base::Candidates{Base::crossed(lanes, u, v, w),
+                                                     bits_of(f4, without_zero(f4, u, v, w)), 0};
+                });
             return open_.open != 0;
         }
         open_ = this->candidates_of(block(), lanes);
