@@ -46,7 +46,7 @@ public:
     using Base::collect;
 
     /// The frame holds another ray, which has this place in the job.
-    void be(std::uint32_t place) { this->place_ = place; }
+    void be(std::uint32_t place) { Base::place_ = place; }
     /// From the root on; false if there is nothing to do.
     HWY_INLINE bool begin(float tmax) {
         const SingleFrame& frame = this->frame_;
@@ -57,12 +57,12 @@ public:
         best_ = {tmax};
         *stack_.pairs = the_end;
         top_ = stack_.pairs + 1;
-        word_ = 0, place_ = nodes_;
+        word_ = 0, next_place_ = nodes_;
         return tmin_ <= tmax;
     }
     /// The next one: what a step visits.
     [[nodiscard]] std::uint32_t next() const { return word_; }
-    HWY_INLINE void ask_for_next() const { ask_at<compact>(place_, word_); }
+    HWY_INLINE void ask_for_next() const { ask_at<compact>(next_place_, word_); }
     /// Leaves the leaf that is next behind; the ray goes as far as `reach` from now on.
     HWY_INLINE bool skip(float reach) {
         best_.t = reach;
@@ -73,7 +73,7 @@ public:
     /// behind the stack's top. Without branches but for what is rare.
     HWY_INLINE void look_at_node() {
         if constexpr (counting) ++this->counts_.visits;
-        const Node& node = *reinterpret_cast<const Node*>(place_);
+        const Node& node = *reinterpret_cast<const Node*>(next_place_);
         pushed_ = 0;
         for (std::size_t l = 0; l < 8; l += lanes8) push_met(node, l);
     }
@@ -155,7 +155,7 @@ private:
         if constexpr (compact)
             return this->tree_.template block<compact>(this->leaf_of(word_).place);
         else
-            return *reinterpret_cast<const TriangleBlock*>(place_);
+            return *reinterpret_cast<const TriangleBlock*>(next_place_);
     }
 
     HWY_INLINE bool pop() {
@@ -165,7 +165,7 @@ private:
         while (closest && pair > farthest());
         top_ = const_cast<std::uint64_t*>(top);
         word_ = static_cast<std::uint32_t>(pair);
-        place_ = place_of<compact>(nodes_, blocks_, word_);
+        next_place_ = place_of<compact>(nodes_, blocks_, word_);
         return word_ != wide_no_child;
     }
     /// No pair is larger whose entry is at most best_.t: floats that are not negative are in the
@@ -181,7 +181,7 @@ private:
             Base::test_boxes(node, this->rates_of(node, about), l, entry, exit);
             return;
         }
-        const auto* const boxes = reinterpret_cast<const float*>(place_) + l;
+        const auto* const boxes = reinterpret_cast<const float*>(next_place_) + l;
         const std::uint64_t planes = planes_;
         const SingleFrame& frame = this->frame_;
         entry = hn::Set(f8, tmin_);
@@ -263,7 +263,7 @@ private:
     float tmin_ = 0;
     std::uint64_t planes_ = 0;
     std::uintptr_t nodes_, blocks_;
-    std::uintptr_t place_ = 0;  // of the next one
+    std::uintptr_t next_place_ = 0;
     std::uint64_t* top_ = nullptr;
     std::uint32_t word_ = 0;
     // Between the halves of a visit: how many children lie behind the stack's top, or what of the
