@@ -47,7 +47,7 @@ PROGRAMS = ("c", "cli", "examples", "python")
 MPI_HEADER = "include/raydix/mpi.h"
 # Headers of one library -> the only files that may include them.
 PRIVATE_LIBRARIES = {
-    r"(tbb|oneapi)/.*": r"src/exec/parallel\.cpp|tests/more_threads\.cpp",
+    r"(tbb|oneapi)/.*": r"src/exec/parallel\.cpp|tests/(more_threads|exec/caller_onetbb_test)\.cpp",
     r"(cuda|cub|thrust|nv|nvtx3)/.*|cuda.*\.h": r"(src|tests|bench)/.*\.cuh?|src/base/device_words\.h",
     r"(embree\d?|nanoflann).*": r"(tests|bench)/.*",
     r"CGAL/.*": r"bench/.*",

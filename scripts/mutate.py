@@ -147,6 +147,8 @@ def set_limits(looks, programs, limits):
 def noticed_in(looks, programs, limits):
     """Which of these looks notices what is planted, or None."""
     if looks and not build([programs[folder] for folder, _ in looks]):
+        if "interrupted" in last_lines(1):  # by a signal: the compiler said nothing of the fault
+            sys.exit("the build was interrupted")
         return "the compiler"
     for folder, tests in looks:
         reason = run_program(programs[folder], tests, limits[programs[folder], tests])

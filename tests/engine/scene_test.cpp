@@ -136,6 +136,32 @@ void expect_all_hits_by_every_path(const Scene& scene, std::span<const Ray> rays
     }
 }
 
+/// A thousand million places: a number of a path leaves little room in a word for that of a ray.
+TEST(Scene, AllHitsWhereThereAreManyPaths) {
+    constexpr std::uint32_t copies = 1000;
+    Mesh mesh;
+    mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    mesh.triangles = {{0, 1, 2}};
+    Scene all(mesh);
+    for (std::size_t axis = 0; axis < 3; ++axis) {  // a line, an area, a block
+        Scene row;
+        for (std::uint32_t k = 0; k < copies; ++k) {
+            Transform place;
+            place.m[axis][3] = static_cast<float>(k);
+            row.add(all, place);
+        }
+        row.commit();
+        all = std::move(row);
+    }
+    std::vector<Ray> rays;
+    for (std::uint32_t i = 0; i < 100; ++i) {
+        const float at = static_cast<float>(9 * i);
+        rays.push_back({{at + 0.25f, 900.25f - at, at - 0.5f}, 0, {0, 0, 1}, 2});
+    }
+    expect_all_hits_by_every_path(all, rays, {});
+    EXPECT_EQ(trace_all(all, rays).hits.size(), 2 * rays.size());
+}
+
 TEST(Scene, AllHitsOfShapesTogetherAreThoseOfRaysAlone) {
     for (std::uint32_t levels = 0; levels < 4; ++levels) {
         RandomScenes random(1300 + levels);

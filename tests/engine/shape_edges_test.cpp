@@ -19,6 +19,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "base/double3.h"
 #include "engine/shape_tree.h"
 #include "support/double_scenes.h"
 #include "support/exact.h"
@@ -232,6 +233,33 @@ TYPED_TEST(ShapeEdges, ACapsulesHitKnowsItsPlaceAlongTheAxis) {
     // Along the axis, inside and beside.
     EXPECT_EQ(hit(0, -2, {0, 1, 0}).t, TypeParam(1.75));
     EXPECT_FALSE(hit(TypeParam(-0.26), -2, {0, 1, 0}).hit());
+}
+
+/// Spheres whose radius is what floats err by where they are. Rays pass just inside and outside.
+TEST(ShapeEdgesInFloat, GrainsFarFromTheRaysOrigin) {
+    constexpr float distance = 1000, radius = 0x1p-13f;
+    RandomD random(20190324);
+    const auto direction = [&] { return normalized(Double3(random.direction())); };
+    std::vector<Sphere> grains;
+    std::vector<Ray> rays;
+    std::vector<std::uint8_t> wanted;
+    for (int i = 0; i < 2000; ++i) {
+        const Double3 away = direction() * distance, beside = normalized(cross(away, direction()));
+        const Double3 aim = away + beside * (radius * random.between(0.7, 1.3));
+        grains.push_back({away.rounded(), radius});
+        rays.push_back({{0, 0, 0}, 0, aim.rounded(), infinity});
+        const Double3 d = normalized(Double3(rays.back().direction));
+        wanted.push_back(length(cross(Double3(grains.back().center), d)) <= radius);
+    }
+    const Scene scene = Of<float>::of_spheres(grains);
+    const std::vector<Hit> hits = trace(scene, rays);
+    std::vector<std::uint8_t> found;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        found.push_back(hits[i].prim == i);
+        EXPECT_EQ(any_hit(scene, rays[i]), hits[i].hit()) << i;
+    }
+    EXPECT_EQ(found, wanted);
+    EXPECT_GT(std::ranges::count(wanted, 1), 500);
 }
 
 TEST(ShapeEdgesInDouble, ABallFarFromTheOrigin) {

@@ -60,9 +60,10 @@ Mesh splinters(std::size_t count) {
     return mesh;
 }
 
-/// Most in one cell of the grid, and each of the others in a cell half as large as the last.
+/// Most in one cell of the grid, and each of the others in a cell half as large as the last: in
+/// large ones a leaf for each hangs from the top. Smaller by much, all would be left out.
 Mesh halving_cells(std::size_t count) {
-    Mesh mesh = scaled(random_soup(count, 7), 0x1p-40f);
+    Mesh mesh = scaled(random_soup(count, 7), 0x1p-22f);
     const std::size_t others = std::min<std::size_t>(count / 2, 40);
     for (std::size_t k = 0; k < others; ++k)
         for (const std::uint32_t v : mesh.triangles[k])
