@@ -45,26 +45,31 @@ private:
     std::uint64_t bits_ = 0;
 };
 
-/// Visits what all rays of the set `going` stand at. First the first halves of all visits, then the
-/// second ones: a jump that was guessed wrong is found out at once there, since all it depends on
-/// has been there for a while.
+/// Visits what the rays of the set `going` stand at, some at a time. First the first halves of
+/// their visits, then the second ones: a jump that was guessed wrong is found out at once there,
+/// since all it depends on has been there for a while. Some, not all: memory is asked for in second
+/// halves, and a processor waits for so many lines at once only.
 template <class Turn, class Kind>
 HWY_INLINE void step_all(Turn* turns, std::uint64_t going, Kind kind, TurnSets& next) {
-    std::uint64_t hits = 0;
-    for (std::uint64_t left = going; left != 0; left &= left - 1) {
-        const int k = std::countr_zero(left);
-        hits |= std::uint64_t{turns[k].look(kind)} << k;
-    }
-    for (std::uint64_t left = hits; left != 0; left &= left - 1)
-        turns[std::countr_zero(left)].try_hit();
-    for (std::uint64_t left = hits; left != 0; left &= left - 1)
-        turns[std::countr_zero(left)].keep_hit();
-    for (std::uint64_t left = going; left != 0; left &= left - 1) {
-        const auto k = static_cast<unsigned>(std::countr_zero(left));
-        Turn& turn = turns[k];
-        if (!turn.step(kind) && !turn.start()) continue;
-        turn.ask();
-        next.add(turn.kind(), k);
+    constexpr unsigned at_once = 8;
+    while (going != 0) {
+        std::array<Turn*, at_once> here;
+        unsigned count = 0;
+        std::uint64_t hits = 0;
+        for (; going != 0 && count < at_once; going &= going - 1, ++count) {
+            here[count] = turns + std::countr_zero(going);
+            hits |= std::uint64_t{here[count]->look(kind)} << count;
+        }
+        for (std::uint64_t left = hits; left != 0; left &= left - 1)
+            here[static_cast<std::size_t>(std::countr_zero(left))]->try_hit();
+        for (std::uint64_t left = hits; left != 0; left &= left - 1)
+            here[static_cast<std::size_t>(std::countr_zero(left))]->keep_hit();
+        for (unsigned k = 0; k < count; ++k) {
+            Turn& turn = *here[k];
+            if (!turn.step(kind) && !turn.start()) continue;
+            turn.ask();
+            next.add(turn.kind(), static_cast<unsigned>(&turn - turns));
+        }
     }
 }
 
