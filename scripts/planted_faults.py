@@ -304,7 +304,7 @@ FAULTS = [
           "cwbvh: child nodes do not follow the order of their slots", "layout trace"),
     Fault("src/trace/simd/turn_ray.h", "        top_ += pushed_;", "        top_ += pushed_ - (pushed_ > 3 ? 1 : 0);",
           "rays in turn: the last of many children is forgotten", "trace engine"),
-    Fault("src/trace/simd/turn_ray.h", "if (others != 0 ||", "if (",
+    Fault("src/trace/simd/turn_ray.h", "others != 0 ||", "",
           "rays in turn: of two triangles in one leaf that may be hit the first is kept", "trace"),
     Fault("src/trace/simd/turn_ray.h", "if (entry < entry_of(pairs[k - 1])) return;", "if (k > 3) return;",
           "rays in turn: children are taken in another order than by single calls", "engine trace"),
