@@ -56,7 +56,6 @@ struct WideMaker {
     }
     static std::optional<double> refit(const MeshTree& old, const MeshView& mesh,
                                        const SceneOptions&, MeshTree& out) {
-        out.memory = old.memory;
         out.refitter = old.refitter != nullptr ? old.refitter : WideRefitter::of(*old.tree);
         if (out.refitter == nullptr) return {};
         std::shared_ptr<const WideBvh> tree = out.refitter->refit(*old.tree, mesh);
@@ -98,6 +97,7 @@ public:
         ShapeCommit<float> shapes(state_, own_, options_, report_);
         const double other_work = shapes.work() + parts_of_instances();
         tree_->meshes = meshes.run(other_work);
+        if (tree_->meshes.empty()) tree_->builders = {};
         for (const auto& mesh : tree_->meshes) {
             report_.bytes += mesh->tree->stats().bytes;
             tree_->extents.emplace_back();

@@ -23,7 +23,8 @@
 
 namespace raydix {
 
-/// Maker says how trees of triangles come about, MeshTree and MeshView being those of the type:
+/// Maker says how trees of triangles come about, `build` with what one of them keeps, MeshTree and
+/// MeshView being those of the type:
 ///   build(mesh, options, last, out)   a new one: tree and sah_at_build, 0 if it is not known;
 ///                                     `last`: the tree of the same meshes so far, or null
 ///   left_out(out)                     how many of its triangles are invalid

@@ -96,6 +96,8 @@ private:
     /// What store wrote, in the same fours: other loads would have to wait for it.
     static HWY_INLINE void copy(const SingleFrame& from, SingleFrame& to) {
         constexpr std::size_t floats = offsetof(SingleFrame, kind) / sizeof(float);
+        static_assert(floats % 4 == 0 && offsetof(SingleFrame, tmin) ==
+                                             offsetof(SingleFrame, shear) + 2 * sizeof(float));
         const float* const in = from.origin;
         float* const out = to.origin;
         for (std::size_t f = 0; f < floats; f += 4) hn::Store(hn::Load(f4, in + f), f4, out + f);

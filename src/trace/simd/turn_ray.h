@@ -19,6 +19,8 @@ HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
 /// What a visit reads lies together, and is read once: such rays are limited by how much they read.
+/// After begin(): look_at_node() and step_node(), or look_at_leaf(), if it says so try_hit() and
+/// keep_hit(), and step_leaf(), until a step says that nothing is left.
 template <Wanted wanted, bool counting, bool compact, class Parts = NoParts>
 class TurnRay : SingleRay<wanted, counting, compact, false, Parts> {
     using Base = SingleRay<wanted, counting, compact, false, Parts>;
@@ -31,10 +33,10 @@ class TurnRay : SingleRay<wanted, counting, compact, false, Parts> {
         (wanted == Wanted::closest || wanted == Wanted::any) && !has_parts;
 
 public:
-    /// As SingleRay's; children go to `stack.pairs`.
+    /// As SingleRay's; children go to `stack.pairs`. The frame may change until begin().
     TurnRay(const WideView& tree, const SingleFrame& frame, const WideStackView& stack,
-            SimdCounts& counts, Parts* parts = nullptr, std::uint32_t place = 0)
-        : Base(tree, frame, stack, counts, parts, place) {
+            SimdCounts& counts, Parts* parts = nullptr)
+        : Base(tree, frame, stack, counts, parts) {
         if constexpr (compact)
             nodes_ = address(tree.compact_nodes), blocks_ = address(tree.compact_blocks);
         else
@@ -46,7 +48,7 @@ public:
     using Base::collect;
 
     /// The frame holds another ray, which has this place in the job.
-    void be(std::uint32_t place) { Base::place_ = place; }
+    void stand_for(std::uint32_t place) { Base::place_ = place; }
     /// From the root on; false if there is nothing to do.
     HWY_INLINE bool begin(float tmax) {
         const SingleFrame& frame = this->frame_;
@@ -57,12 +59,12 @@ public:
         best_ = {tmax};
         *stack_.pairs = the_end;
         top_ = stack_.pairs + 1;
-        word_ = 0, next_place_ = nodes_;
+        word_ = 0, next_address_ = nodes_;
         return tmin_ <= tmax;
     }
     /// The next one: what a step visits.
     [[nodiscard]] std::uint32_t next() const { return word_; }
-    HWY_INLINE void ask_for_next() const { ask_at<compact>(next_place_, word_); }
+    HWY_INLINE void ask_for_next() const { ask_at<compact>(next_address_, word_); }
     /// Leaves the leaf that is next behind; the ray goes as far as `reach` from now on.
     HWY_INLINE bool skip(float reach) {
         best_.t = reach;
@@ -73,7 +75,7 @@ public:
     /// behind the stack's top. Without branches but for what is rare.
     HWY_INLINE void look_at_node() {
         if constexpr (counting) ++this->counts_.visits;
-        const Node& node = *reinterpret_cast<const Node*>(next_place_);
+        const Node& node = *reinterpret_cast<const Node*>(next_address_);
         pushed_ = 0;
         for (std::size_t l = 0; l < 8; l += lanes8) push_met(node, l);
     }
@@ -95,8 +97,9 @@ public:
         if constexpr (tries) {
             open_ =
                 this->see(block(), [&](const auto&, const auto&, const auto&, V4 u, V4 v, V4 w) {
-                    return typename Base::Candidates{Base::crossed(lanes, u, v, w),
-                                                     bits_of(f4, without_zero(f4, u, v, w)), 0};
+                    const std::uint32_t clear =
+                        closest ? bits_of(f4, without_zero(f4, u, v, w)) : 0;
+                    return typename Base::Candidates{Base::crossed(lanes, u, v, w), clear, 0};
                 });
             return open_.open != 0;
         }
@@ -147,6 +150,7 @@ private:
 
     /// Below all children: no node or leaf.
     static constexpr std::uint64_t the_end = wide_no_child;
+    static_assert(std::endian::native == std::endian::little);  // pairs are written as two floats
     static constexpr int careful_bit = 56;
 
     static std::uintptr_t address(const void* p) { return reinterpret_cast<std::uintptr_t>(p); }
@@ -155,17 +159,17 @@ private:
         if constexpr (compact)
             return this->tree_.template block<compact>(this->leaf_of(word_).place);
         else
-            return *reinterpret_cast<const TriangleBlock*>(next_place_);
+            return *reinterpret_cast<const TriangleBlock*>(next_address_);
     }
 
     HWY_INLINE bool pop() {
-        const std::uint64_t* top = top_;
+        std::uint64_t* top = top_;
         std::uint64_t pair;
         do pair = *--top;
         while (closest && pair > farthest());
-        top_ = const_cast<std::uint64_t*>(top);
+        top_ = top;
         word_ = static_cast<std::uint32_t>(pair);
-        next_place_ = place_of<compact>(nodes_, blocks_, word_);
+        next_address_ = place_of<compact>(nodes_, blocks_, word_);
         return word_ != wide_no_child;
     }
     /// No pair is larger whose entry is at most best_.t: floats that are not negative are in the
@@ -181,7 +185,7 @@ private:
             Base::test_boxes(node, this->rates_of(node, about), l, entry, exit);
             return;
         }
-        const auto* const boxes = reinterpret_cast<const float*>(next_place_) + l;
+        const auto* const boxes = reinterpret_cast<const float*>(next_address_) + l;
         const std::uint64_t planes = planes_;
         const SingleFrame& frame = this->frame_;
         entry = hn::Set(f8, tmin_);
@@ -197,7 +201,7 @@ private:
 
     /// Of children l to l + lanes8 - 1 those that the ray meets go behind the stack's top: a word
     /// each, and in the upper half where the ray enters it. The nearer one of the first two is
-    /// second.
+    /// second. For any hit upper halves mean nothing, and children keep their order.
     HWY_INLINE void push_met(const Node& node, std::size_t l) {
         V entry, exit;
         test_boxes(node, l, entry, exit);
@@ -261,9 +265,9 @@ private:
     }
 
     float tmin_ = 0;
-    std::uint64_t planes_ = 0;
+    std::uint64_t planes_ = 0;  // packed_plane_places; from careful_bit on SingleFrame::careful
     std::uintptr_t nodes_, blocks_;
-    std::uintptr_t next_place_ = 0;
+    std::uintptr_t next_address_ = 0;
     std::uint64_t* top_ = nullptr;
     std::uint32_t word_ = 0;
     // Between the halves of a visit: how many children lie behind the stack's top, or what of the

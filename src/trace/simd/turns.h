@@ -110,7 +110,7 @@ public:
     }
 
     void trace() {
-        std::array<Turn, rays_in_turn> turns;
+        std::array<Turn, rays_in_turn> turns{};
         for (std::size_t k = 0; k < turns.size(); ++k) {
             turns[k].rays = this;
             turns[k].ray.emplace(job_.tree, turns[k].frame, job_.stack.from(k * job_.stack_size),
@@ -157,7 +157,7 @@ private:
             turn.i = static_cast<std::size_t>(index_[k]);
             if (frames_.take(k, turn.frame) ||
                 fill_frame(job_.tree, job_.rays[turn.i], turn.frame)) {
-                turn.ray->be(static_cast<std::uint32_t>(turn.i));
+                turn.ray->stand_for(static_cast<std::uint32_t>(turn.i));
                 if constexpr (wants_accepted(query))
                     turn.ray->check_by(*job_.check, job_.rays + turn.i);
                 if ((!job_.passing || meets_bounds(turn.frame)) && turn.ray->begin(turn.frame.tmax))

@@ -109,7 +109,7 @@ struct WideStackView {
 
     /// The part that begins `at` places behind this one.
     [[nodiscard]] WideStackView from(std::size_t at) const {
-        return {words + at, entries + at, pairs + at};
+        return {words + at, entries + at, pairs == nullptr ? nullptr : pairs + at};
     }
 };
 
