@@ -65,7 +65,7 @@ class Tables(unittest.TestCase):
                 used.add(row.get("run"))
         self.assertEqual(used - {None}, set(figures["runs"]))
         for name, run in figures["runs"].items():
-            self.assertIn(run["machine"], {"EPYC", "Milan", "Xeon", "simulated"}, name)
+            self.assertIn(run["machine"], {"EPYC", "Genoa", "Milan", "Xeon", "simulated"}, name)
             self.assertRegex(run["date"], r"^\d{4}-\d\d-\d\d$")
             self.assertTrue(run["command"] and run["how"], name)
 
