@@ -70,10 +70,8 @@ public:
             ask_for_all(scene_.placed[part() - scene_.own_part_count()]);
     }
     template <TurnKind kind>
-    HWY_INLINE bool look(std::integral_constant<TurnKind, kind>) {
-        if constexpr (kind == TurnKind::node) now_->look_at_node();
-        if constexpr (kind == TurnKind::leaf) return now_->look_at_leaf();
-        return false;
+    HWY_INLINE bool look(std::integral_constant<TurnKind, kind> what) {
+        return now_->look(what);
     }
     HWY_INLINE void try_hit() { now_->try_hit(); }
     HWY_INLINE void keep_hit() { now_->keep_hit(); }

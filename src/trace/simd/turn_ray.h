@@ -18,9 +18,12 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
+/// What a ray does in its next turn.
+enum class TurnKind { node, leaf, part };
+
 /// What a visit reads lies together, and is read once: such rays are limited by how much they read.
-/// After begin(): look_at_node() and step_node(), or look_at_leaf(), if it says so try_hit() and
-/// keep_hit(), and step_leaf(), until a step says that nothing is left.
+/// After begin(): look(), if it says so try_hit() and keep_hit(), and step_node() or step_leaf(),
+/// until a step says that nothing is left.
 template <Wanted wanted, bool counting, bool compact, class Parts = NoParts>
 class TurnRay : SingleRay<wanted, counting, compact, false, Parts> {
     using Base = SingleRay<wanted, counting, compact, false, Parts>;
@@ -71,40 +74,21 @@ public:
         return pop();
     }
 
-    /// The first half of a visit of the node that is next: its children that the ray meets go
-    /// behind the stack's top. Without branches but for what is rare.
-    HWY_INLINE void look_at_node() {
-        if constexpr (counting) ++this->counts_.visits;
-        const Node& node = *reinterpret_cast<const Node*>(next_address_);
-        pushed_ = 0;
-        for (std::size_t l = 0; l < 8; l += lanes8) push_met(node, l);
+    /// The first half of a visit of what is next; whether there is a hit that try_hit and keep_hit
+    /// shall look at. Nothing for parts of a scene.
+    template <TurnKind kind>
+    HWY_INLINE bool look(std::integral_constant<TurnKind, kind>) {
+        if constexpr (kind == TurnKind::node) look_at_node();
+        if constexpr (kind == TurnKind::leaf) return look_at_leaf();
+        return false;
     }
-    /// The second half; whether there is another node or leaf. Few branches: those of rays in turn
-    /// cannot be foreseen.
+    /// The second half for a node; whether there is another node or leaf. Few branches: those of
+    /// rays in turn cannot be foreseen.
     HWY_INLINE bool step_node() {
         if constexpr (closest)
             for (std::size_t k = parts8 == 1 ? 2 : 1; k < pushed_; ++k) insert(k);
         top_ += pushed_;
         return pop();
-    }
-    /// The first half of a visit of the leaf that is next: which triangles may be hit. Whether
-    /// there is one that try_hit and keep_hit shall look at.
-    HWY_INLINE bool look_at_leaf() {
-        if constexpr (has_parts) return false;
-        const auto [place, count] = this->leaf_of(word_);
-        if constexpr (counting) this->counts_.tests += count;
-        const std::uint32_t lanes = this->lanes_of(place, count);
-        if constexpr (tries) {
-            open_ =
-                this->see(block(), [&](const auto&, const auto&, const auto&, V4 u, V4 v, V4 w) {
-                    const std::uint32_t clear =
-                        closest ? bits_of(f4, without_zero(f4, u, v, w)) : 0;
-                    return typename Base::Candidates{Base::crossed(lanes, u, v, w), clear, 0};
-                });
-            return open_.open != 0;
-        }
-        open_ = this->candidates_of(block(), lanes);
-        return false;
     }
     /// Where the ray meets the first of them; any hit: whether it meets one.
     HWY_INLINE void try_hit() {
@@ -132,7 +116,7 @@ public:
         }
         best_.take_if(hit_.t >= tmin_, hit_.t, prim_, hit_.u, hit_.v);
     }
-    /// The second half; whether there is another node or leaf.
+    /// The second half for a leaf; whether there is another node or leaf.
     HWY_INLINE bool step_leaf() {
         if constexpr (has_parts) {
             if (this->test_leaf(word_)) return false;
@@ -154,6 +138,33 @@ private:
     static constexpr int careful_bit = 56;
 
     static std::uintptr_t address(const void* p) { return reinterpret_cast<std::uintptr_t>(p); }
+
+    /// Of the node that is next: its children that the ray meets go behind the stack's top. Without
+    /// branches but for what is rare.
+    HWY_INLINE void look_at_node() {
+        if constexpr (counting) ++this->counts_.visits;
+        const Node& node = *reinterpret_cast<const Node*>(next_address_);
+        pushed_ = 0;
+        for (std::size_t l = 0; l < 8; l += lanes8) push_met(node, l);
+    }
+    /// Of the leaf that is next: which triangles may be hit.
+    HWY_INLINE bool look_at_leaf() {
+        if constexpr (has_parts) return false;
+        const auto [place, count] = this->leaf_of(word_);
+        if constexpr (counting) this->counts_.tests += count;
+        const std::uint32_t lanes = this->lanes_of(place, count);
+        if constexpr (tries) {
+            open_ =
+                this->see(block(), [&](const auto&, const auto&, const auto&, V4 u, V4 v, V4 w) {
+                    const std::uint32_t clear =
+                        closest ? bits_of(f4, without_zero(f4, u, v, w)) : 0;
+                    return typename Base::Candidates{Base::crossed(lanes, u, v, w), clear, 0};
+                });
+            return open_.open != 0;
+        }
+        open_ = this->candidates_of(block(), lanes);
+        return false;
+    }
 
     [[nodiscard]] HWY_INLINE const TriangleBlock& block() const {
         if constexpr (compact)

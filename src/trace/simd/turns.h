@@ -20,9 +20,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-/// What a ray does in its next turn.
-enum class TurnKind { node, leaf, part };
-
 /// Rays that wait for their turn, each kind apart: jumps that depend on it could not be foreseen.
 /// All in one register.
 class TurnSets {
@@ -134,10 +131,8 @@ private:
         [[nodiscard]] TurnKind kind() const { return static_cast<TurnKind>(ray->next() >> 31); }
         HWY_INLINE void ask() const { ray->ask_for_next(); }
         template <TurnKind kind>
-        HWY_INLINE bool look(std::integral_constant<TurnKind, kind>) {
-            if constexpr (kind == TurnKind::leaf) return ray->look_at_leaf();
-            ray->look_at_node();
-            return false;
+        HWY_INLINE bool look(std::integral_constant<TurnKind, kind> what) {
+            return ray->look(what);
         }
         HWY_INLINE void try_hit() { ray->try_hit(); }
         HWY_INLINE void keep_hit() { ray->keep_hit(); }
