@@ -106,16 +106,84 @@ SimulatedRates::Limit SimulationRow::tightest() const {
     return limit;
 }
 
+double LaunchTimes::correction(std::size_t n) const {
+    double sample_time = 0, sample_rays = 0, all_time = 0, all_rays = 0;
+    for (std::size_t k = 0; k < time.size(); ++k) {
+        all_time += time[k] * rays[k], all_rays += rays[k];
+        if (k < n) sample_time += time[k] * rays[k], sample_rays += rays[k];
+    }
+    return sample_time > 0 && all_time > 0 ? all_rays / all_time * (sample_time / sample_rays)
+                                           : 1.0;
+}
+
+double SimulationRow::correction() const {
+    return all && part_taken < 1.0 ? all->correction(units.size()) : 1.0;
+}
+
+SimulatedRates SimulationRow::rates() const {
+    SimulatedRates out = simulated_rates(sum, options);
+    const double factor = correction();
+    for (double* rate :
+         {&out.bound, &out.scheduled, &out.single_warps, &out.free_blocks, &out.memory})
+        *rate *= factor;
+    for (SimulatedRates::Limit& limit : out.memory_limits) limit.mrays_per_s *= factor;
+    return out;
+}
+
 std::optional<double> SimulationRow::sampling_error() const {
     if (part_taken >= 1.0) return 0.0;
-    const auto n = static_cast<double>(units.size());
+    const std::size_t n = units.size();
     if (n < 2) return std::nullopt;
-    double mean = 0, squares = 0;
-    for (const SimulatedRates& unit : units) mean += 1.0 / unit.bound / n;
-    for (const SimulatedRates& unit : units)
-        squares += (1.0 / unit.bound - mean) * (1.0 / unit.bound - mean);
-    return std::sqrt(squares / (n - 1) / n * (1.0 - part_taken)) / mean;
+    // What a unit takes beside what it takes by while_while, or beside nothing.
+    const auto beside = [&](std::size_t k) { return all ? all->time.at(k) : 1.0; };
+    const auto error_of = [&](double SimulatedRates::*rate) {
+        double own = 0, other = 0, squares = 0;
+        for (std::size_t k = 0; k < n; ++k) own += 1.0 / (units[k].*rate), other += beside(k);
+        for (std::size_t k = 0; k < n; ++k) {
+            const double left = 1.0 / (units[k].*rate) - own / other * beside(k);
+            squares += left * left;
+        }
+        const auto count = static_cast<double>(n);
+        return std::sqrt(squares / (count - 1) / count * (1.0 - part_taken)) / (own / count);
+    };
+    const double of_bound = error_of(&SimulatedRates::bound);
+    return whole_launches ? std::max(of_bound, error_of(&SimulatedRates::scheduled)) : of_bound;
 }
+
+namespace {
+
+/// A sample of fewer launches says too little of its own error.
+constexpr std::size_t least_launches = 8;
+
+/// Traces every launch of the kind by while_while on the first machine. Goes on with what `end`
+/// keeps.
+std::shared_ptr<const LaunchTimes> times_of(const WarpTree& tree, const RayLaunches& launches,
+                                            const std::vector<SimulationRow>& rows,
+                                            const Json& figures, const SimulationEnd& end,
+                                            const CommonOptions& common) {
+    auto times = std::make_shared<LaunchTimes>();
+    if (end.state != nullptr) *times = end.state->restore_times(figures, rows);
+    SimulateOptions run = rows.front().options;
+    run.kernel = WarpKernel::while_while;
+    run.memory = false;
+    Progress progress(fmt::format("all {} launches by while_while", rows.front().rays), common);
+    launches.for_each(
+        rows.front().kind,
+        [&](const RayUnit& unit, double part) {
+            run.part_of_launch = unit.part;
+            const Simulation found =
+                simulate(tree, unit.rays, std::span(&run, 1), nullptr, common.threads).front();
+            const double bound = simulated_rates(found, run).bound;
+            times->time.push_back(bound > 0 ? 1.0 / bound : 0.0);
+            times->rays.push_back(static_cast<double>(unit.rays.size()));
+            if (end.state != nullptr) end.state->keep_times(figures, rows, *times);
+            progress.show(part);
+        },
+        [](double) { return true; }, times->time.size());
+    return times;
+}
+
+}  // namespace
 
 std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree& tree,
                                          const RayLaunches& launches, RayKind kind,
@@ -140,6 +208,10 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
         figures = figures_of(input, rows, options, common.seed);
         done = end.state->restore(figures, rows);
     }
+    if (end.error >= 0) {
+        const auto all = times_of(tree, launches, rows, figures, end, common);
+        for (SimulationRow& row : rows) row.all = all;
+    }
     Progress progress(fmt::format("simulating {}", ray_kind_name(kind)), common);
     const auto visit = [&](const RayUnit& unit, double part) {
         add_unit(tree, unit, runs, rows, common);
@@ -150,7 +222,7 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
         for (SimulationRow& row : rows) row.part_taken = taken;
         return !std::ranges::all_of(rows, [&](const SimulationRow& row) {
             const std::optional<double> error = row.sampling_error();
-            return error && *error <= end.error;
+            return row.units.size() >= least_launches && error && *error <= end.error;
         });
     };
     const double taken = launches.for_each(kind, visit, more, done);
@@ -229,6 +301,7 @@ Json simulation_json(const SimulationRow& row) {
             {"sample", row.sample},
             {"part_taken", row.part_taken},
             {"sampling_error", error ? Json(*error) : Json(nullptr)},
+            {"correction", row.correction()},
             {"operations", operations_json(row)},
             {"histogram", histogram_json(row.sum)}};
 }

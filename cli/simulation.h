@@ -3,6 +3,8 @@
 
 #include <raydix/simulate.h>
 
+#include <cstddef>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,6 +15,16 @@ namespace raydix::cli {
 
 class SimulationState;
 
+/// What every launch of a kind takes by while_while alone, a tenth of the work of all kernels: by
+/// it a sample of the launches is corrected (ratio estimator: Cochran, Sampling Techniques, 1977,
+/// chapter 6).
+struct LaunchTimes {
+    std::vector<double> time, rays;  // [launches], in the order of a sample: microseconds a ray
+
+    /// Rate over all launches, over the rate of the first `n`.
+    [[nodiscard]] double correction(std::size_t n) const;
+};
+
 /// One kernel, kind and machine over all launches.
 struct SimulationRow {
     std::string scene;
@@ -20,26 +32,31 @@ struct SimulationRow {
     std::string rays;  // name of the kind, or a file
     SimulateOptions options;
     Simulation sum;
-    std::string builder = {};           // of the tree
-    double sample = 1.0;                // as asked for
-    double part_taken = 1.0;            // of all rays
-    bool whole_launches = true;         // else there is no launch to schedule
-    std::uint64_t different_hits = 0;   // from those of the scalar reference
-    std::vector<SimulatedRates> units;  // of each launch or run that was traced
+    std::string builder = {};                          // of the tree
+    double sample = 1.0;                               // as asked for
+    double part_taken = 1.0;                           // of all rays
+    bool whole_launches = true;                        // else there is no launch to schedule
+    std::uint64_t different_hits = 0;                  // from those of the scalar reference
+    std::vector<SimulatedRates> units;                 // of each launch or run that was traced
+    std::shared_ptr<const LaunchTimes> all = nullptr;  // of those that were not, too
 
-    [[nodiscard]] SimulatedRates rates() const { return simulated_rates(sum, options); }
+    /// Of the sums, corrected for the launches that were not traced.
+    [[nodiscard]] SimulatedRates rates() const;
+    /// By which rates are corrected; 1 if all was traced, or nothing is known of the rest.
+    [[nodiscard]] double correction() const;
     /// Caches and warps in flight have no meaning for a part of a launch.
     [[nodiscard]] bool has_memory() const { return options.memory && whole_launches; }
     /// The lowest of bound, schedule and memory limits, as far as they are known.
     [[nodiscard]] SimulatedRates::Limit tightest() const;
-    /// Relative standard error of the bound that comes from tracing a part of the rays only; 0 if
-    /// all were traced; nothing if there is only one unit.
+    /// Relative standard error that comes from tracing a part of the rays only: of the bound or of
+    /// the schedule, whichever is larger, after the correction. 0 if all were traced; nothing if
+    /// there is only one unit.
     [[nodiscard]] std::optional<double> sampling_error() const;
 };
 
 /// When to end before all launches are done, and how to go on then.
 struct SimulationEnd {
-    double error = -1;                 // ends when no row's sampling error is larger
+    double error = -1;  // ends when no row's sampling error is larger; corrects for the rest
     SimulationState* state = nullptr;  // or null
 };
 

@@ -102,13 +102,20 @@ SimulationState::SimulationState(std::string file) : file_(std::move(file)) {
     document_ = found;
 }
 
-std::size_t SimulationState::restore(const Json& figures, std::vector<SimulationRow>& rows) const {
+const Json* SimulationState::part_of(const Json& figures,
+                                     const std::vector<SimulationRow>& rows) const {
     const std::string name = part_name(rows);
     const auto part = document_["parts"].find(name);
-    if (part == document_["parts"].end()) return 0;
+    if (part == document_["parts"].end()) return nullptr;
     if (part->value("of", Json()) != figures)
         throw InputError(file_ + ": '" + name +
                          "' was counted with other options, cameras or machines");
+    return &*part;
+}
+
+std::size_t SimulationState::restore(const Json& figures, std::vector<SimulationRow>& rows) const {
+    const Json* const part = part_of(figures, rows);
+    if (part == nullptr || !part->contains("rows")) return 0;
     std::vector<SimulationRow> read = rows;
     try {
         const Json& kept = part->at("rows");
@@ -117,15 +124,47 @@ std::size_t SimulationState::restore(const Json& figures, std::vector<Simulation
         rows = std::move(read);
         return launches;
     } catch (const std::exception& error) {
-        throw InputError(file_ + ": '" + name + "' cannot be gone on with: " + error.what());
+        throw InputError(file_ + ": '" + part_name(rows) +
+                         "' cannot be gone on with: " + error.what());
     }
+}
+
+LaunchTimes SimulationState::restore_times(const Json& figures,
+                                           const std::vector<SimulationRow>& rows) const {
+    const Json* const part = part_of(figures, rows);
+    if (part == nullptr || !part->contains("all")) return {};
+    try {
+        LaunchTimes times;
+        for (const Json& launch : part->at("all"))
+            times.time.push_back(launch.at(0).get<double>()),
+                times.rays.push_back(launch.at(1).get<double>());
+        return times;
+    } catch (const std::exception& error) {
+        throw InputError(file_ + ": '" + part_name(rows) +
+                         "' cannot be gone on with: " + error.what());
+    }
+}
+
+void SimulationState::keep_times(const Json& figures, const std::vector<SimulationRow>& rows,
+                                 const LaunchTimes& times) {
+    Json kept = Json::array();
+    for (std::size_t k = 0; k < times.time.size(); ++k)
+        kept.push_back({times.time[k], times.rays[k]});
+    Json& part = document_["parts"][part_name(rows)];
+    part["of"] = figures, part["all"] = kept;
+    write();
 }
 
 void SimulationState::keep(const Json& figures, const std::vector<SimulationRow>& rows,
                            std::size_t launches) {
     Json kept = Json::array();
     for (const SimulationRow& row : rows) kept.push_back(row_json(row));
-    document_["parts"][part_name(rows)] = {{"of", figures}, {"launches", launches}, {"rows", kept}};
+    Json& part = document_["parts"][part_name(rows)];
+    part["of"] = figures, part["launches"] = launches, part["rows"] = kept;
+    write();
+}
+
+void SimulationState::write() const {
     const std::string text = document_.dump() + "\n";
     write_file(file_, std::as_bytes(std::span(text)));
 }

@@ -24,10 +24,20 @@ public:
     /// Puts what is kept of `figures` into rows that are new; how many launches that was. Throws
     /// InputError if what is kept of scene, builder and kind depends on something else.
     [[nodiscard]] std::size_t restore(const Json& figures, std::vector<SimulationRow>& rows) const;
-    /// Throws InputError if the file cannot be written; the file before it stays.
+    /// The same of what all launches take, as many as are done.
+    [[nodiscard]] LaunchTimes restore_times(const Json& figures,
+                                            const std::vector<SimulationRow>& rows) const;
+    /// Throw InputError if the file cannot be written; the file before it stays.
+    void keep_times(const Json& figures, const std::vector<SimulationRow>& rows,
+                    const LaunchTimes& times);
     void keep(const Json& figures, const std::vector<SimulationRow>& rows, std::size_t launches);
 
 private:
+    /// The part of such rows, or null. Throws InputError if it depends on something else.
+    [[nodiscard]] const Json* part_of(const Json& figures,
+                                      const std::vector<SimulationRow>& rows) const;
+    void write() const;
+
     std::string file_;
     Json document_;
 };

@@ -78,6 +78,21 @@ public:
         for (LaneMask left = active_; left != 0; left &= left - 1)
             fn(lanes[static_cast<std::size_t>(std::countr_zero(left))]);
     }
+    template <class Fn, class First, class ThenFirst, class Second, class ThenSecond>
+    void step_then(Op op, Fn fn, First first, ThenFirst then_first, Second second,
+                   ThenSecond then_second) {
+        charge(op);
+        LaneMask firsts = 0, seconds = 0;
+        for (LaneMask left = active_; left != 0; left &= left - 1) {
+            const int k = std::countr_zero(left);
+            Lane& lane = lanes[static_cast<std::size_t>(k)];
+            fn(lane);
+            firsts |= LaneMask{bool(first(lane))} << k;
+            seconds |= LaneMask{bool(second(lane))} << k;
+        }
+        among(firsts, then_first);
+        among(seconds, then_second);
+    }
     template <class Fn>
     void step_indexed(Op op, Fn fn) {
         charge(op);

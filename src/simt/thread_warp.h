@@ -99,6 +99,14 @@ public:
     RAYDIX_HD void step(Op, Fn fn) {
         fn(lane);
     }
+    /// A step, then `when` for two conditions, neither of which the other's body changes.
+    template <class Fn, class First, class ThenFirst, class Second, class ThenSecond>
+    RAYDIX_HD void step_then(Op op, Fn fn, First first, ThenFirst then_first, Second second,
+                             ThenSecond then_second) {
+        step(op, fn);
+        when(first, then_first);
+        when(second, then_second);
+    }
     /// fn(lane, lane_id)
     template <class Fn>
     RAYDIX_HD void step_indexed(Op, Fn fn) {

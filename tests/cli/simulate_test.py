@@ -292,6 +292,11 @@ class Traversal(ProgramTest):
         self.assertGreater(first["simulate"][-1]["sampling_error"], 0)
         again = self.document(*arguments, "--state", "state.json", "--error", "1")  # nothing is left to do
         self.assertEqual(first["simulate"], again["simulate"])
+        kept = json.loads((self.folder / "state.json").read_text(encoding="utf-8"))
+        part = next(part for name, part in kept["parts"].items() if "diffuse" in name)  # ended before the sample began
+        del part["rows"], part["launches"], part["all"][3:]
+        self.write("early.json", json.dumps(kept))
+        self.assertEqual(first["simulate"], self.document(*arguments, "--state", "early.json", "--error", "1")["simulate"])
         rest = self.document(*arguments, "--state", "state.json")
         self.assertEqual(whole["simulate"], rest["simulate"])
         self.assertEqual(whole["claims"], rest["claims"])
@@ -302,6 +307,21 @@ class Traversal(ProgramTest):
         self.fail_with_one_line(*arguments, "--ao-radius", "3", "--state", "state.json", names=["state.json", "other options"])
         self.write("other.json", "{}")
         self.fail_with_one_line(*arguments, "--state", "other.json", names=["other.json", "is no state of bench traversal"])
+
+    def test_a_sample_is_corrected_by_all_launches(self):
+        arguments = ("bench", "traversal", SCENE, "--size", "128x96", "--samples", "8", "--launch-rays", "1024", "--machine",
+                     "gtx285,gtx480", "--kernel", "while_while,persistent_packet", "--rays", "diffuse", "--sweep-sample", "0",
+                     "--builder", "split", "--quiet")
+        whole = self.document(*arguments)["simulate"]
+        part = self.document(*arguments, "--error", "0.9")["simulate"]
+        for w, p in zip(whole, part, strict=True):
+            self.assertEqual(w["correction"], 1)
+            self.assertLess(p["part_taken"], 0.5)
+            error = p["mrays_per_s_bound"] / w["mrays_per_s_bound"] - 1
+            self.assertLess(abs(error), 6 * p["sampling_error"] + 1e-9)
+            if p["kernel"] == "while_while":  # its instructions are known of all launches
+                self.assertLess(abs(error), 1e-6 if p["machine"] == "gtx285" else 1e-2)
+                self.assertGreater(abs(p["correction"] - 1), 1e-3)
 
     def test_published_figures_of_the_papers_scenes(self):
         mesh = pathlib.Path(self.write("conference_copy.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"

@@ -38,12 +38,13 @@ class SassCosts(unittest.TestCase):
         self.assertEqual(text.operation_of(2), ("start_ray", 2))
         self.assertEqual(text.operation_of(11), ("visit_node", 10))  # the last named above it
         self.assertEqual(text.operation_of(15), ("pop", 15))         # named on the next line
+        self.assertEqual(text.operation_of(16), ("pop", 15))         # of the same call
         self.assertIsNone(text.operation_of(9))                      # nothing is named yet
 
     def test_counts(self):
         # Three of the step, and the condition behind it, whose line names no operation.
         self.assertEqual(self.row["visit_node"], 4)
-        # Two and four instructions at two inlined places.
+        # Two and four instructions at two inlined places; a call over two lines is one place.
         self.assertEqual(self.row["pop"], 3)
         # The vote's branch and the branch back.
         self.assertEqual(self.row["node_loop"], 2)

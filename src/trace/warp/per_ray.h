@@ -27,13 +27,14 @@ template <class Warp>
 RAYDIX_HD void visit_once(Warp& warp, const WarpScene& scene) {
     warp.touches(
         Access::read, [&](const Lane& l) { return &scene.pairs[l.node]; }, sizeof(NodePair));
-    warp.step(Op::visit_node, [&](Lane& l) { visit_node(l, scene); });
-    warp.when([](const Lane& l) { return must_push(l); },
-              [&] {
-                  warp.touches_stack(Access::write, top_of);
-                  warp.step(Op::push, [](Lane& l) { push(l); });
-              });
-    warp.when([](const Lane& l) { return must_pop(l); }, [&] { pop_next(warp); });
+    warp.step_then(
+        Op::visit_node, [&](Lane& l) { visit_node(l, scene); },
+        [](const Lane& l) { return must_push(l); },
+        [&] {
+            warp.touches_stack(Access::write, top_of);
+            warp.step(Op::push, [](Lane& l) { push(l); });
+        },
+        [](const Lane& l) { return must_pop(l); }, [&] { pop_next(warp); });
 }
 
 /// Tests the triangle at `link(lane)`, a reference to a leaf link.

@@ -175,16 +175,7 @@ void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<
     with_threads(threads, [&] {
         for_each_range(rays.size(), 256, [&](std::size_t begin, std::size_t end) {
             std::vector<std::int32_t> stack(tree.max_depth() + 1);
-            for (std::size_t i = begin; i < end; ++i) {
-                ThreadWarp<Lane> warp;
-                warp.lane.stack = stack.data();
-                OneBatch<WhileWhile> kernel;
-                const auto index = static_cast<std::uint32_t>(i);
-                if (any_hit)
-                    kernel.turn<true>(warp, job, index);
-                else
-                    kernel.turn<false>(warp, job, index);
-            }
+            one_by_one(any_hit)(job, begin, end, stack.data());
         });
     });
     prepared.rescale(hits);

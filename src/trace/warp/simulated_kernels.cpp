@@ -10,6 +10,8 @@ struct v3;
 // Instantiated in simulated_kernels_N.cpp, which the build compiles once per instruction set.
 template <class Isa, int Width>
 const SimulatedKernel* simulated_kernel_of_width(WarpKernel kernel, bool any_hit);
+template <class Isa>
+TraceOneByOne* one_by_one_of(bool any_hit);
 
 namespace {
 
@@ -59,6 +61,13 @@ const SimulatedKernel* simulated_kernel(WarpKernel kernel, bool any_hit, int wid
 const SimulatedKernel* simulated_kernel(WarpKernel kernel, bool any_hit, int width) {
     return simulated_kernel(kernel, any_hit, width,
                             has_v3() ? SimulatorIsa::v3 : SimulatorIsa::base);
+}
+
+TraceOneByOne* one_by_one(bool any_hit) {
+#if defined(RAYDIX_SIMULATOR_V3)
+    if (has_v3()) return one_by_one_of<simulator_isa::v3>(any_hit);
+#endif
+    return one_by_one_of<simulator_isa::base>(any_hit);
 }
 
 }  // namespace raydix

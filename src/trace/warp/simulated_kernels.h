@@ -45,6 +45,12 @@ struct SimulatedKernel {
 /// can run; all versions give the same bits.
 [[nodiscard]] const SimulatedKernel* simulated_kernel(WarpKernel kernel, bool any_hit, int width);
 
+/// Rays `begin` to `end` of the job by while_while, each by itself: the reference. `stack`:
+/// [max_depth + 1].
+using TraceOneByOne = void(const WarpJob& job, std::size_t begin, std::size_t end,
+                           std::int32_t* stack);
+[[nodiscard]] TraceOneByOne* one_by_one(bool any_hit);
+
 /// The versions by name, for tests: `base` runs everywhere, `v3` needs AVX2 and FMA. Null where the
 /// build or the processor lacks it.
 enum class SimulatorIsa { base, v3 };

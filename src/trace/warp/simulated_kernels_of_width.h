@@ -14,6 +14,8 @@ namespace raydix {
 
 template <class Isa, int Width>
 const SimulatedKernel* simulated_kernel_of_width(WarpKernel kernel, bool any_hit);
+template <class Isa>
+TraceOneByOne* one_by_one_of(bool any_hit);
 
 namespace simulator_isa {
 struct base;
@@ -102,7 +104,29 @@ const SimulatedKernel* simulated_kernel_of_width(WarpKernel kernel, bool any_hit
     });
 }
 
+/// A warp of one thread, under a name of its own for each instruction set.
+template <class Isa>
+struct OneThread : WarpHardware {};
+
+template <bool any_hit, class Isa>
+void trace_one_by_one(const WarpJob& job, std::size_t begin, std::size_t end, std::int32_t* stack) {
+    for (std::size_t i = begin; i < end; ++i) {
+        ThreadWarp<Lane, OneThread<Isa>> warp;
+        warp.lane.stack = stack;
+        OneBatch<WhileWhile> kernel;
+        kernel.template turn<any_hit>(warp, job, static_cast<std::uint32_t>(i));
+    }
+}
+
+template <class Isa>
+TraceOneByOne* one_by_one_of(bool any_hit) {
+    return any_hit ? &trace_one_by_one<true, Isa> : &trace_one_by_one<false, Isa>;
+}
+
 #if defined(RAYDIX_SIMULATOR_ISA)
+#if RAYDIX_SIMULATOR_WIDTH == 1
+template TraceOneByOne* one_by_one_of<simulator_isa::RAYDIX_SIMULATOR_ISA>(bool any_hit);
+#endif
 template const SimulatedKernel* simulated_kernel_of_width<simulator_isa::RAYDIX_SIMULATOR_ISA,
                                                           RAYDIX_SIMULATOR_WIDTH>(WarpKernel, bool);
 #endif

@@ -12,35 +12,9 @@
 #include "base/hd.h"
 #include "base/math.h"
 #include "trace/warp/lane.h"
+#include "trace/warp/pair_visit.h"
 
 namespace raydix {
-
-/// a * b + c, rounded once.
-RAYDIX_HD static inline float multiply_add(float a, float b, float c) {
-#if defined(__CUDA_ARCH__)
-    return __fmaf_rn(a, b, c);
-#elif defined(__FMA__)
-    return __builtin_fmaf(a, b, c);
-#else
-    return std::fma(a, b, c);
-#endif
-}
-
-// One instruction each on a GPU; nothing here is NaN.
-RAYDIX_HD static inline float lesser(float a, float b) {
-#if defined(__CUDA_ARCH__)
-    return fminf(a, b);
-#else
-    return min_of(a, b);
-#endif
-}
-RAYDIX_HD static inline float greater(float a, float b) {
-#if defined(__CUDA_ARCH__)
-    return fmaxf(a, b);
-#else
-    return max_of(a, b);
-#endif
-}
 
 /// 1 / d, where components closer to 0 than 2^-80 become that (Aila and Laine's release).
 RAYDIX_HD static inline float inverse_of(float d) {
@@ -107,40 +81,27 @@ RAYDIX_HD static inline void store_hit(Lane& l, const RayLaunch& launch) {
     l.ray = no_ray;
 }
 
-/// Interval of the ray inside a box: planes in the order lo, hi of x, y, z.
-RAYDIX_HD static inline void clip_to_box(const Lane& l, const float (&planes)[6], float& near,
-                                         float& far) {
-    const float x0 = multiply_add(planes[0], l.inverse.x, -l.scaled.x),
-                x1 = multiply_add(planes[1], l.inverse.x, -l.scaled.x),
-                y0 = multiply_add(planes[2], l.inverse.y, -l.scaled.y),
-                y1 = multiply_add(planes[3], l.inverse.y, -l.scaled.y),
-                z0 = multiply_add(planes[4], l.inverse.z, -l.scaled.z),
-                z1 = multiply_add(planes[5], l.inverse.z, -l.scaled.z);
-    near = greater(greater(lesser(x0, x1), lesser(y0, y1)), greater(lesser(z0, z1), l.tmin));
-    far = lesser(lesser(greater(x0, x1), greater(y0, y1)), lesser(greater(z0, z1), l.t));
-}
-
-/// Which children of a pair a ray meets, and whether the second is closer.
-struct PairVisit {
-    bool first, second, second_is_closer;
-};
-RAYDIX_HD static inline PairVisit meet_pair(const Lane& l, const NodePair& n) {
-    float near0, far0, near1, far1;
-    clip_to_box(l, {n.c0_xlo, n.c0_xhi, n.c0_ylo, n.c0_yhi, n.c0_zlo, n.c0_zhi}, near0, far0);
-    clip_to_box(l, {n.c1_xlo, n.c1_xhi, n.c1_ylo, n.c1_yhi, n.c1_zlo, n.c1_zhi}, near1, far1);
-    return {near0 <= far0, near1 <= far1, near1 < near0};
-}
-
 /// Both children are tested; the lane goes to the closer, and the other is set aside.
 RAYDIX_HD static inline void visit_node(Lane& l, const WarpScene& scene) {
     const NodePair n = scene.pairs[l.node];
     const PairVisit visit = meet_pair(l, n);
+#if defined(__CUDA_ARCH__)
     const bool both = visit.first & visit.second;
     const bool to_second = both ? visit.second_is_closer : visit.second;
     const std::int32_t closer = to_second ? n.child1 : n.child0;
     const std::int32_t other = to_second ? n.child0 : n.child1;
     l.aside = both ? other : finished_node;
     l.node = (visit.first | visit.second) ? closer : popped_node;
+#else
+    // The same by masks: compilers for the host make jumps of the choices, which nobody foresees.
+    const auto mask = [](bool is) { return -static_cast<std::int32_t>(is); };
+    const std::int32_t first = mask(visit.first), second = mask(visit.second),
+                       both = first & second,
+                       to_second = second & (mask(visit.second_is_closer) | ~first);
+    const std::int32_t differ = n.child0 ^ n.child1, closer = n.child0 ^ (differ & to_second);
+    l.aside = finished_node ^ ((finished_node ^ closer ^ differ) & both);
+    l.node = popped_node ^ ((popped_node ^ closer) & (first | second));
+#endif
 }
 
 RAYDIX_HD static inline void push(Lane& l) {
