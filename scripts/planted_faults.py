@@ -342,6 +342,8 @@ FAULTS = [
           "memory that nobody holds any more serves nothing", "exec layout"),
     Fault("src/exec/path_rates.h", "void share(const PathRates& other) { known_ = other.known_; }",
           "void share(const PathRates&) {}", "rates: a new frame knows nothing of the last one", "trace"),
+    Fault("src/exec/path_rates.h", "count == 1 && known(tried[0]) && cost(tried[0]) < near_cost * cost(best);",
+          "false;", "rates: ways that need many rays are judged by few", "trace"),
     Fault("src/engine/part_tree.cpp", "return wide_leaf_bit | child.first << 3 | (child.count - 1);",
           "return wide_leaf_bit | child.first << 3;", "scenes: only the first part of a leaf is seen", "engine"),
     Fault("src/engine/commit.cpp", "part.number = whole.number + below.number;", "part.number = below.number;",

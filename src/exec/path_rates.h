@@ -77,7 +77,7 @@ public:
 
 private:
     static constexpr std::size_t share_of_job = 8;
-    static constexpr float most_at_once = 16.0f;
+    static constexpr float most_at_once = 16.0f, near_cost = 1.2f;
     static constexpr std::uint32_t least_pause = 8, longest_pause = 1024;
     /// Of jobs that go another way as a whole: rays of one that is asked once should not suffer.
     static constexpr std::uint32_t whole_pause = 4;
@@ -117,18 +117,28 @@ private:
         std::size_t count = 0;
         for (const Way way : ways)
             if (job > 0 && way != best && is_due(way, job)) tried[count++] = way;
-        const std::size_t share =
-            std::min(std::max(least_share, rays / share_of_job), rays / (count + 1));
-        std::array<float, way_count> took;
-        for (std::size_t k = 0; k < count; ++k) {
-            took[k] = time_a_ray(tried[k], begin, begin + share, trace);
-            begin += share;
-        }
         if (count == 0) {
             trace(best, begin, end);
             return;
         }
-        const float main = time_a_ray(best, begin, end, trace);
+        // The fewer rays packets and streams get, the more each of them takes: a way that is not
+        // much slower by a small share gets half of the job.
+        const bool near = count == 1 && known(tried[0]) && cost(tried[0]) < near_cost * cost(best);
+        const std::size_t share =
+            near ? rays / 2
+                 : std::min(std::max(least_share, rays / share_of_job), rays / (count + 1));
+        // Who comes second finds in caches what the first one read.
+        const bool best_first = rounds_.fetch_add(1, std::memory_order_relaxed) % 2 != 0;
+        const auto next = [&](Way way, std::size_t share_rays) {
+            const std::size_t from = begin;
+            begin += share_rays;
+            return time_a_ray(way, from, begin, trace);
+        };
+        std::array<float, way_count> took;
+        float main = 0.0f;
+        if (best_first) main = next(best, rays - count * share);
+        for (std::size_t k = 0; k < count; ++k) took[k] = next(tried[k], share);
+        if (!best_first) main = next(best, end - begin);
         for (std::size_t k = 0; k < count; ++k) {
             add(tried[k], best, took[k] / main);
             pause(tried[k], best, job);
@@ -160,7 +170,7 @@ private:
         trace(best, begin, end);
     }
 
-    std::atomic<std::uint32_t> jobs_{0};
+    std::atomic<std::uint32_t> jobs_{0}, rounds_{0};
     std::array<std::atomic<float>, way_count> costs_{};  // 0: not known
     std::array<std::atomic<std::uint32_t>, way_count> due_{};
     std::array<std::atomic<std::uint8_t>, way_count> trials_{};

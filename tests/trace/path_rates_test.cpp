@@ -100,6 +100,24 @@ TEST(PathRates, MostRaysGoTheFastestWay) {
         }
 }
 
+TEST(PathRates, AWayThatNeedsManyRaysIsNotJudgedByFew) {
+    // 156 ns a ray in a share of 256, 112 in one of 1,024; the other one takes 130 always.
+    Rates rates;
+    constexpr PathWay two[] = {PathWay::turns, PathWay::packets};
+    std::size_t last = 0;
+    for (int job = 0; job < 200; ++job) {
+        last = 0;
+        rates.run(two, 0, 1024, [&](PathWay way, std::size_t begin, std::size_t end) {
+            const auto rays = static_cast<std::int64_t>(end - begin);
+            if (way == PathWay::packets) last += end - begin;
+            HandClock::passed +=
+                std::chrono::nanoseconds(way == PathWay::packets ? 98 * rays + 15000 : 130 * rays);
+        });
+    }
+    EXPECT_GE(last, 512u);
+    EXPECT_EQ(rates.fastest(two), PathWay::packets);
+}
+
 TEST(PathRates, TakesTheFastest) {
     for (const PathWay faster : three_ways) {
         Rates rates;
