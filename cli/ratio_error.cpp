@@ -74,18 +74,11 @@ Interval cost_range(const SimulationRow& a, const SimulationRow& b) {
 std::optional<double> paired_error(const SimulationRow& a, const SimulationRow& b,
                                    double SimulatedRates::*rate) {
     if (a.part_taken >= 1.0 && b.part_taken >= 1.0) return 0.0;
-    const std::size_t n = a.units.size();
-    if (n < 2 || b.units.size() != n) return std::nullopt;
-    double sum_a = 0, sum_b = 0, squares = 0;
-    for (std::size_t k = 0; k < n; ++k)
-        sum_a += 1.0 / (a.units[k].*rate), sum_b += 1.0 / (b.units[k].*rate);
-    for (std::size_t k = 0; k < n; ++k) {
-        const double left = 1.0 / (a.units[k].*rate) - sum_a / sum_b / (b.units[k].*rate);
-        squares += left * left;
-    }
-    const auto count = static_cast<double>(n);
-    const double mean = sum_a / count;
-    return std::sqrt(squares / (count - 1) / count * (1.0 - a.part_taken)) / mean;
+    if (a.units.size() < 2 || b.units.size() != a.units.size()) return std::nullopt;
+    std::vector<double> left = a.deviations(rate);
+    const std::vector<double> other = b.deviations(rate);
+    for (std::size_t k = 0; k < left.size(); ++k) left[k] -= other[k];
+    return error_of_mean(left, a.part_taken);
 }
 
 std::uint64_t warps_of(const Simulation& sum) {

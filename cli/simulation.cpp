@@ -130,21 +130,30 @@ SimulatedRates SimulationRow::rates() const {
     return out;
 }
 
+std::vector<double> SimulationRow::deviations(double SimulatedRates::*rate) const {
+    const std::size_t n = units.size();
+    const auto known = [&](std::size_t k) { return all ? all->time.at(k) : 1.0; };
+    double own = 0, beside = 0;
+    for (std::size_t k = 0; k < n; ++k) own += 1.0 / (units[k].*rate), beside += known(k);
+    const auto count = static_cast<double>(n);
+    std::vector<double> out;
+    for (std::size_t k = 0; k < n; ++k)
+        out.push_back(count / (units[k].*rate) / own - count * known(k) / beside);
+    return out;
+}
+
+double error_of_mean(std::span<const double> deviations, double part) {
+    double squares = 0;
+    for (const double deviation : deviations) squares += deviation * deviation;
+    const auto n = static_cast<double>(deviations.size());
+    return std::sqrt(squares / (n - 1) / n * (1.0 - part));
+}
+
 std::optional<double> SimulationRow::sampling_error() const {
     if (part_taken >= 1.0) return 0.0;
-    const std::size_t n = units.size();
-    if (n < 2) return std::nullopt;
-    // What a unit takes beside what it takes by while_while, or beside nothing.
-    const auto beside = [&](std::size_t k) { return all ? all->time.at(k) : 1.0; };
+    if (units.size() < 2) return std::nullopt;
     const auto error_of = [&](double SimulatedRates::*rate) {
-        double own = 0, other = 0, squares = 0;
-        for (std::size_t k = 0; k < n; ++k) own += 1.0 / (units[k].*rate), other += beside(k);
-        for (std::size_t k = 0; k < n; ++k) {
-            const double left = 1.0 / (units[k].*rate) - own / other * beside(k);
-            squares += left * left;
-        }
-        const auto count = static_cast<double>(n);
-        return std::sqrt(squares / (count - 1) / count * (1.0 - part_taken)) / (own / count);
+        return error_of_mean(deviations(rate), part_taken);
     };
     const double of_bound = error_of(&SimulatedRates::bound);
     return whole_launches ? std::max(of_bound, error_of(&SimulatedRates::scheduled)) : of_bound;
@@ -155,32 +164,47 @@ namespace {
 /// A sample of fewer launches says too little of its own error.
 constexpr std::size_t least_launches = 8;
 
-/// Traces every launch of the kind by while_while on the first machine. Goes on with what `end`
-/// keeps.
-std::shared_ptr<const LaunchTimes> times_of(const WarpTree& tree, const RayLaunches& launches,
-                                            const std::vector<SimulationRow>& rows,
-                                            const Json& figures, const SimulationEnd& end,
-                                            const CommonOptions& common) {
-    auto times = std::make_shared<LaunchTimes>();
-    if (end.state != nullptr) *times = end.state->restore_times(figures, rows);
-    SimulateOptions run = rows.front().options;
-    run.kernel = WarpKernel::while_while;
-    run.memory = false;
-    Progress progress(fmt::format("all {} launches by while_while", rows.front().rays), common);
+/// The cheapest kernel whose launches take more or less time as those of `kernel` do.
+WarpKernel kernel_like(WarpKernel kernel) {
+    const bool packets = kernel == WarpKernel::packet || kernel == WarpKernel::persistent_packet;
+    return packets ? WarpKernel::packet : WarpKernel::while_while;
+}
+
+/// Traces every launch of the kind by kernels that are like those of the rows, on the first
+/// machine. Goes on with what `end` keeps.
+void know_all_launches(const WarpTree& tree, const RayLaunches& launches, const Json& figures,
+                       const SimulationEnd& end, const CommonOptions& common,
+                       std::vector<SimulationRow>& rows) {
+    std::vector<std::shared_ptr<LaunchTimes>> known;
+    for (SimulationRow& row : rows) {
+        const WarpKernel kernel = kernel_like(row.options.kernel);
+        auto found = std::ranges::find(known, kernel, [](const auto& k) { return k->kernel; });
+        if (found == known.end()) {
+            known.push_back(std::make_shared<LaunchTimes>(kernel));
+            found = known.end() - 1;
+        }
+        row.all = *found;
+    }
+    std::vector<SimulateOptions> runs(known.size(), rows.front().options);
+    for (std::size_t k = 0; k < runs.size(); ++k)
+        runs[k].kernel = known[k]->kernel, runs[k].memory = false;
+    if (end.state != nullptr) end.state->restore_times(figures, rows, known);
+    Progress progress(fmt::format("all {} launches", rows.front().rays), common);
     launches.for_each(
         rows.front().kind,
         [&](const RayUnit& unit, double part) {
-            run.part_of_launch = unit.part;
-            const Simulation found =
-                simulate(tree, unit.rays, std::span(&run, 1), nullptr, common.threads).front();
-            const double bound = simulated_rates(found, run).bound;
-            times->time.push_back(bound > 0 ? 1.0 / bound : 0.0);
-            times->rays.push_back(static_cast<double>(unit.rays.size()));
-            if (end.state != nullptr) end.state->keep_times(figures, rows, *times);
+            for (SimulateOptions& run : runs) run.part_of_launch = unit.part;
+            const std::vector<Simulation> found =
+                simulate(tree, unit.rays, runs, nullptr, common.threads);
+            for (std::size_t k = 0; k < runs.size(); ++k) {
+                const double bound = simulated_rates(found[k], runs[k]).bound;
+                known[k]->time.push_back(bound > 0 ? 1.0 / bound : 0.0);
+                known[k]->rays.push_back(static_cast<double>(unit.rays.size()));
+            }
+            if (end.state != nullptr) end.state->keep_times(figures, rows, known);
             progress.show(part);
         },
-        [](double) { return true; }, times->time.size());
-    return times;
+        [](double) { return true; }, known.front()->time.size());
 }
 
 }  // namespace
@@ -208,10 +232,7 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
         figures = figures_of(input, rows, options, common.seed);
         done = end.state->restore(figures, rows);
     }
-    if (end.error >= 0) {
-        const auto all = times_of(tree, launches, rows, figures, end, common);
-        for (SimulationRow& row : rows) row.all = all;
-    }
+    if (end.error >= 0) know_all_launches(tree, launches, figures, end, common, rows);
     Progress progress(fmt::format("simulating {}", ray_kind_name(kind)), common);
     const auto visit = [&](const RayUnit& unit, double part) {
         add_unit(tree, unit, runs, rows, common);

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,11 +16,11 @@ namespace raydix::cli {
 
 class SimulationState;
 
-/// What every launch of a kind takes by while_while alone, a tenth of the work of all kernels: by
-/// it a sample of the launches is corrected (ratio estimator: Cochran, Sampling Techniques, 1977,
-/// chapter 6).
+/// What every launch of a kind takes by one cheap kernel: by it a sample of the launches is
+/// corrected (ratio estimator: Cochran, Sampling Techniques, 1977, chapter 6).
 struct LaunchTimes {
-    std::vector<double> time, rays;  // [launches], in the order of a sample: microseconds a ray
+    WarpKernel kernel;
+    std::vector<double> time = {}, rays = {};  // [launches], as sampled: microseconds a ray
 
     /// Rate over all launches, over the rate of the first `n`.
     [[nodiscard]] double correction(std::size_t n) const;
@@ -48,11 +49,17 @@ struct SimulationRow {
     [[nodiscard]] bool has_memory() const { return options.memory && whole_launches; }
     /// The lowest of bound, schedule and memory limits, as far as they are known.
     [[nodiscard]] SimulatedRates::Limit tightest() const;
+    /// [units] by how much a unit's time is off what is known of it beforehand, as a part of the
+    /// mean time. `rate`: the bound or another one.
+    [[nodiscard]] std::vector<double> deviations(double SimulatedRates::*rate) const;
     /// Relative standard error that comes from tracing a part of the rays only: of the bound or of
     /// the schedule, whichever is larger, after the correction. 0 if all were traced; nothing if
     /// there is only one unit.
     [[nodiscard]] std::optional<double> sampling_error() const;
 };
+
+/// Relative standard error of the mean of `deviations`, of units that are `part` of all.
+[[nodiscard]] double error_of_mean(std::span<const double> deviations, double part);
 
 /// When to end before all launches are done, and how to go on then.
 struct SimulationEnd {

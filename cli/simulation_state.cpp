@@ -129,16 +129,20 @@ std::size_t SimulationState::restore(const Json& figures, std::vector<Simulation
     }
 }
 
-LaunchTimes SimulationState::restore_times(const Json& figures,
-                                           const std::vector<SimulationRow>& rows) const {
+void SimulationState::restore_times(const Json& figures, const std::vector<SimulationRow>& rows,
+                                    AllTimes times) const {
     const Json* const part = part_of(figures, rows);
-    if (part == nullptr || !part->contains("all")) return {};
+    if (part == nullptr || !part->contains("all")) return;
     try {
-        LaunchTimes times;
-        for (const Json& launch : part->at("all"))
-            times.time.push_back(launch.at(0).get<double>()),
-                times.rays.push_back(launch.at(1).get<double>());
-        return times;
+        for (const auto& known : times) {
+            LaunchTimes read{known->kernel};
+            for (const Json& launch : part->at("all").at(warp_kernel_name(known->kernel)))
+                read.time.push_back(launch.at(0).get<double>()),
+                    read.rays.push_back(launch.at(1).get<double>());
+            if (read.time.size() != part->at("all").front().size())
+                throw InputError("kernels with different numbers of launches");
+            *known = std::move(read);
+        }
     } catch (const std::exception& error) {
         throw InputError(file_ + ": '" + part_name(rows) +
                          "' cannot be gone on with: " + error.what());
@@ -146,10 +150,13 @@ LaunchTimes SimulationState::restore_times(const Json& figures,
 }
 
 void SimulationState::keep_times(const Json& figures, const std::vector<SimulationRow>& rows,
-                                 const LaunchTimes& times) {
-    Json kept = Json::array();
-    for (std::size_t k = 0; k < times.time.size(); ++k)
-        kept.push_back({times.time[k], times.rays[k]});
+                                 AllTimes times) {
+    Json kept = Json::object();
+    for (const auto& known : times) {
+        Json& launches = kept[std::string(warp_kernel_name(known->kernel))] = Json::array();
+        for (std::size_t k = 0; k < known->time.size(); ++k)
+            launches.push_back({known->time[k], known->rays[k]});
+    }
     Json& part = document_["parts"][part_name(rows)];
     part["of"] = figures, part["all"] = kept;
     write();

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,12 +26,12 @@ public:
     /// Puts what is kept of `figures` into rows that are new; how many launches that was. Throws
     /// InputError if what is kept of scene, builder and kind depends on something else.
     [[nodiscard]] std::size_t restore(const Json& figures, std::vector<SimulationRow>& rows) const;
+    using AllTimes = std::span<const std::shared_ptr<LaunchTimes>>;
     /// The same of what all launches take, as many as are done.
-    [[nodiscard]] LaunchTimes restore_times(const Json& figures,
-                                            const std::vector<SimulationRow>& rows) const;
+    void restore_times(const Json& figures, const std::vector<SimulationRow>& rows,
+                       AllTimes times) const;
     /// Throw InputError if the file cannot be written; the file before it stays.
-    void keep_times(const Json& figures, const std::vector<SimulationRow>& rows,
-                    const LaunchTimes& times);
+    void keep_times(const Json& figures, const std::vector<SimulationRow>& rows, AllTimes times);
     void keep(const Json& figures, const std::vector<SimulationRow>& rows, std::size_t launches);
 
 private:

@@ -294,7 +294,9 @@ class Traversal(ProgramTest):
         self.assertEqual(first["simulate"], again["simulate"])
         kept = json.loads((self.folder / "state.json").read_text(encoding="utf-8"))
         part = next(part for name, part in kept["parts"].items() if "diffuse" in name)  # ended before the sample began
-        del part["rows"], part["launches"], part["all"][3:]
+        del part["rows"], part["launches"]
+        for launches in part["all"].values():
+            del launches[3:]
         self.write("early.json", json.dumps(kept))
         self.assertEqual(first["simulate"], self.document(*arguments, "--state", "early.json", "--error", "1")["simulate"])
         rest = self.document(*arguments, "--state", "state.json")
@@ -319,9 +321,9 @@ class Traversal(ProgramTest):
             self.assertLess(p["part_taken"], 0.5)
             error = p["mrays_per_s_bound"] / w["mrays_per_s_bound"] - 1
             self.assertLess(abs(error), 6 * p["sampling_error"] + 1e-9)
-            if p["kernel"] == "while_while":  # its instructions are known of all launches
-                self.assertLess(abs(error), 1e-6 if p["machine"] == "gtx285" else 1e-2)
-                self.assertGreater(abs(p["correction"] - 1), 1e-3)
+            self.assertGreater(abs(p["correction"] - 1), 1e-3)
+            # Of these, or of those that are much like them, the instructions of all launches are known.
+            self.assertLess(abs(error), 1e-6 if (p["kernel"], p["machine"]) == ("while_while", "gtx285") else 1e-2)
 
     def test_published_figures_of_the_papers_scenes(self):
         mesh = pathlib.Path(self.write("conference_copy.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
