@@ -28,8 +28,9 @@ public:
     /// Rays begin to end - 1 of a job, by trace(way, begin, end). `ways`: those that there are, not
     /// more than four, in the order of promise. Most jobs go the fastest way known. In a trial some
     /// rays go another way, and both are timed side by side: what rays take differs from place to
-    /// place. These are at least `least_share` rays, enough to tell, or an eighth. A job too small
-    /// to be divided goes the other way as a whole, and the next one is timed beside it.
+    /// place. These are at least `least_share` rays, enough to tell, or an eighth; of a job of
+    /// fewer than twice as many a quarter, and every fourth such job tries one way. A job of fewer
+    /// than 128 rays goes the other way as a whole, and the next one is timed beside it.
     template <class Trace>
     void run(std::span<const Way> ways, std::size_t begin, std::size_t end, const Trace& trace,
              std::size_t least_share = 256) {
@@ -38,7 +39,7 @@ public:
         const std::size_t rays = end - begin;
         if (ways.size() < 2 || rays == 0) {
             if (rays != 0) trace(best, begin, end);
-        } else if (rays < 2 * least_share) {
+        } else if (rays < least_to_divide) {
             run_whole(ways, best, job, begin, end, trace);
         } else {
             run_divided(ways, best, job, begin, end, trace, least_share);
@@ -81,6 +82,7 @@ private:
     static constexpr std::uint32_t least_pause = 8, longest_pause = 1024;
     /// Of jobs that go another way as a whole: rays of one that is asked once should not suffer.
     static constexpr std::uint32_t whole_pause = 4;
+    static constexpr std::size_t least_to_divide = 128;
 
     static std::size_t index(Way way) { return static_cast<std::size_t>(way); }
     [[nodiscard]] float cost(Way way) const {
@@ -112,11 +114,14 @@ private:
     void run_divided(std::span<const Way> ways, Way best, std::uint32_t job, std::size_t begin,
                      std::size_t end, const Trace& trace, std::size_t least_share) {
         const std::size_t rays = end - begin;
+        const bool small = rays < 2 * least_share;
         // The first job finds memory as it was.
+        const bool may_try = small ? job % whole_pause == whole_pause - 1 : job > 0;
         std::array<Way, way_count> tried;
         std::size_t count = 0;
         for (const Way way : ways)
-            if (job > 0 && way != best && is_due(way, job)) tried[count++] = way;
+            if (may_try && !(small && count > 0) && way != best && is_due(way, job))
+                tried[count++] = way;
         if (count == 0) {
             trace(best, begin, end);
             return;
@@ -125,8 +130,9 @@ private:
         // much slower by a small share gets half of the job.
         const bool near = count == 1 && known(tried[0]) && cost(tried[0]) < near_cost * cost(best);
         const std::size_t share =
-            near ? rays / 2
-                 : std::min(std::max(least_share, rays / share_of_job), rays / (count + 1));
+            near    ? rays / 2
+            : small ? rays / 4
+                    : std::min(std::max(least_share, rays / share_of_job), rays / (count + 1));
         // Who comes second finds in caches what the first one read.
         const bool best_first = rounds_.fetch_add(1, std::memory_order_relaxed) % 2 != 0;
         const auto next = [&](Way way, std::size_t share_rays) {
@@ -141,7 +147,7 @@ private:
         if (!best_first) main = next(best, end - begin);
         for (std::size_t k = 0; k < count; ++k) {
             add(tried[k], best, took[k] / main);
-            pause(tried[k], best, job);
+            pause(tried[k], best, job, small ? whole_pause : 1);
         }
     }
 

@@ -29,8 +29,9 @@ results = plots.Results(plots.documents())
 
 class Al09(unittest.TestCase):
     def test_tables_are_those_of_the_results(self):
-        page = PAGE.read_text(encoding="utf-8")
-        self.assertEqual(page, plots.page_text(page, results), "run scripts/plot-al09")
+        for file, tables in ((PAGE, plots.parts(results)), (plots.COSTS_PAGE, plots.cost_parts(results))):
+            page = file.read_text(encoding="utf-8")
+            self.assertEqual(page, plots.page_text(page, tables), "run scripts/plot-al09")
 
     def test_published_rates_of_sibenik_lie_below_the_tightest_limit(self):
         rows = {key[1:]: results.place(key) for key in results.published if key[0] == "sibenik"}

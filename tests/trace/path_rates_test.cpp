@@ -101,7 +101,7 @@ TEST(PathRates, MostRaysGoTheFastestWay) {
 }
 
 TEST(PathRates, AWayThatNeedsManyRaysIsNotJudgedByFew) {
-    // 156 ns a ray in a share of 256, 112 in one of 1,024; the other one takes 130 always.
+    // 156 ns a ray in a share of 256, 112 in one of 1,024; the other one takes 135 always.
     Rates rates;
     constexpr PathWay two[] = {PathWay::turns, PathWay::packets};
     std::size_t last = 0;
@@ -111,11 +111,25 @@ TEST(PathRates, AWayThatNeedsManyRaysIsNotJudgedByFew) {
             const auto rays = static_cast<std::int64_t>(end - begin);
             if (way == PathWay::packets) last += end - begin;
             HandClock::passed +=
-                std::chrono::nanoseconds(way == PathWay::packets ? 98 * rays + 15000 : 130 * rays);
+                std::chrono::nanoseconds(way == PathWay::packets ? 98 * rays + 15000 : 135 * rays);
         });
     }
     EXPECT_GE(last, 512u);
     EXPECT_EQ(rates.fastest(two), PathWay::packets);
+}
+
+TEST(PathRates, ASmallJobTriesAnotherWayOnAQuarterOfItsRays) {
+    Rates rates;
+    Costs costs{100, 400, 400, 400};
+    std::size_t tried = 0;
+    for (int job = 0; job < 40; ++job)
+        for (const Share& share : shares_of(rates, three_ways, 200, costs))
+            if (share.way != PathWay::packets) {
+                EXPECT_EQ(share.end - share.begin, 50u);
+                ++tried;
+            }
+    EXPECT_GE(tried, 4u);
+    EXPECT_LE(tried, 10u);
 }
 
 TEST(PathRates, TakesTheFastest) {

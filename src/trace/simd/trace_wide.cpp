@@ -76,6 +76,7 @@ struct Plan {
     const WideBvh& tree;
     BatchLook look;
     bool automatic, learns, streams, counted;
+    bool few;  // so few rays that nothing but one after the other can be worth a trial
 
     /// `streams`: whether they can answer. `any`: what is asked.
     Plan(const WideBvh& through, std::span<const Ray> rays, const TraceOptions& options, bool any,
@@ -86,7 +87,8 @@ struct Plan {
           // Counters are those of one way: they do not depend on times.
           learns(automatic && !options.counters),
           streams(can_stream),
-          counted(options.counters) {
+          counted(options.counters),
+          few(rays.size() < 32) {
         if (automatic) look = look_at(tree.arrays().bounds, rays);
         look.kind.any = any;
     }
@@ -112,18 +114,29 @@ struct Plan {
 
     /// Of jobs in this order.
     [[nodiscard]] JobWays ways(RayOrder order) const {
-        PathWay first = way_of(look.path);
-        if (look.path == SimdPath::sorted && order == RayOrder::given) first = PathWay::turns;
+        const bool apart = look.path == SimdPath::sorted && order == RayOrder::given;
+        PathWay first = apart ? PathWay::turns : way_of(look.path);
         // Rays from one place are often those of a coarse picture, which packets suit.
         if (!streams && first == PathWay::streams)
             first = automatic ? PathWay::packets : PathWay::turns;
+        // Streams of so few rays have hardly two in a node, and even fewer hardly take turns.
+        const bool small = learns && look.kind.size < 2;
+        const bool tiny = learns && streams && look.kind.size == 0;
+        if (small && first == PathWay::streams) first = PathWay::turns;
         JobWays ways;
+        if (tiny && few && first != PathWay::packets) {
+            ways.add(PathWay::alone);
+            return ways;
+        }
         ways.add(first);
         if (!learns) return ways;
+        const auto may_be_best = [&](PathWay way) {
+            if (way == PathWay::packets) return !(tiny && apart);
+            return way != PathWay::streams || (streams && !small);
+        };
         for (const PathWay way : {PathWay::packets, PathWay::turns, PathWay::streams})
-            if (way != first && (streams || way != PathWay::streams)) ways.add(way);
-        // So few rays hardly take turns.
-        if (streams && look.kind.size == 0) ways.add(PathWay::alone);
+            if (way != first && may_be_best(way)) ways.add(way);
+        if (tiny) ways.add(PathWay::alone);
         BatchKind kind = look.kind;
         kind.sorted = order == RayOrder::sorted;
         ways.rates = &tree.arrays().rates.ways(kind);
@@ -408,7 +421,8 @@ bool passes_by(const Aabb& box, const Ray& ray) {
 
 BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
     const FloatEnvironment plain;
-    constexpr std::size_t window = 64;
+    constexpr std::size_t largest_window = 64;
+    const std::size_t window = std::min(largest_window, rays.size());
     constexpr float small_angle = 0.25f, wide_angle = 1.0f, small_part = 0.05f;
     constexpr float parts[] = {0.002f, 0.01f, small_part}, angles[] = {small_angle, wide_angle};
     const Vec3 size = bounds.hi - bounds.lo;
@@ -418,7 +432,7 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
     std::size_t looked_at = 0, coherent = 0, close = 0, apart = 0, spread = 0, odd = 0, passing = 0;
     for (std::size_t w = 0; w < windows; ++w) {
         const std::size_t begin = rays.size() / windows * w;
-        if (begin + window > rays.size()) break;
+        if (window == 0 || begin + window > rays.size()) break;
         Aabb origins = empty_box(), directions = empty_box();
         for (const Ray& ray : rays.subspan(begin, window)) {
             if (!is_valid(ray)) continue;
@@ -431,7 +445,7 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
         }
         ++looked_at;
         for (std::size_t k = 0; k < put_to_bounds; ++k)
-            passing += passes_by(bounds, rays[begin + k * (window / put_to_bounds)]);
+            passing += passes_by(bounds, rays[begin + k * window / put_to_bounds]);
         const Vec3 o = origins.hi - origins.lo, d = directions.hi - directions.lo;
         const float from = max_of(max_of(o.x, o.y), o.z), to = max_of(max_of(d.x, d.y), d.z);
         const bool here = from <= small_part * longest_side;
