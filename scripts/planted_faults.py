@@ -495,6 +495,6 @@ FAULTS = [
     Fault("src/exec/job_blocks.h", "return ends_.empty() ? std::min((b + 1) * block_, n_) : ends_[b];",
           "return ends_.empty() ? (b + 1) * block_ : ends_[b];", "jobs: the last block ends behind the last ray", "exec"),
     Fault("src/exec/job_blocks.h", "(n - end) / (2 * threads)", "n / (2 * threads)", "jobs: the last ones are as large as the first", "exec"),
-    Fault("src/trace/simd/turns.h", "hn::Set(f4, 1.0f + 0x1p-20f)), f4, half_)", "hn::Set(f4, 0.99f)), f4, half_)",
+    Fault("src/trace/simd/single_frames.h", "half * (1.0f + 0x1p-20f)", "half * 0.99f",
           "rays near a side of the bounds count as passing by", "trace"),
 ]

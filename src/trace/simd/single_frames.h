@@ -19,7 +19,8 @@ namespace raydix::HWY_NAMESPACE {
 /// Frames of the rays of a tree, in their order.
 class SingleFrames {
 public:
-    explicit SingleFrames(const WideView& tree) : tree_(tree) {}
+    /// `passing`: whether to find out which rays pass the tree's bounds by.
+    SingleFrames(const WideView& tree, bool passing) : tree_(tree), passing_(passing) {}
 
     /// rays[index[k]] for k < lanes16.
     HWY_INLINE void fill(const Ray* rays, const std::int32_t* index) {
@@ -57,15 +58,16 @@ public:
             plain = hn::And(plain, hn::Le(hn::Add(hn::Abs(near[a]), hn::Abs(far[a])), most));
         }
         careful_ = ~bits_of(f16, plain);
+        const V16 tmin = hn::IfThenElseZero(hn::Gt(ray.place[3], zero), ray.place[3]),
+                  tmax = hn::Min(ray.way[3], most);
+        if (passing_) pass_by_ = bits_of(f16, pass_by(inverse, near, far, tmin, tmax)) & ~careful_;
         // The two axes behind kz; they change places where the ray goes backward.
         const V16 way = by_axis(ray.way[0], ray.way[1], ray.way[2]),
                   first = by_axis(ray.way[1], ray.way[2], ray.way[0]),
                   second = by_axis(ray.way[2], ray.way[0], ray.way[1]);
         const auto backward = hn::Lt(way, zero);
         const V16 last[4] = {hn::Div(hn::IfThenElse(backward, second, first), way),
-                             hn::Div(hn::IfThenElse(backward, first, second), way),
-                             hn::IfThenElseZero(hn::Gt(ray.place[3], zero), ray.place[3]),
-                             hn::Min(ray.way[3], most)};
+                             hn::Div(hn::IfThenElse(backward, first, second), way), tmin, tmax};
         origin[3] = inverse[3] = near_pad[3] = near[3] = far[3] = none;
         const V16 direction[4] = {ray.way[0], ray.way[1], ray.way[2], none};
         store(origin, &SingleFrame::origin);
@@ -88,7 +90,25 @@ public:
         return true;
     }
 
+    /// Whether ray k passes the bounds by; false for some that do.
+    [[nodiscard]] HWY_INLINE bool passes_by(std::size_t k) const {
+        return (pass_by_ >> k & 1) != 0 && static_cast<std::uint32_t>(codes_[k]) != odd_ray_class;
+    }
+
 private:
+    /// Rays that pass the root's bounds by, widened as boxes of nodes are.
+    HWY_INLINE hn::Mask<F16> pass_by(const V16 (&inverse)[4], const V16 (&near)[4],
+                                     const V16 (&far)[4], V16 tmin, V16 tmax) const {
+        V16 in = tmin, out = tmax;
+        for (int a = 0; a < 3; ++a) {
+            const float half = max_of(tree_.hi[a] - tree_.middle[a], tree_.middle[a] - tree_.lo[a]);
+            const V16 reach = hn::Mul(hn::Abs(inverse[a]),
+                                      hn::Set(f16, half * (1.0f + 0x1p-20f)));  // and its rounding
+            in = hn::Max(in, hn::Sub(near[a], reach)), out = hn::Min(out, hn::Add(far[a], reach));
+        }
+        return hn::Gt(in, out);
+    }
+
     HWY_INLINE void store(const V16 (&from)[4], float (SingleFrame::*to)[4]) {
         store_quads(from, [&](std::size_t l) { return frames_[l].*to; });
     }
@@ -104,6 +124,8 @@ private:
     }
 
     const WideView& tree_;
+    const bool passing_;
+    std::uint32_t pass_by_ = 0;
     SingleFrame frames_[lanes16];
     HWY_ALIGN std::int32_t codes_[lanes16];
     std::uint32_t careful_ = 0;

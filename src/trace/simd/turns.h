@@ -99,12 +99,7 @@ class RayTurns {
     static constexpr bool any = wants_any(query), all = query == Wanted::all;
 
 public:
-    RayTurns(const SimdJob& job, SimdCounts& counts) : job_(job), counts_(counts) {
-        const V4 middle = hn::Load(f4, job.tree.middle),
-                 half = hn::Max(hn::Sub(hn::Load(f4, job.tree.hi), middle),
-                                hn::Sub(middle, hn::Load(f4, job.tree.lo)));
-        hn::Store(hn::Mul(half, hn::Set(f4, 1.0f + 0x1p-20f)), f4, half_);  // and its rounding
-    }
+    RayTurns(const SimdJob& job, SimdCounts& counts) : job_(job), counts_(counts) {}
 
     void trace() {
         std::array<Turn, rays_in_turn> turns{};
@@ -150,13 +145,16 @@ private:
             if (k == 0) read_ahead();
             ++next_;
             turn.i = static_cast<std::size_t>(index_[k]);
+            if (frames_.passes_by(k)) {
+                set(turn.i, {});
+                continue;
+            }
             if (frames_.take(k, turn.frame) ||
                 fill_frame(job_.tree, job_.rays[turn.i], turn.frame)) {
                 turn.ray->stand_for(static_cast<std::uint32_t>(turn.i));
                 if constexpr (wants_accepted(query))
                     turn.ray->check_by(*job_.check, job_.rays + turn.i);
-                if ((!job_.passing || meets_bounds(turn.frame)) && turn.ray->begin(turn.frame.tmax))
-                    return true;
+                if (turn.ray->begin(turn.frame.tmax)) return true;
             } else {
                 ++counts_.invalid;
             }
@@ -174,16 +172,6 @@ private:
             for (std::size_t l = 0; l < lanes16; ++l)
                 ask_for_ray(job_.order[std::min(next_ + l + lanes16, job_.n - 1)]);
         frames_.fill(job_.rays, index_);
-    }
-    /// False only for rays that pass the root's bounds by, widened as boxes of nodes are.
-    HWY_INLINE bool meets_bounds(const SingleFrame& frame) const {
-        if (frame.careful) return true;
-        const V4 reach = hn::Mul(hn::Abs(hn::Load(f4, frame.inverse)), hn::Load(f4, half_));
-        alignas(16) float in[4], out[4];
-        hn::Store(hn::Sub(hn::Load(f4, frame.near), reach), f4, in);
-        hn::Store(hn::Add(hn::Load(f4, frame.far), reach), f4, out);
-        return max_of(max_of(in[0], in[1]), max_of(in[2], frame.tmin)) <=
-               min_of(min_of(out[0], out[1]), min_of(out[2], frame.tmax));
     }
     /// In an order of their own rays and hits lie anywhere.
     HWY_INLINE void ask_for_ray(std::size_t i) const {
@@ -218,8 +206,7 @@ private:
     SimdCounts& counts_;
     std::size_t next_ = 0;
     HWY_ALIGN std::int32_t index_[lanes16];  // of the rays in frames_
-    SingleFrames frames_{job_.tree};
-    alignas(16) float half_[4];  // of the root's sides
+    SingleFrames frames_{job_.tree, job_.passing};
 };
 
 inline void single(const SimdJob& job, SimdCounts& counts) {
