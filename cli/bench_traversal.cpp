@@ -355,16 +355,18 @@ void add_traversal_suite(CLI::App& bench) {
                      "Timed launches with --device cuda, opencl or hip")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
-    command
-        ->add_option("--error", options->error,
-                     "Ends a kind of rays when no sampling error is larger, 0.02 for 2 % (default: "
-                     "when all of --sample is traced)")
-        ->check(finite_number(false))
-        ->check(CLI::Range(0.0, 1.0));
+    CLI::Option* const error =
+        command
+            ->add_option("--error", options->error,
+                         "Ends a kind of rays when no sampling error is larger, 0.02 for 2 %; "
+                         "packet and while_while trace all launches first, for a correction")
+            ->check(finite_number(false))
+            ->check(CLI::Range(0.0, 1.0));
     command->add_option("--state", options->state_file,
                         "Keeps what has been counted in this file after each launch, and goes on "
                         "with what it holds");
     add_launch_options(*command, options->launches);
+    error->excludes(command->get_option("--sample"));  // of the rest nothing would be known
     options->tree.builder = "split";
     options->tree.max_leaf = 8;
     add_tree_options(*command, options->tree);

@@ -126,7 +126,8 @@ RatioFound rate_ratio(const SimulationRow& a, const SimulationRow& b, Figure fig
     found.ratio =
         instructions
             ? static_cast<double>(a.sum.instructions) / static_cast<double>(a.sum.rays) /
-                  (static_cast<double>(b.sum.instructions) / static_cast<double>(b.sum.rays))
+                  (static_cast<double>(b.sum.instructions) / static_cast<double>(b.sum.rays)) *
+                  b.correction() / a.correction()
             : x.*rate / (y.*rate);
     const std::optional<double> error = paired_error(a, b, rate);
     if (!error) {

@@ -51,6 +51,8 @@ public:
         const std::function<bool(double)>& more = [](double) { return true; },
         std::size_t done = 0) const;
 
+    /// Launches of a kind, traced or not.
+    [[nodiscard]] std::size_t count(RayKind kind) const { return launches_of(kind).size(); }
     [[nodiscard]] float ao_radius() const { return ao_radius_; }
     [[nodiscard]] std::size_t cameras() const { return views_.size(); }
 

@@ -180,7 +180,7 @@ void know_all_launches(const WarpTree& tree, const RayLaunches& launches, const 
         const WarpKernel kernel = kernel_like(row.options.kernel);
         auto found = std::ranges::find(known, kernel, [](const auto& k) { return k->kernel; });
         if (found == known.end()) {
-            known.push_back(std::make_shared<LaunchTimes>(kernel));
+            known.push_back(std::make_shared<LaunchTimes>(LaunchTimes{kernel}));
             found = known.end() - 1;
         }
         row.all = *found;
@@ -232,7 +232,9 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
         figures = figures_of(input, rows, options, common.seed);
         done = end.state->restore(figures, rows);
     }
-    if (end.error >= 0) know_all_launches(tree, launches, figures, end, common, rows);
+    const std::size_t count = launches.count(kind);
+    if (end.error >= 0 && done < count && count > least_launches)
+        know_all_launches(tree, launches, figures, end, common, rows);
     Progress progress(fmt::format("simulating {}", ray_kind_name(kind)), common);
     const auto visit = [&](const RayUnit& unit, double part) {
         add_unit(tree, unit, runs, rows, common);

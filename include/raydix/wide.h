@@ -117,7 +117,7 @@ TraceCounts trace_any(const WideBvh& tree, std::span<const Ray> rays,
                                 const TraceOptions& options = {});
 
 /// The path that `automatic` takes; large batches without counters may also try packets in place of
-/// streams. It is judged by a few windows of 64 rays, evenly spread: packets if in most of them
+/// streams. It is judged by a few windows of up to 64, evenly spread: packets if in most of them
 /// origins and directions lie close together, streams if only origins do, else sorted.
 [[nodiscard]] SimdPath choose_simd_path(const WideBvh& tree, std::span<const Ray> rays);
 

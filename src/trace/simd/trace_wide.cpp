@@ -267,7 +267,8 @@ void place_in_tree(Hit& hit) { place_hit(hit, 0); }
 /// Largest jobs, one after the other, in the caller's floating-point environment.
 void trace_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
                           std::uint8_t* occluded) {
-    const PathWay way = way_of(choose_simd_path(tree, rays));
+    PathWay way = way_of(choose_simd_path(tree, rays));
+    if (way == PathWay::streams && BatchKind::size_of(rays.size()) < 2) way = PathWay::turns;
     const Batch batch{tree, simd_kernels().front(), rays, hits, occluded, false};
     SimdCounts counts;
     for (std::size_t begin = 0; begin < rays.size(); begin += max_job_rays)

@@ -5,12 +5,13 @@
 #include <cmath>
 #include <cstddef>
 
+#include "base/device_words.h"
 #include "base/hd.h"
 #include "base/math.h"
 #include "trace/warp/lane.h"
 
 // Static: this is compiled for several instruction sets (lane.h).
-#if defined(__FMA__) && defined(__SSE4_1__) && !defined(__CUDACC__)
+#if defined(__FMA__) && defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(RAYDIX_DEVICE_PASS)
 #define RAYDIX_PAIRS_BY_VECTORS
 #include <immintrin.h>
 

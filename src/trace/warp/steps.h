@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "base/device_words.h"
 #include "base/hd.h"
 #include "base/math.h"
 #include "trace/warp/lane.h"
@@ -85,7 +86,7 @@ RAYDIX_HD static inline void store_hit(Lane& l, const RayLaunch& launch) {
 RAYDIX_HD static inline void visit_node(Lane& l, const WarpScene& scene) {
     const NodePair n = scene.pairs[l.node];
     const PairVisit visit = meet_pair(l, n);
-#if defined(__CUDA_ARCH__)
+#if defined(RAYDIX_DEVICE_PASS)
     const bool both = visit.first & visit.second;
     const bool to_second = both ? visit.second_is_closer : visit.second;
     const std::int32_t closer = to_second ? n.child1 : n.child0;
