@@ -22,11 +22,11 @@ std::uint32_t cost(const std::vector<OperationCost>& costs, std::string_view ker
 
 TEST(DerivedCosts, OfANodeByHand) {
     // 12 multiply-adds, 24 minima and maxima, 4 loads and their address, 12 comparisons, selections
-    // and the like.
+    // and the like, a branch.
     for (const std::string_view kernel : {"while_while", "if_if", "dynamic_fetch"}) {
-        EXPECT_EQ(cost(gt200_costs(), kernel, "visit_node"), 12u + 24 + 4 + 1 + 12);
-        EXPECT_EQ(cost(fermi_costs(), kernel, "visit_node"), 12u + 24 + 4 + 1 + 12);
-        EXPECT_EQ(cost(kepler_costs(), kernel, "visit_node"), 12u + 16 + 4 + 1 + 12);
+        EXPECT_EQ(cost(gt200_costs(), kernel, "visit_node"), 12u + 24 + 4 + 1 + 12 + 1);
+        EXPECT_EQ(cost(fermi_costs(), kernel, "visit_node"), 12u + 24 + 4 + 1 + 12 + 1);
+        EXPECT_EQ(cost(kepler_costs(), kernel, "visit_node"), 12u + 16 + 4 + 1 + 12 + 1);
     }
 }
 
@@ -35,6 +35,16 @@ TEST(DerivedCosts, ChargeTheConditionsOfIfIf) {
         // Three comparisons, three branches, two notes of where lanes meet again.
         EXPECT_EQ(cost(costs, "if_if", "main_loop"), 8u);
         EXPECT_EQ(cost(costs, "while_while", "node_loop"), 2u);
+    }
+}
+
+TEST(DerivedCosts, ALoopWrittenOverTwoLinesCostsAllOfItself) {
+    for (const auto& costs : {gt200_costs(), fermi_costs(), kepler_costs()}) {
+        // Which lanes take part: an and, a branch, a note of where they meet. Whether there is
+        // another triangle: two comparisons and the branch back.
+        EXPECT_EQ(cost(costs, "persistent_packet", "leaf_loop"), 6u);
+        // Whether a first leaf was found: two comparisons, a branch; the branch back.
+        EXPECT_EQ(cost(costs, "persistent_speculative_while_while", "node_loop"), 4u);
     }
 }
 
