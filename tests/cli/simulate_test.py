@@ -316,7 +316,7 @@ class Traversal(ProgramTest):
                      "--builder", "split", "--quiet")
         whole = self.document(*arguments)["simulate"]
         part = self.document(*arguments, "--error", "0.9")["simulate"]
-        self.fail_with_one_line(*arguments, "--error", "0.9", "--sample", "0.5", names=["--error", "--sample"])
+        self.fail_with_usage(*arguments, "--error", "0.9", "--sample", "0.5", names=["--error", "--sample"])
         for w, p in zip(whole, part, strict=True):
             self.assertEqual(w["correction"], 1)
             self.assertLess(p["part_taken"], 0.5)
