@@ -55,6 +55,9 @@ void (*job_of(const SimdKernels& kernels, PathWay way))(const SimdJob&, SimdCoun
     return way == PathWay::packets ? kernels.packets : kernels.streams;
 }
 
+/// BatchKind::size from which on rays may stream: fewer have hardly two in a node.
+constexpr std::uint32_t least_size_to_stream = 2;
+
 PathWay way_of(SimdPath path) {
     if (path == SimdPath::single) return PathWay::turns;
     return path == SimdPath::packet ? PathWay::packets : PathWay::streams;
@@ -119,8 +122,8 @@ struct Plan {
         // Rays from one place are often those of a coarse picture, which packets suit.
         if (!streams && first == PathWay::streams)
             first = automatic ? PathWay::packets : PathWay::turns;
-        // Streams of so few rays have hardly two in a node, and even fewer hardly take turns.
-        const bool small = learns && look.kind.size < 2;
+        const bool small = learns && look.kind.size < least_size_to_stream;
+        // So few hardly take turns.
         const bool tiny = learns && streams && look.kind.size == 0;
         if (small && first == PathWay::streams) first = PathWay::turns;
         JobWays ways;
@@ -268,7 +271,8 @@ void place_in_tree(Hit& hit) { place_hit(hit, 0); }
 void trace_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
                           std::uint8_t* occluded) {
     PathWay way = way_of(choose_simd_path(tree, rays));
-    if (way == PathWay::streams && BatchKind::size_of(rays.size()) < 2) way = PathWay::turns;
+    if (way == PathWay::streams && BatchKind::size_of(rays.size()) < least_size_to_stream)
+        way = PathWay::turns;
     const Batch batch{tree, simd_kernels().front(), rays, hits, occluded, false};
     SimdCounts counts;
     for (std::size_t begin = 0; begin < rays.size(); begin += max_job_rays)
