@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <raydix/error.h>
 
-#include <array>
 #include <cmath>
 
 #include "hierarchy_bench.h"
@@ -10,19 +9,10 @@
 namespace raydix::cli {
 namespace {
 
-constexpr std::array<std::pair<const char*, double BuildMs::*>, 7> stages{
-    {{"bounds", &BuildMs::bounds},
-     {"codes", &BuildMs::codes},
-     {"sort", &BuildMs::sort},
-     {"hierarchy", &BuildMs::hierarchy},
-     {"layout", &BuildMs::layout},
-     {"fit", &BuildMs::fit},
-     {"total", &BuildMs::total}}};
-
 void print_head(const std::string& scene, int bits) {
     fmt::print("\n{}, {} bits: whole builds into kept memory, ms\n{:<18} {:>8}", scene, bits,
                "builder", "threads");
-    for (const auto& [stage, member] : stages) fmt::print(" {:>9}", stage);
+    for (const auto& [stage, member] : build_stages) fmt::print(" {:>9}", stage);
     fmt::print("\n");
 }
 
@@ -44,7 +34,7 @@ std::vector<BuildMs> rebuilds(const Mesh& mesh, const BuildOptions& build, int r
 
 Json one_build(const std::vector<BuildMs>& times, bool print) {
     Json all = Json::object();
-    for (const auto& stage : stages) {
+    for (const auto& stage : build_stages) {
         std::vector<double> values;
         for (const BuildMs& ms : times) values.push_back(ms.*stage.second);
         all[stage.first] = times.empty() ? Json(nullptr) : spread_json(spread_of(values));

@@ -43,9 +43,9 @@ Json json_of(const Judged& j) {
 }
 
 /// The rows of one scene, one thread.
-class Scene {
+class SceneRuns {
 public:
-    Scene(const std::vector<StudiedRow>& rows, std::string name) : name_(std::move(name)) {
+    SceneRuns(const std::vector<StudiedRow>& rows, std::string name) : name_(std::move(name)) {
         for (const StudiedRow& row : rows)
             if (row.scene == name_ && row.run.refusal.empty() && row.run.keys > 1 &&
                 row.run.threads == rows.front().run.threads)
@@ -104,7 +104,7 @@ HierarchyRun part_of(const HierarchyRun& run, std::string_view prefix) {
     return part;
 }
 
-void same_tree(const Scene& scene, Json& out) {
+void same_tree(const SceneRuns& scene, Json& out) {
     std::set<std::string> digests;
     std::size_t builds = 0;
     for (const HierarchyRun* run : scene.runs())
@@ -118,7 +118,7 @@ void same_tree(const Scene& scene, Json& out) {
                            static_cast<double>(digests.size()), 0, 1, 1}));
 }
 
-void scaling(const Scene& scene, const MeasuredCosts& costs, Json& out) {
+void scaling(const SceneRuns& scene, const MeasuredCosts& costs, Json& out) {
     const HierarchyRun *ours = scene.find(own), *levels = scene.find(by_levels);
     if (ours == nullptr || levels == nullptr) return;
     for (const Machine& machine : machines_of(costs)) {
@@ -159,7 +159,7 @@ void linear_work(const std::vector<StudiedRow>& rows, Json& out) {
                            double(part_of(*most, "karras.").launches.size()), 0, 1, 1}));
 }
 
-void boxes(const Scene& scene, const MeasuredCosts& costs, Json& out) {
+void boxes(const SceneRuns& scene, const MeasuredCosts& costs, Json& out) {
     const HierarchyRun *pass = scene.find(one_pass), *levels = scene.find(pass_a_level);
     if (pass == nullptr || levels == nullptr) return;
     const HierarchyRun pass_boxes = part_of(*pass, "fit."), level_boxes = part_of(*levels, "fit.");
@@ -175,7 +175,7 @@ void boxes(const Scene& scene, const MeasuredCosts& costs, Json& out) {
 }
 
 /// Another scene of the same size: the published figure over ours must be about 1.
-void turbine_blade(const Scene& scene, Json& out) {
+void turbine_blade(const SceneRuns& scene, Json& out) {
     const HierarchyRun* run = scene.find(own);
     if (run == nullptr || std::fabs(run->keys / 1.77e6 - 1) > 0.05) return;
     const LaunchMachine machine = study_machines().front();
@@ -198,7 +198,7 @@ Json hierarchy_claims(const std::vector<StudiedRow>& rows, const MeasuredCosts& 
             scenes.push_back(row.scene);
     Json claims = Json::array();
     for (const std::string& name : scenes) {
-        const Scene scene(rows, name);
+        const SceneRuns scene(rows, name);
         same_tree(scene, claims);
         scaling(scene, costs, claims);
         boxes(scene, costs, claims);

@@ -86,8 +86,9 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->check(CLI::Range(1, 255))
         ->capture_default_str();
     of_the_build(command.add_option("--reinsertion-rounds", options.reinsertion_rounds,
-                                    "Then move large subtrees to better places, so often at most "
-                                    "(default: none, or those of --quality)"))
+                                    "Rounds of reinsertion after the build, 0 to 255. Each round "
+                                    "moves large subtrees to cheaper places and stops early when "
+                                    "none moves (default: none, or those of --quality)"))
         ->check(CLI::Range(0, 255))
         ->type_name("ROUNDS");
     of_the_build(command.add_option("--max-level", options.max_level,

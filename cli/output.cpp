@@ -30,15 +30,6 @@ std::vector<double> field(const std::vector<BuildMs>& builds, double BuildMs::*m
     return values;
 }
 
-constexpr std::array<std::pair<const char*, double BuildMs::*>, 7> stages{
-    {{"bounds", &BuildMs::bounds},
-     {"codes", &BuildMs::codes},
-     {"sort", &BuildMs::sort},
-     {"hierarchy", &BuildMs::hierarchy},
-     {"fit", &BuildMs::fit},
-     {"layout", &BuildMs::layout},
-     {"total", &BuildMs::total}}};
-
 }  // namespace
 
 Json new_document(const std::string& command) {
@@ -127,7 +118,7 @@ void add_build_ms(Json& build, const std::vector<BuildMs>& builds) {
         return;
     }
     Json ms, least, most;
-    for (const auto& [name, member] : stages) {
+    for (const auto& [name, member] : build_stages) {
         const Spread spread = spread_of(field(builds, member));
         ms[name] = spread.median;
         least[name] = spread.min;

@@ -5,8 +5,10 @@
 #include <raydix/mesh.h>
 #include <raydix/model.h>
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "options.h"
@@ -33,6 +35,15 @@ struct Spread {
                               const std::vector<BuildMs>& builds);
 /// Puts `ms` and `ms_spread` of the repeats into a `build` object.
 void add_build_ms(Json& build, const std::vector<BuildMs>& builds);
+/// Of a build, in their order, and all of it.
+inline constexpr std::array<std::pair<const char*, double BuildMs::*>, 7> build_stages{
+    {{"bounds", &BuildMs::bounds},
+     {"codes", &BuildMs::codes},
+     {"sort", &BuildMs::sort},
+     {"hierarchy", &BuildMs::hierarchy},
+     {"fit", &BuildMs::fit},
+     {"layout", &BuildMs::layout},
+     {"total", &BuildMs::total}}};
 void print_stages(const Json& build, std::size_t builds);
 [[nodiscard]] StatsOptions stats_options(const TreeOptions& tree, const CommonOptions& common);
 void print_tree_table(const Bvh& bvh, const TreeStats& stats);

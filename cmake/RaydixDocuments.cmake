@@ -19,7 +19,7 @@ target_include_directories(raydix_documents PRIVATE include src)
 target_compile_features(raydix_documents PRIVATE cxx_std_20)
 target_link_libraries(raydix_documents PRIVATE raydix_options fmt::fmt nlohmann_json::nlohmann_json)
 target_compile_options(raydix_documents PRIVATE ${raydix_document_flags})
-raydix_unity(raydix_documents 13)
+raydix_unity(raydix_documents 30)
 # Short names of their own for the same measures of a plot.
 set_source_files_properties(src/report/bar_plot.cpp src/report/dot_plot.cpp src/report/histogram_plot.cpp
     src/report/line_plot.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)

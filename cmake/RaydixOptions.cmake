@@ -21,6 +21,16 @@ target_compile_options(raydix_options INTERFACE
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     target_compile_options(raydix_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-march=x86-64-v2>)
 endif()
+# GCC looks for memory to give back each time it has taken 128 MB. With 512 MB it does so less often: a tenth of its time,
+# for up to 1 GB a job in place of 0.8. Ninja runs two jobs more than there are cores.
+cmake_host_system_information(RESULT raydix_host_memory_mb QUERY TOTAL_PHYSICAL_MEMORY)
+cmake_host_system_information(RESULT raydix_host_cores QUERY NUMBER_OF_LOGICAL_CORES)
+math(EXPR raydix_wanted_mb "1500 * (${raydix_host_cores} + 2)")
+if(raydix_host_memory_mb GREATER_EQUAL raydix_wanted_mb)
+    set(raydix_gcc_memory --param=ggc-min-expand=100 --param=ggc-min-heapsize=524288)
+    target_compile_options(raydix_options INTERFACE
+        $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:${raydix_gcc_memory}>)
+endif()
 if(RAYDIX_SANITIZE)
     target_compile_options(raydix_options INTERFACE
         $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=${RAYDIX_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all>)

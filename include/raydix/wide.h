@@ -104,8 +104,7 @@ private:
 
 /// As trace(), trace_any() and trace_all() of a Bvh, bit for bit. rays [n] -> hits, occluded [n].
 /// options.path says how rays go through the tree, and options.isa with which instructions.
-/// options.kernel has no effect. Throws InputError: sizes that differ, an instruction set that this
-/// processor does not have.
+/// Throws InputError: sizes that differ, an instruction set that this processor does not have.
 TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit> hits,
                   const TraceOptions& options = {});
 [[nodiscard]] std::vector<Hit> trace(const WideBvh& tree, std::span<const Ray> rays,

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <string>
 #include <type_traits>
 #include <vector>
 
+#include "base/same_bits.h"
 #include "exec/search.h"
 #include "layout/about_middle.h"
 #include "primitives/sources.h"
@@ -227,13 +227,6 @@ private:
         const LeafTriangle here = corners(block, lane);
         return same_bits(here.v0, there.v0) && same_bits(here.v1, there.v1) &&
                same_bits(here.v2, there.v2);
-    }
-    /// Neither holds NaN.
-    static bool same_bits(Vec3 a, Vec3 b) {
-        const auto same = [](float x, float y) {
-            return std::bit_cast<std::uint32_t>(x) == std::bit_cast<std::uint32_t>(y);
-        };
-        return same(a.x, b.x) && same(a.y, b.y) && same(a.z, b.z);
     }
 
     Fault check_triangles() {

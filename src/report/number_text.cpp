@@ -10,7 +10,7 @@
 namespace raydix::report {
 namespace {
 
-const char* const dash = "\xE2\x80\x93";
+const char* const en_dash = "\xE2\x80\x93";
 const char* const minus = "\xE2\x88\x92";
 
 /// Of the first digit, after rounding to `digits`: 0.9999 with three is 1.00.
@@ -42,13 +42,13 @@ std::string without_zeros(std::string digits) {
 std::string grouped(std::uint64_t n) { return group_digits(std::to_string(n)); }
 
 std::string with_decimals(double value, int decimals) {
-    if (!std::isfinite(value)) return dash;
+    if (!std::isfinite(value)) return en_dash;
     if (std::fabs(value) >= 1e15) return significant(value);
     return group_digits(fmt::format("{:.{}f}", value, decimals));
 }
 
 std::string significant(double value, int digits) {
-    if (!std::isfinite(value)) return dash;
+    if (!std::isfinite(value)) return en_dash;
     if (value == 0) return "0";
     const double size = std::fabs(value);
     if (size >= 1e15 || size < 1e-6) return fmt::format("{:.{}e}", value, digits - 1);
@@ -57,7 +57,7 @@ std::string significant(double value, int digits) {
 }
 
 std::string short_number(double value) {
-    if (!std::isfinite(value)) return dash;
+    if (!std::isfinite(value)) return en_dash;
     if (value == 0) return "0";
     constexpr std::array<std::pair<double, const char*>, 4> units{
         {{1e12, "T"}, {1e9, "G"}, {1e6, "M"}, {1e3, "k"}}};
@@ -70,7 +70,7 @@ std::string short_number(double value) {
 }
 
 std::string percent(double part) {
-    return std::isfinite(part) ? with_decimals(100 * part, 1) + " %" : dash;
+    return std::isfinite(part) ? with_decimals(100 * part, 1) + " %" : en_dash;
 }
 
 int decimals_for(const std::vector<double>& values) {

@@ -23,7 +23,7 @@ struct KindCounts {
 
 #define RAYDIX_SM90_KINDS(kernel, op, places, ...) \
     KindCounts{kernel, Op::op, places, {__VA_ARGS__}},
-constexpr KindCounts table[] = {
+constexpr KindCounts kind_table[] = {
 #include "simt/sm90_kinds.inc"
 };
 #undef RAYDIX_SM90_KINDS
@@ -68,10 +68,10 @@ std::vector<OperationCost> derived_costs(const KindFactors& factors) {
     for (const WarpKernel kernel : warp_kernels())
         for (const std::string_view operation : op_names) {
             const auto* found =
-                std::find_if(std::begin(table), std::end(table), [&](const auto& c) {
+                std::find_if(std::begin(kind_table), std::end(kind_table), [&](const auto& c) {
                     return c.kernel == warp_kernel_name(kernel) && op_name(c.op) == operation;
                 });
-            if (found != std::end(table))
+            if (found != std::end(kind_table))
                 costs.push_back(cost_of(factors, *found));
             else
                 costs.push_back({std::string(operation), 0, "none of its own in this kernel",

@@ -8,20 +8,12 @@
 #include <vector>
 
 #include "base/math.h"
+#include "base/same_bits.h"
 #include "exec/search.h"
 #include "tree/lbvh_family.h"
 
 namespace raydix {
 namespace {
-
-constexpr std::uint64_t primitive_limit = std::uint64_t{1} << 31;
-
-bool same_bits(Vec3 a, Vec3 b) {
-    const auto same = [](float x, float y) {
-        return std::bit_cast<std::uint32_t>(x) == std::bit_cast<std::uint32_t>(y);
-    };
-    return same(a.x, b.x) && same(a.y, b.y) && same(a.z, b.z);
-}
 
 /// One walk from the root. Each pair of slots may be entered once, so the walk ends.
 class KdTopologyWalk {
@@ -111,8 +103,6 @@ private:
     std::uint64_t inner_count_ = 0;
     std::uint32_t deepest_ = 0;
 };
-
-bool is_clean(Vec3 p) { return in_range(p) && same_bits(p, without_negative_zero(p)); }
 
 bool is_clean_primitive(const KdTree& tree, std::size_t position) {
     if (tree.kind() == PrimitiveKind::points) return is_clean(tree.points()[position]);

@@ -3,9 +3,9 @@
 // are tight.
 #include <fmt/format.h>
 
-#include <bit>
 #include <vector>
 
+#include "base/same_bits.h"
 #include "exec/search.h"
 #include "tree/kdtree.h"
 #include "tree/kdtree_validate.h"
@@ -13,10 +13,6 @@
 
 namespace raydix {
 namespace {
-
-bool same_bits(float a, float b) {
-    return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
-}
 
 /// Slot -> positions [begin, end) below it.
 struct Range {

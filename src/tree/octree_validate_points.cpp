@@ -6,14 +6,13 @@
 #include <vector>
 
 #include "base/math.h"
+#include "base/same_bits.h"
 #include "exec/search.h"
 #include "tree/octree_validate.h"
 #include "tree/octree_walk.h"
 
 namespace raydix {
 namespace {
-
-bool same_bits(Vec3 a, Vec3 b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
 /// The finest code of a point within the scene.
 std::uint64_t code_of(const Grid& grid, Vec3 p) { return interleave<std::uint64_t>(grid.cell(p)); }

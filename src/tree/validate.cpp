@@ -12,7 +12,6 @@
 namespace raydix {
 namespace {
 
-constexpr std::uint64_t primitive_limit = std::uint64_t{1} << 31;
 constexpr std::uint32_t padding_slot = 1;
 
 Fault validate_options(const BuildOptions& options) {

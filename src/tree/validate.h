@@ -14,6 +14,9 @@ namespace raydix {
 /// None: all is well.
 using Fault = std::optional<std::string>;
 
+/// A tree has fewer primitives than this (contract.md 1).
+inline constexpr std::uint64_t primitive_limit = std::uint64_t{1} << 31;
+
 /// Whether leaves may hold parts of primitives: trees of `split` and `sbvh` over triangles, and
 /// over the boxes of triangles in double.
 [[nodiscard]] inline bool may_split_primitives(const Bvh& bvh) {

@@ -3,28 +3,18 @@
 // named.
 #include <fmt/format.h>
 
-#include <bit>
 #include <vector>
 
 #include "base/math.h"
+#include "base/same_bits.h"
 #include "exec/search.h"
 #include "tree/validate.h"
 
 namespace raydix {
 namespace {
 
-bool same_bits(float a, float b) {
-    return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
-}
-bool same_bits(Vec3 a, Vec3 b) {
-    return same_bits(a.x, b.x) && same_bits(a.y, b.y) && same_bits(a.z, b.z);
-}
-
 std::string text_of(Vec3 p) { return fmt::format("({}, {}, {})", p.x, p.y, p.z); }
 std::string text_of(const Aabb& b) { return text_of(b.lo) + " to " + text_of(b.hi); }
-
-/// Finite, within the range of contract.md 1, and without -0.
-bool is_clean(Vec3 p) { return in_range(p) && same_bits(p, without_negative_zero(p)); }
 
 bool is_usable_triangle(Vec3 a, Vec3 b, Vec3 c) {
     return in_range(a) && in_range(b) && in_range(c) && diagonal_in_range(box_of(a, b, c));
