@@ -137,10 +137,13 @@ void run_build(const BuildCommand& options) {
     Json document = new_document("build");
     document["scene"] = scene_json(scene);
     document["load_ms"] = scene.load_ms;
+    const BuildOptions how = about(options.scene, [&] {
+        return options.tree.build_options(scene.mesh(), options.common);
+    });
     const TimedBuilds timed = about(options.scene, [&] {
         const auto build =
             runs_on_device(options.tree.device) ? build_repeatedly_on_device : build_repeatedly;
-        return build(scene.mesh(), options.tree.build_options(options.common), options.repeat);
+        return build(scene.mesh(), how, options.repeat);
     });
     const TreeStats stats = tree_stats(timed.bvh, stats_options(options.tree, options.common));
     Json build = build_json(timed.bvh, stats, timed.fresh);
@@ -152,8 +155,7 @@ void run_build(const BuildCommand& options) {
     build["kept_ms"] = spread_json(totals(timed.kept));
     if (options.tree.layout == "cwbvh") add_cwbvh(build, timed.bvh, options.common);
     if (is_wide_layout(options.tree.layout))
-        add_wide_builds(build, scene.mesh(), options.tree.build_options(options.common),
-                        options.tree.layout, options.repeat);
+        add_wide_builds(build, scene.mesh(), how, options.tree.layout, options.repeat);
     document["build"] = build;
     if (options.common.prints_tables()) {
         fmt::print("{}: {} triangles, {} vertices, loaded in {:.1f} ms\n", scene.name,

@@ -10,6 +10,7 @@
 
 #include "device_scene.h"
 #include "output.h"
+#include "wide_trace.h"
 
 namespace raydix::cli {
 namespace {
@@ -171,6 +172,16 @@ BuildOptions TreeOptions::build_options(const CommonOptions& common) const {
     return result;
 }
 
+BuildOptions TreeOptions::build_options(const MeshView& mesh, const CommonOptions& common) const {
+    const BuildOptions named = build_options(common);
+    const bool of_quality = quality.empty() ? builder.empty() : quality != "fast";
+    if (!of_quality || device != "cpu" || reinsertion_rounds) return named;
+    const Quality asked = quality == "high" ? Quality::high : Quality::balanced;
+    return is_wide_layout(layout)
+               ? best_wide_build_options(mesh, asked, named, wide_options(layout, common.threads))
+               : best_build_options(mesh, asked, named);
+}
+
 void flatten(Model& scene, const CommonOptions& common) {
     if (scene.is_flat()) return;
     if (!common.flatten && common.prints_tables())
@@ -269,7 +280,7 @@ SceneTree tree_of(Model scene, const std::string& name, const TreeOptions& tree,
                   const CommonOptions& common) {
     SceneTree result{std::move(scene), {}};
     result.bvh = about(name, [&] {
-        const BuildOptions options = tree.build_options(common);
+        const BuildOptions options = tree.build_options(result.scene.mesh(), common);
         return runs_on_device(tree.device) ? DeviceScene(result.scene.mesh(), options).build().bvh
                                            : build_bvh(result.scene.mesh(), options);
     });

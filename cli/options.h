@@ -46,6 +46,9 @@ struct TreeOptions {
         of_a_bvh;      // those that mean nothing to other trees
 
     [[nodiscard]] BuildOptions build_options(const CommonOptions& common) const;
+    /// Of a quality, for this mesh: a better one never gives a tree of higher cost.
+    [[nodiscard]] BuildOptions build_options(const MeshView& mesh,
+                                             const CommonOptions& common) const;
 };
 void add_tree_options(CLI::App& command, TreeOptions& options);
 

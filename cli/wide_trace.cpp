@@ -20,10 +20,6 @@ void add_wide_trace_options(CLI::App& command, WideTraceOptions& options) {
 
 namespace {
 
-WideBvhOptions wide_options(const std::string& layout, int threads) {
-    return {.width = layout == "wide4" ? 4 : 8, .compact = layout == "compact", .threads = threads};
-}
-
 std::string layout_name(const WideBvhStats& stats) {
     return stats.compact ? "compact" : stats.width == 4 ? "wide4" : "wide8";
 }
@@ -32,6 +28,10 @@ std::string layout_name(const WideBvhStats& stats) {
 
 bool is_wide_layout(const std::string& layout) {
     return layout == "wide8" || layout == "wide4" || layout == "compact";
+}
+
+WideBvhOptions wide_options(const std::string& layout, int threads) {
+    return {.width = layout == "wide4" ? 4 : 8, .compact = layout == "compact", .threads = threads};
 }
 
 std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,

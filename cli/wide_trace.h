@@ -21,6 +21,8 @@ void add_wide_trace_options(CLI::App& command, WideTraceOptions& options);
 
 /// wide4, wide8 and compact.
 [[nodiscard]] bool is_wide_layout(const std::string& layout);
+/// Of a wide layout.
+[[nodiscard]] WideBvhOptions wide_options(const std::string& layout, int threads);
 
 /// On the cpu rays go through a bvh by the engine, unless --kernel or --layout say otherwise.
 /// --kernel engine (simd is an old name of it) goes with a wide layout and either of them is

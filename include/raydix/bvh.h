@@ -179,6 +179,13 @@ private:
 [[nodiscard]] Bvh build_bvh(const MeshView& mesh, const BuildOptions& options = {});
 [[nodiscard]] Bvh build_bvh(const Mesh& mesh, const BuildOptions& options = {});
 
+/// `options` with the builder and the rounds of reinsertion of the quality whose binary tree has
+/// the least SAH (tree_stats), among `quality` and lower ones; of equals the better word's. So a
+/// better word never means a higher cost, as for scenes. Where more than one may be the best, their
+/// trees are built to find out. Throws InputError as build_bvh does.
+[[nodiscard]] BuildOptions best_build_options(const MeshView& mesh, Quality quality,
+                                              const BuildOptions& options = {});
+
 /// Builds a tree over `boxes`. Boxes that are empty (lo > hi), not finite or out of range are left
 /// out and counted. Errors as above.
 [[nodiscard]] Bvh build_bvh(std::span<const Aabb> boxes, const BuildOptions& options = {});

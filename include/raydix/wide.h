@@ -97,6 +97,11 @@ private:
     const Mesh& mesh, const BuildOptions& options = build_options_for(Quality::balanced),
     const WideBvhOptions& wide = {});
 
+/// As best_build_options, by the SAH of the wide tree (WideBvhStats::sah).
+[[nodiscard]] BuildOptions best_wide_build_options(const MeshView& mesh, Quality quality,
+                                                   const BuildOptions& options = {},
+                                                   const WideBvhOptions& wide = {});
+
 /// The figures of the wide tree that a SceneD makes of the mesh, which is built for this call.
 /// Throws InputError as build_bvh does.
 [[nodiscard]] WideBvhStats wide_stats_of(

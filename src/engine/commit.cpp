@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include "engine/build_by_quality.h"
+#include "build/build_by_quality.h"
 #include "engine/mesh_commit.h"
 #include "engine/part_tree.h"
 #include "engine/shape_commit.h"
@@ -30,7 +30,7 @@ struct WideMaker {
                MeshTree& out) {
         if (last != nullptr) out.memory = last->memory;
         std::unique_ptr<WideBvh> built = build_by_quality(
-            options, mesh.triangles.size(),
+            options.quality, options.threads, mesh.triangles.size(),
             [&](const BuildOptions& build) {
                 std::unique_ptr<WideBvh> tree = taken_or_new(out.memory);
                 std::unique_ptr<WideBvhBuilder> builder = taken_or_new(builders);

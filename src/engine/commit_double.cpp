@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/build_by_quality.h"
+#include "build/build_by_quality.h"
 #include "engine/commit.h"
 #include "engine/mesh_commit.h"
 #include "engine/part_tree.h"
@@ -20,7 +20,7 @@ struct WideMakerD {
     static void build(const MeshViewD& mesh, const SceneOptions& options, const MeshTreeD*,
                       MeshTreeD& out) {
         out.tree = build_by_quality(
-            options, mesh.triangles.size(),
+            options.quality, options.threads, mesh.triangles.size(),
             [&](const BuildOptions& build) { return build_wide_tree(mesh, build); },
             [](const auto& tree) { return tree->arrays.stats.sah; });
         out.sah_at_build = out.tree->arrays.stats.sah;

@@ -1,5 +1,5 @@
 // A better quality never means a tree of higher expected cost, whatever the triangles are like.
-#include "engine/build_by_quality.h"
+#include "build/build_by_quality.h"
 
 #include <gtest/gtest.h>
 #include <raydix/model.h>
@@ -103,6 +103,48 @@ TEST(BuildByQuality, CostNeverRisesOnScenes) {
 TEST(BuildByQuality, CostNeverRisesInDouble) {
     for (std::uint64_t seed = 0; seed < (thorough > 1 ? 60 : 10); ++seed)
         expect_no_rise(in_double(odd_soup(seed)), "soup " + std::to_string(seed));
+}
+
+double binary_sah(const Mesh& mesh, const BuildOptions& options) {
+    return tree_stats(build_bvh(mesh, options)).sah.value_or(0);
+}
+
+TEST(BuildByQuality, BestOptionsNeverCostMore) {
+    const std::uint64_t seeds = thorough > 1 ? 200 : 40;
+    std::size_t other_builder = 0, other_wide_builder = 0;
+    for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+        const Mesh mesh = odd_soup(seed);
+        double before = infinity, wide_before = infinity;
+        for (const Quality quality : qualities) {
+            const BuildOptions best = best_build_options(mesh, quality, {.threads = 2}),
+                               best_wide = best_wide_build_options(mesh, quality, {.max_leaf = 2});
+            EXPECT_EQ(best.threads, 2);
+            EXPECT_EQ(best_wide.max_leaf, 2);
+            const double sah = binary_sah(mesh, best),
+                         wide_sah = build_wide_bvh(mesh, best_wide).stats().sah;
+            EXPECT_LE(sah, before) << "soup " << seed << ", quality " << static_cast<int>(quality);
+            EXPECT_LE(wide_sah, wide_before)
+                << "soup " << seed << ", quality " << static_cast<int>(quality);
+            other_builder += best.builder != build_options_for(quality).builder;
+            other_wide_builder += best_wide.builder != build_options_for(quality).builder;
+            before = sah, wide_before = wide_sah;
+        }
+    }
+    EXPECT_GT(other_builder, seeds / 20);
+    EXPECT_GT(other_wide_builder, seeds / 20);
+}
+
+TEST(BuildByQuality, BestOptionsOfNothingAndOfOneCandidate) {
+    for (const Quality quality : qualities) {
+        EXPECT_EQ(best_build_options(Mesh{}, quality).builder, build_options_for(quality).builder);
+        EXPECT_EQ(best_build_options(random_soup(1, 1), quality).builder,
+                  build_options_for(quality).builder);
+    }
+    const Mesh mesh = random_soup(1025, 3);
+    const BuildOptions balanced = best_build_options(mesh, Quality::balanced, {.bits = 30});
+    EXPECT_EQ(balanced.builder, Builder::ploc);
+    EXPECT_EQ(balanced.reinsertion_rounds, 2);
+    EXPECT_EQ(balanced.bits, 30);
 }
 
 class SharedSceneCost : public testing::TestWithParam<const char*> {};
