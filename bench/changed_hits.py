@@ -57,8 +57,9 @@ def main():
         folder = pathlib.Path(name)
         for scene in args.scenes:
             for kind in "primary", "diffuse_shuffled":
-                trace(args.before, scene, folder, kind, "--size", args.size, "--samples", args.samples, "--camera",
-                      "0", "--save-rays", folder / "rays.npy")
+                samples = () if kind == "primary" else ("--samples", args.samples)
+                trace(args.before, scene, folder, kind, "--size", args.size, *samples, "--camera", "0", "--save-rays",
+                      folder / "rays.npy")
                 row = compare(hits_of(args.before, scene, folder), hits_of(args.after, scene, folder))
                 title = {"scene": pathlib.Path(scene).name.split(".")[0], "kind": kind}
                 results.append({**title, **row})

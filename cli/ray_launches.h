@@ -24,6 +24,8 @@ struct LaunchOptions {
     std::uint32_t launch_rays = 1u << 20;  // secondary rays of one launch
 };
 void add_launch_options(CLI::App& command, LaunchOptions& options);
+/// Options that one kind of rays, or those of a file, ignore are usage errors.
+void refuse_unused_ray_options(const CLI::App& command, const std::string& rays);
 
 /// A launch, or a run of neighbouring rays of one.
 struct RayUnit {
