@@ -12,6 +12,7 @@
 #include "device_scene.h"
 #include "kdtree_commands.h"
 #include "octree_commands.h"
+#include "option_checks.h"
 #include "output.h"
 #include "scene_file.h"
 #include "wide_trace.h"
@@ -186,10 +187,11 @@ void run_check(const CheckCommand& options) {
         return run_octree_check(options.scene, options.tree, options.common);
     if (options.tree.tree == "kdtree" && options.same.empty())
         return run_kdtree_check(options.scene, options.tree, options.common);
+    const bool compares = !options.same.empty();
     Json document = new_document("check");
     CheckReport report;
     std::string what = options.scene;
-    if (!options.same.empty()) {
+    if (compares) {
         const SceneTree a = load_scene_tree(options.same[0], options.tree, options.common);
         const SceneTree b = load_scene_tree(options.same[1], options.tree, options.common);
         report = check_same(a.bvh, b.bvh);
@@ -204,16 +206,20 @@ void run_check(const CheckCommand& options) {
         const SceneTree input = load_scene_tree(options.scene, options.tree, options.common);
         report = check(input.bvh, input.scene.mesh());
     }
-    document["check"] = {{"ok", report.ok},
-                         {"broken", report.ok ? Json(nullptr) : Json(report.broken)},
-                         {"nodes", report.nodes},
-                         {"primitives", report.primitives}};
+    const Json reason = report.ok ? Json(nullptr) : Json(report.broken);
+    document["check"] = {{"ok", report.ok}};
+    if (compares)
+        document["check"].update(
+            {{"compared", options.same}, {"same", report.ok}, {"difference", reason}});
+    else
+        document["check"]["broken"] = reason;
+    document["check"].update({{"nodes", report.nodes}, {"primitives", report.primitives}});
     write_json(document, options.common);
     if (!report.ok) throw InputError(what + ": " + report.broken);
     if (options.common.prints_tables())
         fmt::print("{}: {}, {} nodes, {} primitives\n", what,
-                   options.same.empty() ? "every invariant holds" : "the same",
-                   grouped(report.nodes), grouped(report.primitives));
+                   compares ? "the same" : "every invariant holds", grouped(report.nodes),
+                   grouped(report.primitives));
 }
 
 }  // namespace
@@ -225,7 +231,7 @@ void add_build_command(CLI::App& app) {
     command->add_option("SCENE", options->scene, "A file, or builtin:NAME?key=value&...")
         ->required();
     command->add_option("--repeat", options->repeat, "Builds to time after a warm-up")
-        ->check(CLI::Range(1, 10000))
+        ->transform(whole_number(1, 10000))
         ->capture_default_str();
     command
         ->add_option("-o,--output", options->out_file,
@@ -235,7 +241,11 @@ void add_build_command(CLI::App& app) {
     add_tree_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
-    command->callback([options] { run_build(*options); });
+    command->callback([options, command] {
+        require_writable(*command, "--output", options->out_file);
+        require_writable_json(options->common);
+        run_build(*options);
+    });
 }
 
 void add_check_command(CLI::App& app) {
@@ -254,6 +264,7 @@ void add_check_command(CLI::App& app) {
     add_common_options(*command, options->common);
     command->callback([options, scene, same] {
         if (scene->count() + same->count() == 0) throw CLI::RequiredError("SCENE or --same A B");
+        require_writable_json(options->common);
         run_check(*options);
     });
 }

@@ -35,7 +35,10 @@ void print_info(const Model& scene, const MeshInfo& info, std::size_t meshes, st
     fmt::print("out of range {} vertices (beyond 1e12)\n", grouped(info.out_of_range_vertices));
     fmt::print("unreferenced {} vertices\n", grouped(info.unreferenced_vertices));
     fmt::print("left out     {} triangles of a tree\n", grouped(info.left_out_triangles));
-    fmt::print("cameras      {}\n", scene.cameras.cameras.size());
+    if (scene.cameras_fault.empty())
+        fmt::print("cameras      {}\n", scene.cameras.cameras.size());
+    else
+        fmt::print("cameras      one that sees all: {}\n", scene.cameras_fault);
     fmt::print("memory       {:.2f} MB\n", static_cast<double>(info.bytes) / 1e6);
     fmt::print("loaded in    {:.1f} ms\n", scene.load_ms);
 }

@@ -15,6 +15,7 @@
 #include "mpi_commands.h"
 #include "mpi_input.h"
 #include "mpi_ranks.h"
+#include "option_checks.h"
 
 namespace raydix::cli {
 namespace {
@@ -282,13 +283,13 @@ void add_mpi_bench(CLI::App& app) {
         options->weak = weak;
         add_common_options(*command, options->common);
         command->add_option(weak ? "--per-rank" : "--points", options->points, "Points")
-            ->check(CLI::PositiveNumber)
+            ->transform(whole_number(1))
             ->capture_default_str();
         command->add_option("--queries", options->queries, "Queries, counted as points are")
-            ->check(CLI::PositiveNumber)
+            ->transform(whole_number(1))
             ->capture_default_str();
         command->add_option("--k", options->k, "Neighbours")
-            ->check(CLI::PositiveNumber)
+            ->transform(whole_number(1, 0xFFFFFFFE))
             ->capture_default_str();
         command->add_option("--cloud", options->cloud, "The cloud")
             ->check(CLI::IsMember({"uniform", "clustered"}))
@@ -300,7 +301,7 @@ void add_mpi_bench(CLI::App& app) {
             ->check(CLI::IsMember({"curve", "as_given"}))
             ->capture_default_str();
         command->add_option("--repeat", options->repeat, "Calls; the least time counts")
-            ->check(CLI::PositiveNumber)
+            ->transform(whole_number(1, 10000))
             ->capture_default_str();
         command->callback([options] { run_bench(*options); });
     }

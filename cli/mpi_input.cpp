@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "mpi_ranks.h"
+#include "option_checks.h"
 #include "options.h"
 #include "scene_file.h"
 
@@ -104,6 +105,7 @@ void add_mpi_options(CLI::App& command, MpiOptions& options) {
     command
         .add_option("--exchange-bytes", options.exchange_bytes,
                     "The most bytes that a rank takes in during a round")
+        ->transform(whole_number(0))
         ->capture_default_str();
     command.add_flag("--verify", options.verify,
                      "Rank 0 does the same alone and compares all bits");

@@ -13,6 +13,7 @@
 #include "mpi_commands.h"
 #include "mpi_input.h"
 #include "mpi_ranks.h"
+#include "option_checks.h"
 
 namespace raydix::cli {
 namespace {
@@ -238,7 +239,8 @@ void add_mpi_query(CLI::App& app) {
     command->add_option("--out", options->prefix,
                         "Rank 0 writes PREFIX.indices.npy and others, numbers in 64 bits");
     CLI::Option_group* kind = command->add_option_group("Kind");
-    kind->add_option("--knn", options->k, "The K nearest vertices")->check(CLI::PositiveNumber);
+    kind->add_option("--knn", options->k, "The K nearest vertices")
+        ->transform(whole_number(1, 0xFFFFFFFE));
     kind->add_option("--radius", options->radius, "All vertices within R");
     kind->add_flag("--closest", options->closest, "The closest point of all triangles");
     kind->add_flag("--contains", options->contains, "Inside by parity of crossings");

@@ -28,7 +28,7 @@ struct Shot {
 };
 
 Shot shot_of(const MpiRenderCommand& command, const Model& model) {
-    Shot shot{command.picture.chosen_camera(model.cameras, model.name),
+    Shot shot{command.picture.chosen_camera(model),
               command.picture.render_options(model.cameras, command.common)};
     shot.options.view = view_from_name(command.picture.view);
     return shot;
@@ -168,7 +168,10 @@ void add_mpi_render(CLI::App& app) {
                         {"shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps"});
     command->add_flag("--distributed", options->is_distributed,
                       "Spread the scene over the ranks. Without it each rank reads and holds all");
-    command->callback([options] { run_render(*options); });
+    command->callback([options, command] {
+        check_picture_options(*command, options->picture);
+        run_render(*options);
+    });
 }
 
 }  // namespace raydix::cli

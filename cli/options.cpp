@@ -7,9 +7,12 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 
 #include "device_scene.h"
+#include "option_checks.h"
 #include "output.h"
+#include "program.h"
 #include "wide_trace.h"
 
 namespace raydix::cli {
@@ -35,7 +38,7 @@ void add_result_limit(CLI::App& command, std::uint64_t& max_result_bytes) {
         .add_option("--max-result-bytes", max_result_bytes,
                     "Memory that a result of any length may take, with all it needs on the way "
                     "(0: half of what is left); more is an error")
-        ->check(CLI::NonNegativeNumber)
+        ->transform(whole_number(0))
         ->type_name("BYTES");
 }
 
@@ -47,10 +50,10 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
     command
         .add_option("--threads", options.threads,
                     "Threads to use, 0 to 1024 (0, or more than the machine has: all it has)")
-        ->check(CLI::Range(0, 1024));
+        ->transform(whole_number(0, 1024));
     command.add_flag("--quiet", options.quiet, "Print no tables and no progress");
     command.add_option("--seed", options.seed, "Seed of built-in scenes and sampling")
-        ->check(CLI::NonNegativeNumber)
+        ->transform(whole_number(0))
         ->capture_default_str();
 }
 
@@ -81,21 +84,22 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->check(CLI::IsMember({"fast", "balanced", "high"}))
         ->excludes(builder);
     of_the_build(command.add_option("--bits", options.bits, "Bits of the Morton codes"))
+        ->transform(whole_number(30, 63).description(""))
         ->check(CLI::IsMember({30, 63}))
         ->capture_default_str();
     of_the_build(command.add_option("--max-leaf", options.max_leaf, "Most primitives in a leaf"))
-        ->check(CLI::Range(1, 255))
+        ->transform(whole_number(1, 255))
         ->capture_default_str();
     of_the_build(command.add_option("--reinsertion-rounds", options.reinsertion_rounds,
                                     "Rounds of reinsertion after the build, 0 to 255. Each round "
                                     "moves large subtrees to cheaper places and stops early when "
                                     "none moves (default: none, or those of --quality)"))
-        ->check(CLI::Range(0, 255))
+        ->transform(whole_number(0, 255))
         ->type_name("ROUNDS");
     of_the_build(command.add_option("--max-level", options.max_level,
                                     "Octree: the level that is not divided any more, 0 to 21 (10 "
                                     "with 30 bits; default: the highest)"))
-        ->check(CLI::Range(0, 21))
+        ->transform(whole_number(0, 21))
         ->type_name("LEVEL");
     options.layout_option =
         command
@@ -188,28 +192,36 @@ void flatten(Model& scene, const CommonOptions& common) {
         fmt::print("{}: its {} and {} are taken as one mesh (--flatten)\n", scene.name,
                    counted(scene.meshes.size(), "mesh", "meshes"),
                    counted(scene.nodes.size(), "node", "nodes"));
+    common.flattened = true;
     const auto start = std::chrono::steady_clock::now();
     scene.flatten();
     scene.load_ms +=
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-bool is_rdx(const std::string& scene) { return scene.ends_with(".rdx"); }
+void say_flattened(const std::string& scene, const CommonOptions& common) {
+    if (common.flattened && common.quiet && !common.flatten)
+        complain(scene + ": its meshes and nodes are taken as one mesh (--flatten)");
+}
+
+bool is_rdx(const std::string& scene) { return CLI::detail::to_lower(scene).ends_with(".rdx"); }
 
 bool is_scene_file(const std::string& scene) { return is_rdx(scene) && holds_scene(scene); }
 
 RdxFile load_tree_file(const std::string& file) {
     if (holds_scene(file))
         throw InputError(file +
-                         ": it holds a scene, and this needs one tree or mesh; trace, render, "
-                         "check and info take it");
+                         ": it holds a scene, and this needs one tree or mesh; info, check, trace, "
+                         "render and query --closest, --signed-distance and --pairs take it");
     return load_rdx(file);
 }
 
 namespace {
 
 void override_cameras(Model& scene, const TreeOptions& tree) {
-    if (!tree.cameras_file.empty()) scene.cameras = load_cameras(tree.cameras_file);
+    if (tree.cameras_file.empty()) return;
+    scene.cameras = load_cameras(tree.cameras_file);
+    scene.cameras_fault.clear();
 }
 
 }  // namespace
@@ -244,9 +256,14 @@ void refuse_simulator(const TreeOptions& tree) {
 }
 
 void refuse_layout(const TreeOptions& tree) {
+    if (tree.layout == "cwbvh")
+        throw CLI::ValidationError("--layout",
+                                   "cwbvh is made by build --tree bvh and by nothing else");
     if (tree.layout != "binary")
-        throw CLI::ValidationError(
-            "--layout", tree.layout + " is made by build --tree bvh and by nothing else");
+        throw CLI::ValidationError("--layout",
+                                   tree.layout +
+                                       " does not serve here, only binary; build and trace "
+                                       "with --tree bvh take it");
 }
 
 void refuse_device(const TreeOptions& tree) {
@@ -285,6 +302,17 @@ SceneTree tree_of(Model scene, const std::string& name, const TreeOptions& tree,
                                            : build_bvh(result.scene.mesh(), options);
     });
     return result;
+}
+
+void require_cameras(const Model& scene) {
+    if (!scene.cameras_fault.empty()) throw InputError(scene.cameras_fault);
+}
+
+std::string reason_about(const std::string& scene, const std::string& reason) {
+    const std::string name = std::filesystem::path(scene).filename().string();
+    if (reason.starts_with(scene + ": ")) return reason;
+    if (!name.empty() && reason.starts_with(name + ": ")) return scene + reason.substr(name.size());
+    return scene + ": " + reason;
 }
 
 CLI::Validator finite_number(bool zero_too) {

@@ -20,7 +20,8 @@ struct CommonOptions {
     int threads = 0;
     bool quiet = false;
     std::uint64_t seed = 1;
-    bool flatten = false;  // one mesh was asked for
+    bool flatten = false;            // one mesh was asked for
+    mutable bool flattened = false;  // by flatten(): documents say so
 
     /// Tables for people go to standard output unless JSON does.
     [[nodiscard]] bool prints_tables() const { return !quiet && json_file != "-"; }
@@ -64,12 +65,16 @@ struct SceneTree {
 [[nodiscard]] RdxFile load_tree_file(const std::string& file);
 /// For work on one mesh. Says so unless --flatten did.
 void flatten(Model& scene, const CommonOptions& common);
+/// With --quiet, on standard error: for results that have other columns than those of the scene.
+void say_flattened(const std::string& scene, const CommonOptions& common);
 /// As the file has it.
 [[nodiscard]] Model load_structured_model(const std::string& scene, const TreeOptions& tree,
                                           const CommonOptions& common);
 /// The same flat.
 [[nodiscard]] Model load_model_with_cameras(const std::string& scene, const TreeOptions& tree,
                                             const CommonOptions& common);
+/// Throws InputError: cameras.json beside the scene cannot be read. Before a camera of it is used.
+void require_cameras(const Model& scene);
 /// A .rdx file brings its tree: options that ask for another one are a usage error, never ignored.
 void refuse_build_options(const std::string& scene, const TreeOptions& tree);
 /// The simulator builds no trees: a usage error.
@@ -95,6 +100,10 @@ void refuse_device(const TreeOptions& tree);
 /// --max-result-bytes.
 void add_result_limit(CLI::App& command, std::uint64_t& max_result_bytes);
 
+/// `reason` behind the scene that the user named, which it may name already, with its folder or
+/// without.
+[[nodiscard]] std::string reason_about(const std::string& scene, const std::string& reason);
+
 /// Runs `work`; puts the scene that the user named before what the library has to say about its
 /// geometry.
 template <class Work>
@@ -102,7 +111,7 @@ auto about(const std::string& scene, const Work& work) {
     try {
         return work();
     } catch (const InputError& error) {
-        throw InputError(scene + ": " + error.what());
+        throw InputError(reason_about(scene, error.what()));
     }
 }
 

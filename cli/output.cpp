@@ -10,8 +10,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <iostream>
+
+#include "option_checks.h"
 
 namespace raydix::cli {
 namespace {
@@ -169,8 +172,15 @@ void print_tree_table(const Bvh& bvh, const TreeStats& stats) {
     fmt::print("\nhash         {}\n", stats.tree_hash);
 }
 
-void write_json(const Json& document, const CommonOptions& common) {
+void require_writable_json(const CommonOptions& common) {
+    if (common.json_file != "-") require_writable(common.json_file);
+}
+
+void write_json(const Json& made, const CommonOptions& common) {
     if (common.json_file.empty()) return;
+    Json document = made;
+    if (common.flattened)
+        (document.contains("scene") ? document["scene"] : document)["flattened"] = true;
     const std::string text = document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
     if (common.json_file == "-") {
         std::cout << text << std::flush;
@@ -193,12 +203,13 @@ void Progress::show(double part) {
     shown_ = true;
     constexpr int width = 40;
     const int filled = static_cast<int>(std::clamp(part, 0.0, 1.0) * width);
-    fmt::print(stderr, "\r{} [{:#<{}}{:.<{}}] {:3.0f} %", what_, "", filled, "", width - filled,
-               100 * part);
+    const std::string bar = fmt::format("\r{} [{:#<{}}{:.<{}}] {:3.0f} %", what_, "", filled, "",
+                                        width - filled, 100 * part);
+    static_cast<void>(std::fputs(bar.c_str(), stderr));
 }
 
 Progress::~Progress() {
-    if (shown_) fmt::print(stderr, "\r\033[K");
+    if (shown_) static_cast<void>(std::fputs("\r\033[K", stderr));
 }
 
 int threads_at_work(int asked) {

@@ -48,6 +48,8 @@ void print_stages(const Json& build, std::size_t builds);
 [[nodiscard]] StatsOptions stats_options(const TreeOptions& tree, const CommonOptions& common);
 void print_tree_table(const Bvh& bvh, const TreeStats& stats);
 
+/// Before the work whose document --json takes. Throws InputError as write_json would.
+void require_writable_json(const CommonOptions& common);
 /// Writes the document if one was asked for. Throws InputError that names the file.
 void write_json(const Json& document, const CommonOptions& common);
 

@@ -2,6 +2,8 @@
 
 #include <raydix/error.h>
 
+#include "option_checks.h"
+
 namespace raydix::cli {
 namespace {
 
@@ -9,11 +11,13 @@ Vec3 vec_of(const std::vector<float>& v) { return {v[0], v[1], v[2]}; }
 
 }  // namespace
 
-Camera PictureOptions::chosen_camera(const CameraSet& cameras, const std::string& scene) const {
-    if (camera >= cameras.cameras.size())
-        throw InputError(scene + ": camera " + std::to_string(camera) + " is past the last of " +
-                         std::to_string(cameras.cameras.size()) + " cameras");
-    Camera chosen = cameras.cameras[camera];
+Camera PictureOptions::chosen_camera(const Model& scene) const {
+    if (eye.empty() || camera != 0) require_cameras(scene);
+    const std::vector<Camera>& cameras = scene.cameras.cameras;
+    if (camera >= cameras.size())
+        throw InputError(scene.name + ": camera " + std::to_string(camera) +
+                         " is past the last of " + std::to_string(cameras.size()) + " cameras");
+    Camera chosen = cameras[camera];
     if (!eye.empty()) chosen.position = vec_of(eye);
     if (!target.empty()) chosen.target = vec_of(target);
     if (!up.empty()) chosen.up = vec_of(up);
@@ -35,6 +39,10 @@ RenderOptions PictureOptions::render_options(const CameraSet& cameras,
     return chosen;
 }
 
+void check_picture_options(const CLI::App& command, const PictureOptions& options) {
+    require_picture(command, "--output", options.out_file);
+}
+
 void add_picture_options(CLI::App& command, PictureOptions& options,
                          const std::vector<std::string>& views) {
     command
@@ -49,22 +57,21 @@ void add_picture_options(CLI::App& command, PictureOptions& options,
         .add_option("--size", options.size_text, "Pixels (default: of cameras.json, or 1024x768)")
         ->type_name("WxH");
     command.add_option("--camera", options.camera, "Number of a camera")
-        ->check(CLI::NonNegativeNumber)
+        ->transform(whole_number(0))
         ->capture_default_str();
-    command.add_option("--eye", options.eye, "Camera position x y z")->expected(3)->delimiter(',');
-    command.add_option("--target", options.target, "Point looked at x y z")
-        ->expected(3)
-        ->delimiter(',');
-    command.add_option("--up", options.up, "Direction that is up in the picture x y z")
-        ->expected(3)
-        ->delimiter(',');
+    const auto add_vector = [&](const char* name, std::vector<float>& value, const char* what) {
+        command.add_option(name, value, what)->expected(3)->delimiter(',')->allow_extra_args(false);
+    };
+    add_vector("--eye", options.eye, "Camera position x y z");
+    add_vector("--target", options.target, "Point looked at x y z");
+    add_vector("--up", options.up, "Direction that is up in the picture x y z");
     command.add_option("--fov", options.fov, "Vertical field of view in degrees")
         ->check(finite_number(false))
         ->check(CLI::Range(0.01f, 179.0f));
     command
         .add_option("--samples", options.samples,
                     "Rays per pixel of views with chance (0: the view's own default)")
-        ->check(CLI::Range(0, 4096))
+        ->transform(whole_number(0, 4096))
         ->capture_default_str();
     command
         .add_option("--ao-radius", options.ao_radius,

@@ -19,13 +19,17 @@ struct PictureOptions {
     int samples = 0;
     float ao_radius = 0.0f;
 
-    /// Of these cameras the one that was asked for, moved as it was asked for. Throws InputError
-    /// that names the scene.
-    [[nodiscard]] Camera chosen_camera(const CameraSet& cameras, const std::string& scene) const;
+    /// Of the scene's cameras the one that was asked for, moved as it was asked for. Throws
+    /// InputError: there is no such camera, or cameras.json is at fault and --eye does not replace
+    /// it.
+    [[nodiscard]] Camera chosen_camera(const Model& scene) const;
     /// All but the view.
     [[nodiscard]] RenderOptions render_options(const CameraSet& cameras,
                                                const CommonOptions& common) const;
 };
+/// Before any work: options that the view ignores are usage errors, and the picture must have a
+/// name that can be written.
+void check_picture_options(const CLI::App& command, const PictureOptions& options);
 void add_picture_options(CLI::App& command, PictureOptions& options,
                          const std::vector<std::string>& views);
 

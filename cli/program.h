@@ -3,8 +3,12 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <string_view>
 
 namespace raydix::cli {
+
+/// One line on standard error, whatever `reason` holds. Where that cannot be written it is lost.
+void complain(std::string_view reason);
 
 /// Parses and runs; what goes wrong becomes one line on standard error.
 [[nodiscard]] int run_program(CLI::App& app, int argc, char** argv);

@@ -5,6 +5,8 @@
 
 #include <memory>
 
+#include "option_checks.h"
+
 namespace raydix::cli {
 namespace {
 
@@ -32,6 +34,13 @@ void run_query(const QueryCommand& options) {
            "belongs to --knn, --radius, --box and --pairs");
     refuse(options.tree != "automatic", "--tree", "belongs to --knn, --radius and --box");
     refuse(options.pairs && !options.queries_file.empty(), "--queries", "has no part in --pairs");
+    for (const std::string& scene : {options.scene, options.with_scene}) {
+        const std::string why = "the scene in " + scene + " is used as it is";
+        if (!is_scene_file(scene)) continue;
+        refuse(options.common.flatten, "--flatten", why.c_str());
+        refuse(options.strict, "--strict", why.c_str());
+        refuse(!options.builder.empty(), "--builder", why.c_str());
+    }
     run_mesh_query(options);
 }
 
@@ -40,7 +49,7 @@ void add_kinds(CLI::App& command, QueryCommand& options) {
     command
         .add_option("--knn", options.k,
                     "The K nearest points of each query, by distance, the point itself included")
-        ->check(CLI::Range(std::uint32_t{1}, std::uint32_t{0xFFFFFFFE}))
+        ->transform(whole_number(1, 0xFFFFFFFE))
         ->type_name("K")
         ->group(group);
     command.add_option("--radius", options.radius, "All points within distance R of each query")
@@ -146,12 +155,22 @@ void add_query_command(CLI::App& app) {
     command->add_flag("--strict", options->strict,
                       "Invalid points are an error instead of being left out");
     command->add_option("--repeat", options->repeat, "Timed runs after a warm-up")
-        ->check(CLI::Range(0, 1000))
+        ->transform(whole_number(0, 1000))
         ->capture_default_str();
     add_result_limit(*command, options->max_result_bytes);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
-    command->callback([options] { run_query(*options); });
+    command->callback([options, command] {
+        if (options->prefix.empty()) refuse_given(*command, {"--out"}, "the prefix is empty");
+        if (!options->prefix.empty())
+            require_writable(options->prefix + (options->pairs             ? ".pairs.npy"
+                                                : options->signed_distance ? ".distances.npy"
+                                                : options->radius || options->box
+                                                    ? ".offsets.npy"
+                                                    : ".indices.npy"));
+        require_writable_json(options->common);
+        run_query(*options);
+    });
 }
 
 }  // namespace raydix::cli

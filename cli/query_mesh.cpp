@@ -25,6 +25,7 @@ SceneTree load_tree(const std::string& scene, const QueryCommand& options) {
         return {std::move(file.scene), std::move(file.bvh)};
     }
     SceneTree loaded{load_query_scene(scene, options.common), {}};
+    say_flattened(scene, options.common);
     loaded.bvh = about(scene, [&] {
         return build_bvh(loaded.scene.mesh(),
                          {.builder = options.builder.empty() ? Builder::ploc

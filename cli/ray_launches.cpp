@@ -7,6 +7,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "option_checks.h"
+
 namespace raydix::cli {
 namespace {
 
@@ -23,6 +25,7 @@ float chosen_ao_radius(float given, const Model& scene, const Aabb& box) {
 }
 
 std::vector<Camera> chosen_cameras(const std::string& which, const Model& scene) {
+    require_cameras(scene);
     const std::vector<Camera>& all = scene.cameras.cameras;
     if (which == "all") return all;
     std::size_t index = 0;
@@ -49,7 +52,7 @@ void add_launch_options(CLI::App& command, LaunchOptions& options) {
                     "Pixels of the cameras (default: of cameras.json, or 1024x768)")
         ->type_name("WxH");
     command.add_option("--samples", options.samples, "Secondary rays per primary hit")
-        ->check(CLI::Range(1, 1024))
+        ->transform(whole_number(1, 1024))
         ->capture_default_str();
     command
         .add_option("--ao-radius", options.ao_radius,
@@ -68,7 +71,7 @@ void add_launch_options(CLI::App& command, LaunchOptions& options) {
         })
         ->capture_default_str();
     command.add_option("--launch-rays", options.launch_rays, "Secondary rays of one launch")
-        ->check(CLI::Range(1024u, 1u << 26))
+        ->transform(whole_number(1024, 1u << 26))
         ->capture_default_str();
 }
 

@@ -1,10 +1,8 @@
 #include "raydix.h"
 
-#include <fmt/format.h>
 #include <raydix/error.h>
 #include <raydix/version.h>
 
-#include <cstdio>
 #include <string>
 
 #include "help_pages.h"
@@ -33,7 +31,7 @@ int run_raydix(int argc, char** argv) {
         add_completion_command(app);
         add_man_command(app);
     } catch (const BackendUnavailable& error) {  // some options list what the processor can do
-        fmt::print(stderr, "raydix: {}\n", error.what());
+        complain(error.what());
         return 1;
     }
     group_options(app);

@@ -44,6 +44,9 @@ void run_render(RenderCommand options) {
     refuse_build_options(options.scene, options.tree);
     refuse_device(options.tree);
     const bool of_tree = is_tree_view(options.view);
+    if (of_tree && is_scene_file(options.scene))
+        throw CLI::ValidationError(
+            "--view", options.view + " shows one tree; " + options.scene + " holds a scene");
     if (!of_tree) refuse_tree_view_options(options.tree_view);
     std::optional<Scene> scene;
     Json about_scene;  // of a file that holds one
@@ -53,7 +56,11 @@ void run_render(RenderCommand options) {
                 : TreeScene{load_shown(options, scene, about_scene), {}};
     const SceneTree& input = tree_scene.input;
     const CameraSet& cameras = input.scene.cameras;
-    const Camera camera = options.chosen_camera(cameras, input.scene.name);
+    Camera camera;
+    if (options.view != "slice")
+        camera = options.chosen_camera(input.scene);
+    else if (!cameras.cameras.empty())
+        camera = cameras.cameras.front();
     RenderOptions render_options = options.render_options(cameras, options.common);
     render_options.view = of_tree ? View::shaded : view_from_name(options.view);
     const Size size{render_options.width, render_options.height};
@@ -99,7 +106,11 @@ void add_render_command(CLI::App& app) {
     add_tree_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
-    command->callback([options] { run_render(*options); });
+    command->callback([options, command] {
+        check_picture_options(*command, *options);
+        require_writable_json(options->common);
+        run_render(*options);
+    });
 }
 
 }  // namespace raydix::cli

@@ -12,7 +12,9 @@
 #include <iterator>
 #include <memory>
 
+#include "option_checks.h"
 #include "output.h"
+#include "program.h"
 
 namespace raydix::cli {
 namespace {
@@ -46,6 +48,7 @@ void render_views(const std::string& name, const ReportCommand& options, Size si
     const std::string spec = scene_spec(name, options.scene_folder);
     try {
         const Model scene = load_flat_model(spec, options.common.seed);
+        require_cameras(scene);
         BuildOptions build;
         build.builder = Builder::ploc;
         build.threads = options.common.threads;
@@ -66,7 +69,7 @@ void render_views(const std::string& name, const ReportCommand& options, Size si
             "ploc; the palest is what one pixel in 200 exceeds",
             render(bvh, camera, render_options), false));
     } catch (const InputError& error) {
-        if (!options.common.quiet) fmt::print(stderr, "raydix: no picture: {}\n", error.what());
+        if (!options.common.quiet) complain(std::string("no picture: ") + error.what());
     }
 }
 
@@ -126,6 +129,7 @@ void add_report_command(CLI::App& app) {
     command->add_option("--picture", options->pictures, "A picture to put in; may be repeated")
         ->type_name("FILE.png")
         ->expected(1)
+        ->allow_extra_args(false)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     command->add_flag("--render", options->render,
                       "Also render the scenes that the documents name: shaded, and node visits");
@@ -137,12 +141,15 @@ void add_report_command(CLI::App& app) {
         ->type_name("WxH")
         ->capture_default_str();
     command->add_option("--threads", options->common.threads, "Threads to use (0: all)")
-        ->check(CLI::Range(0, 1024));
+        ->transform(whole_number(0, 1024));
     command->add_flag("--quiet", options->common.quiet, "Print nothing");
     command->add_option("--seed", options->common.seed, "Seed of built-in scenes")
-        ->check(CLI::NonNegativeNumber)
+        ->transform(whole_number(0))
         ->capture_default_str();
-    command->callback([options] { run_report(*options); });
+    command->callback([options, command] {
+        require_writable(*command, "--output", options->out_file);
+        run_report(*options);
+    });
 }
 
 }  // namespace raydix::cli

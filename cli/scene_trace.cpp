@@ -14,7 +14,8 @@ namespace raydix::cli {
 bool serves_a_scene(const TreeOptions& tree, const CommonOptions& common) {
     const auto given = [](const CLI::Option* option) { return option->count() != 0; };
     const bool of_one_tree = std::ranges::any_of(tree.of_the_build, [&](const CLI::Option* option) {
-        return given(option) && option->get_name() != "--quality";
+        const std::string name = option->get_name();
+        return given(option) && name != "--quality" && name != "--strict";
     });
     return !common.flatten && tree.tree == "bvh" && tree.device == "cpu" && !of_one_tree &&
            !tree.epo_sample &&
@@ -27,6 +28,7 @@ SceneOptions scene_options(const TreeOptions& tree, const CommonOptions& common)
                       : tree.quality == "high" ? Quality::high
                                                : Quality::balanced;
     options.compact = tree.layout == "compact";
+    options.strict = tree.strict;
     options.threads = common.threads;
     return options;
 }

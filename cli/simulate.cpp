@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "option_checks.h"
 #include "output.h"
 #include "ray_launches.h"
 #include "simulation.h"
@@ -43,8 +44,11 @@ void print_head(const SimulateCommand& options, const MachineModel& m, const War
 void run_simulate(const SimulateCommand& options) {
     const MachineModel machine = machine_from(options.machine);
     const std::vector<SimulateOptions> runs = runs_of(options, machine);
-    static_cast<void>(
-        simulate(WarpTree(Bvh{}), {}, runs));  // a machine that cannot be, before work
+    const auto try_machine = [&] { static_cast<void>(simulate(WarpTree(Bvh{}), {}, runs)); };
+    if (options.machine.ends_with(".json"))  // one that cannot be, before work
+        about(options.machine, try_machine);
+    else
+        try_machine();
     const bool from_file = options.rays.ends_with(".npy");
     const std::vector<RayKind> kinds =
         from_file ? std::vector<RayKind>{} : kinds_from(options.rays);
@@ -105,6 +109,7 @@ void add_simulate_command(CLI::App& app) {
             "8) float32 .npy file")
         ->capture_default_str();
     command->add_option("--width", options->width, "Lanes of a warp")
+        ->transform(whole_number(1, 64).description(""))
         ->check(CLI::IsMember({1, 2, 4, 8, 16, 32, 64}))
         ->capture_default_str();
     command->add_flag("--memory", options->memory,
@@ -117,7 +122,18 @@ void add_simulate_command(CLI::App& app) {
     add_tree_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
-    command->callback([options] { run_simulate(*options); });
+    command->get_option("--builder")->description("Builder (default: split, without --quality)");
+    command->get_option("--quality")
+        ->description(
+            "Picks a builder and its rounds of reinsertion: fast is apetrei, balanced is ploc and "
+            "2, high is sbvh and 4 (default: none, but the builder split)");
+    command->callback([options, command] {
+        if (!options->rays.ends_with(".npy"))
+            refuse_given(*command, {"--any"},
+                         "belongs to --rays FILE.npy, not to " + options->rays);
+        require_writable_json(options->common);
+        run_simulate(*options);
+    });
 }
 
 }  // namespace raydix::cli

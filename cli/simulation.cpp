@@ -422,8 +422,13 @@ void print_steps_to_scheduled(const std::vector<SimulationRow>& rows) {
 }
 
 MachineModel machine_from(const std::string& name_or_file) {
-    return name_or_file.ends_with(".json") ? load_machine_model(name_or_file)
-                                           : machine_model(name_or_file);
+    if (!name_or_file.ends_with(".json")) return machine_model(name_or_file);
+    MachineModel machine = load_machine_model(name_or_file);
+    const SimulateOptions run{.machine = machine};
+    about(name_or_file, [&] {  // whether it can be simulated
+        static_cast<void>(simulate(WarpTree(Bvh{}), {}, std::span(&run, 1)));
+    });
+    return machine;
 }
 
 std::vector<WarpKernel> kernels_from(const std::string& names) {
@@ -445,11 +450,13 @@ std::vector<RayKind> kinds_from(const std::string& names) {
     for (const std::string& name : split(names)) {
         const auto kind = std::find_if(all.begin(), all.end(),
                                        [&](RayKind k) { return ray_kind_name(k) == name; });
+        if (name.ends_with(".npy"))
+            throw CLI::ValidationError("--rays", "'" + name +
+                                                     "' is a file: simulate takes one alone, and "
+                                                     "bench traversal makes its own rays");
         if (kind == all.end())
             throw CLI::ValidationError(
-                "--rays",
-                "'" + name +
-                    "' is not primary, ao, diffuse, diffuse_shuffled, all, or a .npy file");
+                "--rays", "'" + name + "' is not primary, ao, diffuse, diffuse_shuffled or all");
         kinds.push_back(*kind);
     }
     return kinds;

@@ -10,6 +10,8 @@
 #include <span>
 #include <utility>
 
+#include "option_checks.h"
+
 namespace raydix::cli {
 namespace {
 
@@ -91,6 +93,7 @@ Json figures_of(const SceneTree& input, const std::vector<SimulationRow>& rows,
 
 SimulationState::SimulationState(std::string file) : file_(std::move(file)) {
     document_ = {{"holds", kind_of_file}, {"version", version}, {"parts", Json::object()}};
+    require_writable(file_);
     if (!std::filesystem::exists(file_)) return;
     std::ifstream in(file_);
     const Json found = Json::parse(in, nullptr, false);

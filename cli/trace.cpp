@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "kdtree_commands.h"
+#include "option_checks.h"
 #include "output.h"
 #include "ray_launches.h"
 #include "scene_file.h"
@@ -423,6 +424,7 @@ void run_trace(const TraceCommand& given) {
     on_cpu.device = "cpu";
     std::optional<SceneTracer> scene;
     const KdTraced traced = load_traced(options, on_cpu, scene);
+    say_flattened(options.scene, options.common);
     const bool through_kdtree = traced.kdtree.has_value();
     if (through_kdtree && given.kernel.empty()) options.kernel = default_kernel("cpu");
     if (options.max_result_bytes != 0 && mode != Mode::all)
@@ -474,7 +476,8 @@ void run_trace(const TraceCommand& given) {
             about(options.scene, [&] { measure(batch, rays, options.repeat, tally); });
         keep(options, rays, batch, kept);
     } else {
-        const std::vector<Camera> cameras = chosen_cameras(options.camera, input.scene);
+        const std::vector<Camera> cameras =
+            about(options.scene, [&] { return chosen_cameras(options.camera, input.scene); });
         for (std::size_t c = 0; c < cameras.size(); ++c)
             about(options.scene, [&] {
                 trace_camera(options, input, cameras[c], ray_kind(options.rays), size, batch, tally,
@@ -555,14 +558,14 @@ void add_trace_command(CLI::App& app) {
                      "Pixels of the cameras (default: of cameras.json, or 1024x768)")
         ->type_name("WxH");
     command->add_option("--samples", options->samples, "Secondary rays per primary hit")
-        ->check(CLI::Range(1, 1024))
+        ->transform(whole_number(1, 1024))
         ->capture_default_str();
     command
         ->add_option("--ao-radius", options->ao_radius,
                      "Reach of ao rays (default: of cameras.json, or 5 % of the diagonal)")
         ->check(finite_number(false));
     command->add_option("--repeat", options->repeat, "Times to trace after a warm-up")
-        ->check(CLI::Range(1, 10000))
+        ->transform(whole_number(1, 10000))
         ->capture_default_str();
     command
         ->add_option(
@@ -577,7 +580,14 @@ void add_trace_command(CLI::App& app) {
     add_tree_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
-    command->callback([options] { run_trace(*options); });
+    command->callback([options, command] {
+        if (options->tree.device != "sim")
+            refuse_given(*command, {"--machine"}, "belongs to --device sim");
+        require_writable(*command, "--hits", options->hits_file);
+        require_writable(*command, "--save-rays", options->rays_file);
+        require_writable_json(options->common);
+        run_trace(*options);
+    });
 }
 
 }  // namespace raydix::cli

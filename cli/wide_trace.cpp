@@ -54,6 +54,8 @@ std::string chosen_cpu_kernel(const std::string& kernel, TreeOptions& tree,
     if (tree.layout == "cwbvh")
         throw CLI::ValidationError("--layout",
                                    "cwbvh does not go with --kernel engine, wide8 does");
+    if (!wide && tree.layout_option->count() != 0)
+        throw CLI::ValidationError("--layout", tree.layout + " does not go with --kernel engine");
     if (!wide) tree.layout = "wide8";
     return "engine";
 }
@@ -144,7 +146,7 @@ void add_wide_builds(Json& build, const Mesh& mesh, const BuildOptions& options,
                      const std::string& layout, int repeat) {
     const WideBvhOptions wide = wide_options(layout, options.threads);
     std::vector<double> fresh, kept;
-    WideBvh tree = build_wide_bvh(mesh, options, wide);
+    WideBvh tree = about(mesh.name, [&] { return build_wide_bvh(mesh, options, wide); });
     for (int i = 0; i < repeat; ++i) {
         tree = WideBvh();
         tree = build_wide_bvh(mesh, options, wide);

@@ -53,6 +53,9 @@ struct Model {
     CameraSet
         cameras;  // from cameras.json beside the file, the built-in's own, or one fitted to the box
     double load_ms = 0.0;
+    /// Why cameras.json beside the file gave no cameras, with its name; `cameras` is then one
+    /// fitted to the box. Empty: it did, or there is none.
+    std::string cameras_fault;
 
     /// The only mesh. Throws InputError if there are nodes or several meshes.
     [[nodiscard]] const Mesh& mesh() const&;
@@ -73,7 +76,8 @@ struct Model {
 /// (ascii, binary), .gltf, .glb, .off, .xyz or .npy, each also with .gz, .xz or .zst behind it.
 /// Polygons are fanned in order. -0 becomes +0. Coordinates that are not finite are kept; builders
 /// leave such triangles out. Memory stays in proportion to what the file really holds. Throws
-/// InputError for what cannot be read or does not exist: "FILE: ELEMENT: reason".
+/// InputError for what cannot be read or does not exist: "FILE: ELEMENT: reason"; not for a
+/// cameras.json beside the file, which may be another program's (Model::cameras_fault).
 [[nodiscard]] Model load_model(const std::string& spec, std::uint64_t seed = 1);
 
 /// As load_model, then Model::flatten.

@@ -119,6 +119,12 @@ AnyCamera camera_from(const Fields& fields) {
 nb::dict camera_figures(const Camera& camera) { return figures_of(camera); }
 nb::dict camera_figures(const CameraD& camera) { return figures_of(camera); }
 
+void warn_of_cameras(const std::string& fault) {
+    const std::string text = fault + "; the camera is one that sees all";
+    if (!fault.empty() && PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0)
+        throw nb::python_error();
+}
+
 Camera camera_of(const CameraFields<float>& fields) { return camera_from<Camera>(fields); }
 CameraD camera_of(const CameraFields<double>& fields) { return camera_from<CameraD>(fields); }
 

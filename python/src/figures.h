@@ -36,6 +36,9 @@ using CameraFields =
 [[nodiscard]] inline Vec3d point_of(const Coordinates<double>& c) {
     return {std::get<0>(c), std::get<1>(c), std::get<2>(c)};
 }
+/// A UserWarning of what Model::cameras_fault says, if it says anything. With the interpreter's
+/// lock.
+void warn_of_cameras(const std::string& fault);
 [[nodiscard]] Camera camera_of(const CameraFields<float>& fields);
 [[nodiscard]] CameraD camera_of(const CameraFields<double>& fields);
 [[nodiscard]] nanobind::dict stage_ms(const BuildMs& ms);

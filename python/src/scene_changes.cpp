@@ -121,16 +121,18 @@ nb::tuple load(const std::string& spec, std::uint64_t seed, const std::string& b
     const BuildOptions trees =
         build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads);
     const SceneOptions commits = scene_options(quality, usage, compact, threads);
-    std::string name;
+    std::string name, cameras_fault;
     std::vector<Camera> shown;
     std::shared_ptr<SceneTrees> scene;
     {
         const nb::gil_scoped_release unlocked;
         Model model = load_model(spec, seed);
         name = model.name;
+        cameras_fault = model.cameras_fault;
         shown = std::move(model.cameras.cameras);
         scene = SceneFiles::scene_of(std::move(model), trees, commits);
     }
+    warn_of_cameras(cameras_fault);
     return named(scene, name, shown);
 }
 

@@ -2,6 +2,7 @@
 // scene.
 #include <raydix/bvh.h>
 #include <raydix/camera.h>
+#include <raydix/error.h>
 #include <raydix/model.h>
 #include <raydix/trace.h>
 
@@ -49,6 +50,18 @@ Aabb finite_bounds(const Model& model) {
     return box;
 }
 
+/// Another program's file of this name is no reason not to give the geometry.
+void take_cameras_beside(const std::filesystem::path& file, Model& model) {
+    const std::filesystem::path beside = file.parent_path() / "cameras.json";
+    std::error_code ignored;
+    if (!std::filesystem::exists(beside, ignored)) return;
+    try {
+        model.cameras = load_cameras(beside);
+    } catch (const InputError& error) {
+        model.cameras_fault = error.what();
+    }
+}
+
 }  // namespace
 
 Model load_model(const std::string& spec, std::uint64_t seed) {
@@ -65,9 +78,7 @@ Model load_model(const std::string& spec, std::uint64_t seed) {
         const std::filesystem::path file(spec);
         scene = load_file(file);
         scene.name = file.filename().string();
-        const std::filesystem::path beside = file.parent_path() / "cameras.json";
-        if (std::error_code ignored; std::filesystem::exists(beside, ignored))
-            scene.cameras = load_cameras(beside);
+        take_cameras_beside(file, scene);
     }
     if (scene.cameras.cameras.empty())
         scene.cameras.cameras.push_back(fit_camera(finite_bounds(scene)));

@@ -1,5 +1,6 @@
 // JSON -> a machine of the simulator, with errors that name the file and the field.
 #include <fmt/format.h>
+#include <raydix/error.h>
 #include <raydix/simulate.h>
 
 #include <algorithm>
@@ -23,8 +24,8 @@ public:
 
     MachineModel read() {
         if (!document_.is_object()) in_.fail("machine", "not a JSON object");
-        if (document_.contains("base")) m_ = machine_model(text(document_["base"], "base"));
         based_ = document_.contains("base");
+        if (based_) read_base();
         m_.name = document_.contains("name") ? text(document_["name"], "name") : "custom";
         m_.origin = document_.contains("origin") ? text(document_["origin"], "origin")
                     : based_                     ? fmt::format("{}, changed", m_.origin)
@@ -62,6 +63,15 @@ public:
     }
 
 private:
+    void read_base() {
+        try {
+            m_ = machine_model(text(document_["base"], "base"));
+        } catch (const InputError& error) {
+            const std::string reason = error.what();
+            if (reason.starts_with(in_.name())) throw;  // it is no text
+            in_.fail("base", reason);
+        }
+    }
     std::string text(const json& value, const char* key) const {
         if (!value.is_string()) in_.fail(key, "not a text");
         return value.get<std::string>();

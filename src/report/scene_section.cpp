@@ -56,6 +56,35 @@ std::string scene_table(const Documents& documents) {
     return table_html(table);
 }
 
+/// What a `check` object says: in a cell and in the summary.
+struct CheckVerdict {
+    bool known, good;
+    std::string cell, sentence;
+};
+
+/// Of a tree, or of two that were compared.
+CheckVerdict verdict_of(const Json& check, const std::string& document) {
+    const Json& ok = at(check, "ok");
+    const bool known = ok.is_boolean(), good = known && ok.get<bool>();
+    const Json& pair = at(check, "compared");
+    if (pair.is_array() && pair.size() == 2 && pair[0].is_string() && pair[1].is_string()) {
+        const std::string a = pair[0].get<std::string>(), b = pair[1].get<std::string>();
+        const std::string where = text_at(check, "difference");
+        const std::string both = breakable(a) + " and " + breakable(b);
+        return {known, good,
+                a + " and " + b + (good ? ": the same \xE2\x9C\x93" : " differ: " + where),
+                good ? fmt::format("Compared: the trees of {} are the same.", both)
+                     : fmt::format("<span class=\"warning\">The trees of {} differ: {}</span>",
+                                   both, escaped(where))};
+    }
+    const std::string why = text_at(check, "broken");
+    return {
+        known, good, good ? "\xE2\x9C\x93 every invariant holds" : "\xE2\x9C\x97 broken: " + why,
+        good ? fmt::format("Checked: every invariant of the tree in {} holds.", breakable(document))
+             : fmt::format("<span class=\"warning\">The tree checked in {} is broken: {}</span>",
+                           breakable(document), escaped(why))};
+}
+
 std::string check_table(const Documents& documents, Section& section) {
     Table table{
         .title = "Checks",
@@ -64,23 +93,14 @@ std::string check_table(const Documents& documents, Section& section) {
     for (const Document& document : documents) {
         const Json& check = at(document.root, "check");
         if (!check.is_object()) continue;
-        const Json& ok = at(check, "ok");
-        const bool known = ok.is_boolean(), sound = known && ok.get<bool>();
-        Cell result(sound ? "\xE2\x9C\x93 every invariant holds" : "says neither yes nor no");
-        result.mark = sound ? Cell::Mark::better : Cell::Mark::even;
-        if (known && !sound) {
-            result = Cell("\xE2\x9C\x97 broken: " + text_at(check, "broken"));
-            result.mark = Cell::Mark::alert;
-        }
+        const CheckVerdict verdict = verdict_of(check, document.name);
+        Cell result(verdict.known ? verdict.cell : "says neither yes nor no");
+        result.mark = !verdict.known ? Cell::Mark::even
+                      : verdict.good ? Cell::Mark::better
+                                     : Cell::Mark::alert;
         table.rows.push_back(
             {document.name, result, number_at(check, "nodes"), number_at(check, "primitives")});
-        if (known)
-            section.summary.push_back(
-                sound ? fmt::format("Checked: every invariant of the tree in {} holds.",
-                                    breakable(document.name))
-                      : fmt::format("<span class=\"warning\">The tree checked in {} is broken: "
-                                    "{}</span>",
-                                    breakable(document.name), escaped(text_at(check, "broken"))));
+        if (verdict.known) section.summary.push_back(verdict.sentence);
     }
     return table_html(table);
 }

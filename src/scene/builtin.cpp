@@ -124,6 +124,7 @@ Arguments read_arguments(const BuiltinScene& scene, std::string_view text) {
     std::vector<std::uint64_t> values;
     for (const BuiltinParameter& parameter : scene.parameters)
         values.push_back(static_cast<std::uint64_t>(parameter.default_value));
+    std::vector<bool> given(values.size());
     while (!text.empty()) {
         std::string_view value = take_until(text, '&');
         const std::string_view key = take_until(value, '=');
@@ -131,6 +132,9 @@ Arguments read_arguments(const BuiltinScene& scene, std::string_view text) {
         if (i == scene.parameters.size())
             throw InputError(fmt::format("builtin:{}: unknown parameter '{}'; there are: {}",
                                          scene.name, key, names(scene.parameters)));
+        if (given[i])
+            throw InputError(fmt::format("builtin:{}: '{}' is given twice", scene.name, key));
+        given[i] = true;
         values[i] = read_value(scene.name, scene.parameters[i], value);
     }
     return {scene.parameters, std::move(values)};

@@ -41,9 +41,12 @@ Model load_by_extension(ByteSource& in, const std::filesystem::path& file,
     if (extension == ".xyz") return model_of(load_xyz(in));
     if (extension == ".npy") return model_of(load_npy_points(in));
     if (extension == ".gltf" || extension == ".glb") return load_gltf_file(in, file);
+    if (extension == ".rdx")
+        in.fail("file name", "is that of a tree or a scene, which load_rdx or load_rdx_scene read");
     in.fail(
         "file name",
-        "ends in none of .ply .obj .stl .off .xyz .npy .gltf .glb, with or without .gz .xz .zst");
+        "ends in none of .ply .obj .stl .off .xyz .npy .gltf .glb, with or without .gz .xz .zst, "
+        "nor in .rdx");
 }
 
 }  // namespace

@@ -79,6 +79,20 @@ class Gltf(ProgramTest):
                 self.assertEqual([hit[1] for hit in hits], FLAT_PRIMS)
                 self.assertEqual([hit[0] for hit in hits][:5], [wanted[0] for _, wanted in RAYS[:5]])
 
+    def test_strict_keeps_the_structure(self):
+        made = self.trace("--strict")
+        self.assertEqual((made["scene"]["geometries"], made["scene"]["instances"]), (3, 3))
+        self.assertNotIn("flattened", made["scene"])
+        self.assertEqual(read_scene_hits(self.hits)[0][4:6], RAYS[0][1][2:4])
+
+    def test_quiet_says_what_was_flattened(self):
+        result = self.run_program("trace", self.scene, "--rays", self.rays, "--builder", "karras", "--quiet", "--json", "flat.json")
+        self.assertEqual((result.code, result.out), (0, ""))
+        self.assertEqual(result.err, "raydix: " + self.scene + ": its meshes and nodes are taken as one mesh (--flatten)\n")
+        self.assertIs(json.loads((self.folder / "flat.json").read_text())["scene"]["flattened"], True)
+        self.assertEqual(self.succeed("trace", self.scene, "--rays", self.rays, "--flatten", "--quiet").out, "")
+        self.assertIs(self.document("query", self.scene, "--closest", "--builder", "ploc")["scene"]["flattened"], True)
+
     def test_devices_take_one_mesh(self):
         self.assertIn("its 3 meshes and 3 nodes are taken as one mesh (--flatten)",
                       self.succeed("trace", self.scene, "--device", "sim", "--size", "8x8").out)

@@ -174,8 +174,9 @@ class Pipeline(ProgramTest):
 
     def test_saved_rays_give_the_same_hits(self):
         for kind in ("primary", "ao", "diffuse", "diffuse_shuffled"):
-            arguments = ["--samples", "2", "--repeat", "1", "--mode", "closest"]
-            first = self.document("trace", SOUP, "--rays", kind, "--size", "32x24", "--camera", "0", *arguments,
+            arguments = ["--repeat", "1", "--mode", "closest"]
+            samples = [] if kind == "primary" else ["--samples", "2"]
+            first = self.document("trace", SOUP, "--rays", kind, "--size", "32x24", "--camera", "0", *samples, *arguments,
                                   "--hits", "a.npy", "--save-rays", "rays.npy")["trace"][0]
             second = self.document("trace", SOUP, "--rays", "rays.npy", *arguments, "--hits", "b.npy",
                                    "--threads", "1")["trace"][0]
@@ -258,6 +259,24 @@ class Pipeline(ProgramTest):
             write_npy(self.folder / f"{name}.npy", descr, shape, data)
             self.fail_with_one_line("trace", SOUP, "--rays", f"{name}.npy", names=[f"{name}.npy"])
 
+    def test_cameras_of_another_program(self):
+        os.mkdir(self.folder / "foreign")
+        scene, broken = "foreign/squares.ply", "foreign/cameras.json"
+        self.write(scene, SQUARES)
+        self.write(broken, '[{"id": 0, "img_name": "0001"}]')
+        self.write("own.json", '[{"position": [0.5, 0.5, 4], "target": [0.5, 0.5, 0]}]')
+        write_npy(self.folder / "one.npy", "<f4", (1, 8), struct.pack("<8f", 0.5, 0.5, 3, 0, 0, 0, -1, 9))
+        self.assertIn(f"{broken}: camera 1: position is missing", self.succeed("info", scene).out)
+        for command in (["build", scene, "-o", "foreign.rdx"], ["query", scene, "--closest"], ["check", scene],
+                        ["trace", scene, "--rays", "one.npy"], ["trace", scene, "--cameras", "own.json", "--size", "8x8"],
+                        ["render", scene, "--eye", "0", "0", "4", "--size", "8x8", "-o", "x.png"],
+                        ["render", scene, "--cameras", "own.json", "--size", "8x8", "-o", "x.png"],
+                        ["render", scene, "--view", "slice", "--size", "8x8", "-o", "x.png"], ["info", "foreign.rdx"]):
+            self.succeed(*command)
+        for command in (["trace", scene], ["trace", scene, "--rays", "ao"], ["render", scene, "-o", "x.png"],
+                        ["simulate", scene], ["render", scene, "--eye", "0", "0", "4", "--camera", "1", "-o", "x.png"]):
+            self.fail_with_one_line(*command, "--quiet", names=[broken, "position is missing"])
+
     def test_cameras(self):
         one = '{"position": [0.5, 0.5, %g], "target": [0.5, 0.5, 0], "up": [0, 1, 0], "vfov": 40}'
         os.mkdir(self.folder / "scene")
@@ -284,12 +303,13 @@ class Pipeline(ProgramTest):
         self.succeed("build", scene, "--quality", "balanced", "-o", "figure.rdx", "--repeat", "1")
         seen = set()
         for view in ("shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps"):
-            self.succeed("render", "figure.rdx", "--view", view, "--size", "40x30", "--samples", "16", "-o", "a.png")
+            samples = ("--samples", "16") if view in ("shaded", "ao", "diffuse") else ()
+            self.succeed("render", "figure.rdx", "--view", view, "--size", "40x30", *samples, "-o", "a.png")
             width, height, values = read_png(self.folder / "a.png")
             self.assertEqual((width, height), (40, 30), view)
             self.assertGreater(values, 4, f"{view}: the picture is empty")
             seen.add((self.folder / "a.png").read_bytes())
-            self.succeed("render", scene, "--view", view, "--size", "40x30", "--samples", "16", "-o", "b.png",
+            self.succeed("render", scene, "--view", view, "--size", "40x30", *samples, "-o", "b.png",
                          "--threads", "1")
             if view != "steps":  # of a .rdx file those are through its own binary tree
                 self.assertEqual((self.folder / "a.png").read_bytes(), (self.folder / "b.png").read_bytes(), view)

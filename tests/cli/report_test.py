@@ -35,6 +35,22 @@ class Report(ProgramTest):
             self.assertIn(name, html)
         self.assertEqual(html, self.page(*results))
 
+    def test_trees_that_are_compared(self):
+        """Neither says that a tree is broken."""
+        other = "builtin:soup?triangles=50"
+        differs = self.run_program("check", "--same", FIGURE, other, "--quiet", "--json", "differs.json")
+        self.assertEqual(differs.code, 1)
+        same = json.loads((self.folder / self.make("same.json", "check", "--same", FIGURE, FIGURE)).read_text(encoding="utf-8"))["check"]
+        check = json.loads((self.folder / "differs.json").read_text(encoding="utf-8"))["check"]
+        self.assertEqual((same["ok"], same["same"], same["difference"], same["compared"]), (True, True, None, [FIGURE, FIGURE]))
+        self.assertEqual((check["ok"], check["same"], check["compared"]), (False, False, [FIGURE, other]))
+        self.assertIn("primitives given: ", check["difference"])
+        self.assertNotIn("broken", check)
+        html = re.sub("<wbr>", "", self.page("differs.json", "same.json"))
+        self.assertIn(f"The trees of {FIGURE} and {other} differ: primitives given: ", html)
+        self.assertIn(f"The trees of {FIGURE} and {FIGURE} are the same.", html.replace("Compared: the", "The"))
+        self.assertNotIn("broken", html)
+
     def test_two_runs_are_compared(self):
         first = self.make("a.json", "build", FIGURE, "--builder", "karras", "--max-leaf", "4")
         second = self.make("b.json", "build", FIGURE, "--builder", "karras", "--max-leaf", "8")
@@ -52,6 +68,7 @@ class Report(ProgramTest):
         self.succeed("render", FIGURE, "--size", "32x24", "--samples", "1", "-o", "p.png", "--json", "render.json", "--quiet")
         self.assertEqual(self.page("render.json").count("data:image/png;base64,"), 1)  # named in the document
         self.assertEqual(self.page("render.json", "--picture", "p.png", "--picture", "p.png").count("data:image/png"), 3)
+        self.assertEqual(self.page("--picture", "p.png", "render.json").count("data:image/png"), 2)
         html = self.page(self.make("info.json", "info", FIGURE), "--render", "--size", "24x16")
         self.assertEqual(html.count('width="24" height="16"'), 2)
         self.assertIn("shaded", html)

@@ -59,11 +59,13 @@ class SceneFile(ProgramTest):
 
     def test_what_is_refused(self):
         self.succeed("build", self.scene, "--repeat", "1", "-o", "saved.rdx")
-        for command in (("build", "saved.rdx"), ("query", "saved.rdx", "--knn", "2"),
-                        ("query", SOUP, "--pairs", "--with", "saved.rdx", "--flatten"), ("simulate", "saved.rdx", "--size", "8x8"),
-                        ("check", "--same", "saved.rdx", SOUP),
-                        ("render", "saved.rdx", "--view", "tree", "-o", "x.png")):
-            self.fail_with_one_line(*command, names=("saved.rdx", "it holds a scene"))
+        for command in (("build", "saved.rdx"), ("query", "saved.rdx", "--knn", "2"), ("simulate", "saved.rdx", "--size", "8x8"),
+                        ("check", "--same", "saved.rdx", SOUP)):
+            self.fail_with_one_line(*command, names=("saved.rdx", "it holds a scene", "info, check, trace, render and query --closest"))
+        self.fail_with_usage("render", "saved.rdx", "--view", "tree", "-o", "x.png", names=("saved.rdx", "--view: tree"))
+        for options in (("--flatten",), ("--builder", "ploc"), ("--strict",)):
+            self.fail_with_usage("query", "saved.rdx", "--closest", *options, names=("saved.rdx", options[0]))
+        self.fail_with_usage("query", SOUP, "--pairs", "--with", "saved.rdx", "--flatten", names=("saved.rdx", "--flatten"))
         for options in (("--kernel", "scalar"), ("--layout", "compact"), ("--builder", "karras"), ("--quality", "high"),
                         ("--flatten",), ("--tree", "kdtree"), ("--device", "sim")):
             self.fail_with_usage("trace", "saved.rdx", "--size", "8x8", *options)
@@ -71,6 +73,14 @@ class SceneFile(ProgramTest):
                         ("--layout", "compact", "--max-leaf", "2"), ("--layout", "wide8", "--device", "cuda")):
             self.fail_with_usage("build", self.scene, "-o", "x.rdx", *options, names=("--output",))
         self.assertFalse((self.folder / "x.rdx").exists() or (self.folder / "x.png").exists())
+
+    def test_names_in_any_case(self):
+        self.succeed("build", SOUP, "--repeat", "1", "-o", "TREE.RDX")
+        self.assertEqual(self.document("info", "TREE.RDX")["build"]["tree"], "bvh")
+        self.succeed("trace", "TREE.RDX", "--size", "8x8", "--repeat", "1")
+        self.fail_with_usage("trace", "TREE.RDX", "--builder", "karras", names=("--builder", "TREE.RDX"))
+        self.succeed("build", "TREE.RDX", "--builder", "karras", "--repeat", "1")  # its triangles anew
+        self.fail_with_one_line("info", self.write("x.txt", ""), names=("x.txt", ".glb", ".rdx"))
 
     def test_altered_files(self):
         self.succeed("build", self.scene, "--repeat", "1", "-o", "saved.rdx")

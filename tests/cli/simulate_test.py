@@ -1,11 +1,12 @@
 """raydix simulate and bench traversal: figures, machine files, samples, refusals."""
 import json
+import os
 import pathlib
 import sys
 import unittest
 
 sys.dont_write_bytecode = True
-from program import SANITIZED, SHARED_SCENES, ProgramTest, main  # noqa: E402
+from program import SANITIZED, SHARED_SCENES, TRIANGLE, ProgramTest, main  # noqa: E402
 
 SCENE = "builtin:grove?triangles=10000" if SANITIZED else "builtin:grove?triangles=20000"
 SMALL = ("--size", "32x24", "--samples", "2") if SANITIZED else ("--size", "64x48", "--samples", "4")
@@ -140,10 +141,10 @@ class Simulate(ProgramTest):
                              '{"operation": "push", "instructions": 4}]}', ["push has two costs"]),
                             ('{"name": "bare"}', ["multiprocessors", "missing"])):
             file = self.write("bad.json", text)
-            self.fail_with_one_line("simulate", SCENE, "--machine", file, names=[*words])
+            self.fail_with_one_line("simulate", SCENE, "--machine", file, names=["bad.json", *words])
         # 15 first-level caches of 4 GB would be 32 GB of records.
         file = self.write("caches.json", '{"base": "gtx480", "l1_bytes": 4000000000}')
-        self.fail_with_one_line("simulate", SCENE, "--memory", "--machine", file, names=["l1_bytes", "2^30"])
+        self.fail_with_one_line("simulate", SCENE, "--memory", "--machine", file, names=["caches.json", "l1_bytes", "2^30"])
         self.fail_with_one_line("simulate", SCENE, "--machine", "none.json", names=["none.json"])
         self.fail_with_one_line("simulate", SCENE, "--machine", "gtx1", names=["gtx1", "gtx285_enum_popc"])
 
@@ -155,6 +156,26 @@ class Simulate(ProgramTest):
         self.fail_with_usage("simulate", SCENE, "--sample", "0")
         self.fail_with_usage("simulate", SCENE, "--sample", "1.5")
         self.fail_with_usage("bench", "traversal", SCENE, "--kernel", "x")
+        self.fail_with_usage("simulate", SCENE, "--any", "--rays", "primary", names=["--any", "--rays FILE.npy", "primary"])
+        for option in ("--size", "8x8"), ("--camera", "0"), ("--samples", "2"), ("--sample", "0.5"), ("--launch-rays", "1024"):
+            self.fail_with_usage("simulate", SCENE, "--rays", "x.npy", *option, names=[option[0], "--rays x.npy"])
+        help_text = " ".join(self.succeed("simulate", "--help").out.split())
+        self.assertIn("Builder (default: split, without --quality)", help_text)
+        self.assertNotIn("default: balanced", help_text)
+
+    def test_files_at_fault_are_named_once(self):
+        scene = self.write("one.ply", TRIANGLE)
+        result = self.fail_with_one_line("simulate", scene, "--camera", "7", "--quiet", names=["camera 7"])
+        self.assertEqual(result.err.count("one.ply"), 1, result)
+        os.mkdir(self.folder / "folder")
+        for state in ("folder", "none/state.json"):
+            result = self.fail_with_one_line("bench", "traversal", scene, "--state", state, names=[state + ": cannot write: "])
+            self.assertNotIn("one.ply", result.err)
+        result = self.fail_with_one_line("bench", "traversal", "none.ply", names=["none.ply"])
+        self.assertEqual(result.err.count("none.ply"), 1, result)
+        result = self.run_program("bench", "traversal", scene, "--rays", "rays.npy", "--quiet")
+        self.assertEqual(result.code, 2)
+        self.assertIn("bench traversal makes its own rays", result.err)
 
     def test_points_are_refused(self):
         self.fail_with_one_line("simulate", "builtin:uniform?points=100", names=["triangles"])

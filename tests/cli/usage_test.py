@@ -45,6 +45,7 @@ class Usage(ProgramTest):
     def test_usage_errors_are_2(self):
         self.fail_with_usage()
         self.fail_with_usage("trade", names=["'trade'"])
+        self.fail_with_usage("bench", "trade", names=["'trade'", "traversal", "hierarchy"])
         self.fail_with_usage("--nothing")
         for command in ("info", "build", "trace", "render"):
             self.fail_with_usage(command, names=["SCENE" if command != "render" else "required"])
@@ -75,6 +76,58 @@ class Usage(ProgramTest):
         self.fail_with_usage("build", SMALL, "--threads", "100000", names=["--threads", "100000"])
         self.fail_with_usage("two\nlines", names=["'two\\x0Alines'"])
         self.fail_with_usage("build", SMALL, "--builder", "two\nlines", names=["--builder", "two\\x0Alines"])
+
+    def test_options_before_the_scene(self):
+        size = ("--size", "8x8")
+        for arguments in (["--eye", "1,2,3", SMALL], ["--eye", "1", "2", "3", SMALL], [SMALL, "--eye", "0", "-.5", "3"],
+                          ["--eye", "-.5,-.25,3", "--up", "0", "1", "-.5", SMALL]):
+            self.succeed("render", *size, *arguments, "-o", "eye.png")
+        made = [self.succeed("render", SMALL, *size, "-o", name, "--quiet", f"--eye={eye}") and (self.folder / name).read_bytes()
+                for name, eye in (("a.png", "-0.5,1,3"), ("b.png", "-.5,1,3"))]
+        self.assertEqual(*made)
+        self.assertIsNotNone(self.document("build", "--epo", SMALL)["build"]["epo"])
+        self.assertIsNotNone(self.document("build", "--epo", "0.5", SMALL)["build"]["epo"])
+        self.fail_with_usage("render", SMALL, "-o", "x.png", "--eye", "1", "2", names=["--eye", "3 required"])
+
+    def test_whole_numbers(self):
+        for command, option, most in (("build", "--seed", 2**64 - 1), ("trace", "--max-result-bytes", 2**64 - 1),
+                                      ("build", "--repeat", 10000), ("build", "--threads", 1024), ("build", "--max-leaf", 255)):
+            for bad in ("18446744073709551616", "99999999999999999999", "-1", "1G", "0x10", "1e3", "", "3.5"):
+                self.fail_with_usage(command, SMALL, f"{option}={bad}" if bad else option, *([""] if not bad else []),
+                                     names=[option, f"'{bad}' is not a whole number from ", f" to {most};"])
+        self.fail_with_usage("render", SMALL, "-o", "x.png", "--camera", "-1", names=["'-1' is not a whole number from 0"])
+        repeats = self.document("build", SMALL, "--repeat", "010", "--seed", "18446744073709551615")
+        self.assertIn("build", repeats)
+        self.assertIn("of 10 ", self.succeed("build", SMALL, "--repeat", "010").out)  # no octal number
+        self.fail_with_one_line("info", "builtin:soup?triangles=10&triangles=20", names=["'triangles' is given twice"])
+
+    def test_options_that_would_be_ignored(self):
+        for arguments, names in ((("trace", SMALL, "--kernel", "engine", "--layout", "binary"), ("--layout", "--kernel engine")),
+                                 (("trace", SMALL, "--machine", "h100"), ("--machine", "--device sim")),
+                                 (("simulate", SMALL, "--any", "--rays", "primary"), ("--any", "--rays FILE.npy"))):
+            self.fail_with_usage(*arguments, names=names)
+        self.fail_with_usage("render", SMALL, "-o", "x.png", "--layout", "wide8", names=["wide8", "build and trace"])
+
+    def test_outputs_are_tried_before_the_work(self):
+        absent = "absent.ply"  # the work would fail with it
+        for command, names in ((("render", absent, "-o", "x.jpg"), ("x.jpg", "known: .png .exr")),
+                               (("render", absent, "-o", "no/x.png"), ("no/x.png: cannot write",)),
+                               (("render", absent, "-o", "x.png", "--json", "no/x.json"), ("no/x.json: cannot write",)),
+                               (("trace", absent, "--hits", "no/h.npy"), ("no/h.npy: cannot write",)),
+                               (("trace", absent, "--save-rays", "/"), ("/: cannot write",)),
+                               (("build", absent, "-o", "no/t.rdx"), ("no/t.rdx: cannot write",)),
+                               (("query", absent, "--closest", "--out", "no/q"), ("no/q.indices.npy: cannot write",))):
+            self.fail_with_one_line(*command, names=names)
+        for command in (("query", SMALL, "--closest", "--out"), ("build", SMALL, "-o"), ("trace", SMALL, "--hits")):
+            self.fail_with_usage(*command, "", names=["empty"])
+        self.assertFalse([name for name in os.listdir(self.folder) if name.startswith(".")])
+
+    def test_standard_error_that_cannot_be_written(self):
+        for arguments, code in (("info /nonexistent", 1), ("--foo", 2), ("build " + SMALL + " -o t.rdx --bits 1", 2)):
+            for where in ("2>&-", "2>/dev/full"):
+                done = subprocess.run(["sh", "-c", f"'{PROGRAM}' {arguments.replace('?', chr(92) + '?')} {where}"], timeout=TIME_LIMIT_S,
+                                      cwd=self.folder, stdout=subprocess.PIPE)
+                self.assertEqual((done.returncode, done.stdout), (code, b""), (arguments, where))
 
     def test_outputs_go_through_links_and_into_devices(self):
         for command, option in ((["build", SMALL, "--quiet"], "-o"), (["build", SMALL, "--quiet"], "--json"),
@@ -177,10 +230,11 @@ class Usage(ProgramTest):
     def test_a_full_standard_output(self):
         if not os.path.exists("/dev/full"):
             self.skipTest("there is no /dev/full")
-        for arguments in (["scenes"], ["info", SMALL], ["build", SMALL, "--json", "-"]):
+        for arguments in (["scenes"], ["info", SMALL], ["build", SMALL, "--json", "-"], ["--version"], ["--help"], ["man", "trace"]):
             with open("/dev/full", "w") as full:
                 done = subprocess.run([PROGRAM, *arguments], stdout=full, stderr=subprocess.PIPE, timeout=TIME_LIMIT_S)
             self.assertEqual((done.returncode, done.stderr.count(b"\n")), (1, 1), done)
+            self.assertIn(b"raydix: standard output: cannot be written", done.stderr)
 
     def test_geometry_errors_name_the_file(self):
         nan = self.write("nan.ply", ply([(0, 0, 0), (1, 0, 0), ("nan", 1, 0), (0, 1, 0)], [(0, 1, 3), (0, 1, 2)]))
@@ -191,6 +245,7 @@ class Usage(ProgramTest):
         self.fail_with_one_line("build", far, names=["far.ply", "3"])
         points = self.write("points.ply", ply([(0, 0, 0), (1, 0, 0)]))
         self.fail_with_one_line("trace", points, names=["points.ply", "points"])
+        self.fail_with_one_line("build", points, "--layout", "compact", "--quiet", names=["points.ply", "rays need triangles"])
         self.fail_with_one_line("render", points, "-o", "x.png", names=["points.ply", "points"])
 
     def test_odd_file_names(self):

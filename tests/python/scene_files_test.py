@@ -33,6 +33,15 @@ def triangle_gltf(nodes, roots, meshes=2):
     )
 
 
+def test_cameras_of_another_program(tmp_path):
+    file = tmp_path / "one.gltf"
+    file.write_text(triangle_gltf([{"mesh": 0}], [0]))
+    (tmp_path / "cameras.json").write_text('[{"id": 0}]')
+    with pytest.warns(UserWarning, match="cameras.json: camera 1: position is missing"):
+        scene = raydix.Scene(file)
+    assert len(scene.cameras) == 1
+
+
 def test_files_keep_their_nodes(tmp_path):
     file = tmp_path / "nodes.gltf"
     nodes = [

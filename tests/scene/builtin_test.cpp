@@ -201,6 +201,7 @@ TEST(Builtin, BadSpecificationsNameThePart) {
     expect_input_error("soup?triangles=", {"triangles="});
     expect_input_error("soup?triangles", {"triangles="});
     expect_input_error("soup?&", {"''"});
+    expect_input_error("soup?triangles=10&triangles=20", {"soup", "'triangles' is given twice"});
     EXPECT_EQ(make("soup?triangles=1e3").mesh.triangles.size(), 1000u);
     EXPECT_EQ(make("soup?").mesh.triangles.size(), 100'000u);
 }

@@ -71,6 +71,8 @@ TEST(LoadMesh, what_cannot_be_read) {
     write(folder.path() / "a.txt", "");
     EXPECT_TRUE(file_error(folder.path() / "a.txt")
                     .starts_with(root + "/a.txt: file name: ends in none of .ply"));
+    write(folder.path() / "a.RDX", "");
+    EXPECT_TRUE(file_error(folder.path() / "a.RDX").ends_with("load_rdx or load_rdx_scene read"));
     write(folder.path() / "secret.obj", "v 0 0 0\n");
     std::filesystem::permissions(folder.path() / "secret.obj", std::filesystem::perms::none);
     if (geteuid() != 0) {
@@ -80,6 +82,19 @@ TEST(LoadMesh, what_cannot_be_read) {
     write(folder.path() / "a.gltf", gltf_json(R"("uri":"absent.bin",)"));
     EXPECT_EQ(file_error(folder.path() / "a.gltf"),
               root + "/absent.bin: cannot be opened: No such file or directory");
+}
+
+TEST(LoadModel, cameras_of_another_program) {
+    const TempFolder folder;
+    write(folder.path() / "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    const std::string file = (folder.path() / "a.obj").string();
+    EXPECT_EQ(load_model(file).cameras_fault, "");
+    write(folder.path() / "cameras.json", R"([{"id":0}])");
+    const Model model = load_model(file);
+    EXPECT_EQ(model.cameras_fault,
+              (folder.path() / "cameras.json").string() + ": camera 1: position is missing");
+    EXPECT_EQ(model.cameras.cameras.size(), 1u);
+    EXPECT_EQ(load_flat_model(file).cameras_fault, model.cameras_fault);
 }
 
 TEST(LoadMesh, crown) {

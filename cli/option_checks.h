@@ -1,0 +1,34 @@
+// What several commands ask of options before any work: whole numbers, files that can be written,
+// options that do not go together.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include <cstdint>
+#include <initializer_list>
+#include <limits>
+#include <string>
+
+namespace raydix::cli {
+
+/// For add_option(...)->transform: decimal digits, whose leading zeros it drops. `check` in its
+/// place would leave those to CLI11, which takes them for octal.
+[[nodiscard]] CLI::Validator whole_number(
+    std::uint64_t least, std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
+
+/// Usage error of the first of `names` that was given: `why` follows the name. For options that
+/// would be ignored.
+void refuse_given(const CLI::App& command, std::initializer_list<const char*> names,
+                  const std::string& why);
+[[nodiscard]] bool is_given(const CLI::App& command, const char* name);
+
+/// Before the work of which `file` takes the result, as far as can be told then. Not given: nothing
+/// to check. Throws InputError as writing would, and a usage error that names the option if the
+/// name is empty.
+void require_writable(const CLI::App& command, const char* option, const std::string& file);
+/// The same of --json, and of no option.
+void require_writable(const std::string& file);
+/// The same of a picture: also its ending.
+void require_picture(const CLI::App& command, const char* option, const std::string& file);
+
+}  // namespace raydix::cli
