@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "machine_check.h"
 #include "output.h"
 #include "ray_launches.h"
 #include "simulation.h"
@@ -43,8 +44,7 @@ void print_head(const SimulateCommand& options, const MachineModel& m, const War
 void run_simulate(const SimulateCommand& options) {
     const MachineModel machine = machine_from(options.machine);
     const std::vector<SimulateOptions> runs = runs_of(options, machine);
-    static_cast<void>(
-        simulate(WarpTree(Bvh{}), {}, runs));  // a machine that cannot be, before work
+    check_machine(options.machine, runs);
     const bool from_file = options.rays.ends_with(".npy");
     const std::vector<RayKind> kinds =
         from_file ? std::vector<RayKind>{} : kinds_from(options.rays);
