@@ -176,7 +176,7 @@ std::string quality_plot(const std::vector<BuildRow>& rows, PageColours& colours
                                .x = {*row.total},
                                .y = {*row.sah},
                                .colour = colour,
-                               .shape = colour,
+                               .shape = static_cast<int>(plot.series.size()),
                                .markers_only = true});
     }
     return plot.series.size() < 2 ? "" : line_plot(plot);
