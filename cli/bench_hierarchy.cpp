@@ -4,13 +4,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <raydix/error.h>
-#include <raydix/machine.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "hierarchy_bench.h"
 
@@ -18,8 +18,6 @@ namespace raydix::cli {
 namespace {
 
 constexpr const char* here_name = "here";
-
-Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 /// Launches with one name together.
 Json launches_json(const HierarchyRun& run, const MeasuredCosts& costs) {
@@ -83,12 +81,14 @@ Json costs_json(const MeasuredCosts& costs, int bits) {
             {"kernels", kernels}};
 }
 
-/// The kernel that the prediction misses by most, of launches with one name together.
+/// The kernel that the prediction misses by most, of launches with one name together; nothing where
+/// there is no prediction.
 struct Worst {
     std::string label;
     double measured = 0, predicted = 0;
 };
-Worst worst_of(const HierarchyRun& run, const MeasuredCosts& costs) {
+std::optional<Worst> worst_of(const HierarchyRun& run, const MeasuredCosts& costs) {
+    if (!std::isfinite(predicted_ms(run, costs, run.threads))) return std::nullopt;
     std::vector<Worst> sums;
     for (const LaunchFigures& l : run.launches) {
         auto sum = std::ranges::find(sums, l.label, &Worst::label);
@@ -97,7 +97,8 @@ Worst worst_of(const HierarchyRun& run, const MeasuredCosts& costs) {
         sum->predicted += predicted_ms(run, l, costs, run.threads);
     }
     const auto off = [](const Worst& w) { return std::fabs(w.predicted - w.measured); };
-    return sums.empty() ? Worst() : *std::ranges::max_element(sums, {}, off);
+    if (sums.empty()) return std::nullopt;
+    return *std::ranges::max_element(sums, {}, off);
 }
 
 class Study {
@@ -116,7 +117,8 @@ public:
         for (const LaunchMachine& m : machines_) document_["machines"].push_back(machine_json(m));
         thread_counts_ = options_.thread_counts;
         if (thread_counts_.empty())
-            for (int t = 1; t <= machine_info().cores; t *= 2) thread_counts_.push_back(t);
+            for (int t = 1; t <= threads_at_work(options_.common.threads); t *= 2)
+                thread_counts_.push_back(t);
         cases_ = cases();
         for (const int bits : options_.bits) study_bits(bits);
         if (options_.common.prints_tables()) {
@@ -229,16 +231,18 @@ private:
         std::uint64_t chain = 0;
         for (const LaunchFigures& l : run.launches) chain += l.longest_chain;
         const double predicted = predicted_ms(run, costs_, run.threads);
-        const double measured = run.measured_ms();
-        fmt::print("{:<38} {:>8} {:>6} {:>8.1f} {:>7} {:>9.3f} {:>9.3f} {:>+5.0f}% {:<20}",
-                   run.what.name(), run.launches.size(), chain,
-                   double(sum_of(run, &LaunchFigures::bytes)) / 1e6, run.threads, measured,
-                   predicted, 100 * (predicted / measured - 1), worst_of(run, costs_).label);
+        const double measured = run.measured_ms(), error = predicted / measured - 1;
+        const std::optional<Worst> worst = worst_of(run, costs_);
+        fmt::print("{:<38} {:>8} {:>6} {:>8.1f} {:>7} {:>9.3f} {:>9} {:>6} {:<20}", run.what.name(),
+                   run.launches.size(), chain, double(sum_of(run, &LaunchFigures::bytes)) / 1e6,
+                   run.threads, measured, or_dash(predicted, 3),
+                   std::isfinite(error) ? fmt::format("{:+.0f}%", 100 * error) : "-",
+                   worst ? worst->label : "-");
         for (const LaunchMachine& m : machines_) {
             const double once = predicted_ms(run, m, options_.factors.front()),
                          most = predicted_ms(run, m, options_.factors.back());
             if (std::isfinite(once))
-                fmt::print(" | {:>9.3f} {:>9.3f} {:>5.1f}x", once, most, once / most);
+                fmt::print(" | {:>9.3f} {:>9.3f} {:>6}", once, most, or_dash(once / most, 1, "x"));
         }
         fmt::print("\n");
     }
@@ -296,10 +300,11 @@ private:
         entry["measured_ms"] = measured;
         entry["predicted_ms"] = finite(predicted);
         entry["error"] = finite(predicted / measured - 1);
-        const Worst worst = worst_of(run, costs_);
-        entry["most_of_the_error"] = {{"label", worst.label},
-                                      {"measured_ms", worst.measured},
-                                      {"predicted_ms", finite(worst.predicted)}};
+        entry["most_of_the_error"] = nullptr;
+        if (const std::optional<Worst> worst = worst_of(run, costs_))
+            entry["most_of_the_error"] = {{"label", worst->label},
+                                          {"measured_ms", worst->measured},
+                                          {"predicted_ms", worst->predicted}};
         if (run.threads != thread_counts_.front()) return entry;  // the same counts
         entry["simulated_ms"] = scaled_json(run);
         entry["items"] = sum_of(run, &LaunchFigures::items);
@@ -351,7 +356,7 @@ void add_hierarchy_suite(CLI::App& bench) {
         ->capture_default_str();
     command
         ->add_option("--thread-counts", options->thread_counts,
-                     "Threads to measure with (default: 1, 2, 4, ...)")
+                     "Threads to measure with (default: 1, 2, 4, ... up to --threads)")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(CLI::Range(1, 1024));
@@ -382,7 +387,15 @@ void add_hierarchy_suite(CLI::App& bench) {
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
     add_common_options(*command, options->common);
-    command->callback([options] { run_hierarchy(*options); });
+    command->callback([options] {
+        const int most = options->common.threads;  // 0: all
+        for (const int threads : options->thread_counts)
+            if (most > 0 && threads > most)
+                throw CLI::ValidationError(
+                    "--thread-counts",
+                    fmt::format("{} is more than the {} of --threads", threads, most));
+        run_hierarchy(*options);
+    });
 }
 
 }  // namespace raydix::cli

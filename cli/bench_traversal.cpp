@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 
+#include "machine_check.h"
 #include "output.h"
 #include "published.h"
 #include "ray_launches.h"
@@ -156,9 +157,12 @@ Json sweep_widths(const TraversalBench& options, const SceneTree& input, const W
     LaunchOptions sampled = options.launches;
     sampled.sample = std::min(sampled.sample, options.sweep_sample);
     const RayLaunches launches(sampled, input, options.common);
+    std::vector<int> widths;
+    for (const int width : {1, 2, 4, 8, 16, 32, 64})
+        if (machine.resident_lanes % static_cast<unsigned>(width) == 0) widths.push_back(width);
     std::vector<SimulateOptions> runs;
     for (const WarpKernel kernel : kernels_from(options.kernel))
-        for (const int width : {1, 2, 4, 8, 16, 32, 64})
+        for (const int width : widths)
             runs.push_back({.kernel = kernel, .machine = machine, .width = width});
     for (const RayKind kind : kinds_from(options.rays)) {
         const std::vector<SimulationRow> rows =
@@ -168,21 +172,22 @@ Json sweep_widths(const TraversalBench& options, const SceneTree& input, const W
                        ray_kind_name(kind), input.scene.name, machine.name, "kernel");
         for (std::size_t k = 0; k < rows.size(); ++k) {
             const SimulatedRates rates = rows[k].rates();
+            const bool any = rows[k].sum.instructions > 0;  // else there is nothing to rate
             found.push_back({{"scene", rows[k].scene},
                              {"kernel", warp_kernel_name(rows[k].options.kernel)},
                              {"rays", rows[k].rays},
                              {"machine", machine.name},
                              {"width", rows[k].options.width},
-                             {"simd_efficiency", rates.simd_efficiency},
-                             {"mrays_per_s_bound", rates.bound},
+                             {"simd_efficiency", any ? Json(rates.simd_efficiency) : Json(nullptr)},
+                             {"mrays_per_s_bound", any ? Json(rates.bound) : Json(nullptr)},
                              {"sample", sampled.sample},
                              {"simulated", true}});
             if (!options.common.prints_tables()) continue;
             if (k == 0)
-                for (std::size_t w = 0; w < 7; ++w) fmt::print(" {:>7}", rows[w].options.width);
+                for (const int width : widths) fmt::print(" {:>7}", width);
             if (rows[k].options.width == 1)
                 fmt::print("\n{:<36}", warp_kernel_name(rows[k].options.kernel));
-            fmt::print(" {:>6.1f}%", 100 * rates.simd_efficiency);
+            fmt::print(" {:>7}", any ? fmt::format("{:.1f}%", 100 * rates.simd_efficiency) : "-");
         }
         if (options.common.prints_tables()) fmt::print("\n");
     }
@@ -212,9 +217,11 @@ public:
                                  "published", "claims", "width_sweep"})
             document_[list] = Json::array();
         if (on_device()) static_cast<void>(device_name());  // says what is missing, before any work
-        for (const std::string& name : options.machines) machines_.push_back(machine_from(name));
+        for (const std::string& name : options.machines) {
+            machines_.push_back(machine_from(name));
+            check_machine(name, runs_of(options, {machines_.back()}));
+        }
         runs_ = runs_of(options, machines_);
-        static_cast<void>(simulate(WarpTree(Bvh{}), {}, runs_));  // a machine that cannot be
         std::vector<std::string> named;
         for (const SimulateOptions& run : runs_) {
             if (std::find(named.begin(), named.end(), run.machine.name) != named.end()) continue;
@@ -290,10 +297,10 @@ private:
         document_["builds"].push_back(build_json(input.bvh, stats, builds));
         const WarpTree tree(input.bvh);
         if (options_.common.prints_tables())
-            fmt::print("\n{}: {} triangles, builder {}, {} nodes, SAH {:.1f}, depth {}\n", scene,
+            fmt::print("\n{}: {} triangles, builder {}, {} nodes, SAH {}, depth {}\n", scene,
                        grouped(input.scene.mesh().triangles.size()),
                        builder_name(input.bvh.options().builder), grouped(stats.nodes),
-                       stats.sah.value_or(0.0), stats.max_depth);
+                       stats.sah ? fmt::format("{:.1f}", *stats.sah) : "-", stats.max_depth);
         const RayLaunches launches(options_.launches, input, options_.common);
         for (const RayKind kind : kinds_from(options_.rays)) {
             const std::vector<SimulationRow> rows =

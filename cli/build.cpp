@@ -138,9 +138,8 @@ void run_build(const BuildCommand& options) {
     Json document = new_document("build");
     document["scene"] = scene_json(scene);
     document["load_ms"] = scene.load_ms;
-    const BuildOptions how = about(options.scene, [&] {
-        return options.tree.build_options(scene.mesh(), options.common);
-    });
+    const BuildOptions how = about(
+        options.scene, [&] { return options.tree.build_options(scene.mesh(), options.common); });
     const TimedBuilds timed = about(options.scene, [&] {
         const auto build =
             runs_on_device(options.tree.device) ? build_repeatedly_on_device : build_repeatedly;

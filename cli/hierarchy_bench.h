@@ -2,8 +2,10 @@
 // parts of its document.
 #pragma once
 
+#include <fmt/format.h>
 #include <raydix/hierarchy_study.h>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -22,6 +24,16 @@ struct HierarchyBench {
     std::vector<int> bits{30};
     int max_leaf = 1, repeat = 5;
 };
+
+/// As tables show a figure; a dash where there is none.
+[[nodiscard]] inline std::string or_dash(double value, int digits, const char* unit = "") {
+    return std::isfinite(value) ? fmt::format("{:.{}f}{}", value, digits, unit) : "-";
+}
+
+/// As documents hold a figure; null where there is none.
+[[nodiscard]] inline Json finite(double value) {
+    return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
 
 /// A run and where it comes from.
 struct StudiedRow {

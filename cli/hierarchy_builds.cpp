@@ -38,7 +38,7 @@ Json one_build(const std::vector<BuildMs>& times, bool print) {
         std::vector<double> values;
         for (const BuildMs& ms : times) values.push_back(ms.*stage.second);
         all[stage.first] = times.empty() ? Json(nullptr) : spread_json(spread_of(values));
-        if (print) fmt::print(" {:>9.2f}", times.empty() ? NAN : spread_of(values).median);
+        if (print) fmt::print(" {:>9}", or_dash(times.empty() ? NAN : spread_of(values).median, 2));
     }
     return all;
 }

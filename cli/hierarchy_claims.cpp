@@ -24,6 +24,7 @@ struct Judged {
 };
 
 const char* verdict_of(const Judged& j) {
+    if (!std::isfinite(j.value)) return "open";
     const double from = j.value * (1 - j.error), to = j.value * (1 + j.error);
     if (from >= j.low && to <= j.high) return "holds";
     return to < j.low || from > j.high ? "does not hold" : "open";
@@ -35,10 +36,10 @@ Json json_of(const Judged& j) {
             {"scene", j.scene},
             {"machine", j.machine},
             {"figure", j.figure},
-            {"value", j.value},
-            {"error", j.error},
-            {"low", std::isfinite(j.low) ? Json(j.low) : Json(nullptr)},
-            {"high", std::isfinite(j.high) ? Json(j.high) : Json(nullptr)},
+            {"value", finite(j.value)},
+            {"error", finite(std::isfinite(j.value) ? j.error : j.value)},
+            {"low", finite(j.low)},
+            {"high", finite(j.high)},
             {"verdict", verdict_of(j)}};
 }
 
@@ -91,8 +92,11 @@ double error_of(const Machine& machine, const MeasuredCosts& costs,
                 std::initializer_list<const HierarchyRun*> runs) {
     if (std::isfinite(machine.own_error)) return machine.own_error;
     double worst = 0;
-    for (const HierarchyRun* run : runs)
-        worst = std::max(worst, std::fabs(predicted_ms(*run, costs) / run->measured_ms() - 1));
+    for (const HierarchyRun* run : runs) {
+        const double error = std::fabs(predicted_ms(*run, costs) / run->measured_ms() - 1);
+        if (!std::isfinite(error)) return error;
+        worst = std::max(worst, error);
+    }
     return worst;
 }
 
@@ -217,13 +221,18 @@ void print_hierarchy_claims(const Json& claims) {
     const auto limit = [](const Json& value, const char* none) {
         return value.is_null() ? std::string(none) : fmt::format("{:g}", value.get<double>());
     };
+    const auto figure = [](const Json& c) {
+        if (c["value"].is_null()) return std::string("-");
+        return fmt::format(
+            "{:.3g} +- {} %", c["value"].get<double>(),
+            c["error"].is_null() ? "-" : fmt::format("{:.0f}", 100 * c["error"].get<double>()));
+    };
     for (const Json& c : claims)
-        fmt::print(
-            "{:<13} {} [{}, {}, {} bits]\n              {}: {:.3g} +- {:.0f} %, range {} to {}\n",
-            c["verdict"].get<std::string>(), c["claim"].get<std::string>(),
-            c["scene"].get<std::string>(), c["machine"].get<std::string>(), c["bits"].get<int>(),
-            c["figure"].get<std::string>(), c["value"].get<double>(),
-            100 * c["error"].get<double>(), limit(c["low"], "any"), limit(c["high"], "any"));
+        fmt::print("{:<13} {} [{}, {}, {} bits]\n              {}: {}, range {} to {}\n",
+                   c["verdict"].get<std::string>(), c["claim"].get<std::string>(),
+                   c["scene"].get<std::string>(), c["machine"].get<std::string>(),
+                   c["bits"].get<int>(), c["figure"].get<std::string>(), figure(c),
+                   limit(c["low"], "any"), limit(c["high"], "any"));
 }
 
 }  // namespace raydix::cli

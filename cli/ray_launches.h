@@ -16,6 +16,15 @@
 
 namespace raydix::cli {
 
+struct LaunchOptions {
+    std::string camera = "all", size_text, rays_file;
+    int samples = 32;                      // secondary rays per primary hit
+    float ao_radius = 0.0f;                // 0: of cameras.json, or 5 % of the diagonal
+    double sample = 1.0;                   // part of the rays, in (0, 1]
+    std::uint32_t launch_rays = 1u << 20;  // secondary rays of one launch
+};
+void add_launch_options(CLI::App& command, LaunchOptions& options);
+
 /// A launch, or a run of neighbouring rays of one.
 struct RayUnit {
     std::span<const Ray> rays;

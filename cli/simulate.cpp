@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "machine_check.h"
 #include "option_checks.h"
 #include "output.h"
 #include "ray_launches.h"
@@ -44,11 +45,7 @@ void print_head(const SimulateCommand& options, const MachineModel& m, const War
 void run_simulate(const SimulateCommand& options) {
     const MachineModel machine = machine_from(options.machine);
     const std::vector<SimulateOptions> runs = runs_of(options, machine);
-    const auto try_machine = [&] { static_cast<void>(simulate(WarpTree(Bvh{}), {}, runs)); };
-    if (options.machine.ends_with(".json"))  // one that cannot be, before work
-        about(options.machine, try_machine);
-    else
-        try_machine();
+    check_machine(options.machine, runs);
     const bool from_file = options.rays.ends_with(".npy");
     const std::vector<RayKind> kinds =
         from_file ? std::vector<RayKind>{} : kinds_from(options.rays);

@@ -187,8 +187,9 @@ struct SimulatedRates {
 /// is not null, hits [runs][n]: those that the kernel itself found. Invalid rays miss. The figures
 /// do not depend on the number of threads. Throws InputError: 2^31 - 1 rays or more; a width,
 /// kernel or part_of_launch out of range; a machine with a figure that is not positive, without a
-/// cost for an operation, with more than 2^24 lanes in flight or, for the memory model, more than
-/// 2^30 bytes of caches.
+/// cost for an operation, with a cost above its own `most`, with resident_lanes that are no
+/// multiple of the width or fewer than block_lanes, with more than 2^24 lanes in flight or, for the
+/// memory model, more than 2^30 bytes of caches.
 [[nodiscard]] std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays,
                                                std::span<const SimulateOptions> runs,
                                                std::vector<std::vector<TreeHit>>* hits = nullptr,

@@ -35,12 +35,10 @@ std::string device_of(const Json& build) {
 
 /// Tree, builder and settings, as texts to put beside each other.
 std::vector<std::string> parts_of(const Json& build) {
-    std::vector<std::string> parts{text_at(build, "tree"), text_at(build, "builder"), "", "", ""};
+    std::vector<std::string> parts{text_at(build, "tree"), text_at(build, "builder")};
     if (parts[0] == "bvh") parts[0].clear();
-    if (const auto bits = number_at(build, "bits")) parts[2] = fmt::format("{:.0f} bits", *bits);
-    if (const auto leaf = number_at(build, "max_leaf"))
-        parts[3] = fmt::format("leaves of {:.0f}", *leaf);
-    parts[4] = device_of(build);
+    for (const std::string& setting : tree_settings(build)) parts.push_back(setting);
+    parts.push_back(device_of(build));
     return parts;
 }
 
@@ -49,12 +47,15 @@ void name_rows(std::vector<BuildRow>& rows) {
         if (!row.name.empty()) continue;
         std::vector<BuildRow*> group;
         std::vector<std::vector<std::string>> parts;
+        std::vector<std::string> sources;
         for (BuildRow& other : rows)
             if (other.scene == row.scene) {
                 group.push_back(&other);
                 parts.push_back(parts_of(*other.build));
+                sources.push_back(other.document->name);
             }
-        const Names names = distinct_names(parts, 1);
+        Names names = distinct_names(parts, 1);
+        tell_apart(names.each, sources);
         for (std::size_t i = 0; i < group.size(); ++i) {
             group[i]->name = names.each[i];
             group[i]->shared = names.common;
@@ -80,6 +81,19 @@ std::vector<BuildRow> rows_of(const Documents& documents) {
                         .sah = number_at(build, "sah")});
     }
     return rows;
+}
+
+/// Each tree once: every trace of a scene brings the same one again.
+std::vector<BuildRow> different_trees(const std::vector<BuildRow>& rows) {
+    std::vector<BuildRow> trees;
+    std::set<std::vector<std::string>> seen;
+    for (const BuildRow& row : rows) {
+        std::vector<std::string> identity = parts_of(*row.build);
+        identity.push_back(row.scene);
+        identity.push_back(text_at(*row.build, "tree_hash"));
+        if (seen.insert(identity).second) trees.push_back(row);
+    }
+    return trees;
 }
 
 /// Scenes in the order of the documents.
@@ -162,7 +176,7 @@ std::string quality_plot(const std::vector<BuildRow>& rows, PageColours& colours
                                .x = {*row.total},
                                .y = {*row.sah},
                                .colour = colour,
-                               .shape = colour,
+                               .shape = static_cast<int>(plot.series.size()),
                                .markers_only = true});
     }
     return plot.series.size() < 2 ? "" : line_plot(plot);
@@ -198,6 +212,7 @@ std::string time_table(const std::vector<BuildRow>& rows) {
                             {"tree"},
                             {"bits", Format::integer},
                             {"leaves of", Format::integer},
+                            {"reinsertion", Format::integer, "rounds"},
                             {"device"},
                             {"total", Format::number, "ms, median"},
                             {"least", Format::number, "ms"},
@@ -217,15 +232,16 @@ std::string time_table(const std::vector<BuildRow>& rows) {
         if (row.primitives && *row.total > 0) rate = *row.primitives / *row.total / 1e3;
         table.rows.push_back({text_at(*row.build, "builder"), row.scene,
                               text_at(*row.build, "tree"), number_at(*row.build, "bits"),
-                              number_at(*row.build, "max_leaf"), row.device, row.total, row.low,
-                              row.high, ratio, spread_at(*row.build, "kept_ms").median, rate,
-                              number_at(row.document->root, "load_ms"), row.document->name});
+                              number_at(*row.build, "max_leaf"),
+                              number_at(*row.build, "reinsertion_rounds"), row.device, row.total,
+                              row.low, row.high, ratio, spread_at(*row.build, "kept_ms").median,
+                              rate, number_at(row.document->root, "load_ms"), row.document->name});
     }
     table.drop_empty_columns();
     return table_html(table);
 }
 
-std::string tree_table(const std::vector<BuildRow>& rows) {
+std::string tree_table(const std::vector<BuildRow>& trees) {
     Table table{.title = "The trees",
                 .note =
                     "SAH and EPO are costs that a model gives, counted over the real tree. A tree "
@@ -235,6 +251,7 @@ std::string tree_table(const std::vector<BuildRow>& rows) {
                             {"tree"},
                             {"bits", Format::integer},
                             {"leaves of", Format::integer},
+                            {"reinsertion", Format::integer, "rounds"},
                             {"device"},
                             {"primitives", Format::integer},
                             {"left out", Format::integer},
@@ -249,8 +266,7 @@ std::string tree_table(const std::vector<BuildRow>& rows) {
                             {"each primitive", Format::number, "bytes"},
                             {"peak", Format::number, "MB, building"},
                             {"tree hash"}}};
-    std::set<std::string> seen;
-    for (const BuildRow& row : rows) {
+    for (const BuildRow& row : trees) {
         const Json& b = *row.build;
         const auto mega = [&](const char* field) -> std::optional<double> {
             const auto bytes = number_at(b, field);
@@ -261,16 +277,26 @@ std::string tree_table(const std::vector<BuildRow>& rows) {
             each = *bytes / *row.primitives;
         Cell hash(shortened(text_at(b, "tree_hash"), 11));
         hash.tip = text_at(b, "tree_hash");
-        // Every trace of a scene brings the same tree again.
-        const std::string identity = row.scene + text_at(b, "tree") + text_at(b, "builder") +
-                                     row.device + text_at(b, "tree_hash");
-        if (!seen.insert(identity).second) continue;
-        table.rows.push_back({text_at(b, "builder"), row.scene, text_at(b, "tree"),
-                              number_at(b, "bits"), number_at(b, "max_leaf"), row.device,
-                              row.primitives, number_at(b, "left_out"), number_at(b, "nodes"),
-                              number_at(b, "leaves"), number_at(b, "references"),
-                              number_at(b, "max_depth"), number_at(b, "depth_bound"), row.sah,
-                              number_at(b, "epo"), mega("bytes"), each, mega("peak_bytes"), hash});
+        table.rows.push_back({text_at(b, "builder"),
+                              row.scene,
+                              text_at(b, "tree"),
+                              number_at(b, "bits"),
+                              number_at(b, "max_leaf"),
+                              number_at(b, "reinsertion_rounds"),
+                              row.device,
+                              row.primitives,
+                              number_at(b, "left_out"),
+                              number_at(b, "nodes"),
+                              number_at(b, "leaves"),
+                              number_at(b, "references"),
+                              number_at(b, "max_depth"),
+                              number_at(b, "depth_bound"),
+                              row.sah,
+                              number_at(b, "epo"),
+                              mega("bytes"),
+                              each,
+                              mega("peak_bytes"),
+                              hash});
     }
     table.drop_empty_columns();
     return table_html(table);
@@ -300,19 +326,22 @@ void say_times(const std::string& scene, const std::vector<BuildRow>& rows, Sect
                             timed.size() == 1 ? "" : " for the fastest");
     section.summary.push_back(said + ".");
     section.tiles.push_back({significant(*fast.total), "ms",
-                             "fastest build of " + scene + ": " + text_at(*fast.build, "builder"),
+                             "fastest build of " + scene + ": " + fast.name,
                              badge(Origin::measured)});
 }
 
-void say_quality(const std::string& scene, const std::vector<BuildRow>& rows, Section& section) {
+/// Of the trees in the table.
+void say_quality(const std::string& scene, const std::vector<BuildRow>& trees, Section& section) {
     std::vector<BuildRow> rated;
     std::map<std::string, std::vector<std::string>> same;
-    for (const BuildRow& row : rows) {
+    std::set<Json> constants;
+    for (const BuildRow& row : trees) {
+        if (row.sah) constants.insert(at(*row.build, "sah_constants"));
         if (row.sah) rated.push_back(row);
         if (const std::string hash = text_at(*row.build, "tree_hash"); !hash.empty())
             same[hash].push_back(row.name);
     }
-    if (rated.size() > 1) {
+    if (rated.size() > 1 && constants.size() == 1) {  // other constants, another unit
         const auto [low, high] =
             std::ranges::minmax(rated, {}, [](const BuildRow& r) { return *r.sah; });
         if (*low.sah < *high.sah)
@@ -332,6 +361,20 @@ void say_quality(const std::string& scene, const std::vector<BuildRow>& rows, Se
 
 }  // namespace
 
+std::vector<std::string> tree_settings(const Json& build) {
+    std::vector<std::string> settings(4);
+    if (const auto bits = number_at(build, "bits")) settings[0] = fmt::format("{:.0f} bits", *bits);
+    if (const auto leaf = number_at(build, "max_leaf"))
+        settings[1] = fmt::format("leaves of {:.0f}", *leaf);
+    if (const auto rounds = number_at(build, "reinsertion_rounds"); rounds.value_or(0) > 0)
+        settings[2] = counted(*rounds, "round") + " of reinsertion";
+    const double node = number_at(build, "sah_constants.node").value_or(1),
+                 primitive = number_at(build, "sah_constants.primitive").value_or(1);
+    if (node != 1 || primitive != 1)
+        settings[3] = fmt::format("SAH costs {:g} and {:g}", node, primitive);
+    return settings;
+}
+
 Section build_section(const Documents& documents, PageColours& colours) {
     Section section{.id = "builds", .title = "Builds"};
     const std::vector<BuildRow> all = rows_of(documents);
@@ -343,11 +386,14 @@ Section build_section(const Documents& documents, PageColours& colours) {
         const std::vector<BuildRow> rows = rows_of_scene(built, scene);
         plots += stage_plot(rows, colours) + quality_plot(rows, colours);
         say_times(scene, rows, section);
-        say_quality(scene, rows, section);
     }
+    std::vector<BuildRow> trees = different_trees(all);
+    name_rows(trees);
+    for (const std::string& scene : scenes_of(trees))
+        say_quality(scene, rows_of_scene(trees, scene), section);
     plots += level_plot(built);
     if (!plots.empty()) section.html = "<div class=\"plots\">" + plots + "</div>\n";
-    section.html += time_table(built) + tree_table(all);
+    section.html += time_table(built) + tree_table(trees);
     return section;
 }
 

@@ -164,8 +164,8 @@ std::vector<std::pair<std::string, std::string>> settings_of(const Document& doc
         {"raydix", text_at(document.root, "version")}};
     for (const char* field : {"cpu", "cores", "isa", "gpu"})
         settings.emplace_back(field, text_at(document.root, std::string("machine.") + field));
-    for (const char* field :
-         {"tree", "builder", "bits", "max_leaf", "layout", "device", "threads", "tree_hash"})
+    for (const char* field : {"tree", "builder", "bits", "max_leaf", "reinsertion_rounds", "layout",
+                              "device", "threads", "tree_hash"})
         settings.emplace_back(field, text_at(document.root, std::string("build.") + field));
     settings.emplace_back("leaves", text_at(document.root, "max_leaf"));
     const std::vector<const Json*> simulated = objects_at(document.root, "simulate");

@@ -122,7 +122,7 @@ std::string launch_table(const Study& study) {
             sum->steps += number_at(*launch, "steps").value_or(0);
             sum->chain = std::max(sum->chain, number_at(*launch, "longest_chain").value_or(0));
             sum->ms += number_at(*launch, "ms").value_or(0);
-            sum->predicted += number_at(*launch, "predicted_ms").value_or(0);
+            sum->predicted += or_nan(number_at(*launch, "predicted_ms"));
         }
         for (const LaunchSum& s : sums)
             table.rows.push_back({s.label, run.name(), run.scene, run.bits, run.threads, s.launches,

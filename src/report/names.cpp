@@ -36,6 +36,12 @@ Names distinct_names(const std::vector<std::vector<std::string>>& parts, std::si
     return names;
 }
 
+void tell_apart(std::vector<std::string>& names, const std::vector<std::string>& beside) {
+    const std::vector<std::string> before = names;
+    for (std::size_t i = 0; i < names.size(); ++i)
+        if (std::ranges::count(before, before[i]) > 1) append(names[i], beside[i]);
+}
+
 std::string listed(const std::vector<std::string>& names) {
     std::string text;
     for (std::size_t i = 0; i < names.size(); ++i) {

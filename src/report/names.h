@@ -16,6 +16,9 @@ struct Names {
 [[nodiscard]] Names distinct_names(const std::vector<std::vector<std::string>>& parts,
                                    std::size_t always);
 
+/// Adds to names that several rows have what stands beside them: [row].
+void tell_apart(std::vector<std::string>& names, const std::vector<std::string>& beside);
+
 /// "a", "a and b", "a, b and c".
 [[nodiscard]] std::string listed(const std::vector<std::string>& names);
 

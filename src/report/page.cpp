@@ -31,6 +31,7 @@ std::string tile_html(const Tile& tile) {
            tile.badge + "</li>";
 }
 
+/// Empty if no section has anything to say.
 std::string summary_html(const Page& page) {
     std::string tiles, said;
     for (const Section& section : page.sections) {
@@ -40,6 +41,7 @@ std::string summary_html(const Page& page) {
         for (const std::string& sentence : section.summary) said += "<li>" + sentence + "</li>\n";
         said += "</ul>\n";
     }
+    if (tiles.empty() && said.empty()) return {};
     std::string out = "<section id=\"summary\"><h2>Summary</h2>\n";
     if (!tiles.empty()) out += "<ul class=\"tiles\">" + tiles + "</ul>\n";
     return out + said + "</section>\n";
@@ -48,15 +50,17 @@ std::string summary_html(const Page& page) {
 }  // namespace
 
 std::string page_html(const Page& page) {
+    const std::string summary = summary_html(page);
     std::string out = head(page);
     out += "<header><h1>" + escaped(page.title) + "</h1><p class=\"lead\">" +
            breakable(page.subtitle) + "</p></header>\n";
-    out += "<nav aria-label=\"Sections\"><ul><li><a href=\"#summary\">Summary</a></li>";
+    out += "<nav aria-label=\"Sections\"><ul>";
+    if (!summary.empty()) out += "<li><a href=\"#summary\">Summary</a></li>";
     for (const Section& section : page.sections)
         if (!section.html.empty())
             out += "<li><a href=\"#" + id_of(section.id) + "\">" + escaped(section.title) +
                    "</a></li>";
-    out += "</ul></nav>\n<main>\n" + summary_html(page);
+    out += "</ul></nav>\n<main>\n" + summary;
     for (const Section& section : page.sections)
         if (!section.html.empty())
             out += "<section id=\"" + id_of(section.id) + "\"><h2>" + escaped(section.title) +

@@ -53,6 +53,10 @@ struct PageColours {
 /// "builtin:figure" of a document or of a row in it; "a scene without a name" if it has none.
 [[nodiscard]] std::string scene_name(const Json& holder);
 
+/// What a tree was built with, beside its builder: bits, leaves, rounds of reinsertion, costs of
+/// the SAH. Texts to put beside each other, empty where a build says nothing or does what is usual.
+[[nodiscard]] std::vector<std::string> tree_settings(const Json& build);
+
 /// `<strong>` around escaped text, for sentences.
 [[nodiscard]] std::string strong(const std::string& text);
 /// The same with a number: "3.02 ms", never broken between the two.

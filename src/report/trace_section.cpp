@@ -33,6 +33,7 @@ std::vector<TraceRow> trace_rows_of(const Documents& documents) {
 /// Names the rows of one scene; returns what they share.
 std::string name_rows(std::vector<TraceRow>& rows) {
     std::vector<std::vector<std::string>> parts;
+    std::vector<std::string> sources;
     for (const TraceRow& row : rows) {
         const std::string mode = text_at(*row.trace, "mode"),
                           kernel = text_at(*row.trace, "kernel"),
@@ -40,8 +41,12 @@ std::string name_rows(std::vector<TraceRow>& rows) {
         parts.push_back(
             {row.rays, mode.empty() ? "" : mode + " hit", kernel.empty() ? "" : "kernel " + kernel,
              builder.empty() ? "" : "tree of " + builder, text_at(*row.trace, "device")});
+        for (const std::string& setting : tree_settings(at(row.document->root, "build")))
+            parts.back().push_back(setting);
+        sources.push_back(row.document->name);
     }
-    const Names names = distinct_names(parts, 0);
+    Names names = distinct_names(parts, 0);
+    tell_apart(names.each, sources);
     for (std::size_t i = 0; i < rows.size(); ++i) rows[i].name = names.each[i];
     return names.common;
 }

@@ -285,19 +285,37 @@ std::string width_plots(const Documents& documents, PageColours& colours) {
 
 void say_claims(const std::vector<const Json*>& claims, Section& section) {
     if (claims.empty()) return;
-    std::size_t hold = 0, fail = 0;
+    constexpr std::string_view needs = "needs ";
+    std::size_t hold = 0, fail = 0, open = 0;
+    std::map<std::string, std::size_t> needing;  // what there is no verdict without
     for (const Json* claim : claims) {
         const Json& holds = at(*claim, "holds");
-        if (holds.is_boolean()) ++(holds.get<bool>() ? hold : fail);
+        const std::string verdict = text_at(*claim, "verdict");
+        if (holds.is_boolean())
+            ++(holds.get<bool>() ? hold : fail);
+        else if (verdict.starts_with(needs))
+            ++needing[verdict.substr(needs.size())];
+        else
+            ++open;
     }
-    const std::size_t open = claims.size() - hold - fail;
+    std::vector<std::string> without;
+    for (const auto& [what, count] : needing)
+        without.push_back(fmt::format("{} need{} {}", count, count == 1 ? "s" : "", escaped(what)));
+    const std::size_t judged = hold + fail + open;
+    if (judged == 0) {
+        section.summary.push_back(
+            fmt::format("No claim of the paper has a verdict here: {}.", listed(without)));
+        return;
+    }
     section.summary.push_back(
-        fmt::format("Of {} claims of the paper, {} here, {}{}.", claims.size(),
+        fmt::format("Of {} claims of the paper{}, {} here, {}{}{}.", judged,
+                    without.empty() ? "" : " that have a verdict",
                     strong(fmt::format("{} {}", hold, hold == 1 ? "holds" : "hold")),
                     strong(fmt::format("{} {} not", fail, fail == 1 ? "does" : "do")),
-                    open ? fmt::format(" and {} stay{} open", open, open == 1 ? "s" : "") : ""));
+                    open ? fmt::format(" and {} stay{} open", open, open == 1 ? "s" : "") : "",
+                    without.empty() ? "" : "; " + listed(without)));
     section.tiles.push_back(
-        {fmt::format("{} of {}", hold, claims.size()), "", "claims of the paper hold here", ""});
+        {fmt::format("{} of {}", hold, judged), "", "claims of the paper hold here", ""});
 }
 
 void say_published(const std::vector<PublishedRow>& rows, Section& section) {

@@ -5,7 +5,7 @@ import sys
 import unittest
 
 sys.dont_write_bytecode = True
-from program import SANITIZED, ProgramTest, json_of, main  # noqa: E402
+from program import SANITIZED, TRIANGLE, ProgramTest, json_of, main  # noqa: E402
 
 SMALL = ("--sizes", "100,500", "--cost-sizes", "500,2000", "--thread-counts", "1,2", "--repeat", "1")
 SUBJECTS = {"codes", "sort", "karras", "apetrei", "garanzha", "lauterbach", "octree", "kdtree"}
@@ -52,6 +52,31 @@ class Bench(ProgramTest):
         for word in ("karras, published, boxes in one pass", "lauterbach, boxes by levels", "gtx480 (simulated)", "us a launch",
                      "error", "nodes a level: 1 2", "whole builds", "claims of Karras 2012", "holds", "no GPU was used"):
             self.assertIn(word, out)
+
+    def test_what_has_no_figure_is_a_dash(self):
+        empty = self.write("empty.obj", b"")
+        triangle = self.write("triangle.ply", TRIANGLE)
+        for scene, more in ((triangle, ()), (empty, ()), ("builtin:soup?triangles=20", ("--sizes", "1", "--max-leaf", "255"))):
+            arguments = ("bench", "hierarchy", scene, *SMALL, *more)
+            result = self.succeed(*arguments, "--json", "figures.json")
+            self.assertNotRegex(result.out, r"\b(nan|inf)", result)
+            tuned = [line for line in result.out.splitlines() if line.startswith("sort, tuned")]
+            self.assertRegex(tuned[1], r" 2 +[0-9.]+ +- +- -", result)  # threads, measured, predicted, error, most of it
+            document = json_of((self.folder / "figures.json").read_text(encoding="utf-8"))
+            for run in document["runs"]:
+                if run.get("predicted_ms", 0) is None:
+                    self.assertIsNone(run["error"])
+                    self.assertIsNone(run["most_of_the_error"])
+            for claim in document["hierarchy_claims"]:
+                if claim["value"] is None or claim["error"] is None:
+                    self.assertEqual((claim["error"], claim["verdict"]), (None, "open"), claim)
+
+    def test_threads_bound_the_thread_counts(self):
+        arguments = ("bench", "hierarchy", "builtin:soup?triangles=300", "--sizes", "100", "--cost-sizes", "500", "--repeat", "1")
+        for more in ((), ("--thread-counts", "1")):
+            document = self.document(*arguments, "--threads", "1", *more)
+            self.assertEqual({row["threads"] for row in document["runs"] + document["builds"]}, {1})
+        self.fail_with_usage(*arguments, "--threads", "1", "--thread-counts", "1,2", names=["--thread-counts", "--threads", "2"])
 
     @unittest.skipIf(SANITIZED, "test_hierarchy writes the same document")
     def test_plots(self):

@@ -64,6 +64,26 @@ class Report(ProgramTest):
         self.assertIn("max_leaf", html)  # a setting that differs
         self.assertNotIn('<section id="comparison">', self.page(first))
 
+    def test_summary_and_table_have_the_same_trees(self):
+        documents = [self.make("plain.json", "build", FIGURE, "--builder", "ploc"),
+                     self.make("better.json", "build", FIGURE, "--builder", "ploc", "--reinsertion-rounds", "2"),
+                     self.make("sbvh.json", "trace", FIGURE, "--builder", "sbvh", "--size", "16x12"),
+                     self.make("split.json", "trace", FIGURE, "--builder", "split", "--size", "16x12")]
+        builds = {name: json.loads((self.folder / name).read_text(encoding="utf-8"))["build"] for name in documents}
+        html = self.page(*documents)
+        low, high = (choose(builds.values(), key=lambda build: build["sah"]) for choose in (min, max))
+        self.assertIn(f"is that of <strong>{low['builder']}</strong>; the highest", html)
+        self.assertIn(f"is that of {high['builder']}.", html)
+        self.assertIn("ploc, 2 rounds of reinsertion", html)
+        for build in builds.values():
+            self.assertIn(f'data-v="{build["sah"]:.17g}"', html)
+
+    def test_nothing_to_say_is_no_summary(self):
+        self.write("empty.obj", b"")
+        for arguments in (("scenes",), ("simulate", "empty.obj", "--rays", "primary", "--size", "8x8")):
+            self.assertNotIn("Summary", self.page(self.make("quiet.json", *arguments)))
+        self.assertIn('<a href="#summary">Summary</a>', self.page(self.make("build.json", "build", FIGURE)))
+
     def test_pictures(self):
         self.succeed("render", FIGURE, "--size", "32x24", "--samples", "1", "-o", "p.png", "--json", "render.json", "--quiet")
         self.assertEqual(self.page("render.json").count("data:image/png;base64,"), 1)  # named in the document

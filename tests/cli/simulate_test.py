@@ -142,6 +142,14 @@ class Simulate(ProgramTest):
                             ('{"name": "bare"}', ["multiprocessors", "missing"])):
             file = self.write("bad.json", text)
             self.fail_with_one_line("simulate", SCENE, "--machine", file, names=["bad.json", *words])
+        for text, words in (('{"base": "gtx480", "costs": [{"operation": "push", "instructions": 9, "most": 3}]}',
+                             ["'push'", "most", "3", "instructions", "9"]),
+                            ('{"base": "gtx480", "block_lanes": 4096}', ["block_lanes is 4096", "resident_lanes", "1024"]),
+                            ('{"base": "gtx480", "resident_lanes": 16, "block_lanes": 16}', ["resident_lanes is 16", "32"]),
+                            ('{"base": "gtx480", "resident_lanes": 200}', ["resident_lanes is 200", "32"])):
+            file = self.write("cannot.json", text)
+            self.fail_with_one_line("simulate", SCENE, "--machine", file, names=["cannot.json", *words])
+            self.fail_with_one_line("bench", "traversal", SCENE, "--machine", f"gtx285,{file}", names=["cannot.json", *words])
         # 15 first-level caches of 4 GB would be 32 GB of records.
         file = self.write("caches.json", '{"base": "gtx480", "l1_bytes": 4000000000}')
         self.fail_with_one_line("simulate", SCENE, "--memory", "--machine", file, names=["caches.json", "l1_bytes", "2^30"])
@@ -250,6 +258,27 @@ class Traversal(ProgramTest):
         out = self.succeed(*arguments, "--sweep-sample", "0").out
         for word in ("simulated Mrays/s", "claims", "no GPU was used"):
             self.assertIn(word, out)
+
+    def test_what_has_no_figure_is_null_and_a_dash(self):
+        empty = self.write("empty.obj", b"")
+        arguments = ("bench", "traversal", empty, *SMALL, "--machine", "gtx285")
+        out = self.succeed(*arguments, "--json", "empty.json").out
+        self.assertIn("SAH -,", out)
+        self.assertNotIn(" 0.0%", out.split("SIMD efficiency by width", 1)[1].split("claims of", 1)[0])
+        document = json.loads((self.folder / "empty.json").read_text(encoding="utf-8"))
+        self.assertEqual(len(document["width_sweep"]), 4 * 11 * 7)
+        for row in document["width_sweep"]:
+            self.assertEqual((row["simd_efficiency"], row["mrays_per_s_bound"]), (None, None))
+        self.assertEqual({claim["verdict"] for claim in document["claims"]}, {"needs rays"})
+        self.succeed("report", "empty.json", "-o", "empty.html", "--quiet")
+        html = (self.folder / "empty.html").read_text(encoding="utf-8")
+        self.assertIn(f"No claim of the paper has a verdict here: {len(document['claims'])} need rays.", html)
+
+    def test_the_sweep_has_the_widths_that_a_machine_holds(self):
+        small = self.write("small.json", '{"base": "gtx480", "name": "small", "resident_lanes": 32, "block_lanes": 32}')
+        document = self.document("bench", "traversal", SCENE, "--size", "16x16", "--samples", "1", "--machine", small, "--rays",
+                                 "primary", "--kernel", "if_if")
+        self.assertEqual([row["width"] for row in document["width_sweep"]], [1, 2, 4, 8, 16, 32])
 
     def test_claims_are_intervals_against_intervals(self):
         arguments = ("bench", "traversal", SCENE, *SMALL, "--machine", "gtx285", "--sweep-sample", "0")

@@ -222,6 +222,54 @@ TEST(MakeReport, ClaimsSayWhatTheyWouldTake) {
     EXPECT_TRUE(holds(page_of({document}), "needs whole launches"));
 }
 
+TEST(MakeReport, ClaimsWithoutAVerdictAreNotCountedAmongThoseThatHaveOne) {
+    Json document = Json::parse(shared_document("traversal.json"));
+    document["claims"] = Json::array();
+    const auto add = [&](const char* verdict, const Json& holds) {
+        document["claims"].push_back({{"claim", "c"}, {"verdict", verdict}, {"holds", holds}});
+    };
+    add("needs rays", nullptr);
+    add("needs rays", nullptr);
+    const std::string none = page_of({document});
+    EXPECT_TRUE(holds(none, "No claim of the paper has a verdict here: 2 need rays."));
+    EXPECT_FALSE(holds(none, "claims of the paper hold here"));
+    add("holds", true);
+    add("open", nullptr);
+    add("needs whole launches", nullptr);
+    const std::string some = page_of({document});
+    EXPECT_TRUE(holds(some, "Of 2 claims of the paper that have a verdict, <strong>1 holds"));
+    EXPECT_TRUE(holds(some, "and 1 stays open; 2 need rays and 1 needs whole launches."));
+    EXPECT_TRUE(holds(some, "1 of 2"));
+}
+
+TEST(MakeReport, TheLowestSahIsThatOfAllTreesOfTheTable) {
+    Json again = build_document(4), better = build_document(4), other = build_document(4);
+    again["build"]["reinsertion_rounds"] = 2;
+    again["build"]["sah"] = 12.25;
+    again["build"]["tree_hash"] = "11ff";
+    better["command"] = "trace";
+    better["build"]["builder"] = "sbvh";
+    better["build"]["sah"] = 11.125;
+    better["build"]["tree_hash"] = "22ff";
+    const std::string html = page_of({build_document(4), again, better, better});
+    EXPECT_TRUE(holds(html, "the lowest SAH cost, 11.12, is that of <strong>sbvh"));
+    EXPECT_TRUE(holds(html, "the highest, 12.50, is that of karras."));
+    EXPECT_TRUE(holds(html, "karras, 2 rounds of reinsertion"));
+    EXPECT_FALSE(holds(html, "give the same tree"));  // one tree, traced twice
+    // Costs of other constants are no rivals.
+    better["build"]["sah_constants"] = {{"node", 2.0}, {"primitive", 1.0}};
+    EXPECT_FALSE(holds(page_of({build_document(4), better}), "the lowest SAH cost"));
+    // What nothing else tells apart its document does.
+    EXPECT_TRUE(holds(page_of({build_document(4), build_document(2)}), "karras, d1.json"));
+}
+
+TEST(MakeReport, NothingToSayIsNoSummary) {
+    for (const Json& document : {Json::parse(R"({"command": "scenes", "scenes": []})"),
+                                 Json::parse(R"({"command": "simulate", "simulate": []})")})
+        EXPECT_FALSE(holds(page_of({document}), "Summary"));
+    EXPECT_TRUE(holds(page_of({build_document(4)}), "<a href=\"#summary\">Summary</a>"));
+}
+
 TEST(MakeReport, APublishedRateWithinTheErrorOfItsBoundIsNoAlarm) {
     Json document = Json::parse(shared_document("traversal.json"));
     document["published"][0]["mrays_per_s"] = 600.0;  // the bound is 584.7

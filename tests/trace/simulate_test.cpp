@@ -114,7 +114,7 @@ TEST(Simulate, ADoubledCostMovesWhatUsesItOnly) {
         auto changed = runs;
         for (SimulateOptions& run : changed)
             for (OperationCost& cost : run.machine.costs)
-                if (cost.operation == op_names[op]) cost.instructions *= 2;
+                if (cost.operation == op_names[op]) cost.instructions *= 2, cost.most = 0;
         const auto after = simulate(tree, rays, changed);
         for (std::size_t k = 0; k < runs.size(); ++k) {
             const std::uint64_t extra =
@@ -195,7 +195,7 @@ TEST(Simulate, StepsFromBoundToScheduledByPencil) {
     options.machine.resident_lanes = 64;
     options.machine.block_lanes = 32;
     for (OperationCost& cost : options.machine.costs)
-        if (cost.operation == "test_triangle") cost.instructions = 500;
+        if (cost.operation == "test_triangle") cost.instructions = 500, cost.most = 0;
     const Ray hitting = down(0.25f, 0.25f), missing = down(5, 5);
     const double longer = warp_instructions(tree, options, hitting),
                  shorter = warp_instructions(tree, options, missing);
@@ -452,6 +452,16 @@ TEST(Simulate, RefusesWhatItCannotRun) {
     refuse("read_clocks", [](SimulateOptions& o) { o.machine.read_clocks = -1; });
     refuse("block_release", [](SimulateOptions& o) { o.machine.block_release = BlockRelease(7); });
     refuse("in flight", [](SimulateOptions& o) { o.machine.resident_lanes = 1u << 30; });
+    refuse("most of 'push' is 3; it must be at least its instructions, 9", [](SimulateOptions& o) {
+        for (OperationCost& cost : o.machine.costs)
+            if (cost.operation == "push") cost.instructions = 9, cost.most = 3;
+    });
+    refuse("block_lanes is 4096; it must be at most resident_lanes, 1024",
+           [](SimulateOptions& o) { o.machine.block_lanes = 4096; });
+    refuse("resident_lanes is 16; it must be a multiple of the warp's width, 32",
+           [](SimulateOptions& o) { o.machine.resident_lanes = o.machine.block_lanes = 16; });
+    refuse("resident_lanes is 200; it must be a multiple of the warp's width, 16",
+           [](SimulateOptions& o) { o.machine.resident_lanes = 200, o.width = 16; });
     refuse("has no cost", [](SimulateOptions& o) {
         std::erase_if(o.machine.costs,
                       [](const OperationCost& cost) { return cost.operation == "visit_node"; });

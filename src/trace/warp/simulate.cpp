@@ -44,6 +44,23 @@ constexpr std::array<std::string_view, kernels.size()> kernel_names{
 
 constexpr std::array<std::string_view, 3> release_names{"own", "in_order", "together"};
 
+/// What no machine can have, whatever each figure is by itself.
+void check_together(const MachineModel& m, int width) {
+    const auto refuse = [&](const std::string& what) {
+        throw InputError("machine " + m.name + ": " + what);
+    };
+    if (m.resident_lanes % static_cast<std::uint32_t>(width) != 0)
+        refuse("resident_lanes is " + std::to_string(m.resident_lanes) +
+               "; it must be a multiple of the warp's width, " + std::to_string(width));
+    if (m.block_lanes > m.resident_lanes)
+        refuse("block_lanes is " + std::to_string(m.block_lanes) +
+               "; it must be at most resident_lanes, " + std::to_string(m.resident_lanes));
+    for (const OperationCost& cost : m.costs)
+        if (cost.most != 0 && cost.most < cost.instructions)
+            refuse("costs: most of '" + cost.operation + "' is " + std::to_string(cost.most) +
+                   "; it must be at least its instructions, " + std::to_string(cost.instructions));
+}
+
 WarpScene scene_of(const WarpTree& tree) {
     const WarpTree::Arrays& arrays = tree.arrays();
     return {arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()};
@@ -74,6 +91,7 @@ void check_options(const SimulateOptions& options) {
     check_enum("block_release", m.block_release, BlockRelease::together);
     positive("resident_lanes", m.resident_lanes);
     positive("block_lanes", m.block_lanes);
+    check_together(m, options.width);
     if (!(options.part_of_launch > 0 && options.part_of_launch <= 1))
         throw InputError("part_of_launch is " + std::to_string(options.part_of_launch) +
                          "; it must be above 0 and at most 1");
