@@ -165,8 +165,6 @@ class Simulate(ProgramTest):
         self.fail_with_usage("simulate", SCENE, "--sample", "1.5")
         self.fail_with_usage("bench", "traversal", SCENE, "--kernel", "x")
         self.fail_with_usage("simulate", SCENE, "--any", "--rays", "primary", names=["--any", "--rays FILE.npy", "primary"])
-        for option in ("--size", "8x8"), ("--camera", "0"), ("--samples", "2"), ("--sample", "0.5"), ("--launch-rays", "1024"):
-            self.fail_with_usage("simulate", SCENE, "--rays", "x.npy", *option, names=[option[0], "--rays x.npy"])
         help_text = " ".join(self.succeed("simulate", "--help").out.split())
         self.assertIn("Builder (default: split, without --quality)", help_text)
         self.assertNotIn("default: balanced", help_text)
