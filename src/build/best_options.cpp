@@ -2,7 +2,7 @@
 #include <raydix/bvh.h>
 #include <raydix/wide.h>
 
-#include "build/build_by_quality.h"
+#include "tree/build_by_quality.h"
 
 namespace raydix {
 namespace {

@@ -4,7 +4,6 @@
 #include <optional>
 #include <utility>
 
-#include "build/build_by_quality.h"
 #include "engine/mesh_commit.h"
 #include "engine/part_tree.h"
 #include "engine/shape_commit.h"
@@ -12,6 +11,7 @@
 #include "exec/parallel.h"
 #include "exec/recycler.h"
 #include "layout/wide_refit.h"
+#include "tree/build_by_quality.h"
 
 namespace raydix {
 namespace {

@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "build/build_by_quality.h"
 #include "engine/commit.h"
 #include "engine/mesh_commit.h"
 #include "engine/part_tree.h"
 #include "engine/shape_commit.h"
+#include "tree/build_by_quality.h"
 
 namespace raydix {
 namespace {

@@ -1,5 +1,5 @@
 // A better quality never means a tree of higher expected cost, whatever the triangles are like.
-#include "build/build_by_quality.h"
+#include "tree/build_by_quality.h"
 
 #include <gtest/gtest.h>
 #include <raydix/model.h>
