@@ -55,7 +55,7 @@ struct Model {
     double load_ms = 0.0;
     /// Why cameras.json beside the file gave no cameras, with its name; `cameras` is then one
     /// fitted to the box. Empty: it did, or there is none.
-    std::string cameras_fault;
+    std::string cameras_fault = {};
 
     /// The only mesh. Throws InputError if there are nodes or several meshes.
     [[nodiscard]] const Mesh& mesh() const&;
