@@ -7,9 +7,12 @@ Nothing is copied that already has the right type and lies in one run.
 from __future__ import annotations
 
 import operator
+import os
 from typing import Any
 
 import numpy as np
+
+from ._core import InputError
 
 FLOAT32 = np.dtype(np.float32)
 FLOAT64 = np.dtype(np.float64)
@@ -29,7 +32,8 @@ def to_numpy(value: Any, name: str) -> np.ndarray:
     TypeError if it is no array of numbers or its memory is a device's.
     """
     if isinstance(value, np.ndarray):
-        return value
+        # Columns of np.matrix keep two dimensions: what is not a plain array is seen as one.
+        return value if type(value) is np.ndarray else value.view(np.ndarray)
     if hasattr(value, "__dlpack__") and hasattr(value, "__dlpack_device__"):
         device = int(value.__dlpack_device__()[0])
         if device not in _READABLE_DEVICES:
@@ -46,12 +50,25 @@ def to_numpy(value: Any, name: str) -> np.ndarray:
         return np.asarray(value)
     except (ValueError, TypeError, RuntimeError) as error:
         raise TypeError(
-            f"{name}: expected an array of numbers, given {type(value).__name__} ({error})"
+            f"{name}: expected an array of numbers, given {type(value).__name__} "
+            f"({' '.join(str(error).split())})"
         ) from None
 
 
 def describe(array: np.ndarray) -> str:
     return f"shape {array.shape} {array.dtype}"
+
+
+def shown(value: Any) -> str:
+    """A wrong value on one line of a message: arrays by shape and type, long ones cut off."""
+    if isinstance(value, np.ndarray) or hasattr(value, "__dlpack__"):
+        shape, dtype = getattr(value, "shape", None), getattr(value, "dtype", None)
+        return f"an array of shape {tuple(shape or ())} {dtype}"
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # of any class, which may say anything; or of a whole number too long
+        text = f"a value of type {type(value).__name__}"
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def _as_floats(array: np.ndarray, name: str, expected: str) -> np.ndarray:
@@ -105,30 +122,69 @@ def rows(
 
 def number(value: Any, name: str) -> float:
     """Any real number as a float."""
-    if not isinstance(value, str):
+    is_other_array = getattr(value, "ndim", 0) or (
+        isinstance(value, (np.ndarray, np.generic)) and value.dtype.kind not in "biuf"
+    )
+    if not isinstance(value, (str, bytes, bytearray)) and not is_other_array:
         try:
             return float(value)
+        except OverflowError:
+            raise InputError(
+                f"{name}: expected a number that float64 can hold, given {shown(value)}"
+            ) from None
         except (TypeError, ValueError):
             pass
-    raise TypeError(f"{name}: expected a number, given {value!r}")
+    raise TypeError(f"{name}: expected a number, given {shown(value)}")
+
+
+def flag(value: Any, name: str) -> bool:
+    """A bool, NumPy's too, or 0 or 1."""
+    if isinstance(value, (bool, np.bool_)) or (type(value) is int and value in (0, 1)):
+        return bool(value)
+    raise TypeError(f"{name}: expected True or False, given {shown(value)}")
+
+
+def text(value: Any, name: str) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{name}: expected a str, given {shown(value)}")
+    return value.encode("utf-8", "replace").decode()
+
+
+def one_of(value: Any, name: str, known: Any) -> str:
+    if not isinstance(value, str) or value not in known:
+        raise InputError(
+            f"{name}: expected one of {', '.join(map(str, known))}, given {shown(value)}"
+        )
+    return value
+
+
+def path(value: Any, name: str) -> bytes:
+    """A path as the system has it: str, also of a name that is no UTF-8, bytes, or os.PathLike."""
+    try:
+        return os.fsencode(value)
+    except UnicodeEncodeError:
+        raise InputError(f"{name}: no path can be {shown(value)}") from None
+    except TypeError:
+        raise TypeError(f"{name}: expected a path, given {shown(value)}") from None
+
+
+def result_bytes(value: Any) -> int:
+    return whole(value, "max_result_bytes", 0, 2**64 - 1)
 
 
 def whole(value: Any, name: str, least: int, most: int) -> int:
     """A whole number from `least` to `most`; floats that are whole count."""
-    expected = f"{name}: expected a whole number, {least} to {most}, given {value!r}"
+    error: type[Exception] = InputError
     try:
         found = operator.index(value)
+        if least <= found <= most:
+            return found
     except TypeError:
-        found = None
-    if found is None:
         if not isinstance(value, (float, np.floating)):
-            raise TypeError(expected)
-        if value != np.floor(value) or np.isinf(value):  # NaN too
-            raise ValueError(expected)
-        found = int(value)
-    if not least <= found <= most:
-        raise ValueError(expected)
-    return found
+            error = TypeError
+        elif value == np.floor(value) and least <= value <= most:  # neither NaN nor infinite
+            return int(value)
+    raise error(f"{name}: expected a whole number, {least} to {most}, given {shown(value)}")
 
 
 def uint32s(value: Any, name: str) -> np.ndarray:
@@ -143,16 +199,24 @@ def uint32s(value: Any, name: str) -> np.ndarray:
     return cast(array, UINT32)
 
 
+def code_bits(value: Any) -> int:
+    """Of Morton codes."""
+    found = whole(value, "bits", 30, 63)
+    if found not in (30, 63):
+        raise InputError(f"bits: expected 30 or 63, given {found}")
+    return found
+
+
 def thread_count(value: Any) -> int:
     return whole(value, "threads", 0, 1024)
 
 
 def float_type(value: Any, name: str) -> np.dtype:
     """float32 for None; else what "float32", np.float64 and the like stand for."""
-    expected = f"{name}: expected 'float32' or 'float64', given {value!r}"
+    expected = f"{name}: expected 'float32' or 'float64', given {shown(value)}"
     try:
         dtype = FLOAT32 if value is None else np.dtype(value)
-    except TypeError:
+    except Exception:  # NumPy raises several kinds of what is no type
         raise ValueError(expected) from None
     if dtype not in (FLOAT32, FLOAT64):
         raise ValueError(expected)

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ._arrays import number
 from ._core import InputError
 from .points import Points
 
@@ -27,9 +28,10 @@ Pairs = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 def order_of(p: float) -> float:
     """p of a Minkowski distance; ValueError unless it is from 1 to infinity."""
-    if not p >= 1:
+    order = number(p, "p")
+    if not order >= 1:
         raise ValueError(f"p: expected a number from 1 to infinity, given {p}")
-    return float(p)
+    return order
 
 
 def measure_of(distance: np.ndarray, p: float) -> np.ndarray:

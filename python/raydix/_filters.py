@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._arrays import ALL, describe, to_numpy, uint32s, whole
+from ._arrays import ALL, describe, shown, to_numpy, uint32s, whole
 
 
 def _place_of(key: Any) -> tuple[int, int]:
     """(instance, geometry) of a key: a geometry's id, or both."""
     if isinstance(key, tuple):
         if len(key) != 2:
-            raise ValueError(f"keep: expected a geometry's id or (instance, id), given {key!r}")
+            raise ValueError(
+                f"keep: expected a geometry's id or (instance, id), given {shown(key)}"
+            )
         return whole(key[0], "keep: instance", 0, ALL), whole(key[1], "keep: geometry", 0, ALL)
     return 0, whole(key, "keep: geometry", 0, ALL)
 
@@ -27,6 +29,9 @@ def _flags(value: Any, name: str) -> np.ndarray:
     if flags.ndim != 1:
         raise ValueError(f"{name}: expected shape (primitives,), given {describe(flags)}")
     return np.ascontiguousarray(flags)
+
+
+_NAMES = ("prim", "geometry", "instance")
 
 
 def _column(value: Any, lead: tuple[int, ...], name: str) -> np.ndarray:
@@ -43,7 +48,11 @@ def hit_filter(keep: Any, skip: Any, lead: tuple[int, ...]) -> Any:
     made = _core.HitFilter()
     if skip is not None:
         if isinstance(skip, Mapping):
-            columns = [_column(skip[name], lead, "skip") for name in ("prim", "geometry", "instance")]
+            if any(name not in skip for name in _NAMES):
+                raise ValueError(
+                    f"skip: expected {', '.join(_NAMES)}, given {shown(list(skip))}"
+                )
+            columns = [_column(skip[name], lead, f"skip, {name}") for name in _NAMES]
         else:
             prims = _column(skip, lead, "skip")
             columns = [prims, np.zeros_like(prims), np.zeros_like(prims)]

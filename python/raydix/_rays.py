@@ -12,6 +12,7 @@ from ._arrays import (
     FLOAT64,
     describe,
     floats,
+    number,
     to_numpy,
     uint32s,
     whole,
@@ -23,7 +24,7 @@ def _limit(value: Any, name: str, lead: tuple[int, ...]) -> Any:
     """tmin or tmax: a number as it is; an array that fits the rays as (...) of their leading
     shape."""
     if isinstance(value, (int, float)):
-        return float(value)
+        return number(value, name)
     limit = to_numpy(value, name)
     if limit.dtype.kind not in "iuf":
         raise TypeError(
@@ -42,6 +43,13 @@ def _limit(value: Any, name: str, lead: tuple[int, ...]) -> Any:
 def floats_of(value: Any, name: str, lead: tuple[int, ...]) -> np.ndarray:
     """A number, or an array that fits the leading shape, as one of that shape."""
     return np.broadcast_to(_limit(value, name, lead), lead)
+
+
+def _stepped(array: np.ndarray) -> np.ndarray:
+    """The array, or a copy if its steps are no multiples of an item, as in packed records."""
+    if any(step % array.itemsize for step in array.strides):
+        return np.ascontiguousarray(array)
+    return array
 
 
 def _columns(
@@ -68,6 +76,7 @@ def _columns(
         arrays = [
             array.reshape(-1, 3) if i < 2 else array.reshape(-1) for i, array in enumerate(arrays)
         ]
+    arrays = [_stepped(array) for array in arrays]
     limits = iter(arrays[2:])
     return (
         *arrays[:2],

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
+
+import numpy as np
+
+from ._arrays import number, shown, text, to_numpy
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,9 +23,16 @@ class Camera:
 
     def _fields(self) -> tuple:
         return (
-            tuple(self.position),
-            tuple(self.target),
-            tuple(self.up),
-            float(self.vfov),
-            self.name,
+            _place(self.position, "camera, position"),
+            _place(self.target, "camera, target"),
+            _place(self.up, "camera, up"),
+            number(self.vfov, "camera, vfov"),
+            text(self.name, "camera, name"),
         )
+
+
+def _place(value: Any, name: str) -> tuple[float, ...]:
+    place = to_numpy(value, name)
+    if place.shape != (3,) or place.dtype.kind not in "iuf":
+        raise TypeError(f"{name}: expected three numbers, given {shown(value)}")
+    return tuple(place.astype(np.float64).tolist())

@@ -14,11 +14,14 @@ from ._arrays import (
     UINT32,
     cast,
     describe,
+    flag,
     mesh_faces,
     mesh_vertices,
     number,
+    one_of,
     require_dtype,
     require_float32,
+    shown,
     thread_count,
     to_numpy,
     uint32s,
@@ -28,12 +31,6 @@ from ._arrays import (
 QUALITIES = {"fast": ("apetrei", 0), "balanced": ("ploc", 2), "high": ("sbvh", 4)}
 """Which builder and how many rounds of reinsertion each quality stands for."""
 USAGES = ("fixed", "moving")
-
-
-def one_of(value: Any, name: str, known: Any) -> str:
-    if value not in known:
-        raise ValueError(f"{name}: expected one of {', '.join(map(str, known))}, given {value!r}")
-    return value
 
 
 def mesh_of(source: Any) -> tuple[Any, Any]:
@@ -62,7 +59,7 @@ def transforms(value: Any, dtype: np.dtype) -> tuple[np.ndarray, bool]:
 
 def _one_or_many(value: Any, name: str) -> np.ndarray:
     """A whole number, or several: (n,) uint32."""
-    if np.ndim(value) == 0:
+    if not isinstance(value, (list, tuple)) and not getattr(value, "ndim", 0):
         return np.array([whole(value, name, 0, ALL)], UINT32)
     array = uint32s(value, name)
     if array.ndim != 1:
@@ -116,7 +113,7 @@ def point_rows(points: ArrayLike, radius: Any, dtype: np.dtype) -> np.ndarray:
 def _radius(value: Any) -> float:
     radius = number(value, "radius")
     if not 0 <= radius < np.inf:
-        raise ValueError(f"radius: expected a finite number, 0 or more, given {value!r}")
+        raise ValueError(f"radius: expected a finite number, 0 or more, given {shown(value)}")
     return radius
 
 
@@ -192,7 +189,7 @@ class SceneContents:
             raise TypeError("transform: expected shape (3, 4) or (4, 4), given None")
         rows, one = transforms(where, self.dtype)
         if wanted is not None and not one:
-            raise ValueError(f"id: expected None for {len(rows)} transforms, given {id!r}")
+            raise ValueError(f"id: expected None for {len(rows)} transforms, given {shown(id)}")
         masks = _one_or_many(mask, "mask")
         if len(masks) != 1 and (one or len(masks) != len(rows)):
             raise ValueError(f"mask: expected one or {len(rows)}, given {len(masks)}")
@@ -344,14 +341,15 @@ class SceneContents:
         InputError, the last commit still stands: an instance of a scene that was never committed, a
         scene that reaches beyond 1e12, more than 32 levels of instances or 2**32 - 2 paths.
         """
+        compact = None if compact is None else flag(compact, "compact")
         if compact:
             require_float32(self, "compact=True")
         if progress is not None and not callable(progress):
-            raise TypeError(f"progress: expected a function, given {progress!r}")
+            raise TypeError(f"progress: expected a function, given {shown(progress)}")
         report = self._core.commit(
             quality if quality is None else one_of(quality, "quality", QUALITIES),
             usage if usage is None else one_of(usage, "usage", USAGES),
-            None if compact is None else bool(compact),
+            compact,
             None if refit_limit is None else number(refit_limit, "refit_limit"),
             None if threads is None else thread_count(threads),
             progress,
@@ -369,7 +367,8 @@ class SceneContents:
     def bounds(self) -> np.ndarray:
         """Of the last commit: the corners of a box around all triangles, shape (2, 3) in `dtype`;
         the first is above the second where there are none. It is the smallest one around meshes;
-        around instances it is that of their scenes' moved boxes."""
+        around instances it is that of their scenes' moved boxes. In float32 a mesh whose triangles
+        all have no area may be left out of it."""
         return np.array(self._core.bounds(), self.dtype)
 
     def path(self, number: int) -> list[int]:

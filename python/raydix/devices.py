@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._arrays import ALL, FLOAT32, cast
+from ._arrays import ALL, FLOAT32, cast, shown
 from ._rays import ray_batch
 from .hits import COLUMNS, Hits
 
@@ -42,7 +42,7 @@ def device_name(value: Any) -> str:
         return value
     raise ValueError(
         "device: expected 'cpu', 'cuda', 'opencl', 'opencl:N', 'hip' or 'hip:N', "
-        f"given {value!r}"
+        f"given {shown(value)}"
     )
 
 

@@ -16,12 +16,24 @@ or what becomes one, such as Open3D's own tensors on the processor. What differs
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import FLOAT32, MISSING, UINT32, mesh_faces, mesh_vertices, rows
+from ._arrays import (
+    FLOAT32,
+    MISSING,
+    UINT32,
+    mesh_faces,
+    mesh_vertices,
+    number,
+    rows,
+    shown,
+    thread_count,
+    whole,
+)
 from ._core import split_hits
 from .scene import Scene
 
@@ -51,6 +63,11 @@ class RaycastingScene:
         self._ready(self._scene.threads)  # a scene with changes that no commit has seen has no copy
         return self.__dict__
 
+    def __copy__(self) -> RaycastingScene:
+        made = type(self).__new__(type(self))
+        made.__dict__.update(self.__getstate__(), _scene=copy.copy(self._scene))
+        return made
+
     def add_triangles(self, mesh: Any, triangle_indices: ArrayLike | None = None) -> int:
         """Adds a mesh and returns its geometry's number: vertices (N, 3) and triangles (M, 3); or an
         object that has them, as the meshes of Open3D do."""
@@ -63,22 +80,25 @@ class RaycastingScene:
         scene = self._scene
         if not scene.committed:
             scene.commit()
-        scene.threads = nthreads
+        scene.threads = thread_count(nthreads)
         return scene
 
     def cast_rays(self, rays: ArrayLike, nthreads: int = 0) -> dict[str, np.ndarray]:
         """The first hit of each ray (..., 6), origin and direction: "t_hit" (...,), infinity for
         none; "geometry_ids" and "primitive_ids" uint32, INVALID_ID for none; "primitive_uvs"
         (..., 2); "primitive_normals" (..., 3) of unit length, 0 for none."""
+        given = _rays(rays)
         scene = self._ready(nthreads)
-        hits = scene.intersect(_rays(rays))
+        with scene._core.held():
+            hits = scene.intersect(given)
+            normals = scene.normals(hits)
         lead = hits._rows.shape[:-1]
         found = {
             "t_hit": np.empty(lead, FLOAT32),
             "geometry_ids": np.empty(lead, UINT32),
             "primitive_ids": np.empty(lead, UINT32),
             "primitive_uvs": np.empty((*lead, 2), FLOAT32),
-            "primitive_normals": scene.normals(hits),
+            "primitive_normals": normals,
         }
         rows_of = [array.reshape(-1, *array.shape[len(lead) :]) for array in found.values()]
         split_hits(hits._rows.reshape(-1, hits._rows.shape[-1]), *rows_of)
@@ -88,7 +108,8 @@ class RaycastingScene:
         self, rays: ArrayLike, tnear: float = 0.0, tfar: float = np.inf, nthreads: int = 0
     ) -> np.ndarray:
         """Whether each ray (..., 6) hits anything between tnear and tfar: bool."""
-        return self._ready(nthreads).occluded(_rays(rays), tmin=float(tnear), tmax=float(tfar))
+        near, far = number(tnear, "tnear"), number(tfar, "tfar")
+        return self._ready(nthreads).occluded(_rays(rays), tmin=near, tmax=far)
 
     def count_intersections(self, rays: ArrayLike, nthreads: int = 0) -> np.ndarray:
         """How many triangles each ray (..., 6) hits: int32."""
@@ -137,11 +158,14 @@ class RaycastingScene:
         """The closest point of the meshes to each query (..., 3): "points" (..., 3),
         "geometry_ids", "primitive_ids", "primitive_uvs" and "primitive_normals" as in
         `cast_rays`."""
+        given = _points(query_points)
         scene = self._ready(nthreads)
-        found = scene.closest_point(_points(query_points))
+        with scene._core.held():
+            found = scene.closest_point(given)
+            surface = _surface(scene, {"t": found["distance"], **found})
         return {
             "points": np.ascontiguousarray(found["point"]),
-            **_surface(scene, {"t": found["distance"], **found}),
+            **surface,
         }
 
     @staticmethod
@@ -158,9 +182,7 @@ class RaycastingScene:
             raise TypeError(
                 f"create_rays_pinhole: expected {', '.join(names)}, given {list(given)}"
             )
-        width, height = int(given["width_px"]), int(given["height_px"])
-        if width < 1 or height < 1:
-            raise ValueError(f"create_rays_pinhole: a picture of {width} x {height} pixels")
+        width, height = (whole(given[name], name, 1, 2**31) for name in ("width_px", "height_px"))
         if "fov_deg" in given:
             return _pinhole_rays(*_looking(given, width, height), width, height)
         matrices = (given["intrinsic_matrix"], given["extrinsic_matrix"])
@@ -193,8 +215,8 @@ def _points(points: ArrayLike) -> np.ndarray:
 
 
 def _check_samples(nsamples: int) -> None:
-    if nsamples < 1 or nsamples % 2 == 0:
-        raise ValueError(f"nsamples: expected an odd number of 1 or more, given {nsamples}")
+    if whole(nsamples, "nsamples", 1, 2**31) % 2 == 0:
+        raise ValueError(f"nsamples: expected an odd number of 1 or more, given {shown(nsamples)}")
 
 
 def _surface(scene: Scene, hits: Any) -> dict[str, np.ndarray]:

@@ -11,9 +11,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import FLOAT32, cast, describe, floats, rows
+from ._arrays import (
+    FLOAT32,
+    cast,
+    describe,
+    flag,
+    floats,
+    number,
+    one_of,
+    path,
+    rows,
+    shown,
+    whole,
+)
 from .cameras import Camera
 
+KINDS = ("ao", "diffuse", "diffuse_shuffled")
 VIEWS = ("shaded", "normal", "depth", "primitive", "ao", "diffuse", "steps")
 
 
@@ -44,7 +57,10 @@ class SceneViews:
     def _camera(self, camera: Camera | int | None) -> Camera:
         if isinstance(camera, Camera):
             return camera
-        return self.cameras[camera or 0]
+        known = self.cameras
+        if camera is None:
+            return known[0]
+        return known[whole(camera, "camera", -len(known), len(known) - 1)]
 
     def render(
         self,
@@ -67,15 +83,13 @@ class SceneViews:
         A scene in float64 is met in float64, wherever it lies; light is then gathered in float32 about
         the middle of its box. It does not count steps: ValueError for that view.
         """
-        width, height = size
         return self._core.render(
             self._camera(camera)._fields(),
-            view,
-            width,
-            height,
-            samples,
-            ao_radius,
-            seed,
+            one_of(view, "view", VIEWS),
+            *_pixels(size),
+            whole(samples, "samples", 0, 4096),
+            number(ao_radius, "ao_radius"),
+            whole(seed, "seed", 0, 2**64 - 1),
             self.threads,
         )
 
@@ -88,7 +102,7 @@ class SceneViews:
         Returns "rays" (N, 8) in the scene's type with unit directions, and "pixels" (N,) uint32:
         y * width + x.
         """
-        rays, pixels = self._core.primary_rays(self._camera(camera)._fields(), *size)
+        rays, pixels = self._core.primary_rays(self._camera(camera)._fields(), *_pixels(size))
         return {"rays": rays, "pixels": pixels}
 
     def secondary_rays(
@@ -109,7 +123,14 @@ class SceneViews:
         fiftieth of the distance that they keep from the surface.
         """
         primary, _ = rows(rays, "rays", (8,), self.dtype)
-        return self._core.secondary_rays(primary, kind, samples, ao_radius, seed, self.threads)
+        return self._core.secondary_rays(
+            primary,
+            one_of(kind, "kind", KINDS),
+            whole(samples, "samples", 1, 1024),
+            number(ao_radius, "ao_radius"),
+            whole(seed, "seed", 0, 2**64 - 1),
+            self.threads,
+        )
 
     def _facts(self) -> tuple[list[tuple[str, str]], Any]:
         """What a notebook shows in a table, and the corners of the box around what can be seen."""
@@ -148,6 +169,13 @@ class SceneViews:
         return f"<div><b>{title}</b><div style='display:flex;gap:1em'>{shown}</div></div>"
 
 
+def _pixels(size: Any) -> tuple[int, int]:
+    is_row = isinstance(size, (tuple, list)) or getattr(size, "ndim", 0) == 1
+    if not is_row or len(size) != 2:
+        raise TypeError(f"size: expected (width, height), given {shown(size)}")
+    return whole(size[0], "size, width", 1, 16384), whole(size[1], "size, height", 1, 16384)
+
+
 def _corners(box: Any) -> str:
     return " to ".join(str(tuple(round(c, 4) for c in corner)) for corner in box)
 
@@ -170,10 +198,10 @@ def to_srgb(picture: ArrayLike) -> np.ndarray:
 def to_png(picture: ArrayLike, *, tone_map: bool = True) -> bytes:
     """Linear colours (H, W, 3) -> the bytes of a PNG file, 8-bit sRGB; `tone_map`: after a filmic
     curve."""
-    return _core.png(_picture(picture), tone_map)
+    return _core.png(_picture(picture), flag(tone_map, "tone_map"))
 
 
-def save_picture(file: str | os.PathLike, picture: ArrayLike, *, tone_map: bool = True) -> None:
+def save_picture(file: str | bytes | os.PathLike, picture: ArrayLike, *, tone_map: bool = True) -> None:
     """Writes linear colours (H, W, 3) as .png (8-bit sRGB) or .exr (float). InputError names the
     file."""
-    _core.save_picture(os.fspath(file), _picture(picture), tone_map)
+    _core.save_picture(path(file, "file"), _picture(picture), flag(tone_map, "tone_map"))

@@ -14,10 +14,15 @@ from ._arrays import (
     UINT32,
     cast,
     describe,
+    flag,
     floats,
     number,
+    one_of,
+    path,
+    result_bytes,
     rows,
     thread_count,
+    to_numpy,
     uint32s,
     whole,
 )
@@ -28,6 +33,9 @@ _INDICES = {
     (np.dtype(np.float64), 2): _core.PointIndex2d,
     (np.dtype(np.float64), 3): _core.PointIndex3d,
 }
+
+
+TREES = ("automatic", "bvh", "kdtree")
 
 
 class Points:
@@ -68,10 +76,11 @@ class Points:
         self.dtype = array.dtype
         self.dimension = array.shape[1]
         self.threads = threads = thread_count(threads)
+        tree, strict = one_of(tree, "tree", TREES), flag(strict, "strict")
         self._core = _INDICES[self.dtype, self.dimension](
             cast(array, self.dtype), tree, strict, threads
         )
-        self._options = {"tree": tree, "strict": bool(strict), "threads": threads}
+        self._options = {"tree": tree, "strict": strict, "threads": threads}
 
     @property
     def options(self) -> dict[str, Any]:
@@ -80,8 +89,9 @@ class Points:
 
     def _points(self) -> np.ndarray:
         """The points as they were given; NaN for those that were left out."""
-        points = np.full((self._core.given(), self.dimension), np.nan, self.dtype)
-        points[self._core.order()] = self._core.points()
+        given, numbers, there = self._core.snapshot()
+        points = np.full((given, self.dimension), np.nan, self.dtype)
+        points[numbers] = there
         return points
 
     def __reduce__(self) -> tuple:
@@ -131,7 +141,7 @@ class Points:
         shape = lead + (k,)
         bytes_each = UINT32.itemsize + self.dtype.itemsize
         _core.require_result_bytes(
-            "knn", min(len(asked) * k * bytes_each, 2**64 - 1), max_result_bytes
+            "knn", min(len(asked) * k * bytes_each, 2**64 - 1), result_bytes(max_result_bytes)
         )
         indices, distances = np.empty(shape, UINT32), np.empty(shape, self.dtype)
         flat = (len(asked), k)
@@ -166,20 +176,26 @@ class Points:
         negative or NaN radius.
         """
         asked, lead = rows(queries, "queries", (self.dimension,), self.dtype)
-        try:
-            radii = np.asarray(r, self.dtype)
-        except (TypeError, ValueError):
-            raise TypeError(f"r: expected a number or shape {lead}, given {r!r}") from None
-        if radii.ndim:
-            if radii.shape != lead:
-                raise ValueError(f"r: expected a number or shape {lead}, given {describe(radii)}")
-        radii = np.ascontiguousarray(radii.reshape(-1))
+        max_result_bytes = result_bytes(max_result_bytes)
+        radii = self._radii(r, lead)
+        is_padded = flag(padded, "padded")
         offsets, indices, distances = self._core.radius(
-            asked, radii, sort, max_result_bytes, self._threads(threads)
+            asked, radii, flag(sort, "sort"), max_result_bytes, self._threads(threads)
         )
-        if not padded:
+        if not is_padded:
             return {"offsets": offsets, "indices": indices, "distances": distances}
         return _padded(offsets, indices, distances, lead, max_result_bytes)
+
+    def _radii(self, r: ArrayLike, lead: tuple[int, ...]) -> np.ndarray:
+        """One radius for all, (1,), or one for each query, (n,)."""
+        radii = to_numpy(r, "r")
+        if radii.ndim == 0 and radii.dtype.kind in "OU":
+            radii = np.array(number(r, "r"))  # whole numbers of any length, too
+        is_numbers = radii.dtype.kind in "biuf" or not radii.size
+        if not is_numbers or (radii.ndim and radii.shape != lead):
+            error = ValueError if is_numbers else TypeError
+            raise error(f"r: expected a number or shape {lead}, given {describe(radii)}")
+        return cast(radii, self.dtype).reshape(-1)
 
     def count(self, queries: ArrayLike, r: float, *, threads: int | None = None) -> np.ndarray:
         """How many points lie within the distance `r` of each query: uint32, with the leading shape
@@ -199,7 +215,9 @@ class Points:
         `max_result_bytes` as in `radius`.
         """
         asked, _ = rows(boxes, "boxes", (2 * self.dimension,), self.dtype)
-        offsets, indices, _ = self._core.box(asked, max_result_bytes, self._threads(threads))
+        offsets, indices, _ = self._core.box(
+            asked, result_bytes(max_result_bytes), self._threads(threads)
+        )
         return {"offsets": offsets, "indices": indices}
 
     def pairs(
@@ -210,6 +228,7 @@ class Points:
         Returns "pairs" (P, 2) uint32 with i < j, sorted, and "distances" (P,). Points at the same
         place are a pair. `max_result_bytes` as in `radius`.
         """
+        max_result_bytes = result_bytes(max_result_bytes)
         offsets, others, distances = self._core.neighbours(
             number(r, "r"), False, max_result_bytes, self._threads(threads)
         )
@@ -231,7 +250,7 @@ class Points:
         """The points within `r` of each point, itself left out: one row for each point, as `radius`
         has them. `max_result_bytes` as in `radius`."""
         offsets, others, distances = self._core.neighbours(
-            number(r, "r"), True, max_result_bytes, self._threads(threads)
+            number(r, "r"), True, result_bytes(max_result_bytes), self._threads(threads)
         )
         return {"offsets": offsets, "indices": others, "distances": distances}
 
@@ -286,10 +305,10 @@ def _padded(
     }
 
 
-def load_points(file: str | os.PathLike) -> np.ndarray:
+def load_points(file: str | bytes | os.PathLike) -> np.ndarray:
     """The vertices of a file, (N, 3) float32: .ply, .xyz, .npy, .obj, .stl, .off, .gltf, .glb, also
     with .gz, .xz or .zst.
 
     InputError names the file, the element and the reason.
     """
-    return _core.load_scene(os.fspath(file), 1)["vertices"]
+    return _core.load_scene(path(file, "file"), 1)["vertices"]

@@ -7,11 +7,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import FLOAT32, FLOAT64, UINT32, number, require_dtype, rows
+from ._arrays import (
+    FLOAT32,
+    FLOAT64,
+    UINT32,
+    flag,
+    number,
+    one_of,
+    require_dtype,
+    result_bytes,
+    rows,
+    shown,
+)
 from ._rays import floats_of, ray_batch
 
 if TYPE_CHECKING:
     from .scene import Scene
+
+
+RULES = ("automatic", "crossings", "parity", "winding")
 
 
 class SceneQueries:
@@ -60,14 +74,15 @@ class SceneQueries:
         """Distance of each point from the mesh, negative inside: in the scene's type, with the
         leading shape of the queries.
 
-        (`trimesh.proximity.signed_distance` has the other sign.) `rule` as in `contains`. Beyond
+        (`trimesh.proximity.signed_distance` has the other sign.) `rule` as in `contains`, and so
+        the sign on open meshes. Beyond
         `max_distance` the answer is infinite, with its sign; for points with NaN or infinity it is
         infinite.
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
         distances = np.empty(lead, self.dtype)
         reach = number(max_distance, "max_distance")
-        self._core.signed_distance(asked, distances.reshape(-1), reach, rule, self.threads)
+        self._core.signed_distance(asked, distances.reshape(-1), reach, _rule(rule), self.threads)
         return distances
 
     def contains(self, points: ArrayLike, *, rule: str = "automatic") -> np.ndarray:
@@ -75,22 +90,24 @@ class SceneQueries:
 
         `rule`: "crossings" (signed crossings to infinity are not 0), "parity" (their number is
         odd), "winding" (generalized winding number of 1/2 or more, Jacobson et al. 2013: for meshes
-        with holes; parts far away count by a series, Barill et al. 2018, with errors below 0.01),
+        with holes; parts far away count by a series, Barill et al. 2018, with errors below 0.01,
+        which differ between builders and qualities),
         or "automatic": the first of these that the mesh is closed enough for. The
         first two are decided without rounding, at edges and vertices too, and points of the surface
         are inside. Points with NaN or infinity are outside.
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
         flags = np.empty(lead, np.bool_)
-        self._core.contains(asked, flags.reshape(-1), rule, self.threads)
+        self._core.contains(asked, flags.reshape(-1), _rule(rule), self.threads)
         return flags
 
     def winding_number(self, points: ArrayLike, *, rule: str = "automatic") -> np.ndarray:
         """The number that `contains` decides by: float64, with the leading shape; NaN for points
-        with NaN or infinity."""
+        with NaN or infinity. With "winding" it has an error below 0.01, which differs between
+        builders and qualities."""
         asked, lead = rows(points, "points", (3,), self.dtype)
         numbers = np.empty(lead, FLOAT64)
-        self._core.winding(asked, numbers.reshape(-1), rule, self.threads)
+        self._core.winding(asked, numbers.reshape(-1), _rule(rule), self.threads)
         return numbers
 
     def overlaps(
@@ -108,7 +125,12 @@ class SceneQueries:
         first, then of the second. The memory of the call holds a copy of all triangles, those of
         instances on every path. InputError names spheres and capsules.
         """
-        pairs = self._core.overlaps(self._partner(other), narrow, max_result_bytes, self.threads)
+        pairs = self._core.overlaps(
+            self._partner(other),
+            flag(narrow, "narrow"),
+            result_bytes(max_result_bytes),
+            self.threads,
+        )
         if pairs.shape[1] == 2:
             return pairs
         columns = pairs.reshape(-1, 2, 3)
@@ -119,13 +141,13 @@ class SceneQueries:
         if other is None:
             return None
         if not isinstance(other, SceneQueries):
-            raise TypeError(f"other: expected a Scene, given {other!r}")
+            raise TypeError(f"other: expected a Scene, given {shown(other)}")
         require_dtype(other, self.dtype, "other")
         return other._core
 
     def count_overlaps(self, other: Scene | None = None, *, narrow: bool = False) -> int:
         """How many pairs `overlaps` would give, without keeping them."""
-        return self._core.count_overlaps(self._partner(other), narrow, self.threads)
+        return self._core.count_overlaps(self._partner(other), flag(narrow, "narrow"), self.threads)
 
     def touched_by(
         self,
@@ -143,7 +165,7 @@ class SceneQueries:
         """
         kind, shapes, _ = self._touching(spheres, segments, "touched_by")
         call = getattr(self._core, f"touched_by_{kind}")
-        offsets, names = call(shapes, max_result_bytes, self.threads)
+        offsets, names = call(shapes, result_bytes(max_result_bytes), self.threads)
         return {
             "offsets": offsets,
             "prim": names[:, 2],
@@ -212,3 +234,7 @@ class SceneQueries:
             "u": hits[..., -2],
             "v": hits[..., -1],
         }
+
+
+def _rule(rule: Any) -> str:
+    return one_of(rule, "rule", RULES)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._arrays import ALL
+from ._arrays import ALL, path, text
 from .cameras import Camera
 
 
@@ -21,10 +21,11 @@ class SavedScene:
     name: str
     threads: int
     device: str
+    committed: bool
     _options: dict[str, Any]
     _cameras: list[Camera]
     _attributes: dict[int, dict[str, np.ndarray]]
-    _file: tuple[str, int, int, int] | None
+    _file: tuple[Any, int, int, int] | None
 
     @property
     def options(self) -> dict[str, Any]:
@@ -32,7 +33,7 @@ class SavedScene:
         arguments of `Scene` by their names. Scenes with equal options are built alike."""
         return dict(self._options)
 
-    def save(self, file: str | os.PathLike) -> None:
+    def save(self, file: str | bytes | os.PathLike) -> None:
         """Writes the scene to a .rdx file, as its last commit left it: its trees, all scenes that
         it places, each once, with ids and masks, its name and its cameras. `load_scene` reads it.
 
@@ -41,7 +42,7 @@ class SavedScene:
         written.
         """
         cameras = [camera._fields() for camera in self._cameras]
-        self._core.save_rdx(os.fspath(file), self.name, cameras)
+        self._core.save_rdx(path(file, "file"), text(self.name, "name"), cameras)
 
     def __reduce_ex__(self, protocol: Any) -> tuple:
         """Pickles, copies and deep copies.
@@ -53,7 +54,13 @@ class SavedScene:
 
         InputError: changes without a commit.
         """
-        if not self.committed and len(self):  # type: ignore[attr-defined]
+        with self._core.held():
+            return self._reduced()
+
+    def _reduced(self) -> tuple:
+        ids, given = self._core.ids(), self._core.ids_given()
+        committed = self.committed
+        if not committed and given:
             raise _core.InputError("the scene has changes without a commit: it cannot be copied")
         more = {
             "options": self._options,
@@ -62,20 +69,21 @@ class SavedScene:
             "attributes": self._attributes,
             "threads": self.threads,
             "device": self.device,
+            "committed": committed,
         }
         if self._file is not None and self._file == state_of(self._file[0]):
             return _from_file, (self._file, more)
-        if not len(self) or self._is_plain_mesh():  # type: ignore[arg-type]
-            mesh = self._core.arrays_of(0) if len(self) else None  # type: ignore[arg-type]
-            return _from_mesh, (mesh, more)
+        if not given:
+            return _from_mesh, (None, more)
+        if ids == [0] and given == 1 and self._is_plain_mesh():
+            return _from_mesh, (self._core.arrays_of(0), more)
         return _from_bytes, (self._bytes(), more)
 
     def _is_plain_mesh(self) -> bool:
-        """Whether `Scene(vertices, faces)` makes the same."""
-        ids = self._core.ids()
+        """Of a scene that was given the id 0 alone: whether `Scene(vertices, faces)` makes the
+        same."""
         return (
-            ids == [0]
-            and self._core.is_mesh()
+            self._core.is_mesh()
             and self._core.mask_of(0) == ALL
             and self._core.arrays_of(0) is not None
         )
@@ -102,10 +110,13 @@ def _filled(scene: Any, more: dict[str, Any]) -> Any:
 
 
 def _from_mesh(mesh: tuple[np.ndarray, np.ndarray] | None, more: dict[str, Any]) -> Any:
-    return _filled(_new(more, *mesh) if mesh else _new(more), more)
+    scene = _new(more, *mesh) if mesh else _new(more)
+    if not mesh and more.get("committed"):
+        scene.commit()
+    return _filled(scene, more)
 
 
-def state_of(file: str) -> tuple[str, int, int, int] | None:
+def state_of(file: Any) -> tuple[Any, int, int, int] | None:
     """What a file that is replaced or written to does not have any more; None: it is gone."""
     try:
         found = os.stat(file)
@@ -114,11 +125,13 @@ def state_of(file: str) -> tuple[str, int, int, int] | None:
     return file, found.st_size, found.st_mtime_ns, found.st_ino
 
 
-def _from_file(file: tuple[str, int, int, int], more: dict[str, Any]) -> Any:
+def _from_file(file: tuple[Any, int, int, int], more: dict[str, Any]) -> Any:
     from .scene import load_scene
 
     if state_of(file[0]) != file:
-        raise _core.InputError(f"{file[0]}: it has changed since the scene was pickled, or is gone")
+        raise _core.InputError(
+            f"{os.fsdecode(file[0])}: it has changed since the scene was pickled, or is gone"
+        )
     return _filled(load_scene(file[0], threads=more["threads"], device=more["device"]), more)
 
 

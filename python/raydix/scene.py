@@ -14,24 +14,32 @@ from ._arrays import (
     ALL,
     FLOAT32,
     UINT32,
+    code_bits,
+    flag,
     float_type,
     mesh_faces,
     mesh_vertices,
     number,
+    one_of,
+    path,
     require_float32,
+    result_bytes,
+    shown,
     thread_count,
     whole,
 )
 from ._filters import hit_filter
 from ._rays import ray_batch, ray_masks
 from .cameras import Camera
-from .contents import QUALITIES, USAGES, SceneContents, mesh_of, one_of
+from .contents import QUALITIES, USAGES, SceneContents, mesh_of
 from .devices import DeviceRays, device_name
 from .hits import Hits
 from .pictures import SceneViews
 from .queries import SceneQueries
 from .saved import SavedScene, state_of
-from .surface import SurfaceOfHits
+from .surface import SurfaceOfHits, also_names
+
+_NO_NAMES = ()
 
 
 class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
@@ -122,7 +130,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
 
     def __init__(
         self,
-        vertices: ArrayLike | str | os.PathLike | Any = None,
+        vertices: ArrayLike | str | bytes | os.PathLike | Any = None,
         faces: ArrayLike | None = None,
         *,
         quality: str = "balanced",
@@ -139,7 +147,10 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     ) -> None:
         one_of(quality, "quality", QUALITIES)
         one_of(usage, "usage", USAGES)
-        asked_builder, asked_rounds = (builder, 0) if builder else QUALITIES[quality]
+        asked_builder, asked_rounds = QUALITIES[quality]
+        if builder is not None:
+            asked_builder, asked_rounds = one_of(builder, "builder", _core.builders()), 0
+        strict, compact = flag(strict, "strict"), flag(compact, "compact")
         device = device_name(device)
         self.dtype = float_type(precision, "precision")
         """float32 or float64: what the scene computes in and its results are."""
@@ -147,19 +158,19 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         self.device = device
         self._attributes: dict[int, dict[str, np.ndarray]] = {}
         self._placed: dict[int, Any] = {}
-        self._file: tuple[str, int, int, int] | None = None
+        self._file: tuple[Any, int, int, int] | None = None
         self._options: dict[str, Any] = {
             "quality": quality,
             "builder": builder,
             "reinsertion_rounds": reinsertion_rounds,
             "max_leaf": max_leaf,
             "bits": bits,
-            "strict": bool(strict),
+            "strict": strict,
             "threads": threads,
             "device": device,
             "precision": self.dtype.name,
             "usage": usage,
-            "compact": bool(compact),
+            "compact": compact,
         }
         self.name = ""
         self._cameras: list[Camera] = []
@@ -174,9 +185,8 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         if reinsertion_rounds is not None:
             asked_rounds = whole(reinsertion_rounds, "reinsertion_rounds", 0, 255)
         leaf = whole(max_leaf, "max_leaf", 1, 255)
-        one_of(bits, "bits", (30, 63))
-        trees = (asked_builder, asked_rounds, bits, leaf, bool(strict), threads)
-        options = (*trees, quality, usage, bool(compact))
+        trees = (asked_builder, asked_rounds, code_bits(bits), leaf, strict, threads)
+        options = (*trees, quality, usage, compact)
         self._core: Any = self._make(vertices, faces, options)
 
     def _make(self, vertices: Any, faces: Any, options: tuple) -> Any:
@@ -187,14 +197,14 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
                 raise TypeError("vertices: expected shape (V, 3) for these faces, given None")
             return core_type(*options)
         if faces is None:
-            if isinstance(vertices, (str, os.PathLike)):
+            if isinstance(vertices, (str, bytes, os.PathLike)):
                 if self.dtype == FLOAT32:
                     core, self.name, cameras = _core.SceneTrees.load(
-                        os.fspath(vertices), 1, *options
+                        path(vertices, "vertices"), 1, *options
                     )
                     self._cameras = [Camera(**camera) for camera in cameras]
                     return core
-                vertices, faces = self._built_in(os.fspath(vertices))
+                vertices, faces = self._built_in(os.fsdecode(vertices))
             else:
                 vertices, faces = mesh_of(vertices)
         corners = mesh_vertices(vertices, dtype=self.dtype)
@@ -205,10 +215,10 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         """The mesh of a built-in scene for one in float64."""
         if not name.startswith("builtin:"):
             raise ValueError(
-                f"precision: files are read in float32, given 'float64' and the path {name}; "
+                f"precision: files are read in float32, given 'float64' and the path {shown(name)}; "
                 "give vertices and faces as another library has read them"
             )
-        loaded = _core.load_scene(name, 1)
+        loaded = _core.load_scene(path(name, "vertices"), 1)
         self.name = loaded["name"]
         return loaded["vertices"], loaded["faces"]
 
@@ -253,7 +263,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         masks: ArrayLike | None = None,
         keep: ArrayLike | Mapping[Any, ArrayLike] | None = None,
         skip: ArrayLike | Mapping[str, Any] | None = None,
-        also: Sequence[str] | str = (),
+        also: Sequence[str] | str = _NO_NAMES,
         stream: int = 0,
     ) -> Hits:
         """The closest hit of each ray.
@@ -284,7 +294,8 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
             positions in the mesh of geometry 0.
         also :
             What else the hits are to have: "position", "normal", or names that `set_attributes`
-            gave vertices, such as "uv". One name or several. Computed on the processor.
+            gave vertices, such as "uv". One name or several. Computed on the processor, from the
+            commit that the hits are of.
         stream :
             Only with device="cuda" and rays that lie on the GPU, float32 of shape (..., 8): the
             CUDA stream to run on, as a number (`cupy.cuda.get_current_stream().ptr`). Results are
@@ -306,6 +317,22 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         same, bit for bit. Scenes with instances, spheres or capsules, `mask`, `masks`, `keep` and
         `skip` raise BackendUnavailable there.
         """
+        names = () if also is _NO_NAMES else also_names(also)
+        if names:
+            with self._core.held():  # both of one commit
+                found = Scene.intersect(
+                    self,
+                    rays,
+                    directions,
+                    tmin=tmin,
+                    tmax=tmax,
+                    mask=mask,
+                    masks=masks,
+                    keep=keep,
+                    skip=skip,
+                    stream=stream,
+                )
+                return self._with(found, names, rays, directions)
         if (
             directions is not None
             and tmin is tmax is masks is keep is skip is None
@@ -315,12 +342,10 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
             row = np.empty(self._core.hit_columns, self.dtype)
             dimensions = self._core.hit_of(rays, directions, row)
             if dimensions:
-                found = Hits(row if dimensions == 1 else row[None])
-                return self._with(found, also, rays, directions) if also else found
+                return Hits(row if dimensions == 1 else row[None])
         if self.device != "cpu":
             self._refuse_filter(keep, skip)
-            found = self._on_device().intersect(rays, directions, tmin, tmax, mask, masks, stream)
-            return self._with(found, also, rays, directions) if also else found
+            return self._on_device().intersect(rays, directions, tmin, tmax, mask, masks, stream)
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
         only = hit_filter(keep, skip, lead)
@@ -329,8 +354,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         self._core.intersect(
             *args, hits if hits.ndim == 2 else hits.reshape(-1, columns), *seen, self.threads, only
         )
-        found = Hits(hits)
-        return self._with(found, also, rays, directions) if also else found
+        return Hits(hits)
 
     def occluded(
         self,
@@ -410,7 +434,8 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         seen = ray_masks(mask, masks, lead)
         only = hit_filter(keep, skip, lead)
-        offsets, hits, _ = self._core.all_hits(*args, max_result_bytes, *seen, self.threads, only)
+        most = result_bytes(max_result_bytes)
+        offsets, hits, _ = self._core.all_hits(*args, most, *seen, self.threads, only)
         return Hits(hits, {"offsets": offsets})
 
     def _refuse_filter(self, keep: Any, skip: Any) -> None:
@@ -464,7 +489,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
             raise RuntimeError(broken)
 
 
-def load_scene(file: str | os.PathLike, *, threads: int = 0, device: str = "cpu") -> Scene:
+def load_scene(file: str | bytes | os.PathLike, *, threads: int = 0, device: str = "cpu") -> Scene:
     """The scene that `Scene.save` wrote, committed: with its name, its cameras, and the options of
     its last commit. Rays have the same hits. A scene in float64 is one again, with every number as it
     was, to the bit.
@@ -477,10 +502,10 @@ def load_scene(file: str | os.PathLike, *, threads: int = 0, device: str = "cpu"
     InputError that names the file and what is wrong with it; so for a .rdx file that holds a tree
     and no scene.
     """
-    path = os.fspath(file)
-    precision = "float64" if _core.holds_scene_double(path) else "float32"
+    name = path(file, "file")
+    precision = "float64" if _core.holds_scene_double(name) else "float32"
     scene = Scene(threads=threads, device=device, precision=precision)
-    scene._core, scene.name, cameras = type(scene._core).load_rdx(path, scene.threads)
+    scene._core, scene.name, cameras = type(scene._core).load_rdx(name, scene.threads)
     scene._cameras = [Camera(**camera) for camera in cameras]
     scene._options.update(scene._core.commit_options())
     scene._file = state_of(os.path.abspath(file))

@@ -20,23 +20,58 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import MISSING
+from ._arrays import MISSING, number, shown, whole
 from ._distances import Neighbourhood, Pairs, distance_of, measure_of, order_of
 
 
 def _threads(workers: int) -> int:
-    if workers == -1:
-        return 0
-    if workers < 1:
-        raise ValueError(f"workers: expected -1 or a number of 1 or more, given {workers}")
-    return workers
+    threads = whole(workers, "workers", -1, 1024)
+    if threads == 0:
+        raise ValueError("workers: expected -1 or a number of 1 or more, given 0")
+    return max(threads, 0)
 
 
 def _real(value: ArrayLike, name: str) -> np.ndarray:
-    array = np.asarray(value)
-    if np.iscomplexobj(array):
+    error: type[Exception] = TypeError
+    array = None
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "cSUmMV":
+            return array.astype(np.float64, copy=False)
+    except (ValueError, OverflowError):
+        error = ValueError
+    except TypeError:
+        pass
+    if array is not None and array.dtype.kind == "c":
         raise TypeError(f"{name}: complex data is not supported")
-    return array.astype(np.float64, copy=False)
+    raise error(f"{name}: expected numbers, given {shown(value)}")
+
+
+def _radii(r: ArrayLike, lead: tuple[int, ...]) -> np.ndarray:
+    """One for each query: shape (Q,)."""
+    given = _real(r, "r")
+    try:
+        return np.array(np.broadcast_to(given, lead)).reshape(-1)
+    except ValueError:
+        raise ValueError(f"r: expected a number or shape {lead}, given {shown(given)}") from None
+
+
+def _ranks(k: Any) -> tuple[int, np.ndarray | None]:
+    """How many neighbours, k rounded up, and which of them, if k lists some."""
+    if type(k) is int:
+        return k, None
+    if k is None:
+        raise ValueError("k must be an integer or a sequence of integers")
+    if np.ndim(k) == 0:
+        most = number(k, "k")
+        if not most < 2**31:  # NaN too
+            raise ValueError(f"k: expected at most {2**31 - 1}, given {shown(k)}")
+        return int(np.ceil(max(most, 0))), None
+    ranks = np.asarray(k)
+    if ranks.ndim != 1 or (ranks.dtype.kind not in "biuf" and ranks.size):
+        raise TypeError(f"k: expected a number or shape (K,) of whole numbers, given {shown(k)}")
+    ranks = ranks.astype(np.intp)
+    return int(ranks.max(initial=0)) if ranks.min(initial=1) > 0 else 0, ranks
 
 
 def _box(boxsize: ArrayLike | None, data: np.ndarray) -> np.ndarray | None:
@@ -141,12 +176,9 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         """(distances, indices) of the k nearest; missing ones have infinity and the index n. k may
         list which neighbours: [1, 3]."""
         p = order_of(p)
-        if k is None:
-            raise ValueError("k must be an integer or a sequence of integers")
+        most, ranks = _ranks(k)
         queries = self._queries(x)
-        ranks = None if np.ndim(k) == 0 else np.asarray(k, np.int64)
-        most = int(k) if ranks is None else int(ranks.max(initial=0))  # type: ignore[arg-type]
-        if most < 1 or (ranks is not None and ranks.min() < 1):
+        if most < 1:
             raise ValueError("k: neighbours are counted from 1")
         distances, indices = self._nearest(queries, most, p, _threads(workers))
         missing = ~(distances < distance_upper_bound)
@@ -154,7 +186,7 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         indices[missing] = self.n
         if ranks is not None:
             return distances[..., ranks - 1], indices[..., ranks - 1]
-        if most == 1:
+        if k == 1:
             distances, indices = distances[..., 0], indices[..., 0]
             return (distances, indices) if queries.ndim > 1 else (float(distances), int(indices))
         return distances, indices
@@ -178,14 +210,17 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         """Batches of numbers of queries, of points, and distances: every pair no farther apart than
         the query's radius, sorted by both numbers. Queries (Q, m), radii (Q,)."""
         near = self._near
+        if not (radii >= 0).all():  # below 0, or NaN: nothing is so near
+            some = np.flatnonzero(radii >= 0)
+            for rows, indices, distances in self._within(queries[some], radii[some], p, threads):
+                yield some[rows], indices, distances
+            return
         if near.plain(p):
             found = near.points.radius(near.along_axes(queries), radii, threads=threads)
             lengths = np.diff(found["offsets"]).astype(np.intp)
             rows = np.repeat(np.arange(len(queries)), lengths)
             yield rows, found["indices"].astype(np.intp), found["distances"]
             return
-        if not (radii >= 0).all():
-            raise ValueError("r: expected numbers of 0 or more")
         for rows, indices, measures in near.within(queries, measure_of(radii, p), p, threads):
             yield rows, indices, distance_of(measures, p)
 
@@ -209,21 +244,22 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         return_length: bool = False,
     ) -> Any:
         """Indices of all points within r (a number or one for each query): a list, or an array of
-        lists. Rows ascend always."""
+        lists. Rows ascend always. None are within a
+        radius below 0 or NaN."""
         p, threads = order_of(p), _threads(workers)
         queries = self._queries(x)
         lead = queries.shape[:-1]
         near, rows = self._near, queries.reshape(-1, self.m)
-        radii = np.array(np.broadcast_to(np.asarray(r, np.float64), lead)).reshape(-1)
+        radii = _radii(r, lead)
         if return_length:
-            if np.ndim(r) == 0 and near.plain(p):
+            if np.ndim(r) == 0 and near.plain(p) and (radii >= 0).all():
                 lengths = near.points.count(near.along_axes(rows), float(r), threads=threads)  # type: ignore[arg-type]
             else:
                 lengths = np.zeros(len(rows), np.intp)
                 for some, _, _ in self._within(rows, radii, p, threads):
                     lengths += np.bincount(some, minlength=len(rows))
             lengths = lengths.astype(np.intp).reshape(lead)
-            return lengths if lead else int(lengths)
+            return lengths if lead else lengths[()]
         some, indices, _ = self._pairs_within(rows, radii, p, threads)
         lists = _lists(some, indices, len(rows))
         return lists.reshape(lead) if lead else lists[0]
@@ -232,7 +268,7 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         self, other: cKDTree, r: float, p: float = 2.0, eps: float = 0
     ) -> list[list[int]]:
         """For each point of this tree the indices of all points of `other` within r, ascending."""
-        return self._other(other).query_ball_point(self.data, r, p).tolist()
+        return self._other(other).query_ball_point(self.data, number(r, "r"), p).tolist()
 
     def query_pairs(
         self, r: float, p: float = 2.0, eps: float = 0, output_type: str = "set"
@@ -242,7 +278,8 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         p = order_of(p)
         if output_type not in ("set", "ndarray"):
             raise ValueError(f"output_type: expected 'set' or 'ndarray', given {output_type!r}")
-        if self._near.plain(p):
+        r = number(r, "r")
+        if self._near.plain(p) and r >= 0:
             pairs = self._near.points.pairs(r)["pairs"].astype(np.intp)
         else:
             radii = np.full(self.n, r, np.float64)
@@ -267,7 +304,7 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
             raise ValueError(
                 f"output_type: expected one of {', '.join(kinds)}, given {output_type!r}"
             )
-        radii = np.full(self.n, max_distance, np.float64)
+        radii = np.full(self.n, number(max_distance, "max_distance"), np.float64)
         i, j, v = self._other(other)._pairs_within(self.data, radii, order_of(p), 1)
         if output_type == "ndarray":
             table = np.empty(len(i), [("i", np.intp), ("j", np.intp), ("v", np.float64)])
@@ -296,7 +333,7 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         the same tree, the sum of the products of both; None stands for ones.
         """
         other, p = self._other(other), order_of(p)
-        steps = np.asarray(r, np.float64)
+        steps = _real(r, "r")
         if steps.ndim > 1:
             raise ValueError(f"r: expected a number or shape (R,), given {steps.shape}")
         radii = steps.reshape(-1)

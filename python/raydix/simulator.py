@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import FLOAT32, cast, rows
+from ._arrays import FLOAT32, cast, flag, one_of, path, rows, shown, whole
 from .scene import Scene
 
 
@@ -59,20 +59,26 @@ def simulate(
     in float64, and rounded to float32 once. The scene itself stays as it is. "hits" may then differ
     from those of `Scene.intersect` by rays at edges.
     """
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene: expected a Scene, given {shown(scene)}")
+    builder = one_of(builder, "builder", _core.builders())
+    leaf = whole(max_leaf, "max_leaf", 1, 255)
+    lanes = whole(width, "width", 1, 64)
+    options = flag(any_hit, "any_hit"), flag(memory, "memory")
+    if kernels is None or isinstance(kernels, str):
+        kernels = _core.kernels() if kernels is None else [kernels]
+    if not isinstance(kernels, (list, tuple)):
+        raise TypeError(f"kernels: expected a name or several, given {shown(kernels)}")
+    names = [one_of(kernel, "kernels", _core.kernels()) for kernel in kernels]
+    model = path(machine, "machine")
     if rays is None:
         rays = scene.primary_rays(size=(256, 192))["rays"]
     launch, _ = rows(rays, "rays", (8,), scene.dtype)
     vertices = scene.vertices
     if scene.dtype != FLOAT32:
         vertices, launch = _about_the_middle(scene, launch)
-    if kernels is None:
-        kernels = _core.kernels()
-    elif isinstance(kernels, str):
-        kernels = [kernels]
-    tree = _core.Bvh(vertices, scene.faces, builder, 63, max_leaf, False, scene.threads)
-    return _core.simulate(
-        tree, launch, list(kernels), machine, width, any_hit, memory, scene.threads
-    )
+    tree = _core.Bvh(vertices, scene.faces, builder, 63, leaf, False, scene.threads)
+    return _core.simulate(tree, launch, names, model, lanes, *options, scene.threads)
 
 
 def _about_the_middle(scene: Scene, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,12 +8,39 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import ALL, MISSING, UINT32, cast, describe, to_numpy, whole
+from ._arrays import ALL, MISSING, UINT32, cast, describe, shown, text, to_numpy, uint32s, whole
 from ._core import InputError
 from ._rays import hit_rows, ray_rows
 from .hits import COLUMNS, Hits
 
 _COMPUTED = ("position", "normal")
+
+
+def also_names(also: Any) -> tuple[str, ...]:
+    """What `intersect(also=...)` was given: one name or several."""
+    names = (also,) if isinstance(also, str) else also
+    if not isinstance(names, (tuple, list)):
+        raise TypeError(f"also: expected a name or several, given {shown(also)}")
+    return tuple(text(name, "also") for name in names)
+
+
+def _columns_of(hits: Any) -> list[np.ndarray]:
+    """What interpolation needs of hits, all of one shape."""
+    names = ("prim", "geometry", "instance", "u", "v")
+    if not isinstance(hits, Mapping) or any(name not in hits for name in names):
+        raise TypeError(
+            f"hits: expected a dict of arrays {', '.join(COLUMNS)}, as of Scene.intersect, "
+            f"given {shown(hits)}"
+        )
+    ids = [uint32s(hits[name], f"hits, {name}") for name in names[:3]]
+    weights = [to_numpy(hits[name], f"hits, {name}") for name in names[3:]]
+    columns = [*ids, *weights]
+    for name, column in zip(names, columns, strict=True):
+        if column.shape != ids[0].shape or column.dtype.kind not in "iuf":
+            raise ValueError(
+                f"hits, {name}: expected numbers of shape {ids[0].shape}, given {describe(column)}"
+            )
+    return columns
 
 
 class SurfaceOfHits:
@@ -69,7 +96,8 @@ class SurfaceOfHits:
 
         Each array has shape (V,) or (V, C), numbers, V as the mesh has vertices now; it is copied,
         in the scene's type. None takes one away. `intersect(..., also="uv")` and `interpolate` give
-        their values at hits. "position", "normal" and names of hits' columns are taken. InputError:
+        their values at hits. "position", "normal" and the names of columns and methods of
+        `Hits` are taken, as "hit" and "items". InputError:
         no such geometry, or no mesh. `load_scene` and files give none.
         """
         number = whole(id, "id", 0, ALL)
@@ -79,7 +107,8 @@ class SurfaceOfHits:
         vertices = len(mesh[0])
         checked: dict[str, np.ndarray | None] = {}
         for name, values in attributes.items():
-            if name in _COMPUTED or name in COLUMNS or name.startswith("_"):
+            taken = name in (*_COMPUTED, *COLUMNS, "offsets") or hasattr(Hits, name)
+            if taken or name.startswith("_"):
                 raise ValueError(f"attributes: the name {name!r} is taken")
             checked[name] = None if values is None else self._attribute(values, name, vertices)
         own = self._attributes.setdefault(number, {})
@@ -105,11 +134,10 @@ class SurfaceOfHits:
         third, in the scene's type, shape (...,) or (..., C). NaN for misses and for geometries
         without it. Through instances too: those of the scenes that stand in this one, as they are
         now. ValueError: no geometry that was hit has it, or they have other numbers of columns."""
-        prim, geometry, instance, u, v = (
-            np.asarray(hits[column]).reshape(-1)
-            for column in ("prim", "geometry", "instance", "u", "v")
-        )
-        lead = np.shape(hits["prim"])
+        columns = _columns_of(hits)
+        lead = columns[0].shape
+        prim, geometry, instance, u, v = (column.reshape(-1) for column in columns)
+        name = text(name, "name")
         hit = np.flatnonzero(prim != MISSING)
         places, which = np.unique(
             np.stack([instance[hit], geometry[hit]]).astype(UINT32), axis=1, return_inverse=True
@@ -129,6 +157,11 @@ class SurfaceOfHits:
             raise ValueError(f"{name}: no geometry that was hit has such an attribute")
         made = np.full((len(prim), *width), np.nan, self.dtype)
         for rays, values, faces in parts:
+            if prim[rays].max() >= len(faces):
+                raise InputError(
+                    f"{name}: triangle {prim[rays].max()} was hit, and its mesh has {len(faces)} "
+                    "now"
+                )
             corners = values[faces[prim[rays]]]  # (n, 3, ...)
             weights = np.stack([1 - u[rays] - v[rays], u[rays], v[rays]], axis=1)
             weights = weights.reshape(weights.shape + (1,) * len(width))
@@ -159,12 +192,12 @@ class SurfaceOfHits:
             )
         return values, mesh[1]
 
-    def _with(self, hits: Hits, also: Sequence[str] | str, rays: Any, directions: Any) -> Hits:
+    def _with(self, hits: Hits, also: Sequence[str], rays: Any, directions: Any) -> Hits:
         """The hits, and what else was asked for."""
         if not isinstance(hits, Hits):
             raise ValueError("also: only for hits that are not left on a GPU")
         more: dict[str, np.ndarray] = {}
-        for name in (also,) if isinstance(also, str) else also:
+        for name in also:
             if name == "position":
                 more[name] = self._of_hits(hits, rays, directions, "positions")
             elif name == "normal":

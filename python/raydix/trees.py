@@ -11,11 +11,18 @@ from . import _core
 from ._arrays import (
     FLOAT32,
     UINT32,
+    code_bits,
+    flag,
     mesh_faces,
     mesh_vertices,
+    number,
+    one_of,
     require_float32,
+    result_bytes,
     rows,
-    to_numpy,
+    thread_count,
+    uint32s,
+    whole,
 )
 
 BVH_NODE = np.dtype([("lo", "<f4", 3), ("first", "<u4"), ("hi", "<f4", 3), ("count", "<u4")])
@@ -120,7 +127,11 @@ class Bvh(_Tree):
     ) -> dict[str, Any]:
         """Figures of the tree: "sah" with these costs, "epo" (Aila, Karras, Laine 2013) if asked
         for, and the hash."""
-        return self._core.stats(epo, node_cost, primitive_cost)
+        return self._core.stats(
+            flag(epo, "epo"),
+            number(node_cost, "node_cost"),
+            number(primitive_cost, "primitive_cost"),
+        )
 
 
 class Octree(_Tree):
@@ -144,8 +155,7 @@ class Octree(_Tree):
     def boxes(self, nodes: ArrayLike) -> np.ndarray:
         """The cubes of nodes, given by their numbers (M,): (M, 6) float32, lowest corner and
         highest. InputError: no such node."""
-        numbers = to_numpy(nodes, "nodes")
-        return self._core.boxes(np.ascontiguousarray(numbers.reshape(-1), UINT32))
+        return self._core.boxes(uint32s(nodes, "nodes").reshape(-1))
 
     def locate(self, points: ArrayLike) -> np.ndarray:
         """The deepest node that holds each point (..., 3): uint32, 0xFFFFFFFF outside of the
@@ -159,7 +169,7 @@ class Octree(_Tree):
         """Points in closed boxes (..., 6): "offsets" and "indices", rows ascending.
         `max_result_bytes` as in `Scene.all_hits`."""
         asked, _ = rows(boxes, "boxes", (6,), FLOAT32)
-        offsets, indices = self._core.points_in_boxes(asked, max_result_bytes)
+        offsets, indices = self._core.points_in_boxes(asked, result_bytes(max_result_bytes))
         return {"offsets": offsets, "indices": indices}
 
 
@@ -192,7 +202,14 @@ def bvh(
     same tree bit for bit. The same tree for every number of threads. Arguments as in
     `raydix.Scene`.
     """
-    return Bvh(*_mesh(vertices, faces), builder, bits, max_leaf, strict, threads)
+    return Bvh(
+        *_mesh(vertices, faces),
+        one_of(builder, "builder", _core.builders()),
+        code_bits(bits),
+        whole(max_leaf, "max_leaf", 1, 255),
+        flag(strict, "strict"),
+        thread_count(threads),
+    )
 
 
 def octree(
@@ -207,7 +224,14 @@ def octree(
 ) -> Octree:
     """An octree over points, or over the centres of triangles: nodes with more than `max_leaf` are
     divided, down to `max_level`."""
-    return Octree(*_mesh(vertices, faces), bits, max_level, max_leaf, strict, threads)
+    return Octree(
+        *_mesh(vertices, faces),
+        code_bits(bits),
+        whole(max_level, "max_level", -1, 21),
+        whole(max_leaf, "max_leaf", 1, 2**31 - 1),
+        flag(strict, "strict"),
+        thread_count(threads),
+    )
 
 
 def kdtree(
@@ -221,4 +245,10 @@ def kdtree(
 ) -> KdTree:
     """A k-d tree over triangles or points. `max_leaf` 0: 8 points or 4 triangles. For neighbours
     use `raydix.Points`: it is faster."""
-    return KdTree(*_mesh(vertices, faces), bits, max_leaf, strict, threads)
+    return KdTree(
+        *_mesh(vertices, faces),
+        code_bits(bits),
+        whole(max_leaf, "max_leaf", 0, 255),
+        flag(strict, "strict"),
+        thread_count(threads),
+    )

@@ -1,7 +1,6 @@
 // Files and built-in scenes, and files of pictures.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
-#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 #include <raydix/camera.h>
@@ -22,14 +21,15 @@
 namespace raydix::python {
 namespace {
 
-nb::dict load(const std::string& spec, std::uint64_t seed) {
+nb::dict load(const nb::bytes& file, std::uint64_t seed) {
+    const std::string spec = path_of(file);
     Model scene;
     {
         const nb::gil_scoped_release unlocked;
         scene = load_flat_model(spec, seed);
     }
     nb::dict fields;
-    fields["name"] = scene.name;
+    fields["name"] = text_of(scene.name);
     Mesh mesh = std::move(scene).mesh();
     fields["vertices"] = hand_over_rows<float>(std::move(mesh.vertices));
     fields["faces"] = hand_over_rows<std::uint32_t>(std::move(mesh.triangles));
@@ -81,17 +81,20 @@ nb::bytes png(const PictureIn& pixels, bool tone_map) {
 }  // namespace
 
 void bind_pictures(nb::module_& module) {
-    module.def("load_scene", &load, nb::arg("spec"), nb::arg("seed"));
-    module.def("holds_scene_double", &holds_scene_double, nb::arg("file"),
-               "Whether a .rdx file holds a scene in float64.");
+    module.def("load_scene", &load, nb::arg("file"), nb::arg("seed"));
+    module.def(
+        "holds_scene_double",
+        [](const nb::bytes& file) { return holds_scene_double(path_of(file)); }, nb::arg("file"),
+        "Whether a .rdx file holds a scene in float64.");
     module.def("scenes", &scenes, "The built-in scenes and their parameters.");
     module.def(
         "save_picture",
-        [](const std::string& file, const PictureIn& pixels, bool tone_map) {
+        [](const nb::bytes& path, const PictureIn& pixels, bool tone_map) {
+            const std::string file = path_of(path);
+            const nb::gil_scoped_release unlocked;
             save_picture(file, picture_of(pixels), tone_map);
         },
-        nb::arg("file"), nb::arg("picture").noconvert(), nb::arg("tone_map"),
-        nb::call_guard<nb::gil_scoped_release>());
+        nb::arg("file"), nb::arg("picture").noconvert(), nb::arg("tone_map"));
     module.def("png", &png, nb::arg("picture").noconvert(), nb::arg("tone_map"));
 }
 

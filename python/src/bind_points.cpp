@@ -6,9 +6,8 @@
 #include <raydix/points.h>
 
 #include <cstdint>
-#include <mutex>
-#include <shared_mutex>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -29,25 +28,20 @@ public:
     explicit SharedIndex(Index index) : index_(std::move(index)) {}
 
     /// Held while the index is asked; changes wait for those who hold it, and let no new ones past.
-    [[nodiscard]] Reading read() const {
-        if (Reading::held() != 0) return Reading(use_);
-        const std::lock_guard queue(queue_);
-        return Reading(use_);
-    }
+    [[nodiscard]] Reading read() const { return Reading::in_turn("points", locks_); }
     /// While reading.
     [[nodiscard]] const Index& index() const { return index_; }
     /// call(index) alone, without the interpreter's lock. Throws InputError as Writing does.
     template <class Call>
     auto change(const char* name, const Call& call) {
         const nb::gil_scoped_release unlocked;
-        const Writing lock(name, queue_, use_);
+        const Writing lock(name, locks_);
         return call(index_);
     }
 
 private:
     Index index_;
-    mutable std::mutex queue_;  // without it, readers would keep a change waiting for ever
-    mutable std::shared_mutex use_;
+    mutable Locks locks_;
 };
 
 template <class Index>
@@ -201,6 +195,15 @@ struct PointCalls {
         return ask(shared.index());
     }
 
+    /// How many points were given, the numbers of those that are there, and these.
+    static nb::tuple snapshot(const Shared& shared) {
+        auto [given, order, points] = of_index(shared, [](const Index& index) {
+            return std::tuple(index.input_count(), index.order(), index.points());
+        });
+        return nb::make_tuple(given, hand_over(std::move(order)),
+                              hand_over_rows<Scalar>(std::move(points)));
+    }
+
     static nb::dict stats(const Shared& shared) {
         Reading lock;
         {
@@ -243,18 +246,10 @@ struct PointCalls {
                  nb::arg("threads") = 0)
             .def("neighbours", &neighbours, nb::arg("radius"), nb::arg("full"),
                  nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
+            .def("snapshot", &snapshot)
             .def("order",
                  [](const Shared& shared) {
                      return hand_over(of_index(shared, [](const Index& i) { return i.order(); }));
-                 })
-            .def("points",
-                 [](const Shared& shared) {
-                     return hand_over_rows<Scalar>(
-                         of_index(shared, [](const Index& i) { return i.points(); }));
-                 })
-            .def("given",
-                 [](const Shared& shared) {
-                     return of_index(shared, [](const Index& i) { return i.input_count(); });
                  })
             .def("insert", &insert, nb::arg("points").noconvert())
             .def("remove", &remove, nb::arg("ids").noconvert())

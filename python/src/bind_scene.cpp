@@ -455,7 +455,8 @@ void bind_asking(nb::class_<Scene>& scene) {
         return nb::capsule(reading(self, [&] { return &self.traced(); }),
                            scene_name<Scalar<Scene>>);
     });
-    scene.def("hit_of", &hit_of<Scene>, nb::arg("origin"), nb::arg("direction"), nb::arg("row"));
+    scene.def("hit_of", &hit_of<Scene>, nb::arg("origin").none(), nb::arg("direction").none(),
+              nb::arg("row"));
     scene.def("positions", &positions_of<Scene>, nb::arg("hits").noconvert(),
               nb::arg("rays").noconvert().none(), nb::arg("points").noconvert(),
               nb::arg("threads") = 0);

@@ -46,11 +46,12 @@ MachineModel machine_of(const std::string& name) {
 }
 
 nb::list run(const Bvh& bvh, const RaysIn& rays, const std::vector<std::string>& kernels,
-             const std::string& machine, int width, bool any_hit, bool memory, int threads) {
+             const nb::bytes& machine, int width, bool any_hit, bool memory, int threads) {
+    const MachineModel model = machine_of(path_of(machine));
     std::vector<SimulateOptions> runs;
     for (const std::string& kernel : kernels)
         runs.push_back({.kernel = warp_kernel_from_name(kernel),
-                        .machine = machine_of(machine),
+                        .machine = model,
                         .width = width,
                         .any_hit = any_hit,
                         .memory = memory});

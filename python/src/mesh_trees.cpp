@@ -9,37 +9,10 @@
 
 namespace raydix::python {
 
-namespace {
-
-std::mutex& unless_reading(const char* call, std::mutex& queue) {
-    Writing::require_none(call);
-    if (Reading::held() != 0)
-        throw InputError(std::string(call) +
-                         ": this thread is within a query of a scene, in a signal handler");
-    return queue;
-}
-
-}  // namespace
-
-Writing::Writing(const char* call, std::mutex& queue, std::shared_mutex& use)
-    : queue_(unless_reading(call, queue)), use_(use) {
-    is_held_ = true;
-}
-
-void Writing::require_none(const char* call) {
-    if (is_held_)
-        throw InputError(std::string(call) +
-                         ": this thread is within a change of a scene, in a signal handler or a "
-                         "progress function");
-}
-
 template <class Names>
 Reading MeshTrees<Names>::read() const {
     Writing::require_none("scene");
-    // Who reads already must not queue up behind a change that waits for the end of that.
-    if (Reading::held() != 0) return Reading(use_);
-    const std::lock_guard queue(queue_);
-    return Reading(use_);
+    return Reading::in_turn("scene", locks_);
 }
 
 template <class Names>
@@ -61,14 +34,14 @@ const typename Names::Bvh& MeshTrees<Names>::bvh_locked() {
 template <class Names>
 const typename Names::Bvh& MeshTrees<Names>::bvh(const char* call) {
     static_cast<void>(mesh(call));
-    const std::lock_guard lock(build_);
+    const std::lock_guard lock(locks_.build());
     return bvh_locked();
 }
 
 template <class Names>
 const typename Names::Solid& MeshTrees<Names>::solid(InsideRule rule, const char* call) {
     static_cast<void>(mesh(call));
-    const std::lock_guard lock(build_);
+    const std::lock_guard lock(locks_.build());
     std::optional<typename Types::Solid>& kept = solids_[static_cast<std::size_t>(rule)];
     if (!kept)
         kept.emplace(bvh_locked(),

@@ -15,6 +15,7 @@
 
 #include "batch.h"
 #include "bindings.h"
+#include "locks.h"
 
 namespace raydix::python {
 
@@ -26,6 +27,7 @@ std::atomic<bool> threads_were_started{false};
 std::atomic<bool> threads_were_lost{false};
 
 void in_forked_child() {
+    Locks::in_forked_child();
     if (threads_were_started) threads_were_lost = true;
 }
 
@@ -77,7 +79,7 @@ int threads_for(int asked) {
 NB_MODULE(_core, module) {
     using namespace raydix::python;
     module.doc() = "The C++ library, array by array. Use the package raydix.";
-    pthread_atfork(nullptr, nullptr, in_forked_child);
+    pthread_atfork(Locks::before_fork, Locks::after_fork, in_forked_child);
     module.attr("__version__") = raydix::version;
     bind_errors(module);
     bind_limits(module);

@@ -23,6 +23,7 @@
 
 #include "arrays.h"
 #include "batch.h"
+#include "bindings.h"
 #include "figures.h"
 
 namespace raydix::python {
@@ -111,16 +112,17 @@ nb::tuple named(const std::shared_ptr<Scene>& scene, const std::string& name,
                 const std::vector<AnyCamera>& shown) {
     nb::list cameras;
     for (const AnyCamera& camera : shown) cameras.append(camera_figures(camera));
-    return nb::make_tuple(scene, name, cameras);
+    return nb::make_tuple(scene, text_of(name), cameras);
 }
 
 /// What a file holds, and what belongs to it.
-nb::tuple load(const std::string& spec, std::uint64_t seed, const std::string& builder,
+nb::tuple load(const nb::bytes& file, std::uint64_t seed, const std::string& builder,
                int reinsertion_rounds, int bits, int max_leaf, bool strict, int threads,
                const std::string& quality, const std::string& usage, bool compact) {
     const BuildOptions trees =
         build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads);
     const SceneOptions commits = scene_options(quality, usage, compact, threads);
+    const std::string spec = path_of(file);
     std::string name, cameras_fault;
     std::vector<Camera> shown;
     std::shared_ptr<SceneTrees> scene;
@@ -143,11 +145,12 @@ RdxSceneD load_rdx(const std::string& file, const SceneTreesD*) {
 
 /// The same of a .rdx file, with the options that it was saved with.
 template <class Scene>
-nb::tuple load_saved(const std::string& file, int threads) {
+nb::tuple load_saved(const nb::bytes& path, int threads) {
     using Names = typename Scene::Types;
     std::string name;
     decltype(Names::CameraSet::cameras) shown;
     std::shared_ptr<Scene> scene;
+    const std::string file = path_of(path);
     {
         const nb::gil_scoped_release unlocked;
         auto loaded = load_rdx(file, static_cast<const Scene*>(nullptr));
@@ -162,10 +165,11 @@ nb::tuple load_saved(const std::string& file, int threads) {
 }
 
 template <class Scene>
-void save(Scene& self, const std::string& file, const std::string& name,
+void save(Scene& self, const nb::bytes& path, const std::string& name,
           const std::vector<CameraFields<typename Scene::Types::Scalar>>& cameras) {
     typename Scene::Types::CameraSet shown;
     for (const auto& camera : cameras) shown.cameras.push_back(camera_of(camera));
+    const std::string file = path_of(path);
     while_reading(self, [&] { save_rdx(file, self.traced(), name, shown); });
 }
 
@@ -262,10 +266,36 @@ nb::dict refit(Scene& scene, const PointRows<Scene>& vertices, int threads) {
     return fields;
 }
 
+/// `with scene.held():` calls of this thread see one commit, whatever other threads do.
+template <class Scene>
+class Held {
+public:
+    explicit Held(std::shared_ptr<Scene> scene) : scene_(std::move(scene)) {}
+    void enter() {
+        const nb::gil_scoped_release unlocked;
+        lock_ = scene_->read();
+    }
+    void leave() { lock_ = {}; }
+
+private:
+    std::shared_ptr<Scene> scene_;
+    Reading lock_;
+};
+
+template <class Scene>
+void bind_held(nb::class_<Scene>& scene) {
+    nb::class_<Held<Scene>>(scene, "Held")
+        .def("__enter__", &Held<Scene>::enter)
+        .def("__exit__", [](Held<Scene>& self, const nb::args&) { self.leave(); });
+    scene.def("held", [](std::shared_ptr<Scene> self) { return Held<Scene>(std::move(self)); });
+}
+
 /// What a scene of either type says of itself.
 template <class Scene>
 void bind_contents(nb::class_<Scene>& scene) {
     scene.def("ids", [](Scene& self) { return while_reading(self, [&] { return self.ids(); }); })
+        .def("ids_given",
+             [](Scene& self) { return while_reading(self, [&] { return self.ids_given(); }); })
         .def("__len__",
              [](Scene& self) { return while_reading(self, [&] { return self.ids().size(); }); })
         .def("__contains__",
@@ -351,6 +381,7 @@ void bind_changes(nb::class_<Scene>& scene) {
              nb::arg("transforms").noconvert())
         .def("set_masks", &set_masks<Scene>, nb::arg("ids").noconvert(),
              nb::arg("masks").noconvert());
+    bind_held(scene);
     bind_contents(scene);
     bind_commits(scene);
 }
@@ -439,7 +470,7 @@ template void bind_shapes(nb::class_<SceneTrees>& scene);
 template void bind_shapes(nb::class_<SceneTreesD>& scene);
 
 void bind_files(nb::class_<SceneTrees>& scene) {
-    scene.def_static("load", &load, nb::arg("spec"), nb::arg("seed"), nb::arg("builder"),
+    scene.def_static("load", &load, nb::arg("file"), nb::arg("seed"), nb::arg("builder"),
                      nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
                      nb::arg("strict"), nb::arg("threads"), nb::arg("quality"), nb::arg("usage"),
                      nb::arg("compact"), "The scene, its name, and its cameras' fields.");

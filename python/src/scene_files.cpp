@@ -31,6 +31,7 @@ std::shared_ptr<SceneTrees> SceneFiles::scene_of(Model model, const BuildOptions
         // Its geometries are the nodes that stand in the world.
         for (const std::uint32_t id : scene->scene_.ids())
             scene->geometries_[id] = {.is_instance = true};
+        scene->ids_given_ = scene->geometries_.size();
     }
     scene->look_for_mesh();
     return scene;
@@ -49,6 +50,7 @@ std::shared_ptr<BasicSceneTrees<Names>> SceneFiles::scene_of_rdx(typename Names:
                                   .mask = scene->scene_.mask(id),
                                   .is_in_file = is_mesh};
     }
+    scene->ids_given_ = scene->geometries_.size() + 1;
     scene->look_for_mesh();
     return scene;
 }

@@ -15,8 +15,8 @@
 namespace raydix::python {
 
 std::mutex& structure() {
-    static std::mutex mutex;
-    return mutex;
+    static Locks locks;
+    return locks.build();
 }
 
 namespace {
@@ -135,18 +135,20 @@ typename BasicSceneTrees<Names>::Geometry& BasicSceneTrees<Names>::at(std::uint3
 template <class Names>
 void BasicSceneTrees<Names>::settle() {
     if (!unsettled_) return;
+    const Locks::Change change(locks_);
     static_cast<void>(commit_now(commits_));
     unsettled_ = false;
 }
 
 template <class Names>
 std::uint32_t BasicSceneTrees<Names>::add(Arrays mesh, const GeometryOptions& options) {
-    const Writing lock("add", queue_, use_);
+    const Writing lock("add", locks_);
     settle();
     check_strict("mesh", mesh.view());
     const std::lock_guard all(structure());
     const std::uint32_t id = scene_.share(mesh.view(), options);
     geometries_[id] = {.mask = options.mask, .mesh = std::move(mesh)};
+    ++ids_given_;
     return id;
 }
 
@@ -156,7 +158,7 @@ std::vector<std::uint32_t> BasicSceneTrees<Names>::add(std::shared_ptr<BasicScen
                                                        std::span<const std::uint32_t> masks,
                                                        std::optional<std::uint32_t> id) {
     if (masks.size() != 1) require_one_each("masks", masks.size(), transforms.size());
-    const Writing lock("add", queue_, use_);
+    const Writing lock("add", locks_);
     settle();
     const std::lock_guard all(structure());
     std::vector<std::uint32_t> ids;
@@ -165,6 +167,7 @@ std::vector<std::uint32_t> BasicSceneTrees<Names>::add(std::shared_ptr<BasicScen
             const std::uint32_t mask = masks[masks.size() == 1 ? 0 : i];
             ids.push_back(scene_.add(scene->scene_, transforms[i], {mask, id}));
             geometries_[ids.back()] = {.is_instance = true, .mask = mask, .scene = scene};
+            ++ids_given_;
             id.reset();
         }
     } catch (...) {
@@ -179,7 +182,7 @@ std::vector<std::uint32_t> BasicSceneTrees<Names>::add(std::shared_ptr<BasicScen
 
 template <class Names>
 void BasicSceneTrees<Names>::remove(std::uint32_t id) {
-    const Writing lock("remove", queue_, use_);
+    const Writing lock("remove", locks_);
     settle();
     const std::lock_guard all(structure());
     scene_.remove(id);
@@ -189,7 +192,7 @@ void BasicSceneTrees<Names>::remove(std::uint32_t id) {
 template <class Names>
 void BasicSceneTrees<Names>::update(std::uint32_t id, Vertices vertices,
                                     std::optional<std::vector<Triangle>> triangles) {
-    const Writing lock("update", queue_, use_);
+    const Writing lock("update", locks_);
     Geometry& geometry = at(id);
     if (geometry.is_instance) throw InputError(name_of(id) + " is an instance, not a mesh");
     if (geometry.is_shapes) throw InputError(name_of(id) + " holds shapes, not a mesh");
@@ -208,7 +211,7 @@ template <class Names>
 void BasicSceneTrees<Names>::set_transforms(std::span<const std::uint32_t> ids,
                                             std::span<const Transform> transforms) {
     require_one_each("transforms", transforms.size(), ids.size());
-    const Writing lock("set_transform", queue_, use_);
+    const Writing lock("set_transform", locks_);
     check_places(ids, transforms);
     settle();
     for (std::size_t i = 0; i < ids.size(); ++i) scene_.set_transform(ids[i], transforms[i]);
@@ -236,7 +239,7 @@ template <class Names>
 void BasicSceneTrees<Names>::set_masks(std::span<const std::uint32_t> ids,
                                        std::span<const std::uint32_t> masks) {
     if (masks.size() != 1) require_one_each("masks", masks.size(), ids.size());
-    const Writing lock("set_mask", queue_, use_);
+    const Writing lock("set_mask", locks_);
     for (const std::uint32_t id : ids) static_cast<void>(at(id));
     settle();
     for (std::size_t i = 0; i < ids.size(); ++i) {
@@ -254,7 +257,7 @@ CommitReport BasicSceneTrees<Names>::commit_now(SceneOptions options) {
 
 template <class Names>
 CommitReport BasicSceneTrees<Names>::commit(const SceneOptions& options) {
-    const Writing lock("commit", queue_, use_);
+    const Writing lock("commit", locks_);
     // The scenes that this one places must stay as they are meanwhile. Past their queues: whoever
     // changes one of them may wait for somebody who waits for this.
     std::vector<Reading> below;
@@ -264,8 +267,8 @@ CommitReport BasicSceneTrees<Names>::commit(const SceneOptions& options) {
         if (!geometry.is_instance) {
             kept->meshes.push_back(geometry.mesh);
         } else if (geometry.scene != nullptr && placed.insert(geometry.scene.get()).second) {
-            below.emplace_back(geometry.scene->use_);
-            const std::lock_guard build(geometry.scene->build_);
+            below.emplace_back("commit", geometry.scene->locks_);
+            const std::lock_guard build(geometry.scene->locks_.build());
             geometry.scene->settle();
             kept->below.push_back(geometry.scene->kept_);
         }
@@ -310,7 +313,7 @@ void BasicSceneTrees<Names>::look_for_mesh() {
 
 template <class Names>
 RefitQuality BasicSceneTrees<Names>::refit(Vertices vertices, int threads) {
-    const Writing lock("refit", queue_, use_);
+    const Writing lock("refit", locks_);
     const Arrays moved{std::make_shared<const Vertices>(std::move(vertices)),
                        this->mesh("refit").triangles};
     if (!scene_.committed() && !unsettled_)
@@ -347,7 +350,7 @@ RefitQuality BasicSceneTrees<Names>::refit(Vertices vertices, int threads) {
 
 template <class Names>
 bool BasicSceneTrees<Names>::committed() {
-    const std::lock_guard lock(build_);
+    const std::lock_guard lock(locks_.build());
     return unsettled_ || scene_.committed();
 }
 
@@ -360,7 +363,7 @@ std::vector<std::uint32_t> BasicSceneTrees<Names>::ids() const {
 
 template <class Names>
 const typename Names::Scene& BasicSceneTrees<Names>::traced() {
-    const std::lock_guard lock(build_);
+    const std::lock_guard lock(locks_.build());
     settle();
     return scene_;
 }
@@ -399,7 +402,7 @@ QueryCounts BasicSceneTrees<Names>::sweep_spheres(std::span<const typename Names
 template <class Names>
 const typename Names::Solid& BasicSceneTrees<Names>::solid(InsideRule rule, const char* call) {
     if (this->is_mesh()) return MeshTrees<Names>::solid(rule, call);
-    const std::lock_guard lock(build_);
+    const std::lock_guard lock(locks_.build());
     settle();
     std::optional<typename Names::Solid>& kept = scene_solids_[static_cast<std::size_t>(rule)];
     if (kept) return *kept;

@@ -20,7 +20,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <shared_mutex>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -134,9 +133,7 @@ protected:
     const typename Types::Bvh& bvh_locked();
 
     BuildOptions options_;
-    mutable std::mutex queue_;  // without it, readers would keep a change waiting for ever
-    mutable std::shared_mutex use_;
-    std::mutex build_;  // one thread builds, the others wait
+    mutable Locks locks_;
     std::optional<typename Types::Bvh> bvh_;
     std::string why_no_mesh_;
 
@@ -205,6 +202,9 @@ public:
     [[nodiscard]] bool committed();
     [[nodiscard]] bool contains(std::uint32_t id) const { return scene_.contains(id); }
     [[nodiscard]] std::vector<std::uint32_t> ids() const;
+    /// How many ids were ever given, those of removed geometries too. Of a scene from a .rdx file,
+    /// which may have given more than it holds, a number above that of its geometries.
+    [[nodiscard]] std::uint64_t ids_given() const { return ids_given_; }
     /// Of the mesh, if the last commit saw one and nothing else.
     [[nodiscard]] std::optional<std::uint32_t> mesh_id() const { return mesh_id_; }
     /// Its mask; 0 if there is none.
@@ -242,10 +242,8 @@ public:
 private:
     friend struct SceneFiles;
     using MeshTrees<Names>::bvh_;
-    using MeshTrees<Names>::build_;
+    using MeshTrees<Names>::locks_;
     using MeshTrees<Names>::options_;
-    using MeshTrees<Names>::queue_;
-    using MeshTrees<Names>::use_;
     using MeshTrees<Names>::why_no_mesh_;
 
     /// What a commit may still read: meshes of the scene and of those that it places.
@@ -269,8 +267,8 @@ private:
     /// Of a mesh: its arrays, copied if they are still those of a file.
     const Arrays& arrays_of(std::uint32_t id, Geometry& geometry);
     [[nodiscard]] static Arrays copied(const typename Names::MeshView& mesh);
-    /// While writing, or with `build_` locked: the first commit of a scene that was made from a
-    /// mesh.
+    /// While writing, or with `locks_.build()` locked: the first commit of a scene that was made
+    /// from a mesh.
     void settle();
     CommitReport commit_now(SceneOptions options);
     void look_for_mesh();
@@ -278,6 +276,7 @@ private:
     SceneOptions commits_;
     Scene scene_;
     bool unsettled_ = false;
+    std::uint64_t ids_given_ = 0;
     std::map<std::uint32_t, Geometry> geometries_;
     std::shared_ptr<const Kept> kept_ = std::make_shared<const Kept>();
     std::optional<std::uint32_t> mesh_id_;
@@ -289,18 +288,19 @@ private:
 template <class Names>
 template <class Add>
 std::uint32_t BasicSceneTrees<Names>::add_shapes(const Add& add, const GeometryOptions& options) {
-    const Writing lock("add", queue_, use_);
+    const Writing lock("add", locks_);
     settle();
     const std::lock_guard all(structure());
     const std::uint32_t id = add(scene_, options);
     geometries_[id] = {.is_shapes = true, .mask = options.mask};
+    ++ids_given_;
     return id;
 }
 
 template <class Names>
 template <class Update>
 void BasicSceneTrees<Names>::update_shapes(const Update& update, std::uint32_t id) {
-    const Writing lock("update", queue_, use_);
+    const Writing lock("update", locks_);
     settle();
     update(scene_, id);
 }

@@ -23,6 +23,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/path_check.h"
 #include "base/printable.h"
 
 namespace raydix {
@@ -165,12 +166,13 @@ int write_through(int descriptor, Pieces pieces) {
 std::pair<std::filesystem::path, int> create_beside(const std::filesystem::path& file) {
     static std::atomic<std::uint32_t> count{0};
     constexpr std::size_t longest = 200;  // names have at most 255 bytes
+    constexpr int most_tries = 10'000;
     const std::string name = file.filename().native().substr(0, longest);
-    for (;;) {
+    for (int tries = 1;; ++tries) {
         auto part = file.parent_path() / fmt::format("{}.{}-{}.part", name, getpid(), count++);
         const int out = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
         // Another machine's process may have the same number, and a dead one may have left a file.
-        if (out >= 0 || errno != EEXIST) return {std::move(part), out};
+        if (out >= 0 || errno != EEXIST || tries == most_tries) return {std::move(part), out};
     }
 }
 
@@ -208,6 +210,7 @@ int write_to(const Target& target, Pieces pieces) {
 }  // namespace
 
 void write_pieces(const std::filesystem::path& file, Pieces pieces) {
+    require_no_nul(file);
     const WriteSignals quiet;
     const int error = write_to(follow(file), pieces);
     if (error == 0) return;

@@ -8,6 +8,8 @@
 #include <cerrno>
 #include <system_error>
 
+#include "base/path_check.h"
+
 namespace raydix {
 namespace {
 
@@ -24,6 +26,7 @@ struct Descriptor {
 }  // namespace
 
 MappedFile map_file(const std::filesystem::path& file) {
+    require_no_nul(file);
     // Without O_NONBLOCK the open would wait for a writer if the name is a pipe's.
     const Descriptor in{::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
     if (in.number < 0) fail(errno, "cannot be opened");

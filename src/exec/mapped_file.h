@@ -15,7 +15,7 @@ struct MappedFile {
 
 /// Maps a regular file for reading. Its later changes by others may or may not show, and if it is
 /// cut short, touching what is gone ends the process: that is how mappings are. Throws
-/// std::system_error.
+/// std::system_error, and InputError for a path with a NUL.
 [[nodiscard]] MappedFile map_file(const std::filesystem::path& file);
 
 }  // namespace raydix

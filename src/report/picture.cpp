@@ -8,6 +8,8 @@
 #include <fstream>
 #include <string>
 
+#include "base/path_check.h"
+#include "base/printable.h"
 #include "report/picture_codec.h"
 
 namespace raydix {
@@ -20,7 +22,7 @@ std::string lower_extension(const std::filesystem::path& file) {
 }
 
 [[noreturn]] void fail(const std::filesystem::path& file, const std::string& reason) {
-    throw InputError(file.string() + ": " + reason);
+    throw InputError(printable(file) + ": " + reason);
 }
 
 void check_size(const std::filesystem::path& file, const Picture& picture) {
@@ -35,6 +37,7 @@ void check_size(const std::filesystem::path& file, const Picture& picture) {
 }
 
 std::vector<std::byte> read_all(const std::filesystem::path& file) {
+    require_no_nul(file);
     std::error_code error;
     if (!std::filesystem::exists(file, error)) fail(file, "no such file");
     if (!std::filesystem::is_regular_file(file, error)) fail(file, "is not a regular file");
@@ -51,9 +54,11 @@ std::vector<std::byte> read_all(const std::filesystem::path& file) {
 }  // namespace
 
 void save_picture(const std::filesystem::path& file, const Picture& picture, bool tone_map) {
+    require_no_nul(file);
     const std::string extension = lower_extension(file);
     if (extension != ".png" && extension != ".exr")
-        fail(file, "unknown picture type '" + extension + "'; known: .png .exr");
+        fail(file, "unknown picture type '" + printable(std::string_view(extension)) +
+                       "'; known: .png .exr");
     check_size(file, picture);
     std::vector<std::byte> bytes;
     try {

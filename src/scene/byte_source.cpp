@@ -18,6 +18,7 @@
 #include <system_error>
 #include <type_traits>
 
+#include "base/path_check.h"
 #include "scene/input_error.h"
 #include "scene/zstd_frames.h"
 
@@ -154,6 +155,7 @@ ByteSource::ByteSource(std::unique_ptr<Stream> stream, std::string name, std::ui
       packing_(packing) {}
 
 ByteSource ByteSource::from_file(const std::filesystem::path& file, Packing packing) {
+    require_no_nul(file);
     std::string name = printable(file);
     std::error_code ignored;
     if (std::filesystem::is_directory(file, ignored))

@@ -211,6 +211,14 @@ TEST_F(WriteFile, NamesTheReason) {
     EXPECT_EQ(reason(""), std::string(": cannot write: ") + std::strerror(ENOENT));
     EXPECT_EQ(reason(here_ / "absent\n" / "x"),
               here_.string() + "/absent\\x0A/x: cannot write: " + std::strerror(ENOENT));
+    const fs::path cut = here_ / std::string("cut\0short.png", 13);
+    const std::string told =
+        here_.string() + "/cut\\x00short.png: a path must not hold a NUL character";
+    EXPECT_EQ(reason(cut), told);
+    const Picture black{.width = 1, .height = 1, .pixels = {{0, 0, 0}}};
+    EXPECT_EQ(message_of([&] { save_picture(cut, black, false); }), told);
+    EXPECT_EQ(message_of([&] { (void)load_picture(cut); }), told);
+    EXPECT_EQ(entries(here_), 0u);
     write(here_ / "locked", "old");
     fs::permissions(here_ / "locked", fs::perms::owner_read);
     if (access((here_ / "locked").c_str(), W_OK) != 0) {

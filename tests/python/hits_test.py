@@ -133,6 +133,9 @@ def test_attributes_that_are_wrong(tmp_path):
         ({"uv": ["a"] * 8}, "uv: expected"),
         ({"normal": np.zeros((8, 3))}, "'normal' is taken"),
         ({"prim": np.zeros(8)}, "'prim' is taken"),
+        ({"hit": np.zeros(8)}, "'hit' is taken"),
+        ({"items": np.zeros(8)}, "'items' is taken"),
+        ({"offsets": np.zeros(8)}, "'offsets' is taken"),
     ):
         with pytest.raises((TypeError, ValueError), match=text):
             scene.set_attributes(0, **values)
@@ -146,3 +149,12 @@ def test_attributes_that_are_wrong(tmp_path):
     scene.commit()
     with pytest.raises(ValueError, match="geometry 0 had 8 vertices .* has 9 now"):
         scene.intersect([0, 0, 20, 0, 0, -1], also="uv", skip={"prim": 0, "geometry": 1, "instance": 0})
+
+
+def test_hits_of_triangles_that_are_gone():
+    scene = raydix.Scene(*BOX)
+    scene.set_attributes(0, uv=BOX[0])
+    hits = scene.intersect(np.array([[0, 0, 9, 0, 0, 0, -1, np.inf]], np.float32))
+    scene.update(0, BOX[0], BOX[1][:1])
+    with pytest.raises(raydix.InputError, match="uv: triangle .* was hit, and its mesh has 1 now"):
+        scene.interpolate(hits, "uv")

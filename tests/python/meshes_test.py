@@ -59,7 +59,7 @@ def test_far_and_invalid_points():
     for wrong in (-1, np.nan):
         with pytest.raises(ValueError, match="max_distance"):
             scene.closest_point([0, 0, 0], max_distance=wrong)
-    with pytest.raises(raydix.InputError, match="unknown rule"):
+    with pytest.raises(raydix.InputError, match="rule: expected one of automatic"):
         scene.contains([0, 0, 0], rule="guess")
     with pytest.raises(
         ValueError,

@@ -152,7 +152,7 @@ def test_what_open3d_calls_refuse():
         (lambda: scene.create_rays_pinhole(60, [0, 0, 0], [0, 0, 1], [0, 0, 1], 4, 4), "up is"),
         (lambda: scene.create_rays_pinhole(60, [0, 0, 0]), "expected intrinsic_matrix"),
         (lambda: scene.create_rays_pinhole(np.eye(3), np.eye(3), 4, 4), "expected matrices"),
-        (lambda: scene.create_rays_pinhole(np.eye(3), np.eye(4), 0, 4), "0 x 4"),
+        (lambda: scene.create_rays_pinhole(np.eye(3), np.eye(4), 0, 4), "width_px: expected"),
     ):
         with pytest.raises((TypeError, ValueError), match=text):
             call()

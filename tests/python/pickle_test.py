@@ -3,6 +3,8 @@
 import copy
 import multiprocessing
 import pickle
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -182,3 +184,67 @@ def test_stand_ins_for_open3d_and_embreex(made):
         other = made(embree)
         assert repr(other) == repr(embree)
         assert other.run(down[:, :3], down[:, 3:]) == embree.run(down[:, :3], down[:, 3:]) >= 0
+
+
+@copies
+@precisions
+def test_scenes_without_geometries(made, precision):
+    scene = raydix.Scene(precision=precision)
+    assert not made(scene).committed
+    scene.commit()
+    assert made(scene).committed and not made(scene).intersect(RAYS).hit.any()
+    assert made(scene).add(*BOX) == 0
+    id = scene.add(*BOX)
+    scene.remove(id)  # other ids than those of a scene that never had one
+    with pytest.raises(raydix.InputError, match="changes without a commit"):
+        made(scene)
+    scene.commit()
+    other = made(scene)
+    assert other.committed and len(other) == 0 and other.options == scene.options
+    assert other.add(*BOX) == 1
+
+
+@copies
+@precisions
+def test_ids_are_not_given_twice(made, precision):
+    scene = raydix.Scene(*BOX, precision=precision)
+    scene.remove(scene.add(*BOX))
+    scene.commit()
+    other = made(scene)
+    assert list(other) == [0] and other.intersect(RAYS) == scene.intersect(RAYS)
+    assert other.add(*BOX) == 2
+
+
+def test_points_while_another_thread_adds(rng):
+    points = np.arange(30.0).reshape(10, 3)
+    index, done = raydix.Points(points), threading.Event()
+
+    def change():
+        while not done.is_set():
+            index.remove(index.add(rng.random((5, 3))))
+
+    changer = threading.Thread(target=change)
+    changer.start()
+    try:
+        end = time.monotonic() + 2
+        while time.monotonic() < end:
+            found = pickle.loads(pickle.dumps(index)).knn(points, 1)
+            assert found["indices"][:, 0].tolist() == list(range(10))
+            assert not found["distances"].any()
+    finally:
+        done.set()
+        changer.join()
+
+
+@pytest.mark.parametrize("made", [copy.copy, copy.deepcopy])
+def test_copies_of_stand_ins_are_their_own(made):
+    scene = raydix.open3d.RaycastingScene()
+    scene.add_triangles(*BOX)
+    other = made(scene)
+    other.add_triangles(*BOX)
+    assert other.count_intersections(RAYS[:, [0, 1, 2, 4, 5, 6]]).tolist() == [4, 0]
+    assert scene.count_intersections(RAYS[:, [0, 1, 2, 4, 5, 6]]).tolist() == [2, 0]
+    embree = rtcore_scene.EmbreeScene()
+    TriangleMesh(embree, *BOX)
+    TriangleMesh(made(embree), *BOX)
+    assert len(embree._scene) == 1

@@ -235,3 +235,110 @@ print(refused[0])
     )
     assert result.returncode == 0, result.stderr
     assert "signal handler" in result.stdout
+
+
+def test_what_is_asked_with_hits_is_of_their_commit():
+    """Hits, positions, normals and attributes of one call, while another thread commits."""
+    quad = np.array([[-5, -5, 0], [5, -5, 0], [5, 5, 0], [-5, 5, 0.0]])
+    scene = raydix.Scene(quad, [[0, 1, 2], [0, 2, 3]])
+    done = threading.Event()
+
+    def move():
+        height = 0
+        while not done.is_set():
+            height ^= 10
+            scene.update(0, quad + [0, 0, height])
+            scene.commit()
+
+    origins = np.zeros((500, 3))
+    origins[:, 2] = 20
+    mover = threading.Thread(target=move)
+    mover.start()
+    try:
+        end = time.monotonic() + 3
+        while time.monotonic() < end:
+            hits = scene.intersect(origins, [0, 0, -1.0], also=("position", "normal"))
+            np.testing.assert_allclose(hits.position[:, 2], 20 - hits.t)
+            one = scene.intersect([0, 0, 20.0], np.array([0, 0, -1.0]), also="position")
+            assert one.position[2] == 20 - one.t
+    finally:
+        done.set()
+        mover.join()
+
+
+FORKS = SETUP + """
+points = raydix.Points(scene.vertices)
+vertices = np.array(scene.vertices)
+many = np.concatenate([rays] * 20)
+scene.intersect(rays)
+def in_child(*calls):
+    child = os.fork()
+    if child == 0:
+        signal.alarm(60)
+        try:
+            for call in calls:
+                call()
+            os._exit(0)
+        except raydix.InputError as error:
+            print(error, flush=True)
+            os._exit(1)
+    _, status = os.waitpid(child, 0)
+    return os.waitstatus_to_exitcode(status)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+def test_a_fork_while_others_ask_can_change():
+    """The locks of threads that the child does not have must not keep it waiting."""
+    result = run_python(FORKS + """
+stop = False
+def ask(call):
+    while not stop:
+        call()
+threads = [
+    threading.Thread(target=ask, args=(call,))
+    for call in (lambda: scene.intersect(many), lambda: points.knn(vertices, 3))
+]
+for thread in threads:
+    thread.start()
+codes = []
+for calls in (
+    [lambda: scene.update(0, vertices + 0.1), lambda: scene.commit(), lambda: scene.intersect(rays)],
+    [lambda: scene.refit(vertices + 0.1), lambda: scene.contains(vertices[:9])],
+    [lambda: points.add(vertices[:50]), lambda: points.remove([3]), lambda: points.knn(vertices, 2)],
+    [lambda: scene.remove(0), lambda: scene.add(vertices, scene.faces)],
+):
+    time.sleep(0.1)
+    codes.append(in_child(*calls))
+stop = True
+for thread in threads:
+    thread.join()
+scene.refit(vertices)
+print(codes)
+""")
+    assert (result.returncode, result.stdout) == (0, "[0, 0, 0, 0]\n"), result.stderr
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+def test_a_fork_while_another_thread_changes():
+    """What is half changed is an error in the child, all else is there."""
+    result = run_python(FORKS + """
+inside, go_on = threading.Event(), threading.Event()
+def progress(part):
+    inside.set()
+    go_on.wait()
+world = raydix.Scene()
+world.add(vertices, scene.faces)
+thread = threading.Thread(target=lambda: world.commit(progress=progress))
+thread.start()
+inside.wait()
+codes = [in_child(lambda: scene.remove(0)), in_child(lambda: world.intersect(rays)),
+         in_child(lambda: world.remove(0))]
+go_on.set()
+thread.join()
+assert world.intersect(rays).hit.any()
+print(codes)
+""")
+    told = "another thread was changing it when this process was forked off; make it again\n"
+    assert result.returncode == 0, result.stderr
+    assert result.stdout == f"scene: {told}remove: {told}[0, 1, 1]\n"

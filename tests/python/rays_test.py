@@ -271,3 +271,31 @@ def test_all_hits_of_many_pieces_have_one_limit():
         few = scene.all_hits(rays[:1000], max_result_bytes=100_000_000)
         assert few["offsets"].tolist() == list(range(0, 300_001, 300))
         assert (scene.count(rays[:5000]) == 300).all()
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_packed_records(precision, rng):
+    """Columns of records whose rows begin at any byte, as files of sensors have them."""
+    scene = raydix.Scene(*support.random_triangles(rng, 300), precision=precision)
+    rays = support.random_rays(rng, 50)
+    calls = (scene.intersect, scene.occluded, scene.count, scene.all_hits)
+    for kind in (np.float32, np.float64):
+        packed = np.zeros(
+            50,
+            [("ring", "u1"), ("origin", kind, 3), ("along", kind, 3), ("far", kind), ("ray", kind, 8)],
+        )
+        packed["origin"], packed["along"], packed["far"] = rays[:, :3], rays[:, 4:7], 9
+        packed["ray"] = rays
+        six = np.zeros(50, [("ring", "u1"), ("ray", kind, 6)])
+        six["ray"] = rays[:, [0, 1, 2, 4, 5, 6]]
+        origins, along = (packed[name].copy() for name in ("origin", "along"))
+        for call in calls:
+            wanted = call(origins, along)
+            for found in (call(packed["origin"], packed["along"]), call(six["ray"])):
+                np.testing.assert_equal(found, wanted)
+            np.testing.assert_equal(call(packed["ray"]), call(packed["ray"].copy()))
+            np.testing.assert_equal(
+                call(origins, along, tmax=packed["far"]), call(origins, along, tmax=9)
+            )
+            flat = packed["origin"].reshape(5, 10, 3), packed["along"].reshape(5, 10, 3)
+            np.testing.assert_equal(call(*flat), call(*(part.copy() for part in flat)))

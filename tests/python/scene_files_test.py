@@ -2,6 +2,10 @@
 
 import base64
 import json
+import os
+import pathlib
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -235,3 +239,60 @@ def test_files_that_hold_no_scene(tmp_path):
         raydix.load_scene(tmp_path / "missing.rdx")
     with pytest.raises(TypeError):
         raydix.load_scene(3)
+
+
+@pytest.mark.parametrize("place", ["notes\0y.rdx", b"notes\0y.rdx", pathlib.Path("notes\0y.rdx")])
+def test_paths_with_a_nul_are_refused(place, tmp_path, monkeypatch):
+    """The system takes the part before it: another file would be written, or nothing for ever."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "notes").write_text("mine")
+    (tmp_path / "p").write_text("0 0 0")
+    told = r"^notes\\x00y.rdx: a path must not hold a NUL"
+    with pytest.raises(raydix.InputError, match=told):
+        raydix.load_scene(place)
+    picture = np.zeros((2, 2, 3))
+    for call in (
+        lambda: raydix.Scene("p\0.xyz"),
+        lambda: raydix.load_points(b"p\0.xyz"),
+        lambda: raydix.save_picture("p\0.png", picture),
+        lambda: raydix.simulate(raydix.Scene(*BOX), np.ones((1, 8)), machine="p\0.json"),
+    ):
+        with pytest.raises(raydix.InputError, match=r"^p\\x00.*: a path must not hold a NUL"):
+            call()
+    # In a process of its own: what failed before held the interpreter's lock for ever.
+    code = """
+import signal, sys, numpy as np, raydix
+signal.alarm(60)
+scene = raydix.Scene(np.eye(3), [[0, 1, 2]])
+try:
+    scene.save("notes\\0y.rdx")
+except raydix.InputError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout == "notes\\x00y.rdx: a path must not hold a NUL character\n", done.stderr
+    assert sorted(os.listdir(tmp_path)) == ["notes", "p"]
+    assert (tmp_path / "notes").read_text() == "mine"
+
+
+def test_paths_of_any_encoding(tmp_path, rng):
+    """Names that are no UTF-8, as str with surrogates, as bytes, and as a path."""
+    world, rays = random_world(rng).scene, support.random_rays(rng, 200)
+    world.commit()
+    for name in (b"\xff.rdx", "\udcfe.rdx", "häuser.rdx"):
+        file = os.path.join(os.fsencode(tmp_path), os.fsencode(name))
+        for form in (file, os.fsdecode(file), pathlib.Path(os.fsdecode(file))):
+            world.save(form)
+            assert raydix.load_scene(form).intersect(rays) == world.intersect(rays)
+    file = os.path.join(os.fsencode(tmp_path), b"\xff.xyz")
+    pathlib.Path(os.fsdecode(file)).write_text("0 0 0\n1 2 3\n")
+    for form in (file, os.fsdecode(file)):
+        assert raydix.load_points(form).tolist() == [[0, 0, 0], [1, 2, 3]]
+        scene = raydix.Scene(form)
+        assert len(scene.vertices) == 2
+        scene.save(tmp_path / "named.rdx")
+        assert raydix.load_scene(tmp_path / "named.rdx").name
+    raydix.save_picture(file[:-4] + b".png", np.zeros((2, 2, 3)))
+    assert os.path.exists(file[:-4] + b".png")
+    with pytest.raises(raydix.InputError, match=r"\\xFD.rdx"):
+        raydix.load_scene(b"/no such folder/\xfd.rdx")

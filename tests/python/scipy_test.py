@@ -215,7 +215,6 @@ def test_what_is_refused():
         (lambda: tree.query([0, 0, 0], k=None), "k must be an integer or a sequence"),
         (lambda: tree.query([0, 0, 0], p=0.5), "p: expected a number from 1"),
         (lambda: tree.query([0, 0, 0], p=np.nan), "p: expected a number from 1"),
-        (lambda: tree.query_ball_point([0, 0, 0], -1, p=1), "r: expected numbers of 0 or more"),
         (lambda: tree.query_pairs(1, output_type="list"), "output_type: expected 'set'"),
         (lambda: tree.sparse_distance_matrix(tree, 1, output_type="csr"), "output_type: expected"),
         (lambda: tree.query_ball_tree(plane, 1), "other: has another number of dimensions"),
@@ -272,3 +271,36 @@ def test_scipys_own_tests(tmp_path, capsys):
             print(f"  {name}: {why}")
     assert passed > 200
     assert {n for r, names in by_result.items() if r != "passed" for n in names} <= set(NOT_PASSED)
+
+
+@pytest.mark.parametrize("kind", [cKDTree, KDTree])
+def test_radii_that_hold_nothing(kind, rng):
+    data = rng.random((40, 3))
+    for p in (2, 1):
+        tree, plane = kind(data), kind(data[:, :2])
+        for r in (-1, np.nan, -np.inf):
+            assert tree.query_ball_point(data[0], r, p) == []
+            assert tree.query_ball_point(data[:3], r, p).tolist() == [[], [], []]
+            assert tree.query_ball_point(data[:3], r, p, return_length=True).tolist() == [0, 0, 0]
+            assert tree.query_pairs(r, p) == set() and plane.query_pairs(r, p) == set()
+            assert tree.query_pairs(r, p, output_type="ndarray").shape == (0, 2)
+            assert tree.query_ball_tree(tree, r, p) == [[]] * 40
+            assert tree.sparse_distance_matrix(tree, r, p, output_type="dict") == {}
+        mixed = tree.query_ball_point(data[:4], [0, -1, np.nan, np.inf], p)
+        assert [len(row) for row in mixed] == [1, 0, 0, 40]
+
+
+def test_numbers_of_neighbours_as_scipy_takes_them(rng):
+    theirs = support.peer("scipy.spatial")
+    data = rng.random((40, 3))
+    for mine, other in ((cKDTree, theirs.cKDTree), (KDTree, theirs.KDTree)):
+        for k in (1, 1.0, 0.5, 2.5, 3.0, np.float32(3.9), True, [1.0, 3.0]):
+            found, wanted = mine(data).query(data[:5], k=k), other(data).query(data[:5], k=k)
+            for a, b in zip(found, wanted, strict=True):
+                assert a.shape == b.shape
+                np.testing.assert_allclose(a, b)
+        for k in ("2", b"2", np.array(["2"])):
+            with pytest.raises(TypeError, match="k: expected a number"):
+                mine(data).query(data[0], k=k)
+        length = mine(data).query_ball_point(data[0], 0.5, return_length=True)
+        assert type(length) is type(other(data).query_ball_point(data[0], 0.5, return_length=True))

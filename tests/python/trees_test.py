@@ -154,7 +154,7 @@ def test_rays_of_cameras(figure):
     hits = int(figure.occluded(primary).sum())
     for kind in ("ao", "diffuse", "diffuse_shuffled"):
         assert figure.secondary_rays(primary, kind, samples=3).shape == (3 * hits, 8)
-    with pytest.raises(raydix.InputError, match="unknown kind"):
+    with pytest.raises(raydix.InputError, match="kind: expected one of ao"):
         figure.secondary_rays(primary, "wild")
     assert [scene["name"] for scene in raydix.scenes()]
 

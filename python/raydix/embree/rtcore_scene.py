@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,11 @@ class EmbreeScene:
     def __getstate__(self) -> dict[str, Any]:
         self._ready()  # a scene with changes that no commit has seen has no copy
         return self.__dict__
+
+    def __copy__(self) -> EmbreeScene:
+        made = type(self).__new__(type(self))
+        made.__dict__.update(self.__getstate__(), _scene=copy.copy(self._scene))
+        return made
 
     def _ready(self) -> Scene:
         if not self._scene.committed:
@@ -77,9 +83,10 @@ class EmbreeScene:
         if query == "OCCLUDED":
             hit = scene.occluded(origins, along, tmax=far)
             return np.where(hit, 0, -1).astype(np.int32)
-        hits = scene.intersect(origins, along, tmax=far)
         if output:
-            return self._columns(hits, far)
+            with scene._core.held():  # hits and vertices of one commit
+                return self._columns(scene.intersect(origins, along, tmax=far), far)
+        hits = scene.intersect(origins, along, tmax=far)
         if query == "DISTANCE":
             return np.where(hits.hit, hits.t, far)
         return _signed(hits.prim)
