@@ -208,6 +208,7 @@ def code_bits(value: Any) -> int:
 
 
 def thread_count(value: Any) -> int:
+    """0, all the machine has, to 1024."""
     return whole(value, "threads", 0, 1024)
 
 

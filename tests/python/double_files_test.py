@@ -127,7 +127,7 @@ def test_what_is_wrong_is_said(rng, tmp_path):
     assert raydix.load_scene(tmp_path / "float.rdx").dtype == np.float32
     for core, other in (("SceneTrees", file), ("SceneTreesD", tmp_path / "float.rdx")):
         with pytest.raises(raydix.InputError, match="header: this file holds a scene in"):
-            getattr(raydix._core, core).load_rdx(str(other), 0)
+            getattr(raydix._core, core).load_rdx(os.fsencode(other), 0)
     for at in rng.integers(0, len(good), 40):
         bad = bytearray(good)
         bad[at] ^= 1 << rng.integers(8)
