@@ -12,7 +12,6 @@
 #include <memory>
 #include <optional>
 
-#include "machine_check.h"
 #include "output.h"
 #include "published.h"
 #include "ray_launches.h"

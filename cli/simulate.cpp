@@ -5,7 +5,6 @@
 
 #include <memory>
 
-#include "machine_check.h"
 #include "option_checks.h"
 #include "output.h"
 #include "ray_launches.h"

@@ -422,13 +422,13 @@ void print_steps_to_scheduled(const std::vector<SimulationRow>& rows) {
 }
 
 MachineModel machine_from(const std::string& name_or_file) {
-    if (!name_or_file.ends_with(".json")) return machine_model(name_or_file);
-    MachineModel machine = load_machine_model(name_or_file);
-    const SimulateOptions run{.machine = machine};
-    about(name_or_file, [&] {  // whether it can be simulated
-        static_cast<void>(simulate(WarpTree(Bvh{}), {}, std::span(&run, 1)));
-    });
-    return machine;
+    return name_or_file.ends_with(".json") ? load_machine_model(name_or_file)
+                                           : machine_model(name_or_file);
+}
+
+void check_machine(const std::string& name_or_file, std::span<const SimulateOptions> runs) {
+    const auto check = [&] { static_cast<void>(simulate(WarpTree(Bvh{}), {}, runs)); };
+    name_or_file.ends_with(".json") ? about(name_or_file, check) : check();
 }
 
 std::vector<WarpKernel> kernels_from(const std::string& names) {

@@ -89,6 +89,9 @@ void print_simulation(const std::vector<SimulationRow>& rows);
 void print_steps_to_scheduled(const std::vector<SimulationRow>& rows);
 /// A machine by name, or from a JSON file.
 [[nodiscard]] MachineModel machine_from(const std::string& name_or_file);
+/// Before any work. Throws InputError if a run has a machine that cannot be; it names the file if
+/// there is one.
+void check_machine(const std::string& name_or_file, std::span<const SimulateOptions> runs);
 /// Names separated by commas, or "all".
 [[nodiscard]] std::vector<WarpKernel> kernels_from(const std::string& names);
 [[nodiscard]] std::vector<RayKind> kinds_from(const std::string& names);

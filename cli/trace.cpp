@@ -386,10 +386,12 @@ TraceCommand with_device(TraceCommand options, Mode mode) {
             "--tree", "device " + device + " traces a bvh, not a " + options.tree.tree);
     if (mode == Mode::all)
         throw CLI::ValidationError("--mode", "all hits are found on the cpu only");
-    if (device == "sim")
-        static_cast<void>(machine_from(options.machine));
-    else
+    if (device == "sim") {
+        const SimulateOptions run{.machine = machine_from(options.machine)};
+        check_machine(options.machine, std::span(&run, 1));
+    } else {
         select_device(device);
+    }
     return options;
 }
 

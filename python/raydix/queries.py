@@ -74,10 +74,9 @@ class SceneQueries:
         """Distance of each point from the mesh, negative inside: in the scene's type, with the
         leading shape of the queries.
 
-        (`trimesh.proximity.signed_distance` has the other sign.) `rule` as in `contains`, and so
-        the sign on open meshes. Beyond
-        `max_distance` the answer is infinite, with its sign; for points with NaN or infinity it is
-        infinite.
+        (`trimesh.proximity.signed_distance` has the other sign.) The sign is that of `contains`
+        with this `rule`. Beyond `max_distance` the answer is infinite, with its sign; for points
+        with NaN or infinity it is infinite.
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
         distances = np.empty(lead, self.dtype)
@@ -91,10 +90,9 @@ class SceneQueries:
         `rule`: "crossings" (signed crossings to infinity are not 0), "parity" (their number is
         odd), "winding" (generalized winding number of 1/2 or more, Jacobson et al. 2013: for meshes
         with holes; parts far away count by a series, Barill et al. 2018, with errors below 0.01,
-        which differ between builders and qualities),
-        or "automatic": the first of these that the mesh is closed enough for. The
-        first two are decided without rounding, at edges and vertices too, and points of the surface
-        are inside. Points with NaN or infinity are outside.
+        which differ between builders and qualities), or "automatic": the first of these that the
+        mesh is closed enough for. The first two are decided without rounding, at edges and vertices
+        too, and points of the surface are inside. Points with NaN or infinity are outside.
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
         flags = np.empty(lead, np.bool_)
