@@ -100,7 +100,7 @@ SimulationState::SimulationState(std::string file) : file_(std::move(file)) {
     if (!found.is_object() || found.value("holds", "") != kind_of_file ||
         !found.contains("parts") || !found["parts"].is_object())
         throw InputError(file_ + ": is no " + kind_of_file);
-    if (found.value("version", "") != document_["version"])
+    if (found.value("version", "") != std::string(version))
         throw InputError(file_ + ": comes from another version of raydix");
     document_ = found;
 }

@@ -19,7 +19,7 @@ if(NOT RAYDIX_CUDA STREQUAL "OFF")
         add_library(raydix_cuda_options INTERFACE)
         target_compile_options(raydix_cuda_options INTERFACE $<$<COMPILE_LANGUAGE:CUDA>:
             -fmad=false -ftz=false -prec-div=true -prec-sqrt=true -Xcompiler=-ffp-contract=off --expt-relaxed-constexpr
-            -Werror=all-warnings>)
+            ${raydix_cuda_warnings}>)
         if(RAYDIX_TESTS)  # tests/device/resources_test.py reads the device code
             target_compile_options(raydix_cuda_options INTERFACE $<$<COMPILE_LANGUAGE:CUDA>:-no-compress>)
         endif()

@@ -31,7 +31,7 @@ endif()
 set(RAYDIX_HAVE_OPENCL ON)
 
 # The host's bits: no contraction. Optimised by clang alone: llc's own passes know less of SPIR-V.
-set(raydix_hip_flags -x hip --cuda-device-only -nogpuinc -nogpulib -std=c++20 -O2 -ffp-contract=off -Wall -Wextra -Werror
+set(raydix_hip_flags -x hip --cuda-device-only -nogpuinc -nogpulib -std=c++20 -O2 -ffp-contract=off ${raydix_kernel_warnings}
     -Wno-unused-function -Wno-unused-private-field -I${CMAKE_CURRENT_SOURCE_DIR}/include -I${CMAKE_CURRENT_SOURCE_DIR}/src)
 set(raydix_spirv_folder ${CMAKE_CURRENT_BINARY_DIR}/spirv)
 file(MAKE_DIRECTORY ${raydix_spirv_folder})

@@ -114,8 +114,8 @@ std::string table_html(const Table& table) {
     for (std::size_t r = 0; r < shown; ++r) {
         out += "<tr>";
         for (std::size_t c = 0; c < table.columns.size(); ++c) {
-            static const Cell nothing;
-            const Cell& cell = c < table.rows[r].size() ? table.rows[r][c] : nothing;
+            static const Cell empty;
+            const Cell& cell = c < table.rows[r].size() ? table.rows[r][c] : empty;
             out += cell_html(table.columns[c], cell, decimals[c], c == 0);
         }
         out += "</tr>\n";

@@ -171,12 +171,12 @@ constexpr std::array models{Named{"gtx285", gtx285}, Named{"gtx285_enum_popc", g
 }  // namespace
 
 std::span<const std::string_view> machine_model_names() {
-    static const auto names = [] {
-        std::array<std::string_view, models.size()> all;
-        for (std::size_t k = 0; k < all.size(); ++k) all[k] = models[k].name;
-        return all;
+    static const auto all = [] {
+        std::array<std::string_view, models.size()> names_of;
+        for (std::size_t k = 0; k < names_of.size(); ++k) names_of[k] = models[k].name;
+        return names_of;
     }();
-    return names;
+    return all;
 }
 
 MachineModel machine_model(std::string_view name) {
