@@ -14,6 +14,7 @@
 
 #include "engine/scene_tree.h"
 #include "exec/result_budget.h"
+#include "trace/ray_frame.h"
 #include "trace/simd/simd_kernels.h"
 #include "trace/simd/wide_batch.h"
 
@@ -33,11 +34,9 @@ struct SceneLine {
     alignas(32) double direction[4];
     double scale;  // t of the caller's ray = scale * t here
 
-    /// t of the caller's ray.
-    [[nodiscard]] float units(float t) const {
-        return scale == 1.0 ? t : static_cast<float>(double{t} / scale);
-    }
-    /// The same for the end of the ray, where t of the caller's ray must be finite.
+    /// The start of the caller's ray.
+    [[nodiscard]] float start(float t) const { return scale == 1.0 ? t : start_in_units(t, scale); }
+    /// Its end, which must be finite.
     [[nodiscard]] float end(float t) const { return end_in_units(scale, t); }
 };
 

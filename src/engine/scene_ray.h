@@ -86,13 +86,13 @@ HWY_INLINE const SceneLine& line_at_mesh(const SceneLine& line, std::uint32_t nu
     return line;
 }
 
-/// Brings a line's direction near unit length.
+/// Brings a line's direction near unit length, as floats see it: rounding to them may take the
+/// longest component up to 2^3, or down to 2^-3.
 inline HWY_NOINLINE void rescale(SceneLine& line) {
     const double longest =
         max_of(max_of(std::fabs(line.direction[0]), std::fabs(line.direction[1])),
                std::fabs(line.direction[2]));
-    if (near_unit_length(longest)) return;
-    const double by = line_scale(longest);
+    const double by = line_scale(near_unit_length(longest) ? static_cast<float>(longest) : longest);
     for (int a = 0; a < 3; ++a) line.direction[a] *= by;
     line.scale *= by;
 }
@@ -303,7 +303,7 @@ protected:
     /// False if floats do not hold the ray, or it ends before it begins.
     HWY_INLINE bool fill(const WideView& view, const SceneLine& line, PadGrowth growth,
                          SingleFrame& frame) const {
-        const float tmin = line.units(tmin_), tmax = line.end(reach_);
+        const float tmin = line.start(tmin_), tmax = line.end(reach_);
         if (!(tmin <= tmax && tmax >= 0.0f)) return false;
         frame.tmin = tmin > 0.0f ? tmin : 0.0f;
         frame.tmax = min_of(tmax, std::numeric_limits<float>::max());

@@ -290,7 +290,7 @@ private:
         level.sources[level.count].scale = scale;
         const Double3 scaled = Double3(ray.direction) * scale;
         ray.direction = scaled.rounded();
-        ray.tmin = static_cast<float>(double{ray.tmin} / scale);
+        ray.tmin = start_in_units(ray.tmin, scale);
         ray.tmax = end_in_units(scale, ray.tmax);
         return true;
     }
@@ -322,7 +322,7 @@ private:
         hn::Store(rounded(line.direction), f4, direction);
         ray.origin = {origin[0], origin[1], origin[2]};
         ray.direction = {direction[0], direction[1], direction[2]};
-        ray.tmin = line.units(limits.tmin);
+        ray.tmin = line.start(limits.tmin);
         ray.tmax = line.end(limits.reach);
         if (!is_valid(ray)) return;
         if (!placed.scene->instances.empty()) to.lines[to.count] = line;

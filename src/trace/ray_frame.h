@@ -71,6 +71,15 @@ RAYDIX_HD inline Scalar direction_scale(Scalar longest) {
     return std::ldexp(Scalar(1), -limited);
 }
 
+/// The start of a ray in units of `scale`, at least 0. One above 0 stays so: t = 0 is before it,
+/// also where the quotient is less than what the type has.
+template <class Scalar, class Scale>
+RAYDIX_HD inline Scalar start_in_units(Scalar tmin, Scale scale) {
+    if (!(tmin > 0)) return 0;
+    const auto start = static_cast<Scalar>(Scale{tmin} / scale);
+    return start > 0 ? start : std::numeric_limits<Scalar>::denorm_min();
+}
+
 /// `ray` must be valid.
 template <class AnyRay, class Scalar = decltype(AnyRay::tmin)>
 RAYDIX_HD inline BasicRayFrame<Scalar> make_frame(const AnyRay& ray) {
@@ -96,7 +105,7 @@ RAYDIX_HD inline BasicRayFrame<Scalar> make_frame(const AnyRay& ray) {
     const Scalar one = 1;
     frame.inverse = {one / d.x, one / d.y, one / d.z};
     frame.t_scale = scale;
-    frame.tmin = (ray.tmin > 0 ? ray.tmin : 0) / scale;
+    frame.tmin = start_in_units(ray.tmin, scale);
     // The caller's t is finite too: first in those units, then in these.
     constexpr Scalar most = std::numeric_limits<Scalar>::max();
     frame.tmax = min_of(min_of(ray.tmax, most) / scale, most);

@@ -33,7 +33,7 @@ inline float scaled_copy(const Ray& ray, Ray& copy) {
     if (is_near_unit(longest) || !is_valid(ray)) return 1.0f;
     constexpr float most = std::numeric_limits<float>::max();
     const float scale = direction_scale(longest);
-    const Ray scaled{ray.origin, (ray.tmin > 0 ? ray.tmin : 0) / scale, ray.direction * scale,
+    const Ray scaled{ray.origin, start_in_units(ray.tmin, scale), ray.direction * scale,
                      min_of(min_of(ray.tmax, most) / scale, most)};
     if (!is_near_unit(longest_of(scaled)) || !(scaled.tmin <= scaled.tmax)) return 1.0f;
     copy = scaled;
