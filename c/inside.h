@@ -88,8 +88,8 @@ std::span<T> results_at(Element* first, std::size_t count, const char* name) {
     return {reinterpret_cast<T*>(first), count};
 }
 
-/// Whether the last field ends where the struct does: a field that comes later then makes the struct
-/// larger, and struct_size tells it.
+/// Whether the last field ends where the struct does: a field that comes later then makes the
+/// struct larger, and struct_size tells it.
 #define RAYDIX_HAS_NO_TAIL(Options, last) \
     (offsetof(Options, last) + sizeof(Options::last) == sizeof(Options))
 static_assert(RAYDIX_HAS_NO_TAIL(raydix_commit_options, reserved));

@@ -86,11 +86,11 @@ typedef enum raydix_quality {
 
 typedef struct raydix_commit_options {
     size_t struct_size;
-    int quality; /* a raydix_quality. No hit depends on it */
-    int moving;  /* 1: each mesh has a tree of its own, and changed ones are refitted */
-    int compact; /* 1: trees of about 60 % of the size */
-    int strict;  /* 1: what would be left out is an error */
-    int threads; /* 0 to 1024; 0: all there are */
+    int quality;  /* a raydix_quality. No hit depends on it */
+    int moving;   /* 1: each mesh has a tree of its own, and changed ones are refitted */
+    int compact;  /* 1: trees of about 60 % of the size */
+    int strict;   /* 1: what would be left out is an error */
+    int threads;  /* 0 to 1024; 0: all there are */
     int reserved; /* 0 */
 } raydix_commit_options;
 #define RAYDIX_COMMIT_OPTIONS \
@@ -105,8 +105,8 @@ RAYDIX_C_API raydix_status raydix_scene_load(const char* path, const raydix_comm
                                              raydix_scene** scene);
 RAYDIX_C_API void raydix_scene_destroy(raydix_scene* scene);
 /* Writes a scene as its last commit left it, with the scenes that stand in it, to a file of type
-   .rdx, which loads without building trees. A name that does not end in .rdx, changes that no commit
-   has taken in and geometry of the caller's own are errors. */
+   .rdx, which loads without building trees. A name that does not end in .rdx, changes that no
+   commit has taken in and geometry of the caller's own are errors. */
 RAYDIX_C_API raydix_status raydix_scene_save(const raydix_scene* scene, const char* path);
 
 /* Points origin + t * direction for t in [tmin, tmax]. Rays that are not finite, have direction 0

@@ -35,12 +35,11 @@ protected:
     void SetUp() override {
         constexpr std::array<float, 6> box{2, 2, 2, 3, 3, 3};
         ASSERT_EQ(raydix_scene_create(&scene), RAYDIX_OK);
-        ASSERT_EQ(raydix_scene_add_mesh(scene, corners.data(), 3, indices.data(), 1, RAYDIX_ALL,
-                                        nullptr),
-                  RAYDIX_OK);
         ASSERT_EQ(
-            raydix_scene_add_user(scene, box.data(), 1, no_hit, nullptr, RAYDIX_ALL, nullptr),
+            raydix_scene_add_mesh(scene, corners.data(), 3, indices.data(), 1, RAYDIX_ALL, nullptr),
             RAYDIX_OK);
+        ASSERT_EQ(raydix_scene_add_user(scene, box.data(), 1, no_hit, nullptr, RAYDIX_ALL, nullptr),
+                  RAYDIX_OK);
         ASSERT_EQ(raydix_scene_commit(scene, nullptr), RAYDIX_OK);
     }
     ~Refusals() override { raydix_scene_destroy(scene); }
@@ -56,8 +55,8 @@ TEST_F(Refusals, ResultsStayAsTheyWere) {
                                  raydix_hit{1, 0, 0, 0, 0, 5}}) {
         const std::vector<raydix_hit> hits{good, good, bad};
         std::vector<float> results(9, 42);
-        expect_refused(
-            raydix_hit_positions(scene, rays.data(), hits.data(), 3, results.data(), 0), "hit 2");
+        expect_refused(raydix_hit_positions(scene, rays.data(), hits.data(), 3, results.data(), 0),
+                       "hit 2");
         EXPECT_EQ(results, std::vector<float>(9, 42));
         expect_refused(raydix_hit_normals(scene, rays.data(), hits.data(), 3, results.data(), 0),
                        "hit 2");
@@ -86,9 +85,9 @@ TEST_F(Refusals, CountsThatNoArrayHas) {
         expect_refused(
             raydix_scene_add_user(scene, numbers, count, no_hit, nullptr, RAYDIX_ALL, &id),
             "boxes: ");
-        expect_refused(raydix_scene_add_mesh(scene, numbers, count, indices.data(), 1, RAYDIX_ALL,
-                                             &id),
-                       "vertices: ");
+        expect_refused(
+            raydix_scene_add_mesh(scene, numbers, count, indices.data(), 1, RAYDIX_ALL, &id),
+            "vertices: ");
         expect_refused(
             raydix_scene_add_mesh(scene, numbers, 3, indices.data(), count, RAYDIX_ALL, &id),
             "triangles: ");
