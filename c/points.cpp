@@ -40,8 +40,7 @@ raydix_status knn(const auto* index, const Scalar* queries, std::size_t count, s
                   std::uint32_t* indices, Scalar* distances, int threads) {
     return guarded([&] {
         require(index, "index");
-        if (k != 0 && count > std::numeric_limits<std::size_t>::max() / k)
-            throw raydix::InputError("count * k is more than an array can have");
+        if (k != 0) require_countable(count, k, "count * k");
         const std::size_t size = count * k;
         raydix::knn(index->index, points_at(queries, count, "queries"), k,
                     results_at<std::uint32_t>(indices, size, "indices"),

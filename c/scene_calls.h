@@ -1,9 +1,12 @@
 // Calls of scenes and rays, once for float and double.
 #pragma once
 
+#include <raydix/rdx.h>
+
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -77,12 +80,26 @@ struct SceneCalls {
         return transform;
     }
 
+    static constexpr bool in_double = std::is_same_v<Scalar, double>;
+
+    /// Whether a name ends in .rdx, in letters of either case.
+    static bool is_rdx(std::string_view name) {
+        constexpr std::string_view ending = ".rdx";
+        const auto same = [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a + 32 : a) == b; };
+        return name.size() >= ending.size() &&
+               std::ranges::equal(name.substr(name.size() - ending.size()), ending, same);
+    }
     static Scene load_scene(const std::string& name, const raydix::SceneOptions& options) {
-        if (!name.ends_with(".rdx")) return Scene(raydix::load_model(name), options);
-        if constexpr (std::is_same_v<Scalar, float>)
-            return raydix::load_rdx_scene(name).scene;
-        else
+        if (!is_rdx(name)) return Scene(raydix::load_model(name), options);
+        if (!raydix::holds_scene(name)) return Scene(raydix::load_rdx(name).scene, options);
+        if (raydix::holds_scene_double(name) != in_double)
+            throw raydix::InputError(
+                name + (in_double ? ": holds a scene in float, which raydix_scene_load reads"
+                                  : ": holds a scene in double, which raydix_scene_load_d reads"));
+        if constexpr (in_double)
             return raydix::load_rdx_scene_double(name).scene;
+        else
+            return raydix::load_rdx_scene(name).scene;
     }
 
     static raydix_status create(Handle** scene) {
@@ -103,6 +120,9 @@ struct SceneCalls {
         return guarded([&] {
             require(scene, "scene");
             require(path, "path");
+            if (!is_rdx(path))
+                throw raydix::InputError(std::string(path) +
+                                         ": the name of a scene's file must end in .rdx");
             raydix::save_rdx(path, scene->scene);
         });
     }
@@ -247,9 +267,11 @@ struct SceneCalls {
         }
         return result;
     }
-    /// Whether the call is one ray that needs no thread but this one.
+    /// Whether the call is one ray that needs no thread but this one. A number of threads out of
+    /// range goes to the call for many rays, which refuses it.
     static bool is_single(std::size_t count, const Options& options) {
-        return count == 1 && options.masks.empty();
+        return count == 1 && options.masks.empty() && options.threads >= 0 &&
+               options.threads <= 1024;
     }
 
     static raydix_status closest(const Handle* scene, const CRay* rays, std::size_t count,

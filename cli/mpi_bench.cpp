@@ -61,6 +61,8 @@ private:
     sem_t* tokens_ = SEM_FAILED;
 };
 
+constexpr std::uint64_t most_points = 0x7FFFFFFF;  // of a rank; one rank alone has all of them
+
 struct BenchCommand {
     CommonOptions common;
     std::uint64_t points = 1000000, queries = 100000;
@@ -259,14 +261,15 @@ void run_bench(const BenchCommand& options) {
         if (counted.size() >= 3) document["modelled"] = modelled_json(counted, model);
         if (prints && options.weak)
             fmt::print("alone: {:.3f} s with every rank alone at the same time.\n", alone);
+        if (prints && fitted.size() >= 2)
+            fmt::print("fit: predicted for {} ranks from 2 to {}.\n", mpi_ranks(),
+                       fitted.back().ranks);
         if (prints)
             fmt::print(
-                "fit: predicted for {} ranks from 2 to {}. two-round: the nearest rank, then "
-                "all that its answer leaves, itself again.\nbroadcast: bytes if every query "
-                "went to every rank. modelled s: {} s a message, {:g} bytes a second, both "
-                "chosen.\n",
-                mpi_ranks(), fitted.empty() ? 0 : fitted.back().ranks, model.latency_s,
-                model.bytes_per_s);
+                "two-round: the nearest rank, then all that its answer leaves, itself again.\n"
+                "broadcast: bytes if every query went to every rank. modelled s: {} s a message, "
+                "{:g} bytes a second, both chosen.\n",
+                model.latency_s, model.bytes_per_s);
         write_json(document, options.common);
     });
 }
@@ -283,10 +286,10 @@ void add_mpi_bench(CLI::App& app) {
         options->weak = weak;
         add_common_options(*command, options->common);
         command->add_option(weak ? "--per-rank" : "--points", options->points, "Points")
-            ->transform(whole_number(1))
+            ->transform(whole_number(1, most_points))
             ->capture_default_str();
         command->add_option("--queries", options->queries, "Queries, counted as points are")
-            ->transform(whole_number(1))
+            ->transform(whole_number(1, most_points))
             ->capture_default_str();
         command->add_option("--k", options->k, "Neighbours")
             ->transform(whole_number(1, 0xFFFFFFFE))
@@ -303,7 +306,10 @@ void add_mpi_bench(CLI::App& app) {
         command->add_option("--repeat", options->repeat, "Calls; the least time counts")
             ->transform(whole_number(1, 10000))
             ->capture_default_str();
-        command->callback([options] { run_bench(*options); });
+        command->callback([options, command] {
+            require_writable_results(*command, options->common, "", "");
+            run_bench(*options);
+        });
     }
 }
 

@@ -63,6 +63,22 @@ Model load_whole(const std::string& name, const CommonOptions& common) {
     return model;
 }
 
+/// Throws InputError that names a file of a type that holds points alone. Where others hold
+/// triangles nobody would see them.
+void refuse_clouds(const MpiOptions& options) {
+    std::vector<std::string> files{options.scene};
+    files.insert(files.end(), options.more.begin(), options.more.end());
+    for (const std::string& file : files) {
+        std::string name = CLI::detail::to_lower(file);
+        for (const char* packed : {".gz", ".xz", ".zst"})
+            if (name.ends_with(packed)) name.erase(name.rfind('.'));
+        if (name.ends_with(".npy") || name.ends_with(".xyz"))
+            throw InputError(file +
+                             ": it holds points, and the other files triangles; several files are "
+                             "one mesh or one cloud");
+    }
+}
+
 std::uint64_t over_ranks(std::uint64_t value, MPI_Op op) {
     MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_UINT64_T, op, MPI_COMM_WORLD);
     return value;
@@ -105,10 +121,19 @@ void add_mpi_options(CLI::App& command, MpiOptions& options) {
     command
         .add_option("--exchange-bytes", options.exchange_bytes,
                     "The most bytes that a rank takes in during a round")
-        ->transform(whole_number(0))
+        ->transform(whole_number(1))
         ->capture_default_str();
     command.add_flag("--verify", options.verify,
                      "Rank 0 does the same alone and compares all bits");
+}
+
+void require_writable_results(const CLI::App& command, const CommonOptions& common,
+                              const std::string& prefix, const std::string& ending) {
+    if (prefix.empty()) refuse_given(command, {"--out"}, "the prefix is empty");
+    on_first([&] {
+        if (!prefix.empty()) require_writable(prefix + ending);
+        require_writable_json(common);
+    });
 }
 
 SpreadModel spread_model(const MpiOptions& options) {
@@ -119,6 +144,7 @@ SpreadModel spread_model(const MpiOptions& options) {
     files.insert(files.end(), options.more.begin(), options.more.end());
     auto read = is_builtin ? std::nullopt : mpi::load_part(MPI_COMM_WORLD, files);
     if (read) {
+        if (read->triangles > 0) refuse_clouds(options);
         if (says) fmt::print("reading      each rank reads its part of {}\n", options.names());
         model.part = std::move(read->mesh);
         model.triangles = read->triangles;
@@ -137,14 +163,24 @@ SpreadModel spread_model(const MpiOptions& options) {
     return model;
 }
 
+void require_triangles(const SpreadModel& model, const MpiOptions& options, const char* who) {
+    if (model.triangles == 0 && over_ranks(model.part.vertices.size(), MPI_SUM) != 0)
+        throw InputError(options.names() + ": " + who +
+                         " need triangles; there are vertices alone");
+}
+
+Model load_files(const MpiOptions& options) {
+    Model whole = load_whole(options.scene, options.common);
+    for (const std::string& file : options.more)
+        whole.meshes.push_back(load_whole(file, options.common).mesh());
+    if (!options.more.empty()) whole.flatten();
+    if (!whole.mesh().triangles.empty()) refuse_clouds(options);
+    return whole;
+}
+
 void read_whole(SpreadModel& model, const MpiOptions& options) {
     if (model.is_whole_read) return;
-    on_first([&] {
-        model.whole = load_whole(options.scene, options.common);
-        for (const std::string& file : options.more)
-            model.whole.meshes.push_back(load_whole(file, options.common).mesh());
-        if (!options.more.empty()) model.whole.flatten();
-    });
+    on_first([&] { model.whole = load_files(options); });
     model.is_whole_read = true;
 }
 

@@ -26,6 +26,10 @@ struct MpiOptions {
     [[nodiscard]] mpi::SceneOptions scene_options() const;
 };
 void add_mpi_options(CLI::App& command, MpiOptions& options);
+/// Collective. Before any work: rank 0 tries --json, and --out as the prefix of a file with this
+/// ending.
+void require_writable_results(const CLI::App& command, const CommonOptions& common,
+                              const std::string& prefix, const std::string& ending);
 
 struct SpreadModel {
     Model whole;                  // of rank 0, flat, if it has been read
@@ -36,8 +40,13 @@ struct SpreadModel {
 
 /// Collective. Says who reads. Triangles, or else points, come in equal runs.
 [[nodiscard]] SpreadModel spread_model(const MpiOptions& options);
-/// Collective. For what rank 0 does alone: it reads all of the files unless it has. Cameras are
-/// those of the first.
+/// Collective. `who`, such as "rays", need triangles. Throws InputError, on all ranks, if the ranks
+/// hold points alone.
+void require_triangles(const SpreadModel& model, const MpiOptions& options, const char* who);
+/// All of the files as one mesh or cloud, read by the rank that calls. Cameras are those of the
+/// first.
+[[nodiscard]] Model load_files(const MpiOptions& options);
+/// Collective. For what rank 0 does alone: it reads all of the files unless it has.
 void read_whole(SpreadModel& model, const MpiOptions& options);
 
 /// {command, version, machine, ranks, partition}.

@@ -18,7 +18,30 @@
 namespace raydix::cli {
 namespace {
 
+/// Collective. Throws a usage error, on all ranks, if one has other arguments than rank 0: it would
+/// wait for calls that never come.
+void require_same_arguments(int argc, char** argv) {
+    std::string mine;
+    for (int i = 1; i < argc; ++i) mine.append(i == 1 ? "" : " ").append(argv[i]);
+    std::string first = mine;
+    std::uint64_t size = mine.size();
+    MPI_Bcast(&size, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
+    first.resize(size);
+    MPI_Bcast(first.data(), static_cast<int>(size), MPI_CHAR, 0, MPI_COMM_WORLD);
+    on_each([&] {
+        if (mine != first)
+            throw CLI::ValidationError("started with '" + mine + "', and rank 0 with '" + first +
+                                       "'; all ranks need the same arguments");
+    });
+}
+
 int run(int argc, char** argv) {
+    try {
+        require_same_arguments(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        complain(error.what());
+        return 2;
+    }
     CLI::App app("Scenes and points spread over the ranks of mpirun.", "raydix mpi");
     app.set_version_flag("--version", std::string("raydix ") + raydix::version);
     app.require_subcommand(1);

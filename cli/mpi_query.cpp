@@ -101,6 +101,8 @@ public:
         : options_(options),
           model_(spread_model(options)),
           document_(mpi_document("mpi query", options)) {
+        if (options.closest) require_triangles(model_, options, "closest points");
+        if (options.contains) require_triangles(model_, options, "solids");
         if (options.verify || options.queries_file.empty() || asks_vertices())
             read_whole(model_, options);
         on_first([&] { queries_ = queries_of(options_, model_.whole); });
@@ -241,11 +243,18 @@ void add_mpi_query(CLI::App& app) {
     CLI::Option_group* kind = command->add_option_group("Kind");
     kind->add_option("--knn", options->k, "The K nearest vertices")
         ->transform(whole_number(1, 0xFFFFFFFE));
-    kind->add_option("--radius", options->radius, "All vertices within R");
+    kind->add_option("--radius", options->radius, "All vertices within R")
+        ->check(finite_number(true));
     kind->add_flag("--closest", options->closest, "The closest point of all triangles");
     kind->add_flag("--contains", options->contains, "Inside by parity of crossings");
     kind->require_option(1);
-    command->callback([options] { QueryRun(*options).run(); });
+    command->callback([options, command] {
+        require_writable_results(*command, options->common, options->prefix,
+                                 options->radius     ? ".offsets.npy"
+                                 : options->contains ? ".inside.npy"
+                                                     : ".indices.npy");
+        QueryRun(*options).run();
+    });
 }
 
 }  // namespace raydix::cli

@@ -38,16 +38,18 @@ void receive_bytes(void* data, std::uint64_t bytes, int from) {
     });
 }
 
-void throw_on_all(const std::string& error) {
+void throw_on_all(const std::string& error, bool is_usage) {
     int failed = error.empty() ? mpi_ranks() : mpi_rank();
     MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
     if (failed == mpi_ranks()) return;
-    std::uint64_t size = error.size();
-    MPI_Bcast(&size, 1, MPI_UINT64_T, failed, MPI_COMM_WORLD);
+    std::uint64_t told[2] = {error.size(), is_usage ? 1u : 0u};
+    MPI_Bcast(told, 2, MPI_UINT64_T, failed, MPI_COMM_WORLD);
     std::string text = error;
-    text.resize(size);
-    MPI_Bcast(text.data(), static_cast<int>(size), MPI_CHAR, failed, MPI_COMM_WORLD);
-    throw InputError(failed == 0 ? text : "rank " + std::to_string(failed) + ": " + text);
+    text.resize(told[0]);
+    MPI_Bcast(text.data(), static_cast<int>(told[0]), MPI_CHAR, failed, MPI_COMM_WORLD);
+    if (failed != 0) text.insert(0, "rank " + std::to_string(failed) + ": ");
+    if (told[1] != 0) throw CLI::ValidationError(text);
+    throw InputError(text);
 }
 
 }  // namespace raydix::cli

@@ -4,6 +4,7 @@
 #include <mpi.h>
 #include <raydix/error.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -67,24 +68,26 @@ template <class T>
     return whole;
 }
 
-/// Collective. What went wrong on any rank is an InputError on all: that of the lowest rank, which
-/// it names unless it is rank 0. Empty: nothing.
-void throw_on_all(const std::string& error);
+/// Collective. What went wrong on any rank is an error on all: that of the lowest rank, which it
+/// names unless it is rank 0. A usage error stays one; others are InputErrors. Empty: nothing.
+void throw_on_all(const std::string& error, bool is_usage = false);
 
 /// Collective. All ranks run `body`.
 template <class Body>
 void on_each(const Body& body) {
     std::string error;
+    bool is_usage = false;
     try {
         body();
     } catch (const std::exception& e) {
         error = e.what();
+        is_usage = dynamic_cast<const CLI::ParseError*>(&e) != nullptr;
         if (error.empty()) error = "unknown error";
     }
-    throw_on_all(error);
+    throw_on_all(error, is_usage);
 }
 
-/// Collective. Rank 0 runs `body`; what goes wrong there is an InputError on all ranks.
+/// Collective. Rank 0 runs `body`; what goes wrong there is an error on all ranks.
 template <class Body>
 void on_first(const Body& body) {
     on_each([&] {

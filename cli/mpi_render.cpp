@@ -2,16 +2,19 @@
 // over them.
 #include <fmt/format.h>
 #include <raydix/picture.h>
+#include <raydix/rdx.h>
 
 #include <chrono>
 #include <cstring>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "mpi_commands.h"
 #include "mpi_input.h"
 #include "mpi_ranks.h"
 #include "picture_options.h"
+#include "scene_file.h"
 
 namespace raydix::cli {
 namespace {
@@ -77,18 +80,31 @@ void show_progress(Shot& shot, Progress& progress) {
     shot.options.progress = [&progress](double part) { progress.show(part); };
 }
 
+/// What raydix render shows of one file, or the mesh of several; gives its cameras.
+Model load_shown(const MpiRenderCommand& command, Scene& scene) {
+    const bool is_one = command.more.empty();
+    if (is_one && is_scene_file(command.scene)) {
+        RdxScene file = load_rdx_scene(command.scene);
+        scene = std::move(file.scene);
+        return model_of(file);
+    }
+    const bool is_tree = is_one && is_rdx(command.scene);
+    if (is_tree && command.picture.view == "steps")
+        throw CLI::ValidationError("--view", "steps of the tree in " + command.scene +
+                                                 " are counted by raydix render alone");
+    Model model = is_tree  ? load_rdx(command.scene).scene
+                  : is_one ? load_model(command.scene, command.common.seed)
+                           : load_files(command);
+    SceneOptions options;
+    options.threads = command.common.threads;
+    about(command.names(), [&] { scene = Scene(model, options); });
+    return model;
+}
+
 /// Each rank reads the scene itself.
 Rendered render_replicated(const MpiRenderCommand& command) {
     Rendered rendered;
-    on_each([&] {
-        if (!command.more.empty())
-            throw InputError("render: several files need --distributed; given " + command.names());
-        const Model model = load_model(command.scene, command.common.seed);
-        rendered.shot = shot_of(command, model);
-        SceneOptions options;
-        options.threads = command.common.threads;
-        about(command.scene, [&] { rendered.alone = Scene(model, options); });
-    });
+    on_each([&] { rendered.shot = shot_of(command, load_shown(command, rendered.alone)); });
     Progress progress("rendering", command.common);
     show_progress(rendered.shot, progress);
     timed(rendered, [&] {
@@ -101,6 +117,7 @@ Rendered render_replicated(const MpiRenderCommand& command) {
 Rendered render_distributed(const MpiRenderCommand& command) {
     Rendered rendered;
     SpreadModel model = spread_model(command);
+    require_triangles(model, command, "pictures");
     read_whole(model, command);  // its cameras
     rendered.shot = shot_of_first(command, model.whole);
     const MeshView view(model.part);
@@ -169,7 +186,8 @@ void add_mpi_render(CLI::App& app) {
     command->add_flag("--distributed", options->is_distributed,
                       "Spread the scene over the ranks. Without it each rank reads and holds all");
     command->callback([options, command] {
-        check_picture_options(*command, options->picture);
+        on_first([&] { check_picture_options(*command, options->picture); });
+        require_writable_results(*command, options->common, "", "");
         run_render(*options);
     });
 }

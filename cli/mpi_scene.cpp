@@ -10,6 +10,7 @@
 #include "mpi_commands.h"
 #include "mpi_input.h"
 #include "mpi_ranks.h"
+#include "option_checks.h"
 
 namespace raydix::cli {
 namespace {
@@ -127,9 +128,8 @@ void finish(const TraceCommand& options, const SpreadModel& model, const std::ve
 }
 
 void run_trace(const TraceCommand& options) {
-    if (options.mode == "all" && !options.prefix.empty())
-        throw CLI::ValidationError("--out", "writes one hit a ray; not with --mode all");
     SpreadModel model = spread_model(options);
+    require_triangles(model, options, "rays");
     if (options.verify || options.rays_file.empty()) read_whole(model, options);
     std::vector<Ray> rays;
     on_first([&] { rays = rays_of(options, model.whole); });
@@ -198,7 +198,10 @@ void add_mpi_info(CLI::App& app) {
     command->add_flag("--tree-hash", options->with_hash,
                       "The hash of the LBVH over the triangles of all ranks, as raydix build "
                       "--builder karras prints it; --verify does it too");
-    command->callback([options] { run_info(*options); });
+    command->callback([options, command] {
+        require_writable_results(*command, options->common, "", "");
+        run_info(*options);
+    });
 }
 
 void add_mpi_trace(CLI::App& app) {
@@ -206,7 +209,9 @@ void add_mpi_trace(CLI::App& app) {
     auto options = std::make_shared<TraceCommand>();
     add_mpi_options(*command, *options);
     command->add_option("--rays", options->rays_file, "Rays from an (N, 8) .npy file");
-    command->add_option("--camera", options->camera, "Camera of the rays")->capture_default_str();
+    command->add_option("--camera", options->camera, "Camera of the rays")
+        ->transform(whole_number(0))
+        ->capture_default_str();
     command->add_option("--size", options->size_text, "Pixels, WxH")->capture_default_str();
     command->add_option("--mode", options->mode, "Which hits")
         ->check(CLI::IsMember({"closest", "any", "all"}))
@@ -214,7 +219,14 @@ void add_mpi_trace(CLI::App& app) {
     command->add_option(
         "--out", options->prefix,
         "Rank 0 writes PREFIX.prims.npy (64 bits), .t.npy, .uv.npy; or .occluded.npy");
-    command->callback([options] { run_trace(*options); });
+    command->callback([options, command] {
+        static_cast<void>(parse_size(options->size_text));
+        if (options->mode == "all")
+            refuse_given(*command, {"--out"}, "writes one hit a ray; not with --mode all");
+        require_writable_results(*command, options->common, options->prefix,
+                                 options->mode == "any" ? ".occluded.npy" : ".prims.npy");
+        run_trace(*options);
+    });
 }
 
 }  // namespace raydix::cli

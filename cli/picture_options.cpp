@@ -40,6 +40,7 @@ RenderOptions PictureOptions::render_options(const CameraSet& cameras,
 }
 
 void check_picture_options(const CLI::App& command, const PictureOptions& options) {
+    if (!options.size_text.empty()) static_cast<void>(parse_size(options.size_text));
     require_picture(command, "--output", options.out_file);
 }
 

@@ -86,25 +86,27 @@ typedef enum raydix_quality {
 
 typedef struct raydix_commit_options {
     size_t struct_size;
-    int quality; /* a raydix_quality. No hit depends on it */
-    int moving;  /* 1: each mesh has a tree of its own, and changed ones are refitted */
-    int compact; /* 1: trees of about 60 % of the size */
-    int strict;  /* 1: what would be left out is an error */
-    int threads; /* 0 to 1024; 0: all there are */
+    int quality;  /* a raydix_quality. No hit depends on it */
+    int moving;   /* 1: each mesh has a tree of its own, and changed ones are refitted */
+    int compact;  /* 1: trees of about 60 % of the size */
+    int strict;   /* 1: what would be left out is an error */
+    int threads;  /* 0 to 1024; 0: all there are */
+    int reserved; /* 0 */
 } raydix_commit_options;
 #define RAYDIX_COMMIT_OPTIONS \
-    { sizeof(raydix_commit_options), RAYDIX_BALANCED, 0, 0, 0, 0 }
+    { sizeof(raydix_commit_options), RAYDIX_BALANCED, 0, 0, 0, 0, 0 }
 
 /* An empty scene. */
 RAYDIX_C_API raydix_status raydix_scene_create(raydix_scene** scene);
 /* Reads a file (.ply .obj .stl .off .gltf .glb .rdx) or makes a built-in scene ("builtin:NAME"),
-   and commits it. The options have no effect on .rdx files, whose trees are read. */
+   and commits it. The options have no effect on a scene that raydix_scene_save wrote, whose trees
+   are read. Of an .rdx file that holds one tree the mesh is read, and a tree is built. */
 RAYDIX_C_API raydix_status raydix_scene_load(const char* path, const raydix_commit_options* options,
                                              raydix_scene** scene);
 RAYDIX_C_API void raydix_scene_destroy(raydix_scene* scene);
 /* Writes a scene as its last commit left it, with the scenes that stand in it, to a file of type
-   .rdx, which loads without building trees. Changes that no commit has taken in and geometry of the
-   caller's own are errors. */
+   .rdx, which loads without building trees. A name that does not end in .rdx, changes that no
+   commit has taken in and geometry of the caller's own are errors. */
 RAYDIX_C_API raydix_status raydix_scene_save(const raydix_scene* scene, const char* path);
 
 /* Points origin + t * direction for t in [tmin, tmax]. Rays that are not finite, have direction 0
@@ -236,17 +238,19 @@ RAYDIX_C_API raydix_status raydix_hit_lists_arrays(const raydix_hit_lists* lists
 RAYDIX_C_API raydix_status raydix_hit_positions(const raydix_scene* scene, const raydix_ray* rays,
                                                 const raydix_hit* hits, size_t count,
                                                 float* positions, int threads);
-/* The unit normal at each hit, from which side the corners appear counter-clockwise; NaN for a
-   miss. A hit on geometry of the caller's own is an error. rays [count], hits [count] -> normals [3
-   * count]. */
+/* The unit normal at each hit; NaN for a miss. In the mesh's own space it points to the side from
+   which the corners of the triangle appear counter-clockwise. The outside of a mesh stays outside
+   where an instance mirrors it; there the corners appear clockwise. A hit on geometry of the
+   caller's own is an error. rays [count], hits [count] -> normals [3 * count]. */
 RAYDIX_C_API raydix_status raydix_hit_normals(const raydix_scene* scene, const raydix_ray* rays,
                                               const raydix_hit* hits, size_t count, float* normals,
                                               int threads);
 
 /* ---- Distances -------------------------------------------------------------------------- */
 
-/* The point of a scene that is closest to a query. Nothing found: distance INFINITY, prim
-   RAYDIX_MISSING. */
+/* The point of a scene that is closest to a query. Of a triangle it is (1-u-v)*v0 + u*v1 + v*v2. Of
+   a capsule u is the place along its axis, 0 at the first end and 1 at the second, and v is 0. Of a
+   sphere and of a point both are 0. Nothing found: distance INFINITY, prim RAYDIX_MISSING. */
 typedef struct raydix_closest_point {
     float position[3], distance;
     uint32_t prim, geometry, instance;
@@ -258,9 +262,10 @@ typedef struct raydix_closest_options {
     float max_distance; /* farther ones are not found. A small one saves time */
     uint32_t mask;
     int threads;
+    int reserved; /* 0 */
 } raydix_closest_options;
 #define RAYDIX_CLOSEST_OPTIONS \
-    { sizeof(raydix_closest_options), INFINITY, RAYDIX_ALL, 0 }
+    { sizeof(raydix_closest_options), INFINITY, RAYDIX_ALL, 0, 0 }
 
 /* queries [3 * count] -> results [count]. */
 RAYDIX_C_API raydix_status raydix_closest_points(const raydix_scene* scene, const float* queries,

@@ -34,8 +34,8 @@ typedef int (*raydix_user_test_d)(void* user, uint32_t prim, const raydix_ray_d*
                                   raydix_hit_d* hit);
 
 RAYDIX_C_API raydix_status raydix_scene_create_d(raydix_scene_d** scene);
-/* Of .rdx files it reads those of raydix_scene_save_d alone; raydix_scene_load reads none of them.
-   Other files hold floats, which are taken as they are. */
+/* Of .rdx files with scenes it reads those of raydix_scene_save_d alone; raydix_scene_load reads
+   none of them. Other files hold floats, which are taken as they are. */
 RAYDIX_C_API raydix_status raydix_scene_load_d(const char* path,
                                                const raydix_commit_options* options,
                                                raydix_scene_d** scene);

@@ -6,7 +6,6 @@
 #include <raydix/surface.h>
 
 #include <algorithm>
-#include <atomic>
 #include <limits>
 #include <string>
 
@@ -88,12 +87,19 @@ const Tree* follow_path(const Tree& scene, const AnyHit& hit, BasicHitTriangle<T
     return inner;
 }
 
+/// The mesh of a hit, and the way to it; null if there is no such triangle.
+template <class Tree, class AnyHit>
+auto mesh_of(const Tree& scene, const AnyHit& hit, BasicHitTriangle<Tree>& triangle)
+    -> decltype(scene.mesh_names.data()) {
+    const Tree* const inner = follow_path(scene, hit, triangle);
+    const auto* const name = inner == nullptr ? nullptr : mesh_by_id(*inner, hit.geometry);
+    return name != nullptr && hit.prim < name->mesh.triangles.size() ? name : nullptr;
+}
+
 template <class Tree, class AnyHit>
 bool find(const Tree& scene, const AnyHit& hit, BasicHitTriangle<Tree>& triangle) {
-    const Tree* const inner = follow_path(scene, hit, triangle);
-    if (inner == nullptr) return false;
-    const auto* const name = mesh_by_id(*inner, hit.geometry);
-    if (name == nullptr || hit.prim >= name->mesh.triangles.size()) return false;
+    const auto* const name = mesh_of(scene, hit, triangle);
+    if (name == nullptr) return false;
     const Triangle& t = name->mesh.triangles[hit.prim];
     for (std::size_t k = 0; k < 3; ++k) triangle.corners[k] = corner_of(name->mesh.vertices[t[k]]);
     return true;
@@ -156,9 +162,37 @@ template <class Tree, class AnyHit>
 void check(const Tree& scene, std::span<const AnyHit> hits) {
     const std::size_t bad = first_index_where(hits.size(), [&](std::size_t i) {
         BasicHitTriangle<Tree> triangle;
-        return hits[i].hit() && !find(scene, hits[i], triangle);
+        return hits[i].hit() && mesh_of(scene, hits[i], triangle) == nullptr;
     });
     if (bad < hits.size()) refuse(scene, hits[bad], bad);
+}
+
+/// What is asked of hits whose rays are known.
+struct CallByRays {
+    const char* name;
+    bool takes_user_geometry;
+};
+
+/// The same where hits of shapes serve too.
+template <class Tree, class AnyHit>
+void check_with_shapes(const Tree& scene, std::span<const AnyHit> hits, const CallByRays& call) {
+    const auto is_refused = [&](const HitShape<Tree>& shape) {
+        return !call.takes_user_geometry &&
+               geometry_kind_of(shape.shapes->shapes) == GeometryKind::user;
+    };
+    const std::size_t bad = first_index_where(hits.size(), [&](std::size_t i) {
+        BasicHitTriangle<Tree> triangle;
+        HitShape<Tree> shape;
+        return hits[i].hit() && mesh_of(scene, hits[i], triangle) == nullptr &&
+               (!find(scene, hits[i], shape) || is_refused(shape));
+    });
+    if (bad == hits.size()) return;
+    HitShape<Tree> shape;
+    if (find(scene, hits[bad], shape))
+        throw InputError(std::string(call.name) + ": hit " + std::to_string(bad) + ": geometry " +
+                         std::to_string(shape.shapes->id) +
+                         " is user geometry, whose normals its owner knows");
+    refuse(scene, hits[bad], bad);
 }
 
 /// value(hit i, its triangle) for all hits, in double; NaN for misses.
@@ -171,37 +205,34 @@ void fill(const BasicScene<Scalar>& scene, std::span<const AnyHit> hits, std::sp
     if (hits.size() != out.size())
         throw InputError(std::string(call) + ": " + std::to_string(hits.size()) +
                          " hits, but room for " + std::to_string(out.size()));
-    std::atomic<bool> all_there{true};
     with_threads(threads, [&] {
+        check(tree, hits);
         for_each_range(hits.size(), 4096, [&](std::size_t begin, std::size_t end) {
             BasicHitTriangle<Tree> triangle;
             for (std::size_t i = begin; i < end; ++i) {
-                if (!hits[i].hit())
-                    out[i] = {nan, nan, nan};
-                else if (find(tree, hits[i], triangle))
+                if (hits[i].hit() && find(tree, hits[i], triangle))
                     value(hits[i], triangle).round_to(out[i]);
                 else
-                    all_there.store(false, std::memory_order_relaxed);
+                    out[i] = {nan, nan, nan};
             }
         });
-        if (!all_there.load()) check(tree, hits);
     });
 }
 
 /// Of hits whose rays are known: as above; value_of_shape(ray i, hit i, its shape) for shapes.
 template <class Scalar, class AnyRay, class AnyHit, class Point, class Value, class ValueOfShape>
 void fill_by_rays(const BasicScene<Scalar>& scene, std::span<const AnyRay> rays,
-                  std::span<const AnyHit> hits, std::span<Point> out, int threads, const char* call,
-                  const Value& value, const ValueOfShape& value_of_shape) {
+                  std::span<const AnyHit> hits, std::span<Point> out, int threads,
+                  const CallByRays& call, const Value& value, const ValueOfShape& value_of_shape) {
     using Tree = typename SceneKind<Scalar>::Tree;
     constexpr Scalar nan = std::numeric_limits<Scalar>::quiet_NaN();
     const Tree& tree = *BasicSceneInternals<Scalar>::tree(scene);
     if (hits.size() != out.size() || hits.size() != rays.size())
-        throw InputError(std::string(call) + ": " + std::to_string(rays.size()) + " rays, " +
+        throw InputError(std::string(call.name) + ": " + std::to_string(rays.size()) + " rays, " +
                          std::to_string(hits.size()) + " hits and room for " +
                          std::to_string(out.size()));
-    std::atomic<bool> all_there{true};
     with_threads(threads, [&] {
+        check_with_shapes(tree, hits, call);
         for_each_range(hits.size(), 4096, [&](std::size_t begin, std::size_t end) {
             BasicHitTriangle<Tree> triangle;
             HitShape<Tree> shape;
@@ -212,17 +243,8 @@ void fill_by_rays(const BasicScene<Scalar>& scene, std::span<const AnyRay> rays,
                     value(hits[i], triangle).round_to(out[i]);
                 else if (find(tree, hits[i], shape))
                     value_of_shape(i, shape).round_to(out[i]);
-                else
-                    all_there.store(false, std::memory_order_relaxed);
             }
         });
-        if (all_there.load()) return;
-        for (std::size_t i = 0; i < hits.size(); ++i) {
-            BasicHitTriangle<Tree> triangle;
-            HitShape<Tree> shape;
-            if (hits[i].hit() && !find(tree, hits[i], triangle) && !find(tree, hits[i], shape))
-                refuse(tree, hits[i], i);
-        }
     });
 }
 
@@ -231,8 +253,7 @@ Double3 point_on(const AnyRay& ray, double t) {
     return Double3(ray.origin) + Double3(ray.direction) * t;
 }
 
-/// From the axis or center of a shape to a point, in the shape's own space. NaN: the caller's own
-/// shapes.
+/// From the axis or center of a shape to a point, in the shape's own space. Not of user geometry.
 template <class Tree>
 Double3 away_from(const HitShape<Tree>& hit, Double3 point) {
     constexpr std::size_t of_spheres = 0, of_capsules = 1, of_balls = 2;
@@ -241,15 +262,11 @@ Double3 away_from(const HitShape<Tree>& hit, Double3 point) {
         return point - Double3((*spheres)[hit.prim].center);
     if (const auto* const balls = std::get_if<of_balls>(&shapes))
         return point - Double3(balls->centers[hit.prim]);
-    if (const auto* const capsules = std::get_if<of_capsules>(&shapes)) {
-        const auto& capsule = (*capsules)[hit.prim];
-        const Double3 a(capsule.a), axis = Double3(capsule.b) - a, from = point - a;
-        const double length2 = dot(axis, axis);
-        const double along = length2 > 0 ? std::clamp(dot(from, axis) / length2, 0.0, 1.0) : 0.0;
-        return from - axis * along;
-    }
-    throw InputError("normals: geometry " + std::to_string(hit.shapes->id) +
-                     " is user geometry, whose normals its owner knows");
+    const auto& capsule = std::get<of_capsules>(shapes)[hit.prim];
+    const Double3 a(capsule.a), axis = Double3(capsule.b) - a, from = point - a;
+    const double length2 = dot(axis, axis);
+    const double along = length2 > 0 ? std::clamp(dot(from, axis) / length2, 0.0, 1.0) : 0.0;
+    return from - axis * along;
 }
 
 Double3 into(const InstanceName& instance, Double3 point) {
@@ -285,7 +302,7 @@ template <class Scalar, class AnyRay, class AnyHit, class Point>
 void fill_positions_by_rays(const BasicScene<Scalar>& scene, std::span<const AnyRay> rays,
                             std::span<const AnyHit> hits, std::span<Point> points, int threads) {
     fill_by_rays(
-        scene, rays, hits, points, threads, "positions",
+        scene, rays, hits, points, threads, {"positions", true},
         [](const auto& hit, const auto& triangle) { return triangle.point(hit.u, hit.v); },
         [&](std::size_t i, const auto&) { return point_on(rays[i], hits[i].t); });
 }
@@ -294,7 +311,7 @@ template <class Scalar, class AnyRay, class AnyHit, class Point>
 void fill_normals_by_rays(const BasicScene<Scalar>& scene, std::span<const AnyRay> rays,
                           std::span<const AnyHit> hits, std::span<Point> normals, int threads) {
     fill_by_rays(
-        scene, rays, hits, normals, threads, "normals",
+        scene, rays, hits, normals, threads, {"normals", false},
         [](const auto&, const auto& triangle) { return unit_of(triangle.normal()); },
         [&](std::size_t i, const auto& shape) {
             return normal_of(shape, point_on(rays[i], hits[i].t));

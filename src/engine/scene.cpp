@@ -63,6 +63,22 @@ bool are_equal(std::span<const Triangle> a, std::span<const Triangle> b) {
     return equal;
 }
 
+constexpr std::size_t most_primitives = 0x7FFFFFFF, most_vertices = 0xFFFFFFFF;
+
+/// Before the first of them is read: a wrong count is not to be followed.
+void check_count(const std::string& name, std::size_t count, const char* what,
+                 std::size_t most = most_primitives) {
+    if (count > most)
+        throw InputError(name + ": " + std::to_string(count) + " " + what +
+                         "; a geometry holds at most " + std::to_string(most));
+}
+
+template <class AnyMeshView>
+void check_mesh_size(const std::string& name, const AnyMeshView& mesh) {
+    check_count(name, mesh.triangles.size(), "triangles");
+    check_count(name, mesh.vertices.size(), "vertices", most_vertices);
+}
+
 template <class AnyMeshView>
 void check_mesh(const std::string& name, const AnyMeshView& mesh) {
     if (mesh.triangles.empty() && !mesh.vertices.empty())
@@ -185,6 +201,7 @@ template <class State, class AnyMeshView>
 std::uint32_t add_mesh(State& state, const AnyMeshView& mesh, const GeometryOptions& options,
                        bool shared) {
     const std::uint32_t id = new_id(state, options.id);
+    check_mesh_size(name_of(id), mesh);
     check_mesh(name_of(id), mesh);
     typename State::Geometry geometry;
     geometry.mask = options.mask;
@@ -196,6 +213,7 @@ template <class Scalar, class State>
 std::uint32_t add_shapes(State& state, const BasicShapes<Scalar>& shapes,
                          const GeometryOptions& options) {
     const std::uint32_t id = new_id(state, options.id);
+    check_count(name_of(id), count_of(shapes), "primitives");
     typename State::Geometry geometry;
     geometry.mask = options.mask;
     set_shapes<typename State::Geometry, Scalar>(geometry, shapes);
@@ -207,6 +225,7 @@ void update_shapes(State& state, std::uint32_t id, const BasicShapes<Scalar>& sh
     auto& geometry = state.at(id);
     if (!geometry.shapes || geometry.shapes->index() != shapes.index())
         throw InputError(name_of(id) + " is " + what_is(geometry) + ", not " + kind_of(shapes));
+    check_count(name_of(id), count_of(shapes), "primitives");
     set_shapes<typename State::Geometry, Scalar>(geometry, shapes);
     state.changed = true;
 }
@@ -341,6 +360,7 @@ void BasicScene<Scalar>::update(std::uint32_t id, const MeshView& mesh) {
     auto& geometry = state_->at(id);
     if (!geometry.is_mesh())
         throw InputError(name_of(id) + " is " + what_is(geometry) + ", not a mesh");
+    check_mesh_size(name_of(id), mesh);
     const bool same_triangles =
         !geometry.shared && !mesh.triangles.empty() && keeps_triangles(geometry, mesh);
     if (!same_triangles || mesh.vertices.size() < geometry.mesh.vertices.size())

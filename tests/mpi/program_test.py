@@ -150,6 +150,28 @@ class Answers(Mpi):
                 self.assertEqual(document["render"]["scene"], "distributed" if more else "replicated")
                 self.assertEqual(many.read_bytes(), alone.read_bytes())
 
+    def test_pictures_of_rdx_files_and_of_several_files(self):
+        tree, scene, alone, many = (self.folder / name for name in ("tree.rdx", "scene.rdx", "a.png", "b.png"))
+        size = ("--size", "40x30")
+        for file, layout in ((tree, "binary"), (scene, "wide8")):
+            subprocess.run([PROGRAM, "build", self.scene(), "--layout", layout, "-o", str(file)], check=True,
+                           capture_output=True)
+        for files in ([tree], [scene], [self.scene(), self.scene()]):
+            with self.subTest(files=files):
+                subprocess.run([PROGRAM, "render", str(files[0]), "-o", str(alone), *size], check=True,
+                               capture_output=True)
+                done = self.run_on(2, "render", *map(str, files), "-o", str(many), *size, "--verify")
+                self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+                self.assertEqual(many.read_bytes(), alone.read_bytes())
+        self.assertIn("--view: steps of the tree",
+                      self.failure_of(2, "render", str(tree), "-o", str(many), "--view", "steps")[0])
+
+    def test_bench_of_two_ranks_predicts_nothing(self):
+        done = self.run_on(2, "bench", "weak", "--per-rank", "500", "--queries", "50", "--repeat", "1")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("fit", done.stdout)
+        self.assertIn("two-round: ", done.stdout)
+
     def test_bench_counts_and_predicts(self):
         document = self.document_of(8, "bench", "weak", "--per-rank", "2000", "--queries", "200", "--repeat", "1")
         self.assertEqual([row["ranks"] for row in document["counted"]], [1, 2, 4, 8])
@@ -186,6 +208,55 @@ class Failures(Mpi):
                 lines = self.failure_of(3, *arguments)
                 self.assertEqual(len(lines), 1, lines)
                 self.assertIn(text, lines[0])
+
+    def test_points_have_no_triangles(self):
+        file, other = self.folder / "cloud.xyz", self.folder / "cloud.npy"
+        file.write_text("0 0 0\n1 0 0\n0 1 0\n")
+        head = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }".ljust(117) + "\n"
+        other.write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head.encode()
+                          + struct.pack("<6f", *range(6)))
+        mesh = self.folder / "one.ply"  # of which, with the .npy file, each rank reads its part
+        mesh.write_bytes(b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
+                         b"property float y\nproperty float z\nelement face 1\n"
+                         b"property list uchar int vertex_indices\nend_header\n"
+                         + struct.pack("<9fB3i", 0, 0, 0, 1, 0, 0, 0, 1, 0, 3, 0, 1, 2))
+        for cloud in (str(file), str(other)):
+            for arguments, who in ((("trace", cloud), "rays"), (("query", cloud, "--closest"), "closest points"),
+                                   (("query", cloud, "--contains"), "solids"),
+                                   (("render", cloud, "-o", "x.png", "--distributed"), "pictures")):
+                with self.subTest(arguments=arguments):
+                    self.assertEqual(self.failure_of(2, *arguments),
+                                     [f"raydix: {cloud}: {who} need triangles; there are vertices alone"])
+            with self.subTest(mixed_with=cloud):
+                lines = self.failure_of(2, "info", str(mesh), cloud)
+                self.assertEqual(len(lines), 1, lines)
+                self.assertIn(f"{cloud}: it holds points, and the other files triangles", lines[0])
+
+    def test_usage_and_outputs_before_the_work(self):
+        none = str(self.folder / "none" / "x")
+        for code, text, arguments in ((2, "--size", ("trace", self.scene(), "--size", "0x5")),
+                                      (2, "--camera", ("trace", self.scene(), "--camera", "-1")),
+                                      (2, "--radius", ("query", self.scene(), "--radius", "nan")),
+                                      (2, "--radius", ("query", self.scene(), "--radius", "-1")),
+                                      (2, "--out", ("query", self.scene(), "--knn", "1", "--out", "")),
+                                      (2, "--exchange-bytes", ("info", self.scene(), "--exchange-bytes", "0")),
+                                      (2, "--size", ("render", self.scene(), "-o", "x.png", "--size", "0x5")),
+                                      (2, "--per-rank", ("bench", "weak", "--per-rank", str(2 ** 64 - 1))),
+                                      (1, none, ("trace", "no_file.obj", "--out", none)),
+                                      (1, none, ("query", "no_file.obj", "--knn", "1", "--out", none)),
+                                      (1, none, ("info", "no_file.obj", "--json", none)),
+                                      (1, none, ("render", "no_file.obj", "-o", none + ".png"))):
+            with self.subTest(arguments=arguments):
+                done = self.run_on(2, *arguments)
+                self.assertEqual(done.returncode, code, done.stderr)
+                self.assertRegex(done.stderr, "(?m)^raydix: " + re.escape(text))
+
+    def test_ranks_with_other_arguments(self):
+        first, second = command(1, "info", self.scene()), command(1, "trace", self.scene())[len(MPIRUN):]
+        done = subprocess.run([*first, ":", *second], capture_output=True, text=True, timeout=TIME_LIMIT_S)
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn(f"raydix: rank 1: started with 'trace {self.scene()}', and rank 0 with 'info {self.scene()}'",
+                      done.stderr)
 
     def test_a_killed_rank_ends_all(self):
         run = subprocess.Popen(command(4, "bench", "weak", "--per-rank", "300000", "--repeat", "1000"),

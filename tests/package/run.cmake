@@ -1,5 +1,6 @@
 # Configures, builds and runs consumer/ against an installed raydix (find_package), one that was built as a shared library
-# (shared), or its sources, without oneTBB (add_subdirectory). consumer_c/ does the same in C against what is installed.
+# (shared), or its sources, without oneTBB (add_subdirectory). consumer_c/ does the same in C against what is installed,
+# consumer_without/ looks for it where pkg-config finds no libraries.
 function(run_step what)
     execute_process(COMMAND ${ARGN} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
     if(NOT status EQUAL 0)
@@ -42,7 +43,7 @@ if(VARIANT STREQUAL "shared")
     set(installed_from ${RAYDIX_BINARY_DIR}-shared)
     run_step("configure shared" ${CMAKE_COMMAND} -G ${GENERATOR} -S ${RAYDIX_SOURCE_DIR} -B ${installed_from}
         -D CMAKE_BUILD_TYPE=${BUILD_TYPE} -D CMAKE_CXX_COMPILER=${COMPILER} -D BUILD_SHARED_LIBS=ON -D RAYDIX_TESTS=OFF
-        -D RAYDIX_BENCH=OFF -D RAYDIX_CLI=OFF -D RAYDIX_CUDA=OFF -D RAYDIX_OPENCL=OFF -D RAYDIX_MPI=OFF)
+        -D RAYDIX_BENCH=OFF -D RAYDIX_CUDA=OFF -D RAYDIX_OPENCL=OFF -D RAYDIX_MPI=OFF)
     run_step("build shared" ${CMAKE_COMMAND} --build ${installed_from} --parallel 2)
 endif()
 file(REMOVE_RECURSE ${WORK_DIR}/prefix ${WORK_DIR}/prefix_before)
@@ -82,7 +83,11 @@ if(VARIANT STREQUAL "shared")
     if(NOT shared)
         message(FATAL_ERROR "no libraydix.so was installed")
     endif()
+    run_step("the installed program" ${WORK_DIR}/prefix/bin/raydix --version)
 endif()
 if(NOT VARIANT STREQUAL "add_subdirectory")
     run_consumer_c()
+    run_step("configure without libraries" ${CMAKE_COMMAND} -E env PKG_CONFIG_LIBDIR=${WORK_DIR} --unset=PKG_CONFIG_PATH
+        ${CMAKE_COMMAND} -G ${GENERATOR} -S ${CMAKE_CURRENT_LIST_DIR}/consumer_without -B ${WORK_DIR}/build_without
+        ${arguments})
 endif()
