@@ -43,7 +43,8 @@ void bring_near_unit_length(WideRayLine& line, double& scale) {
     const Double3 d = line.direction;
     double longest = std::max({std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)});
     if (longest == 0 || !std::isfinite(longest)) return;
-    if (longest > 0x1p-3 && longest < 0x1p3) longest = static_cast<float>(longest);  // as they see it
+    if (longest > 0x1p-3 && longest < 0x1p3)
+        longest = static_cast<float>(longest);  // as they see it
     const double by = longest >= 0x1p125 && longest < 0x1p128 ? 0x1p-125 : direction_scale(longest);
     line.direction = d * by;
     scale *= by;
