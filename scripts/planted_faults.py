@@ -270,7 +270,7 @@ FAULTS = [
           "speculation: a second leaf takes the place of the first", "trace"),
     Fault("src/trace/warp/replacement.h", "count_ones(mask & lanes_below(lane))", "count_ones(mask >> lane)",
           "replacement: ranks count from the wrong end", "trace"),
-    Fault("src/trace/warp/packet.h", "at.lanes &= alive;", "at.lanes = alive;", "packet: all lanes visit what one pushed", "trace"),
+    Fault("src/trace/warp/packet.h", "= to_second ? pair.child0 : pair.child1;", "= to_second ? pair.child1 : pair.child0;", "packet: pushes the child that it goes to", "trace"),
     Fault("src/trace/warp/simulate_launch.cpp", "if (--left[block] != 0) continue;",
           "if (left[block]-- == 0) continue;", "launch: a block's place is free with its first warp", "trace"),
     Fault("src/report/compare_section.cpp", "if (!a.error_known || !b.error_known) return Verdict::unknown;", "",

@@ -63,18 +63,12 @@ struct WarpHardware {
     }
 };
 
-/// A node and the lanes that met its box: what packets put on their stack.
-struct PacketEntry {
-    std::int32_t node;
-    LaneMask lanes;
-};
-
 /// What a warp's lanes share; null where a kernel has no use for it.
 template <class Lane>
 struct WarpMemory {
-    Lane* spares = nullptr;          // [width]: second rays, one a lane
-    std::uint32_t* slots = nullptr;  // [width]: places of spare rays
-    PacketEntry* packets = nullptr;  // [max_depth + 1]
+    Lane* spares = nullptr;                // [width]: second rays, one a lane
+    std::uint32_t* slots = nullptr;        // [width]: places of spare rays
+    std::int32_t* packet_stack = nullptr;  // [max_depth + 1]: of packets, which have one for all
 };
 
 template <class Lane, class Hardware = WarpHardware>

@@ -18,7 +18,7 @@ GROUP_THREADS = 128
 # out of the way or align the array. Exact tests of pairs hold sums of up to 48 doubles besides.
 LIMITS = (
     (r"warps_merge_clusters", (5, 16), 0, 0),
-    (r"trace_(persistent_)?packet", (5, 16), 40, 8192),
+    (r"trace_(persistent_)?packet", (7, 16), 0, 2048),
     (r"trace_work_queue", (3, 16), 0, 15104),
     (r"trace_cwbvh|cwbvh", (4, 12), 128 * 8 + 16, 0),
     (r"trace", (6, 16), 128 * 4 + 16, 0),

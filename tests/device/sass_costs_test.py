@@ -52,6 +52,16 @@ class SassCosts(unittest.TestCase):
         self.assertEqual(self.row["start_ray"], 7)
         self.assertEqual(set(self.row), {"visit_node", "pop", "node_loop", "start_ray"})
 
+    def test_a_chain_that_the_text_cannot_have_is_cut(self):
+        # turn() calls take() in line 7; its line 5 is neither there nor in a lambda that is given to take().
+        chain = (("per_ray.h", 5), ("thread_warp.h", 1), ("per_ray.h", 15), ("per_ray.h", 7), ("batches.h", 1))
+        self.assertEqual(SCRIPT.believable(chain, self.texts), (("per_ray.h", 5), ("batches.h", 1)))
+        # A lambda in the call itself comes back to its own function.
+        chain = (("per_ray.h", 6), ("thread_warp.h", 1), ("per_ray.h", 10), ("per_ray.h", 6), ("batches.h", 1))
+        self.assertEqual(SCRIPT.believable(chain, self.texts), chain)
+        for chain in ((("per_ray.h", 5), ("per_ray.h", 5)), (("per_ray.h", 10), ("thread_warp.h", 1), ("per_ray.h", 6)), ()):
+            self.assertEqual(SCRIPT.believable(chain, self.texts), chain)
+
     def test_what_is_left_out(self):
         # The call of the slow path with its argument; three behind BRA.DIV.
         self.assertEqual(self.notes["slow"], 5)

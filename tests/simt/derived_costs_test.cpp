@@ -40,11 +40,20 @@ TEST(DerivedCosts, ChargeTheConditionsOfIfIf) {
 
 TEST(DerivedCosts, ALoopWrittenOverTwoLinesCostsAllOfItself) {
     for (const auto& costs : {gt200_costs(), fermi_costs(), kepler_costs()}) {
-        // Which lanes take part: an and, a branch, a note of where they meet. Whether there is
-        // another triangle: two comparisons and the branch back.
-        EXPECT_EQ(cost(costs, "persistent_packet", "leaf_loop"), 6u);
+        // Whether there is another triangle: three comparisons. The way there: two additions, and
+        // the branches out and back.
+        EXPECT_EQ(cost(costs, "persistent_packet", "leaf_loop"), 7u);
         // Whether a first leaf was found: two comparisons, a branch; the branch back.
         EXPECT_EQ(cost(costs, "persistent_speculative_while_while", "node_loop"), 4u);
+    }
+}
+
+TEST(DerivedCosts, AVoteOfPacketsIsOnePlace) {
+    for (const auto& costs : {gt200_costs(), fermi_costs(), kepler_costs()}) {
+        // The vote, and a branch on it; the first of two makes a comparison besides.
+        EXPECT_LE(cost(costs, "packet", "vote"), 4u);
+        EXPECT_LE(cost(costs, "persistent_packet", "vote"), 4u);
+        EXPECT_GT(cost(costs, "packet", "pop"), 0u);
     }
 }
 

@@ -147,7 +147,7 @@ void run_lanes(const WarpJob& job, std::uint32_t warp_index, std::uint32_t stack
         std::array<std::uint32_t, thread_lanes> slots{};
     };
     Spares spares;
-    std::vector<PacketEntry> packets(stack_entries);
+    std::vector<std::int32_t> packets(stack_entries);
     std::vector<std::int32_t> stacks(std::size_t{2} * thread_lanes * stack_entries);
     LaneBoard board(60s);
     board.run([&](std::uint32_t lane) {

@@ -19,7 +19,7 @@ __device__ Each& of_this_warp(std::uint64_t* words) {
 }
 
 struct PacketStack {
-    PacketEntry entries[large_stack_entries];
+    std::int32_t entries[large_stack_entries];
 };
 
 template <class Kernel, bool any_hit>
@@ -28,7 +28,7 @@ __device__ void trace(const TraceArguments& given) {
     const std::uint32_t warp_index = thread() / warp_lanes;
     if constexpr (Kernel::one_stack) {
         __shared__ std::uint64_t shared[warps_per_group * sizeof(PacketStack) / 8];
-        warp.memory.packets = of_this_warp<PacketStack>(shared).entries;
+        warp.memory.packet_stack = of_this_warp<PacketStack>(shared).entries;
         run_warp<Kernel, any_hit>(warp, given.job, warp_index);
     } else if constexpr (Kernel::rays_per_lane == 2) {
         __shared__ std::uint64_t shared[warps_per_group * sizeof(SpareRays) / 8];

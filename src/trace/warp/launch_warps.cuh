@@ -15,11 +15,12 @@ namespace kernels {
 
 inline constexpr std::uint32_t warps_per_block = warp_block_threads / words::warp_width;
 
-/// Blocks of packets that a multiprocessor must be able to hold: a bound on their registers, within
-/// which the compiler of CUDA 13.0 spills none; left alone it stops at 40 and spills one.
+/// Blocks of packets that a multiprocessor must be able to hold: a bound on their registers. Left
+/// alone the compiler of CUDA 13.0 stops at 40, which costs a turn of persistent packets three
+/// instructions more.
 inline constexpr std::uint32_t packet_blocks = 10;
 
-/// Shared memory is dynamic: packets [warps][stack_entries], or SpareRays [warps].
+/// Shared memory is dynamic: stacks of packets [warps][stack_entries], or SpareRays [warps].
 extern __shared__ std::uint64_t shared_words[];
 
 /// The stack is the thread's own: local memory, which the hardware interleaves by lane.
@@ -37,8 +38,8 @@ template <class Kernel, bool any_hit>
 __global__ void __launch_bounds__(warp_block_threads, packet_blocks)
     trace_packets(const WarpJob job, std::uint32_t stack_entries) {
     ThreadWarp<Lane> warp;
-    warp.memory.packets = reinterpret_cast<PacketEntry*>(shared_words) +
-                          threadIdx.x / words::warp_width * stack_entries;
+    warp.memory.packet_stack = reinterpret_cast<std::int32_t*>(shared_words) +
+                               threadIdx.x / words::warp_width * stack_entries;
     run_warp<Kernel, any_hit>(warp, job,
                               (blockIdx.x * blockDim.x + threadIdx.x) / words::warp_width);
 }
@@ -62,7 +63,7 @@ void with_global_function(const WarpLaunch& launch, std::int32_t* stacks, const 
     with_kernel(launch.kernel, [&]<class Kernel>() {
         using kernels::warps_per_block;
         if constexpr (Kernel::one_stack) {
-            const std::size_t bytes = warps_per_block * launch.stack_entries * sizeof(PacketEntry);
+            const std::size_t bytes = warps_per_block * launch.stack_entries * sizeof(std::int32_t);
             visit(kernels::trace_packets<Kernel, any_hit>, bytes, launch.stack_entries);
         } else if constexpr (Kernel::rays_per_lane == 2) {
             visit(kernels::trace_queues<Kernel, any_hit>, warps_per_block * sizeof(SpareRays),

@@ -1,5 +1,6 @@
-// Packet traversal as the 2009 comparison has it: one stack a warp, in shared memory; all rays
-// follow the union of the nodes that any of them needs, and the majority decides the order.
+// Packet traversal as the 2009 comparison has it, after Guenther et al. 2007: one stack of nodes a
+// warp, in shared memory; all rays visit the union of the nodes that any of them needs, and the
+// majority decides the order.
 #pragma once
 
 #include <cstdint>
@@ -14,81 +15,82 @@
 
 namespace raydix {
 
-/// The body for trace/warp/batches.h. What is said of the packet is the same in all lanes; a lane
-/// takes part in a node if it met the node's box.
+/// The body for trace/warp/batches.h. What is said of the packet is the same in all lanes. All
+/// lanes test each node and each triangle; one that searches no more has tmin > t, so that it meets
+/// nothing.
 struct Packet {
     static constexpr bool one_stack = true;
 
     template <bool any_hit, class Warp>
     RAYDIX_HD static void trace(Warp& warp, const WarpScene& scene) {
-        PacketEntry at{0, warp.ballot(Op::vote, is_unfinished)};
-        LaneMask alive = at.lanes;
+        warp.step(Op::choose, [](Lane& l) {
+            if (is_finished(l)) l.tmin = infinity, l.t = -infinity;
+        });
+        std::int32_t at = 0;
         std::uint32_t top = 0;
         warp.uniform_loop(
-            Op::main_loop, [&] { return at.lanes != 0; },
+            Op::main_loop, [&] { return at != finished_node; },
             [&] {
-                if (at.node >= 0) {
+                if (at >= 0) {
                     at = visit(warp, scene, at, top);
                 } else {
-                    alive = test_leaf<any_hit>(warp, scene, at, alive);
-                    at.lanes = 0;
+                    at = test_leaf<any_hit>(warp, scene, at);
                 }
-                while (at.lanes == 0 && top > 0) {
-                    at = warp.uniform(Op::pop, [&] { return warp.memory.packets[top - 1]; });
-                    at.lanes &= alive;
-                    --top;
+                if (at == popped_node && top == 0) {
+                    at = finished_node;
+                } else if (at == popped_node) {
+                    at = warp.uniform(Op::pop, [&] { return warp.memory.packet_stack[--top]; });
                 }
             });
-        warp.step(Op::choose, [](Lane& l) { l.node = finished_node; });
     }
 
 private:
-    /// Both children against the packet. No lanes come back if it must pop.
+    RAYDIX_HD static bool meets_first(const Lane& l) { return (l.meets & 1) != 0; }
+    RAYDIX_HD static bool meets_second(const Lane& l) { return (l.meets & 2) != 0; }
+    RAYDIX_HD static bool prefers_second(const Lane& l) { return (l.meets & 4) != 0; }
+
+    /// Both children against the packet. Returns where it goes next.
     template <class Warp>
-    RAYDIX_HD static PacketEntry visit(Warp& warp, const WarpScene& scene, PacketEntry at,
-                                       std::uint32_t& top) {
-        const NodePair& pair = scene.pairs[at.node];
-        warp.among(at.lanes, [&] {
-            warp.touches(
-                Access::read, [&](const Lane&) { return &pair; }, sizeof(NodePair));
-            warp.step(Op::visit_node, [&](Lane& l) {
-                const PairVisit met = meet_pair(l, pair);
-                const bool rather_second = met.second && (met.second_is_closer || !met.first);
-                l.meets =
-                    (met.first ? 1u : 0u) | (met.second ? 2u : 0u) | (rather_second ? 4u : 0u);
-            });
+    RAYDIX_HD static std::int32_t visit(Warp& warp, const WarpScene& scene, std::int32_t node,
+                                        std::uint32_t& top) {
+        warp.touches(
+            Access::read, [&](const Lane&) { return scene.pairs + node; }, sizeof(NodePair));
+        NodePair pair{};  // loaded once, links too
+        warp.step(Op::visit_node, [&](Lane& l) {
+            pair = scene.pairs[node];
+            const PairVisit met = meet_pair(l, pair);
+            const bool rather_second = met.second && (met.second_is_closer || !met.first);
+            l.meets = (met.first ? 1u : 0u) | (met.second ? 2u : 0u) | (rather_second ? 4u : 0u);
         });
-        const auto votes = [&](std::uint32_t flag, Op op = Op::vote) {
-            return at.lanes &
-                   warp.ballot(op, [flag](const Lane& l) { return (l.meets & flag) != 0; });
-        };
-        const PacketEntry first{pair.child0, votes(1)}, second{pair.child1, votes(2)};
-        if (first.lanes == 0 || second.lanes == 0) return first.lanes == 0 ? second : first;
-        const LaneMask rather_second = votes(4, Op::ballot);
-        const bool to_second = warp.uniform(Op::choose, [&] {
-            return 2 * count_ones(rather_second) > count_ones(first.lanes | second.lanes);
+        const LaneMask first = warp.ballot(Op::vote, meets_first);
+        const LaneMask second = warp.ballot(Op::vote, meets_second);
+        if (first == 0) return second == 0 ? popped_node : pair.child1;
+        if (second == 0) return pair.child0;
+        const LaneMask rather_second = warp.ballot(Op::ballot, prefers_second);
+        const bool to_second = warp.uniform(
+            Op::choose, [&] { return 2 * count_ones(rather_second) > count_ones(first | second); });
+        warp.write_shared(Op::push, [&] {
+            warp.memory.packet_stack[top] = to_second ? pair.child0 : pair.child1;
         });
-        warp.write_shared(Op::push, [&] { warp.memory.packets[top] = to_second ? first : second; });
         ++top;
-        return to_second ? second : first;
+        return to_second ? pair.child1 : pair.child0;
     }
 
-    /// All triangles of the leaf. Returns the lanes that still search.
+    /// All triangles of the leaf. Returns popped_node, or finished_node if no lane searches any
+    /// more.
     template <bool any_hit, class Warp>
-    RAYDIX_HD static LaneMask test_leaf(Warp& warp, const WarpScene& scene, PacketEntry at,
-                                        LaneMask alive) {
-        std::int32_t link = at.node;
+    RAYDIX_HD static std::int32_t test_leaf(Warp& warp, const WarpScene& scene, std::int32_t link) {
         warp.uniform_loop(
             Op::leaf_loop, [&] { return link != 0; },
             [&] {
-                warp.among(at.lanes, [&] {
-                    test_triangle(warp, scene, [link](const Lane&) { return link; });
-                });
+                test_triangle(warp, scene, [link](const Lane&) { return link; });
                 link =
                     warp.uniform(Op::next_triangle, [&] { return after_triangle(link, scene, 0); });
             });
-        if (!any_hit) return alive;
-        return alive & warp.ballot(Op::vote, [](const Lane& l) { return l.prim == no_primitive; });
+        if (!any_hit) return popped_node;
+        warp.step(Op::choose, [](Lane& l) { l.tmin = l.prim == no_primitive ? l.tmin : infinity; });
+        const bool searching = warp.any(Op::vote, [](const Lane& l) { return l.tmin <= l.t; });
+        return searching ? popped_node : finished_node;
     }
 };
 

@@ -36,7 +36,7 @@ struct SimulatedKernelOf {
 
     static std::size_t rounded(std::size_t bytes) { return (bytes + 63) / 64 * 64; }
     static std::size_t shared_bytes(std::uint32_t stack_entries) {
-        if (Kernel::one_stack) return rounded(stack_entries * sizeof(PacketEntry));
+        if (Kernel::one_stack) return rounded(stack_entries * sizeof(std::int32_t));
         return Kernel::rays_per_lane == 2 ? rounded(sizeof(Spares)) : 0;
     }
     static std::size_t warp_bytes(std::uint32_t stack_entries) {
@@ -49,7 +49,7 @@ struct SimulatedKernelOf {
         warp.observer = setup.observer;
         std::byte* shared = memory + rounded(sizeof(Warp));
         if (Kernel::one_stack) {
-            warp.memory.packets = reinterpret_cast<PacketEntry*>(shared);
+            warp.memory.packet_stack = reinterpret_cast<std::int32_t*>(shared);
             return;
         }
         auto* stack = reinterpret_cast<std::int32_t*>(shared + shared_bytes(setup.stack_entries));
