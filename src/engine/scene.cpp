@@ -168,11 +168,13 @@ std::uint32_t new_id(const State& state, const std::optional<std::uint32_t>& wan
     return static_cast<std::uint32_t>(id);
 }
 
-/// The geometry is complete: nothing can fail from here on but for want of memory.
+/// The geometry is complete. Where memory ends, the state is as it was.
 template <class State>
 std::uint32_t insert(State& state, std::uint32_t id, typename State::Geometry geometry) {
-    state.geometries.emplace(id, std::move(geometry));
+    decltype(state.geometries) added;
+    added.emplace(id, std::move(geometry));
     state.taken.insert(id);
+    state.geometries.merge(added);  // takes no memory
     while (!state.taken.empty() && *state.taken.begin() == state.next_id) {
         state.taken.erase(state.taken.begin());
         ++state.next_id;
