@@ -15,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/float_env.h"
 #include "base/options.h"
 #include "engine/commit.h"
 #include "engine/scene_state.h"
@@ -258,6 +259,7 @@ auto BasicSceneInternals<Scalar>::tree(const Scene& scene) -> const std::shared_
 template <class Scalar>
 void BasicSceneInternals<Scalar>::place(std::uint32_t id, const BasicTransform<Scalar>& transform,
                                         typename State::Geometry& geometry) {
+    const FloatEnvironment plain;
     const auto back = way_back(transform);
     if (!back)
         throw InputError("instance " + std::to_string(id) +
