@@ -1,9 +1,11 @@
 // Memory that ends at a chosen allocation of this program (result_limit_test.cpp).
 #pragma once
 
+#include <atomic>
+
 namespace raydix {
 
-/// Lets one allocation of this thread fail: the one that `before` others come before.
+/// Lets one allocation fail, on whichever thread: the one that `before` others come before.
 class MemoryEnd {
 public:
     explicit MemoryEnd(long before) { left_ = before; }
@@ -14,7 +16,7 @@ public:
     static bool is_here() { return left_ >= 0 && left_-- == 0; }
 
 private:
-    static inline thread_local long left_ = -1;
+    static inline std::atomic<long> left_ = -1;
 };
 
 }  // namespace raydix

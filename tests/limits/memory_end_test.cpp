@@ -7,11 +7,16 @@
 #include <raydix/scene.h>
 
 #include <cstdint>
+#include <cstring>
 #include <new>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "exec/memory.h"
+#include "layout/refit_walk.h"
 #include "limits/memory_end.h"
+#include "support/support.h"
 
 namespace raydix {
 namespace {
@@ -88,6 +93,61 @@ TYPED_TEST(MemoryEnds, ArraysAreFreedOnce) {
             EXPECT_EQ(memory_count().now(), held);
         });
     EXPECT_GE(ends, 5);
+}
+
+/// `scale` times random triangles.
+template <class Scalar>
+BasicMesh<Scalar> soup(Scalar scale) {
+    const Mesh in_float = test::random_soup(3000, 1);
+    BasicMesh<Scalar> mesh;
+    mesh.triangles = in_float.triangles;
+    for (const Vec3 v : in_float.vertices)
+        mesh.vertices.push_back({scale * v.x, scale * v.y, scale * v.z});
+    return mesh;
+}
+/// What tells trees of boxes and corners apart.
+std::vector<float> boxes_of(const Bvh& tree) {
+    std::vector<float> all;
+    for (const BvhNode& node : tree.nodes())
+        for (const Vec3 p : {node.lo, node.hi}) all.insert(all.end(), {p.x, p.y, p.z});
+    for (const LeafTriangle& t : tree.triangles()) all.insert(all.end(), {t.v0.x, t.v1.y, t.v2.z});
+    return all;
+}
+std::vector<double> boxes_of(const BvhD& tree) {
+    std::vector<double> all;
+    for (const float x : boxes_of(tree.tree())) all.push_back(x);
+    for (const LeafTriangleD& t : tree.triangles()) all.insert(all.end(), {t.v0.x, t.v1.y, t.v2.z});
+    return all;
+}
+
+/// Or some of its boxes were around the new places and others around the old ones.
+TYPED_TEST(MemoryEnds, RefitLeavesTheTreeAsItWas) {
+    const BasicMesh<TypeParam> mesh = soup<TypeParam>(1), moved = soup<TypeParam>(3);
+    auto tree = build_bvh(mesh);
+    auto before = boxes_of(tree);
+    const long ends = at_each_end([] {}, [&] { refit(tree, moved, 2); },
+                                  [&] { ASSERT_TRUE(boxes_of(tree) == before); });
+    EXPECT_GE(ends, 5);
+    EXPECT_FALSE(boxes_of(tree) == before);
+}
+
+/// Of deep trees the walk needs memory of its own: it comes before the first change too.
+TEST(MemoryEndsInDepth, RefitLeavesTheTreeAsItWas) {
+    const Mesh mesh = soup<float>(1), moved = soup<float>(3);
+    const Bvh tree = build_bvh(mesh);
+    const TriangleSource source{moved.vertices.data(), moved.triangles.data(),
+                                moved.vertices.size()};
+    std::vector<BvhNode> nodes(tree.nodes().begin(), tree.nodes().end()), usual = nodes;
+    std::vector<LeafTriangle> copies(tree.triangles().size());
+    RefitWalk(source, tree.order(), usual.data(), copies.data(), tree.max_depth()).run();
+    const auto are_equal = [](std::span<const BvhNode> a, std::span<const BvhNode> b) {
+        return std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+    };
+    const RefitWalk walk(source, tree.order(), nodes.data(), copies.data(), 100'000);
+    const long ends = at_each_end([] {}, [&] { walk.run(); },
+                                  [&] { ASSERT_TRUE(are_equal(nodes, tree.nodes())); });
+    EXPECT_GE(ends, 4);
+    EXPECT_TRUE(are_equal(nodes, usual));
 }
 
 }  // namespace
