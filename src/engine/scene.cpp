@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -227,6 +228,25 @@ std::optional<SceneKind<double>::WayBack> way_back(const TransformD& transform) 
 }
 
 }  // namespace
+
+/// The last scene that stands in one ends within its destructor, and so on inward: below a depth the
+/// outermost one goes on with what is left, since a long chain would not fit a thread's stack.
+template <class Scalar>
+BasicScene<Scalar>::State::~State() {
+    constexpr int most_depth = 2 * static_cast<int>(max_levels);
+    static thread_local int depth = 0;
+    static thread_local std::multimap<std::uint32_t, Geometry>* left = nullptr;
+    if (depth == most_depth) {
+        left->merge(geometries);  // takes no memory
+        return;
+    }
+    std::multimap<std::uint32_t, Geometry> own;
+    if (depth == 0) left = &own;
+    ++depth;
+    geometries.clear();
+    while (!own.empty()) own.erase(own.begin());
+    --depth;
+}
 
 template <class Scalar>
 auto BasicScene<Scalar>::State::at(std::uint32_t id) -> Geometry& {
