@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "base/float_env.h"
 #include "build/refit_checks.h"
 #include "exec/search.h"
 #include "layout/refit_walk.h"
@@ -105,6 +106,7 @@ RefitQuality quality_of(double sah, double sah_at_build) {
 Refitter::Refitter(const Bvh& built) : sah_at_build_(cost_of(built)) { require_whole(built); }
 
 RefitQuality Refitter::refit(Bvh& bvh, const MeshView& mesh, int threads) const {
+    const FloatEnvironment plain;
     const bool points = mesh.triangles.empty();
     const auto kind = points ? PrimitiveKind::points : PrimitiveKind::triangles;
     require_fit(bvh, kind, points ? mesh.vertices.size() : mesh.triangles.size());
@@ -124,6 +126,7 @@ RefitQuality Refitter::refit(Bvh& bvh, const MeshView& mesh, int threads) const 
 }
 
 RefitQuality Refitter::refit(Bvh& bvh, std::span<const Aabb> boxes, int threads) const {
+    const FloatEnvironment plain;
     require_fit(bvh, PrimitiveKind::boxes, boxes.size());
     double sah = 0.0;
     with_threads(threads, [&] {

@@ -215,7 +215,8 @@ private:
                                     empty ? nullptr : source.scene->only_mesh()};
                 Image& image = tree_->images[i];
                 image = image_of(affine_of(geometry.transform), geometry.errors,
-                                 source.inner ? *source.inner : image_of(source.scene->extent));
+                                 source.inner ? *source.inner : image_of(source.scene->extent),
+                                 source.scene->extent.error);
                 if (!empty) tree_->extents[own + i] = extent_of(image, *source.support);
             },
             256);

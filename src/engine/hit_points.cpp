@@ -127,32 +127,32 @@ bool find(const Tree& scene, const AnyHit& hit, HitShape<Tree>& shape) {
     return hit.prim < count_of(shape.shapes->shapes);
 }
 
-/// "geometry 3 (spheres)", if the hit is of shapes.
-template <class Tree, class AnyHit>
-std::string shapes_of(const Tree& scene, const AnyHit& hit) {
-    HitShape<Tree> shape;
-    if (!find(scene, hit, shape)) return {};
-    return "geometry " + std::to_string(hit.geometry) + " (" + kind_of(shape.shapes->shapes) + ")";
-}
-
 template <class Tree, class AnyHit>
 [[noreturn]] void refuse(const Tree& scene, const AnyHit& hit, std::size_t at) {
     const std::string start = "hit " + std::to_string(at) + ": ";
     if (hit.instance > scene.paths)
         throw InputError(start + "the scene has no path " + std::to_string(hit.instance) +
                          " of instances");
-    if (const std::string shapes = shapes_of(scene, hit); !shapes.empty())
-        throw InputError(start + shapes + " has no triangles: give the rays too");
     const Tree* inner = &scene;
     for (std::uint32_t left = hit.instance; left != 0;) {
         const auto& instance = instance_on(*inner, left);
         left -= instance.number;
         inner = instance.scene.get();
     }
-    const auto* const name = mesh_by_id(*inner, hit.geometry);
-    const std::string mesh = "mesh " + std::to_string(hit.geometry);
     const std::string where =
         hit.instance == 0 ? "" : " on path " + std::to_string(hit.instance) + " of instances";
+    for (const auto& shapes : inner->shapes) {
+        if (shapes->id != hit.geometry) continue;
+        const std::string geometry = "geometry " + std::to_string(hit.geometry) + " (" +
+                                     kind_of(shapes->shapes) + ")" + where;
+        const std::uint64_t count = count_of(shapes->shapes);
+        if (hit.prim < count)
+            throw InputError(start + geometry + " has no triangles: give the rays too");
+        throw InputError(start + geometry + " has " + std::to_string(count) +
+                         " primitives; there is no primitive " + std::to_string(hit.prim));
+    }
+    const auto* const name = mesh_by_id(*inner, hit.geometry);
+    const std::string mesh = "mesh " + std::to_string(hit.geometry);
     if (name == nullptr) throw InputError(start + "the scene has no " + mesh + where);
     throw InputError(start + mesh + where + " has " + std::to_string(name->mesh.triangles.size()) +
                      " triangles; there is no triangle " + std::to_string(hit.prim));

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/float_env.h"
 #include "engine/scene_state.h"
 #include "exec/progress.h"
 
@@ -194,6 +195,7 @@ private:
 
 template <class Scalar>
 BasicScene<Scalar>::BasicScene(const Model& model, const SceneOptions& options) : BasicScene() {
+    const FloatEnvironment plain;
     if (model.is_flat()) {
         add(mesh_as<Scalar>(model.mesh()));
         commit(options);

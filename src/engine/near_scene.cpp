@@ -4,6 +4,7 @@
 #include <cmath>
 #include <mutex>
 #include <numbers>
+#include <set>
 
 #include "base/mirrors.h"
 #include "engine/hit_points.h"
@@ -172,15 +173,17 @@ private:
     }
 
     void list_shapes() {
+        std::set<ShownShapes> known;
+        const auto add = [&](const ShownShapes& shown) {
+            if (known.insert(shown).second) out_.shapes.push_back(shown);
+        };
         for (const auto& shapes : scene_.shapes)
-            if (!shapes->empty()) out_.shapes.push_back({{shapes->mask}, shapes.get()});
+            if (!shapes->empty()) add({{shapes->mask}, shapes.get()});
         for (const InstanceName& instance : scene_.instances)
             for (ShownShapes shown : near_scene_of(*instance.scene).shapes) {
                 shown.masks.push_back(instance.mask);
-                out_.shapes.push_back(std::move(shown));
+                add(shown);
             }
-        std::sort(out_.shapes.begin(), out_.shapes.end());
-        out_.shapes.erase(std::unique(out_.shapes.begin(), out_.shapes.end()), out_.shapes.end());
     }
 
     const SceneTree& scene_;

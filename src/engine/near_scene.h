@@ -50,7 +50,7 @@ struct ShownShapes {
             if ((m & mask) == 0) return false;
         return true;
     }
-    friend bool operator==(const ShownShapes&, const ShownShapes&) = default;
+    /// An order by addresses, for sets.
     friend auto operator<=>(const ShownShapes&, const ShownShapes&) = default;
 };
 
@@ -59,7 +59,7 @@ struct NearScene {
     std::vector<Affine> maps;         // as the caller gave them, the innermost of each way first
     PartTree flats;                   // over parts that hold triangles without area
     double reach = 0;                 // the largest coordinate of all that is in the scene
-    std::vector<ShownShapes> shapes;  // each once
+    std::vector<ShownShapes> shapes;  // each once, by the least (path, geometry) of it
 
     [[nodiscard]] bool has_flats() const { return !flats.empty(); }
 };

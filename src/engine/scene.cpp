@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -15,6 +16,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/float_env.h"
 #include "base/options.h"
 #include "engine/commit.h"
 #include "engine/scene_state.h"
@@ -184,11 +186,13 @@ std::uint32_t new_id(const State& state, const std::optional<std::uint32_t>& wan
     return static_cast<std::uint32_t>(id);
 }
 
-/// The geometry is complete: nothing can fail from here on but for want of memory.
+/// The geometry is complete. Where memory ends, the state is as it was.
 template <class State>
 std::uint32_t insert(State& state, std::uint32_t id, typename State::Geometry geometry) {
-    state.geometries.emplace(id, std::move(geometry));
+    decltype(state.geometries) added;
+    added.emplace(id, std::move(geometry));
     state.taken.insert(id);
+    state.geometries.merge(added);  // takes no memory
     while (!state.taken.empty() && *state.taken.begin() == state.next_id) {
         state.taken.erase(state.taken.begin());
         ++state.next_id;
@@ -244,6 +248,25 @@ std::optional<SceneKind<double>::WayBack> way_back(const TransformD& transform) 
 
 }  // namespace
 
+/// The last scene that stands in one ends within its destructor, and so on inward: below a depth the
+/// outermost one goes on with what is left, since a long chain would not fit a thread's stack.
+template <class Scalar>
+BasicScene<Scalar>::State::~State() {
+    constexpr int most_depth = 2 * static_cast<int>(max_levels);
+    static thread_local int depth = 0;
+    static thread_local std::multimap<std::uint32_t, Geometry>* left = nullptr;
+    if (depth == most_depth) {
+        left->merge(geometries);  // takes no memory
+        return;
+    }
+    std::multimap<std::uint32_t, Geometry> own;
+    if (depth == 0) left = &own;
+    ++depth;
+    geometries.clear();
+    while (!own.empty()) own.erase(own.begin());
+    --depth;
+}
+
 template <class Scalar>
 auto BasicScene<Scalar>::State::at(std::uint32_t id) -> Geometry& {
     const auto found = geometries.find(id);
@@ -275,6 +298,7 @@ auto BasicSceneInternals<Scalar>::tree(const Scene& scene) -> const std::shared_
 template <class Scalar>
 void BasicSceneInternals<Scalar>::place(std::uint32_t id, const BasicTransform<Scalar>& transform,
                                         typename State::Geometry& geometry) {
+    const FloatEnvironment plain;
     const auto back = way_back(transform);
     if (!back)
         throw InputError("instance " + std::to_string(id) +

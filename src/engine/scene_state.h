@@ -72,6 +72,11 @@ struct BasicScene<Scalar>::State {
         [[nodiscard]] bool is_mesh() const { return scene == nullptr && !shapes; }
     };
 
+    State() = default;
+    ~State();
+    State(const State&) = delete;
+    State& operator=(const State&) = delete;
+
     std::map<std::uint32_t, Geometry> geometries;
     std::uint64_t next_id = 0;      // all below were given once
     std::set<std::uint32_t> taken;  // those above, chosen by the caller

@@ -10,8 +10,8 @@
 
 #include "engine/scene_state.h"
 #include "engine/shape_tree.h"
+#include "engine/shared_arrays.h"
 #include "exec/parallel.h"
-#include "layout/wide_check.h"
 
 namespace raydix {
 namespace {
@@ -28,6 +28,7 @@ public:
     std::uint32_t add(const Tree& scene) {
         const auto known = scenes_.find(&scene);
         if (known != scenes_.end()) return known->second;
+        for (const auto& mesh : scene.meshes) SharedArrays<Tree>(scene, *mesh).require_unchanged();
         const auto none = no_transform<Transform>();
         std::vector<Stored> geometries;
         for (const auto& instance : scene.instances)
@@ -102,14 +103,9 @@ private:
         const auto [known, is_new] =
             trees_.emplace(mesh.tree.get(), static_cast<std::uint32_t>(out_.meshes.size()));
         if (!is_new) return known->second;
-        const std::size_t first = out_.views.size();
         for (const std::uint32_t id : mesh.ids)
             add_mesh(std::ranges::lower_bound(scene.mesh_names, id, {}, &MeshName::id)->mesh);
         const WideBvh::Arrays& arrays = mesh.tree->arrays();
-        WideBvhStats stats;
-        if (const Fault fault =
-                wide_fault(arrays, std::span<const MeshView>(out_.views).subspan(first), stats))
-            throw InputError(*fault);
         const bool compact = arrays.stats.compact;
         out_.trees.push_back({static_cast<std::uint32_t>(mesh.ids.size()), compact ? 1u : 0u,
                               compact ? arrays.compact_nodes.size() : arrays.nodes.size(),

@@ -102,8 +102,8 @@ struct BasicSceneTables {
 };
 using SceneTables = BasicSceneTables<float>;
 using SceneTablesD = BasicSceneTables<double>;
-/// Throws InputError if there is no commit that holds all changes, or for user geometry; in float
-/// also if shared arrays are no longer those of the commit: "SECTION: reason".
+/// Throws InputError if there is no commit that holds all changes, for user geometry, and if shared
+/// arrays are no longer those of the commit: "SECTION: reason".
 [[nodiscard]] SceneTables tables_of(const Scene& scene);
 [[nodiscard]] SceneTablesD tables_of(const SceneD& scene);
 

@@ -29,17 +29,12 @@ std::shared_ptr<void> allocate_bytes(std::size_t bytes) {
     void* memory = std::aligned_alloc(unit, (bytes + unit - 1) / unit * unit);
     if (!memory) throw std::bad_alloc();
     if (large) prefer_large_pages(memory, (bytes + large_page / 2) / large_page * large_page);
-    try {
-        std::shared_ptr<void> owner(memory, [bytes](void* p) {
-            memory_count().give_back(bytes);
-            std::free(p);
-        });
-        memory_count().take(bytes);
-        return owner;
-    } catch (...) {
-        std::free(memory);
-        throw;
-    }
+    memory_count().take(bytes);
+    // Also called where the pointer itself finds no memory.
+    return {memory, [bytes](void* p) {
+                memory_count().give_back(bytes);
+                std::free(p);
+            }};
 }
 
 }  // namespace raydix

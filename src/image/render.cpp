@@ -9,6 +9,7 @@
 #include <cmath>
 #include <string>
 
+#include "base/float_env.h"
 #include "base/math.h"
 #include "base/options.h"
 #include "exec/progress.h"
@@ -288,6 +289,7 @@ View view_from_name(std::string_view name) {
 }
 
 Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& options) {
+    const FloatEnvironment plain;
     check_render_options(options);
     require_triangles(bvh, "render");
     return render_with(picture_camera(camera, options), options, [&](const auto& picture_of) {
@@ -297,12 +299,14 @@ Picture render(const Bvh& bvh, const Camera& camera, const RenderOptions& option
 }
 
 Picture render(const Scene& scene, const Camera& camera, const RenderOptions& options) {
+    const FloatEnvironment plain;
     check_render_options(options);
     return render_with(picture_camera(camera, options), options,
                        [&](const auto& picture_of) { picture_of(SceneTracer(scene)); });
 }
 
 Picture render(const SceneD& scene, const CameraD& camera, const RenderOptions& options) {
+    const FloatEnvironment plain;
     check_render_options(options);
     const SceneTracerD tracer(scene);
     return render_with(picture_camera(camera, options, tracer.middle()), options,

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "base/float_env.h"
 #include "base/math.h"
 #include "image/tree_picture.h"
 #include "report/colour_map.h"
@@ -167,6 +168,7 @@ void check_options(const SliceOptions& options) {
 
 Picture render_slice(const Bvh& scene, std::span<const LevelBox> boxes,
                      const SliceOptions& options) {
+    const FloatEnvironment plain;
     check_options(options);
     Picture picture{options.width, options.height, {}};
     picture.pixels.assign(std::size_t{options.width} * options.height, background);

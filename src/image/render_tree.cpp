@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "base/float_env.h"
 #include "image/tree_picture.h"
 
 #include "base/double3.h"
@@ -150,6 +151,7 @@ Picture shaded_below(const Bvh& scene, const Camera& camera, const RenderOptions
 
 Picture render_tree(const Bvh& scene, const Camera& camera, std::span<const LevelBox> boxes,
                     const RenderOptions& options) {
+    const FloatEnvironment plain;
     const CameraFrame frame = make_camera_frame(camera, options.width, options.height);
     const Aabb bounds = scene.bounds();
     const Double3 size = Double3(bounds.hi) - Double3(bounds.lo);

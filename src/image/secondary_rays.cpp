@@ -7,6 +7,7 @@
 #include <string>
 
 #include "base/double3.h"
+#include "base/float_env.h"
 #include "base/options.h"
 #include "exec/parallel.h"
 #include "image/surface_points.h"
@@ -117,6 +118,7 @@ std::vector<RayD> make_secondary_rays(const SceneD& scene, std::span<const RayD>
                                       std::span<const HitD> hits,
                                       std::span<const std::uint32_t> pixels,
                                       const SecondaryOptions& options) {
+    const FloatEnvironment plain;
     const SceneSurfaceD surface(scene);
     check_arguments(rays.size(), hits.size(), pixels.size(), options);
     std::vector<RayD> secondary;

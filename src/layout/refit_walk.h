@@ -75,11 +75,17 @@ public:
         constexpr std::size_t subtrees_wanted = 1024;
         const TreeParts parts = cut_tree(nodes_, subtrees_wanted);
         std::vector<RefitSum> sums(parts.subtrees.size());
-        for_each_range(parts.subtrees.size(), 1, [&](std::size_t begin, std::size_t end) {
-            std::vector<Waiting> stack;
-            stack.reserve(std::size_t{max_depth_} + 1);
-            for (std::size_t k = begin; k < end; ++k) fit(parts.subtrees[k], stack, sums[k]);
-        });
+        // What takes memory comes before the first change, so that a tree is never fitted in part.
+        if (stack_size() <= most_waiting) {
+            for_each_range(parts.subtrees.size(), 1, [&](std::size_t begin, std::size_t end) {
+                Waiting stack[most_waiting];
+                for (std::size_t k = begin; k < end; ++k) fit(parts.subtrees[k], stack, sums[k]);
+            });
+        } else {
+            std::vector<Waiting> stack(stack_size());
+            for (std::size_t k = 0; k < sums.size(); ++k)
+                fit(parts.subtrees[k], stack.data(), sums[k]);
+        }
         RefitSum sum;
         for (const RefitSum& part : sums) {
             sum.cost += part.cost;
@@ -97,31 +103,36 @@ private:
         bool done;
     };
 
-    void fit(std::uint32_t root, std::vector<Waiting>& stack, RefitSum& sum) const {
-        stack.assign(1, {root, false});
-        while (!stack.empty()) {
-            const Waiting at = stack.back();
+    static constexpr std::size_t most_waiting = 512;  // on a thread's own stack
+    /// A node that waits for its children, and one of these, a level.
+    [[nodiscard]] std::size_t stack_size() const { return 2 * std::size_t{max_depth_} + 1; }
+
+    void fit(std::uint32_t root, Waiting* stack, RefitSum& sum) const {
+        std::size_t size = 0;
+        stack[size++] = {root, false};
+        while (size != 0) {
+            Waiting& at = stack[size - 1];
             BvhNode& node = nodes_[at.slot];
             if (node.is_leaf()) {
                 fit_leaf(node, sum);
-                stack.pop_back();
+                --size;
             } else if (at.done) {
                 unite_children(node, sum);
-                stack.pop_back();
+                --size;
             } else {
-                stack.back().done = true;
+                at.done = true;
                 BvhNode* pair = nodes_ + node.first;
                 // Leaves from left to right, at once where nothing waits before them.
                 if (!pair[0].is_leaf()) {
-                    stack.push_back({node.first + 1, false});
-                    stack.push_back({node.first, false});
+                    stack[size++] = {node.first + 1, false};
+                    stack[size++] = {node.first, false};
                     continue;
                 }
                 fit_leaf(pair[0], sum);
                 if (pair[1].is_leaf())
                     fit_leaf(pair[1], sum);
                 else
-                    stack.push_back({node.first + 1, false});
+                    stack[size++] = {node.first + 1, false};
             }
         }
     }

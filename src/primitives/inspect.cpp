@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "base/float_env.h"
 #include "base/math.h"
 #include "primitives/double_sources.h"
 #include "primitives/sources.h"
@@ -66,6 +67,7 @@ void inspect_triangles(const BasicMeshView<Scalar>& mesh, BasicMeshInfo<Scalar>&
 
 template <class Source, class Scalar>
 BasicMeshInfo<Scalar> inspect_mesh(const BasicMeshView<Scalar>& mesh) {
+    const FloatEnvironment plain;
     BasicMeshInfo<Scalar> info;
     info.vertices = mesh.vertices.size();
     info.triangles = mesh.triangles.size();

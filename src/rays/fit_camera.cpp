@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "base/double3.h"
+#include "base/float_env.h"
 
 namespace raydix {
 namespace {
@@ -30,6 +31,7 @@ double fitting_distance(Double3 half, Double3 forward, double tangent) {
 /// `step`: numbers of the camera's type are this part of themselves apart, at most.
 template <class AnyCamera, class Box>
 AnyCamera fitted(const Box& bounds, decltype(AnyCamera::vfov) vfov, double step) {
+    const FloatEnvironment plain;
     if (!(vfov > 0 && vfov < 180))
         throw InputError("vfov is " + std::to_string(vfov) + "; it must lie between 0 and 180");
     AnyCamera camera;

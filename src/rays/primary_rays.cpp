@@ -1,6 +1,7 @@
 // Camera -> one ray per pixel centre, in Morton order of the screen [width * height].
 #include <raydix/rays.h>
 
+#include "base/float_env.h"
 #include "exec/parallel.h"
 #include "rays/camera_frame.h"
 #include "rays/screen_order.h"
@@ -12,6 +13,7 @@ namespace {
 template <class AnyRay, class AnyCamera, class RayAt>
 std::vector<AnyRay> rays_of(const AnyCamera& camera, std::uint32_t width, std::uint32_t height,
                             std::vector<std::uint32_t>* pixels, const RayAt& ray_at) {
+    const FloatEnvironment plain;
     const CameraFrame frame = make_camera_frame(camera, width, height);
     std::vector<std::uint32_t> order = pixels_in_morton_order(width, height);
     std::vector<AnyRay> rays(order.size());

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/float_env.h"
 #include "exec/parallel.h"
 #include "report/picture_codec.h"
 #include "report/srgb.h"
@@ -44,6 +45,7 @@ std::vector<std::uint8_t> screen_bytes(const Picture& picture, bool tone_map) {
 }  // namespace
 
 std::vector<std::byte> encode_png(const Picture& picture, bool tone_map) {
+    const FloatEnvironment plain;
     const std::vector<std::uint8_t> pixels = screen_bytes(picture, tone_map);
     PngImage png;
     png.image.width = picture.width;
@@ -60,6 +62,7 @@ std::vector<std::byte> encode_png(const Picture& picture, bool tone_map) {
 }
 
 Picture decode_png(std::span<const std::byte> bytes) {
+    const FloatEnvironment plain;
     PngImage png;
     if (!png_image_begin_read_from_memory(&png.image, bytes.data(), bytes.size())) png.fail();
     const std::uint64_t width = png.image.width, height = png.image.height;

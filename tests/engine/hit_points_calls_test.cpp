@@ -164,6 +164,23 @@ TYPED_TEST(HitPointsOf, TheFirstHitThatIsNowhereIsNamed) {
     EXPECT_NE(message_of([&] { (void)positions(scene, {}, -1); }), "no error");
     EXPECT_TRUE(positions(scene, {}).empty());
     EXPECT_TRUE(normals(Scene(Mesh{}), {}).empty());
+
+    Scene ball, outer;
+    const std::vector<typename Scene::Sphere> spheres(3);
+    ball.add(spheres);
+    ball.commit();
+    outer.add(ball, {});
+    outer.commit();
+    const std::vector<typename Scene::Ray> rays(1);
+    const std::vector<Hit> past{Kind::hit_on(0, 0, 3)}, inside{Kind::hit_on(0, 1, 3)},
+        there{Kind::hit_on(0, 0, 2)};
+    EXPECT_EQ(message_of([&] { (void)positions(ball, rays, past); }),
+              "hit 0: geometry 0 (spheres) has 3 primitives; there is no primitive 3");
+    EXPECT_EQ(message_of([&] { (void)normals(outer, rays, inside); }),
+              "hit 0: geometry 0 (spheres) on path 1 of instances has 3 primitives; there is no "
+              "primitive 3");
+    EXPECT_EQ(message_of([&] { (void)positions(ball, there); }),
+              "hit 0: geometry 0 (spheres) has no triangles: give the rays too");
 }
 
 }  // namespace

@@ -162,5 +162,30 @@ TEST(NearShapes, WhatHasNoAnswerIsNamed) {
     EXPECT_EQ(closest_point(scene, {1, 0, 5}, infinity, 1).geometry, 0u);
 }
 
+/// Wherever in memory the trees of shapes are.
+TEST(NearShapes, TheFirstGeometryIsNamed) {
+    Scene inner, scene, outer;
+    const std::vector<Sphere> spheres{{{0, 0, 0}, 1}};
+    inner.add(spheres, {.id = 9});
+    inner.commit();
+    for (std::uint32_t id = 2; id < 8; ++id) scene.add(spheres, {.id = id});
+    scene.add(inner, {}, {.id = 1});
+    const SphereSweep sweep{{{0, 0, 9}, 0, {0, 0, -1}}, 1};
+    const auto named = [&](const Scene& in) {
+        return message_of([&] { static_cast<void>(sweep_sphere(in, sweep)); });
+    };
+    for (std::uint32_t k = 0; k < 12; ++k) {  // each of them is made last once
+        scene.update(2 + (k * 5) % 6, spheres);
+        scene.commit();
+        EXPECT_EQ(named(scene),
+                  "sweeps: geometry 2 (spheres) cannot be swept against: only triangles can");
+    }
+    outer.add(inner, {});
+    outer.add(scene, {});
+    outer.commit();
+    EXPECT_EQ(named(outer),
+              "sweeps: geometry 9 (spheres) cannot be swept against: only triangles can");
+}
+
 }  // namespace
 }  // namespace raydix::test

@@ -253,6 +253,20 @@ TEST(SceneChanges, LimitsOfNesting) {
     EXPECT_EQ(said, "instance 3: more than 2^32 - 2 paths through instances");
 }
 
+/// However many stand in each other, twice each; or their ends would not fit the stack.
+TEST(SceneChanges, LongChainsOfScenesEnd) {
+    Scene outer;
+    {
+        std::vector<Scene> chain(200'000);
+        outer.add(chain[0], {});
+        for (std::size_t k = 0; k + 1 < chain.size(); ++k)
+            for (int twice = 0; twice < 2; ++twice) chain[k].add(chain[k + 1], {});
+    }
+    EXPECT_EQ(outer.size(), 1u);
+    outer.remove(0);  // the last to hold them
+    EXPECT_EQ(outer.size(), 0u);
+}
+
 TEST(SceneChanges, TracesWhileAnotherIsCommitted) {
     const Mesh mesh = random_soup(300, 4);
     Scene object(mesh), old;

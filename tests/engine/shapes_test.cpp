@@ -548,7 +548,8 @@ TEST(Shapes, HavePointsAndNormals) {
     const float gx = 1.5f / 36, gz = z / 4, length = std::sqrt(gx * gx + gz * gz);
     EXPECT_TRUE(near(towards[5], {gx / length, 0, gz / length}));
     EXPECT_EQ(error_of([&] { static_cast<void>(normals(outer, hits)); }),
-              "hit 0: geometry 0 (spheres) has no triangles: give the rays too");
+              "hit 0: geometry 0 (spheres) on path 1 of instances has no triangles: give the rays "
+              "too");
 }
 
 }  // namespace

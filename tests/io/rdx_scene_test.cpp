@@ -365,8 +365,8 @@ TEST_F(RdxSceneTest, WhatCannotBeSaved) {
     EXPECT_EQ(message(scene), "no error");
     mesh.vertices[0].x += 1;
     EXPECT_EQ(message(scene), start +
-                                  "blocks: a leaf of node 0 holds what is no triangle of the "
-                                  "meshes, or one that rays cannot hit");
+                                  "scenes: geometry 0: its shared arrays changed since the commit, "
+                                  "at triangle 0");
     mesh.vertices[0].x -= 1;
     CameraSet bad = cameras_;
     bad.width = 0;

@@ -18,11 +18,13 @@
 #include <vector>
 
 #include "exec/memory.h"
+#include "limits/memory_end.h"
 #include "support/sanitized.h"
 #include "support/support.h"
 
 // What the library's arrays take is counted by itself; here comes what containers take.
 void* operator new(std::size_t bytes) {
+    if (raydix::MemoryEnd::is_here()) throw std::bad_alloc();
     void* const memory = std::malloc(bytes == 0 ? 1 : bytes);
     if (memory == nullptr) throw std::bad_alloc();
     raydix::memory_count().take(malloc_usable_size(memory));
