@@ -70,8 +70,8 @@ struct InFloat {
             bring_near_unit_length(line, scale);
         }
         constexpr float most = std::numeric_limits<float>::max();
-        const auto units = [&](float t) { return static_cast<float>(double{t} / scale); };
-        return {line.rounded(units(ray.tmin), units(ray.tmax > most ? most : ray.tmax)), scale};
+        const auto end = static_cast<float>(double{ray.tmax > most ? most : ray.tmax} / scale);
+        return {line.rounded(start_in_units(ray.tmin, scale), end), scale};
     }
     static std::vector<Hit> of_all_triangles(const Mesh& mesh, const std::vector<Ray>& rays) {
         return trace_brute_force(mesh, rays, 1);
