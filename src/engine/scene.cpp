@@ -229,8 +229,8 @@ std::optional<SceneKind<double>::WayBack> way_back(const TransformD& transform) 
 
 }  // namespace
 
-/// The last scene that stands in one ends within its destructor, and so on inward: below a depth the
-/// outermost one goes on with what is left, since a long chain would not fit a thread's stack.
+/// The last scene that stands in one ends within its destructor, and so on inward: below a depth
+/// the outermost one goes on with what is left, since a long chain would not fit a thread's stack.
 template <class Scalar>
 BasicScene<Scalar>::State::~State() {
     constexpr int most_depth = 2 * static_cast<int>(max_levels);

@@ -188,9 +188,8 @@ TEST(CallerEnvironmentOfTrees, LeavesPictures) {
     expect_same_bytes([&] { return bytes_of(render(tree, camera, options).pixels); });
     const std::vector<LevelBox> boxes = level_boxes(tree, {2, 4});
     expect_same_bytes([&] { return bytes_of(render_tree(tree, camera, boxes, options).pixels); });
-    expect_same_bytes([&] {
-        return bytes_of(render_slice(tree, boxes, {.width = 40, .height = 30}).pixels);
-    });
+    expect_same_bytes(
+        [&] { return bytes_of(render_slice(tree, boxes, {.width = 40, .height = 30}).pixels); });
 }
 
 }  // namespace

@@ -40,8 +40,8 @@ protected:
         return message_of([&] { save_rdx(folder_.path() / "x.rdx", of); });
     }
     std::string refusal(int geometry, int triangle) const {
-        return (folder_.path() / "x.rdx").string() +
-               ": not written: scenes: geometry " + std::to_string(geometry) +
+        return (folder_.path() / "x.rdx").string() + ": not written: scenes: geometry " +
+               std::to_string(geometry) +
                ": its shared arrays changed since the commit, at triangle " +
                std::to_string(triangle);
     }
