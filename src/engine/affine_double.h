@@ -155,32 +155,58 @@ inline constexpr AabbD nothing_d{{infinity, infinity, infinity}, {-infinity, -in
 /// Of triangles in `box`: at t the ray is as near to the triangle as slab.h says, twice over.
 [[nodiscard]] inline ExtentD extent_of_triangles(const AabbD& box) { return {box, 0x1p-46}; }
 
-/// Of what a map makes of `inner`. With M = |L| |L^-1| for the map's matrix L, rounding on the way
-/// in moves the point at t by at most 2^-49 M (|origin - move| + |point - origin|): L^-1 is off by
-/// 4 roundings, the difference by 1, products and sums by 3, and there is as much to spare. The
-/// part of that which does not grow with the ray's distance goes into the box, as do the
-/// roundings of the box itself.
-inline ExtentD image_of(const AffineD& a, const InverseD& inverse, const ExtentD& inner) {
-    constexpr double rounding = 0x1p-48;
-    const double condition = a.norm() * inverse.rows.norm();
-    const Double3 lo(inner.box.lo), hi(inner.box.hi);
-    const Double3 middle = lo * 0.5 + hi * 0.5, half = hi * 0.5 - lo * 0.5;
-    const Double3 far{std::max(std::fabs(lo.x), std::fabs(hi.x)),
-                      std::max(std::fabs(lo.y), std::fabs(hi.y)),
-                      std::max(std::fabs(lo.z), std::fabs(hi.z))};
-    const double turned = condition * a.norm() * std::max({far.x, far.y, far.z});
-    const auto reach = [](Double3 row, Double3 by) {
-        return std::fabs(row.x) * by.x + std::fabs(row.y) * by.y + std::fabs(row.z) * by.z;
-    };
-    const auto side = [&](Double3 row, double move) {
-        return reach(row, half) + rounding * (reach(row, far) + std::fabs(move) + turned);
-    };
-    const Double3 center = a.vector(middle) + a.move;
-    const Double3 by{side(a.x, a.move.x), side(a.y, a.move.y), side(a.z, a.move.z)};
-    ExtentD out{{}, condition * (inner.error + rounding)};
-    (center - by).round_to(out.box.lo);
-    (center + by).round_to(out.box.hi);
-    return out;
-}
+/// What stands somewhere through maps, one after the other from the inside outward. As `Image` in
+/// float (docs/algorithms/scenes.md): only the outermost box is a box.
+struct ImageD {
+    AffineD map{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {}};
+    double size;       // at least the largest coordinate of the image, on all levels
+    double slack = 0;  // how far rays may miss it, but for what grows with their distance
+    double error;      // as in ExtentD
+
+    /// In its own space. No extent may be asked of one that is empty.
+    explicit ImageD(const ExtentD& own)
+        : size(std::max({std::fabs(own.box.lo.x), std::fabs(own.box.hi.x), std::fabs(own.box.lo.y),
+                         std::fabs(own.box.hi.y), std::fabs(own.box.lo.z),
+                         std::fabs(own.box.hi.z)})),
+          error(own.error) {}
+
+    /// One map farther out. With M = |L| |L^-1| for its matrix L, rounding on the way in moves the
+    /// point at t by at most 2^-49 M (|origin - move| + |point - origin|): L^-1 is off by 4
+    /// roundings, the difference by 1, products and sums by 3, and there is as much to spare. The
+    /// part of that which does not grow with the ray's distance is slack, as are the roundings of
+    /// the product of maps.
+    void go_through(const AffineD& a, const InverseD& inverse) {
+        const auto row = [&](Double3 r) { return map.x * r.x + map.y * r.y + map.z * r.z; };
+        const double norm = a.norm(), condition = norm * inverse.rows.norm();
+        const double moved =
+            std::max({std::fabs(a.move.x), std::fabs(a.move.y), std::fabs(a.move.z)});
+        map = {row(a.x), row(a.y), row(a.z), a.vector(map.move) + a.move};
+        slack = norm * slack + rounding * ((1.0 + condition) * norm * size + moved);
+        size = norm * size + moved;
+        error = condition * (error + rounding);
+    }
+
+    /// `own`: what it was made with.
+    [[nodiscard]] ExtentD extent(const ExtentD& own) const {
+        const Double3 lo(own.box.lo), hi(own.box.hi);
+        const Double3 middle = lo * 0.5 + hi * 0.5, half = hi * 0.5 - lo * 0.5;
+        // The origin inside may be off by slack too: at most half of what the box then spans, which
+        // errors have to spare.
+        const double room = slack + rounding * size;
+        const auto side = [&](Double3 row) {
+            return std::fabs(row.x) * half.x + std::fabs(row.y) * half.y +
+                   std::fabs(row.z) * half.z + room;
+        };
+        const Double3 center = map.vector(middle) + map.move;
+        const Double3 by{side(map.x), side(map.y), side(map.z)};
+        ExtentD out{{}, error};
+        (center - by).round_to(out.box.lo);
+        (center + by).round_to(out.box.hi);
+        return out;
+    }
+
+private:
+    static constexpr double rounding = 0x1p-48;
+};
 
 }  // namespace raydix

@@ -104,36 +104,30 @@ private:
             const std::uint32_t number = number_instance(*tree_, id, inner);
             tree_->instances.push_back(
                 {id, geometry.mask, number, geometry.transform, geometry.inverse, inner});
-            const AffineD map = affine_of(geometry.transform);
-            const auto image = [&map, &inverse = geometry.inverse](const ExtentD& extent) {
-                return is_empty(extent) ? ExtentD{nothing_d, 0.0} : image_of(map, inverse, extent);
-            };
-            place({{geometry.inverse, geometry.mask}, number, 0, 0, inner.get()}, image);
-            const ExtentD whole = image(inner->parts.around);
-            if (is_empty(whole)) continue;
-            if (!in_range(whole)) refuse_reach(id);
-            unite_with(tree_->bounds, whole.box);
+            place({{geometry.inverse, geometry.mask}, number, 0, 0, inner.get()},
+                  {id, affine_of(geometry.transform), geometry.inverse});
         }
     }
 
-    /// All that one instance places, nested instances opened. image(extent): from its scene.
-    template <class ImageOf>
-    void place(const PlacedSceneD& whole, const ImageOf& image) {
+    /// An instance of this scene.
+    struct Outermost {
+        std::uint32_t id;
+        AffineD map;
+        const InverseD& inverse;
+    };
+
+    /// All that one instance places, nested instances opened.
+    void place(const PlacedSceneD& whole, const Outermost& by) {
         const SceneTreeD& inner = *whole.scene;
-        const auto add = [&](const PlacedSceneD& part, const ExtentD& extent) {
-            tree_->placed.push_back(part);
-            tree_->extents.push_back(image(extent));
-            tree_->stack_size = std::max(tree_->stack_size, part.scene->stack_size);
-        };
         if (inner.instances.empty() ||
             tree_->placed.size() + inner.placed.size() + 1 > most_placed_) {
-            add(whole, inner.parts.around);
+            add(whole, ImageD(inner.parts.around), by);
             return;
         }
         PlacedSceneD part = whole;
         if (inner.own_parts != nullptr) {
             part.scene = inner.own_parts.get();
-            add(part, inner.own_parts->parts.around);
+            add(part, ImageD(part.scene->parts.around), by);
         }
         for (std::size_t k = 0; k < inner.placed.size(); ++k) {
             const PlacedSceneD& below = inner.placed[k];
@@ -144,8 +138,21 @@ private:
             tree_->ways.push_back(below.way);
             for (std::uint32_t w = 0; w < below.more; ++w)
                 tree_->ways.push_back(inner.ways[below.first + w]);
-            add(part, inner.extents[inner.own_part_count() + k]);
+            add(part, inner.images[k], by);
         }
+    }
+    /// `image`: in the instance's scene.
+    void add(const PlacedSceneD& part, ImageD image, const Outermost& by) {
+        image.go_through(by.map, by.inverse);
+        tree_->placed.push_back(part);
+        tree_->images.push_back(image);
+        tree_->stack_size = std::max(tree_->stack_size, part.scene->stack_size);
+        const ExtentD& own = part.scene->parts.around;
+        tree_->extents.push_back(is_empty(own) ? ExtentD{nothing_d, 0.0} : image.extent(own));
+        if (is_empty(own)) return;
+        const ExtentD& extent = tree_->extents.back();
+        if (!in_range(extent)) refuse_reach(by.id);
+        unite_with(tree_->bounds, extent.box);
     }
 
     void list_masks() {

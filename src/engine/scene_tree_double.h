@@ -74,6 +74,7 @@ struct SceneTreeD {
     std::vector<InstanceNameD> instances;                   // by ascending id
     std::vector<MeshNameD> mesh_names;                      // by ascending id
     std::vector<PlacedSceneD> placed;
+    std::vector<ImageD> images;  // [placed scenes]
     std::vector<WayInD> ways;
     std::vector<ExtentD> extents;  // [parts]
     /// The meshes and shapes without the instances, where there are both.

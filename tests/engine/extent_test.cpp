@@ -173,6 +173,81 @@ TEST(Extent, ErrorsOfChainsAreHeld) {
     EXPECT_GT(by_product, 50 * thorough);
 }
 
+TransformD in_double(const Transform& t) {
+    TransformD out;
+    for (std::size_t r = 0; r < 3; ++r)
+        for (std::size_t c = 0; c < 4; ++c) out.m[r][c] = double{t.m[r][c]};
+    return out;
+}
+
+/// The same in double: a point inside, mapped outward, is as near to the line as its image says.
+TEST(Extent, ErrorsOfChainsAreHeldInDouble) {
+    RandomMaps random(seed);
+    double tightest = 0;
+    for (std::size_t i = 0; i < 300 * thorough; ++i) {
+        const std::vector<Transform> chain = random_chain(random);
+        const double size = std::ldexp(1.0, static_cast<int>(random.below(20)) - 10);
+        const Vec3d from{random.between(-100, 100), random.between(-1, 1), 0};
+        const ExtentD inner{{from, from + Vec3d{size, size, 0}}, i % 2 == 0 ? 0x1p-46 : 0.0};
+        ImageD image(inner);
+        LongMap whole;
+        for (auto t = chain.rbegin(); t != chain.rend(); ++t) {
+            const AffineD map = affine_of(in_double(*t));
+            image.go_through(map, *inverse_of(map));
+            whole = LongMap(*t).after(whole);
+        }
+        const Column target = mapped(whole.m, {inner.box.lo.x, inner.box.hi.y, 0});
+        const ExtentD outer = image.extent(inner);
+        for (std::size_t k = 0; k < 3; ++k) {
+            EXPECT_GE(target[k], column(outer.box.lo)[k]);
+            EXPECT_LE(target[k], column(outer.box.hi)[k]);
+        }
+        const Real away = std::ldexp(Real(size), static_cast<int>(random.below(30)) - 4);
+        Vec3d origin, direction;
+        const auto toward = [&](Real to, double& start, double& along) {
+            start = static_cast<double>(to + away * random.between(-1, 1));
+            along = static_cast<double>(to - start);
+        };
+        toward(target[0], origin.x, direction.x);
+        toward(target[1], origin.y, direction.y);
+        toward(target[2], origin.z, direction.z);
+        LineD inside{Double3(origin), Double3(direction)};
+        for (const Transform& t : chain) inside = inside.into(*inverse_of(affine_of(in_double(t))));
+        Column outside = column(origin), p = column(inside.origin);
+        const Real off = inner.error / 2 *  // errors are twice what is needed
+                         farthest(p, column(inner.box.lo), column(inner.box.hi));
+        for (std::size_t k = 0; k < 3; ++k) {
+            outside[k] += column(direction)[k];
+            p[k] += column(inside.direction)[k] + (random.below(2) == 0 ? off : -off);
+        }
+        const Real miss = largest(minus(mapped(whole.m, p), outside));
+        const Real room =
+            image.error * farthest(column(origin), column(outer.box.lo), column(outer.box.hi)) +
+            image.slack;
+        ASSERT_LE(miss, room) << "case " << i << ", " << chain.size() << " levels";
+        tightest = std::max(tightest, static_cast<double>(miss / room));
+    }
+    std::cout << "up to " << tightest << " of the room\n";
+}
+
+/// Each level's box around a turned box would be larger by a half.
+TEST(Extent, BoxesDoNotGrowByLevelsInDouble) {
+    const double c = std::sqrt(0.5);
+    const TransformD turn{{{{c, -c, 0, 0}, {c, c, 0, 0}, {0, 0, 1, 0}}}};
+    SceneD scene(MeshD{"diamond",
+                       {{5e11, 0, 0}, {0, 5e11, 0}, {-5e11, 0, 0}, {0, -5e11, 0}},
+                       {{0, 1, 2}, {0, 2, 3}}});
+    for (int level = 1; level <= 32; ++level) {
+        SceneD outer;
+        outer.add(scene, turn);
+        outer.commit();
+        const double reach = level % 2 == 0 ? 5e11 : 5e11 / c;
+        EXPECT_NEAR(outer.bounds().hi.x, reach, 1e-6 * reach);
+        EXPECT_NEAR(outer.bounds().lo.y, -reach, 1e-6 * reach);
+        scene = std::move(outer);
+    }
+}
+
 Mesh small_mesh(RandomScenes& random) { return random_soup(6, random.below(1000), 1.0f); }
 
 /// `fan` copies a level, each placed by map_of(level, copy).

@@ -341,7 +341,9 @@ TEST(InstanceEdges, BoxesHoldWhatRoundingMoves) {
         const InverseD inverse = *inverse_of(a);
         const Vec3d corner{random.between(-5, 5), 1e3 * random.unit(), random.between(-1e-3, 0)};
         const ExtentD inner{{corner, corner + Vec3d{random.unit(), 0.0, 1.0}}, 0x1p-48};
-        const ExtentD outer = image_of(a, inverse, inner);
+        ImageD image(inner);
+        image.go_through(a, inverse);
+        const ExtentD outer = image.extent(inner);
         const Vec3d p = random.in(inner.box);  // the point that is hit
         const Vec3d from =
             utm_place + std::ldexp(1.0, static_cast<int>(random.below(20))) * random.direction();
