@@ -80,6 +80,7 @@ TYPED_TEST(MemoryEnds, AddLeavesTheSceneAsItWas) {
 /// Or the memory of arrays was freed twice.
 TYPED_TEST(MemoryEnds, ArraysAreFreedOnce) {
     const BasicMesh<TypeParam> mesh{"m", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+    { SCOPED_TRACE("the first one of a thread takes memory that stays"); }
     BasicScene<TypeParam> scene;
     std::uint64_t held = 0;
     const long ends = at_each_end(
