@@ -38,8 +38,9 @@ template <class Kernel, bool any_hit>
 __global__ void __launch_bounds__(warp_block_threads, packet_blocks)
     trace_packets(const WarpJob job, std::uint32_t stack_entries) {
     ThreadWarp<Lane> warp;
-    warp.memory.packet_stack = reinterpret_cast<std::int32_t*>(shared_words) +
-                               threadIdx.x / words::warp_width * stack_entries;
+    const std::uint32_t warp_in_block = threadIdx.x / words::warp_width;
+    warp.memory.packet_stack =
+        reinterpret_cast<std::int32_t*>(shared_words) + warp_in_block * stack_entries;
     run_warp<Kernel, any_hit>(warp, job,
                               (blockIdx.x * blockDim.x + threadIdx.x) / words::warp_width);
 }
