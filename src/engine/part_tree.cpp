@@ -41,23 +41,11 @@ std::uint32_t word_of(const BvhNode& child) {
 }
 
 void set_node(std::span<const BvhNode> slots, const Vec3& middle, WideNode& node) {
-    // The smallest box in slot 0, as in trees of triangles.
-    std::array<BvhNode, quantised_width> children;
-    std::array<double, quantised_width> areas;
-    std::size_t count = 0;
-    for (const BvhNode& child : slots) {
-        if (WideTree::is_unused(child)) continue;
-        const double area = half_area({child.lo, child.hi});
-        std::size_t at = count++;
-        for (; at > 0 && areas[at - 1] > area; --at)
-            areas[at] = areas[at - 1], children[at] = children[at - 1];
-        areas[at] = area, children[at] = child;
-    }
     SlotBoxes boxes;
     std::fill_n(node.child, quantised_width, wide_no_child);
-    for (std::size_t s = 0; s < count; ++s) {
-        boxes.set(static_cast<int>(s), reach_of({children[s].lo, children[s].hi}));
-        node.child[s] = word_of(children[s]);
+    for (std::size_t s = 0; s < slots.size() && !WideTree::is_unused(slots[s]); ++s) {
+        boxes.set(static_cast<int>(s), reach_of({slots[s].lo, slots[s].hi}));
+        node.child[s] = word_of(slots[s]);
     }
     set_boxes_about(middle, boxes, node);
 }

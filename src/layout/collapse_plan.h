@@ -10,6 +10,7 @@
 
 #include "base/math.h"
 #include "layout/binary_view.h"
+#include "layout/search_odds.h"
 #include "layout/subtree_shares.h"
 #include "layout/wide_collapse.h"
 
@@ -22,6 +23,7 @@ struct CollapseEntry {
     Ref ref;
     std::uint32_t children;  // the first one; none of a leaf
     PrimitiveRun run;
+    float hits;  // as SearchOdds has it; areas are parts of the tree's
 
     static constexpr std::uint32_t none = ~std::uint32_t{0};
     [[nodiscard]] bool is_leaf() const { return children == none; }
@@ -168,6 +170,10 @@ public:
     [[nodiscard]] std::size_t size() const { return entries_.size(); }
     /// Whether a subtree is a leaf of the wide tree, as a child of some node.
     [[nodiscard]] bool is_leaf(std::uint32_t k) const { return plans_[k].is_leaf(); }
+    /// Of a subtree that is a child of some node.
+    [[nodiscard]] SearchOdds odds(std::uint32_t k) const {
+        return {entries_[k].hits, plans_[k].cost[0]};
+    }
     /// Calls take(position) for the primitives of a leaf of the wide tree, in the tree's order.
     template <class Take>
     void for_each_primitive(std::uint32_t k, const Take& take) const {
@@ -200,13 +206,15 @@ private:
     /// What its children will be read from is asked for ahead.
     [[nodiscard]] Entry entry_of(Ref ref) const {
         view_.prefetch(ref);
-        if (view_.is_leaf(ref)) return {view_.box(ref), ref, Entry::none, view_.run(ref)};
-        return {view_.box(ref), ref, 0, {0, 0}};
+        if (view_.is_leaf(ref)) return {view_.box(ref), ref, Entry::none, view_.run(ref), 0};
+        return {view_.box(ref), ref, 0, {0, 0}, 0};
     }
 
     void plan_leaf(std::size_t k) {
-        plans_[k].cost.fill(leaf_cost(relative_area(entries_[k].box), entries_[k].run.count));
+        const float area = relative_area(entries_[k].box);
+        plans_[k].cost.fill(leaf_cost(area, entries_[k].run.count));
         plans_[k].choices = 1;
+        entries_[k].hits = hits_of_leaf(area);
     }
 
     [[nodiscard]] float relative_area(const Aabb& box) const {
@@ -229,6 +237,9 @@ private:
                                  area * static_cast<float>(node_cost),
                                  may_be_leaf ? leaf_cost(area, entry.run.count) : infinity,
                                  plans_[k]);
+        entry.hits = plans_[k].is_leaf() ? hits_of_leaf(area)
+                                         : joined_hits(entries_[entry.children].hits,
+                                                       entries_[entry.children + 1].hits, area);
     }
 
     /// Plans begin with their costs, and end with another word.

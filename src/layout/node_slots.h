@@ -1,4 +1,4 @@
-// The slots of a wide node of eight children, all at once: order by area, boxes about the middle,
+// The slots of a wide node of eight children, all at once: their order, boxes about the middle,
 // words.
 #pragma once
 
@@ -7,8 +7,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "base/x86_intrinsics.h"
+#include "layout/search_odds.h"
 #include "layout/wide_bvh.h"
 
 namespace raydix {
@@ -56,22 +58,23 @@ struct EightRows {
     }
 }
 
-/// rows: a child each, the corner lo, its word, the corner hi, its area; infinite ones, turned
-/// round, with wide_no_child and an infinite area for those that there are none of. Boxes and words
-/// of the node: the smallest first, since rays that stop at any hit take the last slot first, where
-/// a hit is likeliest. Equal areas keep their order, which is returned.
+/// rows: a child each, the corner lo, its word, the corner hi, its hits; infinite ones, turned
+/// round, with wide_no_child and infinite hits for those that there are none of. costs: of the
+/// children. Boxes and words of the node, by ascending search_rank: rays that stop at any hit take
+/// the last slot first. Equal ranks keep their order, which is returned.
 [[gnu::always_inline]] __attribute__((target("avx2"))) inline SlotOrder write_slots_within_avx2(
-    EightRows& rows, Vec3 about, WideNode& node) {
+    EightRows& rows, __m256 costs, Vec3 about, WideNode& node) {
     transpose_8(rows);
-    const __m256 area = rows[7];
+    constexpr float least = std::numeric_limits<float>::min();
+    const __m256 worth = _mm256_div_ps(rows[7], _mm256_max_ps(costs, _mm256_set1_ps(least)));
     const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
     __m256i rank = _mm256_setzero_si256();
     for (int other = 0; other < 8; ++other) {
         const __m256i which = _mm256_set1_epi32(other);
-        const __m256 its = _mm256_permutevar8x32_ps(area, which);
-        const __m256 equal = _mm256_and_ps(_mm256_cmp_ps(its, area, _CMP_EQ_OQ),
+        const __m256 its = _mm256_permutevar8x32_ps(worth, which);
+        const __m256 equal = _mm256_and_ps(_mm256_cmp_ps(its, worth, _CMP_EQ_OQ),
                                            _mm256_castsi256_ps(_mm256_cmpgt_epi32(lane, which)));
-        const __m256 before = _mm256_or_ps(_mm256_cmp_ps(its, area, _CMP_LT_OQ), equal);
+        const __m256 before = _mm256_or_ps(_mm256_cmp_ps(its, worth, _CMP_LT_OQ), equal);
         rank = _mm256_sub_epi32(rank, _mm256_castps_si256(before));
     }
     __m256i from = _mm256_setzero_si256();  // [slot]: the child whose rank it is

@@ -12,6 +12,7 @@
 
 #include "exec/progress.h"
 #include "layout/collapse_plan.h"
+#include "layout/search_odds.h"
 #include "layout/sorted_top.h"
 #include "layout/wide_bvh.h"
 #include "layout/wide_part.h"
@@ -26,14 +27,14 @@ struct alignas(64) PartEntry {
     Vec3 lo;
     std::uint32_t link;  // of a leaf its word, as in WideNode::child; else the left child
     Vec3 hi;
-    float area;  // half of the surface
+    float hits;  // as SearchOdds has it
     CollapsePlan<width> plan;
 };
 
 /// What a part has become, as a child of the top.
 struct PartRoot {
     Aabb box;
-    float area = 0;
+    SearchOdds odds{};
     std::uint32_t word = 0;  // a node or a leaf, numbered within its group
 };
 

@@ -30,7 +30,7 @@ public:
             const Entry& entry = entries_[root];
             const std::uint32_t word = is_whole(root) ? entry.link : write_nodes(root, part.depth);
             in_.progress.add(0.5 * (part.end - part.begin));
-            group_.roots[p] = {{entry.lo, entry.hi}, entry.area, word};
+            group_.roots[p] = {{entry.lo, entry.hi}, odds(entry), word};
         }
     }
 
@@ -115,10 +115,10 @@ private:
         entry.lo = plain.lo;
         entry.hi = plain.hi;
         entry.link = wide_leaf_bit | place << 3 | (count - 1);
-        entry.area = area_of(entry);
-        set_leaf_plan(
-            entry.area * static_cast<float>(count) * static_cast<float>(wide_primitive_cost),
-            entry.plan);
+        const float area = area_of(entry);
+        entry.hits = hits_of_leaf(area);
+        set_leaf_plan(area * static_cast<float>(count) * static_cast<float>(wide_primitive_cost),
+                      entry.plan);
     }
 
     /// Entry `k`, with the one before it as right child.
@@ -129,8 +129,9 @@ private:
         box.lo.store(entry.lo);
         box.hi.store(entry.hi);
         entry.link = left;
-        entry.area = area_of(entry);
-        join_plans(a.plan, b.plan, entry.area, entry.plan);
+        const float area = area_of(entry);
+        entry.hits = joined_hits(a.hits, b.hits, area);
+        join_plans(a.plan, b.plan, area, entry.plan);
     }
     static void join_plans(const CollapsePlan<width>& a, const CollapsePlan<width>& b,
                            float node_cost, CollapsePlan<width>& out) {
@@ -191,20 +192,23 @@ private:
         sums.levels = std::max(sums.levels, at.depth + 1);
     }
 
-    /// Boxes and links of the children: the smallest first, since rays that stop at any hit take
-    /// the last slot first, where a hit is likeliest. Equal areas keep their order, which is
-    /// returned.
+    static SearchOdds odds(const Entry& entry) { return {entry.hits, entry.plan.cost[0]}; }
+
+    /// Boxes and links of the children, by ascending search_rank: rays that stop at any hit take
+    /// the last slot first. Equal ranks keep their order, which is returned.
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
     Order write_slots(const std::array<std::uint32_t, width>& chosen, std::uint32_t count,
                       WideNode& node) const {
         static_assert(offsetof(Entry, plan) == sizeof(__m256));
         EightRows rows;
+        alignas(32) std::array<float, 8> costs;
         for (std::uint32_t s = 0; s < 8; ++s) {
             const bool there = s < width && s < count;
             const Entry* const entry = there ? &entries_[chosen[s]] : &no_entry;
             rows[s] = _mm256_load_ps(reinterpret_cast<const float*>(entry));
+            costs[s] = entry->plan.cost[0];
         }
-        return write_slots_within_avx2(rows, in_.middle, node);
+        return write_slots_within_avx2(rows, _mm256_load_ps(costs.data()), in_.middle, node);
     }
 #else
     Order write_slots(const std::array<std::uint32_t, width>& chosen, std::uint32_t count,
@@ -212,7 +216,7 @@ private:
         Order order{};
         for (std::uint32_t child = 0; child < count; ++child) {
             std::uint32_t at = child;
-            for (; at > 0 && area(chosen[order[at - 1]]) > area(chosen[child]); --at)
+            for (; at > 0 && rank(chosen[order[at - 1]]) > rank(chosen[child]); --at)
                 order[at] = order[at - 1];
             order[at] = child;
         }
@@ -226,7 +230,7 @@ private:
         set_boxes_about(in_.middle, boxes, node);
         return order;
     }
-    [[nodiscard]] float area(std::uint32_t k) const { return entries_[k].area; }
+    [[nodiscard]] float rank(std::uint32_t k) const { return search_rank(odds(entries_[k])); }
 #endif
 
     const PartInput& in_;

@@ -23,7 +23,7 @@ struct SortedTriangles {
     Aabb bounds;  // around all
 };
 
-/// A slot of the top before its children are in order of area.
+/// A slot of the top before its children are in order.
 struct TopSlot {
     static constexpr std::uint32_t no_node = ~std::uint32_t{0};
     std::uint32_t node, child;

@@ -169,7 +169,8 @@ private:
 
     static PartRoot write_top_node(std::span<PartRoot> children, Vec3 middle, WideNode& node,
                                    WideSums& sums) {
-        std::ranges::stable_sort(children, {}, &PartRoot::area);
+        std::ranges::stable_sort(children, {},
+                                 [](const PartRoot& root) { return search_rank(root.odds); });
         SlotBoxes boxes{};
         std::fill_n(node.child, quantised_width, wide_no_child);
         PartRoot all{empty_box()};
@@ -185,9 +186,12 @@ private:
             sums.triangle_area += half_area(child.box) * triangles;
         }
         set_boxes_about(middle, boxes, node);
-        all.area = static_cast<float>(half_area(all.box));
+        const double area = half_area(all.box);
+        all.odds = odds_of_node(static_cast<float>(area));
+        for (const PartRoot& child : children)
+            add_child(child.odds, static_cast<float>(area), all.odds);
         sums.children += children.size();
-        sums.node_area += half_area(all.box);
+        sums.node_area += area;
         return all;
     }
 

@@ -40,24 +40,38 @@ private:
         for (std::size_t begin = 0; begin < roots_.size(); ++levels)
             for (const std::size_t end = roots_.size(); begin < end; ++begin) {
                 base_.push_back(static_cast<std::uint32_t>(roots_.size()));
-                const auto count =
-                    static_cast<std::size_t>(collapse_.children(roots_[begin], chosen));
+                const std::size_t count = children(roots_[begin], chosen);
                 for (std::size_t k = 0; k < count; ++k)
                     if (!collapse_.is_leaf(chosen[k])) roots_.push_back(chosen[k]);
             }
         return levels;
     }
 
+    /// By ascending search_rank; those of equal rank from left to right.
+    std::size_t children(std::uint32_t root, std::array<std::uint32_t, width>& chosen) const {
+        const auto count = static_cast<std::size_t>(collapse_.children(root, chosen));
+        std::array<float, width> ranks;
+        for (std::size_t k = 0; k < count; ++k) {
+            const std::uint32_t child = chosen[k];
+            const float rank = search_rank(collapse_.odds(child));
+            std::size_t at = k;
+            for (; at > 0 && ranks[at - 1] > rank; --at)
+                ranks[at] = ranks[at - 1], chosen[at] = chosen[at - 1];
+            ranks[at] = rank, chosen[at] = child;
+        }
+        return count;
+    }
+
     void emit(std::size_t w, BvhNode* out) const {
         std::array<std::uint32_t, width> chosen;
-        const auto count = static_cast<std::size_t>(collapse_.children(roots_[w], chosen));
+        const std::size_t count = children(roots_[w], chosen);
         std::uint32_t next = base_[w];
         for (std::size_t k = 0; k < count; ++k) {
-            const auto& [box, ref, children, run] = collapse_.entry(chosen[k]);
+            const auto& entry = collapse_.entry(chosen[k]);
             if (collapse_.is_leaf(chosen[k]))
-                out[k] = {box.lo, run.first, box.hi, run.count};
+                out[k] = {entry.box.lo, entry.run.first, entry.box.hi, entry.run.count};
             else
-                out[k] = {box.lo, next++, box.hi, 0};
+                out[k] = {entry.box.lo, next++, entry.box.hi, 0};
         }
         const Aabb none = empty_box();
         std::fill(out + count, out + width, BvhNode{none.lo, WideTree::no_child, none.hi, 0});

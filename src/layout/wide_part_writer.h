@@ -12,6 +12,7 @@
 #include "layout/about_middle.h"
 #include "layout/collapse_plan.h"
 #include "layout/node_slots.h"
+#include "layout/search_odds.h"
 #include "layout/wide_bvh.h"
 #include "layout/wide_part.h"
 
@@ -23,6 +24,7 @@ struct WideChild {
     Aabb box;
     std::uint32_t word;
     std::uint32_t source;  // the caller's name for it
+    SearchOdds odds;
 };
 
 template <int width, class View>
@@ -50,14 +52,11 @@ public:
                    const Wait& wait) {
         out_.sums.levels = std::max(out_.sums.levels, depth + 1);
         Aabb all = empty_box();
-        std::array<float, quantised_width> areas;
-        for (std::size_t k = 0; k < children.size(); ++k) {
-            const double area = half_area(children[k].box);
-            areas[k] = static_cast<float>(area);
-            all = unite(all, children[k].box);
-            add_figures(children[k], area);
+        for (const WideChild& child : children) {
+            all = unite(all, child.box);
+            add_figures(child);
         }
-        const SlotOrder order = write_slots(w, children, areas, all);
+        const SlotOrder order = write_slots(w, children, all);
         for (std::uint32_t slot = 0; slot < children.size(); ++slot)
             if (children[order[slot]].word == WideChild::inner_word)
                 wait(children[order[slot]].source, slot);
@@ -87,7 +86,8 @@ public:
                                                ? leaf_word(subtree, chosen[k])
                                                : WideChild::inner_word;
                 if (word != wide_no_child)
-                    children[count++] = {subtree.entry(chosen[k]).box, word, chosen[k]};
+                    children[count++] = {subtree.entry(chosen[k]).box, word, chosen[k],
+                                         subtree.odds(chosen[k])};
             }
             fill_node(w, std::span(children).first(count), at.depth,
                       [&](std::uint32_t entry, std::uint32_t slot) {
@@ -117,13 +117,11 @@ public:
 
 private:
     /// Boxes and words of the children, in the order that is returned.
-    SlotOrder write_slots(std::uint32_t w, std::span<const WideChild> children,
-                          const std::array<float, quantised_width>& areas, const Aabb& all) {
+    SlotOrder write_slots(std::uint32_t w, std::span<const WideChild> children, const Aabb& all) {
 #if defined(RAYDIX_X86_INTRINSICS)
-        if (with_avx2_ && !compact_)
-            return write_slots_avx2(children, areas, middle_, out_.nodes[w]);
+        if (with_avx2_ && !compact_) return write_slots_avx2(children, middle_, out_.nodes[w]);
 #endif
-        const SlotOrder order = by_area(children.size(), areas);
+        const SlotOrder order = by_search_rank(children);
         SlotBoxes by_slot;
         for (std::uint32_t slot = 0; slot < children.size(); ++slot) {
             const WideChild& child = children[order[slot]];
@@ -143,9 +141,9 @@ private:
 
 #if defined(RAYDIX_X86_INTRINSICS)
     __attribute__((target("avx2"))) static SlotOrder write_slots_avx2(
-        std::span<const WideChild> children, const std::array<float, quantised_width>& areas,
-        Vec3 middle, WideNode& node) {
+        std::span<const WideChild> children, Vec3 middle, WideNode& node) {
         EightRows rows;
+        alignas(32) std::array<float, 8> costs{};
         for (std::size_t k = 0; k < 8; ++k) {
             if (k >= children.size()) {
                 rows[k] = _mm256_setr_ps(infinity, infinity, infinity,
@@ -155,22 +153,24 @@ private:
             }
             const WideChild& child = children[k];
             const __m128 lo_hi = _mm_loadu_ps(&child.box.lo.x),  // lo.x, lo.y, lo.z, hi.x
-                hi = _mm_setr_ps(child.box.hi.x, child.box.hi.y, child.box.hi.z, areas[k]);
+                hi = _mm_setr_ps(child.box.hi.x, child.box.hi.y, child.box.hi.z, child.odds.hits);
+            costs[k] = child.odds.cost;
             const __m128i lo =
                 _mm_insert_epi32(_mm_castps_si128(lo_hi), static_cast<int>(child.word), 3);
             rows[k] = _mm256_set_m128(hi, _mm_castsi128_ps(lo));
         }
-        return write_slots_within_avx2(rows, middle, node);
+        return write_slots_within_avx2(rows, _mm256_load_ps(costs.data()), middle, node);
     }
 #endif
 
-    /// The children's places, the smallest box first: rays that stop at any hit take the last slot
-    /// first, where a hit is likeliest. Equal areas keep their order.
-    static SlotOrder by_area(std::size_t count, const std::array<float, quantised_width>& areas) {
+    /// The children's places: rays that stop at any hit take the last slot first. Equal ranks keep
+    /// their order.
+    static SlotOrder by_search_rank(std::span<const WideChild> children) {
         SlotOrder order{};
-        for (std::uint32_t k = 0; k < count; ++k) {
+        const auto rank = [&](std::uint32_t k) { return search_rank(children[k].odds); };
+        for (std::uint32_t k = 0; k < children.size(); ++k) {
             std::uint32_t at = k;
-            for (; at > 0 && areas[order[at - 1]] > areas[k]; --at) order[at] = order[at - 1];
+            for (; at > 0 && rank(order[at - 1]) > rank(k); --at) order[at] = order[at - 1];
             order[at] = k;
         }
         return order;
@@ -211,7 +211,8 @@ private:
         }
     }
 
-    void add_figures(const WideChild& child, double area) {
+    void add_figures(const WideChild& child) {
+        const double area = half_area(child.box);
         ++out_.sums.children;
         out_.sums.child_area += area;
         if ((child.word & wide_leaf_bit) == 0) return;

@@ -116,8 +116,8 @@ private:
 #endif
 };
 
-/// `slots` into `order`, the smallest box first; how many.
-HWY_INLINE std::uint32_t order_by_area(std::uint32_t slots, std::uint32_t* order) {
+/// `slots` into `order`, as they lie; how many.
+HWY_INLINE std::uint32_t order_by_slot(std::uint32_t slots, std::uint32_t* order) {
     std::uint32_t count = 0;
     for (; slots != 0; slots &= slots - 1)
         order[count++] = static_cast<std::uint32_t>(std::countr_zero(slots));

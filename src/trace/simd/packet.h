@@ -369,7 +369,7 @@ private:
     static HWY_INLINE std::uint32_t order_of(std::uint32_t met, const float* entries,
                                              std::uint32_t* order) {
         return closest || nearest_first ? order_by_entry(met, entries, order)
-                                        : order_by_area(met, order);
+                                        : order_by_slot(met, order);
     }
 
     void test_leaf(std::uint32_t word, std::uint64_t active) {

@@ -35,7 +35,7 @@ constexpr std::size_t parts8 = 8 / lanes8;
 ///   bool is_at_hand()
 ///       if there is such a function: whether any hit need not ask; else it never asks
 ///   bool nearest_first
-///       for any hit: whether the nearest child is the next one, not the largest. It ends rays soon
+///       for any hit: whether the nearest child is the next one, not the last. It ends rays soon
 ///       that begin close to something.
 struct NoParts {};
 
@@ -197,8 +197,9 @@ protected:
         }
     }
 
-    /// `word` becomes the nearest child that the ray meets, or for any hit the largest; the others
-    /// go onto the stack, the farthest or smallest first. False if it meets none.
+    /// `word` becomes the nearest child that the ray meets, or for any hit that of the last slot;
+    /// the others go onto the stack, the farthest or those of lower slots first. False if it meets
+    /// none.
     template <class Node>
     HWY_INLINE bool visit(const Node& node, const Rates& about, std::size_t& top,
                           std::uint32_t& word) {
@@ -219,13 +220,13 @@ protected:
                 }
                 if (parts_->nearest_first) {
                     const std::size_t nearest = nearest_of(entries, met);
-                    push_by_area(node.child, met & ~(1u << nearest), top, word);
+                    push_by_slot(node.child, met & ~(1u << nearest), top, word);
                     stack_.words[top++] = word;
                     word = node.child[nearest];
                     return true;
                 }
             }
-            push_by_area(node.child, met, top, word);
+            push_by_slot(node.child, met, top, word);
         }
         return true;
     }
@@ -240,7 +241,7 @@ protected:
     }
 
     /// Two children or more, in the order of their slots.
-    HWY_INLINE void push_by_area(const std::uint32_t* child, std::uint32_t met, std::size_t& top,
+    HWY_INLINE void push_by_slot(const std::uint32_t* child, std::uint32_t met, std::size_t& top,
                                  std::uint32_t& word) {
         if constexpr (parts8 == 1) {
             const auto words = hn::BitCast(f8, hn::Load(U8(), child));

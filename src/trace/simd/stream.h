@@ -160,7 +160,7 @@ private:
         const Planes planes = planes_of(node);
         std::uint32_t children[8], child_count;  // the farthest first
         if constexpr (any && !has_parts) {       // parts: see single.h
-            child_count = order_by_area(used_slots(node), children);
+            child_count = order_by_slot(used_slots(node), children);
         } else {
             HWY_ALIGN float entries[8];
             find_entries(planes, rays_[*list & ray_bits], entries);
