@@ -140,15 +140,9 @@ private:
     };
 
     HWY_INLINE bool start(Turn& turn) {
-        while (next_ < job_.n) {
-            const std::size_t k = next_ % lanes16;
-            if (k == 0) read_ahead();
-            ++next_;
+        while (at_ < count_ || read_ahead()) {
+            const std::size_t k = at_++;
             turn.i = static_cast<std::size_t>(index_[k]);
-            if (frames_.passes_by(k)) {
-                set(turn.i, {});
-                continue;
-            }
             if (frames_.take(k, turn.frame) ||
                 fill_frame(job_.tree, job_.rays[turn.i], turn.frame)) {
                 turn.ray->stand_for(static_cast<std::uint32_t>(turn.i));
@@ -162,16 +156,42 @@ private:
         }
         return false;
     }
-    /// The next lanes16 rays, the last one again to fill the vector.
-    HWY_INLINE void read_ahead() {
-        for (std::size_t l = 0; l < lanes16; ++l) {
+    /// Frames of the next lanes16 rays, or of all that are left; false if there are none.
+    HWY_INLINE bool read_ahead() {
+        waiting_ -= count_;
+        std::copy_n(index_ + count_, waiting_, index_);
+        while (waiting_ < lanes16 && next_ < job_.n) take_up();
+        at_ = 0;
+        count_ = std::min(waiting_, lanes16);
+        if (count_ == 0) return false;
+        for (std::size_t l = count_; l < lanes16; ++l) index_[l] = index_[count_ - 1];
+        frames_.fill(job_.rays, index_);
+        return true;
+    }
+    /// The next lanes16 rays of the job, without those that pass the bounds by where many do.
+    HWY_INLINE void take_up() {
+        std::int32_t* const taken = index_ + waiting_;
+        const std::size_t count = std::min(job_.n - next_, lanes16);
+        for (std::size_t l = 0; l < lanes16; ++l) {  // the last one again to fill the vector
             const std::size_t k = std::min(next_ + l, job_.n - 1);
-            index_[l] = static_cast<std::int32_t>(job_.order != nullptr ? job_.order[k] : k);
+            taken[l] = static_cast<std::int32_t>(job_.order != nullptr ? job_.order[k] : k);
         }
         if (job_.order != nullptr)
             for (std::size_t l = 0; l < lanes16; ++l)
                 ask_for_ray(job_.order[std::min(next_ + l + lanes16, job_.n - 1)]);
-        frames_.fill(job_.rays, index_);
+        next_ += count;
+        if (!job_.passing) {
+            waiting_ += count;
+            return;
+        }
+        const std::uint32_t passing = frames_.passing_by(job_.rays, taken);
+        for (std::size_t l = 0; l < count; ++l) {
+            const std::int32_t i = taken[l];
+            if ((passing >> l & 1) != 0)
+                set(static_cast<std::size_t>(i), {});
+            else
+                index_[waiting_++] = i;
+        }
     }
     /// In an order of their own rays and hits lie anywhere.
     HWY_INLINE void ask_for_ray(std::size_t i) const {
@@ -204,9 +224,10 @@ private:
 
     const SimdJob& job_;
     SimdCounts& counts_;
-    std::size_t next_ = 0;
-    HWY_ALIGN std::int32_t index_[lanes16];  // of the rays in frames_
-    SingleFrames frames_{job_.tree, job_.passing};
+    std::size_t next_ = 0;                          // of the job that has not been taken up
+    std::size_t waiting_ = 0, count_ = 0, at_ = 0;  // of index_: all, in frames_, and begun
+    HWY_ALIGN std::int32_t index_[2 * lanes16];     // of rays in the job
+    SingleFrames frames_{job_.tree};
 };
 
 inline void single(const SimdJob& job, SimdCounts& counts) {
