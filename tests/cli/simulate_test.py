@@ -6,7 +6,7 @@ import sys
 import unittest
 
 sys.dont_write_bytecode = True
-from program import SANITIZED, SHARED_SCENES, TRIANGLE, ProgramTest, main  # noqa: E402
+from program import SANITIZED, SHARED_SCENES, TRIANGLE, ProgramTest, main, ply  # noqa: E402
 
 SCENE = "builtin:grove?triangles=10000" if SANITIZED else "builtin:grove?triangles=20000"
 SMALL = ("--size", "32x24", "--samples", "2") if SANITIZED else ("--size", "64x48", "--samples", "4")
@@ -357,6 +357,46 @@ class Traversal(ProgramTest):
         self.fail_with_one_line(*arguments, "--ao-radius", "3", "--state", "state.json", names=["state.json", "other options"])
         self.write("other.json", "{}")
         self.fail_with_one_line(*arguments, "--state", "other.json", names=["other.json", "is no state of bench traversal"])
+
+    def test_a_state_of_something_else_is_refused(self):
+        cameras = {"width": 32, "height": 24, "ao_radius": 0.5, "cameras": [
+            {"position": [0.2, 0.3, 3], "target": [0.5, 0.5, 0], "up": [0, 1, 0], "vfov": 30}]}
+        arguments = ("bench", "traversal", "one.ply", "--cameras", "cameras.json", "--samples", "1", "--machine", "gtx285",
+                     "--kernel", "while_while", "--rays", "primary,ao", "--sweep-sample", "0", "--quiet", "--state", "kept.json")
+        corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+        self.write("one.ply", ply(corners, [(0, 1, 2)]))
+        self.write("cameras.json", json.dumps(cameras))
+        self.document(*arguments)
+        for change in ({"width": 64, "height": 48}, {"ao_radius": 5}):
+            self.write("cameras.json", json.dumps({**cameras, **change}))
+            self.fail_with_one_line(*arguments, names=["kept.json", "other options"])
+        self.write("cameras.json", json.dumps(cameras))
+        self.write("one.ply", ply([(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 1, 2)]))  # in the same box
+        self.fail_with_one_line(*arguments, names=["kept.json", "another scene"])
+        self.write("one.ply", ply(corners, [(0, 1, 2)]))
+        self.document(*arguments)
+
+    def test_a_damaged_state_is_refused(self):
+        arguments = ("bench", "traversal", self.write("one.ply", TRIANGLE), *SMALL, "--machine", "gtx285", "--kernel",
+                     "while_while", "--rays", "primary", "--sweep-sample", "0", "--quiet", "--state")
+        self.document(*arguments, "sound.json")
+        sound = json.loads((self.folder / "sound.json").read_text(encoding="utf-8"))
+        (name, part), = sound["parts"].items()
+
+        def refused(document, *names):
+            self.write("damaged.json", json.dumps(document))
+            result = self.fail_with_one_line(*arguments, "damaged.json", names=["damaged.json: ", *names])
+            self.assertNotIn("json.exception", result.err)
+
+        refused({**sound, "holds": 3}, "is no state")
+        refused({**sound, "version": 1}, "another version")
+        for value in (3, None, [1], "x", {}):
+            refused({**sound, "parts": {name: value}})
+        for launches in (-1, 0.5, part["launches"] - 1, part["launches"] + 1):
+            refused({**sound, "parts": {name: {**part, "launches": launches}}}, "cannot be gone on with")
+        for row in ({"instructions": -5}, {"rays": 1.5}, {"warp_times": [[-1, 1]]}):
+            refused({**sound, "parts": {name: {**part, "rows": [{**part["rows"][0], **row}]}}}, "cannot be gone on with")
+        refused({**sound, "parts": {name: {**part, "rows": 2 * part["rows"]}}}, "cannot be gone on with: 2 rows, not 1")
 
     def test_a_sample_is_corrected_by_all_launches(self):
         arguments = ("bench", "traversal", SCENE, "--size", "128x96", "--samples", "8", "--launch-rays", "1024", "--machine",
