@@ -107,6 +107,7 @@ public:
         : options_(options), document_(document), machines_(study_machines()) {}
 
     void run() {
+        require_different_names(scenes());
         document_["max_leaf"] = options_.max_leaf;
         document_["factors"] = options_.factors;
         for (const char* list : {"runs", "builds", "machines", "hierarchy_claims"})
@@ -394,6 +395,7 @@ void add_hierarchy_suite(CLI::App& bench) {
                 throw CLI::ValidationError(
                     "--thread-counts",
                     fmt::format("{} is more than the {} of --threads", threads, most));
+        require_writable_json(options->common);
         run_hierarchy(*options);
     });
 }

@@ -215,9 +215,10 @@ public:
         for (const char* list : {"scenes", "builds", "machines", "simulate", "measured",
                                  "published", "claims", "width_sweep"})
             document_[list] = Json::array();
+        require_different_names(options.scenes);
         if (on_device()) static_cast<void>(device_name());  // says what is missing, before any work
         for (const std::string& name : options.machines) {
-            machines_.push_back(machine_from(name));
+            add_machine(name);
             check_machine(name, runs_of(options, {machines_.back()}));
         }
         runs_ = runs_of(options, machines_);
@@ -245,6 +246,17 @@ public:
 
 private:
     [[nodiscard]] bool on_device() const { return runs_on_device(options_.tree.device); }
+
+    /// Throws InputError if its name is that of an earlier one: rows have no more than the name.
+    void add_machine(const std::string& name_or_file) {
+        machines_.push_back(machine_from(name_or_file));
+        const std::string& name = machines_.back().name;
+        if (std::ranges::count(machines_, name, &MachineModel::name) > 1)
+            throw InputError(
+                fmt::format("{}: an earlier machine is named '{}', too: results "
+                            "would not tell them apart",
+                            name_or_file, name));
+    }
 
     /// The same tree, cameras and launches as are simulated, all of them.
     void measure(const SceneTree& input, const WarpTree& tree, RayKind kind,
@@ -383,6 +395,7 @@ void add_traversal_suite(CLI::App& bench) {
         TreeOptions host_tree = options->tree;
         if (is_device(host_tree.device)) host_tree.device = "cpu";
         refuse_device(host_tree);
+        require_writable_json(options->common);
         TraversalStudy(*options).run();
     });
 }

@@ -69,16 +69,19 @@ bool says(const Json& object, const char* field, std::string_view text) {
            object[field].get<std::string>() == text;
 }
 
+/// In UTF-8, whatever the file's name is in: JSON holds nothing else.
 std::string part_name(const std::vector<SimulationRow>& rows) {
-    return fmt::format("{}, {}, {}", rows.front().scene, rows.front().builder, rows.front().rays);
+    const Json name =
+        fmt::format("{}, {}, {}", rows.front().scene, rows.front().builder, rows.front().rays);
+    return Json::parse(name.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
 void read_row(const Json& from, std::uint64_t launches, SimulationRow& row) {
     row.sum = simulate(WarpTree(Bvh{}), {}, std::span(&row.options, 1)).front();  // names and costs
     for_each_sum(row, [&](const char* name, auto& value) { take(from.at(name), value); });
     if (row.sum.launches != launches)
-        throw InputError(fmt::format("the sums are of {} launches, not of {}", row.sum.launches,
-                                     launches));
+        throw InputError(
+            fmt::format("the sums are of {} launches, not of {}", row.sum.launches, launches));
     const Json& operations = from.at("operations");
     for (std::size_t k = 0; k < row.sum.operations.size(); ++k) {
         take(operations.at(k).at(0), row.sum.operations[k].issues);

@@ -358,6 +358,28 @@ class Traversal(ProgramTest):
         self.write("other.json", "{}")
         self.fail_with_one_line(*arguments, "--state", "other.json", names=["other.json", "is no state of bench traversal"])
 
+    def test_scenes_and_machines_of_one_name_are_refused(self):
+        for folder, size in (("a", 1), ("b", 2)):
+            os.makedirs(self.folder / folder, exist_ok=True)
+            self.write(f"{folder}/one.ply", ply([(0, 0, 0), (size, 0, 0), (0, 1, 0)], [(0, 1, 2)]))
+            self.succeed("build", f"{folder}/one.ply", "-o", f"{folder}.rdx", "--quiet")
+        small = ("--size", "16x16", "--samples", "1", "--quiet")
+        for a, b in (("a/one.ply", "b/one.ply"), ("a.rdx", "b.rdx"), ("a.rdx", "b/one.ply"), (SCENE, SCENE)):
+            for bench in ("traversal", "hierarchy"):
+                self.fail_with_one_line("bench", bench, a, b, "--quiet", names=[f"{b}: ", f"from {a}: both are named "])
+        for number in (1, 2):
+            self.write(f"m{number}.json", json.dumps({"base": "gtx480", "multiprocessors": number}))
+        for a, b, name in (("m1.json", "m2.json", "custom"), ("gtx480", "gtx480", "gtx480")):
+            self.fail_with_one_line("bench", "traversal", "a/one.ply", *small, "--machine", f"{a},{b}", names=[f"{b}: ", f"'{name}'"])
+
+    def test_a_name_that_is_not_utf8_has_a_state(self):
+        scene = os.fsdecode(b"b\xff.ply")
+        (self.folder / scene).write_text(TRIANGLE)
+        arguments = ("bench", "traversal", scene, *SMALL, "--machine", "gtx285", "--kernel", "while_while", "--rays", "primary",
+                     "--sweep-sample", "0", "--quiet", "--state", "bytes.json")
+        self.assertEqual(self.document(*arguments)["simulate"], self.document(*arguments)["simulate"])
+        self.assertEqual(len(json.loads((self.folder / "bytes.json").read_text(encoding="utf-8"))["parts"]), 1)
+
     def test_a_state_of_something_else_is_refused(self):
         cameras = {"width": 32, "height": 24, "ao_radius": 0.5, "cameras": [
             {"position": [0.2, 0.3, 3], "target": [0.5, 0.5, 0], "up": [0, 1, 0], "vfov": 30}]}
