@@ -51,6 +51,7 @@ TEST(HierarchyStudy, EveryBuilderMakesTheTreeOfTheLibrary) {
     const Mesh mesh = random_soup(3000, 4);
     const Bvh tree = build_bvh(mesh, {.max_leaf = 1});
     std::set<std::string> digests;
+    std::set<std::vector<std::uint64_t>> levels;
     std::size_t builders = 0;
     for (const HierarchyRun& run : study_all(mesh)) {
         SCOPED_TRACE(run.what.name());
@@ -71,7 +72,10 @@ TEST(HierarchyStudy, EveryBuilderMakesTheTreeOfTheLibrary) {
                                   std::uint64_t{0}),
                   run.inner_nodes);
         EXPECT_EQ(run.items_per_level.front(), 1u);
+        EXPECT_EQ(run.items_per_level.size(), run.max_depth);
+        levels.insert(run.items_per_level);
     }
+    EXPECT_EQ(levels.size(), 1u);
     EXPECT_EQ(builders, 13u);
     EXPECT_EQ(digests.size(), 1u);
     EXPECT_NE(study(random_soup(3000, 5), own).digest, *digests.begin());
