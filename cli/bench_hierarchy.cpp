@@ -223,7 +223,10 @@ private:
             scene, grouped(keys), bits, "case", "launches", "chain", "MB", "threads", "here ms",
             "predicted", "error", "most of it");
         for (const LaunchMachine& m : machines_)
-            fmt::print(" | {:>9} {:>9} {:>6}", m.name,
+            fmt::print(" | {:>9} {:>9} {:>6}",
+                       options_.factors.front() == 1
+                           ? m.name
+                           : fmt::format("{} x{:g}", m.name, options_.factors.front()),
                        fmt::format("x{:g}", options_.factors.back()), "speed");
         fmt::print("\n");
     }
