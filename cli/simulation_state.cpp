@@ -5,6 +5,8 @@
 #include <raydix/files.h>
 #include <raydix/version.h>
 
+#include <array>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <span>
@@ -17,6 +19,33 @@ namespace raydix::cli {
 namespace {
 
 constexpr const char* kind_of_file = "state of bench traversal";
+
+/// As long as it lives a signal that would end the process waits: half a file would be left beside
+/// the one before. Signals that the caller's shell ignores stay ignored.
+class EndsLater {
+public:
+    EndsLater() {
+        noted = 0;
+        for (std::size_t k = 0; k < signals.size(); ++k) {
+            struct sigaction note {};
+            note.sa_handler = [](int signal) { noted = signal; };
+            sigaction(signals[k], nullptr, &before_[k]);
+            if (before_[k].sa_handler == SIG_DFL) sigaction(signals[k], &note, nullptr);
+        }
+    }
+    ~EndsLater() {
+        for (std::size_t k = 0; k < signals.size(); ++k)
+            sigaction(signals[k], &before_[k], nullptr);
+        if (noted != 0) static_cast<void>(std::raise(noted));
+    }
+    EndsLater(const EndsLater&) = delete;
+    EndsLater& operator=(const EndsLater&) = delete;
+
+private:
+    static constexpr std::array signals{SIGINT, SIGTERM, SIGHUP};
+    static inline volatile std::sig_atomic_t noted = 0;
+    std::array<struct sigaction, signals.size()> before_{};
+};
 
 /// Of what rays hit: a tree's hash knows boxes only.
 std::string hash_of_triangles(const Bvh& bvh) {
@@ -213,6 +242,7 @@ void SimulationState::keep(const Json& figures, const std::vector<SimulationRow>
 
 void SimulationState::write() const {
     const std::string text = document_.dump() + "\n";
+    const EndsLater ends_later;
     write_file(file_, std::as_bytes(std::span(text)));
 }
 

@@ -156,7 +156,10 @@ bool StudyCase::is_builder() const {
 std::string StudyCase::name() const {
     std::string text = subject;
     if (form != StudyForm::launches) text += ", " + std::string(study_form_name(form));
-    if (is_builder()) text += fit == Fit::levels ? ", boxes by levels" : ", boxes in one pass";
+    if (is_builder())
+        text += fit == Fit::levels   ? ", boxes by levels"
+                : fit == Fit::atomic ? ", boxes in one pass"
+                                     : ", boxes as published";
     return text;
 }
 

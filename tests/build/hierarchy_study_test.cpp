@@ -197,6 +197,12 @@ TEST(HierarchyStudy, FewAndNoPrimitives) {
             EXPECT_EQ(run.inner_nodes, n - 1) << run.what.name();
         }
     EXPECT_THROW(study(random_soup(5, 1), {"ploc"}), InputError);
+    try {  // the study has it with boxes in one pass and by levels
+        static_cast<void>(study(random_soup(5, 1), {"karras"}));
+        FAIL();
+    } catch (const InputError& error) {
+        EXPECT_STREQ(error.what(), "the study has no case karras, boxes as published");
+    }
     EXPECT_THROW((void)study_hierarchy(random_soup(5, 1), {.repeat = 0}), InputError);
     EXPECT_THROW((void)study_hierarchy(random_soup(5, 1), {.bits = 31}), InputError);
     EXPECT_THROW((void)study_hierarchy(random_soup(5, 1), {.max_leaf = 0}), InputError);

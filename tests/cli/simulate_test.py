@@ -2,11 +2,14 @@
 import json
 import os
 import pathlib
+import signal
+import subprocess
 import sys
+import time
 import unittest
 
 sys.dont_write_bytecode = True
-from program import SANITIZED, SHARED_SCENES, TRIANGLE, ProgramTest, main, ply  # noqa: E402
+from program import PROGRAM, SANITIZED, SHARED_SCENES, TRIANGLE, ProgramTest, main, ply  # noqa: E402
 
 SCENE = "builtin:grove?triangles=10000" if SANITIZED else "builtin:grove?triangles=20000"
 SMALL = ("--size", "32x24", "--samples", "2") if SANITIZED else ("--size", "64x48", "--samples", "4")
@@ -379,6 +382,22 @@ class Traversal(ProgramTest):
                      "--sweep-sample", "0", "--quiet", "--state", "bytes.json")
         self.assertEqual(self.document(*arguments)["simulate"], self.document(*arguments)["simulate"])
         self.assertEqual(len(json.loads((self.folder / "bytes.json").read_text(encoding="utf-8"))["parts"]), 1)
+
+    def test_an_interrupted_study_leaves_its_state_alone(self):
+        arguments = ("bench", "traversal", SCENE, "--size", "64x48", "--samples", "8", "--launch-rays", "1024", "--machine",
+                     "gtx285", "--kernel", "while_while", "--rays", "primary,diffuse", "--sweep-sample", "0", "--quiet")
+        whole = self.document(*arguments)
+        for k in range(20):
+            state = self.folder / "ended.json"
+            state.unlink(missing_ok=True)
+            process = subprocess.Popen([PROGRAM, *arguments, "--state", "ended.json"], cwd=self.folder)
+            while process.poll() is None and not state.exists():
+                time.sleep(0.001)  # until the first launch
+            time.sleep(0.0007 * k)
+            process.send_signal((signal.SIGINT, signal.SIGTERM)[k % 2])
+            self.assertIn(process.wait(), (0, -signal.SIGINT, -signal.SIGTERM))
+            self.assertEqual([file.name for file in self.folder.glob("*.part")], [])
+        self.assertEqual(whole["simulate"], self.document(*arguments, "--state", "ended.json")["simulate"])
 
     def test_a_state_of_something_else_is_refused(self):
         cameras = {"width": 32, "height": 24, "ao_radius": 0.5, "cameras": [
