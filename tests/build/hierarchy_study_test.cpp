@@ -176,6 +176,7 @@ TEST(HierarchyStudy, WorkHereIsSharedByItems) {
     const HierarchyRun wide = one_launch(4000, 0, 2000, 0), narrow = one_launch(4, 0, 5996, 0);
     EXPECT_DOUBLE_EQ(ms(wide, 1), 1e-3 + 18'000e-6);
     EXPECT_DOUBLE_EQ(ms(wide, 8), 1e-3 + 18'000e-6 / 8);
+    EXPECT_DOUBLE_EQ(ms(wide, 0.5), 1e-3 + 18'000e-6 * 2);
     EXPECT_DOUBLE_EQ(ms(narrow, 8), 1e-3 + 18'000e-6 / 4);  // four items fill four threads
     const HierarchyRun chain = one_launch(4000, 0, 2000, 1000);
     EXPECT_DOUBLE_EQ(ms(chain, 1), 1e-3 + 18'000e-6);
