@@ -95,7 +95,7 @@ void simulate_rows(const Document& document, std::vector<CompareRow>& rows) {
         rows.push_back(std::move(row));
     }
     for (const Json* m : objects_at(document.root, "measured")) {
-        CompareRow row{key_of(*m, {"kernel", "rays", "device"}, scene_name(*m)) + ", on a GPU", {}};
+        CompareRow row{key_of(*m, {"kernel", "rays", "device"}, scene_name(*m)) + ", measured", {}};
         add(row,
             {"rate", "Mrays/s", Better::higher, Origin::measured, spread_at(*m, "mrays_per_s")});
         rows.push_back(std::move(row));
