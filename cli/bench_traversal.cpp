@@ -307,12 +307,12 @@ private:
             document_["scenes"].push_back(scene_fields);
         document_["builds"].push_back(build_json(input.bvh, stats, builds));
         const WarpTree tree(input.bvh);
+        const RayLaunches launches(options_.launches, input, options_.common);
         if (options_.common.prints_tables())
             fmt::print("\n{}: {} triangles, builder {}, {} nodes, SAH {}, depth {}\n", scene,
                        grouped(input.scene.mesh().triangles.size()),
                        builder_name(input.bvh.options().builder), grouped(stats.nodes),
                        stats.sah ? fmt::format("{:.1f}", *stats.sah) : "-", stats.max_depth);
-        const RayLaunches launches(options_.launches, input, options_.common);
         for (const RayKind kind : kinds_from(options_.rays)) {
             const std::vector<SimulationRow> rows =
                 simulate_kind(input, tree, launches, kind, runs, options_.launches, options_.common,

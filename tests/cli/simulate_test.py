@@ -186,6 +186,13 @@ class Simulate(ProgramTest):
         self.assertEqual(result.code, 2)
         self.assertIn("bench traversal makes its own rays", result.err)
 
+    def test_nothing_is_printed_before_an_error(self):
+        scene = self.write("one.ply", TRIANGLE)
+        for arguments in (("simulate", scene), ("bench", "traversal", scene, "--machine", "gtx285")):
+            self.fail_with_one_line(*arguments, "--camera", "7", names=["camera 7"])
+            self.fail_with_usage(*arguments, "--camera", "x", names=["'x'"])
+        self.fail_with_one_line("simulate", scene, "--rays", "none.npy", names=["none.npy"])
+
     def test_points_are_refused(self):
         self.fail_with_one_line("simulate", "builtin:uniform?points=100", names=["triangles"])
 
