@@ -107,6 +107,7 @@ public:
         : options_(options), document_(document), machines_(study_machines()) {}
 
     void run() {
+        require_different_names(scenes());
         document_["max_leaf"] = options_.max_leaf;
         document_["factors"] = options_.factors;
         for (const char* list : {"runs", "builds", "machines", "hierarchy_claims"})
@@ -222,7 +223,10 @@ private:
             scene, grouped(keys), bits, "case", "launches", "chain", "MB", "threads", "here ms",
             "predicted", "error", "most of it");
         for (const LaunchMachine& m : machines_)
-            fmt::print(" | {:>9} {:>9} {:>6}", m.name,
+            fmt::print(" | {:>9} {:>9} {:>6}",
+                       options_.factors.front() == 1
+                           ? m.name
+                           : fmt::format("{} x{:g}", m.name, options_.factors.front()),
                        fmt::format("x{:g}", options_.factors.back()), "speed");
         fmt::print("\n");
     }
@@ -394,6 +398,7 @@ void add_hierarchy_suite(CLI::App& bench) {
                 throw CLI::ValidationError(
                     "--thread-counts",
                     fmt::format("{} is more than the {} of --threads", threads, most));
+        require_writable_json(options->common);
         run_hierarchy(*options);
     });
 }

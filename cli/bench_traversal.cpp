@@ -215,9 +215,10 @@ public:
         for (const char* list : {"scenes", "builds", "machines", "simulate", "measured",
                                  "published", "claims", "width_sweep"})
             document_[list] = Json::array();
+        require_different_names(options.scenes);
         if (on_device()) static_cast<void>(device_name());  // says what is missing, before any work
         for (const std::string& name : options.machines) {
-            machines_.push_back(machine_from(name));
+            add_machine(name);
             check_machine(name, runs_of(options, {machines_.back()}));
         }
         runs_ = runs_of(options, machines_);
@@ -245,6 +246,17 @@ public:
 
 private:
     [[nodiscard]] bool on_device() const { return runs_on_device(options_.tree.device); }
+
+    /// Throws InputError if its name is that of an earlier one: rows have no more than the name.
+    void add_machine(const std::string& name_or_file) {
+        machines_.push_back(machine_from(name_or_file));
+        const std::string& name = machines_.back().name;
+        if (std::ranges::count(machines_, name, &MachineModel::name) > 1)
+            throw InputError(
+                fmt::format("{}: an earlier machine is named '{}', too: results "
+                            "would not tell them apart",
+                            name_or_file, name));
+    }
 
     /// The same tree, cameras and launches as are simulated, all of them.
     void measure(const SceneTree& input, const WarpTree& tree, RayKind kind,
@@ -295,12 +307,12 @@ private:
             document_["scenes"].push_back(scene_fields);
         document_["builds"].push_back(build_json(input.bvh, stats, builds));
         const WarpTree tree(input.bvh);
+        const RayLaunches launches(options_.launches, input, options_.common);
         if (options_.common.prints_tables())
             fmt::print("\n{}: {} triangles, builder {}, {} nodes, SAH {}, depth {}\n", scene,
                        grouped(input.scene.mesh().triangles.size()),
                        builder_name(input.bvh.options().builder), grouped(stats.nodes),
                        stats.sah ? fmt::format("{:.1f}", *stats.sah) : "-", stats.max_depth);
-        const RayLaunches launches(options_.launches, input, options_.common);
         for (const RayKind kind : kinds_from(options_.rays)) {
             const std::vector<SimulationRow> rows =
                 simulate_kind(input, tree, launches, kind, runs, options_.launches, options_.common,
@@ -383,6 +395,7 @@ void add_traversal_suite(CLI::App& bench) {
         TreeOptions host_tree = options->tree;
         if (is_device(host_tree.device)) host_tree.device = "cpu";
         refuse_device(host_tree);
+        require_writable_json(options->common);
         TraversalStudy(*options).run();
     });
 }

@@ -1,7 +1,7 @@
 // The claims of Karras 2012 as data. One rule for all: a claim is a figure and the range it must
 // lie in. What is counted has no error. What is modelled has an interval: the figure times 1 - e to
-// 1 + e, where e is the largest error of the rows it stands on at N = 1, and 0.5 on machines whose
-// constants are estimates. Holds: the whole interval lies in the range. Does not hold: none of it.
+// 1 + e, where e is the largest error of the rows it stands on, and 0.5 on machines whose constants
+// are estimates. Holds: the whole interval lies in the range. Does not hold: none of it.
 // Else open.
 #include <fmt/format.h>
 
@@ -43,13 +43,13 @@ Json json_of(const Judged& j) {
             {"verdict", verdict_of(j)}};
 }
 
-/// The rows of one scene, one thread.
+/// The rows of one scene, with as many threads as the first has.
 class SceneRuns {
 public:
     SceneRuns(const std::vector<StudiedRow>& rows, std::string name) : name_(std::move(name)) {
         for (const StudiedRow& row : rows)
-            if (row.scene == name_ && row.run.refusal.empty() && row.run.keys > 1 &&
-                row.run.threads == rows.front().run.threads)
+            if (row.scene == name_ && !row.size_series && row.run.refusal.empty() &&
+                row.run.keys > 1 && row.run.threads == rows.front().run.threads)
                 runs_.push_back(&row.run);
     }
     [[nodiscard]] const std::string& name() const { return name_; }
@@ -93,7 +93,8 @@ double error_of(const Machine& machine, const MeasuredCosts& costs,
     if (std::isfinite(machine.own_error)) return machine.own_error;
     double worst = 0;
     for (const HierarchyRun* run : runs) {
-        const double error = std::fabs(predicted_ms(*run, costs) / run->measured_ms() - 1);
+        const double error =
+            std::fabs(predicted_ms(*run, costs, run->threads) / run->measured_ms() - 1);
         if (!std::isfinite(error)) return error;
         worst = std::max(worst, error);
     }

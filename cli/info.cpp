@@ -108,7 +108,10 @@ void add_info_command(CLI::App& app) {
     command->add_option("SCENE", options->scene, "A file, or builtin:NAME?key=value&...")
         ->required();
     add_common_options(*command, options->common);
-    command->callback([options] { run_info(*options); });
+    command->callback([options] {
+        require_writable_json(options->common);
+        run_info(*options);
+    });
 }
 
 void add_scenes_command(CLI::App& app) {

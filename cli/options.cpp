@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <map>
 
 #include "device_scene.h"
 #include "option_checks.h"
@@ -207,6 +208,21 @@ void say_flattened(const std::string& scene, const CommonOptions& common) {
 bool is_rdx(const std::string& scene) { return CLI::detail::to_lower(scene).ends_with(".rdx"); }
 
 bool is_scene_file(const std::string& scene) { return is_rdx(scene) && holds_scene(scene); }
+
+void require_different_names(const std::vector<std::string>& scenes) {
+    std::map<std::string, std::string> first_of;  // by name
+    for (const std::string& scene : scenes) {
+        std::string name = scene;
+        if (scenes.size() > 1 && is_rdx(scene))
+            name = load_tree_file(scene).scene.name;
+        else if (!scene.starts_with("builtin:"))
+            name = std::filesystem::path(scene).filename();
+        const auto [first, fresh] = first_of.try_emplace(name, scene);
+        if (!fresh)
+            throw InputError(fmt::format("{}: results would not tell it from {}: both are named {}",
+                                         scene, first->second, name));
+    }
+}
 
 RdxFile load_tree_file(const std::string& file) {
     if (holds_scene(file))

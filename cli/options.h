@@ -61,6 +61,8 @@ struct SceneTree {
 [[nodiscard]] bool is_rdx(const std::string& scene);
 /// An .rdx file that holds a scene (scene_file.h).
 [[nodiscard]] bool is_scene_file(const std::string& scene);
+/// Throws InputError if two scenes have one name in results, where folders are left out.
+void require_different_names(const std::vector<std::string>& scenes);
 /// Of an .rdx file that holds a tree. Throws InputError: one that holds a scene.
 [[nodiscard]] RdxFile load_tree_file(const std::string& file);
 /// For work on one mesh. Says so unless --flatten did.

@@ -4,6 +4,7 @@
 #include <raydix/error.h>
 
 #include <memory>
+#include <optional>
 
 #include "option_checks.h"
 #include "output.h"
@@ -62,6 +63,12 @@ void run_simulate(const SimulateCommand& options) {
     document["simulate"] = Json::array();
     about(options.scene, [&] {
         const WarpTree tree(input.bvh);
+        std::vector<Ray> rays;
+        std::optional<RayLaunches> launches;  // before any table: cameras and files may be at fault
+        if (from_file)
+            rays = load_rays(options.rays);
+        else
+            launches.emplace(options.launches, input, options.common);
         if (options.common.prints_tables()) print_head(options, machine, tree);
         const auto hand_out = [&](const std::vector<SimulationRow>& rows) {
             for (const SimulationRow& row : rows)
@@ -72,13 +79,11 @@ void run_simulate(const SimulateCommand& options) {
             }
         };
         if (from_file)
-            return hand_out(simulate_rays(input, tree, load_rays(options.rays), options.rays, runs,
-                                          options.common));
-        const RayLaunches launches(options.launches, input, options.common);
-        document["ao_radius"] = launches.ao_radius();
+            return hand_out(simulate_rays(input, tree, rays, options.rays, runs, options.common));
+        document["ao_radius"] = launches->ao_radius();
         for (const RayKind kind : kinds)
-            hand_out(
-                simulate_kind(input, tree, launches, kind, runs, options.launches, options.common));
+            hand_out(simulate_kind(input, tree, *launches, kind, runs, options.launches,
+                                   options.common));
     });
     write_json(document, options.common);
 }

@@ -5,9 +5,12 @@
 #include <raydix/files.h>
 #include <raydix/version.h>
 
+#include <array>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 #include "option_checks.h"
@@ -16,6 +19,41 @@ namespace raydix::cli {
 namespace {
 
 constexpr const char* kind_of_file = "state of bench traversal";
+
+/// As long as it lives a signal that would end the process waits: half a file would be left beside
+/// the one before. Signals that the caller's shell ignores stay ignored.
+class EndsLater {
+public:
+    EndsLater() {
+        noted = 0;
+        for (std::size_t k = 0; k < signals.size(); ++k) {
+            struct sigaction note {};
+            note.sa_handler = [](int signal) { noted = signal; };
+            sigaction(signals[k], nullptr, &before_[k]);
+            if (before_[k].sa_handler == SIG_DFL) sigaction(signals[k], &note, nullptr);
+        }
+    }
+    ~EndsLater() {
+        for (std::size_t k = 0; k < signals.size(); ++k)
+            sigaction(signals[k], &before_[k], nullptr);
+        if (noted != 0) static_cast<void>(std::raise(noted));
+    }
+    EndsLater(const EndsLater&) = delete;
+    EndsLater& operator=(const EndsLater&) = delete;
+
+private:
+    static constexpr std::array signals{SIGINT, SIGTERM, SIGHUP};
+    static inline volatile std::sig_atomic_t noted = 0;
+    std::array<struct sigaction, signals.size()> before_{};
+};
+
+/// Of what rays hit: a tree's hash knows boxes only.
+std::string hash_of_triangles(const Bvh& bvh) {
+    std::uint64_t hash = 0xCBF29CE484222325u;  // FNV-1a
+    for (const std::byte byte : std::as_bytes(bvh.triangles()))
+        hash = (hash ^ std::to_integer<std::uint64_t>(byte)) * 0x100000001B3u;
+    return fmt::format("{:016x}", hash);
+}
 
 /// Calls field(name, member) for all numbers of a row that launches add to.
 template <class Row, class Field>
@@ -47,20 +85,42 @@ Json row_json(const SimulationRow& row) {
     return out;
 }
 
-std::string part_name(const std::vector<SimulationRow>& rows) {
-    return fmt::format("{}, {}, {}", rows.front().scene, rows.front().builder, rows.front().rays);
+/// As written: no count is negative or has a fraction.
+template <class T>
+void take(const Json& from, T& value) {
+    if (std::is_integral_v<T> && !std::is_same_v<T, bool> && !from.is_number_unsigned())
+        throw InputError(from.dump() + " is no count");
+    from.get_to(value);
 }
 
-void read_row(const Json& from, SimulationRow& row) {
+bool says(const Json& object, const char* field, std::string_view text) {
+    return object.contains(field) && object[field].is_string() &&
+           object[field].get<std::string>() == text;
+}
+
+/// In UTF-8, whatever the file's name is in: JSON holds nothing else.
+std::string part_name(const std::vector<SimulationRow>& rows) {
+    const Json name =
+        fmt::format("{}, {}, {}", rows.front().scene, rows.front().builder, rows.front().rays);
+    return Json::parse(name.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+void read_row(const Json& from, std::uint64_t launches, SimulationRow& row) {
     row.sum = simulate(WarpTree(Bvh{}), {}, std::span(&row.options, 1)).front();  // names and costs
-    for_each_sum(row, [&](const char* name, auto& value) { from.at(name).get_to(value); });
+    for_each_sum(row, [&](const char* name, auto& value) { take(from.at(name), value); });
+    if (row.sum.launches != launches)
+        throw InputError(
+            fmt::format("the sums are of {} launches, not of {}", row.sum.launches, launches));
     const Json& operations = from.at("operations");
     for (std::size_t k = 0; k < row.sum.operations.size(); ++k) {
-        operations.at(k).at(0).get_to(row.sum.operations[k].issues);
-        operations.at(k).at(1).get_to(row.sum.operations[k].lanes);
+        take(operations.at(k).at(0), row.sum.operations[k].issues);
+        take(operations.at(k).at(1), row.sum.operations[k].lanes);
     }
-    for (const Json& bin : from.at("warp_times"))
-        bin.at(1).get_to(row.sum.warp_times.at(bin.at(0).get<std::size_t>()));
+    for (const Json& bin : from.at("warp_times")) {
+        std::size_t k = 0;
+        take(bin.at(0), k);
+        take(bin.at(1), row.sum.warp_times.at(k));
+    }
     for (const Json& unit : from.at("units"))
         row.units.push_back({.bound = unit.at(0).get<double>(),
                              .scheduled = unit.at(1).get<double>(),
@@ -79,12 +139,14 @@ Json figures_of(const SceneTree& input, const std::vector<SimulationRow>& rows,
     for (const SimulationRow& row : rows)
         runs.push_back({warp_kernel_name(row.options.kernel), row.options.width, row.options.memory,
                         machine_model_json(row.options.machine)});
+    const Size size = chosen_size(launches, input.scene);
     return {{"tree", tree_hash(input.bvh)},
+            {"triangles", hash_of_triangles(input.bvh)},
             {"cameras", cameras},
             {"camera", launches.camera},
-            {"size", launches.size_text},
+            {"size", {size.width, size.height}},
             {"samples", launches.samples},
-            {"ao_radius", launches.ao_radius},
+            {"ao_radius", chosen_ao_radius(launches.ao_radius, input.scene, input.bvh.bounds())},
             {"sample", launches.sample},
             {"launch_rays", launches.launch_rays},
             {"seed", seed},
@@ -97,10 +159,10 @@ SimulationState::SimulationState(std::string file) : file_(std::move(file)) {
     if (!std::filesystem::exists(file_)) return;
     std::ifstream in(file_);
     const Json found = Json::parse(in, nullptr, false);
-    if (!found.is_object() || found.value("holds", "") != kind_of_file ||
-        !found.contains("parts") || !found["parts"].is_object())
+    if (!found.is_object() || !says(found, "holds", kind_of_file) || !found.contains("parts") ||
+        !found["parts"].is_object())
         throw InputError(file_ + ": is no " + kind_of_file);
-    if (found.value("version", "") != std::string(version))
+    if (!says(found, "version", version))
         throw InputError(file_ + ": comes from another version of raydix");
     document_ = found;
 }
@@ -110,9 +172,10 @@ const Json* SimulationState::part_of(const Json& figures,
     const std::string name = part_name(rows);
     const auto part = document_["parts"].find(name);
     if (part == document_["parts"].end()) return nullptr;
-    if (part->value("of", Json()) != figures)
+    if (!part->is_object() || part->value("of", Json()) != figures)
         throw InputError(file_ + ": '" + name +
-                         "' was counted with other options, cameras or machines");
+                         "' was counted with another scene, or with other options, cameras or "
+                         "machines");
     return &*part;
 }
 
@@ -122,8 +185,11 @@ std::size_t SimulationState::restore(const Json& figures, std::vector<Simulation
     std::vector<SimulationRow> read = rows;
     try {
         const Json& kept = part->at("rows");
-        for (std::size_t k = 0; k < read.size(); ++k) read_row(kept.at(k), read[k]);
-        const auto launches = part->at("launches").get<std::size_t>();
+        std::size_t launches = 0;
+        take(part->at("launches"), launches);
+        if (kept.size() != read.size())
+            throw InputError(fmt::format("{} rows, not {}", kept.size(), read.size()));
+        for (std::size_t k = 0; k < read.size(); ++k) read_row(kept[k], launches, read[k]);
         rows = std::move(read);
         return launches;
     } catch (const std::exception& error) {
@@ -176,6 +242,7 @@ void SimulationState::keep(const Json& figures, const std::vector<SimulationRow>
 
 void SimulationState::write() const {
     const std::string text = document_.dump() + "\n";
+    const EndsLater ends_later;
     write_file(file_, std::as_bytes(std::span(text)));
 }
 

@@ -77,7 +77,7 @@ FAULTS = [
     Fault("src/exec/host_launcher.h", "Probe::bytes((end - begin) * 2 * pair_bytes);\n                          Probe::steps",
           "Probe::bytes((end - begin) * pair_bytes);\n                          Probe::steps",
           "the sort counts what it reads and not what it writes", "build"),
-    Fault("src/measure/launch_model.cpp", "std::clamp(double(launch.items), 1.0, factor)", "factor",
+    Fault("src/measure/launch_model.cpp", "std::min(std::max(double(launch.items), 1.0), factor)", "factor",
           "the model shares a launch of few items among more threads", "build"),
     Fault("src/tree/garanzha.h", "if (right && task.split - task.first >= max_leaf) ++place;", "",
           "garanzha: both children of a task get the same place in the queue", "tree"),

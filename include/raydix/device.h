@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -91,7 +92,8 @@ public:
     void reset(std::size_t size) {
         if (size > capacity_) {
             *this = DeviceBuffer();
-            memory_ = detail::device_allocate(size * sizeof(T));
+            constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
+            memory_ = detail::device_allocate(size > all / sizeof(T) ? all : size * sizeof(T));
             capacity_ = size;
         }
         size_ = size;

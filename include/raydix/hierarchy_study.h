@@ -27,7 +27,7 @@ enum class StudyForm {
 struct StudyCase {
     std::string subject;  // codes, sort, karras, apetrei, garanzha, lauterbach, octree, kdtree
     StudyForm form = StudyForm::launches;
-    Fit fit = Fit::as_published;  // of the four builders
+    Fit fit = Fit::as_published;  // of the four builders: levels or atomic
 
     [[nodiscard]] bool is_builder() const;  // one of the four
     [[nodiscard]] std::string name() const;

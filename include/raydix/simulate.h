@@ -100,8 +100,8 @@ struct MachineModel {
     // quarter of a warp for words of 16 bytes.
     double l1_transactions_per_clock = 1;
     double l2_gb_per_s = 100, dram_gb_per_s = 100;
-    std::uint32_t l1_bytes = 16384;  // of each multiprocessor; 0: no cache holds data
-    std::uint32_t l1_line_bytes = 128;
+    std::uint32_t l1_bytes = 16384;     // of each multiprocessor; 0: no cache holds data
+    std::uint32_t l1_line_bytes = 128;  // a multiple of 32, at most 4,096
     bool replays = false;  // further lines of one request are asked for by issuing it again
     std::uint32_t l2_bytes = 1u << 20;
     std::uint32_t texture_bytes = 0;       // of a texture cache, in lines of 32; 0: there is none
@@ -118,8 +118,9 @@ struct MachineModel {
 [[nodiscard]] MachineModel machine_model(std::string_view name);
 [[nodiscard]] std::span<const std::string_view> machine_model_names();
 /// Reads a JSON file with the fields of MachineModel. What it leaves out comes from the machine
-/// that its "base" names. Without "base" it must have all but name and origin. Throws InputError
-/// that names the file and the field: one that is missing, unknown or out of range.
+/// that its "base" names. Without "base" it must have the fields that docs/simulator.md does not
+/// let out. Throws InputError that names the file and the field: one that is missing, unknown or
+/// out of range.
 [[nodiscard]] MachineModel load_machine_model(const std::filesystem::path& file);
 
 struct SimulateOptions {
@@ -188,8 +189,9 @@ struct SimulatedRates {
 /// do not depend on the number of threads. Throws InputError: 2^31 - 1 rays or more; a width,
 /// kernel or part_of_launch out of range; a machine with a figure that is not positive, without a
 /// cost for an operation, with a cost above its own `most`, with resident_lanes that are no
-/// multiple of the width or fewer than block_lanes, with more than 2^24 lanes in flight or, for the
-/// memory model, more than 2^30 bytes of caches.
+/// multiple of the width or fewer than block_lanes, with more than 2^24 lanes in flight; for the
+/// memory model lines out of range, more than 2^30 bytes of caches, or 4 GiB or more of tree, rays
+/// and hits.
 [[nodiscard]] std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays,
                                                std::span<const SimulateOptions> runs,
                                                std::vector<std::vector<TreeHit>>* hits = nullptr,

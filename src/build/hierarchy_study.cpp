@@ -17,13 +17,11 @@ namespace {
 
 constexpr std::string_view builders[] = {"karras", "apetrei", "garanzha", "lauterbach"};
 
-/// Inner nodes by depth, as builders that go by levels meet them.
-std::vector<std::uint64_t> level_items(const std::vector<LaunchRecord>& launches) {
-    std::vector<std::uint64_t> items;
-    for (const LaunchRecord& launch : launches)
-        if (launch.label == "fit.level") items.push_back(launch.items);
-    std::ranges::reverse(items);
-    return items;
+/// Where boxes are fitted by levels. Those that lauterbach launches are bits of the code, which are
+/// more than the tree has.
+bool goes_by_levels(const CountedBuild& build) {
+    return std::ranges::find(build.launches, "fit.level", &LaunchRecord::label) !=
+           build.launches.end();
 }
 
 /// One mesh: counted, then timed in rounds.
@@ -84,7 +82,7 @@ private:
             run.digest = counted.digest;
             for (const LaunchRecord& r : counted.launches)
                 run.launches.push_back({r.label, r.items, r.bytes, r.steps, r.longest_chain, 0});
-            run.items_per_level = level_items(counted.launches);
+            if (goes_by_levels(counted)) run.items_per_level = counted.inner_per_level;
         } catch (const InputError& error) {  // more memory than the builder may take, larger leaves
             run.refusal = error.what();
         }
@@ -158,7 +156,10 @@ bool StudyCase::is_builder() const {
 std::string StudyCase::name() const {
     std::string text = subject;
     if (form != StudyForm::launches) text += ", " + std::string(study_form_name(form));
-    if (is_builder()) text += fit == Fit::levels ? ", boxes by levels" : ", boxes in one pass";
+    if (is_builder())
+        text += fit == Fit::levels   ? ", boxes by levels"
+                : fit == Fit::atomic ? ", boxes in one pass"
+                                     : ", boxes as published";
     return text;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <optional>
+#include <system_error>
 
 namespace raydix {
 namespace {
@@ -22,11 +23,11 @@ std::optional<std::uint32_t> index_of(std::string_view kind, std::string_view se
     if (!selector.starts_with(kind)) return {};
     const std::string_view rest = selector.substr(kind.size());
     if (rest.empty()) return 0;
+    if (rest[0] != ':') return {};
     std::uint32_t index = 0;
     const char* end = rest.data() + rest.size();
-    if (rest.size() < 2 || rest[0] != ':' ||
-        std::from_chars(rest.data() + 1, end, index).ptr != end)
-        return {};
+    const auto [after, error] = std::from_chars(rest.data() + 1, end, index);
+    if (error != std::errc() || after != end) return {};
     return index;
 }
 

@@ -24,6 +24,11 @@ namespace detail {
 DeviceMemory device_allocate(std::size_t bytes) {
     DeviceBackend& backend = device_backend();
     if (bytes == 0) return {nullptr, &backend};
+    static_cast<void>(backend.name());  // says if there is no device
+    // Backends round up to lines.
+    if (bytes > std::numeric_limits<std::size_t>::max() / 2)
+        throw DeviceError("device " + backend.selector() +
+                          ": no memory has 2^63 bytes and more, which an array was to take");
     return {backend.allocate(bytes), &backend};
 }
 void device_free(const DeviceMemory& memory) noexcept {

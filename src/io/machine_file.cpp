@@ -87,7 +87,7 @@ private:
         const json* found = find(key);
         if (found == nullptr) return;
         const double given = found->is_number() ? found->get<double>() : -1.0;
-        if (!(given > 0 && given <= 1e15)) in_.fail(key, "not a number above 0");
+        if (!(given > 0 && given <= 1e15)) in_.fail(key, "not a number above 0 and at most 1e15");
         value = given;
     }
     /// A field that may be left out, base or not.

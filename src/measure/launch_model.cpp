@@ -110,7 +110,8 @@ double predicted_ms(const HierarchyRun& run, const LaunchFigures& launch,
     const KernelCost* kernel = costs.find(kernel_of(run, launch));
     if (kernel == nullptr) return launch.items == 0 ? costs.launch_us * 1e-3 : unknown;
     const double work_ns = work_of(launch) * kernel->at(run.keys);
-    const double shared_ns = work_ns / std::clamp(double(launch.items), 1.0, factor);
+    // A part of this machine takes longer, however many items there are.
+    const double shared_ns = work_ns / std::min(std::max(double(launch.items), 1.0), factor);
     // One thread has the chain in its work, most of it in a cache.
     const double chain_ns = std::min(work_ns, launch.longest_chain * costs.latency_ns);
     return costs.launch_us * 1e-3 + std::max(shared_ns, chain_ns) * 1e-6;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "report/hierarchy_tables.h"
 #include "report/sections.h"
 
 namespace raydix::report {
@@ -94,7 +95,7 @@ void simulate_rows(const Document& document, std::vector<CompareRow>& rows) {
         rows.push_back(std::move(row));
     }
     for (const Json* m : objects_at(document.root, "measured")) {
-        CompareRow row{key_of(*m, {"kernel", "rays", "device"}, scene_name(*m)) + ", on a GPU", {}};
+        CompareRow row{key_of(*m, {"kernel", "rays", "device"}, scene_name(*m)) + ", measured", {}};
         add(row,
             {"rate", "Mrays/s", Better::higher, Origin::measured, spread_at(*m, "mrays_per_s")});
         rows.push_back(std::move(row));
@@ -102,6 +103,7 @@ void simulate_rows(const Document& document, std::vector<CompareRow>& rows) {
 }
 
 void hierarchy_rows(const Document& document, std::vector<CompareRow>& rows) {
+    const std::vector<double> factors = numbers_at(document.root, "factors");
     for (const Json* r : objects_at(document.root, "runs")) {
         const char* threads = text_at(*r, "threads") == "1" ? " thread" : " threads";
         CompareRow row{scene_name(*r) + ", " + key_of(*r, {"keys"}, "") + " keys, " +
@@ -114,7 +116,7 @@ void hierarchy_rows(const Document& document, std::vector<CompareRow>& rows) {
         if (const Json& machines = at(*r, "simulated_ms"); machines.is_object())
             for (const auto& [machine, ms] : machines.items())
                 if (const auto list = numbers_at(ms, ""); !list.empty())
-                    add(row, {machine,
+                    add(row, {times_machine(machine, factors),
                               "ms",
                               Better::lower,
                               Origin::simulated,

@@ -61,7 +61,8 @@ std::string run_table(const Study& study) {
             if (std::ranges::find(machines, machine) == machines.end()) machines.push_back(machine);
     for (const std::string& machine : machines) {
         const double last = study.factors.empty() ? 1 : study.factors.back();
-        table.columns.push_back({machine, Format::number, "ms", Origin::simulated});
+        table.columns.push_back(
+            {times_machine(machine, study.factors), Format::number, "ms", Origin::simulated});
         table.columns.push_back({machine + fmt::format(" \xC3\x97 {:g}", last), Format::number,
                                  "ms", Origin::simulated});
         table.columns.push_back({"speed-up", Format::ratio, machine, Origin::simulated});
@@ -221,6 +222,11 @@ std::string build_table(const Study& study) {
 }
 
 }  // namespace
+
+std::string times_machine(const std::string& machine, const std::vector<double>& factors) {
+    const double first = factors.empty() ? 1 : factors.front();
+    return first == 1 ? machine : machine + fmt::format(" \xC3\x97 {:g}", first);
+}
 
 std::string StudyRun::name() const {
     std::string text = builder;

@@ -44,6 +44,10 @@ struct StudyScene {
     [[nodiscard]] std::vector<std::string> machines() const;
 };
 
+/// "gtx480", and the first factor behind it where that is not 1.
+[[nodiscard]] std::string times_machine(const std::string& machine,
+                                        const std::vector<double>& factors);
+
 /// Refers to the document.
 struct Study {
     explicit Study(const Document& source);

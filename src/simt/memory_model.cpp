@@ -1,7 +1,10 @@
 #include "simt/memory_model.h"
 
+#include <raydix/error.h>
+
 #include <algorithm>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace raydix {
@@ -31,7 +34,9 @@ std::uint64_t MemoryModel::set_out(std::span<const MemoryRange> ranges) {
         at += rounded(range.bytes);
     }
     if (at / sector_bytes >= 1u << 27)
-        throw std::logic_error("more than the memory model can hold");
+        throw InputError(
+            "the memory model takes less than 4 GiB of tree, rays and hits; these are " +
+            std::to_string(at) + " bytes");
     return at / sector_bytes;
 }
 

@@ -33,7 +33,7 @@ MemoryReplay::MemoryReplay(const MachineModel& machine, std::uint32_t warps,
       stack_sectors_(stack_sectors),
       l2_(machine.l2_bytes, sector_bytes),
       multiprocessors_(machine.multiprocessors) {
-    const std::uint32_t sharers = std::max(1u, machine.texture_sharers);
+    const std::uint64_t sharers = std::max(1u, machine.texture_sharers);
     if (machine.texture_bytes > 0)
         texture_.assign((machine.multiprocessors + sharers - 1) / sharers,
                         SetCache(machine.texture_bytes, sector_bytes));

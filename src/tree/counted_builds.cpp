@@ -20,11 +20,17 @@ namespace raydix {
 namespace {
 
 /// Boxes and leaves in preorder. Keys of a leaf follow each other, so first and count say which.
-std::string digest_of(std::span<const BvhNode> nodes) {
+/// `inner_per_level`, out: inner nodes by depth.
+std::string digest_of(std::span<const BvhNode> nodes, std::vector<std::uint64_t>& inner_per_level) {
     WordHash hash;
-    std::vector<std::uint32_t> waiting{0};
+    struct Place {
+        std::uint32_t slot;
+        std::size_t depth;
+    };
+    std::vector<Place> waiting{{0, 0}};
     while (!waiting.empty()) {
-        const BvhNode& node = nodes[waiting.back()];
+        const auto [slot, depth] = waiting.back();
+        const BvhNode& node = nodes[slot];
         waiting.pop_back();
         hash.put(node.lo);
         hash.put(node.hi);
@@ -32,8 +38,10 @@ std::string digest_of(std::span<const BvhNode> nodes) {
         if (node.is_leaf()) {
             hash.put(node.first);
         } else {
-            waiting.push_back(node.first + 1);
-            waiting.push_back(node.first);
+            if (depth == inner_per_level.size()) inner_per_level.push_back(0);
+            ++inner_per_level[depth];
+            waiting.push_back({node.first + 1, depth + 1});
+            waiting.push_back({node.first, depth + 1});
         }
     }
     return hash.hex();
@@ -72,7 +80,8 @@ public:
         else
             build_tuned(way.builder);
         result_.bounds = box_of(memory_.nodes[0]);
-        if constexpr (Probe::counts) result_.digest = digest_of(memory_.nodes.view());
+        if constexpr (Probe::counts)
+            result_.digest = digest_of(memory_.nodes.view(), result_.inner_per_level);
         return std::move(result_);
     }
 

@@ -50,7 +50,8 @@ struct CountedBuild {
     std::vector<LaunchRecord> launches;
     std::uint32_t inner_count = 0, max_depth = 0;
     Aabb bounds{};
-    std::string digest;  // of a counted build
+    std::string digest;                          // of a counted build
+    std::vector<std::uint64_t> inner_per_level;  // of a counted build: inner nodes by depth
 };
 
 /// Builds a tree over sorted keys [n], n > 0, and boxes [n] in the same order, and returns its

@@ -51,6 +51,7 @@ TEST(HierarchyStudy, EveryBuilderMakesTheTreeOfTheLibrary) {
     const Mesh mesh = random_soup(3000, 4);
     const Bvh tree = build_bvh(mesh, {.max_leaf = 1});
     std::set<std::string> digests;
+    std::set<std::vector<std::uint64_t>> levels;
     std::size_t builders = 0;
     for (const HierarchyRun& run : study_all(mesh)) {
         SCOPED_TRACE(run.what.name());
@@ -71,7 +72,10 @@ TEST(HierarchyStudy, EveryBuilderMakesTheTreeOfTheLibrary) {
                                   std::uint64_t{0}),
                   run.inner_nodes);
         EXPECT_EQ(run.items_per_level.front(), 1u);
+        EXPECT_EQ(run.items_per_level.size(), run.max_depth);
+        levels.insert(run.items_per_level);
     }
+    EXPECT_EQ(levels.size(), 1u);
     EXPECT_EQ(builders, 13u);
     EXPECT_EQ(digests.size(), 1u);
     EXPECT_NE(study(random_soup(3000, 5), own).digest, *digests.begin());
@@ -172,6 +176,7 @@ TEST(HierarchyStudy, WorkHereIsSharedByItems) {
     const HierarchyRun wide = one_launch(4000, 0, 2000, 0), narrow = one_launch(4, 0, 5996, 0);
     EXPECT_DOUBLE_EQ(ms(wide, 1), 1e-3 + 18'000e-6);
     EXPECT_DOUBLE_EQ(ms(wide, 8), 1e-3 + 18'000e-6 / 8);
+    EXPECT_DOUBLE_EQ(ms(wide, 0.5), 1e-3 + 18'000e-6 * 2);
     EXPECT_DOUBLE_EQ(ms(narrow, 8), 1e-3 + 18'000e-6 / 4);  // four items fill four threads
     const HierarchyRun chain = one_launch(4000, 0, 2000, 1000);
     EXPECT_DOUBLE_EQ(ms(chain, 1), 1e-3 + 18'000e-6);
@@ -193,6 +198,12 @@ TEST(HierarchyStudy, FewAndNoPrimitives) {
             EXPECT_EQ(run.inner_nodes, n - 1) << run.what.name();
         }
     EXPECT_THROW(study(random_soup(5, 1), {"ploc"}), InputError);
+    try {  // the study has it with boxes in one pass and by levels
+        static_cast<void>(study(random_soup(5, 1), {"karras"}));
+        FAIL();
+    } catch (const InputError& error) {
+        EXPECT_STREQ(error.what(), "the study has no case karras, boxes as published");
+    }
     EXPECT_THROW((void)study_hierarchy(random_soup(5, 1), {.repeat = 0}), InputError);
     EXPECT_THROW((void)study_hierarchy(random_soup(5, 1), {.bits = 31}), InputError);
     EXPECT_THROW((void)study_hierarchy(random_soup(5, 1), {.max_leaf = 0}), InputError);

@@ -53,6 +53,24 @@ class Bench(ProgramTest):
                      "error", "nodes a level: 1 2", "whole builds", "claims of Karras 2012", "holds", "no GPU was used"):
             self.assertIn(word, out)
 
+    def test_claims_and_heads_say_what_they_stand_on(self):
+        """Errors of claims are those of the rows, whatever threads these ran with; columns name the size of the machine."""
+        arguments = ("bench", "hierarchy", "builtin:soup?triangles=3000", "--sizes", "3000", "--cost-sizes", "500,2000",
+                     "--thread-counts", "2", "--repeat", "1", "--factors", "4,16")
+        out = self.succeed(*arguments, "--json", "two.json").out
+        document = json_of((self.folder / "two.json").read_text(encoding="utf-8"))
+        error = {(run["builder"], run["form"], run["fit"]): run["error"] for run in document["runs"] if run["series"] == "scene"}
+        known = [claim for claim in document["hierarchy_claims"] if claim["claim"].startswith("2.") and claim["machine"] == "here"]
+        self.assertEqual(len(known), 2)
+        for claim in known:
+            self.assertEqual(claim["error"], max(abs(error["karras", "published", "atomic"]),
+                                                 abs(error["garanzha", "published", "levels"])))
+        builds = {claim["figure"] for claim in document["hierarchy_claims"] if claim["claim"].startswith("1.")}
+        self.assertEqual(builds, {"different trees of 13 builds"})  # those of the series of sizes have the same name
+        self.assertIn("gtx480 x4       x16", out)
+        self.succeed("report", "two.json", "-o", "two.html", "--quiet")
+        self.assertIn("gtx480 \u00d7 4<", (self.folder / "two.html").read_text(encoding="utf-8"))
+
     def test_what_has_no_figure_is_a_dash(self):
         empty = self.write("empty.obj", b"")
         triangle = self.write("triangle.ply", TRIANGLE)

@@ -2,11 +2,14 @@
 import json
 import os
 import pathlib
+import signal
+import subprocess
 import sys
+import time
 import unittest
 
 sys.dont_write_bytecode = True
-from program import SANITIZED, SHARED_SCENES, TRIANGLE, ProgramTest, main  # noqa: E402
+from program import PROGRAM, SANITIZED, SHARED_SCENES, TRIANGLE, ProgramTest, main, ply  # noqa: E402
 
 SCENE = "builtin:grove?triangles=10000" if SANITIZED else "builtin:grove?triangles=20000"
 SMALL = ("--size", "32x24", "--samples", "2") if SANITIZED else ("--size", "64x48", "--samples", "4")
@@ -183,6 +186,13 @@ class Simulate(ProgramTest):
         self.assertEqual(result.code, 2)
         self.assertIn("bench traversal makes its own rays", result.err)
 
+    def test_nothing_is_printed_before_an_error(self):
+        scene = self.write("one.ply", TRIANGLE)
+        for arguments in (("simulate", scene), ("bench", "traversal", scene, "--machine", "gtx285")):
+            self.fail_with_one_line(*arguments, "--camera", "7", names=["camera 7"])
+            self.fail_with_usage(*arguments, "--camera", "x", names=["'x'"])
+        self.fail_with_one_line("simulate", scene, "--rays", "none.npy", names=["none.npy"])
+
     def test_points_are_refused(self):
         self.fail_with_one_line("simulate", "builtin:uniform?points=100", names=["triangles"])
 
@@ -357,6 +367,84 @@ class Traversal(ProgramTest):
         self.fail_with_one_line(*arguments, "--ao-radius", "3", "--state", "state.json", names=["state.json", "other options"])
         self.write("other.json", "{}")
         self.fail_with_one_line(*arguments, "--state", "other.json", names=["other.json", "is no state of bench traversal"])
+
+    def test_scenes_and_machines_of_one_name_are_refused(self):
+        for folder, size in (("a", 1), ("b", 2)):
+            os.makedirs(self.folder / folder, exist_ok=True)
+            self.write(f"{folder}/one.ply", ply([(0, 0, 0), (size, 0, 0), (0, 1, 0)], [(0, 1, 2)]))
+            self.succeed("build", f"{folder}/one.ply", "-o", f"{folder}.rdx", "--quiet")
+        small = ("--size", "16x16", "--samples", "1", "--quiet")
+        for a, b in (("a/one.ply", "b/one.ply"), ("a.rdx", "b.rdx"), ("a.rdx", "b/one.ply"), (SCENE, SCENE)):
+            for bench in ("traversal", "hierarchy"):
+                self.fail_with_one_line("bench", bench, a, b, "--quiet", names=[f"{b}: ", f"from {a}: both are named "])
+        for number in (1, 2):
+            self.write(f"m{number}.json", json.dumps({"base": "gtx480", "multiprocessors": number}))
+        for a, b, name in (("m1.json", "m2.json", "custom"), ("gtx480", "gtx480", "gtx480")):
+            self.fail_with_one_line("bench", "traversal", "a/one.ply", *small, "--machine", f"{a},{b}", names=[f"{b}: ", f"'{name}'"])
+
+    def test_a_name_that_is_not_utf8_has_a_state(self):
+        scene = os.fsdecode(b"b\xff.ply")
+        (self.folder / scene).write_text(TRIANGLE)
+        arguments = ("bench", "traversal", scene, *SMALL, "--machine", "gtx285", "--kernel", "while_while", "--rays", "primary",
+                     "--sweep-sample", "0", "--quiet", "--state", "bytes.json")
+        self.assertEqual(self.document(*arguments)["simulate"], self.document(*arguments)["simulate"])
+        self.assertEqual(len(json.loads((self.folder / "bytes.json").read_text(encoding="utf-8"))["parts"]), 1)
+
+    def test_an_interrupted_study_leaves_its_state_alone(self):
+        arguments = ("bench", "traversal", SCENE, "--size", "64x48", "--samples", "8", "--launch-rays", "1024", "--machine",
+                     "gtx285", "--kernel", "while_while", "--rays", "primary,diffuse", "--sweep-sample", "0", "--quiet")
+        whole = self.document(*arguments)
+        for k in range(20):
+            state = self.folder / "ended.json"
+            state.unlink(missing_ok=True)
+            process = subprocess.Popen([PROGRAM, *arguments, "--state", "ended.json"], cwd=self.folder)
+            while process.poll() is None and not state.exists():
+                time.sleep(0.001)  # until the first launch
+            time.sleep(0.0007 * k)
+            process.send_signal((signal.SIGINT, signal.SIGTERM)[k % 2])
+            self.assertIn(process.wait(), (0, -signal.SIGINT, -signal.SIGTERM))
+            self.assertEqual([file.name for file in self.folder.glob("*.part")], [])
+        self.assertEqual(whole["simulate"], self.document(*arguments, "--state", "ended.json")["simulate"])
+
+    def test_a_state_of_something_else_is_refused(self):
+        cameras = {"width": 32, "height": 24, "ao_radius": 0.5, "cameras": [
+            {"position": [0.2, 0.3, 3], "target": [0.5, 0.5, 0], "up": [0, 1, 0], "vfov": 30}]}
+        arguments = ("bench", "traversal", "one.ply", "--cameras", "cameras.json", "--samples", "1", "--machine", "gtx285",
+                     "--kernel", "while_while", "--rays", "primary,ao", "--sweep-sample", "0", "--quiet", "--state", "kept.json")
+        corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+        self.write("one.ply", ply(corners, [(0, 1, 2)]))
+        self.write("cameras.json", json.dumps(cameras))
+        self.document(*arguments)
+        for change in ({"width": 64, "height": 48}, {"ao_radius": 5}):
+            self.write("cameras.json", json.dumps({**cameras, **change}))
+            self.fail_with_one_line(*arguments, names=["kept.json", "other options"])
+        self.write("cameras.json", json.dumps(cameras))
+        self.write("one.ply", ply([(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 1, 2)]))  # in the same box
+        self.fail_with_one_line(*arguments, names=["kept.json", "another scene"])
+        self.write("one.ply", ply(corners, [(0, 1, 2)]))
+        self.document(*arguments)
+
+    def test_a_damaged_state_is_refused(self):
+        arguments = ("bench", "traversal", self.write("one.ply", TRIANGLE), *SMALL, "--machine", "gtx285", "--kernel",
+                     "while_while", "--rays", "primary", "--sweep-sample", "0", "--quiet", "--state")
+        self.document(*arguments, "sound.json")
+        sound = json.loads((self.folder / "sound.json").read_text(encoding="utf-8"))
+        (name, part), = sound["parts"].items()
+
+        def refused(document, *names):
+            self.write("damaged.json", json.dumps(document))
+            result = self.fail_with_one_line(*arguments, "damaged.json", names=["damaged.json: ", *names])
+            self.assertNotIn("json.exception", result.err)
+
+        refused({**sound, "holds": 3}, "is no state")
+        refused({**sound, "version": 1}, "another version")
+        for value in (3, None, [1], "x", {}):
+            refused({**sound, "parts": {name: value}})
+        for launches in (-1, 0.5, part["launches"] - 1, part["launches"] + 1):
+            refused({**sound, "parts": {name: {**part, "launches": launches}}}, "cannot be gone on with")
+        for row in ({"instructions": -5}, {"rays": 1.5}, {"warp_times": [[-1, 1]]}):
+            refused({**sound, "parts": {name: {**part, "rows": [{**part["rows"][0], **row}]}}}, "cannot be gone on with")
+        refused({**sound, "parts": {name: {**part, "rows": 2 * part["rows"]}}}, "cannot be gone on with: 2 rows, not 1")
 
     def test_a_sample_is_corrected_by_all_launches(self):
         arguments = ("bench", "traversal", SCENE, "--size", "128x96", "--samples", "8", "--launch-rays", "1024", "--machine",

@@ -115,6 +115,9 @@ class Usage(ProgramTest):
                                (("render", absent, "-o", "x.png", "--json", "no/x.json"), ("no/x.json: cannot write",)),
                                (("trace", absent, "--hits", "no/h.npy"), ("no/h.npy: cannot write",)),
                                (("trace", absent, "--save-rays", "/"), ("/: cannot write",)),
+                               (("info", absent, "--json", "no/i.json"), ("no/i.json: cannot write",)),
+                               (("bench", "traversal", absent, "--json", "no/b.json"), ("no/b.json: cannot write",)),
+                               (("bench", "hierarchy", absent, "--json", "no/b.json"), ("no/b.json: cannot write",)),
                                (("build", absent, "-o", "no/t.rdx"), ("no/t.rdx: cannot write",)),
                                (("query", absent, "--closest", "--out", "no/q"), ("no/q.indices.npy: cannot write",))):
             self.fail_with_one_line(*command, names=names)

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstring>
 #include <iostream>
+#include <limits>
 #include <numeric>
 #include <random>
 #include <thread>
@@ -127,6 +128,18 @@ TEST_F(OpenclBuild, OtherWordsAreRefused) {
     EXPECT_THROW(select_device("gpu"), InputError);
     EXPECT_THROW(select_device("opencl:4000"), BackendUnavailable);
     EXPECT_EQ(selected_device(), before);
+}
+
+TEST_F(OpenclBuild, NoBufferIsSmallerThanItSays) {
+    constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
+    DeviceBuffer<std::uint64_t> buffer(3);
+    for (const std::size_t size : {all / 8 + 2, all / 8, all, all / 2}) {
+        EXPECT_THROW(buffer.reset(size), DeviceError) << size;
+        EXPECT_EQ(buffer.size(), 0u);
+    }
+    EXPECT_THROW(DeviceBuffer<std::byte>(all - 3), DeviceError);
+    buffer.reset(5);
+    EXPECT_NE(buffer.data(), nullptr);
 }
 
 TEST_F(OpenclBuild, SizesAroundThoseOfWarpsTilesAndGroups) {

@@ -258,6 +258,14 @@ TEST(DeviceBuild, OptionsOutOfRangeAreNamed) {
     EXPECT_THROW(check_device_options({}, std::uint64_t{1} << 31), InputError);
 }
 
+TEST(Device, NumbersThatNoneCanHaveAreNoSelectors) {
+    const std::string before = selected_device();
+    for (const char* selector : {"opencl:4294967296", "opencl:99999999999999999999",
+                                 "hip:4294967296", "opencl:-1", "opencl:", "hip:0x"})
+        EXPECT_THROW(select_device(selector), InputError) << selector;
+    EXPECT_EQ(selected_device(), before);
+}
+
 TEST(Device, WithoutOneEveryCallSaysSo) {
     if (device_available()) GTEST_SKIP() << "there is a device: " << device_name();
     EXPECT_THROW(static_cast<void>(device_name()), BackendUnavailable);

@@ -203,6 +203,19 @@ TEST(MakeReport, SimulatedFiguresDifferBeyondTheirSamplingErrorOnly) {
     EXPECT_TRUE(holds(exact, "settings are the same"));
 }
 
+TEST(MakeReport, MeasuredRowsAreCalledByTheirDevice) {
+    const Json document{{"command", "bench traversal"},
+                        {"measured",
+                         {{{"scene", "hall.obj"},
+                           {"kernel", "packet"},
+                           {"rays", "primary"},
+                           {"device", "EPYC (OpenCL on a CPU)"},
+                           {"mrays_per_s", 1.5}}}}};
+    const std::string html = page_of({document, document});
+    EXPECT_TRUE(holds(html, "EPYC (OpenCL on a CPU),<wbr> measured"));
+    EXPECT_FALSE(holds(html, "on a GPU"));
+}
+
 TEST(MakeReport, TheBestBoundNamesItsError) {
     Json document = simulated_document(100, 0.03, 0.01);
     Json second = document["simulate"][0];

@@ -2,6 +2,7 @@
 #include "simt/memory_model.h"
 
 #include <gtest/gtest.h>
+#include <raydix/error.h>
 
 #include <array>
 #include <cstddef>
@@ -112,6 +113,23 @@ TEST(MemoryModel, TexturesHaveTheirOwnCacheAndFetches) {
     read_as_one_warp(nodes, every(0), 64);
     EXPECT_EQ(nodes.traffic().texture_fetches, 0u);
     EXPECT_EQ(nodes.traffic().l1_requests, 16u);
+}
+
+TEST(MemoryModel, AllMultiprocessorsMayShareATextureCache) {
+    MachineModel m = machine();
+    m.texture_bytes = 8 * 32, m.texture_sharers = 0xFFFFFFFF;
+    MemoryModel model = model_of(m, MemoryRange::Holds::triangles);
+    read_as_one_warp(model, every(0), 48);
+    model.access(every(0).data(), width, 48, Access::read);
+    model.hand_over(1);
+    model.finish();
+    EXPECT_EQ(model.traffic().l2_bytes, 64u);
+}
+
+TEST(MemoryModel, RefusesMoreThanItsAddressesReach) {
+    const MachineModel m = machine();
+    const MemoryRange all{memory, std::uint64_t{1} << 32, MemoryRange::Holds::other};
+    EXPECT_THROW(MemoryModel(m, width, 8, std::span(&all, 1)), InputError);
 }
 
 TEST(MemoryModel, StacksLieInterleavedAndAreWrittenBack) {

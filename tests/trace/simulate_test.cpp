@@ -431,6 +431,21 @@ TEST(Simulate, EmptyTreesAndNoRays) {
     for (const Simulation& s : simulate(tree, {}, runs)) EXPECT_EQ(s.rays, 0u);
 }
 
+TEST(Simulate, SumsBeginAnywhereAndTakeNothing) {
+    const WarpTree tree(build_bvh(two_triangles()));
+    const SimulateOptions options = options_for(WarpKernel::while_while);
+    const std::vector<Ray> rays(3, down(0, 0));
+    const Simulation one = simulate(tree, rays, std::span(&options, 1)).front();
+    Simulation sum;
+    sum.add(Simulation{});
+    sum.add(one);
+    sum.add(Simulation{});
+    sum.add(one);
+    EXPECT_EQ(sum.rays, 2 * one.rays);
+    EXPECT_EQ(sum.instructions, 2 * one.instructions);
+    EXPECT_EQ(sum.operations.size(), one.operations.size());
+}
+
 TEST(Simulate, RefusesWhatItCannotRun) {
     const WarpTree tree(build_bvh(two_triangles()));
     const auto refuse = [&](const char* word, auto change) {
@@ -466,6 +481,21 @@ TEST(Simulate, RefusesWhatItCannotRun) {
         std::erase_if(o.machine.costs,
                       [](const OperationCost& cost) { return cost.operation == "visit_node"; });
     });
+    const auto refuse_memory = [&](const char* word, auto change) {
+        refuse(word, [&](SimulateOptions& o) {
+            o.memory = true;
+            change(o.machine);
+        });
+    };
+    refuse_memory("l1_line_bytes is 8192; it must be a multiple of 32 and at most 4096",
+                  [](MachineModel& m) { m.l1_line_bytes = 8192; });
+    refuse_memory("l1_line_bytes is 100", [](MachineModel& m) { m.l1_line_bytes = 100; });
+    refuse_memory("dram_clocks", [](MachineModel& m) { m.dram_clocks = -1; });
+    refuse_memory("texture_clocks", [](MachineModel& m) { m.texture_clocks = std::nan(""); });
+    refuse_memory("l1_clocks", [](MachineModel& m) { m.l1_clocks = 1e10; });
+    refuse_memory("l2_clocks", [](MachineModel& m) { m.l2_clocks = -infinity; });
+    refuse_memory("texture_fetches_per_clock",
+                  [](MachineModel& m) { m.texture_fetches_per_clock = -1; });
     refuse("two costs", [](SimulateOptions& o) { o.machine.costs.push_back(o.machine.costs[0]); });
     refuse("no operation", [](SimulateOptions& o) { o.machine.costs[0].operation = "jump"; });
     EXPECT_THROW(static_cast<void>(machine_model("gtx1")), InputError);

@@ -44,6 +44,9 @@ constexpr std::array<std::string_view, kernels.size()> kernel_names{
 
 constexpr std::array<std::string_view, 3> release_names{"own", "in_order", "together"};
 
+/// The memory model looks at each sector of a line.
+constexpr std::uint32_t largest_line_bytes = 4096;
+
 /// What no machine can have, whatever each figure is by itself.
 void check_together(const MachineModel& m, int width) {
     const auto refuse = [&](const std::string& what) {
@@ -75,7 +78,7 @@ void check_options(const SimulateOptions& options) {
     const auto positive = [&](const char* field, double value) {
         if (!(value > 0) || value > 1e15)
             throw InputError("machine " + m.name + ": " + field + " is " + std::to_string(value) +
-                             "; it must be positive");
+                             "; it must be above 0 and at most 1e15");
     };
     positive("multiprocessors", m.multiprocessors);
     positive("clock_ghz", m.clock_ghz);
@@ -102,8 +105,15 @@ void check_options(const SimulateOptions& options) {
     positive("l2_gb_per_s", m.l2_gb_per_s);
     positive("dram_gb_per_s", m.dram_gb_per_s);
     positive("l1_line_bytes", m.l1_line_bytes);
-    if (m.l1_line_bytes % 32 != 0)
-        throw InputError("machine " + m.name + ": l1_line_bytes is not a multiple of 32");
+    if (m.l1_line_bytes % 32 != 0 || m.l1_line_bytes > largest_line_bytes)
+        throw InputError(
+            "machine " + m.name + ": l1_line_bytes is " + std::to_string(m.l1_line_bytes) +
+            "; it must be a multiple of 32 and at most " + std::to_string(largest_line_bytes));
+    not_negative("texture_fetches_per_clock", m.texture_fetches_per_clock);
+    not_negative("texture_clocks", m.texture_clocks);
+    not_negative("l1_clocks", m.l1_clocks);
+    not_negative("l2_clocks", m.l2_clocks);
+    not_negative("dram_clocks", m.dram_clocks);
     if (m.texture_bytes > 0) positive("texture_sharers", m.texture_sharers);
     positive("l2_bytes", m.l2_bytes);
     // The model keeps a record for each 32 bytes of cache.
@@ -200,6 +210,7 @@ void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<
 }
 
 void Simulation::add(const Simulation& other) {
+    if (other.operations.empty()) return;
     if (operations.empty()) {
         *this = other;
         return;
