@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "option_checks.h"
+#include "tree/word_hash.h"
 
 namespace raydix::cli {
 namespace {
@@ -49,10 +50,10 @@ private:
 
 /// Of what rays hit: a tree's hash knows boxes only.
 std::string hash_of_triangles(const Bvh& bvh) {
-    std::uint64_t hash = 0xCBF29CE484222325u;  // FNV-1a
-    for (const std::byte byte : std::as_bytes(bvh.triangles()))
-        hash = (hash ^ std::to_integer<std::uint64_t>(byte)) * 0x100000001B3u;
-    return fmt::format("{:016x}", hash);
+    WordHash hash;
+    for (const LeafTriangle& t : bvh.triangles())
+        for (const Vec3 corner : {t.v0, t.v1, t.v2}) hash.put(corner);
+    return hash.hex();
 }
 
 /// Calls field(name, member) for all numbers of a row that launches add to.
