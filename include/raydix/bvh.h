@@ -181,8 +181,10 @@ private:
 
 /// `options` with the builder and the rounds of reinsertion of the quality whose binary tree has
 /// the least SAH (tree_stats), among `quality` and lower ones; of equals the better word's. So a
-/// better word never means a higher cost, as for scenes. Where more than one may be the best, their
-/// trees are built to find out. Throws InputError as build_bvh does.
+/// better word does not mean a higher cost, as for scenes. Where more than one may be the best,
+/// their trees are built to find out, and InputError is thrown as by build_bvh. Of more than 1,024
+/// triangles `fast` is not built to compare: it is better on few meshes, such as thousands of
+/// triangles that lie one around the other.
 [[nodiscard]] BuildOptions best_build_options(const MeshView& mesh, Quality quality,
                                               const BuildOptions& options = {});
 
@@ -195,7 +197,8 @@ private:
 [[nodiscard]] Bvh build_bvh(std::span<const Vec3> points, const BuildOptions& options = {});
 
 /// Builds again and again into the same memory. Scratch is kept from one call to the next, and so
-/// are the arrays of the tree if they are large enough. Not for use by two threads at once.
+/// are the arrays of the tree if they are large enough. Not for use by two threads at once. The
+/// boxes and points that a tree is built from may be those of `tree` itself.
 class BvhBuilder {
 public:
     BvhBuilder();
@@ -210,7 +213,8 @@ public:
 private:
     friend struct BvhBuilderInternals;  // for builders that go on where this one would end
     struct Scratch;
-    std::unique_ptr<Scratch> scratch_;
+    Scratch& scratch();
+    std::unique_ptr<Scratch> scratch_;  // null: moved away
 };
 
 /// Many small trees in one call, as build_bvh makes them. A mesh is one thread's, so thousands of

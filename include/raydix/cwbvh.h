@@ -21,7 +21,7 @@ struct CwbvhStats {
     double children_per_node = 0;
     double sah = 0;       // 1 a node and 1 a triangle, by the boxes before they are quantised; 0
                           // if the root has no area
-    double widening = 0;  // surface of all quantised child boxes / that of the exact ones; 1
+    double widening = 1;  // surface of all quantised child boxes / that of the exact ones; 1
                           // without surface
     std::uint64_t node_bytes = 0, triangle_bytes = 0;
     std::uint64_t bytes = 0;        // every byte a trace touches
@@ -30,7 +30,7 @@ struct CwbvhStats {
 
 /// Holds all that a trace reads: the binary tree may go. Children are chosen by dynamic programming
 /// over the surface area heuristic. Child boxes have 8 bits an axis and are rounded outward. The
-/// tree has the same bits for every number of threads.
+/// tree has the same bits for every number of threads. A tree that was moved from is empty.
 class Cwbvh {
 public:
     /// `threads`: 0 to 1,024; 0: all the machine has. Throws InputError: a tree that holds boxes or
@@ -44,9 +44,13 @@ public:
     [[nodiscard]] const CwbvhStats& stats() const;
 
     struct Arrays;
-    [[nodiscard]] const Arrays& arrays() const { return *arrays_; }
+    [[nodiscard]] const Arrays& arrays() const {
+        const Arrays* const own = arrays_.get();
+        return own != nullptr ? *own : nothing();
+    }
 
 private:
+    [[nodiscard]] static const Arrays& nothing();
     std::unique_ptr<Arrays> arrays_;
 };
 

@@ -64,7 +64,7 @@ private:
     Buffer<LeafTriangleD> triangles_;
     Vec3d center_{0.0, 0.0, 0.0};
     double scale_ = 1.0;
-    AabbD bounds_{};
+    AabbD bounds_{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
     BuildMs build_ms_;
 };
 

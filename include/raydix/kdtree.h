@@ -98,7 +98,7 @@ private:
     Buffer<LeafTriangle> triangles_;
     Buffer<Vec3> points_;
     PrimitiveKind kind_ = PrimitiveKind::points;
-    KdTreeOptions options_;
+    KdTreeOptions options_{.max_leaf = 8};
     Aabb bounds_{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
     std::uint32_t inner_count_ = 0;
     std::uint32_t max_depth_ = 0;

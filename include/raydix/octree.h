@@ -101,7 +101,7 @@ private:
     Buffer<Vec3> points_;
     std::array<std::uint32_t, 23> level_begin_{};  // [level_count + 1], the rest repeats the last
     PrimitiveKind kind_ = PrimitiveKind::points;
-    OctreeOptions options_;
+    OctreeOptions options_{.max_level = 21};
     Aabb bounds_{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
     std::uint64_t input_count_ = 0;
     std::uint64_t left_out_ = 0;

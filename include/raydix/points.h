@@ -63,7 +63,7 @@ struct PointOf<double, 3> {
 
 /// How points are put into groups of 16, and those into larger ones. Answers do not depend on it.
 enum class PointsTree : std::uint32_t {
-    automatic = 0,  // bvh where the Morton curve alone parts the points well, else kdtree
+    automatic = 0,  // kdtree: no points were found on which bvh answers faster
     kdtree = 1,     // short runs of the curve are halved at the median of their widest side
     bvh = 2,        // runs of the curve as they are. Built faster; boxes overlap more
 };
@@ -108,7 +108,7 @@ public:
     /// Makes the index that `build_points` would make, in the memory of this one. Without `options`
     /// those of the last build hold. The memory grows only where it is too small. Scratch is kept
     /// too, from the first rebuild on. Needs the index for itself. Throws what `build_points`
-    /// throws; the index is then empty.
+    /// throws; the index is then empty, and its options are those of the last build.
     void rebuild(std::span<const Point> points);
     void rebuild(std::span<const Point> points, const PointsOptions& options);
 
@@ -299,12 +299,13 @@ bool visit_radius(const Index& index, const typename Index::Point& query,
 template <class Index, class Visit>
 bool for_each_in_radius(const Index& index, const typename Index::Point& query,
                         ScalarOf<Index> radius, Visit&& visit) {
+    auto* visitor = std::addressof(visit);  // of a function too
     return detail::visit_radius(
         index, query, radius,
         [](void* data, std::uint32_t point, typename Index::Scalar distance) -> bool {
-            return (*static_cast<std::remove_reference_t<Visit>*>(data))(point, distance);
+            return (**static_cast<decltype(visitor)*>(data))(point, distance);
         },
-        const_cast<void*>(static_cast<const void*>(std::addressof(visit))));
+        &visitor);
 }
 
 }  // namespace raydix

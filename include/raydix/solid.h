@@ -53,7 +53,7 @@ struct SceneSolidOptions {
 
 /// Triangles as the boundary of a body. Making one takes O(n log n): edges are matched, and
 /// `winding` also sums normals. Any number of threads may ask a solid at once. In double, crossings
-/// and their signs are exact too.
+/// and their signs are exact too. A solid that was moved from may only be assigned to or destroyed.
 template <class Scalar>
 class BasicSolid {
 public:

@@ -14,7 +14,8 @@ struct ThreadPool {
     /// Calls job(i) once for each i in [0, jobs), on any threads and in any order, and returns when
     /// all calls have returned. A job never throws and waits for no other job, so that one thread
     /// may run all of them. Several threads may call this at once. What it throws before the first
-    /// job ran comes out of the library's call.
+    /// job ran comes out of the library's call. Only loops that change a tree in place, which would
+    /// end half-way, then run on the calling thread.
     std::function<void(std::size_t jobs, const std::function<void(std::size_t)>& job)> run = {};
 };
 

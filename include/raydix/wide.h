@@ -43,7 +43,7 @@ struct WideBvhStats {
 };
 
 /// Holds all that a trace reads: the binary tree and the mesh may go. The same bits for every
-/// thread count and instruction set.
+/// thread count and instruction set. A tree that was moved from is empty.
 class WideBvh {
 public:
     /// Empty: nothing is hit.
@@ -59,11 +59,15 @@ public:
     [[nodiscard]] const WideBvhStats& stats() const;
 
     struct Arrays;
-    [[nodiscard]] const Arrays& arrays() const { return *arrays_; }
+    [[nodiscard]] const Arrays& arrays() const {
+        const Arrays* const own = arrays_.get();
+        return own != nullptr ? *own : nothing();
+    }
 
 private:
     friend class WideBvhBuilder;
     friend struct WideBvhInternals;
+    [[nodiscard]] static const Arrays& nothing();
     std::unique_ptr<Arrays> arrays_;
 };
 

@@ -1,11 +1,13 @@
-// Options that are numbers, checked: how many threads, and enumerations, which a caller may have
-// cast from anything.
+// Options that are numbers, checked: how many threads, distances, and enumerations, which a caller
+// may have cast from anything.
 #pragma once
 
 #include <raydix/error.h>
 
+#include <charconv>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace raydix {
 
@@ -17,6 +19,22 @@ inline void check_threads(int threads) {
     if (threads < 0 || threads > max_threads)
         throw InputError("option threads is " + std::to_string(threads) + "; it must be 0 to " +
                          std::to_string(max_threads) + ", where 0 is all the machine has");
+}
+
+/// A number for a message, in as few digits as tell it from all others; std::to_string would make
+/// -0.000000 of -1e-9.
+template <class Scalar>
+std::string number_text(Scalar value) {
+    char digits[32];
+    return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
+}
+
+/// Throws InputError unless `value` is at least 0. `what`: its name.
+template <class Scalar>
+void check_not_negative(std::string_view what, Scalar value) {
+    if (!(value >= 0))
+        throw InputError(std::string(what) + " is " + number_text(value) +
+                         "; it must be 0 or more");
 }
 
 /// Throws InputError unless `value` is one of 0 to `last`.

@@ -3,6 +3,10 @@
 #include <raydix/error.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <utility>
 
 #include "base/check.h"
 #include "base/options.h"
@@ -421,32 +425,49 @@ void build_boxes(std::span<const Aabb> boxes, const BuildOptions& options,
           scratch, tree, tree.boxes());
 }
 
+/// The tree's arrays, taken from it, if the input lies in them: a build would write over what it
+/// reads.
+Bvh arrays_below(const void* input, Bvh& tree) {
+    const auto lies_in = [&](const auto& array) {
+        const std::span<const std::byte> bytes = std::as_bytes(array);
+        return !std::less<>{}(input, bytes.data()) &&
+               std::less<>{}(input, bytes.data() + bytes.size());
+    };
+    if (lies_in(tree.points()) || lies_in(tree.boxes())) return std::move(tree);
+    return {};
+}
+
 }  // namespace
 
 BvhBuilder::BvhBuilder() : scratch_(std::make_unique<Scratch>()) {}
 BvhBuilder::~BvhBuilder() = default;
 BvhBuilder::BvhBuilder(BvhBuilder&&) noexcept = default;
 BvhBuilder& BvhBuilder::operator=(BvhBuilder&&) noexcept = default;
+BvhBuilder::Scratch& BvhBuilder::scratch() {
+    if (!scratch_) scratch_ = std::make_unique<Scratch>();
+    return *scratch_;
+}
 
 void BvhBuilderInternals::build_clusters(BvhBuilder& builder, const MeshView& mesh,
                                          const BuildOptions& options, Bvh& tree,
                                          const TakeClusters& take) {
-    build_mesh(mesh, options, {.take = &take}, *builder.scratch_, tree);
+    build_mesh(mesh, options, {.take = &take}, builder.scratch(), tree);
 }
 
 void BvhBuilderInternals::sort(BvhBuilder& builder, const MeshView& mesh,
                                const BuildOptions& options, Bvh& tree, const SortedTaker& take) {
-    build_mesh(mesh, options, {.sorted = &take}, *builder.scratch_, tree);
+    build_mesh(mesh, options, {.sorted = &take}, builder.scratch(), tree);
 }
 
 void BvhBuilderInternals::build_around(BvhBuilder& builder, std::span<const Aabb> boxes,
                                        const TriangleCorners& corners, const BuildOptions& options,
                                        Bvh& tree) {
-    build_boxes(boxes, options, {.around = &corners}, *builder.scratch_, tree);
+    build_boxes(boxes, options, {.around = &corners}, builder.scratch(), tree);
 }
 
 void BvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Bvh& tree) {
-    build_mesh(mesh, options, {}, *scratch_, tree);
+    const Bvh read = arrays_below(mesh.vertices.data(), tree);
+    build_mesh(mesh, options, {}, scratch(), tree);
 }
 
 Bvh build_bvh(const MeshView& mesh, const BuildOptions& options) {
@@ -467,7 +488,8 @@ Bvh build_bvh(std::span<const Aabb> boxes, const BuildOptions& options) {
 }
 
 void BvhBuilder::build(std::span<const Aabb> boxes, const BuildOptions& options, Bvh& tree) {
-    build_boxes(boxes, options, {}, *scratch_, tree);
+    const Bvh read = arrays_below(boxes.data(), tree);
+    build_boxes(boxes, options, {}, scratch(), tree);
 }
 
 Bvh build_bvh(std::span<const Vec3> points, const BuildOptions& options) {

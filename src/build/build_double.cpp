@@ -108,8 +108,8 @@ void require_triangles_that_fit(const MeshViewD& mesh, const BoundsD& bounds, bo
 void copy_corners(const BvhDInternals& tree, const TriangleSourceD& source) {
     const std::span<const std::uint32_t> order = tree.bvh.order();
     tree.triangles().reset(order.size());
-    for_each_index(order.size(),
-                   [&](std::size_t k) { tree.triangles()[k] = source.corners(order[k]); });
+    for_each_index_to_the_end(
+        order.size(), [&](std::size_t k) { tree.triangles()[k] = source.corners(order[k]); });
 }
 
 void build(const MeshViewD& mesh, const BuildOptions& options, BvhBuilderD& builder,

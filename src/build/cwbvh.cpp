@@ -80,7 +80,12 @@ Cwbvh::~Cwbvh() = default;
 Cwbvh::Cwbvh(Cwbvh&&) noexcept = default;
 Cwbvh& Cwbvh::operator=(Cwbvh&&) noexcept = default;
 
-bool Cwbvh::empty() const { return arrays_->nodes.empty(); }
-const CwbvhStats& Cwbvh::stats() const { return arrays_->stats; }
+const Cwbvh::Arrays& Cwbvh::nothing() {
+    static const Arrays empty;
+    return empty;
+}
+
+bool Cwbvh::empty() const { return arrays().nodes.empty(); }
+const CwbvhStats& Cwbvh::stats() const { return arrays().stats; }
 
 }  // namespace raydix

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <string>
 
 #include "base/median.h"
 #include "base/options.h"
@@ -192,8 +193,13 @@ std::vector<std::vector<HierarchyRun>> study_hierarchies(std::span<const MeshVie
     std::vector<std::vector<HierarchyRun>> runs;
     with_threads(options.threads, [&] {
         std::vector<std::unique_ptr<AnyStudy>> studies;
-        for (const MeshView& mesh : meshes) {
-            studies.push_back(study_of(mesh, options));
+        for (std::size_t i = 0; i < meshes.size(); ++i) {
+            try {
+                studies.push_back(study_of(meshes[i], options));
+            } catch (const InputError& error) {
+                if (meshes.size() == 1) throw;
+                throw InputError("mesh " + std::to_string(i) + ": " + error.what());
+            }
             studies.back()->count();
         }
         for (int round = 0; round <= options.repeat; ++round)  // the first one warms up

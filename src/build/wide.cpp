@@ -61,6 +61,10 @@ WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
 }
 
 WideBvh::WideBvh() : arrays_(std::make_unique<Arrays>()) { arrays_->clear({}); }
+const WideBvh::Arrays& WideBvh::nothing() {
+    static const WideBvh empty;
+    return *empty.arrays_;
+}
 WideBvh::~WideBvh() = default;
 WideBvh::WideBvh(WideBvh&&) noexcept = default;
 WideBvh& WideBvh::operator=(WideBvh&&) noexcept = default;
@@ -84,6 +88,8 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
     const WideOptions collapse = collapse_options(wide);
     if (mesh.triangles.empty() && !mesh.vertices.empty())
         throw InputError("rays need triangles; this mesh has vertices alone");
+    if (!tree.arrays_) tree = WideBvh();  // both were moved from
+    if (!scratch_) scratch_ = std::make_unique<Scratch>();
     WideBvh::Arrays& arrays = *tree.arrays_;
     Bvh& bvh = scratch_->tree;
     double layout_ms = 0;
@@ -149,7 +155,7 @@ WideBvh build_wide_bvh(const Mesh& mesh, const BuildOptions& options, const Wide
     return build_wide_bvh(MeshView(mesh), options, wide);
 }
 
-bool WideBvh::empty() const { return arrays_->blocks.empty() && arrays_->compact_blocks.empty(); }
-const WideBvhStats& WideBvh::stats() const { return arrays_->stats; }
+bool WideBvh::empty() const { return arrays().blocks.empty() && arrays().compact_blocks.empty(); }
+const WideBvhStats& WideBvh::stats() const { return arrays().stats; }
 
 }  // namespace raydix

@@ -115,6 +115,16 @@ private:
     const NearKernels& kernels_;
 };
 
+/// In a plain environment. Not inlined: of two copies in one function a compiler makes one, before
+/// the environment is set.
+[[gnu::noinline]] SceneClosestPoint closest_plainly(const Scene& scene, Vec3 query,
+                                                    float max_distance, std::uint32_t mask) {
+    const float limit = square_limit_of(max_distance);
+    const Near near(scene, mask, NearCall::closest);
+    if (!is_finite(query)) return {};
+    return Near::Thread(near).closest(query, limit);
+}
+
 }  // namespace
 
 QueryCounts closest_points(const Scene& scene, std::span<const Vec3> queries,
@@ -130,12 +140,9 @@ std::vector<SceneClosestPoint> closest_points(const Scene& scene, std::span<cons
 }
 SceneClosestPoint closest_point(const Scene& scene, Vec3 query, float max_distance,
                                 std::uint32_t mask) {
-    const float limit = square_limit_of(max_distance);
-    const Near near(scene, mask, NearCall::closest);
-    if (!is_finite(query)) return {};
-    if (FloatEnvironment::is_plain()) return Near::Thread(near).closest(query, limit);
+    if (FloatEnvironment::is_plain()) return closest_plainly(scene, query, max_distance, mask);
     const FloatEnvironment plain;
-    return Near::Thread(near).closest(query, limit);
+    return closest_plainly(scene, query, max_distance, mask);
 }
 
 QueryCounts touch_any(const Scene& scene, std::span<const Segment> queries,

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "base/float_env.h"
+#include "base/options.h"
 #include "engine/near_call.h"
 #include "exec/parallel.h"
 #include "exec/result_budget.h"
@@ -32,11 +33,10 @@
 
 namespace raydix {
 
+/// In a plain environment: the square of a small distance is a denormal number.
 template <class Scalar>
 Scalar square_limit_of(Scalar max_distance) {
-    if (!(max_distance >= 0))
-        throw InputError("closest points: max_distance is " + std::to_string(max_distance) +
-                         "; it must be 0 or more");
+    check_not_negative("closest points: max_distance", max_distance);
     return max_distance * max_distance;
 }
 
@@ -83,10 +83,10 @@ template <class Near, class Scene, class Query, class Result, class Options>
 QueryCounts closest_batch(const Scene& scene, std::span<const Query> queries,
                           std::span<Result> results, const Options& options) {
     require_room(name_of(NearCall::closest), queries.size(), results.size());
-    const auto limit = square_limit_of(options.max_distance);
     static_cast<void>(kernels_for(options.isa));  // throws
     std::vector<QueryCounts> parts(block_count(queries.size()));
     with_threads(options.threads, [&] {
+        const auto limit = square_limit_of(options.max_distance);
         const Near near(scene, options.mask, NearCall::closest, options.isa);
         Buffer<std::uint32_t> order;
         if (is_ordered(queries.size())) order = near.order(queries);

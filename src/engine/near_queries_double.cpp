@@ -125,8 +125,8 @@ std::vector<SceneClosestPointD> closest_points(const SceneD& scene, std::span<co
 }
 SceneClosestPointD closest_point(const SceneD& scene, Vec3d query, double max_distance,
                                  std::uint32_t mask) {
-    const double limit = square_limit_of(max_distance);
     const FloatEnvironment plain;
+    const double limit = square_limit_of(max_distance);
     const Near near(scene, mask, NearCall::closest);
     if (!is_finite(query)) return {};
     return Near::Thread(near).closest(query, limit);

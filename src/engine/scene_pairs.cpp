@@ -23,7 +23,8 @@ public:
     using Scene = BasicScene<Scalar>;
 
     /// `b` null: within `a`.
-    FlatSides(const Scene& a, const Scene* b, const ScenePairOptions& options) : options_(options) {
+    FlatSides(const Scene& a, const Scene* b, bool keeps_pairs, const ScenePairOptions& options)
+        : options_(options) {
         const FlatPlan<Scalar> plan_a(a, options.mask, call_of_pairs);
         std::optional<FlatPlan<Scalar>> plan_b;
         std::uint64_t bytes = plan_a.tree_bytes();
@@ -31,7 +32,7 @@ public:
             plan_b.emplace(*b, options.mask, call_of_pairs);
             bytes = saturating_sum(bytes, plan_b->tree_bytes());
         }
-        require_result_bytes(call_of_pairs, bytes, options.max_result_bytes);
+        require_trees(bytes, keeps_pairs);
         first = plan_a.tree(options.threads);
         if (plan_b) second = plan_b->tree(options.threads);
     }
@@ -52,13 +53,27 @@ public:
         try {
             return call(left);
         } catch (const ResultTooLarge& error) {
-            if (options_.max_result_bytes == 0) throw;
-            throw ResultTooLarge(call_of_pairs, bytes() + error.bytes(), error.is_exact(),
-                                 options_.max_result_bytes);
+            if (options_.max_result_bytes == 0 && !error.is_exact()) throw;
+            refuse(bytes() + error.bytes(), error.is_exact());
         }
     }
 
 private:
+    void require_trees(std::uint64_t bytes, bool keeps_pairs) const {
+        try {
+            require_result_bytes(call_of_pairs, bytes, options_.max_result_bytes);
+        } catch (const ResultTooLarge&) {
+            if (!keeps_pairs) throw;
+            refuse(bytes, true);
+        }
+    }
+    /// A step needs `bytes`, or more than these. The names of pairs, which come later, may need
+    /// more than all before.
+    [[noreturn]] void refuse(std::uint64_t bytes, bool exact) const {
+        const std::uint64_t limit = options_.max_result_bytes;
+        throw ResultTooLarge(call_of_pairs, exact ? bytes - 1 : bytes, false,
+                             limit != 0 ? limit : usual_result_bytes());
+    }
     static std::uint64_t bytes_of(const FlatTree<Scalar>& side) {
         return side.tree.bytes() + side.names.runs.size() * sizeof(FlatNames::Run);
     }
@@ -71,7 +86,7 @@ ScenePairs pairs_of_scenes(const BasicScene<Scalar>& a, const BasicScene<Scalar>
                            const ScenePairOptions& options) {
     ScenePairs out;
     with_threads(options.threads, [&] {
-        const FlatSides<Scalar> sides(a, b, options);
+        const FlatSides<Scalar> sides(a, b, true, options);
         const std::vector<PrimitivePair> found = sides.within([&](const PairOptions& how) {
             return sides.second ? overlapping_pairs(sides.first.tree, sides.second->tree, how)
                                 : overlapping_pairs(sides.first.tree, how);
@@ -99,7 +114,7 @@ std::uint64_t count_of_scenes(const BasicScene<Scalar>& a, const BasicScene<Scal
                               const ScenePairOptions& options) {
     std::uint64_t count = 0;
     with_threads(options.threads, [&] {
-        const FlatSides<Scalar> sides(a, b, options);
+        const FlatSides<Scalar> sides(a, b, false, options);
         count = sides.within([&](const PairOptions& how) {
             return sides.second ? count_overlapping_pairs(sides.first.tree, sides.second->tree, how)
                                 : count_overlapping_pairs(sides.first.tree, how);

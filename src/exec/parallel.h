@@ -48,6 +48,17 @@ void for_each_index(std::size_t n, const Body& body, std::size_t grain = 4096) {
     });
 }
 
+/// The same for what must not end half-way, with bodies that never throw and may run twice: where
+/// the caller's thread pool refuses the loop, this thread runs all of it.
+template <class Body>
+void for_each_index_to_the_end(std::size_t n, const Body& body) {
+    try {
+        for_each_index(n, body);
+    } catch (...) {
+        for (std::size_t i = 0; i < n; ++i) body(i);
+    }
+}
+
 /// Splits [0, n) into fixed blocks that depend on n and `block` alone, never on the thread count,
 /// and calls body(block_index, begin, end): what is summed per block and then in order is the same
 /// on every machine.

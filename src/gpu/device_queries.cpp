@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "base/options.h"
 #include "exec/arena.h"
 #include "gpu/device_fetch.h"
 
@@ -25,12 +26,6 @@ void check_count(std::span<const Vec3> queries) {
 [[noreturn]] void no_room(const char* what, std::size_t wanted, std::size_t given) {
     throw InputError(std::string(what) + " on a device: " + std::to_string(wanted) +
                      " results, but room for " + std::to_string(given));
-}
-
-void check_not_negative(const char* what, float distance) {
-    if (!(distance >= 0.0f))
-        throw InputError(std::string(what) + " is " + std::to_string(distance) +
-                         "; it must be 0 or more");
 }
 
 void check_offsets(std::size_t rows, std::size_t offsets) {

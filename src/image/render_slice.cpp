@@ -11,6 +11,7 @@
 
 #include "base/float_env.h"
 #include "base/math.h"
+#include "base/options.h"
 #include "image/tree_picture.h"
 #include "report/colour_map.h"
 #include "report/picture_codec.h"
@@ -35,7 +36,7 @@ struct Slice {
     Slice(const Aabb& bounds, const SliceOptions& options)
         : axis(options.axis), right(axis == 0 ? 1 : 0), up(axis == 2 ? 1 : 2) {
         const float lo = component_of(bounds.lo, axis), hi = component_of(bounds.hi, axis);
-        at = lo + options.at * (hi - lo);
+        at = std::min(lo + options.at * (hi - lo), hi);
         const auto size = [&](std::uint32_t k) {
             return double(component_of(bounds.hi, k)) - component_of(bounds.lo, k);
         };
@@ -156,7 +157,7 @@ void check_options(const SliceOptions& options) {
     if (options.axis > 2)
         throw InputError("slice: axis " + std::to_string(options.axis) + "; it must be 0, 1 or 2");
     if (!(options.at >= 0.0f && options.at <= 1.0f))
-        throw InputError("slice: place " + std::to_string(options.at) + "; it must be 0 to 1");
+        throw InputError("slice: place " + number_text(options.at) + "; it must be 0 to 1");
     for (const std::uint32_t side : {options.width, options.height})
         if (side < 1 || side > max_picture_side)
             throw InputError("slice: a picture of " + std::to_string(options.width) + " x " +

@@ -4,6 +4,8 @@
 #include <raydix/tree_view.h>
 
 #include <algorithm>
+#include <functional>
+#include <vector>
 
 #include "base/float_env.h"
 #include "image/tree_picture.h"
@@ -97,7 +99,11 @@ void draw_levels(Picture& picture, const CameraFrame& frame, std::span<const Lev
     const auto shade = [&](std::size_t pixel, double inverse_depth) {
         return inverse_depth * (1 + depth_slack) < double(surface[pixel]) ? behind : 1.0;
     };
-    for (std::uint32_t level = scale.last + 1; level-- > scale.first;) {
+    std::vector<std::uint32_t> levels;  // that have boxes, from the last up
+    for (const LevelBox& b : boxes) levels.push_back(b.level);
+    std::ranges::sort(levels, std::greater<>());
+    levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
+    for (const std::uint32_t level : levels) {
         const float part = scale.part(level);
         const double line_width = unit * (2.4 - 1.5 * double(part));
         mask.clear();

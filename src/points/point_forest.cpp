@@ -237,7 +237,7 @@ void PointForest<T, Dim>::make_room(std::size_t leaves, std::size_t nodes) {
 template <class T, int Dim>
 void PointForest<T, Dim>::place_leaves(const Arrays& part, std::uint32_t first,
                                        const std::uint32_t* ids) {
-    for_each_index(part.tree.leaf_count, [&](std::size_t i) {
+    for_each_index_to_the_end(part.tree.leaf_count, [&](std::size_t i) {
         Leaf& leaf = arrays_.leaves[first + i];
         leaf = part.leaves[i];
         for (std::uint32_t& id : leaf.id) {
@@ -255,7 +255,7 @@ void PointForest<T, Dim>::place_nodes(const Arrays& part, const PointLevel& leve
         return i == 0 ? root : level.first_node + static_cast<std::uint32_t>(i) - 1;
     };
     state_.parent_of_node[root] = 0;
-    for_each_index(part.tree.node_count, [&](std::size_t i) {
+    for_each_index_to_the_end(part.tree.node_count, [&](std::size_t i) {
         const std::uint32_t at = place(i);
         Node& node = arrays_.nodes[at];
         node = part.nodes[i];

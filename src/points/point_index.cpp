@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "base/check.h"
 #include "base/options.h"
@@ -42,9 +43,9 @@ void build(const T* points, std::size_t n, detail::PointArrays<T, Dim>& arrays) 
     arrays.left_out = bounds.left_out;
     set_bounds(bounds, arrays.bounds);
     arrays.ms.bounds = stage.lap();
+    arrays.chosen = arrays.options.tree == PointsTree::bvh ? PointsTree::bvh : PointsTree::kdtree;
     if (bounds.left_out == n) return;
     const auto valid = static_cast<std::uint32_t>(n - bounds.left_out);
-    arrays.chosen = arrays.options.tree == PointsTree::bvh ? PointsTree::bvh : PointsTree::kdtree;
     const bool kdtree = arrays.chosen == PointsTree::kdtree;
     sort_along_curve(points, n, bounds, arrays);
     arrays.ms.sort = stage.lap();
@@ -84,7 +85,7 @@ void rebuild_arrays(detail::PointArrays<T, Dim>& arrays, const T* points, std::s
     if (n > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
         throw InputError(std::to_string(n) + " points; an index holds fewer than 2^31");
     check_enum("tree", options.tree, PointsTree::bvh);
-    arrays.options = options;
+    const PointsOptions last = std::exchange(arrays.options, options);
     const bool first = arrays.leaves.empty();
     memory_count().restart_peak();
     const std::uint64_t held = arrays.leaves.capacity_bytes() + arrays.nodes.capacity_bytes() +
@@ -96,6 +97,7 @@ void rebuild_arrays(detail::PointArrays<T, Dim>& arrays, const T* points, std::s
         with_threads(options.threads, [&] { build(points, n, arrays); });
     } catch (...) {
         forget(arrays);
+        arrays.options = last;
         throw;
     }
     arrays.input_count = n;

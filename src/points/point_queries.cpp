@@ -16,13 +16,6 @@ const Scalar* values_of(std::span<const Value> values) {
     return reinterpret_cast<const Scalar*>(values.data());
 }
 
-template <class Scalar>
-void check_radius(Scalar radius, const std::string& whose) {
-    if (!(radius >= 0))
-        throw InputError("radius" + whose + " is " + std::to_string(radius) +
-                         "; it must be 0 or more");
-}
-
 template <class Index>
 Within<Index> within_job(const Index& index, const typename Index::Scalar* queries, std::size_t n,
                          const PointQueryOptions& options) {
@@ -161,7 +154,7 @@ template <class Index>
 PointLists<typename Index::Scalar> radius_search(const Index& index, PointsOf<Index> queries,
                                                  ScalarOf<Index> radius,
                                                  const PointQueryOptions& options) {
-    check_radius(radius, "");
+    check_not_negative("radius", radius);
     Within<Index> job =
         within_job(index, values_of<typename Index::Scalar>(queries), queries.size(), options);
     job.radius = radius;
@@ -177,7 +170,7 @@ PointLists<typename Index::Scalar> radius_search(
         throw InputError("radius search: " + std::to_string(queries.size()) + " queries, but " +
                          std::to_string(radii.size()) + " radii");
     for (std::size_t i = 0; i < radii.size(); ++i)
-        if (!(radii[i] >= 0)) check_radius(radii[i], std::string(" ").append(std::to_string(i)));
+        if (!(radii[i] >= 0)) check_not_negative("radius " + std::to_string(i), radii[i]);
     Within<Index> job =
         within_job(index, values_of<typename Index::Scalar>(queries), queries.size(), options);
     job.radii = radii.data();
@@ -188,7 +181,7 @@ template <class Index>
 QueryCounts radius_count(const Index& index, PointsOf<Index> queries, ScalarOf<Index> radius,
                          std::span<std::uint32_t> counts, const PointQueryOptions& options) {
     check_enum("order", options.order, QueryOrder::sorted);
-    check_radius(radius, "");
+    check_not_negative("radius", radius);
     if (counts.size() != queries.size())
         throw InputError("radius count: " + std::to_string(queries.size()) +
                          " queries, but room for " + std::to_string(counts.size()) + " counts");
@@ -206,7 +199,7 @@ QueryCounts radius_count(const Index& index, PointsOf<Index> queries, ScalarOf<I
 template <class Index>
 std::uint32_t radius_count(const Index& index, const typename Index::Point& query,
                            ScalarOf<Index> radius) {
-    check_radius(radius, "");
+    check_not_negative("radius", radius);
     const FloatEnvironment plain;
     std::uint32_t count = 0;
     Within<Index> job = within_job(index, &query.x, 1, {});
@@ -259,7 +252,7 @@ PointLists<typename Index::Scalar> neighbour_lists(const Index& index, ScalarOf<
     constexpr int dim = Index::dimension;
     check_enum("rows", rows, PairRows::full);
     check_enum("order", options.order, QueryOrder::sorted);
-    check_radius(radius, "");
+    check_not_negative("radius", radius);
     const PointTreeView<Scalar, dim>& tree = index.arrays().tree;
     PointLists<Scalar> result;
     with_threads(options.threads, [&] {
@@ -292,7 +285,7 @@ template <class Index>
 bool visit_radius(const Index& index, const typename Index::Point& query,
                   typename Index::Scalar radius,
                   bool (*call)(void*, std::uint32_t, typename Index::Scalar), void* data) {
-    check_radius(radius, "");
+    check_not_negative("radius", radius);
     const FloatEnvironment plain;
     return point_kernels<typename Index::Scalar, Index::dimension>().front().visit_ball(
         index.arrays().tree, &query.x, radius, {call, data});

@@ -4,17 +4,17 @@
 #include <raydix/double.h>
 
 #include "base/float_env.h"
+#include "base/options.h"
 #include "proximity/closest_walk.h"
 #include "proximity/query_batch.h"
 
 namespace raydix {
 namespace {
 
+/// In a plain environment: the square of a small distance is a denormal number.
 template <class Scalar>
 Scalar square_limit(Scalar max_distance) {
-    if (!(max_distance >= 0))
-        throw InputError("closest points: max_distance is " + std::to_string(max_distance) +
-                         "; it must be 0 or more");
+    check_not_negative("closest points: max_distance", max_distance);
     return max_distance * max_distance;
 }
 
@@ -27,8 +27,9 @@ Result public_point(const BasicClosestTriangle<Scalar>& best) {
 /// Tree: PaddedTree of a Bvh, PaddedTreeD of a BvhD.
 template <class Tree, class AnyBvh, class Vec, class Result>
 QueryCounts closest_batch(const AnyBvh& bvh, std::span<const Vec> queries,
-                          std::span<Result> results, typename Tree::Scalar limit) {
+                          std::span<Result> results, typename Tree::Scalar max_distance) {
     using Scalar = typename Tree::Scalar;
+    const Scalar limit = square_limit(max_distance);
     const Tree tree(bvh);
     std::vector<QueryCounts> parts(block_count(queries.size()));
     for_each_query_block(
@@ -56,9 +57,9 @@ QueryCounts closest_batch(const AnyBvh& bvh, std::span<const Vec> queries,
 template <class Tree, class Result, class AnyBvh, class Vec>
 Result closest_one(const AnyBvh& bvh, Vec query, typename Tree::Scalar max_distance) {
     require_triangles(bvh, "closest points need");
+    const FloatEnvironment plain;
     const auto limit = square_limit(max_distance);
     if (bvh.empty() || !is_finite(query)) return {};
-    const FloatEnvironment plain;
     const Tree tree(bvh);
     BasicWalkStack<typename Tree::Scalar> stack(tree.max_depth);
     return public_point<Result>(find_closest_triangle(tree, query, limit, no_primitive, stack));
@@ -70,20 +71,20 @@ QueryCounts closest_points(const Bvh& bvh, std::span<const Vec3> queries,
                            std::span<ClosestPoint> results, const ClosestOptions& options) {
     require_triangles(bvh, "closest points need");
     require_room("closest points", queries.size(), results.size());
-    const float limit = square_limit(options.max_distance);
     QueryCounts counts;
-    with_threads(options.threads,
-                 [&] { counts = closest_batch<PaddedTree>(bvh, queries, results, limit); });
+    with_threads(options.threads, [&] {
+        counts = closest_batch<PaddedTree>(bvh, queries, results, options.max_distance);
+    });
     return counts;
 }
 
 QueryCounts closest_points(const BvhD& bvh, std::span<const Vec3d> queries,
                            std::span<ClosestPointD> results, const ClosestOptionsD& options) {
     require_room("closest points", queries.size(), results.size());
-    const double limit = square_limit(options.max_distance);
     QueryCounts counts;
-    with_threads(options.threads,
-                 [&] { counts = closest_batch<PaddedTreeD>(bvh, queries, results, limit); });
+    with_threads(options.threads, [&] {
+        counts = closest_batch<PaddedTreeD>(bvh, queries, results, options.max_distance);
+    });
     return counts;
 }
 

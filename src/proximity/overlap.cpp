@@ -77,8 +77,8 @@ QueryCounts any_batch(const AnyBvh& bvh, std::span<const Query> queries,
     require_room("overlap queries", queries.size(), touched.size());
     std::fill(touched.begin(), touched.end(), std::uint8_t{0});
     QueryCounts counts;
-    const auto tree = padded_tree(bvh);
     with_threads(options.threads, [&] {
+        const auto tree = padded_tree(bvh);
         counts = for_each_query(
             tree, queries, order_of(bvh, queries).view(),
             [&](std::size_t, std::size_t i, auto& stack) {
@@ -94,9 +94,9 @@ template <class AnyBvh, class Query>
 OverlapLists all_batch(const AnyBvh& bvh, std::span<const Query> queries,
                        const OverlapOptions& options) {
     require_triangles(bvh, what);
-    const auto tree = padded_tree(bvh);
     OverlapLists lists;
     with_threads(options.threads, [&] {
+        const auto tree = padded_tree(bvh);
         ResultBudget budget("touch_all", options.max_result_bytes);
         RowBlocks<OverlapLists> rows(queries.size(), has_parts(bvh), budget);
         // Without room to put the queries in order they are taken as they come.

@@ -1,5 +1,7 @@
 #include "proximity/winding_tree.h"
 
+#include <raydix/types.h>
+
 #include <cmath>
 #include <numbers>
 
@@ -45,9 +47,11 @@ inline Facet facet_of(const LocalCorners& t) {
     return {(t.a + t.b + t.c) * (1.0 / 3.0), normal, length(normal)};
 }
 
-/// The two terms at d = center - query.
+/// The two terms at d = center - query; 0 where 1 / |d|^3 is beyond the range of numbers: the query
+/// is that far away, or so close to triangles that are points.
 inline double far_winding(const FarTriangles& far, Double3 d, double d2) {
     const double inverse3 = 1.0 / (d2 * std::sqrt(d2));
+    if (!(inverse3 > 0.0 && inverse3 < infinity)) return 0.0;
     const Double3 turned{dot(far.moment_x, d), dot(far.moment_y, d), dot(far.moment_z, d)};
     const double trace = far.moment_x.x + far.moment_y.y + far.moment_z.z;
     const double sum = dot(far.normal, d) + trace - 3.0 * dot(turned, d) / d2;

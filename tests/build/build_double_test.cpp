@@ -418,5 +418,11 @@ TEST(BuildManyDouble, AreTheTreesOfEachMesh) {
     EXPECT_TRUE(build_many(std::span<const MeshViewD>{}).empty());
 }
 
+TEST(BuildDouble, ATreeThatWasNeverBuiltHasEmptyBounds) {
+    const BvhD never, nothing = build_bvh(MeshD{});
+    EXPECT_GT(never.bounds().lo.x, never.bounds().hi.x);
+    EXPECT_GT(nothing.bounds().lo.z, nothing.bounds().hi.z);
+}
+
 }  // namespace
 }  // namespace raydix::test

@@ -116,6 +116,36 @@ TEST(BvhBuilder, RebuildsInPlaceWhateverCameBefore) {
     }
 }
 
+TEST(BvhBuilder, BoxesAndPointsMayBeThoseOfTheTree) {
+    const Mesh mesh = test::random_soup(2000, 5);
+    std::vector<Aabb> boxes;
+    for (const Vec3 p : mesh.vertices) boxes.push_back({p, {p.x + 0.1f, p.y + 0.2f, p.z + 0.1f}});
+    for (std::uint32_t number = 0; number < 10; ++number) {
+        const BuildOptions options{.builder = static_cast<Builder>(number)};
+        BvhBuilder builder;
+        Bvh tree = build_bvh(boxes, options);
+        const std::vector<Aabb> in_leaf_order(tree.boxes().begin(), tree.boxes().end());
+        builder.build(tree.boxes(), options, tree);
+        EXPECT_EQ(check_same(tree, build_bvh(in_leaf_order, options)).broken, "") << number;
+        tree = build_bvh(std::span<const Vec3>(mesh.vertices), options);
+        const std::vector<Vec3> points(tree.points().begin(), tree.points().end());
+        builder.build(MeshView(tree.points(), {}), options, tree);
+        EXPECT_EQ(check_same(tree, build_bvh(std::span<const Vec3>(points), options)).broken, "")
+            << number;
+    }
+}
+
+TEST(BvhBuilder, OneThatWasMovedFromBuildsAgain) {
+    const Mesh mesh = test::random_soup(300, 5);
+    BvhBuilder builder;
+    Bvh tree;
+    builder.build(mesh, {}, tree);
+    const BvhBuilder other = std::move(builder);
+    const Bvh first = std::move(tree);
+    builder.build(mesh, {}, tree);
+    EXPECT_EQ(check_same(tree, first).broken, "");
+}
+
 TEST(BvhBuilder, ABuildThatFailsLeavesAnEmptyTree) {
     BvhBuilder builder;
     Bvh tree;

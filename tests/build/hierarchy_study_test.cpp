@@ -10,6 +10,7 @@
 #include <numeric>
 #include <set>
 
+#include "support/message.h"
 #include "support/sanitized.h"
 #include "support/support.h"
 
@@ -210,6 +211,10 @@ TEST(HierarchyStudy, FewAndNoPrimitives) {
     Mesh bad = random_soup(5, 1);
     bad.triangles[3] = {0, 1, 99};
     EXPECT_THROW(study(bad, queue), InputError);
+    const Mesh good = random_soup(5, 1);
+    const MeshView both[] = {MeshView(good), MeshView(bad)};
+    EXPECT_EQ(message_of([&] { (void)study_hierarchies(both, {.repeat = 1}); }),
+              "mesh 1: triangle 3: an index is past the last vertex");
     // The kernels of the paper know leaves of one primitive only.
     const auto larger = study_hierarchy(random_soup(50, 1), {.max_leaf = 4, .cases = {own, queue}});
     EXPECT_NE(larger[0].refusal, "");

@@ -2,12 +2,15 @@
 // pictures stay the same.
 #include <gtest/gtest.h>
 #include <raydix/camera.h>
+#include <raydix/closest.h>
 #include <raydix/double.h>
 #include <raydix/mesh.h>
 #include <raydix/model.h>
 #include <raydix/picture.h>
 #include <raydix/rays.h>
 #include <raydix/scene.h>
+#include <raydix/scene_queries.h>
+#include <raydix/solid.h>
 #include <raydix/tree_view.h>
 
 #include <cfenv>
@@ -190,6 +193,25 @@ TEST(CallerEnvironmentOfTrees, LeavesPictures) {
     expect_same_bytes([&] { return bytes_of(render_tree(tree, camera, boxes, options).pixels); });
     expect_same_bytes(
         [&] { return bytes_of(render_slice(tree, boxes, {.width = 40, .height = 30}).pixels); });
+}
+
+/// The squares of these distances are denormal numbers.
+TEST(CallerEnvironmentOfQueries, LeavesLimitsOfSmallDistances) {
+    Mesh mesh;
+    mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    mesh.triangles = {{0, 1, 2}};
+    const Bvh tree = build_bvh(mesh);
+    const Scene scene(mesh);
+    const Solid solid(tree);
+    const std::vector<Vec3> queries{{0.25f, 0.25f, 3e-21f}};
+    constexpr float most = 4e-21f;
+    ASSERT_TRUE(closest_point(tree, queries[0], most).found());
+    ASSERT_FALSE(closest_point(tree, queries[0], 0.5f * most).found());
+    expect_same_bytes([&] { return bytes_of(closest_points(tree, queries, {most})[0].prim); });
+    expect_same_bytes([&] { return bytes_of(closest_point(tree, queries[0], most).prim); });
+    expect_same_bytes([&] { return bytes_of(closest_points(scene, queries, {most})[0].prim); });
+    expect_same_bytes([&] { return bytes_of(closest_point(scene, queries[0], most).prim); });
+    expect_same_bytes([&] { return bytes_of(signed_distances(solid, queries, {most})); });
 }
 
 }  // namespace

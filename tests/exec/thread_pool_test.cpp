@@ -2,12 +2,16 @@
 // exceptions come out, and no answer changes.
 #include <gtest/gtest.h>
 #include <raydix/bvh.h>
+#include <raydix/double.h>
 #include <raydix/raydix.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstring>
 #include <mutex>
 #include <set>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -160,6 +164,85 @@ TEST(ThreadPool, APoolThatSaysNoneHasOne) {
 TEST(ThreadPool, HalfOfOneIsRefused) {
     EXPECT_EQ(test::message_of([] { use_thread_pool({.workers = [] { return 2; }}); }),
               "a thread pool needs both functions, workers and run; one is missing");
+}
+
+/// Runs loops on the calling thread, and throws in place of one of them.
+class RefusingPool {
+public:
+    explicit RefusingPool(int refused) {
+        use_thread_pool({.workers = [] { return 4; },
+                         .run =
+                             [this, refused](std::size_t jobs, const auto& job) {
+                                 if (loops++ == refused) throw std::runtime_error("no room");
+                                 for (std::size_t i = 0; i < jobs; ++i) job(i);
+                             }});
+    }
+    ~RefusingPool() { use_thread_pool({}); }
+    RefusingPool(const RefusingPool&) = delete;
+    RefusingPool& operator=(const RefusingPool&) = delete;
+
+    int loops = 0;
+};
+
+/// How many loops `call` has that the pool is asked to run.
+template <class Call>
+int loops_of(const Call& call) {
+    const RefusingPool pool(-1);
+    call();
+    return pool.loops;
+}
+/// Whether `call` throws what the pool throws.
+template <class Call>
+bool is_refused(int loop, const Call& call) {
+    const RefusingPool pool(loop);
+    try {
+        call();
+    } catch (const std::runtime_error&) {
+        return true;
+    }
+    return false;
+}
+
+/// So many points that the loops over groups of them are more than one thread's.
+TEST(ThreadPool, ChangingPointsStayWholeWhenALoopIsRefused) {
+    std::vector<Vec3> points;
+    for (std::uint32_t i = 0; i < 120'000; ++i)
+        points.push_back({float(i % 311), float(i % 353), float(i % 397)});
+    const std::span all(points), first = all.first(100'000), rest = all.subspan(100'000),
+                                 queries = all.first(20);
+    const Points built = build_points(first);
+    Points grown = build_points(first);
+    const int loops = loops_of([&] { grown.insert(rest); });
+    EXPECT_GT(loops, 3);
+    for (int loop = 0; loop < loops; ++loop) {
+        Points index = build_points(first);
+        const bool thrown = is_refused(loop, [&] { index.insert(rest); });
+        EXPECT_EQ(index.size(), thrown ? 100'000u : 120'000u) << loop;
+        EXPECT_EQ(index.order().size(), index.size()) << loop;
+        const auto found = knn(index, queries, 3), wanted = knn(thrown ? built : grown, queries, 3);
+        EXPECT_TRUE(std::ranges::equal(found.indices.view(), wanted.indices.view())) << loop;
+    }
+}
+
+TEST(ThreadPool, RefitsInDoubleStayWholeWhenALoopIsRefused) {
+    MeshD mesh;
+    for (std::uint32_t i = 0; i < 20'000; ++i) {
+        const double x = i % 100, y = i / 100;
+        mesh.vertices.insert(mesh.vertices.end(), {{x, y, 0}, {x + 1, y, 0}, {x, y + 1, 1}});
+        mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    MeshD moved = mesh;
+    for (Vec3d& p : moved.vertices) p.x += 1000;
+    const RayD at_old{{50.25, 50.25, -9}, 0, {0, 0, 1}}, at_new{{1050.25, 50.25, -9}, 0, {0, 0, 1}};
+    BvhD refitted = build_bvh(mesh);
+    const int loops = loops_of([&] { refit(refitted, moved); });
+    EXPECT_GT(loops, 3);
+    for (int loop = 0; loop < loops; ++loop) {
+        BvhD tree = build_bvh(mesh);
+        const bool thrown = is_refused(loop, [&] { refit(tree, moved); });
+        EXPECT_EQ(any_hit(tree, at_old), thrown) << loop;
+        EXPECT_EQ(any_hit(tree, at_new), !thrown) << loop;
+    }
 }
 
 /// A scene's tree and hits, and neighbours of its vertices, as bytes.

@@ -135,6 +135,17 @@ TEST(RenderSlice, SurvivesOddScenes) {
         }
 }
 
+/// The float sum of the lower end and the size may be above the upper end.
+TEST(RenderSlice, TheUpperEndIsInTheBox) {
+    const Mesh mesh{
+        "", {{0, 0, -0.0487069301f}, {1, 0, 2.52381113e-07f}, {0, 1, -0.0487069301f}}, {{0, 1, 2}}};
+    const Bvh bvh = build_bvh(mesh);
+    const SliceOptions options{.at = 1, .width = 40, .height = 40};
+    const Picture with = render_slice(bvh, level_boxes(bvh), options);
+    const Picture without = render_slice(bvh, {}, options);
+    EXPECT_NE(light(with.pixels[20 * 40 + 20]), light(without.pixels[20 * 40 + 20]));
+}
+
 TEST(RenderSlice, RefusesWhatItCannotShow) {
     const Bvh bvh = build_bvh(test::ball_and_boxes());
     EXPECT_THROW((void)render_slice(bvh, {}, {.axis = 3}), InputError);
@@ -204,6 +215,23 @@ TEST(RenderTree, BoxesAroundTheCameraAndPointsAreFine) {
     EXPECT_GT(most, 0.3f);
     const Picture empty = render_tree(build_bvh(Mesh{}), front_camera(), {}, small_picture(64, 48));
     EXPECT_EQ(empty.pixels.size(), 64u * 48u);
+}
+
+/// Boxes may come from any tree: only the order of their levels counts.
+TEST(RenderTree, LevelsMayLieFarApart) {
+    const Bvh bvh = build_bvh(test::ball_and_boxes());
+    const Aabb box = bvh.bounds();
+    const auto picture = [&](std::vector<std::uint32_t> levels) {
+        std::vector<LevelBox> boxes;
+        for (const std::uint32_t level : levels) boxes.push_back({box, level});
+        return render_tree(bvh, front_camera(), boxes, small_picture(61, 47)).pixels;
+    };
+    const auto same = [](const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+        return std::memcmp(a.data(), b.data(), a.size() * sizeof(Vec3)) == 0;
+    };
+    EXPECT_TRUE(same(picture({0, 0xFFFFFFFFu}), picture({2, 3})));
+    EXPECT_TRUE(same(picture({0xFFFFFFFFu}), picture({5})));
+    EXPECT_FALSE(same(picture({0xFFFFFFFFu}), picture({})));
 }
 
 TEST(RenderTree, IsTheSameForEveryThreadCount) {

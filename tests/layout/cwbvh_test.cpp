@@ -250,6 +250,17 @@ TEST(Cwbvh, StatisticsAddUp) {
     EXPECT_LT(stats.sah, *tree_stats(bvh).sah);
 }
 
+TEST(Cwbvh, ATreeThatWasMovedFromIsEmpty) {
+    Cwbvh tree(build_bvh(random_soup(300, 5)));
+    const Cwbvh other = std::move(tree), nothing{Bvh()};
+    EXPECT_FALSE(other.empty());
+    for (const Cwbvh* empty : {static_cast<const Cwbvh*>(&tree), &nothing}) {
+        EXPECT_TRUE(empty->empty());
+        EXPECT_EQ(empty->stats().nodes, 0u);
+        EXPECT_EQ(empty->stats().widening, 1.0) << "without surface";
+    }
+}
+
 TEST(Cwbvh, RefusesTreesWithoutTriangles) {
     const std::vector<Vec3> points{{0, 0, 0}, {1, 1, 1}};
     EXPECT_THROW(Cwbvh{build_bvh(std::span(points))}, InputError);

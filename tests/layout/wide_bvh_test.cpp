@@ -266,6 +266,24 @@ TEST(WideBuild, LeavesOutWhatIsInvalidOrFlat) {
     EXPECT_TRUE(same_bits(tree, kept));
 }
 
+TEST(WideBuild, WhatWasMovedFromIsEmptyAndBuildsAgain) {
+    const Mesh mesh = random_soup(300, 5);
+    WideBvhBuilder builder;
+    WideBvh tree;
+    builder.build(mesh, {}, tree);
+    const WideBvh first = std::move(tree);
+    const std::vector<Ray> rays(3, Ray{{0, 0, -9}, 0, {0, 0, 1}, infinity});
+    EXPECT_TRUE(tree.empty());
+    EXPECT_EQ(tree.stats().references, 0u);
+    EXPECT_FALSE(trace(tree, rays)[0].hit());
+    EXPECT_FALSE(closest_hit(tree, rays[0]).hit());
+    builder.build(mesh, {}, tree);
+    EXPECT_TRUE(same_bits(tree, first));
+    WideBvhBuilder other = std::move(builder);
+    builder.build(mesh, {}, tree);
+    EXPECT_TRUE(same_bits(tree, first));
+}
+
 TEST(WideBuild, RefusesPointsAndOtherWidths) {
     const std::vector<Vec3> points{{0, 0, 0}, {1, 1, 1}};
     EXPECT_THROW(static_cast<void>(build_wide_bvh(MeshView(points, {}))), InputError);

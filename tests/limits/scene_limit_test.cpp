@@ -44,8 +44,9 @@ MeshD in_double(const Mesh& mesh) {
     return out;
 }
 
-/// Holds the call to what it says.
-void expect_bound(const std::string& name, const std::function<void(std::uint64_t limit)>& call) {
+/// Holds the call to what it says: all that it needs or, unless `exact`, that it needs more.
+void expect_bound(const std::string& name, const std::function<void(std::uint64_t limit)>& call,
+                  bool exact = true) {
     SCOPED_TRACE(name);
     std::uint64_t told = 0;
     const std::uint64_t before = memory_count().now();
@@ -54,7 +55,7 @@ void expect_bound(const std::string& name, const std::function<void(std::uint64_
         call(1);
     } catch (const ResultTooLarge& error) {
         told = error.bytes();
-        EXPECT_TRUE(error.is_exact());
+        EXPECT_EQ(error.is_exact(), exact);
     }
     ASSERT_GT(told, 0u);
     const std::uint64_t refused = memory_count().peak() - before;
@@ -89,15 +90,53 @@ TEST(SceneLimits, BodiesTakeNoMoreThanTheySay) {
                          [&](std::uint64_t limit) { SolidD(in_doubles, options(limit)); });
         }
         // Pairs are few here: what counts is the copies and their trees.
-        expect_bound("pairs" + which, [&](std::uint64_t limit) {
-            static_cast<void>(
-                overlapping_pairs(many, {.narrow = true, .max_result_bytes = limit, .threads = 1}));
-        });
-        expect_bound("pairs in double" + which, [&](std::uint64_t limit) {
-            static_cast<void>(overlapping_pairs(
-                in_doubles, {.narrow = true, .max_result_bytes = limit, .threads = 1}));
-        });
+        const auto pairs_of = [](const auto& scene) {
+            return [&](std::uint64_t limit) {
+                static_cast<void>(overlapping_pairs(
+                    scene, {.narrow = true, .max_result_bytes = limit, .threads = 1}));
+            };
+        };
+        expect_bound("pairs" + which, pairs_of(many), false);
+        expect_bound("pairs in double" + which, pairs_of(in_doubles), false);
     }
+}
+
+/// A call with as much as an error names exactly passes, and one with as much as it names as too
+/// little is refused. call(limit)
+void expect_true_errors(const std::function<void(std::uint64_t limit)>& call) {
+    std::uint64_t limit = 1;
+    for (int tries = 0; tries < 40; ++tries) {
+        try {
+            call(limit);
+            return;
+        } catch (const ResultTooLarge& error) {
+            const std::uint64_t named = error.bytes();
+            ASSERT_GE(named, limit);
+            if (error.is_exact()) {
+                EXPECT_NO_THROW(call(named));
+            } else {
+                EXPECT_THROW(call(named), ResultTooLarge) << named;
+            }
+            limit = named + 1 + named / 8;
+        }
+    }
+    FAIL() << "no limit is enough";
+}
+
+TEST(SceneLimits, PairsPassWithWhatTheErrorNames) {
+    const Mesh mesh = test::random_soup(400, 3, 2.0f);  // many pairs
+    const Scene scene(mesh), other(test::random_soup(300, 4, 2.0f));
+    expect_true_errors([&](std::uint64_t limit) {
+        static_cast<void>(overlapping_pairs(scene, {.max_result_bytes = limit, .threads = 1}));
+    });
+    expect_true_errors([&](std::uint64_t limit) {
+        static_cast<void>(
+            overlapping_pairs(scene, other, {.max_result_bytes = limit, .threads = 1}));
+    });
+    expect_true_errors([&](std::uint64_t limit) {
+        static_cast<void>(
+            count_overlapping_pairs(scene, {.max_result_bytes = limit, .threads = 1}));
+    });
 }
 
 }  // namespace

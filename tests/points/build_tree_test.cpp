@@ -4,6 +4,7 @@
 #include <raydix/points.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "points/point_arrays.h"
@@ -198,6 +199,23 @@ TYPED_TEST(PointTree, StrictNamesTheFirstInvalidPoint) {
     points[77'777].x = static_cast<T>(1e12f);
     points[90'000].y = -static_cast<T>(1e12f);
     EXPECT_EQ(build_points(points, {.strict = true}).left_out(), 0u);
+}
+
+TEST(PointsOptions, SayTheTreeOfNoPointsAndLastUntilTheNextBuild) {
+    const std::vector<Vec3> points{{0, 0, 0}, {1, 0, 0}, {NAN, 0, 0}};
+    Points index;
+    index.rebuild({}, {.tree = PointsTree::bvh});
+    EXPECT_EQ(index.tree(), PointsTree::bvh);
+    index.insert(points);
+    EXPECT_EQ(index.tree(), PointsTree::bvh);
+    EXPECT_THROW(index.rebuild(points, {.strict = true}), InputError);
+    EXPECT_THROW(index.rebuild(points, {.threads = -1}), InputError);
+    EXPECT_TRUE(index.empty());
+    EXPECT_EQ(index.options().tree, PointsTree::bvh) << "that of the last build";
+    EXPECT_EQ(index.insert(points), 0u);
+    EXPECT_EQ(index.size(), 2u);
+    index.rebuild(points);
+    EXPECT_EQ(index.tree(), PointsTree::bvh);
 }
 
 TEST(PointsTreeNames, ThereAndBack) {

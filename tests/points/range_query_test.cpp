@@ -137,6 +137,15 @@ TYPED_TEST(Within, CallbacksMayStop) {
     }
 }
 
+bool stop_at_once(std::uint32_t, float) { return false; }
+
+TEST(Visitors, MayBeFunctions) {
+    const std::vector<Vec3> points(3);
+    const Points index = build_points(points);
+    EXPECT_FALSE(for_each_in_radius(index, points[0], 1, stop_at_once));
+    EXPECT_FALSE(for_each_in_radius(index, points[0], 1, &stop_at_once));
+}
+
 TYPED_TEST(Within, BoxLikeEveryPoint) {
     using Box = typename TypeParam::Box;
     for (const PointSet& set : point_sets(20 * thorough, seed + 6)) {
@@ -382,6 +391,8 @@ TYPED_TEST(Within, BadRadii) {
               "no error");
     EXPECT_NE(message_of([&] { radius_count(index, queries, 1, std::span(counts).first(2)); }),
               "no error");
+    EXPECT_EQ(message_of([&] { (void)radius_count(index, queries[0], T(-1e-9)); }),
+              "radius is -1e-09; it must be 0 or more");
     // -0 is zero.
     EXPECT_EQ(radius_search(index, queries, -T{0}).indices.size(), 30u);
 }

@@ -12,6 +12,7 @@
 
 #include "primitives/zero_area.h"
 #include "proximity/closest_on_triangle.h"
+#include "support/message.h"
 #include "support/random.h"
 #include "support/region_distance.h"
 #include "support/sanitized.h"
@@ -244,6 +245,8 @@ TEST(Closest, OddInput) {
     EXPECT_THROW(closest_points(bvh, queries, std::span(results).first(2)), InputError);
     const Bvh points = build_bvh(std::span<const Vec3>(mesh.vertices).first(3));
     EXPECT_THROW(static_cast<void>(closest_point(points, {0, 0, 0})), InputError);
+    EXPECT_EQ(test::message_of([&] { (void)closest_points(bvh, queries, {-1e-9f}); }),
+              "closest points: max_distance is -1e-09; it must be 0 or more");
     // Thousands of equal points as triangles: the lowest id.
     Mesh equal;
     equal.vertices.push_back({1, 2, 3});

@@ -263,6 +263,27 @@ TEST(DoubleQueries, WindingNumbersOfAnOpenMesh) {
     }
 }
 
+/// Farther away than squares of distances go, and nearer to a triangle without area.
+TEST(DoubleQueries, WindingNumbersAreNumbersAtAnyDistance) {
+    MeshD open;
+    open.vertices = {{-1, -1, -1}, {1, -1, -1}, {0, 1, -1}, {0, 0, 1}, {0, 0, 0}};
+    open.triangles = {{0, 1, 3}, {1, 2, 3}, {4, 4, 4}};
+    const BvhD bvh = build_bvh(open, {.max_leaf = 1});
+    const SolidD solid(bvh);
+    ASSERT_EQ(solid.rule(), InsideRule::winding);
+    std::vector<Vec3d> far, near;
+    for (const double away : {1e102, 1e104, 1e153, 1e155, 1e160, 1e300, 1.7e308})
+        for (const Vec3d& at :
+             {Vec3d{away, 0.5, 0}, Vec3d{-0.5, away, -away}, Vec3d{away, away, -away}})
+            far.push_back(at);
+    for (const double away : {1e-30, 1e-100, 1e-105, 1e-140, 1e-300, 0.0})
+        near.push_back({away, 0, 0});
+    for (const double number : winding_numbers(solid, far)) EXPECT_NEAR(number, 0, 1e-100);
+    const double wanted = winding_numbers(solid, near)[0];
+    for (const double number : winding_numbers(solid, near)) EXPECT_NEAR(number, wanted, 1e-12);
+    for (const Vec3d& at : far) EXPECT_FALSE(contains(solid, at));
+}
+
 TEST(DoubleQueries, SegmentsAndSpheresLikeEveryTriangle) {
     for (const MeshD& mesh :
          {random_soup_d(400, 5, 0.2), in_double(random_soup(400, 6, 0.2f), 100.0, utm_place),

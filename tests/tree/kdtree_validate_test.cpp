@@ -139,5 +139,10 @@ TEST(KdCheck, HashSeesEveryPart) {
     EXPECT_EQ(kd_hash(build_kdtree(Mesh{})).size(), 32u);
 }
 
+TEST(KdCheck, ATreeThatWasNeverBuiltIsEmpty) {
+    EXPECT_EQ(kd_check(KdTree()).broken, "");
+    EXPECT_EQ(kd_hash(KdTree()), kd_hash(build_kdtree(std::span<const Vec3>{})));
+}
+
 }  // namespace
 }  // namespace raydix::test

@@ -188,5 +188,10 @@ TEST(OctreeCheck, TrianglesStandAtTheCentresOfTheirBoxes) {
     }
 }
 
+TEST(OctreeCheck, ATreeThatWasNeverBuiltIsEmpty) {
+    EXPECT_EQ(check(Octree()).broken, "");
+    EXPECT_EQ(tree_hash(Octree()), tree_hash(build_octree(Mesh{})));
+}
+
 }  // namespace
 }  // namespace raydix::test
