@@ -4,6 +4,8 @@
 #include <raydix/error.h>
 #include <raydix/files.h>
 #include <raydix/version.h>
+#define XXH_INLINE_ALL  // the library that raydix links may be its own affair
+#include <xxhash.h>
 
 #include <array>
 #include <csignal>
@@ -14,7 +16,6 @@
 #include <utility>
 
 #include "option_checks.h"
-#include "tree/word_hash.h"
 
 namespace raydix::cli {
 namespace {
@@ -50,10 +51,8 @@ private:
 
 /// Of what rays hit: a tree's hash knows boxes only.
 std::string hash_of_triangles(const Bvh& bvh) {
-    WordHash hash;
-    for (const LeafTriangle& t : bvh.triangles())
-        for (const Vec3 corner : {t.v0, t.v1, t.v2}) hash.put(corner);
-    return hash.hex();
+    const auto bytes = std::as_bytes(bvh.triangles());
+    return fmt::format("{:016x}", XXH3_64bits(bytes.data(), bytes.size()));
 }
 
 /// Calls field(name, member) for all numbers of a row that launches add to.
