@@ -101,6 +101,29 @@ class Simulate(ProgramTest):
         same = self.document("simulate", SCENE, *SMALL, "--rays", "primary", "--kernel", "while_while", "--machine", again)
         self.assertEqual(same["simulate"][0]["mrays_per_s_bound"], before)
 
+    def test_machines_that_were_never_built(self):
+        """Those of docs/simulator.md do what it says of them, on another scene."""
+        folder = pathlib.Path(__file__).resolve().parents[2] / "examples" / "machines"
+
+        def figures(machine, kernels, field, *more):
+            rows = self.document("simulate", SCENE, *SMALL, "--machine", machine, "--kernel", kernels, "--rays", "diffuse",
+                                 *more)["simulate"]
+            return {row["kernel"]: row[field] for row in rows}
+
+        kernels = "while_while,work_queue"
+        base = figures("gtx480", kernels, "mrays_per_s_bound")
+        free = figures(folder / "gtx480-free-exchange.json", kernels, "mrays_per_s_bound")
+        self.assertEqual(free["while_while"], base["while_while"])
+        self.assertGreater(free["work_queue"], 1.3 * base["work_queue"])
+        kernels = "while_while,persistent_while_while"
+        base = figures("gtx285", kernels, "mrays_per_s_scheduled")
+        own = figures(folder / "gtx285-blocks-out-of-order.json", kernels, "mrays_per_s_scheduled")
+        self.assertEqual(own["persistent_while_while"], base["persistent_while_while"])
+        self.assertGreaterEqual(own["while_while"], base["while_while"])
+        base = figures("gtx680", "while_while", "mrays_per_s_memory", "--memory")
+        more = figures(folder / "gtx680-more-in-flight.json", "while_while", "mrays_per_s_memory", "--memory")
+        self.assertGreaterEqual(more["while_while"], base["while_while"])
+
     def test_costs_of_single_kernels_are_kept_in_machine_files(self):
         arguments = ("simulate", SCENE, "--size", "32x24", "--rays", "primary")
         first = self.document(*arguments, "--machine", "h200")
