@@ -37,7 +37,7 @@ enum class Usage : std::uint32_t {
 struct SceneOptions {
     /// A mesh's tree of quality `high` never has a higher SAH than that of `balanced`: both are
     /// built, and the cheaper one is kept. Meshes of up to 1,024 triangles are also built as
-    /// `fast`.
+    /// `fast`, and so are those of which the cheaper tree has a SAH above 100.
     Quality quality = Quality::balanced;
     Usage usage = Usage::fixed;
     bool compact = false;  // the small layout (WideBvhOptions::compact); no effect in double

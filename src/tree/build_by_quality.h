@@ -16,9 +16,11 @@
 
 namespace raydix {
 
-/// Trees of so few triangles take so little time that all lower qualities are tried. In larger ones
-/// clustering was never seen to cost more than the radix tree.
+/// Trees of so few triangles take so little time that all lower qualities are tried.
 inline constexpr std::size_t few_triangles = 1024;
+/// In larger ones clustering was seen to cost more than the radix tree only where boxes lie in each
+/// other a hundredfold, as those of nested shells do. Wide trees of scans and rooms cost 5 to 28.
+inline constexpr double costly_sah = 100.0;
 
 /// The quality asked for, and the lower ones that may have a better tree.
 inline std::vector<Quality> qualities_to_try(Quality quality, std::size_t triangles) {
@@ -30,7 +32,8 @@ inline std::vector<Quality> qualities_to_try(Quality quality, std::size_t triang
 
 /// The tree of the least SAH among those that make(BuildOptions) gives for the quality asked for
 /// and lower ones; of equals that of the better word. sah_of(tree): its cost. `threads` as in
-/// BuildOptions. All are built at once: what one leaves of the threads another takes.
+/// BuildOptions. All are built at once: what one leaves of the threads another takes. Of more than
+/// few_triangles the tree of `fast` is tried afterwards, where the others are costly.
 template <class Make, class SahOf>
 auto build_by_quality(Quality quality, int threads, std::size_t triangles, const Make& make,
                       const SahOf& sah_of) {
@@ -40,8 +43,14 @@ auto build_by_quality(Quality quality, int threads, std::size_t triangles, const
         of_quality.threads = threads;
         return make(of_quality);
     };
-    if (qualities.size() == 1) return build(quality);
     using Tree = std::invoke_result_t<Make, const BuildOptions&>;
+    const auto or_fast = [&](Tree tree) {
+        if (qualities.back() == Quality::fast || !(sah_of(tree) > costly_sah)) return tree;
+        const ProgressStage silent(ProgressSpan{});
+        Tree fast = build(Quality::fast);
+        return sah_of(fast) < sah_of(tree) ? std::move(fast) : std::move(tree);
+    };
+    if (qualities.size() == 1) return or_fast(build(quality));
     std::vector<std::optional<Tree>> trees(qualities.size());
     // The best one takes the longest, and tells how far all are.
     const ProgressSpan progress = progress_span();
@@ -54,8 +63,8 @@ auto build_by_quality(Quality quality, int threads, std::size_t triangles, const
             },
             1);
     });
-    return std::move(**std::ranges::min_element(
-        trees, {}, [&](const std::optional<Tree>& tree) { return sah_of(*tree); }));
+    return or_fast(std::move(**std::ranges::min_element(
+        trees, {}, [&](const std::optional<Tree>& tree) { return sah_of(*tree); })));
 }
 
 }  // namespace raydix

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 #include <raydix/model.h>
+#include <raydix/quality.h>
 #include <raydix/scene.h>
+#include <raydix/wide.h>
 
 #include <array>
 #include <cmath>
@@ -75,6 +77,29 @@ MeshD in_double(const Mesh& mesh) {
     for (const Vec3 v : mesh.vertices) out.vertices.push_back({v.x, v.y, v.z});
     out.triangles = mesh.triangles;
     return out;
+}
+
+/// Triangles that lie one around the other.
+Mesh nested(std::uint32_t count) {
+    Mesh mesh;
+    for (std::uint32_t k = 0; k < count; ++k) {
+        const float s = 1.0f + 0.01f * static_cast<float>(k);
+        for (const Vec3 corner : {Vec3{-s, -s, -s}, Vec3{s, -s, s}, Vec3{0, s, 0}})
+            mesh.vertices.push_back(corner);
+        mesh.triangles.push_back({3 * k, 3 * k + 1, 3 * k + 2});
+    }
+    return mesh;
+}
+
+TEST(BuildByQuality, CostNeverRisesWhereTrianglesLieAroundEachOther) {
+    for (const std::uint32_t count : {1025u, 1500u, 5000u}) {
+        const Mesh mesh = nested(count);
+        ASSERT_LT(sah_of(mesh, {.quality = Quality::fast}),
+                  build_wide_bvh(mesh, build_options_for(Quality::balanced)).stats().sah)
+            << count << ": no test of it";
+        expect_no_rise(mesh, "nested " + std::to_string(count));
+        expect_no_rise(in_double(mesh), "nested " + std::to_string(count) + ", double");
+    }
 }
 
 TEST(BuildByQuality, CostNeverRisesOnOddSoups) {
