@@ -62,6 +62,9 @@ static_assert(sizeof(KdNode) == 16);
 /// inner node r lie in slots 2r + 2 and 2r + 3.
 class KdTree {
 public:
+    /// Empty.
+    KdTree() { options_.max_leaf = 8; }
+
     [[nodiscard]] bool empty() const { return order_.empty(); }
     [[nodiscard]] std::span<const KdNode> nodes() const { return nodes_.view(); }
     /// Position in leaf order -> the caller's primitive id, [references].
@@ -98,7 +101,7 @@ private:
     Buffer<LeafTriangle> triangles_;
     Buffer<Vec3> points_;
     PrimitiveKind kind_ = PrimitiveKind::points;
-    KdTreeOptions options_{.max_leaf = 8};
+    KdTreeOptions options_;
     Aabb bounds_{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
     std::uint32_t inner_count_ = 0;
     std::uint32_t max_depth_ = 0;

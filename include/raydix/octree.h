@@ -63,6 +63,9 @@ struct NodeRange {
 /// input may go. A tree without valid points has no nodes; else nodes()[0] is the root.
 class Octree {
 public:
+    /// Empty.
+    Octree() { options_.max_level = 21; }
+
     [[nodiscard]] bool empty() const { return order_.empty(); }
     [[nodiscard]] std::span<const OctreeNode> nodes() const { return nodes_.view(); }
     /// Position in leaf order -> the caller's primitive id, [references]. Ascending by Morton code,
@@ -101,7 +104,7 @@ private:
     Buffer<Vec3> points_;
     std::array<std::uint32_t, 23> level_begin_{};  // [level_count + 1], the rest repeats the last
     PrimitiveKind kind_ = PrimitiveKind::points;
-    OctreeOptions options_{.max_level = 21};
+    OctreeOptions options_;
     Aabb bounds_{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
     std::uint64_t input_count_ = 0;
     std::uint64_t left_out_ = 0;
