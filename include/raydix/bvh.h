@@ -183,8 +183,8 @@ private:
 /// the least SAH (tree_stats), among `quality` and lower ones; of equals the better word's. So a
 /// better word does not mean a higher cost, as for scenes. Where more than one may be the best,
 /// their trees are built to find out, and InputError is thrown as by build_bvh. Of more than 1,024
-/// triangles `fast` is not built to compare with `balanced`: it is better on few meshes, such as
-/// thousands of triangles that lie one around the other.
+/// triangles `fast` is not built to compare: it is better on few meshes, such as thousands of
+/// triangles that lie one around the other.
 [[nodiscard]] BuildOptions best_build_options(const MeshView& mesh, Quality quality,
                                               const BuildOptions& options = {});
 

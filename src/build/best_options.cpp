@@ -25,7 +25,7 @@ BuildOptions cheapest(const MeshView& mesh, Quality quality, const BuildOptions&
                    if (!alone) tried.sah = cost(tried.options);
                    return tried;
                },
-               [](const Tried& tried) { return tried.sah; })
+               [](const Tried& tried) { return tried.sah; }, infinity)
         .options;
 }
 

@@ -15,7 +15,7 @@ struct SearchOdds {
 };
 
 /// Of a leaf's box of this area: every other ray. Triangles of a leaf are not looked at: orders by
-/// how much of its box they cover visit as many nodes (docs/performance/batches.md).
+/// how much of its box they cover visit as many nodes (docs/performance/single-calls.md).
 constexpr float hits_of_leaf(float area) { return 0.5f * area; }
 
 /// Of the box of this area around two subtrees, as if what one stops had nothing to do with what

@@ -37,7 +37,8 @@ inline constexpr double wide_primitive_cost = 0.4;
 /// (WideBvh::Arrays::middle), rounded outward: then a plane meets a ray after plane * inverse + (a
 /// constant of the ray), with an error that depends on the size of the scene and not on where it
 /// lies. A missing child has lo = infinity and hi = -infinity. Children are in ascending
-/// order of their search_rank (search_odds.h): any hit is looked for in the last one first.
+/// order of their search_rank at the time of the build (search_odds.h): any hit is looked for in
+/// the last one first. A refit leaves them where they are.
 struct alignas(32) WideNode {
     float lo[3][8], hi[3][8];
     std::uint32_t child[8];

@@ -20,6 +20,7 @@ namespace raydix {
 inline constexpr std::size_t few_triangles = 1024;
 /// In larger ones clustering was seen to cost more than the radix tree only where boxes lie in each
 /// other a hundredfold, as those of nested shells do. Wide trees of scans and rooms cost 5 to 28.
+/// Of binary trees the like is not known.
 inline constexpr double costly_sah = 100.0;
 
 /// The quality asked for, and the lower ones that may have a better tree.
@@ -33,10 +34,10 @@ inline std::vector<Quality> qualities_to_try(Quality quality, std::size_t triang
 /// The tree of the least SAH among those that make(BuildOptions) gives for the quality asked for
 /// and lower ones; of equals that of the better word. sah_of(tree): its cost. `threads` as in
 /// BuildOptions. All are built at once: what one leaves of the threads another takes. Of more than
-/// few_triangles the tree of `fast` is tried afterwards, where the others are costly.
+/// few_triangles the tree of `fast` is tried afterwards, where the others cost more than `costly`.
 template <class Make, class SahOf>
 auto build_by_quality(Quality quality, int threads, std::size_t triangles, const Make& make,
-                      const SahOf& sah_of) {
+                      const SahOf& sah_of, double costly = costly_sah) {
     const std::vector<Quality> qualities = qualities_to_try(quality, triangles);
     const auto build = [&](Quality one) {
         BuildOptions of_quality = build_options_for(one);
@@ -45,7 +46,7 @@ auto build_by_quality(Quality quality, int threads, std::size_t triangles, const
     };
     using Tree = std::invoke_result_t<Make, const BuildOptions&>;
     const auto or_fast = [&](Tree tree) {
-        if (qualities.back() == Quality::fast || !(sah_of(tree) > costly_sah)) return tree;
+        if (qualities.back() == Quality::fast || !(sah_of(tree) > costly)) return tree;
         const ProgressStage silent(ProgressSpan{});
         Tree fast = build(Quality::fast);
         return sah_of(fast) < sah_of(tree) ? std::move(fast) : std::move(tree);
