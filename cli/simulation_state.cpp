@@ -4,7 +4,7 @@
 #include <raydix/error.h>
 #include <raydix/files.h>
 #include <raydix/version.h>
-#define XXH_INLINE_ALL  // the library that raydix links may be its own affair
+#define XXH_INLINE_ALL  // a shared raydix does not hand on the library it links
 #include <xxhash.h>
 
 #include <array>

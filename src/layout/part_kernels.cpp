@@ -4,6 +4,8 @@
 #include <bit>
 #include <cstddef>
 #include <cstring>
+#include <numeric>
+#include <span>
 #include <vector>
 
 #include "base/float3.h"

@@ -4,7 +4,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <span>
 
 namespace raydix {
 
@@ -35,6 +38,20 @@ constexpr void add_child(const SearchOdds& child, float area, SearchOdds& node) 
 /// the cost.
 constexpr float search_rank(const SearchOdds& odds) {
     return odds.hits / std::max(odds.cost, std::numeric_limits<float>::min());
+}
+
+/// Puts the few children into ascending order of search_rank(odds_of(child)); those of equal rank
+/// keep theirs.
+template <class Odds>
+void order_for_search(std::span<std::uint32_t> children, const Odds& odds_of) {
+    for (std::size_t k = 1; k < children.size(); ++k) {
+        const std::uint32_t child = children[k];
+        const float rank = search_rank(odds_of(child));
+        std::size_t at = k;
+        for (; at > 0 && search_rank(odds_of(children[at - 1])) > rank; --at)
+            children[at] = children[at - 1];
+        children[at] = child;
+    }
 }
 
 }  // namespace raydix

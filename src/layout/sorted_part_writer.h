@@ -214,12 +214,9 @@ private:
     Order write_slots(const std::array<std::uint32_t, width>& chosen, std::uint32_t count,
                       WideNode& node) const {
         Order order{};
-        for (std::uint32_t child = 0; child < count; ++child) {
-            std::uint32_t at = child;
-            for (; at > 0 && rank(chosen[order[at - 1]]) > rank(chosen[child]); --at)
-                order[at] = order[at - 1];
-            order[at] = child;
-        }
+        std::iota(order.begin(), order.end(), 0u);
+        order_for_search(std::span(order).first(count),
+                         [&](std::uint32_t child) { return odds(entries_[chosen[child]]); });
         SlotBoxes boxes{};
         std::fill_n(node.child, quantised_width, wide_no_child);
         for (std::uint32_t s = 0; s < count; ++s) {
@@ -230,7 +227,6 @@ private:
         set_boxes_about(in_.middle, boxes, node);
         return order;
     }
-    [[nodiscard]] float rank(std::uint32_t k) const { return search_rank(odds(entries_[k])); }
 #endif
 
     const PartInput& in_;

@@ -3,6 +3,8 @@
 #include <raydix/error.h>
 
 #include <algorithm>
+#include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -50,15 +52,8 @@ private:
     /// By ascending search_rank; those of equal rank from left to right.
     std::size_t children(std::uint32_t root, std::array<std::uint32_t, width>& chosen) const {
         const auto count = static_cast<std::size_t>(collapse_.children(root, chosen));
-        std::array<float, width> ranks;
-        for (std::size_t k = 0; k < count; ++k) {
-            const std::uint32_t child = chosen[k];
-            const float rank = search_rank(collapse_.odds(child));
-            std::size_t at = k;
-            for (; at > 0 && ranks[at - 1] > rank; --at)
-                ranks[at] = ranks[at - 1], chosen[at] = chosen[at - 1];
-            ranks[at] = rank, chosen[at] = child;
-        }
+        order_for_search(std::span(chosen).first(count),
+                         [&](std::uint32_t k) { return collapse_.odds(k); });
         return count;
     }
 

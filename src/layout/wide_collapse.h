@@ -21,11 +21,10 @@ struct WideOptions {
 };
 
 /// Node w has the children [w * width, (w + 1) * width), used ones first, by ascending search_rank
-/// (search_odds.h). A child is a BvhNode: an
-/// inner one has count == 0 and `first` is its wide node, a leaf holds the positions [first, first
-/// + count) of the tree's order, an unused one has count == 0 and first == no_child. The root is
-/// node 0; the inner children of a node are consecutive nodes, in the order of its children, and
-/// come after it.
+/// (search_odds.h). A child is a BvhNode: an inner one has count == 0 and `first` is its wide node,
+/// a leaf holds the positions [first, first + count) of the tree's order, an unused one has count
+/// == 0 and first == no_child. The root is node 0; the inner children of a node are consecutive
+/// nodes, in the order of its children, and come after it.
 struct WideTree {
     static constexpr std::uint32_t no_child = ~std::uint32_t{0};
 

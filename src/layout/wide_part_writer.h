@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -167,12 +168,9 @@ private:
     /// their order.
     static SlotOrder by_search_rank(std::span<const WideChild> children) {
         SlotOrder order{};
-        const auto rank = [&](std::uint32_t k) { return search_rank(children[k].odds); };
-        for (std::uint32_t k = 0; k < children.size(); ++k) {
-            std::uint32_t at = k;
-            for (; at > 0 && rank(order[at - 1]) > rank(k); --at) order[at] = order[at - 1];
-            order[at] = k;
-        }
+        std::iota(order.begin(), order.end(), 0u);
+        order_for_search(std::span(order).first(children.size()),
+                         [&](std::uint32_t k) { return children[k].odds; });
         return order;
     }
 
