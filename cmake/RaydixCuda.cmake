@@ -1,11 +1,15 @@
 # CUDA is found or left out by itself. RAYDIX_HAVE_CUDA says which.
 set(RAYDIX_HAVE_CUDA OFF)
-if(NOT RAYDIX_CUDA STREQUAL "OFF")
+raydix_nothing_runs(raydix_no_gpu "${RAYDIX_CUDA}" "GPU of NVIDIA" "${raydix_nvidia_gpus}")
+if(NOT RAYDIX_CUDA STREQUAL "OFF" AND NOT raydix_no_gpu)
     include(CheckLanguage)
     check_language(CUDA)
     if(CMAKE_CUDA_COMPILER)
         if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
             set(CMAKE_CUDA_ARCHITECTURES 90)
+            if(raydix_nvidia_gpus)
+                set(CMAKE_CUDA_ARCHITECTURES native)
+            endif()
         endif()
         enable_language(CUDA)
         if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)  # CMake before 3.26 does not know that nvcc has C++20

@@ -7,6 +7,15 @@ endif()
 if(RAYDIX_MPI STREQUAL "OFF" OR (RAYDIX_MPI STREQUAL "AUTO" AND (RAYDIX_SANITIZE MATCHES "thread" OR CMAKE_CROSSCOMPILING)))
     return()
 endif()
+if(RAYDIX_PYTHON AND RAYDIX_THIS_MACHINE)  # -I: where pip isolates a build, it shows the interpreter's own packages too
+    find_package(Python 3.10 REQUIRED COMPONENTS Interpreter)
+    execute_process(COMMAND ${Python_EXECUTABLE} -I -c "import importlib.util as u; print(u.find_spec('mpi4py') or '', end='')"
+        OUTPUT_VARIABLE raydix_mpi4py ERROR_QUIET)
+    raydix_nothing_runs(raydix_no_mpi4py "${RAYDIX_MPI}" mpi4py "${raydix_mpi4py}")
+    if(raydix_no_mpi4py)
+        return()
+    endif()
+endif()
 set(MPI_CXX_SKIP_MPICXX ON)  # the C calls alone
 find_package(MPI COMPONENTS CXX)
 if(NOT MPI_CXX_FOUND)

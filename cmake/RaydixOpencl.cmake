@@ -4,7 +4,8 @@
 set(RAYDIX_OPENCL AUTO CACHE STRING "AUTO, ON or OFF")
 set_property(CACHE RAYDIX_OPENCL PROPERTY STRINGS AUTO ON OFF)
 set(RAYDIX_HAVE_OPENCL OFF)
-if(RAYDIX_OPENCL STREQUAL "OFF")
+raydix_nothing_runs(raydix_no_opencl "${RAYDIX_OPENCL}" "OpenCL driver" "${raydix_opencl_drivers}")
+if(RAYDIX_OPENCL STREQUAL "OFF" OR raydix_no_opencl)
     return()
 endif()
 

@@ -58,8 +58,8 @@ try:
 except ImportError as error:
     raise ImportError(
         f"raydix.mpi needs the module raydix._mpi, which cannot be imported here ({error}). It is "
-        "built where pip compiles raydix and finds MPI (Debian package libopenmpi-dev), and needs "
-        "that MPI library again where it runs"
+        "built where pip compiles raydix and finds MPI (Debian package libopenmpi-dev) and mpi4py, "
+        "and needs that MPI library again where it runs"
     ) from error
 
 __all__ = ["MISSING", "CommunicationError", "DistributedPoints", "DistributedScene"]
