@@ -184,6 +184,8 @@ public:
         fn();
     }
     void meet() const {}
+    /// Charges what the active lanes did elsewhere.
+    void issue(Op op) { charge(op); }
 
 private:
     template <class Cond>

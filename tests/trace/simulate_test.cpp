@@ -1,5 +1,6 @@
 // The simulator's figures: counts worked out by hand, costs that move only what uses them, the same
 // figures for every thread count, pools under random delays.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <raydix/raydix.h>
@@ -332,6 +333,23 @@ TEST(Simulate, PersistentFormsDifferByTheirFetchesOnly) {
     }
 }
 
+/// A sum over all that a memory model is told.
+struct ToldAccesses final : MemoryObserver {
+    std::uint64_t sum = 0;
+
+    void add(std::uint64_t value) { sum = sum * 0x9E3779B97F4A7C15u + value; }
+    void access(const void* const* addresses, std::uint32_t lanes, std::uint32_t bytes,
+                Access how) override {
+        for (std::uint32_t l = 0; l < lanes; ++l)
+            add(reinterpret_cast<std::uintptr_t>(addresses[l]));
+        add(bytes), add(static_cast<std::uint64_t>(how));
+    }
+    void stack(const std::int32_t* entries, std::uint32_t lanes, Access how) override {
+        for (std::uint32_t l = 0; l < lanes; ++l) add(static_cast<std::uint64_t>(entries[l]));
+        add(static_cast<std::uint64_t>(how));
+    }
+};
+
 TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
     if (simulated_kernel(WarpKernel::packet, false, 32, SimulatorIsa::v3) == nullptr)
         GTEST_SKIP() << "no AVX2 and FMA here";
@@ -339,30 +357,41 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
     const WarpTree tree(build_bvh(scene.mesh()));
     const PreparedRays rays(make_mixed_rays(scene, 640, 8));
     const auto& arrays = tree.arrays();
-    for (const WarpKernel name : warp_kernels()) {
-        std::vector<std::vector<TreeHit>> hits;
+    std::vector<TreeHit> hits(640);
+    const auto compare = [&](WarpKernel name, bool any_hit, int width) {
+        SCOPED_TRACE(fmt::format("{}, {}, {} lanes", warp_kernel_name(name),
+                                 any_hit ? "any hit" : "closest hit", width));
+        std::vector<TreeHit> first;
         std::vector<OpCounts> counts;
+        std::vector<std::uint64_t> told;
         for (const SimulatorIsa isa : {SimulatorIsa::base, SimulatorIsa::v3}) {
-            const SimulatedKernel& kernel = *simulated_kernel(name, false, 32, isa);
+            const SimulatedKernel& kernel = *simulated_kernel(name, any_hit, width, isa);
             OpCounts tally{};
+            ToldAccesses observer;
             Buffer<std::byte> memory(kernel.warp_bytes(tree.max_depth() + 1));
             std::uint32_t next = 0;
-            hits.emplace_back(640);
+            hits.assign(640, {});  // the same array, of which the observer is told
             const WarpJob job{{arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
-                              {rays.rays().data(), hits.back().data(), 640, &next}};
-            kernel.start_warp(memory.data(), {&tally, nullptr, tree.max_depth() + 1});
-            for (std::uint32_t warp = 0; warp < 20; ++warp) {
+                              {rays.rays().data(), hits.data(), 640, &next}};
+            kernel.start_warp(memory.data(), {&tally, &observer, tree.max_depth() + 1});
+            for (int warp = 0; warp < 640 / width; ++warp) {
                 KernelState state;
                 kernel.start_kernel(state);
-                while (kernel.turn(memory.data(), state, job, warp)) {
+                while (kernel.turn(memory.data(), state, job, static_cast<std::uint32_t>(warp))) {
                 }
             }
             counts.push_back(tally);
+            told.push_back(observer.sum);
+            if (first.empty()) first = hits;
         }
-        EXPECT_EQ(counts[0], counts[1]) << warp_kernel_name(name);
-        EXPECT_EQ(std::memcmp(hits[0].data(), hits[1].data(), 640 * sizeof(TreeHit)), 0)
-            << warp_kernel_name(name);
-    }
+        EXPECT_EQ(counts[0], counts[1]);
+        EXPECT_EQ(told[0], told[1]);
+        EXPECT_EQ(std::memcmp(first.data(), hits.data(), 640 * sizeof(TreeHit)), 0);
+    };
+    for (const WarpKernel name : warp_kernels())
+        for (const bool any_hit : {false, true}) compare(name, any_hit, 32);
+    for (const int width : {8, 16, 64})
+        for (const bool any_hit : {false, true}) compare(WarpKernel::packet, any_hit, width);
 }
 
 /// Warps on real threads that wait at random between turns, on one pool.

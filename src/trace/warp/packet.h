@@ -10,6 +10,7 @@
 #include "simt/op.h"
 #include "simt/thread_warp.h"
 #include "trace/warp/lane.h"
+#include "trace/warp/packet_lanes.h"
 #include "trace/warp/per_ray.h"
 #include "trace/warp/steps.h"
 
@@ -26,15 +27,16 @@ struct Packet {
         warp.step(Op::choose, [](Lane& l) {
             if (is_finished(l)) l.tmin = infinity, l.t = -infinity;
         });
+        PacketLanes<Warp> lanes(warp);
         std::int32_t at = 0;
         std::uint32_t top = 0;
         warp.uniform_loop(
             Op::main_loop, [&] { return at != finished_node; },
             [&] {
                 if (at >= 0) {
-                    at = visit(warp, scene, at, top);
+                    at = visit(warp, lanes, scene, at, top);
                 } else {
-                    at = test_leaf<any_hit>(warp, scene, at);
+                    at = test_leaf<any_hit>(warp, lanes, scene, at);
                 }
                 if (at == popped_node && top == 0) {
                     at = finished_node;
@@ -45,28 +47,20 @@ struct Packet {
     }
 
 private:
-    RAYDIX_HD static bool meets_first(const Lane& l) { return (l.meets & 1) != 0; }
-    RAYDIX_HD static bool meets_second(const Lane& l) { return (l.meets & 2) != 0; }
-    RAYDIX_HD static bool prefers_second(const Lane& l) { return (l.meets & 4) != 0; }
-
     /// Both children against the packet. Returns where it goes next.
     template <class Warp>
-    RAYDIX_HD static std::int32_t visit(Warp& warp, const WarpScene& scene, std::int32_t node,
+    RAYDIX_HD static std::int32_t visit(Warp& warp, PacketLanes<Warp>& lanes,
+                                        const WarpScene& scene, std::int32_t node,
                                         std::uint32_t& top) {
         warp.touches(
             Access::read, [&](const Lane&) { return scene.pairs + node; }, sizeof(NodePair));
         NodePair pair{};  // loaded once, links too
-        warp.step(Op::visit_node, [&](Lane& l) {
-            pair = scene.pairs[node];
-            const PairVisit met = meet_pair(l, pair);
-            const bool rather_second = met.second && (met.second_is_closer || !met.first);
-            l.meets = (met.first ? 1u : 0u) | (met.second ? 2u : 0u) | (rather_second ? 4u : 0u);
-        });
-        const LaneMask first = warp.ballot(Op::vote, meets_first);
-        const LaneMask second = warp.ballot(Op::vote, meets_second);
+        lanes.meet(warp, Op::visit_node, scene.pairs + node, pair);
+        const LaneMask first = lanes.first(warp, Op::vote);
+        const LaneMask second = lanes.second(warp, Op::vote);
         if (first == 0) return second == 0 ? popped_node : pair.child1;
         if (second == 0) return pair.child0;
-        const LaneMask rather_second = warp.ballot(Op::ballot, prefers_second);
+        const LaneMask rather_second = lanes.rather_second(warp, Op::ballot);
         const bool to_second = warp.uniform(
             Op::choose, [&] { return 2 * count_ones(rather_second) > count_ones(first | second); });
         warp.write_shared(Op::push, [&] {
@@ -79,16 +73,21 @@ private:
     /// All triangles of the leaf. Returns popped_node, or finished_node if no lane searches any
     /// more.
     template <bool any_hit, class Warp>
-    RAYDIX_HD static std::int32_t test_leaf(Warp& warp, const WarpScene& scene, std::int32_t link) {
+    RAYDIX_HD static std::int32_t test_leaf(Warp& warp, PacketLanes<Warp>& lanes,
+                                            const WarpScene& scene, std::int32_t link) {
         warp.uniform_loop(
             Op::leaf_loop, [&] { return link != 0; },
             [&] {
-                test_triangle(warp, scene, [link](const Lane&) { return link; });
+                if (!lanes.pass_by(warp, scene.triangles[~link])) {
+                    test_triangle(warp, scene, [link](const Lane&) { return link; });
+                    lanes.look_again(warp);
+                }
                 link =
                     warp.uniform(Op::next_triangle, [&] { return after_triangle(link, scene, 0); });
             });
         if (!any_hit) return popped_node;
         warp.step(Op::choose, [](Lane& l) { l.tmin = l.prim == no_primitive ? l.tmin : infinity; });
+        lanes.look_again(warp);
         const bool searching = warp.any(Op::vote, [](const Lane& l) { return l.tmin <= l.t; });
         return searching ? popped_node : finished_node;
     }
