@@ -269,6 +269,15 @@ TEST(WarpOracle, AgreesWithEveryKernelOnRandomTriangles) {
         expect_hits_of_the_oracle(scene, builder, fewer(8000, 20));
 }
 
+/// Every triangle twice, the second ones backwards: which of two is met first is up to the tree.
+TEST(WarpOracle, TheLowerOfTwoEqualTrianglesWins) {
+    Mesh soup = random_soup(1000, 5, 0.1f);
+    for (std::size_t k = 1000; k-- > 0;) soup.triangles.push_back(soup.triangles[k]);
+    const Model scene = scene_of(std::move(soup), "every triangle twice");
+    for (const Builder builder : {Builder::split, Builder::karras})
+        expect_hits_of_the_oracle(scene, builder, fewer(4000, 20));
+}
+
 TEST(WarpOracle, AgreesWithEveryKernelOnSibenik) {
     const std::filesystem::path file = shared_scene("sibenik/sibenik.ply.xz");
     if (!std::filesystem::exists(file)) GTEST_SKIP() << "needs the scene sibenik";
