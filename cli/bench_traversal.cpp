@@ -157,7 +157,7 @@ Json sweep_widths(const TraversalBench& options, const SceneTree& input, const W
     sampled.sample = std::min(sampled.sample, options.sweep_sample);
     const RayLaunches launches(sampled, input, options.common);
     std::vector<int> widths;
-    for (const int width : {1, 2, 4, 8, 16, 32, 64})
+    for (const int width : {1, 2, 4, 8, 16, 32, 64, 128})
         if (machine.resident_lanes % static_cast<unsigned>(width) == 0) widths.push_back(width);
     std::vector<SimulateOptions> runs;
     for (const WarpKernel kernel : kernels_from(options.kernel))
@@ -362,7 +362,7 @@ void add_traversal_suite(CLI::App& bench) {
         ->capture_default_str();
     command
         ->add_option("--sweep-sample", options->sweep_sample,
-                     "Part of the rays for the sweep of the width from 1 to 64; 0: no sweep")
+                     "Part of the rays for the sweep of the width from 1 to 128; 0: no sweep")
         ->check(finite_number(true))
         ->check(CLI::Range(0.0, 1.0))
         ->capture_default_str();

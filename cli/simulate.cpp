@@ -110,8 +110,8 @@ void add_simulate_command(CLI::App& app) {
             "8) float32 .npy file")
         ->capture_default_str();
     command->add_option("--width", options->width, "Lanes of a warp")
-        ->transform(whole_number(1, 64).description(""))
-        ->check(CLI::IsMember({1, 2, 4, 8, 16, 32, 64}))
+        ->transform(whole_number(1, 128).description(""))
+        ->check(CLI::IsMember({1, 2, 4, 8, 16, 32, 64, 128}))
         ->capture_default_str();
     command->add_flag("--memory", options->memory,
                       "Also a first-order memory model, as a column of its own");

@@ -126,7 +126,7 @@ struct MachineModel {
 struct SimulateOptions {
     WarpKernel kernel = WarpKernel::while_while;
     MachineModel machine;
-    int width = 32;        // lanes of a warp: 1, 2, 4, 8, 16, 32 or 64
+    int width = 32;        // lanes of a warp: 1, 2, 4, 8, 16, 32, 64 or 128
     bool any_hit = false;  // rays end at their first hit
     bool memory = false;   // also run the memory model
     // Which part of a launch the rays are, above 0 and at most 1: so large a part of the persistent

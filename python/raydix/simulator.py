@@ -40,7 +40,7 @@ def simulate(
     builder, max_leaf :
         The tree: AL09's own by default.
     width :
-        Lanes of a warp: 1, 2, 4, 8, 16, 32 or 64.
+        Lanes of a warp: 1, 2, 4, 8, 16, 32, 64 or 128.
     any_hit :
         Rays end at their first hit.
     memory :

@@ -1,13 +1,14 @@
-// The warp policy of the simulator: up to 64 lanes on the host. A step runs for the active lanes
+// The warp policy of the simulator: up to 128 lanes on the host. A step runs for the active lanes
 // and is charged once for all of them. Counters rise in charged steps only.
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "base/atomic.h"
+#include "base/bits.h"
 #include "simt/op.h"
 #include "simt/thread_warp.h"
 
@@ -46,20 +47,23 @@ protected:
 /// name.
 template <class Lane, int Width = 32, class Isa = void>
 class SimulatedWarp {
-    static_assert(Width >= 1 && Width <= 64);
+    static_assert(Width >= 1 && Width <= 128);
 
 public:
+    /// A set of lanes: bit k is lane k.
+    using Mask = std::conditional_t<(Width <= 64), std::uint64_t, Uint128>;
+
     std::array<Lane, Width> lanes{};
     WarpMemory<Lane> memory{};
     OpCounts* tally = nullptr;  // of this warp, or of several that run one after the other
     MemoryObserver* observer = nullptr;
 
     [[nodiscard]] static constexpr std::uint32_t width() { return Width; }
-    [[nodiscard]] LaneMask active() const { return active_; }
+    [[nodiscard]] Mask active() const { return active_; }
 
     template <class Cond, class Body>
     void loop(Op op, Cond cond, Body body) {
-        const LaneMask entered = active_;
+        const Mask entered = active_;
         while ((active_ = votes(cond)) != 0) {
             charge(op);
             body();
@@ -68,27 +72,27 @@ public:
     }
     template <class Cond, class Body>
     void when(Cond cond, Body body) {
-        const LaneMask entered = active_;
+        const Mask entered = active_;
         if ((active_ = votes(cond)) != 0) body();
         active_ = entered;
     }
     template <class Fn>
     void step(Op op, Fn fn) {
         charge(op);
-        for (LaneMask left = active_; left != 0; left &= left - 1)
-            fn(lanes[static_cast<std::size_t>(std::countr_zero(left))]);
+        for (Mask left = active_; left != 0; left &= left - 1)
+            fn(lanes[static_cast<std::size_t>(lowest_one(left))]);
     }
     template <class Fn, class First, class ThenFirst, class Second, class ThenSecond>
     void step_then(Op op, Fn fn, First first, ThenFirst then_first, Second second,
                    ThenSecond then_second) {
         charge(op);
-        LaneMask firsts = 0, seconds = 0;
-        for (LaneMask left = active_; left != 0; left &= left - 1) {
-            const int k = std::countr_zero(left);
+        Mask firsts = 0, seconds = 0;
+        for (Mask left = active_; left != 0; left &= left - 1) {
+            const int k = lowest_one(left);
             Lane& lane = lanes[static_cast<std::size_t>(k)];
             fn(lane);
-            firsts |= LaneMask{bool(first(lane))} << k;
-            seconds |= LaneMask{bool(second(lane))} << k;
+            firsts |= Mask{bool(first(lane))} << k;
+            seconds |= Mask{bool(second(lane))} << k;
         }
         among(firsts, then_first);
         among(seconds, then_second);
@@ -96,8 +100,8 @@ public:
     template <class Fn>
     void step_indexed(Op op, Fn fn) {
         charge(op);
-        for (LaneMask left = active_; left != 0; left &= left - 1) {
-            const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
+        for (Mask left = active_; left != 0; left &= left - 1) {
+            const auto k = static_cast<std::uint32_t>(lowest_one(left));
             fn(lanes[k], k);
         }
     }
@@ -105,8 +109,8 @@ public:
     void touches(Access how, Address address, std::uint32_t bytes) {
         if (observer == nullptr) return;
         std::array<const void*, Width> addresses{};
-        for (LaneMask left = active_; left != 0; left &= left - 1) {
-            const auto k = static_cast<std::size_t>(std::countr_zero(left));
+        for (Mask left = active_; left != 0; left &= left - 1) {
+            const auto k = static_cast<std::size_t>(lowest_one(left));
             addresses[k] = address(lanes[k]);
         }
         observer->access(addresses.data(), width(), bytes, how);
@@ -116,15 +120,15 @@ public:
         if (observer == nullptr) return;
         std::array<std::int32_t, Width> entries;
         entries.fill(-1);
-        for (LaneMask left = active_; left != 0; left &= left - 1) {
-            const auto k = static_cast<std::size_t>(std::countr_zero(left));
+        for (Mask left = active_; left != 0; left &= left - 1) {
+            const auto k = static_cast<std::size_t>(lowest_one(left));
             entries[k] = entry(lanes[k]);
         }
         observer->stack(entries.data(), width(), how);
     }
     template <class Cond, class Body, class Stay>
     void voting_loop(Op op, Cond cond, Body body, Stay stay) {
-        const LaneMask entered = active_;
+        const Mask entered = active_;
         while ((active_ = votes(cond)) != 0) {
             charge(op);
             body();
@@ -133,25 +137,25 @@ public:
         active_ = entered;
     }
     template <class Cond>
-    [[nodiscard]] LaneMask ballot(Op op, Cond cond) {
+    [[nodiscard]] Mask ballot(Op op, Cond cond) {
         charge(op);
         return votes(cond);
     }
     template <class Cond>
-    [[nodiscard]] LaneMask ballot_indexed(Op op, Cond cond) {
+    [[nodiscard]] Mask ballot_indexed(Op op, Cond cond) {
         charge(op);
-        LaneMask found = 0;
-        for (LaneMask left = active_; left != 0; left &= left - 1) {
-            const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
-            found |= LaneMask{bool(cond(lanes[k], k))} << k;
+        Mask found = 0;
+        for (Mask left = active_; left != 0; left &= left - 1) {
+            const auto k = static_cast<std::uint32_t>(lowest_one(left));
+            found |= Mask{bool(cond(lanes[k], k))} << k;
         }
         return found;
     }
     template <class Cond>
     [[nodiscard]] bool any(Op op, Cond cond) {
         charge(op);
-        for (LaneMask left = active_; left != 0; left &= left - 1)
-            if (cond(lanes[static_cast<std::size_t>(std::countr_zero(left))])) return true;
+        for (Mask left = active_; left != 0; left &= left - 1)
+            if (cond(lanes[static_cast<std::size_t>(lowest_one(left))])) return true;
         return false;
     }
     [[nodiscard]] std::uint32_t take(Op op, std::uint32_t& counter, std::uint32_t count) {
@@ -172,8 +176,8 @@ public:
         }
     }
     template <class Body>
-    void among(LaneMask mask, Body body) {
-        const LaneMask entered = active_;
+    void among(Mask mask, Body body) {
+        const Mask entered = active_;
         active_ &= mask;
         if (active_ != 0) body();
         active_ = entered;
@@ -189,11 +193,11 @@ public:
 
 private:
     template <class Cond>
-    [[nodiscard]] LaneMask votes(Cond cond) const {
-        LaneMask found = 0;
-        for (LaneMask left = active_; left != 0; left &= left - 1) {
-            const int k = std::countr_zero(left);
-            found |= LaneMask{bool(cond(lanes[static_cast<std::size_t>(k)]))} << k;
+    [[nodiscard]] Mask votes(Cond cond) const {
+        Mask found = 0;
+        for (Mask left = active_; left != 0; left &= left - 1) {
+            const int k = lowest_one(left);
+            found |= Mask{bool(cond(lanes[static_cast<std::size_t>(k)]))} << k;
         }
         return found;
     }
@@ -201,10 +205,10 @@ private:
     void charge(Op op) {
         OpCount& count = (*tally)[static_cast<std::size_t>(op)];
         ++count.issues;
-        count.lanes += static_cast<std::uint64_t>(std::popcount(active_));
+        count.lanes += static_cast<std::uint64_t>(count_ones(active_));
     }
 
-    LaneMask active_ = ~LaneMask{0} >> (64 - Width);
+    Mask active_ = static_cast<Mask>(~Mask{0}) >> (8 * sizeof(Mask) - Width);
 };
 
 }  // namespace raydix

@@ -36,11 +36,12 @@ using LaneMask = std::uint64_t;
 enum class Access : std::uint8_t { read, read_beside, write };
 
 /// The bits below `lane`.
-RAYDIX_HD static inline LaneMask lanes_below(std::uint32_t lane) {
+template <class Mask>
+RAYDIX_HD static inline Mask lanes_below(std::uint32_t lane) {
 #if defined(RAYDIX_DEVICE_PASS)
     return (1u << lane) - 1;  // a device's masks have 32 bits; half the instructions
 #else
-    return (LaneMask{1} << lane) - 1;
+    return (Mask{1} << lane) - 1;
 #endif
 }
 

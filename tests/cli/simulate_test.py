@@ -123,6 +123,12 @@ class Simulate(ProgramTest):
         base = figures("gtx680", "while_while", "mrays_per_s_memory", "--memory")
         more = figures(folder / "gtx680-more-in-flight.json", "while_while", "mrays_per_s_memory", "--memory")
         self.assertGreaterEqual(more["while_while"], base["while_while"])
+        kernels = "while_while,speculative_while_while,dynamic_fetch"
+        base = figures("h100", kernels, "mrays_per_s_bound")
+        step = figures(folder / "h100-lanes-in-step.json", kernels, "mrays_per_s_bound")
+        self.assertEqual(step["while_while"], base["while_while"])
+        for kernel in ("speculative_while_while", "dynamic_fetch"):
+            self.assertGreater(step[kernel], 1.03 * base[kernel])
 
     def test_costs_of_single_kernels_are_kept_in_machine_files(self):
         arguments = ("simulate", SCENE, "--size", "32x24", "--rays", "primary")
@@ -282,7 +288,7 @@ class Traversal(ProgramTest):
         self.assertAlmostEqual(queue[0]["ratio"], bound["work_queue", "ao", "gtx285_enum_popc"] /
                                bound["persistent_while_while", "ao", "gtx285"])
         sweep = document["width_sweep"]
-        self.assertEqual(len(sweep), 4 * 11 * 7)
+        self.assertEqual(len(sweep), 4 * 11 * 8)
         for row in sweep:
             if row["width"] == 1 and row["kernel"] in ("while_while", "if_if"):
                 self.assertAlmostEqual(row["simd_efficiency"], 1)
@@ -297,7 +303,7 @@ class Traversal(ProgramTest):
         self.assertIn("SAH -,", out)
         self.assertNotIn(" 0.0%", out.split("SIMD efficiency by width", 1)[1].split("claims of", 1)[0])
         document = json.loads((self.folder / "empty.json").read_text(encoding="utf-8"))
-        self.assertEqual(len(document["width_sweep"]), 4 * 11 * 7)
+        self.assertEqual(len(document["width_sweep"]), 4 * 11 * 8)
         for row in document["width_sweep"]:
             self.assertEqual((row["simd_efficiency"], row["mrays_per_s_bound"]), (None, None))
         self.assertEqual({claim["verdict"] for claim in document["claims"]}, {"needs rays"})

@@ -135,7 +135,7 @@ TEST(Simulate, OneLaneHasFullEfficiencyAndWidthsAgree) {
     const std::vector<Ray> rays = make_mixed_rays(scene, 64 * 20, 3);
     for (const WarpKernel kernel : {WarpKernel::while_while, WarpKernel::if_if}) {
         std::vector<SimulateOptions> runs;
-        for (const int width : {1, 2, 4, 8, 16, 32, 64}) {
+        for (const int width : {1, 2, 4, 8, 16, 32, 64, 128}) {
             runs.push_back(options_for(kernel));
             runs.back().width = width;
         }
@@ -390,7 +390,7 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
     };
     for (const WarpKernel name : warp_kernels())
         for (const bool any_hit : {false, true}) compare(name, any_hit, 32);
-    for (const int width : {8, 16, 64})
+    for (const int width : {8, 16, 64, 128})
         for (const bool any_hit : {false, true}) compare(WarpKernel::packet, any_hit, width);
 }
 
@@ -488,7 +488,7 @@ TEST(Simulate, RefusesWhatItCannotRun) {
         }
     };
     refuse("width", [](SimulateOptions& o) { o.width = 3; });
-    refuse("width", [](SimulateOptions& o) { o.width = 128; });
+    refuse("width", [](SimulateOptions& o) { o.width = 256; });
     refuse("part_of_launch", [](SimulateOptions& o) { o.part_of_launch = 0; });
     refuse("part_of_launch", [](SimulateOptions& o) { o.part_of_launch = 1.5; });
     refuse("clock_ghz", [](SimulateOptions& o) { o.machine.clock_ghz = 0; });

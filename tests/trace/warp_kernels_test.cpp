@@ -15,13 +15,13 @@
 namespace raydix::test {
 namespace {
 
-constexpr int widths[] = {1, 2, 4, 8, 16, 32, 64};
+constexpr int widths[] = {1, 2, 4, 8, 16, 32, 64, 128};
 
 /// A small machine with few warps, so that pools are shared by many fetches.
 MachineModel small_machine() {
     MachineModel m = machine_model("gtx480");
     m.multiprocessors = 3;
-    m.resident_lanes = 192;
+    m.resident_lanes = 256;
     m.block_lanes = 64;
     return m;
 }

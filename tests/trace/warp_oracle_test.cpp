@@ -22,7 +22,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr int widths[] = {1, 2, 4, 8, 16, 32, 64};
+constexpr int widths[] = {1, 2, 4, 8, 16, 32, 64, 128};
 
 struct Vector {
     double x, y, z;
@@ -234,7 +234,7 @@ void expect_hits_of_the_oracle(const Model& scene, Builder builder, std::size_t 
     const WarpTree tree(bvh);
     MachineModel machine = machine_model("gtx480");
     machine.multiprocessors = 3;  // few warps, so that each fetches many times
-    machine.resident_lanes = 192;
+    machine.resident_lanes = 256;
     machine.block_lanes = 64;
     std::vector<SimulateOptions> runs;
     for (const WarpKernel kernel : warp_kernels())

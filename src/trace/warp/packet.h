@@ -56,11 +56,11 @@ private:
             Access::read, [&](const Lane&) { return scene.pairs + node; }, sizeof(NodePair));
         NodePair pair{};  // loaded once, links too
         lanes.meet(warp, Op::visit_node, scene.pairs + node, pair);
-        const LaneMask first = lanes.first(warp, Op::vote);
-        const LaneMask second = lanes.second(warp, Op::vote);
+        const auto first = lanes.first(warp, Op::vote);
+        const auto second = lanes.second(warp, Op::vote);
         if (first == 0) return second == 0 ? popped_node : pair.child1;
         if (second == 0) return pair.child0;
-        const LaneMask rather_second = lanes.rather_second(warp, Op::ballot);
+        const auto rather_second = lanes.rather_second(warp, Op::ballot);
         const bool to_second = warp.uniform(
             Op::choose, [&] { return 2 * count_ones(rather_second) > count_ones(first | second); });
         warp.write_shared(Op::push, [&] {

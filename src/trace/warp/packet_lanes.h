@@ -36,9 +36,9 @@ public:
     }
     /// Of those that meet the first child; the second; that would go to the second before the
     /// first.
-    RAYDIX_HD LaneMask first(Warp& warp, Op op) { return ballot<1>(warp, op); }
-    RAYDIX_HD LaneMask second(Warp& warp, Op op) { return ballot<2>(warp, op); }
-    RAYDIX_HD LaneMask rather_second(Warp& warp, Op op) { return ballot<4>(warp, op); }
+    RAYDIX_HD auto first(Warp& warp, Op op) { return ballot<1>(warp, op); }
+    RAYDIX_HD auto second(Warp& warp, Op op) { return ballot<2>(warp, op); }
+    RAYDIX_HD auto rather_second(Warp& warp, Op op) { return ballot<4>(warp, op); }
 
     /// Whether no lane hits the triangle. Its test is charged then, and need not be done. False
     /// where that is not known.
@@ -48,7 +48,7 @@ public:
 
 private:
     template <std::uint32_t bit>
-    RAYDIX_HD static LaneMask ballot(Warp& warp, Op op) {
+    RAYDIX_HD static auto ballot(Warp& warp, Op op) {
         return warp.ballot(op, [](const Lane& l) { return (l.meets & bit) != 0; });
     }
 };
@@ -58,6 +58,7 @@ private:
 template <int width, class Isa>
 requires(width % 8 == 0) class PacketLanes<SimulatedWarp<Lane, width, Isa>> {
     using Warp = SimulatedWarp<Lane, width, Isa>;
+    using Mask = typename Warp::Mask;
     static constexpr int vectors = width / 8;
 
 public:
@@ -81,25 +82,25 @@ public:
                  near0, far0);
             clip(k, {pair.c1_xlo, pair.c1_xhi, pair.c1_ylo, pair.c1_yhi, pair.c1_zlo, pair.c1_zhi},
                  near1, far1);
-            const LaneMask first = mask_of(_mm256_cmp_ps(near0, far0, _CMP_LE_OQ)),
-                           second = mask_of(_mm256_cmp_ps(near1, far1, _CMP_LE_OQ)),
-                           second_is_closer = mask_of(_mm256_cmp_ps(near1, near0, _CMP_LT_OQ));
+            const Mask first = mask_of(_mm256_cmp_ps(near0, far0, _CMP_LE_OQ)),
+                       second = mask_of(_mm256_cmp_ps(near1, far1, _CMP_LE_OQ)),
+                       second_is_closer = mask_of(_mm256_cmp_ps(near1, near0, _CMP_LT_OQ));
             first_ |= first << (8 * k);
             second_ |= second << (8 * k);
             rather_second_ |= (second & (second_is_closer | ~first)) << (8 * k);
         }
     }
-    LaneMask first(Warp& warp, Op op) const { return warp.issue(op), first_; }
-    LaneMask second(Warp& warp, Op op) const { return warp.issue(op), second_; }
-    LaneMask rather_second(Warp& warp, Op op) const { return warp.issue(op), rather_second_; }
+    Mask first(Warp& warp, Op op) const { return warp.issue(op), first_; }
+    Mask second(Warp& warp, Op op) const { return warp.issue(op), second_; }
+    Mask rather_second(Warp& warp, Op op) const { return warp.issue(op), rather_second_; }
 
     bool pass_by(Warp& warp, const WoopTriangle& triangle) const {
-        LaneMask in_range = 0;
+        Mask in_range = 0;
         for (int k = 0; k < vectors; ++k) {
             // test_plane, then test_edges where a lane needs them
             const __m256 t = _mm256_div_ps(start(triangle.z, k, -1), slope(triangle.z, k));
-            const LaneMask here = mask_of(_mm256_and_ps(_mm256_cmp_ps(t, tmin_[k], _CMP_GE_OQ),
-                                                        _mm256_cmp_ps(t, t_[k], _CMP_LE_OQ)));
+            const Mask here = mask_of(_mm256_and_ps(_mm256_cmp_ps(t, tmin_[k], _CMP_GE_OQ),
+                                                    _mm256_cmp_ps(t, t_[k], _CMP_LE_OQ)));
             if (here == 0) continue;
             in_range |= here << (8 * k);
             const __m256 u = _mm256_fmadd_ps(t, slope(triangle.x, k), start(triangle.x, k, 1)),
@@ -137,7 +138,7 @@ private:
             to[k] = _mm256_loadu_ps(eight);
         }
     }
-    static LaneMask mask_of(__m256 is) { return static_cast<LaneMask>(_mm256_movemask_ps(is)); }
+    static Mask mask_of(__m256 is) { return static_cast<Mask>(_mm256_movemask_ps(is)); }
 
     /// A row of a triangle at the origins (sign -1: of its rotation, turned round), and along the
     /// directions.
@@ -168,7 +169,7 @@ private:
 
     __m256 origin_[3][vectors], direction_[3][vectors], inverse_[3][vectors], scaled_[3][vectors],
         tmin_[vectors], t_[vectors];
-    LaneMask first_ = 0, second_ = 0, rather_second_ = 0;
+    Mask first_ = 0, second_ = 0, rather_second_ = 0;
 };
 #endif
 

@@ -15,15 +15,16 @@
 namespace raydix {
 
 /// Bits of `mask` below lane `lane`.
-RAYDIX_HD static inline std::uint32_t rank_in(LaneMask mask, std::uint32_t lane) {
-    return static_cast<std::uint32_t>(count_ones(mask & lanes_below(lane)));
+template <class Mask>
+RAYDIX_HD static inline std::uint32_t rank_in(Mask mask, std::uint32_t lane) {
+    return static_cast<std::uint32_t>(count_ones(mask & lanes_below<Mask>(lane)));
 }
 
 /// Stores the hits of finished lanes and gives them new rays: one atomic addition for the warp,
 /// ranks by masked counts. Returns false once no lane has a ray. `dry`: the pool is empty.
 template <class Warp>
 RAYDIX_HD bool replace_finished(Warp& warp, const RayLaunch& launch, bool& dry) {
-    const LaneMask finished = warp.ballot(Op::ballot, is_finished);
+    const auto finished = warp.ballot(Op::ballot, is_finished);
     if (finished == 0) return true;
     warp.when([](const Lane& l) { return is_finished(l) && has_ray(l); },
               [&] { store_hits(warp, launch); });
@@ -75,7 +76,7 @@ struct DynamicFetch {
             [&] { SpeculativeWhileWhile::turn<any_hit>(warp, job.scene); },
             [&] {
                 if (dry) return true;  // nothing to fetch
-                const LaneMask active = warp.ballot(Op::ballot, is_unfinished);
+                const auto active = warp.ballot(Op::ballot, is_unfinished);
                 return static_cast<std::uint32_t>(count_ones(active)) >= least_active<Warp>();
             });
         return true;

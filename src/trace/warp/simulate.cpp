@@ -72,9 +72,9 @@ WarpScene scene_of(const WarpTree& tree) {
 void check_options(const SimulateOptions& options) {
     check_enum("kernel", options.kernel, kernels.back());
     const MachineModel& m = options.machine;
-    if (options.width < 1 || options.width > 64 || (options.width & (options.width - 1)) != 0)
+    if (options.width < 1 || options.width > 128 || (options.width & (options.width - 1)) != 0)
         throw InputError("width is " + std::to_string(options.width) +
-                         "; it must be 1, 2, 4, 8, 16, 32 or 64");
+                         "; it must be 1, 2, 4, 8, 16, 32, 64 or 128");
     const auto positive = [&](const char* field, double value) {
         if (!(value > 0) || value > 1e15)
             throw InputError("machine " + m.name + ": " + field + " is " + std::to_string(value) +

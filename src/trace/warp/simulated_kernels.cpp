@@ -32,6 +32,8 @@ const SimulatedKernel* kernel_of(WarpKernel kernel, bool any_hit, int width) {
             return simulated_kernel_of_width<Isa, 32>(kernel, any_hit);
         case 64:
             return simulated_kernel_of_width<Isa, 64>(kernel, any_hit);
+        case 128:
+            return simulated_kernel_of_width<Isa, 128>(kernel, any_hit);
         default:
             return nullptr;
     }

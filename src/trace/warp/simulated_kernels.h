@@ -41,8 +41,8 @@ struct SimulatedKernel {
                        std::uint32_t& batch);
 };
 
-/// Null for a width that is not 1, 2, 4, 8, 16, 32 or 64. Takes the fastest code that the processor
-/// can run; all versions give the same bits.
+/// Null for a width that is not 1, 2, 4, 8, 16, 32, 64 or 128. Takes the fastest code that the
+/// processor can run; all versions give the same bits.
 [[nodiscard]] const SimulatedKernel* simulated_kernel(WarpKernel kernel, bool any_hit, int width);
 
 /// Rays `begin` to `end` of the job by while_while, each by itself: the reference. `stack`:

@@ -58,7 +58,7 @@ private:
     /// Lanes with finished rays store their hits and take new ones.
     template <class Warp>
     RAYDIX_HD void fetch(Warp& warp, const RayLaunch& launch) {
-        const LaneMask finished = warp.ballot(Op::ballot, is_finished);
+        const auto finished = warp.ballot(Op::ballot, is_finished);
         warp.when([](const Lane& l) { return is_finished(l) && has_ray(l); },
                   [&] { store_hits(warp, launch); });
         if (dry_) return;
@@ -96,10 +96,10 @@ private:
     }
     template <class Warp, class Cond>
     RAYDIX_HD static int count(Warp& warp, Cond cond) {
-        const LaneMask own = warp.ballot(Op::ballot, cond);
-        const LaneMask spare = warp.ballot_indexed(
-            Op::ballot,
-            [&](const Lane&, std::uint32_t lane) { return cond(warp.memory.spares[lane]); });
+        const auto own = warp.ballot(Op::ballot, cond);
+        const auto spare = warp.ballot_indexed(Op::ballot, [&](const Lane&, std::uint32_t lane) {
+            return cond(warp.memory.spares[lane]);
+        });
         return count_ones(own) + count_ones(spare);
     }
 
@@ -113,10 +113,10 @@ private:
         const auto fits = [wanted, dry](const Lane& l) {
             return wants(l, wanted) && (wanted != Want::fetch || !dry || has_ray(l));
         };
-        const LaneMask without = warp.ballot(Op::ballot, [&](const Lane& l) { return !fits(l); });
-        const LaneMask offered = warp.ballot_indexed(
-            Op::ballot,
-            [&](const Lane&, std::uint32_t lane) { return fits(warp.memory.spares[lane]); });
+        const auto without = warp.ballot(Op::ballot, [&](const Lane& l) { return !fits(l); });
+        const auto offered = warp.ballot_indexed(Op::ballot, [&](const Lane&, std::uint32_t lane) {
+            return fits(warp.memory.spares[lane]);
+        });
         if (without == 0 || offered == 0) return;
         const auto pairs =
             static_cast<std::uint32_t>(lesser_count(count_ones(without), count_ones(offered)));
@@ -125,7 +125,7 @@ private:
                 warp.memory.slots[rank_in(offered, lane)] = lane;
             });
         });
-        const LaneMask served =
+        const auto served =
             without & warp.ballot_indexed(Op::rank, [&](const Lane&, std::uint32_t lane) {
                 return rank_in(without, lane) < pairs;
             });
