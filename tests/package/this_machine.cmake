@@ -1,0 +1,36 @@
+# RAYDIX_THIS_MACHINE, as pip sets it: nothing is compiled for devices that the machine lacks, and what it has is found.
+function(configure name drivers)
+    file(REMOVE_RECURSE ${WORK_DIR}/${name})
+    execute_process(COMMAND ${CMAKE_COMMAND} -E env OCL_ICD_VENDORS=${drivers} PATH=${WORK_DIR}/tools:$ENV{PATH}
+        ${CMAKE_COMMAND} -G ${GENERATOR} -S ${RAYDIX_SOURCE_DIR} -B ${WORK_DIR}/${name} -D CMAKE_CXX_COMPILER=${COMPILER}
+        -D RAYDIX_THIS_MACHINE=ON -D RAYDIX_TESTS=OFF -D RAYDIX_BENCH=OFF -D RAYDIX_MPI=OFF ${ARGN}
+        RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
+    if(NOT status EQUAL 0)
+        message(FATAL_ERROR "configure: exit code ${status}\n${output}")
+    endif()
+    set(output "${output}" PARENT_SCOPE)
+    file(STRINGS ${WORK_DIR}/${name}/CMakeCache.txt sets REGEX "^RAYDIX_INSTRUCTION_SETS:")
+    if(NOT sets MATCHES "=HOST$")
+        message(FATAL_ERROR "not this machine's instruction set alone: ${sets}")
+    endif()
+endfunction()
+function(expect_said said text)
+    string(FIND "${output}" "${text}" at)
+    if((at EQUAL -1 AND said) OR (NOT at EQUAL -1 AND NOT said))
+        message(FATAL_ERROR "'${text}' said: not ${said}\n${output}")
+    endif()
+endfunction()
+
+# An nvidia-smi that finds no driver, in front of the system's.
+file(WRITE ${WORK_DIR}/tools/nvidia-smi "#!/bin/sh\nexit 9\n")
+file(CHMOD ${WORK_DIR}/tools/nvidia-smi PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE)
+file(MAKE_DIRECTORY ${WORK_DIR}/no_drivers)
+file(WRITE ${WORK_DIR}/drivers/one.icd "libone.so\n")
+configure(without ${WORK_DIR}/no_drivers)
+expect_said(YES "no OpenCL driver")
+if(NOT EXISTS /proc/driver/nvidia/gpus)
+    expect_said(YES "no GPU of NVIDIA")
+endif()
+configure(with ${WORK_DIR}/drivers -D RAYDIX_CUDA=OFF)
+expect_said(NO "no OpenCL driver")
+expect_said(NO "no GPU of NVIDIA")
