@@ -286,6 +286,38 @@ Transform half(std::uint32_t level, std::uint32_t k) {
     return t;
 }
 
+/// The t of a ray from far away is rounded: its point lies before or behind the flat box.
+TEST(Extent, HitsOfAMeshLieWithinItsOwn) {
+    RandomMaps random(seed);
+    Mesh square;
+    square.vertices = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+    square.triangles = {{0, 1, 2}, {0, 2, 3}};
+    const Scene scene(square);
+    const Extent extent = extent_of_mesh({{-1, -1, 0}, {1, 1, 0}});
+    double farthest = 0;  // from the box, over the distance
+    for (int k = 0; k < 5000; ++k) {
+        const float distance = std::ldexp(1.0f, 2 + k % 20) * random.between(1, 2);
+        const Vec3 to{random.between(-0.9f, 0.9f), random.between(-0.9f, 0.9f), 0};
+        const Vec3 origin{random.between(-1, 1) * distance, random.between(-1, 1) * distance,
+                          distance};
+        const Vec3 way = (to - origin) * random.between(0.3f, 1);  // t is no round number
+        const Hit hit = closest_hit(scene, {origin, 0, way, infinity});
+        if (!hit.hit()) continue;  // the direction is rounded too
+        const auto at = [&](float from, float along) {
+            return double{from} + double{hit.t} * double{along};
+        };
+        const double p[3] = {at(origin.x, way.x), at(origin.y, way.y), at(origin.z, way.z)};
+        double beside = 0;
+        for (int axis = 0; axis < 3; ++axis)
+            beside = std::max({beside, component(extent.box.lo, axis) - p[axis],
+                               p[axis] - component(extent.box.hi, axis)});
+        const double reach = double{distance} + 1;
+        EXPECT_LE(beside, extent.error * reach) << "from " << distance;
+        farthest = std::max(farthest, beside / reach);
+    }
+    EXPECT_GT(farthest, 0x1p-30) << "boxes need not widen for these rays";
+}
+
 /// Or every ray would visit them all.
 TEST(Extent, HarmlessNestsHaveNoWildParts) {
     RandomMaps random(seed);
