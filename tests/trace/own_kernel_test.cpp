@@ -195,10 +195,10 @@ TEST(OwnKernel, IsCountedAsThoseOfTheLibraryAre) {
         const Simulation library = simulate(tree, rays, std::span(&options, 1)).front();
         EXPECT_DOUBLE_EQ(known.instructions_per_ray, static_cast<double>(library.instructions) /
                                                          static_cast<double>(library.rays));
-        const auto print = [&](const char* name, const Counted& kernel) {
+        const auto print = [of = kind](const char* name, const Counted& kernel) {
             std::printf(
                 "%s, %s: %.1f warp instructions a ray, %.2f of lanes in use, %.1f visits a ray\n",
-                name, kind, kernel.instructions_per_ray, kernel.simd_efficiency,
+                name, of, kernel.instructions_per_ray, kernel.simd_efficiency,
                 kernel.visits_per_ray);
             EXPECT_GT(kernel.instructions_per_ray, 0.0);
         };
