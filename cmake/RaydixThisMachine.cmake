@@ -25,4 +25,7 @@ if(RAYDIX_THIS_MACHINE)
         set(folder $ENV{OCL_ICD_VENDORS})
     endif()
     file(GLOB raydix_opencl_drivers ${folder}/*.icd)
+    if(EXISTS ${folder} AND NOT IS_DIRECTORY ${folder})  # loaders take a single file as well
+        set(raydix_opencl_drivers ${folder})
+    endif()
 endif()
