@@ -3,6 +3,7 @@
 #include "engine/extent.h"
 
 #include <gtest/gtest.h>
+#include <raydix/error.h>
 
 #include <cmath>
 #include <iostream>
@@ -284,6 +285,28 @@ Transform half(std::uint32_t level, std::uint32_t k) {
     t.m[level % 3][level % 3] = 0.5f;
     t.m[level % 3][3] = k == 0 ? 0.0f : 0.5f;
     return t;
+}
+
+/// The bounds need determinants above 2^-40 of the product of the rows' lengths.
+TEST(Extent, MapsThatAreAlmostFlatAreRefused) {
+    Mesh triangle;
+    triangle.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    triangle.triangles = {{0, 1, 2}};
+    const Scene inner(triangle);
+    for (const float sign : {1.0f, -1.0f})
+        for (const int exponent : {38, 39, 41, 44, 60}) {
+            Transform map;
+            map.m[2][0] = 0.6f, map.m[2][1] = 0.8f;  // a row of length 1
+            map.m[2][2] = std::ldexp(sign, -exponent);
+            Scene outer;
+            bool refused = false;
+            try {
+                outer.add(inner, map);
+            } catch (const InputError&) {
+                refused = true;
+            }
+            EXPECT_EQ(refused, exponent > 40) << sign << " x 2^-" << exponent;
+        }
 }
 
 /// The t of a ray from far away is rounded: its point lies before or behind the flat box.
