@@ -28,7 +28,7 @@ results = plots.Results(plots.documents())
 
 class Al09(unittest.TestCase):
     def test_tables_are_those_of_the_results(self):
-        for file, tables in ((PAGE, plots.parts(results)), (plots.COSTS_PAGE, plots.cost_parts(results))):
+        for file, tables in ((PAGE, plots.parts(results)), (plots.SCENES_PAGE, plots.scene_parts(results)), (plots.COSTS_PAGE, plots.cost_parts(results))):
             page = file.read_text(encoding="utf-8")
             self.assertEqual(page, plots.page_text(page, tables), "run scripts/plot-al09")
 
