@@ -30,6 +30,7 @@ enum class WarpKernel : std::uint32_t {
     ray_replacement,
     work_queue,
     dynamic_fetch,
+    cwbvh,  // while-while over nodes of eight children (Ylitie, Karras, Laine 2017)
 };
 [[nodiscard]] std::span<const WarpKernel> warp_kernels();
 [[nodiscard]] std::string_view warp_kernel_name(WarpKernel kernel);
@@ -37,8 +38,9 @@ enum class WarpKernel : std::uint32_t {
 [[nodiscard]] WarpKernel warp_kernel_from_name(std::string_view name);
 
 /// A tree of triangles in the form that the kernels read, as in Aila and Laine 2009: node pairs of
-/// 64 bytes (`pair64`) and Woop's triangles of 48 bytes (`woop48`). Holds all that they read: the
-/// binary tree may go.
+/// 64 bytes (`pair64`) and Woop's triangles of 48 bytes (`woop48`). Besides it holds a compressed
+/// wide tree of nodes of 80 bytes, for the kernel `cwbvh`, made from the same binary tree. Holds
+/// all that the kernels read: the binary tree may go.
 class WarpTree {
 public:
     /// Throws InputError for a tree that holds boxes or points.

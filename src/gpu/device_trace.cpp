@@ -10,7 +10,9 @@ DeviceWarpTree& DeviceWarpTree::operator=(DeviceWarpTree&&) noexcept = default;
 bool DeviceWarpTree::empty() const { return arrays_->scene.pairs == nullptr; }
 std::uint32_t DeviceWarpTree::max_depth() const { return arrays_->max_depth; }
 std::uint64_t DeviceWarpTree::bytes() const {
-    return arrays_->own_pairs.bytes() + arrays_->own_triangles.bytes() + arrays_->own_ids.bytes();
+    return arrays_->own_pairs.bytes() + arrays_->own_triangles.bytes() + arrays_->own_ids.bytes() +
+           arrays_->own_wide.bytes() + arrays_->own_wide_triangles.bytes() +
+           arrays_->own_wide_ids.bytes();
 }
 
 std::size_t device_trace_scratch_bytes(const DeviceWarpTree& tree, std::uint32_t count,

@@ -20,19 +20,21 @@
 
 namespace raydix {
 
-inline constexpr std::size_t warp_kernel_count = 11;
+inline constexpr std::size_t warp_kernel_count = 12;
 
 struct DeviceWarpTree::Arrays {
     DeviceBuffer<std::byte> own_pairs, own_triangles;  // the former if copied from the host
     DeviceBuffer<std::uint32_t> own_ids;
     WarpScene scene{nullptr, nullptr, nullptr};  // null: no triangles
-    std::uint32_t max_depth = 0;
+    DeviceBuffer<std::byte> own_wide, own_wide_triangles;
+    DeviceBuffer<std::uint32_t> own_wide_ids;
+    std::uint32_t max_depth = 0, wide_max_depth = 0;
     // Blocks that fill the device, by kernel, closest and any hit: asked for once, not per launch.
     std::array<std::array<std::uint32_t, 2>, warp_kernel_count> resident_blocks{};
 
     [[nodiscard]] WarpLaunch launch(WarpKernel kernel, bool any_hit) const {
-        check_enum("kernel", kernel, WarpKernel::dynamic_fetch);
-        return {kernel, any_hit, max_depth + 1};
+        check_enum("kernel", kernel, WarpKernel::cwbvh);
+        return {kernel, any_hit, warp_stack_entries(kernel, max_depth, wide_max_depth)};
     }
 };
 
@@ -41,6 +43,18 @@ inline void check_stack_depth(std::uint32_t max_depth) {
         throw InputError("the tree is " + std::to_string(max_depth) +
                          " deep; the kernels on a device have stacks for depths up to " +
                          std::to_string(large_stack_entries - 1));
+}
+
+inline void check_wide(const DeviceWarpTree::Arrays& tree, const WarpLaunch& launch) {
+    if (launch.kernel != WarpKernel::cwbvh || tree.scene.pairs == nullptr) return;
+    if (tree.scene.wide == nullptr)
+        throw InputError(
+            "the kernel cwbvh needs a tree that was copied from the host: one built on the device "
+            "has no wide nodes here (DeviceCwbvh makes them)");
+    if (launch.stack_entries > large_stack_entries)
+        throw InputError("the wide tree is " + std::to_string(tree.wide_max_depth) +
+                         " deep; the kernel cwbvh has stacks for depths up to " +
+                         std::to_string(large_stack_entries / 2 - 1));
 }
 
 /// What a launch works in.
@@ -81,14 +95,21 @@ inline std::unique_ptr<DeviceWarpTree::Arrays> upload_warp_tree(const WarpTree& 
                                                                 Stream stream) {
     check_stack_depth(tree.max_depth());
     auto arrays = std::make_unique<DeviceWarpTree::Arrays>();
-    arrays->max_depth = tree.max_depth();
-    if (tree.empty()) return arrays;
     const WarpTree::Arrays& from = tree.arrays();
+    arrays->max_depth = from.max_depth;
+    arrays->wide_max_depth = from.wide_max_depth;
+    if (tree.empty()) return arrays;
     arrays->own_ids.upload({from.ids.data(), from.ids.size()}, stream);
+    arrays->own_wide_ids.upload({from.wide_ids.data(), from.wide_ids.size()}, stream);
     arrays->scene = {
         upload_array(arrays->own_pairs, from.pairs.data(), from.pairs.size(), stream),
         upload_array(arrays->own_triangles, from.triangles.data(), from.triangles.size(), stream),
-        arrays->own_ids.data()};
+        arrays->own_ids.data(),
+        upload_array(arrays->own_wide, from.wide.data(), from.wide.size(), stream),
+        upload_array(arrays->own_wide_triangles, from.wide_triangles.data(),
+                     from.wide_triangles.size(), stream),
+        arrays->own_wide_ids.data(),
+        from.wide_bounds};
     return arrays;
 }
 
@@ -143,6 +164,7 @@ public:
           count_(checked_count(rays)),
           launch_(tree.arrays().launch(options.kernel, options.any_hit)),
           blocks_(blocks_of(tree.arrays(), launch_, count_)) {
+        check_wide(tree.arrays(), launch_);
         check_trace_memory(rays, hits, scratch, device_trace_scratch_bytes(tree, count_, options));
         arena_ = Arena(scratch.data(), scratch.size());
         work_ = DeviceTraceScratch(arena_, count_, launch_, blocks_);

@@ -1,4 +1,5 @@
-// A binary tree of triangles in the form of the warp kernels: pairs, Woop triangles, marked ids.
+// A tree of triangles in the form of the warp kernels: pairs, Woop triangles, marked ids; and the
+// same as a compressed wide tree.
 #pragma once
 
 #include <raydix/buffer.h>
@@ -6,16 +7,33 @@
 
 #include <cstdint>
 
+#include "layout/cwbvh.h"
 #include "layout/pair64.h"
 #include "layout/woop48.h"
 
 namespace raydix {
+
+/// Entries of 4 bytes that the stack of a lane needs. In a wide tree a level takes two.
+[[nodiscard]] inline std::uint32_t warp_stack_entries(WarpKernel kernel, std::uint32_t max_depth,
+                                                      std::uint32_t wide_max_depth) {
+    return kernel == WarpKernel::cwbvh ? 2 * (wide_max_depth + 1) : max_depth + 1;
+}
 
 struct WarpTree::Arrays {
     Buffer<NodePair> pairs;          // [max(inner, 1)]
     Buffer<WoopTriangle> triangles;  // [references]
     Buffer<std::uint32_t> ids;       // [references]
     std::uint32_t max_depth = 0;
+    // Of the kernel `cwbvh`.
+    Buffer<CwbvhNode> wide;
+    Buffer<WoopTriangle> wide_triangles;  // [references]
+    Buffer<std::uint32_t> wide_ids;       // [references]
+    Aabb wide_bounds = {};
+    std::uint32_t wide_max_depth = 0;
+
+    [[nodiscard]] std::uint32_t stack_entries(WarpKernel kernel) const {
+        return warp_stack_entries(kernel, max_depth, wide_max_depth);
+    }
 };
 
 }  // namespace raydix

@@ -4,12 +4,11 @@
 #pragma once
 
 #include <cstdint>
-#include <cstring>
 
-#include "base/bits.h"
 #include "base/hd.h"
 #include "base/math.h"
 #include "layout/cwbvh.h"
+#include "trace/cwbvh_node.h"
 #include "trace/slab.h"
 #include "trace/triangle_test.h"
 
@@ -19,14 +18,6 @@ struct CwbvhView {
     const CwbvhNode* nodes;
     const CwbvhTriangle* triangles;
     Aabb bounds;  // of the root
-};
-
-/// Bits 24 to 31 of `hits`: children still to visit, the highest first; bits 0 to 7: inner_mask of
-/// their parent, whose child_base is `base`.
-struct CwbvhGroup {
-    std::uint32_t base, hits;
-
-    [[nodiscard]] RAYDIX_HD bool has_nodes() const { return hits >> cwbvh_first_child_bit != 0; }
 };
 
 /// Bits 0 to 23 of `hits`: triangles still to test, by their position behind `base`.
@@ -42,14 +33,10 @@ struct CwbvhTriangles {
 struct CwbvhRay {
     RayFrame frame;
     Vec3 inverse, pad;  // pad: with the sign that moves near planes toward the ray's start
-    bool negative_x, negative_y, negative_z;
-    /// Slot s comes at place s ^ octant, high places first.
-    std::uint32_t octant;
+    CwbvhOrder order;
 };
 
 inline constexpr float cwbvh_longest_inverse = 0x1p80f;
-/// Planes round three times more than those of slab.h.
-inline constexpr float cwbvh_pad_factor = 1.5f;
 
 RAYDIX_HD inline CwbvhRay make_cwbvh_ray(const RayFrame& frame, const Aabb& bounds) {
     const SlabFrame slabs = make_slab_frame(frame, bounds);
@@ -60,36 +47,8 @@ RAYDIX_HD inline CwbvhRay make_cwbvh_ray(const RayFrame& frame, const Aabb& boun
     ray.frame = frame;
     ray.inverse = {limited(slabs.inverse.x), limited(slabs.inverse.y), limited(slabs.inverse.z)};
     ray.pad = cwbvh_pad_factor * slabs.near_pad;
-    ray.negative_x = slabs.near_x != 0;
-    ray.negative_y = slabs.near_y != 0;
-    ray.negative_z = slabs.near_z != 0;
-    ray.octant =
-        (ray.negative_x ? 0u : 1u) | (ray.negative_y ? 0u : 2u) | (ray.negative_z ? 0u : 4u);
+    ray.order = order_of(slabs.near_x != 0, slabs.near_y != 0, slabs.near_z != 0);
     return ray;
-}
-
-/// A node as 32-bit words: 0-2 origin, 3 exponents and inner_mask, 4 and 5 bases, 6 and 7 meta,
-/// then pairs of lo x, y, z and hi x, y, z.
-struct CwbvhWords {
-    std::uint32_t word[20];
-};
-
-RAYDIX_HD inline CwbvhWords load_node(const CwbvhNode* node) {
-    CwbvhWords words;
-#if defined(__CUDA_ARCH__)
-    const uint4* from = reinterpret_cast<const uint4*>(node);
-#pragma unroll
-    for (int k = 0; k < 5; ++k) {
-        const uint4 four = __ldg(from + k);
-        words.word[4 * k] = four.x;
-        words.word[4 * k + 1] = four.y;
-        words.word[4 * k + 2] = four.z;
-        words.word[4 * k + 3] = four.w;
-    }
-#else
-    std::memcpy(&words, node, sizeof(words));
-#endif
-    return words;
 }
 
 RAYDIX_HD inline CwbvhTriangle load_triangle(const CwbvhTriangle* triangle) {
@@ -102,16 +61,6 @@ RAYDIX_HD inline CwbvhTriangle load_triangle(const CwbvhTriangle* triangle) {
 #endif
 }
 
-RAYDIX_HD inline float float_of_bits(std::uint32_t bits) {
-    float value;
-    std::memcpy(&value, &bits, sizeof(value));
-    return value;
-}
-
-RAYDIX_HD inline std::uint32_t byte_of(std::uint32_t word, int k) { return word >> (8 * k) & 255u; }
-
-RAYDIX_HD inline int highest_bit(std::uint32_t bits) { return 31 - leading_zeros(bits); }
-
 /// steps * rate + start. A device rounds once, the host twice: the pad covers both.
 RAYDIX_HD inline float plane_at(float steps, float rate, float start) {
 #if defined(__CUDA_ARCH__)
@@ -121,11 +70,6 @@ RAYDIX_HD inline float plane_at(float steps, float rate, float start) {
 #endif
 }
 
-/// One axis of a node for one ray: t of the plane q is q * rate + near or far.
-struct CwbvhAxis {
-    float rate, near, far;
-};
-
 RAYDIX_HD inline CwbvhAxis make_axis(float node_origin, std::uint32_t exponent, float origin,
                                      float pad, float inverse) {
     const float from_ray = node_origin - origin;
@@ -133,68 +77,19 @@ RAYDIX_HD inline CwbvhAxis make_axis(float node_origin, std::uint32_t exponent, 
             (from_ray - pad) * inverse};
 }
 
-/// Bits of four children whose meta is one word: a leaf's triangles, or the place of a node's turn.
-RAYDIX_HD inline std::uint32_t places_in_order(std::uint32_t meta, std::uint32_t octant) {
-    // Where bits 3 and 4 of a byte are set there is a node; its slot is the lowest three bits.
-    const std::uint32_t nodes = (meta & meta << 1) >> 4 & 0x01010101u;
-    return meta ^ (nodes * octant);
-}
-
-/// The children of a node that the ray meets no later than tmax: nodes as bits 24 to 31, triangles
-/// as bits 0 to 23.
+/// The children of a node that the ray meets no later than tmax.
 RAYDIX_HD inline std::uint32_t meet_children(const CwbvhRay& ray, const CwbvhWords& node,
                                              float tmax) {
     const std::uint32_t* w = node.word;
-    const CwbvhAxis x = make_axis(float_of_bits(w[0]), byte_of(w[3], 0), ray.frame.origin.x,
-                                  ray.pad.x, ray.inverse.x);
-    const CwbvhAxis y = make_axis(float_of_bits(w[1]), byte_of(w[3], 1), ray.frame.origin.y,
-                                  ray.pad.y, ray.inverse.y);
-    const CwbvhAxis z = make_axis(float_of_bits(w[2]), byte_of(w[3], 2), ray.frame.origin.z,
-                                  ray.pad.z, ray.inverse.z);
-    std::uint32_t hits = 0;
-#if defined(__CUDA_ARCH__)
-#pragma unroll
-#endif
-    for (int half = 0; half < 2; ++half) {
-        const std::uint32_t lo_x = w[8 + half], lo_y = w[10 + half], lo_z = w[12 + half];
-        const std::uint32_t hi_x = w[14 + half], hi_y = w[16 + half], hi_z = w[18 + half];
-        const std::uint32_t near_x = ray.negative_x ? hi_x : lo_x,
-                            far_x = ray.negative_x ? lo_x : hi_x;
-        const std::uint32_t near_y = ray.negative_y ? hi_y : lo_y,
-                            far_y = ray.negative_y ? lo_y : hi_y;
-        const std::uint32_t near_z = ray.negative_z ? hi_z : lo_z,
-                            far_z = ray.negative_z ? lo_z : hi_z;
-        const std::uint32_t meta = places_in_order(w[6 + half], ray.octant);
-#if defined(__CUDA_ARCH__)
-#pragma unroll
-#endif
-        for (int k = 0; k < 4; ++k) {
-            const auto steps = [&](std::uint32_t word) {
-                return static_cast<float>(byte_of(word, k));
-            };
-            const float ex = plane_at(steps(near_x), x.rate, x.near),
-                        ey = plane_at(steps(near_y), y.rate, y.near),
-                        ez = plane_at(steps(near_z), z.rate, z.near);
-            const float lx = plane_at(steps(far_x), x.rate, x.far),
-                        ly = plane_at(steps(far_y), y.rate, y.far),
-                        lz = plane_at(steps(far_z), z.rate, z.far);
-            const float entry = max_of(max_of(ex, ey), max_of(ez, ray.frame.tmin));
-            const float leave = min_of(min_of(lx, ly), lz) * slab_exit_factor;
-            const std::uint32_t child = byte_of(meta, k);
-            if (entry <= min_of(leave, tmax)) hits |= (child >> 5) << (child & 31u);
-        }
-    }
-    return hits;
-}
-
-/// Goes on to the first child of `group`: takes it out, and returns its node.
-RAYDIX_HD inline std::uint32_t take_first_child(const CwbvhRay& ray, CwbvhGroup& group) {
-    const int bit = highest_bit(group.hits);
-    group.hits ^= 1u << bit;
-    const std::uint32_t slot =
-        (static_cast<std::uint32_t>(bit) - cwbvh_first_child_bit) ^ ray.octant;
-    const std::uint32_t before = group.hits & ((1u << slot) - 1u);
-    return group.base + static_cast<std::uint32_t>(count_ones(std::uint64_t{before}));
+    const CwbvhAxis axes[3] = {make_axis(float_of_bits(w[0]), byte_of(w[3], 0), ray.frame.origin.x,
+                                         ray.pad.x, ray.inverse.x),
+                               make_axis(float_of_bits(w[1]), byte_of(w[3], 1), ray.frame.origin.y,
+                                         ray.pad.y, ray.inverse.y),
+                               make_axis(float_of_bits(w[2]), byte_of(w[3], 2), ray.frame.origin.z,
+                                         ray.pad.z, ray.inverse.z)};
+    return meet_children(
+        ray.order, node, axes, ray.frame.tmin, tmax,
+        [](float steps, float rate, float start) { return plane_at(steps, rate, start); });
 }
 
 struct CwbvhBest {
@@ -222,16 +117,13 @@ struct NoCwbvhSteps {
     RAYDIX_HD void test() {}
 };
 
-/// What a ray has before it: the root, as the only child of nothing.
-RAYDIX_HD inline CwbvhGroup root_group() { return {0, 1u << 31}; }
-
 /// Enters the first child of `nodes`, whose siblings go to the stack. One entry a level at most:
 /// the stack needs room for `max_depth` of them.
 template <class Steps>
 RAYDIX_HD void visit_first_child(const CwbvhView& tree, const CwbvhRay& ray, float tmax,
                                  CwbvhGroup& nodes, CwbvhTriangles& triangles, CwbvhGroup*& top,
                                  Steps& steps) {
-    const std::uint32_t index = take_first_child(ray, nodes);
+    const std::uint32_t index = take_first_child(ray.order.octant, nodes);
     if (nodes.has_nodes()) *top++ = nodes;
     const CwbvhWords words = load_node(tree.nodes + index);
     steps.visit();

@@ -28,12 +28,12 @@ CORE = EVERY | dict.fromkeys((
     "EmitKdNode", "FitKdIntervals"), 32)
 EXPECTED = {"kernels.cu": dict.fromkeys(PLAIN, 255), "device_build_cuda.cu": BUILD, "device_trees_cuda.cu": CORE}
 # Traversal: 40 registers leave room for 1536 threads, which the h200 of src/simt/machine_models.cpp has in flight.
-KERNELS = {"trace_rays": 40, "trace_packets": 48, "trace_queues": 72}
+KERNELS = {"trace_rays": 40, "trace_packets": 48, "trace_queues": 72, "trace_wide": 72}
 EXPECTED |= {"launch_warps_closest.cu": KERNELS, "launch_warps_any.cu": KERNELS,
              "device_trace_cuda.cu": {"StartPool": 32, "PrepareRay": 32, "RescaleHit": 32, "MissAll": 32, "EmitWoopTriangle": 48,
                                    "ClearUnusedValues": 32, "SaveLastValue": 32, "AddLastValue": 32, "SetWord": 32}}
 # The traversal stack itself, of the larger size: an array that the kernel indexes. Exactly that, so that a spill shows.
-STACK_BYTES = {"trace_rays": 4 * 128, "cwbvh_rays": 8 * 128, "persistent_cwbvh_rays": 8 * 128}
+STACK_BYTES = {"trace_rays": 4 * 128, "trace_wide": 4 * 128, "cwbvh_rays": 8 * 128, "persistent_cwbvh_rays": 8 * 128}
 # Queries: stacks of 96 entries of 16, 8 and 4 bytes; exact tests of pairs hold sums of up to 48 doubles besides, three of them.
 STACK_BYTES |= {"FindNearest": 96 * 16, "CountWithin": 96 * 16, "FillWithin": 96 * 16, "FindClosest": 96 * 8,
                 "CountPartners": 96 * 4 + 1184, "FillPartners": 96 * 4 + 1184}

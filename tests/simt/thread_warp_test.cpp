@@ -9,13 +9,13 @@
 #include <memory>
 #include <thread>
 
-#include "layout/warp_tree.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"
 #include "support/support.h"
 #include "support/thread_lanes.h"
 #include "trace/warp/kernel_list.h"
 #include "trace/warp/prepare_rays.h"
+#include "trace/warp/warp_scene.h"
 
 namespace raydix::test {
 namespace {
@@ -142,8 +142,9 @@ TEST(ThreadWarp, WrongMembersAreSeen) {
 /// One warp's lanes, with the memory that a block would give it.
 template <class Kernel, bool any_hit>
 void run_lanes(const WarpJob& job, std::uint32_t warp_index, std::uint32_t stack_entries) {
+    using OneLane = typename LaneOf<Kernel>::Type;
     struct Spares {
-        std::array<Lane, thread_lanes> lanes{};
+        std::array<OneLane, thread_lanes> lanes{};
         std::array<std::uint32_t, thread_lanes> slots{};
     };
     Spares spares;
@@ -152,7 +153,7 @@ void run_lanes(const WarpJob& job, std::uint32_t warp_index, std::uint32_t stack
     LaneBoard board(60s);
     board.run([&](std::uint32_t lane) {
         ThreadLane::State state{&board, lane, {}};
-        ThreadWarp<Lane, ThreadLane> warp;
+        ThreadWarp<OneLane, ThreadLane> warp;
         warp.hardware.state = &state;
         warp.memory = {spares.lanes.data(), spares.slots.data(), packets.data()};
         warp.lane.stack = stacks.data() + std::size_t{2} * lane * stack_entries;
@@ -188,15 +189,15 @@ void compare_with_reference(const WarpTree& tree, std::span<const Ray> rays, War
     trace_reference(tree, rays, expected, any_hit);
     const PreparedRays prepared(rays);
     std::uint32_t next = 0;
-    const WarpTree::Arrays& arrays = tree.arrays();
     const WarpJob job{
-        {arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
+        scene_of(tree),
         {prepared.rays().data(), hits.data(), static_cast<std::uint32_t>(rays.size()), &next}};
+    const std::uint32_t entries = tree.arrays().stack_entries(kernel);
     with_kernel(kernel, [&]<class Kernel>() {
         if (any_hit)
-            run_launch<Kernel, true>(job, tree.max_depth() + 1);
+            run_launch<Kernel, true>(job, entries);
         else
-            run_launch<Kernel, false>(job, tree.max_depth() + 1);
+            run_launch<Kernel, false>(job, entries);
     });
     prepared.rescale(hits);
     for (std::size_t i = 0; i < rays.size(); ++i) {

@@ -15,7 +15,6 @@
 #include <utility>
 #include <vector>
 
-#include "layout/warp_tree.h"
 #include "support/ray_sets.h"
 #include "support/support.h"
 #include "trace/warp/batch_work.h"
@@ -23,6 +22,7 @@
 #include "trace/warp/prepare_rays.h"
 #include "trace/warp/simulate_launch.h"
 #include "trace/warp/simulated_kernels_of_width.h"
+#include "trace/warp/warp_scene.h"
 
 namespace raydix::test {
 namespace {
@@ -126,8 +126,7 @@ template <class Body, int width, bool any_hit>
 Counted run_kernel(const WarpTree& tree, std::span<const Ray> rays, const MachineModel& machine) {
     Counted out{std::vector<TreeHit>(rays.size())};
     const PreparedRays prepared(rays);
-    const WarpTree::Arrays& arrays = tree.arrays();
-    const WarpJob job{{arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
+    const WarpJob job{scene_of(tree),
                       {prepared.rays().data(), out.hits.data(),
                        static_cast<std::uint32_t>(rays.size()), nullptr}};
     const BatchWork work =

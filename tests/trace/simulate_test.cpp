@@ -10,13 +10,13 @@
 #include <cstring>
 #include <thread>
 
-#include "layout/warp_tree.h"
 #include "simt/op.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"
 #include "support/support.h"
 #include "trace/warp/prepare_rays.h"
 #include "trace/warp/simulated_kernels.h"
+#include "trace/warp/warp_scene.h"
 
 namespace raydix::test {
 namespace {
@@ -356,7 +356,6 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
     const Model scene = scene_of(random_soup(1000, 4, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh()));
     const PreparedRays rays(make_mixed_rays(scene, 640, 8));
-    const auto& arrays = tree.arrays();
     std::vector<TreeHit> hits(640);
     const auto compare = [&](WarpKernel name, bool any_hit, int width) {
         SCOPED_TRACE(fmt::format("{}, {}, {} lanes", warp_kernel_name(name),
@@ -368,12 +367,12 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
             const SimulatedKernel& kernel = *simulated_kernel(name, any_hit, width, isa);
             OpCounts tally{};
             ToldAccesses observer;
-            Buffer<std::byte> memory(kernel.warp_bytes(tree.max_depth() + 1));
+            const std::uint32_t entries = tree.arrays().stack_entries(name);
+            Buffer<std::byte> memory(kernel.warp_bytes(entries));
             std::uint32_t next = 0;
             hits.assign(640, {});  // the same array, of which the observer is told
-            const WarpJob job{{arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
-                              {rays.rays().data(), hits.data(), 640, &next}};
-            kernel.start_warp(memory.data(), {&tally, &observer, tree.max_depth() + 1});
+            const WarpJob job{scene_of(tree), {rays.rays().data(), hits.data(), 640, &next}};
+            kernel.start_warp(memory.data(), {&tally, &observer, entries});
             for (int warp = 0; warp < 640 / width; ++warp) {
                 KernelState state;
                 kernel.start_kernel(state);
@@ -407,7 +406,6 @@ TEST(Simulate, PoolsLoseAndRepeatNoRayWhateverTheDelays) {
     const std::vector<SimulateOptions> reference_run{options_for(WarpKernel::while_while)};
     const std::uint64_t visits =
         figure(simulate(tree, some, reference_run).front(), Op::visit_node).lanes;
-    const auto& arrays = tree.arrays();
     for (const WarpKernel name :
          {WarpKernel::persistent_while_while, WarpKernel::ray_replacement, WarpKernel::work_queue,
           WarpKernel::dynamic_fetch, WarpKernel::persistent_packet}) {
@@ -417,8 +415,7 @@ TEST(Simulate, PoolsLoseAndRepeatNoRayWhateverTheDelays) {
         std::vector<OpCounts> tallies(warps);
         std::vector<TreeHit> hits(count, TreeHit{-5.0f, 7u, 0, 0});
         std::uint32_t next = 0;
-        const WarpJob job{{arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()},
-                          {rays.rays().data(), hits.data(), count, &next}};
+        const WarpJob job{scene_of(tree), {rays.rays().data(), hits.data(), count, &next}};
         std::vector<std::thread> threads;
         for (int w = 0; w < warps; ++w)
             threads.emplace_back([&, w] {

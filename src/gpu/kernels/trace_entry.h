@@ -24,7 +24,7 @@ struct PacketStack {
 
 template <class Kernel, bool any_hit>
 __device__ void trace(const TraceArguments& given) {
-    ThreadWarp<Lane> warp;
+    ThreadWarp<typename LaneOf<Kernel>::Type> warp;
     const std::uint32_t warp_index = thread() / warp_lanes;
     if constexpr (Kernel::one_stack) {
         __shared__ std::uint64_t shared[warps_per_group * sizeof(PacketStack) / 8];

@@ -19,6 +19,7 @@ namespace raydix {
 /// - persistent: as many warps as fill the machine, which fetch from the pool until it is empty;
 /// - keeps_rays: lanes have rays from one turn to the next;
 /// - one_stack: the warp has a stack, its lanes have none;
+/// - LaneType: what their lanes are, if it is more than Lane;
 /// - rays_per_lane: 2 if half of the rays wait in shared memory.
 ///
 /// What is the same for all warps of a launch.
@@ -56,6 +57,7 @@ template <class Body>
 struct OneBatch {
     static constexpr bool persistent = false, keeps_rays = false, one_stack = Body::one_stack;
     static constexpr int rays_per_lane = 1;
+    using LaneType = typename LaneOf<Body>::Type;
 
     template <bool any_hit, class Warp>
     RAYDIX_HD bool turn(Warp& warp, const WarpJob& job, std::uint32_t warp_index) {
@@ -73,6 +75,7 @@ template <class Body>
 struct Persistent {
     static constexpr bool persistent = true, keeps_rays = false, one_stack = Body::one_stack;
     static constexpr int rays_per_lane = 1;
+    using LaneType = typename LaneOf<Body>::Type;
     std::uint32_t next = 0, end = 0;  // rays taken and not yet started
 
     /// Whether there is a batch, from `next` on.

@@ -7,6 +7,7 @@
 #include "trace/warp/packet.h"
 #include "trace/warp/per_ray.h"
 #include "trace/warp/replacement.h"
+#include "trace/warp/wide.h"
 #include "trace/warp/work_queue.h"
 
 namespace raydix {
@@ -35,8 +36,10 @@ auto with_kernel(WarpKernel kernel, const Fn& fn) {
             return fn.template operator()<RayReplacement>();
         case WarpKernel::work_queue:
             return fn.template operator()<WorkQueue>();
-        default:
+        case WarpKernel::dynamic_fetch:
             return fn.template operator()<DynamicFetch>();
+        default:
+            return fn.template operator()<OneBatch<WideWhileWhile>>();
     }
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "base/hd.h"
+#include "layout/cwbvh.h"
 #include "layout/pair64.h"
 #include "layout/woop48.h"
 
@@ -16,6 +17,11 @@ struct WarpScene {
     const NodePair* pairs;
     const WoopTriangle* triangles;  // [references]
     const std::uint32_t* ids;       // [references], last_in_leaf set on the last of each leaf
+    // The same triangles as a compressed wide tree; null where there is none.
+    const CwbvhNode* wide = nullptr;
+    const WoopTriangle* wide_triangles = nullptr;  // [references], as its leaves name them
+    const std::uint32_t* wide_ids = nullptr;       // [references]
+    Aabb wide_bounds = {};                         // of the root
 };
 
 /// Values of Lane::node beside inner nodes (>= 0, the index of a pair) and leaves (< 0, the
@@ -53,6 +59,17 @@ RAYDIX_HD static inline bool must_pop(const Lane& l) { return l.node == popped_n
 RAYDIX_HD static inline bool must_push(const Lane& l) { return l.aside != finished_node; }
 RAYDIX_HD static inline bool has_leaf_aside(const Lane& l) { return l.leaf != 0; }
 RAYDIX_HD static inline bool has_ray(const Lane& l) { return l.ray != no_ray; }
+
+/// Lanes of a kernel or body: Lane, unless it names a LaneType of its own.
+template <class Kernel>
+struct LaneOf {
+    using Type = Lane;
+};
+template <class Kernel>
+requires requires { typename Kernel::LaneType; }
+struct LaneOf<Kernel> {
+    using Type = typename Kernel::LaneType;
+};
 
 /// The rays of one launch and where their hits go. On a device both are aligned to 16 bytes.
 struct RayLaunch {

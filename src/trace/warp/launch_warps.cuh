@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "exec/cuda_error.cuh"
 #include "simt/thread_warp.h"
@@ -28,6 +29,16 @@ template <class Kernel, bool any_hit, std::uint32_t stack_entries>
 __global__ void __launch_bounds__(warp_block_threads) trace_rays(const WarpJob job) {
     std::int32_t stack[stack_entries];
     ThreadWarp<Lane> warp;
+    warp.lane.stack = stack;
+    run_warp<Kernel, any_hit>(warp, job,
+                              (blockIdx.x * blockDim.x + threadIdx.x) / words::warp_width);
+}
+
+/// Groups of children take two entries each.
+template <class Kernel, bool any_hit>
+__global__ void __launch_bounds__(warp_block_threads) trace_wide(const WarpJob job) {
+    std::int32_t stack[large_stack_entries];
+    ThreadWarp<WideLane> warp;
     warp.lane.stack = stack;
     run_warp<Kernel, any_hit>(warp, job,
                               (blockIdx.x * blockDim.x + threadIdx.x) / words::warp_width);
@@ -69,6 +80,8 @@ void with_global_function(const WarpLaunch& launch, std::int32_t* stacks, const 
         } else if constexpr (Kernel::rays_per_lane == 2) {
             visit(kernels::trace_queues<Kernel, any_hit>, warps_per_block * sizeof(SpareRays),
                   launch.stack_entries, stacks);
+        } else if constexpr (std::is_same_v<typename LaneOf<Kernel>::Type, WideLane>) {
+            visit(kernels::trace_wide<Kernel, any_hit>, std::size_t{0});
         } else if (launch.stack_entries <= small_stack_entries) {
             visit(kernels::trace_rays<Kernel, any_hit, small_stack_entries>, std::size_t{0});
         } else {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "base/device_words.h"
+#include "base/device_math.h"
 #include "base/hd.h"
 #include "base/math.h"
 #include "trace/warp/lane.h"
@@ -19,33 +19,6 @@
 #endif
 
 namespace raydix {
-
-/// a * b + c, rounded once.
-RAYDIX_HD static inline float multiply_add(float a, float b, float c) {
-#if defined(__CUDA_ARCH__)
-    return __fmaf_rn(a, b, c);
-#elif defined(__FMA__)
-    return __builtin_fmaf(a, b, c);
-#else
-    return std::fma(a, b, c);
-#endif
-}
-
-// One instruction each on a GPU; nothing here is NaN.
-RAYDIX_HD static inline float lesser(float a, float b) {
-#if defined(__CUDA_ARCH__)
-    return fminf(a, b);
-#else
-    return min_of(a, b);
-#endif
-}
-RAYDIX_HD static inline float greater(float a, float b) {
-#if defined(__CUDA_ARCH__)
-    return fmaxf(a, b);
-#else
-    return max_of(a, b);
-#endif
-}
 
 /// Interval of the ray inside a box: planes in the order lo, hi of x, y, z.
 RAYDIX_HD static inline void clip_to_box(const Lane& l, const float (&planes)[6], float& near,

@@ -1,4 +1,5 @@
 // Public calls of the warp simulator: trees in the kernels' form, launches, rates.
+#include <raydix/cwbvh.h>
 #include <raydix/error.h>
 #include <raydix/simulate.h>
 
@@ -14,6 +15,7 @@
 #include "trace/warp/kernel_list.h"
 #include "trace/warp/prepare_rays.h"
 #include "trace/warp/simulate_launch.h"
+#include "trace/warp/warp_scene.h"
 
 namespace raydix {
 namespace {
@@ -28,7 +30,8 @@ constexpr std::array kernels{WarpKernel::packet,
                              WarpKernel::persistent_speculative_while_while,
                              WarpKernel::ray_replacement,
                              WarpKernel::work_queue,
-                             WarpKernel::dynamic_fetch};
+                             WarpKernel::dynamic_fetch,
+                             WarpKernel::cwbvh};
 constexpr std::array<std::string_view, kernels.size()> kernel_names{
     "packet",
     "while_while",
@@ -40,7 +43,8 @@ constexpr std::array<std::string_view, kernels.size()> kernel_names{
     "persistent_speculative_while_while",
     "ray_replacement",
     "work_queue",
-    "dynamic_fetch"};
+    "dynamic_fetch",
+    "cwbvh"};
 
 constexpr std::array<std::string_view, 3> release_names{"own", "in_order", "together"};
 
@@ -62,11 +66,6 @@ void check_together(const MachineModel& m, int width) {
         if (cost.most != 0 && cost.most < cost.instructions)
             refuse("costs: most of '" + cost.operation + "' is " + std::to_string(cost.most) +
                    "; it must be at least its instructions, " + std::to_string(cost.instructions));
-}
-
-WarpScene scene_of(const WarpTree& tree) {
-    const WarpTree::Arrays& arrays = tree.arrays();
-    return {arrays.pairs.data(), arrays.triangles.data(), arrays.ids.data()};
 }
 
 void check_options(const SimulateOptions& options) {
@@ -175,6 +174,19 @@ WarpTree::WarpTree(const Bvh& bvh) : arrays_(std::make_unique<Arrays>()) {
     const EmitWoopTriangle emit_triangle{bvh.triangles().data(), arrays_->triangles.data()};
     for_each_index(references,
                    [&](std::size_t i) { emit_triangle(static_cast<std::uint32_t>(i)); });
+    const Cwbvh wide(bvh);
+    const Cwbvh::Arrays& from = wide.arrays();
+    arrays_->wide_bounds = from.bounds;
+    arrays_->wide_max_depth = wide.stats().max_depth;
+    arrays_->wide.reset(from.nodes.size());
+    std::copy_n(from.nodes.data(), from.nodes.size(), arrays_->wide.data());
+    arrays_->wide_triangles.reset(from.triangles.size());
+    arrays_->wide_ids.reset(from.triangles.size());
+    for_each_index(from.triangles.size(), [&](std::size_t i) {
+        const CwbvhTriangle& t = from.triangles[i];
+        arrays_->wide_triangles[i] = make_woop_triangle({t.v0, t.v1, t.v2});
+        arrays_->wide_ids[i] = t.prim;
+    });
 }
 
 WarpTree::~WarpTree() = default;
@@ -185,7 +197,9 @@ bool WarpTree::empty() const { return arrays_->ids.empty(); }
 std::uint32_t WarpTree::max_depth() const { return arrays_->max_depth; }
 std::uint64_t WarpTree::bytes() const {
     return arrays_->pairs.size() * sizeof(NodePair) +
-           arrays_->triangles.size() * sizeof(WoopTriangle) + arrays_->ids.size() * 4;
+           (arrays_->triangles.size() + arrays_->wide_triangles.size()) * sizeof(WoopTriangle) +
+           (arrays_->ids.size() + arrays_->wide_ids.size()) * 4 +
+           arrays_->wide.size() * sizeof(CwbvhNode);
 }
 
 void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<TreeHit> hits,
@@ -337,17 +351,21 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
     found.resize(runs.size());
     const PreparedRays prepared(rays);
     const WarpTree::Arrays& arrays = tree.arrays();
-    const std::array memory{
-        MemoryRange{arrays.pairs.data(), arrays.pairs.view().size_bytes(),
-                    MemoryRange::Holds::nodes},
-        MemoryRange{arrays.triangles.data(), arrays.triangles.view().size_bytes(),
-                    MemoryRange::Holds::triangles},
-        MemoryRange{arrays.ids.data(), arrays.ids.view().size_bytes(),
-                    MemoryRange::Holds::triangles}};
+    const auto memory_of = [&](WarpKernel kernel) {
+        const auto range = [](const auto& buffer, MemoryRange::Holds holds) {
+            return MemoryRange{buffer.data(), buffer.view().size_bytes(), holds};
+        };
+        using enum MemoryRange::Holds;
+        if (kernel == WarpKernel::cwbvh)
+            return std::array{range(arrays.wide, nodes), range(arrays.wide_triangles, triangles),
+                              range(arrays.wide_ids, triangles)};
+        return std::array{range(arrays.pairs, nodes), range(arrays.triangles, triangles),
+                          range(arrays.ids, triangles)};
+    };
     const std::vector<std::vector<std::size_t>> groups = groups_of(runs);
     const auto run = [&](const std::vector<std::size_t>& group) {
         const WarpScene scene = scene_of(tree);
-        const std::uint32_t stack_entries = tree.max_depth() + 1;
+        const std::uint32_t stack_entries = arrays.stack_entries(runs[group.front()].kernel);
         std::vector<TreeHit>& first = found[group.front()];
         first.assign(rays.size(), TreeHit{});
         std::optional<BatchWork> batches;
@@ -357,8 +375,9 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
             group.size(),
             [&](std::size_t i) {
                 const std::size_t k = group[i];
-                figures[k] = simulate_launch(scene, stack_entries, prepared.rays(), first, runs[k],
-                                             memory, batches ? &*batches : nullptr);
+                figures[k] =
+                    simulate_launch(scene, stack_entries, prepared.rays(), first, runs[k],
+                                    memory_of(runs[k].kernel), batches ? &*batches : nullptr);
             },
             1);
         prepared.rescale(first);

@@ -24,10 +24,11 @@ struct v3;
 
 template <class Kernel, bool any_hit, int Width, class Isa>
 struct SimulatedKernelOf {
-    using Warp = SimulatedWarp<Lane, Width, Isa>;
+    using OneLane = typename LaneOf<Kernel>::Type;
+    using Warp = SimulatedWarp<OneLane, Width, Isa>;
     static constexpr std::size_t stacks = Kernel::rays_per_lane * std::size_t{Width};
     struct Spares {
-        std::array<Lane, Width> lanes;
+        std::array<OneLane, Width> lanes;
         std::array<std::uint32_t, Width> slots;
     };
     static_assert(sizeof(Kernel) <= sizeof(KernelState) && alignof(Kernel) <= alignof(KernelState));
@@ -53,7 +54,7 @@ struct SimulatedKernelOf {
             return;
         }
         auto* stack = reinterpret_cast<std::int32_t*>(shared + shared_bytes(setup.stack_entries));
-        for (Lane& lane : warp.lanes) {
+        for (OneLane& lane : warp.lanes) {
             lane.stack = stack;
             stack += setup.stack_entries;
         }
@@ -61,7 +62,7 @@ struct SimulatedKernelOf {
         Spares& spares = *new (shared) Spares{};
         warp.memory.spares = spares.lanes.data();
         warp.memory.slots = spares.slots.data();
-        for (Lane& lane : spares.lanes) {
+        for (OneLane& lane : spares.lanes) {
             lane.stack = stack;
             stack += setup.stack_entries;
         }
