@@ -354,7 +354,9 @@ void add_traversal_suite(CLI::App& bench) {
         ->delimiter(',')
         ->allow_extra_args(false)
         ->capture_default_str();
-    command->add_option("--kernel", options->kernel, "Kernels, separated by commas, or all")
+    command
+        ->add_option("--kernel", options->kernel,
+                     "Kernels, separated by commas; all: those of Aila and Laine, without cwbvh")
         ->capture_default_str();
     command
         ->add_option("--rays", options->rays,

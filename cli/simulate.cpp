@@ -101,7 +101,9 @@ void add_simulate_command(CLI::App& app) {
         ->add_option("--machine", options->machine,
                      fmt::format("{}, or a .json file", fmt::join(machine_model_names(), ", ")))
         ->capture_default_str();
-    command->add_option("--kernel", options->kernel, "Kernels, separated by commas, or all")
+    command
+        ->add_option("--kernel", options->kernel,
+                     "Kernels, separated by commas; all: those of Aila and Laine, without cwbvh")
         ->capture_default_str();
     command
         ->add_option(

@@ -432,7 +432,7 @@ void check_machine(const std::string& name_or_file, std::span<const SimulateOpti
 }
 
 std::vector<WarpKernel> kernels_from(const std::string& names) {
-    if (names == "all") return {warp_kernels().begin(), warp_kernels().end()};
+    if (names == "all") return {warp_kernel_family().begin(), warp_kernel_family().end()};
     std::vector<WarpKernel> kernels;
     for (const std::string& name : split(names)) try {
             kernels.push_back(warp_kernel_from_name(name));

@@ -33,6 +33,8 @@ enum class WarpKernel : std::uint32_t {
     cwbvh,  // while-while over nodes of eight children (Ylitie, Karras, Laine 2017)
 };
 [[nodiscard]] std::span<const WarpKernel> warp_kernels();
+/// Those of Aila and Laine alone: what `all` means to the program.
+[[nodiscard]] std::span<const WarpKernel> warp_kernel_family();
 [[nodiscard]] std::string_view warp_kernel_name(WarpKernel kernel);
 /// Throws InputError that lists the known names.
 [[nodiscard]] WarpKernel warp_kernel_from_name(std::string_view name);

@@ -148,7 +148,7 @@ private:
         }
         replace_costs(given);
         for (const std::string_view operation : op_names)
-            for (const WarpKernel kernel : warp_kernels()) require_cost(operation, kernel);
+            for (const WarpKernel kernel : warp_kernel_family()) require_cost(operation, kernel);
     }
     OperationCost cost_of(const json& entry) const {
         if (!entry.is_object() || !entry.contains("operation") || !entry.contains("instructions"))

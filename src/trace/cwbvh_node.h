@@ -66,15 +66,10 @@ struct CwbvhAxis {
     float rate, near, far;
 };
 
-/// How a ray goes through any node.
-struct CwbvhOrder {
-    bool negative_x, negative_y, negative_z;
-    /// Slot s comes at place s ^ octant, high places first.
-    std::uint32_t octant;
-};
-RAYDIX_HD static inline CwbvhOrder order_of(bool negative_x, bool negative_y, bool negative_z) {
-    return {negative_x, negative_y, negative_z,
-            (negative_x ? 0u : 1u) | (negative_y ? 0u : 2u) | (negative_z ? 0u : 4u)};
+/// How a ray goes through any node: slot s comes at place s ^ octant, high places first. Bit a is
+/// set where the direction is not negative along axis a.
+RAYDIX_HD static inline std::uint32_t octant_of(bool negative_x, bool negative_y, bool negative_z) {
+    return (negative_x ? 0u : 1u) | (negative_y ? 0u : 2u) | (negative_z ? 0u : 4u);
 }
 
 /// Bits of four children whose meta is one word: a leaf's triangles, or the place of a node's turn.
@@ -87,11 +82,13 @@ RAYDIX_HD static inline std::uint32_t places_in_order(std::uint32_t meta, std::u
 /// The children of a node that the ray meets between tmin and tmax: nodes as bits 24 to 31,
 /// triangles as bits 0 to 23. plane(steps, rate, start) is steps * rate + start.
 template <class Plane>
-RAYDIX_HD static inline std::uint32_t meet_children(const CwbvhOrder& order, const CwbvhWords& node,
+RAYDIX_HD static inline std::uint32_t meet_children(std::uint32_t octant, const CwbvhWords& node,
                                                     const CwbvhAxis (&axes)[3], float tmin,
                                                     float tmax, Plane plane) {
     const std::uint32_t* w = node.word;
     const CwbvhAxis &x = axes[0], &y = axes[1], &z = axes[2];
+    const bool negative_x = (octant & 1u) == 0, negative_y = (octant & 2u) == 0,
+               negative_z = (octant & 4u) == 0;
     std::uint32_t hits = 0;
 #if defined(__CUDA_ARCH__)
 #pragma unroll
@@ -99,13 +96,10 @@ RAYDIX_HD static inline std::uint32_t meet_children(const CwbvhOrder& order, con
     for (int half = 0; half < 2; ++half) {
         const std::uint32_t lo_x = w[8 + half], lo_y = w[10 + half], lo_z = w[12 + half];
         const std::uint32_t hi_x = w[14 + half], hi_y = w[16 + half], hi_z = w[18 + half];
-        const std::uint32_t near_x = order.negative_x ? hi_x : lo_x,
-                            far_x = order.negative_x ? lo_x : hi_x;
-        const std::uint32_t near_y = order.negative_y ? hi_y : lo_y,
-                            far_y = order.negative_y ? lo_y : hi_y;
-        const std::uint32_t near_z = order.negative_z ? hi_z : lo_z,
-                            far_z = order.negative_z ? lo_z : hi_z;
-        const std::uint32_t meta = places_in_order(w[6 + half], order.octant);
+        const std::uint32_t near_x = negative_x ? hi_x : lo_x, far_x = negative_x ? lo_x : hi_x;
+        const std::uint32_t near_y = negative_y ? hi_y : lo_y, far_y = negative_y ? lo_y : hi_y;
+        const std::uint32_t near_z = negative_z ? hi_z : lo_z, far_z = negative_z ? lo_z : hi_z;
+        const std::uint32_t meta = places_in_order(w[6 + half], octant);
 #if defined(__CUDA_ARCH__)
 #pragma unroll
 #endif

@@ -33,7 +33,7 @@ struct CwbvhTriangles {
 struct CwbvhRay {
     RayFrame frame;
     Vec3 inverse, pad;  // pad: with the sign that moves near planes toward the ray's start
-    CwbvhOrder order;
+    std::uint32_t octant;
 };
 
 inline constexpr float cwbvh_longest_inverse = 0x1p80f;
@@ -47,7 +47,7 @@ RAYDIX_HD inline CwbvhRay make_cwbvh_ray(const RayFrame& frame, const Aabb& boun
     ray.frame = frame;
     ray.inverse = {limited(slabs.inverse.x), limited(slabs.inverse.y), limited(slabs.inverse.z)};
     ray.pad = cwbvh_pad_factor * slabs.near_pad;
-    ray.order = order_of(slabs.near_x != 0, slabs.near_y != 0, slabs.near_z != 0);
+    ray.octant = octant_of(slabs.near_x != 0, slabs.near_y != 0, slabs.near_z != 0);
     return ray;
 }
 
@@ -88,7 +88,7 @@ RAYDIX_HD inline std::uint32_t meet_children(const CwbvhRay& ray, const CwbvhWor
                                make_axis(float_of_bits(w[2]), byte_of(w[3], 2), ray.frame.origin.z,
                                          ray.pad.z, ray.inverse.z)};
     return meet_children(
-        ray.order, node, axes, ray.frame.tmin, tmax,
+        ray.octant, node, axes, ray.frame.tmin, tmax,
         [](float steps, float rate, float start) { return plane_at(steps, rate, start); });
 }
 
@@ -123,7 +123,7 @@ template <class Steps>
 RAYDIX_HD void visit_first_child(const CwbvhView& tree, const CwbvhRay& ray, float tmax,
                                  CwbvhGroup& nodes, CwbvhTriangles& triangles, CwbvhGroup*& top,
                                  Steps& steps) {
-    const std::uint32_t index = take_first_child(ray.order.octant, nodes);
+    const std::uint32_t index = take_first_child(ray.octant, nodes);
     if (nodes.has_nodes()) *top++ = nodes;
     const CwbvhWords words = load_node(tree.nodes + index);
     steps.visit();

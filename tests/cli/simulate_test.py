@@ -19,6 +19,16 @@ KINDS = {"primary", "ao", "diffuse", "diffuse_shuffled"}
 
 
 class Simulate(ProgramTest):
+    def test_wide_nodes_by_name(self):
+        rows = self.document("simulate", SCENE, *SMALL, "--kernel", "while_while,cwbvh")["simulate"]
+        self.assertEqual({(r["kernel"], r["rays"]) for r in rows}, {(k, r) for k in ("while_while", "cwbvh") for r in KINDS})
+        visits = {(r["kernel"], r["rays"]): next(o["issues_per_ray"] * o["simd_efficiency"] for o in r["operations"] if o["name"] == "visit_node")
+                  for r in rows}
+        for row in rows:
+            self.assertEqual(row["different_hits"], 0, row["kernel"])
+        for rays in KINDS:
+            self.assertLess(visits["cwbvh", rays], visits["while_while", rays])
+
     def test_every_kernel_and_kind(self):
         document = self.document("simulate", SCENE, *SMALL)
         rows = document["simulate"]

@@ -213,8 +213,8 @@ TEST(CwbvhTrace, PlanesStayWithinTheirPad) {
         if (!(at >= root.lo.x && at <= root.hi.x)) continue;
         const float t = (at - frame.origin.x) * frame.inverse.x;
         const auto [below, above] = quantised_steps(root.lo.x, root.hi.x, at);
-        const int near = own.order.negative_x ? above : below,
-                  far = own.order.negative_x ? below : above;
+        const int near = (own.octant & 1u) == 0 ? above : below,
+                  far = (own.octant & 1u) == 0 ? below : above;
         ASSERT_LE(plane_at(float(near), axis.rate, axis.near), t) << "turn " << turn;
         ASSERT_GE(plane_at(float(far), axis.rate, axis.far), t) << "turn " << turn;
         // The device's form, rounded once.

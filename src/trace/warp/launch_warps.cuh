@@ -20,6 +20,8 @@ inline constexpr std::uint32_t warps_per_block = warp_block_threads / words::war
 /// alone the compiler of CUDA 13.0 stops at 40, which costs a turn of persistent packets three
 /// instructions more.
 inline constexpr std::uint32_t packet_blocks = 10;
+/// Of wide nodes: 64 registers. Left alone the compiler stops at 56, and spills one.
+inline constexpr std::uint32_t wide_blocks = 8;
 
 /// Shared memory is dynamic: stacks of packets [warps][stack_entries], or SpareRays [warps].
 extern __shared__ std::uint64_t shared_words[];
@@ -36,7 +38,7 @@ __global__ void __launch_bounds__(warp_block_threads) trace_rays(const WarpJob j
 
 /// Groups of children take two entries each.
 template <class Kernel, bool any_hit>
-__global__ void __launch_bounds__(warp_block_threads) trace_wide(const WarpJob job) {
+__global__ void __launch_bounds__(warp_block_threads, wide_blocks) trace_wide(const WarpJob job) {
     std::int32_t stack[large_stack_entries];
     ThreadWarp<WideLane> warp;
     warp.lane.stack = stack;

@@ -135,6 +135,10 @@ Simulation without_tree(const SimulateOptions& options, std::size_t rays) {
 
 std::span<const WarpKernel> warp_kernels() { return kernels; }
 
+std::span<const WarpKernel> warp_kernel_family() {
+    return std::span(kernels).first(static_cast<std::size_t>(WarpKernel::dynamic_fetch) + 1);
+}
+
 std::string_view warp_kernel_name(WarpKernel kernel) {
     const auto k = static_cast<std::size_t>(kernel);
     return k < kernel_names.size() ? kernel_names[k] : "unknown";

@@ -21,7 +21,7 @@ struct WideLane : Lane {
     CwbvhGroup group;         // children of one node that are still to visit
     std::uint32_t first;      // triangle_base of the node whose triangles are tested
     std::uint32_t triangles;  // of which those are left, by bits
-    CwbvhOrder order;
+    std::uint32_t octant;
     Vec3 margin;  // by which the times of planes move, near ones back, far ones on
 };
 
@@ -51,8 +51,8 @@ RAYDIX_HD static inline void start_wide(WideLane& l, const WarpScene& scene) {
     l.group = {0, 0};
     l.first = 0;
     l.triangles = 0;
-    l.order =
-        order_of(std::signbit(l.inverse.x), std::signbit(l.inverse.y), std::signbit(l.inverse.z));
+    l.octant =
+        octant_of(std::signbit(l.inverse.x), std::signbit(l.inverse.y), std::signbit(l.inverse.z));
 }
 
 /// Boxes of all children are tested. Those that the ray meets become its group and its triangles.
@@ -67,7 +67,7 @@ RAYDIX_HD static inline void visit_wide(WideLane& l, const WarpScene& scene) {
                                axis(1, l.origin.y, l.inverse.y, l.margin.y),
                                axis(2, l.origin.z, l.inverse.z, l.margin.z)};
     const std::uint32_t hits = meet_children(
-        l.order, words, axes, l.tmin, l.t,
+        l.octant, words, axes, l.tmin, l.t,
         [](float steps, float rate, float start) { return multiply_add(steps, rate, start); });
     constexpr std::uint32_t node_bits = ~std::uint32_t{0} << cwbvh_first_child_bit;
     l.group = {words.word[4], (hits & node_bits) | words.word[3] >> 24};
@@ -77,7 +77,7 @@ RAYDIX_HD static inline void visit_wide(WideLane& l, const WarpScene& scene) {
 }
 
 RAYDIX_HD static inline void take_child(WideLane& l) {
-    l.node = static_cast<std::int32_t>(take_first_child(l.order.octant, l.group));
+    l.node = static_cast<std::int32_t>(take_first_child(l.octant, l.group));
 }
 RAYDIX_HD static inline void push_group(WideLane& l) {
     l.stack[2 * l.top] = static_cast<std::int32_t>(l.group.base);
