@@ -260,6 +260,34 @@ TEST(Slab, PairGivesTheBitsOfTheSingleTest) {
     }
 }
 
+/// Pads keep planes away from a ray's start but where they end on it: 0 * Inf.
+TEST(Slab, PairDropsPlanesOnWhichAParallelRayLies) {
+    alignas(64) const BvhNode pair[2] = {node_of({{1, 2, 3}, {4, 5, 6}}),
+                                         node_of({{-3, -2, -1}, {1, 2, 3}})};
+    const Aabb bounds = unite({pair[0].lo, pair[0].hi}, {pair[1].lo, pair[1].hi});
+    for (int axis = 0; axis < 3; ++axis)
+        for (const float place : {component(pair[0].lo, axis), component(pair[0].hi, axis),
+                                  component(pair[1].lo, axis)})
+            for (const float zero : {0.0f, -0.0f}) {
+                Ray ray{{0.5f, 0.5f, 0.5f}, 0, {1, 1, 1}, infinity};
+                (&ray.origin.x)[axis] = place;
+                (&ray.direction.x)[axis] = zero;
+                const RayFrame frame = make_frame(ray);
+                SlabFrame slabs = make_slab_frame(frame, bounds);
+                (&slabs.near_pad.x)[axis] = 0.0f;
+                (&slabs.far_pad.x)[axis] = 0.0f;
+                const PairInterval both = HostSlabs(slabs, frame.tmin).intersect(pair, frame.tmax);
+                const float entries[] = {both.entry_a, both.entry_b};
+                for (int k = 0; k < 2; ++k) {
+                    const SlabInterval one =
+                        intersect_slabs(slabs, &pair[k].lo.x, frame.tmin, frame.tmax);
+                    EXPECT_EQ(one.entry, entries[k]) << axis << " " << place << " " << k;
+                    EXPECT_EQ(both.hit >> k & 1, one.entry <= one.exit)
+                        << axis << " " << place << " " << k;
+                }
+            }
+}
+
 /// Fault of other libraries: 0 * Inf where a ray lies in a slab's plane.
 TEST(Slab, FaultRayInASlabPlaneIsMissed) {
     const Aabb box{{1, 2, 3}, {4, 5, 6}};
