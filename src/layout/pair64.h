@@ -13,7 +13,8 @@
 
 namespace raydix {
 
-/// One per inner node; pair r is inner node r, the root is pair 0.
+/// One per inner node; pair r is inner node r, but the root is pair 0: where it is another inner
+/// node (`apetrei`), it and inner node 0 change places.
 /// A child >= 0 is the index of its pair, in units of 64 bytes. A child < 0 is a leaf: its
 /// complement is the position of the leaf's first primitive in leaf order, in primitives; the list
 /// goes on up to an id with `last_in_leaf`.
@@ -70,6 +71,7 @@ struct EmitNodePair {
 
     RAYDIX_HD void operator()(std::uint32_t r) const {
         NodePair pair;
+        std::uint32_t place = r;
         pair.unused0 = pair.unused1 = 0;
         const float pad = pair_padding(nodes[0]);
         if (*inner_count == 0) {
@@ -82,15 +84,21 @@ struct EmitNodePair {
             copy_ids(nodes[0]);
         } else {
             const BvhNode &left = nodes[2 * r + 2], &right = nodes[2 * r + 3];
-            pair.set_child0(left, pad, pair_link(left));
-            pair.set_child1(right, pad, pair_link(right));
+            pair.set_child0(left, pad, place_of(pair_link(left)));
+            pair.set_child1(right, pad, place_of(pair_link(right)));
             copy_ids(left);
             copy_ids(right);
+            place = static_cast<std::uint32_t>(place_of(static_cast<std::int32_t>(r)));
         }
-        pairs[r] = pair;
+        pairs[place] = pair;
     }
 
 private:
+    /// Of an inner node's pair; leaves stay what they are.
+    [[nodiscard]] RAYDIX_HD std::int32_t place_of(std::int32_t inner) const {
+        const std::int32_t root = pair_link(nodes[0]);
+        return inner == root ? 0 : inner == 0 ? root : inner;
+    }
     RAYDIX_HD void copy_ids(const BvhNode& leaf) const {
         if (!leaf.is_leaf()) return;
         const std::uint32_t last = leaf.first + leaf.count - 1;

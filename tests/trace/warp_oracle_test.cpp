@@ -269,6 +269,15 @@ TEST(WarpOracle, AgreesWithEveryKernelOnRandomTriangles) {
         expect_hits_of_the_oracle(scene, builder, fewer(8000, 20));
 }
 
+/// The root is not the first inner node of every builder.
+TEST(WarpOracle, AgreesWithEveryKernelOnTreesOfAllBuilders) {
+    const Model scene = scene_of(random_soup(300, 6, 0.2f), "soup");
+    for (const Builder builder :
+         {Builder::karras, Builder::lauterbach, Builder::garanzha, Builder::apetrei, Builder::ploc,
+          Builder::hploc, Builder::binned, Builder::sweep, Builder::split, Builder::sbvh})
+        expect_hits_of_the_oracle(scene, builder, 400);
+}
+
 /// Every triangle twice, the second ones backwards: which of two is met first is up to the tree.
 TEST(WarpOracle, TheLowerOfTwoEqualTrianglesWins) {
     Mesh soup = random_soup(1000, 5, 0.1f);
