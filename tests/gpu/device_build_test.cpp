@@ -10,6 +10,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "support/launched_build.h"
 #include "support/sanitized.h"
@@ -40,14 +41,16 @@ void for_all_options(const Run& run) {
                 }
 }
 
-/// Arrays, not only the tree: the pairs are read by position.
+/// Arrays, not only the tree: the pairs as kernels walk them, from pair 0 on.
 void expect_pairs_hold_the_tree(const LaunchedBuild& built) {
     const DeviceCounts& counts = built.counts;
     if (counts.references == 0) return;
     std::vector<bool> seen(counts.references);
+    std::vector<bool> met(counts.inner_count);  // pairs
+    std::vector<std::pair<std::int32_t, BvhNode>> to_visit;
     const auto visit_child = [&](std::int32_t link, const BvhNode& node) {
         if (!node.is_leaf()) {
-            ASSERT_EQ(link, static_cast<std::int32_t>((node.first - 2) / 2));
+            to_visit.emplace_back(link, node);
             return;
         }
         ASSERT_LT(link, 0);
@@ -69,9 +72,17 @@ void expect_pairs_hold_the_tree(const LaunchedBuild& built) {
         EXPECT_GT(only.c1_xlo, only.c1_xhi);
         EXPECT_GT(only.c1_zlo, only.c1_zhi);
     }
-    for (std::uint32_t r = 0; r < counts.inner_count; ++r) {
+    if (counts.inner_count > 0) to_visit.emplace_back(0, built.nodes[0]);
+    while (!to_visit.empty()) {
+        const auto [link, node] = to_visit.back();
+        to_visit.pop_back();
+        ASSERT_GE(link, 0);
+        const auto r = static_cast<std::uint32_t>(link);
+        ASSERT_LT(r, counts.inner_count);
+        ASSERT_FALSE(met[r]) << r;
+        met[r] = true;
         const NodePair& pair = built.pairs[r];
-        const BvhNode &a = built.nodes[2 * r + 2], &b = built.nodes[2 * r + 3];
+        const BvhNode &a = built.nodes[node.first], &b = built.nodes[node.first + 1];
         visit_child(pair.child0, a);
         visit_child(pair.child1, b);
         const float pad = pair_padding(built.nodes[0]);
@@ -81,6 +92,7 @@ void expect_pairs_hold_the_tree(const LaunchedBuild& built) {
         ASSERT_EQ(std::memcmp(&pair.c0_xlo, expected, sizeof(expected)), 0) << r;
         ASSERT_EQ(pair.unused0 | pair.unused1, 0);
     }
+    EXPECT_EQ(std::accumulate(met.begin(), met.end(), 0u), counts.inner_count);
     EXPECT_EQ(std::accumulate(seen.begin(), seen.end(), 0u), counts.references);
 }
 
