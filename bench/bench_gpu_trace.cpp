@@ -111,7 +111,7 @@ void run(const Options& options) {
         build.builder = raydix::builder_from_name(options.builder);
         build.max_leaf = options.max_leaf;
         const raydix::Bvh bvh = build_bvh(scene.mesh(), build);
-        const raydix::WarpTree host(bvh);
+        const raydix::WarpTree host(bvh, true);
         const raydix::DeviceWarpTree tree(host);
         for (const std::string& kind : options.kinds) {
             Launch launch;

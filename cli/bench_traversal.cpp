@@ -306,7 +306,7 @@ private:
         if (document_["scenes"].empty() || document_["scenes"].back() != scene_fields)
             document_["scenes"].push_back(scene_fields);
         document_["builds"].push_back(build_json(input.bvh, stats, builds));
-        const WarpTree tree(input.bvh);
+        const WarpTree tree = warp_tree_for(input.bvh, kernels_from(options_.kernel));
         const RayLaunches launches(options_.launches, input, options_.common);
         if (options_.common.prints_tables())
             fmt::print("\n{}: {} triangles, builder {}, {} nodes, SAH {}, depth {}\n", scene,

@@ -62,7 +62,7 @@ void run_simulate(const SimulateCommand& options) {
     document["machines"] = Json::array({machine_model_json(machine)});
     document["simulate"] = Json::array();
     about(options.scene, [&] {
-        const WarpTree tree(input.bvh);
+        const WarpTree tree = warp_tree_for(input.bvh, kernels_from(options.kernel));
         std::vector<Ray> rays;
         std::optional<RayLaunches> launches;  // before any table: cameras and files may be at fault
         if (from_file)

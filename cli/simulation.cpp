@@ -442,6 +442,10 @@ std::vector<WarpKernel> kernels_from(const std::string& names) {
     return kernels;
 }
 
+WarpTree warp_tree_for(const Bvh& bvh, const std::vector<WarpKernel>& kernels) {
+    return WarpTree(bvh, std::ranges::find(kernels, WarpKernel::cwbvh) != kernels.end());
+}
+
 std::vector<RayKind> kinds_from(const std::string& names) {
     const std::vector<RayKind> all{RayKind::primary, RayKind::ao, RayKind::diffuse,
                                    RayKind::diffuse_shuffled};

@@ -94,6 +94,8 @@ void print_steps_to_scheduled(const std::vector<SimulationRow>& rows);
 void check_machine(const std::string& name_or_file, std::span<const SimulateOptions> runs);
 /// Names separated by commas, or "all".
 [[nodiscard]] std::vector<WarpKernel> kernels_from(const std::string& names);
+/// With wide nodes if one of the kernels reads them.
+[[nodiscard]] WarpTree warp_tree_for(const Bvh& bvh, const std::vector<WarpKernel>& kernels);
 [[nodiscard]] std::vector<RayKind> kinds_from(const std::string& names);
 
 }  // namespace raydix::cli

@@ -50,7 +50,8 @@ void check_kernel(const std::string& kernel, const std::string& device) {
                                    joined(warp_kernel_names()));
 }
 
-WarpTracer::WarpTracer(const Bvh& bvh, const Settings& settings) : settings_(settings), tree_(bvh) {
+WarpTracer::WarpTracer(const Bvh& bvh, const Settings& settings)
+    : settings_(settings), tree_(bvh, settings.kernel == warp_kernel_name(WarpKernel::cwbvh)) {
     simulate_.kernel = warp_kernel_from_name(settings.kernel);
     simulate_.any_hit = settings.any_hit;
     if (is_simulated()) {

@@ -29,7 +29,7 @@ std::vector<Ray> ordinary_rays(Random& random, const Mesh& mesh) {
 
 void compare_kernels(Case& c, const TestMesh& made) {
     const BuildOptions build = any_build_options(c.random);
-    const WarpTree tree(build_bvh(made.mesh, build));
+    const WarpTree tree(build_bvh(made.mesh, build), true);
     const std::vector<Ray> rays = ordinary_rays(c.random, made.mesh);
     constexpr int widths[] = {1, 2, 4, 8, 16, 32, 64};
     std::vector<SimulateOptions> runs;

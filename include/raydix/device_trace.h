@@ -18,12 +18,13 @@ namespace raydix {
 /// and Woop's triangles of 48 bytes. It belongs to the device that was current when it was made.
 class DeviceWarpTree {
 public:
-    /// Copies a tree from the host and waits for the copy. Throws InputError for a tree deeper than
-    /// 127, which no kernel has a stack for. Throws BackendUnavailable, DeviceError.
+    /// Copies a tree from the host, its wide nodes too if it has them, and waits for the copy.
+    /// Throws InputError for a tree deeper than 127, which no kernel has a stack for. Throws
+    /// BackendUnavailable, DeviceError.
     explicit DeviceWarpTree(const WarpTree& tree, Stream stream = nullptr);
     /// Takes a tree of triangles that was built on the device with pairs. Pairs and ids are read
     /// where they lie, so they must outlive this object. After a rebuild there it must be made
-    /// again. It has no wide nodes: the kernel `cwbvh` throws InputError. Waits for `stream` to
+    /// again. It has no wide nodes. Waits for `stream` to
     /// learn the tree's counts. Throws InputError: a tree without pairs or triangles, one deeper
     /// than 127, an index past the vertices in its data. Throws BackendUnavailable, DeviceError.
     explicit DeviceWarpTree(const DeviceTree& tree, Stream stream = nullptr);
@@ -61,8 +62,9 @@ struct DeviceTraceOptions {
 /// Asynchronous: the call puts launches on `stream` and returns. It allocates nothing and waits for
 /// nothing. `scratch` is device memory of device_trace_scratch_bytes or more, aligned to 256 bytes.
 /// It is in use until the stream is past the launches. Throws InputError: sizes that differ,
-/// 2^31 - 1 rays or more, a number that is no kernel, memory that is too small or not aligned.
-/// Throws BackendUnavailable, DeviceError.
+/// 2^31 - 1 rays or more, a number that is no kernel, memory that is too small or not aligned; the
+/// kernel `cwbvh` and a tree without wide nodes, or with some deeper than 63. Throws
+/// BackendUnavailable, DeviceError.
 void trace_warps_on_device(const DeviceWarpTree& tree, std::span<const Ray> rays,
                            std::span<TreeHit> hits, const DeviceTraceOptions& options,
                            std::span<std::byte> scratch, Stream stream);

@@ -40,18 +40,20 @@ enum class WarpKernel : std::uint32_t {
 [[nodiscard]] WarpKernel warp_kernel_from_name(std::string_view name);
 
 /// A tree of triangles in the form that the kernels read, as in Aila and Laine 2009: node pairs of
-/// 64 bytes (`pair64`) and Woop's triangles of 48 bytes (`woop48`). Besides it holds a compressed
-/// wide tree of nodes of 80 bytes, for the kernel `cwbvh`, made from the same binary tree. Holds
-/// all that the kernels read: the binary tree may go.
+/// 64 bytes (`pair64`) and Woop's triangles of 48 bytes (`woop48`). If asked for, also as a
+/// compressed wide tree: nodes of 80 bytes, which the kernel `cwbvh` reads and no other, with
+/// triangles of their own. Holds all that the kernels read: the binary tree may go.
 class WarpTree {
 public:
-    /// Throws InputError for a tree that holds boxes or points.
-    explicit WarpTree(const Bvh& bvh);
+    /// `wide_nodes`: also for the kernel `cwbvh`. Throws InputError for a tree that holds boxes or
+    /// points.
+    explicit WarpTree(const Bvh& bvh, bool wide_nodes = false);
     ~WarpTree();
     WarpTree(WarpTree&&) noexcept;
     WarpTree& operator=(WarpTree&&) noexcept;
 
     [[nodiscard]] bool empty() const;
+    [[nodiscard]] bool has_wide_nodes() const;  // false if it is empty
     [[nodiscard]] std::uint32_t max_depth() const;
     [[nodiscard]] std::uint64_t bytes() const;
 
@@ -190,7 +192,8 @@ struct SimulatedRates {
 
 /// Simulates one launch of all rays for each of `runs`. rays [n] -> figures [runs] and, if `hits`
 /// is not null, hits [runs][n]: those that the kernel itself found. Invalid rays miss. The figures
-/// do not depend on the number of threads. Throws InputError: 2^31 - 1 rays or more; a width,
+/// do not depend on the number of threads. Throws InputError: 2^31 - 1 rays or more; the kernel
+/// `cwbvh` and a tree without wide nodes; a width,
 /// kernel or part_of_launch out of range; a machine with a figure that is not positive, without a
 /// cost for an operation, with a cost above its own `most`, with resident_lanes that are no
 /// multiple of the width or fewer than block_lanes, with more than 2^24 lanes in flight; for the

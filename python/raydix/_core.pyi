@@ -499,6 +499,9 @@ def simulate(bvh: Bvh, rays: Annotated[NDArray[numpy.float32], dict(shape=(None,
 def kernels() -> list[str]:
     """Names of the traversal kernels that can be simulated."""
 
+def kernel_family() -> list[str]:
+    """Those of Aila and Laine."""
+
 def machines() -> list[str]:
     """Names of the simulated machines."""
 

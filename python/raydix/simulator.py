@@ -34,7 +34,7 @@ def simulate(
         (N, 8) float32, in the order in which threads take them; the first camera's primary rays,
         256 x 192, if left out.
     kernels :
-        A name or several of `raydix.kernels()`; if left out all but `cwbvh`: those of Aila and Laine.
+        A name or several of `raydix.kernels()`; those of Aila and Laine if left out.
     machine :
         A name of `raydix.machines()`, or the path of a .json file with one's own.
     builder, max_leaf :
@@ -66,7 +66,7 @@ def simulate(
     lanes = whole(width, "width", 1, 128)
     options = flag(any_hit, "any_hit"), flag(memory, "memory")
     if kernels is None or isinstance(kernels, str):
-        kernels = [name for name in _core.kernels() if name != "cwbvh"] if kernels is None else [kernels]
+        kernels = _core.kernel_family() if kernels is None else [kernels]
     if not isinstance(kernels, (list, tuple)):
         raise TypeError(f"kernels: expected a name or several, given {shown(kernels)}")
     names = [one_of(kernel, "kernels", _core.kernels()) for kernel in kernels]

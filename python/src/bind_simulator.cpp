@@ -5,7 +5,9 @@
 #include <nanobind/stl/vector.h>
 #include <raydix/simulate.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -59,7 +61,9 @@ nb::list run(const Bvh& bvh, const RaysIn& rays, const std::vector<std::string>&
     const auto launch = rows<Ray>(rays);
     const WarpTree tree = [&] {
         const nb::gil_scoped_release unlocked;
-        return WarpTree(bvh);
+        return WarpTree(bvh, std::ranges::any_of(runs, [](const SimulateOptions& run) {
+                            return run.kernel == WarpKernel::cwbvh;
+                        }));
     }();
     for (const SimulateOptions& options : runs) {  // one at a time, so that signals are heard
         hear_signals();
@@ -73,9 +77,9 @@ nb::list run(const Bvh& bvh, const RaysIn& rays, const std::vector<std::string>&
     return results;
 }
 
-std::vector<std::string> kernel_names() {
+std::vector<std::string> names_of(std::span<const WarpKernel> kernels) {
     std::vector<std::string> names;
-    for (const WarpKernel kernel : warp_kernels()) names.emplace_back(warp_kernel_name(kernel));
+    for (const WarpKernel kernel : kernels) names.emplace_back(warp_kernel_name(kernel));
     return names;
 }
 
@@ -90,7 +94,11 @@ void bind_simulator(nb::module_& module) {
     module.def("simulate", &run, nb::arg("bvh"), nb::arg("rays").noconvert(), nb::arg("kernels"),
                nb::arg("machine"), nb::arg("width"), nb::arg("any_hit"), nb::arg("memory"),
                nb::arg("threads"));
-    module.def("kernels", &kernel_names, "Names of the traversal kernels that can be simulated.");
+    module.def(
+        "kernels", [] { return names_of(warp_kernels()); },
+        "Names of the traversal kernels that can be simulated.");
+    module.def(
+        "kernel_family", [] { return names_of(warp_kernel_family()); }, "Those of Aila and Laine.");
     module.def("machines", &machine_names, "Names of the simulated machines.");
 }
 

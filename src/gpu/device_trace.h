@@ -47,10 +47,10 @@ inline void check_stack_depth(std::uint32_t max_depth) {
 
 inline void check_wide(const DeviceWarpTree::Arrays& tree, const WarpLaunch& launch) {
     if (launch.kernel != WarpKernel::cwbvh || tree.scene.pairs == nullptr) return;
-    if (tree.scene.wide == nullptr)
+    if (tree.scene.wide.nodes == nullptr)
         throw InputError(
-            "the kernel cwbvh needs a tree that was copied from the host: one built on the device "
-            "has no wide nodes here (DeviceCwbvh makes them)");
+            "the kernel cwbvh needs a WarpTree with wide nodes, copied from the host (DeviceCwbvh "
+            "has kernels of its own)");
     if (launch.stack_entries > large_stack_entries)
         throw InputError("the wide tree is " + std::to_string(tree.wide_max_depth) +
                          " deep; the kernel cwbvh has stacks for depths up to " +
@@ -97,19 +97,21 @@ inline std::unique_ptr<DeviceWarpTree::Arrays> upload_warp_tree(const WarpTree& 
     auto arrays = std::make_unique<DeviceWarpTree::Arrays>();
     const WarpTree::Arrays& from = tree.arrays();
     arrays->max_depth = from.max_depth;
-    arrays->wide_max_depth = from.wide_max_depth;
+    arrays->wide_max_depth = from.wide.max_depth;
     if (tree.empty()) return arrays;
     arrays->own_ids.upload({from.ids.data(), from.ids.size()}, stream);
-    arrays->own_wide_ids.upload({from.wide_ids.data(), from.wide_ids.size()}, stream);
     arrays->scene = {
         upload_array(arrays->own_pairs, from.pairs.data(), from.pairs.size(), stream),
         upload_array(arrays->own_triangles, from.triangles.data(), from.triangles.size(), stream),
-        arrays->own_ids.data(),
-        upload_array(arrays->own_wide, from.wide.data(), from.wide.size(), stream),
-        upload_array(arrays->own_wide_triangles, from.wide_triangles.data(),
-                     from.wide_triangles.size(), stream),
-        arrays->own_wide_ids.data(),
-        from.wide_bounds};
+        arrays->own_ids.data()};
+    if (!tree.has_wide_nodes()) return arrays;
+    const WarpTree::Arrays::Wide& wide = from.wide;
+    arrays->own_wide_ids.upload({wide.ids.data(), wide.ids.size()}, stream);
+    arrays->scene.wide = {
+        upload_array(arrays->own_wide, wide.nodes.data(), wide.nodes.size(), stream),
+        upload_array(arrays->own_wide_triangles, wide.triangles.data(), wide.triangles.size(),
+                     stream),
+        arrays->own_wide_ids.data(), wide.bounds, wide.padding};
     return arrays;
 }
 

@@ -24,15 +24,18 @@ struct WarpTree::Arrays {
     Buffer<WoopTriangle> triangles;  // [references]
     Buffer<std::uint32_t> ids;       // [references]
     std::uint32_t max_depth = 0;
-    // Of the kernel `cwbvh`.
-    Buffer<CwbvhNode> wide;
-    Buffer<WoopTriangle> wide_triangles;  // [references]
-    Buffer<std::uint32_t> wide_ids;       // [references]
-    Aabb wide_bounds = {};
-    std::uint32_t wide_max_depth = 0;
+    struct Wide {
+        Buffer<CwbvhNode> nodes;
+        Buffer<WoopTriangle> triangles;  // [references]
+        Buffer<std::uint32_t> ids;       // [references]
+        Aabb bounds = {};
+        float padding = 0.0f;
+        std::uint32_t max_depth = 0;
+    };
+    Wide wide;  // empty unless it was asked for
 
     [[nodiscard]] std::uint32_t stack_entries(WarpKernel kernel) const {
-        return warp_stack_entries(kernel, max_depth, wide_max_depth);
+        return warp_stack_entries(kernel, max_depth, wide.max_depth);
     }
 };
 

@@ -122,6 +122,14 @@ RAYDIX_HD static inline std::uint32_t meet_children(std::uint32_t octant, const 
     return hits;
 }
 
+/// What meet_children found, apart: a group of nodes, and bits of triangles.
+RAYDIX_HD static inline CwbvhGroup met_nodes(const CwbvhWords& node, std::uint32_t hits) {
+    return {node.word[4], (hits & 0xFF000000u) | node.word[3] >> 24};
+}
+RAYDIX_HD static inline std::uint32_t met_triangles(std::uint32_t hits) {
+    return hits & 0x00FFFFFFu;
+}
+
 /// Goes on to the first child of `group`: takes it out, and returns its node.
 RAYDIX_HD static inline std::uint32_t take_first_child(std::uint32_t octant, CwbvhGroup& group) {
     const int bit = highest_bit(group.hits);
@@ -130,8 +138,5 @@ RAYDIX_HD static inline std::uint32_t take_first_child(std::uint32_t octant, Cwb
     const std::uint32_t before = group.hits & ((1u << slot) - 1u);
     return group.base + static_cast<std::uint32_t>(count_ones(std::uint64_t{before}));
 }
-
-/// What a ray has before it: the root, as the only child of nothing.
-RAYDIX_HD static inline CwbvhGroup root_group() { return {0, 1u << 31}; }
 
 }  // namespace raydix

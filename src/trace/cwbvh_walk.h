@@ -117,6 +117,9 @@ struct NoCwbvhSteps {
     RAYDIX_HD void test() {}
 };
 
+/// What a ray has before it: the root, as the only child of nothing.
+RAYDIX_HD inline CwbvhGroup root_group() { return {0, 1u << 31}; }
+
 /// Enters the first child of `nodes`, whose siblings go to the stack. One entry a level at most:
 /// the stack needs room for `max_depth` of them.
 template <class Steps>
@@ -128,8 +131,8 @@ RAYDIX_HD void visit_first_child(const CwbvhView& tree, const CwbvhRay& ray, flo
     const CwbvhWords words = load_node(tree.nodes + index);
     steps.visit();
     const std::uint32_t hits = meet_children(ray, words, tmax);
-    nodes = {words.word[4], (hits & 0xFF000000u) | words.word[3] >> 24};
-    triangles = {words.word[5], hits & 0x00FFFFFFu};
+    nodes = met_nodes(words, hits);
+    triangles = {words.word[5], met_triangles(hits)};
 }
 
 /// The whole walk; stack [max_depth]. With `any`, the first hit found ends it.

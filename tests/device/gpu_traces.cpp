@@ -79,7 +79,7 @@ void compare(const std::string& what, const WarpTree& host, const DeviceWarpTree
 TEST_F(GpuTrace, FewTrianglesAndFewRays) {
     for (const std::size_t n : {0u, 1u, 2u, 3u, 40u}) {
         const Model scene = scene_of(random_soup(n, n + 1, 0.5f), "soup");
-        const WarpTree host(build_bvh(scene.mesh(), {.max_leaf = 2}));
+        const WarpTree host(build_bvh(scene.mesh(), {.max_leaf = 2}), true);
         const DeviceWarpTree tree(host);
         EXPECT_EQ(tree.empty(), n == 0);
         for (const std::size_t count : {0u, 1u, 31u, 33u, 500u}) {
@@ -91,7 +91,7 @@ TEST_F(GpuTrace, FewTrianglesAndFewRays) {
 
 TEST_F(GpuTrace, EachBuiltinScene) {
     for (const Model& scene : fitting(builtin_triangle_scenes(fitting(200'000)))) {
-        const WarpTree host(build_bvh(scene.mesh(), {.builder = Builder::ploc}));
+        const WarpTree host(build_bvh(scene.mesh(), {.builder = Builder::ploc}), true);
         compare(scene.name, host, DeviceWarpTree(host),
                 make_mixed_rays(scene, fitting(200'000), 9));
     }
@@ -99,7 +99,7 @@ TEST_F(GpuTrace, EachBuiltinScene) {
 
 TEST_F(GpuTrace, AMillionRaysThroughEachKernel) {
     const Model scene = scene_of(random_soup(2000, 11, 0.02f), "soup");
-    const WarpTree host(build_bvh(scene.mesh(), {.builder = Builder::ploc}));
+    const WarpTree host(build_bvh(scene.mesh(), {.builder = Builder::ploc}), true);
     const DeviceWarpTree tree(host);
     const std::vector<Ray> rays = make_mixed_rays(scene, 1'000'000, 12);
     std::vector<TreeHit> expected(rays.size());
@@ -131,7 +131,7 @@ TEST_F(GpuTrace, ATreeThatWasBuiltThere) {
 
 TEST_F(GpuTrace, InvalidRaysAreCountedAndMiss) {
     const Model scene = scene_of(random_soup(1000, 8), "soup");
-    const WarpTree host(build_bvh(scene.mesh(), {}));
+    const WarpTree host(build_bvh(scene.mesh(), {}), true);
     const DeviceWarpTree tree(host);
     std::vector<Ray> rays = make_mixed_rays(scene, 1000, 2);
     for (std::size_t i = 0; i < rays.size(); i += 10) rays[i].direction.y = std::nanf("");

@@ -212,7 +212,7 @@ class KernelOnThreads : public ::testing::TestWithParam<WarpKernel> {};
 
 TEST_P(KernelOnThreads, GivesTheReferencesHits) {
     const Model scene = scene_of(random_soup(120, 11, 0.3f), "soup");
-    const WarpTree tree(build_bvh(scene.mesh(), {.max_leaf = 3}));
+    const WarpTree tree(build_bvh(scene.mesh(), {.max_leaf = 3}), true);
     for (const std::size_t count : {std::size_t{1}, 28 + 4 * thorough}) {
         const std::vector<Ray> rays = make_mixed_rays(scene, count, 3);
         for (const bool any_hit : {false, true})

@@ -102,7 +102,7 @@ TEST(Simulate, BothChildrenMeanOnePush) {
 // resident, it fetches all.
 TEST(Simulate, ADoubledCostMovesWhatUsesItOnly) {
     const Model scene = scene_of(random_soup(500, 3, 0.1f), "soup");
-    const WarpTree tree(build_bvh(scene.mesh()));
+    const WarpTree tree(build_bvh(scene.mesh()), true);
     const std::vector<Ray> rays = make_mixed_rays(scene, 640, 3);
     std::vector<SimulateOptions> runs;
     for (const WarpKernel kernel : warp_kernels()) {
@@ -259,7 +259,7 @@ bool same(const Simulation& a, const Simulation& b) {
 /// Runs that trace the same batches share them; with the memory model each run traces its own.
 TEST(Simulate, SharedBatchesCostWhatTheyCostAlone) {
     const Model scene = scene_of(random_soup(2000, 4, 0.1f), "soup");
-    const WarpTree tree(build_bvh(scene.mesh()));
+    const WarpTree tree(build_bvh(scene.mesh()), true);
     const std::vector<Ray> rays = make_mixed_rays(scene, 1500, 8);
     std::vector<SimulateOptions> runs;
     for (const char* machine : {"gtx285", "h200"})
@@ -295,7 +295,7 @@ TEST(Simulate, SharedBatchesCostWhatTheyCostAlone) {
 
 TEST(Simulate, FiguresDoNotDependOnThreads) {
     const Model scene = scene_of(random_soup(3000, 4, 0.1f), "soup");
-    const WarpTree tree(build_bvh(scene.mesh()));
+    const WarpTree tree(build_bvh(scene.mesh()), true);
     const std::vector<Ray> rays = make_mixed_rays(scene, 1000 * thorough, 8);
     std::vector<SimulateOptions> runs;
     for (const WarpKernel kernel : warp_kernels())
@@ -354,7 +354,7 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
     if (simulated_kernel(WarpKernel::packet, false, 32, SimulatorIsa::v3) == nullptr)
         GTEST_SKIP() << "no AVX2 and FMA here";
     const Model scene = scene_of(random_soup(1000, 4, 0.1f), "soup");
-    const WarpTree tree(build_bvh(scene.mesh()));
+    const WarpTree tree(build_bvh(scene.mesh()), true);
     const PreparedRays rays(make_mixed_rays(scene, 640, 8));
     std::vector<TreeHit> hits(640);
     const auto compare = [&](WarpKernel name, bool any_hit, int width) {
@@ -453,7 +453,7 @@ TEST(Simulate, EmptyTreesAndNoRays) {
     }
     for (const auto& row : hits)
         for (const TreeHit& hit : row) EXPECT_FALSE(hit.hit());
-    const WarpTree tree(build_bvh(two_triangles()));
+    const WarpTree tree(build_bvh(two_triangles()), true);
     for (const Simulation& s : simulate(tree, {}, runs)) EXPECT_EQ(s.rays, 0u);
 }
 

@@ -231,7 +231,7 @@ void expect_hits_of_the_oracle(const Model& scene, Builder builder, std::size_t 
     for_each_index(
         rays.size(), [&](std::size_t i) { expected[i] = oracle.closest(rays[i]); }, 64);
     const Bvh bvh = build_bvh(scene.mesh(), {.builder = builder, .max_leaf = 8});
-    const WarpTree tree(bvh);
+    const WarpTree tree(bvh, true);
     MachineModel machine = machine_model("gtx480");
     machine.multiprocessors = 3;  // few warps, so that each fetches many times
     machine.resident_lanes = 256;

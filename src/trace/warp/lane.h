@@ -12,16 +12,21 @@
 
 namespace raydix {
 
+/// A compressed wide tree with Woop's triangles; null where there is none.
+struct WarpWideTree {
+    const CwbvhNode* nodes = nullptr;
+    const WoopTriangle* triangles = nullptr;  // [references], as its leaves name them
+    const std::uint32_t* ids = nullptr;       // [references]
+    Aabb bounds = {};                         // of the root
+    float padding = 0.0f;                     // pair_padding of the same tree
+};
+
 /// What the kernels read of a tree. It must not be empty.
 struct WarpScene {
     const NodePair* pairs;
     const WoopTriangle* triangles;  // [references]
     const std::uint32_t* ids;       // [references], last_in_leaf set on the last of each leaf
-    // The same triangles as a compressed wide tree; null where there is none.
-    const CwbvhNode* wide = nullptr;
-    const WoopTriangle* wide_triangles = nullptr;  // [references], as its leaves name them
-    const std::uint32_t* wide_ids = nullptr;       // [references]
-    Aabb wide_bounds = {};                         // of the root
+    WarpWideTree wide = {};         // of the kernel `cwbvh`
 };
 
 /// Values of Lane::node beside inner nodes (>= 0, the index of a pair) and leaves (< 0, the

@@ -160,7 +160,30 @@ std::string_view block_release_name(BlockRelease release) {
     return k < release_names.size() ? release_names[k] : "unknown";
 }
 
-WarpTree::WarpTree(const Bvh& bvh) : arrays_(std::make_unique<Arrays>()) {
+namespace {
+
+WarpTree::Arrays::Wide wide_of(const Bvh& bvh) {
+    const Cwbvh cwbvh(bvh);
+    const Cwbvh::Arrays& from = cwbvh.arrays();
+    WarpTree::Arrays::Wide wide;
+    wide.bounds = from.bounds;
+    wide.padding = pair_padding(bvh.nodes()[0]);
+    wide.max_depth = cwbvh.stats().max_depth;
+    wide.nodes.reset(from.nodes.size());
+    std::copy_n(from.nodes.data(), from.nodes.size(), wide.nodes.data());
+    wide.triangles.reset(from.triangles.size());
+    wide.ids.reset(from.triangles.size());
+    for_each_index(from.triangles.size(), [&](std::size_t i) {
+        const CwbvhTriangle& t = from.triangles[i];
+        wide.triangles[i] = make_woop_triangle({t.v0, t.v1, t.v2});
+        wide.ids[i] = t.prim;
+    });
+    return wide;
+}
+
+}  // namespace
+
+WarpTree::WarpTree(const Bvh& bvh, bool wide_nodes) : arrays_(std::make_unique<Arrays>()) {
     if (bvh.empty()) return;
     if (bvh.kind() != PrimitiveKind::triangles)
         throw InputError(std::string("rays need triangles; this tree holds ") +
@@ -178,32 +201,21 @@ WarpTree::WarpTree(const Bvh& bvh) : arrays_(std::make_unique<Arrays>()) {
     const EmitWoopTriangle emit_triangle{bvh.triangles().data(), arrays_->triangles.data()};
     for_each_index(references,
                    [&](std::size_t i) { emit_triangle(static_cast<std::uint32_t>(i)); });
-    const Cwbvh wide(bvh);
-    const Cwbvh::Arrays& from = wide.arrays();
-    arrays_->wide_bounds = from.bounds;
-    arrays_->wide_max_depth = wide.stats().max_depth;
-    arrays_->wide.reset(from.nodes.size());
-    std::copy_n(from.nodes.data(), from.nodes.size(), arrays_->wide.data());
-    arrays_->wide_triangles.reset(from.triangles.size());
-    arrays_->wide_ids.reset(from.triangles.size());
-    for_each_index(from.triangles.size(), [&](std::size_t i) {
-        const CwbvhTriangle& t = from.triangles[i];
-        arrays_->wide_triangles[i] = make_woop_triangle({t.v0, t.v1, t.v2});
-        arrays_->wide_ids[i] = t.prim;
-    });
+    if (wide_nodes) arrays_->wide = wide_of(bvh);
 }
 
 WarpTree::~WarpTree() = default;
 WarpTree::WarpTree(WarpTree&&) noexcept = default;
 WarpTree& WarpTree::operator=(WarpTree&&) noexcept = default;
 
+bool WarpTree::has_wide_nodes() const { return !arrays_->wide.ids.empty(); }
 bool WarpTree::empty() const { return arrays_->ids.empty(); }
 std::uint32_t WarpTree::max_depth() const { return arrays_->max_depth; }
 std::uint64_t WarpTree::bytes() const {
     return arrays_->pairs.size() * sizeof(NodePair) +
-           (arrays_->triangles.size() + arrays_->wide_triangles.size()) * sizeof(WoopTriangle) +
-           (arrays_->ids.size() + arrays_->wide_ids.size()) * 4 +
-           arrays_->wide.size() * sizeof(CwbvhNode);
+           (arrays_->triangles.size() + arrays_->wide.triangles.size()) * sizeof(WoopTriangle) +
+           (arrays_->ids.size() + arrays_->wide.ids.size()) * 4 +
+           arrays_->wide.nodes.size() * sizeof(CwbvhNode);
 }
 
 void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<TreeHit> hits,
@@ -346,6 +358,8 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
     for (const SimulateOptions& options : runs) {
         check_options(options);
         static_cast<void>(op_costs(options.machine, options.kernel));
+        if (options.kernel == WarpKernel::cwbvh && !tree.empty() && !tree.has_wide_nodes())
+            throw InputError("simulate: the kernel cwbvh needs a WarpTree with wide nodes");
     }
     check_threads(threads);
     if (rays.size() >= 0x7FFFFFFFu) throw InputError("simulate: 2^31 rays or more in one launch");
@@ -361,8 +375,9 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
         };
         using enum MemoryRange::Holds;
         if (kernel == WarpKernel::cwbvh)
-            return std::array{range(arrays.wide, nodes), range(arrays.wide_triangles, triangles),
-                              range(arrays.wide_ids, triangles)};
+            return std::array{range(arrays.wide.nodes, nodes),
+                              range(arrays.wide.triangles, triangles),
+                              range(arrays.wide.ids, triangles)};
         return std::array{range(arrays.pairs, nodes), range(arrays.triangles, triangles),
                           range(arrays.ids, triangles)};
     };

@@ -254,7 +254,8 @@ OpCosts op_costs(const MachineModel& machine, WarpKernel kernel) {
     }
     for (std::size_t k = 0; k < op_count; ++k) {
         if (found[k] == nullptr)
-            throw InputError(told + std::string(op_names[k]) + "' has no cost");
+            throw InputError(told + std::string(op_names[k]) + "' has no cost in kernel " +
+                             std::string(warp_kernel_name(kernel)));
         costs[k] = found[k]->instructions;
     }
     return costs;

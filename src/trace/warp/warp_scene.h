@@ -8,9 +8,11 @@ namespace raydix {
 
 inline WarpScene scene_of(const WarpTree& tree) {
     const WarpTree::Arrays& arrays = tree.arrays();
-    return {arrays.pairs.data(), arrays.triangles.data(),      arrays.ids.data(),
-            arrays.wide.data(),  arrays.wide_triangles.data(), arrays.wide_ids.data(),
-            arrays.wide_bounds};
+    const WarpTree::Arrays::Wide& wide = arrays.wide;
+    return {arrays.pairs.data(),
+            arrays.triangles.data(),
+            arrays.ids.data(),
+            {wide.nodes.data(), wide.triangles.data(), wide.ids.data(), wide.bounds, wide.padding}};
 }
 
 }  // namespace raydix

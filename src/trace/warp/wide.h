@@ -36,16 +36,19 @@ RAYDIX_HD static inline void next_of_leaf(WideLane& l) {
     l.triangles = none ? 0u : l.triangles ^ 1u << (bit & 31u);
 }
 
-/// The pad of boxes is that of cwbvh_walk.h, on all axes that of the farthest side of the root.
+/// Boxes grow by the pad of cwbvh_walk.h, on all axes that of the farthest side of the root, for
+/// the roundings of their planes; and by as much as those of pair64, since Woop's triangles err
+/// with the size of coordinates. Larger ones would let in hits that the other kernels never meet.
 RAYDIX_HD static inline void start_wide(WideLane& l, const WarpScene& scene) {
-    const Aabb& root = scene.wide_bounds;
+    const Aabb& root = scene.wide.bounds;
     const auto reach = [](float lo, float hi, float o) {
         return greater(std::fabs(lo - o), std::fabs(hi - o));
     };
     const float farthest = greater(
         greater(reach(root.lo.x, root.hi.x, l.origin.x), reach(root.lo.y, root.hi.y, l.origin.y)),
         reach(root.lo.z, root.hi.z, l.origin.z));
-    const float pad = cwbvh_pad_factor * (2 * slab_pad * farthest + least_slab_pad);
+    const float pad =
+        cwbvh_pad_factor * (2 * slab_pad * farthest + least_slab_pad) + scene.wide.padding;
     l.margin = {pad * std::fabs(l.inverse.x), pad * std::fabs(l.inverse.y),
                 pad * std::fabs(l.inverse.z)};
     l.group = {0, 0};
@@ -57,7 +60,7 @@ RAYDIX_HD static inline void start_wide(WideLane& l, const WarpScene& scene) {
 
 /// Boxes of all children are tested. Those that the ray meets become its group and its triangles.
 RAYDIX_HD static inline void visit_wide(WideLane& l, const WarpScene& scene) {
-    const CwbvhWords words = load_node(scene.wide + l.node);
+    const CwbvhWords words = load_node(scene.wide.nodes + l.node);
     const auto axis = [&](int k, float origin, float inverse, float margin) {
         const float start = (float_of_bits(words.word[k]) - origin) * inverse;
         return CwbvhAxis{float_of_bits(byte_of(words.word[3], k) << 23) * inverse, start - margin,
@@ -69,10 +72,9 @@ RAYDIX_HD static inline void visit_wide(WideLane& l, const WarpScene& scene) {
     const std::uint32_t hits = meet_children(
         l.octant, words, axes, l.tmin, l.t,
         [](float steps, float rate, float start) { return multiply_add(steps, rate, start); });
-    constexpr std::uint32_t node_bits = ~std::uint32_t{0} << cwbvh_first_child_bit;
-    l.group = {words.word[4], (hits & node_bits) | words.word[3] >> 24};
+    l.group = met_nodes(words, hits);
     l.first = words.word[5];
-    l.triangles = hits & ~node_bits;
+    l.triangles = met_triangles(hits);
     next_of_leaf(l);
 }
 
@@ -99,7 +101,7 @@ struct WideWhileWhile {
 
     template <bool any_hit, class Warp>
     RAYDIX_HD static void trace(Warp& warp, const WarpScene& scene) {
-        const WarpScene leaves{nullptr, scene.wide_triangles, scene.wide_ids};
+        const WarpScene leaves{nullptr, scene.wide.triangles, scene.wide.ids};
         warp.step(Op::start_ray, [&](WideLane& l) { start_wide(l, scene); });
         warp.loop(Op::main_loop, is_unfinished, [&] {
             warp.loop(Op::node_loop, at_inner_node, [&] { visit_once(warp, scene); });
@@ -111,7 +113,7 @@ private:
     template <class Warp>
     RAYDIX_HD static void visit_once(Warp& warp, const WarpScene& scene) {
         warp.touches(
-            Access::read, [&](const WideLane& l) { return scene.wide + l.node; },
+            Access::read, [&](const WideLane& l) { return scene.wide.nodes + l.node; },
             sizeof(CwbvhNode));
         warp.step(Op::visit_node, [&](WideLane& l) { visit_wide(l, scene); });
         go_on(warp);
