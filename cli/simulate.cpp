@@ -38,8 +38,9 @@ void print_head(const SimulateCommand& options, const MachineModel& m, const War
     fmt::print(
         "machine {} (simulated): {} multiprocessors, {:g} lanes a clock each, {:g} GHz\n    {}\n",
         m.name, m.multiprocessors, m.lanes_per_clock, m.clock_ghz, m.origin);
-    fmt::print("pair64 nodes and woop48 triangles, {} bytes, depth {}, width {}\n",
-               grouped(tree.bytes()), tree.max_depth(), options.width);
+    fmt::print("pair64 nodes and woop48 triangles{}, {} bytes, depth {}, width {}\n",
+               tree.has_wide_nodes() ? ", for cwbvh wide nodes besides" : "", grouped(tree.bytes()),
+               tree.max_depth(), options.width);
 }
 
 void run_simulate(const SimulateCommand& options) {
