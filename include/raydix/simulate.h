@@ -30,7 +30,8 @@ enum class WarpKernel : std::uint32_t {
     ray_replacement,
     work_queue,
     dynamic_fetch,
-    cwbvh,  // while-while over nodes of eight children (Ylitie, Karras, Laine 2017)
+    cwbvh,        // while-while over nodes of eight children (Ylitie, Karras, Laine 2017)
+    short_stack,  // while-while with a stack of four entries and a restart trail (Laine 2010)
 };
 [[nodiscard]] std::span<const WarpKernel> warp_kernels();
 /// Those of Aila and Laine alone: what `all` means to the program.
@@ -193,12 +194,11 @@ struct SimulatedRates {
 /// Simulates one launch of all rays for each of `runs`. rays [n] -> figures [runs] and, if `hits`
 /// is not null, hits [runs][n]: those that the kernel itself found. Invalid rays miss. The figures
 /// do not depend on the number of threads. Throws InputError: 2^31 - 1 rays or more; the kernel
-/// `cwbvh` and a tree without wide nodes; a width,
-/// kernel or part_of_launch out of range; a machine with a figure that is not positive, without a
-/// cost for an operation, with a cost above its own `most`, with resident_lanes that are no
-/// multiple of the width or fewer than block_lanes, with more than 2^24 lanes in flight; for the
-/// memory model lines out of range, more than 2^30 bytes of caches, or 4 GiB or more of tree, rays
-/// and hits.
+/// `cwbvh` and a tree without wide nodes; `short_stack` and a tree deeper than 63; a width, kernel
+/// or part_of_launch out of range; a machine with a figure that is not positive, without a cost for
+/// an operation, with a cost above its own `most`, with resident_lanes that are no multiple of the
+/// width or fewer than block_lanes, with more than 2^24 lanes in flight; for the memory model lines
+/// out of range, more than 2^30 bytes of caches, or 4 GiB or more of tree, rays and hits.
 [[nodiscard]] std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays,
                                                std::span<const SimulateOptions> runs,
                                                std::vector<std::vector<TreeHit>>* hits = nullptr,

@@ -20,7 +20,7 @@
 
 namespace raydix {
 
-inline constexpr std::size_t warp_kernel_count = 12;
+inline constexpr std::size_t warp_kernel_count = 13;
 
 struct DeviceWarpTree::Arrays {
     DeviceBuffer<std::byte> own_pairs, own_triangles;  // the former if copied from the host
@@ -33,7 +33,7 @@ struct DeviceWarpTree::Arrays {
     std::array<std::array<std::uint32_t, 2>, warp_kernel_count> resident_blocks{};
 
     [[nodiscard]] WarpLaunch launch(WarpKernel kernel, bool any_hit) const {
-        check_enum("kernel", kernel, WarpKernel::cwbvh);
+        check_enum("kernel", kernel, WarpKernel::short_stack);
         return {kernel, any_hit, warp_stack_entries(kernel, max_depth, wide_max_depth)};
     }
 };
@@ -167,6 +167,7 @@ public:
           launch_(tree.arrays().launch(options.kernel, options.any_hit)),
           blocks_(blocks_of(tree.arrays(), launch_, count_)) {
         check_wide(tree.arrays(), launch_);
+        check_trail_levels(launch_.kernel, tree.arrays().max_depth);
         check_trace_memory(rays, hits, scratch, device_trace_scratch_bytes(tree, count_, options));
         arena_ = Arena(scratch.data(), scratch.size());
         work_ = DeviceTraceScratch(arena_, count_, launch_, blocks_);

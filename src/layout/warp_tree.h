@@ -3,9 +3,11 @@
 #pragma once
 
 #include <raydix/buffer.h>
+#include <raydix/error.h>
 #include <raydix/simulate.h>
 
 #include <cstdint>
+#include <string>
 
 #include "layout/cwbvh.h"
 #include "layout/pair64.h"
@@ -17,6 +19,16 @@ namespace raydix {
 [[nodiscard]] inline std::uint32_t warp_stack_entries(WarpKernel kernel, std::uint32_t max_depth,
                                                       std::uint32_t wide_max_depth) {
     return kernel == WarpKernel::cwbvh ? 2 * (wide_max_depth + 1) : max_depth + 1;
+}
+
+/// Levels that the kernel `short_stack` has bits for, from the root to the deepest leaf.
+inline constexpr std::uint32_t trail_levels = 64;
+
+inline void check_trail_levels(WarpKernel kernel, std::uint32_t max_depth) {
+    if (kernel == WarpKernel::short_stack && max_depth >= trail_levels)
+        throw InputError("the tree is " + std::to_string(max_depth) +
+                         " deep; the kernel short_stack has a trail for depths up to " +
+                         std::to_string(trail_levels - 1));
 }
 
 struct WarpTree::Arrays {

@@ -21,6 +21,7 @@ LIMITS = (
     (r"trace_(persistent_)?packet", (7, 16), 0, 2048),
     (r"trace_work_queue", (3, 16), 0, 15104),
     (r"trace_wide", (5, 16), 128 * 4 + 16, 0),
+    (r"trace_short_stack", (6, 16), 0, 0),
     (r"trace_cwbvh|cwbvh", (4, 12), 128 * 8 + 16, 0),
     (r"trace", (6, 16), 128 * 4 + 16, 0),
     (r"each_(find_nearest|count_within|fill_within)", (8, 16), 96 * 16 + 48, 8192),

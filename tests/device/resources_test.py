@@ -28,7 +28,7 @@ CORE = EVERY | dict.fromkeys((
     "EmitKdNode", "FitKdIntervals"), 32)
 EXPECTED = {"kernels.cu": dict.fromkeys(PLAIN, 255), "device_build_cuda.cu": BUILD, "device_trees_cuda.cu": CORE}
 # Traversal: 40 registers leave room for 1536 threads, which the h200 of src/simt/machine_models.cpp has in flight.
-KERNELS = {"trace_rays": 40, "trace_packets": 48, "trace_queues": 72, "trace_wide": 64}
+KERNELS = {"trace_rays": 40, "trace_packets": 48, "trace_queues": 72, "trace_wide": 64, "trace_short_stack": 48}
 EXPECTED |= {"launch_warps_closest.cu": KERNELS, "launch_warps_any.cu": KERNELS,
              "device_trace_cuda.cu": {"StartPool": 32, "PrepareRay": 32, "RescaleHit": 32, "MissAll": 32, "EmitWoopTriangle": 48,
                                    "ClearUnusedValues": 32, "SaveLastValue": 32, "AddLastValue": 32, "SetWord": 32}}

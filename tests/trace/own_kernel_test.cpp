@@ -2,12 +2,12 @@
 // reference and counted on simulated machines. How a kernel comes into the library:
 // docs/write-a-kernel.md.
 #include <gtest/gtest.h>
+#include <raydix/error.h>
 #include <raydix/raydix.h>
 #include <raydix/rays.h>
 #include <raydix/simulate.h>
 #include <raydix/trace.h>
 
-#include <bit>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
@@ -16,10 +16,12 @@
 #include <vector>
 
 #include "support/ray_sets.h"
+#include "support/scenes.h"
 #include "support/support.h"
 #include "trace/warp/batch_work.h"
 #include "trace/warp/per_ray.h"
 #include "trace/warp/prepare_rays.h"
+#include "trace/warp/restart_trail.h"
 #include "trace/warp/simulate_launch.h"
 #include "trace/warp/simulated_kernels_of_width.h"
 #include "trace/warp/warp_scene.h"
@@ -41,77 +43,6 @@ struct WhileIf {
     }
 };
 
-/// While-while without a stack (Laine 2010, "Restart trail for stackless BVH traversal"): a lane
-/// that is done with a node begins at the root again. Its trail has a bit for each level, set where
-/// nothing is left but what it goes to, and leads it to where it has not been. Trees of up to 64
-/// levels. Members of Lane that other kernels need for their stacks hold the trail.
-struct RestartTrail {
-    static constexpr bool one_stack = false;
-
-    template <bool any_hit, class Warp>
-    static void trace(Warp& warp, const WarpScene& scene) {
-        warp.step(Op::choose, [](Lane& l) { set_trail(l, 0), l.top = top_level, l.aside = none; });
-        warp.loop(Op::main_loop, is_unfinished, [&] {
-            warp.loop(Op::node_loop, at_inner_node, [&] {
-                warp.touches(
-                    Access::read, [&](const Lane& l) { return &scene.pairs[l.node]; },
-                    sizeof(NodePair));
-                warp.step(Op::visit_node, [&](Lane& l) { visit(l, scene.pairs[l.node]); });
-                begin_again(warp);
-            });
-            warp.loop(Op::leaf_loop, at_leaf, [&] {
-                test_triangle(warp, scene, [](const Lane& l) { return l.node; });
-                warp.touches(
-                    Access::read_beside, [&](const Lane& l) { return &scene.ids[~l.node]; }, 4);
-                warp.step(Op::next_triangle, [&](Lane& l) {
-                    const std::int32_t next = after_triangle(l.node, scene, popped_node);
-                    l.node = any_hit && l.prim != no_primitive ? finished_node : next;
-                });
-                begin_again(warp);
-            });
-        });
-    }
-
-private:
-    static constexpr std::uint32_t top_level = 63;  // the root's bit
-    static constexpr std::int32_t none = -1;
-
-    static std::uint64_t trail(const Lane& l) {
-        return std::uint64_t{static_cast<std::uint32_t>(l.leaf)} << 32 | l.meets;
-    }
-    static void set_trail(Lane& l, std::uint64_t bits) {
-        l.leaf = static_cast<std::int32_t>(bits >> 32), l.meets = static_cast<std::uint32_t>(bits);
-    }
-    /// l.top: the level. l.aside: that of the last begin, where the nearer child is done.
-    static void visit(Lane& l, const NodePair& n) {
-        const PairVisit met = meet_pair(l, n);
-        const std::uint64_t bit = std::uint64_t{1} << l.top;
-        const bool both = met.first && met.second, one = met.first != met.second;
-        if (!both && (!one || static_cast<std::int32_t>(l.top) == l.aside)) {
-            l.node = popped_node;
-            return;
-        }
-        bool to_second = both ? met.second_is_closer : met.second;
-        if (both && (trail(l) & bit) != 0) to_second = !to_second;
-        if (one) set_trail(l, trail(l) | bit);
-        l.node = to_second ? n.child1 : n.child0;
-        --l.top;
-    }
-    template <class Warp>
-    static void begin_again(Warp& warp) {
-        warp.when(must_pop, [&] { warp.step(Op::pop, from_the_root); });
-    }
-    static void from_the_root(Lane& l) {
-        const bool root = l.top == top_level;
-        const std::uint64_t parent = root ? 0 : std::uint64_t{2} << l.top;
-        const std::uint64_t next = root ? 0 : (trail(l) & (~parent + 1)) + parent;  // carries
-        set_trail(l, next);
-        l.aside = next == 0 ? none : std::countr_zero(next);
-        l.top = top_level;
-        l.node = next == 0 ? finished_node : 0;
-    }
-};
-
 struct TestIsa;  // marks what is compiled here
 
 struct Counted {
@@ -121,9 +52,10 @@ struct Counted {
     double visits_per_ray = 0;
 };
 
-/// One batch of rays a warp. `machine`: what operations cost, those of while_while.
+/// One batch of rays a warp. `machine`: what operations cost, those of `like`.
 template <class Body, int width, bool any_hit>
-Counted run_kernel(const WarpTree& tree, std::span<const Ray> rays, const MachineModel& machine) {
+Counted run_kernel(const WarpTree& tree, std::span<const Ray> rays, const MachineModel& machine,
+                   WarpKernel like = WarpKernel::while_while) {
     Counted out{std::vector<TreeHit>(rays.size())};
     const PreparedRays prepared(rays);
     const WarpJob job{scene_of(tree),
@@ -133,7 +65,7 @@ Counted run_kernel(const WarpTree& tree, std::span<const Ray> rays, const Machin
         trace_batches(SimulatedKernelOf<OneBatch<Body>, any_hit, width, TestIsa>::table, job, width,
                       tree.max_depth() + 1);
     prepared.rescale(out.hits);
-    const OpCosts costs = op_costs(machine, WarpKernel::while_while);
+    const OpCosts costs = op_costs(machine, like);
     double issued = 0, useful = 0;
     for (std::size_t op = 0; op < op_count; ++op) {
         issued += static_cast<double>(work.counts[op].issues) * costs[op];
@@ -175,7 +107,10 @@ void expect_hits_at_all_widths() {
 }
 
 TEST(OwnKernel, HasTheHitsOfTheReference) { expect_hits_at_all_widths<WhileIf>(); }
-TEST(OwnKernel, WithoutAStackHasThemToo) { expect_hits_at_all_widths<RestartTrail>(); }
+TEST(OwnKernel, OfNoStackAndOfTwoEntriesHaveThemToo) {
+    expect_hits_at_all_widths<RestartTrail<0>>();
+    expect_hits_at_all_widths<RestartTrail<2>>();
+}
 
 TEST(OwnKernel, IsCountedAsThoseOfTheLibraryAre) {
     const Model scene = load_model("builtin:atrium?triangles=20000");
@@ -201,12 +136,72 @@ TEST(OwnKernel, IsCountedAsThoseOfTheLibraryAre) {
                 kernel.visits_per_ray);
             EXPECT_GT(kernel.instructions_per_ray, 0.0);
         };
-        const Counted stackless = run_kernel<RestartTrail, 32, false>(tree, rays, machine);
         print("while_while", known);
         print("while_if", run_kernel<WhileIf, 32, false>(tree, rays, machine));
-        print("restart_trail", stackless);
-        EXPECT_GT(stackless.visits_per_ray, known.visits_per_ray);
     }
+}
+
+/// Triangles that grow by a tenth of the smallest, each around those before it: a chain.
+Mesh chain_of(int count) {
+    Mesh mesh;
+    for (int k = 0; k < count; ++k) {
+        const float size = 1.0f + 0.01f * static_cast<float>(k);
+        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+        for (const Vec3& corner : {Vec3{0, 0, 0}, Vec3{size, 0, size}, Vec3{0, size, 0.3f * size}})
+            mesh.vertices.push_back(corner);
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    return mesh;
+}
+
+TEST(ShortStack, HasATrailForSixtyFourLevelsAndRefusesMore) {
+    const SimulateOptions run{.kernel = WarpKernel::short_stack, .machine = machine_model("h200")};
+    bool reached = false, refused = false;
+    for (int count = 2; count < 140 && !refused; ++count) {
+        const Model scene = scene_of(chain_of(count), "chain");
+        const WarpTree tree(build_bvh(scene.mesh(), {.builder = Builder::ploc, .max_leaf = 1}));
+        const std::vector<Ray> rays = make_mixed_rays(scene, 300, 3);
+        if (tree.max_depth() >= trail_levels) {
+            EXPECT_THROW(static_cast<void>(simulate(tree, rays, std::span(&run, 1))), InputError);
+            refused = true;
+            continue;
+        }
+        if (tree.max_depth() + 1 < trail_levels) continue;
+        reached = true;
+        std::vector<TreeHit> expected(rays.size());
+        trace_reference(tree, rays, expected);
+        std::vector<std::vector<TreeHit>> hits;
+        static_cast<void>(simulate(tree, rays, std::span(&run, 1), &hits));
+        EXPECT_EQ(std::memcmp(hits[0].data(), expected.data(), expected.size() * sizeof(TreeHit)),
+                  0)
+            << count << " triangles";
+    }
+    EXPECT_TRUE(reached && refused);
+}
+
+/// The more entries, the fewer nodes are visited again; with as many as the tree is deep, none.
+TEST(ShortStack, VisitsByEntries) {
+    const Model scene = load_model("builtin:atrium?triangles=20000");
+    const WarpTree tree(build_bvh(scene.mesh(), {.builder = Builder::split, .max_leaf = 8}));
+    const MachineModel machine = machine_model("h200");
+    const std::vector<Ray> rays = make_primary_rays(scene.cameras.cameras.front(), 128, 96);
+    const double least = run_kernel<WhileWhile, 32, false>(tree, rays, machine).visits_per_ray;
+    double before = 1e9;
+    const auto compare = [&]<int entries>(std::integral_constant<int, entries>) {
+        const Counted found = run_kernel<RestartTrail<entries>, 32, false>(tree, rays, machine,
+                                                                           WarpKernel::short_stack);
+        std::printf("%d entries: %.1f visits a ray, of while_while's %.2f\n", entries,
+                    found.visits_per_ray, found.visits_per_ray / least);
+        EXPECT_LT(found.visits_per_ray, before);
+        before = found.visits_per_ray;
+    };
+    compare(std::integral_constant<int, 0>());
+    compare(std::integral_constant<int, 2>());
+    compare(std::integral_constant<int, 4>());
+    EXPECT_LT(before, 1.05 * least);
+    compare(std::integral_constant<int, 8>());
+    EXPECT_GE(before, least);
+    EXPECT_LT(before, 1.01 * least);
 }
 
 }  // namespace

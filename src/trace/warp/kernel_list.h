@@ -7,6 +7,7 @@
 #include "trace/warp/packet.h"
 #include "trace/warp/per_ray.h"
 #include "trace/warp/replacement.h"
+#include "trace/warp/restart_trail.h"
 #include "trace/warp/wide.h"
 #include "trace/warp/work_queue.h"
 
@@ -38,8 +39,10 @@ auto with_kernel(WarpKernel kernel, const Fn& fn) {
             return fn.template operator()<WorkQueue>();
         case WarpKernel::dynamic_fetch:
             return fn.template operator()<DynamicFetch>();
-        default:
+        case WarpKernel::cwbvh:
             return fn.template operator()<OneBatch<WideWhileWhile>>();
+        default:
+            return fn.template operator()<OneBatch<ShortStack>>();
     }
 }
 

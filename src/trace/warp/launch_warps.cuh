@@ -46,6 +46,14 @@ __global__ void __launch_bounds__(warp_block_threads, wide_blocks) trace_wide(co
                               (blockIdx.x * blockDim.x + threadIdx.x) / words::warp_width);
 }
 
+/// What is kept of a stack is in registers.
+template <class Kernel, bool any_hit>
+__global__ void __launch_bounds__(warp_block_threads) trace_short_stack(const WarpJob job) {
+    ThreadWarp<typename LaneOf<Kernel>::Type> warp;
+    run_warp<Kernel, any_hit>(warp, job,
+                              (blockIdx.x * blockDim.x + threadIdx.x) / words::warp_width);
+}
+
 /// One stack a warp.
 template <class Kernel, bool any_hit>
 __global__ void __launch_bounds__(warp_block_threads, packet_blocks)
@@ -84,6 +92,8 @@ void with_global_function(const WarpLaunch& launch, std::int32_t* stacks, const 
                   launch.stack_entries, stacks);
         } else if constexpr (std::is_same_v<typename LaneOf<Kernel>::Type, WideLane>) {
             visit(kernels::trace_wide<Kernel, any_hit>, std::size_t{0});
+        } else if constexpr (std::is_same_v<typename LaneOf<Kernel>::Type, ShortStack::LaneType>) {
+            visit(kernels::trace_short_stack<Kernel, any_hit>, std::size_t{0});
         } else if (launch.stack_entries <= small_stack_entries) {
             visit(kernels::trace_rays<Kernel, any_hit, small_stack_entries>, std::size_t{0});
         } else {

@@ -58,9 +58,10 @@ RAYDIX_HD void test_triangle(Warp& warp, const WarpScene& scene, Link link) {
               });
 }
 
-/// The triangle that `node` stands at, and on to the next or out of the leaf.
-template <bool any_hit, class Warp>
-RAYDIX_HD void test_in_place(Warp& warp, const WarpScene& scene) {
+/// The triangle that `node` stands at, and on to the next or out of the leaf: `go_on` gives lanes
+/// that are done with it their next node.
+template <bool any_hit, class Warp, class GoOn>
+RAYDIX_HD void test_in_place(Warp& warp, const WarpScene& scene, const GoOn& go_on) {
     test_triangle(warp, scene, [](const Lane& l) { return l.node; });
     warp.touches(
         Access::read_beside, [&](const Lane& l) { return &scene.ids[~l.node]; }, 4);
@@ -68,7 +69,11 @@ RAYDIX_HD void test_in_place(Warp& warp, const WarpScene& scene) {
         const std::int32_t next = after_triangle(l.node, scene, popped_node);
         l.node = any_hit && l.prim != no_primitive ? finished_node : next;
     });
-    warp.when([](const Lane& l) { return must_pop(l); }, [&] { pop_next(warp); });
+    warp.when(must_pop, go_on);
+}
+template <bool any_hit, class Warp>
+RAYDIX_HD void test_in_place(Warp& warp, const WarpScene& scene) {
+    test_in_place<any_hit>(warp, scene, [&] { pop_next(warp); });
 }
 
 /// Nodes until each lane has come to a leaf, then all triangles of those leaves.

@@ -31,7 +31,8 @@ constexpr std::array kernels{WarpKernel::packet,
                              WarpKernel::ray_replacement,
                              WarpKernel::work_queue,
                              WarpKernel::dynamic_fetch,
-                             WarpKernel::cwbvh};
+                             WarpKernel::cwbvh,
+                             WarpKernel::short_stack};
 constexpr std::array<std::string_view, kernels.size()> kernel_names{
     "packet",
     "while_while",
@@ -44,7 +45,8 @@ constexpr std::array<std::string_view, kernels.size()> kernel_names{
     "ray_replacement",
     "work_queue",
     "dynamic_fetch",
-    "cwbvh"};
+    "cwbvh",
+    "short_stack"};
 
 constexpr std::array<std::string_view, 3> release_names{"own", "in_order", "together"};
 
@@ -360,6 +362,7 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
         static_cast<void>(op_costs(options.machine, options.kernel));
         if (options.kernel == WarpKernel::cwbvh && !tree.empty() && !tree.has_wide_nodes())
             throw InputError("simulate: the kernel cwbvh needs a WarpTree with wide nodes");
+        check_trail_levels(options.kernel, tree.max_depth());
     }
     check_threads(threads);
     if (rays.size() >= 0x7FFFFFFFu) throw InputError("simulate: 2^31 rays or more in one launch");
