@@ -4,6 +4,7 @@
 // code 1 and the reason.
 #include <fmt/format.h>
 #include <raydix/device_trace.h>
+#include <raydix/error.h>
 #include <raydix/machine.h>
 #include <raydix/model.h>
 #include <raydix/rays.h>
@@ -133,7 +134,12 @@ void run(const Options& options) {
                           {"builder", options.builder},
                           {"max_leaf", options.max_leaf},
                           {"rays", kind}};
-                line.update(measure(tree, launch, kernel, options.repeat));
+                try {
+                    line.update(measure(tree, launch, kernel, options.repeat));
+                } catch (const raydix::InputError& refused) {  // short_stack, of deep trees
+                    line["kernel"] = raydix::warp_kernel_name(kernel);
+                    line["refused"] = refused.what();
+                }
                 fmt::print("{}\n", line.dump());
             }
         }

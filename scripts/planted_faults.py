@@ -277,7 +277,7 @@ FAULTS = [
     Fault("src/trace/warp/restart_trail.h", "(one & (l.level != l.begun))", "one", "short stack: the nearer child is traced twice", "trace"),
     Fault("src/trace/warp/restart_trail.h", "met.second_is_closer != nearer_is_done", "met.second_is_closer",
           "short stack: the farther child is never begun again", "trace"),
-    Fault("src/trace/warp/restart_trail.h", "l.level = kept ? l.begun >> 1 : root_level;", "l.level = kept ? l.begun : root_level;",
+    Fault("src/trace/warp/restart_trail.h", "kept ? l.begun >> 1 :", "kept ? l.begun :",
           "short stack: a popped node is a level too high", "trace"),
     Fault("src/trace/warp/restart_trail.h", "two = two << 32 | in;", "two = in;", "short stack: every second entry is lost", "trace"),
     Fault("src/trace/warp/wide.h", " + scene.wide.padding;", ";", "cwbvh: boxes do not grow with coordinates, hits far away are lost", "trace"),

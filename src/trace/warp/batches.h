@@ -19,7 +19,8 @@ namespace raydix {
 /// - persistent: as many warps as fill the machine, which fetch from the pool until it is empty;
 /// - keeps_rays: lanes have rays from one turn to the next;
 /// - one_stack: the warp has a stack, its lanes have none;
-/// - LaneType: what their lanes are, if it is more than Lane;
+/// - LaneType: what their lanes are, if it is more than Lane; its start() begins a ray, where that
+///   needs nothing of the scene;
 /// - rays_per_lane: 2 if half of the rays wait in shared memory.
 ///
 /// What is the same for all warps of a launch.
@@ -47,8 +48,10 @@ RAYDIX_HD void store_hits(Warp& warp, const RayLaunch& launch) {
 
 template <class Warp>
 RAYDIX_HD void start_batch(Warp& warp, const RayLaunch& launch, std::uint32_t first) {
-    warp.step_indexed(Op::start_ray,
-                      [&](Lane& l, std::uint32_t lane) { start_ray(l, launch, first + lane); });
+    warp.step_indexed(Op::start_ray, [&](auto& l, std::uint32_t lane) {
+        start_ray(l, launch, first + lane);
+        if constexpr (requires { l.start(); }) l.start();
+    });
     touch_rays(warp, launch);
 }
 

@@ -76,6 +76,12 @@ struct LaneOf<Kernel> {
     using Type = typename Kernel::LaneType;
 };
 
+/// Whether what a lane keeps of its stack is in registers: its LaneType says so.
+template <class Kernel>
+inline constexpr bool stack_in_registers = requires {
+    requires LaneOf<Kernel>::Type::stack_in_registers;
+};
+
 /// The rays of one launch and where their hits go. On a device both are aligned to 16 bytes.
 struct RayLaunch {
     const Ray* rays;  // [count]

@@ -92,7 +92,7 @@ void with_global_function(const WarpLaunch& launch, std::int32_t* stacks, const 
                   launch.stack_entries, stacks);
         } else if constexpr (std::is_same_v<typename LaneOf<Kernel>::Type, WideLane>) {
             visit(kernels::trace_wide<Kernel, any_hit>, std::size_t{0});
-        } else if constexpr (std::is_same_v<typename LaneOf<Kernel>::Type, ShortStack::LaneType>) {
+        } else if constexpr (stack_in_registers<Kernel>) {
             visit(kernels::trace_short_stack<Kernel, any_hit>, std::size_t{0});
         } else if (launch.stack_entries <= small_stack_entries) {
             visit(kernels::trace_rays<Kernel, any_hit, small_stack_entries>, std::size_t{0});

@@ -28,10 +28,17 @@ namespace raydix {
 template <int entries>
 struct TrailLane : Lane {
     static_assert(entries % 2 == 0);
+    static constexpr bool stack_in_registers = true;
     std::uint64_t trail;  // levels where nothing is left but the child that the lane goes to
     std::uint64_t level;  // of `node`
     std::uint64_t begun;  // the lowest level where the nearer child is done and the farther is not
     std::uint64_t recent[entries > 0 ? entries / 2 : 1];  // two in each, the last first; `top` are
+
+    RAYDIX_HD void start() {
+        trail = begun = 0;
+        level = root_level;
+    }
+    static constexpr std::uint64_t root_level = std::uint64_t{1} << 63;  // trail_levels - 1
 };
 
 template <int entries>
@@ -41,7 +48,6 @@ struct RestartTrail {
 
     template <bool any_hit, class Warp>
     RAYDIX_HD static void trace(Warp& warp, const WarpScene& scene) {
-        warp.step(Op::start_ray, [](LaneType& l) { start(l); });
         warp.loop(Op::main_loop, is_unfinished, [&] {
             warp.loop(Op::node_loop, at_inner_node, [&] { visit_once(warp, scene); });
             warp.loop(Op::leaf_loop, at_leaf,
@@ -50,12 +56,6 @@ struct RestartTrail {
     }
 
 private:
-    static constexpr std::uint64_t root_level = std::uint64_t{1} << 63;  // trail_levels - 1
-
-    RAYDIX_HD static void start(LaneType& l) {
-        l.trail = l.begun = 0;
-        l.level = root_level;
-    }
     template <class Warp>
     RAYDIX_HD static void visit_once(Warp& warp, const WarpScene& scene) {
         warp.touches(
@@ -72,7 +72,8 @@ private:
     }
     /// Where both children are met the nearer one comes first, and the farther one when the trail
     /// says that the nearer is done. If only one is met where the farther is left, that is the
-    /// nearer: its hits lie before the farther one.
+    /// nearer: its hits lie before the farther one. (Above that level the nearer may be walked
+    /// again, where the roundings of a box far away take the farther one out of reach.)
     RAYDIX_HD static void visit(LaneType& l, const WarpScene& scene) {
         const NodePair n = scene.pairs[l.node];
         const PairVisit met = meet_pair(l, n);
@@ -105,7 +106,7 @@ private:
         l.node = l.trail == 0 ? finished_node
                  : kept       ? static_cast<std::int32_t>(l.recent[0] & 0xFFFFFFFFu)
                               : 0;
-        l.level = kept ? l.begun >> 1 : root_level;
+        l.level = kept ? l.begun >> 1 : LaneType::root_level;
         for (int k = 0; k < entries / 2; ++k) {
             const std::uint64_t in = k + 1 < entries / 2 ? l.recent[k + 1] << 32 : 0;
             l.recent[k] = l.recent[k] >> 32 | in;

@@ -215,13 +215,13 @@ void run_persistent(const LaunchRun& run, const BatchWork* batches, Simulation& 
 /// What a warp that is alone on its multiprocessor takes for each operation. Its instructions wait
 /// for each other; a read at the start of one waits for memory. A stack of the warp's own lies in
 /// shared memory, which counts as an instruction like others.
-OpClocks op_clocks(const MachineModel& machine, const OpCosts& costs, bool one_stack) {
+OpClocks op_clocks(const MachineModel& machine, const OpCosts& costs, bool local_stacks) {
     OpClocks clocks{};
     for (std::size_t k = 0; k < op_count; ++k) {
         clocks[k] = costs[k] * machine.warp_issue_clocks;
         if (waits_for_read(static_cast<Op>(k))) clocks[k] += machine.read_clocks;
     }
-    if (!one_stack) clocks[static_cast<std::size_t>(Op::pop)] += machine.stack_read_clocks;
+    if (local_stacks) clocks[static_cast<std::size_t>(Op::pop)] += machine.stack_read_clocks;
     return clocks;
 }
 
@@ -276,7 +276,7 @@ Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,
         {scene, {rays.data(), hits.data(), static_cast<std::uint32_t>(rays.size()), &next}},
         stack_entries,
         costs,
-        op_clocks(m, costs, kernel.one_stack),
+        op_clocks(m, costs, kernel.local_stacks),
         nullptr};
     if (options.memory) {
         std::vector<MemoryRange> ranges(memory.begin(), memory.end());

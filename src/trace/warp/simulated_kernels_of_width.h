@@ -89,7 +89,7 @@ struct SimulatedKernelOf {
     static constexpr SimulatedKernel table{
         Kernel::persistent,
         Kernel::keeps_rays,
-        Kernel::one_stack,
+        !Kernel::one_stack && !stack_in_registers<Kernel>,
         &warp_bytes,
         &start_warp,
         &start_kernel,
