@@ -48,6 +48,18 @@ Mesh lattice_mesh(std::size_t triangles, int side, std::uint64_t seed) {
     return mesh;
 }
 
+Mesh nested_triangles(int count) {
+    Mesh mesh;
+    for (int k = 0; k < count; ++k) {
+        const float size = 1.0f + 0.01f * static_cast<float>(k);
+        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+        for (const Vec3& corner : {Vec3{0, 0, 0}, Vec3{size, 0, size}, Vec3{0, size, 0.3f * size}})
+            mesh.vertices.push_back(corner);
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    return mesh;
+}
+
 Mesh ball_mesh(Vec3 middle) {
     Mesh mesh;
     constexpr int rows = 24;

@@ -18,6 +18,10 @@ Model scene_of(Mesh mesh, std::string name);
 /// Triangles on a small lattice of integers: ties, shared edges, coplanar ones, zero areas.
 Mesh lattice_mesh(std::size_t triangles, int side, std::uint64_t seed);
 
+/// Each a hundredth of the smallest larger than the one before, and around it: builders that join
+/// what is near make a chain of them.
+Mesh nested_triangles(int count);
+
 /// A closed surface around `middle`, 100 from it, with many edges and two poles.
 Mesh ball_mesh(Vec3 middle);
 

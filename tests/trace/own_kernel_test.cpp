@@ -141,24 +141,11 @@ TEST(OwnKernel, IsCountedAsThoseOfTheLibraryAre) {
     }
 }
 
-/// Triangles that grow by a tenth of the smallest, each around those before it: a chain.
-Mesh chain_of(int count) {
-    Mesh mesh;
-    for (int k = 0; k < count; ++k) {
-        const float size = 1.0f + 0.01f * static_cast<float>(k);
-        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-        for (const Vec3& corner : {Vec3{0, 0, 0}, Vec3{size, 0, size}, Vec3{0, size, 0.3f * size}})
-            mesh.vertices.push_back(corner);
-        mesh.triangles.push_back({first, first + 1, first + 2});
-    }
-    return mesh;
-}
-
 TEST(ShortStack, HasATrailForSixtyFourLevelsAndRefusesMore) {
     const SimulateOptions run{.kernel = WarpKernel::short_stack, .machine = machine_model("h200")};
     bool reached = false, refused = false;
     for (int count = 2; count < 140 && !refused; ++count) {
-        const Model scene = scene_of(chain_of(count), "chain");
+        const Model scene = scene_of(nested_triangles(count), "chain");
         const WarpTree tree(build_bvh(scene.mesh(), {.builder = Builder::ploc, .max_leaf = 1}));
         const std::vector<Ray> rays = make_mixed_rays(scene, 300, 3);
         if (tree.max_depth() >= trail_levels) {

@@ -152,15 +152,7 @@ TEST_P(Clusters, NestedBoxesDoNotTakeARoundPerPair) {
 /// Boxes one inside the other: each is nearest to the one before, so the tree is a chain, deeper
 /// than the array that stacks of radix trees fit into.
 TEST_P(Clusters, DeepTreesAreTracedSavedAndLoaded) {
-    Mesh mesh;
-    for (int k = 0; k < 280; ++k) {
-        const float size = 1.0f + 0.01f * static_cast<float>(k);
-        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-        for (const Vec3& corner : {Vec3{0, 0, 0}, Vec3{size, 0, size}, Vec3{0, size, 0.3f * size}})
-            mesh.vertices.push_back(corner);
-        mesh.triangles.push_back({first, first + 1, first + 2});
-    }
-    const Model scene = scene_of(std::move(mesh), "chain");
+    const Model scene = scene_of(nested_triangles(280), "chain");
     const Bvh tree = build_bvh(scene.mesh(), options(1));
     // From the top down, such boxes are divided evenly.
     const std::uint32_t least_depth = GetParam() == Builder::ploc    ? 96
