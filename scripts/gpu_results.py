@@ -48,6 +48,8 @@ def text_of(line):
         rates = [f"{rays} {kernel} {line[rays][kernel]['mrays_per_s']['median']:.0f}"
                  for rays in ("primary", "diffuse") for kernel in ("cwbvh", "persistent_cwbvh")]
         return f"{line['scene']:<40}Mrays/s: {', '.join(rates)}"
+    if line["bench"] == "gpu_trace" and "refused" in line:
+        return f"{line['scene']:<40}{line['rays']:<18}{line['kernel']:<36}refused: {line['refused']}"
     if line["bench"] == "gpu_trace":
         return f"{line['scene']:<40}{line['rays']:<18}{line['kernel']:<36}{line['mrays_per_s']['median']:8.1f} Mrays/s"
     share = f", hierarchy and boxes at {100 * line['of_copy_rate']:5.1f} % of the copy rate" if "of_copy_rate" in line else ""

@@ -18,8 +18,8 @@ Model scene_of(Mesh mesh, std::string name);
 /// Triangles on a small lattice of integers: ties, shared edges, coplanar ones, zero areas.
 Mesh lattice_mesh(std::size_t triangles, int side, std::uint64_t seed);
 
-/// Each a hundredth of the smallest larger than the one before, and around it: builders that join
-/// what is near make a chain of them.
+/// Each is larger than the one before by a hundredth of the first, and lies around it. Builders
+/// that join what is near make a chain of them.
 Mesh nested_triangles(int count);
 
 /// A closed surface around `middle`, 100 from it, with many edges and two poles.

@@ -170,7 +170,7 @@ TEST(ShortStack, HasATrailForSixtyFourLevelsAndRefusesMore) {
     EXPECT_TRUE(reached && refused);
 }
 
-/// The more entries, the fewer nodes are visited again; with as many as the tree is deep, none.
+/// The more entries, the fewer nodes are visited again; with eight hardly any.
 TEST(ShortStack, VisitsByEntries) {
     const Model scene = load_model("builtin:atrium?triangles=20000");
     const WarpTree tree(build_bvh(scene.mesh(), {.builder = Builder::split, .max_leaf = 8}));

@@ -32,7 +32,7 @@ struct TrailLane : Lane {
     std::uint64_t trail;  // levels where nothing is left but the child that the lane goes to
     std::uint64_t level;  // of `node`
     std::uint64_t begun;  // the lowest level where the nearer child is done and the farther is not
-    std::uint64_t recent[entries > 0 ? entries / 2 : 1];  // two in each, the last first; `top` are
+    std::uint64_t recent[entries > 0 ? entries / 2 : 1];  // two nodes in each, the last first
 
     RAYDIX_HD void start() {
         trail = begun = 0;
