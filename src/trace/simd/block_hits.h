@@ -10,6 +10,7 @@
 #include <hwy/highway.h>
 
 #include "trace/simd/lanes.h"
+#include "trace/simd/seen_corners.h"
 #include "trace/simd/wide_ray.h"
 #include "trace/triangle_test.h"
 
@@ -157,16 +158,6 @@ HWY_INLINE std::uint32_t without_far_corner(D d, hn::Vec<D> farthest, hn::Vec<D>
 
 }  // namespace weights
 
-/// One corner's component each, from `first` on: v0, v1, v2 and 0.
-#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
-HWY_INLINE __m256d corners_from(const float* first, float origin) {
-    constexpr std::size_t next = 3 * block_lanes;
-    const __m128 v01 = _mm_insert_ps(_mm_load_ss(first), _mm_load_ss(first + next), 0x10);
-    const __m128 v012 = _mm_insert_ps(v01, _mm_load_ss(first + 2 * next), 0x20);
-    return _mm256_sub_pd(_mm256_cvtps_pd(v012), _mm256_cvtps_pd(_mm_set1_ps(origin)));
-}
-#endif
-
 /// finish_hit, but for tmin and tmax, for one ray and one triangle of a block, none of whose edge
 /// functions is 0 or NaN: most hits. False: test_exactly must be asked.
 HWY_INLINE bool hit_lane(const TriangleBlock& block, std::uint32_t lane, const float* origin,
@@ -174,43 +165,29 @@ HWY_INLINE bool hit_lane(const TriangleBlock& block, std::uint32_t lane, const f
                          TriangleHit& hit) {
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
     // weigh_corners with a corner in each lane. The fourth lane's edge function is 0.
-    const auto way = [&](std::uint32_t axis) {
-        return _mm256_cvtps_pd(_mm_set1_ps(direction[axis]));
-    };
-    const auto corners = [&](std::uint32_t axis) {
-        return corners_from(block.corner[axis] + lane, origin[axis]);
-    };
-    const __m256d dz = way(kind.kz), z = corners(kind.kz);
-    const __m256d digits =
-        _mm256_castsi256_pd(_mm256_set1_epi64x(static_cast<std::int64_t>(narrow_digits)));
-    const auto sheared = [&](std::uint32_t axis) {
-        return _mm256_and_pd(
-            _mm256_sub_pd(_mm256_mul_pd(corners(axis), dz), _mm256_mul_pd(z, way(axis))), digits);
-    };
-    constexpr int next = 0b11'00'10'01;  // v1, v2, v0
-    const __m256d x = sheared(kind.kx), y = sheared(kind.ky),
-                  next_x = _mm256_permute4x64_pd(x, next), next_y = _mm256_permute4x64_pd(y, next);
-    const __m256d opposite = _mm256_fmsub_pd(y, next_x, _mm256_mul_pd(x, next_y));
-    const __m256d at = _mm256_permute4x64_pd(opposite, next);
-    const __m256d halves = _mm256_hadd_pd(at, _mm256_mul_pd(at, z));
+    const __m256d way = _mm256_cvtps_pd(_mm_set1_ps(direction[kind.kz]));
+    const SeenCorners seen = see_corners(block, lane, origin, direction, kind, way);
+    const __m256d at = _mm256_fmsub_pd(seen.y, seen.next_x, _mm256_mul_pd(seen.x, seen.next_y));
+    const __m256d halves = _mm256_hadd_pd(at, _mm256_mul_pd(at, seen.depth));
     const __m128d sums =
         _mm_add_pd(_mm256_castpd256_pd128(halves), _mm256_extractf128_pd(halves, 1));
-    const double along = _mm256_cvtsd_f64(dz);
+    const double along = _mm256_cvtsd_f64(way);
     const double inverse = 1.0 / (_mm_cvtsd_f64(sums) * along);
     const double t = _mm_cvtsd_f64(_mm_unpackhi_pd(sums, sums)) * inverse;
     const __m256d weight = _mm256_mul_pd(at, _mm256_set1_pd(inverse * along));
     HWY_ALIGN float weights[4];
     _mm_store_ps(weights, _mm_add_ps(_mm256_cvtpd_ps(weight), _mm_setzero_ps()));
     hit = {static_cast<float>(t) + 0.0f, weights[1], weights[2]};
-    const int inside =
-        _mm256_movemask_pd(_mm256_cmp_pd(weight, _mm256_setzero_pd(), _CMP_GE_OQ)) & 7;
-    const __m256d depths = _mm256_andnot_pd(_mm256_set1_pd(-0.0), z);
-    const __m128d depths01 = _mm256_castpd256_pd128(depths);
-    const double farthest =
-        _mm_cvtsd_f64(_mm_max_sd(_mm_max_sd(depths01, _mm_unpackhi_pd(depths01, depths01)),
-                                 _mm256_extractf128_pd(depths, 1)));
-    const double rate = std::fabs(along);
-    return inside == 7 && !has_far_corner(farthest, t * rate, tmin * rate);
+    // Not has_far_corner, for each corner.
+    const double rate = std::fabs(along), depth = t * rate;
+    const __m256d distance = _mm256_andnot_pd(_mm256_set1_pd(-0.0), seen.depth);
+    const __m256d near =
+        _mm256_cmp_pd(distance, _mm256_set1_pd(std::fabs(depth) * far_corner), _CMP_LE_OQ);
+    const __m256d slack = _mm256_mul_pd(distance, _mm256_set1_pd(far_corner_slack));
+    const __m256d before = _mm256_cmp_pd(_mm256_add_pd(_mm256_set1_pd(depth), slack),
+                                         _mm256_set1_pd(tmin * rate), _CMP_LT_OQ);
+    const __m256d inside = _mm256_cmp_pd(weight, _mm256_setzero_pd(), _CMP_GE_OQ);
+    return (_mm256_movemask_pd(_mm256_and_pd(inside, _mm256_or_pd(near, before))) & 7) == 7;
 #else
     const TriangleRay ray =
         triangle_ray_of(kind, {origin[0], origin[1], origin[2]},

@@ -359,20 +359,88 @@ private:
         finish(block, lane, chunk.list, candidates, clear);
     }
 
+    /// From so many rays on vectors of rays cost less than one ray after the other.
+    static constexpr int least_together = 4;
+
     /// `clear`: rays none of whose edge functions is 0 or NaN.
     HWY_NOINLINE void finish(const TriangleBlock& block, std::uint32_t lane,
                              const std::uint32_t* list, std::uint32_t candidates,
                              std::uint32_t clear) {
+        clear &= candidates;
+        if (std::popcount(clear) >= least_together) {
+            finish_together(block, lane, list, clear);
+            candidates &= ~clear;
+        }
         for (; candidates != 0; candidates &= candidates - 1) {
             const auto l = static_cast<std::uint32_t>(std::countr_zero(candidates));
-            const std::uint32_t k = list[l] & ray_bits;
-            const StreamRay& ray = rays_[k];
-            TriangleHit hit;
-            if ((clear >> l & 1) != 0 &&
-                        hit_lane(block, lane, ray.origin, ray.direction, frame_.kind, ray.tmin, hit)
-                    ? hit.t >= ray.tmin && hit.t <= ray.t
-                    : test_exactly(frame_.triangle_ray(ray), block, lane, ray.t, hit))
-                take(k, hit.t, block.prim[lane], hit.u, hit.v);
+            finish_one(block, lane, list[l] & ray_bits, (clear >> l & 1) != 0);
+        }
+    }
+    HWY_INLINE void finish_one(const TriangleBlock& block, std::uint32_t lane, std::uint32_t k,
+                               bool is_clear) {
+        const StreamRay& ray = rays_[k];
+        TriangleHit hit;
+        if (is_clear && hit_lane(block, lane, ray.origin, ray.direction, frame_.kind, ray.tmin, hit)
+                ? hit.t >= ray.tmin && hit.t <= ray.t
+                : test_exactly(frame_.triangle_ray(ray), block, lane, ray.t, hit))
+            take(k, hit.t, block.prim[lane], hit.u, hit.v);
+    }
+
+    using D = hn::Repartition<double, F16>;
+    using VD = hn::Vec<D>;
+
+    struct TogetherHits {
+        HWY_ALIGN float t[lanes16], u[lanes16], v[lanes16];
+        std::uint32_t sure = 0;  // the others must be asked alone
+    };
+    /// Rays `from` to from + (lanes of D) - 1; places and ways as doubles.
+    HWY_INLINE void weigh_together(const TriangleBlock& block, std::uint32_t lane,
+                                   const VD (&place)[3], const VD (&way)[3], std::size_t from,
+                                   TogetherHits& hits) const {
+        const D d;
+        const weights::HalfOf<D> h;
+        VD corner[3][3], direction[3];
+        for (std::uint32_t k = 0; k < 3; ++k) {
+            const std::uint32_t axis = frame_.kind.axis(k);
+            direction[k] = way[axis];
+            for (std::uint32_t c = 0; c < 3; ++c)
+                corner[c][k] =
+                    hn::Sub(weights::spread(d, block.corner[3 * c + axis][lane]), place[axis]);
+        }
+        const auto at = weights::weigh(d, corner, direction);
+        const VD depth = hn::Abs(hn::Mul(at.t, direction[2]));
+        const auto near = hn::Le(weights::farthest(corner), hn::Mul(depth, hn::Set(d, far_corner)));
+        hits.sure |= (weights::inside(d, at) & bits_of(d, near)) << from;
+        hn::Store(weights::rounded(d, at.t), h, hits.t + from);
+        hn::Store(weights::rounded(d, at.u), h, hits.u + from);
+        hn::Store(weights::rounded(d, at.v), h, hits.v + from);
+    }
+    /// finish_one for all rays of the list in `which`, none of whose edge functions is 0 or NaN.
+    HWY_INLINE void finish_together(const TriangleBlock& block, std::uint32_t lane,
+                                    const std::uint32_t* list, std::uint32_t which) {
+        constexpr std::size_t lanes_d = hn::MaxLanes(D());
+        HWY_ALIGN std::uint32_t items[lanes16];
+        const auto mask = mask_of(U16(), which);
+        hn::Store(compress(U16(), hn::LoadU(U16(), list), mask, which), U16(), items);
+        V16 place[4], way[4];
+        load_quads(RowsOf{rays_, items, 0}, place);
+        load_quads(RowsOf{rays_, items, 3}, way);
+        const auto count = static_cast<std::uint32_t>(std::popcount(which));
+        TogetherHits hits;
+        const auto weigh = [&](std::size_t from, const auto& half) {
+            const auto doubles = [&](V16 x) { return hn::PromoteTo(D(), half(x)); };
+            weigh_together(block, lane, {doubles(place[0]), doubles(place[1]), doubles(place[2])},
+                           {doubles(way[0]), doubles(way[1]), doubles(way[2])}, from, hits);
+        };
+        weigh(0, [](V16 x) { return hn::LowerHalf(x); });
+        if (count > lanes_d)
+            weigh(lanes_d, [](V16 x) { return hn::UpperHalf(weights::HalfOf<D>(), x); });
+        for (std::uint32_t j = 0; j < count; ++j) {
+            const std::uint32_t k = items[j] & ray_bits;
+            if ((hits.sure >> j & 1) == 0)
+                finish_one(block, lane, k, true);
+            else if (hits.t[j] >= rays_[k].tmin && hits.t[j] <= rays_[k].t)
+                take(k, hits.t[j], block.prim[lane], hits.u[j], hits.v[j]);
         }
     }
 
