@@ -16,10 +16,10 @@
 #include "trace/simd/wide_ray.h"
 #include "trace/triangle_test.h"
 
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
 /// x and y as weigh_corners shears them: of v1, v2, v0 and a fourth corner. next_x, next_y: those
 /// of v2, v0, v1, and of the fourth once more. depth: along kz, of v0, v1, v2 and a fourth.
 struct SeenCorners {
@@ -27,7 +27,6 @@ struct SeenCorners {
 };
 
 constexpr int next_corner = 0b11'00'10'01;
-#endif
 
 #if HWY_TARGET == HWY_AVX3
 
@@ -90,7 +89,7 @@ HWY_INLINE SeenCorners see_corners(const TriangleBlock& block, std::uint32_t lan
             upper(next), upper(depths)};
 }
 
-#elif HWY_TARGET == HWY_AVX2
+#else
 
 HWY_INLINE SeenCorners see_corners(const TriangleBlock& block, std::uint32_t lane,
                                    const float* origin, const float* direction,
@@ -120,4 +119,5 @@ HWY_INLINE SeenCorners see_corners(const TriangleBlock& block, std::uint32_t lan
 
 }  // namespace raydix::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
+#endif
 #endif
