@@ -158,8 +158,9 @@ HWY_INLINE std::uint32_t without_far_corner(D d, hn::Vec<D> farthest, hn::Vec<D>
 
 }  // namespace weights
 
-/// finish_hit, but for tmin and tmax, for one ray and one triangle of a block, none of whose edge
-/// functions is 0 or NaN: most hits. False: test_exactly must be asked.
+/// finish_hit, but for the limits of t and the area, for one ray and one triangle of a block, none
+/// of whose edge functions is 0 or NaN: most hits. Blocks hold no triangle without area. `origin`
+/// and `direction` are followed by a float more. False: test_exactly must be asked.
 HWY_INLINE bool hit_lane(const TriangleBlock& block, std::uint32_t lane, const float* origin,
                          const float* direction, const RayClass& kind, float tmin,
                          TriangleHit& hit) {
@@ -178,7 +179,7 @@ HWY_INLINE bool hit_lane(const TriangleBlock& block, std::uint32_t lane, const f
     HWY_ALIGN float weights[4];
     _mm_store_ps(weights, _mm_add_ps(_mm256_cvtpd_ps(weight), _mm_setzero_ps()));
     hit = {static_cast<float>(t) + 0.0f, weights[1], weights[2]};
-    // Not has_far_corner, for each corner.
+    // Corners that has_far_corner would leave alone if they were the farthest.
     const double rate = std::fabs(along), depth = t * rate;
     const __m256d distance = _mm256_andnot_pd(_mm256_set1_pd(-0.0), seen.depth);
     const __m256d near =
