@@ -146,12 +146,17 @@ template <class V>
 HWY_INLINE V farthest(const V (&corner)[3][3]) {
     return hn::Max(hn::Max(hn::Abs(corner[0][2]), hn::Abs(corner[1][2])), hn::Abs(corner[2][2]));
 }
+/// Lanes in which no corner is far for a hit so deep.
+template <class D>
+HWY_INLINE hn::Mask<D> near_corner(D d, hn::Vec<D> farthest, hn::Vec<D> depth) {
+    return hn::Le(farthest, hn::Mul(hn::Abs(depth), hn::Set(d, far_corner)));
+}
 /// Lanes that has_far_corner leaves alone.
 template <class D>
 HWY_INLINE std::uint32_t without_far_corner(D d, hn::Vec<D> farthest, hn::Vec<D> t, hn::Vec<D> tmin,
                                             hn::Vec<D> way) {
     const auto rate = hn::Abs(way), depth = hn::Mul(t, rate);
-    const auto near = hn::Le(farthest, hn::Mul(hn::Abs(depth), hn::Set(d, far_corner)));
+    const auto near = near_corner(d, farthest, depth);
     const auto slack = hn::Mul(farthest, hn::Set(d, far_corner_slack));
     return bits_of(d, hn::Or(near, hn::Lt(hn::Add(depth, slack), hn::Mul(tmin, rate))));
 }
@@ -179,7 +184,7 @@ HWY_INLINE bool hit_lane(const TriangleBlock& block, std::uint32_t lane, const f
     HWY_ALIGN float weights[4];
     _mm_store_ps(weights, _mm_add_ps(_mm256_cvtpd_ps(weight), _mm_setzero_ps()));
     hit = {static_cast<float>(t) + 0.0f, weights[1], weights[2]};
-    // Corners that has_far_corner would leave alone if they were the farthest.
+    // without_far_corner, for each corner as the farthest. Vectors, not masks, as in bits_of_le.
     const double rate = std::fabs(along), depth = t * rate;
     const __m256d distance = _mm256_andnot_pd(_mm256_set1_pd(-0.0), seen.depth);
     const __m256d near =

@@ -408,8 +408,9 @@ private:
                     hn::Sub(weights::spread(d, block.corner[3 * c + axis][lane]), place[axis]);
         }
         const auto at = weights::weigh(d, corner, direction);
-        const VD depth = hn::Abs(hn::Mul(at.t, direction[2]));
-        const auto near = hn::Le(weights::farthest(corner), hn::Mul(depth, hn::Set(d, far_corner)));
+        // Where there is a far corner rays are asked alone, before tmin too.
+        const auto near =
+            weights::near_corner(d, weights::farthest(corner), hn::Mul(at.t, direction[2]));
         hits.sure |= (weights::inside(d, at) & bits_of(d, near)) << from;
         hn::Store(weights::rounded(d, at.t), h, hits.t + from);
         hn::Store(weights::rounded(d, at.u), h, hits.u + from);
