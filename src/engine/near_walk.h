@@ -58,13 +58,11 @@ HWY_INLINE bool walk_near(const NearTree& tree, const NearSpace* space, const Pr
             }
             // Behind each other by key, the nearest on top.
             const std::size_t first = stack.top;
-            std::size_t top = first;
-            for (; bits != 0; bits &= bits - 1) {
-                const NearStack::Entry next = entry(bits);
-                std::size_t k = top++;
-                for (; k > first && all[k - 1].key < next.key; --k) all[k] = all[k - 1];
-                all[k] = next;
-            }
+            std::uint32_t order[8];
+            const std::uint32_t count = order_by_entry(bits, keys, order);
+            for (std::uint32_t k = 0; k < count; ++k)
+                all[first + k] = {keys[order[k]], node.child[order[k]]};
+            const std::size_t top = first + count;
             stack.top = top;
             if constexpr (may_ask)
                 if (top - first > 1) ask_for<compact>(tree.view, all[top - 2].word);

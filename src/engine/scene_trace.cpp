@@ -197,22 +197,17 @@ TraceCounts trace_mesh(const MeshTree& mesh, const Batch& batch) {
     options.threads = batch.options.threads;
     options.path = batch.options.path;
     options.isa = batch.options.isa;
-    const HitRows rows{batch.hits, sizeof(Hit)};
-    return trace_rows(
-        *mesh.tree, batch.rays, rows, batch.occluded, options,
-        [&](std::size_t first, const std::uint32_t* order, std::size_t begin, std::size_t end) {
-            if (batch.hits == nullptr) return;
-            Hit* const hits = batch.hits + first;
-            const std::uint32_t least_id = mesh.ids.front();
-            if (mesh.ids.size() == 1)
-                for_each_row(hits, order, begin, end, [&](Hit& hit) { place_hit(hit, least_id); });
-            else
-                for_each_row(hits, order, begin, end, [&](Hit& hit) {
-                    place_hit(hit, least_id);
-                    if (hit.hit()) mesh.name(hit);
-                });
-        },
-        batch.options.filter ? &check : nullptr);
+    const HitRows rows(batch.hits, mesh.ids.front());
+    RowsDone name;
+    if (batch.hits != nullptr && mesh.ids.size() != 1)
+        name = [&](std::size_t first, const std::uint32_t* order, std::size_t begin,
+                   std::size_t end) {
+            for_each_row(batch.hits + first, order, begin, end, [&](Hit& hit) {
+                if (hit.hit()) mesh.name(hit);
+            });
+        };
+    return trace_rows(*mesh.tree, batch.rays, rows, batch.occluded, options, name,
+                      batch.options.filter ? &check : nullptr);
 }
 
 /// All rays see all masks.

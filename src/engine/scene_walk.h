@@ -532,7 +532,7 @@ private:
                           level.rays.data(),
                           rays,
                           count,
-                          any ? HitRows{} : HitRows{level.hits.data()},
+                          any ? HitRows() : HitRows(level.hits.data()),
                           any ? level.occluded.data() : nullptr,
                           level.mesh_stack.view(),
                           level.mesh_stack.packet_view(),

@@ -426,6 +426,28 @@ TEST(Simd, SameCountsForEveryThreadCount) {
     }
 }
 
+/// Children are ordered in a way of its own by each: a wrong order costs visits, not hits.
+TEST(Simd, VisitsAboutAsManyNodesWithEveryInstructionSet) {
+    const Model scene = load_model("builtin:atrium?triangles=20000");
+    const Bvh bvh = build_bvh(scene.mesh());
+    const WideBvh tree(bvh);
+    std::vector<std::uint32_t> pixels;
+    std::vector<Ray> rays = make_primary_rays(scene.cameras.cameras.at(0), 160, 120, &pixels);
+    const auto secondary = make_secondary_rays(bvh, rays, trace(bvh, rays), pixels,
+                                               {.kind = RayKind::diffuse, .samples = 2});
+    rays.insert(rays.end(), secondary.begin(), secondary.end());
+    std::vector<Hit> hits(rays.size());
+    for (const SimdPath path : {SimdPath::single, SimdPath::packet, SimdPath::stream}) {
+        std::vector<std::uint64_t> visits;
+        for (const std::string& isa : simd_instruction_sets())
+            visits.push_back(
+                trace(tree, rays, hits, {.counters = true, .path = path, .isa = isa}).node_visits);
+        const auto [least, most] = std::ranges::minmax(visits);
+        EXPECT_LE(static_cast<double>(most), 1.02 * static_cast<double>(least))
+            << simd_path_name(path);
+    }
+}
+
 TEST(Simd, EachPathWhereItBelongs) {
     const Model scene = load_model("builtin:atrium?triangles=20000");
     const Bvh bvh = build_bvh(scene.mesh());

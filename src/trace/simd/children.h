@@ -118,15 +118,57 @@ private:
 
 /// `slots` into `order`, as they lie; how many.
 HWY_INLINE std::uint32_t order_by_slot(std::uint32_t slots, std::uint32_t* order) {
+    if constexpr (lanes8 == 8) {
+        const auto all = hn::BitCast(f8, hn::Iota(U8(), 0));
+        hn::StoreU(hn::BitCast(U8(), compress(f8, all, slots)), U8(), order);
+        return static_cast<std::uint32_t>(std::popcount(slots));
+    }
     std::uint32_t count = 0;
     for (; slots != 0; slots &= slots - 1)
         order[count++] = static_cast<std::uint32_t>(std::countr_zero(slots));
     return count;
 }
 
-/// `slots` into `order`, the largest of `entries` [8] first; how many.
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+/// The larger of each key and its partner in the lanes of `larger`, else the smaller.
+template <int larger>
+HWY_INLINE __m256i compare_exchange(__m256i key, __m256i partner) {
+    return _mm256_blend_epi32(_mm256_min_epi32(key, partner), _mm256_max_epi32(key, partner),
+                              larger);
+}
+#endif
+
+/// `slots` into `order` [8], the largest of `entries` [8] first, which is not quite the largest
+/// where they differ in the last digits alone; how many.
 HWY_INLINE std::uint32_t order_by_entry(std::uint32_t slots, const float* entries,
                                         std::uint32_t* order) {
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+    const auto number = static_cast<std::uint32_t>(std::popcount(slots));
+    if (number < 2) {
+        order[0] = static_cast<std::uint32_t>(std::countr_zero(slots));
+        return number;
+    }
+    // A sorting network, since no comparison could be foreseen. Its keys end with the slot.
+    const __m256i own = _mm256_set_epi32(0, 1, 2, 3, 4, 5, 6, 7), digits = _mm256_set1_epi32(7);
+    const __m256i bit = _mm256_set_epi32(128, 64, 32, 16, 8, 4, 2, 1);
+    const __m256i there =
+        _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(static_cast<int>(slots)), bit), bit);
+    // As integers the larger of two negative floats is the smaller one.
+    const __m256i entry = _mm256_castps_si256(_mm256_load_ps(entries));
+    const __m256i sign = _mm256_srai_epi32(entry, 31);
+    const __m256i by_size = _mm256_xor_si256(entry, _mm256_srli_epi32(sign, 1));
+    __m256i key = _mm256_or_si256(_mm256_andnot_si256(digits, by_size), own);
+    key = _mm256_blendv_epi8(_mm256_set1_epi32(INT32_MIN), key, there);
+    // Bitonic (Batcher 1968), the largest first.
+    key = compare_exchange<0b10011001>(key, _mm256_shuffle_epi32(key, 0b10110001));
+    key = compare_exchange<0b11000011>(key, _mm256_shuffle_epi32(key, 0b01001110));
+    key = compare_exchange<0b10100101>(key, _mm256_shuffle_epi32(key, 0b10110001));
+    key = compare_exchange<0b00001111>(key, _mm256_permute4x64_epi64(key, 0b01001110));
+    key = compare_exchange<0b00110011>(key, _mm256_shuffle_epi32(key, 0b01001110));
+    key = compare_exchange<0b01010101>(key, _mm256_shuffle_epi32(key, 0b10110001));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(order), _mm256_andnot_si256(key, digits));
+    return number;
+#else
     std::uint32_t count = 0;
     for (; slots != 0; slots &= slots - 1) {
         const auto s = static_cast<std::uint32_t>(std::countr_zero(slots));
@@ -135,6 +177,7 @@ HWY_INLINE std::uint32_t order_by_entry(std::uint32_t slots, const float* entrie
         order[k] = s;
     }
     return count;
+#endif
 }
 
 }  // namespace raydix::HWY_NAMESPACE

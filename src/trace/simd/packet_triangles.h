@@ -171,25 +171,32 @@ private:
         return changed;
     }
 
-    /// Component `axis` of a row's floats in all lanes of its block.
-    static HWY_INLINE V spread(V row, std::uint32_t axis) {
-        const hn::Repartition<std::uint8_t, F16> bytes;
-        const auto index = hn::Set(U16(), 0x03020100u + 0x04040404u * axis);
-        return hn::BitCast(
-            f16, hn::TableLookupBytes(hn::BitCast(bytes, row), hn::BitCast(bytes, index)));
+    /// Lane l: values[ray[l / 4]].
+    static HWY_INLINE V of_rays(const float* values, const std::uint32_t* ray) {
+#if HWY_TARGET == HWY_AVX3
+        __m512 out = _mm512_set1_ps(values[ray[0]]);
+        out = _mm512_mask_broadcastss_ps(out, 0x00F0, _mm_load_ss(values + ray[1]));
+        out = _mm512_mask_broadcastss_ps(out, 0x0F00, _mm_load_ss(values + ray[2]));
+        return V{_mm512_mask_broadcastss_ps(out, 0xF000, _mm_load_ss(values + ray[3]))};
+#elif HWY_TARGET == HWY_AVX2
+        return V{_mm256_insertf128_ps(_mm256_broadcast_ss(values + ray[0]),
+                                      _mm_broadcast_ss(values + ray[1]), 1)};
+#else
+        static_assert(rays_a_quad == 1);
+        return hn::Set(f16, values[ray[0]]);
+#endif
+    }
+    /// Where they start along an axis.
+    HWY_INLINE V starts_of(std::uint32_t axis, const std::uint32_t* ray) const {
+        return p_.one_origin ? hn::Set(f16, p_.origin_lo[axis]) : of_rays(p_.origin[axis], ray);
     }
 
     HWY_INLINE bool test_quad(const TriangleBlock& block, const std::uint32_t* ray,
                               std::uint32_t wanted) {
-        const auto start = [&](std::size_t l) { return &rays_[index_[ray[l / 4]]].origin.x; };
-        const auto way = [&](std::size_t l) { return &rays_[index_[ray[l / 4]]].direction.x; };
         const RayClass& kind = p_.kind;
-        const V origin = hn::Add(load_blocks(start), hn::Zero(f16));  // -0 becomes +0
-        const V direction = load_blocks(way);
-        const V slope = hn::Div(direction, spread(direction, kind.kz));
-        const V shear_x = spread(slope, kind.kx), shear_y = spread(slope, kind.ky);
-        const V origin_x = spread(origin, kind.kx), origin_y = spread(origin, kind.ky),
-                origin_z = spread(origin, kind.kz);
+        const V shear_x = of_rays(p_.shear_x, ray), shear_y = of_rays(p_.shear_y, ray);
+        const V origin_x = starts_of(kind.kx, ray), origin_y = starts_of(kind.ky, ray),
+                origin_z = starts_of(kind.kz, ray);
         const auto at = [&](int vertex) {
             const auto corner = [&](std::uint32_t axis) {
                 return hn::LoadDup128(f16, block.corner[3 * vertex + static_cast<int>(axis)]);
@@ -205,14 +212,10 @@ private:
         const std::uint32_t clear = bits_of(f16, without_zero(f16, u, v, w));
         bool certain = false;
         if constexpr (roughly) {
-            HWY_ALIGN float tmin[lanes16], reach[lanes16];
-            for (std::size_t r = 0; r < rays_a_quad; ++r) {
-                hn::Store(hn::Set(f4, p_.tmin[ray[r]]), f4, tmin + 4 * r);
-                hn::Store(hn::Set(f4, p_.t[ray[r]]), f4, reach + 4 * r);
-            }
-            const AnyHit hit = any_hit(
-                f16, limits(hn::Load(f16, tmin), hn::Load(f16, reach), spread(direction, kind.kz)),
-                a, b, c, u, v, w, candidates, clear);
+            const AnyHit hit = any_hit(f16,
+                                       limits(of_rays(p_.tmin, ray), of_rays(p_.t, ray),
+                                              of_rays(p_.direction[kind.kz], ray)),
+                                       a, b, c, u, v, w, candidates, clear);
             for (std::size_t r = 0; r < rays_a_quad; ++r) {
                 if ((hit.certain >> (4 * r) & 0xFu) == 0) continue;
                 found_ |= std::uint64_t{1} << ray[r];
@@ -222,22 +225,22 @@ private:
             candidates &= hit.open;
             if (candidates == 0) return certain;
         }
-        return finish_quad(block, ray, origin, direction, candidates, clear) || certain;
+        return finish_quad(block, ray, candidates, clear) || certain;
     }
 
     /// The second half of the test for lanes of test_quad; `clear`: those none of whose edge
     /// functions is 0 or NaN. Whether any ray has hit or came nearer.
-    HWY_INLINE bool finish_quad(const TriangleBlock& block, const std::uint32_t* ray, V origin,
-                                V direction, std::uint32_t candidates, std::uint32_t clear) {
+    HWY_INLINE bool finish_quad(const TriangleBlock& block, const std::uint32_t* ray,
+                                std::uint32_t candidates, std::uint32_t clear) {
         const D d;
         const H h;
         const RayClass& kind = p_.kind;
         HWY_ALIGN float from[4][lanes16], way[3][lanes16];  // the fourth: tmin
         for (std::size_t k = 0; k < 3; ++k) {
-            hn::Store(spread(origin, kind.axis(k)), f16, from[k]);
-            hn::Store(spread(direction, kind.axis(k)), f16, way[k]);
+            hn::Store(starts_of(kind.axis(k), ray), f16, from[k]);
+            hn::Store(of_rays(p_.direction[kind.axis(k)], ray), f16, way[k]);
         }
-        hn::Store(hn::Max(spread(origin, 3), hn::Zero(f16)), f16, from[3]);
+        hn::Store(of_rays(p_.tmin, ray), f16, from[3]);
         HWY_ALIGN float t[lanes16], u[lanes16], v[lanes16];
         std::uint32_t sure = 0;
         for (std::size_t part = 0; part < lanes16; part += lanes_d) {
@@ -348,28 +351,14 @@ private:
                                p_.shear_x[k], p_.shear_y[k], p_.tmin[k]);
     }
 
-    /// The second half of the test for the rays i + (bits of `candidates`) and one triangle.
+    /// What doubles say of half a vector of rays.
+    struct Half {
+        hn::Vec<H> t, u, v;
+        std::uint32_t sure;  // the others must be tested alone
+    };
     template <bool one_origin>
-    HWY_INLINE bool finish_rays(Target<one_origin>& target, std::size_t i, std::uint32_t candidates,
-                                std::uint32_t clear) {
-        bool changed = false;
-        std::uint32_t alone = candidates & ~clear;
-        for (std::size_t part = 0; part < lanes16; part += lanes_d) {
-            const std::uint32_t here = (candidates & clear) >> part & ((1u << lanes_d) - 1);
-            if (here != 0) alone |= finish_vector(target, i + part, here, changed) << part;
-        }
-        for (; alone != 0; alone &= alone - 1)
-            changed |= test_alone(target.block, target.lane,
-                                  i + static_cast<std::size_t>(std::countr_zero(alone)));
-        return changed;
-    }
-
-    /// finish_hit for the rays i + (bits of `candidates`); those that it leaves open.
-    template <bool one_origin>
-    HWY_INLINE std::uint32_t finish_vector(Target<one_origin>& target, std::size_t i,
-                                           std::uint32_t candidates, bool& changed) {
+    HWY_INLINE Half weigh_half(const Target<one_origin>& target, std::size_t i) const {
         const D d;
-        const H h;
         const auto doubles = [&](const float* from) {
             return hn::PromoteTo(D(), hn::Load(H(), from + i));
         };
@@ -377,7 +366,6 @@ private:
         for (std::size_t k = 0; k < 3; ++k) direction[k] = doubles(p_.direction[p_.kind.axis(k)]);
         bool may_be_far = true;
         if constexpr (one_origin) {
-            if (!target.has_exact) target.add_exact(p_);
             for (std::size_t v = 0; v < 3; ++v)
                 for (std::size_t k = 0; k < 3; ++k) corner[v][k] = hn::Set(d, target.exact[v][k]);
             may_be_far = target.may_be_far;
@@ -391,45 +379,65 @@ private:
             farthest = weights::farthest(corner);
         }
         const auto at = weights::weigh(d, corner, direction);
-        const auto t = weights::rounded(d, at.t), reach = hn::Load(h, p_.t + i);
         std::uint32_t sure = weights::inside(d, at);
         if (may_be_far)
             sure &= weights::without_far_corner(d, farthest, at.t, doubles(p_.tmin), direction[2]);
-        const std::uint32_t open = candidates & ~sure;
-        candidates &= sure & bits_of(h, hn::Ge(t, hn::Load(h, p_.tmin + i)));
-        const std::uint32_t equal = candidates & bits_of(h, hn::Eq(t, reach));
-        candidates &= bits_of(h, hn::Lt(t, reach));
-        if ((candidates | equal) == 0) return open;
-        if constexpr (!wants_accepted(query)) {
-            changed = true;
-            found_ |= std::uint64_t{candidates | equal} << i;
-        }
-        if constexpr (roughly) return open;
-        if constexpr (query == Wanted::all || wants_accepted(query)) {
-            HWY_ALIGN float values[3][lanes_d];
-            hn::Store(t, h, values[0]);
-            hn::Store(weights::rounded(d, at.u), h, values[1]);
-            hn::Store(weights::rounded(d, at.v), h, values[2]);
-            for (std::uint32_t left = candidates | equal; left != 0; left &= left - 1) {
-                const auto l = static_cast<std::size_t>(std::countr_zero(left));
-                changed |= take(target.block, target.lane, i + l,
-                                {values[0][l], values[1][l], values[2][l]});
+        return {weights::rounded(d, at.t), weights::rounded(d, at.u), weights::rounded(d, at.v),
+                sure};
+    }
+
+    /// The second half of the test for the rays i + (bits of `candidates`) and one triangle. Both
+    /// halves of the vector always: which of them has candidates cannot be foreseen.
+    template <bool one_origin>
+    HWY_INLINE bool finish_rays(Target<one_origin>& target, std::size_t i, std::uint32_t candidates,
+                                std::uint32_t clear) {
+        if constexpr (one_origin)
+            if (!target.has_exact) target.add_exact(p_);
+        const Half lower = weigh_half(target, i), upper = weigh_half(target, i + lanes_d);
+        const V t = hn::Combine(f16, upper.t, lower.t), u = hn::Combine(f16, upper.u, lower.u),
+                v = hn::Combine(f16, upper.v, lower.v), reach = hn::Load(f16, p_.t + i);
+        const std::uint32_t sure = (lower.sure | upper.sure << lanes_d) & clear;
+        std::uint32_t alone = candidates & ~sure;
+        candidates &= sure & bits_of(f16, hn::Ge(t, hn::Load(f16, p_.tmin + i)));
+        const std::uint32_t equal = candidates & bits_of(f16, hn::Eq(t, reach));
+        candidates &= bits_of(f16, hn::Lt(t, reach));
+        bool changed = false;
+        if ((candidates | equal) != 0) {
+            if constexpr (!wants_accepted(query)) {
+                changed = true;
+                found_ |= std::uint64_t{candidates | equal} << i;
             }
-            return open;
+            if constexpr (query == Wanted::all || wants_accepted(query)) {
+                HWY_ALIGN float values[3][lanes16];
+                hn::Store(t, f16, values[0]);
+                hn::Store(u, f16, values[1]);
+                hn::Store(v, f16, values[2]);
+                for (std::uint32_t left = candidates | equal; left != 0; left &= left - 1) {
+                    const auto l = static_cast<std::size_t>(std::countr_zero(left));
+                    changed |= take(target.block, target.lane, i + l,
+                                    {values[0][l], values[1][l], values[2][l]});
+                }
+            } else if constexpr (!roughly) {
+                const auto own = hn::Set(U16(), target.block.prim[target.lane]),
+                           old = hn::Load(U16(), p_.prim + i);
+                // At equal t the lower primitive wins.
+                if (equal != 0)
+                    candidates |= equal & bits_of(f16, hn::RebindMask(f16, hn::Lt(own, old)));
+                const auto take = mask_of(f16, candidates);
+                const auto store = [&](V value, float* to) {
+                    hn::Store(hn::IfThenElse(take, value, hn::Load(f16, to)), f16, to);
+                };
+                store(t, p_.t + i);
+                store(u, p_.u + i);
+                store(v, p_.v + i);
+                hn::Store(hn::IfThenElse(hn::RebindMask(U16(), take), own, old), U16(),
+                          p_.prim + i);
+            }
         }
-        const hn::RebindToUnsigned<H> n;
-        const auto own = hn::Set(n, target.block.prim[target.lane]), old = hn::Load(n, p_.prim + i);
-        // At equal t the lower primitive wins.
-        if (equal != 0) candidates |= equal & bits_of(h, hn::RebindMask(h, hn::Lt(own, old)));
-        const auto take = mask_of(h, candidates);
-        const auto store = [&](auto value, float* to) {
-            hn::Store(hn::IfThenElse(take, value, hn::Load(H(), to)), H(), to);
-        };
-        store(t, p_.t + i);
-        store(weights::rounded(d, at.u), p_.u + i);
-        store(weights::rounded(d, at.v), p_.v + i);
-        hn::Store(hn::IfThenElse(hn::RebindMask(n, take), own, old), n, p_.prim + i);
-        return open;
+        for (; alone != 0; alone &= alone - 1)
+            changed |= test_alone(target.block, target.lane,
+                                  i + static_cast<std::size_t>(std::countr_zero(alone)));
+        return changed;
     }
 
     Packet& p_;

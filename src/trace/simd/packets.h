@@ -189,9 +189,46 @@ private:
     HWY_ALIGN std::int32_t order_[max_rays + slack * ray_class_count];
 };
 
+/// t, prim, u, v and the geometry of hits that stand behind each other, as Hit has them. False: not
+/// by this instruction set.
+HWY_INLINE bool store_scene_hits(const V16 (&hit)[4], V16 geometry, TreeHit* to) {
+#if HWY_TARGET == HWY_AVX3
+    // Of a hit in words of 64 bits: t and prim, u and v, the geometry and 0. Eight hits a vector,
+    // two of them of each 128 bits of what is interleaved.
+    const __m512i lower = _mm512_set_epi64(11, 10, 3, 2, 9, 8, 1, 0),
+                  upper = _mm512_set_epi64(15, 14, 7, 6, 13, 12, 5, 4);
+    const auto words = [&](V16 even, V16 odd, __m512i half) {
+        return _mm512_permutex2var_epi64(
+            _mm512_castps_si512(_mm512_unpacklo_ps(even.raw, odd.raw)), half,
+            _mm512_castps_si512(_mm512_unpackhi_ps(even.raw, odd.raw)));
+    };
+    // The first two of words 8 k to 8 k + 7 of eight hits, and where the third comes in.
+    const __m512i first[3] = {_mm512_set_epi64(10, 2, 0, 9, 1, 0, 8, 0),
+                              _mm512_set_epi64(5, 0, 12, 4, 0, 11, 3, 0),
+                              _mm512_set_epi64(0, 15, 7, 0, 14, 6, 0, 13)};
+    const __m512i third[3] = {_mm512_set_epi64(0, 0, 1, 0, 0, 0, 0, 0),
+                              _mm512_set_epi64(0, 4, 0, 0, 3, 0, 0, 2),
+                              _mm512_set_epi64(7, 0, 0, 6, 0, 0, 5, 0)};
+    constexpr __mmask8 places[3] = {0b00100100, 0b01001001, 0b10010010};
+    auto* out = reinterpret_cast<char*>(to);
+    for (const __m512i& half : {lower, upper}) {
+        const __m512i a = words(hit[0], hit[1], half), b = words(hit[2], hit[3], half),
+                      c = words(geometry, hn::Zero(f16), half);
+        for (int k = 0; k < 3; ++k, out += 64) {
+            const __m512i ab = _mm512_permutex2var_epi64(a, first[k], b);
+            _mm512_storeu_si512(out, _mm512_mask_permutexvar_epi64(ab, places[k], third[k], c));
+        }
+    }
+    return true;
+#else
+    static_cast<void>(hit), static_cast<void>(geometry), static_cast<void>(to);
+    return false;
+#endif
+}
+
 template <Wanted query>
-HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, const Packet& p,
-                             std::uint64_t found, SimdCounts& counts) {
+HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, bool in_order,
+                             const Packet& p, std::uint64_t found, SimdCounts& counts) {
     counts.hits += static_cast<std::uint64_t>(std::popcount(found));
     if constexpr (wants_any(query)) {
         for (std::uint32_t k = 0; k < p.count; ++k) job.occluded[index[k]] = found >> k & 1;
@@ -204,13 +241,24 @@ HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, cons
         const V16 out[4] = {hn::IfThenElse(hit, hn::Load(f16, p.t + k), hn::Set(f16, infinity)),
                             hn::BitCast(f16, prim), hn::IfThenElseZero(hit, hn::Load(f16, p.u + k)),
                             hn::IfThenElseZero(hit, hn::Load(f16, p.v + k))};
+        const auto geometry =
+            hn::IfThenElse(hn::RebindMask(U16(), hit), hn::Set(U16(), job.hits.geometry()), prim);
+        if (in_order && job.hits.of_scene() &&
+            store_scene_hits(out, hn::BitCast(f16, geometry), job.hits.at(k)))
+            continue;
         store_quads(out, [&](std::size_t l) {
             return reinterpret_cast<float*>(job.hits.at(static_cast<std::size_t>(index[k + l])));
         });
+        if (!job.hits.of_scene()) continue;
+        HWY_ALIGN std::uint32_t geometries[lanes16];
+        hn::Store(geometry, U16(), geometries);
+        for (std::size_t l = 0; l < lanes16; ++l)
+            job.hits.put_place(static_cast<std::size_t>(index[k + l]), geometries[l]);
     }
     for (; k < p.count; ++k)
-        *job.hits.at(static_cast<std::size_t>(index[k])) =
-            p.prim[k] != no_primitive ? TreeHit{p.t[k], p.prim[k], p.u[k], p.v[k]} : TreeHit{};
+        job.hits.put(
+            static_cast<std::size_t>(index[k]),
+            p.prim[k] != no_primitive ? TreeHit{p.t[k], p.prim[k], p.u[k], p.v[k]} : TreeHit{});
 }
 
 /// The rays of a job in packets.
@@ -268,7 +316,7 @@ private:
         } else if constexpr (any)
             job_.occluded += count;
         else
-            job_.hits.first = job_.hits.at(count);
+            job_.hits = job_.hits.from(count);
     }
 
     void trace_sorted() {
@@ -301,7 +349,9 @@ private:
         PacketWalk<query, counting, compact> walk(job_.tree, packet_, job_.rays, index,
                                                   job_.packet_stack, counts_, job_.all, job_.check);
         walk.trace();
-        if constexpr (!all) store_packet<query>(job_, index, packet_, walk.found(), counts_);
+        if constexpr (!all)
+            store_packet<query>(job_, index, index == index_ && job_.order == nullptr, packet_,
+                                walk.found(), counts_);
     }
 
     SimdJob job_;             // what is left of it
@@ -386,8 +436,8 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
             if constexpr (any)
                 job.occluded[*index] = hit;
             else
-                *job.hits.at(static_cast<std::size_t>(*index)) =
-                    hit ? TreeHit{ray.t, ray.prim, found->u, found->v} : TreeHit{};
+                job.hits.put(static_cast<std::size_t>(*index),
+                             hit ? TreeHit{ray.t, ray.prim, found->u, found->v} : TreeHit{});
             ++found, ++index;
         }
     }

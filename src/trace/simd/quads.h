@@ -30,12 +30,6 @@ HWY_INLINE V16 load_row(const At& at, std::size_t first) {
 #endif
 }
 
-/// Four floats from each of lanes16 / 4 places, one a 128-bit block: at(0), at(4), ...
-template <class At>
-HWY_INLINE V16 load_blocks(const At& at) {
-    return load_row(at, 0);
-}
-
 /// out[c], lane l: float c of the four at `at(l)`.
 template <class At>
 HWY_INLINE void load_quads(const At& at, V16 (&out)[4]) {

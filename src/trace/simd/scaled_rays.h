@@ -54,7 +54,7 @@ public:
         out.order = nullptr;
         if (job.hits) {
             hits_.resize(job.n);
-            out.hits = {hits_.data(), sizeof(TreeHit)};
+            out.hits = HitRows(hits_.data());
         } else {
             found_.resize(job.n);
             out.occluded = found_.data();
@@ -68,9 +68,9 @@ public:
                 job.occluded[place(job, k)] = found_[k];
                 continue;
             }
-            TreeHit& hit = *job.hits.at(place(job, k));
-            hit = hits_[k];
+            TreeHit hit = hits_[k];
             if (hit.hit()) hit.t *= scales_[k];
+            job.hits.put(place(job, k), hit);
         }
     }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -21,15 +22,41 @@ struct SimdCounts {
     std::uint64_t hits = 0, invalid = 0, visits = 0, tests = 0;
 };
 
-/// Where hits go: `bytes` apart, as they are at the beginning of larger structs. null: none.
-struct HitRows {
-    TreeHit* first = nullptr;
-    std::size_t bytes = sizeof(TreeHit);
+/// Where hits go: as a tree knows them, or as those of a scene, on one of its geometries. None
+/// where it is false.
+class HitRows {
+public:
+    HitRows() = default;
+    explicit HitRows(TreeHit* hits) : first_(hits) {}
+    HitRows(Hit* hits, std::uint32_t geometry)
+        : first_(hits), bytes_(sizeof(Hit)), geometry_(geometry) {}
+    explicit operator bool() const { return first_ != nullptr; }
 
-    [[nodiscard]] TreeHit* at(std::size_t i) const {
-        return reinterpret_cast<TreeHit*>(reinterpret_cast<char*>(first) + bytes * i);
+    [[nodiscard]] HitRows from(std::size_t i) const {
+        HitRows out = *this;
+        if (out) out.first_ = out.at(i);
+        return out;
     }
-    explicit operator bool() const { return first != nullptr; }
+    [[nodiscard]] TreeHit* at(std::size_t i) const {
+        return reinterpret_cast<TreeHit*>(reinterpret_cast<char*>(first_) + bytes_ * i);
+    }
+    [[nodiscard]] bool of_scene() const { return bytes_ == sizeof(Hit); }
+    [[nodiscard]] std::uint32_t geometry() const { return geometry_; }
+
+    void put(std::size_t i, const TreeHit& hit) const {
+        *at(i) = hit;
+        if (of_scene()) put_place(i, hit.hit() ? geometry_ : no_primitive);
+    }
+    /// What a tree does not know.
+    void put_place(std::size_t i, std::uint32_t geometry) const {
+        const std::uint32_t place[2] = {geometry, 0};
+        std::memcpy(&static_cast<Hit*>(at(i))->geometry, place, sizeof place);  // both in one store
+    }
+
+private:
+    TreeHit* first_ = nullptr;
+    std::size_t bytes_ = sizeof(TreeHit);
+    std::uint32_t geometry_ = no_primitive;
 };
 
 /// At most max_job_rays rays, rays[order[k]], or rays[k] without an order; hits, or occluded if

@@ -264,32 +264,24 @@ protected:
     /// Two children or more, by where the ray enters them.
     HWY_INLINE void push_sorted(const std::uint32_t* child, const float* entries, std::uint32_t met,
                                 std::size_t& top, std::uint32_t& word) {
-        const auto first = static_cast<std::size_t>(std::countr_zero(met));
-        met &= met - 1;
-        const auto second = static_cast<std::size_t>(std::countr_zero(met));
-        met &= met - 1;
-        const bool swap = entries[second] < entries[first];
-        const std::size_t near = swap ? second : first, far = swap ? first : second;
-        word = choose(child, near);
-        ask_for_child(child[far]);
-        float nearest = entries[near];
-        stack_.words[top] = child[far];
-        stack_.entries[top] = entries[far];
-        const std::size_t begin = top++;
-        for (; met != 0; met &= met - 1) {
-            const auto s = static_cast<std::size_t>(std::countr_zero(met));
-            std::uint32_t moved = child[s];
-            ask_for_child(child[s]);
-            float at = entries[s];
-            if (at < nearest) std::swap(at, nearest), std::swap(moved, word);
-            std::size_t k = top++;
-            for (; k > begin && stack_.entries[k - 1] < at; --k) {
-                stack_.entries[k] = stack_.entries[k - 1];
-                stack_.words[k] = stack_.words[k - 1];
-            }
-            stack_.entries[k] = at;
-            stack_.words[k] = moved;
+        const auto push = [&](std::size_t slot) {
+            ask_for_child(child[slot]);
+            stack_.words[top] = child[slot];
+            stack_.entries[top++] = entries[slot];
+        };
+        const std::uint32_t others = met & (met - 1);
+        if ((others & (others - 1)) == 0) {
+            const auto first = static_cast<std::size_t>(std::countr_zero(met)),
+                       second = static_cast<std::size_t>(std::countr_zero(others));
+            const bool swap = entries[second] < entries[first];
+            word = choose(child, swap ? second : first);
+            push(swap ? first : second);
+            return;
         }
+        std::uint32_t order[8];
+        const std::size_t last = order_by_entry(met, entries, order) - 1;
+        word = choose(child, order[last]);
+        for (std::size_t k = 0; k < last; ++k) push(order[k]);
     }
 
     struct Leaf {
@@ -486,7 +478,7 @@ void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
     if constexpr (any)
         job.occluded[i] = hit.hit() ? 1 : 0;
     else
-        *job.hits.at(i) = hit;
+        job.hits.put(i, hit);
 }
 
 /// Calls run(counting, compact) with what the job wants, as constants. Code for compact trees

@@ -212,24 +212,34 @@ private:
     }
 
     /// Lists that hold a ray go onto the stack, moved together: gaps would add up in deep trees.
+    /// Without jumps but for long lists: which are empty cannot be foreseen.
     template <class Node>
     HWY_INLINE void push_children(const Node& node, const std::uint32_t* children,
                                   std::uint32_t* const* ends, std::uint32_t child_count,
                                   std::uint32_t out_begin, std::uint32_t stride) {
         std::uint32_t* const lists = memory_.lists();
+        std::vector<StreamEntry>& stack = memory_.stack();
+        const std::size_t before = stack.size();
+        stack.resize(before + child_count);
+        StreamEntry* to = stack.data() + before;
         std::uint32_t free = out_begin;
         for (std::uint32_t c = 0; c < child_count; ++c) {
             const std::uint32_t* const list = lists + out_begin + c * stride;
             const auto count = static_cast<std::uint32_t>(ends[c] - list);
-            if (count == 0) continue;
+            const bool goes = count != 0;
+            const std::uint32_t word = node.child[children[c]];
+            hn::StoreU(hn::LoadU(U16(), list), U16(), lists + free);
+            for (std::uint32_t k = lanes16; k < count; k += lanes16)
+                hn::StoreU(hn::LoadU(U16(), list + k), U16(), lists + free + k);
             if constexpr (!has_parts)
-                ask_for<compact>(tree_, node.child[children[c]]);
+                ask_for<compact>(tree_, word);
             else if constexpr (Parts::large)
-                parts_->ask_for(node.child[children[c]]);
-            std::memmove(lists + free, list, count * sizeof(*lists));
-            memory_.stack().push_back({node.child[children[c]], free, count});
-            free += count + StreamMemory::slack;
+                parts_->ask_for(word);
+            *to = {word, free, count};
+            to += goes;
+            free += goes ? count + StreamMemory::slack : 0;
         }
+        stack.resize(static_cast<std::size_t>(to - stack.data()));
     }
 
     void go_alone(std::uint32_t item, std::uint32_t word) {

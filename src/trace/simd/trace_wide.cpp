@@ -179,7 +179,7 @@ struct Batch {
                           rays.data() + from,
                           order.empty() ? nullptr : order.data() + begin,
                           end - begin,
-                          hits ? HitRows{hits.at(from), hits.bytes} : HitRows{},
+                          hits.from(from),
                           occluded == nullptr ? nullptr : occluded + from,
                           stack.view(),
                           stack.packet_view(),
@@ -210,7 +210,7 @@ private:
             counts.hits += hit.hit();
             counts.invalid += !hit.hit() && !is_valid(job.rays[k]);
             if (hits)
-                *job.hits.at(k) = hit;
+                job.hits.put(k, hit);
             else
                 job.occluded[k] = hit.hit();
         }
@@ -231,7 +231,7 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
             Batch batch{tree,
                         kernels,
                         part,
-                        hits ? HitRows{hits.at(first), hits.bytes} : HitRows{},
+                        hits.from(first),
                         occluded == nullptr ? nullptr : occluded + first,
                         options.counters};
             batch.check = check;
@@ -263,9 +263,7 @@ TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows 
     return sum;
 }
 
-HitRows rows_of(std::span<Hit> hits) { return {hits.data(), sizeof(Hit)}; }
-
-void place_in_tree(Hit& hit) { place_hit(hit, 0); }
+HitRows rows_of(std::span<Hit> hits) { return {hits.data(), 0}; }
 
 /// Largest jobs, one after the other, in the caller's floating-point environment.
 void trace_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
@@ -301,12 +299,7 @@ TraceCounts trace(const WideBvh& tree, std::span<const Ray> rays, std::span<Hit>
     check_sizes(rays.size(), hits.size());
     check_call(options);
     static_cast<void>(kernels_for(options.isa));
-    const RowsDone place = [&](std::size_t first, const std::uint32_t* order, std::size_t begin,
-                               std::size_t end) {
-        for_each_row(hits.data() + first, order, begin, end, place_in_tree);
-    };
-    if (!tree.empty())
-        return trace_batch(tree, rays, rows_of(hits), nullptr, options, place, nullptr);
+    if (!tree.empty()) return trace_batch(tree, rays, rows_of(hits), nullptr, options, {}, nullptr);
     std::ranges::fill(hits, Hit{});
     return miss_all(rays);
 }
@@ -335,7 +328,6 @@ void closest_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, std:
         return;
     }
     trace_on_this_thread(tree, rays, rows_of(hits), nullptr);
-    std::ranges::for_each(hits, place_in_tree);
 }
 
 void occluded_on_this_thread(const WideBvh& tree, std::span<const Ray> rays,
@@ -388,10 +380,10 @@ TraceCounts trace_rows(const WideBvh& tree, std::span<const Ray> rays, HitRows h
     if (!tree.empty()) return trace_batch(tree, rays, hits, occluded, options, done, check);
     for (std::size_t i = 0; i < rays.size(); ++i)
         if (hits)
-            *hits.at(i) = {};
+            hits.put(i, {});
         else
             occluded[i] = 0;
-    done(0, nullptr, 0, rays.size());
+    if (done) done(0, nullptr, 0, rays.size());
     return miss_all(rays);
 }
 

@@ -86,7 +86,7 @@ public:
     /// rays in turn cannot be foreseen.
     HWY_INLINE bool step_node() {
         if constexpr (closest)
-            for (std::size_t k = parts8 == 1 ? 2 : 1; k < pushed_; ++k) insert(k);
+            for (std::size_t k = parts8 == 1 ? 4 : 1; k < pushed_; ++k) insert(k);
         top_ += pushed_;
         return pop();
     }
@@ -232,7 +232,6 @@ private:
                 // Only AVX-512 leaves zeros behind them.
                 if constexpr (HWY_TARGET != HWY_AVX3)
                     entry = hn::IfThenElseZero(hn::FirstN(f8, count), entry);
-                farther_first(entry, word);
             }
         }
         auto* const to = reinterpret_cast<float*>(top_ + pushed_);
@@ -240,8 +239,7 @@ private:
                 second = hn::InterleaveUpper(f8, word, entry);
         if constexpr (parts8 == 1) {
             // Blocks of four floats: pairs 0, 1 and 4, 5; then 2, 3 and 6, 7.
-            hn::StoreU(hn::LowerHalf(first), f4, to);
-            hn::StoreU(hn::LowerHalf(second), f4, to + 4);
+            store_four(hn::LowerHalf(first), hn::LowerHalf(second), to);
             if (count > 4) {
                 hn::StoreU(hn::UpperHalf(f4, first), f4, to + 8);
                 hn::StoreU(hn::UpperHalf(f4, second), f4, to + 12);
@@ -252,15 +250,36 @@ private:
         }
         pushed_ += count;
     }
-    /// The first two by where the ray enters them: the nearer one second, of equals the first. Of
-    /// fewer the others are 0.
-    static HWY_INLINE void farther_first(V& entry, V& word) {
-        const auto here = hn::BitCast(I8(), entry), other = hn::Shuffle2301(here);
-        const auto sorted = hn::OddEven(hn::Min(here, other), hn::Max(here, other));
-        const auto turned = hn::RebindMask(f8, hn::Eq(sorted, other));
-        word = hn::IfThenElse(turned, hn::Shuffle2301(word), word);
-        entry = hn::BitCast(f8, sorted);
+    /// Four pairs; for closest hits the larger ones first. Of fewer the others are 0.
+    static HWY_INLINE void store_four(hn::Vec<F4> first, hn::Vec<F4> second, float* to) {
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+        if constexpr (closest) {
+            __m256i pairs = _mm256_castps_si256(_mm256_set_m128(second.raw, first.raw));
+            // Bitonic, in three steps (Batcher 1968). Upper halves are not negative.
+            pairs = compare_exchange<0b1001>(pairs, _mm256_permute4x64_epi64(pairs, 0b10110001));
+            pairs = compare_exchange<0b0011>(pairs, _mm256_permute4x64_epi64(pairs, 0b01001110));
+            pairs = compare_exchange<0b0101>(pairs, _mm256_permute4x64_epi64(pairs, 0b10110001));
+            _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), pairs);
+            return;
+        }
+#endif
+        hn::StoreU(first, f4, to);
+        hn::StoreU(second, f4, to + 4);
     }
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+    /// The larger of each pair and its partner in the lanes of `larger`, else the smaller.
+    template <int larger>
+    static HWY_INLINE __m256i compare_exchange(__m256i pair, __m256i partner) {
+#if HWY_TARGET == HWY_AVX3
+        return _mm256_mask_max_epi64(_mm256_min_epi64(pair, partner), larger, pair, partner);
+#else
+        const __m256i smaller = _mm256_setr_epi64x(larger & 1 ? 0 : -1, larger & 2 ? 0 : -1,
+                                                   larger & 4 ? 0 : -1, larger & 8 ? 0 : -1);
+        const __m256i taken = _mm256_xor_si256(_mm256_cmpgt_epi64(partner, pair), smaller);
+        return _mm256_blendv_epi8(pair, partner, taken);
+#endif
+    }
+#endif
     static HWY_INLINE std::uint32_t entry_of(std::uint64_t pair) {
         return static_cast<std::uint32_t>(pair >> 32);
     }

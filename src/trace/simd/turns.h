@@ -219,7 +219,7 @@ private:
         if constexpr (any)
             job_.occluded[i] = hit.hit() ? 1 : 0;
         else
-            *job_.hits.at(i) = hit;
+            job_.hits.put(i, hit);
     }
 
     const SimdJob& job_;

@@ -58,12 +58,6 @@ private:
     std::vector<std::uint64_t> pairs_;  // or sets of active rays
 };
 
-/// Kernels write what one tree knows of a hit: the rest, where all of it is one geometry.
-inline void place_hit(Hit& hit, std::uint32_t geometry) {
-    const std::uint32_t place[2] = {hit.hit() ? geometry : no_primitive, 0};
-    std::memcpy(&hit.geometry, place, sizeof place);  // both in one store
-}
-
 /// The hits of rays first + order[begin] to first + order[end - 1] are there; without an order,
 /// those of first + begin to first + end - 1.
 using RowsDone = std::function<void(std::size_t first, const std::uint32_t* order,
