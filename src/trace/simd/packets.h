@@ -274,9 +274,27 @@ public:
     }
 
     /// Windows of one class go as they are, as those of primary rays are but for the edges of
-    /// classes; from the first other one on, rays are sorted by class.
+    /// classes; the others are sorted by class when those are done. All hits are found in order:
+    /// there, and where many windows are mixed, all rays from one of them on are sorted.
     void trace() {
-        while (job_.n > 0 && trace_window()) leave_behind(std::min(job_.n, packet_size));
+        const SimdJob whole = job_;
+        std::size_t windows = 0, mixed = 0, place = 0;
+        while (job_.n > 0) {
+            const std::size_t count = std::min(job_.n, packet_size);
+            ++windows;
+            if (!trace_window()) {
+                ++mixed;
+                if (all || 2 * mixed > windows + 2) break;
+                put_off(place, count);
+            }
+            place += count;
+            leave_behind(count);
+        }
+        if constexpr (!all) {
+            put_off(place, job_.n);
+            job_ = whole;
+            job_.order = later_, job_.n = later_count_;
+        }
         if (job_.n > 0) trace_sorted();
     }
 
@@ -300,6 +318,13 @@ private:
         trace_packet([&](std::size_t i) { return rays[i / lanes16]; }, index_,
                      static_cast<std::uint32_t>(count), code);
         return true;
+    }
+
+    /// The next `count` rays, of which the first is the job's ray `place`.
+    void put_off(std::size_t place, std::size_t count) {
+        for (std::size_t k = 0; k < count; ++k)
+            later_[later_count_++] =
+                job_.order == nullptr ? static_cast<std::uint32_t>(place + k) : job_.order[k];
     }
 
     void leave_behind(std::size_t count) {
@@ -360,6 +385,8 @@ private:
     const Ray* ahead_;
     HWY_ALIGN std::int32_t index_[packet_size];
     Packet packet_;
+    std::size_t later_count_ = 0;
+    std::uint32_t later_[max_job_rays];
 };
 
 template <Wanted query, bool counting, bool compact>
