@@ -189,8 +189,8 @@ private:
     HWY_ALIGN std::int32_t order_[max_rays + slack * ray_class_count];
 };
 
-/// t, prim, u, v and the geometry of hits that stand behind each other, as Hit has them. False: not
-/// by this instruction set.
+/// t, prim, u, v and the geometry of lanes16 rays -> as many Hits from `to` on. False, and nothing
+/// stored: not with this instruction set.
 HWY_INLINE bool store_scene_hits(const V16 (&hit)[4], V16 geometry, TreeHit* to) {
 #if HWY_TARGET == HWY_AVX3
     // Of a hit in words of 64 bits: t and prim, u and v, the geometry and 0. Eight hits a vector,
@@ -273,9 +273,10 @@ public:
         std::iota(index_, index_ + packet_size, 0);
     }
 
-    /// Windows of one class go as they are, as those of primary rays are but for the edges of
-    /// classes; the others are sorted by class when those are done. All hits are found in order:
-    /// there, and where many windows are mixed, all rays from one of them on are sorted.
+    /// Windows of one class go as they are; most of primary rays are such. The others wait until
+    /// those are done, and are then sorted by class. Where half of the windows are mixed, all rays
+    /// that are left are sorted; so they are from the first mixed one on if all hits are wanted,
+    /// since these are found in order.
     void trace() {
         const SimdJob whole = job_;
         std::size_t windows = 0, mixed = 0, place = 0;

@@ -22,8 +22,8 @@ struct SimdCounts {
     std::uint64_t hits = 0, invalid = 0, visits = 0, tests = 0;
 };
 
-/// Where hits go: as a tree knows them, or as those of a scene, on one of its geometries. None
-/// where it is false.
+/// Where hits go: TreeHits, or Hits on one geometry of a scene. By default, and from a null
+/// pointer, there are none, and it is false.
 class HitRows {
 public:
     HitRows() = default;

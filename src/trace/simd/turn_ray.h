@@ -256,9 +256,12 @@ private:
         if constexpr (closest) {
             __m256i pairs = _mm256_castps_si256(_mm256_set_m128(second.raw, first.raw));
             // Bitonic, in three steps (Batcher 1968). Upper halves are not negative.
-            pairs = compare_exchange<0b1001>(pairs, _mm256_permute4x64_epi64(pairs, 0b10110001));
-            pairs = compare_exchange<0b0011>(pairs, _mm256_permute4x64_epi64(pairs, 0b01001110));
-            pairs = compare_exchange<0b0101>(pairs, _mm256_permute4x64_epi64(pairs, 0b10110001));
+            pairs =
+                compare_exchange_pairs<0b1001>(pairs, _mm256_permute4x64_epi64(pairs, 0b10110001));
+            pairs =
+                compare_exchange_pairs<0b0011>(pairs, _mm256_permute4x64_epi64(pairs, 0b01001110));
+            pairs =
+                compare_exchange_pairs<0b0101>(pairs, _mm256_permute4x64_epi64(pairs, 0b10110001));
             _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), pairs);
             return;
         }
@@ -269,7 +272,7 @@ private:
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
     /// The larger of each pair and its partner in the lanes of `larger`, else the smaller.
     template <int larger>
-    static HWY_INLINE __m256i compare_exchange(__m256i pair, __m256i partner) {
+    static HWY_INLINE __m256i compare_exchange_pairs(__m256i pair, __m256i partner) {
 #if HWY_TARGET == HWY_AVX3
         return _mm256_mask_max_epi64(_mm256_min_epi64(pair, partner), larger, pair, partner);
 #else

@@ -73,7 +73,8 @@ void for_each_row(Hit* hits, const std::uint32_t* order, std::size_t begin, std:
         for (std::size_t k = begin; k < end; ++k) place(hits[order[k]]);
 }
 
-/// As trace or, without rows for hits, trace_any; `done` comes once for each ray, on any thread.
+/// As trace or, without rows for hits, trace_any; `done`, unless empty, comes once for each ray, on
+/// any thread.
 /// `check`: of the hits that it accepts, or null; its rays are the caller's.
 TraceCounts trace_rows(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
                        std::uint8_t* occluded, const TraceOptions& options, const RowsDone& done,
