@@ -34,6 +34,13 @@ class Tables(unittest.TestCase):
         page = PAGE.read_text(encoding="utf-8")
         self.assertEqual(page, plots.page_text(page, plots.load()), "run scripts/plot-performance")
 
+    def test_pages_of_topics_are_what_the_documents_give(self):
+        pages = dict(plots.topic_pages(plots.load()))
+        self.assertEqual({path.name for path in pages}, {"batches.md", "single-calls.md", "scenes.md"})
+        for path, text in pages.items():
+            self.assertEqual(path.read_text(encoding="utf-8"), text, "run scripts/plot-performance")
+            self.assertGreater(text.split("<!-- workloads")[1].count("\n| "), 25, path.name)
+
     def test_a_changed_number_is_found(self):
         page = PAGE.read_text(encoding="utf-8")
         number = re.search(r"\| (\d\.\d\d) / \d\.\d\d \|", page.split("<!-- tables")[1]).group(1)
