@@ -355,9 +355,9 @@ void add_traversal_suite(CLI::App& bench) {
         ->allow_extra_args(false)
         ->capture_default_str();
     command
-        ->add_option(
-            "--kernel", options->kernel,
-            "Kernels, separated by commas; all: those of Aila and Laine, not cwbvh, short_stack")
+        ->add_option("--kernel", options->kernel,
+                     "Kernels, separated by commas; all: those of Aila and Laine, not the cwbvh "
+                     "and short_stack kernels")
         ->capture_default_str();
     command
         ->add_option("--rays", options->rays,

@@ -103,9 +103,9 @@ void add_simulate_command(CLI::App& app) {
                      fmt::format("{}, or a .json file", fmt::join(machine_model_names(), ", ")))
         ->capture_default_str();
     command
-        ->add_option(
-            "--kernel", options->kernel,
-            "Kernels, separated by commas; all: those of Aila and Laine, not cwbvh, short_stack")
+        ->add_option("--kernel", options->kernel,
+                     "Kernels, separated by commas; all: those of Aila and Laine, not the cwbvh "
+                     "and short_stack kernels")
         ->capture_default_str();
     command
         ->add_option(

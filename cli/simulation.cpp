@@ -443,7 +443,7 @@ std::vector<WarpKernel> kernels_from(const std::string& names) {
 }
 
 WarpTree warp_tree_for(const Bvh& bvh, const std::vector<WarpKernel>& kernels) {
-    return WarpTree(bvh, std::ranges::find(kernels, WarpKernel::cwbvh) != kernels.end());
+    return WarpTree(bvh, std::ranges::any_of(kernels, reads_wide_nodes));
 }
 
 std::vector<RayKind> kinds_from(const std::string& names) {

@@ -51,7 +51,7 @@ void check_kernel(const std::string& kernel, const std::string& device) {
 }
 
 WarpTracer::WarpTracer(const Bvh& bvh, const Settings& settings)
-    : settings_(settings), tree_(bvh, settings.kernel == warp_kernel_name(WarpKernel::cwbvh)) {
+    : settings_(settings), tree_(bvh, reads_wide_nodes(warp_kernel_from_name(settings.kernel))) {
     simulate_.kernel = warp_kernel_from_name(settings.kernel);
     simulate_.any_hit = settings.any_hit;
     if (is_simulated()) {

@@ -62,9 +62,9 @@ struct DeviceTraceOptions {
 /// Asynchronous: the call puts launches on `stream` and returns. It allocates nothing and waits for
 /// nothing. `scratch` is device memory of device_trace_scratch_bytes or more, aligned to 256 bytes.
 /// It is in use until the stream is past the launches. Throws InputError: sizes that differ,
-/// 2^31 - 1 rays or more, a number that is no kernel, memory that is too small or not aligned; the
-/// kernel `cwbvh` and a tree without wide nodes, or with some deeper than 63; `short_stack` and a
-/// tree deeper than 63. Throws BackendUnavailable, DeviceError.
+/// 2^31 - 1 rays or more, a number that is no kernel, memory that is too small or not aligned; a
+/// kernel that reads_wide_nodes and a tree without them, or with some deeper than 63; a kernel of a
+/// short stack and a tree deeper than 63. Throws BackendUnavailable, DeviceError.
 void trace_warps_on_device(const DeviceWarpTree& tree, std::span<const Ray> rays,
                            std::span<TreeHit> hits, const DeviceTraceOptions& options,
                            std::span<std::byte> scratch, Stream stream);

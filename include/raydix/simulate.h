@@ -30,24 +30,28 @@ enum class WarpKernel : std::uint32_t {
     ray_replacement,
     work_queue,
     dynamic_fetch,
-    cwbvh,        // while-while over nodes of eight children (Ylitie, Karras, Laine 2017)
-    short_stack,  // while-while with a stack of four entries and a restart trail (Laine 2010)
+    cwbvh,             // while-while over nodes of eight children (Ylitie, Karras, Laine 2017)
+    short_stack,       // while-while with a stack of four entries and a restart trail (Laine 2010)
+    persistent_cwbvh,  // the two before, by persistent warps
+    persistent_short_stack,
 };
 [[nodiscard]] std::span<const WarpKernel> warp_kernels();
 /// Those of Aila and Laine alone: what `all` means to the program.
 [[nodiscard]] std::span<const WarpKernel> warp_kernel_family();
 [[nodiscard]] std::string_view warp_kernel_name(WarpKernel kernel);
+/// Whether it reads the wide nodes of a WarpTree, and not its pairs.
+[[nodiscard]] bool reads_wide_nodes(WarpKernel kernel);
 /// Throws InputError that lists the known names.
 [[nodiscard]] WarpKernel warp_kernel_from_name(std::string_view name);
 
 /// A tree of triangles in the form that the kernels read, as in Aila and Laine 2009: node pairs of
 /// 64 bytes (`pair64`) and Woop's triangles of 48 bytes (`woop48`). If asked for, also as a
-/// compressed wide tree: nodes of 80 bytes, which the kernel `cwbvh` reads and no other, with
+/// compressed wide tree: nodes of 80 bytes, which `cwbvh` kernels read and no others, with
 /// triangles of their own. Holds all that the kernels read: the binary tree may go.
 class WarpTree {
 public:
-    /// `wide_nodes`: also for the kernel `cwbvh`. Throws InputError for a tree that holds boxes or
-    /// points.
+    /// `wide_nodes`: also for kernels that read_wide_nodes. Throws InputError for a tree that holds
+    /// boxes or points.
     explicit WarpTree(const Bvh& bvh, bool wide_nodes = false);
     ~WarpTree();
     WarpTree(WarpTree&&) noexcept;
@@ -194,11 +198,12 @@ struct SimulatedRates {
 /// Simulates one launch of all rays for each of `runs`. rays [n] -> figures [runs] and, if `hits`
 /// is not null, hits [runs][n]: those that the kernel itself found. Invalid rays miss. The figures
 /// do not depend on the number of threads. Throws InputError: 2^31 - 1 rays or more; the kernel
-/// `cwbvh` and a tree without wide nodes; `short_stack` and a tree deeper than 63; a width, kernel
-/// or part_of_launch out of range; a machine with a figure that is not positive, without a cost for
-/// an operation, with a cost above its own `most`, with resident_lanes that are no multiple of the
-/// width or fewer than block_lanes, with more than 2^24 lanes in flight; for the memory model lines
-/// out of range, more than 2^30 bytes of caches, or 4 GiB or more of tree, rays and hits.
+/// that reads_wide_nodes and a tree without them; one of a short stack and a tree deeper than 63; a
+/// width, kernel or part_of_launch out of range; a machine with a figure that is not positive,
+/// without a cost for an operation, with a cost above its own `most`, with resident_lanes that are
+/// no multiple of the width or fewer than block_lanes, with more than 2^24 lanes in flight; for the
+/// memory model lines out of range, more than 2^30 bytes of caches, or 4 GiB or more of tree, rays
+/// and hits.
 [[nodiscard]] std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays,
                                                std::span<const SimulateOptions> runs,
                                                std::vector<std::vector<TreeHit>>* hits = nullptr,

@@ -62,7 +62,7 @@ nb::list run(const Bvh& bvh, const RaysIn& rays, const std::vector<std::string>&
     const WarpTree tree = [&] {
         const nb::gil_scoped_release unlocked;
         return WarpTree(bvh, std::ranges::any_of(runs, [](const SimulateOptions& run) {
-                            return run.kernel == WarpKernel::cwbvh;
+                            return reads_wide_nodes(run.kernel);
                         }));
     }();
     for (const SimulateOptions& options : runs) {  // one at a time, so that signals are heard

@@ -20,7 +20,7 @@
 
 namespace raydix {
 
-inline constexpr std::size_t warp_kernel_count = 13;
+inline constexpr std::size_t warp_kernel_count = 15;
 
 struct DeviceWarpTree::Arrays {
     DeviceBuffer<std::byte> own_pairs, own_triangles;  // the former if copied from the host
@@ -33,7 +33,7 @@ struct DeviceWarpTree::Arrays {
     std::array<std::array<std::uint32_t, 2>, warp_kernel_count> resident_blocks{};
 
     [[nodiscard]] WarpLaunch launch(WarpKernel kernel, bool any_hit) const {
-        check_enum("kernel", kernel, WarpKernel::short_stack);
+        check_enum("kernel", kernel, WarpKernel::persistent_short_stack);
         return {kernel, any_hit, warp_stack_entries(kernel, max_depth, wide_max_depth)};
     }
 };
@@ -46,14 +46,16 @@ inline void check_stack_depth(std::uint32_t max_depth) {
 }
 
 inline void check_wide(const DeviceWarpTree::Arrays& tree, const WarpLaunch& launch) {
-    if (launch.kernel != WarpKernel::cwbvh || tree.scene.pairs == nullptr) return;
+    if (!reads_wide_nodes(launch.kernel) || tree.scene.pairs == nullptr) return;
     if (tree.scene.wide.nodes == nullptr)
         throw InputError(
-            "the kernel cwbvh needs a WarpTree with wide nodes, copied from the host (DeviceCwbvh "
-            "has kernels of its own)");
+            "the kernel " + std::string(warp_kernel_name(launch.kernel)) +
+            " needs a WarpTree with wide nodes, copied from the host (DeviceCwbvh has kernels of "
+            "its own)");
     if (launch.stack_entries > large_stack_entries)
         throw InputError("the wide tree is " + std::to_string(tree.wide_max_depth) +
-                         " deep; the kernel cwbvh has stacks for depths up to " +
+                         " deep; the kernel " + std::string(warp_kernel_name(launch.kernel)) +
+                         " has stacks for depths up to " +
                          std::to_string(large_stack_entries / 2 - 1));
 }
 

@@ -18,16 +18,18 @@ namespace raydix {
 /// Entries of 4 bytes that the stack of a lane needs. In a wide tree a level takes two.
 [[nodiscard]] inline std::uint32_t warp_stack_entries(WarpKernel kernel, std::uint32_t max_depth,
                                                       std::uint32_t wide_max_depth) {
-    return kernel == WarpKernel::cwbvh ? 2 * (wide_max_depth + 1) : max_depth + 1;
+    return reads_wide_nodes(kernel) ? 2 * (wide_max_depth + 1) : max_depth + 1;
 }
 
-/// Levels that the kernel `short_stack` has bits for, from the root to the deepest leaf.
+/// Levels that the kernels with a short stack have bits for, from the root to the deepest leaf.
 inline constexpr std::uint32_t trail_levels = 64;
 
 inline void check_trail_levels(WarpKernel kernel, std::uint32_t max_depth) {
-    if (kernel == WarpKernel::short_stack && max_depth >= trail_levels)
-        throw InputError("the tree is " + std::to_string(max_depth) +
-                         " deep; the kernel short_stack has a trail for depths up to " +
+    const bool has_trail =
+        kernel == WarpKernel::short_stack || kernel == WarpKernel::persistent_short_stack;
+    if (has_trail && max_depth >= trail_levels)
+        throw InputError("the tree is " + std::to_string(max_depth) + " deep; the kernel " +
+                         std::string(warp_kernel_name(kernel)) + " has a trail for depths up to " +
                          std::to_string(trail_levels - 1));
 }
 

@@ -61,7 +61,7 @@ void compare(const std::string& what, const WarpTree& host, const DeviceWarpTree
         for (const WarpKernel kernel : warp_kernels()) {
             SCOPED_TRACE(what + ", " + std::string(warp_kernel_name(kernel)) +
                          (any_hit ? ", any" : ", closest"));
-            if (kernel == WarpKernel::cwbvh && !has_wide) {
+            if (reads_wide_nodes(kernel) && !has_wide) {
                 EXPECT_THROW(trace_there(tree, rays, kernel, any_hit), InputError);
                 continue;
             }

@@ -46,6 +46,10 @@ std::optional<WarpKernel> batch_kernel(WarpKernel kernel) {
             return WarpKernel::if_if;
         case WarpKernel::persistent_speculative_while_while:
             return WarpKernel::speculative_while_while;
+        case WarpKernel::persistent_cwbvh:
+            return WarpKernel::cwbvh;
+        case WarpKernel::persistent_short_stack:
+            return WarpKernel::short_stack;
         default:
             if (simulated_kernel(kernel, false, 1)->persistent) return std::nullopt;
             return kernel;

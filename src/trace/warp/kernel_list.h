@@ -41,8 +41,12 @@ auto with_kernel(WarpKernel kernel, const Fn& fn) {
             return fn.template operator()<DynamicFetch>();
         case WarpKernel::cwbvh:
             return fn.template operator()<OneBatch<WideWhileWhile>>();
-        default:
+        case WarpKernel::short_stack:
             return fn.template operator()<OneBatch<ShortStack>>();
+        case WarpKernel::persistent_cwbvh:
+            return fn.template operator()<Persistent<WideWhileWhile>>();
+        default:
+            return fn.template operator()<Persistent<ShortStack>>();
     }
 }
 

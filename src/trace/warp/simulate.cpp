@@ -32,7 +32,9 @@ constexpr std::array kernels{WarpKernel::packet,
                              WarpKernel::work_queue,
                              WarpKernel::dynamic_fetch,
                              WarpKernel::cwbvh,
-                             WarpKernel::short_stack};
+                             WarpKernel::short_stack,
+                             WarpKernel::persistent_cwbvh,
+                             WarpKernel::persistent_short_stack};
 constexpr std::array<std::string_view, kernels.size()> kernel_names{
     "packet",
     "while_while",
@@ -46,7 +48,9 @@ constexpr std::array<std::string_view, kernels.size()> kernel_names{
     "work_queue",
     "dynamic_fetch",
     "cwbvh",
-    "short_stack"};
+    "short_stack",
+    "persistent_cwbvh",
+    "persistent_short_stack"};
 
 constexpr std::array<std::string_view, 3> release_names{"own", "in_order", "together"};
 
@@ -144,6 +148,10 @@ std::span<const WarpKernel> warp_kernel_family() {
 std::string_view warp_kernel_name(WarpKernel kernel) {
     const auto k = static_cast<std::size_t>(kernel);
     return k < kernel_names.size() ? kernel_names[k] : "unknown";
+}
+
+bool reads_wide_nodes(WarpKernel kernel) {
+    return kernel == WarpKernel::cwbvh || kernel == WarpKernel::persistent_cwbvh;
 }
 
 WarpKernel warp_kernel_from_name(std::string_view name) {
@@ -360,8 +368,10 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
     for (const SimulateOptions& options : runs) {
         check_options(options);
         static_cast<void>(op_costs(options.machine, options.kernel));
-        if (options.kernel == WarpKernel::cwbvh && !tree.empty() && !tree.has_wide_nodes())
-            throw InputError("simulate: the kernel cwbvh needs a WarpTree with wide nodes");
+        if (reads_wide_nodes(options.kernel) && !tree.empty() && !tree.has_wide_nodes())
+            throw InputError("simulate: the kernel " +
+                             std::string(warp_kernel_name(options.kernel)) +
+                             " needs a WarpTree with wide nodes");
         check_trail_levels(options.kernel, tree.max_depth());
     }
     check_threads(threads);
@@ -377,7 +387,7 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
             return MemoryRange{buffer.data(), buffer.view().size_bytes(), holds};
         };
         using enum MemoryRange::Holds;
-        if (kernel == WarpKernel::cwbvh)
+        if (reads_wide_nodes(kernel))
             return std::array{range(arrays.wide.nodes, nodes),
                               range(arrays.wide.triangles, triangles),
                               range(arrays.wide.ids, triangles)};
