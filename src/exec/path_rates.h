@@ -8,6 +8,7 @@
 #include <atomic>
 #include <bit>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -60,13 +61,18 @@ public:
     void add(Way way, Way other, float ratio) {
         if (!(ratio > 0.0f)) return;
         if (!known(other)) set(other, 1.0f);
-        const float base = cost(other),
-                    now = base * std::clamp(ratio, 1 / most_at_once, most_at_once);
+        const float now = cost(other) * std::clamp(ratio, 1 / most_at_once, most_at_once);
         const std::uint8_t trials = trials_[index(way)].load(std::memory_order_relaxed);
         // The first one finds memory as it was, and counts until there is another.
-        const float weight = trials < 2 ? 1.0f : trials < 4 ? 0.5f : 0.2f;
-        set(way, trials == 0 ? now : cost(way) + weight * (now - cost(way)));
-        if (trials < 4)
+        if (trials < 2) {
+            set(way, now);
+        } else {
+            // Of many the geometric mean: short times are often far off, either way.
+            const float change = std::clamp(now / cost(way), 1 / most_change, most_change);
+            set(way,
+                cost(way) * std::pow(change, std::max(1.0f / static_cast<float>(trials), 0.2f)));
+        }
+        if (trials < most_trials)
             trials_[index(way)].store(static_cast<std::uint8_t>(trials + 1),
                                       std::memory_order_relaxed);
     }
@@ -78,8 +84,9 @@ public:
 
 private:
     static constexpr std::size_t share_of_job = 8;
-    static constexpr float most_at_once = 16.0f, near_cost = 1.2f;
+    static constexpr float most_at_once = 16.0f, near_cost = 1.2f, most_change = 3.0f;
     static constexpr std::uint32_t least_pause = 8, longest_pause = 1024;
+    static constexpr std::uint8_t often_tried = 4, most_trials = 8;  // that are told apart
     /// Of jobs that go another way as a whole: rays of one that is asked once should not suffer.
     static constexpr std::uint32_t whole_pause = 4;
     static constexpr std::size_t least_to_divide = 128;
@@ -91,6 +98,10 @@ private:
     [[nodiscard]] bool known(Way way) const { return cost(way) > 0.0f; }
     void set(Way way, float cost) { costs_[index(way)].store(cost, std::memory_order_relaxed); }
 
+    [[nodiscard]] bool is_proven(Way way) const {
+        return trials_[index(way)].load(std::memory_order_relaxed) >= 2;
+    }
+
     template <class Trace>
     static float time_a_ray(Way way, std::size_t begin, std::size_t end, const Trace& trace) {
         const auto start = Clock::now();
@@ -99,13 +110,18 @@ private:
         return took.count() / static_cast<float>(end - begin);
     }
 
-    /// The slower a way was, the longer until it is tried again.
+    /// The slower a way was, the longer until it is tried again, and longer each time if that was
+    /// found often.
     void pause(Way way, Way best, std::uint32_t job, std::uint32_t least = 1) {
         std::uint32_t jobs = least;
-        if (trials_[index(way)].load(std::memory_order_relaxed) >= 2) {
+        if (is_proven(way)) {
+            const std::uint8_t trials = trials_[index(way)].load(std::memory_order_relaxed);
             const float ratio = std::max(cost(way) / cost(best), 1.0f);
+            const bool often = trials > often_tried && ratio >= near_cost;
+            const std::uint32_t longer = often ? 1u << (trials - often_tried) : 1;
             jobs = static_cast<std::uint32_t>(
-                std::min(least_pause * ratio * ratio, static_cast<float>(longest_pause)));
+                std::min(static_cast<float>(least_pause * longer) * ratio * ratio,
+                         static_cast<float>(longest_pause)));
         }
         due_[index(way)].store(job + jobs, std::memory_order_relaxed);
     }
@@ -120,18 +136,19 @@ private:
         std::array<Way, way_count> tried;
         std::size_t count = 0;
         for (const Way way : ways)
-            if (may_try && !(small && count > 0) && way != best && is_due(way, job))
+            if (may_try && !(small && count > 0) && way != best && is_due(way, job) &&
+                !(count > 0 && is_proven(way)))
                 tried[count++] = way;
         if (count == 0) {
             trace(best, begin, end);
             return;
         }
         // The fewer rays packets and streams get, the more each of them takes: a way that is not
-        // much slower by a small share gets half of the job.
+        // much slower by a small share gets half of the job, and so does one that is rarely tried.
         const bool near = count == 1 && known(tried[0]) && cost(tried[0]) < near_cost * cost(best);
         const std::size_t share =
-            near    ? rays / 2
-            : small ? rays / 4
+            near || (!small && count == 1 && is_proven(tried[0])) ? rays / 2
+            : small                                               ? rays / 4
                     : std::min(std::max(least_share, rays / share_of_job), rays / (count + 1));
         // Who comes second finds in caches what the first one read.
         const bool best_first = rounds_.fetch_add(1, std::memory_order_relaxed) % 2 != 0;

@@ -170,6 +170,30 @@ TEST(PathRates, OneThatStoodStillForAWhileDecidesLittle) {
     EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
 }
 
+TEST(PathRates, TimesFarOffEitherWayCancel) {
+    // 0.77 in the geometric mean, 1.15 in the arithmetic one.
+    for (const bool long_ones_first : {false, true}) {
+        Rates rates;
+        for (int trial = 0; trial < 60; ++trial)
+            rates.add(PathWay::streams, PathWay::packets,
+                      (trial % 2 == 0) == long_ones_first ? 2.0f : 0.3f);
+        rates.add(PathWay::streams, PathWay::packets, 0.8f);
+        EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
+    }
+}
+
+TEST(PathRates, ASlowWayIsTriedLessAndLess) {
+    Rates rates;
+    const Costs costs{100, 150, 150, 150};
+    std::size_t tried[3] = {};
+    for (std::size_t& of_part : tried)
+        for (int job = 0; job < 500; ++job)
+            for (const Share& share : shares_of(rates, three_ways, 1024, costs))
+                of_part += share.way != PathWay::packets ? 1 : 0;
+    EXPECT_LT(2 * tried[1], tried[0]);
+    EXPECT_GT(tried[2], 0u);
+}
+
 TEST(PathRates, AJobThatIsNoTrialGoesTheFastestWay) {
     for (const std::size_t rays : {64u, 8192u})
         for (const PathWay faster : three_ways) {
