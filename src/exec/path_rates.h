@@ -63,14 +63,14 @@ public:
         if (!known(other)) set(other, 1.0f);
         const float now = cost(other) * std::clamp(ratio, 1 / most_at_once, most_at_once);
         const std::uint8_t trials = trials_[index(way)].load(std::memory_order_relaxed);
-        // The first one finds memory as it was, and counts until there is another.
-        if (trials < 2) {
+        // Of many the geometric mean: single ones are often far off, either way. The first one
+        // finds memory as it was, and counts little once there is another.
+        if (trials == 0) {
             set(way, now);
         } else {
-            // Of many the geometric mean: short times are often far off, either way.
+            const float weight = trials == 1 ? 0.67f : std::max(1.0f / trials, 0.2f);
             const float change = std::clamp(now / cost(way), 1 / most_change, most_change);
-            set(way,
-                cost(way) * std::pow(change, std::max(1.0f / static_cast<float>(trials), 0.2f)));
+            set(way, cost(way) * std::pow(change, weight));
         }
         if (trials < most_trials)
             trials_[index(way)].store(static_cast<std::uint8_t>(trials + 1),
@@ -84,7 +84,7 @@ public:
 
 private:
     static constexpr std::size_t share_of_job = 8;
-    static constexpr float most_at_once = 16.0f, near_cost = 1.2f, most_change = 3.0f;
+    static constexpr float most_at_once = 16.0f, near_cost = 1.2f, most_change = 4.0f;
     static constexpr std::uint32_t least_pause = 8, longest_pause = 1024;
     static constexpr std::uint8_t often_tried = 4, most_trials = 8;  // that are told apart
     /// Of jobs that go another way as a whole: rays of one that is asked once should not suffer.
@@ -119,9 +119,11 @@ private:
             const float ratio = std::max(cost(way) / cost(best), 1.0f);
             const bool often = trials > often_tried && ratio >= near_cost;
             const std::uint32_t longer = often ? 1u << (trials - often_tried) : 1;
+            // Few trials may all be wrong.
+            const std::uint32_t longest = std::min(least_pause << trials, longest_pause);
             jobs = static_cast<std::uint32_t>(
                 std::min(static_cast<float>(least_pause * longer) * ratio * ratio,
-                         static_cast<float>(longest_pause)));
+                         static_cast<float>(longest)));
         }
         due_[index(way)].store(job + jobs, std::memory_order_relaxed);
     }
@@ -144,14 +146,16 @@ private:
             return;
         }
         // The fewer rays packets and streams get, the more each of them takes: a way that is not
-        // much slower by a small share gets half of the job, and so does one that is rarely tried.
-        const bool near = count == 1 && known(tried[0]) && cost(tried[0]) < near_cost * cost(best);
+        // much slower by a small share gets half of the job. So does one that is rarely tried.
+        const float half_below = is_proven(tried[0]) && !small ? 2.0f : near_cost;
+        const bool half = count == 1 && known(tried[0]) && cost(tried[0]) < half_below * cost(best);
         const std::size_t share =
-            near || (!small && count == 1 && is_proven(tried[0])) ? rays / 2
-            : small                                               ? rays / 4
+            half    ? rays / 2
+            : small ? rays / 4
                     : std::min(std::max(least_share, rays / share_of_job), rays / (count + 1));
         // Who comes second finds in caches what the first one read.
-        const bool best_first = rounds_.fetch_add(1, std::memory_order_relaxed) % 2 != 0;
+        const bool best_first =
+            rounds_[index(tried[0])].fetch_add(1, std::memory_order_relaxed) % 2 != 0;
         const auto next = [&](Way way, std::size_t share_rays) {
             const std::size_t from = begin;
             begin += share_rays;
@@ -193,7 +197,8 @@ private:
         trace(best, begin, end);
     }
 
-    std::atomic<std::uint32_t> jobs_{0}, rounds_{0};
+    std::atomic<std::uint32_t> jobs_{0};
+    std::array<std::atomic<std::uint8_t>, way_count> rounds_{};
     std::array<std::atomic<float>, way_count> costs_{};  // 0: not known
     std::array<std::atomic<std::uint32_t>, way_count> due_{};
     std::array<std::atomic<std::uint8_t>, way_count> trials_{};

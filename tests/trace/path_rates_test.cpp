@@ -182,6 +182,25 @@ TEST(PathRates, TimesFarOffEitherWayCancel) {
     }
 }
 
+TEST(PathRates, ALongTimeInOneOfTheFirstTrialsIsMadeGood) {
+    constexpr PathWay two[] = {PathWay::turns, PathWay::packets};
+    for (int long_trial = 0; long_trial < 3; ++long_trial) {
+        Rates rates;
+        int trials = 0;
+        for (int job = 0; job < 100; ++job)
+            rates.run(two, 0, 1024, [&](PathWay way, std::size_t begin, std::size_t end) {
+                int cost = 100;
+                if (way == PathWay::packets) {
+                    cost = trials == long_trial ? 800 : trials < 2 ? 110 : 40;
+                    ++trials;
+                }
+                HandClock::passed +=
+                    std::chrono::nanoseconds(cost * static_cast<std::int64_t>(end - begin));
+            });
+        EXPECT_EQ(rates.fastest(two), PathWay::packets) << "trial " << long_trial;
+    }
+}
+
 TEST(PathRates, ASlowWayIsTriedLessAndLess) {
     Rates rates;
     const Costs costs{100, 150, 150, 150};
