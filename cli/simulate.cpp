@@ -39,7 +39,7 @@ void print_head(const SimulateCommand& options, const MachineModel& m, const War
         "machine {} (simulated): {} multiprocessors, {:g} lanes a clock each, {:g} GHz\n    {}\n",
         m.name, m.multiprocessors, m.lanes_per_clock, m.clock_ghz, m.origin);
     fmt::print("pair64 nodes and woop48 triangles{}, {} bytes, depth {}, width {}\n",
-               tree.has_wide_nodes() ? ", for cwbvh wide nodes besides" : "", grouped(tree.bytes()),
+               tree.has_wide_nodes() ? ", wide nodes besides" : "", grouped(tree.bytes()),
                tree.max_depth(), options.width);
 }
 

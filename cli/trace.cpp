@@ -367,10 +367,14 @@ void explain(const TraceCommand& options, const Bvh& bvh) {
 
 void explain_warps(const TraceCommand& options, const Bvh& bvh) {
     if (!options.explain || !options.common.prints_tables()) return;
-    fmt::print(
-        "kernel {}: pair64 nodes and woop48 triangles, width 2, warps of 32, stacks of {} "
-        "entries, tree built on the cpu\n",
-        options.kernel, bvh.max_depth() + 1);
+    const bool wide = reads_wide_nodes(warp_kernel_from_name(options.kernel));
+    const bool short_stack = options.kernel.ends_with("short_stack");
+    fmt::print("kernel {}: {} and woop48 triangles, warps of 32, {}, tree built on the cpu\n",
+               options.kernel,
+               wide ? "cwbvh nodes of 80 bytes, width 8," : "pair64 nodes, width 2,",
+               wide          ? std::string("stacks of two entries a level")
+               : short_stack ? std::string("stacks of four entries in registers")
+                             : fmt::format("stacks of {} entries", bvh.max_depth() + 1));
 }
 
 /// What the options say about the device, before any work. The tree is built on the cpu.

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 
 namespace raydix {
@@ -29,9 +30,11 @@ public:
     /// Rays begin to end - 1 of a job, by trace(way, begin, end). `ways`: those that there are, not
     /// more than four, in the order of promise. Most jobs go the fastest way known. In a trial some
     /// rays go another way, and both are timed side by side: what rays take differs from place to
-    /// place. These are at least `least_share` rays, enough to tell, or an eighth; of a job of
-    /// fewer than twice as many a quarter, and every fourth such job tries one way. A job of fewer
-    /// than 128 rays goes the other way as a whole, and the next one is timed beside it.
+    /// place. These are at least `least_share` rays, enough to tell, or an eighth; half of the job
+    /// once a way has been tried twice and takes less than twice the time. A job of fewer than
+    /// 2 * least_share tries one way at most, every fourth one if a way is due, with a quarter of
+    /// its rays, or half if that way is not much slower. A job of fewer than 128 rays goes the
+    /// other way as a whole, and the next one is timed beside it.
     template <class Trace>
     void run(std::span<const Way> ways, std::size_t begin, std::size_t end, const Trace& trace,
              std::size_t least_share = 256) {
@@ -57,12 +60,12 @@ public:
     }
 
     /// A ray took so many times as long by `way` as one beside it by `other`, which is the first to
-    /// be known or known already.
+    /// be known or known already. Forgotten while another thread adds something.
     void add(Way way, Way other, float ratio) {
-        if (!(ratio > 0.0f)) return;
+        if (!(ratio > 0.0f) || adding_.test_and_set(std::memory_order_acquire)) return;
         if (!known(other)) set(other, 1.0f);
         const float now = cost(other) * std::clamp(ratio, 1 / most_at_once, most_at_once);
-        const std::uint8_t trials = trials_[index(way)].load(std::memory_order_relaxed);
+        const std::uint8_t trials = trials_of(way);
         // Of many the geometric mean: single ones are often far off, either way. The first one
         // finds memory as it was, and counts little once there is another.
         if (trials == 0) {
@@ -72,19 +75,22 @@ public:
             const float change = std::clamp(now / cost(way), 1 / most_change, most_change);
             set(way, cost(way) * std::pow(change, weight));
         }
-        if (trials < most_trials)
-            trials_[index(way)].store(static_cast<std::uint8_t>(trials + 1),
-                                      std::memory_order_relaxed);
+        if (trials < most_trials) set_trials(way, trials + 1);
+        // It may have lost by chance: then it is not to rest for long.
+        if (cost(way) < cost(other)) set_trials(other, std::min(trials_of(other), often_tried));
+        keep_in_range();
+        adding_.clear(std::memory_order_release);
     }
 
     /// Whether job number `job` should try `way`.
     [[nodiscard]] bool is_due(Way way, std::uint32_t job) const {
-        return job >= due_[index(way)].load(std::memory_order_relaxed);
+        return static_cast<std::int32_t>(waited(way, job)) >= 0;
     }
 
 private:
     static constexpr std::size_t share_of_job = 8;
     static constexpr float most_at_once = 16.0f, near_cost = 1.2f, most_change = 4.0f;
+    static constexpr float least_cost = 0x1p-10f, infinite_cost = 0x1p100f;
     static constexpr std::uint32_t least_pause = 8, longest_pause = 1024;
     static constexpr std::uint8_t often_tried = 4, most_trials = 8;  // that are told apart
     /// Of jobs that go another way as a whole: rays of one that is asked once should not suffer.
@@ -98,8 +104,29 @@ private:
     [[nodiscard]] bool known(Way way) const { return cost(way) > 0.0f; }
     void set(Way way, float cost) { costs_[index(way)].store(cost, std::memory_order_relaxed); }
 
-    [[nodiscard]] bool is_proven(Way way) const {
-        return trials_[index(way)].load(std::memory_order_relaxed) >= 2;
+    [[nodiscard]] std::uint8_t trials_of(Way way) const {
+        return trials_[index(way)].load(std::memory_order_relaxed);
+    }
+    void set_trials(Way way, int trials) {
+        trials_[index(way)].store(static_cast<std::uint8_t>(trials), std::memory_order_relaxed);
+    }
+    [[nodiscard]] bool is_proven(Way way) const { return trials_of(way) >= 2; }
+    /// Jobs since it has been due. Numbers of jobs may wrap around.
+    [[nodiscard]] std::uint32_t waited(Way way, std::uint32_t job) const {
+        return job - due_[index(way)].load(std::memory_order_relaxed);
+    }
+
+    /// Who wins by chance is thought too fast, and the others are compared with that. So where ways
+    /// are alike all costs sink.
+    void keep_in_range() {
+        float least = infinite_cost;
+        for (const auto& cost : costs_)
+            if (const float one = cost.load(std::memory_order_relaxed); one > 0.0f)
+                least = std::min(least, one);
+        if (least > least_cost) return;
+        for (auto& cost : costs_)
+            cost.store(cost.load(std::memory_order_relaxed) / least_cost,
+                       std::memory_order_relaxed);
     }
 
     template <class Trace>
@@ -110,12 +137,12 @@ private:
         return took.count() / static_cast<float>(end - begin);
     }
 
-    /// The slower a way was, the longer until it is tried again, and longer each time if that was
-    /// found often.
+    /// The slower a way is, the longer until it is tried again. Once it has been tried often, and
+    /// is not close to the best, longer each time.
     void pause(Way way, Way best, std::uint32_t job, std::uint32_t least = 1) {
         std::uint32_t jobs = least;
         if (is_proven(way)) {
-            const std::uint8_t trials = trials_[index(way)].load(std::memory_order_relaxed);
+            const std::uint8_t trials = trials_of(way);
             const float ratio = std::max(cost(way) / cost(best), 1.0f);
             const bool often = trials > often_tried && ratio >= near_cost;
             const std::uint32_t longer = often ? 1u << (trials - often_tried) : 1;
@@ -128,6 +155,17 @@ private:
         due_[index(way)].store(job + jobs, std::memory_order_relaxed);
     }
 
+    /// Which of those that are due has waited longest, so that each has its turn.
+    [[nodiscard]] std::optional<Way> longest_due(std::span<const Way> ways, Way best,
+                                                 std::uint32_t job) const {
+        std::optional<Way> found;
+        for (const Way way : ways)
+            if (way != best && is_due(way, job) &&
+                (!found || waited(way, job) > waited(*found, job)))
+                found = way;
+        return found;
+    }
+
     template <class Trace>
     void run_divided(std::span<const Way> ways, Way best, std::uint32_t job, std::size_t begin,
                      std::size_t end, const Trace& trace, std::size_t least_share) {
@@ -137,16 +175,17 @@ private:
         const bool may_try = small ? job % whole_pause == whole_pause - 1 : job > 0;
         std::array<Way, way_count> tried;
         std::size_t count = 0;
-        for (const Way way : ways)
-            if (may_try && !(small && count > 0) && way != best && is_due(way, job) &&
-                !(count > 0 && is_proven(way)))
-                tried[count++] = way;
+        if (may_try && !small)
+            for (const Way way : ways)
+                if (way != best && !is_proven(way) && is_due(way, job)) tried[count++] = way;
+        if (may_try && count == 0)
+            if (const auto way = longest_due(ways, best, job)) tried[count++] = *way;
         if (count == 0) {
             trace(best, begin, end);
             return;
         }
         // The fewer rays packets and streams get, the more each of them takes: a way that is not
-        // much slower by a small share gets half of the job. So does one that is rarely tried.
+        // much slower by a small share gets half of the job.
         const float half_below = is_proven(tried[0]) && !small ? 2.0f : near_cost;
         const bool half = count == 1 && known(tried[0]) && cost(tried[0]) < half_below * cost(best);
         const std::size_t share =
@@ -188,9 +227,9 @@ private:
             pause(tried, best, job, whole_pause);
             return;
         }
-        for (const Way way : ways)
-            if (job % whole_pause == whole_pause - 1 && way != best && is_due(way, job)) {
-                open_.store(pack(way, time_a_ray(way, begin, end, trace)),
+        if (job % whole_pause == whole_pause - 1)
+            if (const auto way = longest_due(ways, best, job)) {
+                open_.store(pack(*way, time_a_ray(*way, begin, end, trace)),
                             std::memory_order_relaxed);
                 return;
             }
@@ -203,6 +242,7 @@ private:
     std::array<std::atomic<std::uint32_t>, way_count> due_{};
     std::array<std::atomic<std::uint8_t>, way_count> trials_{};
     std::atomic<std::uint64_t> open_{0};
+    std::atomic_flag adding_;
 };
 
 /// What a batch is like, as far as a few of its rays tell.

@@ -336,7 +336,7 @@ TEST(Options, EnumerationsAreOfTheirKind) {
         });
         expect_refused<PairRows>("rows", 1,
                                  [&](PairRows r) { (void)neighbour_lists(in.index, 1.0f, r); });
-        expect_refused<WarpKernel>("kernel", 12, [&](WarpKernel k) {
+        expect_refused<WarpKernel>("kernel", 14, [&](WarpKernel k) {
             const SimulateOptions run{.kernel = k,
                                       .machine = machine_model(machine_model_names().front())};
             (void)simulate(in.warp, in.rays, std::span(&run, 1));

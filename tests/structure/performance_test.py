@@ -39,7 +39,26 @@ class Tables(unittest.TestCase):
         self.assertEqual({path.name for path in pages}, {"batches.md", "single-calls.md", "scenes.md"})
         for path, text in pages.items():
             self.assertEqual(path.read_text(encoding="utf-8"), text, "run scripts/plot-performance")
-            self.assertGreater(text.split("<!-- workloads")[1].count("\n| "), 25, path.name)
+            rows = text.split("<!-- workloads")[1].split("<!-- end -->")[0].count("\n| ")
+            self.assertGreater(rows, 25, path.name)
+
+    def test_a_mark_that_is_lost_is_found(self):
+        page = "<!-- a: made -->\n| old |\n<!-- end -->\n"
+        self.assertEqual(plots.between_marks(page, "a", "| new |"), page.replace("old", "new"))
+        for broken in (page.replace("<!-- end -->", ""), page.replace("a: made", "b: made"), page + page,
+                       page.replace("<!-- end -->", "<!-- c: made -->\n<!-- end -->")):
+            with self.assertRaises(SystemExit):
+                plots.between_marks(broken, "a", "| new |")
+
+    def test_a_changed_number_of_a_topic_is_found(self):
+        figures = plots.load()
+        for path, text in plots.topic_pages(figures):
+            number = re.search(r"\| (\d\.\d\d) / \d\.\d\d \|", text.split("<!-- workloads")[1]).group(1)
+            changed = text.split("<!-- workloads")
+            changed[1] = changed[1].replace(f"| {number} / ", "| 9.99 / ", 1)
+            self.assertNotEqual(text, "<!-- workloads".join(changed))
+            table = text.split("<!-- workloads")[1].split("-->\n", 1)[1].split("\n<!-- end -->")[0]
+            self.assertEqual(plots.between_marks("<!-- workloads".join(changed), "workloads", table), text)
 
     def test_a_changed_number_is_found(self):
         page = PAGE.read_text(encoding="utf-8")

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <random>
 #include <span>
 #include <thread>
 #include <vector>
@@ -179,6 +180,33 @@ TEST(PathRates, TimesFarOffEitherWayCancel) {
                       (trial % 2 == 0) == long_ones_first ? 2.0f : 0.3f);
         rates.add(PathWay::streams, PathWay::packets, 0.8f);
         EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
+    }
+}
+
+TEST(PathRates, LearnsAfterAMillionJobsOfWaysThatAreAlike) {
+    Rates rates;
+    std::mt19937 random(5);
+    std::lognormal_distribution<float> noise(0.0f, 0.3f);
+    const auto run = [&](const std::array<float, 4>& costs) {
+        rates.run(three_ways, 0, 1024, [&](PathWay way, std::size_t begin, std::size_t end) {
+            const float time = costs[static_cast<std::size_t>(way)] * noise(random);
+            HandClock::passed += std::chrono::nanoseconds(
+                static_cast<std::int64_t>(time * static_cast<float>(end - begin)));
+        });
+    };
+    for (int job = 0; job < 1'000'000; ++job) run({100, 100, 100, 100});
+    for (int job = 0; job < 4000; ++job) run({100, 20, 100, 100});
+    EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
+}
+
+TEST(PathRates, EachWayHasItsTurnInSmallJobs) {
+    // Two that are close to the best one, and behind them the fastest.
+    constexpr PathWay four[] = {PathWay::packets, PathWay::streams, PathWay::turns, PathWay::alone};
+    for (const std::size_t rays : {64u, 128u, 200u, 511u, 512u}) {
+        Rates rates;
+        for (int job = 0; job < 2000; ++job)
+            static_cast<void>(shares_of(rates, four, rays, {100, 103, 104, 50}));
+        EXPECT_EQ(rates.fastest(four), PathWay::alone) << rays << " rays";
     }
 }
 

@@ -26,7 +26,7 @@ struct WarpScene {
     const NodePair* pairs;
     const WoopTriangle* triangles;  // [references]
     const std::uint32_t* ids;       // [references], last_in_leaf set on the last of each leaf
-    WarpWideTree wide = {};         // of the kernel `cwbvh`
+    WarpWideTree wide = {};         // of kernels that read_wide_nodes
 };
 
 /// Values of Lane::node beside inner nodes (>= 0, the index of a pair) and leaves (< 0, the
