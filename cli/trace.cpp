@@ -367,14 +367,14 @@ void explain(const TraceCommand& options, const Bvh& bvh) {
 
 void explain_warps(const TraceCommand& options, const Bvh& bvh) {
     if (!options.explain || !options.common.prints_tables()) return;
-    const bool wide = reads_wide_nodes(warp_kernel_from_name(options.kernel));
-    const bool short_stack = options.kernel.ends_with("short_stack");
-    fmt::print("kernel {}: {} and woop48 triangles, warps of 32, {}, tree built on the cpu\n",
-               options.kernel,
-               wide ? "cwbvh nodes of 80 bytes, width 8," : "pair64 nodes, width 2,",
-               wide          ? std::string("stacks of two entries a level")
-               : short_stack ? std::string("stacks of four entries in registers")
-                             : fmt::format("stacks of {} entries", bvh.max_depth() + 1));
+    const WarpKernel kernel = warp_kernel_from_name(options.kernel);
+    const char* const nodes =
+        reads_wide_nodes(kernel) ? "cwbvh nodes of 80 bytes, width 8" : "pair64 nodes, width 2";
+    std::string stacks = fmt::format("stacks of {} entries", bvh.max_depth() + 1);
+    if (reads_wide_nodes(kernel)) stacks = "stacks of two entries a level";
+    if (has_short_stack(kernel)) stacks = "stacks of four entries in registers";
+    fmt::print("kernel {}: {}, woop48 triangles, warps of 32, {}, tree built on the cpu\n",
+               options.kernel, nodes, stacks);
 }
 
 /// What the options say about the device, before any work. The tree is built on the cpu.

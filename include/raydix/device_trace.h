@@ -63,8 +63,8 @@ struct DeviceTraceOptions {
 /// nothing. `scratch` is device memory of device_trace_scratch_bytes or more, aligned to 256 bytes.
 /// It is in use until the stream is past the launches. Throws InputError: sizes that differ,
 /// 2^31 - 1 rays or more, a number that is no kernel, memory that is too small or not aligned; a
-/// kernel that reads_wide_nodes and a tree without them, or with some deeper than 63; a kernel of a
-/// short stack and a tree deeper than 63. Throws BackendUnavailable, DeviceError.
+/// kernel that reads_wide_nodes and a tree without them, or with some deeper than 63; one that
+/// has_short_stack and a tree deeper than 63. Throws BackendUnavailable, DeviceError.
 void trace_warps_on_device(const DeviceWarpTree& tree, std::span<const Ray> rays,
                            std::span<TreeHit> hits, const DeviceTraceOptions& options,
                            std::span<std::byte> scratch, Stream stream);

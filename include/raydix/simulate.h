@@ -32,8 +32,8 @@ enum class WarpKernel : std::uint32_t {
     dynamic_fetch,
     cwbvh,             // while-while over nodes of eight children (Ylitie, Karras, Laine 2017)
     short_stack,       // while-while with a stack of four entries and a restart trail (Laine 2010)
-    persistent_cwbvh,  // the two before, by persistent warps
-    persistent_short_stack,
+    persistent_cwbvh,  // cwbvh by persistent warps
+    persistent_short_stack,  // short_stack by persistent warps
 };
 [[nodiscard]] std::span<const WarpKernel> warp_kernels();
 /// Those of Aila and Laine alone: what `all` means to the program.
@@ -41,6 +41,8 @@ enum class WarpKernel : std::uint32_t {
 [[nodiscard]] std::string_view warp_kernel_name(WarpKernel kernel);
 /// Whether it reads the wide nodes of a WarpTree, and not its pairs.
 [[nodiscard]] bool reads_wide_nodes(WarpKernel kernel);
+/// Whether it has a stack of four entries and a trail, which is for trees of up to 64 levels.
+[[nodiscard]] bool has_short_stack(WarpKernel kernel);
 /// Throws InputError that lists the known names.
 [[nodiscard]] WarpKernel warp_kernel_from_name(std::string_view name);
 
@@ -197,13 +199,13 @@ struct SimulatedRates {
 
 /// Simulates one launch of all rays for each of `runs`. rays [n] -> figures [runs] and, if `hits`
 /// is not null, hits [runs][n]: those that the kernel itself found. Invalid rays miss. The figures
-/// do not depend on the number of threads. Throws InputError: 2^31 - 1 rays or more; the kernel
-/// that reads_wide_nodes and a tree without them; one of a short stack and a tree deeper than 63; a
-/// width, kernel or part_of_launch out of range; a machine with a figure that is not positive,
-/// without a cost for an operation, with a cost above its own `most`, with resident_lanes that are
-/// no multiple of the width or fewer than block_lanes, with more than 2^24 lanes in flight; for the
-/// memory model lines out of range, more than 2^30 bytes of caches, or 4 GiB or more of tree, rays
-/// and hits.
+/// do not depend on the number of threads. Throws InputError: 2^31 - 1 rays or more; a kernel
+/// that reads_wide_nodes and a tree without them; one that has_short_stack and a tree deeper than
+/// 63; a width, kernel or part_of_launch out of range; a machine with a figure that is not
+/// positive, without a cost for an operation, with a cost above its own `most`, with resident_lanes
+/// that are no multiple of the width or fewer than block_lanes, with more than 2^24 lanes in
+/// flight; for the memory model lines out of range, more than 2^30 bytes of caches, or 4 GiB or
+/// more of tree, rays and hits.
 [[nodiscard]] std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays,
                                                std::span<const SimulateOptions> runs,
                                                std::vector<std::vector<TreeHit>>* hits = nullptr,

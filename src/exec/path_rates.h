@@ -60,7 +60,7 @@ public:
     }
 
     /// A ray took so many times as long by `way` as one beside it by `other`, which is the first to
-    /// be known or known already. Forgotten while another thread adds something.
+    /// be known or known already. It is lost if another thread adds something at the same time.
     void add(Way way, Way other, float ratio) {
         if (!(ratio > 0.0f) || adding_.test_and_set(std::memory_order_acquire)) return;
         if (!known(other)) set(other, 1.0f);
@@ -90,7 +90,7 @@ public:
 private:
     static constexpr std::size_t share_of_job = 8;
     static constexpr float most_at_once = 16.0f, near_cost = 1.2f, most_change = 4.0f;
-    static constexpr float least_cost = 0x1p-10f, infinite_cost = 0x1p100f;
+    static constexpr float least_cost = 0x1p-10f;
     static constexpr std::uint32_t least_pause = 8, longest_pause = 1024;
     static constexpr std::uint8_t often_tried = 4, most_trials = 8;  // that are told apart
     /// Of jobs that go another way as a whole: rays of one that is asked once should not suffer.
@@ -119,7 +119,7 @@ private:
     /// Who wins by chance is thought too fast, and the others are compared with that. So where ways
     /// are alike all costs sink.
     void keep_in_range() {
-        float least = infinite_cost;
+        float least = 1.0f;
         for (const auto& cost : costs_)
             if (const float one = cost.load(std::memory_order_relaxed); one > 0.0f)
                 least = std::min(least, one);

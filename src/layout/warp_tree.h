@@ -25,9 +25,7 @@ namespace raydix {
 inline constexpr std::uint32_t trail_levels = 64;
 
 inline void check_trail_levels(WarpKernel kernel, std::uint32_t max_depth) {
-    const bool has_trail =
-        kernel == WarpKernel::short_stack || kernel == WarpKernel::persistent_short_stack;
-    if (has_trail && max_depth >= trail_levels)
+    if (has_short_stack(kernel) && max_depth >= trail_levels)
         throw InputError("the tree is " + std::to_string(max_depth) + " deep; the kernel " +
                          std::string(warp_kernel_name(kernel)) + " has a trail for depths up to " +
                          std::to_string(trail_levels - 1));

@@ -154,6 +154,10 @@ bool reads_wide_nodes(WarpKernel kernel) {
     return kernel == WarpKernel::cwbvh || kernel == WarpKernel::persistent_cwbvh;
 }
 
+bool has_short_stack(WarpKernel kernel) {
+    return kernel == WarpKernel::short_stack || kernel == WarpKernel::persistent_short_stack;
+}
+
 WarpKernel warp_kernel_from_name(std::string_view name) {
     std::string known;
     for (const WarpKernel kernel : kernels) {
