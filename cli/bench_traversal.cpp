@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 #include <raydix/device.h>
 #include <raydix/error.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
@@ -19,6 +18,7 @@
 #include "simulation_state.h"
 #include "traversal_claims.h"
 #include "traversal_measured.h"
+#include "traversal_ranking.h"
 
 namespace raydix::cli {
 namespace {
@@ -110,11 +110,6 @@ void judge_published(Json& published, const std::vector<SimulationRow>& rows) {
         p["mrays_per_s_tightest"] = limit.mrays_per_s;
         p["tightest_limit"] = limit.name;
     }
-}
-
-/// In red where a terminal shows it.
-std::string warning(const std::string& text) {
-    return isatty(STDOUT_FILENO) ? "\x1b[31m" + text + "\x1b[0m" : text;
 }
 
 void print_published(const Json& published, const std::vector<SimulationRow>& rows) {
@@ -213,7 +208,7 @@ public:
         : options_(options), document_(new_document("bench traversal")) {
         if (!options.state_file.empty()) state_.emplace(options.state_file);
         for (const char* list : {"scenes", "builds", "machines", "simulate", "measured",
-                                 "published", "claims", "width_sweep"})
+                                 "published", "claims", "ranking", "width_sweep"})
             document_[list] = Json::array();
         require_different_names(options.scenes);
         if (on_device()) static_cast<void>(device_name());  // says what is missing, before any work
@@ -233,10 +228,12 @@ public:
     void run() {
         for (const std::string& scene : options_.scenes) about(scene, [&] { study(scene); });
         document_["claims"] = traversal_claims(rows_);
+        document_["ranking"] = traversal_ranking(rows_);
         judge_published(document_["published"], rows_);
         if (options_.common.prints_tables()) {
             print_published(document_["published"], rows_);
             print_claims(document_["claims"]);
+            print_ranking(document_["ranking"]);
             print_measured(document_["measured"]);
             if (!on_device())
                 fmt::print("\nmeasured: no GPU was used; every rate above is simulated\n");

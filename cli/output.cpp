@@ -222,6 +222,10 @@ std::string grouped(std::uint64_t n) {
     return fmt::format("{},{:03}", grouped(n / 1000), n % 1000);
 }
 
+std::string warning(const std::string& text) {
+    return isatty(STDOUT_FILENO) ? "\x1b[31m" + text + "\x1b[0m" : text;
+}
+
 std::string counted(std::uint64_t n, const char* one, const char* many) {
     return grouped(n) + " " + (n == 1 ? one : many);
 }

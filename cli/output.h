@@ -74,6 +74,8 @@ private:
 
 /// 12345678 -> "12,345,678".
 [[nodiscard]] std::string grouped(std::uint64_t n);
+/// For standard output, in red where a terminal shows it.
+[[nodiscard]] std::string warning(const std::string& text);
 /// "1 node", "2 nodes".
 [[nodiscard]] std::string counted(std::uint64_t n, const char* one, const char* many);
 

@@ -71,12 +71,12 @@ Interval cost_range(const SimulationRow& a, const SimulationRow& b) {
 }
 
 /// Relative standard error of the ratio of two rates whose rows traced the same units.
-std::optional<double> paired_error(const SimulationRow& a, const SimulationRow& b,
-                                   double SimulatedRates::*rate) {
+std::optional<double> paired_error(const SimulationRow& a, double SimulatedRates::*rate_a,
+                                   const SimulationRow& b, double SimulatedRates::*rate_b) {
     if (a.part_taken >= 1.0 && b.part_taken >= 1.0) return 0.0;
     if (a.units.size() < 2 || b.units.size() != a.units.size()) return std::nullopt;
-    std::vector<double> left = a.deviations(rate);
-    const std::vector<double> other = b.deviations(rate);
+    std::vector<double> left = a.deviations(rate_a);
+    const std::vector<double> other = b.deviations(rate_b);
     for (std::size_t k = 0; k < left.size(); ++k) left[k] -= other[k];
     return error_of_mean(left, a.part_taken);
 }
@@ -118,8 +118,12 @@ RatioFound slow_ratio(const SimulationRow& a, const SimulationRow& b) {
 }
 
 RatioFound rate_ratio(const SimulationRow& a, const SimulationRow& b, Figure figure) {
-    const auto rate =
-        figure == Figure::scheduled ? &SimulatedRates::scheduled : &SimulatedRates::bound;
+    const auto rate_of = [figure](const SimulationRow& row) {
+        return figure == Figure::tightest    ? row.tightest_rate()
+               : figure == Figure::scheduled ? &SimulatedRates::scheduled
+                                             : &SimulatedRates::bound;
+    };
+    const auto rate_a = rate_of(a), rate_b = rate_of(b);
     const SimulatedRates x = a.rates(), y = b.rates();
     const bool instructions = figure == Figure::instructions;
     RatioFound found;
@@ -128,8 +132,8 @@ RatioFound rate_ratio(const SimulationRow& a, const SimulationRow& b, Figure fig
             ? static_cast<double>(a.sum.instructions) / static_cast<double>(a.sum.rays) /
                   (static_cast<double>(b.sum.instructions) / static_cast<double>(b.sum.rays)) *
                   b.correction() / a.correction()
-            : x.*rate / (y.*rate);
-    const std::optional<double> error = paired_error(a, b, rate);
+            : x.*rate_a / (y.*rate_b);
+    const std::optional<double> error = paired_error(a, rate_a, b, rate_b);
     if (!error) {
         found.needs = "needs two parts of launches or more";
         return found;

@@ -13,7 +13,8 @@ struct Interval {
     double low, high;
 };
 
-enum class Figure { bound, scheduled, instructions, slowest_warps };
+/// `tightest`: of each row the lowest of its limits.
+enum class Figure { bound, scheduled, tightest, instructions, slowest_warps };
 
 struct RatioFound {
     std::optional<double> ratio;  // nothing if a figure is missing
@@ -24,7 +25,8 @@ struct RatioFound {
 /// `a` over `b`. The error is the product of two ranges. The first comes from costs: each operation
 /// of a machine takes any number of instructions between its cost and OperationCost::most. Forms of
 /// one kernel that differ by persistence only share that number; other kernels and machines have
-/// numbers of their own. A schedule moves at most as its instructions do. The second is two
+/// numbers of their own. A schedule moves at most as its instructions do; so does a memory limit,
+/// whose own clocks and rates are taken as they are. The second is two
 /// standard errors of the sample, of the differences between units that both rows traced. The
 /// slowest 0.1 % of warps also carry the width of their bins and, in a sample, two standard errors
 /// of their number.

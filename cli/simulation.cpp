@@ -96,14 +96,21 @@ Json operations_json(const SimulationRow& row) {
 
 }  // namespace
 
+double SimulatedRates::*SimulationRow::tightest_rate() const {
+    const SimulatedRates found = rates();
+    double SimulatedRates::*rate = &SimulatedRates::bound;
+    if (whole_launches && found.scheduled < found.*rate) rate = &SimulatedRates::scheduled;
+    if (has_memory() && found.memory < found.*rate) rate = &SimulatedRates::memory;
+    return rate;
+}
+
 SimulatedRates::Limit SimulationRow::tightest() const {
     const SimulatedRates found = rates();
-    SimulatedRates::Limit limit{"issue", found.bound};
-    if (whole_launches && found.scheduled < limit.mrays_per_s)
-        limit = {"scheduled", found.scheduled};
-    if (has_memory() && found.memory < limit.mrays_per_s)
-        limit = {found.memory_limit, found.memory};
-    return limit;
+    const auto rate = tightest_rate();
+    return {rate == &SimulatedRates::bound       ? "issue"
+            : rate == &SimulatedRates::scheduled ? "scheduled"
+                                                 : found.memory_limit,
+            found.*rate};
 }
 
 double LaunchTimes::correction(std::size_t n) const {

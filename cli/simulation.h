@@ -49,6 +49,8 @@ struct SimulationRow {
     [[nodiscard]] bool has_memory() const { return options.memory && whole_launches; }
     /// The lowest of bound, schedule and memory limits, as far as they are known.
     [[nodiscard]] SimulatedRates::Limit tightest() const;
+    /// Of bound, scheduled and memory the one that tightest() is.
+    [[nodiscard]] double SimulatedRates::*tightest_rate() const;
     /// [units] by how much a unit's time is off what is known of it beforehand, as a part of the
     /// mean time. `rate`: the bound or another one.
     [[nodiscard]] std::vector<double> deviations(double SimulatedRates::*rate) const;

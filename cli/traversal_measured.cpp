@@ -131,16 +131,25 @@ void print_measured(const Json& measured) {
     fmt::print("\nmeasured on {}\n{:<28} {:<36} {:<18} {:>9} {:>9} {:>9}\n",
                measured.front()["device"].get<std::string>(), "scene", "kernel", "rays", "Mrays/s",
                "simulated", "of it");
+    bool above = false;
     for (const Json& row : measured) {
+        const double rate = row["mrays_per_s"]["median"].get<double>();
         fmt::print("{:<28} {:<36} {:<18} {:>9.1f}", row["scene"].get<std::string>(),
-                   row["kernel"].get<std::string>(), row["rays"].get<std::string>(),
-                   row["mrays_per_s"]["median"].get<double>());
-        if (row["percent_of_simulated"].is_null())
+                   row["kernel"].get<std::string>(), row["rays"].get<std::string>(), rate);
+        if (row["percent_of_simulated"].is_null()) {
             fmt::print(" {:>9} {:>9}\n", "-", "-");
-        else
-            fmt::print(" {:>9.1f} {:>8.1f}%\n", row["mrays_per_s_limit"].get<double>(),
-                       row["percent_of_simulated"].get<double>());
+            continue;
+        }
+        const std::string part =
+            fmt::format(" {:>9.1f} {:>8.1f}%", row["mrays_per_s_limit"].get<double>(),
+                        row["percent_of_simulated"].get<double>());
+        const bool is_above = rate > row["mrays_per_s_bound"].get<double>();
+        fmt::print("{}\n", is_above ? warning(part + " above the bound") : part);
+        above = above || is_above;
     }
+    if (above)
+        fmt::print("{}\n", warning("above the bound: a cost or figure of the simulated machine is "
+                                   "wrong, or the device is another one"));
 }
 
 }  // namespace raydix::cli

@@ -368,6 +368,53 @@ class Traversal(ProgramTest):
         self.assertAlmostEqual(gain["low"], ends[0], 5)
         self.assertAlmostEqual(gain["high"], ends[1], 5)
 
+    def test_kernels_are_ranked_with_the_error_of_their_difference(self):
+        arguments = ("bench", "traversal", SCENE, *SMALL, "--machine", "gtx285,gtx480", "--rays", "primary,ao", "--memory",
+                     "--sweep-sample", "0")
+        document = self.document(*arguments)
+        rows = {(r["rays"], r["kernel"], r["machine"]): r for r in document["simulate"]}
+        most = {(m["name"], c.get("kernel"), c["operation"]): c.get("most", 0) for m in document["machines"] for c in m["costs"]}
+
+        def tightest(row):
+            limits = [row["mrays_per_s_bound"], row["mrays_per_s_scheduled"], row["mrays_per_s_memory"]]
+            return min(limit for limit in limits if limit)
+
+        def all_costs(row):
+            """Instructions with every cost at its most, over those that are charged."""
+            sums = [sum(o["issues_per_ray"] * cost(o) for o in row["operations"]) for cost in (
+                lambda o: max(o["cost"], most.get((row["machine"], row["kernel"], o["name"]), 0)), lambda o: o["cost"])]
+            return sums[0] / sums[1]
+
+        self.assertCountEqual([(r["machine"], r["rays"], len(r["kernels"])) for r in document["ranking"]],
+                              [(machine, rays, number) for rays in ("primary", "ao")
+                               for machine, number in (("gtx285", 11), ("gtx285_enum_popc", 2), ("gtx480", 11))])
+        level = 0
+        for ranked in document["ranking"]:
+            own = [rows[ranked["rays"], k["kernel"], ranked["machine"]] for k in ranked["kernels"]]
+            rates = [tightest(row) for row in own]
+            self.assertEqual(rates, sorted(rates, reverse=True))
+            self.assertEqual([k["behind"] for k in ranked["kernels"]][0], None)
+            first = ranked["kernels"][0]["kernel"]
+            for kernel, row, rate in list(zip(ranked["kernels"], own, rates))[1:]:
+                self.assertAlmostEqual(kernel["mrays_per_s"], rate)
+                self.assertAlmostEqual(kernel["first_over_it"], rates[0] / rate)
+                self.assertEqual(kernel["behind"], kernel["low"] > 1)
+                level += not kernel["behind"]
+                if kernel["kernel"].removeprefix("persistent_") == first.removeprefix("persistent_"):
+                    continue  # one kernel in two forms
+                self.assertAlmostEqual(kernel["low"], rates[0] / rate / all_costs(own[0]), 5)
+                self.assertAlmostEqual(kernel["high"], rates[0] / rate * all_costs(row), 5)
+        self.assertGreater(level, 0)
+        self.assertIn("not told from: ", self.succeed(*arguments).out)
+        # Of a part of the launches the error of the sample comes to that.
+        part = self.document("bench", "traversal", SCENE, "--size", "256x192", "--samples", "4", "--launch-rays", "8192", "--sample",
+                             "0.3", "--machine", "gtx480", "--rays", "ao", "--sweep-sample", "0")
+        rows = {(r["rays"], r["kernel"], r["machine"]): r for r in part["simulate"]}
+        ranked = next(r for r in part["ranking"] if (r["machine"], r["rays"]) == ("gtx480", "ao"))
+        first, last = ranked["kernels"][0], ranked["kernels"][-1]
+        self.assertGreater(rows["ao", first["kernel"], "gtx480"]["sampling_error"], 0)
+        self.assertLess(last["low"], last["first_over_it"] / all_costs(rows["ao", first["kernel"], "gtx480"]))
+
     def test_a_small_sample_needs_whole_launches(self):
         claims = self.document("bench", "traversal", SCENE, "--size", "256x192", "--samples", "4", "--sample", "0.1", "--rays",
                                "primary", "--machine", "gtx285", "--sweep-sample", "0", "--kernel",

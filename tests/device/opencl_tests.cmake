@@ -20,6 +20,12 @@ foreach(test opencl:device_opencl opencl_trace:device_gpu_trace)
     set_tests_properties(device.${name} PROPERTIES LABELS device TIMEOUT 900 SKIP_REGULAR_EXPRESSION "PASSED  . 0 tests"
         ENVIRONMENT "${raydix_opencl_environment}")
 endforeach()
+if(RAYDIX_CLI)
+    find_package(Python3 REQUIRED COMPONENTS Interpreter)
+    add_test(NAME device.measured COMMAND Python3::Interpreter ${CMAKE_CURRENT_SOURCE_DIR}/measured_test.py)
+    set_tests_properties(device.measured PROPERTIES LABELS device TIMEOUT 300 SKIP_REGULAR_EXPRESSION "skipped="
+        ENVIRONMENT "RAYDIX_PROGRAM=$<TARGET_FILE:raydix_cli>;${raydix_opencl_environment}")
+endif()
 # How a process ends that has left work on a device.
 add_executable(device_opencl_exit opencl_exit.cpp)
 target_link_libraries(device_opencl_exit PRIVATE raydix)

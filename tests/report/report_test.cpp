@@ -160,8 +160,14 @@ TEST(MakeReport, MadeUpSimulationsAreShownAndLabelled) {
 TEST(MakeReport, AMeasuredRateAboveItsBoundIsAnAlarm) {
     Json document = Json::parse(shared_document("traversal.json"));
     EXPECT_FALSE(holds(page_of({document}), "the model is wrong there"));
+    // Above what memory allows by the model, not above what it issues.
     document["measured"][0]["percent_of_simulated"] = 120.0;
+    document["measured"][0]["mrays_per_s_bound"] = 2778.0;
+    EXPECT_FALSE(holds(page_of({document}), "the model is wrong there"));
+    EXPECT_TRUE(holds(page_of({document}), "above the limit"));
+    document["measured"][0]["mrays_per_s_bound"] = 2776.0;
     EXPECT_TRUE(holds(page_of({document}), "the model is wrong there"));
+    EXPECT_TRUE(holds(page_of({document}), "above the bound"));
 }
 
 TEST(MakeReport, APublishedRateAboveItsBoundIsAnAlarm) {
@@ -227,6 +233,20 @@ TEST(MakeReport, TheBestBoundNamesItsError) {
     EXPECT_TRUE(holds(html, "within the error also"));
     document["simulate"][1]["mrays_per_s_bound"] = 80.0;
     EXPECT_FALSE(holds(page_of({document}), "within the error also"));
+}
+
+TEST(MakeReport, KernelsThatMayBeAsFastStandBesideTheFirst) {
+    Json document = Json::parse(shared_document("traversal.json"));
+    std::string html = page_of({document});
+    EXPECT_TRUE(holds(html, "Which kernel"));
+    EXPECT_TRUE(holds(html, "if_if 1.02 (0.97 to 1.07)"));
+    EXPECT_FALSE(holds(html, "packet 2.00"));
+    EXPECT_TRUE(holds(html, "none"));
+    document["ranking"][1]["kernels"][1].update(
+        {{"low", nullptr}, {"high", nullptr}, {"behind", nullptr}});
+    EXPECT_TRUE(holds(page_of({document}), "while_while 2.00 (error not known)"));
+    document.erase("ranking");
+    EXPECT_FALSE(holds(page_of({document}), "Which kernel"));
 }
 
 TEST(MakeReport, ClaimsSayWhatTheyWouldTake) {
