@@ -12,6 +12,7 @@
 
 #include "simt/op.h"
 #include "support/ray_sets.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 #include "trace/warp/prepare_rays.h"
@@ -127,6 +128,41 @@ TEST(Simulate, ADoubledCostMovesWhatUsesItOnly) {
             }
         }
     }
+}
+
+// With many warps in flight costs move who fetches which ray in the kernels that replace single
+// rays, and so how full their warps are, but by little. In all others a batch is traced alike by
+// whichever warp.
+TEST(Simulate, ADoubledCostMovesNothingElseWhereManyWarpsFetch) {
+    const Model scene = scene_of(random_soup(2000, 3, 0.1f), "soup");
+    const WarpTree tree(build_bvh(scene.mesh()), true);
+    const std::vector<Ray> rays = make_mixed_rays(scene, fewer(60000, 20), 3);
+    std::vector<SimulateOptions> runs;
+    for (const WarpKernel kernel : warp_kernels()) {
+        runs.push_back(options_for(kernel));
+        runs.back().machine.multiprocessors = 2;
+    }
+    const auto before = simulate(tree, rays, runs);
+    for (SimulateOptions& run : runs)
+        for (OperationCost& cost : run.machine.costs)
+            if (cost.operation == op_names[std::size_t(Op::visit_node)])
+                cost.instructions *= 2, cost.most = 0;
+    const auto after = simulate(tree, rays, runs);
+    bool moved = false;
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+        const WarpKernel kernel = runs[k].kernel;
+        const bool replaces = kernel == WarpKernel::ray_replacement ||
+                              kernel == WarpKernel::work_queue ||
+                              kernel == WarpKernel::dynamic_fetch;
+        for (std::size_t op = 0; op < op_count; ++op) {
+            const auto a = double(before[k].operations[op].issues),
+                       b = double(after[k].operations[op].issues);
+            EXPECT_NEAR(b, a, replaces ? 0.01 * a + 10 : 0.0)
+                << warp_kernel_name(kernel) << ", " << op_names[op];
+            moved |= a != b;
+        }
+    }
+    EXPECT_TRUE(moved);
 }
 
 TEST(Simulate, OneLaneHasFullEfficiencyAndWidthsAgree) {

@@ -295,5 +295,13 @@ TEST(WarpOracle, AgreesWithEveryKernelOnSibenik) {
         expect_hits_of_the_oracle(scene, builder, fewer(100000, 50));
 }
 
+TEST(WarpOracle, AgreesWithEveryKernelOnConference) {
+    const std::filesystem::path file = shared_scene("conference/conference.ply.xz");
+    if (!std::filesystem::exists(file)) GTEST_SKIP() << "needs the scene conference";
+    const Model scene = load_model(file.string());
+    for (const Builder builder : {Builder::split, Builder::sbvh})
+        expect_hits_of_the_oracle(scene, builder, fewer(20000, 20));
+}
+
 }  // namespace
 }  // namespace raydix::test
