@@ -1,12 +1,15 @@
 """raydix report: pages from real documents; what is refused. tests/report/page_test.py opens them in a browser."""
 import json
 import os
+import pathlib
 import re
+import shutil
 import sys
 
 sys.dont_write_bytecode = True
 from program import ProgramTest, main  # noqa: E402
 
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 FIGURE = "builtin:figure?triangles=5000"
 
 
@@ -34,6 +37,13 @@ class Report(ProgramTest):
         for name in results:
             self.assertIn(name, html)
         self.assertEqual(html, self.page(*results))
+
+    def test_the_page_of_sibenik_is_what_its_documents_give(self):
+        names = ("traversal-sibenik-gtx285.json", "traversal-sibenik-widths.json")
+        results = [shutil.copy(ROOT / "bench/results" / name, self.folder / name) for name in names]
+        self.succeed("report", *(pathlib.Path(result).name for result in results), "-o", "page.html", "--quiet")
+        self.assertTrue((self.folder / "page.html").read_bytes() == (ROOT / "docs/reports/al09-sibenik.html").read_bytes(),
+                        "docs/reports/al09-sibenik.html is older than the program or its documents: docs/al09.md says how it is made")
 
     def test_trees_that_are_compared(self):
         """Neither says that a tree is broken."""
