@@ -8,17 +8,16 @@
 namespace raydix::cli {
 namespace {
 
-/// Instructions per ray of each operation: those that are charged, and those beyond that it may
-/// take.
-struct IssueRange {
-    double charged = 0;
-    std::vector<double> beyond;  // in the order of the simulation's operations
+/// What an operation takes, in the order of the simulation's operations.
+struct OperationRange {
+    double issues;              // per ray
+    double instructions, most;  // of one issue: as charged, and as its derivation allows
+    [[nodiscard]] double beyond() const { return issues * (most - instructions); }
+};
 
-    [[nodiscard]] double most() const {
-        double sum = charged;
-        for (const double instructions : beyond) sum += instructions;
-        return sum;
-    }
+struct IssueRange {
+    double charged = 0;  // instructions per ray
+    std::vector<OperationRange> operations;
 };
 
 IssueRange issue_range(const SimulationRow& row) {
@@ -26,31 +25,38 @@ IssueRange issue_range(const SimulationRow& row) {
     const std::string_view kernel = warp_kernel_name(row.options.kernel);
     const auto rays = static_cast<double>(row.sum.rays);
     for (const OperationFigure& op : row.sum.operations) {
-        const double issues = static_cast<double>(op.issues) / rays;
-        range.charged += issues * op.instructions;
-        double beyond = 0;
+        OperationRange here{.issues = static_cast<double>(op.issues) / rays,
+                            .instructions = static_cast<double>(op.instructions),
+                            .most = static_cast<double>(op.instructions)};
         for (const OperationCost& cost : row.options.machine.costs)
             if (cost.operation == op.operation && (cost.kernel.empty() || cost.kernel == kernel) &&
                 cost.most > op.instructions)
-                beyond = issues * (cost.most - op.instructions);
-        range.beyond.push_back(beyond);
+                here.most = cost.most;
+        range.charged += here.issues * here.instructions;
+        range.operations.push_back(here);
     }
     return range;
 }
 
-/// The largest a / b if an operation is at the same end of its range in both: the ends that raise
-/// the ratio found so far, until none does.
-double largest_together(const IssueRange& a, const IssueRange& b) {
-    double ratio = a.charged / b.charged;
+/// The largest a / b. An operation that is `shared` is at the same end of its range in both: at the
+/// end that raises the ratio found so far, until none does.
+double largest_ratio(const IssueRange& a, const IssueRange& b, const std::vector<bool>& shared) {
+    double most = a.charged;
+    for (std::size_t k = 0; k < shared.size(); ++k)
+        if (!shared[k]) most += a.operations[k].beyond();
+    double ratio = most / b.charged;
     while (true) {
-        double above = a.charged, below = b.charged;
-        for (std::size_t k = 0; k < a.beyond.size(); ++k)
-            if (a.beyond[k] > ratio * b.beyond[k]) above += a.beyond[k], below += b.beyond[k];
+        double above = most, below = b.charged;
+        for (std::size_t k = 0; k < shared.size(); ++k) {
+            const double x = a.operations[k].beyond(), y = b.operations[k].beyond();
+            if (shared[k] && x > ratio * y) above += x, below += y;
+        }
         if (above / below <= ratio * (1 + 1e-12)) return ratio;
         ratio = above / below;
     }
 }
 
+/// Whether one is the persistent form of the other.
 bool same_steps(const SimulationRow& a, const SimulationRow& b) {
     constexpr std::string_view prefix = "persistent_";
     const auto body = [&](const SimulationRow& row) {
@@ -58,16 +64,21 @@ bool same_steps(const SimulationRow& a, const SimulationRow& b) {
         if (name.starts_with(prefix)) name.remove_prefix(prefix.size());
         return name;
     };
-    return a.options.machine.name == b.options.machine.name && body(a) == body(b);
+    return body(a) == body(b);
 }
 
 /// Instructions of `a` over those of `b`, both per ray, relative to what is charged.
 Interval cost_range(const SimulationRow& a, const SimulationRow& b) {
     const IssueRange x = issue_range(a), y = issue_range(b);
+    std::vector<bool> shared;
+    for (std::size_t k = 0; k < x.operations.size(); ++k) {
+        const OperationRange &p = x.operations[k], &q = y.operations[k];
+        shared.push_back(
+            a.options.machine.name == b.options.machine.name &&
+            (same_steps(a, b) || (p.instructions == q.instructions && p.most == q.most)));
+    }
     const double charged = x.charged / y.charged;
-    if (same_steps(a, b))
-        return {1.0 / (largest_together(y, x) * charged), largest_together(x, y) / charged};
-    return {x.charged / y.most() / charged, x.most() / y.charged / charged};
+    return {1.0 / (largest_ratio(y, x, shared) * charged), largest_ratio(x, y, shared) / charged};
 }
 
 /// Relative standard error of the ratio of two rates whose rows traced the same units.

@@ -23,13 +23,14 @@ struct RatioFound {
 };
 
 /// `a` over `b`. The error is the product of two ranges. The first comes from costs: each operation
-/// of a machine takes any number of instructions between its cost and OperationCost::most. Forms of
-/// one kernel that differ by persistence only share that number; other kernels and machines have
-/// numbers of their own. A schedule moves at most as its instructions do; so does a memory limit,
-/// whose own clocks and rates are taken as they are. The second is two
-/// standard errors of the sample, of the differences between units that both rows traced. The
-/// slowest 0.1 % of warps also carry the width of their bins and, in a sample, two standard errors
-/// of their number.
+/// of a machine takes any number of instructions between its cost and OperationCost::most. Kernels
+/// share that number where their costs and ranges of the operation are equal, since it is the same
+/// code there, and forms of one kernel that differ by persistence only share all; other kernels and
+/// machines have numbers of their own. A schedule moves at most as its instructions do; so does a
+/// memory limit, whose own clocks and rates are taken as they are. The second is two standard
+/// errors of the sample, of the differences between units that both rows traced. The slowest 0.1 %
+/// of warps also carry the width of their bins and, in a sample, two standard errors of their
+/// number.
 [[nodiscard]] RatioFound ratio_of(const SimulationRow& a, const SimulationRow& b, Figure figure);
 
 }  // namespace raydix::cli

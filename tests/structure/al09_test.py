@@ -81,11 +81,26 @@ class Al09(unittest.TestCase):
         def row(kernel, error):
             return {"machine": "m", "kernel": kernel, "sampling_error": error, "operations": [{"name": "turn", "issues_per_ray": 2, "cost": 10}]}
         made_up = plots.Results([{"simulate": [], "claims": [], "published": [], "machines": [
-            {"name": "m", "costs": [{"kernel": "first", "operation": "turn", "most": 11}]}]}])
-        # Costs leave the first kernel 10 % slower; samples leave 2 * hypot(0.03, 0.04) = 10 %.
-        for kernel, errors, limit, behind in (("other", (0, 0), 90, True), ("other", (0, 0), 91, False), ("persistent_first", (0, 0), 99, True),
+            {"name": "m", "costs": [{"kernel": kernel, "operation": "turn", "most": most}
+                                    for kernel, most in (("first", 11), ("persistent_first", 12), ("twin", 11))]}]}])
+        # Costs leave the first kernel 10 % slower, but where they are in common; samples leave 2 * hypot(0.03, 0.04) = 10 %.
+        for kernel, errors, limit, behind in (("other", (0, 0), 90, True), ("other", (0, 0), 91, False), ("twin", (0, 0), 99, True), ("persistent_first", (0, 0), 99, True),
                                               ("persistent_first", (0.03, 0.04), 91, False), ("persistent_first", (0.03, 0.04), 90, True)):
             self.assertEqual(made_up.is_behind(row(kernel, errors[0]), limit, row("first", errors[1]), 100), behind)
+
+    def test_derived_ranges_are_those_of_the_claims(self):
+        """What the program says of claims by issue on all primary rays, which have no error but that of costs."""
+        found = 0
+        for (scene, _, about), claim in results.claims.items():
+            match = re.fullmatch(r"(\S+) against (\S+), primary rays, issue bound", about)
+            if match is None:
+                continue
+            first, second = (min(results.rows[scene, "gtx285", kernel, "primary"], key=plots.error_of) for kernel in match.groups())
+            low, high = results.cost_range(second, first)
+            self.assertAlmostEqual(claim["low"], low * claim["ratio"], 6)
+            self.assertAlmostEqual(claim["high"], high * claim["ratio"], 6)
+            found += 1
+        self.assertGreaterEqual(found, 14)
 
     def test_verdicts_follow_the_rule(self):
         self.assertGreater(len(results.claims), 40)
