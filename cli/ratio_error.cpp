@@ -128,6 +128,14 @@ RatioFound slow_ratio(const SimulationRow& a, const SimulationRow& b) {
     return {x.middle / y.middle, {x.low / y.high * costs.low, x.high / y.low * costs.high}, {}};
 }
 
+/// Whether its launches have a ray for every lane that the machine holds: else what a schedule
+/// takes says more of the launch than of the kernel.
+bool fills_machine(const SimulationRow& row) {
+    const MachineModel& machine = row.options.machine;
+    return row.sum.rays >=
+           row.sum.launches * std::uint64_t{machine.multiprocessors} * machine.resident_lanes;
+}
+
 RatioFound rate_ratio(const SimulationRow& a, const SimulationRow& b, Figure figure) {
     const auto rate_of = [figure](const SimulationRow& row) {
         return figure == Figure::tightest    ? row.tightest_rate()
@@ -144,6 +152,10 @@ RatioFound rate_ratio(const SimulationRow& a, const SimulationRow& b, Figure fig
                   (static_cast<double>(b.sum.instructions) / static_cast<double>(b.sum.rays)) *
                   b.correction() / a.correction()
             : x.*rate_a / (y.*rate_b);
+    if (figure == Figure::scheduled && !(fills_machine(a) && fills_machine(b))) {
+        found.needs = "needs launches that fill the machine";
+        return found;
+    }
     const std::optional<double> error = paired_error(a, rate_a, b, rate_b);
     if (!error) {
         found.needs = "needs two parts of launches or more";

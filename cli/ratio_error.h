@@ -19,7 +19,7 @@ enum class Figure { bound, scheduled, tightest, instructions, slowest_warps };
 struct RatioFound {
     std::optional<double> ratio;  // nothing if a figure is missing
     Interval error{};             // the ratio with all of its error
-    std::string needs;            // what is missing for a ratio, or for its error
+    std::string needs;            // what is missing for a ratio, or for its error or meaning
 };
 
 /// `a` over `b`. The error is the product of two ranges. The first comes from costs: each operation

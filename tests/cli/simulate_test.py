@@ -329,7 +329,8 @@ class Traversal(ProgramTest):
         self.assertEqual([row["width"] for row in document["width_sweep"]], [1, 2, 4, 8, 16, 32])
 
     def test_claims_are_intervals_against_intervals(self):
-        arguments = ("bench", "traversal", SCENE, *SMALL, "--machine", "gtx285", "--sweep-sample", "0")
+        one = self.write("one.json", '{"base": "gtx285", "name": "gtx285", "multiprocessors": 1}')  # which small launches fill
+        arguments = ("bench", "traversal", SCENE, "--size", "64x48", "--samples", "4", "--machine", one, "--sweep-sample", "0")
         claims = self.document(*arguments)["claims"]
         for claim in claims:
             self.assertTrue(0 < claim["low"] <= claim["ratio"] <= claim["high"], claim)
@@ -349,6 +350,7 @@ class Traversal(ProgramTest):
         arguments = ("bench", "traversal", SCENE, *SMALL, "--sweep-sample", "0", "--rays", "diffuse", "--kernel",
                      "persistent_packet,persistent_while_while,packet")
         machine = self.document(*arguments, "--machine", "gtx285")["machines"][0]
+        machine["multiprocessors"] = 1  # which small launches fill
         for cost in machine["costs"]:
             cost.pop("most", None)
             if cost["operation"] == "visit_node":
@@ -430,6 +432,17 @@ class Traversal(ProgramTest):
         self.assertGreater(rows["ao", first["kernel"], "gtx480"]["sampling_error"], 0)
         ends = cost_range(*(rows["ao", kernel["kernel"], "gtx480"] for kernel in (first, last)))
         self.assertLess(last["low"], last["first_over_it"] * ends[0])
+
+    def test_small_launches_do_not_judge_schedules(self):
+        claims = self.document("bench", "traversal", SCENE, *SMALL, "--machine", "gtx285", "--sweep-sample", "0", "--kernel",
+                               "packet,persistent_packet,while_while,persistent_while_while")["claims"]
+        scheduled = [c for c in claims if ", scheduled" in c["found"]]
+        self.assertGreaterEqual(len(scheduled), 6)
+        for claim in claims:
+            needs = claim["verdict"] == "needs launches that fill the machine"
+            self.assertEqual(needs, claim in scheduled)
+            self.assertEqual((claim["low"], claim["holds"]) == (None, None), needs)
+            self.assertGreater(claim["ratio"], 0)
 
     def test_a_small_sample_needs_whole_launches(self):
         claims = self.document("bench", "traversal", SCENE, "--size", "256x192", "--samples", "4", "--sample", "0.1", "--rays",
