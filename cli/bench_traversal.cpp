@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 
+#include "option_checks.h"
 #include "output.h"
 #include "published.h"
 #include "ray_launches.h"
@@ -380,9 +381,11 @@ void add_traversal_suite(CLI::App& bench) {
                          "packet and while_while trace all launches first, for a correction")
             ->check(finite_number(false))
             ->check(CLI::Range(0.0, 1.0));
-    command->add_option("--state", options->state_file,
-                        "Keeps what has been counted in this file after each launch, and goes on "
-                        "with what it holds");
+    command
+        ->add_option("--state", options->state_file,
+                     "Keeps what has been counted in this file after each launch, and goes on "
+                     "with what it holds")
+        ->check(file_name());
     add_launch_options(*command, options->launches);
     error->excludes(command->get_option("--sample"));  // of the rest nothing would be known
     options->tree.builder = "split";

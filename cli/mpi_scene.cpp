@@ -208,7 +208,8 @@ void add_mpi_trace(CLI::App& app) {
     CLI::App* command = app.add_subcommand("trace", "Rays through a scene spread over ranks");
     auto options = std::make_shared<TraceCommand>();
     add_mpi_options(*command, *options);
-    command->add_option("--rays", options->rays_file, "Rays from an (N, 8) .npy file");
+    command->add_option("--rays", options->rays_file, "Rays from an (N, 8) .npy file")
+        ->check(file_name());
     command->add_option("--camera", options->camera, "Camera of the rays")
         ->transform(whole_number(0))
         ->capture_default_str();

@@ -37,6 +37,14 @@ void refuse_given(const CLI::App& command, std::initializer_list<const char*> na
         if (is_given(command, name)) throw CLI::ValidationError(name, why);
 }
 
+CLI::Validator file_name() {
+    return CLI::Validator(
+        [](const std::string& name) {
+            return std::string(name.empty() ? "the name of the file is empty" : "");
+        },
+        "");
+}
+
 void require_writable(const std::string& file) {
     if (file.empty()) return;
     struct stat is;

@@ -22,6 +22,10 @@ void refuse_given(const CLI::App& command, std::initializer_list<const char*> na
                   const std::string& why);
 [[nodiscard]] bool is_given(const CLI::App& command, const char* name);
 
+/// For add_option(...)->check: a name that is not empty, as that of a shell's variable without a
+/// value is.
+[[nodiscard]] CLI::Validator file_name();
+
 /// Before the work of which `file` takes the result, as far as can be told then. Not given: nothing
 /// to check. Throws InputError as writing would, and a usage error that names the option if the
 /// name is empty.

@@ -47,6 +47,7 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
     command
         .add_option("--json", options.json_file,
                     "Write one JSON document to FILE ('-': standard output)")
+        ->check(file_name())
         ->type_name("FILE");
     command
         .add_option("--threads", options.threads,
@@ -143,6 +144,7 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
     command
         .add_option("--cameras", options.cameras_file,
                     "Cameras file instead of cameras.json beside the scene")
+        ->check(file_name())
         ->type_name("FILE")
         ->group(group);
     for (const char* name : {"--builder", "--quality", "--reinsertion-rounds", "--fit",

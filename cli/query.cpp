@@ -76,6 +76,7 @@ void add_mesh_options(CLI::App& command, QueryCommand& options) {
     command
         .add_option("--with", options.with_scene,
                     "--pairs: between the scene and this one instead of within it")
+        ->check(file_name())
         ->type_name("SCENE2");
     std::vector<std::string> builders;
     for (std::uint32_t i = 0; i <= static_cast<std::uint32_t>(Builder::sbvh); ++i)
@@ -135,6 +136,7 @@ void add_query_command(CLI::App& app) {
         ->add_option("--queries", options->queries_file,
                      "A (Q, 3) .npy file or any scene with points; for --box a (Q, 6) .npy file of "
                      "lo and hi (default: the scene's own points)")
+        ->check(file_name())
         ->type_name("FILE");
     command
         ->add_option("--out", options->prefix,

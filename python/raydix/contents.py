@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from typing import Any, overload
 
 import numpy as np
@@ -129,6 +130,8 @@ class SceneContents:
     _options: dict[str, Any]
     _placed: dict[int, Any]  # the scene of each instance that was added here
     _attributes: dict[int, dict[str, np.ndarray]]
+    _keep_surface: Callable[[], None]
+    _changing: Callable[[int], AbstractContextManager[None]]
 
     def _forget(self) -> None: ...
 
@@ -263,12 +266,15 @@ class SceneContents:
         """
         corners = mesh_vertices(vertices, dtype=self.dtype)
         triangles = None if faces is None else mesh_faces(faces, len(corners))
-        self._core.update(whole(id, "id", 0, ALL), corners, triangles)
+        which = whole(id, "id", 0, ALL)
+        with self._changing(which):
+            self._core.update(which, corners, triangles)
 
     def remove(self, id: int) -> None:
         """Takes a geometry out, from the next `commit` on. Its id is not given again."""
         which = whole(id, "id", 0, ALL)
-        self._core.remove(which)
+        with self._changing(which):
+            self._core.remove(which)
         for kept in (self._placed, self._attributes):
             kept.pop(which, None)
 
@@ -355,6 +361,7 @@ class SceneContents:
             progress,
         )
         self._forget()
+        self._keep_surface()
         self._options.update(self._core.commit_options())
         return report
 

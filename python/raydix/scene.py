@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -158,6 +159,8 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         self.device = device
         self._attributes: dict[int, dict[str, np.ndarray]] = {}
         self._placed: dict[int, Any] = {}
+        self._surfaces: weakref.WeakSet = weakref.WeakSet()
+        self._keep_surface()
         self._file: tuple[Any, int, int, int] | None = None
         self._options: dict[str, Any] = {
             "quality": quality,

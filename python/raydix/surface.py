@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import weakref
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -43,6 +45,17 @@ def _columns_of(hits: Any) -> list[np.ndarray]:
     return columns
 
 
+class Surface:
+    """What of a scene's commit has changed since then, and what its instances showed. All else is
+    as it stands in the scene now."""
+
+    def __init__(self, placed: Mapping[int, Any]) -> None:
+        # By id: attributes and mesh, or None; the scene of an instance, or None.
+        self.meshes: dict[int, Any] = {}
+        self.placed: dict[int, Any] = {}
+        self.children = {scene: scene._surface for scene in set(placed.values())}
+
+
 class SurfaceOfHits:
     """What a Scene knows about hits."""
 
@@ -51,6 +64,31 @@ class SurfaceOfHits:
     threads: int
     _attributes: dict[int, dict[str, np.ndarray]]
     _placed: dict[int, Any]
+    _surface: Surface  # of the last commit
+    _surfaces: weakref.WeakSet  # and of those before that another scene still shows
+
+    def _keep_surface(self) -> None:
+        """After each commit."""
+        self._surface = Surface(self._placed)
+        self._surfaces.add(self._surface)
+
+    @contextmanager
+    def _changing(self, id: int) -> Iterator[None]:
+        """Around what gives a geometry another mesh, or takes it out."""
+        knowing = [surface for surface in self._surfaces if id not in surface.meshes]
+        for surface in knowing:
+            surface.meshes[id] = self._mesh_now(id)
+            surface.placed[id] = self._placed.get(id)
+        try:
+            yield
+        except BaseException:
+            for surface in knowing:
+                del surface.meshes[id], surface.placed[id]
+            raise
+
+    def _mesh_now(self, id: int) -> tuple[dict[str, np.ndarray], Any] | None:
+        own = self._attributes.get(id)
+        return (dict(own), self._core.arrays_of(id)) if own else None
 
     def positions(
         self,
@@ -132,8 +170,8 @@ class SurfaceOfHits:
     def interpolate(self, hits: Mapping[str, Any], name: str) -> np.ndarray:
         """A vertex attribute at hits: (1-u-v) of the first corner + u of the second + v of the
         third, in the scene's type, shape (...,) or (..., C). NaN for misses and for geometries
-        without it. Through instances too: those of the scenes that stand in this one, as they are
-        now. ValueError: no geometry that was hit has it, or they have other numbers of columns."""
+        without it. Through instances too. `hits` are of this scene as it is committed now: values are
+        those that vertices have now, but for meshes that have changed since. ValueError: no geometry that was hit has it, or they have other numbers of columns."""
         columns = _columns_of(hits)
         lead = columns[0].shape
         prim, geometry, instance, u, v = (column.reshape(-1) for column in columns)
@@ -160,7 +198,7 @@ class SurfaceOfHits:
             if prim[rays].max() >= len(faces):
                 raise InputError(
                     f"{name}: triangle {prim[rays].max()} was hit, and its mesh has {len(faces)} "
-                    "now"
+                    "by the last commit"
                 )
             corners = values[faces[prim[rays]]]  # (n, 3, ...)
             weights = np.stack([1 - u[rays] - v[rays], u[rays], v[rays]], axis=1)
@@ -177,14 +215,16 @@ class SurfaceOfHits:
     def _mesh_with(self, name: str, path: int, id: int) -> tuple[np.ndarray, np.ndarray] | None:
         """An attribute's array and the triangles of a geometry that was hit."""
         scene: Any = self
+        surface = self._surface
         for step in self._core.path(path):
-            if scene is None or step not in scene._placed:
+            scene = surface.placed.get(step, scene._placed.get(step))
+            if scene not in surface.children:
                 return None
-            scene = scene._placed[step]
-        values = scene._attributes.get(id, {}).get(name)
-        mesh = None if values is None else scene._core.arrays_of(id)
-        if values is None or mesh is None:
+            surface = surface.children[scene]
+        found = surface.meshes[id] if id in surface.meshes else scene._mesh_now(id)
+        if found is None or name not in found[0] or found[1] is None:
             return None
+        values, mesh = found[0][name], found[1]
         if len(values) != len(mesh[0]):
             raise ValueError(
                 f"{name}: geometry {id} had {len(values)} vertices when it was given, "

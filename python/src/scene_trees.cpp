@@ -158,26 +158,34 @@ std::vector<std::uint32_t> BasicSceneTrees<Names>::add(std::shared_ptr<BasicScen
                                                        std::span<const std::uint32_t> masks,
                                                        std::optional<std::uint32_t> id) {
     if (masks.size() != 1) require_one_each("masks", masks.size(), transforms.size());
+    if (transforms.size() > 1) check_transforms(transforms);
     const Writing lock("add", locks_);
     settle();
     const std::lock_guard all(structure());
+    // What else may be wrong is wrong with the first one.
     std::vector<std::uint32_t> ids;
-    try {
-        for (std::size_t i = 0; i < transforms.size(); ++i) {
-            const std::uint32_t mask = masks[masks.size() == 1 ? 0 : i];
-            ids.push_back(scene_.add(scene->scene_, transforms[i], {mask, id}));
-            geometries_[ids.back()] = {.is_instance = true, .mask = mask, .scene = scene};
-            ++ids_given_;
-            id.reset();
-        }
-    } catch (...) {
-        for (const std::uint32_t added : ids) {
-            scene_.remove(added);
-            geometries_.erase(added);
-        }
-        throw;
+    for (std::size_t i = 0; i < transforms.size(); ++i) {
+        const std::uint32_t mask = masks[masks.size() == 1 ? 0 : i];
+        ids.push_back(scene_.add(scene->scene_, transforms[i], {mask, id}));
+        geometries_[ids.back()] = {.is_instance = true, .mask = mask, .scene = scene};
+        ++ids_given_;
+        id.reset();
     }
     return ids;
+}
+
+/// Throws what Scene::add would of one of them, and says of which.
+template <class Names>
+void BasicSceneTrees<Names>::check_transforms(std::span<const Transform> transforms) {
+    Scene tried;
+    const Scene nothing;
+    const std::uint32_t id = tried.add(nothing, Transform{});
+    for (std::size_t i = 0; i < transforms.size(); ++i) try {
+            tried.set_transform(id, transforms[i]);
+        } catch (const InputError&) {
+            throw InputError("transform, row " + std::to_string(i) +
+                             ": it is singular or not finite, so rays cannot go through it");
+        }
 }
 
 template <class Names>

@@ -263,6 +263,7 @@ private:
 
     void check_strict(const std::string& name, const typename Names::MeshView& mesh) const;
     void check_places(std::span<const std::uint32_t> ids, std::span<const Transform> transforms);
+    static void check_transforms(std::span<const Transform> transforms);
     Geometry& at(std::uint32_t id);
     /// Of a mesh: its arrays, copied if they are still those of a file.
     const Arrays& arrays_of(std::uint32_t id, Geometry& geometry);

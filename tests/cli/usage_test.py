@@ -89,6 +89,13 @@ class Usage(ProgramTest):
         self.assertIsNotNone(self.document("build", "--epo", "0.5", SMALL)["build"]["epo"])
         self.fail_with_usage("render", SMALL, "-o", "x.png", "--eye", "1", "2", names=["--eye", "3 required"])
 
+    def test_names_of_files_that_are_empty(self):
+        """As a shell gives a variable that has no value."""
+        for arguments, option in ((("info", "tri.ply"), "--json"), (("trace", "tri.ply"), "--cameras"), (("query", "tri.ply", "--pairs"), "--with"),
+                                  (("query", "tri.ply", "--knn", "1"), "--queries"), (("bench", "traversal", "tri.ply"), "--state")):
+            with self.subTest(option=option):
+                self.fail_with_usage(*arguments, option, "", names=[option, "the name of the file is empty"])
+
     def test_whole_numbers(self):
         for command, option, most in (("build", "--seed", 2**64 - 1), ("trace", "--max-result-bytes", 2**64 - 1),
                                       ("build", "--repeat", 10000), ("build", "--threads", 1024), ("build", "--max-leaf", 255)):

@@ -1,6 +1,7 @@
 """Hits: keys and attributes, what else they can have, and how they behave as a dict."""
 
 import copy
+import gc
 import pickle
 
 import numpy as np
@@ -124,6 +125,64 @@ def test_vertex_attributes(precision):
     assert np.isnan(scene.interpolate(hits, "place")[0]).all()
 
 
+@precisions
+def test_attributes_are_those_of_the_commit_that_was_hit(precision):
+    """Corners in another order, other vertices, a mesh that is gone: hits are of the old ones until
+    the next commit, and so in scenes that show the commit before."""
+    corners, heights = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [0.0, 10.0, 20.0]
+    ray = [0.5, 0.25, -1, 0, 0, 1]  # u = 0.5, v = 0.25
+
+    def at(scene):
+        return scene.intersect(ray, also="height").height
+
+    leaf = raydix.Scene(corners, [[0, 1, 2]], precision=precision)
+    outer, top = (raydix.Scene(precision=precision) for _ in range(2))
+    outer.add(leaf, np.eye(4))
+    outer.commit()
+    top.add(outer, np.eye(4))
+    top.commit()
+    leaf.set_attributes(0, height=heights)
+    scenes = (leaf, outer, top)
+    assert [at(scene) for scene in scenes] == [10, 10, 10]
+    leaf.update(0, corners, [[2, 0, 1]])
+    assert [at(scene) for scene in scenes] == [10, 10, 10]
+    leaf.set_attributes(0, height=[0.0, 20.0, 40.0])  # of the vertices to come
+    assert [at(scene) for scene in scenes] == [10, 10, 10]
+    leaf.commit()
+    assert [at(scene) for scene in scenes] == [20, 10, 10]
+    leaf.update(0, corners + [[9, 9, 9]], [[1, 2, 0]])
+    leaf.set_attributes(0, height=[1.0, 1.0, 1.0, 1.0])
+    leaf.commit()
+    assert [at(scene) for scene in scenes] == [1, 10, 10]
+    outer.commit()
+    assert [at(scene) for scene in scenes] == [1, 1, 10]
+    outer.remove(0)
+    assert [at(scene) for scene in scenes] == [1, 1, 10]
+    top.commit()
+    assert [at(scene) for scene in scenes] == [1, 1, 1]
+    leaf.remove(0)
+    assert [at(scene) for scene in scenes] == [1, 1, 1]
+    # A change that is refused changes nothing, and values of vertices that stay show at once.
+    mesh = raydix.Scene(corners, [[0, 1, 2]], precision=precision, strict=True)
+    mesh.set_attributes(0, height=heights)
+    with pytest.raises(raydix.InputError):
+        mesh.update(0, np.full((3, 3), np.nan))
+    mesh.set_attributes(0, height=[0.0, 0.0, 40.0])
+    assert at(mesh) == 10
+    mesh.refit(np.add(corners, [0, 0, 1]))
+    assert at(mesh) == 10
+
+
+def test_surfaces_that_nothing_shows_are_not_kept():
+    scene = raydix.Scene(*BOX)
+    scene.set_attributes(0, height=BOX[0][:, 2])
+    for _ in range(5):
+        scene.update(0, BOX[0])
+        scene.commit()
+    gc.collect()
+    assert len(scene._surfaces) == 1
+
+
 def test_attributes_that_are_wrong(tmp_path):
     scene = raydix.Scene(*BOX)
     scene.add_spheres([[0, 0, 9]], 1)
@@ -155,6 +214,10 @@ def test_hits_of_triangles_that_are_gone():
     scene = raydix.Scene(*BOX)
     scene.set_attributes(0, uv=BOX[0])
     hits = scene.intersect(np.array([[0, 0, 9, 0, 0, 0, -1, np.inf]], np.float32))
+    values = scene.interpolate(hits, "uv")
     scene.update(0, BOX[0], BOX[1][:1])
-    with pytest.raises(raydix.InputError, match="uv: triangle .* was hit, and its mesh has 1 now"):
+    np.testing.assert_array_equal(scene.interpolate(hits, "uv"), values)
+    scene.commit()
+    gone = "uv: triangle .* was hit, and its mesh has 1 by the last commit"
+    with pytest.raises(raydix.InputError, match=gone):
         scene.interpolate(hits, "uv")

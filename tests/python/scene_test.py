@@ -332,7 +332,12 @@ def test_many_places_at_once(rng, precision):
     for call in (lambda: whole.set_transform(ids, flat), lambda: whole.add(leaf, flat)):
         with pytest.raises(raydix.InputError, match="singular or not finite"):
             call()
+        assert whole.committed
+    with pytest.raises(raydix.InputError, match="transform, row 7: "):
+        whole.add(leaf, flat)
     assert len(whole) == 20
+    assert whole.add(leaf, places[0]) == 20  # no number was given
+    whole.remove(20)
     whole.commit()
     same_hits(whole.intersect(rays), wanted)  # none of them has moved
     whole.set_transform(ids[:0], flat[:0])
