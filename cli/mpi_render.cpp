@@ -152,8 +152,7 @@ void run_render(const MpiRenderCommand& command) {
             require_verified(same_picture(alone, rendered.picture), "pixels",
                              command.common.prints_tables());
         }
-        save_picture(command.picture.out_file, rendered.picture,
-                     options.view == View::shaded || options.view == View::diffuse);
+        save_picture(command.picture.out_file, rendered.picture, is_tone_mapped(options.view));
         const char* held = command.is_distributed ? "distributed" : "replicated";
         if (command.common.prints_tables())
             fmt::print("{} ({} x {}, {}, {} ranks, scene {}, {:.0f} ms)\n",
@@ -181,8 +180,9 @@ void add_mpi_render(CLI::App& app) {
         "render", "Render a view of a scene: the bytes of raydix render, by all ranks");
     auto options = std::make_shared<MpiRenderCommand>();
     add_mpi_options(*command, *options);
-    add_picture_options(*command, options->picture,
-                        {"shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps"});
+    add_picture_options(
+        *command, options->picture,
+        {"shaded", "ao", "diffuse", "path", "normal", "depth", "primitive", "steps"});
     command->add_flag("--distributed", options->is_distributed,
                       "Spread the scene over the ranks. Without it each rank reads and holds all");
     command->callback([options, command] {

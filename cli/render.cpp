@@ -76,8 +76,7 @@ void run_render(RenderCommand options) {
     const double ms =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     const View view = render_options.view;
-    save_picture(options.out_file, picture,
-                 !of_tree && (view == View::shaded || view == View::diffuse));
+    save_picture(options.out_file, picture, !of_tree && is_tone_mapped(view));
     if (of_tree && options.common.prints_tables()) print_levels(tree_scene);
     if (options.common.prints_tables())
         fmt::print("{} ({} x {}, {}, {:.0f} ms)\n", options.out_file, size.width, size.height,
@@ -99,9 +98,9 @@ void add_render_command(CLI::App& app) {
     command
         ->add_option("SCENE", options->scene, "A file, builtin:NAME?key=value&..., or a .rdx file")
         ->required();
-    add_picture_options(
-        *command, *options,
-        {"shaded", "ao", "diffuse", "normal", "depth", "primitive", "steps", "tree", "slice"});
+    add_picture_options(*command, *options,
+                        {"shaded", "ao", "diffuse", "path", "normal", "depth", "primitive", "steps",
+                         "tree", "slice"});
     add_tree_view_options(*command, options->tree_view);
     add_tree_options(*command, options->tree);
     add_flatten_option(*command, options->common);

@@ -223,6 +223,8 @@ FAULTS = [
     Fault("src/image/surface_points.cpp", "const Double3 place = (Double3(ray.origin) - space_.middle) + direction * t;",
           "const Double3 place = Double3(ray.origin) + direction * t;",
           "secondary rays in double: points are rounded far from the origin", "image"),
+    Fault("src/image/render_light.cpp", "part = tinted(part, surface_grey);", "",
+          "paths lose no light at a surface", "image"),
     Fault("src/io/rdx_sections.cpp", "if (section.count > room / section.element_bytes)",
           "if (section.count * section.element_bytes > room)",
           ".rdx: a number of elements that wraps around is believed", "io"),

@@ -21,8 +21,8 @@ struct Picture {
     std::vector<Vec3> pixels;
 };
 
-/// What a picture shows. A pixel whose ray hits nothing has the sky in `shaded` and `diffuse`,
-/// white in `ao`, and black in `normal`, `depth` and `primitive`.
+/// What a picture shows. A pixel whose ray hits nothing has the sky in `shaded`, `diffuse` and
+/// `path`, white in `ao`, and black in `normal`, `depth` and `primitive`.
 /// - `shaded`: grey surfaces under sky and sun with shadows; in closed rooms under a lamp at the
 ///   camera.
 /// - `normal`: (n + 1) / 2 of the geometric normal, turned to the viewer.
@@ -32,8 +32,12 @@ struct Picture {
 /// - `diffuse`: as `shaded`, with one bounce of light in place of the even sky.
 /// - `steps`: the number of nodes that a ray visits, as a heat map. For a scene: of a ray that goes
 ///   alone, which may differ between instruction sets. For a tree: of that tree.
-enum class View : std::uint32_t { shaded, normal, depth, primitive, ao, diffuse, steps };
+/// - `path`: path traced, as `diffuse` with up to eight bounces of light.
+enum class View : std::uint32_t { shaded, normal, depth, primitive, ao, diffuse, steps, path };
 [[nodiscard]] std::string_view view_name(View view);
+/// Whether its colours are light, which a file with 8 bits shows after a tone curve: `shaded`,
+/// `diffuse` and `path`.
+[[nodiscard]] bool is_tone_mapped(View view);
 /// Throws InputError that lists the known names.
 [[nodiscard]] View view_from_name(std::string_view name);
 
@@ -41,8 +45,8 @@ struct RenderOptions {
     View view = View::shaded;
     std::uint32_t width = 1024, height = 768;  // each 1..16384
     // Rays per pixel that gather light, 1..4096. From 4 on a pixel has four primary rays, and this
-    // is rounded up to a multiple of 4; below 4 it has one. 0: 64 for ao, 32 for diffuse, 16 for
-    // shaded. No effect in the other views.
+    // is rounded up to a multiple of 4; below 4 it has one. 0: 64 for ao and path, 32 for diffuse,
+    // 16 for shaded. No effect in the other views.
     int samples = 0;
     float ao_radius = 0.0f;  // 0: 5 % of the diagonal of the scene's box
     std::uint64_t seed = 1;
@@ -53,9 +57,9 @@ struct RenderOptions {
 };
 
 /// Renders the scene as its last commit left it. A geometry or instance without any bit in its mask
-/// is not seen. `shaded`, `ao` and `diffuse` gather light; a pixel of the other views has one ray,
-/// through its center. The picture does not depend on the number of threads. Throws InputError: a
-/// scene that was never committed, a camera that shows nothing, options out of range.
+/// is not seen. `shaded`, `ao`, `diffuse` and `path` gather light; a pixel of the other views has
+/// one ray, through its center. The picture does not depend on the number of threads. Throws
+/// InputError: a scene that was never committed, a camera that shows nothing, options out of range.
 [[nodiscard]] Picture render(const Scene& scene, const Camera& camera,
                              const RenderOptions& options = {});
 /// The same of a scene in double, wherever it lies: rays meet it in double. All views but `steps`;

@@ -24,8 +24,8 @@ namespace raydix {
 namespace {
 
 constexpr int max_samples = 4096;
-constexpr std::array<std::string_view, 7> view_names = {"shaded", "normal",  "depth", "primitive",
-                                                        "ao",     "diffuse", "steps"};
+constexpr std::array<std::string_view, 8> view_names = {"shaded", "normal",  "depth", "primitive",
+                                                        "ao",     "diffuse", "steps", "path"};
 
 /// Where in a pixel its rays go: the centre, or four points of a turned square.
 constexpr double one_place[][2] = {{0.5, 0.5}};
@@ -33,11 +33,13 @@ constexpr double four_places[][2] = {
     {0.375, 0.125}, {0.875, 0.375}, {0.125, 0.625}, {0.625, 0.875}};
 
 bool gathers_light(View view) {
-    return view == View::shaded || view == View::ao || view == View::diffuse;
+    return view == View::shaded || view == View::ao || view == View::diffuse || view == View::path;
 }
 
 /// Light of `shaded` comes from the sun and an even sky, and is smooth with few rays.
-int default_samples(View view) { return view == View::ao ? 64 : view == View::diffuse ? 32 : 16; }
+int default_samples(View view) {
+    return view == View::ao || view == View::path ? 64 : view == View::diffuse ? 32 : 16;
+}
 
 /// Rays of each pixel.
 struct PixelRays {
@@ -137,6 +139,8 @@ std::vector<Vec3> tile_samples(const RenderScene& scene, std::span<const std::ui
             return open_sky_samples(scene, primary);
         case View::diffuse:
             return diffuse_samples(scene, primary);
+        case View::path:
+            return path_samples(scene, primary);
         default:
             return surface_values(scene, primary);
     }
@@ -198,7 +202,7 @@ Picture render_with(const PictureCamera& camera, const RenderOptions& options, c
 }  // namespace
 
 void check_render_options(const RenderOptions& options) {
-    check_enum("view", options.view, View::steps);
+    check_enum("view", options.view, View::path);
     if (options.samples < 0 || options.samples > max_samples)
         throw InputError("render: samples is " + std::to_string(options.samples) +
                          "; it must be 0.." + std::to_string(max_samples));
@@ -273,6 +277,10 @@ PrimarySamples trace_primary(const RenderScene& scene, std::span<const std::uint
         primary.points[k].sequence = i % scene.rays_per_pixel;
     }
     return primary;
+}
+
+bool is_tone_mapped(View view) {
+    return view == View::shaded || view == View::diffuse || view == View::path;
 }
 
 std::string_view view_name(View view) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "base/double3.h"
 #include "base/math.h"
@@ -18,6 +19,7 @@ constexpr Vec3 lamp_outside{0.15f, 0.15f, 0.14f};
 constexpr Vec3 lamp_inside{0.58f, 0.56f, 0.52f};
 constexpr Vec3 zenith_light{0.19f, 0.28f, 0.43f};
 constexpr Vec3 horizon_light{0.48f, 0.53f, 0.59f};
+constexpr std::uint32_t most_bounces = 8;
 /// Stands for all that further bounces would add to a surface, so that closed rooms do not go dark.
 constexpr Vec3 later_light{0.20f, 0.20f, 0.20f};
 /// The even light of a closed room, from below and from above.
@@ -115,6 +117,17 @@ std::vector<float> open_parts(const RenderScene& scene, std::span<const SurfaceP
     return open;
 }
 
+/// The mean of each `per_point` values in a row.
+std::vector<Vec3> means(const std::vector<Vec3>& values, std::uint32_t per_point) {
+    std::vector<Vec3> mean(values.size() / per_point);
+    for (std::size_t i = 0; i < mean.size(); ++i) {
+        Vec3 sum{0, 0, 0};
+        for (std::uint32_t k = 0; k < per_point; ++k) sum = sum + values[i * per_point + k];
+        mean[i] = (1.0f / static_cast<float>(per_point)) * sum;
+    }
+    return mean;
+}
+
 /// What arrives at each point over the hemisphere: sky where a ray escapes, lit surface where it
 /// hits. [points]
 std::vector<Vec3> bounced_light(const RenderScene& scene, std::span<const SurfacePoint> points) {
@@ -133,14 +146,53 @@ std::vector<Vec3> bounced_light(const RenderScene& scene, std::span<const Surfac
     for (std::size_t k = 0; k < positions.size(); ++k) {
         arriving[positions[k]] = tinted(surface_grey, light_on_seen[k] + later_light);
     }
-    const std::uint32_t per_point = scene.samples_per_ray;
-    std::vector<Vec3> mean(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        Vec3 sum{0, 0, 0};
-        for (std::uint32_t k = 0; k < per_point; ++k) sum = sum + arriving[i * per_point + k];
-        mean[i] = (1.0f / static_cast<float>(per_point)) * sum;
+    return means(arriving, scene.samples_per_ray);
+}
+
+/// What arrives at each point over the hemisphere, by paths of up to most_bounces surfaces.
+/// [points]
+std::vector<Vec3> light_of_paths(const RenderScene& scene, std::span<const SurfacePoint> points) {
+    std::vector<Ray> rays = hemisphere_rays(scene, points, infinity);
+    std::vector<Vec3> arriving(rays.size(), Vec3{0, 0, 0});
+    std::vector<std::uint32_t> path(rays.size());  // whose part each ray is
+    std::iota(path.begin(), path.end(), 0u);
+    Vec3 part{1, 1, 1};  // of the light that is left on the way; every surface is the same
+    const std::uint32_t paths_of_pixel = scene.rays_per_pixel * scene.samples_per_ray;
+    for (std::uint32_t bounce = 1; bounce <= most_bounces && !rays.empty(); ++bounce) {
+        const std::uint64_t seed = hash_of(scene.options.seed, bounce);
+        std::vector<Hit> hits(rays.size());
+        std::vector<Double3> normals(rays.size());
+        scene.tracer.closest(rays, hits, normals);
+        for (std::size_t i = 0; i < rays.size(); ++i)
+            if (!hits[i].hit())
+                arriving[path[i]] =
+                    arriving[path[i]] + tinted(part, sky_colour(scene.lights, rays[i].direction));
+        const std::vector<std::uint32_t> positions = positions_of_hits(hits);
+        std::vector<SurfacePoint> seen = points_of_hits(scene, rays, hits, normals, positions);
+        const std::vector<Vec3> direct = direct_light(scene, seen, SeenBy::reflection);
+        part = tinted(part, surface_grey);
+        std::vector<std::uint32_t> next(positions.size());
+        for (std::size_t k = 0; k < positions.size(); ++k) {
+            next[k] = path[positions[k]];
+            arriving[next[k]] = arriving[next[k]] + tinted(part, direct[k]);
+            // At random among those of the pixel: what a path does at one bounce must say nothing
+            // of what it does at the next.
+            const SurfacePoint& first = points[next[k] / scene.samples_per_ray];
+            const std::uint64_t number = std::uint64_t{first.pixel} * paths_of_pixel +
+                                         first.sequence * scene.samples_per_ray +
+                                         next[k] % scene.samples_per_ray;
+            seen[k].pixel = first.pixel;
+            seen[k].sequence = static_cast<std::uint32_t>(hash_of(seed, number) % paths_of_pixel);
+        }
+        path = std::move(next);
+        HemisphereOptions options;
+        options.samples = 1;
+        options.sequences = paths_of_pixel;
+        options.seed = seed;
+        rays.resize(seen.size());
+        make_hemisphere_rays(seen, options, rays);
     }
-    return mean;
+    return means(arriving, scene.samples_per_ray);
 }
 
 /// Sky for the samples that missed; on_hit(k) for the k-th of those that hit.
@@ -220,6 +272,14 @@ std::vector<Vec3> diffuse_samples(const RenderScene& scene, const PrimarySamples
     const std::vector<Vec3> bounced = bounced_light(scene, primary.points);
     return fill_samples(scene, primary, [&](std::size_t k) {
         return tinted(surface_grey, direct[k] + bounced[k]);
+    });
+}
+
+std::vector<Vec3> path_samples(const RenderScene& scene, const PrimarySamples& primary) {
+    const std::vector<Vec3> direct = direct_light(scene, primary.points, SeenBy::camera);
+    const std::vector<Vec3> arriving = light_of_paths(scene, primary.points);
+    return fill_samples(scene, primary, [&](std::size_t k) {
+        return tinted(surface_grey, direct[k] + arriving[k]);
     });
 }
 

@@ -1,4 +1,5 @@
-// The views that gather light: shaded, AO, diffuse. Primary samples [n] -> linear colours [n].
+// The views that gather light: shaded, AO, diffuse, path. Primary samples [n] -> linear colours
+// [n].
 #pragma once
 
 #include <vector>
@@ -24,5 +25,10 @@ namespace raydix {
 /// Sun and lamp with shadows, and one bounce: the light of the sky and of the surfaces around.
 [[nodiscard]] std::vector<Vec3> diffuse_samples(const RenderScene& scene,
                                                 const PrimarySamples& primary);
+
+/// Sun and lamp with shadows at each of up to eight further surfaces, and the sky where a path
+/// leaves the scene.
+[[nodiscard]] std::vector<Vec3> path_samples(const RenderScene& scene,
+                                             const PrimarySamples& primary);
 
 }  // namespace raydix

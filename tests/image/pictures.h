@@ -13,7 +13,7 @@
 namespace raydix::test {
 
 inline constexpr View all_views[] = {View::shaded, View::normal,  View::depth, View::primitive,
-                                     View::ao,     View::diffuse, View::steps};
+                                     View::ao,     View::diffuse, View::steps, View::path};
 
 /// Before the ball and the boxes of shapes.h.
 inline Camera camera_before_ball() {

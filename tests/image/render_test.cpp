@@ -129,6 +129,36 @@ TEST(RenderDiffuse, WallsThrowLightOnEachOther) {
     EXPECT_LT(cube, 1.20f * endless);
 }
 
+TEST(RenderPath, LightOfAWhiteBallIsASeries) {
+    // Inside a ball with the lamp in its middle all walls have the same light L from it, and look
+    // at nothing but each other: grey (L + grey (L + ...)), here with eight bounces.
+    Mesh ball;
+    test::add_sphere(ball, {0, 0, 0}, 1.0f, 64);
+    const Camera camera{"", {0, 0, 0}, {0, 0, -1}, {0, 1, 0}, 60};
+    RenderOptions options = options_for(View::path, 8, 8);
+    options.samples = 64;
+    const Picture picture = render(build_bvh(ball), camera, options);
+    const double grey = 0.72, lamp = 0.58;  // of the red channel: render_light.cpp
+    double expected = 0, part = 1;
+    for (int bounce = 0; bounce <= 8; ++bounce) expected += lamp * (part *= grey);
+    for (const Vec3& pixel : picture.pixels) EXPECT_NEAR(pixel.x, expected, 0.02 * expected);
+}
+
+TEST(RenderPath, IsAboutAsBrightAsOneBounceInTheOpen) {
+    // There `diffuse` has a constant for all further bounces, and most light comes from the sky.
+    const Bvh bvh = build_bvh(test::ball_and_boxes());
+    RenderOptions options = options_for(View::path, 32, 24);
+    options.samples = 256;
+    const Picture path = render(bvh, camera_before_ball(), options);
+    options.view = View::diffuse;
+    const Picture diffuse = render(bvh, camera_before_ball(), options);
+    EXPECT_EQ(at(path, 0, 0).z, at(diffuse, 0, 0).z);  // sky
+    double difference = 0, light = 0;
+    for (std::size_t i = 0; i < path.pixels.size(); ++i)
+        difference += path.pixels[i].y - diffuse.pixels[i].y, light += diffuse.pixels[i].y;
+    EXPECT_LT(std::abs(difference), 0.1 * light);
+}
+
 TEST(RenderSteps, MissesAreDarkHitsAreLighter) {
     const Picture picture = ball_picture(View::steps);
     const auto light = [](Vec3 p) { return p.x + p.y + p.z; };
@@ -216,8 +246,9 @@ TEST(ViewNames, GoThereAndBack) {
         (void)view_from_name("x-ray");
         ADD_FAILURE();
     } catch (const InputError& error) {
-        EXPECT_STREQ(error.what(),
-                     "unknown view 'x-ray'; known: shaded normal depth primitive ao diffuse steps");
+        EXPECT_STREQ(
+            error.what(),
+            "unknown view 'x-ray'; known: shaded normal depth primitive ao diffuse steps path");
     }
 }
 
@@ -230,7 +261,7 @@ TEST(Render, GoldenPictures) {
     for (const View view : all_views) {
         SCOPED_TRACE(view_name(view));
         const std::string name = std::string(view_name(view)) + ".png";
-        const bool tone_map = view == View::shaded || view == View::diffuse;
+        const bool tone_map = is_tone_mapped(view);
         RenderOptions options = options_for(view, 256, 192);
         if (view == View::ao) options.ao_radius = 2.5f;
         const Picture picture = render(bvh, camera_before_ball(), options);
