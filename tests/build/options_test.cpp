@@ -343,7 +343,7 @@ TEST(Options, EnumerationsAreOfTheirKind) {
         });
         expect_refused<CwbvhKernel>("kernel", 1,
                                     [&](CwbvhKernel k) { (void)device_cwbvh_scratch_bytes(k); });
-        expect_refused<View>("view", 6,
+        expect_refused<View>("view", 7,
                              [&](View v) { (void)render(in.bvh, camera(), small_picture(v, 1)); });
         expect_refused<RayKind>("kind", 3, [&](RayKind k) {
             (void)make_secondary_rays(in.bvh, in.rays, std::vector<Hit>(in.rays.size()),
