@@ -149,50 +149,58 @@ std::vector<Vec3> bounced_light(const RenderScene& scene, std::span<const Surfac
     return means(arriving, scene.samples_per_ray);
 }
 
+/// A bounce of path `number` of the `paths` of a pixel. Those of a pixel part evenly, about places
+/// that chance gives for each pixel and bounce: so every path goes anywhere, whatever it did
+/// before.
+Ray ray_of_path(const SurfacePoint& from, std::uint64_t seed, std::uint32_t pixel,
+                std::uint32_t number, std::uint32_t paths) {
+    const std::uint64_t own = hash_of(seed, pixel);
+    const auto index = static_cast<std::uint32_t>((number + hash_of(own, 0)) % paths);
+    const auto coordinate = [&](std::uint32_t base) {
+        const double x = radical_inverse(base, index) + double{unit_from(hash_of(own, base))};
+        return x < 1.0 ? x : x - 1.0;
+    };
+    return ray_above(from, cosine_direction(coordinate(2), coordinate(3)));
+}
+
 /// What arrives at each point over the hemisphere, by paths of up to most_bounces surfaces.
 /// [points]
 std::vector<Vec3> light_of_paths(const RenderScene& scene, std::span<const SurfacePoint> points) {
-    std::vector<Ray> rays = hemisphere_rays(scene, points, infinity);
-    std::vector<Vec3> arriving(rays.size(), Vec3{0, 0, 0});
-    std::vector<std::uint32_t> path(rays.size());  // whose part each ray is
+    const std::uint32_t per_point = scene.samples_per_ray;
+    std::vector<Vec3> arriving(points.size() * per_point, Vec3{0, 0, 0});
+    std::vector<std::uint32_t> path(arriving.size());  // of those that go on
     std::iota(path.begin(), path.end(), 0u);
+    std::vector<SurfacePoint> from;
+    for (const std::uint32_t i : path) from.push_back(points[i / per_point]);
     Vec3 part{1, 1, 1};  // of the light that is left on the way; every surface is the same
-    const std::uint32_t paths_of_pixel = scene.rays_per_pixel * scene.samples_per_ray;
-    for (std::uint32_t bounce = 1; bounce <= most_bounces && !rays.empty(); ++bounce) {
+    // Without rays too: a tracer over ranks is called by all ranks as often.
+    for (std::uint32_t bounce = 1; bounce <= most_bounces; ++bounce) {
         const std::uint64_t seed = hash_of(scene.options.seed, bounce);
+        std::vector<Ray> rays(path.size());
+        for (std::size_t k = 0; k < rays.size(); ++k) {
+            const SurfacePoint& first = points[path[k] / per_point];
+            rays[k] = ray_of_path(from[k], seed, first.pixel,
+                                  first.sequence * per_point + path[k] % per_point,
+                                  scene.rays_per_pixel * per_point);
+        }
         std::vector<Hit> hits(rays.size());
         std::vector<Double3> normals(rays.size());
         scene.tracer.closest(rays, hits, normals);
-        for (std::size_t i = 0; i < rays.size(); ++i)
-            if (!hits[i].hit())
-                arriving[path[i]] =
-                    arriving[path[i]] + tinted(part, sky_colour(scene.lights, rays[i].direction));
+        const auto add = [&](std::size_t k, Vec3 light) {
+            arriving[path[k]] = arriving[path[k]] + tinted(part, light);
+        };
+        for (std::size_t k = 0; k < rays.size(); ++k)
+            if (!hits[k].hit()) add(k, sky_colour(scene.lights, rays[k].direction));
         const std::vector<std::uint32_t> positions = positions_of_hits(hits);
-        std::vector<SurfacePoint> seen = points_of_hits(scene, rays, hits, normals, positions);
-        const std::vector<Vec3> direct = direct_light(scene, seen, SeenBy::reflection);
+        from = points_of_hits(scene, rays, hits, normals, positions);
+        const std::vector<Vec3> direct = direct_light(scene, from, SeenBy::reflection);
         part = tinted(part, surface_grey);
-        std::vector<std::uint32_t> next(positions.size());
-        for (std::size_t k = 0; k < positions.size(); ++k) {
-            next[k] = path[positions[k]];
-            arriving[next[k]] = arriving[next[k]] + tinted(part, direct[k]);
-            // At random among those of the pixel: what a path does at one bounce must say nothing
-            // of what it does at the next.
-            const SurfacePoint& first = points[next[k] / scene.samples_per_ray];
-            const std::uint64_t number = std::uint64_t{first.pixel} * paths_of_pixel +
-                                         first.sequence * scene.samples_per_ray +
-                                         next[k] % scene.samples_per_ray;
-            seen[k].pixel = first.pixel;
-            seen[k].sequence = static_cast<std::uint32_t>(hash_of(seed, number) % paths_of_pixel);
-        }
-        path = std::move(next);
-        HemisphereOptions options;
-        options.samples = 1;
-        options.sequences = paths_of_pixel;
-        options.seed = seed;
-        rays.resize(seen.size());
-        make_hemisphere_rays(seen, options, rays);
+        for (std::size_t k = 0; k < positions.size(); ++k) add(positions[k], direct[k]);
+        // Positions ascend.
+        for (std::size_t k = 0; k < positions.size(); ++k) path[k] = path[positions[k]];
+        path.resize(positions.size());
     }
-    return means(arriving, scene.samples_per_ray);
+    return means(arriving, per_point);
 }
 
 /// Sky for the samples that missed; on_hit(k) for the k-th of those that hit.

@@ -29,6 +29,10 @@ TangentFrame turned_frame(Vec3 unit_normal, double angle) {
     return {(a * c + b * s).rounded(), (b * c - a * s).rounded(), unit_normal};
 }
 
+Vec3 turned(Vec3 d, const TangentFrame& frame) {
+    return d.x * frame.across + d.y * frame.along + d.z * frame.normal;
+}
+
 }  // namespace
 
 Double3 normal_of(Vec3 v0, Vec3 v1, Vec3 v2) {
@@ -51,6 +55,10 @@ Vec3 point_before(const Ray& ray, float t, double step_back) {
     return (Double3(ray.origin) + direction * (t - step_back / length(direction))).rounded();
 }
 
+Ray ray_above(const SurfacePoint& point, Vec3 direction) {
+    return {point.origin, 0.0f, turned(direction, turned_frame(point.normal, 0.0)), infinity};
+}
+
 void make_hemisphere_rays(std::span<const SurfacePoint> points, const HemisphereOptions& options,
                           std::span<Ray> rays) {
     const std::size_t samples = options.samples;
@@ -61,10 +69,8 @@ void make_hemisphere_rays(std::span<const SurfacePoint> points, const Hemisphere
         const float turn = unit_from(hash_of(options.seed, point.pixel));
         const TangentFrame frame = turned_frame(point.normal, 2.0 * std::numbers::pi * turn);
         for (std::size_t k = 0; k < samples; ++k) {
-            const Vec3 d = directions[point.sequence * samples + k];
-            rays[i * samples + k] = {point.origin, 0.0f,
-                                     d.x * frame.across + d.y * frame.along + d.z * frame.normal,
-                                     options.tmax};
+            const Vec3 direction = directions[point.sequence * samples + k];
+            rays[i * samples + k] = {point.origin, 0.0f, turned(direction, frame), options.tmax};
         }
     };
     for_each_index(points.size(), emit, 256);

@@ -46,6 +46,9 @@ struct HemisphereOptions {
     std::uint64_t seed = 1;
 };
 
+/// A ray without an end in this direction about +z, turned to the normal.
+[[nodiscard]] Ray ray_above(const SurfacePoint& point, Vec3 direction);
+
 /// Rays [points * samples], those of a point in a row: the directions of Halton indices
 /// [1 + sequence * samples, 1 + (sequence + 1) * samples), the same for every point, turned about
 /// its normal by the angle 2 pi * unit_from(hash_of(seed, pixel)).

@@ -141,7 +141,25 @@ TEST(RenderPath, LightOfAWhiteBallIsASeries) {
     const double grey = 0.72, lamp = 0.58;  // of the red channel: render_light.cpp
     double expected = 0, part = 1;
     for (int bounce = 0; bounce <= 8; ++bounce) expected += lamp * (part *= grey);
-    for (const Vec3& pixel : picture.pixels) EXPECT_NEAR(pixel.x, expected, 0.02 * expected);
+    for (const Vec3& pixel : picture.pixels) EXPECT_NEAR(pixel.x, expected, 0.01 * expected);
+}
+
+TEST(RenderPath, FewSamplesAreRightInTheMean) {
+    // A wall on a floor under the sky: one path a pixel, over many pixels and seeds, against many.
+    const Bvh bvh = build_bvh(test::ball_and_boxes());
+    const auto mean = [&](int samples, int seeds) {
+        double sum = 0;
+        for (int seed = 1; seed <= seeds; ++seed) {
+            RenderOptions options = options_for(View::path, 48, 36);
+            options.samples = samples;
+            options.seed = static_cast<std::uint64_t>(seed);
+            for (const Vec3& pixel : render(bvh, camera_before_ball(), options).pixels)
+                sum += pixel.y;
+        }
+        return sum / seeds;
+    };
+    const double many = mean(512, 1);
+    EXPECT_NEAR(mean(4, 24), many, 0.004 * many);
 }
 
 TEST(RenderPath, IsAboutAsBrightAsOneBounceInTheOpen) {

@@ -59,8 +59,8 @@ RenderOptions small_picture(View view) {
     return options;
 }
 
-constexpr View views[] = {View::shaded,    View::normal, View::depth,
-                          View::primitive, View::ao,     View::diffuse};
+constexpr View views[] = {View::shaded, View::normal,  View::depth, View::primitive,
+                          View::ao,     View::diffuse, View::path};
 
 template <class T>
 class PicturesOverRanks : public testing::Test {};
