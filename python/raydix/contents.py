@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
 from typing import Any, overload
 
 import numpy as np
@@ -128,10 +127,6 @@ class SceneContents:
     _core: Any
     dtype: np.dtype
     _options: dict[str, Any]
-    _placed: dict[int, Any]  # the scene of each instance that was added here
-    _attributes: dict[int, dict[str, np.ndarray]]
-    _keep_surface: Callable[[], None]
-    _changing: Callable[[int], AbstractContextManager[None]]
 
     def _forget(self) -> None: ...
 
@@ -197,7 +192,6 @@ class SceneContents:
         if len(masks) != 1 and (one or len(masks) != len(rows)):
             raise ValueError(f"mask: expected one or {len(rows)}, given {len(masks)}")
         ids = self._core.add_instances(source._core, rows, masks, wanted)
-        self._placed.update((added, source) for added in ids)
         return ids[0] if one else np.array(ids, UINT32)
 
     def add_spheres(
@@ -266,17 +260,11 @@ class SceneContents:
         """
         corners = mesh_vertices(vertices, dtype=self.dtype)
         triangles = None if faces is None else mesh_faces(faces, len(corners))
-        which = whole(id, "id", 0, ALL)
-        with self._changing(which):
-            self._core.update(which, corners, triangles)
+        self._core.update(whole(id, "id", 0, ALL), corners, triangles)
 
     def remove(self, id: int) -> None:
         """Takes a geometry out, from the next `commit` on. Its id is not given again."""
-        which = whole(id, "id", 0, ALL)
-        with self._changing(which):
-            self._core.remove(which)
-        for kept in (self._placed, self._attributes):
-            kept.pop(which, None)
+        self._core.remove(whole(id, "id", 0, ALL))
 
     def set_transform(self, id: ArrayLike, transform: ArrayLike) -> None:
         """Moves an instance, from the next `commit` on: `transform` as in `add`. Or several: ids of
@@ -361,7 +349,6 @@ class SceneContents:
             progress,
         )
         self._forget()
-        self._keep_surface()
         self._options.update(self._core.commit_options())
         return report
 

@@ -75,7 +75,8 @@ class SceneViews:
         """A picture of linear colours: shape (height, width, 3) float32, rows from the top.
 
         `view`: "shaded" (sun and sky, a lamp in closed rooms), "normal", "depth", "primitive",
-        "ao", "diffuse", "steps" (node visits) or "path" (up to eight bounces of light). `size`: (width, height), each 1 to 16384.
+        "ao", "diffuse", "steps" (node visits) or "path" (up to eight bounces of light).
+        `size`: (width, height), each 1 to 16384.
         `samples`: rays a pixel that gather light, 1 to 4096; 0: 64 for "ao" and "path", 32 for
         "diffuse", 16 for "shaded". `ao_radius`: 0 means 5 % of the diagonal. The same picture for every number of
         threads. Ctrl-C ends it. `raydix.to_srgb` makes 8-bit colours of it.

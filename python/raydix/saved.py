@@ -24,7 +24,6 @@ class SavedScene:
     committed: bool
     _options: dict[str, Any]
     _cameras: list[Camera]
-    _attributes: dict[int, dict[str, np.ndarray]]
     _file: tuple[Any, int, int, int] | None
 
     @property
@@ -66,7 +65,7 @@ class SavedScene:
             "options": self._options,
             "name": self.name,
             "cameras": self._cameras,
-            "attributes": self._attributes,
+            "attributes": {id: own for id in ids if (own := self._core.attributes(id))},
             "threads": self.threads,
             "device": self.device,
             "committed": committed,
@@ -105,7 +104,9 @@ def _new(more: dict[str, Any], *mesh: np.ndarray) -> Any:
 def _filled(scene: Any, more: dict[str, Any]) -> Any:
     scene.name, scene._cameras = more["name"], list(more["cameras"])
     scene._options = dict(more["options"])
-    scene._attributes = {id: dict(own) for id, own in more["attributes"].items()}
+    for id, own in more["attributes"].items():
+        for name, (numbers, columns) in own.items():
+            scene._core.set_attribute(id, name, numbers.reshape(-1), columns)
     return scene
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -157,10 +156,6 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         """float32 or float64: what the scene computes in and its results are."""
         self.threads = threads = thread_count(threads)
         self.device = device
-        self._attributes: dict[int, dict[str, np.ndarray]] = {}
-        self._placed: dict[int, Any] = {}
-        self._surfaces: weakref.WeakSet = weakref.WeakSet()
-        self._keep_surface()
         self._file: tuple[Any, int, int, int] | None = None
         self._options: dict[str, Any] = {
             "quality": quality,

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import weakref
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,15 +43,16 @@ def _columns_of(hits: Any) -> list[np.ndarray]:
     return columns
 
 
-class Surface:
-    """What of a scene's commit has changed since then, and what its instances showed. All else is
-    as it stands in the scene now."""
-
-    def __init__(self, placed: Mapping[int, Any]) -> None:
-        # By id: attributes and mesh, or None; the scene of an instance, or None.
-        self.meshes: dict[int, Any] = {}
-        self.placed: dict[int, Any] = {}
-        self.children = {scene: scene._surface for scene in set(placed.values())}
+def _rows_of(found: tuple, name: str, id: int) -> tuple[np.ndarray, np.ndarray]:
+    """An attribute of a mesh: a row for each vertex, and the triangles."""
+    numbers, columns, vertices, faces = found
+    values = numbers.reshape(-1) if columns is None else numbers.reshape(-1, columns)
+    if len(values) != vertices:
+        raise ValueError(
+            f"{name}: geometry {id} had {len(values)} vertices when it was given, "
+            f"and has {vertices} now"
+        )
+    return values, faces
 
 
 class SurfaceOfHits:
@@ -62,33 +61,6 @@ class SurfaceOfHits:
     _core: Any
     dtype: np.dtype
     threads: int
-    _attributes: dict[int, dict[str, np.ndarray]]
-    _placed: dict[int, Any]
-    _surface: Surface  # of the last commit
-    _surfaces: weakref.WeakSet  # and of those before that another scene still shows
-
-    def _keep_surface(self) -> None:
-        """After each commit."""
-        self._surface = Surface(self._placed)
-        self._surfaces.add(self._surface)
-
-    @contextmanager
-    def _changing(self, id: int) -> Iterator[None]:
-        """Around what gives a geometry another mesh, or takes it out."""
-        knowing = [surface for surface in self._surfaces if id not in surface.meshes]
-        for surface in knowing:
-            surface.meshes[id] = self._mesh_now(id)
-            surface.placed[id] = self._placed.get(id)
-        try:
-            yield
-        except BaseException:
-            for surface in knowing:
-                del surface.meshes[id], surface.placed[id]
-            raise
-
-    def _mesh_now(self, id: int) -> tuple[dict[str, np.ndarray], Any] | None:
-        own = self._attributes.get(id)
-        return (dict(own), self._core.arrays_of(id)) if own else None
 
     def positions(
         self,
@@ -149,12 +121,12 @@ class SurfaceOfHits:
             if taken or name.startswith("_"):
                 raise ValueError(f"attributes: the name {name!r} is taken")
             checked[name] = None if values is None else self._attribute(values, name, vertices)
-        own = self._attributes.setdefault(number, {})
         for name, array in checked.items():
             if array is None:
-                own.pop(name, None)
+                self._core.set_attribute(number, name, None, None)
             else:
-                own[name] = array
+                columns = None if array.ndim == 1 else array.shape[1]
+                self._core.set_attribute(number, name, array.reshape(-1), columns)
 
     def _attribute(self, values: ArrayLike, name: str, vertices: int) -> np.ndarray:
         array = to_numpy(values, name)
@@ -163,15 +135,17 @@ class SurfaceOfHits:
                 f"{name}: expected shape ({vertices},) or ({vertices}, C) of numbers, "
                 f"given {describe(array)}"
             )
-        array = np.array(cast(array, self.dtype))
-        array.flags.writeable = False
-        return array
+        return np.ascontiguousarray(cast(array, self.dtype))
 
     def interpolate(self, hits: Mapping[str, Any], name: str) -> np.ndarray:
         """A vertex attribute at hits: (1-u-v) of the first corner + u of the second + v of the
         third, in the scene's type, shape (...,) or (..., C). NaN for misses and for geometries
-        without it. Through instances too. `hits` are of this scene as it is committed now: values are
-        those that vertices have now, but for meshes that have changed since. ValueError: no geometry that was hit has it, or they have other numbers of columns."""
+        without it. Through instances too.
+
+        `hits` are of this scene as it is committed now. Values are those that were set for the
+        meshes of that commit, before it or since; what is set for a mesh that has changed since
+        shows after the next commit. ValueError: neither a geometry that was hit nor one of this
+        scene has it, or those that were hit have other numbers of columns."""
         columns = _columns_of(hits)
         lead = columns[0].shape
         prim, geometry, instance, u, v = (column.reshape(-1) for column in columns)
@@ -180,19 +154,20 @@ class SurfaceOfHits:
         places, which = np.unique(
             np.stack([instance[hit], geometry[hit]]).astype(UINT32), axis=1, return_inverse=True
         )
-        parts, width = [], self._width_of(name)
+        parts = []
         for i, (path, id) in enumerate(places.T.tolist()):
-            found = self._mesh_with(name, path, id)
+            found = self._core.attribute(name, path, id)
+            if found is not None:
+                parts.append((hit[which.reshape(-1) == i], *_rows_of(found, name, id)))
+        widths = {values.shape[1:] for _, values, _ in parts}
+        if len(widths) > 1:
+            raise ValueError(f"{name}: meshes that were hit have it in columns {sorted(widths)}")
+        if not widths:
+            found = self._core.attribute(name)
             if found is None:
-                continue
-            values, faces = found
-            if width is None:
-                width = values.shape[1:]
-            if values.shape[1:] != width:
-                raise ValueError(f"{name}: {values.shape[1:]} columns here, {width} elsewhere")
-            parts.append((hit[which.reshape(-1) == i], values, faces))
-        if width is None:
-            raise ValueError(f"{name}: no geometry that was hit has such an attribute")
+                raise ValueError(f"{name}: no geometry that was hit has such an attribute")
+            widths = {() if found[1] is None else (found[1],)}
+        (width,) = widths
         made = np.full((len(prim), *width), np.nan, self.dtype)
         for rays, values, faces in parts:
             if prim[rays].max() >= len(faces):
@@ -205,32 +180,6 @@ class SurfaceOfHits:
             weights = weights.reshape(weights.shape + (1,) * len(width))
             made[rays] = (weights * corners).sum(axis=1)
         return made.reshape(lead + tuple(width))
-
-    def _width_of(self, name: str) -> tuple[int, ...] | None:
-        for own in self._attributes.values():
-            if name in own:
-                return own[name].shape[1:]
-        return None
-
-    def _mesh_with(self, name: str, path: int, id: int) -> tuple[np.ndarray, np.ndarray] | None:
-        """An attribute's array and the triangles of a geometry that was hit."""
-        scene: Any = self
-        surface = self._surface
-        for step in self._core.path(path):
-            scene = surface.placed.get(step, scene._placed.get(step))
-            if scene not in surface.children:
-                return None
-            surface = surface.children[scene]
-        found = surface.meshes[id] if id in surface.meshes else scene._mesh_now(id)
-        if found is None or name not in found[0] or found[1] is None:
-            return None
-        values, mesh = found[0][name], found[1]
-        if len(values) != len(mesh[0]):
-            raise ValueError(
-                f"{name}: geometry {id} had {len(values)} vertices when it was given, "
-                f"and has {len(mesh[0])} now"
-            )
-        return values, mesh[1]
 
     def _with(self, hits: Hits, also: Sequence[str], rays: Any, directions: Any) -> Hits:
         """The hits, and what else was asked for."""

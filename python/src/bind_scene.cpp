@@ -404,6 +404,17 @@ auto view_of(std::shared_ptr<const std::vector<Row>> values) {
         owner_of(std::make_unique<std::shared_ptr<const std::vector<Row>>>(std::move(values))));
 }
 
+/// (numbers, columns or None)
+template <class Scalar>
+nb::tuple attribute_tuple(std::shared_ptr<const Attribute<Scalar>> attribute) {
+    const auto columns = attribute->columns;
+    const auto* const values = &attribute->values;
+    // The vector lives as long as the attribute.
+    const std::shared_ptr<const std::vector<Scalar>> shared(std::move(attribute), values);
+    return nb::make_tuple(view_of<Scalar>(shared),
+                          columns ? nb::object(nb::int_(*columns)) : nb::object(nb::none()));
+}
+
 /// The arrays of a mesh, changes without a commit included; None of what is no mesh.
 template <class Scene>
 nb::object arrays_of(Scene& scene, std::uint32_t id) {
@@ -411,6 +422,42 @@ nb::object arrays_of(Scene& scene, std::uint32_t id) {
     if (!arrays) return nb::none();
     return nb::make_tuple(view_of<Scalar<Scene>>(arrays->vertices),
                           view_of<std::uint32_t>(arrays->triangles));
+}
+
+/// Of one mesh: numbers for each vertex, `columns` of them, or one without columns.
+template <class Scene>
+void set_attribute(Scene& scene, std::uint32_t id, const std::string& name,
+                   const std::optional<In<Scalar<Scene>, nb::ndim<1>>>& values,
+                   std::optional<std::size_t> columns) {
+    std::shared_ptr<const Attribute<Scalar<Scene>>> value;
+    if (values) {
+        const auto* const first = values->data();
+        value = std::make_shared<const Attribute<Scalar<Scene>>>(
+            Attribute<Scalar<Scene>>{{first, first + values->size()}, columns});
+    }
+    const nb::gil_scoped_release unlocked;
+    scene.set_attribute(id, name, std::move(value));
+}
+
+/// {name: (numbers, columns or None)}
+template <class Scene>
+nb::dict attributes(Scene& scene, std::uint32_t id) {
+    nb::dict out;
+    for (auto& [name, value] : reading(scene, [&] { return scene.attributes(id); }))
+        out[name.c_str()] = attribute_tuple(value);
+    return out;
+}
+
+/// (numbers, columns or None, vertices, triangles), or None. Without a path: of any mesh of the
+/// scene itself.
+template <class Scene>
+nb::object attribute(Scene& scene, const std::string& name, std::optional<std::uint32_t> path,
+                     std::uint32_t id) {
+    const auto found = reading(
+        scene, [&] { return path ? scene.attribute(*path, id, name) : scene.any_attribute(name); });
+    if (!found) return nb::none();
+    return attribute_tuple(found->value) +
+           nb::make_tuple(found->vertices, view_of<std::uint32_t>(found->triangles));
 }
 
 /// The closest hit of one ray, from its two arrays to the row of a hit. The shortest way here that
@@ -451,6 +498,11 @@ void bind_asking(nb::class_<Scene>& scene) {
         return reading(self, [&] { return self.mask_of(id); });
     });
     scene.def("arrays_of", &arrays_of<Scene>);
+    scene.def("set_attribute", &set_attribute<Scene>, nb::arg("id"), nb::arg("name"),
+              nb::arg("values").noconvert().none(), nb::arg("columns").none());
+    scene.def("attributes", &attributes<Scene>, nb::arg("id"));
+    scene.def("attribute", &attribute<Scene>, nb::arg("name"), nb::arg("path").none() = nb::none(),
+              nb::arg("id") = 0);
     scene.def("traced", [](Scene& self) -> nb::object {
         return nb::capsule(reading(self, [&] { return &self.traced(); }),
                            scene_name<Scalar<Scene>>);

@@ -13,15 +13,13 @@ std::shared_ptr<SceneTrees> SceneFiles::scene_of(Model model, const BuildOptions
     auto scene = std::make_shared<SceneTrees>(trees, commits);
     if (model.nodes.empty()) {
         if (model.meshes.empty()) model.meshes.emplace_back();
-        SceneTrees::Kept kept;
         for (Mesh& mesh : model.meshes) {
             const SceneTrees::Arrays arrays{
                 std::make_shared<const SceneTrees::Vertices>(std::move(mesh.vertices)),
                 std::make_shared<const SceneTrees::Arrays::Triangles>(std::move(mesh.triangles))};
-            kept.meshes.push_back(arrays);
             static_cast<void>(scene->add(arrays, {}));
         }
-        scene->kept_ = std::make_shared<const SceneTrees::Kept>(std::move(kept));
+        scene->kept_ = scene->keep();
         scene->unsettled_ = true;
     } else {
         for (const Mesh& mesh : model.meshes) scene->check_strict("mesh " + mesh.name, mesh);
@@ -49,7 +47,11 @@ std::shared_ptr<BasicSceneTrees<Names>> SceneFiles::scene_of_rdx(typename Names:
                                   .is_shapes = is_shapes,
                                   .mask = scene->scene_.mask(id),
                                   .is_in_file = is_mesh};
+        if (is_mesh)
+            scene->geometries_[id].attributes =
+                std::make_shared<Attributes<typename Names::Scalar>>();
     }
+    scene->kept_ = scene->keep();
     scene->ids_given_ = scene->geometries_.size() + 1;
     scene->look_for_mesh();
     return scene;

@@ -85,8 +85,8 @@ template <class Names>
 BasicSceneTrees<Names>::BasicSceneTrees(Arrays mesh, const BuildOptions& trees,
                                         const SceneOptions& commits)
     : BasicSceneTrees(trees, commits) {
-    kept_ = std::make_shared<const Kept>(Kept{{mesh}, {}});
     static_cast<void>(add(std::move(mesh), {}));
+    kept_ = keep();
     unsettled_ = true;
     look_for_mesh();
 }
@@ -147,7 +147,9 @@ std::uint32_t BasicSceneTrees<Names>::add(Arrays mesh, const GeometryOptions& op
     check_strict("mesh", mesh.view());
     const std::lock_guard all(structure());
     const std::uint32_t id = scene_.share(mesh.view(), options);
-    geometries_[id] = {.mask = options.mask, .mesh = std::move(mesh)};
+    geometries_[id] = {.mask = options.mask,
+                       .mesh = std::move(mesh),
+                       .attributes = std::make_shared<MeshAttributes>()};
     ++ids_given_;
     return id;
 }
@@ -162,14 +164,21 @@ std::vector<std::uint32_t> BasicSceneTrees<Names>::add(std::shared_ptr<BasicScen
     const Writing lock("add", locks_);
     settle();
     const std::lock_guard all(structure());
-    // What else may be wrong is wrong with the first one.
     std::vector<std::uint32_t> ids;
-    for (std::size_t i = 0; i < transforms.size(); ++i) {
-        const std::uint32_t mask = masks[masks.size() == 1 ? 0 : i];
-        ids.push_back(scene_.add(scene->scene_, transforms[i], {mask, id}));
-        geometries_[ids.back()] = {.is_instance = true, .mask = mask, .scene = scene};
-        ++ids_given_;
-        id.reset();
+    try {
+        for (std::size_t i = 0; i < transforms.size(); ++i) {
+            const std::uint32_t mask = masks[masks.size() == 1 ? 0 : i];
+            ids.push_back(scene_.add(scene->scene_, transforms[i], {mask, id}));
+            geometries_[ids.back()] = {.is_instance = true, .mask = mask, .scene = scene};
+            ++ids_given_;
+            id.reset();
+        }
+    } catch (...) {  // other than the first one: out of memory or of ids
+        for (const std::uint32_t added : ids) {
+            scene_.remove(added);
+            geometries_.erase(added);
+        }
+        throw;
     }
     return ids;
 }
@@ -211,6 +220,7 @@ void BasicSceneTrees<Names>::update(std::uint32_t id, Vertices vertices,
         mesh.triangles = std::make_shared<const typename Arrays::Triangles>(std::move(*triangles));
     check_strict(name_of(id), mesh.view());
     scene_.update(id, mesh.view());
+    geometry.attributes = geometry.attributes->of(mesh.vertices->size(), mesh.triangles);
     geometry.mesh = std::move(mesh);
     geometry.is_in_file = false;
 }
@@ -269,18 +279,14 @@ CommitReport BasicSceneTrees<Names>::commit(const SceneOptions& options) {
     // The scenes that this one places must stay as they are meanwhile. Past their queues: whoever
     // changes one of them may wait for somebody who waits for this.
     std::vector<Reading> below;
-    auto kept = std::make_shared<Kept>();
     std::set<BasicSceneTrees*> placed;
     for (const auto& [id, geometry] : geometries_) {
-        if (!geometry.is_instance) {
-            kept->meshes.push_back(geometry.mesh);
-        } else if (geometry.scene != nullptr && placed.insert(geometry.scene.get()).second) {
-            below.emplace_back("commit", geometry.scene->locks_);
-            const std::lock_guard build(geometry.scene->locks_.build());
-            geometry.scene->settle();
-            kept->below.push_back(geometry.scene->kept_);
-        }
+        if (geometry.scene == nullptr || !placed.insert(geometry.scene.get()).second) continue;
+        below.emplace_back("commit", geometry.scene->locks_);
+        const std::lock_guard build(geometry.scene->locks_.build());
+        geometry.scene->settle();
     }
+    auto kept = keep();
     const CommitReport report = commit_now(options);
     commits_ = options;
     commits_.progress = nullptr;
@@ -288,6 +294,70 @@ CommitReport BasicSceneTrees<Names>::commit(const SceneOptions& options) {
     kept_ = std::move(kept);
     look_for_mesh();
     return report;
+}
+
+template <class Names>
+std::shared_ptr<const typename BasicSceneTrees<Names>::Kept> BasicSceneTrees<Names>::keep() const {
+    auto kept = std::make_shared<Kept>();
+    for (const auto& [id, geometry] : geometries_) {
+        if (!geometry.is_instance) kept->meshes.push_back(geometry.mesh);
+        if (geometry.attributes != nullptr) kept->attributes.emplace_back(id, geometry.attributes);
+        if (geometry.scene != nullptr) kept->placed.emplace_back(id, geometry.scene->kept_);
+    }
+    return kept;
+}
+
+namespace {
+
+/// What a list by ascending ids has for one; null: nothing.
+template <class Value>
+const Value* find_id(const std::vector<std::pair<std::uint32_t, std::shared_ptr<const Value>>>& all,
+                     std::uint32_t id) {
+    const auto found =
+        std::ranges::lower_bound(all, id, {}, [](const auto& entry) { return entry.first; });
+    return found == all.end() || found->first != id ? nullptr : found->second.get();
+}
+
+}  // namespace
+
+template <class Names>
+void BasicSceneTrees<Names>::set_attribute(
+    std::uint32_t id, const std::string& name,
+    typename Attributes<typename Names::Scalar>::Value value) {
+    const Writing lock("set_attributes", locks_);
+    Geometry& geometry = at(id);
+    if (geometry.attributes == nullptr)
+        throw InputError(name_of(id) + " is no mesh whose vertices could have attributes");
+    const Arrays& mesh = arrays_of(id, geometry);
+    geometry.attributes->set(name, std::move(value), mesh.vertices->size(), mesh.triangles);
+}
+
+template <class Names>
+std::map<std::string, typename Attributes<typename Names::Scalar>::Value>
+BasicSceneTrees<Names>::attributes(std::uint32_t id) const {
+    const auto found = geometries_.find(id);
+    if (found == geometries_.end() || found->second.attributes == nullptr) return {};
+    return found->second.attributes->all();
+}
+
+template <class Names>
+std::optional<typename Attributes<typename Names::Scalar>::Found> BasicSceneTrees<Names>::attribute(
+    std::uint32_t path, std::uint32_t id, const std::string& name) {
+    const Kept* kept = kept_.get();
+    for (const std::uint32_t step : traced().path(path)) {
+        kept = find_id(kept->placed, step);
+        if (kept == nullptr) return std::nullopt;
+    }
+    const auto* mesh = find_id(kept->attributes, id);
+    return mesh == nullptr ? std::nullopt : mesh->find(name);
+}
+
+template <class Names>
+std::optional<typename Attributes<typename Names::Scalar>::Found>
+BasicSceneTrees<Names>::any_attribute(const std::string& name) const {
+    for (const auto& [id, mesh] : kept_->attributes)
+        if (auto found = mesh->find(name)) return found;
+    return std::nullopt;
 }
 
 /// After a commit, or in its place.
@@ -351,7 +421,7 @@ RefitQuality BasicSceneTrees<Names>::refit(Vertices vertices, int threads) {
         static_cast<void>(commit_now(options));
     }
     at(*mesh_id_).mesh = moved;
-    kept_ = std::make_shared<const Kept>(Kept{{moved}, {}});
+    kept_ = keep();
     this->move_mesh(moved);
     return quality;
 }

@@ -23,9 +23,11 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "array_filter.h"
+#include "attributes.h"
 #include "locks.h"
 
 namespace raydix::python {
@@ -191,6 +193,9 @@ public:
     /// All of them or none.
     void set_transforms(std::span<const std::uint32_t> ids, std::span<const Transform> transforms);
     void set_masks(std::span<const std::uint32_t> ids, std::span<const std::uint32_t> masks);
+    /// Null: takes it away. Throws InputError: no such geometry, no mesh.
+    void set_attribute(std::uint32_t id, const std::string& name,
+                       typename Attributes<typename Names::Scalar>::Value value);
     CommitReport commit(const SceneOptions& options);
     /// Moves the vertices of the one mesh that the scene holds, in the binary tree and in the wide
     /// one. Throws InputError as Refitter::refit does, and if there are changes without a commit.
@@ -213,6 +218,16 @@ public:
     [[nodiscard]] std::uint32_t mask_of(std::uint32_t id) const { return scene_.mask(id); }
     /// Those of a mesh; a copy of what still lies in the file of the scene. None of all else.
     [[nodiscard]] std::optional<Arrays> mesh_arrays(std::uint32_t id) const;
+    /// Of a mesh, changes without a commit included; else none.
+    [[nodiscard]] std::map<std::string, typename Attributes<typename Names::Scalar>::Value>
+    attributes(std::uint32_t id) const;
+    /// By the last commit, of what rays hit there; nothing if it has none of that name. Throws
+    /// InputError: no such path.
+    [[nodiscard]] std::optional<typename Attributes<typename Names::Scalar>::Found> attribute(
+        std::uint32_t path, std::uint32_t id, const std::string& name);
+    /// By the last commit, of any mesh of the scene itself.
+    [[nodiscard]] std::optional<typename Attributes<typename Names::Scalar>::Found> any_attribute(
+        const std::string& name) const;
     /// As the last commit left it. Throws InputError, as its functions do, if there was none.
     [[nodiscard]] const Scene& traced();
 
@@ -246,16 +261,21 @@ private:
     using MeshTrees<Names>::options_;
     using MeshTrees<Names>::why_no_mesh_;
 
-    /// What a commit may still read: meshes of the scene and of those that it places.
+    using MeshAttributes = Attributes<typename Names::Scalar>;
+    /// What a commit may still read, meshes of the scene and of those that it places, and what its
+    /// vertices carry.
     struct Kept {
         std::vector<Arrays> meshes;
-        std::vector<std::shared_ptr<const Kept>> below;
+        // By id, ascending: of meshes and of instances.
+        std::vector<std::pair<std::uint32_t, std::shared_ptr<const MeshAttributes>>> attributes;
+        std::vector<std::pair<std::uint32_t, std::shared_ptr<const Kept>>> placed;
     };
     struct Geometry {
         bool is_instance = false;
         bool is_shapes = false;  // whose arrays the library has
         std::uint32_t mask = 0xFFFFFFFFu;
-        Arrays mesh = {};  // empty while `is_in_file`
+        Arrays mesh = {};                                 // empty while `is_in_file`
+        std::shared_ptr<MeshAttributes> attributes = {};  // null unless it is a mesh
         std::shared_ptr<BasicSceneTrees> scene =
             {};                   // of an instance; null if it comes from a file
         bool is_in_file = false;  // the arrays of the mesh are those that the scene came with
@@ -272,6 +292,8 @@ private:
     /// from a mesh.
     void settle();
     CommitReport commit_now(SceneOptions options);
+    /// While writing, with the scenes that are placed held: of all geometries as they are.
+    [[nodiscard]] std::shared_ptr<const Kept> keep() const;
     void look_for_mesh();
 
     SceneOptions commits_;

@@ -1,8 +1,8 @@
 """Hits: keys and attributes, what else they can have, and how they behave as a dict."""
 
 import copy
-import gc
 import pickle
+import threading
 
 import numpy as np
 import pytest
@@ -173,14 +173,52 @@ def test_attributes_are_those_of_the_commit_that_was_hit(precision):
     assert at(mesh) == 10
 
 
-def test_surfaces_that_nothing_shows_are_not_kept():
-    scene = raydix.Scene(*BOX)
-    scene.set_attributes(0, height=BOX[0][:, 2])
-    for _ in range(5):
-        scene.update(0, BOX[0])
-        scene.commit()
-    gc.collect()
-    assert len(scene._surfaces) == 1
+def test_the_number_of_columns_is_that_of_what_was_hit():
+    corners, ray, miss = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [0.5, 0.25, -1, 0, 0, 1], [9, 9, 9] * 2
+    scene = raydix.Scene(corners, [[0, 1, 2]])
+    scene.set_attributes(0, h=[0.0, 10.0, 20.0])
+    scene.update(0, corners)
+    scene.set_attributes(0, h=np.zeros((3, 2)))
+    assert scene.intersect([ray], also="h").h.tolist() == [10]
+    assert scene.intersect([miss], also="h").h.shape == (1,)
+    scene.commit()
+    assert scene.intersect([ray], also="h").h.tolist() == [[0, 0]]
+    scene.remove(0)
+    assert scene.intersect([miss], also="h").h.shape == (1, 2)
+    other = raydix.Scene(corners, [[0, 1, 2]])
+    other.add(np.add(corners, [10, 0, 0]), [[0, 1, 2]])
+    other.commit()
+    other.set_attributes(0, h=[1.0, 1.0, 1.0])
+    other.set_attributes(1, h=np.ones((3, 2)))
+    there = [10.5, 0.25, -1, 0, 0, 1]
+    assert other.intersect([there], also="h").h.tolist() == [[1, 1]]
+    with pytest.raises(ValueError, match="h: meshes that were hit have it in columns"):
+        other.intersect([ray, there], also="h")
+
+
+def test_attributes_while_others_commit():
+    """Whichever commit a ray meets, its corner with the value 10 is where it was."""
+    corners, heights = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [0.0, 10.0, 20.0]
+    orders = [[0, 1, 2]], [[1, 2, 0]], [[2, 0, 1]]
+    scene = raydix.Scene(corners, orders[0])
+    scene.set_attributes(0, height=heights)
+    ended = threading.Event()
+
+    def change():
+        for k in range(400):
+            scene.update(0, corners, orders[k % 3])
+            scene.commit()
+        ended.set()
+
+    writers = [threading.Thread(target=change) for _ in range(2)]
+    for writer in writers:
+        writer.start()
+    found = set()
+    while not ended.is_set():
+        found.add(float(scene.intersect([0.5, 0.25, -1, 0, 0, 1], also="height").height))
+    for writer in writers:
+        writer.join()
+    assert found == {10.0}
 
 
 def test_attributes_that_are_wrong(tmp_path):
