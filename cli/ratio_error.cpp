@@ -152,7 +152,10 @@ RatioFound rate_ratio(const SimulationRow& a, const SimulationRow& b, Figure fig
                   (static_cast<double>(b.sum.instructions) / static_cast<double>(b.sum.rays)) *
                   b.correction() / a.correction()
             : x.*rate_a / (y.*rate_b);
-    if (figure == Figure::scheduled && !(fills_machine(a) && fills_machine(b))) {
+    const auto needs_full = [](const SimulationRow& row, double SimulatedRates::*of) {
+        return of == &SimulatedRates::scheduled && !fills_machine(row);
+    };
+    if (!instructions && (needs_full(a, rate_a) || needs_full(b, rate_b))) {
         found.needs = "needs launches that fill the machine";
         return found;
     }

@@ -42,10 +42,12 @@ Json ranked_json(const SimulationRow& row, const SimulationRow& first) {
              {"first_over_it", 1.0},
              {"low", nullptr},
              {"high", nullptr},
-             {"behind", nullptr}};
+             {"behind", nullptr},
+             {"needs", ""}};
     if (&row == &first) return out;
     const RatioFound found = ratio_of(first, row, Figure::tightest);
     out["first_over_it"] = *found.ratio;
+    out["needs"] = found.needs;
     if (!found.needs.empty()) return out;
     out["low"] = found.error.low, out["high"] = found.error.high;
     out["behind"] = found.error.low > 1.0;
@@ -83,7 +85,7 @@ void print_ranking(const Json& ranking) {
             if (&kernel == &first || kernel["behind"] == true) continue;
             level.push_back(kernel["kernel"].get<std::string>() +
                             (kernel["low"].is_null()
-                                 ? " (error not known)"
+                                 ? fmt::format(" ({})", kernel["needs"].get<std::string>())
                                  : fmt::format(" ({:.2f} to {:.2f})", kernel["low"].get<double>(),
                                                kernel["high"].get<double>())));
         }

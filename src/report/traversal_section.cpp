@@ -292,13 +292,13 @@ std::string width_plots(const Documents& documents, PageColours& colours) {
     return plots;
 }
 
-/// "1.02 (0.98 to 1.06)"
+/// "1.02 (0.98 to 1.06)", or what it takes to know the error
 std::string ahead_text(const Json& kernel) {
     const auto low = number_at(kernel, "low"), high = number_at(kernel, "high");
-    return with_decimals(or_nan(number_at(kernel, "first_over_it")), 2) +
-           (low && high
-                ? fmt::format(" ({} to {})", with_decimals(*low, 2), with_decimals(*high, 2))
-                : " (error not known)");
+    return fmt::format(
+        "{} ({})", with_decimals(or_nan(number_at(kernel, "first_over_it")), 2),
+        low && high ? fmt::format("{} to {}", with_decimals(*low, 2), with_decimals(*high, 2))
+                    : text_at(kernel, "needs"));
 }
 
 /// The fastest kernel of each machine and kind of rays, and those that are not told from it.
