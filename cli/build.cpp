@@ -236,12 +236,13 @@ void add_build_command(CLI::App& app) {
         ->add_option("-o,--output", options->out_file,
                      "Save the tree with its geometry; of a scene of several meshes or nodes, or "
                      "with --layout wide8 or compact, the whole scene")
+        ->check(file_name())
         ->type_name("FILE.rdx");
     add_tree_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options, command] {
-        require_writable(*command, "--output", options->out_file);
+        require_writable(options->out_file);
         require_writable_json(options->common);
         run_build(*options);
     });

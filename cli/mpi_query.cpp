@@ -240,10 +240,8 @@ void add_mpi_query(CLI::App& app) {
         ->add_option("--queries", options->queries_file,
                      "(Q, 3) .npy file; without it the scene's own vertices")
         ->check(file_name());
-    command
-        ->add_option("--out", options->prefix,
-                     "Rank 0 writes PREFIX.indices.npy and others, numbers in 64 bits")
-        ->check(file_name());
+    command->add_option("--out", options->prefix,
+                        "Rank 0 writes PREFIX.indices.npy and others, numbers in 64 bits");
     CLI::Option_group* kind = command->add_option_group("Kind");
     kind->add_option("--knn", options->k, "The K nearest vertices")
         ->transform(whole_number(1, 0xFFFFFFFE));

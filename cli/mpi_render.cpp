@@ -186,7 +186,7 @@ void add_mpi_render(CLI::App& app) {
     command->add_flag("--distributed", options->is_distributed,
                       "Spread the scene over the ranks. Without it each rank reads and holds all");
     command->callback([options, command] {
-        on_first([&] { check_picture_options(*command, options->picture); });
+        on_first([&] { check_picture_options(options->picture); });
         require_writable_results(*command, options->common, "", "");
         run_render(*options);
     });

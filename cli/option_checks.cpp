@@ -62,17 +62,11 @@ void require_writable(const std::string& file) {
         throw InputError(file + ": cannot write: " + std::generic_category().message(error));
 }
 
-void require_writable(const CLI::App& command, const char* option, const std::string& file) {
-    if (file.empty() && is_given(command, option))
-        throw CLI::ValidationError(option, "the name of the file is empty");
-    require_writable(file);
-}
-
-void require_picture(const CLI::App& command, const char* option, const std::string& file) {
+void require_picture(const std::string& file) {
     const std::string ending = CLI::detail::to_lower(std::filesystem::path(file).extension());
     if (!file.empty() && ending != ".png" && ending != ".exr")
         throw InputError(file + ": unknown picture type '" + ending + "'; known: .png .exr");
-    require_writable(command, option, file);
+    require_writable(file);
 }
 
 }  // namespace raydix::cli

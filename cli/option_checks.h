@@ -26,13 +26,10 @@ void refuse_given(const CLI::App& command, std::initializer_list<const char*> na
 /// value is.
 [[nodiscard]] CLI::Validator file_name();
 
-/// Before the work of which `file` takes the result, as far as can be told then. Not given: nothing
-/// to check. Throws InputError as writing would, and a usage error that names the option if the
-/// name is empty.
-void require_writable(const CLI::App& command, const char* option, const std::string& file);
-/// The same of --json, and of no option.
+/// Before the work of which `file` takes the result, as far as can be told then. Empty: nothing to
+/// check. Throws InputError as writing would.
 void require_writable(const std::string& file);
 /// The same of a picture: also its ending.
-void require_picture(const CLI::App& command, const char* option, const std::string& file);
+void require_picture(const std::string& file);
 
 }  // namespace raydix::cli

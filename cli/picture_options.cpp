@@ -39,9 +39,9 @@ RenderOptions PictureOptions::render_options(const CameraSet& cameras,
     return chosen;
 }
 
-void check_picture_options(const CLI::App& command, const PictureOptions& options) {
+void check_picture_options(const PictureOptions& options) {
     if (!options.size_text.empty()) static_cast<void>(parse_size(options.size_text));
-    require_picture(command, "--output", options.out_file);
+    require_picture(options.out_file);
 }
 
 void add_picture_options(CLI::App& command, PictureOptions& options,
@@ -49,6 +49,7 @@ void add_picture_options(CLI::App& command, PictureOptions& options,
     command
         .add_option("-o,--output", options.out_file,
                     "Picture to write: .png, or .exr for linear values")
+        ->check(file_name())
         ->required()
         ->type_name("PICTURE");
     command.add_option("--view", options.view, "What to show")

@@ -28,7 +28,7 @@ struct PictureOptions {
                                                const CommonOptions& common) const;
 };
 /// Before any work: --size must be one, and the picture must have a name that can be written.
-void check_picture_options(const CLI::App& command, const PictureOptions& options);
+void check_picture_options(const PictureOptions& options);
 void add_picture_options(CLI::App& command, PictureOptions& options,
                          const std::vector<std::string>& views);
 

@@ -106,7 +106,7 @@ void add_render_command(CLI::App& app) {
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options, command] {
-        check_picture_options(*command, *options);
+        check_picture_options(*options);
         require_writable_json(options->common);
         run_render(*options);
     });

@@ -123,6 +123,7 @@ void add_report_command(CLI::App& app) {
                      "Documents written with --json; two of one command are compared")
         ->required();
     command->add_option("-o,--output", options->out_file, "Page to write")
+        ->check(file_name())
         ->required()
         ->type_name("FILE.html");
     command->add_option("--title", options->title, "Head of the page");
@@ -147,7 +148,7 @@ void add_report_command(CLI::App& app) {
         ->transform(whole_number(0))
         ->capture_default_str();
     command->callback([options, command] {
-        require_writable(*command, "--output", options->out_file);
+        require_writable(options->out_file);
         run_report(*options);
     });
 }

@@ -578,8 +578,11 @@ void add_trace_command(CLI::App& app) {
             "--hits", options->hits_file,
             "Save the hits as a structured array (of any hits: 1 or 0 a ray); for all hits "
             "also FILE.offsets.npy")
+        ->check(file_name())
         ->type_name("FILE.npy");
-    command->add_option("--save-rays", options->rays_file, "Save the rays")->type_name("FILE.npy");
+    command->add_option("--save-rays", options->rays_file, "Save the rays")
+        ->check(file_name())
+        ->type_name("FILE.npy");
     command->add_flag("--explain", options->explain, "Say which layout and which code ran");
     add_result_limit(*command, options->max_result_bytes);
     add_wide_trace_options(*command, options->wide);
@@ -589,8 +592,8 @@ void add_trace_command(CLI::App& app) {
     command->callback([options, command] {
         if (options->tree.device != "sim")
             refuse_given(*command, {"--machine"}, "belongs to --device sim");
-        require_writable(*command, "--hits", options->hits_file);
-        require_writable(*command, "--save-rays", options->rays_file);
+        require_writable(options->hits_file);
+        require_writable(options->rays_file);
         require_writable_json(options->common);
         run_trace(*options);
     });

@@ -86,7 +86,7 @@ class Al09(unittest.TestCase):
         # Costs leave the first kernel 10 % slower, but where they are in common; samples leave 2 * hypot(0.03, 0.04) = 10 %.
         for kernel, errors, limit, behind in (("other", (0, 0), 90, True), ("other", (0, 0), 91, False), ("twin", (0, 0), 99, True), ("persistent_first", (0, 0), 99, True),
                                               ("persistent_first", (0.03, 0.04), 91, False), ("persistent_first", (0.03, 0.04), 89, True), ("other", (None, 0), 1, False)):
-            self.assertEqual(results.is_behind(row(kernel, errors[0]), limit, row("first", errors[1]), 100), behind)
+            self.assertEqual(plots.is_behind(row(kernel, errors[0]), limit, row("first", errors[1]), 100), behind)
 
     def test_derived_ranges_are_those_of_the_claims(self):
         """What the program says of claims by issue on all primary rays, which have no error but that of costs."""
@@ -96,7 +96,7 @@ class Al09(unittest.TestCase):
             if match is None:
                 continue
             first, second = (min(results.rows[scene, "gtx285", kernel, "primary"], key=plots.error_of) for kernel in match.groups())
-            low, high = results.cost_range(second, first)
+            low, high = plots.cost_range(second, first)
             self.assertAlmostEqual(claim["low"], low * claim["ratio"], 6)
             self.assertAlmostEqual(claim["high"], high * claim["ratio"], 6)
             found += 1
