@@ -241,7 +241,7 @@ void add_build_command(CLI::App& app) {
     add_tree_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
-    command->callback([options, command] {
+    command->callback([options] {
         require_writable(options->out_file);
         require_writable_json(options->common);
         run_build(*options);

@@ -105,7 +105,7 @@ void add_render_command(CLI::App& app) {
     add_tree_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
-    command->callback([options, command] {
+    command->callback([options] {
         check_picture_options(*options);
         require_writable_json(options->common);
         run_render(*options);

@@ -147,7 +147,7 @@ void add_report_command(CLI::App& app) {
     command->add_option("--seed", options->common.seed, "Seed of built-in scenes")
         ->transform(whole_number(0))
         ->capture_default_str();
-    command->callback([options, command] {
+    command->callback([options] {
         require_writable(options->out_file);
         run_report(*options);
     });
