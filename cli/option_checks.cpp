@@ -5,10 +5,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <filesystem>
+#include <string_view>
 #include <system_error>
+#include <vector>
 
 namespace raydix::cli {
 
@@ -43,6 +46,70 @@ CLI::Validator file_name() {
             return std::string(name.empty() ? "the name of the file is empty" : "");
         },
         "");
+}
+
+namespace {
+
+/// A name of a file as given, and where.
+struct NamedFile {
+    std::string option, path;
+    bool may_replace = false;  // what is read
+};
+
+bool is_one_of(const std::string& name, std::initializer_list<std::string_view> names) {
+    return std::ranges::find(names, name) != names.end();
+}
+
+/// Pipes and devices take any number of results.
+bool same_file(const std::string& a, const std::string& b) {
+    namespace fs = std::filesystem;
+    std::error_code error;
+    if (fs::exists(a, error) && !fs::is_regular_file(a, error)) return false;
+    if (fs::equivalent(a, b, error)) return true;
+    return fs::weakly_canonical(fs::absolute(a, error), error) ==
+           fs::weakly_canonical(fs::absolute(b, error), error);
+}
+
+void collect_files(const CLI::App& command, std::vector<NamedFile>& written,
+                   std::vector<NamedFile>& read) {
+    for (const CLI::Option* option : command.get_options()) {
+        const std::string name = option->get_single_name();
+        const bool output = is_one_of(name, {"output", "json", "hits", "save-rays", "state"});
+        const bool input =
+            option->get_positional() ||
+            is_one_of(name, {"with", "queries", "rays", "cameras", "machine", "picture"});
+        for (const std::string& file : option->results()) {
+            if (file.empty() || file == "-") continue;
+            if (output)
+                written.push_back(
+                    {"--" + name, file,
+                     name == "state" || (name == "output" && command.get_name() == "build")});
+            else if (input)
+                read.push_back({option->get_positional() ? name : "--" + name, file});
+        }
+    }
+    for (const CLI::App* chosen : command.get_subcommands()) collect_files(*chosen, written, read);
+}
+
+}  // namespace
+
+void refuse_shared_files(const CLI::App& program) {
+    std::vector<NamedFile> written, read;
+    collect_files(program, written, read);
+    for (std::size_t k = 0; k < written.size(); ++k) {
+        const NamedFile& file = written[k];
+        for (std::size_t other = 0; other < k; ++other)
+            if (same_file(file.path, written[other].path))
+                throw CLI::ValidationError(
+                    file.option,
+                    fmt::format("{} is the file of {} too", file.path, written[other].option));
+        if (file.may_replace) continue;
+        for (const NamedFile& source : read)
+            if (same_file(file.path, source.path))
+                throw CLI::ValidationError(
+                    file.option,
+                    fmt::format("would replace {}, which is read ({})", file.path, source.option));
+    }
 }
 
 void require_writable(const std::string& file) {

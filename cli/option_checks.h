@@ -26,6 +26,11 @@ void refuse_given(const CLI::App& command, std::initializer_list<const char*> na
 /// value is.
 [[nodiscard]] CLI::Validator file_name();
 
+/// Usage error where a file that the command writes is one that it reads, or is written twice. A
+/// tree may take the place of the one it was read from (build -o). For the program's
+/// parse_complete.
+void refuse_shared_files(const CLI::App& program);
+
 /// Before the work of which `file` takes the result, as far as can be told then. Empty: nothing to
 /// check. Throws InputError as writing would.
 void require_writable(const std::string& file);

@@ -17,6 +17,8 @@
 #include <system_error>
 #include <vector>
 
+#include "option_checks.h"
+
 namespace raydix::cli {
 namespace {
 
@@ -99,6 +101,7 @@ int run_program(CLI::App& app, int argc, char** argv) {
     const std::vector<std::string> words = words_of(argc, argv);
     std::vector<const char*> pointers;
     for (const std::string& word : words) pointers.push_back(word.c_str());
+    app.parse_complete_callback([&app] { refuse_shared_files(app); });
     try {
         app.parse(argc, pointers.data());
     } catch (const CLI::ParseError& error) {

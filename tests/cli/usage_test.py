@@ -269,6 +269,26 @@ class Usage(ProgramTest):
                 file.write(TRIANGLE[:40].encode())
             self.fail_with_one_line("build", path)
 
+    def test_a_file_is_written_once_and_never_over_what_is_read(self):
+        file = self.write("one.ply", TRIANGLE)
+        os.symlink("one.ply", os.path.join(self.folder, "link.ply"))
+        self.succeed("info", file, "--json", "one.json")
+        before = {name: open(os.path.join(self.folder, name), "rb").read() for name in ("one.ply", "one.json")}
+        rays = ["trace", file, "--size", "4x4", "--samples", "1"]
+        for arguments, names in ((["report", "one.json", "-o", "./one.json"], ["--output", "one.json", "RESULT"]),
+                                 (["info", file, "--json", "link.ply"], ["--json", "link.ply"]),
+                                 ([*rays, "--hits", "h.npy", "--save-rays", os.path.join(self.folder, "h.npy")], ["h.npy"]),
+                                 ([*rays, "--hits", "h.npy", "--json", "h.npy"], ["--hits", "--json"]),
+                                 (["build", file, "-o", "a.rdx", "--json", "a.rdx"], ["--json", "--output"])):
+            with self.subTest(arguments[0], names=names):
+                self.fail_with_usage(*arguments, names=names)
+        self.assertEqual(before, {name: open(os.path.join(self.folder, name), "rb").read() for name in before})
+        self.assertEqual([name for name in ("h.npy", "a.rdx") if os.path.exists(os.path.join(self.folder, name))], [])
+        self.succeed("build", file, "-o", "again.rdx")
+        self.succeed("build", "again.rdx", "-o", "again.rdx")  # a tree may be built anew in its place
+        self.succeed("check", "again.rdx")
+        self.succeed(*rays, "--hits", "/dev/null", "--json", "/dev/null", "--quiet")
+
     def test_quiet_prints_nothing(self):
         file = self.write("quiet.ply", TRIANGLE)
         for arguments in (["info", file], ["scenes"], ["build", file, "-o", "quiet.rdx"], ["check", "quiet.rdx"],
