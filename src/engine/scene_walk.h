@@ -173,7 +173,7 @@ private:
             }
         }
         float reach(std::uint32_t ray) { return walk_.shorten(level_, ray); }
-        static constexpr bool nearest_first = true, large = false;
+        static constexpr bool nearest_first = true, packets_nearest_first = true, large = false;
 
     private:
         SceneWalk& walk_;
