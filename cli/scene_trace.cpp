@@ -89,7 +89,8 @@ Json SceneTracer::build_json() const {
 }
 
 HitFields SceneTracer::hit_fields() const {
-    const bool one_mesh = scene_json_["geometries"] == 1 && scene_json_["instances"] == 0;
+    const bool one_mesh = scene_json_["geometries"] == 1 && scene_json_["instances"] == 0 &&
+                          scene_json_.value("shapes", 0) == 0;
     return one_mesh ? HitFields::tree : HitFields::scene;
 }
 

@@ -46,13 +46,15 @@ class SceneViews:
         scene."""
         if self._cameras:
             return list(self._cameras)
-        if self._fitted is None:
-            is_mesh = self._core.is_mesh()
-            lo, hi = self._core.info()["bounds"] if is_mesh else self._core.bounds()
-            if not lo[0] <= hi[0]:
-                return [Camera()]
-            self._fitted = Camera(**self._core.fit_camera(lo, hi, 45.0))
-        return [self._fitted]
+        fitted = self._fitted
+        if fitted is None:
+            with self._core.held():  # no commit comes between the making and the keeping
+                is_mesh = self._core.is_mesh()
+                lo, hi = self._core.info()["bounds"] if is_mesh else self._core.bounds()
+                if not lo[0] <= hi[0]:
+                    return [Camera()]
+                fitted = self._fitted = Camera(**self._core.fit_camera(lo, hi, 45.0))
+        return [fitted]
 
     def _camera(self, camera: Camera | int | None) -> Camera:
         if isinstance(camera, Camera):

@@ -225,9 +225,11 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         self._there = self._fitted = self._file = None
 
     def _on_device(self) -> DeviceRays:
-        if self._there is None:
-            self._there = DeviceRays(self._core, self.device)
-        return self._there
+        there = self._there
+        if there is None:
+            with self._core.held():  # no commit comes between the making and the keeping
+                there = self._there = DeviceRays(self._core, self.device)
+        return there
 
     @property
     def vertices(self) -> np.ndarray:
@@ -456,8 +458,10 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
             raise ValueError(
                 f"vertices: expected shape ({len(self.vertices)}, 3), given {corners.shape}"
             )
-        self._forget()
-        return self._core.refit(corners, self.threads)
+        try:
+            return self._core.refit(corners, self.threads)
+        finally:
+            self._forget()
 
     def info(self) -> dict[str, Any]:
         """Counts, bounds and degenerate elements of the mesh."""

@@ -378,6 +378,7 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
     ) -> np.ndarray:
         """Sums of the products of weights over the pairs within each radius."""
         weighted = mine is not None or theirs is not None
+        radii = np.where(radii >= 0, radii, -1.0)  # NaN holds no pair either
         order = np.argsort(radii, kind="stable")
         limits = measure_of(np.maximum(radii[order], 0), p)
         bins = np.zeros(len(radii) + 1, np.float64 if weighted else np.intp)

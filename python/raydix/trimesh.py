@@ -28,21 +28,23 @@ class RayMeshIntersector:
     def __init__(self, geometry: Any, scale_to_box: bool = True) -> None:
         self.mesh = geometry
         self._scale_to_box = scale_to_box
-        self._made_for: Any = None
+        self._made: tuple[Any, Any, Any] = None, None, None
 
-    def _scene(self) -> Scene:
+    def _scene(self) -> tuple[Scene, np.ndarray]:
+        """The mesh moved to 0, and by how much."""
         now = hash(self.mesh)
-        if self._made_for != now:
+        made_for, scene, middle = self._made
+        if made_for != now:
             vertices = np.asarray(self.mesh.vertices, np.float64)
             faces = np.asarray(self.mesh.faces)
             corners = vertices[np.unique(faces)]  # what no triangle has does not count
             corners = corners[np.isfinite(corners).all(axis=1)]
-            self._middle = (
+            middle = (
                 (corners.min(axis=0) + corners.max(axis=0)) / 2 if len(corners) else np.zeros(3)
             )
-            self._kept = Scene(vertices - self._middle, faces)
-            self._made_for = now
-        return self._kept
+            scene = Scene(vertices - middle, faces)
+            self._made = now, scene, middle  # in one step: other threads may ask
+        return scene, middle
 
     def _rays(
         self, origins: ArrayLike, directions: ArrayLike
@@ -53,8 +55,8 @@ class RayMeshIntersector:
         start, along = start.reshape(-1, 3), along.reshape(-1, 3)
         length = np.linalg.norm(along, axis=1, keepdims=True)
         along = np.divide(along, length, out=np.zeros_like(along), where=length > 0)
-        scene = self._scene()
-        return scene, start - self._middle, along
+        scene, middle = self._scene()
+        return scene, start - middle, along
 
     def _places(self, hits: dict[str, np.ndarray], triangles: np.ndarray) -> np.ndarray:
         """Where on their triangles hits are, from the mesh's own float64 corners."""
@@ -121,8 +123,8 @@ class RayMeshIntersector:
     def contains_points(self, points: ArrayLike) -> np.ndarray:
         """Whether each point is inside: bool, exact on closed meshes, at edges and vertices too.
         See `Scene.contains`."""
-        scene = self._scene()
-        return scene.contains(np.asarray(points, np.float64).reshape(-1, 3) - self._middle)
+        scene, middle = self._scene()
+        return scene.contains(np.asarray(points, np.float64).reshape(-1, 3) - middle)
 
     def __getstate__(self) -> dict[str, Any]:
         return {"mesh": self.mesh, "_scale_to_box": self._scale_to_box}

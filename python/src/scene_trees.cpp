@@ -146,10 +146,16 @@ std::uint32_t BasicSceneTrees<Names>::add(Arrays mesh, const GeometryOptions& op
     settle();
     check_strict("mesh", mesh.view());
     const std::lock_guard all(structure());
-    const std::uint32_t id = scene_.share(mesh.view(), options);
-    geometries_[id] = {.mask = options.mask,
-                       .mesh = std::move(mesh),
-                       .attributes = std::make_shared<MeshAttributes>()};
+    Geometry made{.mask = options.mask,
+                  .mesh = std::move(mesh),
+                  .attributes = std::make_shared<MeshAttributes>()};
+    const std::uint32_t id = scene_.share(made.mesh.view(), options);
+    try {
+        geometries_.emplace(id, std::move(made));
+    } catch (...) {  // no memory
+        scene_.remove(id);
+        throw;
+    }
     ++ids_given_;
     return id;
 }
@@ -165,6 +171,7 @@ std::vector<std::uint32_t> BasicSceneTrees<Names>::add(std::shared_ptr<BasicScen
     settle();
     const std::lock_guard all(structure());
     std::vector<std::uint32_t> ids;
+    ids.reserve(transforms.size());
     try {
         for (std::size_t i = 0; i < transforms.size(); ++i) {
             const std::uint32_t mask = masks[masks.size() == 1 ? 0 : i];
@@ -219,8 +226,9 @@ void BasicSceneTrees<Names>::update(std::uint32_t id, Vertices vertices,
     if (triangles)
         mesh.triangles = std::make_shared<const typename Arrays::Triangles>(std::move(*triangles));
     check_strict(name_of(id), mesh.view());
+    auto attributes = geometry.attributes->of(mesh.vertices->size(), mesh.triangles);
     scene_.update(id, mesh.view());
-    geometry.attributes = geometry.attributes->of(mesh.vertices->size(), mesh.triangles);
+    geometry.attributes = std::move(attributes);
     geometry.mesh = std::move(mesh);
     geometry.is_in_file = false;
 }
@@ -397,6 +405,10 @@ RefitQuality BasicSceneTrees<Names>::refit(Vertices vertices, int threads) {
     if (!scene_.committed() && !unsettled_)
         throw InputError("refit: the scene has changed; commit it first");
     if (!mesh_id_) return {};
+    const auto spoil = [&] {
+        this->drop_trees();
+        refitter_.reset();
+    };
     RefitQuality quality;
     if (!moved.triangles->empty()) {
         if (!refitter_) refitter_.emplace(this->bvh_locked());
@@ -405,23 +417,30 @@ RefitQuality BasicSceneTrees<Names>::refit(Vertices vertices, int threads) {
             quality = refitter_->refit(*bvh_, moved.view(), threads_for(threads));
         } catch (const InputError&) {
             // Found late, the tree is gone: the mesh is still there, and makes it again.
-            if (had_nodes && bvh_->empty()) {
-                this->drop_trees();
-                refitter_.reset();
-            }
+            if (had_nodes && bvh_->empty()) spoil();
+            throw;
+        } catch (...) {
+            spoil();
             throw;
         }
     }
-    scene_.update(*mesh_id_, moved.view());
-    if (!unsettled_) {
-        SceneOptions options = commits_;
-        options.usage = Usage::moving;
-        options.refit_limit = std::numeric_limits<double>::infinity();
-        options.threads = threads;
-        static_cast<void>(commit_now(options));
+    try {
+        Geometry& geometry = at(*mesh_id_);
+        scene_.update(*mesh_id_, moved.view());
+        geometry.mesh = moved;  // the scene looks at it from here on, whatever fails
+        auto kept = keep();
+        if (!unsettled_) {
+            SceneOptions options = commits_;
+            options.usage = Usage::moving;
+            options.refit_limit = std::numeric_limits<double>::infinity();
+            options.threads = threads;
+            static_cast<void>(commit_now(options));
+        }
+        kept_ = std::move(kept);
+    } catch (...) {  // as after `update`: the last commit stands, with the mesh it was made of
+        spoil();
+        throw;
     }
-    at(*mesh_id_).mesh = moved;
-    kept_ = keep();
     this->move_mesh(moved);
     return quality;
 }

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <mutex>
 #include <numbers>
-#include <set>
 
 #include "base/mirrors.h"
 #include "engine/hit_points.h"
@@ -133,7 +132,7 @@ public:
         }
         add_ways();
         build_flats();
-        list_shapes();
+        look_for_shapes();
     }
 
 private:
@@ -172,18 +171,17 @@ private:
             out_.reach = std::max(out_.reach, largest_coordinate(flat_boxes_[part].box));
     }
 
-    void list_shapes() {
-        std::set<ShownShapes> known;
-        const auto add = [&](const ShownShapes& shown) {
-            if (known.insert(shown).second) out_.shapes.push_back(shown);
-        };
-        for (const auto& shapes : scene_.shapes)
-            if (!shapes->empty()) add({{shapes->mask}, shapes.get()});
-        for (const InstanceName& instance : scene_.instances)
-            for (ShownShapes shown : near_scene_of(*instance.scene).shapes) {
-                shown.masks.push_back(instance.mask);
-                add(shown);
-            }
+    void look_for_shapes() {
+        for (const auto& shapes : scene_.shapes) {
+            if (shapes->empty()) continue;
+            out_.has_shapes = true;
+            out_.has_user_geometry |= shapes->user() != nullptr;
+        }
+        for (const InstanceName& instance : scene_.instances) {
+            const NearScene& inner = near_scene_of(*instance.scene);
+            out_.has_shapes |= inner.has_shapes;
+            out_.has_user_geometry |= inner.has_user_geometry;
+        }
     }
 
     const SceneTree& scene_;

@@ -5,6 +5,7 @@
 
 #include <raydix/buffer.h>
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -40,26 +41,14 @@ void set_weights(NearWay& way);
 /// One map farther out.
 [[nodiscard]] NearWay compose(const NearWay& outer, const NearWay& inner);
 
-/// A geometry that is not made of triangles, and the masks that a query must see to come to it.
-struct ShownShapes {
-    std::vector<std::uint32_t> masks;
-    const ShapeTree* shapes;
-
-    [[nodiscard]] bool seen_by(std::uint32_t mask) const {
-        for (const std::uint32_t m : masks)
-            if ((m & mask) == 0) return false;
-        return true;
-    }
-    /// An order by addresses, for sets.
-    friend auto operator<=>(const ShownShapes&, const ShownShapes&) = default;
-};
-
 struct NearScene {
-    std::vector<NearWay> ways;        // [placed scenes]
-    std::vector<Affine> maps;         // as the caller gave them, the innermost of each way first
-    PartTree flats;                   // over parts that hold triangles without area
-    double reach = 0;                 // the largest coordinate of all that is in the scene
-    std::vector<ShownShapes> shapes;  // each once, by the least (path, geometry) of it
+    std::vector<NearWay> ways;  // [placed scenes]
+    std::vector<Affine> maps;   // as the caller gave them, the innermost of each way first
+    PartTree flats;             // over parts that hold triangles without area
+    double reach = 0;           // the largest coordinate of all that is in the scene
+    bool has_shapes = false, has_user_geometry = false;  // on any path
+    /// The call and mask that were last found to have all answers, in one number.
+    mutable std::atomic<std::uint64_t> has_answers = 0;
 
     [[nodiscard]] bool has_flats() const { return !flats.empty(); }
 };

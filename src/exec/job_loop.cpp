@@ -67,6 +67,11 @@ void with_job_limit(int threads, const std::function<void()>& body) {
     body();
 }
 
+void as_job(const std::function<void()>& body) {
+    const Restore within(job_limit, true);
+    body();
+}
+
 bool pool_is_used() { return used.load(std::memory_order_acquire); }
 
 int pool_threads() {

@@ -39,6 +39,9 @@ private:
 /// Calls body() with at most `threads` jobs in each loop; 0 keeps the limit as it is.
 void with_job_limit(int threads, const std::function<void()>& body);
 
+/// Calls body() as a job does: its loops stay on this thread.
+void as_job(const std::function<void()>& body);
+
 /// Whether the caller has handed over a thread pool, how many it has, and a loop on it.
 [[nodiscard]] bool pool_is_used();
 [[nodiscard]] int pool_threads();

@@ -78,7 +78,7 @@ void with_threads(int threads, const std::function<void()>& body) {
 
 void isolated(const std::function<void()>& body) {
     if (pool_is_used())
-        body();  // a job takes up nothing else
+        as_job(body);  // a pool may run any of its tasks while a loop waits
     else
         tbb::this_task_arena::isolate(body);
 }

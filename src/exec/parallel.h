@@ -19,7 +19,8 @@ void with_threads(int threads, const std::function<void()>& body);
 [[nodiscard]] int thread_count();
 
 /// Calls body() within a loop so that the calling thread takes no other part of that loop up while
-/// loops inside of body wait: what body holds, a mutex for one, stays out of reach of itself.
+/// loops inside of body wait: what body holds, a mutex for one, stays out of reach of itself. On
+/// the caller's own pool, which may give that thread any other task, its loops stay on the thread.
 void isolated(const std::function<void()>& body);
 
 namespace detail {

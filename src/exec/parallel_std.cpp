@@ -38,7 +38,12 @@ int thread_count() {
     return pool_is_used() ? pool_threads() : jobs_at_once(machine_threads(), most_threads());
 }
 
-void isolated(const std::function<void()>& body) { body(); }  // loops take up nothing else
+void isolated(const std::function<void()>& body) {
+    if (pool_is_used())
+        as_job(body);  // a pool may run any of its tasks while a loop waits
+    else
+        body();
+}
 
 bool has_onetbb() { return false; }
 

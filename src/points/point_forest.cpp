@@ -99,6 +99,7 @@ void PointForest<T, Dim>::begin() {
     if (arrays_.tree.empty()) {
         make_room(0, 0);
     } else {
+        state_.levels.reserve(1);  // nothing throws once there is room
         Arrays part;
         part.leaves = std::move(arrays_.leaves);
         part.nodes = std::move(arrays_.nodes);

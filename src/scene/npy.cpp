@@ -120,6 +120,10 @@ void check_shape(const ByteSource& in, const NpyHeader& header, std::size_t leas
 template <class T>
 void save_values(const std::filesystem::path& file, std::string_view type,
                  std::span<const T> values, std::size_t columns) {
+    if (columns > 0 && values.size() % columns != 0)
+        input_error(
+            printable(file), "values",
+            fmt::format("{} given, which fill no whole rows of {}", values.size(), columns));
     std::vector<std::uint64_t> shape{values.size()};
     if (columns > 0) shape = {values.size() / columns, columns};
     save_npy_bytes(file, type, shape, std::as_bytes(values));
@@ -135,6 +139,7 @@ std::vector<float> read_npy_rows(ByteSource& in, std::size_t keep) {
 }
 
 std::vector<float> load_npy(const std::filesystem::path& file, std::size_t columns) {
+    if (columns == 0) input_error(printable(file), "columns", "0 given, 1 or more are needed");
     ByteSource in = ByteSource::from_file(file, packing_of(file));
     const NpyHeader header = read_npy_header(in);
     check_shape(in, header, columns, columns);

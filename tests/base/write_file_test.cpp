@@ -203,6 +203,18 @@ TEST_F(WriteFile, AFullDiskLeavesTheOldFile) {
     EXPECT_EQ(content(fresh), large);
 }
 
+TEST_F(WriteFile, ArraysHaveWholeRows) {
+    const std::vector<float> values(7);
+    const fs::path file = here_ / "array.npy";
+    EXPECT_EQ(message_of([&] { save_array(file, values, 3); }),
+              file.string() + ": values: 7 given, which fill no whole rows of 3");
+    EXPECT_FALSE(fs::exists(file));
+    save_array(file, std::vector<float>(), 3);
+    EXPECT_TRUE(load_array(file, 3).empty());
+    EXPECT_EQ(message_of([&] { static_cast<void>(load_array(file, 0)); }),
+              file.string() + ": columns: 0 given, 1 or more are needed");
+}
+
 TEST_F(WriteFile, NamesTheReason) {
     const auto reason = [&](const fs::path& file) { return message_of([&] { write(file, "x"); }); };
     EXPECT_EQ(reason(here_), here_.string() + ": cannot write: " + std::strerror(EISDIR));

@@ -1,9 +1,14 @@
 """Scenes in .rdx files: build -o, the same hits and pictures, what takes such files and what refuses them."""
+import math
+import os
+import struct
+import subprocess
 import sys
+import unittest
 
 sys.dont_write_bytecode = True
-from gltf_test import document as gltf  # noqa: E402
-from program import ProgramTest, main  # noqa: E402
+from gltf_test import document as gltf, read_scene_hits  # noqa: E402
+from program import MISS, ProgramTest, main, write_npy  # noqa: E402
 
 SOUP = "builtin:soup?triangles=3000"
 RAYS = ("--rays", "diffuse", "--camera", "0", "--repeat", "1", "--size", "40x30", "--samples", "2")
@@ -50,6 +55,16 @@ class SceneFile(ProgramTest):
         self.assertIn("3 meshes", self.succeed("info", "saved.rdx").out)
         self.assertIn("every invariant holds", self.succeed("check", "saved.rdx").out)
         self.assertEqual(self.document("check", "saved.rdx")["check"]["primitives"], 6)
+
+    @unittest.skipUnless("RAYDIX_MIXED_SCENE" in os.environ, "RAYDIX_MIXED_SCENE is not set")
+    def test_hits_of_a_mesh_and_of_shapes_are_told_apart(self):
+        subprocess.run([os.environ["RAYDIX_MIXED_SCENE"], self.folder / "mixed.rdx"], check=True)
+        down = (0, 0, 0, -1, math.inf)  # tmin, direction, tmax
+        rays = [struct.pack("<8f", x, y, 9, *down) for x, y in ((0, 0), (5, 0), (9, 9))]
+        write_npy(self.folder / "mixed.npy", "<f4", (3, 8), b"".join(rays))
+        self.succeed("trace", "mixed.rdx", "--rays", "mixed.npy", "--hits", "mixed_hits.npy", "--repeat", "1")
+        hits = read_scene_hits(self.folder / "mixed_hits.npy")
+        self.assertEqual([(hit[1], hit[4]) for hit in hits], [(0, 0), (0, 1), (MISS, MISS)])
 
     def test_one_tree_where_it_is_asked_for(self):
         for options in (("--builder", "karras"), ("--flatten",), ("--max-leaf", "2")):

@@ -162,6 +162,37 @@ TEST(NearShapes, WhatHasNoAnswerIsNamed) {
     EXPECT_EQ(closest_point(scene, {1, 0, 5}, infinity, 1).geometry, 0u);
 }
 
+/// Six levels of 32 instances, each with a mask of its own: 2^30 paths, but seven scenes.
+TEST(NearShapes, WhatMasksHideOnManyPathsIsFoundAtOnce) {
+    constexpr std::uint32_t levels = 6, each = 32;
+    const std::vector<Sphere> spheres{{{0, 0, 0}, 1}};
+    const std::vector<Aabb> boxes{{{0, 0, 0}, {1, 1, 1}}};
+    std::vector<Scene> scenes(levels + 1);
+    scenes[0].add(std::span<const Sphere>(spheres));
+    scenes[0].add(UserGeometry(boxes, [](std::uint32_t, const Ray&, Hit&) { return false; }),
+                  {.mask = 1});
+    scenes[0].commit();
+    float step = 4;
+    for (std::uint32_t level = 0; level < levels; ++level) {
+        for (std::uint32_t k = 0; k < each; ++k)
+            scenes[level + 1].add(scenes[level], moved(step * static_cast<float>(k), 0, 0),
+                                  {.mask = 2 + (k << 8)});
+        step *= each;
+        scenes[level + 1].commit();
+    }
+    const Scene& all = scenes[levels];
+    for (int round = 0; round < 2; ++round) {
+        EXPECT_EQ(closest_point(all, {0, 0, 3}, infinity, 2).distance, 2.0f);
+        EXPECT_NE(message_of([&] {
+                      static_cast<void>(closest_point(all, {0, 0, 3}, infinity, 3));
+                  }).find("user geometry"),
+                  std::string::npos);
+    }
+    const SphereSweep sweep{{{0, 0, 9}, 0, {0, 0, -1}}, 1};
+    EXPECT_NE(message_of([&] { static_cast<void>(sweep_sphere(all, sweep, 2)); }).find("spheres"),
+              std::string::npos);
+}
+
 /// Wherever in memory the trees of shapes are.
 TEST(NearShapes, TheFirstGeometryIsNamed) {
     Scene inner, scene, outer;

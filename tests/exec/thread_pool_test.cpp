@@ -4,10 +4,13 @@
 #include <raydix/bvh.h>
 #include <raydix/double.h>
 #include <raydix/raydix.h>
+#include <raydix/scene_queries.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <deque>
+#include <functional>
 #include <mutex>
 #include <set>
 #include <span>
@@ -201,6 +204,53 @@ bool is_refused(int loop, const Call& call) {
         return true;
     }
     return false;
+}
+
+/// A thread that takes up other tasks while it waits for a loop of its own.
+class HelpingPool {
+public:
+    HelpingPool() {
+        use_thread_pool({.workers = [] { return 2; },
+                         .run =
+                             [this](std::size_t jobs, const auto& job) {
+                                 std::size_t left = jobs;
+                                 for (std::size_t i = 0; i < jobs; ++i)
+                                     tasks.push_back([&job, &left, i] { job(i), --left; });
+                                 while (left > 0) run_one();
+                             }});
+    }
+    ~HelpingPool() { use_thread_pool({}); }
+    HelpingPool(const HelpingPool&) = delete;
+    HelpingPool& operator=(const HelpingPool&) = delete;
+
+    void run_one() {
+        const auto task = std::move(tasks.front());
+        tasks.pop_front();
+        task();
+    }
+
+    std::deque<std::function<void()>> tasks;
+};
+
+/// What a scene makes for the first query of distance must not wait for a second one that the pool
+/// hands to the same thread.
+TEST(ThreadPool, FirstQueriesOfDistanceDoNotWaitForEachOther) {
+    std::vector<Vec3> corners;  // of triangles without area, which such queries list in a loop
+    std::vector<Triangle> triangles;
+    for (std::uint32_t i = 0; i < 40000; ++i) {
+        const auto x = static_cast<float>(i);
+        corners.insert(corners.end(), {{x, 0, 0}, {x + 1, 0, 0}, {x + 1, 0, 0}});
+        triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    const Scene scene(MeshView{corners, triangles});
+    HelpingPool pool;
+    int answered = 0;
+    for (int k = 0; k < 2; ++k)
+        pool.tasks.push_back([&] {
+            answered += closest_point(scene, {5.25f, 3, 0}).distance == 3.0f;
+        });
+    while (!pool.tasks.empty()) pool.run_one();
+    EXPECT_EQ(answered, 2);
 }
 
 /// So many points that the loops over groups of them are more than one thread's.

@@ -288,6 +288,10 @@ def test_radii_that_hold_nothing(kind, rng):
             assert tree.sparse_distance_matrix(tree, r, p, output_type="dict") == {}
         mixed = tree.query_ball_point(data[:4], [0, -1, np.nan, np.inf], p)
         assert [len(row) for row in mixed] == [1, 0, 0, 40]
+        for weights in (None, np.ones(40)):
+            alone = tree.count_neighbors(tree, 0.3, p, weights)
+            counts = tree.count_neighbors(tree, [0.3, np.nan, -1, np.inf], p, weights)
+            assert counts.tolist() == [alone, 0, 0, 1600] and alone > 40
 
 
 def test_numbers_of_neighbours_as_scipy_takes_them(rng):

@@ -114,6 +114,22 @@ def test_edits_copies_and_pickles(trimesh):
     assert len(mesh.ray.intersects_first(np.zeros((0, 3)), np.zeros((0, 3)))) == 0
 
 
+def test_an_edit_that_cannot_be_traced_leaves_no_trace(trimesh):
+    mesh = trimesh.creation.box()
+    mesh.ray = raydix.trimesh.RayMeshIntersector(mesh)
+    right = np.array(mesh.faces)
+    from_above = [[0.1, 0.2, 5]], [[0, 0, -1]]
+    wanted = mesh.ray.intersects_first(*from_above)
+    assert wanted[0] >= 0
+    mesh.vertices[0] = 1e6, 0, 0  # another middle
+    mesh.faces = right - 8  # NumPy takes such numbers, a scene does not
+    with pytest.raises(ValueError):
+        mesh.ray.intersects_first(*from_above)
+    mesh.vertices = trimesh.creation.box().vertices
+    mesh.faces = right
+    assert mesh.ray.intersects_first(*from_above) == wanted
+
+
 def test_scene_takes_a_trimesh(trimesh):
     scene = raydix.Scene(trimesh.creation.icosphere(subdivisions=3))
     assert scene.closure()["closure"] == "oriented"
