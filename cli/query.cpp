@@ -155,7 +155,8 @@ void add_query_command(CLI::App& app) {
         ->capture_default_str();
     add_mesh_options(*command, *options);
     command->add_flag("--strict", options->strict,
-                      "Invalid points are an error instead of being left out");
+                      "Invalid points, or triangles of the scene, are an error instead of being "
+                      "left out; of the queries they never are");
     command->add_option("--repeat", options->repeat, "Timed runs after a warm-up")
         ->transform(whole_number(0, 1000))
         ->capture_default_str();

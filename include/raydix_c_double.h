@@ -35,7 +35,8 @@ typedef int (*raydix_user_test_d)(void* user, uint32_t prim, const raydix_ray_d*
 
 RAYDIX_C_API raydix_status raydix_scene_create_d(raydix_scene_d** scene);
 /* Of .rdx files with scenes it reads those of raydix_scene_save_d alone; raydix_scene_load reads
-   none of them. Other files hold floats, which are taken as they are. */
+   none of them. Of other files the coordinates are rounded to float first, as raydix_scene_load
+   has them: give what a float does not hold to raydix_scene_add_mesh_d. */
 RAYDIX_C_API raydix_status raydix_scene_load_d(const char* path,
                                                const raydix_commit_options* options,
                                                raydix_scene_d** scene);

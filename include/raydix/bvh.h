@@ -189,7 +189,9 @@ private:
                                               const BuildOptions& options = {});
 
 /// Builds a tree over `boxes`. Boxes that are empty (lo > hi), not finite or out of range are left
-/// out and counted. Errors as above.
+/// out and counted. Such a tree answers overlapping_pairs (pairs.h), within itself and with a tree
+/// over boxes to look for. Rays and distances take triangles or, with boxes around them, user
+/// geometry of a Scene (user_geometry.h). Errors as above.
 [[nodiscard]] Bvh build_bvh(std::span<const Aabb> boxes, const BuildOptions& options = {});
 
 /// Builds a tree over points. Points that are not finite or out of range are left out and counted.

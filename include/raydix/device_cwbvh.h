@@ -1,6 +1,7 @@
-// Rays through a compressed wide tree on an NVIDIA GPU (Ylitie, Karras, Laine 2017): device
-// pointers in, device pointers out, on the caller's stream. Memory belongs to the caller. Plain
-// C++. In a build without CUDA every call that needs a device throws BackendUnavailable.
+// Rays through a compressed wide tree on a device, an NVIDIA GPU or one with OpenCL or AMD's HIP
+// (Ylitie, Karras, Laine 2017): device pointers in, device pointers out, on the caller's stream.
+// Memory belongs to the caller. Plain C++. Where there is no such device every call that needs one
+// throws BackendUnavailable.
 #pragma once
 
 #include <raydix/cwbvh.h>

@@ -1,8 +1,9 @@
-// Nearest points, points within a radius, closest points of a mesh and overlapping pairs on an
-// NVIDIA GPU, over trees that lie there (raydix/device.h, raydix/device_trees.h). Device pointers
-// in, device pointers out, on the caller's stream. Memory belongs to the caller. The answers are
-// those of raydix/points.h, closest.h and pairs.h, bit for bit. Plain C++. In a build without CUDA
-// every call that needs a device throws BackendUnavailable.
+// Nearest points, points within a radius, closest points of a mesh and overlapping pairs on a
+// device, an NVIDIA GPU or one with OpenCL or AMD's HIP, over trees that lie there
+// (raydix/device.h, raydix/device_trees.h). Device pointers in, device pointers out, on the
+// caller's stream. Memory belongs to the caller. The answers are those of raydix/points.h,
+// closest.h and pairs.h, bit for bit. Plain C++. Where there is no such device every call that
+// needs one throws BackendUnavailable.
 //
 // The calls that take queries or pairs are asynchronous: they put launches on `stream` and return.
 // They allocate nothing and wait for nothing. Rows of any length take three steps. `count` writes

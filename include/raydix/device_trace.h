@@ -1,7 +1,7 @@
-// Tracing on an NVIDIA GPU with the kernels of Aila and Laine 2009 and 2012: device pointers in,
-// device pointers out, on the caller's stream. Plain C++. In a build without CUDA every call that
-// needs a device throws BackendUnavailable. The triangle test is Woop's. Closest hits are those of
-// trace_reference, bit for bit.
+// Tracing on a device, an NVIDIA GPU or one with OpenCL or AMD's HIP, with the kernels of Aila and
+// Laine 2009 and 2012: device pointers in, device pointers out, on the caller's stream. Plain C++.
+// Where there is no such device every call that needs one throws BackendUnavailable. The triangle
+// test is Woop's. Closest hits are those of trace_reference, bit for bit.
 #pragma once
 
 #include <raydix/device.h>

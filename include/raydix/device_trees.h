@@ -1,6 +1,7 @@
-// Building k-d trees and octrees on an NVIDIA GPU, by the rules of raydix/device.h: device pointers
-// in, device pointers out, on the caller's stream. Memory belongs to the caller. In a build without
-// CUDA every call that needs a device throws BackendUnavailable.
+// Building k-d trees and octrees on a device, an NVIDIA GPU or one with OpenCL or AMD's HIP, by the
+// rules of raydix/device.h: device pointers in, device pointers out, on the caller's stream. Memory
+// belongs to the caller. Where there is no such device every call that needs one throws
+// BackendUnavailable.
 #pragma once
 
 #include <raydix/device.h>

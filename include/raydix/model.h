@@ -74,7 +74,8 @@ struct Model {
 /// Loads a file, or makes a built-in scene. `spec` is a path or "builtin:NAME?key=value&key=value".
 /// `seed` drives built-in scenes. Files: .ply (ascii, binary little and big endian), .obj, .stl
 /// (ascii, binary), .gltf, .glb, .off, .xyz or .npy, each also with .gz, .xz or .zst behind it.
-/// Polygons are fanned in order. -0 becomes +0. Coordinates that are not finite are kept; builders
+/// Polygons are fanned in order. Coordinates are rounded to float: a SceneD of the model has those.
+/// -0 becomes +0. Coordinates that are not finite are kept; builders
 /// leave such triangles out. Memory stays in proportion to what the file really holds. Throws
 /// InputError for what cannot be read or does not exist: "FILE: ELEMENT: reason"; not for a
 /// cameras.json beside the file, which may be another program's (Model::cameras_fault).

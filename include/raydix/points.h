@@ -14,6 +14,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -191,13 +192,16 @@ struct PointQueryOptions {
     /// to the process (result_limit.h).
     std::uint64_t max_result_bytes = 0;
     std::string isa = {};  // one of point_instruction_sets(); empty: the best
+    /// Of knn: points farther away do not count, as radius_search has it. Rounded to the index's
+    /// type. 0 or more.
+    double max_distance = std::numeric_limits<double>::infinity();
 };
 
 /// Instruction sets that batches can run in here, best first.
 [[nodiscard]] std::vector<std::string> point_instruction_sets();
 
 /// The k nearest of each query. Row i is [i * k, (i + 1) * k) of both arrays. Where there are fewer
-/// than k points the row ends with no_primitive and infinity.
+/// than k points, or fewer within max_distance, the row ends with no_primitive and infinity.
 template <class Scalar>
 struct NearestPoints {
     Buffer<std::uint32_t> indices;  // [queries * k]
@@ -225,8 +229,9 @@ using ScalarOf = std::type_identity_t<typename Index::Scalar>;
 
 /// Finds the k nearest points of each query, a point at the query's own place included. queries [n]
 /// -> indices and distances [n * k]. A query that is not finite finds nothing and is counted.
-/// Throws InputError: k = 0, sizes that do not fit. The form that returns NearestPoints throws
-/// ResultTooLarge before it makes room for more than options.max_result_bytes.
+/// Throws InputError: k = 0, sizes that do not fit, a max_distance that is negative or NaN. The
+/// form that returns NearestPoints throws ResultTooLarge before it makes room for more than
+/// options.max_result_bytes.
 template <class Index>
 QueryCounts knn(const Index& index, PointsOf<Index> queries, std::uint32_t k,
                 std::span<std::uint32_t> indices, ScalarsOf<Index> distances,

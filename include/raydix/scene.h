@@ -143,6 +143,7 @@ public:
     /// The same without a copy. The caller keeps the arrays until the scene ends or is committed
     /// without them, and those in which it stands are committed after that. `update` changes them.
     std::uint32_t share(const MeshView& mesh, const GeometryOptions& options = {});
+    std::uint32_t share(Mesh&&, const GeometryOptions& = {}) = delete;  // would be gone at once
     /// Adds spheres, capsules, or points of one radius, of which the scene keeps a copy. `prim`
     /// counts them. Rays hit their surfaces from both sides. A ray that starts inside hits where it
     /// leaves. t is computed in double and rounded once. In double, the point of the ray at t is
@@ -182,7 +183,9 @@ public:
     void set_transform(std::uint32_t id, const Transform& transform);
     void set_mask(std::uint32_t id, std::uint32_t mask);
 
-    /// Takes all changes in: rays meet them from then on. Throws InputError, and the last commit
+    /// Takes all changes in: rays meet them from then on. The options are those of this commit
+    /// alone: what the constructor or an earlier commit was given, or a file holds, is not kept.
+    /// With another quality all trees are built again. Throws InputError, and the last commit
     /// still stands: an option out of range, an instance of a scene without a commit, one that
     /// reaches beyond the range of coordinates (docs/contract.md 1), more than max_levels levels or
     /// 2^32 - 2 paths.

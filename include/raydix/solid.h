@@ -62,6 +62,7 @@ public:
     /// Refers to the tree. The caller keeps it as it is, as long as the solid lives. Throws
     /// InputError: a tree that holds boxes or points; more than 1.4e9 triangles.
     explicit BasicSolid(const Tree& bvh, const SolidOptions& options = {});
+    explicit BasicSolid(Tree&&, const SolidOptions& = {}) = delete;  // would be gone at once
     /// The same, and keeps the tree, which must not be null.
     explicit BasicSolid(std::shared_ptr<const Tree> bvh, const SolidOptions& options = {});
     /// Takes all meshes of the scene's last commit, on every path of instances, as one body.

@@ -40,7 +40,7 @@ def to_numpy(value: Any, name: str) -> np.ndarray:
             raise TypeError(
                 f"{name}: expected an array in the processor's memory, given a "
                 f"{type(value).__name__} on another "
-                f"device (DLPack {device}); only a Scene with device='cuda' takes those"
+                f"device (DLPack {device}); only intersect and occluded of a Scene with device='cuda' take those"
             )
         try:
             return np.from_dlpack(value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from typing import Any, overload
 
@@ -37,6 +38,11 @@ def mesh_of(source: Any) -> tuple[Any, Any]:
     """Vertices and faces of another library's mesh."""
     if hasattr(source, "vertices") and hasattr(source, "faces"):
         return source.vertices, source.faces
+    if isinstance(source, (str, os.PathLike)):
+        raise TypeError(
+            "vertices: a path is read by Scene(path) alone; "
+            "add(Scene(path), transform) places that scene"
+        )
     raise TypeError(
         "vertices: expected a path, a mesh with .vertices and .faces, "
         "or an array together with faces, "

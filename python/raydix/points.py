@@ -126,18 +126,22 @@ class Points:
         queries: ArrayLike,
         k: int,
         *,
+        max_distance: float = np.inf,
         max_result_bytes: int = 0,
         threads: int | None = None,
     ) -> dict[str, np.ndarray]:
         """The k nearest points of each query, nearest first; equal distances by index.
 
-        `queries`: shape (..., D). `k`: any number of 1 or more. Returns "indices" (uint32) and
-        "distances", both of shape (..., k). A query that is one of the points finds itself.
+        `queries`: shape (..., D). `k`: any number of 1 or more. Points farther than `max_distance`
+        do not count, as `radius` has it, which saves the search for them. Returns "indices"
+        (uint32) and "distances", both of shape (..., k); where fewer count, rows end with MISSING
+        and infinity. A query that is one of the points finds itself.
         `max_result_bytes` bounds both arrays; 0: half of the memory that is left. InputError,
         before they are made, if they would take more.
         """
         asked, lead = rows(queries, "queries", (self.dimension,), self.dtype)
         k = whole(k, "k", 1, 2**31)
+        max_distance = number(max_distance, "max_distance")
         shape = lead + (k,)
         bytes_each = UINT32.itemsize + self.dtype.itemsize
         _core.require_result_bytes(
@@ -149,6 +153,7 @@ class Points:
             asked,
             indices.reshape(flat),
             distances.reshape(flat),
+            max_distance,
             self._threads(threads),
         )
         return {"indices": indices, "distances": distances}

@@ -299,7 +299,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         stream :
             Only with device="cuda" and rays that lie on the GPU, float32 of shape (..., 8): the
             CUDA stream to run on, as a number (`cupy.cuda.get_current_stream().ptr`). Results are
-            then arrays of the same library, on the GPU, and not waited for.
+            then a plain dict of arrays of the same library, on the GPU, and not waited for.
 
         Returns
         -------

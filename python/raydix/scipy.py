@@ -180,7 +180,9 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         queries = self._queries(x)
         if most < 1:
             raise ValueError("k: neighbours are counted from 1")
-        distances, indices = self._nearest(queries, most, p, _threads(workers))
+        distances, indices = self._nearest(
+            queries, most, p, _threads(workers), distance_upper_bound
+        )
         missing = ~(distances < distance_upper_bound)
         distances[missing] = np.inf
         indices[missing] = self.n
@@ -192,11 +194,15 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
         return distances, indices
 
     def _nearest(
-        self, queries: np.ndarray, k: int, p: float, threads: int
+        self, queries: np.ndarray, k: int, p: float, threads: int, bound: float = np.inf
     ) -> tuple[np.ndarray, np.ndarray]:
+        """Those beyond `bound` may be left out."""
         near = self._near
         if near.plain(p):
-            found = near.points.knn(near.along_axes(queries), k, threads=threads)
+            most = bound * (1 + 1e-6) if bound >= 0 else np.inf
+            found = near.points.knn(
+                near.along_axes(queries), k, max_distance=most, threads=threads
+            )
             indices = found["indices"].astype(np.intp)
             indices[found["indices"] == MISSING] = self.n
             return found["distances"], indices

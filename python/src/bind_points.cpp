@@ -74,7 +74,9 @@ struct PointCalls {
     static std::pair<std::uint64_t, std::uint64_t> nearest(
         const Shared& shared, const PointRows& queries,
         const Out<std::uint32_t, nb::ndim<2>>& indices, const Out<Scalar, nb::ndim<2>>& distances,
-        int threads) {
+        double max_distance, int threads) {
+        PointQueryOptions options = query_options(threads);
+        options.max_distance = max_distance;
         const auto asked = rows<Point>(queries);
         const std::size_t k = indices.shape(1);
         if (indices.shape(0) != asked.size() || distances.shape(0) != asked.size() ||
@@ -86,13 +88,12 @@ struct PointCalls {
             const std::size_t first = begin * k, length = (end - begin) * k;
             const std::span ids(indices.data() + first, length);
             const std::span far(distances.data() + first, length);
-            if (asked.size() == 1) {  // on the caller's thread: no set-up
+            if (asked.size() == 1 && max_distance == infinity) {  // here, without set-up
                 counts.first += knn(index, asked[0], ids, far);
                 return;
             }
-            const QueryCounts met =
-                knn(index, asked.subspan(begin, end - begin), static_cast<std::uint32_t>(k), ids,
-                    far, query_options(threads));
+            const QueryCounts met = knn(index, asked.subspan(begin, end - begin),
+                                        static_cast<std::uint32_t>(k), ids, far, options);
             counts.first += met.found;
             counts.second += met.invalid_queries;
         });
@@ -237,7 +238,7 @@ struct PointCalls {
             .def("__init__", &make, nb::arg("points").noconvert(), nb::arg("tree"),
                  nb::arg("strict"), nb::arg("threads"))
             .def("knn", &nearest, nb::arg("queries").noconvert(), nb::arg("indices").noconvert(),
-                 nb::arg("distances").noconvert(), nb::arg("threads") = 0)
+                 nb::arg("distances").noconvert(), nb::arg("max_distance"), nb::arg("threads") = 0)
             .def("radius", &radius, nb::arg("queries").noconvert(), nb::arg("radii").noconvert(),
                  nb::arg("sort") = false, nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
             .def("count", &count, nb::arg("queries").noconvert(), nb::arg("radius"),

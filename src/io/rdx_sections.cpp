@@ -54,12 +54,13 @@ void Sections::fail(std::string_view section, const std::string& reason) const {
 void Sections::read_header(std::uint32_t wanted) {
     const std::uint32_t actual = version_of(file_, bytes_);
     if (actual != wanted)
-        fail("header", actual == version ? "this file holds a tree, not a scene (load_rdx)"
-                       : actual == double_version
-                           ? "this file holds a scene in double (load_rdx_scene_double)"
-                       : wanted == double_version
-                           ? "this file holds a scene in float (load_rdx_scene)"
-                           : "this file holds a scene, not a tree (load_rdx_scene)");
+        fail("header",
+             actual == version ? "this file holds a tree, not a scene (load_rdx reads it; raydix "
+                                 "build --layout wide8 -o saves scenes)"
+             : actual == double_version
+                 ? "this file holds a scene in double (load_rdx_scene_double)"
+             : wanted == double_version ? "this file holds a scene in float (load_rdx_scene)"
+                                        : "this file holds a scene, not a tree (load_rdx_scene)");
     const std::size_t whole = header_bytes(kinds_.size());
     if (bytes_.size() < whole)
         fail("header", fmt::format("the file has {} bytes, a header has {}", bytes_.size(), whole));

@@ -285,7 +285,7 @@ void nearest_rows(const NearestJob<T, Dim>& job, PointJobCounts& counts) {
         std::uint32_t* indices = job.indices + place * job.k;
         T* distances = job.distances + place * job.k;
         Row row(job.k, indices, distances,
-                job.most_d2 == nullptr ? std::numeric_limits<T>::infinity() : job.most_d2[place]);
+                job.most_d2 == nullptr ? job.limit_d2 : job.most_d2[place]);
         const bool valid = is_finite<T, Dim>(query);
         counts.invalid += !valid;
         if (valid && !job.tree.empty()) NearestWalk<T, Dim, Row>(job.tree, query, row).run();

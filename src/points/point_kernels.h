@@ -27,7 +27,8 @@ struct PointJob {
 template <class T, int Dim>
 struct NearestJob : PointJob<T, Dim> {
     std::uint32_t k;
-    const T* most_d2;        // one of each query, beyond which no point counts; null: infinity
+    T limit_d2;              // beyond which no point counts
+    const T* most_d2;        // the same for each query; null: limit_d2
     bool squared;            // d2 instead of distances
     std::uint32_t* indices;  // [queries * k]
     T* distances;            // [queries * k]

@@ -46,8 +46,12 @@ using Nearest = NearestJob<typename Index::Scalar, Index::dimension>;
 
 template <class Index>
 Nearest<Index> nearest_job(const Index& index, PointsOf<Index> queries, std::uint32_t k,
-                           std::span<std::uint32_t> indices, ScalarsOf<Index> distances) {
+                           std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
+                           double max_distance = infinity) {
+    check_not_negative("max_distance", max_distance);
+    const auto limit = static_cast<typename Index::Scalar>(max_distance);
     Nearest<Index> job{};
+    job.limit_d2 = limit * limit;
     job.tree = index.arrays().tree;
     job.queries = values_of<typename Index::Scalar>(queries);
     job.n = queries.size();
@@ -102,8 +106,8 @@ QueryCounts knn(const Index& index, PointsOf<Index> queries, std::uint32_t k,
             throw InputError("knn: " + std::to_string(queries.size()) + " queries for " +
                              std::to_string(k) + " each, but room for " + std::to_string(room) +
                              " results");
-    return nearest<Index>(nearest_job(index, queries, k, indices, distances), options,
-                          [&](const typename Index::Scalar* first) {
+    return nearest<Index>(nearest_job(index, queries, k, indices, distances, options.max_distance),
+                          options, [&](const typename Index::Scalar* first) {
                               return order_for(index, first, queries.size(), Index::dimension,
                                                options.order);
                           });
@@ -115,18 +119,19 @@ NearestPoints<typename Index::Scalar> knn(const Index& index, PointsOf<Index> qu
     using Scalar = typename Index::Scalar;
     check_enum("order", options.order, QueryOrder::sorted);
     require_neighbours(k);
+    check_not_negative("max_distance", options.max_distance);
     ResultBudget budget("knn", options.max_result_bytes);
     budget.take_last(
         saturating_product(queries.size(), k * (sizeof(std::uint32_t) + sizeof(Scalar))));
     NearestPoints<Scalar> result;
     result.indices.reset(queries.size() * k);
     result.distances.reset(queries.size() * k);
-    result.counts = nearest<Index>(
-        nearest_job(index, queries, k, result.indices.span(), result.distances.span()), options,
-        [&](const Scalar* first) {
-            return order_within(budget, index, first, queries.size(), Index::dimension,
-                                options.order);
-        });
+    result.counts = nearest<Index>(nearest_job(index, queries, k, result.indices.span(),
+                                               result.distances.span(), options.max_distance),
+                                   options, [&](const Scalar* first) {
+                                       return order_within(budget, index, first, queries.size(),
+                                                           Index::dimension, options.order);
+                                   });
     return result;
 }
 
@@ -140,6 +145,7 @@ std::uint32_t knn(const Index& index, const typename Index::Point& query,
     const FloatEnvironment plain;
     NearestJob<typename Index::Scalar, Index::dimension> job{};
     job.tree = index.arrays().tree;
+    job.limit_d2 = infinity;
     job.queries = &query.x;
     job.n = 1;
     job.k = static_cast<std::uint32_t>(indices.size());

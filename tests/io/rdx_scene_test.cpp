@@ -386,7 +386,9 @@ TEST_F(RdxSceneTest, TheOtherKindIsNamed) {
     save_rdx(file(), build_bvh(model.mesh()), model);
     EXPECT_FALSE(holds_scene(file()));
     EXPECT_EQ(message_of([&] { static_cast<void>(load_rdx_scene(file())); }),
-              file().string() + ": header: this file holds a tree, not a scene (load_rdx)");
+              file().string() +
+                  ": header: this file holds a tree, not a scene (load_rdx "
+                  "reads it; raydix build --layout wide8 -o saves scenes)");
     static_cast<void>(saved(Scene(model.mesh())));
     EXPECT_EQ(message_of([&] { static_cast<void>(load_rdx(file())); }),
               file().string() + ": header: this file holds a scene, not a tree (load_rdx_scene)");

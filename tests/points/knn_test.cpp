@@ -23,17 +23,19 @@ class Knn : public ::testing::Test {};
 using Indices = ::testing::Types<Points, Points2, PointsD, Points2D>;
 TYPED_TEST_SUITE(Knn, Indices);
 
-/// Rows of k as the index should give them.
+/// Rows of k as the index should give them, of points with d2 <= limit * limit.
 template <class Index>
 NearestPoints<typename Index::Scalar> expected(const std::vector<typename Index::Point>& points,
                                                const std::vector<typename Index::Point>& queries,
-                                               std::uint32_t k) {
+                                               std::uint32_t k,
+                                               typename Index::Scalar limit = infinity) {
     using T = typename Index::Scalar;
     NearestPoints<T> rows{
         Buffer<std::uint32_t>(queries.size() * k), Buffer<T>(queries.size() * k), {}};
     const EveryPoint<Index> every(points);
     for (std::size_t q = 0; q < queries.size(); ++q) {
-        const std::vector<Near<T>> all = every.by_distance(queries[q]);
+        std::vector<Near<T>> all = every.by_distance(queries[q]);
+        std::erase_if(all, [&](const Near<T>& near) { return !(near.d2 <= limit * limit); });
         for (std::size_t i = 0; i < k; ++i) {
             rows.indices[q * k + i] = i < all.size() ? all[i].id : no_primitive;
             rows.distances[q * k + i] =
@@ -77,6 +79,37 @@ TYPED_TEST(Knn, LikeEveryPoint) {
         }
     }
     std::cout << rows << " rows compared, seed " << seed << "\n";
+}
+
+TYPED_TEST(Knn, FarPointsDoNotCount) {
+    using T = typename TypeParam::Scalar;
+    std::size_t rows = 0, cut = 0;
+    for (const PointSet& set : point_sets(20 * thorough, seed + 8)) {
+        const auto points = points_as<TypeParam>(set.points);
+        const auto queries =
+            points_as<TypeParam>(queries_for(set.points, 20 + 2 * thorough, seed + 9));
+        const TypeParam index = build_points(points);
+        // A distance that is met is a limit that includes it.
+        auto third = knn(index, queries, 3);
+        std::vector<T> limits{0, T(0.01), std::numeric_limits<T>::max()};
+        for (const T met : third.distances.span())
+            if (met < infinity && limits.size() < 6) limits.push_back(met);
+        for (const std::uint32_t k : {1u, 8u, 9u, 17u, 33u, 1000u})
+            for (const T limit : limits) {
+                const auto wanted = expected<TypeParam>(points, queries, k, limit);
+                cut += wanted.counts.found < expected<TypeParam>(points, queries, k).counts.found;
+                for (const std::string& isa : point_instruction_sets()) {
+                    const auto found = knn(index, queries, k, {.isa = isa, .max_distance = limit});
+                    EXPECT_EQ(differences(found, wanted), 0u)
+                        << set.name << ", " << points.size() << " points, k " << k << ", within "
+                        << limit << ", " << isa << ", seed " << seed + 8;
+                    EXPECT_EQ(found.counts.found, wanted.counts.found);
+                    rows += queries.size();
+                }
+            }
+    }
+    EXPECT_GT(cut, 20u);
+    std::cout << rows << " rows compared, seed " << seed + 8 << "\n";
 }
 
 TYPED_TEST(Knn, ThreadsAndOrderChangeNothing) {
@@ -179,6 +212,16 @@ TYPED_TEST(Knn, BadCalls) {
         std::string::npos);
     EXPECT_NE(message([&] { (void)knn(index, queries, 2, {.isa = "mmx"}); }).find("mmx"),
               std::string::npos);
+    for (const double wrong : {-1.0, std::numeric_limits<double>::quiet_NaN()})
+        for (const bool to_arrays : {false, true})
+            EXPECT_NE(message([&] {
+                          const PointQueryOptions options{.max_distance = wrong};
+                          if (to_arrays)
+                              knn(index, queries, 2, ids, distances, options);
+                          else
+                              (void)knn(index, queries, 2, options);
+                      }).find("max_distance is"),
+                      std::string::npos);
     EXPECT_EQ(knn(index, queries, 2, ids, distances).found, 6u);
 }
 

@@ -47,6 +47,25 @@ def test_nearest_equal_brute_force_bit_for_bit(cloud, k):
     ).all()
 
 
+def test_nearest_within_a_distance(cloud):
+    index = raydix.Points(cloud)
+    wanted = index.knn(cloud, 5)
+    limit = float(np.median(wanted["distances"]))
+    beyond = wanted["distances"] > limit
+    for queries in (cloud, cloud[:1], cloud[0]):
+        near = index.knn(queries, 5, max_distance=limit)
+        here = wanted["indices"][: len(np.atleast_2d(queries))].reshape(near["indices"].shape)
+        far = beyond[: len(np.atleast_2d(queries))].reshape(near["indices"].shape)
+        assert (near["indices"] == np.where(far, raydix.MISSING, here)).all()
+        assert np.isinf(near["distances"][far]).all() and (near["distances"][~far] <= limit).all()
+    assert beyond.any()
+    for wrong in (-1, np.nan):
+        with pytest.raises(raydix.InputError, match="max_distance is"):
+            index.knn(cloud, 5, max_distance=wrong)
+    with pytest.raises(TypeError, match="max_distance: expected a number"):
+        index.knn(cloud, 5, max_distance="far")
+
+
 def test_radius_count_and_box_equal_brute_force(cloud):
     points, queries = cloud
     index = raydix.Points(points)

@@ -1,5 +1,7 @@
 """Scenes: what they refuse, and what they say then."""
 
+import pathlib
+
 import numpy as np
 import pytest
 from worlds import BOX, DOWN, same_hits
@@ -75,6 +77,9 @@ def test_errors_of_changes(rng):
             scene.add(leaf, wrong)
     with pytest.raises(TypeError, match="given int alone"):
         scene.add(3)
+    for path in ("bunny.ply", pathlib.Path("bunny.ply")):
+        with pytest.raises(TypeError, match=r"a path is read by Scene\(path\) alone"):
+            scene.add(path)
     with pytest.raises(TypeError, match="faces"):
         scene.add(BOX[0], np.eye(4))
     for id in (-1, 2**32, 1.5):
