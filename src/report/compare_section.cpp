@@ -36,6 +36,8 @@ Verdict verdict_of(const Measure& a, const Measure& b) {
         if (overlap(a.value, b.value)) return Verdict::even;
     }
     if (a.origin == Origin::measured) {
+        // A stage of which one of the two builders has nothing: its work is in another stage.
+        if (first == 0 || second == 0) return Verdict::differs;
         const double scale = std::fmax(std::fabs(first), std::fabs(second));
         if (overlap(a.value, b.value) || std::fabs(first - second) < least_change * scale)
             return Verdict::even;
@@ -142,9 +144,9 @@ public:
 private:
     void add_measure(const std::string& key, const Measure& a, const Measure& b) {
         const double first = *a.value.median, second = *b.value.median;
-        const std::optional<double> ratio = first != 0 && std::isfinite(second / first)
-                                                ? std::optional(second / first)
-                                                : std::nullopt;
+        const bool has_ratio = first != 0 && std::isfinite(second / first) &&
+                               !(a.origin == Origin::measured && second == 0);
+        const auto ratio = has_ratio ? std::optional(second / first) : std::nullopt;
         const Verdict verdict = verdict_of(a, b);
         table_.rows.push_back({key, a.name,
                                a.origin == Origin::measured    ? "measured"

@@ -48,11 +48,12 @@ def test_nearest_equal_brute_force_bit_for_bit(cloud, k):
 
 
 def test_nearest_within_a_distance(cloud):
-    index = raydix.Points(cloud)
-    wanted = index.knn(cloud, 5)
+    points, asked = cloud
+    index = raydix.Points(points)
+    wanted = index.knn(asked, 5)
     limit = float(np.median(wanted["distances"]))
     beyond = wanted["distances"] > limit
-    for queries in (cloud, cloud[:1], cloud[0]):
+    for queries in (asked, asked[:1], asked[0]):
         near = index.knn(queries, 5, max_distance=limit)
         here = wanted["indices"][: len(np.atleast_2d(queries))].reshape(near["indices"].shape)
         far = beyond[: len(np.atleast_2d(queries))].reshape(near["indices"].shape)
@@ -61,9 +62,9 @@ def test_nearest_within_a_distance(cloud):
     assert beyond.any()
     for wrong in (-1, np.nan):
         with pytest.raises(raydix.InputError, match="max_distance is"):
-            index.knn(cloud, 5, max_distance=wrong)
+            index.knn(asked, 5, max_distance=wrong)
     with pytest.raises(TypeError, match="max_distance: expected a number"):
-        index.knn(cloud, 5, max_distance="far")
+        index.knn(asked, 5, max_distance="far")
 
 
 def test_radius_count_and_box_equal_brute_force(cloud):

@@ -90,6 +90,19 @@ TEST(MakeReport, TwoOfACommandAreCompared) {
     EXPECT_TRUE(holds(close, "within 2 %"));
 }
 
+TEST(MakeReport, AStageThatOneDoesNotHaveIsNoGain) {
+    Json without = build_document(4);
+    without["build"]["ms"]["sort"] = 0.0;
+    for (const bool first : {false, true}) {
+        const std::string html = first ? page_of({without, build_document(4)})
+                                       : page_of({build_document(4), without});
+        EXPECT_TRUE(holds(html, "differs"));
+        EXPECT_FALSE(holds(html, "0.00 \xC3\x97"));
+        EXPECT_FALSE(holds(html, "\xE2\x96\xB2 better"));
+        EXPECT_FALSE(holds(html, "\xE2\x96\xBC worse"));
+    }
+}
+
 TEST(MakeReport, OverlappingSpreadsAreNoChange) {
     Json a = build_document(4), b = build_document(5);
     a["build"]["ms_spread"] = {{"min", {{"total", 3.0}}}, {"max", {{"total", 5.5}}}};
