@@ -94,8 +94,8 @@ TEST(MakeReport, AStageThatOneDoesNotHaveIsNoGain) {
     Json without = build_document(4);
     without["build"]["ms"]["sort"] = 0.0;
     for (const bool first : {false, true}) {
-        const std::string html = first ? page_of({without, build_document(4)})
-                                       : page_of({build_document(4), without});
+        const std::string html =
+            first ? page_of({without, build_document(4)}) : page_of({build_document(4), without});
         EXPECT_TRUE(holds(html, "differs"));
         EXPECT_FALSE(holds(html, "0.00 \xC3\x97"));
         EXPECT_FALSE(holds(html, "\xE2\x96\xB2 better"));
